@@ -1,0 +1,17 @@
+//! The host side of jointrig: device sessions, campaigns, spectra, substructuring, hysteresis, report.
+//!
+//! Data flows one way: records come from [`device`] sessions, [`campaign`] keeps them, [`spectra`]
+//! turns them into FRFs, [`substructuring`] and [`hysteresis`] turn those into the joint's stiffness,
+//! [`results`] gathers both and [`report`] shows them. The analysis rooms know nothing of devices,
+//! files or screens: arrays and geometry in, numbers out.
+#![forbid(unsafe_code)]
+
+pub mod campaign;
+pub mod cli;
+pub mod device;
+pub mod exchange;
+pub mod hysteresis;
+pub mod report;
+pub mod results;
+pub mod spectra;
+pub mod substructuring;

@@ -1,0 +1,2 @@
+//! The `jointrig` command.
+fn main() {}

@@ -1,0 +1,1 @@
+//! Whole-system scenarios live in this package.
