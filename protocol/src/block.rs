@@ -1,0 +1,108 @@
+//! Sample blocks: 16 bytes of header (the frame's kind byte included), then scans, little-endian.
+//!
+//! | offset in frame | bytes | field |
+//! |---|---|---|
+//! | 0 | 1 | kind ([`crate::frame::Kind::Samples`]) |
+//! | 1 | 1 | flags |
+//! | 2 | 1 | channel-map id |
+//! | 3 | 1 | scans in this block |
+//! | 4 | 4 | session epoch |
+//! | 8 | 8 | absolute index of the first scan |
+//! | 16 | … | scans: for each, one two's-complement 16-bit code per channel |
+//!
+//! The scan index is the only clock for results. It advances whether or not a block is delivered, so
+//! that loss is a range and never a guess; a restart is a new epoch and never a gap.
+
+use crate::limits::{BLOCK_HEADER_BYTES, BLOCK_SAMPLE_BYTES};
+
+/// Bytes of the header that are payload (all but the kind byte).
+pub const HEADER_PAYLOAD: usize = BLOCK_HEADER_BYTES - 1;
+
+/// Some channel touched either end of its converter's range.
+pub const OVER_RANGE: u8 = 1;
+/// The hammer's trigger lies in this block.
+pub const TRIGGER: u8 = 1 << 1;
+/// Scans before this block were lost in the device and can never be asked for.
+pub const GAP: u8 = 1 << 2;
+/// Sent again on request.
+pub const RESENT: u8 = 1 << 3;
+
+/// A block's header.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Header {
+    /// [`OVER_RANGE`], [`TRIGGER`], [`GAP`], [`RESENT`].
+    pub flags: u8,
+    /// Which channel map the samples follow.
+    pub map: u8,
+    /// Scans in the block.
+    pub scans: u8,
+    /// Which stream.
+    pub epoch: u32,
+    /// Absolute index of the first scan.
+    pub first_scan: u64,
+}
+
+impl Header {
+    /// The 15 payload bytes.
+    #[must_use]
+    pub fn to_bytes(&self) -> [u8; HEADER_PAYLOAD] {
+        let mut out = [0; HEADER_PAYLOAD];
+        out[0] = self.flags;
+        out[1] = self.map;
+        out[2] = self.scans;
+        out[3..7].copy_from_slice(&self.epoch.to_le_bytes());
+        out[7..15].copy_from_slice(&self.first_scan.to_le_bytes());
+        out
+    }
+}
+
+/// A received block: header and raw sample bytes, checked to be whole scans.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Block<'a> {
+    /// Its header.
+    pub header: Header,
+    samples: &'a [u8],
+}
+
+impl<'a> Block<'a> {
+    /// Reads a frame's payload. `None` when it is too short, holds no scan, or its length is not a
+    /// whole number of 16-bit channels per scan.
+    #[must_use]
+    pub fn from_payload(payload: &'a [u8]) -> Option<Self> {
+        let (h, samples) = payload.split_first_chunk::<HEADER_PAYLOAD>()?;
+        let header = Header {
+            flags: h[0],
+            map: h[1],
+            scans: h[2],
+            epoch: u32::from_le_bytes([h[3], h[4], h[5], h[6]]),
+            first_scan: u64::from_le_bytes([h[7], h[8], h[9], h[10], h[11], h[12], h[13], h[14]]),
+        };
+        let scans = usize::from(header.scans);
+        if scans == 0
+            || samples.is_empty()
+            || samples.len() > BLOCK_SAMPLE_BYTES
+            || !samples.len().is_multiple_of(2 * scans)
+            || header.first_scan.checked_add(scans as u64).is_none()
+        {
+            return None;
+        }
+        Some(Self { header, samples })
+    }
+
+    /// Channels in each scan.
+    #[must_use]
+    pub fn channels(&self) -> usize {
+        self.samples.len() / (2 * usize::from(self.header.scans))
+    }
+
+    /// The scan after the last one.
+    #[must_use]
+    pub fn end_scan(&self) -> u64 {
+        self.header.first_scan + u64::from(self.header.scans)
+    }
+
+    /// Codes in order: scan by scan, channel by channel.
+    pub fn codes(&self) -> impl ExactSizeIterator<Item = i16> + 'a {
+        self.samples.as_chunks::<2>().0.iter().map(|b| i16::from_le_bytes(*b))
+    }
+}

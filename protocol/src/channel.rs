@@ -1,0 +1,97 @@
+//! What a channel of the scan is: enough to turn its codes into SI units without asking anybody.
+
+use heapless::String;
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+use crate::limits::NAME_BYTES;
+
+/// A short name.
+pub type Name = String<NAME_BYTES>;
+
+/// The physical quantity of a channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Quantity {
+    /// Force, N.
+    Force,
+    /// Velocity, m/s.
+    Velocity,
+    /// Displacement, m.
+    Displacement,
+    /// Acceleration, m/s².
+    Acceleration,
+    /// A voltage that stands for itself, V.
+    Voltage,
+}
+
+impl Quantity {
+    /// Its SI unit's symbol.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Force => "N",
+            Self::Velocity => "m/s",
+            Self::Displacement => "m",
+            Self::Acceleration => "m/s^2",
+            Self::Voltage => "V",
+        }
+    }
+}
+
+/// What a channel serves for: the firmware and the host find their inputs by role, never by name or place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Role {
+    /// The hammer's force sensor.
+    HammerForce,
+    /// The scanning vibrometer at the aimed response point, along x, y, z.
+    Response(Axis),
+    /// Single-point vibrometer on the specimen of substructure A, along z.
+    SpecimenA,
+    /// Single-point vibrometer on the specimen of substructure B, along z.
+    SpecimenB,
+    /// One of the load cells that ground substructure B, along z.
+    LoadCell,
+    /// The excitation force between shaker and moving mass.
+    Excitation,
+    /// Anything else that is recorded.
+    Auxiliary,
+}
+
+/// An axis of the rig: x lateral, y vertical (normal load), z sliding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Axis {
+    /// Lateral.
+    X,
+    /// Vertical, the direction of the normal load.
+    Y,
+    /// Horizontal, the sliding direction.
+    Z,
+}
+
+/// One channel of the scan. A value in SI units is `code / 32768 × range_v × units_per_volt`, its
+/// polarity being the scale's sign.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Channel {
+    /// Unique in the map.
+    pub name: Name,
+    /// What it serves for.
+    pub role: Role,
+    /// What it measures; the unit follows ([`Quantity::unit`]).
+    pub quantity: Quantity,
+    /// SI units per volt at the converter, sign included.
+    pub units_per_volt: f32,
+    /// Full scale of the converter, ± V.
+    pub range_v: f32,
+    /// By how much the sample lags the physical quantity, in ns (decoder and converter).
+    pub delay_ns: u32,
+    /// Bits of the converter that carry information (16, or 18 rounded to 16).
+    pub bits: u8,
+}
+
+impl Channel {
+    /// SI units per code.
+    #[must_use]
+    pub fn units_per_code(&self) -> f64 {
+        f64::from(self.units_per_volt) * f64::from(self.range_v) / 32_768.0
+    }
+}

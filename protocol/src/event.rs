@@ -1,0 +1,83 @@
+//! What a device says unasked. Events inform; everything a host must know can also be asked
+//! ([`crate::answer::Status`]), so that a lost event loses nothing.
+
+use heapless::String;
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+use crate::answer::Counters;
+use crate::limits::SENTENCE_BYTES;
+use crate::shot::Shot;
+
+/// A numbered event.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Numbered {
+    /// Counts events since the device started; a jump tells how many were lost.
+    pub number: u32,
+    /// The scan at which it happened.
+    pub at_scan: u64,
+    /// What happened.
+    pub event: Event,
+}
+
+/// What happened. Variants only ever grow at the end.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub enum Event {
+    /// The hammer is armed.
+    Armed,
+    /// The hammer is disarmed.
+    Disarmed(Reason),
+    /// A shot reached a new phase.
+    Shot(Shot),
+    /// Scans were lost in the device: they cannot be asked for again.
+    Lost {
+        /// Which stream.
+        epoch: u32,
+        /// First scan lost.
+        first_scan: u64,
+        /// How many.
+        scans: u32,
+        /// Why.
+        why: Loss,
+    },
+    /// Once a second while a stream runs.
+    Counters(Counters),
+    /// The emergency stop latched (true) or was reset at the rig (false).
+    EmergencyStop(bool),
+    /// The interlock closed (true) or opened (false).
+    Interlock(bool),
+    /// A converter or another part reported a fault.
+    Fault(String<SENTENCE_BYTES>),
+    /// The last run ended in a panic, and this is what it said.
+    Panic(String<SENTENCE_BYTES>),
+}
+
+/// Why the hammer disarmed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Reason {
+    /// The host asked for it.
+    Asked,
+    /// The arming expired.
+    Expired,
+    /// The shot is over.
+    Fired,
+    /// The host was not heard for [`crate::limits::LINK_SILENCE_MS`].
+    LinkLost,
+    /// The interlock opened.
+    Interlock,
+    /// The emergency stop.
+    EmergencyStop,
+    /// The stream ended or began anew.
+    StreamEnded,
+}
+
+/// Why scans were lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Loss {
+    /// They left the ring before the link could carry them.
+    LinkSlow,
+    /// The front end did not deliver them.
+    FrontEnd,
+}

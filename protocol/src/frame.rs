@@ -1,0 +1,232 @@
+//! Frames: kind, payload, CRC-32 (ISO-HDLC, little-endian), in COBS, ended by zero.
+//!
+//! [`encode`] writes one; [`Accumulator`] finds them in a stream of any bytes at all. Whatever arrives,
+//! the accumulator uses bounded memory, does work proportional to the bytes it is given, and is back in
+//! step at the next zero byte. An oversized frame latches until that zero: its tail is never parsed
+//! as a frame of its own.
+
+use crate::limits::{CRC_BYTES, MAX_FRAME, MAX_WIRE};
+
+/// CRC-32/ISO-HDLC (the one of Ethernet and zlib), sixteen bytes at a time: its tables cost 16 KiB of
+/// flash and save some ten instructions a byte.
+static CRC: crc::Crc<u32, crc::Table<16>> = crc::Crc::<u32, crc::Table<16>>::new(&crc::CRC_32_ISO_HDLC);
+
+/// What a frame carries. Kinds only ever grow at the end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum Kind {
+    /// The frozen handshake, both ways ([`crate::hello`]).
+    Hello = 1,
+    /// Host to device, postcard ([`crate::request`]).
+    Request = 2,
+    /// Device to host, postcard ([`crate::answer`]).
+    Answer = 3,
+    /// Device to host, postcard, unasked ([`crate::event`]).
+    Event = 4,
+    /// Device to host, fixed layout ([`crate::block`]).
+    Samples = 5,
+    /// Host to device, fixed layout ([`crate::acknowledge`]).
+    Acknowledge = 6,
+    /// Device to host: encoded defmt, dropped first when the link is short.
+    Log = 7,
+}
+
+impl Kind {
+    /// The kind that a frame's first byte names, if this version knows it.
+    #[must_use]
+    pub const fn from_byte(byte: u8) -> Option<Self> {
+        Some(match byte {
+            1 => Self::Hello,
+            2 => Self::Request,
+            3 => Self::Answer,
+            4 => Self::Event,
+            5 => Self::Samples,
+            6 => Self::Acknowledge,
+            7 => Self::Log,
+            _ => return None,
+        })
+    }
+}
+
+/// Why bytes were not a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum FrameError {
+    /// Longer than [`MAX_WIRE`]: everything up to the next zero was skipped.
+    Overflow,
+    /// Not COBS, or too short to hold a kind and a CRC.
+    Malformed,
+    /// The CRC does not agree with the content.
+    Crc,
+    /// A kind that this version does not know.
+    UnknownKind(u8),
+    /// The payload does not fit a frame (only when encoding).
+    TooLong,
+}
+
+impl core::fmt::Display for FrameError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Overflow => write!(f, "a frame longer than {MAX_WIRE} bytes was skipped"),
+            Self::Malformed => f.write_str("bytes that are no frame were skipped"),
+            Self::Crc => f.write_str("a frame whose CRC-32 does not agree was skipped"),
+            Self::UnknownKind(kind) => write!(f, "a frame of unknown kind {kind} was skipped"),
+            Self::TooLong => write!(f, "the content does not fit a frame of {MAX_FRAME} bytes"),
+        }
+    }
+}
+
+impl core::error::Error for FrameError {}
+
+/// A decoded frame, borrowed from the accumulator that found it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frame<'a> {
+    /// What the payload is.
+    pub kind: Kind,
+    /// The payload, without kind and CRC.
+    pub payload: &'a [u8],
+}
+
+/// A frame on its way to the wire: content is written in place, then sealed.
+///
+/// ```
+/// use jointrig_protocol::frame::{Kind, Writer};
+/// let mut writer = Writer::new(Kind::Log);
+/// writer.payload_mut()[..2].copy_from_slice(&[7, 0]);
+/// let wire = writer.seal(2).unwrap();
+/// assert_eq!(wire.last(), Some(&0));
+/// ```
+pub struct Writer {
+    plain: [u8; MAX_FRAME],
+    wire: [u8; MAX_WIRE],
+}
+
+impl Writer {
+    /// An empty frame of this kind.
+    #[must_use]
+    pub const fn new(kind: Kind) -> Self {
+        let mut plain = [0; MAX_FRAME];
+        plain[0] = kind as u8;
+        Self { plain, wire: [0; MAX_WIRE] }
+    }
+
+    /// Starts anew with another kind, keeping the memory.
+    pub fn restart(&mut self, kind: Kind) {
+        self.plain[0] = kind as u8;
+    }
+
+    /// Where the payload goes: `MAX_FRAME − 5` bytes.
+    pub fn payload_mut(&mut self) -> &mut [u8] {
+        &mut self.plain[1..MAX_FRAME - CRC_BYTES]
+    }
+
+    /// Adds the CRC over kind and the first `payload` bytes, and encodes.
+    ///
+    /// # Errors
+    /// [`FrameError::TooLong`] when `payload` is more than fits.
+    pub fn seal(&mut self, payload: usize) -> Result<&[u8], FrameError> {
+        let end = 1 + payload;
+        if end + CRC_BYTES > MAX_FRAME {
+            return Err(FrameError::TooLong);
+        }
+        let crc = CRC.checksum(&self.plain[..end]).to_le_bytes();
+        self.plain[end..end + CRC_BYTES].copy_from_slice(&crc);
+        let length = cobs::encode(&self.plain[..end + CRC_BYTES], &mut self.wire);
+        self.wire[length] = 0;
+        Ok(&self.wire[..=length])
+    }
+
+    /// Writes a postcard value as the payload, and seals.
+    ///
+    /// # Errors
+    /// [`FrameError::TooLong`] when the value does not fit.
+    pub fn seal_value<T: serde::Serialize>(&mut self, value: &T) -> Result<&[u8], FrameError> {
+        let used = postcard::to_slice(value, self.payload_mut()).map_err(|_| FrameError::TooLong)?.len();
+        self.seal(used)
+    }
+}
+
+/// Encodes one frame into `wire` and returns the part used, delimiter included.
+///
+/// # Errors
+/// [`FrameError::TooLong`] when payload or `wire` do not fit.
+pub fn encode<'a>(kind: Kind, payload: &[u8], wire: &'a mut [u8; MAX_WIRE]) -> Result<&'a [u8], FrameError> {
+    let mut writer = Writer::new(kind);
+    let room = writer.payload_mut();
+    if payload.len() > room.len() {
+        return Err(FrameError::TooLong);
+    }
+    room[..payload.len()].copy_from_slice(payload);
+    let sealed = writer.seal(payload.len())?;
+    let length = sealed.len();
+    wire[..length].copy_from_slice(sealed);
+    Ok(&wire[..length])
+}
+
+/// Finds frames in a stream of bytes.
+pub struct Accumulator {
+    bytes: [u8; MAX_WIRE],
+    used: usize,
+    overflowed: bool,
+}
+
+impl Default for Accumulator {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Accumulator {
+    /// In step, with nothing gathered.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { bytes: [0; MAX_WIRE], used: 0, overflowed: false }
+    }
+
+    /// Takes bytes up to and including the next zero.
+    ///
+    /// Returns how many bytes were consumed and, when a zero was among them, what stood before it. Call
+    /// again with the rest. Empty frames (zeros in a row) are idle line, not errors. At least one byte
+    /// is consumed when `input` is not empty.
+    pub fn feed(&mut self, input: &[u8]) -> (usize, Option<Result<Frame<'_>, FrameError>>) {
+        let Some(end) = input.iter().position(|byte| *byte == 0) else {
+            self.gather(input);
+            return (input.len(), None);
+        };
+        self.gather(&input[..end]);
+        let used = core::mem::take(&mut self.used);
+        if core::mem::take(&mut self.overflowed) {
+            return (end + 1, Some(Err(FrameError::Overflow)));
+        }
+        if used == 0 {
+            return (end + 1, None);
+        }
+        (end + 1, Some(Self::decode(&mut self.bytes[..used])))
+    }
+
+    fn gather(&mut self, input: &[u8]) {
+        if self.overflowed {
+            return;
+        }
+        match self.bytes.get_mut(self.used..self.used + input.len()) {
+            Some(room) => {
+                room.copy_from_slice(input);
+                self.used += input.len();
+            }
+            None => self.overflowed = true,
+        }
+    }
+
+    fn decode(bytes: &mut [u8]) -> Result<Frame<'_>, FrameError> {
+        let length = cobs::decode_in_place(bytes).map_err(|_| FrameError::Malformed)?;
+        let plain = &bytes[..length];
+        let (content, crc) = plain.split_last_chunk::<CRC_BYTES>().ok_or(FrameError::Malformed)?;
+        let (kind, payload) = content.split_first().ok_or(FrameError::Malformed)?;
+        if CRC.checksum(content) != u32::from_le_bytes(*crc) {
+            return Err(FrameError::Crc);
+        }
+        let kind = Kind::from_byte(*kind).ok_or(FrameError::UnknownKind(*kind))?;
+        Ok(Frame { kind, payload })
+    }
+}

@@ -1,0 +1,249 @@
+//! Golden vectors: one frame of every kind (and every answer that carries data), byte for byte.
+//!
+//! The bytes are committed under `protocol/golden/`; [`for_each`] builds the same frames anew, so that
+//! one comparison runs on the PC, on the controller and in the emulator. `JOINTRIG_BLESS=1 cargo test
+//! -p jointrig-protocol` rewrites the files after a deliberate change of the contract.
+
+use heapless::{String, Vec};
+
+use crate::acknowledge::Acknowledge;
+use crate::answer::{self, Answer, Counters, Hammer, Info, Refusal, Status};
+use crate::block::{Header, OVER_RANGE, TRIGGER};
+use crate::channel::{Axis, Channel, Quantity, Role};
+use crate::event::{self, Event, Loss, Reason};
+use crate::frame::{FrameError, Kind, Writer};
+use crate::hello::{Hello, Role as HelloRole};
+use crate::request::{self, Configuration, Fire, Request, Stage, Trigger};
+use crate::shot::{Phase, Shot};
+
+macro_rules! golden {
+    ($($name:ident),* $(,)?) => {
+        /// The committed bytes, by name.
+        pub const COMMITTED: &[(&str, &[u8])] = &[
+            $((stringify!($name), include_bytes!(concat!("../golden/", stringify!($name), ".bin")))),*
+        ];
+    };
+}
+
+golden!(
+    hello,
+    info,
+    channel,
+    status,
+    started,
+    refused,
+    fire,
+    stage,
+    trigger,
+    resend,
+    shot_event,
+    lost_event,
+    counters_event,
+    samples,
+    short_samples,
+    acknowledge,
+    log,
+);
+
+fn text<const N: usize>(value: &str) -> String<N> {
+    let mut out = String::new();
+    // what does not fit is left out: the committed bytes would tell
+    let _ = out.push_str(value);
+    out
+}
+
+const SHOT: Shot = Shot {
+    number: 41,
+    phase: Phase::Done,
+    fired_at: 5_000_000_100,
+    trigger: 5_000_000_320,
+    pulse_us: 3_200,
+    peak_n: 50.25,
+    width_us: 273.0,
+    rebound_ratio: 0.0,
+    rebound_after: 0,
+    friction_peak_n: 17.5,
+    quiet_ratio: 0.5,
+};
+
+const COUNTERS: Counters = Counters {
+    frames_in: 12,
+    frames_bad: 1,
+    scans_produced: 102_400,
+    scans_sent: 102_376,
+    scans_resent: 48,
+    scans_dropped: 24,
+    scans_missed: 0,
+    events_dropped: 0,
+    logs_dropped: 3,
+};
+
+/// Builds every vector and hands its name and wire bytes to `each`, in the order of [`COMMITTED`].
+///
+/// # Errors
+/// [`FrameError::TooLong`] if one does not fit a frame, which would be a defect of the contract.
+pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
+    let mut frame = Writer::new(Kind::Hello);
+    // The golden Hello carries a fixed hash: the real one changes with every deliberate change, and is
+    // checked by the handshake itself.
+    let hello = Hello { schema: 0x0123_4567_89ab_cdef, ..Hello::device(77, 3, 64_000) };
+    debug_assert!(hello.role == HelloRole::Device);
+    let bytes = hello.to_bytes();
+    frame.payload_mut()[..bytes.len()].copy_from_slice(&bytes);
+    each("hello", frame.seal(bytes.len())?);
+
+    let answers = [
+        (
+            "info",
+            Ok(Answer::Info(Info {
+                board: text("golden"),
+                serial: text("0001"),
+                version: text("1.2.3"),
+                target: text("thumbv8m.main-none-eabihf"),
+                build: 0xfeed_beef,
+                channels: 16,
+                scan_rate_hz: 51_200,
+                ring_scans: 64_000,
+                coil_cap_us: 8_000,
+                stage: false,
+            })),
+        ),
+        (
+            "channel",
+            Ok(Answer::Channel(Channel {
+                name: text("vib_z"),
+                role: Role::Response(Axis::Z),
+                quantity: Quantity::Velocity,
+                units_per_volt: 0.005,
+                range_v: 10.0,
+                delay_ns: 12_500,
+                bits: 16,
+            })),
+        ),
+        (
+            "status",
+            Ok(Answer::Status(Status {
+                epoch: 3,
+                streaming: true,
+                next_scan: 5_000_102_720,
+                oldest_scan: 5_000_038_720,
+                hammer: Hammer::HoldOff,
+                armed_for_ms: 0,
+                interlock_closed: true,
+                emergency_stop: false,
+                friction_n: -1.5,
+                shot: Some(SHOT),
+                counters: COUNTERS,
+            })),
+        ),
+        ("started", Ok(Answer::Started { epoch: 3, map: 1, first_scan: 0 })),
+        ("refused", Err(Refusal::Gone { oldest: 5_000_038_720 })),
+    ];
+    frame.restart(Kind::Answer);
+    for (number, (name, outcome)) in answers.into_iter().enumerate() {
+        each(name, frame.seal_value(&answer::Numbered { number: number as u32, outcome })?);
+    }
+
+    let mut quiet_limits = Vec::new();
+    for limit in [0.0, 2.5e-6, 2.5e-6] {
+        // three of sixteen fit
+        let _ = quiet_limits.push(limit);
+    }
+    let requests = [
+        (
+            "fire",
+            Request::Fire(Fire {
+                number: 41,
+                pulse_us: 3_200,
+                not_before: 5_000_000_000,
+                quiet_limits,
+                quiet_window: 256,
+                quiet_patience: 1_536_000,
+            }),
+        ),
+        (
+            "stage",
+            Request::Stage(Stage {
+                configuration: Configuration::Ajb,
+                impact: text("AZ3"),
+                response: text("B4"),
+                attempt: 2,
+            }),
+        ),
+        (
+            "trigger",
+            Request::Trigger(Trigger {
+                level_n: 1.0,
+                flight_scans: 5_120,
+                listen_scans: 10_240,
+                hold_off_scans: 25_600,
+            }),
+        ),
+        ("resend", Request::Resend { epoch: 3, first_scan: 5_000_000_000, scans: 48 }),
+    ];
+    frame.restart(Kind::Request);
+    for (number, (name, request)) in requests.into_iter().enumerate() {
+        each(name, frame.seal_value(&request::Numbered { number: 100 + number as u32, request })?);
+    }
+
+    let events = [
+        ("shot_event", Event::Shot(SHOT)),
+        ("lost_event", Event::Lost { epoch: 3, first_scan: 24, scans: 24, why: Loss::LinkSlow }),
+        ("counters_event", Event::Counters(COUNTERS)),
+    ];
+    frame.restart(Kind::Event);
+    for (number, (name, event)) in events.into_iter().enumerate() {
+        each(
+            name,
+            frame.seal_value(&event::Numbered { number: number as u32, at_scan: 5_000_000_320, event })?,
+        );
+    }
+    debug_assert!(Reason::Asked != Reason::Expired);
+
+    // a full block of 15 scans of 16 channels (every byte value appears, zeros among them), and a short one
+    for (name, scans, channels) in [("samples", 15_u8, 16_usize), ("short_samples", 3, 10)] {
+        frame.restart(Kind::Samples);
+        let header =
+            Header { flags: TRIGGER | OVER_RANGE, map: 1, scans, epoch: 3, first_scan: 5_000_000_310 };
+        let room = frame.payload_mut();
+        let (head, samples) = room.split_at_mut(crate::block::HEADER_PAYLOAD);
+        head.copy_from_slice(&header.to_bytes());
+        let used = usize::from(scans) * channels * 2;
+        for (i, pair) in samples[..used].as_chunks_mut::<2>().0.iter_mut().enumerate() {
+            *pair = ((i as i16).wrapping_mul(273).wrapping_sub(32_000)).to_le_bytes();
+        }
+        each(name, frame.seal(crate::block::HEADER_PAYLOAD + used)?);
+    }
+
+    frame.restart(Kind::Acknowledge);
+    let bytes = Acknowledge { epoch: 3, next_scan: 5_000_000_325 }.to_bytes();
+    frame.payload_mut()[..bytes.len()].copy_from_slice(&bytes);
+    each("acknowledge", frame.seal(bytes.len())?);
+
+    frame.restart(Kind::Log);
+    frame.payload_mut()[..4].copy_from_slice(&[0, 1, 0, 255]);
+    each("log", frame.seal(4)?);
+    Ok(())
+}
+
+/// Compares every vector with its committed bytes; the name of the first that differs, if any.
+///
+/// # Errors
+/// The name of the vector that differs or cannot be built.
+pub fn check() -> Result<usize, &'static str> {
+    let mut compared = 0;
+    let mut differs = None;
+    for_each(|name, wire| {
+        if COMMITTED.get(compared).is_none_or(|(known, bytes)| *known != name || *bytes != wire) {
+            differs =
+                differs.or(Some(COMMITTED.get(compared).map_or("a vector too many", |(known, _)| *known)));
+        }
+        compared += 1;
+    })
+    .map_err(|_| "a vector does not fit a frame")?;
+    match differs {
+        Some(name) => Err(name),
+        None if compared == COMMITTED.len() => Ok(compared),
+        None => Err("a committed vector is no longer built"),
+    }
+}

@@ -1,0 +1,56 @@
+//! The sizes and bounds that both ends agree on. Each enters the schema hash.
+
+/// Most channels in one scan: two simultaneous-sampling converters of eight.
+pub const MAX_CHANNELS: usize = 16;
+
+/// Bytes of samples in one block: 15 scans of 16 channels, 24 scans of 10 channels, of 16 bits each.
+pub const BLOCK_SAMPLE_BYTES: usize = 480;
+
+/// Bytes of a block's fixed header, its kind byte included.
+pub const BLOCK_HEADER_BYTES: usize = 16;
+
+/// Bytes of the CRC-32 that ends every frame.
+pub const CRC_BYTES: usize = 4;
+
+/// Longest frame before COBS: kind, payload, CRC. A full sample block is exactly this long.
+pub const MAX_FRAME: usize = BLOCK_HEADER_BYTES + BLOCK_SAMPLE_BYTES + CRC_BYTES;
+
+/// Longest frame on the wire: COBS adds a byte per started 254, the delimiter one more.
+/// 503 < 512, so that one frame is one short high-speed bulk packet and never needs a zero-length one.
+pub const MAX_WIRE: usize = MAX_FRAME + MAX_FRAME.div_ceil(254) + 1;
+
+/// Longest name of a channel, point or board, in bytes of UTF-8.
+pub const NAME_BYTES: usize = 24;
+
+/// Longest sentence in a refusal or event, in bytes of UTF-8.
+pub const SENTENCE_BYTES: usize = 120;
+
+/// Longest coil pulse that any firmware may accept, in µs. A board's own cap may only be shorter.
+pub const COIL_PULSE_CAP_US: u32 = 8_000;
+
+/// Longest time for which one arming holds, in ms.
+pub const ARM_VALID_CAP_MS: u32 = 60_000;
+
+/// A host that has not been heard for this long is gone: the hammer disarms (ms of the device's time).
+pub const LINK_SILENCE_MS: u32 = 1_000;
+
+/// Scans that fit one block of `channels` channels of 16 bits; `None` when there are none or too many.
+#[must_use]
+pub const fn scans_per_block(channels: usize) -> Option<usize> {
+    if channels == 0 || channels > MAX_CHANNELS { None } else { Some(BLOCK_SAMPLE_BYTES / (2 * channels)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_block_is_one_short_high_speed_packet() {
+        assert_eq!(MAX_FRAME, 500);
+        assert_eq!(MAX_WIRE, 503);
+        assert_eq!(scans_per_block(16), Some(15));
+        assert_eq!(scans_per_block(10), Some(24));
+        assert_eq!(scans_per_block(0), None);
+        assert_eq!(scans_per_block(17), None);
+    }
+}

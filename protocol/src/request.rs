@@ -1,0 +1,120 @@
+//! What a host may ask. Every request has a number; a repeated number is answered from memory and does
+//! nothing twice, and every actuator request is bounded before it is accepted.
+
+use heapless::Vec;
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+use crate::channel::Name;
+use crate::limits::MAX_CHANNELS;
+
+/// A numbered request. Numbers increase within a session.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Numbered {
+    /// The request's number within the session.
+    pub number: u32,
+    /// What is asked.
+    pub request: Request,
+}
+
+/// What is asked. Variants only ever grow at the end.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub enum Request {
+    /// Who are you? → [`crate::answer::Answer::Info`]
+    Info,
+    /// Describe one channel. → [`crate::answer::Answer::Channel`]
+    Channel {
+        /// Place in the scan, from 0.
+        index: u8,
+    },
+    /// How are you? → [`crate::answer::Answer::Status`]
+    Status,
+    /// Begin a new stream of sample blocks. → [`crate::answer::Answer::Started`]
+    Start,
+    /// End the stream; the ring keeps what it has. → [`crate::answer::Answer::Done`]
+    Stop,
+    /// Send blocks again that hold these scans. → [`crate::answer::Answer::Resending`]
+    Resend {
+        /// Which stream.
+        epoch: u32,
+        /// First scan wanted.
+        first_scan: u64,
+        /// How many.
+        scans: u32,
+    },
+    /// How the force pulse is recognised. → [`crate::answer::Answer::Done`]
+    Trigger(Trigger),
+    /// The load cells' calibration matrix, row-major: forces (N) = matrix × readings (N). → `Done`
+    LoadCells {
+        /// 3 × 3, dimensionless.
+        matrix: [f32; 9],
+    },
+    /// Allow one shot within this time; replaces an earlier arming. → `Done`
+    Arm {
+        /// At most [`crate::limits::ARM_VALID_CAP_MS`].
+        valid_ms: u32,
+    },
+    /// Take back arming and any shot whose coil is not on yet. → `Done`
+    Disarm,
+    /// One shot. → [`crate::answer::Answer::Scheduled`]
+    Fire(Fire),
+    /// Where hammer and laser are (virtual rigs only). → [`crate::answer::Answer::Staged`]
+    Stage(Stage),
+    /// Stop everything that moves; only a local action at the rig re-arms. → `Done`
+    EmergencyStop,
+}
+
+/// How the force pulse is recognised.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Trigger {
+    /// Force that counts as contact, N.
+    pub level_n: f32,
+    /// How long to wait for contact after the coil goes off, scans.
+    pub flight_scans: u32,
+    /// How long to watch for rebounds after the trigger, scans.
+    pub listen_scans: u32,
+    /// How long the hammer rests after a shot, scans.
+    pub hold_off_scans: u32,
+}
+
+/// One shot of the hammer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Fire {
+    /// The host's number for it, larger than any before in this session.
+    pub number: u32,
+    /// Coil pulse, µs; refused when over the board's cap.
+    pub pulse_us: u32,
+    /// The coil stays off before this scan.
+    pub not_before: u64,
+    /// Residual motion allowed in the quiet window, one limit per channel in the channel's unit (rms);
+    /// 0 leaves a channel out. See [`Fire::quiet_window`].
+    pub quiet_limits: Vec<f32, MAX_CHANNELS>,
+    /// Length of the windows in which residual motion is judged, in decimated samples (0: not judged).
+    pub quiet_window: u16,
+    /// Give up when the structure is not quiet after this many scans from `not_before`.
+    pub quiet_patience: u32,
+}
+
+/// A configuration of the rig.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Configuration {
+    /// Substructure A alone.
+    A,
+    /// Substructure B alone.
+    B,
+    /// The assembly with its joint.
+    Ajb,
+}
+
+/// Where hammer and laser are.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Stage {
+    /// Which structure hangs in the rig.
+    pub configuration: Configuration,
+    /// Name of the impact point.
+    pub impact: Name,
+    /// Name of the response point.
+    pub response: Name,
+    /// Number of the next attempt in this cell, from 0.
+    pub attempt: u32,
+}

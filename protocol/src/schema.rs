@@ -1,0 +1,57 @@
+//! The version of the contract, and the hash that tells two builds of it apart.
+//!
+//! `postcard-schema` sees types, fields and variants, but neither the capacity of a string or vector nor
+//! the hand-written layouts; those enter by hand through [`LAYOUT`].
+
+use postcard_schema::key::Key;
+
+use crate::{acknowledge, answer, block, event, hello, limits, request};
+
+/// Another major is another protocol.
+pub const MAJOR: u16 = 1;
+
+/// Minors add at the end of enumerations and structures.
+pub const MINOR: u16 = 0;
+
+/// Everything that gives bytes a meaning and that the types do not show. Change a layout, change this.
+pub const LAYOUT: &[u64] = &[
+    limits::MAX_CHANNELS as u64,
+    limits::BLOCK_SAMPLE_BYTES as u64,
+    limits::BLOCK_HEADER_BYTES as u64,
+    limits::MAX_FRAME as u64,
+    limits::NAME_BYTES as u64,
+    limits::SENTENCE_BYTES as u64,
+    limits::COIL_PULSE_CAP_US as u64,
+    limits::ARM_VALID_CAP_MS as u64,
+    limits::LINK_SILENCE_MS as u64,
+    hello::BYTES as u64,
+    acknowledge::BYTES as u64,
+    block::HEADER_PAYLOAD as u64,
+    // revision of the hand-written layouts in `block`, `acknowledge` and `frame`
+    1,
+];
+
+/// Hash of all of it.
+pub const HASH: u64 = {
+    let mut hash = 0xcbf2_9ce4_8422_2325;
+    hash = mix(hash, u64::from_le_bytes(Key::for_path::<request::Numbered>("request").to_bytes()));
+    hash = mix(hash, u64::from_le_bytes(Key::for_path::<answer::Numbered>("answer").to_bytes()));
+    hash = mix(hash, u64::from_le_bytes(Key::for_path::<event::Numbered>("event").to_bytes()));
+    let mut i = 0;
+    while i < LAYOUT.len() {
+        hash = mix(hash, LAYOUT[i]);
+        i += 1;
+    }
+    hash
+};
+
+/// FNV-1a over the eight bytes of `value`.
+const fn mix(mut hash: u64, value: u64) -> u64 {
+    let bytes = value.to_le_bytes();
+    let mut i = 0;
+    while i < bytes.len() {
+        hash = (hash ^ bytes[i] as u64).wrapping_mul(0x0000_0100_0000_01b3);
+        i += 1;
+    }
+    hash
+}
