@@ -23,7 +23,7 @@ pub async fn acquire<M: RawMutex, S: Scans, C: Coil, I: Inputs>(
 ) -> ! {
     let mut samples = [0; BLOCK_SAMPLE_BYTES];
     loop {
-        if S::CAN_BE_HELD {
+        if scans.can_be_held() {
             core.wait_until_it_may_run().await;
         }
         let delivered = scans.next(&mut samples).await;

@@ -42,7 +42,9 @@ pub struct Delivered {
 pub trait Scans {
     /// Whether the clock of the scans can be held (a simulated front end). It then never runs more than
     /// half a ring ahead of the host's acknowledgement, so that nothing depends on the host's speed.
-    const CAN_BE_HELD: bool = false;
+    fn can_be_held(&self) -> bool {
+        false
+    }
 
     /// Waits for the next block and writes it: scan by scan, channel by channel, little-endian 16 bit.
     ///
