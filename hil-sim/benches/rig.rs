@@ -46,8 +46,7 @@ fn record(bencher: Bencher, configuration: &str, stepping: Stepping, scans: u64)
         _ => Configuration::Ajb,
     };
     let (impact, response) = if configuration == Configuration::B { ("BZ3", "B3") } else { ("AZ3", "A3") };
-    let mut rig =
-        Rig::with_stepping(&RigConfig::default(), 1, stepping).expect("the default rig stands");
+    let mut rig = Rig::with_stepping(&RigConfig::default(), 1, stepping).expect("the default rig stands");
     let mut codes = [0_i16; CHANNELS];
     bencher.counter(ItemsCount::new(scans)).bench_local(|| {
         rig.stage(configuration, impact, response, 0).expect("the default rig has this cell");

@@ -111,8 +111,8 @@ mod tests {
         assert!((sum - exact).norm() < 1e-8 * exact.norm());
         // Pieces add up: e^{λh} carries the first to the end of the second.
         let mid = 1.2e-3;
-        let pieces = segment.gained(lambda, from, mid) * (lambda * (to - mid)).exp()
-            + segment.gained(lambda, mid, to);
+        let pieces =
+            segment.gained(lambda, from, mid) * (lambda * (to - mid)).exp() + segment.gained(lambda, mid, to);
         assert!((pieces - exact).norm() < 1e-13 * exact.norm());
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::config::RigConfig;
-use super::modal::{Mode, ModalError, modes};
+use super::modal::{ModalError, Mode, modes};
 use super::probe::{AXES, Probe};
 use super::sensors::{CHANNELS, Channel, FIRST_SIGNAL};
 use super::state_space::StateSpace;
@@ -81,20 +81,14 @@ impl Plant {
         // A load cell's signal is its spring force kz · z on arm B.
         let cell = |index: usize| {
             let it = &config.load_cells[index];
-            let probe = Probe {
-                body: super::config::BodyName::ArmB,
-                position_m: it.position_m,
-                direction: AXES[2],
-            };
+            let probe =
+                Probe { body: super::config::BodyName::ArmB, position_m: it.position_m, direction: AXES[2] };
             let row = self.structure.row(&probe).map(|row| self.space.displacement(&row));
             row.unwrap_or_else(nothing) * it.stiffness_n_per_m[2]
         };
         let hit = self.structure.row(&aim.impact).ok_or_else(|| missing(&aim.impact))?;
-        let pushed = Probe {
-            body: config.shaker.body,
-            position_m: config.shaker.position_m,
-            direction: AXES[2],
-        };
+        let pushed =
+            Probe { body: config.shaker.body, position_m: config.shaker.position_m, direction: AXES[2] };
         let aimed = Aimed {
             rows: [
                 seen(x)?,

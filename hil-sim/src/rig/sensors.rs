@@ -117,7 +117,12 @@ pub struct Sensors {
 
 impl Sensors {
     /// For a response point that is speckled or not, with the cell's idle `stream` and a stream of its own for speckle.
-    pub fn new(config: &RigConfig, channels: &[Channel; CHANNELS], speckle: Option<Stream>, stream: Stream) -> Self {
+    pub fn new(
+        config: &RigConfig,
+        channels: &[Channel; CHANNELS],
+        speckle: Option<Stream>,
+        stream: Stream,
+    ) -> Self {
         let sensors = &config.sensors;
         let rate_hz = f64::from(config.scan_rate_hz);
         // White up to half the scan rate.

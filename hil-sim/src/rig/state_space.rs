@@ -19,7 +19,6 @@ pub struct StateSpace {
     pub a: DMatrix<f64>,
     shapes: DMatrix<f64>,
     scale: DVector<f64>,
-    /// Undamped circular frequencies (rad/s) in the order of the states.
     frequencies: DVector<f64>,
 }
 
@@ -31,7 +30,8 @@ impl StateSpace {
     pub fn new(structure: &Structure) -> Result<Self, RigError> {
         let fail = |what| RigError::Structure { configuration: structure.configuration(), what };
         let n = structure.order();
-        let factor = structure.mass.clone().cholesky().ok_or(fail("the mass matrix is not positive definite"))?;
+        let factor =
+            structure.mass.clone().cholesky().ok_or(fail("the mass matrix is not positive definite"))?;
         let inverse = factor
             .l()
             .solve_lower_triangular(&DMatrix::identity(n, n))
@@ -63,6 +63,11 @@ impl StateSpace {
         self.a.nrows()
     }
 
+    /// Undamped circular frequencies (rad/s), from K and M alone, in the order of the states.
+    pub fn undamped_rad_s(&self) -> &DVector<f64> {
+        &self.frequencies
+    }
+
     /// Row (2n) that reads the displacement seen by the row `seen` (n) of the structure.
     pub fn displacement(&self, seen: &DVector<f64>) -> DVector<f64> {
         let n = self.scale.len();
@@ -85,8 +90,7 @@ impl StateSpace {
     /// Mechanical energy (J) of the state `x` (2n).
     pub fn energy_j(&self, x: &DVector<f64>) -> f64 {
         let n = self.scale.len();
-        let potential: f64 =
-            (0..n).map(|i| x[i] * self.frequencies[i] / self.scale[i]).map(|e| e * e).sum();
+        let potential: f64 = (0..n).map(|i| x[i] * self.frequencies[i] / self.scale[i]).map(|e| e * e).sum();
         let kinetic: f64 = (n..2 * n).map(|i| x[i] * x[i]).sum();
         0.5 * (potential + kinetic)
     }

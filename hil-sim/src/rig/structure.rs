@@ -155,7 +155,9 @@ impl Structure {
         let scale = self.scale();
         let n = self.order();
         let dynamic = DMatrix::from_fn(n, n, |i, j| {
-            (s * s * self.mass[(i, j)] + s * self.damping[(i, j)] + self.stiffness[(i, j)]) * scale[i] * scale[j]
+            (s * s * self.mass[(i, j)] + s * self.damping[(i, j)] + self.stiffness[(i, j)])
+                * scale[i]
+                * scale[j]
         });
         let forces = DMatrix::from_fn(n, inputs.len(), |i, j| Complex::from(columns[j][i] * scale[i]));
         let motion = dynamic.lu().solve(&forces).ok_or(RigError::Structure {

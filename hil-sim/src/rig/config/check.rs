@@ -91,7 +91,10 @@ fn hammer(config: &RigConfig) -> Result<(), RigError> {
     fraction("hammer.mishaps.weak", mishaps.weak)?;
     fraction("hammer.mishaps.overload", mishaps.overload)?;
     if mishaps.double_hit + mishaps.weak + mishaps.overload > 1.0 {
-        return Err(bad("hammer.mishaps", "at most one happens per attempt: the three chances must sum to at most 1"));
+        return Err(bad(
+            "hammer.mishaps",
+            "at most one happens per attempt: the three chances must sum to at most 1",
+        ));
     }
     range("hammer.mishaps.double_fraction", mishaps.double_fraction)?;
     range("hammer.mishaps.double_delay_s", mishaps.double_delay_s)?;

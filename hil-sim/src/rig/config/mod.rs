@@ -7,9 +7,7 @@ mod check;
 mod document;
 mod sensors;
 
-pub use sensors::{
-    Excitation, ForceSensor, LoadCells, Sensors, SpeckleNoise, SpotVibrometer, Vibrometer,
-};
+pub use sensors::{Excitation, ForceSensor, LoadCells, Sensors, SpeckleNoise, SpotVibrometer, Vibrometer};
 
 use serde::{Deserialize, Serialize};
 
