@@ -1,5 +1,7 @@
 //! Rig files: the default, the shipped variants, and what is said about a wrong one.
 
+#![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
+
 use jointrig_hil_sim::rig::config::DEFAULT_TOML;
 use jointrig_hil_sim::rig::{Rig, RigConfig, RigError};
 

@@ -1,5 +1,7 @@
 //! The structure against an independent implementation: exact FRFs and eigenfrequencies.
 
+#![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
+
 mod reference;
 
 use std::f64::consts::PI;

@@ -1,5 +1,7 @@
 //! The hammer: calibration, monotony, what a pulse too short or too long does, and how often it goes wrong.
 
+#![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
+
 use jointrig_hil_sim::rig::{CHANNELS, Configuration, Hit, Mishap, Rig, RigConfig};
 
 fn strict() -> RigConfig {

@@ -1,5 +1,7 @@
 //! What a record depends on: its own key, and nothing else.
 
+#![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
+
 use jointrig_hil_sim::rig::{CHANNELS, Configuration, Rig, RigConfig};
 
 type Record = Vec<[i16; CHANNELS]>;

@@ -1,5 +1,7 @@
 //! From true signals to codes: scale, sign, rounding, saturation, noise, delay.
 
+#![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
+
 use jointrig_hil_sim::rig::{CHANNELS, Configuration, Measured, Rig, RigConfig};
 
 fn silent() -> RigConfig {
@@ -15,6 +17,12 @@ fn silent() -> RigConfig {
     config.hammer.mishaps.weak = 0.0;
     config.hammer.mishaps.overload = 0.0;
     config
+}
+
+#[test]
+fn a_rig_may_move_to_another_thread() {
+    fn send<T: Send>(_: &T) {}
+    send(&Rig::new(&RigConfig::default(), 1).unwrap());
 }
 
 #[test]

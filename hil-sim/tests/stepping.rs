@@ -1,5 +1,7 @@
 //! The steppers against closed forms and against each other.
 
+#![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
+
 use std::f64::consts::PI;
 
 use jointrig_hil_sim::rig::config::BodyName;
@@ -67,43 +69,49 @@ fn a_hit_carries_the_exact_frfs() {
         if configuration != Configuration::B {
             outputs.push(Probe::along_z(&config.spots.ldv_a));
         }
-        let velocities =
-            exact_frf(&config, configuration, Quantity::Mobility, &lines, &outputs, &[aim.impact]).unwrap();
         let cells: Vec<Probe> = config
             .load_cells
             .iter()
             .map(|cell| Probe { body: BodyName::ArmB, position_m: cell.position_m, direction: Z })
             .collect();
+        let structure = Structure::new(&config, configuration);
         let contacts = &rig.last_hit().unwrap().contacts;
         assert_eq!(contacts.len(), 1);
+        // A sum at the scans is the transform with its images at multiples of the scan rate (Poisson). Velocity falls as
+        // f³ there, so that beyond 32 images a two-thousandth of the first is left, which is 1e-3 of a stiff low line.
+        let folded = |s: Complex<f64>, quantity, outputs: &[Probe]| {
+            (-32..=32)
+                .map(|image| s + Complex::new(0.0, 2.0 * PI * f64::from(image) / period_s))
+                .map(|s| {
+                    structure.frf(s, quantity, outputs, &[aim.impact]).unwrap() * transform(&contacts[0], s)
+                })
+                .reduce(|sum, term| sum + term)
+                .unwrap()
+        };
         let mut worst = 0.0_f64;
         for (line, s) in lines.iter().enumerate() {
-            let force = transform(&contacts[0], *s);
-            let largest = velocities[line].iter().map(|v| v.norm()).fold(0.0, f64::max);
-            for output in 0..outputs.len() {
-                let exact = velocities[line][(output, 0)];
-                worst = worst.max((sums[line][1 + output] / force - exact).norm() / largest);
+            let exact = folded(*s, Quantity::Mobility, &outputs);
+            let largest = exact.iter().map(|v| v.norm()).fold(0.0, f64::max);
+            for (output, exact) in exact.iter().enumerate() {
+                worst = worst.max((sums[line][1 + output] - exact).norm() / largest);
             }
             // Nobody is there to be measured: exactly nothing.
             if configuration == Configuration::A {
                 assert!(sums[line][5..9].iter().all(|sum| sum.norm() == 0.0));
             } else {
-                let receptance =
-                    exact_frf(&config, configuration, Quantity::Receptance, &[*s], &cells, &[aim.impact])
-                        .unwrap();
-                let forces: Vec<Complex<f64>> = (0..3)
-                    .map(|cell| receptance[0][(cell, 0)] * config.load_cells[cell].stiffness_n_per_m[2])
+                let forces: Vec<Complex<f64>> = folded(*s, Quantity::Receptance, &cells)
+                    .iter()
+                    .zip(&config.load_cells)
+                    .map(|(receptance, cell)| receptance * cell.stiffness_n_per_m[2])
                     .collect();
                 let largest = forces.iter().map(|v| v.norm()).fold(0.0, f64::max);
                 for (cell, exact) in forces.iter().enumerate() {
-                    worst = worst.max((sums[line][6 + cell] / force - exact).norm() / largest);
+                    worst = worst.max((sums[line][6 + cell] - exact).norm() / largest);
                 }
             }
         }
         println!("{configuration} {impact} {response}: {worst:.1e}");
-        // A sum at the scans sees what lies above half the scan rate folded back. A half-sine's spectrum falls by
-        // (2 f w)² = 1e3..2e3 up to 49..51 kHz, and a mobility along its mass line by as much as f: at 2 kHz, 1e3 · 25.
-        assert!(worst < 2e-4, "{configuration} {impact} {response}: {worst:.1e}");
+        assert!(worst < 2e-6, "{configuration} {impact} {response}: {worst:.1e}");
         // The force cell is right within its own ringing, g (f / 6 kHz)² with g = 0.15, and within what twenty samples
         // of a half-sine say of its area, (Ω T)² / 12 = 0.19 %.
         for (line, f_khz) in [(0, 0.02), (3, 0.208), (5, 1.0)] {
@@ -243,7 +251,7 @@ fn critical_damping_falls_back_to_the_exponential() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn energy_only_decays(factors in prop::array::uniform12(0.2_f64..5.0)) {
