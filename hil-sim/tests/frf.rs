@@ -1,5 +1,7 @@
 //! The structure against an independent implementation: exact FRFs and eigenfrequencies.
 
+#![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
+
 mod reference;
 
 use std::f64::consts::PI;
@@ -11,8 +13,8 @@ use jointrig_hil_sim::rig::structure::Structure;
 use jointrig_hil_sim::rig::{Configuration, Probe, Quantity, RigConfig, exact_frf};
 use num_complex::Complex;
 
-/// Two implementations in double precision of the same 24 equations: conditioning of the scaled dynamic stiffness (1e5 at
-/// most) leaves more than ten digits.
+/// Two implementations in double precision of the same 24 equations. The worst conditioned is the free clamp (3e9 N/m) beside
+/// the 27 and 40 Hz modes of A, which takes six of the sixteen digits; elsewhere they agree to 1e-11.
 const TOLERANCE: f64 = 1e-9;
 
 const RIGID: &str = include_str!("../rigs/rigid-clamp.toml");
@@ -83,8 +85,7 @@ fn specimen_rig_is_the_reference() {
 
 #[test]
 fn eigenfrequencies_are_the_reference() {
-    // |λ| / 2π or Im λ / 2π, printed to 0.001 Hz: half a unit of the last digit, and as much for which of the two it is
-    // (they differ by ζ²/2, 1e-3 Hz at 1 kHz).
+    // Undamped, printed to 0.001 Hz: half a unit of the last digit.
     let cases = [
         (
             RigConfig::default(),
@@ -114,17 +115,17 @@ fn eigenfrequencies_are_the_reference() {
     ];
     for (config, configuration, expected) in cases {
         let space = StateSpace::new(&Structure::new(&config, configuration)).unwrap();
-        let mut found: Vec<_> = modes(&space)
-            .unwrap()
-            .into_iter()
-            .filter(|mode| mode.weight == 2.0)
-            .map(|mode| mode.lambda)
-            .collect();
-        found.sort_by(|a, b| a.norm().total_cmp(&b.norm()));
-        for (lambda, expected) in found.iter().zip(expected) {
-            let (undamped, damped) = (lambda.norm() / (2.0 * PI), lambda.im / (2.0 * PI));
-            println!("{configuration} {undamped:.4} {damped:.4} {expected}");
-            assert!((undamped - expected).abs() < 6e-4 || (damped - expected).abs() < 6e-4);
+        let mut found: Vec<f64> = space.undamped_rad_s().iter().map(|omega| omega / (2.0 * PI)).collect();
+        found.sort_by(f64::total_cmp);
+        for (found, expected) in found.iter().zip(&expected) {
+            assert!((found - expected).abs() < 5.1e-4, "{configuration}: {found} Hz for {expected} Hz");
+        }
+        // Damping is light: each damped mode lies within ζ² of its undamped one, and non-proportional damping moves it
+        // by no more than that.
+        let modes = modes(&space).unwrap();
+        for expected in expected {
+            let nearest = modes.iter().map(|mode| (mode.lambda.norm() / (2.0 * PI) - expected).abs());
+            assert!(nearest.fold(f64::INFINITY, f64::min) < 1e-3 * expected);
         }
     }
 }

@@ -86,13 +86,19 @@ pub fn strike(hammer: &Hammer, pulse_s: f64, attempt: u32, stream: &mut Stream) 
             ));
         } else if luck < odds.double_hit + odds.weak {
             mishap = Mishap::Weak;
-            contacts.iter_mut().for_each(|c| c.amplitude_n *= between(odds.weak_fraction, first));
+            scale(&mut contacts, between(odds.weak_fraction, first));
         } else if luck < odds.double_hit + odds.weak + odds.overload {
             mishap = Mishap::Overload;
-            contacts.iter_mut().for_each(|c| c.amplitude_n *= between(odds.overload_factor, first));
+            scale(&mut contacts, between(odds.overload_factor, first));
         }
     }
     Hit { attempt, pulse_s, mishap, contacts }
+}
+
+fn scale(contacts: &mut [ForceSegment], factor: f64) {
+    for contact in contacts {
+        contact.amplitude_n *= factor;
+    }
 }
 
 /// The bolt's contacts for a coil force `coil_n` that lasts `pulse_s`.

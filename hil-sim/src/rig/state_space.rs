@@ -19,7 +19,6 @@ pub struct StateSpace {
     pub a: DMatrix<f64>,
     shapes: DMatrix<f64>,
     scale: DVector<f64>,
-    /// Undamped circular frequencies (rad/s) in the order of the states.
     frequencies: DVector<f64>,
 }
 
@@ -62,6 +61,11 @@ impl StateSpace {
     /// Number of states, 2n.
     pub fn order(&self) -> usize {
         self.a.nrows()
+    }
+
+    /// Undamped circular frequencies (rad/s), from K and M alone, in the order of the states.
+    pub fn undamped_rad_s(&self) -> &DVector<f64> {
+        &self.frequencies
     }
 
     /// Row (2n) that reads the displacement seen by the row `seen` (n) of the structure.

@@ -52,8 +52,7 @@ impl Structure {
             let mut block = structure.mass.fixed_view_mut::<6, 6>(6 * index, 6 * index);
             block.copy_from(&body_mass(body));
         }
-        if rigid && configuration.has(BodyName::ArmA) {
-            let (at, cg) = structure.find(BodyName::ArmA).expect("A and AJB have arm A");
+        if let Some((at, cg)) = structure.find(BodyName::ArmA).filter(|_| rigid) {
             let lever = rigid_motion(bodies.specimen_a.cg_m, cg);
             let lumped = lever.transpose() * body_mass(&bodies.specimen_a) * lever;
             let mut block = structure.mass.fixed_view_mut::<6, 6>(at, at);

@@ -35,13 +35,14 @@ fn merge<'i>(base: &mut DeTable<'i>, over: DeTable<'i>) {
     }
     for (key, value) in over {
         let name: &str = key.get_ref();
-        match (base.get_mut(name).map(Spanned::get_mut), value.get_ref()) {
-            (Some(DeValue::Table(below)), DeValue::Table(inner)) => merge(below, inner.clone()),
-            _ => {
-                // Removed first: inserting over an equal key would keep the old key, and with it the default's span.
-                base.remove(name);
-                base.insert(key, value);
-            }
+        if let (Some(DeValue::Table(below)), DeValue::Table(inner)) =
+            (base.get_mut(name).map(Spanned::get_mut), value.get_ref())
+        {
+            merge(below, inner.clone());
+        } else {
+            // Removed first: inserting over an equal key would keep the old key, and with it the default's span.
+            base.remove(name);
+            base.insert(key, value);
         }
     }
 }

@@ -27,7 +27,8 @@ pub struct ModalStepper {
     rows_re: Vec<[f64; SIGNALS]>,
     rows_im: Vec<[f64; SIGNALS]>,
     hammer: Vec<Complex<f64>>,
-    shaker: Vec<Complex<f64>>,
+    shaker_re: Vec<f64>,
+    shaker_im: Vec<f64>,
     negligible: Vec<f64>,
     active: usize,
 }
@@ -48,7 +49,8 @@ impl ModalStepper {
             rows_re: Vec::with_capacity(count),
             rows_im: Vec::with_capacity(count),
             hammer: Vec::with_capacity(count),
-            shaker: Vec::with_capacity(count),
+            shaker_re: Vec::with_capacity(count),
+            shaker_im: Vec::with_capacity(count),
             negligible: Vec::with_capacity(count),
             active: 0,
         };
@@ -62,7 +64,9 @@ impl ModalStepper {
             stepper.rows_re.push(seen.map(|c| c.re));
             stepper.rows_im.push(seen.map(|c| -c.im));
             stepper.hammer.push(project(mode, &aimed.hammer));
-            stepper.shaker.push(project(mode, &aimed.shaker) * phi(mode.lambda * period_s) * period_s);
+            let held = project(mode, &aimed.shaker) * phi(mode.lambda * period_s) * period_s;
+            stepper.shaker_re.push(held.re);
+            stepper.shaker_im.push(held.im);
             let steps = seen.iter().zip(aimed.steps).map(|(c, step)| c.norm() / step).fold(0.0, f64::max);
             // A mode that no signal sees may go at any size; the floor keeps 0/0 away.
             stepper.negligible.push((NEGLIGIBLE_STEPS / steps.max(1e-30)).powi(2));
@@ -84,9 +88,11 @@ impl ModalStepper {
         let mut pushed = false;
         if forces.shaker_n != 0.0 {
             pushed = true;
-            for (k, gain) in self.shaker.iter().enumerate() {
-                self.z_re[k] += gain.re * forces.shaker_n;
-                self.z_im[k] += gain.im * forces.shaker_n;
+            for (z, gain) in self.z_re.iter_mut().zip(&self.shaker_re) {
+                *z += gain * forces.shaker_n;
+            }
+            for (z, gain) in self.z_im.iter_mut().zip(&self.shaker_im) {
+                *z += gain * forces.shaker_n;
             }
         }
         for segment in forces.hammer {
@@ -115,14 +121,24 @@ impl ModalStepper {
     #[inline]
     pub fn signals(&self) -> [f64; SIGNALS] {
         let count = self.active;
-        let mut sums = [0.0; SIGNALS];
-        let rows = self.rows_re[..count].iter().zip(&self.rows_im[..count]);
-        for ((row_re, row_im), (re, im)) in rows.zip(self.z_re[..count].iter().zip(&self.z_im[..count])) {
+        let (rows_re, rows_im) = (&self.rows_re[..count], &self.rows_im[..count]);
+        let (z_re, z_im) = (&self.z_re[..count], &self.z_im[..count]);
+        // Two sums at a time: one alone waits for its own last addition.
+        let (mut even, mut odd) = ([0.0; SIGNALS], [0.0; SIGNALS]);
+        let paired = count & !1;
+        for k in (0..paired).step_by(2) {
             for signal in 0..SIGNALS {
-                sums[signal] += row_re[signal] * re + row_im[signal] * im;
+                even[signal] += rows_re[k][signal] * z_re[k] + rows_im[k][signal] * z_im[k];
+                odd[signal] += rows_re[k + 1][signal] * z_re[k + 1] + rows_im[k + 1][signal] * z_im[k + 1];
             }
         }
-        sums
+        if paired < count {
+            for signal in 0..SIGNALS {
+                even[signal] +=
+                    rows_re[paired][signal] * z_re[paired] + rows_im[paired][signal] * z_im[paired];
+            }
+        }
+        std::array::from_fn(|signal| even[signal] + odd[signal])
     }
 
     /// The state x (2n).
