@@ -51,7 +51,7 @@ pub fn run(project: &Project, options: &Options) -> Result<()> {
     }
     let consent = Consent::new(false);
     let toolchain = setup::everything(project, consent)?;
-    let image = firmware::build_board(project, &toolchain, BOARD, firmware::Warnings::Allowed)?;
+    let image = firmware::build_board(project, &toolchain, BOARD)?;
     let mut qemu = Command::new(PROGRAM);
     qemu.args(arguments(&image, options)?);
     command::run(&mut qemu).context("the emulated board did not end well")

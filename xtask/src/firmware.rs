@@ -13,15 +13,6 @@ use std::path::PathBuf;
 /// The libraries that run on the microcontroller.
 const LIBRARIES: [&str; 2] = ["jointrig-protocol", "jointrig-firmware"];
 
-/// Whether a warning in a board's code fails its build.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Warnings {
-    /// While working on it.
-    Allowed,
-    /// Before a change is merged.
-    Denied,
-}
-
 /// `cargo xtask firmware`.
 pub fn command(project: &Project, only: Option<&str>) -> Result<()> {
     let boards = project.boards()?;
@@ -35,7 +26,7 @@ pub fn command(project: &Project, only: Option<&str>) -> Result<()> {
         println!("  firmware/boards does not exist yet, so there is no image to build");
         return check(project, &toolchain);
     }
-    build_boards(project, &toolchain, only, Warnings::Allowed)
+    build_boards(project, &toolchain, only)
 }
 
 /// Compiles the two libraries for the microcontroller, which shows that they need neither `std` nor anything the
@@ -56,15 +47,10 @@ pub fn check(project: &Project, toolchain: &Toolchain) -> Result<()> {
 }
 
 /// Builds the boards, or the one named, and prints the table of their sizes.
-pub fn build_boards(
-    project: &Project,
-    toolchain: &Toolchain,
-    only: Option<&str>,
-    warnings: Warnings,
-) -> Result<()> {
+pub fn build_boards(project: &Project, toolchain: &Toolchain, only: Option<&str>) -> Result<()> {
     let mut sizes = Vec::new();
     for board in project.boards()?.iter().filter(|board| only.is_none_or(|name| board.name == name)) {
-        let image = build_board(project, toolchain, &board.name, warnings)?;
+        let image = build_board(project, toolchain, &board.name)?;
         sizes.push((board.name.clone(), size::of_image(&image)?));
     }
     print!("\n{}", size::table(&sizes));
@@ -72,12 +58,7 @@ pub fn build_boards(
 }
 
 /// Builds one board's image and returns its path.
-pub fn build_board(
-    project: &Project,
-    toolchain: &Toolchain,
-    name: &str,
-    warnings: Warnings,
-) -> Result<PathBuf> {
+pub fn build_board(project: &Project, toolchain: &Toolchain, name: &str) -> Result<PathBuf> {
     let missing = || format!("no board is called {name} in firmware/boards");
     let folder = project.boards_root().with_context(missing)?;
     let board = board(project, name)?.with_context(missing)?;
@@ -90,10 +71,7 @@ pub fn build_board(
         .with_context(missing)?;
     let mut cargo = command::cargo(&folder);
     toolchain.apply(&mut cargo, project);
-    cargo.args(["rustc", "--release", "--target", TARGET, "--package", name, "--bin", binary]);
-    if warnings == Warnings::Denied {
-        cargo.args(["--", "-Dwarnings"]);
-    }
+    cargo.args(["build", "--release", "--target", TARGET, "--package", name, "--bin", binary]);
     command::run(&mut cargo).with_context(|| format!("the image of {name} could not be built"))?;
     Ok(project.firmware_target().join(TARGET).join("release").join(binary))
 }

@@ -1,7 +1,7 @@
 //! Writing the image to the rig's controller.
 
 use crate::consent::Consent;
-use crate::firmware::{self, Warnings};
+use crate::firmware;
 use crate::project::Project;
 use crate::{command, setup};
 use anyhow::{Context, Result, bail};
@@ -31,7 +31,7 @@ pub fn run(project: &Project, detach: bool) -> Result<()> {
         bail!("cannot flash:\n  - {}", missing.join("\n  - "));
     };
     let toolchain = setup::target(project, Consent::new(false))?;
-    let image = firmware::build_board(project, &toolchain, BOARD, Warnings::Allowed)?;
+    let image = firmware::build_board(project, &toolchain, BOARD)?;
     let mut command = Command::new(probe);
     command.args([if detach { "download" } else { "run" }, "--chip", CHIP]).arg(image);
     command::run(&mut command).context(

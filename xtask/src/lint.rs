@@ -2,9 +2,10 @@
 
 use crate::consent::Consent;
 use crate::project::Project;
-use crate::toolchain::{TARGET, Toolchain};
+use crate::toolchain::TARGET;
 use crate::{command, locks, setup};
 use anyhow::{Context, Result};
+use std::path::Path;
 
 /// `cargo xtask fmt-check`.
 pub fn formatting(project: &Project) -> Result<()> {
@@ -16,13 +17,12 @@ pub fn formatting(project: &Project) -> Result<()> {
     Ok(())
 }
 
-/// `cargo xtask lint`: returns what was left out, if anything.
-pub fn all(project: &Project) -> Result<Option<String>> {
+/// `cargo xtask lint`.
+pub fn all(project: &Project) -> Result<()> {
     workspace(project)?;
-    let Some(folder) = project.boards_root() else { return Ok(None) };
+    let Some(folder) = project.boards_root() else { return Ok(()) };
     locks::compare(&project.root.join("Cargo.lock"), &folder.join("Cargo.lock"))?;
-    let toolchain = setup::target(project, Consent::new(false))?;
-    boards(project, &toolchain)
+    boards(project, &folder)
 }
 
 /// Clippy on the root workspace. It runs in the release profile, like the tests: the build scripts it needs (SQLite's
@@ -34,20 +34,14 @@ fn workspace(project: &Project) -> Result<()> {
         .context("clippy found something: each finding above names its file and its remedy")
 }
 
-fn boards(project: &Project, toolchain: &Toolchain) -> Result<Option<String>> {
-    if !toolchain.has_clippy() {
-        let note =
-            "no clippy for the boards: the distribution's compiler has none (their build denies warnings)";
-        println!("  {note}");
-        return Ok(Some(note.to_owned()));
-    }
-    let folder = project.boards_root().context("the boards' workspace vanished")?;
+/// Clippy on each board, by the compiler that builds it.
+fn boards(project: &Project, folder: &Path) -> Result<()> {
+    let toolchain = setup::target(project, Consent::new(false))?;
     for board in project.boards()? {
-        let mut cargo = command::cargo(&folder);
-        toolchain.apply(&mut cargo, project);
-        cargo.args(["clippy", "--release", "--target", TARGET, "--package", &board.name, "--", "-Dwarnings"]);
-        command::run(&mut cargo)
+        let selection = ["--release", "--target", TARGET, "--package", &board.name];
+        let mut clippy = toolchain.clippy(folder, project, &selection);
+        command::run(&mut clippy)
             .with_context(|| format!("clippy found something in the board {}", board.name))?;
     }
-    Ok(None)
+    Ok(())
 }

@@ -89,7 +89,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Setup { yes } => setup::everything(&project, consent::Consent::new(yes)).map(drop),
         Task::Firmware { board } => firmware::command(&project, board.as_deref()),
         Task::FmtCheck => lint::formatting(&project),
-        Task::Lint => lint::all(&project).map(drop),
+        Task::Lint => lint::all(&project),
         Task::Test(options) => suite::run(&project, &options),
         Task::Qemu(options) => emulator::run(&project, &options),
         Task::Flash { detach } => flash::run(&project, detach),

@@ -11,7 +11,7 @@ pub const ENVIRONMENT_HELP: &str = "\
 JOINTRIG_FIRMWARE_TOOLCHAIN chooses the compiler for the microcontroller:
   auto    (default) what is installed; else `rustup target add`; else the distribution
   rustup  rustup's target only
-  distro  Debian's rustc-web and rust-web-src; core is built once into a private sysroot";
+  distro  Debian's rustc-web, rust-web-src and rust-web-clippy; core is built once into a private sysroot";
 
 /// Makes the target and the emulator available, and returns the compiler for the target.
 pub fn everything(project: &Project, consent: Consent) -> Result<Toolchain> {

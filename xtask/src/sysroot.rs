@@ -1,7 +1,7 @@
 //! The private sysroot: the target's `core` and `alloc`, built once from the distribution's sources.
 //!
-//! Debian's `rustc-web` is a current compiler and `rust-web-src` its library sources; neither has the microcontroller's
-//! target ready-made. This builds `core`, `alloc` and `compiler_builtins` into a folder beside the build's other
+//! Debian's `rustc-web` is a current compiler and `rust-web-src` its library sources (`rust-web-clippy` is its clippy);
+//! none has the microcontroller's target ready-made. This builds `core`, `alloc` and `compiler_builtins` into a folder beside the build's other
 //! products, laid out as rustc expects a sysroot, with a two-line wrapper that makes rustc use it. From then on plain
 //! `cargo build` with `RUSTC` pointing at the wrapper is all it takes. A compiler only reads libraries of its own
 //! version, so the folder's name carries the version.
@@ -23,6 +23,10 @@ use std::process::Command;
 
 /// Where Debian's packages put the compiler.
 const RUSTC: &str = "/usr/bin/rustc";
+/// Where they put the driver of clippy.
+pub const CLIPPY: &str = "/usr/bin/clippy-driver";
+/// The packages: a current compiler, its library sources, and its clippy.
+const PACKAGES: [&str; 3] = ["rustc-web", "rust-web-src", "rust-web-clippy"];
 /// The libraries a `no_std` program with an allocator needs.
 const LIBRARIES: [&str; 3] = ["core", "alloc", "compiler_builtins"];
 /// Settings of the caller's environment that must not reach the build of `core`.
@@ -54,6 +58,7 @@ impl Distribution {
         let sysroot = command::output(Command::new(RUSTC).args(["--print", "sysroot"]))?;
         let found = Self { version, sysroot: PathBuf::from(sysroot.trim()) };
         let usable = found.sources().join("core/src/lib.rs").is_file()
+            && command::is_executable(Path::new(CLIPPY))
             && is_at_least(found.field("release")?, env!("CARGO_PKG_RUST_VERSION"));
         Ok(usable.then_some(found))
     }
@@ -77,31 +82,25 @@ impl Distribution {
     }
 }
 
-/// The wrapper of a finished sysroot that fits the installed compiler; nothing is installed or built.
+/// A finished sysroot that fits the installed compiler; nothing is installed or built.
 pub fn existing(project: &Project) -> Result<Option<PathBuf>> {
     let Some(distribution) = Distribution::find()? else { return Ok(None) };
-    let wrapper = wrapper(&distribution.folder(project)?);
-    Ok(command::is_executable(&wrapper).then_some(wrapper))
+    let folder = distribution.folder(project)?;
+    Ok(is_whole(&folder).then_some(folder))
 }
 
-/// Installs what is missing, builds the sysroot if there is none, and returns the wrapper to use as `RUSTC`.
+/// Installs what is missing, builds the sysroot if there is none, and returns the sysroot.
 pub fn ensure(project: &Project, consent: Consent) -> Result<PathBuf> {
     let distribution = if let Some(found) = Distribution::find()? {
         found
     } else {
-        println!(
-            "  installing Debian's rustc-web and rust-web-src: a current compiler and its library sources"
-        );
-        packages::install(&["rustc-web", "rust-web-src"], consent).with_context(|| {
-            format!(
-                "no distribution compiler; {}=rustup uses rustup's instead",
-                crate::toolchain::MODE_VARIABLE
-            )
-        })?;
+        let names = PACKAGES.join(", ");
+        println!("  installing Debian's {names}: a current compiler, its library sources and its clippy");
+        packages::install(&PACKAGES, consent).context("no distribution compiler")?;
         Distribution::find()?.with_context(|| {
             format!(
-                "rustc-web and rust-web-src are installed, but {RUSTC} is older than {} or has no sources: remove the \
-                 older compiler, or update the system",
+                "{names} are installed, but {RUSTC} is older than {}, or there is no {CLIPPY}, or no sources: remove \
+                 another compiler's packages, or update the system",
                 env!("CARGO_PKG_RUST_VERSION")
             )
         })?
@@ -117,14 +116,13 @@ pub fn ensure(project: &Project, consent: Consent) -> Result<PathBuf> {
             .context("lld is installed, but there is no /usr/bin/ld.lld: reinstall it")?
     };
     let folder = distribution.folder(project)?;
-    let whole = |folder: &Path| command::is_executable(&wrapper(folder)) && has_core(&libraries(folder));
     fs::create_dir_all(&project.target)
         .with_context(|| format!("could not create {}", project.target.display()))?;
     let lock_path = project.target.join("firmware-sysroot.lock");
     let lock =
         fs::File::create(&lock_path).with_context(|| format!("could not create {}", lock_path.display()))?;
     lock.lock().with_context(|| format!("could not lock {}", lock_path.display()))?;
-    if whole(&folder) {
+    if is_whole(&folder) {
         println!("  sysroot: {}", folder.display());
     } else {
         println!(
@@ -142,7 +140,7 @@ pub fn ensure(project: &Project, consent: Consent) -> Result<PathBuf> {
         let _ = fs::remove_file(&link);
         symlink(&linker, &link).with_context(|| format!("could not link {}", link.display()))?;
     }
-    Ok(wrapper(&folder))
+    Ok(folder)
 }
 
 /// Lets `work` fill a `.partial` folder and renames it to `folder` when that went well: `folder` is whole or absent. The
@@ -252,7 +250,12 @@ fn find_linker(distribution: &Distribution) -> Result<Option<PathBuf>> {
     Ok(candidates.into_iter().find(|candidate| command::is_executable(candidate)))
 }
 
-fn wrapper(folder: &Path) -> PathBuf {
+fn is_whole(folder: &Path) -> bool {
+    command::is_executable(&wrapper(folder)) && has_core(&libraries(folder))
+}
+
+/// The script in a sysroot that stands in for `rustc`.
+pub fn wrapper(folder: &Path) -> PathBuf {
     folder.join("bin/rustc")
 }
 

@@ -9,7 +9,7 @@ use crate::project::Project;
 use crate::{command, packages, sysroot};
 use anyhow::{Context, Result, bail};
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::str::FromStr;
 
@@ -55,10 +55,10 @@ impl Mode {
 pub enum Toolchain {
     /// The one cargo uses anyway has the target.
     Installed,
-    /// The distribution's compiler with the private sysroot, behind this wrapper.
+    /// The distribution's compiler with this private sysroot.
     Private {
-        /// The wrapper that stands in for `rustc`.
-        rustc: PathBuf,
+        /// The sysroot; a wrapper in it stands in for `rustc`.
+        sysroot: PathBuf,
     },
 }
 
@@ -66,16 +66,29 @@ impl Toolchain {
     /// Makes a cargo command compile with this toolchain, into the firmware's own target directory.
     pub fn apply(&self, command: &mut Command, project: &Project) {
         command.env("CARGO_TARGET_DIR", project.firmware_target());
-        if let Self::Private { rustc } = self {
-            command.env("RUSTC", rustc);
+        if let Self::Private { sysroot } = self {
+            command.env("RUSTC", sysroot::wrapper(sysroot));
             // They would be rustup's, and check a compiler of another version.
             command.env_remove("RUSTC_WRAPPER").env_remove("RUSTC_WORKSPACE_WRAPPER");
         }
     }
 
-    /// Whether clippy can be used: the distribution's compiler comes without one.
-    pub fn has_clippy(&self) -> bool {
-        *self == Self::Installed
+    /// The command that lints what `selection` names with this toolchain's clippy, warnings as errors.
+    pub fn clippy(&self, folder: &Path, project: &Project, selection: &[&str]) -> Command {
+        let mut command = command::cargo(folder);
+        self.apply(&mut command, project);
+        match self {
+            Self::Installed => command.arg("clippy").args(selection).args(["--", "-Dwarnings"]),
+            // `cargo clippy` would start rustup's clippy, which cannot read another compiler's libraries: this is what
+            // it does inside, with the distribution's.
+            Self::Private { sysroot } => command
+                .env("RUSTC_WORKSPACE_WRAPPER", sysroot::CLIPPY)
+                .env("SYSROOT", sysroot)
+                .env("CLIPPY_ARGS", "-Dwarnings")
+                .arg("check")
+                .args(selection),
+        };
+        command
     }
 }
 
@@ -129,11 +142,18 @@ pub fn ensure(project: &Project, mode: Mode, consent: Consent) -> Result<Toolcha
     if failures.is_empty() {
         failures.push("this machine has neither rustup nor apt-get".to_owned());
     }
-    bail!(
-        "no compiler for {TARGET}: {}. Install rustup (https://rustup.rs) and run `rustup target add {TARGET}`, or on \
-         Debian set {MODE_VARIABLE}=distro, then run `cargo xtask setup` again",
-        failures.join("; ")
-    )
+    bail!("no compiler for {TARGET}: {}. {}", failures.join("; "), remedy(mode))
+}
+
+/// What to do when a mode did not lead to a compiler.
+fn remedy(mode: Mode) -> String {
+    let rustup = format!("install rustup (https://rustup.rs) and run `rustup target add {TARGET}`");
+    let distro = format!("on Debian, set {MODE_VARIABLE}=distro to use its packages");
+    match mode {
+        Mode::Auto => format!("Either {rustup}; or, {distro}; then run `cargo xtask setup` again"),
+        Mode::Rustup => format!("Either {rustup} where it may download; or, {distro}"),
+        Mode::Distro => format!("With {MODE_VARIABLE}=rustup, rustup's compiler is used instead"),
+    }
 }
 
 fn attempt(way: Way, project: &Project, mode: Mode, consent: Consent) -> Result<Toolchain> {
@@ -147,7 +167,7 @@ fn attempt(way: Way, project: &Project, mode: Mode, consent: Consent) -> Result<
                 "  {TARGET}: not in the compiler cargo uses, but a private sysroot from an earlier set-up is there; \
                  {MODE_VARIABLE}=rustup would add it to rustup's instead"
             );
-            sysroot::ensure(project, consent).map(|rustc| Toolchain::Private { rustc })
+            sysroot::ensure(project, consent).map(|sysroot| Toolchain::Private { sysroot })
         }
         Way::RustupAdd => {
             println!("  {TARGET}: not installed; rustup adds its ready-made core (about 10 MB to download)");
@@ -168,7 +188,7 @@ fn attempt(way: Way, project: &Project, mode: Mode, consent: Consent) -> Result<
             println!(
                 "  {TARGET}: from the distribution's compiler and sources, {why} ({MODE_VARIABLE} chooses)"
             );
-            sysroot::ensure(project, consent).map(|rustc| Toolchain::Private { rustc })
+            sysroot::ensure(project, consent).map(|sysroot| Toolchain::Private { sysroot })
         }
     }
 }
@@ -177,7 +197,7 @@ fn attempt(way: Way, project: &Project, mode: Mode, consent: Consent) -> Result<
 fn target_installed() -> bool {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| OsString::from("rustc"));
     command::output(Command::new(rustc).args(["--print", "target-libdir", "--target", TARGET]))
-        .is_ok_and(|libraries| sysroot::has_core(std::path::Path::new(libraries.trim())))
+        .is_ok_and(|libraries| sysroot::has_core(Path::new(libraries.trim())))
 }
 
 #[cfg(test)]
