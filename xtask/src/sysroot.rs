@@ -121,6 +121,9 @@ pub fn ensure(project: &Project, consent: Consent) -> Result<PathBuf> {
     let lock_path = project.target.join("firmware-sysroot.lock");
     let lock =
         fs::File::create(&lock_path).with_context(|| format!("could not create {}", lock_path.display()))?;
+    if lock.try_lock().is_err() {
+        println!("  another set-up is at work on the sysroot: waiting for it");
+    }
     lock.lock().with_context(|| format!("could not lock {}", lock_path.display()))?;
     if is_whole(&folder) {
         println!("  sysroot: {}", folder.display());
