@@ -1,1 +1,3 @@
 //! spectra
+pub mod records;
+pub use records::{ImpactRecords, MotionQuantity};
