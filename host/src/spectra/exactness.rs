@@ -114,9 +114,9 @@ fn the_variance_formula_predicts_the_scatter() {
 
 /// Normal deviates from proptest's generator.
 mod rand_like {
-    use proptest::prelude::RngCore;
+    use proptest::prelude::Rng;
     pub(super) struct Gauss<R>(pub(super) R);
-    impl<R: RngCore> Gauss<R> {
+    impl<R: Rng> Gauss<R> {
         pub(super) fn next(&mut self) -> f64 {
             // twelve uniform deviates, variance one
             (0..12).map(|_| self.0.next_u32() as f64 / u32::MAX as f64).sum::<f64>() - 6.0
