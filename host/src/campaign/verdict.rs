@@ -148,7 +148,12 @@ pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) ->
         .unwrap_or(0);
     let missing = hit.missing_samples as f64 + broken as f64;
     if missing > 0.0 {
-        return verdict(VerdictKind::Gap, missing, 0.0, format!("{missing} samples are missing from the record"));
+        return verdict(
+            VerdictKind::Gap,
+            missing,
+            0.0,
+            format!("{missing} samples are missing from the record"),
+        );
     }
     let Some(pulse) = pulse else {
         return verdict(VerdictKind::Weak, 0.0, 0.0, "there is no force pulse at all".into());
@@ -156,7 +161,8 @@ pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) ->
     // Of some 10⁵ samples of noise the largest reaches 4.5 times its rms.
     let floor = 10.0 * pulse.noise_n;
     if pulse.peak_n < floor {
-        let sentence = format!("the highest force of {:.3} N is not above noise ({floor:.3} N)", pulse.peak_n);
+        let sentence =
+            format!("the highest force of {:.3} N is not above noise ({floor:.3} N)", pulse.peak_n);
         return verdict(VerdictKind::Weak, pulse.peak_n, floor, sentence);
     }
     if let Some(found) = clipping::force(hit.force_n, &pulse, limits.force_range_n) {
@@ -166,7 +172,12 @@ pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) ->
         for (channel, x) in hit.responses.iter().enumerate() {
             if let Some(found) = clipping::response(x, range) {
                 let name = format!("response {channel}");
-                return verdict(VerdictKind::Overload, found.level, found.limit, found.sentence(&name, "in SI"));
+                return verdict(
+                    VerdictKind::Overload,
+                    found.level,
+                    found.limit,
+                    found.sentence(&name, "in SI"),
+                );
             }
         }
     }

@@ -11,7 +11,11 @@ const N: usize = 4096;
 fn record(start: usize, width: usize, delay: usize) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let force: Vec<f64> = (0..N)
         .map(|i| {
-            if (start..start + width).contains(&i) { 50.0 * (PI * (i - start) as f64 / width as f64).sin() } else { 0.0 }
+            if (start..start + width).contains(&i) {
+                50.0 * (PI * (i - start) as f64 / width as f64).sin()
+            } else {
+                0.0
+            }
         })
         .collect();
     let h: Vec<f64> = (0..N)

@@ -14,7 +14,10 @@ pub(super) struct Clipped {
 
 impl Clipped {
     pub(super) fn sentence(&self, channel: &str, unit: &str) -> String {
-        format!("the {channel} stands at {:.4} {unit} for {} samples: it ran into its range", self.level, self.samples)
+        format!(
+            "the {channel} stands at {:.4} {unit} for {} samples: it ran into its range",
+            self.level, self.samples
+        )
     }
 }
 
@@ -41,7 +44,8 @@ pub(super) fn force(force_n: &[f64], pulse: &Pulse, range_n: Option<f64>) -> Opt
         run = if top - f <= slack { run + 1 } else { 0 };
         longest = longest.max(run);
     }
-    let half = force_n[pulse.start..pulse.end].iter().filter(|f| **f - pulse.offset_n >= 0.5 * height).count();
+    let half =
+        force_n[pulse.start..pulse.end].iter().filter(|f| **f - pulse.offset_n >= 0.5 * height).count();
     // Wider slack under noise keeps more of a round top: its share of the width at half height is 0.95 √(slack / height).
     let round = 0.95 * (slack / height).sqrt() * half as f64;
     let needed = (0.12 * half as f64).max(1.8 * round).max(3.0);

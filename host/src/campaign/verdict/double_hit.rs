@@ -70,11 +70,11 @@ fn hump(force_n: &[f64], pulse: &Pulse, limit: f64) -> Option<Second> {
     };
     let before = side(&mut (0..peak).rev());
     let after = side(&mut (peak..inside.len()));
-    before
-        .into_iter()
-        .chain(after)
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-        .map(|(i, h)| Second { start: pulse.start + i, fraction: h / pulse.peak_n, limit: 5.0 * limit })
+    before.into_iter().chain(after).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, h)| Second {
+        start: pulse.start + i,
+        fraction: h / pulse.peak_n,
+        limit: 5.0 * limit,
+    })
 }
 
 /// The record above a baseline that runs through the medians of its blocks.

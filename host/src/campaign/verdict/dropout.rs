@@ -51,8 +51,7 @@ pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<B
 }
 
 fn third_differences(x: &[f64], block: usize) -> Vec<f64> {
-    let means: Vec<f64> =
-        x.chunks_exact(block).map(|b| b.iter().sum::<f64>() / block as f64).collect();
+    let means: Vec<f64> = x.chunks_exact(block).map(|b| b.iter().sum::<f64>() / block as f64).collect();
     means.windows(4).map(|w| (w[0] - 3.0 * w[1] + 3.0 * w[2] - w[3]).abs()).collect()
 }
 

@@ -159,7 +159,11 @@ fn the_other_kinds() {
     let merged: Vec<f64> = (0..4096)
         .map(|i| {
             let u = i as f64 / FS - 5e-3;
-            if (0.0..1.2e-3).contains(&u) { 50.0 * (PI * u / 1.2e-3).sin() * (0.55 - 0.45 * (TAU * u / 0.6e-3).cos()) } else { 0.0 }
+            if (0.0..1.2e-3).contains(&u) {
+                50.0 * (PI * u / 1.2e-3).sin() * (0.55 - 0.45 * (TAU * u / 0.6e-3).cos())
+            } else {
+                0.0
+            }
         })
         .collect();
     assert_eq!(verdict(&merged, &[], &Limits::default()).verdict, VerdictKind::DoubleHit);
