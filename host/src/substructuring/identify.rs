@@ -1,0 +1,226 @@
+//! The front door: three FRF matrices and the geometry in, the joint's stiffness by every method asked for out.
+
+use super::consistency::Consistency;
+use super::frf::{FrfError, FrfMatrix, Quantity};
+use super::geometry::Geometry;
+use super::idm::IdmSet;
+use super::interface_data::Measured;
+use super::joint::{Band, JointRow, JointSpectrum};
+use super::method::Method;
+use super::reduced::{Reduced, Rooms};
+use serde::Serialize;
+
+/// Why nothing at all can be identified from these files.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum IdentifyError {
+    /// One of the files is wrong in itself.
+    #[error("{file}: {source}")]
+    Frf {
+        /// Which file.
+        file: &'static str,
+        /// Why.
+        source: FrfError,
+    },
+    /// The files are not on the same lines.
+    #[error(
+        "{file} is on other frequency lines than A ({detail}): decoupling needs the same lines in all three; process the records alike"
+    )]
+    Axes {
+        /// Which file.
+        file: &'static str,
+        /// The first difference.
+        detail: String,
+    },
+    /// The files hold different quantities.
+    #[error(
+        "{file} holds {found}, A holds {expected}: convert them to one quantity first, or correct the label"
+    )]
+    Quantities {
+        /// Which file.
+        file: &'static str,
+        /// Its quantity.
+        found: Quantity,
+        /// A's quantity.
+        expected: Quantity,
+    },
+    /// The files were windowed differently.
+    #[error(
+        "{file} has an exponential window of {found} 1/s, A of {expected} 1/s: every FRF must be on the same s = σ + iω"
+    )]
+    Damping {
+        /// Which file.
+        file: &'static str,
+        /// Its σ, 1/s.
+        found: f64,
+        /// A's σ, 1/s.
+        expected: f64,
+    },
+    /// A band has no line.
+    #[error(
+        "no line lies in the band {low_hz}–{high_hz} Hz: the files cover {from_hz}–{to_hz} Hz in {lines} lines above 0 Hz"
+    )]
+    EmptyBand {
+        /// Lowest frequency asked for, Hz.
+        low_hz: f64,
+        /// Highest frequency asked for, Hz.
+        high_hz: f64,
+        /// First line, Hz.
+        from_hz: f64,
+        /// Last line, Hz.
+        to_hz: f64,
+        /// Number of lines.
+        lines: usize,
+    },
+    /// No method, IDM set or band was asked for.
+    #[error("nothing to do: at least one method, one IDM set and one band are needed")]
+    NothingAsked,
+}
+
+/// A method and IDM set that gave no result, and why.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Refused {
+    /// The method.
+    pub method: Method,
+    /// Number of interface deformation modes.
+    pub idms: usize,
+    /// Why, as a sentence.
+    pub reason: String,
+}
+
+/// Quality of the virtual points of A alone and B alone for one IDM set.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VirtualPointQuality {
+    /// `A` or `B`.
+    pub substructure: &'static str,
+    /// Number of interface deformation modes.
+    pub idms: usize,
+    /// Condition number of R_u, rotations scaled by 40 mm.
+    pub condition_responses: f64,
+    /// Condition number of R_f, rotations scaled by 40 mm.
+    pub condition_impacts: f64,
+    /// Names of the channels, in the order of `consistency.specific_sensor`.
+    pub channels: Vec<String>,
+    /// Names of the impacts, in the order of `consistency.specific_impact`.
+    pub impacts: Vec<String>,
+    /// Frequency of each line of `consistency.overall_*`, Hz.
+    pub frequency_hz: Vec<f64>,
+    /// What the virtual point keeps of motion and force.
+    pub consistency: Consistency,
+}
+
+/// All that was identified.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Identification {
+    /// One row per method, IDM set and band that gave a result.
+    pub joint: Vec<JointRow>,
+    /// Z^J's diagonal over frequency, one per method and IDM set.
+    pub spectra: Vec<JointSpectrum>,
+    /// Methods that refused this data, with the reason.
+    pub refused: Vec<Refused>,
+    /// Quality of A's and B's virtual points.
+    pub virtual_points: Vec<VirtualPointQuality>,
+}
+
+/// Identifies the joint from FRFs of A, B and AJB (all three alike in lines, quantity and window).
+///
+/// `internal` uses all impacts on A (Grouping 1 and 3) and all responses on B (2 and 4) as internals,
+/// `internal-printed` the Grouping 3 impacts and the Grouping 4 responses. A row or column is used when the geometry
+/// has it and the files have it. A line at 0 Hz is left out.
+///
+/// # Errors
+/// [`IdentifyError`] when the files do not fit together. A method that cannot work on them is listed in
+/// [`Identification::refused`] instead, so that the others still answer.
+pub fn identify(
+    a: &FrfMatrix,
+    b: &FrfMatrix,
+    ajb: &FrfMatrix,
+    geometry: &Geometry,
+    methods: &[Method],
+    idms: &[IdmSet],
+    bands: &[Band],
+) -> Result<Identification, IdentifyError> {
+    if methods.is_empty() || idms.is_empty() || bands.is_empty() {
+        return Err(IdentifyError::NothingAsked);
+    }
+    check_alike(a, b, ajb)?;
+    let receptance = |file: &'static str, y: &FrfMatrix| {
+        y.band(f64::MIN_POSITIVE, f64::MAX)
+            .to_receptance()
+            .map_err(|source| IdentifyError::Frf { file, source })
+    };
+    let files = [receptance("A", a)?, receptance("B", b)?, receptance("AJB", ajb)?];
+    for band in bands {
+        if !files[0].frequency_hz.iter().any(|&f| band.contains(f)) {
+            return Err(IdentifyError::EmptyBand {
+                low_hz: band.low_hz,
+                high_hz: band.high_hz,
+                from_hz: files[0].frequency_hz.first().copied().unwrap_or(f64::NAN),
+                to_hz: files[0].frequency_hz.last().copied().unwrap_or(f64::NAN),
+                lines: files[0].lines.len(),
+            });
+        }
+    }
+    let rooms = Rooms {
+        a: Measured { file: "A", frf: &files[0], points: &geometry.a },
+        b: Measured { file: "B", frf: &files[1], points: &geometry.b },
+        ajb: Measured { file: "AJB", frf: &files[2], points: &geometry.ajb },
+        geometry,
+    };
+    let mut out = Identification { joint: vec![], spectra: vec![], refused: vec![], virtual_points: vec![] };
+    for &set in idms {
+        let reduced = Reduced::of(&rooms, set);
+        if let Ok(reduced) = &reduced {
+            out.virtual_points.extend(reduced.quality(&rooms));
+        }
+        for &method in methods {
+            let z = match &reduced {
+                Ok(reduced) => reduced.solve(&rooms, method),
+                Err(error) => Err(error.clone().into()),
+            };
+            match z {
+                Ok((z, notes)) => {
+                    let spectrum = JointSpectrum::of(
+                        method.name(),
+                        set,
+                        &files[0].frequency_hz,
+                        files[0].sigma_per_s,
+                        &z,
+                    );
+                    for &band in bands {
+                        if let Some(mut row) = spectrum.over(band) {
+                            row.warnings.splice(0..0, notes.iter().cloned());
+                            out.joint.push(row);
+                        }
+                    }
+                    out.spectra.push(spectrum);
+                }
+                Err(reason) => {
+                    out.refused.push(Refused { method, idms: set.count(), reason: reason.to_string() });
+                }
+            }
+        }
+    }
+    Ok(out)
+}
+
+fn check_alike(a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix) -> Result<(), IdentifyError> {
+    for (file, y) in [("A", a), ("B", b), ("AJB", ajb)] {
+        y.check().map_err(|source| IdentifyError::Frf { file, source })?;
+        if y.quantity != a.quantity {
+            return Err(IdentifyError::Quantities { file, found: y.quantity, expected: a.quantity });
+        }
+        if (y.sigma_per_s - a.sigma_per_s).abs() > 1e-9 * a.sigma_per_s {
+            return Err(IdentifyError::Damping { file, found: y.sigma_per_s, expected: a.sigma_per_s });
+        }
+        if y.frequency_hz.len() != a.frequency_hz.len() {
+            let detail = format!("{} lines against {}", y.frequency_hz.len(), a.frequency_hz.len());
+            return Err(IdentifyError::Axes { file, detail });
+        }
+        // A text format may have rounded the axis to seven digits.
+        let differs = y.frequency_hz.iter().zip(&a.frequency_hz).find(|(f, g)| (*f - *g).abs() > 1e-6 * *g);
+        if let Some((f, g)) = differs {
+            return Err(IdentifyError::Axes { file, detail: format!("{f} Hz against {g} Hz") });
+        }
+    }
+    Ok(())
+}
