@@ -1,81 +1,11 @@
 //! Why a record is kept or refused, and by whom it is judged.
 
-use std::fmt;
-
-use serde::{Deserialize, Serialize};
-
 use super::plan::{Cell, Plan};
+use super::verdict::{self, RawHit};
+pub use super::verdict::VerdictKind as Kind;
 use crate::device::channels::ChannelMap;
 use crate::device::recording::Recording;
-use jointrig_protocol::channel::Role;
-
-/// What a record is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-pub enum Kind {
-    /// Kept.
-    #[serde(rename = "good")]
-    Good,
-    /// The hammer struck twice.
-    #[serde(rename = "double hit")]
-    DoubleHit,
-    /// A channel left its range.
-    #[serde(rename = "overload")]
-    Overload,
-    /// Noisier than the cell's other records.
-    #[serde(rename = "noisy")]
-    Noisy,
-    /// Too little force, or no contact at all.
-    #[serde(rename = "weak")]
-    Weak,
-    /// Too much force.
-    #[serde(rename = "strong")]
-    Strong,
-    /// The pulse is not where it should be.
-    #[serde(rename = "mistimed")]
-    Mistimed,
-    /// Samples are missing.
-    #[serde(rename = "gap")]
-    Gap,
-}
-
-impl Kind {
-    /// Every kind, good first.
-    pub const ALL: [Self; 8] = [
-        Self::Good,
-        Self::DoubleHit,
-        Self::Overload,
-        Self::Noisy,
-        Self::Weak,
-        Self::Strong,
-        Self::Mistimed,
-        Self::Gap,
-    ];
-
-    /// Its name in files and on screen.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Good => "good",
-            Self::DoubleHit => "double hit",
-            Self::Overload => "overload",
-            Self::Noisy => "noisy",
-            Self::Weak => "weak",
-            Self::Strong => "strong",
-            Self::Mistimed => "mistimed",
-            Self::Gap => "gap",
-        }
-    }
-
-    /// The kind of that name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name)
-    }
-}
-
-impl fmt::Display for Kind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
+use jointrig_protocol::channel::{Channel, Quantity, Role};
 
 /// A verdict with what it rests on.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,51 +26,72 @@ pub trait Judge {
     fn judge(&mut self, cell: &Cell, plan: &Plan, channels: &ChannelMap, recording: &Recording) -> Judgement;
 }
 
-/// Judges by the device's own summary of the shot and by the codes' range; needs no signal processing.
+/// Judges by the raw record itself ([`verdict::judge`]): hammer force and every velocity of the record, in SI.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct ByShotSummary;
+pub struct ByRecord;
 
-impl Judge for ByShotSummary {
+impl Judge for ByRecord {
     fn judge(&mut self, _: &Cell, plan: &Plan, channels: &ChannelMap, recording: &Recording) -> Judgement {
-        let (shot, limits) = (&recording.shot, &plan.limits);
-        let missing: usize = recording.gaps.iter().map(ExactSizeIterator::len).sum();
-        let judged = |kind, measure, limit, sentence| Judgement { kind, measure, limit, sentence };
-        if missing > 0 {
-            return judged(Kind::Gap, missing as f64, 0.0, format!("{missing} samples are missing"));
+        let si = |place: usize| -> Vec<f64> {
+            let unit = channels.channels.get(place).map_or(f64::NAN, Channel::units_per_code);
+            recording.channel(place).iter().map(|code| f64::from(*code) * unit).collect()
+        };
+        let force_n = channels.place(Role::HammerForce).map(si).unwrap_or_default();
+        let places = channels.channels.iter().enumerate().filter(|(_, channel)| channel.quantity == Quantity::Velocity);
+        let (names, responses): (Vec<&str>, Vec<Vec<f64>>) =
+            places.map(|(place, channel)| (channel.name.as_str(), si(place))).unzip();
+        let (wanted, given) = (plan.force.get_ref(), &plan.limits);
+        let limits = verdict::Limits {
+            // so that noise does not hide a rebound of just the limit
+            rebound_fraction: 0.6 * given.rebound_ratio,
+            weak_fraction: given.weak_n / wanted.target_n,
+            strong_fraction: given.strong_n / wanted.target_n,
+            force_range_n: channels.place(Role::HammerForce).map(|place| range(&channels.channels[place])),
+            response_range: None,
+            expected_start_s: Some(recording.trigger_index as f64 / f64::from(channels.rate_hz)),
+            ..verdict::Limits::default()
+        };
+        let missing = recording.gaps.iter().map(ExactSizeIterator::len).sum::<usize>() as u64;
+        let hit =
+            RawHit { fs_hz: f64::from(channels.rate_hz), force_n: &force_n, responses: &responses, missing_samples: missing };
+        // a channel that runs into its converter's end spoils the record whatever the hammer did; channels
+        // differ in range, so that each is looked at in its own codes
+        if missing == 0
+            && let Some((name, touched)) = over_range(channels, recording)
+        {
+            let sentence = format!("channel {name} stands at the end of its range for {touched} samples");
+            return Judgement { kind: Kind::Overload, measure: touched as f64, limit: 1.0, sentence };
         }
-        for place in 0..recording.channels {
-            let extreme =
-                recording.channel(place).iter().filter(|code| **code == i16::MAX || **code == i16::MIN);
-            let touched = extreme.count();
-            // one code at the end of the range may be chance, two are a flat top
-            if touched > 1 {
-                let name = channels.channels.get(place).map_or("?", |channel| channel.name.as_str());
-                let sentence = format!("channel {name} stands at the end of its range for {touched} samples");
-                return judged(Kind::Overload, touched as f64, 1.0, sentence);
-            }
-        }
-        let (peak, rebound) = (f64::from(shot.peak_n), f64::from(shot.rebound_ratio));
-        let after = f64::from(shot.rebound_after) / f64::from(channels.rate_hz.max(1));
-        if channels.place(Role::HammerForce).is_none() || peak < limits.weak_n {
-            judged(
-                Kind::Weak,
-                peak,
-                limits.weak_n,
-                format!("peak {peak:.1} N, at least {:.1} N wanted", limits.weak_n),
-            )
-        } else if peak > limits.strong_n {
-            judged(
-                Kind::Strong,
-                peak,
-                limits.strong_n,
-                format!("peak {peak:.1} N, at most {:.1} N wanted", limits.strong_n),
-            )
-        } else if rebound >= limits.rebound_ratio && after >= limits.rebound_after_s {
-            let sentence =
-                format!("a second contact of {:.1} % after {:.1} ms", rebound * 100.0, after * 1e3);
-            judged(Kind::DoubleHit, rebound, limits.rebound_ratio, sentence)
-        } else {
-            judged(Kind::Good, peak, plan.force.get_ref().target_n, format!("peak {peak:.1} N"))
-        }
+        let found = verdict::judge(hit, &limits, Some(wanted.target_n));
+        let sentence = match found.verdict {
+            Kind::Noisy => name_responses(&found.sentence, &names),
+            _ => found.sentence,
+        };
+        Judgement { kind: found.verdict, measure: found.measure, limit: found.limit, sentence }
     }
 }
+
+/// Full scale of a channel in its unit.
+fn range(channel: &Channel) -> f64 {
+    f64::from(channel.range_v) * f64::from(channel.units_per_volt).abs()
+}
+
+/// The first channel with more than one code at an end of its range, and how many. One may be chance.
+fn over_range<'a>(channels: &'a ChannelMap, recording: &Recording) -> Option<(&'a str, usize)> {
+    channels.channels.iter().enumerate().find_map(|(place, channel)| {
+        let extreme = |code: &&i16| **code == i16::MAX || **code == i16::MIN;
+        let touched = recording.channel(place).iter().filter(extreme).count();
+        (touched > 1).then_some((channel.name.as_str(), touched))
+    })
+}
+
+/// Puts the channels' names where the analysis, which knows places only, says `response N`.
+fn name_responses(sentence: &str, names: &[&str]) -> String {
+    names.iter().enumerate().rev().fold(sentence.to_owned(), |text, (place, name)| {
+        text.replace(&format!("response {place}"), &format!("response {name}"))
+    })
+}
+
+#[cfg(test)]
+#[path = "judge_by_summary.rs"]
+pub(crate) mod by_summary;

@@ -46,6 +46,23 @@ pub enum VerdictKind {
 }
 
 impl VerdictKind {
+    /// Every kind, good first.
+    pub const ALL: [Self; 8] = [
+        Self::Good,
+        Self::DoubleHit,
+        Self::Overload,
+        Self::Noisy,
+        Self::Weak,
+        Self::Strong,
+        Self::Mistimed,
+        Self::Gap,
+    ];
+
+    /// The kind of that name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
     /// The words used in results.
     pub fn name(self) -> &'static str {
         match self {
@@ -58,6 +75,12 @@ impl VerdictKind {
             VerdictKind::Mistimed => "mistimed",
             VerdictKind::Gap => "gap",
         }
+    }
+}
+
+impl std::fmt::Display for VerdictKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
     }
 }
 
