@@ -124,3 +124,6 @@ impl Results {
         Ok(text)
     }
 }
+
+#[cfg(test)]
+mod shape;
