@@ -101,6 +101,7 @@ fn means(results: &Results, method: &str, panel: &Panel, drawing: &mut Drawing) 
     for joint in results.joint.iter().filter(|j| j.method == method && j.band_hz == MAIN_BAND_HZ) {
         let Some(k) = joint.sliding_stiffness() else { continue };
         let stroke = Stroke::new(idm_stroke(joint.idms).colour, 2.2);
+        panel.level(drawing, MAIN_BAND_HZ, micro(k.mean), Stroke::new("#fff", 5.0));
         panel.level(drawing, MAIN_BAND_HZ, micro(k.mean), stroke);
         labels.push((panel.y.place_within(micro(k.mean)), joint.idms, micro(k.mean)));
     }
@@ -120,16 +121,16 @@ fn means(results: &Results, method: &str, panel: &Panel, drawing: &mut Drawing) 
 
 /// A bracket above the frame for every band.
 fn brackets(bands: &[[f64; 2]], panel: &Panel, drawing: &mut Drawing) {
-    let mut rows: Vec<f64> = Vec::new();
+    let mut rows: Vec<Vec<[f64; 2]>> = Vec::new();
     for range in bands {
-        let (from, to) = (panel.x.place_within(range[0]), panel.x.place_within(range[1]));
         // bands that only touch share a row
-        let row = rows.iter().position(|end| *end <= from + 0.5).unwrap_or(rows.len());
+        let free = |row: &Vec<[f64; 2]>| row.iter().all(|other| other[1] <= range[0] || range[1] <= other[0]);
+        let row = rows.iter().position(free).unwrap_or(rows.len());
         if row == rows.len() {
-            rows.push(to);
-        } else {
-            rows[row] = to;
+            rows.push(Vec::new());
         }
+        rows[row].push(*range);
+        let (from, to) = (panel.x.place_within(range[0]), panel.x.place_within(range[1]));
         let at = panel.area.top - 8.0 - 17.0 * row as f64;
         let stroke = Stroke::new("#777", 1.2);
         drawing.line([from + 2.0, at], [to - 2.0, at], stroke);

@@ -6,7 +6,7 @@ use super::super::scale::{Scale, middle_range};
 use super::WIDTH;
 use crate::results::{FrfCurve, MAIN_BAND_HZ, Results, Role};
 
-const GAP: f64 = 26.0;
+const GAP: f64 = 40.0;
 const LEFT: f64 = 70.0;
 const TOP: f64 = 48.0;
 
@@ -27,7 +27,7 @@ pub fn receptances(results: &Results) -> Option<String> {
         results.frfs.iter().map(|c| c.first_hz.max(5.0)).fold(f64::INFINITY, f64::min),
         results.frfs.iter().map(last_hz).fold(0.0, f64::max),
     ];
-    let column = (WIDTH - LEFT - GAP * 2.0 - 12.0) / 3.0;
+    let column = (WIDTH - LEFT - GAP * 2.0 - 20.0) / 3.0;
     let mut drawing = Drawing::new("receptances", WIDTH, TOP + 240.0 + 14.0 + 120.0 + 14.0 + 90.0 + 48.0);
     for (i, name) in configurations.iter().enumerate() {
         let curves: Vec<&FrfCurve> = results.frfs.iter().filter(shown).filter(|c| c.configuration == *name).collect();
