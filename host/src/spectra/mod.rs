@@ -1,1 +1,63 @@
-//! spectra
+//! Spectra: impact records in, averaged FRFs with coherence and variance out.
+//!
+//! [`pulse`] finds the hit, [`window`] cuts and weights, [`average`] accumulates S_ff, S_xf and S_xx one hit at a time,
+//! [`estimate`](mod@estimate) does all three over a set of records, [`band`] says where the hammer excited anything. Which hits are good is
+//! decided elsewhere, on the raw records: the force window hides a second pulse that the response keeps.
+
+pub mod average;
+pub mod band;
+pub mod estimate;
+pub mod pulse;
+pub mod records;
+pub mod window;
+
+pub use average::{AveragedFrf, SpectraAverage};
+pub use band::{UsableBand, usable_band};
+pub use estimate::{FrfSettings, Origin, estimate};
+pub use pulse::Pulse;
+pub use records::{ImpactRecords, MotionQuantity};
+pub use window::{ForceWeighting, Windowing};
+
+/// Why records cannot become FRFs.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SpectraError {
+    /// No hit to average.
+    #[error("no hit to average: every one was refused, or there is none")]
+    NoHits,
+    /// A hit has another length than the first.
+    #[error("a record has {found} samples, the others {expected}: average only records of one length")]
+    Samples {
+        /// Samples found.
+        found: usize,
+        /// Samples expected.
+        expected: usize,
+    },
+    /// A hit has another number of responses.
+    #[error("a hit has {found} responses, the others {expected}")]
+    Responses {
+        /// Responses found.
+        found: usize,
+        /// Responses expected.
+        expected: usize,
+    },
+    /// A value is NaN or infinite.
+    #[error("sample {sample} is not a number: refuse the hit")]
+    NotFinite {
+        /// The first such sample.
+        sample: usize,
+    },
+    /// A hit has no pulse.
+    #[error("hit {hit} has no force pulse: refuse it, or give the windows a fixed origin")]
+    NoPulse {
+        /// Index of the hit.
+        hit: usize,
+    },
+    /// The transform failed (a length it cannot do).
+    #[error("Fourier transform: {0}")]
+    Transform(String),
+}
+
+#[cfg(test)]
+mod exactness;
+#[cfg(test)]
+mod reference;

@@ -1,1 +1,35 @@
-//! substructuring
+//! Frequency-based substructuring: the joint's dynamic stiffness from FRFs of A, B and the assembly AJB.
+//!
+//! Pure functions of arrays and geometry. The way through the room:
+//!
+//! 1. [`frf`]: FRF matrices with named rows and columns, turned into receptances by dividing by s = σ + iω.
+//! 2. [`geometry`]: where the points are and what each is for (`Grouping`).
+//! 3. [`idm`], [`vpt`]: measured points onto the six motions of a virtual point; [`consistency`] says what is lost.
+//! 4. [`decoupling`]: one file per method, all returning Z^J per line; [`pseudo_inverse`] inverts without truncating.
+//! 5. [`joint`]: K and C per line and over bands, with scatter, interval and warnings.
+//! 6. [`identify`](mod@identify): the front door that does all of it.
+//!
+//! All FRFs of a campaign must share one exponential window: every method is algebraic in s, so it is exact on
+//! s = σ + iω, but only if A, B and AJB are on the same s. Degrees of freedom are ordered x, y, z, rx, ry, rz.
+
+pub mod consistency;
+pub mod decoupling;
+pub mod frf;
+pub mod geometry;
+pub mod identify;
+pub mod idm;
+mod interface_data;
+pub mod joint;
+pub mod method;
+pub mod pseudo_inverse;
+pub mod vpt;
+
+pub use frf::{FrfError, FrfMatrix, Quantity};
+pub use geometry::{Configuration, Geometry, Grouping, Point};
+pub use identify::{Identification, IdentifyError, Refused, VirtualPointQuality, identify};
+pub use idm::{Dof, IdmSet};
+pub use joint::{Band, BandStatistic, JointRow, JointSpectrum};
+pub use method::Method;
+
+#[cfg(test)]
+mod reference;

@@ -1,0 +1,424 @@
+//! Geometry tables: the pyFBS workbook (xlsx), or the same tables as csv files in one folder.
+//!
+//! Eight sheets (`Channels_A`, `Impacts_A`, …, `VP_Channels`, `VP_RefChannels`), columns found by their heading, in metres.
+//! Every error names sheet, row and column; the row is the one a spreadsheet program shows.
+
+use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
+use calamine::{Data, Reader, Xlsx, open_workbook};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Why the geometry cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum PositionsError {
+    /// The workbook or folder cannot be opened.
+    #[error("{}: cannot be opened as geometry ({reason}): give the .xlsx workbook or the folder of its .csv tables", path.display())]
+    Open {
+        /// What was given.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// A sheet is missing.
+    #[error("{}: there is no sheet `{sheet}`; it has: {available}", path.display())]
+    MissingSheet {
+        /// The workbook.
+        path: PathBuf,
+        /// The sheet.
+        sheet: String,
+        /// The sheets that are there.
+        available: String,
+    },
+    /// A heading is missing.
+    #[error("{}, sheet `{sheet}`: there is no column `{column}` in the first row", path.display())]
+    MissingColumn {
+        /// The workbook.
+        path: PathBuf,
+        /// The sheet.
+        sheet: String,
+        /// The column.
+        column: String,
+    },
+    /// A cell is wrong.
+    #[error("{}, sheet `{sheet}`, row {row}, column `{column}`: {reason}", path.display())]
+    Cell {
+        /// The workbook.
+        path: PathBuf,
+        /// The sheet.
+        sheet: String,
+        /// The row as a spreadsheet counts: the headings are row 1.
+        row: usize,
+        /// The column.
+        column: String,
+        /// What is wrong and what is wanted.
+        reason: String,
+    },
+    /// The virtual points contradict each other or are missing.
+    #[error("{}: {reason}", path.display())]
+    VirtualPoint {
+        /// The workbook.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+/// What was read, and what a reader of the results must know about it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Positions {
+    /// The geometry.
+    pub geometry: Geometry,
+    /// E.g. directions that were not of unit length.
+    pub warnings: Vec<String>,
+}
+
+/// Reads the workbook at `path`, or the csv tables when `path` is a folder.
+///
+/// # Errors
+/// [`PositionsError`] naming sheet, row and column.
+pub fn read_positions(path: &Path) -> Result<Positions, PositionsError> {
+    let tables = if path.is_dir() { csv_tables(path)? } else { workbook_tables(path)? };
+    let mut reading = Reading { path, tables, warnings: Vec::new() };
+    let a = reading.configuration("A")?;
+    let b = reading.configuration("B")?;
+    let ajb = reading.configuration("AJB")?;
+    let virtual_points = reading.virtual_points()?;
+    Ok(Positions {
+        geometry: Geometry {
+            a,
+            b,
+            ajb,
+            virtual_point_a_m: virtual_points[0],
+            virtual_point_b_m: virtual_points[1],
+        },
+        warnings: reading.warnings,
+    })
+}
+
+/// A cell: text as it stands, or a number.
+#[derive(Debug, Clone, PartialEq)]
+enum Cell {
+    Empty,
+    Text(String),
+    Number(f64),
+}
+
+/// Rows of one sheet with the spreadsheet's row number of each.
+type Table = Vec<(usize, Vec<Cell>)>;
+
+fn workbook_tables(path: &Path) -> Result<BTreeMap<String, Table>, PositionsError> {
+    let fail = |reason: String| PositionsError::Open { path: path.into(), reason };
+    let mut workbook: Xlsx<_> = open_workbook(path).map_err(|e: calamine::XlsxError| fail(e.to_string()))?;
+    let mut tables = BTreeMap::new();
+    for sheet in workbook.sheet_names() {
+        let range = workbook.worksheet_range(&sheet).map_err(|e| fail(format!("sheet `{sheet}`: {e}")))?;
+        let first = range.start().map_or(0, |(row, _)| row as usize);
+        let rows = range
+            .rows()
+            .enumerate()
+            .map(|(i, row)| (first + i + 1, row.iter().map(cell).collect()))
+            .collect();
+        tables.insert(sheet, rows);
+    }
+    Ok(tables)
+}
+
+fn cell(data: &Data) -> Cell {
+    match data {
+        Data::Empty => Cell::Empty,
+        Data::Float(v) => Cell::Number(*v),
+        Data::Int(v) => Cell::Number(*v as f64),
+        Data::String(text) if text.trim().is_empty() => Cell::Empty,
+        Data::String(text) => Cell::Text(text.clone()),
+        other => Cell::Text(other.to_string()),
+    }
+}
+
+fn csv_tables(path: &Path) -> Result<BTreeMap<String, Table>, PositionsError> {
+    let fail = |reason: String| PositionsError::Open { path: path.into(), reason };
+    let mut tables = BTreeMap::new();
+    for entry in std::fs::read_dir(path).map_err(|e| fail(e.to_string()))? {
+        let file = entry.map_err(|e| fail(e.to_string()))?.path();
+        if file.extension().is_none_or(|e| !e.eq_ignore_ascii_case("csv")) {
+            continue;
+        }
+        let Some(sheet) = file.file_stem().and_then(|s| s.to_str()) else { continue };
+        let text = std::fs::read_to_string(&file).map_err(|e| fail(format!("{}: {e}", file.display())))?;
+        let mut reader =
+            csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
+        let mut table: Table = Vec::new();
+        for record in reader.records() {
+            let record = record.map_err(|e| fail(format!("{}: {e}", file.display())))?;
+            // The reader's own line number lags by one in files with CR LF; its byte position may stand on
+            // the previous line's LF, which is counted then.
+            let byte = record.position().map_or(0, |p| p.byte() as usize);
+            let row = 1 + text.bytes().take(byte + 1).filter(|&b| b == b'\n').count();
+            let cells = record
+                .iter()
+                .map(|text| match text.trim_start_matches('\u{feff}').trim() {
+                    "" => Cell::Empty,
+                    text => Cell::Text(text.into()),
+                })
+                .collect();
+            table.push((row, cells));
+        }
+        tables.insert(sheet.to_string(), table);
+    }
+    Ok(tables)
+}
+
+struct Reading<'a> {
+    path: &'a Path,
+    tables: BTreeMap<String, Table>,
+    warnings: Vec<String>,
+}
+
+/// One sheet with its headings found.
+struct Sheet<'a> {
+    path: &'a Path,
+    name: &'a str,
+    headings: BTreeMap<String, usize>,
+}
+
+impl Sheet<'_> {
+    fn fail(&self, row: usize, column: &str, reason: impl Into<String>) -> PositionsError {
+        PositionsError::Cell {
+            path: self.path.into(),
+            sheet: self.name.into(),
+            row,
+            column: column.into(),
+            reason: reason.into(),
+        }
+    }
+
+    fn at<'c>(&self, cells: &'c [Cell], column: &str) -> Result<&'c Cell, PositionsError> {
+        let place =
+            self.headings.get(&column.to_lowercase()).ok_or_else(|| PositionsError::MissingColumn {
+                path: self.path.into(),
+                sheet: self.name.into(),
+                column: column.into(),
+            })?;
+        Ok(cells.get(*place).unwrap_or(&Cell::Empty))
+    }
+
+    fn text(&self, row: usize, cells: &[Cell], column: &str) -> Result<String, PositionsError> {
+        match self.at(cells, column)? {
+            Cell::Empty => Err(self.fail(row, column, "is empty, a text is needed")),
+            Cell::Text(text) => Ok(text.trim().to_string()),
+            Cell::Number(v) => Ok(v.to_string()),
+        }
+    }
+
+    fn number(&self, row: usize, cells: &[Cell], column: &str) -> Result<f64, PositionsError> {
+        let value = match self.at(cells, column)? {
+            Cell::Empty => return Err(self.fail(row, column, "is empty, a number is needed")),
+            Cell::Number(v) => *v,
+            Cell::Text(text) => text.trim().parse().map_err(|_| {
+                self.fail(row, column, format!("`{text}` is no number (decimal point, no unit)"))
+            })?,
+        };
+        if value.is_finite() { Ok(value) } else { Err(self.fail(row, column, format!("is {value}"))) }
+    }
+
+    fn vector(&self, row: usize, cells: &[Cell], stem: &str) -> Result<[f64; 3], PositionsError> {
+        let mut vector = [0.0; 3];
+        for (i, v) in vector.iter_mut().enumerate() {
+            *v = self.number(row, cells, &format!("{stem}_{}", i + 1))?;
+        }
+        Ok(vector)
+    }
+}
+
+impl Reading<'_> {
+    fn configuration(&mut self, name: &str) -> Result<Configuration, PositionsError> {
+        Ok(Configuration {
+            channels: self.points(&format!("Channels_{name}"))?,
+            impacts: self.points(&format!("Impacts_{name}"))?,
+        })
+    }
+
+    fn points(&mut self, sheet_name: &str) -> Result<Vec<Point>, PositionsError> {
+        let table = self.tables.get(sheet_name).ok_or_else(|| PositionsError::MissingSheet {
+            path: self.path.into(),
+            sheet: sheet_name.into(),
+            available: self.tables.keys().cloned().collect::<Vec<_>>().join(", "),
+        })?;
+        let mut rows = table.iter().filter(|(_, cells)| cells.iter().any(|c| *c != Cell::Empty));
+        let headings = rows.next().map(|(_, cells)| cells.as_slice()).unwrap_or_default();
+        let headings = headings
+            .iter()
+            .enumerate()
+            .filter_map(|(i, c)| match c {
+                Cell::Text(text) => Some((text.trim().to_lowercase(), i)),
+                _ => None,
+            })
+            .collect();
+        let sheet = Sheet { path: self.path, name: sheet_name, headings };
+        let mut points = Vec::new();
+        let mut warnings = Vec::new();
+        for (row, cells) in rows {
+            let (point, warning) = point(&sheet, *row, cells)?;
+            points.push(point);
+            warnings.extend(warning);
+        }
+        self.warnings.extend(warnings);
+        Ok(points)
+    }
+
+    /// Positions of both virtual points, which the tables of motions and of forces must agree on.
+    fn virtual_points(&mut self) -> Result<[[f64; 3]; 2], PositionsError> {
+        let fail = |path: &Path, reason: String| PositionsError::VirtualPoint { path: path.into(), reason };
+        let mut found: [Option<[f64; 3]>; 2] = [None, None];
+        for sheet in ["VP_Channels", "VP_RefChannels"] {
+            for point in self.points(sheet)? {
+                let (which, name) = match point.grouping {
+                    Grouping::InterfaceA => (0, "A"),
+                    Grouping::InterfaceB => (1, "B"),
+                    other => {
+                        let number = u8::from(other);
+                        return Err(fail(
+                            self.path,
+                            format!(
+                                "sheet `{sheet}`: a virtual point belongs to grouping 1 or 2, not {number}"
+                            ),
+                        ));
+                    }
+                };
+                let along_axis = point.direction.iter().filter(|d| **d == 1.0).count() == 1
+                    && point.direction.iter().filter(|d| **d == 0.0).count() == 2;
+                if !along_axis {
+                    return Err(fail(
+                        self.path,
+                        format!(
+                            "sheet `{sheet}`: virtual point {name} has the direction {:?}; only the axes x, y, z are supported",
+                            point.direction
+                        ),
+                    ));
+                }
+                match found[which] {
+                    None => found[which] = Some(point.position_m),
+                    Some(position) if position == point.position_m => {}
+                    Some(position) => {
+                        return Err(fail(
+                            self.path,
+                            format!(
+                                "sheet `{sheet}`: virtual point {name} stands at {position:?} m and at {:?} m; it needs one position",
+                                point.position_m
+                            ),
+                        ));
+                    }
+                }
+            }
+        }
+        let missing = |name| {
+            fail(
+                self.path,
+                format!(
+                    "no virtual point of {name} in VP_Channels (grouping {})",
+                    if name == "A" { 1 } else { 2 }
+                ),
+            )
+        };
+        Ok([found[0].ok_or_else(|| missing("A"))?, found[1].ok_or_else(|| missing("B"))?])
+    }
+}
+
+fn point(sheet: &Sheet<'_>, row: usize, cells: &[Cell]) -> Result<(Point, Option<String>), PositionsError> {
+    let name = sheet.text(row, cells, "Name")?;
+    let description = match sheet.at(cells, "Description")? {
+        Cell::Empty => name.clone(),
+        _ => sheet.text(row, cells, "Description")?,
+    };
+    let number = sheet.number(row, cells, "Grouping")?;
+    let whole = if number.fract() == 0.0 && (0.0..=255.0).contains(&number) { number as u8 } else { 0 };
+    let grouping = Grouping::try_from(whole)
+        .map_err(|reason| sheet.fail(row, "Grouping", format!("{number}: {reason}")))?;
+    let position_m = sheet.vector(row, cells, "Position")?;
+    let mut direction = sheet.vector(row, cells, "Direction")?;
+    let length = direction.iter().map(|d| d * d).sum::<f64>().sqrt();
+    if length < 1e-9 {
+        return Err(sheet.fail(
+            row,
+            "Direction_1",
+            "the direction is zero: give the axis of motion or force",
+        ));
+    }
+    let mut warning = None;
+    // Directions typed with three decimals are off by 1e-3 and still meant as unit vectors; say so from there on.
+    if (length - 1.0).abs() > 1e-3 {
+        warning = Some(format!(
+            "sheet `{}`, row {row}: the direction of {description} has length {length:.4} and was normalised",
+            sheet.name
+        ));
+    }
+    if (length - 1.0).abs() > f64::EPSILON {
+        direction = direction.map(|d| d / length);
+    }
+    Ok((Point { name, description, grouping, position_m, direction }, warning))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/positions");
+
+    #[test]
+    fn workbook_and_csv_are_the_same_geometry() {
+        let xlsx = read_positions(&Path::new(DATA).join("positions.xlsx")).expect("workbook");
+        let csv = read_positions(&Path::new(DATA).join("csv")).expect("tables");
+        assert_eq!(xlsx, csv);
+        assert!(xlsx.warnings.is_empty());
+        assert_eq!(xlsx.geometry.ajb.channels.len(), 24);
+        assert_eq!(xlsx.geometry.ajb.impacts.len(), 21);
+        assert_eq!(xlsx.geometry.a.impacts[9].grouping, Grouping::InternalA);
+        assert_eq!(xlsx.geometry.a.impacts[0].direction, [0.0, 0.0, -1.0]);
+        assert_eq!(xlsx.geometry.virtual_point_b_m, [0.0; 3]);
+        assert_eq!(xlsx.geometry.a.output_names()[2], "A1:z");
+    }
+
+    /// The good csv tables in a temporary folder, with one table edited.
+    fn edited(table: &str, edit: impl Fn(&str) -> String) -> tempfile::TempDir {
+        let dir = tempfile::tempdir().expect("a temporary folder");
+        for entry in fs::read_dir(Path::new(DATA).join("csv")).expect("test data") {
+            let from = entry.expect("entry").path();
+            let name = from.file_name().expect("a file").to_owned();
+            let mut text = fs::read_to_string(&from).expect("text");
+            if name.to_str() == Some(&format!("{table}.csv")) {
+                text = edit(&text);
+            }
+            fs::write(dir.path().join(name), text).expect("written");
+        }
+        dir
+    }
+
+    #[test]
+    fn errors_name_sheet_row_and_column() {
+        let cases = [
+            ("Impacts_A", "0.015,0.028", "0.015,28 mm", vec!["Impacts_A", "row 2", "Position_2", "28 mm"]),
+            ("Channels_B", "Velocity,4", "Velocity,7", vec!["Channels_B", "row 11", "Grouping", "7"]),
+            ("Channels_B", "Position_3", "Position_Z", vec!["Channels_B", "Position_3"]),
+            ("Impacts_B", "0.0,0.0,-1.0", "0.0,0.0,0.0", vec!["Impacts_B", "row 2", "Direction_1", "zero"]),
+            ("VP_Channels", "ux,Velocity,1,0.0", "ux,Velocity,1,0.1", vec!["VP_Channels", "one position"]),
+        ];
+        for (table, from, to, wanted) in cases {
+            let dir = edited(table, |text| text.replacen(from, to, 1));
+            let text = read_positions(dir.path()).expect_err(table).to_string();
+            for part in wanted {
+                assert!(text.contains(part), "{text} lacks {part}");
+            }
+        }
+        let dir = edited("Channels_AJB", |text| text.to_string());
+        fs::remove_file(dir.path().join("Channels_AJB.csv")).expect("removed");
+        assert!(read_positions(dir.path()).expect_err("no sheet").to_string().contains("`Channels_AJB`"));
+    }
+
+    #[test]
+    fn long_directions_are_normalised_with_a_warning() {
+        let dir = edited("Impacts_A", |text| text.replacen("0.0,0.0,-1.0", "0.0,-3.0,-4.0", 1));
+        let read = read_positions(dir.path()).expect("readable");
+        assert_eq!(read.geometry.a.impacts[0].direction, [0.0, -0.6, -0.8]);
+        assert!(read.warnings.len() == 1 && read.warnings[0].contains("AZ1"), "{:?}", read.warnings);
+    }
+}

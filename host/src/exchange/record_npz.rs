@@ -1,0 +1,238 @@
+//! Time records in npz: impact records, and hysteresis records.
+
+use super::npz::{NpzError, NpzFile, NpzOutput};
+use crate::hysteresis::{HysteresisRecord, RelativeMotion};
+use crate::spectra::{ImpactRecords, MotionQuantity};
+use std::path::Path;
+
+/// Reads impact records: `fs` (Hz), `force` (hit, sample) N, `response` (hit, channel, sample) SI, `quantity` = velocity |
+/// acceleration | displacement. One hit may come without the hit axis, one channel without the channel axis.
+///
+/// # Errors
+/// [`NpzError`] naming the array that is missing or does not fit.
+pub fn read_impacts(path: &Path) -> Result<ImpactRecords, NpzError> {
+    let mut file = NpzFile::open(path)?;
+    let fs_hz = positive(&mut file, "fs", "the sampling rate, Hz (positive)")?;
+    let force = file.real("force", "the hammer force (hit, sample), N")?;
+    let (hits, samples) = match force.shape[..] {
+        [samples] => (1, samples),
+        [hits, samples] => (hits, samples),
+        _ => return Err(file.unexpected("force", &format!("has shape {:?}", force.shape), "(hit, sample)")),
+    };
+    let expected = format!("(hit, channel, sample) = ({hits}, channels, {samples})");
+    let response = file.real("response", &expected)?;
+    let channels = match response.shape[..] {
+        [h, c, n] if h == hits && n == samples => c,
+        [h, n] if h == hits && n == samples => 1,
+        [c, n] if hits == 1 && n == samples => c,
+        [n] if hits == 1 && n == samples => 1,
+        _ => {
+            return Err(file.unexpected("response", &format!("has shape {:?}", response.shape), &expected));
+        }
+    };
+    if hits == 0 || samples == 0 || channels == 0 {
+        return Err(file.content("there is no hit, no channel or no sample in it"));
+    }
+    let word = file.word("quantity", "velocity, acceleration or displacement")?;
+    let quantity = MotionQuantity::from_name(&word).ok_or_else(|| {
+        file.unexpected("quantity", &format!("is `{word}`"), "velocity, acceleration or displacement")
+    })?;
+    Ok(ImpactRecords {
+        fs_hz,
+        force_n: force.values.chunks(samples).map(<[f64]>::to_vec).collect(),
+        response: response
+            .values
+            .chunks(samples * channels)
+            .map(|hit| hit.chunks(samples).map(<[f64]>::to_vec).collect())
+            .collect(),
+        quantity,
+    })
+}
+
+/// Writes impact records in the same form.
+///
+/// # Errors
+/// [`NpzError::Write`]; [`NpzError::Content`] when hits differ in length.
+pub fn write_impacts(path: &Path, records: &ImpactRecords) -> Result<(), NpzError> {
+    let content = |reason: &str| NpzError::Content { path: path.into(), reason: reason.into() };
+    let hits = records.force_n.len();
+    let samples = records.force_n.first().map_or(0, Vec::len);
+    let channels = records.response.first().map_or(0, Vec::len);
+    if records.response.len() != hits
+        || records.force_n.iter().any(|f| f.len() != samples)
+        || records.response.iter().any(|h| h.len() != channels || h.iter().any(|c| c.len() != samples))
+    {
+        return Err(content("every hit needs the same channels and the same number of samples"));
+    }
+    let mut out = NpzOutput::create(path)?;
+    out.real("fs", &[], &[records.fs_hz])?;
+    out.real("force", &[hits, samples], &records.force_n.concat())?;
+    out.real("response", &[hits, channels, samples], &records.response.concat().concat())?;
+    out.text("quantity", &[], &[records.quantity.name().into()])?;
+    out.finish()
+}
+
+/// Reads a hysteresis record: `fs`, `velocity_a` and `velocity_b` (m/s) or `displacement_a` and `displacement_b` (m), `force` (N)
+/// or `load_cells` (cell, sample; summed), optional `excitation` (Hz) and `normal_load` (N).
+///
+/// # Errors
+/// [`NpzError`] naming the array that is missing or does not fit.
+pub fn read_hysteresis(path: &Path) -> Result<HysteresisRecord, NpzError> {
+    let mut file = NpzFile::open(path)?;
+    let fs_hz = positive(&mut file, "fs", "the sampling rate, Hz (positive)")?;
+    let velocities = file.has("velocity_a") || file.has("velocity_b");
+    if velocities && (file.has("displacement_a") || file.has("displacement_b")) {
+        return Err(file.content("it has both velocities and displacements: keep the pair that was measured"));
+    }
+    let names = if velocities || !file.has("displacement_a") {
+        ["velocity_a", "velocity_b"]
+    } else {
+        ["displacement_a", "displacement_b"]
+    };
+    let expected = "the motion beside the contact (sample), velocity_* in m/s or displacement_* in m";
+    let a = one_axis(&mut file, names[0], expected)?;
+    let b = one_axis(&mut file, names[1], expected)?;
+    let force_n = if file.has("force") {
+        one_axis(&mut file, "force", "the tangential force (sample), N")?
+    } else {
+        let cells = file.real("load_cells", "the load cells (cell, sample), N, where there is no `force`")?;
+        match cells.shape[..] {
+            [n] | [1, n] if n > 0 => cells.values,
+            [_, n] if n > 0 => {
+                let mut sum = vec![0.0; n];
+                for cell in cells.values.chunks(n) {
+                    for (total, value) in sum.iter_mut().zip(cell) {
+                        *total += value;
+                    }
+                }
+                sum
+            }
+            _ => {
+                return Err(file.unexpected(
+                    "load_cells",
+                    &format!("has shape {:?}", cells.shape),
+                    "(cell, sample)",
+                ));
+            }
+        }
+    };
+    if a.len() != b.len() || a.len() != force_n.len() || a.is_empty() {
+        return Err(file.content(format!(
+            "{} has {} samples, {} {} and the force {}: all three need the same number",
+            names[0],
+            a.len(),
+            names[1],
+            b.len(),
+            force_n.len()
+        )));
+    }
+    if let Some(at) = (0..a.len()).find(|&i| !(a[i] + b[i] + force_n[i]).is_finite()) {
+        return Err(file.content(format!("sample {at} is not a number: cut the record before it")));
+    }
+    let excitation_hz = optional(&mut file, "excitation", "the excitation frequency, Hz (positive)")?;
+    let normal_load_n = optional(&mut file, "normal_load", "the normal load, N (positive)")?;
+    let motion = if velocities {
+        RelativeMotion::Velocity { a_m_per_s: a, b_m_per_s: b }
+    } else {
+        RelativeMotion::Displacement { a_m: a, b_m: b }
+    };
+    Ok(HysteresisRecord { fs_hz, motion, force_n, excitation_hz, normal_load_n })
+}
+
+/// Writes a hysteresis record in the same form (the force summed).
+///
+/// # Errors
+/// [`NpzError::Write`].
+pub fn write_hysteresis(path: &Path, record: &HysteresisRecord) -> Result<(), NpzError> {
+    let mut out = NpzOutput::create(path)?;
+    out.real("fs", &[], &[record.fs_hz])?;
+    let (names, a, b) = match &record.motion {
+        RelativeMotion::Velocity { a_m_per_s, b_m_per_s } => {
+            (["velocity_a", "velocity_b"], a_m_per_s, b_m_per_s)
+        }
+        RelativeMotion::Displacement { a_m, b_m } => (["displacement_a", "displacement_b"], a_m, b_m),
+    };
+    out.real(names[0], &[a.len()], a)?;
+    out.real(names[1], &[b.len()], b)?;
+    out.real("force", &[record.force_n.len()], &record.force_n)?;
+    if let Some(f) = record.excitation_hz {
+        out.real("excitation", &[], &[f])?;
+    }
+    if let Some(n) = record.normal_load_n {
+        out.real("normal_load", &[], &[n])?;
+    }
+    out.finish()
+}
+
+fn one_axis(file: &mut NpzFile, name: &str, expected: &str) -> Result<Vec<f64>, NpzError> {
+    let array = file.real(name, expected)?;
+    match array.shape[..] {
+        [_] | [1, _] => Ok(array.values),
+        _ => Err(file.unexpected(name, &format!("has shape {:?}", array.shape), expected)),
+    }
+}
+
+fn positive(file: &mut NpzFile, name: &str, expected: &str) -> Result<f64, NpzError> {
+    let value = file.number(name, expected)?;
+    if value > 0.0 { Ok(value) } else { Err(file.unexpected(name, &format!("is {value}"), expected)) }
+}
+
+fn optional(file: &mut NpzFile, name: &str, expected: &str) -> Result<Option<f64>, NpzError> {
+    if file.has(name) { positive(file, name, expected).map(Some) } else { Ok(None) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn records_come_back() {
+        let dir = tempfile::tempdir().expect("a temporary folder");
+        let path = dir.path().join("records.npz");
+        let records = ImpactRecords {
+            fs_hz: 51_200.0,
+            force_n: vec![vec![0.0, 1.0, 0.0], vec![0.0, 2.0, 0.0]],
+            response: vec![vec![vec![0.0, 0.5, 0.25]; 2]; 2],
+            quantity: MotionQuantity::Velocity,
+        };
+        write_impacts(&path, &records).expect("written");
+        assert_eq!(read_impacts(&path).expect("read"), records);
+
+        let path = dir.path().join("loop.npz");
+        let record = HysteresisRecord {
+            fs_hz: 51_200.0,
+            motion: RelativeMotion::Displacement { a_m: vec![0.0, 1e-6], b_m: vec![0.0, 0.0] },
+            force_n: vec![1.0, 2.0],
+            excitation_hz: Some(80.0),
+            normal_load_n: None,
+        };
+        write_hysteresis(&path, &record).expect("written");
+        assert_eq!(read_hysteresis(&path).expect("read"), record);
+    }
+
+    #[test]
+    fn load_cells_are_summed() {
+        let dir = tempfile::tempdir().expect("a temporary folder");
+        let path = dir.path().join("loop.npz");
+        let mut out = NpzOutput::create(&path).expect("writable");
+        out.real("fs", &[1], &[100.0]).expect("written");
+        out.real("velocity_a", &[2], &[1.0, 2.0]).expect("written");
+        out.real("velocity_b", &[2], &[0.0, 0.0]).expect("written");
+        out.real("load_cells", &[3, 2], &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).expect("written");
+        out.finish().expect("closed");
+        assert_eq!(read_hysteresis(&path).expect("read").force_n, [9.0, 12.0]);
+    }
+
+    #[test]
+    fn a_missing_force_and_unequal_lengths_are_named() {
+        let dir = tempfile::tempdir().expect("a temporary folder");
+        let path = dir.path().join("loop.npz");
+        let mut out = NpzOutput::create(&path).expect("writable");
+        out.real("fs", &[], &[100.0]).expect("written");
+        out.real("velocity_a", &[2], &[1.0, 2.0]).expect("written");
+        out.real("velocity_b", &[3], &[0.0, 0.0, 0.0]).expect("written");
+        out.finish().expect("closed");
+        assert!(read_hysteresis(&path).expect_err("no force").to_string().contains("load_cells"));
+        assert!(read_impacts(&path).expect_err("no force").to_string().contains("`force`"));
+    }
+}

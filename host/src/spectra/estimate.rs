@@ -1,0 +1,65 @@
+//! From impact records to averaged FRFs: where each hit begins, windows, spectra.
+
+use super::average::{AveragedFrf, SpectraAverage};
+use super::pulse::Pulse;
+use super::records::ImpactRecords;
+use super::window::Windowing;
+use super::SpectraError;
+use serde::{Deserialize, Serialize};
+
+/// The origin t₀ of the windows.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Origin {
+    /// The start of each hit's main pulse, found in its force.
+    PulseStart,
+    /// This long after every record's start, s (a fixed pre-trigger).
+    At(f64),
+}
+
+/// How records become FRFs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FrfSettings {
+    /// The windows.
+    pub windowing: Windowing,
+    /// Their origin.
+    pub origin: Origin,
+    /// How late each response channel is against the force, s; empty means 0.
+    pub delay_s: Vec<f64>,
+}
+
+impl Default for FrfSettings {
+    fn default() -> Self {
+        FrfSettings { windowing: Windowing::default(), origin: Origin::PulseStart, delay_s: Vec::new() }
+    }
+}
+
+/// H1, coherence and variance over those hits of `records` for which `used` is true.
+///
+/// # Errors
+/// When no hit is used, hits differ in length or channels, or a used hit has no pulse or values that are not numbers.
+pub fn estimate(
+    records: &ImpactRecords,
+    used: &[bool],
+    settings: &FrfSettings,
+) -> Result<AveragedFrf, SpectraError> {
+    let first = used.iter().position(|u| *u).ok_or(SpectraError::NoHits)?;
+    let samples = records.force_n.get(first).ok_or(SpectraError::NoHits)?.len();
+    let outputs = records.response.get(first).ok_or(SpectraError::NoHits)?.len();
+    let mut average = SpectraAverage::new(records.fs_hz, samples, outputs);
+    let hits = records.force_n.iter().zip(&records.response).zip(used).enumerate();
+    for (hit, ((force, responses), _)) in hits.filter(|(_, (_, used))| **used) {
+        let origin_s = match settings.origin {
+            Origin::At(seconds) => seconds,
+            Origin::PulseStart => {
+                Pulse::locate(force).ok_or(SpectraError::NoPulse { hit })?.start as f64 / records.fs_hz
+            }
+        };
+        let window = &settings.windowing;
+        average.add(
+            window.force(force, records.fs_hz, origin_s),
+            responses.iter().map(|x| window.response(x, records.fs_hz, origin_s)).collect(),
+        )?;
+    }
+    average.finish(settings.windowing.sigma_per_s, &settings.delay_s)
+}

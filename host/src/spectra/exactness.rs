@@ -1,0 +1,125 @@
+//! Known system in, the same system out: FRFs of a synthetic oscillator on s = σ + iω.
+
+use super::*;
+use num_complex::Complex;
+use std::f64::consts::{PI, TAU};
+
+const FS: f64 = 4096.0;
+const N: usize = 4096;
+
+/// Force: half sine of `width` samples from `start`; response: the force convolved with a decaying sine.
+fn record(start: usize, width: usize, delay: usize) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+    let force: Vec<f64> = (0..N)
+        .map(|i| {
+            if (start..start + width).contains(&i) { 50.0 * (PI * (i - start) as f64 / width as f64).sin() } else { 0.0 }
+        })
+        .collect();
+    let h: Vec<f64> = (0..N)
+        .map(|i| {
+            let t = i as f64 / FS;
+            (-30.0 * t).exp() * (TAU * 200.0 * t).cos()
+        })
+        .collect();
+    let mut x = vec![0.0; N];
+    for (i, f) in force.iter().enumerate().filter(|(_, f)| **f != 0.0) {
+        for j in (i + delay)..N {
+            x[j] += f * h[j - i - delay];
+        }
+    }
+    (force, x, h)
+}
+
+/// Σ h e^(−s n Δt): the sampled system's transfer function.
+fn exact(h: &[f64], s: Complex<f64>) -> Complex<f64> {
+    h.iter().enumerate().map(|(i, h)| h * (-s * (i as f64 / FS)).exp()).sum()
+}
+
+fn records(start: usize, delay: usize) -> (ImpactRecords, Vec<f64>) {
+    let (force, x, h) = record(start, 20, delay);
+    let records = ImpactRecords {
+        fs_hz: FS,
+        force_n: vec![force],
+        response: vec![vec![x]],
+        quantity: MotionQuantity::Velocity,
+    };
+    (records, h)
+}
+
+#[test]
+fn weighting_both_is_exact_on_s_and_weighting_one_is_not() {
+    let (records, h) = records(100, 0);
+    let mut settings = FrfSettings::default();
+    settings.windowing.sigma_per_s = 20.0;
+    settings.windowing.force_after_s = 0.01;
+    let error = |settings: &FrfSettings| {
+        let y = estimate(&records, &[true], settings).expect("one hit");
+        let s = Complex::new(20.0, TAU * y.frequency_hz[180]);
+        ((y.h1[180][0] - exact(&h, s)) / exact(&h, s)).norm()
+    };
+    // The record's end truncates e^(−50 t): 1e-22 after one second. What is left is rounding.
+    assert!(error(&settings) < 1e-10, "{:e}", error(&settings));
+    settings.windowing.force_weighting = ForceWeighting::Rectangular;
+    // About σ times half the pulse's width of 4.9 ms.
+    assert!(error(&settings) > 0.02, "{:e}", error(&settings));
+}
+
+#[test]
+fn a_late_channel_is_put_right() {
+    let (records, h) = records(100, 3);
+    let mut settings = FrfSettings::default();
+    settings.windowing.sigma_per_s = 5.0;
+    settings.windowing.force_after_s = 0.01;
+    settings.delay_s = vec![3.0 / FS];
+    let y = estimate(&records, &[true], &settings).expect("one hit");
+    let s = Complex::new(5.0, TAU * y.frequency_hz[300]);
+    // the record's end truncates e^(−35 t)
+    assert!(((y.h1[300][0] - exact(&h, s)) / exact(&h, s)).norm() < 1e-10);
+}
+
+#[test]
+fn a_single_hit_has_no_coherence_and_no_variance() {
+    let (records, _) = records(100, 0);
+    let y = estimate(&records, &[true], &FrfSettings::default()).expect("one hit");
+    assert!(y.coherence[200][0].is_nan() && y.variance[200][0].is_nan());
+    assert_eq!(estimate(&records, &[false], &FrfSettings::default()), Err(SpectraError::NoHits));
+}
+
+/// The variance formula against the scatter of many simulated averages.
+#[test]
+fn the_variance_formula_predicts_the_scatter() {
+    use proptest::test_runner::{RngAlgorithm, TestRng};
+    use rand_like::Gauss;
+    let mut noise = Gauss(TestRng::deterministic_rng(RngAlgorithm::ChaCha));
+    let (force, x, _) = record(50, 20, 0);
+    let (force, x) = (force[..512].to_vec(), x[..512].to_vec());
+    let line = 20;
+    let mut parts = Vec::new();
+    let mut predicted = 0.0;
+    let trials = 150;
+    for _ in 0..trials {
+        let mut average = SpectraAverage::new(FS, 512, 1);
+        for _ in 0..16 {
+            let noisy = x.iter().map(|x| x + 20.0 * noise.next()).collect();
+            average.add(force.clone(), vec![noisy]).expect("alike");
+        }
+        let y = average.finish(0.0, &[]).expect("hits");
+        parts.push(y.h1[line][0].re);
+        predicted += y.variance[line][0] / f64::from(trials);
+    }
+    let mean = parts.iter().sum::<f64>() / parts.len() as f64;
+    let seen = parts.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / parts.len() as f64;
+    // a variance from 150 trials is known to 12 %; three times that
+    assert!((seen / predicted - 1.0).abs() < 0.36, "seen {seen:e}, predicted {predicted:e}");
+}
+
+/// Normal deviates from proptest's generator.
+mod rand_like {
+    use proptest::prelude::RngCore;
+    pub(super) struct Gauss<R>(pub(super) R);
+    impl<R: RngCore> Gauss<R> {
+        pub(super) fn next(&mut self) -> f64 {
+            // twelve uniform deviates, variance one
+            (0..12).map(|_| self.0.next_u32() as f64 / u32::MAX as f64).sum::<f64>() - 6.0
+        }
+    }
+}

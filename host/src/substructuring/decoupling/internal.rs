@@ -1,0 +1,30 @@
+//! Eq. (3) in its exact least-squares form, for any number of internal degrees of freedom ≥ n_c.
+
+use super::super::pseudo_inverse::full_rank_inverse;
+use super::DecouplingError;
+use nalgebra::{Complex, DMatrix};
+
+/// Z^J from G = (P⁺ M Q⁺)⁻¹, Y^J = G − Y^A_cc − Y^B_cc (the paper's Eq. (3), solved for G by least squares).
+///
+/// `p` = Y^B_{i,c} (responses on B × n_c), `q` = Y^A_{c,i} (n_c × impacts on A), `m` = Y^AJB_{i(B),i(A)}; because
+/// M = P G⁻¹ Q exactly, P and Q are inverted whole and M, which is singular for n_i > n_c, never is.
+///
+/// # Errors
+/// Too few internals, or P or Q without full rank.
+pub fn internal(
+    y_a: &DMatrix<Complex<f64>>,
+    y_b: &DMatrix<Complex<f64>>,
+    p: &DMatrix<Complex<f64>>,
+    m: &DMatrix<Complex<f64>>,
+    q: &DMatrix<Complex<f64>>,
+) -> Result<DMatrix<Complex<f64>>, DecouplingError> {
+    let needed = y_a.nrows();
+    let (responses, impacts) = m.shape();
+    if responses.min(impacts) < needed {
+        return Err(DecouplingError::TooFewInternals { impacts, responses, needed });
+    }
+    let p_plus = full_rank_inverse(p, "P = Y^B between B's responses and the virtual point")?;
+    let q_plus = full_rank_inverse(q, "Q = Y^A between the virtual point and A's impacts")?;
+    let g = full_rank_inverse(&(p_plus * m * q_plus), "P⁺ M Q⁺")?;
+    Ok(full_rank_inverse(&(g - y_a - y_b), "the joint's admittance")?)
+}

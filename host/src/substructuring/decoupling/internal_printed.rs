@@ -1,0 +1,29 @@
+//! Eq. (3) as the paper prints it.
+
+use super::super::pseudo_inverse::{full_rank_inverse, rank};
+use super::DecouplingError;
+use nalgebra::{Complex, DMatrix};
+
+/// Z^J from Y^J = Q M⁻¹ P − Y^A_cc − Y^B_cc: the paper's Eq. (3) as printed.
+///
+/// `p` = Y^B_{i,c}, `q` = Y^A_{c,i}, `m` = Y^AJB_{i(B),i(A)}. Exact only for n_i = n_c. With n_i < n_c what comes back is
+/// Y^J − G (I − Π) with Π of rank n_i ([`observed_rank`]): right for the forces that the internals generate, −(Y^A + Y^B) elsewhere.
+///
+/// # Errors
+/// M, or the resulting admittance, is singular.
+pub fn internal_printed(
+    y_a: &DMatrix<Complex<f64>>,
+    y_b: &DMatrix<Complex<f64>>,
+    p: &DMatrix<Complex<f64>>,
+    m: &DMatrix<Complex<f64>>,
+    q: &DMatrix<Complex<f64>>,
+) -> Result<DMatrix<Complex<f64>>, DecouplingError> {
+    let m_inverse = full_rank_inverse(m, "M = Y^AJB between B's and A's internals")?;
+    Ok(full_rank_inverse(&(q * m_inverse * p - y_a - y_b), "the joint's admittance")?)
+}
+
+/// Rank of Π: how many directions of interface force these internals see, of n_c. It cannot exceed the rank
+/// of P or Q, whatever the joint is.
+pub fn observed_rank(p: &DMatrix<Complex<f64>>, q: &DMatrix<Complex<f64>>) -> usize {
+    rank(p).min(rank(q))
+}

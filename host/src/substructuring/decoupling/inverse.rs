@@ -1,0 +1,32 @@
+//! Eq. (A.1): inverse substructuring.
+
+use super::super::pseudo_inverse::full_rank_inverse;
+use super::DecouplingError;
+use nalgebra::{Complex, DMatrix};
+
+/// Which off-diagonal block of Eq. (A.1) is read. For exact data of a reciprocal structure they are equal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum InverseBlock {
+    /// c(A), c(B).
+    Ab,
+    /// c(B), c(A).
+    Ba,
+}
+
+/// Z^J = minus an off-diagonal block of (Y^AJB_cc)⁻¹: the paper's Eq. (A.1). Needs neither Y^A nor Y^B, so it does not
+/// care whether A changes between configurations. `y_ajb` is 2n_c × 2n_c, A's virtual point first.
+///
+/// # Errors
+/// Y^AJB_cc is singular.
+pub fn inverse(
+    block: InverseBlock,
+    y_ajb: &DMatrix<Complex<f64>>,
+) -> Result<DMatrix<Complex<f64>>, DecouplingError> {
+    let n = y_ajb.nrows() / 2;
+    let at = match block {
+        InverseBlock::Ab => (0, n),
+        InverseBlock::Ba => (n, 0),
+    };
+    let z = full_rank_inverse(y_ajb, "the assembly's interface admittance")?;
+    Ok(-z.view(at, (n, n)).clone_owned())
+}

@@ -1,0 +1,44 @@
+//! Decoupling: the joint's dynamic stiffness Z^J from FRFs of A, B and the assembly AJB, one file per method.
+//!
+//! Every function takes receptances of one line and returns Z^J (n_c × n_c, N/m in consistent units). They work
+//! in Z, not in Y, because a massless joint has no finite admittance on degrees of freedom it does not couple.
+//! c stands for the interface (virtual point) degrees of freedom, i for internal ones. Rows and columns of
+//! rotations may be scaled by a length before: the methods are equivariant, and rounding likes it.
+
+mod interface;
+mod internal;
+mod internal_printed;
+mod inverse;
+mod primal;
+
+pub use interface::interface;
+pub use internal::internal;
+pub use internal_printed::{internal_printed, observed_rank};
+pub use inverse::{InverseBlock, inverse};
+pub use primal::{PrimalBlock, primal};
+
+use super::pseudo_inverse::RankLost;
+
+/// Why a method cannot be applied to this data.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DecouplingError {
+    /// The least-squares form needs at least n_c internal degrees of freedom on both sides.
+    #[error(
+        "{impacts} impacts on A and {responses} responses on B, but {needed} interface DoFs: with fewer internals than \
+         interface DoFs the joint is seen only through the forces they generate (biased); measure more, or use fewer IDMs"
+    )]
+    TooFewInternals {
+        /// n_iA: impacts on A.
+        impacts: usize,
+        /// n_iB: responses on B.
+        responses: usize,
+        /// n_c.
+        needed: usize,
+    },
+    /// A matrix that must be inverted is singular.
+    #[error(transparent)]
+    RankLost(#[from] RankLost),
+}
+
+#[cfg(test)]
+mod exactness;

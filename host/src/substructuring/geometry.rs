@@ -1,0 +1,152 @@
+//! Where sensors and hits are, which way they point, and what each is for.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+
+/// What a row is for. The number stands in the workbook's `Grouping` column; roles are never read from names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "u8", into = "u8")]
+pub enum Grouping {
+    /// 1: interface of A (used for A's virtual point).
+    InterfaceA,
+    /// 2: interface of B.
+    InterfaceB,
+    /// 3: internal of A (a response here is a spare: it never enters a virtual point).
+    InternalA,
+    /// 4: internal of B.
+    InternalB,
+}
+
+impl TryFrom<u8> for Grouping {
+    type Error = String;
+    fn try_from(number: u8) -> Result<Self, String> {
+        match number {
+            1 => Ok(Grouping::InterfaceA),
+            2 => Ok(Grouping::InterfaceB),
+            3 => Ok(Grouping::InternalA),
+            4 => Ok(Grouping::InternalB),
+            other => Err(format!(
+                "{other} is no grouping: 1 and 2 are the interfaces of A and B, 3 and 4 their internals"
+            )),
+        }
+    }
+}
+
+impl From<Grouping> for u8 {
+    fn from(grouping: Grouping) -> u8 {
+        match grouping {
+            Grouping::InterfaceA => 1,
+            Grouping::InterfaceB => 2,
+            Grouping::InternalA => 3,
+            Grouping::InternalB => 4,
+        }
+    }
+}
+
+/// One response channel or one impact: a line of a geometry table.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Point {
+    /// The sensor's or impact's name; the three axes of one sensor share it.
+    pub name: String,
+    /// A text of its own for each line, e.g. `A1:x`.
+    pub description: String,
+    /// What it is for.
+    pub grouping: Grouping,
+    /// Position, m.
+    pub position_m: [f64; 3],
+    /// Unit vector: along it a response counts positive, and a hit pushes.
+    pub direction: [f64; 3],
+}
+
+impl Point {
+    /// Position as a vector, m.
+    pub fn position(&self) -> Vector3<f64> {
+        Vector3::from(self.position_m)
+    }
+
+    /// Direction as a vector.
+    pub fn direction(&self) -> Vector3<f64> {
+        Vector3::from(self.direction)
+    }
+}
+
+/// The points of one configuration (A alone, B alone, or the assembly AJB).
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Configuration {
+    /// Response channels, in the sheet's order.
+    pub channels: Vec<Point>,
+    /// Impacts, in the sheet's order.
+    pub impacts: Vec<Point>,
+}
+
+impl Configuration {
+    /// Names of the FRF's outputs: the description where the name repeats in the sheet, else the name.
+    pub fn output_names(&self) -> Vec<String> {
+        frf_names(&self.channels)
+    }
+
+    /// Names of the FRF's inputs, by the same rule (an impact's name does not normally repeat).
+    pub fn input_names(&self) -> Vec<String> {
+        frf_names(&self.impacts)
+    }
+}
+
+/// The geometry of the whole experiment. One axis system: x lateral, y vertical, z sliding; metres.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Geometry {
+    /// Substructure A alone.
+    pub a: Configuration,
+    /// Substructure B alone.
+    pub b: Configuration,
+    /// The assembly.
+    pub ajb: Configuration,
+    /// A's virtual point, m.
+    pub virtual_point_a_m: [f64; 3],
+    /// B's virtual point, m.
+    pub virtual_point_b_m: [f64; 3],
+}
+
+fn frf_names(points: &[Point]) -> Vec<String> {
+    let mut count: HashMap<&str, usize> = HashMap::new();
+    for point in points {
+        *count.entry(point.name.as_str()).or_default() += 1;
+    }
+    points
+        .iter()
+        .map(|p| if count[p.name.as_str()] > 1 { p.description.clone() } else { p.name.clone() })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(name: &str, description: &str) -> Point {
+        Point {
+            name: name.into(),
+            description: description.into(),
+            grouping: Grouping::InterfaceA,
+            position_m: [0.0; 3],
+            direction: [0.0, 0.0, 1.0],
+        }
+    }
+
+    #[test]
+    fn the_description_names_an_output_only_where_the_name_repeats() {
+        let table = Configuration {
+            channels: vec![point("A1", "A1:x"), point("A1", "A1:y"), point("L", "laser on A")],
+            impacts: vec![point("AZ1", "front")],
+        };
+        assert_eq!(table.output_names(), ["A1:x", "A1:y", "L"]);
+        assert_eq!(table.input_names(), ["AZ1"]);
+    }
+
+    #[test]
+    fn grouping_five_is_refused() {
+        assert!(Grouping::try_from(5).is_err());
+        for n in 1..=4u8 {
+            assert_eq!(Grouping::try_from(n).map(u8::from), Ok(n));
+        }
+    }
+}
