@@ -125,7 +125,7 @@ pub fn hysteresis(results: &Results) -> Option<String> {
         let cycles = h.k_t_n_per_m.or(h.k_eq_n_per_m).map_or(UNKNOWN.into(), |k| k.cycles.to_string());
         table.row([
             words::excitation(h),
-            h.shape.name().into(),
+            words::shape_name(h.shape).into(),
             h.amplitude_m.map_or(UNKNOWN.into(), |a| format!("± {}", short(a * 1e9))),
             over(h.k_t_n_per_m, 1e-6),
             over(h.k_eq_n_per_m, 1e-6),

@@ -1,17 +1,17 @@
 //! Checks: sentences about whether a number may be believed.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// One question that was put to the data.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Check {
     /// Its name, fixed: scripts look for it.
     pub name: String,
     /// Passed, failed, or (null) the data cannot say.
     pub ok: Option<bool>,
     /// Where in the spectrum, Hz, if at one place.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub frequency_hz: Option<f64>,
     /// What it means for the reader, one or two sentences.
     pub meaning: String,

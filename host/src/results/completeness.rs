@@ -1,10 +1,10 @@
 //! What of the plan was measured: kept and refused hits per configuration.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Hits of one configuration.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct Completeness {
     /// Configuration: `A`, `B` or `AJB`.
     pub configuration: String,

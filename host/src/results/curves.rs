@@ -1,9 +1,9 @@
 //! Curves kept for the figures: a few FRFs with their coherence.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// What an FRF shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
     /// Response nearest to the impact, same direction.
@@ -17,7 +17,7 @@ pub enum Role {
 }
 
 /// One FRF: receptance with coherence.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FrfCurve {
     /// Configuration: `A`, `B` or `AJB`.
     pub configuration: String,
@@ -49,7 +49,7 @@ impl FrfCurve {
 }
 
 /// Over which frequencies the hammer put enough force, per configuration.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct UsableBand {
     /// Configuration: `A`, `B` or `AJB`.
     pub configuration: String,

@@ -1,10 +1,10 @@
 //! The contact by hysteresis loops: numbers per kind of excitation, and one loop to look at.
 
-use super::statistics::OverCycles;
-use serde::{Deserialize, Serialize};
+use super::{Excitation, OverCycles, Shape};
+use serde::Serialize;
 
 /// Which force the loop was drawn with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Force {
     /// The sum of the load cells as it is.
@@ -13,44 +13,8 @@ pub enum Force {
     Corrected,
 }
 
-/// What moved the contact.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Excitation {
-    /// A sine at one frequency.
-    Shaker,
-    /// A hammer hit: the first cycle of the decay.
-    Impact,
-}
-
-/// What the loop looks like, and so what its slope means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Shape {
-    /// A straight line: the slope is k_T.
-    Stuck,
-    /// An ellipse: force and displacement out of phase; the slope is k_eq only.
-    Elliptical,
-    /// Slightly open, steeper after reversal: part of the contact slides.
-    Microslip,
-    /// A plateau: the whole contact slides.
-    GrossSlip,
-}
-
-impl Shape {
-    /// The name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Shape::Stuck => "stuck",
-            Shape::Elliptical => "elliptical",
-            Shape::Microslip => "microslip",
-            Shape::GrossSlip => "gross-slip",
-        }
-    }
-}
-
 /// Loops of one kind, together.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Hysteresis {
     /// Which force.
     pub force: Force,
@@ -73,15 +37,15 @@ pub struct Hysteresis {
     /// Phase of T against Δx, degrees.
     pub phase_deg: Option<f64>,
     /// Ids of the records used, as closed ranges.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub records: Vec<[i64; 2]>,
     /// What a reader must know before using these numbers.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
 }
 
 /// One cycle, sample by sample: what the loop figure shows.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LoopCurve {
     /// The record it is from.
     pub record: i64,
@@ -92,10 +56,8 @@ pub struct LoopCurve {
     /// Relative displacement x_A − x_B, m.
     pub displacement_m: Vec<f64>,
     /// Displacement of specimen A, m.
-    #[serde(default)]
     pub displacement_a_m: Vec<f64>,
     /// Displacement of specimen B, m.
-    #[serde(default)]
     pub displacement_b_m: Vec<f64>,
     /// Sum of the load cells, N.
     pub force_n: Vec<f64>,
@@ -106,7 +68,7 @@ pub struct LoopCurve {
 }
 
 /// The slope that one impact gave.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ImpactSlope {
     /// The record.
     pub record: i64,

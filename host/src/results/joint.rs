@@ -1,11 +1,11 @@
 //! The joint by substructuring: numbers over bands, and the spectra they come from.
 
-use super::statistics::Statistics;
-use serde::{Deserialize, Serialize};
+use super::Statistics;
+use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// One method, one set of interface deformation modes, one band.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Joint {
     /// The method's name, as on the command line.
     pub method: String,
@@ -18,10 +18,10 @@ pub struct Joint {
     /// Damping of the translations by direction, N s/m.
     pub damping_n_s_per_m: BTreeMap<String, Statistics>,
     /// Stiffness of the rotations (`rx`, `ry`, `rz`), N m/rad.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub stiffness_n_m_per_rad: BTreeMap<String, Statistics>,
     /// Damping of the rotations, N m s/rad.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub damping_n_m_s_per_rad: BTreeMap<String, Statistics>,
     /// Lines of the band that were used.
     pub lines: usize,
@@ -37,7 +37,7 @@ impl Joint {
 }
 
 /// A method that could not be applied, and why.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Refusal {
     /// The method's name.
     pub method: String,
@@ -48,7 +48,7 @@ pub struct Refusal {
 }
 
 /// Stiffness and damping line by line.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct JointSpectrum {
     /// The lines, Hz.
     pub frequency_hz: Vec<f64>,
@@ -57,7 +57,7 @@ pub struct JointSpectrum {
 }
 
 /// One diagonal term of the joint over frequency.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SpectrumCurve {
     /// The method's name.
     pub method: String,

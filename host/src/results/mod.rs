@@ -4,6 +4,7 @@
 //! ([`crate::report`]) and the terminal summary ([`words`]) show it and add nothing. A value that is not
 //! known is null, never NaN. Every document carries its [`Source`]: file, record ids, settings, version.
 
+pub mod campaign;
 mod check;
 mod completeness;
 mod curves;
@@ -13,18 +14,18 @@ mod hysteresis;
 mod joint;
 pub mod number;
 mod source;
-mod statistics;
 pub mod words;
 
 pub use check::Check;
 pub use completeness::Completeness;
 pub use curves::{FrfCurve, Role, UsableBand, rounded};
-pub use hysteresis::{Excitation, Force, Hysteresis, ImpactSlope, LoopCurve, Shape};
+pub use hysteresis::{Force, Hysteresis, ImpactSlope, LoopCurve};
 pub use joint::{Joint, JointSpectrum, Refusal, SpectrumCurve};
 pub use source::{Software, Source, ranges};
-pub use statistics::{OverCycles, Statistics};
+pub use crate::hysteresis::{Kind as Excitation, OverCycles, Shape};
+pub use crate::substructuring::joint::BandStatistic as Statistics;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// The shape's version: 1.
 pub const VERSION: u32 = 1;
@@ -34,44 +35,41 @@ pub const MAIN_BAND_HZ: [f64; 2] = [300.0, 600.0];
 
 /// All that was found. The first six fields are the contract that scripts rely on; the others are there for
 /// the report and may grow.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Results {
     /// Version of this shape.
     pub version: u32,
     /// Where it comes from.
     pub source: Source,
     /// The joint by substructuring: method × IDM set × band.
-    #[serde(default)]
     pub joint: Vec<Joint>,
     /// The same line by line; absent where nothing was identified.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub joint_spectrum: Option<JointSpectrum>,
     /// The contact by loops.
-    #[serde(default)]
     pub hysteresis: Vec<Hysteresis>,
     /// Whether the numbers may be believed.
-    #[serde(default)]
     pub checks: Vec<Check>,
     /// Methods that were refused, with the reason.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub refused: Vec<Refusal>,
     /// What the analysis had to do without, in sentences.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<String>,
     /// Kept and refused hits per configuration.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub completeness: Vec<Completeness>,
     /// A few FRFs to look at.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub frfs: Vec<FrfCurve>,
     /// Where the hammer's force reaches.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub usable_bands: Vec<UsableBand>,
     /// One loop to look at.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub example_loop: Option<LoopCurve>,
     /// The slope of every impact that counts.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub impact_slopes: Vec<ImpactSlope>,
 }
 

@@ -81,15 +81,3 @@ fn no_value_is_other_than_a_number_and_the_file_stays_small() {
     let check = Check::new("x", None, "y").with("a", f64::NAN).with("b", 1.0);
     assert_eq!(check.values.len(), 1);
 }
-
-#[test]
-fn the_document_reads_back_as_it_was() {
-    let mut results = example::results();
-    // curves of arbitrary doubles may come back one unit in the last place away
-    results.joint_spectrum = None;
-    results.example_loop = None;
-    results.impact_slopes.clear();
-    results.frfs.clear();
-    let back: Results = serde_json::from_str(&results.to_json().expect("serialises")).expect("reads");
-    assert_eq!(back, results);
-}

@@ -1,10 +1,10 @@
 //! Where a result comes from: file, records, settings, software, link.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Provenance: enough to compute the same result again from the campaign file alone.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Source {
     /// The file analysed (its name, not the folder it happened to lie in).
     pub file: String,
@@ -13,24 +13,24 @@ pub struct Source {
     /// The software that computed this.
     pub software: Software,
     /// When the campaign was begun, as its file says, RFC 3339.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub started: Option<String>,
     /// The device as it named itself: name, firmware, schema.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub device: BTreeMap<String, String>,
     /// Settings of the analysis, by name with unit: windows, lines, virtual points.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub settings: BTreeMap<String, serde_json::Value>,
     /// Ids of the records used, per configuration, as closed ranges.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub records: BTreeMap<String, Vec<[i64; 2]>>,
     /// Counters of the link between device and host over the whole campaign.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub link: BTreeMap<String, u64>,
 }
 
 /// A program and its version.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Software {
     /// Its name.
     pub name: String,

@@ -51,6 +51,16 @@ pub fn method(name: &str) -> &str {
     }
 }
 
+/// A loop's shape by its name in files.
+pub fn shape_name(shape: Shape) -> &'static str {
+    match shape {
+        Shape::Stuck => "stuck",
+        Shape::Elliptical => "elliptical",
+        Shape::Microslip => "microslip",
+        Shape::GrossSlip => "gross-slip",
+    }
+}
+
 /// What a loop's shape means.
 pub fn shape(shape: Shape) -> &'static str {
     match shape {
