@@ -1,1 +1,3 @@
 //! campaign
+
+pub mod verdict;

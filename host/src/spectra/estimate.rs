@@ -1,10 +1,10 @@
 //! From impact records to averaged FRFs: where each hit begins, windows, spectra.
 
+use super::SpectraError;
 use super::average::{AveragedFrf, SpectraAverage};
 use super::pulse::Pulse;
 use super::records::ImpactRecords;
 use super::window::Windowing;
-use super::SpectraError;
 use serde::{Deserialize, Serialize};
 
 /// The origin t₀ of the windows.

@@ -11,7 +11,11 @@ const N: usize = 4096;
 fn record(start: usize, width: usize, delay: usize) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let force: Vec<f64> = (0..N)
         .map(|i| {
-            if (start..start + width).contains(&i) { 50.0 * (PI * (i - start) as f64 / width as f64).sin() } else { 0.0 }
+            if (start..start + width).contains(&i) {
+                50.0 * (PI * (i - start) as f64 / width as f64).sin()
+            } else {
+                0.0
+            }
         })
         .collect();
     let h: Vec<f64> = (0..N)
@@ -114,9 +118,9 @@ fn the_variance_formula_predicts_the_scatter() {
 
 /// Normal deviates from proptest's generator.
 mod rand_like {
-    use proptest::prelude::RngCore;
+    use proptest::prelude::Rng;
     pub(super) struct Gauss<R>(pub(super) R);
-    impl<R: RngCore> Gauss<R> {
+    impl<R: Rng> Gauss<R> {
         pub(super) fn next(&mut self) -> f64 {
             // twelve uniform deviates, variance one
             (0..12).map(|_| self.0.next_u32() as f64 / u32::MAX as f64).sum::<f64>() - 6.0

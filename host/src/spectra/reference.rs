@@ -57,7 +57,10 @@ fn default_processing_finds_the_exact_mobility() {
         // four deviations of the noise that the variance formula predicts for these three hits, complex; at the resonance
         // a thousandth of its height for what three hits cannot show of their noise
         let sigma = (2.0 * y.variance[line][0]).sqrt();
-        assert!(error < 4.0 * sigma + 1e-3 * y.h1[line][0].norm() + 1e-2 * scale, "{hz} Hz: {error:e} for {sigma:e}");
+        assert!(
+            error < 4.0 * sigma + 1e-3 * y.h1[line][0].norm() + 1e-2 * scale,
+            "{hz} Hz: {error:e} for {sigma:e}"
+        );
     }
     let band = usable_band(&y.frequency_hz, &y.s_ff, 6.0).expect("a hit");
     // half sines of 0.40…0.42 ms

@@ -85,7 +85,12 @@ mod tests {
 
     #[test]
     fn the_force_window_includes_its_ends() {
-        let w = Windowing { force_before_s: 0.001, force_after_s: 0.002, sigma_per_s: 0.0, ..Windowing::default() };
+        let w = Windowing {
+            force_before_s: 0.001,
+            force_after_s: 0.002,
+            sigma_per_s: 0.0,
+            ..Windowing::default()
+        };
         let kept = w.force(&[1.0; 10], 1000.0, 0.004);
         assert_eq!(kept, [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
     }

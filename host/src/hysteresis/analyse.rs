@@ -1,0 +1,208 @@
+//! The front door: a record in, its loop's figures out.
+
+use super::HysteresisError;
+use super::cycles::{Cycle, steady, synchronous_average};
+use super::impact::{DecayCycle, FIRST_CYCLES, decay, dominant_frequency};
+use super::loops::{
+    OverCycles, energy, equivalent_stiffness, fundamental_stiffness, secant_stiffness, swing,
+};
+use super::record::{HysteresisRecord, Relative};
+use super::shape::{Shape, ShapeEvidence, shape};
+use super::stick::{friction_limit, stick_stiffness, strokes};
+use num_complex::Complex;
+use serde::Serialize;
+
+/// How the contact was moved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// Steadily, at one frequency.
+    Shaker,
+    /// By one hit, decaying.
+    Impact,
+}
+
+/// All that a record's loops say. One loop of the shaker's kind is periodic; an impact's are those of its first cycles.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LoopAnalysis {
+    /// How it was moved.
+    pub kind: Kind,
+    /// Excitation frequency, or the dominant mode of the decay, Hz.
+    pub frequency_hz: f64,
+    /// Half the swing of Δx (averaged loop; first cycle of a decay), m.
+    pub amplitude_m: f64,
+    /// Half the swing of T in the same loop, N.
+    pub force_amplitude_n: f64,
+    /// The loop's shape.
+    pub shape: Shape,
+    /// What the shape was told from; none for a decay, where it is told from the frequency's fall at large amplitude.
+    pub shape_evidence: Option<ShapeEvidence>,
+    /// k_T: slope of the stick part, N/m. None for an ellipse.
+    pub k_t_n_per_m: Option<OverCycles>,
+    /// k_eq: least-squares slope over the whole loop, N/m.
+    pub k_eq_n_per_m: OverCycles,
+    /// Loop area per cycle, J. None for a decay, whose loops do not close.
+    pub energy_j: Option<OverCycles>,
+    /// Peak secant of the averaged loop, N/m.
+    pub k_secant_n_per_m: Option<f64>,
+    /// T₁/Δx₁ of the averaged loop, N/m (complex: real part, imaginary part).
+    pub k_fundamental_n_per_m: Option<Complex<f64>>,
+    /// μN from the plateau's median, N; only in gross slip.
+    pub friction_limit_n: Option<f64>,
+    /// μ; only with a known normal load.
+    pub friction_coefficient: Option<f64>,
+    /// Phase by which Δx lags T at the fundamental, degrees.
+    pub phase_deg: f64,
+    /// Δx of the loop to be drawn, m: the averaged cycle, or the first cycles of a decay.
+    pub loop_displacement_m: Vec<f64>,
+    /// T of the same points, N.
+    pub loop_force_n: Vec<f64>,
+    /// Every cycle of a decay; empty for a shaker.
+    pub decay_cycles: Vec<DecayCycle>,
+    /// What a reader must know.
+    pub warnings: Vec<String>,
+}
+
+/// A record without an excitation frequency is steady when its last quarter is this strong against its first.
+const STEADY: f64 = 0.7;
+
+/// A decay's frequency below this fraction of its later one is slip softening the joint: some of it, all of it.
+const SOFTENED: (f64, f64) = (0.9, 0.6);
+
+/// A line explaining less of T than this in the first cycles is no clean loop.
+const CLEAN_LINE: f64 = 0.95;
+
+/// Analyses a record. With an excitation frequency it is taken as a shaker record; without one it is a shaker record if the motion
+/// is steady, and an impact if it decays.
+///
+/// # Errors
+/// [`HysteresisError`] when the signals do not fit together, nothing moves, or there is no whole cycle.
+pub fn analyse(record: &HysteresisRecord) -> Result<LoopAnalysis, HysteresisError> {
+    record.check()?;
+    let motion = record.relative();
+    let frequency_hz = match record.excitation_hz {
+        Some(f) if f > 0.0 && f.is_finite() => Some(f),
+        Some(f) => return Err(HysteresisError::Excitation(f)),
+        None if is_steady(&record.force_n) => {
+            Some(dominant_frequency(&record.force_n, record.fs_hz).ok_or(HysteresisError::NoMotion)?)
+        }
+        None => None,
+    };
+    match frequency_hz {
+        Some(frequency_hz) => shaker(record, &motion, frequency_hz),
+        None => impact(record, &motion),
+    }
+}
+
+fn is_steady(force_n: &[f64]) -> bool {
+    let quarter = force_n.len() / 4;
+    let strength = |x: &[f64]| {
+        let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
+        x.iter().map(|v| (v - mean).powi(2)).sum::<f64>().sqrt()
+    };
+    quarter > 0 && strength(&force_n[3 * quarter..4 * quarter]) > STEADY * strength(&force_n[..quarter])
+}
+
+fn shaker(
+    record: &HysteresisRecord,
+    motion: &Relative,
+    frequency_hz: f64,
+) -> Result<LoopAnalysis, HysteresisError> {
+    let cycles = steady(motion, &record.force_n, record.fs_hz, frequency_hz)?;
+    let mean = synchronous_average(&cycles);
+    if swing(&mean.displacement_m) == 0.0 || swing(&mean.force_n) == 0.0 {
+        return Err(HysteresisError::NoMotion);
+    }
+    let over = |f: &dyn Fn(&Cycle) -> f64| OverCycles::of(&cycles.iter().map(f).collect::<Vec<_>>());
+    let (shape, evidence) = shape(&mean, &cycles);
+    let strokes = strokes(&mean);
+    let mut warnings = Vec::new();
+    let k_t = match shape {
+        Shape::Stuck => over(&equivalent_stiffness),
+        Shape::Elliptical => {
+            warnings.push(
+                "an ellipse without slip: something between the measured spots resonates near this frequency; its slope is no contact stiffness"
+                    .into(),
+            );
+            None
+        }
+        Shape::Microslip | Shape::GrossSlip => {
+            let values: Vec<f64> = cycles.iter().filter_map(|c| stick_stiffness(c, &strokes)).collect();
+            if values.len() < cycles.len() {
+                warnings.push(format!(
+                    "{} of {} cycles have too few samples on the stick part: sample faster, or excite more slowly",
+                    cycles.len() - values.len(),
+                    cycles.len()
+                ));
+            }
+            OverCycles::of(&values)
+        }
+    };
+    let friction_limit_n = if shape == Shape::GrossSlip { friction_limit(&mean, &strokes) } else { None };
+    Ok(LoopAnalysis {
+        kind: Kind::Shaker,
+        frequency_hz,
+        amplitude_m: 0.5 * swing(&mean.displacement_m),
+        force_amplitude_n: 0.5 * swing(&mean.force_n),
+        shape,
+        shape_evidence: Some(evidence),
+        k_t_n_per_m: k_t,
+        k_eq_n_per_m: over(&equivalent_stiffness).expect("steady() gives at least one cycle"),
+        energy_j: over(&energy),
+        k_secant_n_per_m: Some(secant_stiffness(&mean)),
+        k_fundamental_n_per_m: Some(fundamental_stiffness(&mean)),
+        friction_limit_n,
+        friction_coefficient: friction_limit_n.zip(record.normal_load_n).map(|(limit, load)| limit / load),
+        phase_deg: evidence.phase_deg,
+        loop_displacement_m: mean.displacement_m,
+        loop_force_n: mean.force_n,
+        decay_cycles: Vec::new(),
+        warnings,
+    })
+}
+
+fn impact(record: &HysteresisRecord, motion: &Relative) -> Result<LoopAnalysis, HysteresisError> {
+    let decay = decay(motion, &record.force_n, record.fs_hz)?;
+    let used = &decay.cycles[..FIRST_CYCLES.min(decay.cycles.len())];
+    let slopes: Vec<f64> = used.iter().map(|c| c.stiffness_n_per_m).collect();
+    let k = OverCycles::of(&slopes).expect("decay() gives at least one cycle");
+    let (from, to) = (used[0].first_sample, used[used.len() - 1].end_sample);
+    let ratio = used[0].frequency_hz / decay.frequency_hz;
+    let shape = if ratio < SOFTENED.1 {
+        Shape::GrossSlip
+    } else if ratio < SOFTENED.0 {
+        Shape::Microslip
+    } else {
+        Shape::Stuck
+    };
+    let mut warnings = vec![
+        "slope over the first cycles of a decay: every mode that the hit excites is in it, so it is not the contact's stiffness alone".to_string(),
+    ];
+    let worst = used.iter().map(|c| c.r_squared).fold(1.0, f64::min);
+    if worst < CLEAN_LINE {
+        warnings.push(format!(
+            "a straight line explains only {:.0} % of T in the first cycles: local modes open the loop",
+            100.0 * worst
+        ));
+    }
+    Ok(LoopAnalysis {
+        kind: Kind::Impact,
+        frequency_hz: decay.frequency_hz,
+        amplitude_m: used[0].amplitude_m,
+        force_amplitude_n: 0.5 * swing(&record.force_n[used[0].first_sample..used[0].end_sample]),
+        shape,
+        shape_evidence: None,
+        k_t_n_per_m: (shape == Shape::Stuck).then_some(k),
+        k_eq_n_per_m: k,
+        energy_j: None,
+        k_secant_n_per_m: None,
+        k_fundamental_n_per_m: None,
+        friction_limit_n: None,
+        friction_coefficient: None,
+        phase_deg: decay.phase_deg,
+        loop_displacement_m: decay.displacement_m[from..to].to_vec(),
+        loop_force_n: record.force_n[from..to].to_vec(),
+        decay_cycles: decay.cycles,
+        warnings,
+    })
+}

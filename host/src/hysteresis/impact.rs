@@ -1,0 +1,142 @@
+//! Loops of the decay after an impact.
+//!
+//! The record is cut into cycles of the dominant mode from the onset of motion on; each gives the least-squares slope of T on Δx.
+//! The first cycles carry the largest amplitude and all modes at once: their slope is what a first-cycle loop shows, not the contact's
+//! stiffness, and is reported as such.
+
+use super::HysteresisError;
+use super::integration::open_record;
+use super::loops::{slope, swing};
+use super::record::Relative;
+use num_complex::Complex;
+use realfft::RealFftPlanner;
+use serde::Serialize;
+use std::f64::consts::TAU;
+
+/// The cycles whose slopes make the record's k: the first two, still well above noise and beyond the pulse itself.
+pub(super) const FIRST_CYCLES: usize = 2;
+
+/// One cycle of the decay.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DecayCycle {
+    /// First sample of the record that belongs to it.
+    pub first_sample: usize,
+    /// First sample after it.
+    pub end_sample: usize,
+    /// Least-squares slope of T on Δx, N/m.
+    pub stiffness_n_per_m: f64,
+    /// Coefficient of determination of that line.
+    pub r_squared: f64,
+    /// Half the swing of Δx, m.
+    pub amplitude_m: f64,
+    /// Frequency of the dominant mode in this cycle, Hz (phase advance of T to the next cycle).
+    pub frequency_hz: f64,
+}
+
+/// The decay, cut into cycles.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Decay {
+    pub(super) frequency_hz: f64,
+    pub(super) cycles: Vec<DecayCycle>,
+    pub(super) displacement_m: Vec<f64>,
+    /// Phase by which Δx lags T at the mode over the first cycles, degrees.
+    pub(super) phase_deg: f64,
+}
+
+/// Cuts a decaying record.
+///
+/// # Errors
+/// When nothing moves, or not one cycle of the dominant mode follows the onset.
+pub(super) fn decay(motion: &Relative, force_n: &[f64], fs_hz: f64) -> Result<Decay, HysteresisError> {
+    let signal = match motion {
+        Relative::Velocity(v) | Relative::Displacement(v) => v,
+    };
+    let start = onset(signal).min(onset(force_n));
+    let frequency_hz = dominant_frequency(&force_n[start..], fs_hz).ok_or(HysteresisError::NoMotion)?;
+    let period = fs_hz / frequency_hz;
+    let whole = ((force_n.len() - start) as f64 / period).floor() as usize;
+    if whole == 0 {
+        return Err(HysteresisError::NoCycle {
+            frequency_hz,
+            samples: force_n.len() - start,
+            points: period as usize,
+        });
+    }
+    let displacement_m = match motion {
+        Relative::Velocity(v) => {
+            // A stuck contact returns to where it was: over whole cycles to the end, mean velocity is the sensor's offset.
+            let until = start + (whole as f64 * period) as usize;
+            let offset = v[start..until].iter().sum::<f64>() / (until - start) as f64;
+            open_record(v, offset, 1.0 / fs_hz)
+        }
+        Relative::Displacement(x) => x.clone(),
+    };
+    let edges: Vec<usize> = (0..=whole).map(|c| start + (c as f64 * period).round() as usize).collect();
+    let tone = |x: &[f64], from: usize, to: usize| -> Complex<f64> {
+        let mean = x[from..to].iter().sum::<f64>() / (to - from) as f64;
+        (from..to)
+            .map(|i| (x[i] - mean) * Complex::from_polar(1.0, -TAU * frequency_hz * i as f64 / fs_hz))
+            .sum()
+    };
+    let tones: Vec<Complex<f64>> = edges.windows(2).map(|e| tone(force_n, e[0], e[1])).collect();
+    let cycles = edges
+        .windows(2)
+        .enumerate()
+        .map(|(c, e)| {
+            let (x, t) = (&displacement_m[e[0]..e[1]], &force_n[e[0]..e[1]]);
+            let stiffness_n_per_m = slope(x, t);
+            let advance = tones.get(c + 1).map_or(0.0, |next| (next / tones[c]).arg());
+            DecayCycle {
+                first_sample: e[0],
+                end_sample: e[1],
+                stiffness_n_per_m,
+                r_squared: stiffness_n_per_m * slope(t, x),
+                amplitude_m: 0.5 * swing(x),
+                frequency_hz: frequency_hz * (1.0 + advance / TAU),
+            }
+        })
+        .collect();
+    let end = edges[FIRST_CYCLES.min(whole)];
+    let phase_deg = (tone(force_n, start, end) / tone(&displacement_m, start, end)).arg().to_degrees();
+    Ok(Decay { frequency_hz, cycles, displacement_m, phase_deg })
+}
+
+/// First sample that stands out: 5 % of the largest deviation, or six times the white noise, whichever is more.
+fn onset(x: &[f64]) -> usize {
+    let mut tail: Vec<f64> = x[x.len() - x.len() / 4 - 1..].to_vec();
+    tail.sort_by(f64::total_cmp);
+    let rest = tail[tail.len() / 2];
+    let mut second: Vec<f64> = x.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
+    second.sort_by(f64::total_cmp);
+    // second differences of white noise have √6 times its rms, their median 0.6745 of that
+    let noise = second.get(second.len() / 2).copied().unwrap_or(0.0) / 0.6745 / 6f64.sqrt();
+    let largest = x.iter().map(|v| (v - rest).abs()).fold(0.0, f64::max);
+    let limit = (0.05 * largest).max(6.0 * noise).min(0.5 * largest);
+    x.iter().position(|v| (v - rest).abs() >= limit).unwrap_or(0)
+}
+
+/// The strongest frequency (Hz) above two periods of the record, from a Hann-windowed spectrum with parabolic refinement.
+pub(super) fn dominant_frequency(x: &[f64], fs_hz: f64) -> Option<f64> {
+    let n = x.len();
+    if n < 32 {
+        return None;
+    }
+    let mean = x.iter().sum::<f64>() / n as f64;
+    let mut windowed: Vec<f64> = x
+        .iter()
+        .enumerate()
+        .map(|(i, v)| (v - mean) * (0.5 - 0.5 * (TAU * (i as f64 + 0.5) / n as f64).cos()))
+        .collect();
+    let fft = RealFftPlanner::new().plan_fft_forward(n);
+    let mut spectrum = fft.make_output_vec();
+    fft.process(&mut windowed, &mut spectrum).ok()?;
+    let level: Vec<f64> = spectrum.iter().map(|v| v.norm_sqr().max(f64::MIN_POSITIVE).ln()).collect();
+    let top = (2..level.len() - 1).max_by(|&a, &b| level[a].total_cmp(&level[b]))?;
+    if spectrum[top].norm_sqr() <= f64::MIN_POSITIVE {
+        return None;
+    }
+    let (l, m, r) = (level[top - 1], level[top], level[top + 1]);
+    let bend = l - 2.0 * m + r;
+    let shift = if bend < 0.0 { (0.5 * (l - r) / bend).clamp(-0.5, 0.5) } else { 0.0 };
+    Some((top as f64 + shift) * fs_hz / n as f64)
+}

@@ -1,0 +1,105 @@
+//! What kind of loop it is: a straight line, an ellipse, microslip, gross slip.
+//!
+//! A stuck contact beside whatever linear structure gives T = k Δx + c Δẋ at every harmonic: a line, or an ellipse when something
+//! between the measured spots resonates. Slip does not: its loop has corners. So the residual of that two-parameter fit tells
+//! slip from ellipse, against the noise seen from cycle to cycle; the phase tells ellipse from line; the final tangent
+//! tells gross slip from microslip.
+
+use super::cycles::Cycle;
+use super::loops::fundamental_stiffness;
+use super::stick::{final_tangent, stick_stiffness, strokes};
+use serde::Serialize;
+
+/// The shape of a loop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Shape {
+    /// A straight line: the contact sticks, and k_eq is k_T.
+    Stuck,
+    /// An ellipse without slip: a resonance hidden between the measured spots. It has no k_T.
+    Elliptical,
+    /// Part of the contact slips.
+    Microslip,
+    /// All of it slips: the force has reached a plateau.
+    GrossSlip,
+}
+
+/// The figures the shape was told from.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ShapeEvidence {
+    /// rms residual of T = k Δx + c Δẋ on the averaged loop, over the rms of T.
+    pub nonlinearity: f64,
+    /// The part of `nonlinearity` that noise explains, from the scatter between cycles.
+    pub nonlinearity_noise: f64,
+    /// Phase by which Δx lags T at the fundamental, degrees.
+    pub phase_deg: f64,
+    /// Tangent at the end of the strokes over the stiffness after the reversal.
+    pub final_tangent: f64,
+}
+
+/// Below this a residual may be the instruments' linearity.
+const NONLINEAR: f64 = 0.01;
+
+/// Noise is exceeded by this factor before it counts as slip.
+const SIGNIFICANT: f64 = 4.0;
+
+/// A joint's own damping gives a few degrees of phase (1 % of loss per 0.6°); a resonance between the spots gives tens.
+const ELLIPSE_DEG: f64 = 10.0;
+
+/// On a plateau the tangent is nearly nothing of the initial one.
+const PLATEAU: f64 = 0.05;
+
+/// Tells the shape from the averaged loop and its cycles.
+pub(super) fn shape(mean: &Cycle, cycles: &[Cycle]) -> (Shape, ShapeEvidence) {
+    let (k, c) = linear_fit(mean);
+    let residual = |cycle: &Cycle| -> Vec<f64> {
+        (0..cycle.force_n.len())
+            .map(|i| cycle.force_n[i] - k * cycle.displacement_m[i] - c * cycle.velocity_m_per_s[i])
+            .collect()
+    };
+    let of_mean = residual(mean);
+    let force = rms(&mean.force_n);
+    let scatter = cycles.iter().map(|cycle| {
+        let own = residual(cycle);
+        own.iter().zip(&of_mean).map(|(o, m)| (o - m).powi(2)).sum::<f64>() / own.len() as f64
+    });
+    // the mean of n cycles holds 1/n of their variance; the scatter about that mean only (n − 1)/n of it
+    let n = cycles.len() as f64;
+    let variance = scatter.sum::<f64>() / n;
+    let nonlinearity_noise = (variance / (n - 1.0).max(1.0)).sqrt() / force;
+    let strokes = strokes(mean);
+    let initial = stick_stiffness(mean, &strokes).unwrap_or(k);
+    let evidence = ShapeEvidence {
+        nonlinearity: rms(&of_mean) / force,
+        nonlinearity_noise,
+        phase_deg: fundamental_stiffness(mean).arg().to_degrees(),
+        final_tangent: final_tangent(mean, &strokes, initial),
+    };
+    let shape = if evidence.nonlinearity > NONLINEAR.max(SIGNIFICANT * nonlinearity_noise) {
+        if evidence.final_tangent < PLATEAU { Shape::GrossSlip } else { Shape::Microslip }
+    } else if evidence.phase_deg.abs() > ELLIPSE_DEG {
+        Shape::Elliptical
+    } else {
+        Shape::Stuck
+    };
+    (shape, evidence)
+}
+
+/// k and c of T = k Δx + c Δẋ by least squares.
+fn linear_fit(cycle: &Cycle) -> (f64, f64) {
+    let (mut xx, mut vv, mut xv, mut xt, mut vt) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for i in 0..cycle.force_n.len() {
+        let (x, v, t) = (cycle.displacement_m[i], cycle.velocity_m_per_s[i], cycle.force_n[i]);
+        xx += x * x;
+        vv += v * v;
+        xv += x * v;
+        xt += x * t;
+        vt += v * t;
+    }
+    let determinant = xx * vv - xv * xv;
+    ((xt * vv - vt * xv) / determinant, (vt * xx - xt * xv) / determinant)
+}
+
+fn rms(x: &[f64]) -> f64 {
+    (x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64).sqrt()
+}

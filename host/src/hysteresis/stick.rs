@@ -1,0 +1,99 @@
+//! The stick part of a slipping loop, and its plateau.
+//!
+//! After each reversal the whole contact sticks again. The part used for k_T is chosen by *force*: up to a fifth of the swing from
+//! one reversal to the next. Chosen by displacement, or up to half the swing, microslip is in it already (132 for 143.7 N/µm on an
+//! Iwan contact).
+
+use super::cycles::Cycle;
+use super::loops::slope;
+
+/// The stick part ends at this fraction of the force's swing after a reversal.
+const STICK_END: f64 = 0.20;
+
+/// The first samples after a reversal hardly move: their displacement is noise of the integration.
+const STICK_START: f64 = 0.02;
+
+/// Fewer samples on both branches make no slope.
+const FEWEST_SAMPLES: usize = 6;
+
+/// The plateau begins where the force first reaches this fraction of its swing.
+const PLATEAU_START: f64 = 0.98;
+
+/// The last part of each stroke by displacement in which the final tangent is taken.
+const STROKE_END: f64 = 0.15;
+
+/// One stroke from a reversal to the next: indices into the cycle, in order, wrapping around.
+type Stroke = Vec<usize>;
+
+/// The two strokes of a loop, split at the extremes of `guide`'s displacement (the averaged loop, so that single cycles are all split
+/// alike and their noise does not move the reversal).
+pub(super) fn strokes(guide: &Cycle) -> [Stroke; 2] {
+    let x = &guide.displacement_m;
+    let extreme =
+        |sign: f64| (0..x.len()).max_by(|&a, &b| (sign * x[a]).total_cmp(&(sign * x[b]))).unwrap_or(0);
+    let (top, bottom) = (extreme(1.0), extreme(-1.0));
+    let run = |from: usize, to: usize| {
+        let n = x.len();
+        (0..=(to + n - from) % n).map(|i| (from + i) % n).collect()
+    };
+    [run(top, bottom), run(bottom, top)]
+}
+
+/// How far the force has gone of its swing over the stroke, 0…1, for each of the stroke's samples.
+fn progress(cycle: &Cycle, stroke: &Stroke) -> Vec<f64> {
+    let (Some(&first), Some(&last)) = (stroke.first(), stroke.last()) else { return vec![] };
+    let (from, to) = (cycle.force_n[first], cycle.force_n[last]);
+    stroke.iter().map(|&i| (cycle.force_n[i] - from) / (to - from)).collect()
+}
+
+/// k_T: pooled least-squares slope of T on Δx over the stick parts of both strokes, N/m. None when too few samples lie in them.
+pub(super) fn stick_stiffness(cycle: &Cycle, strokes: &[Stroke; 2]) -> Option<f64> {
+    let (mut xs, mut ts) = (Vec::new(), Vec::new());
+    for stroke in strokes {
+        let (mut x, mut t): (Vec<f64>, Vec<f64>) = stroke
+            .iter()
+            .zip(progress(cycle, stroke))
+            .take_while(|(_, p)| *p < STICK_END)
+            .filter(|(_, p)| *p >= STICK_START)
+            .map(|(&i, _)| (cycle.displacement_m[i], cycle.force_n[i]))
+            .unzip();
+        // each stroke has an intercept of its own
+        for values in [&mut x, &mut t] {
+            let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+            values.iter_mut().for_each(|v| *v -= mean);
+        }
+        xs.extend(x);
+        ts.extend(t);
+    }
+    (xs.len() >= FEWEST_SAMPLES).then(|| slope(&xs, &ts))
+}
+
+/// The tangent at the end of the strokes over `stiffness`: 0 on a plateau, 1 on a straight line.
+pub(super) fn final_tangent(cycle: &Cycle, strokes: &[Stroke; 2], stiffness: f64) -> f64 {
+    let tangents = strokes.iter().filter_map(|stroke| {
+        let (first, last) = (*stroke.first()?, *stroke.last()?);
+        let (from, to) = (cycle.displacement_m[first], cycle.displacement_m[last]);
+        let (x, t): (Vec<f64>, Vec<f64>) = stroke
+            .iter()
+            .filter(|&&i| (cycle.displacement_m[i] - from) / (to - from) > 1.0 - STROKE_END)
+            .map(|&i| (cycle.displacement_m[i], cycle.force_n[i]))
+            .unzip();
+        (x.len() >= 3).then(|| slope(&x, &t))
+    });
+    let tangents: Vec<f64> = tangents.collect();
+    tangents.iter().sum::<f64>() / tangents.len().max(1) as f64 / stiffness
+}
+
+/// The friction limit μN, N: half the distance between the plateaus' medians. The median, not the peak: load cells ring when a
+/// contact lets go (241 N for 180 N).
+pub(super) fn friction_limit(cycle: &Cycle, strokes: &[Stroke; 2]) -> Option<f64> {
+    let mut levels = strokes.iter().map(|stroke| {
+        let progress = progress(cycle, stroke);
+        let start = progress.iter().position(|p| *p >= PLATEAU_START)?;
+        let mut plateau: Vec<f64> = stroke[start..].iter().map(|&i| cycle.force_n[i]).collect();
+        plateau.sort_by(f64::total_cmp);
+        plateau.get(plateau.len() / 2).copied()
+    });
+    let (down, up) = (levels.next()??, levels.next()??);
+    Some(0.5 * (up - down).abs())
+}

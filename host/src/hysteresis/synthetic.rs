@@ -1,0 +1,141 @@
+//! Closed forms: Jenkins and Iwan contacts of any amplitude, straight lines, damped ellipses, periods of no whole number of samples.
+
+use super::*;
+use proptest::prelude::*;
+use std::f64::consts::TAU;
+
+const FS: f64 = 51_200.0;
+
+/// Parallel Jenkins elements (stiffness N/m, limit N) under Δx = X sin ωt; velocities of A, B at rest.
+fn record(elements: &[(f64, f64)], amplitude_m: f64, frequency_hz: f64, damping: f64) -> HysteresisRecord {
+    let w = TAU * frequency_hz;
+    let n = (8.3 * FS / frequency_hz) as usize;
+    let mut sliders = vec![0.0; elements.len()];
+    let mut force = Vec::new();
+    let mut velocity = Vec::new();
+    // one cycle ahead, so that the record starts steady
+    let ahead = (FS / frequency_hz).ceil() as i64;
+    for i in -ahead..n as i64 {
+        let t = i as f64 / FS;
+        let x = amplitude_m * (w * t).sin();
+        let mut total = damping * amplitude_m * w * (w * t).cos();
+        for (slider, &(k, limit)) in sliders.iter_mut().zip(elements) {
+            let f = (k * (x - *slider)).clamp(-limit, limit);
+            *slider = x - f / k;
+            total += f;
+        }
+        if i >= 0 {
+            force.push(total);
+            velocity.push(amplitude_m * w * (w * t).cos());
+        }
+    }
+    HysteresisRecord {
+        fs_hz: FS,
+        motion: RelativeMotion::Velocity { b_m_per_s: vec![2e-6; velocity.len()], a_m_per_s: velocity },
+        force_n: force,
+        excitation_hz: Some(frequency_hz),
+        normal_load_n: Some(300.0),
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, rng_seed: proptest::test_runner::RngSeed::Fixed(22), ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_jenkins_contact_in_gross_slip(k in 50e6..300e6f64, limit in 60.0..300.0f64, over in 2.0..6.0f64, f in 47.0..130.0f64) {
+        let amplitude = over * limit / k;
+        let got = analyse(&record(&[(k, limit)], amplitude, f, 0.0)).expect("a loop");
+        prop_assert_eq!(got.shape, Shape::GrossSlip);
+        // corners fall between samples: some 400 to a cycle
+        let k_t = got.k_t_n_per_m.expect("a stick part").mean;
+        prop_assert!((k_t / k - 1.0).abs() < 0.01, "{} for {}", k_t, k);
+        let energy = 4.0 * limit * (amplitude - limit / k);
+        prop_assert!((got.energy_j.expect("closed").mean / energy - 1.0).abs() < 0.01);
+        prop_assert!((got.friction_limit_n.expect("a plateau") / limit - 1.0).abs() < 0.01);
+        prop_assert!((got.friction_coefficient.expect("a load") - limit / 300.0).abs() < 0.01);
+        prop_assert!((got.k_secant_n_per_m.expect("a swing") / (limit / amplitude) - 1.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn a_spring_and_damper_is_stuck_or_an_ellipse_and_never_slip(k in 50e6..300e6f64, loss in -0.8..0.8f64, f in 47.0..500.0f64) {
+        let damping = loss * k / (TAU * f);
+        let got = analyse(&record(&[(k, 1e9)], 1e-7, f, damping)).expect("a loop");
+        let phase = loss.atan().to_degrees();
+        prop_assume!((phase.abs() - 10.0).abs() > 0.5);
+        prop_assert_eq!(got.shape, if phase.abs() > 10.0 { Shape::Elliptical } else { Shape::Stuck });
+        // the trapezoid loses (ω dt)² / 12 of a hundred samples to a cycle, interpolation as much again
+        prop_assert!((got.k_eq_n_per_m.mean / k - 1.0).abs() < 2e-3);
+        prop_assert!((got.phase_deg - phase).abs() < 0.2);
+        prop_assert_eq!(got.k_t_n_per_m.is_some(), got.shape == Shape::Stuck);
+    }
+}
+
+/// An Iwan contact of 40 elements: part of it slips at small amplitude, all of it at large.
+#[test]
+fn microslip_lies_between_stuck_and_gross_slip() {
+    let elements: Vec<(f64, f64)> = (0..40).map(|i| (4e6, 0.25 + 7.0 * i as f64 / 39.0)).collect();
+    let k: f64 = elements.iter().map(|e| e.0).sum();
+    for (amplitude, shape) in [
+        (0.05e-6, Shape::Stuck),
+        (0.6e-6, Shape::Microslip),
+        (1.2e-6, Shape::Microslip),
+        (6e-6, Shape::GrossSlip),
+    ] {
+        let got = analyse(&record(&elements, amplitude, 80.0, 0.0)).expect("a loop");
+        assert_eq!(got.shape, shape, "{amplitude}: {:?}", got.shape_evidence);
+        // a fifth of the swing already holds some microslip
+        let k_t = got.k_t_n_per_m.expect("a stick part").mean;
+        assert!((k_t / k - 1.0).abs() < 0.1, "{amplitude}: {k_t} for {k}");
+    }
+}
+
+#[test]
+fn displacements_serve_as_well_as_velocities_and_a_steady_record_needs_no_frequency() {
+    let mut one = record(&[(180e6, 150.0)], 4e-6, 80.0, 0.0);
+    let by_velocity = analyse(&one).expect("a loop");
+    let x: Vec<f64> =
+        (0..one.force_n.len()).map(|i| 4e-6 * (TAU * 80.0 * i as f64 / FS).sin() + 1e-3).collect();
+    one.motion = RelativeMotion::Displacement { b_m: vec![0.0; x.len()], a_m: x };
+    one.excitation_hz = None;
+    let got = analyse(&one).expect("a loop");
+    assert_eq!(got.kind, Kind::Shaker);
+    // eight cycles give the frequency to a thousandth or so
+    assert!((got.frequency_hz / 80.0 - 1.0).abs() < 5e-3, "{}", got.frequency_hz);
+    assert!((got.k_eq_n_per_m.mean / by_velocity.k_eq_n_per_m.mean - 1.0).abs() < 0.03);
+}
+
+#[test]
+fn broken_records_are_refused_with_the_reason() {
+    let good = record(&[(180e6, 150.0)], 4e-6, 80.0, 0.0);
+    let refuse = |edit: &dyn Fn(&mut HysteresisRecord)| {
+        let mut record = good.clone();
+        edit(&mut record);
+        analyse(&record).expect_err("broken")
+    };
+    assert!(matches!(
+        refuse(&|r| {
+            r.force_n.pop();
+        }),
+        HysteresisError::Lengths { .. }
+    ));
+    assert!(matches!(refuse(&|r| r.force_n[7] = f64::NAN), HysteresisError::NotFinite { sample: 7 }));
+    assert!(matches!(refuse(&|r| r.excitation_hz = Some(2.0)), HysteresisError::NoCycle { .. }));
+    assert!(matches!(refuse(&|r| r.excitation_hz = Some(-2.0)), HysteresisError::Excitation(_)));
+    let empty = RelativeMotion::Displacement { a_m: vec![], b_m: vec![] };
+    assert!(matches!(
+        refuse(&|r| {
+            r.motion = empty.clone();
+            r.force_n.clear();
+            r.excitation_hz = None;
+        }),
+        HysteresisError::TooShort { samples: 0 }
+    ));
+    assert!(matches!(refuse(&|r| r.force_n.fill(1.0)), HysteresisError::NoMotion));
+    assert!(matches!(
+        refuse(&|r| {
+            r.force_n.fill(1.0);
+            r.excitation_hz = None;
+        }),
+        HysteresisError::NoMotion
+    ));
+}
