@@ -1,1 +1,21 @@
-//! device
+//! Devices: addresses, byte transports, sessions, and the records cut from their streams.
+//!
+//! [`address::Address`] opens a [`transport::Transport`]; [`session::Session`] speaks the protocol over it and
+//! puts the stream of scans together again, whatever the link loses; [`recording::Recording`] is one
+//! impact cut from it.
+
+pub mod address;
+pub mod channels;
+pub mod error;
+#[cfg(test)]
+pub(crate) mod fake;
+pub mod faulty;
+mod inbox;
+pub mod link;
+pub mod recording;
+mod requests;
+mod serial;
+pub mod session;
+pub mod stream;
+mod tcp;
+pub mod transport;

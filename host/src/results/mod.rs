@@ -16,6 +16,7 @@ pub mod number;
 mod source;
 pub mod words;
 
+pub use campaign::{AnalyseError, Progress, analyse};
 pub use check::Check;
 pub use completeness::Completeness;
 pub use curves::{FrfCurve, Role, UsableBand, rounded};

@@ -79,6 +79,11 @@ pub trait Measurements: Sync {
     /// The plan's cells.
     fn cells(&self) -> Vec<CellName>;
 
+    /// Cells that were given up, with the reason.
+    fn given_up(&self) -> Vec<(CellName, String)> {
+        Vec::new()
+    }
+
     /// The kept hits of a cell; none if it was not measured.
     ///
     /// # Errors

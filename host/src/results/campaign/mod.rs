@@ -10,6 +10,7 @@ mod cell;
 mod checks;
 mod chosen;
 mod contact;
+mod from_store;
 mod joint;
 mod loops;
 #[cfg(test)]
@@ -17,6 +18,7 @@ mod synthetic;
 
 pub use cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, Measurements};
 pub use checks::{HIDDEN_RESONANCE, SERIES_COMPLIANCE};
+pub use from_store::{AnalyseError, LINK_NOTE, analyse, geometry};
 pub use joint::shaped;
 
 use super::{Completeness, MAIN_BAND_HZ, Results, UsableBand, ranges, words};
@@ -58,7 +60,7 @@ struct CellOutcome {
 }
 
 /// Fills `results` (which has its source already) from the measurements.
-pub fn analyse<M: Measurements>(
+pub fn analyse_measurements<M: Measurements>(
     measurements: &M,
     mut results: Results,
     progress: &(dyn Fn(Progress) + Sync),
@@ -82,6 +84,9 @@ pub fn analyse<M: Measurements>(
         impact_loops.extend(outcome.loops);
         results.missing.extend(outcome.complaint);
     }
+    results.missing.extend(measurements.given_up().into_iter().map(|(cell, reason)| {
+        format!("{}: cell {} × {} was given up: {reason}.", cell.configuration, cell.impact, cell.response)
+    }));
     note_settings(&mut results, sigma);
     let mut frfs: [Option<FrfMatrix>; 3] = [None, None, None];
     for (place, (name, points)) in configurations(geometry).into_iter().enumerate() {

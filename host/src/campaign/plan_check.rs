@@ -1,0 +1,146 @@
+//! What a plan must hold beyond its grammar.
+
+use std::collections::HashSet;
+
+use jointrig_protocol::limits::{ARM_VALID_CAP_MS, COIL_PULSE_CAP_US, NAME_BYTES};
+use toml::Spanned;
+
+use super::plan::{Plan, configuration_named};
+
+/// Where in the text something is wrong, and what.
+type Wrong = (usize, String);
+
+impl Plan {
+    pub(super) fn check(&self) -> Result<(), Wrong> {
+        let require =
+            |good: bool, at: usize, what: &str| if good { Ok(()) } else { Err((at, what.to_owned())) };
+        require(
+            *self.version.get_ref() == 1,
+            self.version.span().start,
+            "version: this program reads version 1",
+        )?;
+        let (record, at) = (self.record.get_ref(), self.record.span().start);
+        require((1..=1_000_000).contains(&record.rate_hz), at, "record.rate_hz must be 1 to 1000000")?;
+        require(
+            record.length_s > 0.0 && record.length_s <= 60.0,
+            at,
+            "record.length_s must be over 0 and at most 60",
+        )?;
+        require(record.pre_trigger_scans <= 10_000, at, "record.pre_trigger_scans must be at most 10000")?;
+        let (hits, at) = (self.hits.get_ref(), self.hits.span().start);
+        require(hits.wanted > 0, at, "hits.wanted must be at least 1")?;
+        require(
+            hits.minimum <= hits.wanted && hits.wanted <= hits.most,
+            at,
+            "hits: minimum <= wanted <= most must hold",
+        )?;
+        let (force, at) = (self.force.get_ref(), self.force.span().start);
+        require(force.target_n > 0.0, at, "force.target_n must be over 0")?;
+        require(
+            force.tolerance > 0.0 && force.tolerance < 1.0,
+            at,
+            "force.tolerance must lie between 0 and 1",
+        )?;
+        let [shortest, longest] = force.pulse_bounds_us;
+        require(
+            shortest > 0
+                && shortest <= force.pulse_us
+                && force.pulse_us <= longest
+                && longest <= COIL_PULSE_CAP_US,
+            at,
+            "force: 0 < pulse_bounds_us[0] <= pulse_us <= pulse_bounds_us[1] <= 8000 must hold",
+        )?;
+        let (trigger, at) = (self.trigger.get_ref(), self.trigger.span().start);
+        let bounded = |value: f64| (0.0..=1.0).contains(&value);
+        require(trigger.level_n > 0.0, at, "trigger.level_n must be over 0")?;
+        require(
+            bounded(trigger.flight_s) && bounded(trigger.listen_s) && bounded(trigger.hold_off_s),
+            at,
+            "trigger: flight_s, listen_s and hold_off_s must lie between 0 and 1",
+        )?;
+        let (settle, at) = (self.settle.get_ref(), self.settle.span().start);
+        require(
+            settle.bound_s > 0.0 && settle.bound_s < f64::from(ARM_VALID_CAP_MS) / 1000.0 - 5.0,
+            at,
+            "settle.bound_s must lie between 0 and 55",
+        )?;
+        self.check_geometry()?;
+        self.check_configurations()
+    }
+
+    fn check_geometry(&self) -> Result<(), Wrong> {
+        let mut seen = HashSet::new();
+        let responses = self
+            .geometry
+            .response
+            .iter()
+            .map(|point| (point.span().start, &point.get_ref().name, point.get_ref().grouping));
+        let impacts = self
+            .geometry
+            .impact
+            .iter()
+            .map(|point| (point.span().start, &point.get_ref().name, point.get_ref().grouping));
+        for (at, name, grouping) in responses.chain(impacts) {
+            if name.is_empty() || name.len() > NAME_BYTES {
+                return Err((at, format!("geometry: name `{name}` must have 1 to {NAME_BYTES} bytes")));
+            }
+            if !(1..=4).contains(&grouping) {
+                return Err((at, format!("geometry: grouping of `{name}` must be 1 to 4")));
+            }
+            if !seen.insert(name) {
+                return Err((at, format!("geometry: the name `{name}` stands twice")));
+            }
+        }
+        for point in &self.geometry.impact {
+            let [x, y, z] = point.get_ref().direction;
+            if ((x * x + y * y + z * z).sqrt() - 1.0).abs() > 1e-3 {
+                let name = &point.get_ref().name;
+                return Err((
+                    point.span().start,
+                    format!("geometry: direction of `{name}` must have length 1"),
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_configurations(&self) -> Result<(), Wrong> {
+        if self.configuration.is_empty() {
+            return Err((0, "configuration: there must be at least one".into()));
+        }
+        let mut seen = HashSet::new();
+        for structure in &self.configuration {
+            let (name, at) = (structure.name.get_ref(), structure.name.span().start);
+            if configuration_named(name).is_none() {
+                return Err((at, format!("configuration.name `{name}` must be A, B or AJB")));
+            }
+            if !seen.insert(name) {
+                return Err((at, format!("configuration `{name}` stands twice")));
+            }
+            if structure.impacts.is_empty() || structure.responses.is_empty() {
+                return Err((at, format!("configuration `{name}` needs impacts and responses")));
+            }
+            let known: HashSet<&str> =
+                self.geometry.impact.iter().map(|point| &*point.get_ref().name).collect();
+            check_names(&structure.impacts, &known, "impacts")?;
+            let known: HashSet<&str> =
+                self.geometry.response.iter().map(|point| &*point.get_ref().name).collect();
+            check_names(&structure.responses, &known, "responses")?;
+        }
+        Ok(())
+    }
+}
+
+fn check_names(names: &[Spanned<String>], known: &HashSet<&str>, field: &str) -> Result<(), Wrong> {
+    let mut seen = HashSet::new();
+    for name in names {
+        let (at, name) = (name.span().start, name.get_ref());
+        if !known.contains(name.as_str()) {
+            return Err((at, format!("configuration.{field}: the geometry has no point `{name}`")));
+        }
+        if !seen.insert(name) {
+            return Err((at, format!("configuration.{field}: `{name}` stands twice")));
+        }
+    }
+    Ok(())
+}

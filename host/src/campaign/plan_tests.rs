@@ -1,0 +1,62 @@
+use super::*;
+use std::collections::HashSet;
+
+#[test]
+fn the_papers_plan_has_252_cells_and_2016_hits() {
+    let plan = Plan::parse(PAPER, "paper.toml").expect("a good plan");
+    let cells = plan.cells();
+    assert_eq!(cells.len(), 252);
+    assert_eq!(cells.iter().map(|cell| cell.wanted).sum::<u32>(), 2016);
+    let of = |wanted| cells.iter().filter(|cell| cell.configuration == wanted).count();
+    assert_eq!((of(Configuration::A), of(Configuration::B), of(Configuration::Ajb)), (48, 36, 168));
+    assert_eq!(
+        cells.iter().map(|cell| format!("{cell:?}")).collect::<HashSet<_>>().len(),
+        252,
+        "each cell once"
+    );
+    assert_eq!(plan.post_trigger_scans(), 102_400);
+}
+
+#[test]
+fn hammer_and_laser_move_as_little_as_they_can() {
+    for text in [PAPER, DEMO, SMALL] {
+        let plan = Plan::parse(text, "plan").expect("a good plan");
+        let cells = plan.cells();
+        let moves = |of: fn(&Cell) -> String| cells.windows(2).filter(|w| of(&w[0]) != of(&w[1])).count();
+        let hammer = moves(|cell| format!("{:?}{}", cell.configuration, cell.impact));
+        let impacts: usize = plan.configuration.iter().map(|structure| structure.impacts.len()).sum();
+        assert_eq!(hammer + 1, impacts, "each impact is visited once");
+        for pair in cells.windows(2) {
+            let same = pair[0].configuration == pair[1].configuration;
+            let moved = (pair[0].impact != pair[1].impact, pair[0].response != pair[1].response);
+            assert!(!same || moved != (true, true), "only one of the two moves: {pair:?}");
+        }
+    }
+}
+
+#[test]
+fn errors_point_at_line_and_field() {
+    for (from, to, word) in [
+        ("rate_hz = 51200", "rate_hz = \"fast\"", "fast"),
+        ("rate_hz = 51200", "rate_hz = 0", "record.rate_hz"),
+        ("wanted = 2", "wnated = 2", "wnated"),
+        ("minimum = 1", "minimum = 3", "minimum <= wanted"),
+        ("impacts = [\"BZ1\"]", "impacts = [\"BZ7\"]", "no point `BZ7`"),
+        ("responses = [\"B1\"]", "responses = [\"B1\", \"B1\"]", "stands twice"),
+        ("name = \"B\"", "name = \"C\"", "must be A, B or AJB"),
+        ("direction = [0, -1, 0]", "direction = [0, -2, 0]", "length 1"),
+        ("{ name = \"A2\", grouping = 1", "{ name = \"A2\", grouping = 7", "must be 1 to 4"),
+        ("pulse_us = 3000", "pulse_us = 9000", "pulse_bounds_us"),
+    ] {
+        assert!(SMALL.contains(from), "{from}");
+        let text = SMALL.replacen(from, to, 1);
+        let line = 1 + text.lines().position(|line| line.contains(to)).expect("it is there");
+        let wrong = Plan::parse(&text, "my.toml").expect_err(to);
+        let said = wrong.to_string();
+        assert!(said.contains(word), "{to}: {said}");
+        // a range between fields is told at the table that holds them
+        let near = if word.contains('.') || word.contains("<=") || word.contains("bounds") { 6 } else { 0 };
+        assert!(wrong.line <= line && wrong.line + near >= line, "{to}: line {line}, said {said}");
+        assert!(said.starts_with("my.toml:"), "{said}");
+    }
+}

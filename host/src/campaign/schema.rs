@@ -1,0 +1,107 @@
+//! The tables of a campaign file, and their version.
+
+/// Marks the file as ours (`JRIG`).
+pub const APPLICATION_ID: i32 = i32::from_be_bytes(*b"JRIG");
+
+/// Version of the tables, in SQLite's `user_version`.
+pub const VERSION: i32 = 1;
+
+/// Creates version 1. Raw records are append-only: triggers refuse any change.
+pub const CREATE: &str = "
+CREATE TABLE meta (
+    key   TEXT PRIMARY KEY,
+    value TEXT NOT NULL
+) STRICT;
+
+CREATE TABLE plan (
+    id     INTEGER PRIMARY KEY,
+    utc    TEXT NOT NULL,
+    source TEXT NOT NULL,
+    text   TEXT NOT NULL
+) STRICT;
+
+-- one row per connection to a device
+CREATE TABLE sessions (
+    id               INTEGER PRIMARY KEY,
+    utc              TEXT NOT NULL,
+    address          TEXT NOT NULL,
+    board            TEXT NOT NULL,
+    serial           TEXT NOT NULL,
+    firmware_version TEXT NOT NULL,
+    target           TEXT NOT NULL,
+    build            TEXT NOT NULL,
+    schema_hash      TEXT NOT NULL,
+    software_version TEXT NOT NULL,
+    rate_hz          INTEGER NOT NULL
+) STRICT;
+
+-- SI value = code * units_per_volt * range_v / 32768
+CREATE TABLE channels (
+    session        INTEGER NOT NULL REFERENCES sessions(id),
+    place          INTEGER NOT NULL,
+    name           TEXT NOT NULL,
+    role           TEXT NOT NULL,
+    quantity       TEXT NOT NULL,
+    unit           TEXT NOT NULL,
+    units_per_volt REAL NOT NULL,
+    range_v        REAL NOT NULL,
+    delay_ns       INTEGER NOT NULL,
+    bits           INTEGER NOT NULL,
+    PRIMARY KEY (session, place)
+) STRICT;
+
+CREATE TABLE cells (
+    id            INTEGER PRIMARY KEY,
+    configuration TEXT NOT NULL,
+    impact        TEXT NOT NULL,
+    response      TEXT NOT NULL,
+    wanted        INTEGER NOT NULL,
+    given_up      TEXT,
+    UNIQUE (configuration, impact, response)
+) STRICT;
+
+-- one row per firing of the hammer; without samples where the bolt did not arrive
+CREATE TABLE records (
+    id            INTEGER PRIMARY KEY,
+    cell          INTEGER NOT NULL REFERENCES cells(id),
+    attempt       INTEGER NOT NULL,
+    session       INTEGER NOT NULL REFERENCES sessions(id),
+    utc           TEXT NOT NULL,
+    epoch         INTEGER NOT NULL,
+    first_scan    INTEGER NOT NULL,
+    trigger_index INTEGER NOT NULL,
+    scans         INTEGER NOT NULL,
+    channels      INTEGER NOT NULL,
+    pulse_us      INTEGER NOT NULL,
+    peak_n        REAL NOT NULL,
+    shot          TEXT NOT NULL,
+    gaps          TEXT NOT NULL,
+    verdict       TEXT NOT NULL,
+    measure       REAL NOT NULL,
+    limit_value   REAL NOT NULL,
+    sentence      TEXT NOT NULL,
+    crc32         INTEGER NOT NULL,
+    seal          INTEGER NOT NULL,
+    samples       BLOB NOT NULL,
+    UNIQUE (cell, attempt)
+) STRICT;
+
+CREATE TABLE overrules (
+    id      INTEGER PRIMARY KEY,
+    record  INTEGER NOT NULL REFERENCES records(id),
+    utc     TEXT NOT NULL,
+    verdict TEXT NOT NULL,
+    reason  TEXT NOT NULL
+) STRICT;
+
+CREATE TABLE log (
+    id   INTEGER PRIMARY KEY,
+    utc  TEXT NOT NULL,
+    text TEXT NOT NULL
+) STRICT;
+
+CREATE TRIGGER records_stay BEFORE UPDATE ON records
+BEGIN SELECT RAISE(ABORT, 'a raw record is never changed'); END;
+CREATE TRIGGER records_remain BEFORE DELETE ON records
+BEGIN SELECT RAISE(ABORT, 'a raw record is never deleted'); END;
+";

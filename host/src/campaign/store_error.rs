@@ -1,0 +1,90 @@
+//! What can go wrong with a campaign file, and what to do.
+
+use std::path::{Path, PathBuf};
+
+use rusqlite::ErrorCode;
+
+use super::codec::CodecError;
+use super::plan::PlanError;
+
+/// What can go wrong with a campaign file.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// A new file was asked for and something is there.
+    #[error("{path} exists already: choose another name, or continue it with `jointrig campaign run`")]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// There is no such file.
+    #[error("there is no campaign file {path}: create one with `jointrig campaign new`")]
+    Missing {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Some other file.
+    #[error("{path} is not a campaign file")]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Written by a newer program.
+    #[error("{path} has schema version {found}, this program reads up to {known}: use a newer jointrig")]
+    Newer {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        found: i32,
+        /// Ours.
+        known: i32,
+    },
+    /// A record cannot be read.
+    #[error("{path}: record {record} is damaged ({source}); `jointrig campaign verify` lists all damage")]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// The record's id.
+        record: i64,
+        /// What is wrong with it.
+        source: CodecError,
+    },
+    /// Something in the file makes no sense.
+    #[error("{path}: {what}")]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What makes no sense.
+        what: String,
+    },
+    /// The plan cannot be read.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// SQLite failed.
+    #[error("{path}: {doing}: {source}{hint}")]
+    Sqlite {
+        /// The file.
+        path: PathBuf,
+        /// What was being done.
+        doing: &'static str,
+        /// What SQLite said.
+        source: rusqlite::Error,
+        /// What to do, if it is known.
+        hint: &'static str,
+    },
+}
+
+/// SQLite's error with what was being done and, where it is known, what to do.
+pub(super) fn sqlite(path: &Path, doing: &'static str, source: rusqlite::Error) -> StoreError {
+    let hint = match source.sqlite_error_code() {
+        Some(ErrorCode::DiskFull) => {
+            "; free some space, then run the same command again: nothing accepted is lost"
+        }
+        Some(ErrorCode::ReadOnly) => "; the file or its folder is read-only",
+        Some(ErrorCode::CannotOpen) => "; does the folder exist, and may you write there?",
+        Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => {
+            "; another program writes this file: end it first"
+        }
+        _ => "",
+    };
+    StoreError::Sqlite { path: path.into(), doing, source, hint }
+}

@@ -1,0 +1,147 @@
+use super::super::rows::SessionInfo;
+use super::*;
+use crate::campaign::judge::Judgement;
+use crate::campaign::plan::{PAPER, SMALL};
+use crate::device::channels::ChannelMap;
+use jointrig_protocol::channel::Channel;
+use jointrig_protocol::channel::{Quantity, Role};
+use jointrig_protocol::shot::{Phase, Shot};
+
+fn map() -> ChannelMap {
+    let channel = |name: &str, role, scale| Channel {
+        name: name.try_into().expect("short"),
+        role,
+        quantity: Quantity::Velocity,
+        units_per_volt: scale,
+        range_v: 10.0,
+        delay_ns: 5,
+        bits: 16,
+    };
+    ChannelMap {
+        id: 0,
+        rate_hz: 51_200,
+        channels: vec![
+            channel("force", Role::HammerForce, 44.642_857),
+            channel("z", Role::Response(jointrig_protocol::channel::Axis::Z), -0.005),
+        ],
+    }
+}
+
+fn info() -> SessionInfo {
+    SessionInfo {
+        address: "sim:".into(),
+        board: "virtual".into(),
+        serial: "1".into(),
+        firmware_version: "0.1.0".into(),
+        target: "x".into(),
+        build: 1 << 63,
+        schema_hash: u64::MAX,
+    }
+}
+
+fn record(cell: i64, attempt: u32, session: i64, kind: Kind) -> NewRecord {
+    let shot = Shot {
+        number: attempt + 1,
+        phase: Phase::Done,
+        fired_at: 10,
+        trigger: 400,
+        pulse_us: 3_000,
+        peak_n: 49.3,
+        width_us: 270.1,
+        rebound_ratio: 0.1,
+        rebound_after: 3,
+        friction_peak_n: 17.0,
+        quiet_ratio: 0.3,
+    };
+    let codes = (0..4_000_i32).map(|i| ((i * 31 + attempt.cast_signed()) % 2_000 - 1_000) as i16).collect();
+    let recording = Recording {
+        epoch: 3,
+        first_scan: 144,
+        trigger_index: 256,
+        channels: 2,
+        codes,
+        gaps: vec![3..7, 9..10],
+        shot,
+    };
+    let judgement = Judgement { kind, measure: 0.1, limit: 0.02, sentence: "because".into() };
+    NewRecord { cell, attempt, session, utc: utc_now(), recording, judgement }
+}
+
+#[test]
+fn records_come_back_bit_for_bit_and_can_be_read_while_another_writes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.jrig");
+    let mut store = Store::create(&path, SMALL, "small.toml").expect("created");
+    let reader = Store::open_read_only(&path).expect("readable at once");
+    let session = store.begin_session(&info(), &map()).expect("session");
+    let cells = store.cells().expect("cells");
+    assert_eq!(cells.len(), store.plan().expect("plan").cells().len());
+    for attempt in 0..3 {
+        let kind = if attempt == 1 { Kind::DoubleHit } else { Kind::Good };
+        store.insert(&record(cells[0].id, attempt, session, kind)).expect("stored");
+    }
+    let rows = reader.records().expect("rows");
+    assert_eq!(rows.iter().map(RecordRow::kept).collect::<Vec<_>>(), [true, false, true]);
+    assert_eq!(reader.channels(session).expect("channels"), map());
+    assert_eq!(reader.sessions().expect("sessions"), [(session, info())]);
+    for (row, attempt) in rows.iter().zip(0..) {
+        let stored = record(cells[0].id, attempt, session, row.verdict).recording;
+        assert_eq!(reader.samples(row).expect("samples").codes, stored.codes);
+        assert_eq!((row.shot, &row.gaps, row.first_scan), (stored.shot, &stored.gaps, 144));
+    }
+    store.overrule(rows[1].id, Kind::Good, "looked at it").expect("overruled");
+    assert!(reader.records().expect("rows")[1].kept());
+    assert_eq!(reader.verify().expect("checked"), []);
+    assert!(store.insert(&record(cells[0].id, 0, session, Kind::Good)).is_err(), "an attempt is stored once");
+    store.close().expect("closed");
+}
+
+#[test]
+fn raw_records_cannot_be_changed_and_damage_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.jrig");
+    let mut store = Store::create(&path, SMALL, "small.toml").expect("created");
+    let session = store.begin_session(&info(), &map()).expect("session");
+    let ids: Vec<i64> = (0..4)
+        .map(|attempt| store.insert(&record(1, attempt, session, Kind::Good)).expect("stored"))
+        .collect();
+    let change = |sql: &str| store.connection.execute(sql, []);
+    assert!(change("UPDATE records SET measure = 0").is_err());
+    assert!(change("DELETE FROM records").is_err());
+    store.connection.execute_batch("DROP TRIGGER records_stay").expect("as vandals do");
+    let change = |sql: String| assert_eq!(store.connection.execute(&sql, []).expect("changed"), 1);
+    change(format!(
+        "UPDATE records SET samples = CAST(substr(samples, 1, 40) || x'5a' || substr(samples, 42) AS BLOB) WHERE id = {}",
+        ids[1]
+    ));
+    change(format!("UPDATE records SET verdict = 'weak' WHERE id = {}", ids[2]));
+    change(format!("UPDATE records SET shot = replace(shot, '49.3', 'x') WHERE id = {}", ids[3]));
+    let named: Vec<_> =
+        store.verify().expect("checked").into_iter().filter_map(|damage| damage.record).collect();
+    assert_eq!(named, ids[1..]);
+    let row = RecordRow { id: ids[1], ..reader_row(&store, ids[0]) };
+    let said = store.samples(&row).expect_err("damaged").to_string();
+    assert!(said.contains(&format!("record {}", ids[1])), "{said}");
+}
+
+#[test]
+fn wrong_files_are_refused_in_words() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    assert!(matches!(Store::open(&at("none.jrig")), Err(StoreError::Missing { .. })));
+    std::fs::write(at("text.jrig"), "no database, but long enough to be looked at").expect("written");
+    assert!(matches!(Store::open_read_only(&at("text.jrig")), Err(StoreError::Foreign { .. })));
+    let store = Store::create(&at("a.jrig"), PAPER, "paper.toml").expect("created");
+    assert_eq!(store.cells().expect("cells").len(), 252);
+    store.connection.pragma_update(None, "user_version", 99).expect("changed");
+    store.close().expect("closed");
+    assert!(matches!(Store::open(&at("a.jrig")), Err(StoreError::Newer { found: 99, .. })));
+    assert!(matches!(Store::create(&at("a.jrig"), PAPER, "p"), Err(StoreError::Exists { .. })));
+    assert!(matches!(Store::create(&at("no/b.jrig"), PAPER, "p"), Err(StoreError::Sqlite { .. })));
+    assert!(!at("a.jrig-wal").exists(), "one file only");
+}
+
+fn reader_row(store: &Store, id: i64) -> RecordRow {
+    let sql = format!("SELECT {COLUMNS} FROM records WHERE id = ?1");
+    store.all(&sql, [id], RecordRow::read, "testing").expect("a row").remove(0)
+}

@@ -1,0 +1,120 @@
+//! Device addresses: where an instrument is, in one word.
+//!
+//! | address | what it is |
+//! |---|---|
+//! | `sim:` or `sim:RIG.toml` | the simulated rig, built in or described in a file |
+//! | `serial:PATH` | a serial port or pseudo-terminal |
+//! | `tcp:HOST:PORT` | a socket |
+//! | `qemu:`, `usb:`, `replay:` | known, but not served by this version |
+
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use super::error::DeviceError;
+use super::transport::Transport;
+
+/// Where an instrument is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Address {
+    /// The simulated rig: the built-in one, or one described in a file.
+    Sim {
+        /// The rig's description; the built-in one without.
+        rig: Option<PathBuf>,
+    },
+    /// A serial port.
+    Serial(PathBuf),
+    /// A socket, as `host:port`.
+    Tcp(String),
+}
+
+impl FromStr for Address {
+    type Err = DeviceError;
+
+    fn from_str(given: &str) -> Result<Self, DeviceError> {
+        let wrong = |why: &str| DeviceError::Address { given: given.into(), why: why.into() };
+        let (scheme, rest) = given
+            .split_once(':')
+            .ok_or_else(|| wrong("write e.g. sim:, serial:/dev/ttyACM0 or tcp:127.0.0.1:4000"))?;
+        match scheme {
+            "sim" => Ok(Self::Sim { rig: (!rest.is_empty()).then(|| rest.into()) }),
+            "serial" if rest.is_empty() => Err(wrong("name the port, e.g. serial:/dev/ttyACM0")),
+            "serial" => Ok(Self::Serial(rest.into())),
+            "tcp" => match rest.rsplit_once(':') {
+                Some((host, port)) if !host.is_empty() && port.parse::<u16>().is_ok_and(|port| port > 0) => {
+                    Ok(Self::Tcp(rest.into()))
+                }
+                _ => Err(wrong("name host and port (1 to 65535), e.g. tcp:127.0.0.1:4000")),
+            },
+            "qemu" | "usb" | "replay" => {
+                Err(DeviceError::NotBuilt { given: given.into(), scheme: scheme.into() })
+            }
+            _ => Err(wrong("known are sim:, serial: and tcp:")),
+        }
+    }
+}
+
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Sim { rig: None } => f.write_str("sim:"),
+            Self::Sim { rig: Some(path) } => write!(f, "sim:{}", path.display()),
+            Self::Serial(path) => write!(f, "serial:{}", path.display()),
+            Self::Tcp(place) => write!(f, "tcp:{place}"),
+        }
+    }
+}
+
+impl Address {
+    /// Opens the byte pipe to the device. `seed` sets the scatter of a simulated rig and means nothing
+    /// to a real one.
+    ///
+    /// # Errors
+    /// [`DeviceError::Open`] with the reason and what to do.
+    pub fn open(&self, seed: u64) -> Result<Box<dyn Transport>, DeviceError> {
+        match self {
+            Self::Sim { rig } => open_sim(rig.as_deref(), seed),
+            Self::Serial(path) => Ok(Box::new(super::serial::Serial::open(path)?)),
+            Self::Tcp(place) => Ok(Box::new(super::tcp::Tcp::open(place)?)),
+        }
+    }
+}
+
+fn open_sim(rig: Option<&std::path::Path>, _seed: u64) -> Result<Box<dyn Transport>, DeviceError> {
+    Err(DeviceError::NotBuilt {
+        given: Address::Sim { rig: rig.map(Into::into) }.to_string(),
+        scheme: "sim".into(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_form_is_read_and_written_alike() {
+        for text in
+            ["sim:", "sim:rigs/stiff.toml", "serial:/dev/ttyACM0", "tcp:127.0.0.1:4000", "tcp:[::1]:9"]
+        {
+            let address: Address = text.parse().expect(text);
+            assert_eq!(address.to_string(), text);
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_what_to_write() {
+        for (text, word) in [
+            ("/dev/ttyACM0", "serial:/dev/ttyACM0"),
+            ("serial:", "name the port"),
+            ("tcp:localhost", "host and port"),
+            ("tcp:localhost:0", "host and port"),
+            ("bluetooth:x", "known are"),
+            ("qemu:", "not built into this version"),
+            ("usb:", "not built into this version"),
+            ("replay:x.bin", "not built into this version"),
+        ] {
+            let said = text.parse::<Address>().expect_err(text).to_string();
+            assert!(said.contains(word), "{text}: {said}");
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! The channel map: what each place of a scan measures, and how a code becomes a quantity.
+
+use jointrig_protocol::channel::{Axis, Channel, Role};
+
+/// Every channel of a scan, in order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChannelMap {
+    /// The map's id on the wire.
+    pub id: u8,
+    /// Scans per second, Hz.
+    pub rate_hz: u32,
+    /// The channels in the order of the scan.
+    pub channels: Vec<Channel>,
+}
+
+impl ChannelMap {
+    /// How many channels a scan has.
+    pub fn len(&self) -> usize {
+        self.channels.len()
+    }
+
+    /// Whether there is no channel at all.
+    pub fn is_empty(&self) -> bool {
+        self.channels.is_empty()
+    }
+
+    /// Place of the first channel that serves as `role`.
+    pub fn place(&self, role: Role) -> Option<usize> {
+        self.channels.iter().position(|channel| channel.role == role)
+    }
+
+    /// Places of the channels that serve as `role`, in order.
+    pub fn places(&self, role: Role) -> Vec<usize> {
+        (0..self.len()).filter(|place| self.channels[*place].role == role).collect()
+    }
+
+    /// Places of the vibrometer's three axes x, y, z at the aimed point, when all are there.
+    pub fn responses(&self) -> Option<[usize; 3]> {
+        let at = |axis| self.place(Role::Response(axis));
+        Some([at(Axis::X)?, at(Axis::Y)?, at(Axis::Z)?])
+    }
+
+    /// The codes of the channel at `place` in SI units ([`jointrig_protocol::channel::Quantity::unit`]).
+    /// A place outside the map gives nothing.
+    pub fn to_si(&self, place: usize, codes: &[i16]) -> Vec<f64> {
+        let Some(channel) = self.channels.get(place) else { return Vec::new() };
+        let scale = channel.units_per_code();
+        codes.iter().map(|code| f64::from(*code) * scale).collect()
+    }
+
+    /// SI value of full scale of the channel at `place`, always positive; `None` outside the map.
+    pub fn full_scale(&self, place: usize) -> Option<f64> {
+        Some((self.channels.get(place)?.units_per_code() * 32_768.0).abs())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jointrig_protocol::channel::Quantity;
+
+    fn channel(name: &str, role: Role, units_per_volt: f32) -> Channel {
+        Channel {
+            name: name.parse().expect("short"),
+            role,
+            quantity: Quantity::Velocity,
+            units_per_volt,
+            range_v: 10.0,
+            delay_ns: 0,
+            bits: 16,
+        }
+    }
+
+    #[test]
+    fn codes_become_si_units_with_the_polarity_of_the_scale() {
+        let map = ChannelMap {
+            id: 0,
+            rate_hz: 51_200,
+            channels: vec![
+                channel("a", Role::HammerForce, 44.64),
+                channel("b", Role::SpecimenA, -0.001),
+                channel("c", Role::LoadCell, 1.0),
+                channel("d", Role::LoadCell, 1.0),
+            ],
+        };
+        assert_eq!(map.places(Role::LoadCell), [2, 3]);
+        assert_eq!(map.place(Role::SpecimenB), None);
+        assert_eq!(map.responses(), None);
+        let value = map.to_si(1, &[16_384])[0];
+        assert!((value + 0.005).abs() < 1e-9, "{value}");
+        assert!((map.full_scale(1).expect("there") - 0.01).abs() < 1e-9);
+        assert!(map.to_si(9, &[1]).is_empty());
+    }
+}

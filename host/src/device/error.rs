@@ -1,0 +1,128 @@
+//! What can go wrong between host and device, in the words of whoever stands at the rig.
+
+use std::io;
+
+use jointrig_protocol::answer::Refusal;
+use jointrig_protocol::hello::Mismatch;
+
+/// Why a device could not be reached or used.
+#[derive(Debug, thiserror::Error)]
+pub enum DeviceError {
+    /// The address is not one of the known forms.
+    #[error("`{given}` is not a device address: {why}")]
+    Address {
+        /// What was given.
+        given: String,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// The address is a known form that this build does not serve.
+    #[error(
+        "device address `{given}`: `{scheme}:` is not built into this version; use sim:, serial: or tcp:"
+    )]
+    NotBuilt {
+        /// What was given.
+        given: String,
+        /// Its scheme.
+        scheme: String,
+    },
+    /// The device could not be opened.
+    #[error("cannot open {address}: {why}")]
+    Open {
+        /// Which device.
+        address: String,
+        /// Why, and what to do.
+        why: String,
+    },
+    /// The link broke while in use.
+    #[error(
+        "the link to {address} broke while {doing}: {source}\ncheck cable and power, then run the same command again"
+    )]
+    Link {
+        /// Which device.
+        address: String,
+        /// What was being done.
+        doing: &'static str,
+        /// What the operating system said.
+        source: io::Error,
+    },
+    /// No answer after every retry.
+    #[error(
+        "{address} did not answer `{request}` ({tries} tries): check that it is powered, that the address is right \
+         and that no other program holds it"
+    )]
+    NoAnswer {
+        /// Which device.
+        address: String,
+        /// What was asked.
+        request: &'static str,
+        /// How often it was asked.
+        tries: u32,
+    },
+    /// The versions do not fit.
+    #[error("{address}: {mismatch}")]
+    Version {
+        /// Which device.
+        address: String,
+        /// Both versions, and what to do.
+        mismatch: Mismatch,
+    },
+    /// The device refused.
+    #[error("{address} refused `{request}`: {refusal}")]
+    Refused {
+        /// Which device.
+        address: String,
+        /// What was asked.
+        request: &'static str,
+        /// Why it was refused.
+        refusal: Box<Refusal>,
+    },
+    /// The device answered something that was not asked.
+    #[error("{address} answered `{request}` with something else ({got}): firmware and program do not fit")]
+    WrongAnswer {
+        /// Which device.
+        address: String,
+        /// What was asked.
+        request: &'static str,
+        /// What came.
+        got: String,
+    },
+    /// The device started anew or its stream ended unasked.
+    #[error(
+        "{address} restarted or ended its stream (epoch {epoch}) in the middle of the work; \
+         run the same command again: it resumes where this one stopped"
+    )]
+    Restarted {
+        /// Which device.
+        address: String,
+        /// The epoch that was running.
+        epoch: u32,
+    },
+    /// No samples although a stream runs.
+    #[error(
+        "{address} sent no samples for {seconds} s although its stream runs (waiting for scan {scan}): \
+         reset the controller, then run the same command again"
+    )]
+    Stalled {
+        /// Which device.
+        address: String,
+        /// How long nothing came, s.
+        seconds: u64,
+        /// The scan that was waited for.
+        scan: u64,
+    },
+    /// Something needs a stream and there is none.
+    #[error("{address}: no stream was started")]
+    NoStream {
+        /// Which device.
+        address: String,
+    },
+    /// The channels do not serve the purpose.
+    #[error("{address}: {what}")]
+    Channels {
+        /// Which device.
+        address: String,
+        /// What is wrong, and what to do.
+        what: String,
+    },
+}

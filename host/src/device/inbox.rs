@@ -1,0 +1,158 @@
+//! What a device sent, sorted: samples into the stream, answers and events into their queues.
+
+use std::collections::VecDeque;
+
+use jointrig_protocol::answer::{self, Answer, Counters, Status};
+use jointrig_protocol::block::Block;
+use jointrig_protocol::event::{self, Event};
+use jointrig_protocol::frame::{Frame, Kind};
+use jointrig_protocol::hello::{Hello, Mismatch};
+use jointrig_protocol::shot::{Phase, Shot};
+
+use super::stream::Stream;
+
+/// Events that wait for somebody to read them; the oldest go first when nobody does.
+const EVENTS_KEPT: usize = 256;
+
+/// Everything that arrived and was not used yet.
+#[derive(Default)]
+pub struct Inbox {
+    /// The other end's introduction, or why it is none.
+    pub hello: Option<Result<Hello, Mismatch>>,
+    /// The stream being put together.
+    pub stream: Option<Stream>,
+    /// The stream that was asked for and has not begun.
+    pub starting: Option<Starting>,
+    /// Answers in the order of arrival.
+    pub answers: VecDeque<answer::Numbered>,
+    /// Events that concern whoever uses the session.
+    pub events: VecDeque<event::Numbered>,
+    /// The newest word on the last shot.
+    pub shot: Option<Shot>,
+    /// The newest counters of the device.
+    pub counters: Option<Counters>,
+    /// Events that were lost on the way, from the jumps of their numbers.
+    pub events_lost: u64,
+    next_event: Option<u32>,
+    /// Sample blocks of another stream, or unreadable ones.
+    pub strangers: u64,
+    /// The highest epoch among the strangers.
+    pub stranger_epoch: Option<u32>,
+}
+
+/// A stream that was asked for: its first blocks follow the answer closely, so that it must begin the
+/// moment the answer is seen.
+pub struct Starting {
+    /// The request's number.
+    pub number: u32,
+    /// Channels in a scan.
+    pub channels: usize,
+    /// Scans that the device can send again.
+    pub ring_scans: u32,
+}
+
+impl Inbox {
+    /// Sorts one frame.
+    pub fn take(&mut self, frame: Frame<'_>) {
+        match frame.kind {
+            Kind::Samples => self.take_block(frame.payload),
+            Kind::Answer => match postcard::from_bytes(frame.payload) {
+                Ok(answer) => self.take_answer(answer),
+                Err(error) => log::warn!("an answer that cannot be read was dropped: {error}"),
+            },
+            Kind::Event => match postcard::from_bytes(frame.payload) {
+                Ok(event) => self.take_event(event),
+                Err(error) => log::warn!("an event that cannot be read was dropped: {error}"),
+            },
+            Kind::Hello => self.hello = Some(Hello::from_bytes(frame.payload)),
+            Kind::Log => log::trace!("device log, {} bytes", frame.payload.len()),
+            Kind::Request | Kind::Acknowledge => log::debug!("a frame that only a host sends was ignored"),
+        }
+    }
+
+    fn take_answer(&mut self, answer: answer::Numbered) {
+        if let Ok(Answer::Started { epoch, map, first_scan }) = answer.outcome
+            && let Some(starting) = self.starting.take_if(|starting| starting.number == answer.number)
+        {
+            let Starting { channels, ring_scans, .. } = starting;
+            self.stream = Some(Stream::new(epoch, map, first_scan, channels, ring_scans));
+        }
+        self.answers.push_back(answer);
+    }
+
+    fn take_block(&mut self, payload: &[u8]) {
+        let Some(block) = Block::from_payload(payload) else {
+            self.strangers += 1;
+            return;
+        };
+        // without a stream these are the rest of an earlier session's
+        let Some(stream) = &mut self.stream else { return };
+        if !stream.take(&block) {
+            self.strangers += 1;
+            self.stranger_epoch = self.stranger_epoch.max(Some(block.header.epoch));
+        }
+    }
+
+    fn take_event(&mut self, event: event::Numbered) {
+        if let Some(next) = self.next_event {
+            let jump = event.number.wrapping_sub(next);
+            if jump > u32::MAX / 2 {
+                return; // an old one, twice
+            }
+            self.events_lost += u64::from(jump);
+        }
+        self.next_event = Some(event.number.wrapping_add(1));
+        match &event.event {
+            Event::Lost { epoch, first_scan, scans, why } => {
+                log::warn!("the device lost {scans} scans from {first_scan} on ({why:?})");
+                if let Some(stream) = self.stream.as_mut().filter(|stream| stream.epoch() == *epoch) {
+                    stream.mark_lost(*first_scan..first_scan.saturating_add(u64::from(*scans)));
+                }
+            }
+            Event::Counters(counters) => self.counters = Some(*counters),
+            Event::Shot(shot) => self.note_shot(shot),
+            _ => {
+                log::debug!("event at scan {}: {:?}", event.at_scan, event.event);
+                if self.events.len() == EVENTS_KEPT {
+                    self.events.pop_front();
+                }
+                self.events.push_back(event);
+            }
+        }
+    }
+
+    /// Notes what a status says in passing.
+    pub fn note_status(&mut self, status: &Status) {
+        self.counters = Some(status.counters);
+        if let Some(shot) = &status.shot {
+            self.note_shot(shot);
+        }
+    }
+
+    /// The status inside an answer, if it is one.
+    pub fn status_of(answer: &answer::Numbered) -> Option<&Status> {
+        match &answer.outcome {
+            Ok(Answer::Status(status)) => Some(status),
+            _ => None,
+        }
+    }
+
+    /// Events overtake one another on a bad link: a shot only ever goes forward.
+    fn note_shot(&mut self, shot: &Shot) {
+        let newer = self
+            .shot
+            .is_none_or(|known| (known.number, rank(known.phase)) <= (shot.number, rank(shot.phase)));
+        if newer {
+            self.shot = Some(*shot);
+        }
+    }
+}
+
+fn rank(phase: Phase) -> u8 {
+    match phase {
+        Phase::Waiting => 0,
+        Phase::Firing => 1,
+        Phase::Listening => 2,
+        Phase::Done | Phase::Missed | Phase::NotQuiet | Phase::Cancelled => 3,
+    }
+}

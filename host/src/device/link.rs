@@ -1,0 +1,90 @@
+//! Frames over a transport: bytes in, whole and undamaged frames out, and the other way round.
+
+use std::io;
+use std::time::Duration;
+
+use jointrig_protocol::frame::{Accumulator, Frame, FrameError, Kind, Writer};
+
+use super::transport::Transport;
+
+/// Bytes asked for at once: some hundred full blocks.
+const READ_BYTES: usize = 65_536;
+
+/// A transport that speaks frames.
+pub struct Link {
+    transport: Box<dyn Transport>,
+    accumulator: Accumulator,
+    writer: Writer,
+    bytes: Vec<u8>,
+    frames: u64,
+    bad: u64,
+}
+
+impl Link {
+    /// Speaks frames over `transport`.
+    pub fn new(transport: Box<dyn Transport>) -> Self {
+        Self {
+            transport,
+            accumulator: Accumulator::new(),
+            writer: Writer::new(Kind::Hello),
+            bytes: vec![0; READ_BYTES],
+            frames: 0,
+            bad: 0,
+        }
+    }
+
+    /// Good frames received.
+    pub fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// Frames received that were damaged.
+    pub fn bad(&self) -> u64 {
+        self.bad
+    }
+
+    /// Hands every frame that is there to `take`, waiting at most `timeout` for a first byte. Returns
+    /// whether any byte arrived.
+    pub fn receive(&mut self, timeout: Duration, mut take: impl FnMut(Frame<'_>)) -> io::Result<bool> {
+        let got = self.transport.read(&mut self.bytes, timeout)?;
+        let mut rest = &self.bytes[..got];
+        while !rest.is_empty() {
+            let (used, found) = self.accumulator.feed(rest);
+            rest = &rest[used..];
+            match found {
+                Some(Ok(frame)) => {
+                    self.frames += 1;
+                    take(frame);
+                }
+                Some(Err(error)) => {
+                    self.bad += 1;
+                    log::debug!("{error}");
+                }
+                None => {}
+            }
+        }
+        Ok(got > 0)
+    }
+
+    /// Ends whatever frame the other end believes to be in.
+    pub fn end_frame(&mut self) -> io::Result<()> {
+        self.transport.write_all(&[0])
+    }
+
+    /// Sends a frame of a fixed layout.
+    pub fn send(&mut self, kind: Kind, payload: &[u8]) -> io::Result<()> {
+        self.writer.restart(kind);
+        let room = self.writer.payload_mut();
+        let room = room.get_mut(..payload.len()).ok_or_else(|| io::Error::other(FrameError::TooLong))?;
+        room.copy_from_slice(payload);
+        let wire = self.writer.seal(payload.len()).map_err(io::Error::other)?;
+        self.transport.write_all(wire)
+    }
+
+    /// Sends a postcard frame.
+    pub fn send_value<T: serde::Serialize>(&mut self, kind: Kind, value: &T) -> io::Result<()> {
+        self.writer.restart(kind);
+        let wire = self.writer.seal_value(value).map_err(io::Error::other)?;
+        self.transport.write_all(wire)
+    }
+}

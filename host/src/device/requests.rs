@@ -1,0 +1,243 @@
+//! What a session's user may ask, and waiting for what comes of it.
+
+use std::ops::Range;
+use std::time::{Duration, Instant};
+
+use jointrig_protocol::answer::{Answer, Info, Status};
+use jointrig_protocol::frame::Kind;
+use jointrig_protocol::request::{Fire, Numbered, Request, Stage, Trigger};
+
+use super::channels::ChannelMap;
+use super::error::DeviceError;
+use super::inbox::Starting;
+use super::session::{Session, TRIES, patience};
+use super::stream::{Accounts, Stream};
+
+/// Longest wait for a first byte within one pump.
+const POLL: Duration = Duration::from_millis(20);
+
+/// Without a single new scan for this long, a running stream counts as stalled.
+const STALLED: Duration = Duration::from_secs(30);
+
+fn name(request: &Request) -> &'static str {
+    match request {
+        Request::Info => "info",
+        Request::Channel { .. } => "channel",
+        Request::Status => "status",
+        Request::Start => "start",
+        Request::Stop => "stop",
+        Request::Resend { .. } => "resend",
+        Request::Trigger(_) => "trigger",
+        Request::LoadCells { .. } => "load cells",
+        Request::Arm { .. } => "arm",
+        Request::Disarm => "disarm",
+        Request::Fire(_) => "fire",
+        Request::Stage(_) => "stage",
+        Request::EmergencyStop => "emergency stop",
+    }
+}
+
+impl Session {
+    /// Asks, repeats under the same number until there is an answer, and returns it.
+    ///
+    /// # Errors
+    /// A refusal, no answer, a broken link.
+    pub fn ask(&mut self, request: Request) -> Result<Answer, DeviceError> {
+        let asked = name(&request);
+        let number = self.next_number;
+        self.next_number += 1;
+        let numbered = Numbered { number, request };
+        for patience in patience() {
+            self.waiting = Some(number);
+            self.link
+                .send_value(Kind::Request, &numbered)
+                .map_err(|error| self.broken("sending a request", error))?;
+            let until = Instant::now() + patience;
+            while let Some(left) = until.checked_duration_since(Instant::now()) {
+                self.pump(left.min(POLL))?;
+                if let Some(reply) = self.reply.take() {
+                    return reply.outcome.map_err(|refusal| DeviceError::Refused {
+                        address: self.address.clone(),
+                        request: asked,
+                        refusal: Box::new(refusal),
+                    });
+                }
+            }
+        }
+        self.waiting = None;
+        Err(DeviceError::NoAnswer { address: self.address.clone(), request: asked, tries: TRIES })
+    }
+
+    fn wrong(&self, request: &'static str, got: &Answer) -> DeviceError {
+        DeviceError::WrongAnswer { address: self.address.clone(), request, got: format!("{got:?}") }
+    }
+
+    fn ask_done(&mut self, request: Request) -> Result<(), DeviceError> {
+        let asked = name(&request);
+        match self.ask(request)? {
+            Answer::Done => Ok(()),
+            other => Err(self.wrong(asked, &other)),
+        }
+    }
+
+    /// Who the device is.
+    pub fn info(&mut self) -> Result<Info, DeviceError> {
+        match self.ask(Request::Info)? {
+            Answer::Info(info) => {
+                self.rate_hz = f64::from(info.scan_rate_hz);
+                Ok(info)
+            }
+            other => Err(self.wrong("info", &other)),
+        }
+    }
+
+    /// Every channel of the scan. The map's id is that of the next stream ([`Session::start`]).
+    pub fn channels(&mut self, info: &Info) -> Result<ChannelMap, DeviceError> {
+        let mut channels = Vec::with_capacity(info.channels.into());
+        for index in 0..info.channels {
+            match self.ask(Request::Channel { index })? {
+                Answer::Channel(channel) => channels.push(channel),
+                other => return Err(self.wrong("channel", &other)),
+            }
+        }
+        Ok(ChannelMap { id: 0, rate_hz: info.scan_rate_hz, channels })
+    }
+
+    /// How the device is.
+    pub fn status(&mut self) -> Result<Status, DeviceError> {
+        match self.ask(Request::Status)? {
+            Answer::Status(status) => Ok(status),
+            other => Err(self.wrong("status", &other)),
+        }
+    }
+
+    /// Begins a new stream of scans of `channels` channels; returns its epoch and first scan.
+    pub fn start(&mut self, channels: usize) -> Result<(u32, u64), DeviceError> {
+        self.inbox.stream = None;
+        let ring_scans = self.hello().ring_scans;
+        self.inbox.starting = Some(Starting { number: self.next_number, channels, ring_scans });
+        match self.ask(Request::Start)? {
+            Answer::Started { epoch, first_scan, .. } => Ok((epoch, first_scan)),
+            other => Err(self.wrong("start", &other)),
+        }
+    }
+
+    /// Ends the stream, fetches what is still missing of it, and closes its accounts with the device's own.
+    ///
+    /// # Errors
+    /// A broken link, or missing scans that never came.
+    pub fn finish(&mut self) -> Result<Accounts, DeviceError> {
+        let Some(stream) = &self.inbox.stream else { return Ok(Accounts::default()) };
+        let epoch = stream.epoch();
+        self.hold_acknowledgement(None);
+        self.ended = true;
+        self.ask_done(Request::Stop)?;
+        let status = self.status()?;
+        if status.epoch != epoch {
+            return Err(self.restarted());
+        }
+        self.wait_for(status.next_scan)?;
+        if let Some(stream) = &mut self.inbox.stream {
+            stream.note_tail(status.next_scan, true);
+        }
+        Ok(self.accounts())
+    }
+
+    /// Waits until every scan before `scan` has arrived or is known to be lost. Time is the device's: a slow
+    /// or virtual device is waited for as long as it makes progress.
+    ///
+    /// # Errors
+    /// A broken link, a restarted device, no progress for 30 s.
+    pub fn wait_for(&mut self, scan: u64) -> Result<(), DeviceError> {
+        self.wait_until(scan, |_| false).map(|_| ())
+    }
+
+    /// Waits as [`Session::wait_for`] does, or until `stop` says so after some bytes; returns whether it
+    /// was `stop`.
+    ///
+    /// # Errors
+    /// As [`Session::wait_for`].
+    pub fn wait_until(
+        &mut self,
+        scan: u64,
+        mut stop: impl FnMut(&Self) -> bool,
+    ) -> Result<bool, DeviceError> {
+        let mut progress = (self.expected()?, Instant::now());
+        loop {
+            if stop(self) {
+                return Ok(true);
+            }
+            let expected = self.expected()?;
+            if expected >= scan {
+                return Ok(false);
+            }
+            if expected > progress.0 {
+                progress = (expected, Instant::now());
+            } else if progress.1.elapsed() > STALLED {
+                return Err(DeviceError::Stalled {
+                    address: self.address.clone(),
+                    seconds: STALLED.as_secs(),
+                    scan: expected,
+                });
+            }
+            self.pump(POLL)?;
+        }
+    }
+
+    /// The next scan that has not arrived.
+    pub fn expected(&self) -> Result<u64, DeviceError> {
+        let stream = self.inbox.stream.as_ref();
+        stream.map(Stream::expected).ok_or_else(|| DeviceError::NoStream { address: self.address.clone() })
+    }
+
+    /// The codes of `range` (scan after scan) and its gaps; see [`Stream::cut`].
+    pub fn cut(&self, range: Range<u64>) -> Result<(Vec<i16>, Vec<Range<usize>>), DeviceError> {
+        let stream = self.inbox.stream.as_ref();
+        stream
+            .map(|stream| stream.cut(range))
+            .ok_or_else(|| DeviceError::NoStream { address: self.address.clone() })
+    }
+
+    /// The samples before `scan` are not needed any more.
+    pub fn forget_before(&mut self, scan: u64) {
+        if let Some(stream) = &mut self.inbox.stream {
+            stream.forget_before(scan);
+        }
+    }
+
+    /// How the force pulse is recognised.
+    pub fn set_trigger(&mut self, trigger: Trigger) -> Result<(), DeviceError> {
+        self.ask_done(Request::Trigger(trigger))
+    }
+
+    /// The load cells' 3 × 3 calibration matrix, row-major, dimensionless.
+    pub fn set_load_cells(&mut self, matrix: [f32; 9]) -> Result<(), DeviceError> {
+        self.ask_done(Request::LoadCells { matrix })
+    }
+
+    /// Allows one shot within `valid_ms` of the device's time.
+    pub fn arm(&mut self, valid_ms: u32) -> Result<(), DeviceError> {
+        self.ask_done(Request::Arm { valid_ms })
+    }
+
+    /// Takes back arming and any shot whose coil is not on yet.
+    pub fn disarm(&mut self) -> Result<(), DeviceError> {
+        self.ask_done(Request::Disarm)
+    }
+
+    /// One shot of the hammer.
+    pub fn fire(&mut self, fire: Fire) -> Result<(), DeviceError> {
+        match self.ask(Request::Fire(fire))? {
+            Answer::Scheduled { .. } => Ok(()),
+            other => Err(self.wrong("fire", &other)),
+        }
+    }
+
+    /// Tells a virtual rig where hammer and laser are; returns the first scan for which that holds.
+    pub fn stage(&mut self, stage: Stage) -> Result<u64, DeviceError> {
+        match self.ask(Request::Stage(stage))? {
+            Answer::Staged { at_scan } => Ok(at_scan),
+            other => Err(self.wrong("stage", &other)),
+        }
+    }
+}

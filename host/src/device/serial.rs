@@ -1,0 +1,78 @@
+//! `serial:PATH`: the controller's serial port, or a pseudo-terminal that stands for it.
+
+use std::io::{self, Read, Write};
+use std::path::Path;
+use std::time::Duration;
+
+use serialport::{ErrorKind, SerialPort};
+
+use super::error::DeviceError;
+use super::transport::Transport;
+
+/// Any rate will do: USB serial ports ignore it.
+const BAUD: u32 = 921_600;
+
+/// How long a write may wait for a device that does not take bytes.
+const WRITE_PATIENCE: Duration = Duration::from_secs(5);
+
+/// An open serial port.
+pub struct Serial {
+    port: Box<dyn SerialPort>,
+    timeout: Duration,
+}
+
+impl Serial {
+    /// Opens `path` and tells the device that somebody listens.
+    ///
+    /// # Errors
+    /// [`DeviceError::Open`]; "permission denied" names the udev rule.
+    pub fn open(path: &Path) -> Result<Self, DeviceError> {
+        let name = path.display().to_string();
+        let timeout = Duration::from_millis(20);
+        let mut port = serialport::new(name.clone(), BAUD).timeout(timeout).open().map_err(|error| {
+            let why = match error.kind {
+                ErrorKind::Io(io::ErrorKind::PermissionDenied) => format!(
+                    "permission denied: install docs/udev/70-jointrig.rules (`sudo cp` it to /etc/udev/rules.d, then \
+                     `sudo udevadm control --reload && sudo udevadm trigger`), or add yourself to the group that \
+                     owns {name}"
+                ),
+                ErrorKind::NoDevice | ErrorKind::Io(io::ErrorKind::NotFound) => {
+                    "there is no such port: is the controller plugged in? `jointrig devices` lists what is attached".into()
+                }
+                _ => format!("{error}: is another program using it?"),
+            };
+            DeviceError::Open { address: format!("serial:{name}"), why }
+        })?;
+        // A pseudo-terminal has no modem lines; a USB port starts to send only once DTR is up.
+        if let Err(error) = port.write_data_terminal_ready(true) {
+            log::debug!("serial:{name}: DTR cannot be set ({error}); taken for a pseudo-terminal");
+        }
+        Ok(Self { port, timeout })
+    }
+
+    fn set_timeout(&mut self, timeout: Duration) -> io::Result<()> {
+        if self.timeout != timeout {
+            self.port.set_timeout(timeout)?;
+            self.timeout = timeout;
+        }
+        Ok(())
+    }
+}
+
+impl Transport for Serial {
+    fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        self.set_timeout(timeout)?;
+        match self.port.read(buf) {
+            Ok(0) => Err(io::ErrorKind::UnexpectedEof.into()),
+            Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::Interrupted) => {
+                Ok(0)
+            }
+            other => other,
+        }
+    }
+
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.set_timeout(WRITE_PATIENCE)?;
+        self.port.write_all(bytes)
+    }
+}

@@ -1,0 +1,375 @@
+//! A session with a device: handshake, requests that arrive once, samples that arrive all.
+//!
+//! One pump does everything that the link needs ([`Session::pump`]); whoever waits for something pumps.
+//!
+//! - **Requests** carry a number and are repeated under the *same* number until they are answered: the
+//!   device answers a duplicate from memory. One is under way at a time.
+//! - **Samples** are put together by [`Stream`]; what is missing is asked for again, each time under a new
+//!   number, because asking twice does no harm.
+//! - **Acknowledgement** is cumulative and never passes the scan at which it is held
+//!   ([`Session::hold_acknowledgement`]). A virtual board's time stands still half a ring beyond it,
+//!   which is what makes a campaign repeatable. While the line is idle it is sent again: it is the
+//!   host's sign of life.
+//!
+//! Timeouts are wall time and only ever decide when to ask again, never what is measured.
+
+use std::hash::{BuildHasher, Hasher};
+use std::io;
+use std::ops::Range;
+use std::time::{Duration, Instant};
+
+use jointrig_protocol::acknowledge::Acknowledge;
+use jointrig_protocol::answer::{self, Refusal, Status};
+use jointrig_protocol::frame::Kind;
+use jointrig_protocol::hello::{Hello, Mismatch};
+use jointrig_protocol::request::{Numbered, Request};
+use jointrig_protocol::shot::Shot;
+
+use super::error::DeviceError;
+use super::inbox::Inbox;
+use super::link::Link;
+use super::stream::{Accounts, Stream};
+use super::transport::Transport;
+
+/// The line counts as idle when nothing arrived for this long.
+const IDLE: Duration = Duration::from_millis(20);
+
+/// What was asked for again and did not come is asked for anew after this long without any byte.
+const RESEND_IDLE: Duration = Duration::from_millis(50);
+
+/// … or after this much of the scan clock, s.
+const RESEND_CLOCK_S: f64 = 0.05;
+
+/// The device is asked how it is when the line stays idle for this long.
+const STATUS_IDLE: Duration = Duration::from_millis(100);
+
+/// A gap that was asked for this often and never came is entered as lost.
+const RESEND_TRIES: u32 = 100;
+
+/// Something asked for in the background, not by the session's user.
+#[derive(Clone, Debug)]
+enum Errand {
+    Resend { number: u32, range: Range<u64>, asked: Instant, newest: u64, answered: bool },
+    Status { number: u32, asked: Instant },
+}
+
+/// An open session.
+pub struct Session {
+    pub(super) link: Link,
+    pub(super) inbox: Inbox,
+    pub(super) address: String,
+    pub(super) hello: Hello,
+    pub(super) next_number: u32,
+    /// The number for which a caller waits.
+    pub(super) waiting: Option<u32>,
+    pub(super) reply: Option<answer::Numbered>,
+    pub(super) rate_hz: f64,
+    pub(super) ended: bool,
+    errand: Option<Errand>,
+    resend_tries: (u64, u32),
+    tail: Option<u64>,
+    hold: Option<u64>,
+    acknowledged: u64,
+    last_bytes: Instant,
+    last_ack: Instant,
+    last_errand: Instant,
+}
+
+impl Session {
+    /// Shakes hands over `transport`. `address` is what errors call the device.
+    ///
+    /// # Errors
+    /// No answer, or another version: both are named.
+    pub fn open(transport: Box<dyn Transport>, address: &str) -> Result<Self, DeviceError> {
+        let now = Instant::now();
+        let mut session = Self {
+            link: Link::new(transport),
+            inbox: Inbox::default(),
+            address: address.into(),
+            hello: Hello::host(nonce()),
+            next_number: 1,
+            waiting: None,
+            reply: None,
+            rate_hz: 51_200.0,
+            ended: false,
+            errand: None,
+            resend_tries: (0, 0),
+            tail: None,
+            hold: None,
+            acknowledged: 0,
+            last_bytes: now,
+            last_ack: now,
+            last_errand: now,
+        };
+        session.shake_hands()?;
+        Ok(session)
+    }
+
+    fn shake_hands(&mut self) -> Result<(), DeviceError> {
+        let ours = self.hello;
+        // a zero first: it ends whatever half a frame an earlier session left behind
+        self.link.end_frame().map_err(|error| self.broken("shaking hands", error))?;
+        for patience in patience() {
+            self.link
+                .send(Kind::Hello, &ours.to_bytes())
+                .map_err(|error| self.broken("shaking hands", error))?;
+            let until = Instant::now() + patience;
+            while let Some(left) = until.checked_duration_since(Instant::now()) {
+                self.receive(left.min(IDLE))?;
+                match self.inbox.hello.take() {
+                    Some(Ok(theirs)) if theirs.session == ours.session || theirs.role == ours.role => {
+                        ours.check(&theirs).map_err(|mismatch| self.mismatch(mismatch))?;
+                        self.hello = theirs;
+                        return Ok(());
+                    }
+                    Some(Err(mismatch)) => return Err(self.mismatch(mismatch)),
+                    _ => {}
+                }
+            }
+        }
+        Err(DeviceError::NoAnswer { address: self.address.clone(), request: "hello", tries: TRIES })
+    }
+
+    /// What errors call the device.
+    pub fn address(&self) -> &str {
+        &self.address
+    }
+
+    /// The device's introduction.
+    pub fn hello(&self) -> &Hello {
+        &self.hello
+    }
+
+    /// Scans that the device can send again.
+    pub fn ring_scans(&self) -> u64 {
+        u64::from(self.hello.ring_scans)
+    }
+
+    /// The newest word on the last shot.
+    pub fn shot(&self) -> Option<Shot> {
+        self.inbox.shot
+    }
+
+    /// Where every scan of the stream went so far.
+    pub fn accounts(&self) -> Accounts {
+        self.inbox.stream.as_ref().map(Stream::accounts).unwrap_or_default()
+    }
+
+    /// (good, damaged) frames received.
+    pub fn frames(&self) -> (u64, u64) {
+        (self.link.frames(), self.link.bad())
+    }
+
+    /// Never acknowledge beyond scan `at` until told otherwise; a virtual board then stands still at most
+    /// half a ring beyond it. `None` lets go.
+    pub fn hold_acknowledgement(&mut self, at: Option<u64>) {
+        self.hold = at;
+    }
+
+    /// Moves bytes: reads what is there (waiting at most `timeout` for a first one), sorts it, and does what
+    /// the link needs (acknowledge, ask again).
+    ///
+    /// # Errors
+    /// The link broke, or the device restarted.
+    pub fn pump(&mut self, timeout: Duration) -> Result<(), DeviceError> {
+        self.receive(timeout)?;
+        while let Some(answer) = self.inbox.answers.pop_front() {
+            self.sort(answer)?;
+        }
+        self.acknowledge()?;
+        if self.waiting.is_none() {
+            self.run_errands()?;
+        }
+        Ok(())
+    }
+
+    fn begin_stream(&mut self, first_scan: u64) {
+        self.acknowledged = first_scan;
+        self.errand = None;
+        self.tail = None;
+        self.hold = None;
+        self.ended = false;
+    }
+
+    fn receive(&mut self, timeout: Duration) -> Result<(), DeviceError> {
+        let inbox = &mut self.inbox;
+        match self.link.receive(timeout, |frame| inbox.take(frame)) {
+            Ok(true) => self.last_bytes = Instant::now(),
+            Ok(false) => {}
+            Err(error) => return Err(self.broken("reading", error)),
+        }
+        Ok(())
+    }
+
+    fn sort(&mut self, answer: answer::Numbered) -> Result<(), DeviceError> {
+        let asked = self.waiting.or(match &self.errand {
+            Some(Errand::Resend { number, .. } | Errand::Status { number, .. }) => Some(*number),
+            None => None,
+        });
+        if asked == Some(answer.number)
+            && let Some(status) = Inbox::status_of(&answer)
+        {
+            self.inbox.note_status(status);
+            self.check_epoch(status)?;
+            self.tail = Some(status.next_scan);
+        }
+        if self.waiting == Some(answer.number) {
+            self.waiting = None;
+            if let Ok(answer::Answer::Started { first_scan, .. }) = answer.outcome {
+                self.begin_stream(first_scan);
+            }
+            self.reply = Some(answer);
+            return Ok(());
+        }
+        let Some(stream) = &mut self.inbox.stream else { return Ok(()) };
+        match &mut self.errand {
+            Some(Errand::Resend { number, range, answered, newest, .. }) if *number == answer.number => {
+                match answer.outcome {
+                    Ok(_) => {
+                        *answered = true;
+                        *newest = stream.newest();
+                    }
+                    Err(Refusal::Gone { oldest }) => {
+                        // not even the first one is held: at least one scan further, or nothing would end
+                        let end = if oldest > range.start { oldest.min(range.end) } else { range.end };
+                        stream.mark_lost(range.start..end);
+                        self.errand = None;
+                    }
+                    Err(Refusal::WrongEpoch { .. } | Refusal::NotStreaming) if !self.ended => {
+                        return Err(self.restarted());
+                    }
+                    Err(refusal) => log::warn!("{}: scans were not sent again: {refusal}", self.address),
+                }
+            }
+            Some(Errand::Status { number, .. }) if *number == answer.number => self.errand = None,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn check_epoch(&self, status: &Status) -> Result<(), DeviceError> {
+        match &self.inbox.stream {
+            Some(stream) if !self.ended && (status.epoch != stream.epoch() || !status.streaming) => {
+                Err(self.restarted())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn acknowledge(&mut self) -> Result<(), DeviceError> {
+        let Some(stream) = &self.inbox.stream else { return Ok(()) };
+        let up_to =
+            self.hold.map_or(stream.expected(), |at| at.min(stream.expected())).max(self.acknowledged);
+        let fresh = up_to - self.acknowledged;
+        let step = (self.ring_scans() / 16).max(1);
+        let now = Instant::now();
+        let due = fresh >= step || (fresh > 0 && self.hold == Some(up_to));
+        let idle = now - self.last_bytes >= IDLE && now - self.last_ack >= IDLE;
+        // a steady trickle is no idle line, but the device must still hear its host
+        let silent = now - self.last_ack >= 10 * IDLE;
+        if due || idle || silent {
+            let bytes = Acknowledge { epoch: stream.epoch(), next_scan: up_to }.to_bytes();
+            self.acknowledged = up_to;
+            self.last_ack = now;
+            self.link.send(Kind::Acknowledge, &bytes).map_err(|error| self.broken("acknowledging", error))?;
+        }
+        Ok(())
+    }
+
+    /// Asks for what is missing, and how the device is when the line stays idle.
+    fn run_errands(&mut self) -> Result<(), DeviceError> {
+        let Some(stream) = &mut self.inbox.stream else { return Ok(()) };
+        let now = Instant::now();
+        let idle = now - self.last_bytes;
+        if idle >= IDLE
+            && let Some(next_scan) = self.tail.take()
+        {
+            stream.note_tail(next_scan, self.ended);
+        }
+        let (missing, newest) = (stream.missing(), stream.newest());
+        match &self.errand {
+            Some(Errand::Resend { range, asked, newest: then, answered, .. }) => {
+                let clock = (RESEND_CLOCK_S * self.rate_hz) as u64
+                    + if *answered { 0 } else { u64::from(self.hello.ring_scans) / 2 };
+                let waited = (idle >= RESEND_IDLE && now - *asked >= RESEND_IDLE) || newest - then >= clock;
+                let arrived = missing.as_ref().is_none_or(|missing| missing.start >= range.end);
+                if !arrived && !waited {
+                    return Ok(());
+                }
+            }
+            Some(Errand::Status { asked, .. }) if now - *asked < 2 * STATUS_IDLE && missing.is_none() => {
+                return Ok(());
+            }
+            _ => {}
+        }
+        self.errand = None;
+        if let Some(range) = missing {
+            self.ask_again(range, now, newest)
+        } else if idle >= STATUS_IDLE && now - self.last_errand >= STATUS_IDLE {
+            let number = self.background(Request::Status)?;
+            self.last_errand = now;
+            self.errand = Some(Errand::Status { number, asked: now });
+            Ok(())
+        } else {
+            Ok(())
+        }
+    }
+
+    fn ask_again(&mut self, range: Range<u64>, asked: Instant, newest: u64) -> Result<(), DeviceError> {
+        self.resend_tries.1 = if self.resend_tries.0 == range.start { self.resend_tries.1 + 1 } else { 1 };
+        self.resend_tries.0 = range.start;
+        let Some(stream) = &mut self.inbox.stream else { return Ok(()) };
+        if self.resend_tries.1 > RESEND_TRIES {
+            log::error!("scans {range:?} were asked for {RESEND_TRIES} times and never came");
+            stream.mark_lost(range);
+            return Ok(());
+        }
+        let scans = u32::try_from(range.end - range.start).unwrap_or(u32::MAX);
+        let epoch = stream.epoch();
+        let number = self.background(Request::Resend { epoch, first_scan: range.start, scans })?;
+        self.errand = Some(Errand::Resend { number, range, asked, newest, answered: false });
+        Ok(())
+    }
+
+    /// Sends a request that nobody waits for.
+    fn background(&mut self, request: Request) -> Result<u32, DeviceError> {
+        let number = self.next_number;
+        self.next_number += 1;
+        self.link
+            .send_value(Kind::Request, &Numbered { number, request })
+            .map_err(|error| self.broken("asking", error))?;
+        Ok(number)
+    }
+
+    pub(super) fn broken(&self, doing: &'static str, source: io::Error) -> DeviceError {
+        DeviceError::Link { address: self.address.clone(), doing, source }
+    }
+
+    fn mismatch(&self, mismatch: Mismatch) -> DeviceError {
+        DeviceError::Version { address: self.address.clone(), mismatch }
+    }
+
+    pub(super) fn restarted(&self) -> DeviceError {
+        let epoch = self.inbox.stream.as_ref().map_or(0, Stream::epoch);
+        DeviceError::Restarted { address: self.address.clone(), epoch }
+    }
+}
+
+/// How often a request is sent before the device counts as gone.
+pub(super) const TRIES: u32 = 10;
+
+/// How long each try waits: 200 ms, growing, so that a loaded machine is not taken for a dead device.
+pub(super) fn patience() -> impl Iterator<Item = Duration> {
+    (0..TRIES).map(|attempt| Duration::from_millis(200 * u64::from(1 + attempt)))
+}
+
+/// A number that no other session had; it decides nothing but whose answers these are.
+fn nonce() -> u32 {
+    let mut hasher = std::hash::RandomState::new().build_hasher();
+    hasher.write_u32(std::process::id());
+    hasher.finish() as u32
+}
+
+#[cfg(test)]
+#[path = "session_tests.rs"]
+mod tests;

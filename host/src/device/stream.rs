@@ -1,0 +1,257 @@
+//! The sample stream put back together: strictly in scan order, each scan once, every loss on record.
+//!
+//! Blocks may be lost, doubled, late or sent again. What comes early is held; what is missing is named by
+//! [`Stream::missing`], so that the session can ask for it; what the device says is gone for good is
+//! entered as a lost range, and the stream goes on behind it.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use jointrig_protocol::block::{Block, RESENT};
+
+/// Where every scan of a stream went. In the end `sent = received + recovered + lost`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Accounts {
+    /// Scans that arrived when they were sent first.
+    pub received: u64,
+    /// Scans that arrived because they were asked for again.
+    pub recovered: u64,
+    /// Scans that the device reported as lost for good.
+    pub lost: u64,
+    /// Scans that arrived more than once and were ignored.
+    pub duplicates: u64,
+    /// Scans that the device says it produced.
+    pub sent: u64,
+}
+
+impl Accounts {
+    /// Scans of which nobody knows where they went; anything but 0 at the end of a stream is a fault.
+    pub fn unexplained(&self) -> u64 {
+        self.sent.abs_diff(self.received + self.recovered + self.lost)
+    }
+}
+
+/// A stream being put together.
+#[derive(Debug)]
+pub struct Stream {
+    epoch: u32,
+    map: u8,
+    first_scan: u64,
+    channels: usize,
+    /// Most scans that are held ahead of a gap, and the widest gap that is filled with zeros.
+    bound: u64,
+    expected: u64,
+    newest: u64,
+    tail: u64,
+    held: BTreeMap<u64, Held>,
+    gone: Vec<Range<u64>>,
+    lost: Vec<Range<u64>>,
+    tape: Vec<i16>,
+    tape_first: u64,
+    accounts: Accounts,
+}
+
+#[derive(Debug)]
+struct Held {
+    codes: Vec<i16>,
+    again: bool,
+}
+
+impl Stream {
+    /// An empty stream of `channels` channels whose first scan is `first_scan`; `ring_scans` is what the
+    /// device can send again.
+    pub fn new(epoch: u32, map: u8, first_scan: u64, channels: usize, ring_scans: u32) -> Self {
+        Self {
+            epoch,
+            map,
+            first_scan,
+            channels,
+            bound: 4 * u64::from(ring_scans.max(1)),
+            expected: first_scan,
+            newest: first_scan,
+            tail: first_scan,
+            held: BTreeMap::new(),
+            gone: Vec::new(),
+            lost: Vec::new(),
+            tape: Vec::new(),
+            tape_first: first_scan,
+            accounts: Accounts::default(),
+        }
+    }
+
+    /// The stream's epoch.
+    pub fn epoch(&self) -> u32 {
+        self.epoch
+    }
+
+    /// The next scan that has not arrived; everything before it has, or is lost for good.
+    pub fn expected(&self) -> u64 {
+        self.expected
+    }
+
+    /// The scan after the newest one seen: the scan clock as far as the host knows it.
+    pub fn newest(&self) -> u64 {
+        self.newest
+    }
+
+    /// Where every scan went so far.
+    pub fn accounts(&self) -> Accounts {
+        self.accounts
+    }
+
+    /// Scans that are lost for good, in order.
+    pub fn lost(&self) -> &[Range<u64>] {
+        &self.lost
+    }
+
+    /// Takes a block. Returns whether it belongs to this stream.
+    pub fn take(&mut self, block: &Block<'_>) -> bool {
+        let first = block.header.first_scan;
+        if block.header.epoch != self.epoch
+            || block.header.map != self.map
+            || block.channels() != self.channels
+            || first < self.first_scan
+        {
+            return false;
+        }
+        let again = block.header.flags & RESENT != 0 || first < self.newest;
+        self.newest = self.newest.max(block.end_scan());
+        if block.end_scan() <= self.expected || self.held.contains_key(&first) {
+            self.accounts.duplicates += u64::from(block.header.scans);
+        } else if first <= self.expected {
+            self.append(first, block.codes(), again);
+            self.advance();
+        } else if first - self.expected < self.bound || self.held.is_empty() {
+            self.held.insert(first, Held { codes: block.codes().collect(), again });
+            self.advance();
+        }
+        true
+    }
+
+    /// Enters scans that the device can never send (again). What has arrived stays.
+    pub fn mark_lost(&mut self, range: Range<u64>) {
+        if range.end > self.expected && range.start < range.end {
+            let place = self.gone.partition_point(|other| other.start < range.start);
+            self.gone.insert(place, range);
+            self.advance();
+        }
+    }
+
+    /// The device produced scans up to `next_scan` and nothing more is on its way: what has not
+    /// arrived of whole blocks (of every block, when `ended`) is missing.
+    pub fn note_tail(&mut self, next_scan: u64, ended: bool) {
+        let block = jointrig_protocol::limits::scans_per_block(self.channels).unwrap_or(1) as u64;
+        let behind = next_scan.saturating_sub(self.expected);
+        self.tail = self.expected + if ended { behind } else { behind / block * block };
+        if ended {
+            self.accounts.sent = next_scan - self.first_scan.min(next_scan);
+        }
+    }
+
+    /// The first scans that are known to be missing, for the session to ask for.
+    pub fn missing(&self) -> Option<Range<u64>> {
+        let seen = self.held.first_key_value().map_or(self.tail, |(first, _)| *first);
+        let end = self.gone.first().map_or(seen, |range| seen.min(range.start));
+        (end > self.expected).then_some(self.expected..end)
+    }
+
+    fn append(&mut self, first: u64, codes: impl Iterator<Item = i16>, again: bool) {
+        let skip = (self.expected - first) as usize * self.channels;
+        let before = self.tape.len();
+        self.tape.extend(codes.skip(skip));
+        let scans = ((self.tape.len() - before) / self.channels) as u64;
+        self.expected += scans;
+        if again {
+            self.accounts.recovered += scans;
+        } else {
+            self.accounts.received += scans;
+        }
+    }
+
+    /// Goes on over everything that is held or known to be lost.
+    fn advance(&mut self) {
+        loop {
+            while self.gone.first().is_some_and(|range| range.end <= self.expected) {
+                self.gone.remove(0);
+            }
+            if let Some(entry) = self.held.first_entry()
+                && *entry.key() <= self.expected
+            {
+                let first = *entry.key();
+                let held = entry.remove();
+                if first + (held.codes.len() / self.channels) as u64 > self.expected {
+                    self.append(first, held.codes.into_iter(), held.again);
+                } else {
+                    self.accounts.duplicates += (held.codes.len() / self.channels) as u64;
+                }
+            } else if self.gone.first().is_some_and(|range| range.start <= self.expected) {
+                let held = self.held.first_key_value().map_or(u64::MAX, |(first, _)| *first);
+                let end = self.gone[0].end.min(held);
+                self.skip_to(end);
+            } else {
+                break;
+            }
+        }
+    }
+
+    fn skip_to(&mut self, end: u64) {
+        let scans = end - self.expected;
+        self.accounts.lost += scans;
+        match self.lost.last_mut() {
+            Some(last) if last.end == self.expected => last.end = end,
+            _ => self.lost.push(self.expected..end),
+        }
+        self.expected = end;
+        self.newest = self.newest.max(end);
+        if scans > self.bound {
+            // nobody needs that many zeros: the tape begins anew behind the gap
+            self.tape.clear();
+            self.tape_first = end;
+        } else {
+            self.tape.resize(self.tape.len() + scans as usize * self.channels, 0);
+        }
+    }
+
+    /// Forgets the samples before `scan`.
+    pub fn forget_before(&mut self, scan: u64) {
+        let scan = scan.clamp(self.tape_first, self.expected);
+        // moving the tape costs its length: let half of it grow stale first
+        let stale = (scan - self.tape_first) as usize * self.channels;
+        if stale > self.tape.len() / 2 {
+            self.tape.drain(..stale);
+            self.tape_first = scan;
+        }
+    }
+
+    /// The codes of `range`, scan after scan, and which of its scans are missing (as indices into it, their
+    /// codes 0).
+    pub fn cut(&self, range: Range<u64>) -> (Vec<i16>, Vec<Range<usize>>) {
+        let mut codes = vec![0; (range.end - range.start) as usize * self.channels];
+        let there = range.start.max(self.tape_first)..range.end.min(self.expected);
+        let mut gaps = Vec::new();
+        let mut gap = |missing: Range<u64>| {
+            let (start, end) = (missing.start.max(range.start), missing.end.min(range.end));
+            if start < end {
+                gaps.push((start - range.start) as usize..(end - range.start) as usize);
+            }
+        };
+        if there.start >= there.end {
+            gap(range.clone());
+            return (codes, gaps);
+        }
+        gap(range.start..there.start);
+        for lost in &self.lost {
+            gap(lost.start.max(there.start)..lost.end.min(there.end));
+        }
+        gap(there.end..range.end);
+        let from = (there.start - self.tape_first) as usize * self.channels;
+        let to = (there.end - self.tape_first) as usize * self.channels;
+        let at = (there.start - range.start) as usize * self.channels;
+        codes[at..at + to - from].copy_from_slice(&self.tape[from..to]);
+        (codes, gaps)
+    }
+}
+
+#[cfg(test)]
+#[path = "stream_tests.rs"]
+mod tests;

@@ -1,0 +1,31 @@
+//! Bytes to and from a device, whatever carries them.
+
+use std::io;
+use std::time::Duration;
+
+/// A byte pipe to one device. It owes nobody frames: bytes may arrive in any portion, and may be lost.
+pub trait Transport: Send {
+    /// Reads what is there into `buf`, waiting at most `timeout` for a first byte.
+    ///
+    /// Returns how many bytes were read; 0 means that nothing arrived in time.
+    ///
+    /// # Errors
+    /// The device or its cable is gone.
+    fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize>;
+
+    /// Writes all of `bytes`.
+    ///
+    /// # Errors
+    /// The device or its cable is gone.
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()>;
+}
+
+impl<T: Transport + ?Sized> Transport for Box<T> {
+    fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        (**self).read(buf, timeout)
+    }
+
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
+        (**self).write_all(bytes)
+    }
+}
