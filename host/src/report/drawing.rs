@@ -94,8 +94,11 @@ impl Drawing {
     }
 
     fn path(&mut self, path: &str, stroke: Stroke) {
-        let dash =
-            if stroke.dash.is_empty() { String::new() } else { format!(" stroke-dasharray=\"{}\"", stroke.dash) };
+        let dash = if stroke.dash.is_empty() {
+            String::new()
+        } else {
+            format!(" stroke-dasharray=\"{}\"", stroke.dash)
+        };
         self.push(format_args!(
             "<path d=\"{path}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"{dash}/>",
             stroke.colour,
@@ -243,7 +246,8 @@ mod tests {
 
     #[test]
     fn thousands_of_points_in_a_column_become_four() {
-        let run: Vec<[f64; 2]> = (0..4000).map(|i| [f64::from(i) / 1000.0, f64::from(i * 37 % 101)]).collect();
+        let run: Vec<[f64; 2]> =
+            (0..4000).map(|i| [f64::from(i) / 1000.0, f64::from(i * 37 % 101)]).collect();
         let kept = thinned(&run);
         assert!(kept.len() <= 16, "{}", kept.len());
         assert!(kept.iter().any(|p| p[1] == 100.0) && kept.iter().any(|p| p[1] == 0.0));

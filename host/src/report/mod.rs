@@ -54,7 +54,16 @@ mod tests {
     #[test]
     fn the_page_shows_the_numbers_of_the_results() {
         let html = page(&example::results());
-        for text in ["26.8 ± 0.9 N/µm", "148 ± 4", "not k_T", "double hit", "campaign.jrig", "6 IDMs: 26.8", "192 Hz", "32.7 N/µm"] {
+        for text in [
+            "26.8 ± 0.9 N/µm",
+            "148 ± 4",
+            "not k_T",
+            "double hit",
+            "campaign.jrig",
+            "6 IDMs: 26.8",
+            "192 Hz",
+            "32.7 N/µm",
+        ] {
             assert!(html.contains(text), "`{text}` is not on the page");
         }
         assert_eq!(html.matches("<svg").count(), 6);
@@ -71,7 +80,8 @@ mod tests {
 
     #[test]
     fn names_from_a_file_cannot_break_the_page() {
-        let mut results = Results::new(Source { file: "<script>alert(1)</script>".into(), ..Source::default() });
+        let mut results =
+            Results::new(Source { file: "<script>alert(1)</script>".into(), ..Source::default() });
         results.missing.push("<b>".into());
         let html = page(&results);
         assert!(!html.contains("<script>") && html.contains("&lt;b&gt;"));

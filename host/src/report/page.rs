@@ -79,7 +79,12 @@ fn headline(html: &mut String, results: &Results) {
     let found: Vec<String> =
         [words::substructuring(results), words::impact_loops(results)].into_iter().flatten().collect();
     if found.is_empty() {
-        put(html, format_args!("<div class=\"found warn\"><p>No stiffness could be found from this file.</p></div>"));
+        put(
+            html,
+            format_args!(
+                "<div class=\"found warn\"><p>No stiffness could be found from this file.</p></div>"
+            ),
+        );
     } else {
         paragraphs(html, "found", found.iter().map(String::as_str));
     }
@@ -118,7 +123,10 @@ fn refusals(results: &Results) -> Option<String> {
     }
     let mut html = String::from("<p>Not applicable to this data:</p><ul class=\"notes\">");
     for r in &results.refused {
-        put(&mut html, format_args!("<li><b>{}, {} IDMs</b>: {}</li>", escape(&r.method), r.idms, escape(&r.reason)));
+        put(
+            &mut html,
+            format_args!("<li><b>{}, {} IDMs</b>: {}</li>", escape(&r.method), r.idms, escape(&r.reason)),
+        );
     }
     html.push_str("</ul>");
     Some(html)

@@ -47,8 +47,14 @@ impl Panel {
 
     /// Frame and ticks, drawn last. A side without label gets ticks but no numbers.
     pub fn axes(&self, drawing: &mut Drawing, x: (&[Tick], Option<&str>), y: (&[Tick], Option<&str>)) {
-        let (left, right, top, bottom) = (self.area.left, self.area.right(), self.area.top, self.area.bottom());
-        for (from, to) in [([left, top], [right, top]), ([right, top], [right, bottom]), ([left, bottom], [right, bottom]), ([left, top], [left, bottom])] {
+        let (left, right, top, bottom) =
+            (self.area.left, self.area.right(), self.area.top, self.area.bottom());
+        for (from, to) in [
+            ([left, top], [right, top]),
+            ([right, top], [right, bottom]),
+            ([left, bottom], [right, bottom]),
+            ([left, top], [left, bottom]),
+        ] {
             drawing.line(from, to, FRAME);
         }
         for tick in x.0 {
@@ -101,7 +107,11 @@ impl Panel {
 pub fn legend(drawing: &mut Drawing, at: [f64; 2], entries: &[LegendEntry]) {
     let mut x = at[0];
     for (stroke, text) in entries {
-        drawing.line([x, at[1] - 4.0], [x + 22.0, at[1] - 4.0], Stroke { width: stroke.width.max(1.6), ..*stroke });
+        drawing.line(
+            [x, at[1] - 4.0],
+            [x + 22.0, at[1] - 4.0],
+            Stroke { width: stroke.width.max(1.6), ..*stroke },
+        );
         drawing.text([x + 28.0, at[1]], Anchor::Start, "legend", text);
         x += 28.0 + 6.6 * text.chars().count() as f64 + 20.0;
     }

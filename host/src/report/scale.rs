@@ -76,7 +76,8 @@ impl Scale {
     /// Ticks at multiples of `step` (for degrees, where 1-2-5 is not the custom).
     pub fn ticks_every(&self, step: f64) -> Vec<Tick> {
         let places = if step >= 1.0 { 0 } else { (-step.log10().floor()) as usize };
-        let (first, last) = ((self.low / step - 1e-9).ceil() as i64, (self.high / step + 1e-9).floor() as i64);
+        let (first, last) =
+            ((self.low / step - 1e-9).ceil() as i64, (self.high / step + 1e-9).floor() as i64);
         (first..=last)
             .map(|i| {
                 let value = i as f64 * step;
@@ -88,7 +89,11 @@ impl Scale {
     fn even_ticks(&self, wanted: usize) -> Vec<Tick> {
         let raw = (self.high - self.low) / wanted.max(1) as f64;
         let decade = 10f64.powf(raw.log10().floor());
-        let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * decade).find(|s| *s >= raw * 0.999).unwrap_or(decade * 10.0);
+        let step = [1.0, 2.0, 5.0, 10.0]
+            .into_iter()
+            .map(|m| m * decade)
+            .find(|s| *s >= raw * 0.999)
+            .unwrap_or(decade * 10.0);
         self.ticks_every(step)
     }
 
@@ -132,16 +137,16 @@ fn drawable([low, high]: [f64; 2], spread: Spread) -> [f64; 2] {
     if high > low {
         return [low, high];
     }
-    if positive { [low / 2.0, high * 2.0] } else { [low - 0.5 * low.abs().max(1e-12), high + 0.5 * high.abs().max(1e-12)] }
+    if positive {
+        [low / 2.0, high * 2.0]
+    } else {
+        [low - 0.5 * low.abs().max(1e-12), high + 0.5 * high.abs().max(1e-12)]
+    }
 }
 
 fn superscript(exponent: i32) -> String {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
-    exponent
-        .to_string()
-        .chars()
-        .map(|c| c.to_digit(10).map_or('⁻', |d| DIGITS[d as usize]))
-        .collect()
+    exponent.to_string().chars().map(|c| c.to_digit(10).map_or('⁻', |d| DIGITS[d as usize])).collect()
 }
 
 /// The range that holds the share `keep` of the finite values in the middle, widened by `margin` of itself:
@@ -168,12 +173,18 @@ mod tests {
     fn linear_ticks_stand_at_one_two_five() {
         assert_eq!(labels(&Scale::linear([0.0, 103.0], [0.0, 1.0]), 5), ["0", "50", "100"]);
         assert_eq!(labels(&Scale::linear([-0.13, 0.14], [0.0, 1.0]), 5), ["−0.1", "0.0", "0.1"]);
-        assert_eq!(labels(&Scale::linear([0.0, 1.0], [0.0, 1.0]), 5), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
+        assert_eq!(
+            labels(&Scale::linear([0.0, 1.0], [0.0, 1.0]), 5),
+            ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]
+        );
     }
 
     #[test]
     fn logarithmic_ticks_read_as_frequencies_or_powers() {
-        assert_eq!(labels(&Scale::logarithmic([20.0, 1000.0], [0.0, 1.0]), 5), ["20", "50", "100", "200", "500", "1000"]);
+        assert_eq!(
+            labels(&Scale::logarithmic([20.0, 1000.0], [0.0, 1.0]), 5),
+            ["20", "50", "100", "200", "500", "1000"]
+        );
         assert_eq!(labels(&Scale::logarithmic([3e-10, 2e-7], [0.0, 1.0]), 5), ["10⁻⁹", "10⁻⁸", "10⁻⁷"]);
     }
 

@@ -27,7 +27,8 @@ impl Table {
         self.html.push_str("<tr>");
         for (i, cell) in cells.into_iter().enumerate() {
             let class = if i < self.text_columns { "" } else { " class=\"n\"" };
-            write!(self.html, "<{tag}{class}>{}</{tag}>", escape(&cell)).expect("writing into a String cannot fail");
+            write!(self.html, "<{tag}{class}>{}</{tag}>", escape(&cell))
+                .expect("writing into a String cannot fail");
         }
         self.html.push_str("</tr>");
     }
@@ -50,7 +51,17 @@ pub fn joint(results: &Results) -> Option<String> {
     if results.joint.is_empty() {
         return None;
     }
-    let heads = ["method", "IDMs", "band", "k_z ± σ, N/µm", "median", "95 % of mean", "k_y ± σ, N/µm", "c_z ± σ, N s/m", "lines"];
+    let heads = [
+        "method",
+        "IDMs",
+        "band",
+        "k_z ± σ, N/µm",
+        "median",
+        "95 % of mean",
+        "k_y ± σ, N/µm",
+        "c_z ± σ, N s/m",
+        "lines",
+    ];
     let mut table = Table::new(1, &heads);
     let mut bands: Vec<[f64; 2]> = Vec::new();
     for joint in &results.joint {
@@ -116,7 +127,17 @@ pub fn hysteresis(results: &Results) -> Option<String> {
     if results.hysteresis.is_empty() {
         return None;
     }
-    let heads = ["excitation", "shape", "Δx, nm", "k_T ± σ, N/µm", "k_eq ± σ, N/µm", "energy ± σ, µJ", "phase, °", "μ", "cycles"];
+    let heads = [
+        "excitation",
+        "shape",
+        "Δx, nm",
+        "k_T ± σ, N/µm",
+        "k_eq ± σ, N/µm",
+        "energy ± σ, µJ",
+        "phase, °",
+        "μ",
+        "cycles",
+    ];
     let mut table = Table::new(2, &heads);
     let over = |value: Option<OverCycles>, scale: f64| {
         value.map_or(UNKNOWN.into(), |v| with_scatter(v.mean * scale, v.std * scale))
@@ -146,14 +167,17 @@ pub fn checks(results: &Results) -> Option<String> {
     if results.checks.is_empty() {
         return None;
     }
-    let mut html = String::from("<table class=\"checks\"><thead><tr><th>check</th><th>outcome</th><th>what it means</th></tr></thead><tbody>");
+    let mut html = String::from(
+        "<table class=\"checks\"><thead><tr><th>check</th><th>outcome</th><th>what it means</th></tr></thead><tbody>",
+    );
     for check in &results.checks {
         let class = match check.ok {
             Some(true) => "good",
             Some(false) => "bad",
             None => "open",
         };
-        let mut figures: Vec<String> = check.frequency_hz.iter().map(|f| format!("at {} Hz", short(*f))).collect();
+        let mut figures: Vec<String> =
+            check.frequency_hz.iter().map(|f| format!("at {} Hz", short(*f))).collect();
         figures.extend(check.values.iter().map(|(name, value)| figure(name, *value)));
         write!(
             html,
@@ -254,7 +278,8 @@ fn listed(ranges: &[[i64; 2]]) -> String {
         .map(|[a, b]| if a == b { a.to_string() } else { format!("{a}–{b}") })
         .collect();
     let rest = ranges.len().saturating_sub(12);
-    let rest = if rest > 0 { format!(" and {rest} more ranges (all in results.json)") } else { String::new() };
+    let rest =
+        if rest > 0 { format!(" and {rest} more ranges (all in results.json)") } else { String::new() };
     format!("{}{rest}", shown.join(", "))
 }
 

@@ -72,8 +72,11 @@ fn example_loop() -> LoopCurve {
     let t: Vec<f64> = (0..900).map(|i| i as f64 * step_s).collect();
     let decay = |t: f64, f: f64, a: f64| a * (-30.0 * t).exp() * (TAU * f * t).sin();
     let force_n: Vec<f64> = t.iter().map(|&t| decay(t, 208.0, 17.0) + decay(t, 1310.0, 0.8)).collect();
-    let displacement_m: Vec<f64> =
-        t.iter().zip(&force_n).map(|(&t, f)| f / 148e6 + decay(t, 192.0, 2e-8) * (60.0 * t).min(1.0)).collect();
+    let displacement_m: Vec<f64> = t
+        .iter()
+        .zip(&force_n)
+        .map(|(&t, f)| f / 148e6 + decay(t, 192.0, 2e-8) * (60.0 * t).min(1.0))
+        .collect();
     let displacement_b_m: Vec<f64> = force_n.iter().map(|f| f / 75e6).collect();
     let displacement_a_m = displacement_m.iter().zip(&displacement_b_m).map(|(d, b)| d + b).collect();
     LoopCurve {
@@ -100,10 +103,15 @@ fn spectrum() -> JointSpectrum {
             .enumerate()
             .map(|(l, f)| {
                 let peak = 60e6 * (-((f - 208.0) / 9.0).powi(2)).exp() * scatter(l + 31);
-                (l != 700).then(|| rounded(k + size * scatter(l + idms) + peak + 2e6 * (f / 60.0 * PI).sin(), 6))
+                (l != 700)
+                    .then(|| rounded(k + size * scatter(l + idms) + peak + 2e6 * (f / 60.0 * PI).sin(), 6))
             })
             .collect(),
-        damping_n_s_per_m: frequency_hz.iter().enumerate().map(|(l, _)| Some(400.0 + 90.0 * scatter(l))).collect(),
+        damping_n_s_per_m: frequency_hz
+            .iter()
+            .enumerate()
+            .map(|(l, _)| Some(400.0 + 90.0 * scatter(l)))
+            .collect(),
     };
     let curves = vec![
         curve("internal", 2, 52e6, 14e6),
@@ -118,12 +126,18 @@ fn spectrum() -> JointSpectrum {
 
 /// Everything at once: the default rig's numbers, a little noise.
 pub fn results() -> Results {
-    let names = |pairs: &[(&str, &str)]| pairs.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+    let names =
+        |pairs: &[(&str, &str)]| pairs.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
     let mut results = Results::new(Source {
         file: "campaign.jrig".into(),
         kind: "campaign".into(),
         started: Some("2026-03-02T09:15:00Z".into()),
-        device: names(&[("name", "simulated rig"), ("address", "sim:"), ("firmware", "0.1.0"), ("schema", "9c1b7a40")]),
+        device: names(&[
+            ("name", "simulated rig"),
+            ("address", "sim:"),
+            ("firmware", "0.1.0"),
+            ("schema", "9c1b7a40"),
+        ]),
         settings: BTreeMap::from([
             ("sigma_per_s".to_owned(), serde_json::json!(2.3)),
             ("line_spacing_hz".to_owned(), serde_json::json!(0.5)),
@@ -203,7 +217,11 @@ pub fn results() -> Results {
         done("B", 36, 108, &[("double hit", 5), ("weak", 3)]),
         done("AJB", 168, 504, &[("double hit", 31), ("overload", 4), ("noisy", 17), ("weak", 6)]),
     ];
-    let (a, b, j) = ([(27.3, 0.09), (430.0, 0.4)], [(356.0, 0.5), (840.0, 0.3)], [(208.0, 0.1), (356.0, 0.3), (610.0, 0.2)]);
+    let (a, b, j) = (
+        [(27.3, 0.09), (430.0, 0.4)],
+        [(356.0, 0.5), (840.0, 0.3)],
+        [(208.0, 0.1), (356.0, 0.3), (610.0, 0.2)],
+    );
     results.frfs = vec![
         frf("A", Role::DrivingPoint, ["A1:z", "AZ1"], &a, 2e-10),
         frf("A", Role::Transfer, ["A1:z", "I_MZ"], &[(27.3, 0.09), (430.0, -0.2)], 2e-10),
@@ -214,9 +232,8 @@ pub fn results() -> Results {
         frf("AJB", Role::SpecimenA, ["x_A", "I_MZ"], &[(192.0, 0.004), (208.0, 0.1)], 2e-10),
         frf("AJB", Role::SpecimenB, ["x_B", "I_MZ"], &[(208.0, 0.09)], 2e-10),
     ];
-    results.usable_bands = ["A", "B", "AJB"]
-        .map(|c| UsableBand { configuration: c.into(), band_hz: [0.0, 1985.0] })
-        .to_vec();
+    results.usable_bands =
+        ["A", "B", "AJB"].map(|c| UsableBand { configuration: c.into(), band_hz: [0.0, 1985.0] }).to_vec();
     results.example_loop = Some(example_loop());
     results.impact_slopes = (0..72)
         .map(|i| ImpactSlope {

@@ -16,6 +16,8 @@ pub mod number;
 mod source;
 pub mod words;
 
+pub use crate::hysteresis::{Kind as Excitation, OverCycles, Shape};
+pub use crate::substructuring::joint::BandStatistic as Statistics;
 pub use campaign::{AnalyseError, Progress, analyse};
 pub use check::Check;
 pub use completeness::Completeness;
@@ -23,8 +25,6 @@ pub use curves::{FrfCurve, Role, UsableBand, rounded};
 pub use hysteresis::{Force, Hysteresis, ImpactSlope, LoopCurve};
 pub use joint::{Joint, JointSpectrum, Refusal, SpectrumCurve};
 pub use source::{Software, Source, ranges};
-pub use crate::hysteresis::{Kind as Excitation, OverCycles, Shape};
-pub use crate::substructuring::joint::BandStatistic as Statistics;
 
 use serde::Serialize;
 

@@ -25,7 +25,11 @@ pub fn substructuring(results: &Results) -> Option<String> {
 pub fn impact_loops(results: &Results) -> Option<String> {
     let loops = results.impact_loops()?;
     let (name, k) = slope(loops)?;
-    let of = if k.cycles == 1 { "the first cycle of 1 hit".into() } else { format!("the first cycles of {} hits", count(k.cycles as u64)) };
+    let of = if k.cycles == 1 {
+        "the first cycle of 1 hit".into()
+    } else {
+        format!("the first cycles of {} hits", count(k.cycles as u64))
+    };
     Some(format!(
         "The impacts' own loops, measured at the specimens ({of}), give {name} = {}.",
         stiffness(k.mean, k.std)
@@ -65,7 +69,9 @@ pub fn shape_name(shape: Shape) -> &'static str {
 pub fn shape(shape: Shape) -> &'static str {
     match shape {
         Shape::Stuck => "a straight line: the contact sticks",
-        Shape::Elliptical => "an ellipse: force and displacement are out of phase, so the slope is k_eq, not k_T",
+        Shape::Elliptical => {
+            "an ellipse: force and displacement are out of phase, so the slope is k_eq, not k_T"
+        }
         Shape::Microslip => "slightly open: part of the contact slides",
         Shape::GrossSlip => "a plateau: the whole contact slides",
     }
@@ -96,9 +102,9 @@ pub fn outcome(ok: Option<bool>) -> &'static str {
 /// One row of the joint table as text.
 fn joint_line(joint: &Joint) -> Option<String> {
     let k = joint.sliding_stiffness()?;
-    let ci95 = k.ci95.map_or(String::new(), |[low, high]| {
-        format!(", 95 % {}…{}", short(micro(low)), short(micro(high)))
-    });
+    let ci95 = k
+        .ci95
+        .map_or(String::new(), |[low, high]| format!(", 95 % {}…{}", short(micro(low)), short(micro(high))));
     Some(format!(
         "  {:<17} {} IDMs  {:>11}  k_z {} (σ over {} lines; median {}{ci95})",
         joint.method,
@@ -157,7 +163,11 @@ pub fn summary(results: &Results) -> Vec<String> {
         lines.extend(results.completeness.iter().map(|c| {
             let refused: Vec<String> =
                 c.refused.iter().filter(|(_, n)| **n > 0).map(|(v, n)| format!("{n} {v}")).collect();
-            let refused = if refused.is_empty() { "none refused".into() } else { format!("refused: {}", refused.join(", ")) };
+            let refused = if refused.is_empty() {
+                "none refused".into()
+            } else {
+                format!("refused: {}", refused.join(", "))
+            };
             format!(
                 "  {:<4} {} of {} kept in {} of {} cells; {refused}",
                 c.configuration, c.kept, c.wanted, c.cells_complete, c.cells

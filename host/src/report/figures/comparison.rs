@@ -53,7 +53,11 @@ pub fn comparison(results: &Results) -> Option<String> {
         let text = stiffness(row.mean * 1e6, row.std * 1e6);
         drawing.text([area.right() + 10.0, at + 4.0], Anchor::Start, "row", &text);
     }
-    panel.axes(&mut drawing, (&ticks, Some("stiffness along z in N/µm (dot: mean, bar: ± σ, tick: median)")), (&[], None));
+    panel.axes(
+        &mut drawing,
+        (&ticks, Some("stiffness along z in N/µm (dot: mean, bar: ± σ, tick: median)")),
+        (&[], None),
+    );
     Some(drawing.finish("Stiffness along the sliding direction by every method, with scatter"))
 }
 

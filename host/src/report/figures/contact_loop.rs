@@ -69,7 +69,8 @@ fn first_cycle(curve: &LoopCurve, drawing: &mut Drawing) -> Option<()> {
     let range = cycle(curve);
     let x: Vec<f64> = curve.displacement_m[range.clone()].iter().map(|v| v * 1e9).collect();
     let t = &curve.force_n[range];
-    let (horizontal, vertical) = (middle_range(x.iter().copied(), 1.0, 0.08)?, middle_range(t.iter().copied(), 1.0, 0.08)?);
+    let (horizontal, vertical) =
+        (middle_range(x.iter().copied(), 1.0, 0.08)?, middle_range(t.iter().copied(), 1.0, 0.08)?);
     let area = Area { left: 620.0, top: 50.0, width: 408.0, height: 378.0 };
     let panel = Panel {
         area,

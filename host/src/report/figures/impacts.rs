@@ -50,6 +50,11 @@ pub fn impacts(results: &Results) -> Option<String> {
         }
     }
     panel.axes(&mut drawing, (&[], None), (&y_ticks, Some("slope in N/µm")));
-    drawing.text([f64::midpoint(area.left, area.right()), area.bottom() + 38.0], Anchor::Middle, "label", "hit at (records)");
+    drawing.text(
+        [f64::midpoint(area.left, area.right()), area.bottom() + 38.0],
+        Anchor::Middle,
+        "label",
+        "hit at (records)",
+    );
     Some(drawing.finish("Slope of the first cycle of every impact, by impact position"))
 }

@@ -49,7 +49,11 @@ pub fn joint_spectrum(results: &Results) -> Option<String> {
         means(results, method, &panel, &mut drawing);
         brackets(&bands, &panel, &mut drawing);
         let last = i + 1 == methods.len();
-        panel.axes(&mut drawing, (&x_ticks, last.then_some("frequency in Hz")), (&y_ticks, Some("k_z in N/µm")));
+        panel.axes(
+            &mut drawing,
+            (&x_ticks, last.then_some("frequency in Hz")),
+            (&y_ticks, Some("k_z in N/µm")),
+        );
         let title = format!("{method} ({})", words::method(method));
         drawing.text([area.left, area.top - ABOVE + 18.0], Anchor::Start, "title", &title);
         let entries: Vec<_> = of_method().map(|c| (idm_stroke(c.idms), format!("{} IDMs", c.idms))).collect();
@@ -91,7 +95,8 @@ fn shown_stiffness(spectrum: &JointSpectrum, curves: &[&SpectrumCurve]) -> Optio
             },
         )
     };
-    let [low, high] = middle_range(inside(true), 0.96, 0.35).or_else(|| middle_range(inside(false), 0.9, 0.2))?;
+    let [low, high] =
+        middle_range(inside(true), 0.96, 0.35).or_else(|| middle_range(inside(false), 0.9, 0.2))?;
     Some([low.min(-0.08 * high.abs()), high.max(0.08 * low.abs())])
 }
 

@@ -20,7 +20,8 @@ pub fn receptances(results: &Results) -> Option<String> {
     if configurations.is_empty() {
         return None;
     }
-    let all = || results.frfs.iter().filter(shown).flat_map(|c| &c.magnitude_m_per_n).copied().filter(|m| *m > 0.0);
+    let all =
+        || results.frfs.iter().filter(shown).flat_map(|c| &c.magnitude_m_per_n).copied().filter(|m| *m > 0.0);
     let [low, high] = middle_range(all().map(f64::log10), 0.998, 0.04)?;
     let magnitudes = [10f64.powf(low), 10f64.powf(high)];
     let frequencies = [
@@ -30,11 +31,13 @@ pub fn receptances(results: &Results) -> Option<String> {
     let column = (WIDTH - LEFT - GAP * 2.0 - 20.0) / 3.0;
     let mut drawing = Drawing::new("receptances", WIDTH, TOP + 240.0 + 14.0 + 120.0 + 14.0 + 90.0 + 48.0);
     for (i, name) in configurations.iter().enumerate() {
-        let curves: Vec<&FrfCurve> = results.frfs.iter().filter(shown).filter(|c| c.configuration == *name).collect();
+        let curves: Vec<&FrfCurve> =
+            results.frfs.iter().filter(shown).filter(|c| c.configuration == *name).collect();
         let left = LEFT + i as f64 * (column + GAP);
         let mut top = TOP;
         drawing.text([left, 16.0], Anchor::Start, "title", title(name));
-        let entries: Vec<_> = curves.iter().map(|c| (stroke(c), format!("{} from {}", c.output, c.input))).collect();
+        let entries: Vec<_> =
+            curves.iter().map(|c| (stroke(c), format!("{} from {}", c.output, c.input))).collect();
         legend(&mut drawing, [left, 38.0], &entries);
         for kind in [Kind::Magnitude, Kind::Phase, Kind::Coherence] {
             let area = Area { left, top, width: column, height: kind.height() };

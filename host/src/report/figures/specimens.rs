@@ -25,7 +25,8 @@ pub fn specimens(results: &Results) -> Option<String> {
     let levels = curves.iter().flat_map(|(c, ..)| inside(c, &c.magnitude_m_per_n)).map(|(_, m)| m.log10());
     let [low, high] = middle_range(levels, 1.0, 0.06)?;
     let mut drawing = Drawing::new("specimens", WIDTH, 400.0);
-    let entries: Vec<_> = curves.iter().map(|(c, s, name)| (*s, format!("{name} ({} from {})", c.output, c.input))).collect();
+    let entries: Vec<_> =
+        curves.iter().map(|(c, s, name)| (*s, format!("{name} ({} from {})", c.output, c.input))).collect();
     legend(&mut drawing, [70.0, 16.0], &entries);
     for (top, height, phase) in [(28.0, 190.0, false), (232.0, 120.0, true)] {
         let area = Area { left: 70.0, top, width: WIDTH - 70.0 - 12.0, height };

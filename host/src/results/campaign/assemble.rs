@@ -47,23 +47,27 @@ pub fn assemble(
         find(&points.impacts[i].name, locations[l]).is_some()
     });
     let left_out = |all: usize, kept: &[usize]| (0..all).filter(|i| !kept.contains(i)).collect::<Vec<_>>();
-    let impacts_left_out =
-        left_out(points.impacts.len(), &impacts).into_iter().map(|i| points.impacts[i].name.clone()).collect();
+    let impacts_left_out = left_out(points.impacts.len(), &impacts)
+        .into_iter()
+        .map(|i| points.impacts[i].name.clone())
+        .collect();
     let responses_left_out =
         left_out(locations.len(), &kept_locations).into_iter().map(|l| locations[l].to_owned()).collect();
     let channels: Vec<usize> = (0..points.channels.len())
         .filter(|c| kept_locations.iter().any(|l| locations[*l] == points.channels[*c].name))
         .collect();
-    let first = impacts.first().zip(kept_locations.first()).and_then(|(i, l)| {
-        find(&points.impacts[*i].name, locations[*l])
-    });
+    let first = impacts
+        .first()
+        .zip(kept_locations.first())
+        .and_then(|(i, l)| find(&points.impacts[*i].name, locations[*l]));
     let frf = first.map(|first| {
         let mut lines =
             vec![DMatrix::<Complex<f64>>::zeros(channels.len(), impacts.len()); first.frequency_hz.len()];
         for (column, i) in impacts.iter().enumerate() {
             for (row, c) in channels.iter().enumerate() {
                 let channel = &points.channels[*c];
-                let cell = find(&points.impacts[*i].name, &channel.name).expect("only complete rows and columns are kept");
+                let cell = find(&points.impacts[*i].name, &channel.name)
+                    .expect("only complete rows and columns are kept");
                 for (line, y) in lines.iter_mut().enumerate() {
                     y[(row, column)] = along(cell, channel, line);
                 }
@@ -92,7 +96,8 @@ fn along(cell: &CellAverage, channel: &Point, line: usize) -> Complex<f64> {
 
 /// Rows and columns of the largest part without holes that leaving out the worst one, again and again, finds.
 fn complete(rows: usize, columns: usize, there: impl Fn(usize, usize) -> bool) -> (Vec<usize>, Vec<usize>) {
-    let (mut kept_rows, mut kept_columns): (Vec<usize>, Vec<usize>) = ((0..rows).collect(), (0..columns).collect());
+    let (mut kept_rows, mut kept_columns): (Vec<usize>, Vec<usize>) =
+        ((0..rows).collect(), (0..columns).collect());
     loop {
         let holes_of_row = |r: usize| kept_columns.iter().filter(|c| !there(r, **c)).count();
         let holes_of_column = |c: usize| kept_rows.iter().filter(|r| !there(**r, c)).count();

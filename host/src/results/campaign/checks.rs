@@ -77,7 +77,11 @@ pub fn series_compliance(fbs: Option<&Statistics>, loops: Option<OverCycles>) ->
 pub fn hidden_resonance(contact: Option<&ContactCompliance>) -> Check {
     let name = HIDDEN_RESONANCE;
     let Some(contact) = contact else {
-        return Check::new(name, None, "Hits along z on A with both specimens' vibrometers and the load cells are needed to look for it.");
+        return Check::new(
+            name,
+            None,
+            "Hits along z on A with both specimens' vibrometers and the load cells are needed to look for it.",
+        );
     };
     let Some(peak) = contact.imaginary_peak() else {
         return Check::new(name, None, "Too few lines between 100 and 400 Hz to look for it.");
@@ -96,7 +100,11 @@ pub fn hidden_resonance(contact: Option<&ContactCompliance>) -> Check {
         );
     }
     if peak.over_level < 0.25 {
-        let mut quiet = Check::new(name, Some(true), "Both specimens move in phase with the force between 100 and 400 Hz: no resonance hides there.");
+        let mut quiet = Check::new(
+            name,
+            Some(true),
+            "Both specimens move in phase with the force between 100 and 400 Hz: no resonance hides there.",
+        );
         quiet = quiet.with("peak_over_level", peak.over_level);
         return quiet;
     }

@@ -31,7 +31,11 @@ pub fn curves(
         .iter()
         .filter(|(i, c, ..)| same_side(i, c))
         // in the assembly the joint is excited from A
-        .min_by(|x, y| (!on_a(x.0.grouping), x.3).partial_cmp(&(!on_a(y.0.grouping), y.3)).unwrap_or(std::cmp::Ordering::Equal));
+        .min_by(|x, y| {
+            (!on_a(x.0.grouping), x.3)
+                .partial_cmp(&(!on_a(y.0.grouping), y.3))
+                .unwrap_or(std::cmp::Ordering::Equal)
+        });
     let Some(driving) = driving else { return Vec::new() };
     let others = || pairs.iter().filter(|(i, c, ..)| i.name == driving.0.name && c.name != driving.1.name);
     let across = others().filter(|(i, c, ..)| !same_side(i, c)).min_by(|x, y| x.3.total_cmp(&y.3));
@@ -61,9 +65,10 @@ fn curve(
     let order = quantity.frf().order_of_s();
     // receptance along the two directions, hit and response both counted positive along z: a driving point starts at 0°
     let sign = impact.direction[2].signum();
-    let receptance = cell.h1[2].iter().zip(&cell.frequency_hz).map(|(h, f)| {
-        h * sign * Complex::new(sigma_per_s, TAU * f).powi(-order)
-    });
+    let receptance = cell.h1[2]
+        .iter()
+        .zip(&cell.frequency_hz)
+        .map(|(h, f)| h * sign * Complex::new(sigma_per_s, TAU * f).powi(-order));
     let (magnitude_m_per_n, phase_deg) =
         receptance.map(|y| (rounded(y.norm(), 5), rounded(y.arg().to_degrees(), 5))).unzip();
     let coherence = if cell.records.len() > 1 {

@@ -79,7 +79,8 @@ impl ContactCompliance {
         }
         let level = median(smooth.iter().map(|(_, d)| d.re.abs()).collect());
         let usual = median(smooth.iter().map(|(_, d)| d.im.abs()).collect());
-        let (frequency_hz, top) = smooth.iter().map(|(f, d)| (*f, d.im.abs())).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let (frequency_hz, top) =
+            smooth.iter().map(|(f, d)| (*f, d.im.abs())).max_by(|a, b| a.1.total_cmp(&b.1))?;
         Some(ImaginaryPeak { frequency_hz, over_level: top / level, over_median: top / usual })
     }
 }
@@ -99,9 +100,10 @@ pub fn specimen_curves(
 ) -> [FrfCurve; 2] {
     let step_hz = if frequency_hz.len() > 1 { frequency_hz[1] - frequency_hz[0] } else { 0.0 };
     [(Role::SpecimenA, "x_A", 0), (Role::SpecimenB, "x_B", 1)].map(|(role, output, i)| {
-        let receptance = frequency_hz.iter().enumerate().map(|(l, f)| {
-            average.cross[i][l] / average.force[l] / Complex::new(sigma_per_s, TAU * f)
-        });
+        let receptance = frequency_hz
+            .iter()
+            .enumerate()
+            .map(|(l, f)| average.cross[i][l] / average.force[l] / Complex::new(sigma_per_s, TAU * f));
         let (magnitude_m_per_n, phase_deg) =
             receptance.map(|y| (rounded(y.norm(), 5), rounded(y.arg().to_degrees(), 5))).unzip();
         let coherence = if average.hits > 1 {
@@ -157,7 +159,8 @@ mod tests {
     #[test]
     fn a_resonance_of_one_specimen_is_found_where_it_is() {
         let (f, average) = seen(0.05);
-        let peak = ContactCompliance::of(&f, SIGMA, &[&average]).and_then(|c| c.imaginary_peak()).expect("lines");
+        let peak =
+            ContactCompliance::of(&f, SIGMA, &[&average]).and_then(|c| c.imaginary_peak()).expect("lines");
         assert!((peak.frequency_hz - 192.0).abs() < 1.5, "{peak:?}");
         assert!(peak.stands_out(), "{peak:?}");
     }
@@ -165,7 +168,8 @@ mod tests {
     #[test]
     fn without_one_nothing_stands_out() {
         let (f, average) = seen(0.0);
-        let peak = ContactCompliance::of(&f, SIGMA, &[&average]).and_then(|c| c.imaginary_peak()).expect("lines");
+        let peak =
+            ContactCompliance::of(&f, SIGMA, &[&average]).and_then(|c| c.imaginary_peak()).expect("lines");
         assert!(!peak.stands_out() && peak.over_level < 0.01, "{peak:?}");
         assert_eq!(ContactCompliance::of(&f, SIGMA, &[]), None);
     }

@@ -36,7 +36,9 @@ pub enum AnalyseError {
         role: &'static str,
     },
     /// The response channels of the file's sessions measure different quantities, or none that is motion.
-    #[error("the vibrometer's channels measure {0}: velocity, displacement or acceleration is needed, the same in all sessions")]
+    #[error(
+        "the vibrometer's channels measure {0}: velocity, displacement or acceleration is needed, the same in all sessions"
+    )]
     Quantity(String),
 }
 
@@ -129,8 +131,12 @@ impl CampaignFile {
         let (text, plan_file) = store.plan_text()?;
         source.settings.insert("plan".into(), self.plan.name.clone().into());
         source.settings.insert("plan_file".into(), plan_file.into());
-        source.settings.insert("plan_crc32".into(), format!("{:08x}", crc32fast::hash(text.as_bytes())).into());
-        source.settings.insert("virtual_point_m".into(), serde_json::json!(self.plan.geometry.virtual_point_m));
+        source
+            .settings
+            .insert("plan_crc32".into(), format!("{:08x}", crc32fast::hash(text.as_bytes())).into());
+        source
+            .settings
+            .insert("virtual_point_m".into(), serde_json::json!(self.plan.geometry.virtual_point_m));
         if let Some(note) = store.meta(LINK_NOTE)? {
             source.link = serde_json::from_str(&note).unwrap_or_default();
         }
@@ -165,7 +171,10 @@ impl CampaignFile {
     }
 
     /// Runs `work` with a connection of its own.
-    fn with_reader<T>(&self, work: impl FnOnce(&Store) -> Result<T, AnalyseError>) -> Result<T, AnalyseError> {
+    fn with_reader<T>(
+        &self,
+        work: impl FnOnce(&Store) -> Result<T, AnalyseError>,
+    ) -> Result<T, AnalyseError> {
         // a connection is whole even if the thread that used it panicked
         let waiting = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         let idle = waiting().pop();
@@ -195,9 +204,9 @@ impl CampaignFile {
         let force = map.place(Role::HammerForce).ok_or(missing("the hammer's force"))?;
         let responses = map.responses().ok_or(missing("the response along x, y and z"))?;
         let late = |place: usize| delay(place) - delay(force);
-        let mut about =
-            Cell { fs_hz: rate, response_delay_s: responses.map(late), ..Cell::default() };
-        let (a, b, cells) = (map.place(Role::SpecimenA), map.place(Role::SpecimenB), map.places(Role::LoadCell));
+        let mut about = Cell { fs_hz: rate, response_delay_s: responses.map(late), ..Cell::default() };
+        let (a, b, cells) =
+            (map.place(Role::SpecimenA), map.place(Role::SpecimenB), map.places(Role::LoadCell));
         let is_velocity = |place: usize| map.channels[place].quantity == Quantity::Velocity;
         let contact = match (a, b) {
             (Some(a), Some(b)) if is_velocity(a) && is_velocity(b) && !cells.is_empty() => {
@@ -264,7 +273,8 @@ impl Measurements for CampaignFile {
 
 /// The plan's points in the shape that substructuring knows: every response along x, y and z.
 pub fn geometry(plan: &Plan) -> Geometry {
-    const AXES: [(&str, [f64; 3]); 3] = [("x", [1.0, 0.0, 0.0]), ("y", [0.0, 1.0, 0.0]), ("z", [0.0, 0.0, 1.0])];
+    const AXES: [(&str, [f64; 3]); 3] =
+        [("x", [1.0, 0.0, 0.0]), ("y", [0.0, 1.0, 0.0]), ("z", [0.0, 0.0, 1.0])];
     let mut geometry = Geometry {
         a: Configuration::default(),
         b: Configuration::default(),

@@ -79,7 +79,15 @@ fn recording(map: &ChannelMap, peak_n: f64) -> Recording {
         friction_peak_n: 0.0,
         quiet_ratio: 0.0,
     };
-    Recording { epoch: 1, first_scan: 0, trigger_index: TRIGGER, channels: map.len(), codes, gaps: vec![], shot }
+    Recording {
+        epoch: 1,
+        first_scan: 0,
+        trigger_index: TRIGGER,
+        channels: map.len(),
+        codes,
+        gaps: vec![],
+        shot,
+    }
 }
 
 /// A campaign of which only AJB was measured: two good hits and a refused one in each of its cells.
@@ -96,7 +104,9 @@ fn campaign(path: &Path) -> Store {
     };
     let map = map();
     let session = store.begin_session(&info, &map).expect("session");
-    for cell in store.cells().expect("cells").iter().filter(|c| configuration_name(c.cell.configuration) == "AJB") {
+    for cell in
+        store.cells().expect("cells").iter().filter(|c| configuration_name(c.cell.configuration) == "AJB")
+    {
         for (attempt, (peak, kind)) in
             [(50.0, Kind::Good), (48.0, Kind::DoubleHit), (46.0, Kind::Good)].into_iter().enumerate()
         {

@@ -2,7 +2,9 @@
 
 use super::cell::{ContactDelays, ContactSignals};
 use crate::hysteresis::integration::open_record;
-use crate::hysteresis::{HysteresisError, HysteresisRecord, Kind, OverCycles, RelativeMotion, Shape, analyse};
+use crate::hysteresis::{
+    HysteresisError, HysteresisRecord, Kind, OverCycles, RelativeMotion, Shape, analyse,
+};
 use crate::results::{Force, Hysteresis, ImpactSlope, LoopCurve, ranges, rounded};
 
 /// What one hit's first cycle says.
@@ -156,7 +158,9 @@ pub fn drawn(shown: &ImpactLoop, fs_hz: f64, contact: &ContactSignals, delays: C
     let lead = (end - start) / 10;
     let from = start.saturating_sub(lead);
     let to = (start + 4 * (end - start)).min(force_n.len());
-    let offset = |v: &[f64]| v[..start.max(1).min(v.len())].iter().sum::<f64>() / start.max(1).min(v.len()).max(1) as f64;
+    let offset = |v: &[f64]| {
+        v[..start.max(1).min(v.len())].iter().sum::<f64>() / start.max(1).min(v.len()).max(1) as f64
+    };
     let displacement = |v: &[f64]| -> Vec<f64> { open_record(&v[from..to], offset(v), 1.0 / fs_hz) };
     let (x_a, x_b) = (displacement(&a), displacement(&b));
     let rest = offset(&force_n);

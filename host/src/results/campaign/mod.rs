@@ -91,7 +91,8 @@ pub fn analyse_measurements<M: Measurements>(
     let mut frfs: [Option<FrfMatrix>; 3] = [None, None, None];
     for (place, (name, points)) in configurations(geometry).into_iter().enumerate() {
         let planned = cells.iter().filter(|c| c.configuration == name).count();
-        let own: Vec<CellAverage> = averages.iter().filter(|a| a.name.configuration == name).cloned().collect();
+        let own: Vec<CellAverage> =
+            averages.iter().filter(|a| a.name.configuration == name).cloned().collect();
         note_missing(&mut results, name, planned, &own);
         let records = ranges(own.iter().flat_map(|c| c.records.iter().copied()));
         if !records.is_empty() {
@@ -162,7 +163,8 @@ fn note_settings(results: &mut Results, sigma_per_s: f64) {
     let window = Windowing::default();
     let settings = &mut results.source.settings;
     settings.insert("exponential_window_per_s".into(), sigma_per_s.into());
-    settings.insert("force_window_s".into(), serde_json::json!([-window.force_before_s, window.force_after_s]));
+    settings
+        .insert("force_window_s".into(), serde_json::json!([-window.force_before_s, window.force_after_s]));
     settings.insert("estimator".into(), "H1 on s = σ + iω".into());
     settings.insert("lines_hz".into(), serde_json::json!([LOWEST_HZ, HIGHEST_HZ]));
 }
@@ -172,15 +174,17 @@ fn note_missing(results: &mut Results, name: &str, planned: usize, own: &[CellAv
     if planned == 0 {
         results.missing.push(format!("{name} is not in the plan."));
     } else if own.is_empty() {
-        results.missing.push(format!("{name} has not been measured: none of its {planned} cells has a kept hit."));
+        results
+            .missing
+            .push(format!("{name} has not been measured: none of its {planned} cells has a kept hit."));
     } else if absent > 0 {
         results.missing.push(format!("{name}: {absent} of {planned} cells have no kept hit."));
     }
     let single = own.iter().filter(|c| c.records.len() == 1).count();
     if single > 0 {
-        results.missing.push(format!(
-            "{name}: {single} cells have a single kept hit, so their coherence is not known."
-        ));
+        results
+            .missing
+            .push(format!("{name}: {single} cells have a single kept hit, so their coherence is not known."));
     }
 }
 
@@ -256,7 +260,9 @@ fn at_the_contact<M: Measurements>(
         compliance = ContactCompliance::of(&cell.frequency_hz, sigma_per_s, &sums);
         // the moving mass drives the contact as the shaker does; any other impact will do
         let geometry = measurements.geometry();
-        let mass = |name: &str| geometry.ajb.impacts.iter().any(|p| p.name == name && p.grouping == Grouping::InternalA);
+        let mass = |name: &str| {
+            geometry.ajb.impacts.iter().any(|p| p.name == name && p.grouping == Grouping::InternalA)
+        };
         let shown = by_impact.iter().max_by_key(|(name, _)| mass(name));
         if let Some((name, sum)) = shown {
             results.frfs.extend(specimen_curves(name, &cell.frequency_hz, sigma_per_s, sum));

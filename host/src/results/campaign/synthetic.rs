@@ -45,11 +45,17 @@ impl Rig {
         use Grouping::{InterfaceA, InterfaceB};
         let at = |x: f64, side: f64| [x, side * 0.02, 0.03];
         let responses = |on_a: bool| -> Vec<Point> {
-            let (letter, grouping, side) = if on_a { ("A", InterfaceA, 1.0) } else { ("B", InterfaceB, -1.0) };
-            (0..2).flat_map(|i| location(&format!("{letter}{}", i + 1), grouping, at(0.02 * f64::from(i), side))).collect()
+            let (letter, grouping, side) =
+                if on_a { ("A", InterfaceA, 1.0) } else { ("B", InterfaceB, -1.0) };
+            (0..2)
+                .flat_map(|i| {
+                    location(&format!("{letter}{}", i + 1), grouping, at(0.02 * f64::from(i), side))
+                })
+                .collect()
         };
         let impacts = |on_a: bool| -> Vec<Point> {
-            let (letter, grouping, side) = if on_a { ("A", InterfaceA, 1.0) } else { ("B", InterfaceB, -1.0) };
+            let (letter, grouping, side) =
+                if on_a { ("A", InterfaceA, 1.0) } else { ("B", InterfaceB, -1.0) };
             let mut points = Vec::new();
             for (axis, name) in [(1, "Y"), (2, "Z")] {
                 for i in 0..2 {
@@ -89,8 +95,10 @@ impl Rig {
     }
 
     fn grouping(&self, configuration: &str, name: &str) -> Grouping {
-        let (_, points) =
-            configurations(&self.geometry).into_iter().find(|(n, _)| *n == configuration).expect("a configuration");
+        let (_, points) = configurations(&self.geometry)
+            .into_iter()
+            .find(|(n, _)| *n == configuration)
+            .expect("a configuration");
         points.impacts.iter().chain(&points.channels).find(|p| p.name == name).expect("a point").grouping
     }
 }
@@ -188,8 +196,11 @@ impl Measurements for Rig {
                 // y and z of a body are alike, each moved by hits along it only
                 let scaled = |signal: &[f64]| signal.iter().map(|s| s * peak).collect::<Vec<f64>>();
                 let (still, moved) = (vec![0.0; SAMPLES], scaled(&unit.velocity[usize::from(!seen_on_a)]));
-                let response =
-                    if along_z { [still.clone(), still.clone(), moved] } else { [still.clone(), moved, still.clone()] };
+                let response = if along_z {
+                    [still.clone(), still.clone(), moved]
+                } else {
+                    [still.clone(), moved, still.clone()]
+                };
                 let contact = (coupled && along_z).then(|| {
                     let [a, b] = [0, 1].map(|body| scaled(&unit.velocity[body]));
                     // the load cells are B's spring
@@ -243,7 +254,8 @@ fn without_a_there_are_still_loops() {
 
 #[test]
 fn a_hole_costs_a_row_or_column_and_is_told() {
-    let results = run(&Rig::new().without(|c| !(c.configuration == "AJB" && c.impact == "BZ2" && c.response == "A1")));
+    let results =
+        run(&Rig::new().without(|c| !(c.configuration == "AJB" && c.impact == "BZ2" && c.response == "A1")));
     assert!(results.missing.iter().any(|m| m.contains("AJB: 1 of 32 cells")), "{:?}", results.missing);
     assert!(results.missing.iter().any(|m| m.contains("left out")), "{:?}", results.missing);
     assert!(results.headline_joint().is_some());
