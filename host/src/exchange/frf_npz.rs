@@ -1,7 +1,8 @@
 //! FRF matrices in npz: `frequency` (line) Hz, `frf` (line, output, input), `quantity`, `outputs`, `inputs`, and optionally
 //! `sigma`, the damping of the exponential window in 1/s (absent means 0).
 
-use super::npz::{Array, NpzError, NpzFile, NpzOutput};
+use super::npz::{Array, NpzError, NpzFile};
+use super::npz_output::NpzOutput;
 use crate::substructuring::frf::{FrfMatrix, Quantity};
 use nalgebra::DMatrix;
 use num_complex::Complex;

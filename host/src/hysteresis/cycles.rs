@@ -89,8 +89,8 @@ fn interpolate(x: &[f64], at: f64) -> f64 {
         return x[(nearest as usize).min(last)];
     }
     let i = at.floor() as usize;
-    let sample = |k: isize| x[(i as isize + k).clamp(0, last as isize) as usize];
-    let (p0, p1, p2, p3) = (sample(-1), sample(0), sample(1), sample(2));
+    let sample = |k: usize| x[k.min(last)];
+    let (p0, p1, p2, p3) = (sample(i.saturating_sub(1)), sample(i), sample(i + 1), sample(i + 2));
     let t = at - at.floor();
     p1 + 0.5 * t * (p2 - p0 + t * (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3 + t * (3.0 * (p1 - p2) + p3 - p0)))
 }

@@ -21,7 +21,7 @@ fn check(case: &str) -> LoopAnalysis {
             "energy_j" => json!(got.energy_j.expect("a closed loop").mean),
             "phase_deg" => json!(got.phase_deg.abs()),
             "k_secant_n_per_m" => json!(got.k_secant_n_per_m),
-            "k_fundamental_n_per_m" => json!(got.k_fundamental_n_per_m.map(|k| k.norm())),
+            "k_fundamental_n_per_m" => json!(got.k_fundamental_n_per_m.map(num_complex::Complex::norm)),
             "friction_limit_n" => json!(got.friction_limit_n),
             // the load is not in the record
             "friction_coefficient" => {

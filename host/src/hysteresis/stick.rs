@@ -60,7 +60,9 @@ pub(super) fn stick_stiffness(cycle: &Cycle, strokes: &[Stroke; 2]) -> Option<f6
         // each stroke has an intercept of its own
         for values in [&mut x, &mut t] {
             let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
-            values.iter_mut().for_each(|v| *v -= mean);
+            for v in values.iter_mut() {
+                *v -= mean;
+            }
         }
         xs.extend(x);
         ts.extend(t);

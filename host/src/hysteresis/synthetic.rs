@@ -14,9 +14,9 @@ fn record(elements: &[(f64, f64)], amplitude_m: f64, frequency_hz: f64, damping:
     let mut force = Vec::new();
     let mut velocity = Vec::new();
     // one cycle ahead, so that the record starts steady
-    let ahead = (FS / frequency_hz).ceil() as i64;
-    for i in -ahead..n as i64 {
-        let t = i as f64 / FS;
+    let ahead = (FS / frequency_hz).ceil() as usize;
+    for i in 0..ahead + n {
+        let t = (i as f64 - ahead as f64) / FS;
         let x = amplitude_m * (w * t).sin();
         let mut total = damping * amplitude_m * w * (w * t).cos();
         for (slider, &(k, limit)) in sliders.iter_mut().zip(elements) {
@@ -24,7 +24,7 @@ fn record(elements: &[(f64, f64)], amplitude_m: f64, frequency_hz: f64, damping:
             *slider = x - f / k;
             total += f;
         }
-        if i >= 0 {
+        if i >= ahead {
             force.push(total);
             velocity.push(amplitude_m * w * (w * t).cos());
         }

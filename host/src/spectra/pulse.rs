@@ -68,16 +68,16 @@ fn middle(values: &[f64]) -> Option<f64> {
 
 /// The largest value within one sample of `peak` of the record interpolated sixteenfold by a windowed sinc.
 fn band_limited_peak(x: &[f64], peak: usize) -> f64 {
-    const STEPS: i64 = 16;
-    const REACH: i64 = 16;
+    const STEPS: i32 = 16;
+    const REACH: i32 = 16;
     (-STEPS..=STEPS)
         .map(|step| {
-            let t = step as f64 / STEPS as f64;
+            let t = f64::from(step) / f64::from(STEPS);
             (-REACH..=REACH)
                 .map(|k| {
                     // constant beyond the record's ends
-                    let at = (peak as i64 + k).clamp(0, x.len() as i64 - 1) as usize;
-                    x[at] * sinc(t - k as f64) * sinc((t - k as f64) / (REACH + 1) as f64)
+                    let at = peak.saturating_add_signed(k as isize).min(x.len() - 1);
+                    x[at] * sinc(t - f64::from(k)) * sinc((t - f64::from(k)) / f64::from(REACH + 1))
                 })
                 .sum()
         })

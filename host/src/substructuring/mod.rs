@@ -22,6 +22,7 @@ mod interface_data;
 pub mod joint;
 pub mod method;
 pub mod pseudo_inverse;
+mod reduced;
 pub mod vpt;
 
 pub use frf::{FrfError, FrfMatrix, Quantity};

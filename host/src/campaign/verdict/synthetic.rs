@@ -146,7 +146,7 @@ fn the_other_kinds() {
     let plain = |peak: f64, dice: &mut Dice| force(&[(5e-3, peak, 0.41e-3)], 4096, dice);
     assert_eq!(verdict(&plain(15.0, &mut dice), &[], &Limits::default()).verdict, VerdictKind::Weak);
     assert_eq!(verdict(&plain(0.0, &mut dice), &[], &Limits::default()).verdict, VerdictKind::Weak);
-    assert_eq!(verdict(&[0.0; 4096], &[], &Limits::default()).verdict, VerdictKind::Weak);
+    assert_eq!(verdict(&[0.0; 1024], &[], &Limits::default()).verdict, VerdictKind::Weak);
     assert_eq!(verdict(&plain(120.0, &mut dice), &[], &Limits::default()).verdict, VerdictKind::Strong);
     let timed = Limits { expected_start_s: Some(8e-3), ..Limits::default() };
     let v = verdict(&plain(50.0, &mut dice), &[], &timed);

@@ -1,0 +1,88 @@
+//! Arrays into an npz archive: float64, complex128 and unicode, in C order.
+
+use super::npz::NpzError;
+use npyz::npz::NpzWriter;
+use npyz::zip;
+use npyz::{DType, WriterBuilder};
+use num_complex::Complex;
+use std::fs::File;
+use std::io::{self, BufWriter};
+use std::path::{Path, PathBuf};
+
+/// An npz file being written.
+pub struct NpzOutput {
+    path: PathBuf,
+    writer: NpzWriter<BufWriter<File>>,
+}
+
+impl NpzOutput {
+    /// Creates or replaces the file.
+    ///
+    /// # Errors
+    /// [`NpzError::Write`].
+    pub fn create(path: &Path) -> Result<Self, NpzError> {
+        let writer =
+            NpzWriter::create(path).map_err(|source| NpzError::Write { path: path.into(), source })?;
+        Ok(NpzOutput { path: path.into(), writer })
+    }
+
+    /// Adds a float64 array in C order.
+    ///
+    /// # Errors
+    /// [`NpzError::Write`].
+    pub fn real(&mut self, name: &str, shape: &[usize], values: &[f64]) -> Result<(), NpzError> {
+        self.array(name, shape, "<f8", values.iter().copied())
+    }
+
+    /// Adds a complex128 array in C order.
+    ///
+    /// # Errors
+    /// [`NpzError::Write`].
+    pub fn complex(&mut self, name: &str, shape: &[usize], values: &[Complex<f64>]) -> Result<(), NpzError> {
+        self.array(name, shape, "<c16", values.iter().copied())
+    }
+
+    /// Adds a unicode array.
+    ///
+    /// # Errors
+    /// [`NpzError::Write`].
+    pub fn text(&mut self, name: &str, shape: &[usize], values: &[String]) -> Result<(), NpzError> {
+        // numpy has no text of width zero
+        let width = values.iter().map(|v| v.chars().count()).max().unwrap_or(0).max(1);
+        self.array(name, shape, &format!("<U{width}"), values.iter().cloned())
+    }
+
+    fn array<T: npyz::Serialize>(
+        &mut self,
+        name: &str,
+        shape: &[usize],
+        kind: &str,
+        values: impl Iterator<Item = T>,
+    ) -> Result<(), NpzError> {
+        let shape: Vec<u64> = shape.iter().map(|&n| n as u64).collect();
+        // A fixed date keeps files of the same content identical.
+        let options = zip::write::FileOptions::default()
+            .last_modified_time(zip::DateTime::default())
+            .large_file(shape.iter().product::<u64>() > 100_000_000);
+        let dtype = DType::new_scalar(kind.parse().expect("type strings above are numpy's own"));
+        let written = self
+            .writer
+            .array::<T>(name, options)
+            .and_then(|array| array.dtype(dtype).shape(&shape).begin_nd())
+            .and_then(|mut array| {
+                array.extend(values)?;
+                array.finish()
+            });
+        written.map_err(|source| NpzError::Write { path: self.path.clone(), source })
+    }
+
+    /// Closes the archive.
+    ///
+    /// # Errors
+    /// [`NpzError::Write`].
+    pub fn finish(mut self) -> Result<(), NpzError> {
+        let closed = self.writer.zip_writer().finish().map_err(io::Error::from);
+        let flushed = closed.and_then(|mut file| io::Write::flush(&mut file));
+        flushed.map_err(|source| NpzError::Write { path: self.path.clone(), source })
+    }
+}
