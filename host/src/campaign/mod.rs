@@ -1,13 +1,25 @@
 //! Campaigns: the plan, the file that keeps every record, and the runner that fills it.
+//!
+//! [`runner::run`] walks the cells of the plan: hammer and laser are brought there ([`stage`]), shots are fired at
+//! repeatable scans ([`shot`]) with a pulse that finds the target force ([`pulse`]), each record is judged
+//! ([`judge`]) and stored on a thread of its own ([`keeper`], [`store`]).
 
 pub mod codec;
 pub mod judge;
+mod keeper;
 pub mod plan;
 mod plan_check;
+mod progress;
+pub mod pulse;
+pub mod quiet;
 mod records;
 pub mod rows;
+pub mod runner;
 mod schema;
 mod sessions;
+pub mod shot;
+pub mod stage;
 pub mod store;
 pub mod store_error;
+pub mod tally;
 pub mod verdict;

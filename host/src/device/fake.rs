@@ -41,7 +41,7 @@ pub struct Fake {
     pub reach_us: u32,
     /// Peak force per µs of pulse beyond reach, N.
     pub newtons_per_us: f32,
-    /// After this many answers the device is silent for ever.
+    /// After this many requests the cable is pulled.
     pub dies_after: Option<u32>,
     /// Whether it knows a stage.
     pub stage_known: bool,
@@ -63,6 +63,7 @@ pub struct Fake {
     shot: Option<Shot>,
     cell: u64,
     attempt: u32,
+    fired_attempt: u32,
 }
 
 impl Default for Fake {
@@ -91,6 +92,7 @@ impl Default for Fake {
             shot: None,
             cell: 0,
             attempt: 0,
+            fired_attempt: 0,
         }
     }
 }
@@ -131,11 +133,7 @@ impl Fake {
 
     fn answer(&mut self, asked: Numbered) {
         if let Some(left) = &mut self.dies_after {
-            if *left == 0 {
-                self.streaming = false;
-                return;
-            }
-            *left -= 1;
+            *left = left.saturating_sub(1);
         }
         if let Some((_, wire)) = self.memory.iter().find(|(number, _)| *number == asked.number) {
             self.out.extend(wire.clone());
@@ -307,6 +305,8 @@ impl Fake {
 
     fn hammer(&mut self, scan: u64) {
         if let Some(fire) = self.fire.take_if(|fire| fire.not_before < scan + BLOCK) {
+            self.fired_attempt = self.attempt;
+            self.attempt += 1;
             let peak = (fire.pulse_us as f32 - self.reach_us as f32) * self.newtons_per_us;
             let at = fire.not_before;
             let mut shot = Shot { fired_at: at, ..shot(&fire, Phase::Firing) };
@@ -320,7 +320,6 @@ impl Fake {
         {
             shot.phase = if shot.trigger > 0 { Phase::Done } else { Phase::Missed };
             self.shot = Some(shot);
-            self.attempt += 1;
             self.event(Event::Shot(shot));
         }
     }
@@ -329,7 +328,7 @@ impl Fake {
         let Some(shot) = self.shot.filter(|shot| shot.fired_at > 0) else { return 0 };
         let since = scan.wrapping_sub(shot.fired_at).cast_signed();
         let mut hasher = DefaultHasher::new();
-        (self.cell, shot.number, since, place).hash(&mut hasher);
+        (self.cell, self.fired_attempt, since, place).hash(&mut hasher);
         let noise = (hasher.finish() % 9) as i16 - 4;
         let t = since - FLIGHT.cast_signed();
         let pulse = if shot.trigger > 0 && (0..20).contains(&t) {
@@ -364,6 +363,9 @@ fn shot(fire: &Fire, phase: Phase) -> Shot {
 
 impl Transport for Fake {
     fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        if self.dies_after == Some(0) {
+            return Err(io::ErrorKind::BrokenPipe.into());
+        }
         for _ in 0..8 {
             if !self.advance() {
                 break;

@@ -113,12 +113,16 @@ impl Scale {
                     2 | 5 => decades < 3.2,
                     _ => false,
                 };
-                let label = match (labelled, plain) {
-                    (false, _) => String::new(),
-                    (true, true) => decimals(value, usize::try_from(-decade).unwrap_or(0)),
-                    (true, false) if digit == 1 => format!("10{}", superscript(decade)),
-                    (true, false) if decades < 1.2 => format!("{digit}·10{}", superscript(decade)),
-                    (true, false) => String::new(),
+                let label = if !labelled {
+                    String::new()
+                } else if plain {
+                    decimals(value, usize::try_from(-decade).unwrap_or(0))
+                } else if digit == 1 {
+                    format!("10{}", superscript(decade))
+                } else if decades < 1.2 {
+                    format!("{digit}·10{}", superscript(decade))
+                } else {
+                    String::new()
                 };
                 ticks.push(Tick { value, label });
             }

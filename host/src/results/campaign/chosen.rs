@@ -72,7 +72,7 @@ fn curve(
     let (magnitude_m_per_n, phase_deg) =
         receptance.map(|y| (rounded(y.norm(), 5), rounded(y.arg().to_degrees(), 5))).unzip();
     let coherence = if cell.records.len() > 1 {
-        cell.coherence[2].iter().map(|c| rounded(*c, 5)).collect()
+        cell.coherence[2].iter().map(|c| rounded(if c.is_finite() { *c } else { 0.0 }, 5)).collect()
     } else {
         Vec::new()
     };

@@ -91,9 +91,11 @@ fn median(mut values: Vec<f64>) -> f64 {
     *values.select_nth_unstable_by(at, f64::total_cmp).1
 }
 
-/// The two specimens' receptances from one impact, for the report.
+/// The two specimens' receptances from one impact, for the report; hit and response count positive along +z, so
+/// `sign` is −1 for a hit towards −z.
 pub fn specimen_curves(
     impact: &str,
+    sign: f64,
     frequency_hz: &[f64],
     sigma_per_s: f64,
     average: &ContactAverage,
@@ -103,13 +105,13 @@ pub fn specimen_curves(
         let receptance = frequency_hz
             .iter()
             .enumerate()
-            .map(|(l, f)| average.cross[i][l] / average.force[l] / Complex::new(sigma_per_s, TAU * f));
+            .map(|(l, f)| sign * average.cross[i][l] / average.force[l] / Complex::new(sigma_per_s, TAU * f));
         let (magnitude_m_per_n, phase_deg) =
             receptance.map(|y| (rounded(y.norm(), 5), rounded(y.arg().to_degrees(), 5))).unzip();
         let coherence = if average.hits > 1 {
             (0..frequency_hz.len())
                 .map(|l| average.cross[i][l].norm_sqr() / (average.force[l] * average.auto[i][l]))
-                .map(|c| rounded(c, 5))
+                .map(|c| rounded(if c.is_finite() { c } else { 0.0 }, 5))
                 .collect()
         } else {
             Vec::new()

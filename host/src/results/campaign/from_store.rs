@@ -6,12 +6,13 @@ use crate::campaign::plan::{Plan, configuration_name};
 use crate::campaign::rows::RecordRow;
 use crate::campaign::store::Store;
 use crate::campaign::store_error::StoreError;
+use crate::campaign::tally::Tally;
 use crate::device::channels::ChannelMap;
 use crate::results::{Completeness, Results, Source};
 use crate::spectra::MotionQuantity;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
 use jointrig_protocol::channel::{Quantity, Role};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
@@ -56,7 +57,6 @@ pub fn analyse(store: &Store, progress: &(dyn Fn(Progress) + Sync)) -> Result<Re
 struct PlannedCell {
     id: i64,
     name: CellName,
-    wanted: usize,
     given_up: Option<String>,
 }
 
@@ -66,6 +66,7 @@ struct CampaignFile {
     geometry: Geometry,
     quantity: MotionQuantity,
     cells: Vec<PlannedCell>,
+    tally: Tally,
     records: HashMap<i64, Vec<RecordRow>>,
     channels: HashMap<i64, ChannelMap>,
     /// Open connections that no thread uses at the moment: SQLite's cannot be shared, only handed on.
@@ -75,8 +76,9 @@ struct CampaignFile {
 impl CampaignFile {
     fn open(store: &Store) -> Result<Self, AnalyseError> {
         let plan = store.plan()?;
-        let cells = store
-            .cells()?
+        let (rows, all) = (store.cells()?, store.records()?);
+        let tally = Tally::new(&rows, &all);
+        let cells = rows
             .into_iter()
             .map(|row| PlannedCell {
                 id: row.id,
@@ -85,12 +87,11 @@ impl CampaignFile {
                     impact: row.cell.impact,
                     response: row.cell.response,
                 },
-                wanted: row.cell.wanted as usize,
                 given_up: row.given_up,
             })
             .collect();
         let mut records: HashMap<i64, Vec<RecordRow>> = HashMap::new();
-        for record in store.records()? {
+        for record in all {
             records.entry(record.cell).or_default().push(record);
         }
         let mut channels = HashMap::new();
@@ -103,6 +104,7 @@ impl CampaignFile {
             quantity: response_quantity(channels.values())?,
             plan,
             cells,
+            tally,
             records,
             channels,
             idle: Mutex::new(Vec::new()),
@@ -154,12 +156,9 @@ impl CampaignFile {
             .into_iter()
             .map(|name| {
                 let own = self.cells.iter().filter(|c| c.name.configuration == name).map(|cell| {
-                    let records = self.records_of(cell.id);
-                    let mut refused: BTreeMap<&str, usize> = BTreeMap::new();
-                    for record in records.iter().filter(|r| !r.kept()) {
-                        *refused.entry(record.standing().name()).or_default() += 1;
-                    }
-                    (cell.wanted, records.iter().filter(|r| r.kept()).count(), refused.into_iter().collect())
+                    let count = self.tally.cell(cell.id);
+                    let refused = count.refused.iter().map(|(kind, n)| (kind.name(), *n as usize)).collect();
+                    (count.wanted as usize, count.kept as usize, refused)
                 });
                 completeness(name, own)
             })

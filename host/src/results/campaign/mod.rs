@@ -263,9 +263,12 @@ fn at_the_contact<M: Measurements>(
         let mass = |name: &str| {
             geometry.ajb.impacts.iter().any(|p| p.name == name && p.grouping == Grouping::InternalA)
         };
+        let sign = |name: &str| {
+            geometry.ajb.impacts.iter().find(|p| p.name == name).map_or(1.0, |p| p.direction[2].signum())
+        };
         let shown = by_impact.iter().max_by_key(|(name, _)| mass(name));
         if let Some((name, sum)) = shown {
-            results.frfs.extend(specimen_curves(name, &cell.frequency_hz, sigma_per_s, sum));
+            results.frfs.extend(specimen_curves(name, sign(name), &cell.frequency_hz, sigma_per_s, sum));
         }
     }
     let loop_slope = results.impact_loops().and_then(words::slope).map(|(_, k)| k);

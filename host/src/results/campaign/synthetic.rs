@@ -208,7 +208,12 @@ impl Measurements for Rig {
                     let tangential_n = x_b.iter().map(|x| 150e6 * x).collect();
                     ContactSignals { specimen_a_m_per_s: a, specimen_b_m_per_s: b, tangential_n }
                 });
-                Hit { record: (10 * place + i) as i64, force_n: scaled(&unit.force), response, contact }
+                Hit {
+                    record: i64::try_from(10 * place + i).expect("small"),
+                    force_n: scaled(&unit.force),
+                    response,
+                    contact,
+                }
             })
             .collect();
         Ok(Cell { fs_hz: FS_HZ, hits, ..Cell::default() })
