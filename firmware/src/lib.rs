@@ -1,1 +1,34 @@
-//! The instrument.
+//! The rig's controller above its board: acquisition, hammer, link and safety.
+//!
+//! The same code runs on the controller, in the emulator and inside the simulator. It owns no static, no
+//! executor, no time driver and no logger: a board makes one [`Core`] and runs the four asynchronous
+//! functions that borrow it, each in a task of its own:
+//!
+//! | function | what it does | when it is late |
+//! |---|---|---|
+//! | [`acquire::acquire`] | takes blocks of scans from the converters, judges them for the hammer, puts them in the ring | the front end counts missed scans; they are reported as lost ranges |
+//! | [`receive::receive`] | finds frames in incoming bytes and carries out requests | the host asks again |
+//! | [`transmit::transmit`] | sends answers first, then events, then blocks sent again, then new blocks | blocks wait in the ring; what leaves it unsent is reported as lost |
+//! | [`watch::watch`] | disarms when the host falls silent, reports counters | – |
+//!
+//! The scan index is the only clock for results; `embassy-time` serves timeouts. Results never depend on
+//! the order in which an executor polls the four.
+#![no_std]
+#![forbid(unsafe_code)]
+
+pub mod acquire;
+pub mod board;
+mod fmt;
+pub mod friction;
+pub mod hammer;
+pub mod memory;
+pub mod pulse;
+pub mod quiet;
+pub mod receive;
+mod requests;
+pub mod ring;
+mod state;
+pub mod transmit;
+pub mod watch;
+
+pub use state::{Core, Facts};

@@ -19,7 +19,6 @@ pub struct Numbered {
 
 /// What was asked for. Variants only ever grow at the end.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
-#[expect(clippy::large_enum_variant, reason = "there is no heap on the device to put the large one on")]
 pub enum Answer {
     /// Who the device is.
     Info(Info),

@@ -210,7 +210,7 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
         head.copy_from_slice(&header.to_bytes());
         let used = usize::from(scans) * channels * 2;
         for (i, pair) in samples[..used].as_chunks_mut::<2>().0.iter_mut().enumerate() {
-            *pair = ((i as i16).wrapping_mul(273).wrapping_sub(32_000)).to_le_bytes();
+            *pair = (i as u16).wrapping_mul(273).wrapping_add(33_536).to_le_bytes();
         }
         each(name, frame.seal(crate::block::HEADER_PAYLOAD + used)?);
     }

@@ -1,2 +1,98 @@
-//! xtask
-fn main() {}
+//! `cargo xtask`: everything a contributor runs, behind one command.
+//!
+//! Each command is a thin line here and a file of its own: [`setup`] prepares the machine, [`suite`] is the whole
+//! test run, [`firmware`] builds for the microcontroller. The exit code is 0 when all went well, 1 when a step failed
+//! (the message says what, where and what to do), 2 for a command line that makes no sense.
+
+mod bench;
+mod command;
+mod consent;
+mod emulator;
+mod firmware;
+mod flash;
+mod lint;
+mod locks;
+mod packages;
+mod project;
+mod setup;
+mod size;
+mod suite;
+mod sysroot;
+mod tests_run;
+mod toolchain;
+
+use clap::{Parser, Subcommand};
+use project::Project;
+use std::process::ExitCode;
+
+/// Everything a contributor runs.
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask")]
+struct Arguments {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Make the microcontroller target and QEMU available; quick when they already are.
+    #[command(after_help = setup::ENVIRONMENT_HELP)]
+    Setup {
+        /// Do not ask before installing system packages.
+        #[arg(long)]
+        yes: bool,
+    },
+    /// Build the board images and print how much flash and RAM each takes.
+    #[command(after_help = setup::ENVIRONMENT_HELP)]
+    Firmware {
+        /// Only this board (its package name); all boards when absent.
+        #[arg(long, value_name = "NAME")]
+        board: Option<String>,
+    },
+    /// Check the formatting of both workspaces.
+    FmtCheck,
+    /// Run clippy on both workspaces with warnings as errors, and compare their locks.
+    Lint,
+    /// Run all that must pass before a change is merged.
+    #[command(after_help = setup::ENVIRONMENT_HELP)]
+    Test(suite::Options),
+    /// Run the emulated board in QEMU.
+    Qemu(emulator::Options),
+    /// Write the rig controller's image to the board on the desk.
+    Flash {
+        /// Write the image and return, without staying attached to show its log.
+        #[arg(long)]
+        detach: bool,
+    },
+    /// Run every benchmark of the workspace.
+    Bench {
+        /// Passed to `cargo bench`, for example a part of a benchmark's name.
+        #[arg(last = true)]
+        extra: Vec<String>,
+    },
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    match run(arguments.task) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(task: Task) -> anyhow::Result<()> {
+    let project = Project::locate()?;
+    match task {
+        Task::Setup { yes } => setup::everything(&project, consent::Consent::new(yes)).map(drop),
+        Task::Firmware { board } => firmware::command(&project, board.as_deref()),
+        Task::FmtCheck => lint::formatting(&project),
+        Task::Lint => lint::all(&project),
+        Task::Test(options) => suite::run(&project, &options),
+        Task::Qemu(options) => emulator::run(&project, &options),
+        Task::Flash { detach } => flash::run(&project, detach),
+        Task::Bench { extra } => bench::run(&project, &extra),
+    }
+}

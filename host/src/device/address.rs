@@ -80,6 +80,12 @@ impl Address {
     }
 }
 
+#[cfg(feature = "sim")]
+fn open_sim(rig: Option<&std::path::Path>, seed: u64) -> Result<Box<dyn Transport>, DeviceError> {
+    Ok(Box::new(super::sim::Sim::open(rig, seed)?))
+}
+
+#[cfg(not(feature = "sim"))]
 fn open_sim(rig: Option<&std::path::Path>, _seed: u64) -> Result<Box<dyn Transport>, DeviceError> {
     Err(DeviceError::NotBuilt {
         given: Address::Sim { rig: rig.map(Into::into) }.to_string(),

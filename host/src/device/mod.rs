@@ -16,6 +16,8 @@ pub mod recording;
 mod requests;
 mod serial;
 pub mod session;
+#[cfg(feature = "sim")]
+mod sim;
 pub mod stream;
 mod tcp;
 pub mod transport;

@@ -1,0 +1,142 @@
+//! Acquisition: blocks of scans from the converters, through the hammer's machine, into the ring.
+//!
+//! One block is 15 scans of 16 channels, 293 µs at 51.2 kHz: that is the time this task has for each. What
+//! it does with a block is bounded and done under one lock; the coil's order, if one comes of it, is
+//! carried out right after.
+
+use embassy_sync::blocking_mutex::raw::RawMutex;
+use jointrig_protocol::block::{OVER_RANGE, TRIGGER};
+use jointrig_protocol::event::{Event, Loss, Reason};
+use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
+
+use crate::Core;
+use crate::board::{Coil, Delivered, Inputs, Scans};
+use crate::hammer::{CoilOrder, Scanned};
+use crate::ring::Range;
+
+/// Runs for ever.
+pub async fn acquire<M: RawMutex, S: Scans, C: Coil, I: Inputs>(
+    core: &Core<'_, M>,
+    scans: &mut S,
+    coil: &mut C,
+    inputs: &mut I,
+) -> ! {
+    let mut samples = [0; BLOCK_SAMPLE_BYTES];
+    loop {
+        if scans.can_be_held() {
+            core.wait_until_it_may_run().await;
+        }
+        let delivered = scans.next(&mut samples).await;
+        core.watch_inputs(inputs);
+        core.take(delivered, &samples);
+        match core.with(|state| state.coil.take()) {
+            Some(CoilOrder::Pulse(width_us)) => coil.pulse(width_us.min(coil.cap_us())),
+            Some(CoilOrder::Off) => coil.off(),
+            None => {}
+        }
+        core.to_send.signal(());
+    }
+}
+
+/// The block in hand, for the hammer's machine.
+struct InHand<'a> {
+    first_scan: u64,
+    channels: usize,
+    samples: &'a [[u8; 2]],
+}
+
+impl Scanned for InHand<'_> {
+    fn first_scan(&self) -> u64 {
+        self.first_scan
+    }
+
+    fn scans(&self) -> usize {
+        self.samples.len() / self.channels
+    }
+
+    fn code(&self, scan: usize, channel: usize) -> i16 {
+        i16::from_le_bytes(self.samples[scan * self.channels + channel])
+    }
+}
+
+impl<M: RawMutex> Core<'_, M> {
+    /// A front end that can be held waits here: without a stream, and half a ring ahead of the host.
+    async fn wait_until_it_may_run(&self) {
+        loop {
+            let runs = self.with(|state| {
+                let ahead = state.next_scan.saturating_sub(state.acknowledged);
+                state.streaming && ahead < u64::from(state.ring.capacity_scans() / 2)
+            });
+            if runs {
+                return;
+            }
+            self.may_run.wait().await;
+        }
+    }
+
+    /// Interlock and emergency stop, once a block. The hardware acts on both by itself; this is how the
+    /// machine learns of it.
+    fn watch_inputs(&self, inputs: &mut impl Inputs) {
+        let closed = inputs.interlock_closed();
+        let pressed = inputs.emergency_stop();
+        let reset = inputs.local_reset();
+        self.with(|state| {
+            if pressed {
+                if !state.emergency_stop {
+                    state.stop_everything();
+                }
+            } else if state.emergency_stop && reset {
+                state.emergency_stop = false;
+                state.say(Event::EmergencyStop(false));
+            }
+            if closed != state.interlock_closed {
+                state.interlock_closed = closed;
+                state.say(Event::Interlock(closed));
+            }
+            if !closed {
+                state.disarm(Reason::Interlock);
+            }
+        });
+    }
+
+    /// Takes one delivered block.
+    fn take(&self, delivered: Delivered, samples: &[u8; BLOCK_SAMPLE_BYTES]) {
+        let channels = self.facts.channels.len();
+        let (pairs, _) = samples.as_chunks::<2>();
+        let count = (usize::from(delivered.scans) * channels).min(pairs.len() / channels * channels);
+        let codes = &pairs[..count];
+        let over = codes.iter().any(|pair| matches!(i16::from_le_bytes(*pair), i16::MAX | i16::MIN));
+        self.with(|state| {
+            if delivered.missed > 0 {
+                state.counters.scans_missed += u64::from(delivered.missed);
+                if state.streaming {
+                    // what waited to be sent may still hold an unreported loss of its own
+                    state.report_loss(Loss::LinkSlow);
+                    let range = Range { first_scan: state.next_scan, scans: u64::from(delivered.missed) };
+                    state.ring.report(range);
+                    state.report_loss(Loss::FrontEnd);
+                }
+                state.next_scan += u64::from(delivered.missed);
+            }
+            let block = InHand { first_scan: state.next_scan, channels, samples: codes };
+            let scans = block.scans();
+            if scans == 0 {
+                return;
+            }
+            let outcome = state.hammer.block(&block, state.friction.as_ref());
+            if let Some(friction) = &state.friction {
+                let sum: f32 =
+                    (0..scans).map(|scan| friction.of_scan(&|channel| block.code(scan, channel))).sum();
+                state.friction_n = sum / scans as f32;
+            }
+            let flags = if over { OVER_RANGE } else { 0 } | if outcome.trigger { TRIGGER } else { 0 };
+            if state.streaming {
+                let dropped = state.ring.push(state.next_scan, flags, scans as u8, samples);
+                state.counters.scans_dropped += dropped;
+                state.counters.scans_produced += scans as u64;
+            }
+            state.next_scan += scans as u64;
+            state.tell(&outcome);
+        });
+    }
+}

@@ -1,0 +1,113 @@
+//! What a board must bring: scans, a coil, two inputs, bytes in, bytes out, and perhaps a stage.
+//!
+//! The contract is small on purpose. Everything that can be decided above it is decided above it, where
+//! a PC can test it; what stands here is what only hardware can do. A board groups its parts under
+//! [`Board`] so that one name says them all, and hands each part to the task that uses it.
+
+use embassy_sync::blocking_mutex::raw::RawMutex;
+use jointrig_protocol::answer::Refusal;
+use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
+use jointrig_protocol::request::Stage as Place;
+
+/// The parts of one board.
+pub trait Board {
+    /// Guards what the tasks share: a critical section on a controller whose tasks run at several
+    /// priorities, nothing in the simulator.
+    type Mutex: RawMutex;
+    /// The converters.
+    type Scans: Scans;
+    /// The hammer's coil.
+    type Coil: Coil;
+    /// Interlock, emergency stop, local reset.
+    type Inputs: Inputs;
+    /// Bytes from the host.
+    type Source: ByteSource;
+    /// Bytes to the host.
+    type Sink: ByteSink;
+    /// Who moves hammer and laser.
+    type Stage: Stage;
+}
+
+/// A block of scans as the converters delivered it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Delivered {
+    /// Scans in the block, at most what fits it.
+    pub scans: u8,
+    /// Scans that were lost between the last block and this one.
+    pub missed: u32,
+}
+
+/// The converters, sampling all channels on one edge of a hardware timer.
+pub trait Scans {
+    /// Whether the clock of the scans can be held (a simulated front end). It then never runs more than
+    /// half a ring ahead of the host's acknowledgement, so that nothing depends on the host's speed.
+    fn can_be_held(&self) -> bool {
+        false
+    }
+
+    /// Waits for the next block and writes it: scan by scan, channel by channel, little-endian 16 bit.
+    ///
+    /// The sampling instants are the timer's; being late here costs buffer space, never punctuality.
+    fn next(&mut self, block: &mut [u8; BLOCK_SAMPLE_BYTES]) -> impl Future<Output = Delivered>;
+}
+
+/// The coil that pulls the hammer's bolt.
+pub trait Coil {
+    /// Longest pulse, µs: the hardware ends any pulse by then, whatever the software does.
+    fn cap_us(&self) -> u32;
+
+    /// Energises the coil once, from the next scan on, for `width_us` (already checked against the cap).
+    /// The end of the pulse must be the hardware's doing.
+    fn pulse(&mut self, width_us: u32);
+
+    /// De-energises the coil at once.
+    fn off(&mut self);
+}
+
+/// Inputs at the rig that no host can overrule.
+pub trait Inputs {
+    /// Whether the guard is closed.
+    fn interlock_closed(&mut self) -> bool;
+    /// Whether the emergency stop is pressed.
+    fn emergency_stop(&mut self) -> bool;
+    /// Whether somebody at the rig resets a released emergency stop.
+    fn local_reset(&mut self) -> bool;
+}
+
+/// Bytes from the host.
+pub trait ByteSource {
+    /// Waits for at least one byte and returns how many were written; 0 when the link was cut and came
+    /// back (what was gathered of a frame is then dropped).
+    fn read(&mut self, buffer: &mut [u8]) -> impl Future<Output = usize>;
+}
+
+/// Bytes to the host.
+pub trait ByteSink {
+    /// Waits until the link has taken all bytes (one whole frame), or was cut.
+    fn write(&mut self, frame: &[u8]) -> impl Future<Output = ()>;
+}
+
+/// Who moves hammer and laser. Only a simulated rig can be told through the link.
+pub trait Stage {
+    /// Whether [`Stage::go`] can succeed.
+    const PRESENT: bool;
+
+    /// Puts hammer and laser in place, from the next scan on.
+    ///
+    /// # Errors
+    /// A [`Refusal`] for the host.
+    fn go(&mut self, place: &Place) -> Result<(), Refusal>;
+}
+
+/// A rig whose hammer and laser are moved by people.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoStage;
+
+impl Stage for NoStage {
+    const PRESENT: bool = false;
+
+    fn go(&mut self, _place: &Place) -> Result<(), Refusal> {
+        Err(Refusal::Unsupported)
+    }
+}

@@ -1,0 +1,54 @@
+//! The friction force T from the load cells that ground substructure B.
+//!
+//! Three cells share the force; a 3 × 3 calibration matrix takes their readings (N) to forces (N), and T
+//! is the sum of the three. Since T is linear in the readings, the sum of the matrix's columns is formed
+//! once, and each scan costs three multiplications.
+
+use jointrig_protocol::channel::{Channel, Role};
+use nalgebra::{Matrix3, RowVector3, Vector3};
+
+/// Cells that share the friction force.
+pub const CELLS: usize = 3;
+
+/// From codes of the load cells to T.
+#[derive(Clone, Debug)]
+pub struct Friction {
+    /// Places of the cells in the scan.
+    places: [usize; CELLS],
+    /// N per code of each cell.
+    newtons_per_code: Vector3<f32>,
+    /// N per code of each cell, through the calibration.
+    weights: RowVector3<f32>,
+}
+
+impl Friction {
+    /// Uncalibrated (identity matrix); `None` unless exactly three channels are load cells.
+    pub fn new(channels: &[Channel]) -> Option<Self> {
+        let mut cells = channels.iter().enumerate().filter(|(_, channel)| channel.role == Role::LoadCell);
+        let mut places = [0; CELLS];
+        let mut newtons_per_code = Vector3::zeros();
+        for i in 0..CELLS {
+            let (place, channel) = cells.next()?;
+            places[i] = place;
+            newtons_per_code[i] = channel.units_per_code() as f32;
+        }
+        if cells.next().is_some() {
+            return None;
+        }
+        let mut friction = Self { places, newtons_per_code, weights: RowVector3::zeros() };
+        friction.calibrate(&Matrix3::identity());
+        Some(friction)
+    }
+
+    /// Takes a calibration matrix: forces = matrix × readings.
+    pub fn calibrate(&mut self, matrix: &Matrix3<f32>) {
+        self.weights = RowVector3::repeat(1.0) * matrix * Matrix3::from_diagonal(&self.newtons_per_code);
+    }
+
+    /// T of one scan, N.
+    pub fn of_scan(&self, codes: &impl Fn(usize) -> i16) -> f32 {
+        let [a, b, c] = self.places;
+        let readings = Vector3::new(f32::from(codes(a)), f32::from(codes(b)), f32::from(codes(c)));
+        (self.weights * readings).x
+    }
+}

@@ -1,0 +1,136 @@
+//! Receiving: bytes to frames, frames to deeds.
+
+use embassy_sync::blocking_mutex::raw::RawMutex;
+use embassy_time::Instant;
+use jointrig_protocol::acknowledge::Acknowledge;
+use jointrig_protocol::answer::{Numbered, Refusal};
+use jointrig_protocol::event::Reason;
+use jointrig_protocol::frame::{Accumulator, Frame, Kind};
+use jointrig_protocol::hello::{Hello, Role};
+use jointrig_protocol::request;
+
+use crate::Core;
+use crate::board::{ByteSource, Stage};
+use crate::fmt::{info, warning};
+use crate::memory::{Memory, Seen};
+
+/// Runs for ever.
+pub async fn receive<M: RawMutex, S: ByteSource, P: Stage>(
+    core: &Core<'_, M>,
+    source: &mut S,
+    stage: &mut P,
+) -> ! {
+    let mut accumulator = Accumulator::new();
+    let mut bytes = [0; 512];
+    loop {
+        let read = source.read(&mut bytes).await;
+        if read == 0 {
+            accumulator = Accumulator::new();
+            continue;
+        }
+        let mut rest = &bytes[..read];
+        while !rest.is_empty() {
+            let (used, found) = accumulator.feed(rest);
+            match found {
+                Some(Ok(frame)) => core.hear(&frame, stage),
+                Some(Err(_)) => core.with(|state| state.counters.frames_bad += 1),
+                None => {}
+            }
+            rest = &rest[used..];
+        }
+    }
+}
+
+impl<M: RawMutex> Core<'_, M> {
+    /// One good frame from the host.
+    fn hear(&self, frame: &Frame<'_>, stage: &mut impl Stage) {
+        self.with(|state| {
+            state.counters.frames_in += 1;
+            state.last_heard = Instant::now();
+        });
+        match frame.kind {
+            Kind::Hello => self.greet(frame.payload),
+            Kind::Request => self.hear_request(frame.payload, stage),
+            Kind::Acknowledge => self.hear_acknowledge(frame.payload),
+            // a device's own kinds, sent by a confused host
+            Kind::Answer | Kind::Event | Kind::Samples | Kind::Log => {
+                self.with(|state| state.counters.frames_bad += 1);
+            }
+        }
+    }
+
+    /// Answers any Hello of a host, so that even a mismatched one can name both versions; agrees on a
+    /// session only when they match. A new session forgets the old one's requests and stops its doings.
+    fn greet(&self, payload: &[u8]) {
+        let Ok(theirs) = Hello::from_bytes(payload) else {
+            self.with(|state| state.counters.frames_bad += 1);
+            return;
+        };
+        let ours = Hello::device(theirs.session, self.facts.boot, self.ring_scans());
+        let agreed = theirs.role == Role::Host && ours.check(&theirs).is_ok();
+        self.with(|state| {
+            state.hello_due = Some(theirs.session);
+            if agreed && state.session == Some(theirs.session) {
+                return;
+            }
+            state.disarm(Reason::StreamEnded);
+            state.streaming = false;
+            state.answers.clear();
+            state.resends.clear();
+            state.memory = Memory::new();
+            state.hammer.forget();
+            state.session = agreed.then_some(theirs.session);
+            if agreed {
+                info!("session {}", theirs.session);
+            } else {
+                warning!("a host of another version was refused");
+            }
+        });
+        self.to_send.signal(());
+    }
+
+    fn hear_acknowledge(&self, payload: &[u8]) {
+        let Some(acknowledge) = Acknowledge::from_bytes(payload) else {
+            self.with(|state| state.counters.frames_bad += 1);
+            return;
+        };
+        self.with(|state| {
+            if state.streaming && acknowledge.epoch == state.epoch {
+                // never beyond what was produced: a damaged host must not make room that is not there
+                state.acknowledged = state.acknowledged.max(acknowledge.next_scan.min(state.next_scan));
+            }
+        });
+        self.may_run.signal(());
+    }
+
+    fn hear_request(&self, payload: &[u8], stage: &mut impl Stage) {
+        if self.with(|state| state.session.is_none()) {
+            // before the handshake nothing is done and nothing is promised
+            return;
+        }
+        let Ok(request) = postcard::from_bytes::<request::Numbered>(payload) else {
+            // its number may still be read: postcard writes it first
+            if let Ok((number, _)) = postcard::take_from_bytes::<u32>(payload) {
+                self.answer(Numbered { number, outcome: Err(Refusal::Unreadable) });
+            }
+            return;
+        };
+        let answer = match self.with(|state| state.memory.look_up(request.number)) {
+            Seen::Before(answer) => answer,
+            Seen::Stale => Numbered { number: request.number, outcome: Err(Refusal::Stale) },
+            Seen::New => {
+                let answer =
+                    Numbered { number: request.number, outcome: self.carry_out(&request.request, stage) };
+                self.with(|state| state.memory.keep(&answer));
+                answer
+            }
+        };
+        self.answer(answer);
+    }
+
+    fn answer(&self, answer: Numbered) {
+        // a full queue drops the answer: the host asks again, and memory has it
+        self.with(|state| drop(state.answers.push_back(answer)));
+        self.to_send.signal(());
+    }
+}

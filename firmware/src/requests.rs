@@ -1,0 +1,173 @@
+//! What each request does.
+
+use embassy_sync::blocking_mutex::raw::RawMutex;
+use heapless::String;
+use jointrig_protocol::answer::{Answer, Refusal, Status};
+use jointrig_protocol::event::{Event, Reason};
+use jointrig_protocol::request::{Request, Stage as Place};
+use nalgebra::Matrix3;
+
+use crate::Core;
+use crate::board::Stage;
+use crate::ring::{CHANNEL_MAP, Range};
+
+/// A refusal with a sentence.
+pub(crate) fn out_of_bounds(sentence: &str) -> Refusal {
+    let mut text = String::new();
+    // what does not fit 120 bytes is left out
+    let _ = text.push_str(sentence);
+    Refusal::OutOfBounds(text)
+}
+
+impl<M: RawMutex> Core<'_, M> {
+    /// Carries out a request that was not seen before.
+    pub(crate) fn carry_out(&self, request: &Request, stage: &mut impl Stage) -> Result<Answer, Refusal> {
+        match request {
+            Request::Info => Ok(Answer::Info(self.info())),
+            Request::Channel { index } => {
+                let channel = self.facts.channels.get(usize::from(*index)).ok_or(Refusal::NoSuchChannel)?;
+                Ok(Answer::Channel(channel.clone()))
+            }
+            Request::Status => Ok(Answer::Status(self.status())),
+            Request::Start => Ok(self.start()),
+            Request::Stop => {
+                self.with(|state| {
+                    state.disarm(Reason::StreamEnded);
+                    state.streaming = false;
+                });
+                Ok(Answer::Done)
+            }
+            Request::Resend { epoch, first_scan, scans } => self.resend(*epoch, *first_scan, *scans),
+            Request::Trigger(trigger) => {
+                self.with(|state| state.hammer.set_trigger(*trigger)).map(|()| Answer::Done)
+            }
+            Request::LoadCells { matrix } => self.calibrate(matrix),
+            Request::Arm { valid_ms } => self.arm(*valid_ms),
+            Request::Disarm => {
+                self.with(|state| state.disarm(Reason::Asked));
+                Ok(Answer::Done)
+            }
+            Request::Fire(order) => {
+                self.with(|state| {
+                    if !state.streaming {
+                        return Err(Refusal::NotStreaming);
+                    }
+                    if state.emergency_stop {
+                        return Err(Refusal::EmergencyStop);
+                    }
+                    if !state.interlock_closed {
+                        return Err(Refusal::Interlock);
+                    }
+                    state.hammer.fire(order)
+                })?;
+                Ok(Answer::Scheduled { number: order.number })
+            }
+            Request::Stage(place) => self.go(place, stage),
+            Request::EmergencyStop => {
+                self.with(crate::state::State::stop_everything);
+                Ok(Answer::Done)
+            }
+        }
+    }
+
+    fn status(&self) -> Status {
+        self.with(|state| Status {
+            epoch: state.epoch,
+            streaming: state.streaming,
+            next_scan: state.next_scan,
+            oldest_scan: state.ring.oldest_scan().unwrap_or(state.next_scan),
+            hammer: state.hammer.state(),
+            armed_for_ms: state.hammer.armed_for_ms(state.next_scan),
+            interlock_closed: state.interlock_closed,
+            emergency_stop: state.emergency_stop,
+            friction_n: state.friction_n,
+            shot: state.hammer.shot(),
+            counters: state.counters,
+        })
+    }
+
+    /// A new stream is a new epoch; the scan index goes on.
+    fn start(&self) -> Answer {
+        let answer = self.with(|state| {
+            state.disarm(Reason::StreamEnded);
+            // the boot count leaves room for 65536 streams of each start
+            state.epoch = (self.facts.boot << 16) | (state.streams & 0xFFFF);
+            state.streams += 1;
+            state.ring.restart(state.epoch);
+            state.resends.clear();
+            state.counters.scans_produced = 0;
+            state.counters.scans_sent = 0;
+            state.counters.scans_resent = 0;
+            state.counters.scans_dropped = 0;
+            state.counters.scans_missed = 0;
+            state.acknowledged = state.next_scan;
+            state.streaming = true;
+            Answer::Started { epoch: state.epoch, map: CHANNEL_MAP, first_scan: state.next_scan }
+        });
+        self.may_run.signal(());
+        answer
+    }
+
+    fn resend(&self, epoch: u32, first_scan: u64, scans: u32) -> Result<Answer, Refusal> {
+        self.with(|state| {
+            if epoch != state.epoch {
+                return Err(Refusal::WrongEpoch { current: state.epoch });
+            }
+            let oldest = state.ring.oldest_scan().ok_or(Refusal::NotStreaming)?;
+            let end = first_scan.saturating_add(u64::from(scans)).min(state.next_scan);
+            if first_scan < oldest {
+                return Err(Refusal::Gone { oldest });
+            }
+            if first_scan >= end {
+                return Err(out_of_bounds("no such scans have been produced yet"));
+            }
+            let range = Range { first_scan, scans: end - first_scan };
+            // a full queue says so by refusing; the host asks again
+            state.resends.push_back(range).map_err(|_| Refusal::Busy)?;
+            Ok(Answer::Resending { first_scan, scans: (end - first_scan) as u32 })
+        })
+    }
+
+    fn calibrate(&self, matrix: &[f32; 9]) -> Result<Answer, Refusal> {
+        if !matrix.iter().all(|entry| entry.is_finite()) {
+            return Err(out_of_bounds("the load cells' calibration matrix must be finite"));
+        }
+        self.with(|state| {
+            let friction = state.friction.as_mut().ok_or(Refusal::Unsupported)?;
+            friction.calibrate(&Matrix3::from_row_slice(matrix));
+            Ok(Answer::Done)
+        })
+    }
+
+    fn arm(&self, valid_ms: u32) -> Result<Answer, Refusal> {
+        self.with(|state| {
+            if !state.streaming {
+                return Err(Refusal::NotStreaming);
+            }
+            if state.emergency_stop {
+                return Err(Refusal::EmergencyStop);
+            }
+            if !state.interlock_closed {
+                return Err(Refusal::Interlock);
+            }
+            state.hammer.arm(state.next_scan, valid_ms)?;
+            state.say(Event::Armed);
+            Ok(Answer::Done)
+        })
+    }
+
+    fn go<P: Stage>(&self, place: &Place, stage: &mut P) -> Result<Answer, Refusal> {
+        use jointrig_protocol::answer::Hammer;
+        if !P::PRESENT {
+            return Err(Refusal::Unsupported);
+        }
+        let busy = self.with(|state| {
+            matches!(state.hammer.state(), Hammer::Waiting | Hammer::Firing | Hammer::Listening)
+        });
+        if busy {
+            return Err(Refusal::Busy);
+        }
+        stage.go(place)?;
+        Ok(Answer::Staged { at_scan: self.with(|state| state.next_scan) })
+    }
+}

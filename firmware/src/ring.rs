@@ -1,0 +1,181 @@
+//! The ring of recent blocks: the transmit queue and the memory for re-requests are one and the same.
+//!
+//! Blocks enter with increasing first scans. A cursor says what has been sent; what leaves the ring
+//! unsent is counted as dropped and kept as a range until it has been reported.
+
+use jointrig_protocol::block::{GAP, Header};
+use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
+
+/// One block in the ring.
+#[derive(Clone, Copy)]
+pub struct Slot {
+    first_scan: u64,
+    flags: u8,
+    scans: u8,
+    samples: [u8; BLOCK_SAMPLE_BYTES],
+}
+
+impl Slot {
+    /// An unused slot.
+    pub const EMPTY: Self = Self { first_scan: 0, flags: 0, scans: 0, samples: [0; BLOCK_SAMPLE_BYTES] };
+}
+
+/// A range of scans.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Range {
+    /// The first.
+    pub first_scan: u64,
+    /// How many.
+    pub scans: u64,
+}
+
+/// A block taken out to be sent.
+pub struct Out<'a> {
+    /// Its header.
+    pub header: Header,
+    /// Its samples, whole scans.
+    pub samples: &'a [u8],
+}
+
+/// The ring over slots that the board gives it.
+pub struct Ring<'a> {
+    slots: &'a mut [Slot],
+    bytes_per_scan: usize,
+    epoch: u32,
+    /// Sequence number of the next block to enter; its slot is this modulo the length.
+    head: u64,
+    /// Sequence number of the oldest block held.
+    tail: u64,
+    /// Sequence number of the next block to send.
+    cursor: u64,
+    unreported: Option<Range>,
+    /// Whether the next block to be sent follows a loss.
+    gap: bool,
+}
+
+impl<'a> Ring<'a> {
+    /// An empty ring for scans of this many bytes.
+    pub fn new(slots: &'a mut [Slot], bytes_per_scan: usize) -> Self {
+        Self { slots, bytes_per_scan, epoch: 0, head: 0, tail: 0, cursor: 0, unreported: None, gap: false }
+    }
+
+    /// Forgets everything and begins a stream.
+    pub fn restart(&mut self, epoch: u32) {
+        self.epoch = epoch;
+        self.tail = self.head;
+        self.cursor = self.head;
+        self.unreported = None;
+        self.gap = false;
+    }
+
+    /// Scans that the ring can hold when all blocks are full.
+    pub fn capacity_scans(&self) -> u32 {
+        (self.slots.len() * (BLOCK_SAMPLE_BYTES / self.bytes_per_scan)) as u32
+    }
+
+    /// The oldest scan held, if any.
+    pub fn oldest_scan(&self) -> Option<u64> {
+        (self.tail < self.head).then(|| self.slot(self.tail).first_scan)
+    }
+
+    fn slot(&self, sequence: u64) -> &Slot {
+        &self.slots[(sequence % self.slots.len() as u64) as usize]
+    }
+
+    /// Puts a block in; the oldest leaves when the ring is full. Returns the scans that left unsent.
+    pub fn push(&mut self, first_scan: u64, flags: u8, scans: u8, samples: &[u8; BLOCK_SAMPLE_BYTES]) -> u64 {
+        let mut dropped = 0;
+        if self.head - self.tail == self.slots.len() as u64 {
+            let leaving = self.slot(self.tail);
+            let range = Range { first_scan: leaving.first_scan, scans: u64::from(leaving.scans) };
+            if self.cursor == self.tail {
+                self.cursor += 1;
+                dropped = range.scans;
+                self.report(range);
+            }
+            self.tail += 1;
+        }
+        let at = (self.head % self.slots.len() as u64) as usize;
+        let slot = &mut self.slots[at];
+        slot.first_scan = first_scan;
+        slot.flags = flags;
+        slot.scans = scans;
+        slot.samples.copy_from_slice(samples);
+        self.head += 1;
+        dropped
+    }
+
+    /// Notes a loss that the host must hear of; adjoining ranges become one.
+    pub fn report(&mut self, range: Range) {
+        self.gap = true;
+        self.unreported = Some(match self.unreported {
+            Some(known) if known.first_scan + known.scans == range.first_scan => {
+                Range { first_scan: known.first_scan, scans: known.scans + range.scans }
+            }
+            // a hole between two losses was delivered: widening over it would be untrue, so the older one
+            // must have been taken by then; `take_loss` runs before every block that is sent
+            _ => range,
+        });
+    }
+
+    /// Takes the loss that has not been reported yet.
+    pub fn take_loss(&mut self) -> Option<Range> {
+        self.unreported.take()
+    }
+
+    /// Whether a loss waits to be reported.
+    pub fn has_loss(&self) -> bool {
+        self.unreported.is_some()
+    }
+
+    /// The next block that has not been sent; the cursor moves on.
+    pub fn next_unsent(&mut self) -> Option<Out<'_>> {
+        if self.cursor == self.head {
+            return None;
+        }
+        let sequence = self.cursor;
+        self.cursor += 1;
+        let gap = if core::mem::take(&mut self.gap) { GAP } else { 0 };
+        Some(self.out(sequence, gap))
+    }
+
+    /// The sequence number of the block that holds `scan`, or of the first after it.
+    fn find(&self, scan: u64) -> u64 {
+        let (mut low, mut high) = (self.tail, self.head);
+        while low < high {
+            let middle = low + (high - low) / 2;
+            let slot = self.slot(middle);
+            if slot.first_scan + u64::from(slot.scans) <= scan { low = middle + 1 } else { high = middle }
+        }
+        low
+    }
+
+    /// The block that holds `scan` or the first one after it, with a flag added, and the scan after its
+    /// last. `None` when everything held is older.
+    pub fn at_or_after(&self, scan: u64, flag: u8) -> Option<(Out<'_>, u64)> {
+        let sequence = self.find(scan);
+        if sequence == self.head {
+            return None;
+        }
+        let slot = self.slot(sequence);
+        let end = slot.first_scan + u64::from(slot.scans);
+        Some((self.out(sequence, flag), end))
+    }
+
+    fn out(&self, sequence: u64, flag: u8) -> Out<'_> {
+        let slot = self.slot(sequence);
+        Out {
+            header: Header {
+                flags: slot.flags | flag,
+                map: CHANNEL_MAP,
+                scans: slot.scans,
+                epoch: self.epoch,
+                first_scan: slot.first_scan,
+            },
+            samples: &slot.samples[..usize::from(slot.scans) * self.bytes_per_scan],
+        }
+    }
+}
+
+/// The id of the only channel map: a board's channels do not change while it runs.
+pub const CHANNEL_MAP: u8 = 1;

@@ -1,0 +1,205 @@
+//! What the tasks share: one [`Core`], behind one mutex, plus the two signals that wake the others.
+
+use core::cell::RefCell;
+
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::RawMutex;
+use embassy_sync::signal::Signal;
+use embassy_time::Instant;
+use heapless::{Deque, String};
+use jointrig_protocol::answer::{self, Counters, Info};
+use jointrig_protocol::channel::{Channel, Name};
+use jointrig_protocol::event::{self, Event, Loss, Reason};
+use jointrig_protocol::limits;
+
+use crate::fmt::{info, warning};
+use crate::friction::Friction;
+use crate::hammer::{CoilOrder, Hammer, Outcome};
+use crate::memory::Memory;
+use crate::ring::{Range, Ring, Slot};
+
+/// Events that wait for the link.
+const EVENTS: usize = 16;
+/// Answers that wait for the link.
+const ANSWERS: usize = 8;
+/// Ranges that wait to be sent again.
+const RESENDS: usize = 8;
+
+/// What does not change while the device runs.
+#[derive(Clone, Debug)]
+pub struct Facts<'a> {
+    /// Name of the board.
+    pub board: Name,
+    /// Serial number.
+    pub serial: Name,
+    /// Target triple of this build.
+    pub target: String<40>,
+    /// Identifies the build and its table of log strings.
+    pub build: u64,
+    /// Scans per second.
+    pub scan_rate_hz: u32,
+    /// The channels of a scan, in order: 1 to 16.
+    pub channels: &'a [Channel],
+    /// Longest coil pulse of the board, µs.
+    pub coil_cap_us: u32,
+    /// Whether the board has a stage.
+    pub stage: bool,
+    /// How often the device has started; the first stream's epoch.
+    pub boot: u32,
+}
+
+/// Everything that the tasks of one device share.
+pub struct Core<'a, M: RawMutex> {
+    pub(crate) facts: Facts<'a>,
+    pub(crate) state: Mutex<M, RefCell<State<'a>>>,
+    /// There is something to transmit.
+    pub(crate) to_send: Signal<M, ()>,
+    /// A stream has begun, or the acknowledgement has moved.
+    pub(crate) may_run: Signal<M, ()>,
+}
+
+pub(crate) struct State<'a> {
+    pub ring: Ring<'a>,
+    pub hammer: Hammer,
+    pub friction: Option<Friction>,
+    pub friction_n: f32,
+    pub memory: Memory,
+    /// The session agreed on, if any.
+    pub session: Option<u32>,
+    pub hello_due: Option<u32>,
+    pub answers: Deque<answer::Numbered, ANSWERS>,
+    pub events: Deque<event::Numbered, EVENTS>,
+    pub next_event: u32,
+    pub resends: Deque<Range, RESENDS>,
+    pub counters: Counters,
+    pub streaming: bool,
+    pub epoch: u32,
+    /// Streams begun since the device started.
+    pub streams: u32,
+    pub next_scan: u64,
+    pub acknowledged: u64,
+    pub last_heard: Instant,
+    pub interlock_closed: bool,
+    pub emergency_stop: bool,
+    /// An order for the coil that arose outside the acquisition task.
+    pub coil: Option<CoilOrder>,
+}
+
+impl<'a, M: RawMutex> Core<'a, M> {
+    /// A device at rest: disarmed, not streaming.
+    ///
+    /// `slots` is the memory of the ring: at least a second of all channels.
+    ///
+    /// # Panics
+    /// When there are no channels, more than 16, or no slots: a board's mistake that no run can mend.
+    pub fn new(facts: Facts<'a>, slots: &'a mut [Slot]) -> Self {
+        assert!(limits::scans_per_block(facts.channels.len()).is_some(), "a scan has 1 to 16 channels");
+        assert!(!slots.is_empty(), "the ring needs memory");
+        let hammer = Hammer::new(facts.channels, facts.scan_rate_hz, facts.coil_cap_us);
+        let state = State {
+            ring: Ring::new(slots, 2 * facts.channels.len()),
+            hammer,
+            friction: Friction::new(facts.channels),
+            friction_n: 0.0,
+            memory: Memory::new(),
+            session: None,
+            hello_due: None,
+            answers: Deque::new(),
+            events: Deque::new(),
+            next_event: 0,
+            resends: Deque::new(),
+            counters: Counters::default(),
+            streaming: false,
+            epoch: facts.boot,
+            streams: 0,
+            next_scan: 0,
+            acknowledged: 0,
+            last_heard: Instant::from_ticks(0),
+            // closed and released until the board says otherwise, which it does with the first block
+            interlock_closed: true,
+            emergency_stop: false,
+            coil: None,
+        };
+        Self { facts, state: Mutex::new(RefCell::new(state)), to_send: Signal::new(), may_run: Signal::new() }
+    }
+
+    pub(crate) fn with<R>(&self, f: impl FnOnce(&mut State<'a>) -> R) -> R {
+        self.state.lock(|state| f(&mut state.borrow_mut()))
+    }
+
+    /// Scans that can be sent again.
+    pub fn ring_scans(&self) -> u32 {
+        self.with(|state| state.ring.capacity_scans())
+    }
+
+    pub(crate) fn info(&self) -> Info {
+        let mut version = Name::new();
+        // a version of more than 24 characters would be cut here, and nowhere else
+        let _ = version.push_str(env!("CARGO_PKG_VERSION"));
+        Info {
+            board: self.facts.board.clone(),
+            serial: self.facts.serial.clone(),
+            version,
+            target: self.facts.target.clone(),
+            build: self.facts.build,
+            channels: self.facts.channels.len() as u8,
+            scan_rate_hz: self.facts.scan_rate_hz,
+            ring_scans: self.ring_scans(),
+            coil_cap_us: self.facts.coil_cap_us,
+            stage: self.facts.stage,
+        }
+    }
+}
+
+impl State<'_> {
+    /// Queues an event; when the queue is full the new one is dropped and counted.
+    pub fn say(&mut self, event: Event) {
+        let numbered = event::Numbered { number: self.next_event, at_scan: self.next_scan, event };
+        self.next_event = self.next_event.wrapping_add(1);
+        if self.events.push_back(numbered).is_err() {
+            self.counters.events_dropped += 1;
+        }
+    }
+
+    /// Says what came of a step of the hammer, and keeps its order for the coil.
+    pub fn tell(&mut self, outcome: &Outcome) {
+        if outcome.coil.is_some() {
+            self.coil = outcome.coil;
+        }
+        if let Some(shot) = outcome.shot {
+            info!("shot {} is {:?}", shot.number, shot.phase);
+            self.say(Event::Shot(shot));
+        }
+        if let Some(reason) = outcome.disarmed {
+            info!("hammer disarmed: {:?}", reason);
+            self.say(Event::Disarmed(reason));
+        }
+    }
+
+    /// Disarms, for a reason.
+    pub fn disarm(&mut self, reason: Reason) {
+        let outcome = self.hammer.disarm(reason);
+        self.tell(&outcome);
+    }
+
+    /// Latches the emergency stop.
+    pub fn stop_everything(&mut self) {
+        if !self.emergency_stop {
+            warning!("emergency stop");
+            self.emergency_stop = true;
+            self.say(Event::EmergencyStop(true));
+        }
+        self.disarm(Reason::EmergencyStop);
+        // whatever state the machine believes in
+        self.coil = Some(CoilOrder::Off);
+    }
+
+    /// Queues the report of scans that were lost, if any.
+    pub fn report_loss(&mut self, why: Loss) {
+        if let Some(range) = self.ring.take_loss() {
+            let scans = u32::try_from(range.scans).unwrap_or(u32::MAX);
+            warning!("{} scans from {} were lost", scans, range.first_scan);
+            self.say(Event::Lost { epoch: self.epoch, first_scan: range.first_scan, scans, why });
+        }
+    }
+}

@@ -1,0 +1,37 @@
+//! Watching: a silent host disarms the hammer, and the counters are told once a second.
+
+use embassy_sync::blocking_mutex::raw::RawMutex;
+use embassy_time::{Duration, Instant, Timer};
+use jointrig_protocol::answer::Hammer;
+use jointrig_protocol::event::{Event, Reason};
+use jointrig_protocol::limits::LINK_SILENCE_MS;
+
+use crate::Core;
+use crate::fmt::warning;
+
+/// How often the host's silence is checked.
+const PERIOD: Duration = Duration::from_millis(100);
+/// Periods between two reports of the counters.
+const REPORT_EVERY: u32 = 10;
+
+/// Runs for ever.
+pub async fn watch<M: RawMutex>(core: &Core<'_, M>) -> ! {
+    let mut periods = 0_u32;
+    loop {
+        Timer::after(PERIOD).await;
+        periods = periods.wrapping_add(1);
+        core.with(|state| {
+            let silent = Instant::now().saturating_duration_since(state.last_heard).as_millis();
+            let armed = matches!(state.hammer.state(), Hammer::Armed | Hammer::Waiting | Hammer::Firing);
+            if armed && silent >= u64::from(LINK_SILENCE_MS) {
+                warning!("the host is silent: disarming");
+                state.disarm(Reason::LinkLost);
+            }
+            if state.streaming && periods.is_multiple_of(REPORT_EVERY) {
+                let counters = state.counters;
+                state.say(Event::Counters(counters));
+            }
+        });
+        core.to_send.signal(());
+    }
+}

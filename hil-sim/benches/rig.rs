@@ -1,0 +1,60 @@
+//! Simulated seconds per second of a whole scan: modes against the matrix exponential, the named baseline.
+//!
+//! `cargo bench -p jointrig-hil-sim --bench rig`; an item is a simulated second, so items per second is
+//! the ratio to real time at 51.2 kHz.
+
+use divan::counter::ItemsCount;
+use divan::{Bencher, black_box};
+use jointrig_hil_sim::rig::{CHANNELS, Configuration, Rig, RigConfig, Stepping};
+
+/// Scans of the default rig in one second.
+const SECOND: u64 = 51_200;
+
+fn main() {
+    divan::main();
+}
+
+/// One record: fire, then two seconds of decay.
+#[divan::bench(args = ["A", "B", "AJB"])]
+fn record_modal(bencher: Bencher, configuration: &str) {
+    record(bencher, configuration, Stepping::Fastest, 2);
+}
+
+/// The same by the matrix exponential; half as long.
+#[divan::bench(args = ["A", "B", "AJB"], sample_count = 10)]
+fn record_exponential(bencher: Bencher, configuration: &str) {
+    record(bencher, configuration, Stepping::Exponential, 1);
+}
+
+/// Every mode driven in every scan: nothing has died away.
+#[divan::bench]
+fn shaker_modal(bencher: Bencher) {
+    let mut rig = Rig::new(&RigConfig::default(), 1).expect("the default rig stands");
+    let mut codes = [0_i16; CHANNELS];
+    bencher.counter(ItemsCount::new(1_u64)).bench_local(|| {
+        for scan in 0..SECOND {
+            rig.drive(if scan % 256 < 128 { 1.0 } else { -1.0 });
+            rig.scan(&mut codes);
+            black_box(&codes);
+        }
+    });
+}
+
+fn record(bencher: Bencher, configuration: &str, stepping: Stepping, seconds: u64) {
+    let configuration = match configuration {
+        "A" => Configuration::A,
+        "B" => Configuration::B,
+        _ => Configuration::Ajb,
+    };
+    let (impact, response) = if configuration == Configuration::B { ("BZ3", "B3") } else { ("AZ3", "A3") };
+    let mut rig = Rig::with_stepping(&RigConfig::default(), 1, stepping).expect("the default rig stands");
+    let mut codes = [0_i16; CHANNELS];
+    bencher.counter(ItemsCount::new(seconds)).bench_local(|| {
+        rig.stage(configuration, impact, response, 0).expect("the default rig has this cell");
+        rig.fire(3.5e-3);
+        for _ in 0..seconds * SECOND {
+            rig.scan(&mut codes);
+            black_box(&codes);
+        }
+    });
+}

@@ -1,0 +1,7 @@
+//! Tells the crate what it is built for, so that a virtual board can say it in its handshake.
+
+fn main() {
+    println!("cargo::rerun-if-changed=build.rs");
+    let target = std::env::var("TARGET").unwrap_or_else(|_| "unknown".into());
+    println!("cargo::rustc-env=JOINTRIG_TARGET={target}");
+}

@@ -1,0 +1,176 @@
+//! The native virtual board: the real firmware library over the simulated rig, in virtual time.
+//!
+//! One board is one thread. Its converters advance the rig scan by scan, its coil is the rig's, and its
+//! link is a pair of byte queues. Without a stream, and half a ring ahead of the host's acknowledgement, its
+//! time stands still; so a run is repeatable bit for bit however fast host and machine are.
+
+mod parts;
+
+use std::cell::RefCell;
+use std::pin::Pin;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::thread::JoinHandle;
+
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use heapless::String as Text;
+use jointrig_firmware::ring::Slot;
+use jointrig_firmware::{Core, Facts};
+use jointrig_protocol::limits::{COIL_PULSE_CAP_US, scans_per_block};
+
+use crate::executor::{Poller, Polling, Woken, jump};
+use crate::link::{DeviceEnd, HostEnd, pair};
+use crate::rig::{Rig, RigConfig, RigError};
+pub use parts::{Controls, Virtual};
+use parts::{VirtualCoil, VirtualInputs, VirtualScans, VirtualStage, describe};
+
+/// Seconds of scans that the ring holds, at least.
+const RING_S: f64 = 1.0;
+
+/// How a board is run.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Decides noise, scatter and every error of position.
+    pub seed: u64,
+    /// In which order the firmware's tasks are polled; results do not depend on it.
+    pub polling: Polling,
+    /// Whether time goes on without the host: for tests that declare link loss. Such a run is not repeatable.
+    pub free_running: bool,
+    /// The device's count of its own starts.
+    pub boot: u32,
+}
+
+/// Why a board could not start or has stopped.
+#[derive(Debug, thiserror::Error)]
+pub enum BoardError {
+    /// The rig's description is wrong.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+    /// The thread could not be made.
+    #[error("the simulated board could not start its thread: {0}")]
+    Thread(#[from] std::io::Error),
+}
+
+/// A running board. Dropping it stops it.
+pub struct VirtualBoard {
+    link: DeviceEnd,
+    controls: Arc<Controls>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl VirtualBoard {
+    /// Starts a board over the rig that `rig_toml` describes (the built-in one if `None`).
+    ///
+    /// # Errors
+    /// [`BoardError`] with the line and field that is wrong.
+    pub fn start(rig_toml: Option<&str>, seed: u64) -> Result<(Self, HostEnd), BoardError> {
+        let config = match rig_toml {
+            Some(text) => RigConfig::from_toml(text)?,
+            None => RigConfig::default(),
+        };
+        Self::start_with(&config, &Options { seed, ..Options::default() })
+    }
+
+    /// Starts a board over this rig.
+    ///
+    /// # Errors
+    /// [`BoardError`].
+    pub fn start_with(config: &RigConfig, options: &Options) -> Result<(Self, HostEnd), BoardError> {
+        let rig = Rig::new(config, options.seed)?;
+        let (host, device) = pair();
+        let controls = Arc::new(Controls::default());
+        let thread = std::thread::Builder::new().name("virtual board".into()).spawn({
+            let (device, controls, options) = (device.clone(), Arc::clone(&controls), options.clone());
+            move || run(rig, &options, &device, &controls)
+        })?;
+        Ok((Self { link: device, controls, thread: Some(thread) }, host))
+    }
+
+    /// Buttons and observations at the rig's side.
+    pub fn controls(&self) -> &Controls {
+        &self.controls
+    }
+}
+
+impl Drop for VirtualBoard {
+    fn drop(&mut self) {
+        self.link.close();
+        if let Some(thread) = self.thread.take() {
+            // a panic of the board has been printed by its own thread
+            let _ = thread.join();
+        }
+    }
+}
+
+/// The board's thread: everything of the device lives and dies here.
+fn run(rig: Rig, options: &Options, link: &DeviceEnd, controls: &Arc<Controls>) {
+    let channels: &'static [_] = describe(rig.channels());
+    let rate_hz = rig.scan_rate_hz();
+    let per_block = scans_per_block(channels.len()).expect("the rig has ten channels");
+    let slots = (f64::from(rate_hz) * RING_S / per_block as f64).ceil() as usize;
+    let facts = Facts {
+        board: name("jointrig-sim"),
+        serial: name(&format!("sim-{:016x}", options.seed)),
+        target: text(env!("JOINTRIG_TARGET")),
+        build: 0,
+        scan_rate_hz: rate_hz,
+        channels,
+        coil_cap_us: COIL_PULSE_CAP_US,
+        stage: true,
+        boot: options.boot,
+    };
+    let core: Rc<Core<'static, NoopRawMutex>> =
+        Rc::new(Core::new(facts, Box::leak(vec![Slot::EMPTY; slots].into_boxed_slice())));
+    let rig = Rc::new(RefCell::new(rig));
+    let scans = VirtualScans::new(&rig, channels.len(), per_block, rate_hz, !options.free_running);
+    let sampling = scans.sampling();
+    let woken = Arc::new(Woken::default());
+    let mut poller = Poller::new(options.polling, futures(&core, &rig, scans, link, controls), &woken);
+    while !link.is_closed() {
+        while woken.take() {
+            poller.poll();
+        }
+        if sampling.get() || options.free_running {
+            assert!(jump(), "the simulated board waits for something that cannot come: no alarm is set");
+        } else {
+            link.sleep(&woken);
+        }
+    }
+}
+
+fn futures(
+    core: &Rc<Core<'static, NoopRawMutex>>,
+    rig: &Rc<RefCell<Rig>>,
+    mut scans: VirtualScans,
+    link: &DeviceEnd,
+    controls: &Arc<Controls>,
+) -> Vec<Pin<Box<dyn Future<Output = ()>>>> {
+    let mut coil = VirtualCoil::new(rig, controls);
+    let mut inputs = VirtualInputs::new(controls);
+    let mut stage = VirtualStage::new(rig);
+    let (mut source, mut sink) = (link.clone(), link.clone());
+    let (a, b, c, d) = (Rc::clone(core), Rc::clone(core), Rc::clone(core), Rc::clone(core));
+    vec![
+        Box::pin(async move {
+            jointrig_firmware::acquire::acquire(&a, &mut scans, &mut coil, &mut inputs).await;
+        }),
+        Box::pin(async move {
+            jointrig_firmware::receive::receive(&b, &mut source, &mut stage).await;
+        }),
+        Box::pin(async move {
+            jointrig_firmware::transmit::transmit(&c, &mut sink).await;
+        }),
+        Box::pin(async move {
+            jointrig_firmware::watch::watch(&d).await;
+        }),
+    ]
+}
+
+fn name(value: &str) -> jointrig_protocol::channel::Name {
+    text(value)
+}
+
+/// What does not fit is left out.
+fn text<const N: usize>(value: &str) -> Text<N> {
+    value.chars().take(N).collect()
+}

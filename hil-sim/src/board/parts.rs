@@ -1,0 +1,220 @@
+//! The virtual board's parts, as the firmware's board contract asks for them.
+
+use std::cell::{Cell, RefCell};
+use std::rc::Rc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use embassy_time::{Instant, Timer};
+use jointrig_firmware::board::{Board, Coil, Delivered, Inputs, Scans, Stage};
+use jointrig_protocol::answer::Refusal;
+use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
+use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, COIL_PULSE_CAP_US};
+use jointrig_protocol::request;
+
+use crate::link::DeviceEnd;
+use crate::rig::{self, Configuration, Measured, Rig};
+
+/// The native virtual board.
+pub struct Virtual;
+
+impl Board for Virtual {
+    type Mutex = NoopRawMutex;
+    type Scans = VirtualScans;
+    type Coil = VirtualCoil;
+    type Inputs = VirtualInputs;
+    type Source = DeviceEnd;
+    type Sink = DeviceEnd;
+    type Stage = VirtualStage;
+}
+
+/// Buttons and observations at the rig's side, usable from any thread.
+#[derive(Debug, Default)]
+pub struct Controls {
+    guard_open: AtomicBool,
+    pressed: AtomicBool,
+    reset: AtomicBool,
+    pulses_us: Mutex<Vec<u32>>,
+}
+
+impl Controls {
+    /// Opens or closes the guard over the hammer.
+    pub fn open_guard(&self, open: bool) {
+        self.guard_open.store(open, Ordering::Release);
+    }
+
+    /// Presses or releases the emergency stop.
+    pub fn press_emergency_stop(&self, pressed: bool) {
+        self.pressed.store(pressed, Ordering::Release);
+    }
+
+    /// Turns the key that resets a released emergency stop.
+    pub fn reset(&self) {
+        self.reset.store(true, Ordering::Release);
+    }
+
+    /// Every pulse that the coil was given, µs, as the rig felt it.
+    pub fn coil_pulses_us(&self) -> Vec<u32> {
+        self.pulses_us.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+/// The rig's channels in the protocol's words. They live as long as the program: a firmware's channel
+/// table is constant, and a program makes a handful of boards.
+pub(super) fn describe(channels: &[rig::Channel]) -> &'static [Channel] {
+    let cell_or_other = |channel: &rig::Channel| match channel.name {
+        "force" => Role::HammerForce,
+        "ldv_a" => Role::SpecimenA,
+        "ldv_b" => Role::SpecimenB,
+        "excitation" => Role::Excitation,
+        name if name.starts_with("lc_") => Role::LoadCell,
+        "vib_x" => Role::Response(Axis::X),
+        "vib_y" => Role::Response(Axis::Y),
+        "vib_z" => Role::Response(Axis::Z),
+        _ => Role::Auxiliary,
+    };
+    let described = channels.iter().map(|channel| Channel {
+        name: super::name(channel.name),
+        role: cell_or_other(channel),
+        quantity: match channel.quantity {
+            Measured::Force => Quantity::Force,
+            Measured::Velocity => Quantity::Velocity,
+        },
+        units_per_volt: (channel.units_per_volt * f64::from(channel.polarity)) as f32,
+        range_v: channel.range_v as f32,
+        delay_ns: (channel.delay_s * 1e9).round() as u32,
+        bits: 16,
+    });
+    Box::leak(described.collect::<Vec<_>>().into_boxed_slice())
+}
+
+/// Converters whose samples are the rig's.
+pub struct VirtualScans {
+    rig: Rc<RefCell<Rig>>,
+    channels: usize,
+    per_block: usize,
+    rate_hz: u64,
+    scans: u64,
+    held: bool,
+    sampling: Rc<Cell<bool>>,
+}
+
+impl VirtualScans {
+    pub(super) fn new(
+        rig: &Rc<RefCell<Rig>>,
+        channels: usize,
+        per_block: usize,
+        rate_hz: u32,
+        held: bool,
+    ) -> Self {
+        let rig = Rc::clone(rig);
+        let rate_hz = u64::from(rate_hz);
+        Self { rig, channels, per_block, rate_hz, scans: 0, held, sampling: Rc::default() }
+    }
+
+    /// True while the converters run, that is while virtual time may go on.
+    pub(super) fn sampling(&self) -> Rc<Cell<bool>> {
+        Rc::clone(&self.sampling)
+    }
+}
+
+impl Scans for VirtualScans {
+    fn can_be_held(&self) -> bool {
+        self.held
+    }
+
+    async fn next(&mut self, block: &mut [u8; BLOCK_SAMPLE_BYTES]) -> Delivered {
+        self.scans += self.per_block as u64;
+        self.sampling.set(true);
+        // the instant of the block's last scan, rounded up to the clock's microsecond
+        Timer::at(Instant::from_micros((self.scans * 1_000_000).div_ceil(self.rate_hz))).await;
+        self.sampling.set(false);
+        let mut rig = self.rig.borrow_mut();
+        let mut codes = [0; jointrig_protocol::limits::MAX_CHANNELS];
+        for scan in block.chunks_exact_mut(2 * self.channels).take(self.per_block) {
+            rig.scan(&mut codes[..self.channels]);
+            for (bytes, code) in scan.as_chunks_mut::<2>().0.iter_mut().zip(codes) {
+                *bytes = code.to_le_bytes();
+            }
+        }
+        Delivered { scans: self.per_block as u8, missed: 0 }
+    }
+}
+
+/// The rig's coil behind a timer that ends any pulse at the cap.
+pub struct VirtualCoil {
+    rig: Rc<RefCell<Rig>>,
+    controls: Arc<Controls>,
+}
+
+impl VirtualCoil {
+    pub(super) fn new(rig: &Rc<RefCell<Rig>>, controls: &Arc<Controls>) -> Self {
+        Self { rig: Rc::clone(rig), controls: Arc::clone(controls) }
+    }
+}
+
+impl Coil for VirtualCoil {
+    fn cap_us(&self) -> u32 {
+        COIL_PULSE_CAP_US
+    }
+
+    fn pulse(&mut self, width_us: u32) {
+        let width_us = width_us.min(COIL_PULSE_CAP_US);
+        self.controls.pulses_us.lock().unwrap_or_else(PoisonError::into_inner).push(width_us);
+        self.rig.borrow_mut().fire(f64::from(width_us) * 1e-6);
+    }
+
+    fn off(&mut self) {
+        // the rig takes a pulse whole, at its beginning: the few milliseconds that are left of one cannot
+        // be taken back here, and the cap bounds them
+    }
+}
+
+/// Guard and emergency stop.
+pub struct VirtualInputs(Arc<Controls>);
+
+impl VirtualInputs {
+    pub(super) fn new(controls: &Arc<Controls>) -> Self {
+        Self(Arc::clone(controls))
+    }
+}
+
+impl Inputs for VirtualInputs {
+    fn interlock_closed(&mut self) -> bool {
+        !self.0.guard_open.load(Ordering::Acquire)
+    }
+
+    fn emergency_stop(&mut self) -> bool {
+        self.0.pressed.load(Ordering::Acquire)
+    }
+
+    fn local_reset(&mut self) -> bool {
+        self.0.reset.swap(false, Ordering::AcqRel)
+    }
+}
+
+/// Moves the simulated hammer and laser.
+pub struct VirtualStage(Rc<RefCell<Rig>>);
+
+impl VirtualStage {
+    pub(super) fn new(rig: &Rc<RefCell<Rig>>) -> Self {
+        Self(Rc::clone(rig))
+    }
+}
+
+impl Stage for VirtualStage {
+    const PRESENT: bool = true;
+
+    fn go(&mut self, place: &request::Stage) -> Result<(), Refusal> {
+        let configuration = match place.configuration {
+            request::Configuration::A => Configuration::A,
+            request::Configuration::B => Configuration::B,
+            request::Configuration::Ajb => Configuration::Ajb,
+        };
+        self.0
+            .borrow_mut()
+            .stage(configuration, &place.impact, &place.response, place.attempt)
+            .map_err(|error| Refusal::Stage(super::text(&error.to_string())))
+    }
+}

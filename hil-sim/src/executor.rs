@@ -1,0 +1,203 @@
+//! Virtual time: embassy's time driver and two executors that the simulator advances.
+//!
+//! embassy's time driver is one symbol of the whole program, so this one keeps its clock per thread: one
+//! simulated device is one thread, many devices are many threads, and none sees another's time. Time
+//! stands still while anything can run and jumps to the next wake-up when nothing can; wake-ups at the
+//! same instant happen in the order in which they were asked for. An empty queue means that the device
+//! waits for something that cannot come, and is an error that says so.
+//!
+//! Two ways of polling the same futures exist, because results must not depend on the order of polling:
+//! [`Polling::Join`] polls them all in turn, [`Polling::Tasks`] runs each as a task of embassy's own raw
+//! executor, as a board does.
+#![allow(
+    unsafe_code,
+    reason = "the time driver, the pender and the raw executor's poll are unsafe symbols of embassy"
+)]
+
+use std::cell::{Cell, RefCell};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::task::{Context, Wake, Waker};
+
+use embassy_executor::raw::{Executor, TaskStorage};
+
+/// A wake-up that somebody asked for.
+struct Alarm {
+    at_us: u64,
+    sequence: u64,
+    waker: Waker,
+}
+
+impl PartialEq for Alarm {
+    fn eq(&self, other: &Self) -> bool {
+        (self.at_us, self.sequence) == (other.at_us, other.sequence)
+    }
+}
+
+impl Eq for Alarm {}
+
+impl PartialOrd for Alarm {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Alarm {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        (self.at_us, self.sequence).cmp(&(other.at_us, other.sequence))
+    }
+}
+
+thread_local! {
+    static NOW_US: Cell<u64> = const { Cell::new(0) };
+    static ASKED: Cell<u64> = const { Cell::new(0) };
+    static ALARMS: RefCell<BinaryHeap<Reverse<Alarm>>> = const { RefCell::new(BinaryHeap::new()) };
+}
+
+struct VirtualTime;
+
+impl embassy_time_driver::Driver for VirtualTime {
+    fn now(&self) -> u64 {
+        NOW_US.get()
+    }
+
+    fn schedule_wake(&self, at: u64, waker: &Waker) {
+        ALARMS.with_borrow_mut(|alarms| {
+            // a future that is polled again asks again
+            if alarms.iter().any(|Reverse(alarm)| alarm.at_us == at && alarm.waker.will_wake(waker)) {
+                return;
+            }
+            ASKED.set(ASKED.get() + 1);
+            alarms.push(Reverse(Alarm { at_us: at, sequence: ASKED.get(), waker: waker.clone() }));
+        });
+    }
+}
+
+embassy_time_driver::time_driver_impl!(static DRIVER: VirtualTime = VirtualTime);
+
+/// Jumps to the next wake-up of this thread's clock. `false` when there is none.
+pub fn jump() -> bool {
+    ALARMS.with_borrow_mut(|alarms| {
+        let Some(Reverse(next)) = alarms.pop() else { return false };
+        NOW_US.set(NOW_US.get().max(next.at_us));
+        next.waker.wake();
+        while alarms.peek().is_some_and(|Reverse(alarm)| alarm.at_us <= NOW_US.get()) {
+            if let Some(Reverse(alarm)) = alarms.pop() {
+                alarm.waker.wake();
+            }
+        }
+        true
+    })
+}
+
+/// This thread's virtual time, µs.
+pub fn now_us() -> u64 {
+    NOW_US.get()
+}
+
+/// Set whenever some future can go on. Shared with the wakers, which other threads may use.
+#[derive(Debug, Default)]
+pub struct Woken(AtomicBool);
+
+impl Woken {
+    /// Whether something was woken since the last time.
+    pub fn take(&self) -> bool {
+        self.0.swap(false, Ordering::AcqRel)
+    }
+
+    /// Whether something is woken, left as it is.
+    pub fn peek(&self) -> bool {
+        self.0.load(Ordering::Acquire)
+    }
+
+    fn set(&self) {
+        self.0.store(true, Ordering::Release);
+    }
+}
+
+impl Wake for Woken {
+    fn wake(self: Arc<Self>) {
+        self.set();
+    }
+
+    fn wake_by_ref(self: &Arc<Self>) {
+        self.set();
+    }
+}
+
+/// embassy's executor calls this when one of its tasks was woken, from any thread.
+#[unsafe(export_name = "__pender")]
+fn pender(context: *mut ()) {
+    // SAFETY: the only executors of this program are made by `Tasks::new`, which passes a pointer to a
+    // `Woken` that is leaked and so lives for ever; `Woken` is atomic and may be used from any thread.
+    let woken = unsafe { &*context.cast::<Woken>() };
+    woken.set();
+}
+
+/// In which order a device's futures are polled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Polling {
+    /// All in turn, whenever any was woken.
+    #[default]
+    Join,
+    /// Each as a task of embassy's raw executor, when it was woken itself.
+    Tasks,
+}
+
+/// A set of endless futures of one device, and a way to poll them.
+pub enum Poller {
+    /// Polled in turn.
+    Join {
+        /// The futures.
+        futures: Vec<Pin<Box<dyn Future<Output = ()>>>>,
+        /// Wakes all of them.
+        waker: Waker,
+    },
+    /// Polled by embassy.
+    Tasks(&'static Executor),
+}
+
+impl Poller {
+    /// Takes the futures of one device. With [`Polling::Tasks`], executor and tasks are leaked: embassy
+    /// asks for `'static`, and a device that was run so lives until its program ends.
+    pub fn new(
+        polling: Polling,
+        futures: Vec<Pin<Box<dyn Future<Output = ()>>>>,
+        woken: &Arc<Woken>,
+    ) -> Self {
+        woken.set();
+        match polling {
+            Polling::Join => Self::Join { futures, waker: Waker::from(Arc::clone(woken)) },
+            Polling::Tasks => {
+                let context = Arc::into_raw(Arc::clone(woken)).cast_mut().cast::<()>();
+                let executor: &'static Executor = Box::leak(Box::new(Executor::new(context)));
+                for future in futures {
+                    let storage: &'static TaskStorage<_> = Box::leak(Box::new(TaskStorage::new()));
+                    // a new storage holds no task yet
+                    let token = storage.spawn(|| future).expect("a fresh task storage is free");
+                    executor.spawner().spawn(token);
+                }
+                Self::Tasks(executor)
+            }
+        }
+    }
+
+    /// Polls once; the flag says whether to do it again.
+    pub fn poll(&mut self) {
+        match self {
+            Self::Join { futures, waker } => {
+                let mut context = Context::from_waker(waker);
+                for future in futures {
+                    // the futures never end
+                    let _ = future.as_mut().poll(&mut context);
+                }
+            }
+            // SAFETY: this executor is polled from here alone, by the one thread that made it, and never
+            // from within one of its own tasks.
+            Self::Tasks(executor) => unsafe { executor.poll() },
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! `jointrig-hil-sim`: the virtual board behind a pseudo-terminal or a socket.
+#![forbid(unsafe_code)]
+
+use std::net::TcpListener;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+use jointrig_hil_sim::board::VirtualBoard;
+use jointrig_hil_sim::serve;
+
+/// The simulated friction rig with its controller's firmware.
+#[derive(Parser)]
+#[command(version)]
+struct Command {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Subcommand)]
+enum Action {
+    /// Serve one virtual board; its time stands still while no host listens.
+    Serve(Serve),
+}
+
+#[derive(Args)]
+struct Serve {
+    /// Behind a new pseudo-terminal, whose path is printed: open it as serial:PATH.
+    #[arg(long, conflicts_with = "tcp", required_unless_present = "tcp")]
+    pty: bool,
+    /// On this TCP address, for example 127.0.0.1:4000: open it as tcp:ADDR. Port 0 takes a free one.
+    #[arg(long, value_name = "ADDR")]
+    tcp: Option<String>,
+    /// The rig's description; the built-in rig if left out.
+    #[arg(long, value_name = "FILE.toml")]
+    rig: Option<PathBuf>,
+    /// Decides noise, scatter and every error of position.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+fn main() -> ExitCode {
+    let Action::Serve(options) = Command::parse().action;
+    match run(&options) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("jointrig-hil-sim: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(options: &Serve) -> Result<(), Box<dyn std::error::Error>> {
+    let rig = match &options.rig {
+        Some(path) => Some(
+            std::fs::read_to_string(path)
+                .map_err(|error| format!("cannot read the rig's description {}: {error}", path.display()))?,
+        ),
+        None => None,
+    };
+    let (_board, mut host) = VirtualBoard::start(rig.as_deref(), options.seed)?;
+    if let Some(address) = &options.tcp {
+        let listener = TcpListener::bind(address).map_err(|error| {
+            format!("cannot listen on {address}: {error}; is the address free and yours?")
+        })?;
+        println!("tcp:{}", listener.local_addr()?);
+        serve::tcp(&mut host, &listener)?;
+    } else {
+        serve_terminal(&mut host)?;
+    }
+    Ok(())
+}
+
+#[cfg(unix)]
+fn serve_terminal(host: &mut jointrig_hil_sim::link::HostEnd) -> std::io::Result<()> {
+    serve::pseudo_terminal(host, |path| println!("serial:{path}"))
+}
+
+#[cfg(not(unix))]
+fn serve_terminal(_host: &mut jointrig_hil_sim::link::HostEnd) -> std::io::Result<()> {
+    Err(std::io::Error::new(
+        std::io::ErrorKind::Unsupported,
+        "this system has no pseudo-terminals: use --tcp 127.0.0.1:4000 and the address tcp:127.0.0.1:4000",
+    ))
+}

@@ -1,0 +1,75 @@
+//! Where hammer and vibrometer really point: nominal geometry and the errors nobody knows.
+//!
+//! A point's own error belongs to its name and stays all campaign long; each cell adds an aiming error and a tilt of the
+//! hammer. All are keyed to (seed, what they are for), so visiting cells in another order changes nothing.
+
+use super::config::{Errors, ImpactPoint, ResponsePoint};
+use super::key::{Stream, normal, stream};
+use super::probe::{AXES, Probe, normalized};
+
+/// One cell's true geometry.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Aim {
+    /// Where and along what the hammer hits.
+    pub impact: Probe,
+    /// Where the 3-D vibrometer looks, along x, y and z.
+    pub response: [Probe; 3],
+}
+
+impl Aim {
+    /// Of the cell `words` = (configuration, impact, response).
+    pub fn new(
+        seed: u64,
+        words: [&str; 3],
+        errors: &Errors,
+        impact: &ImpactPoint,
+        response: &ResponsePoint,
+    ) -> Self {
+        let [configuration, hit, seen] = words;
+        let cell = |purpose| stream(seed, &[configuration, hit, seen, purpose]);
+        let mut impact_aim = cell("impact aim");
+        let mut response_aim = cell("response aim");
+        let mut hit_point = stream(seed, &["impact position", hit]);
+        let mut seen_point = stream(seed, &["response position", seen]);
+        let hit_m = shifted(
+            shifted(impact.position_m, errors.position_m, &mut hit_point),
+            errors.aim_m,
+            &mut impact_aim,
+        );
+        let seen_m = shifted(
+            shifted(response.position_m, errors.position_m, &mut seen_point),
+            errors.aim_m,
+            &mut response_aim,
+        );
+        let direction = tilted(impact.probe().direction, errors.hammer_angle_rad, &mut cell("hammer angle"));
+        Self {
+            impact: Probe { body: impact.body, position_m: hit_m, direction },
+            response: AXES.map(|axis| Probe { body: response.body, position_m: seen_m, direction: axis }),
+        }
+    }
+}
+
+fn shifted(position_m: [f64; 3], sigma_m: f64, stream: &mut Stream) -> [f64; 3] {
+    position_m.map(|coordinate| coordinate + sigma_m * normal(stream))
+}
+
+/// `direction` turned by a random angle about each of two axes across it.
+fn tilted(direction: [f64; 3], sigma_rad: f64, stream: &mut Stream) -> [f64; 3] {
+    let (about_first, about_second) = (sigma_rad * normal(stream), sigma_rad * normal(stream));
+    // The axis least along the direction gives a safe first perpendicular.
+    let least = (0..3).min_by(|a, b| direction[*a].abs().total_cmp(&direction[*b].abs())).unwrap_or(0);
+    let first = normalized(cross(direction, AXES[least]));
+    let second = cross(direction, first);
+    // A rotation vector across the direction turns it by its own length.
+    let angle = about_first.hypot(about_second);
+    if angle == 0.0 {
+        return direction;
+    }
+    let axis: [f64; 3] = std::array::from_fn(|i| (first[i] * about_first + second[i] * about_second) / angle);
+    let across = cross(axis, direction);
+    std::array::from_fn(|i| direction[i] * angle.cos() + across[i] * angle.sin())
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}

@@ -1,0 +1,228 @@
+//! Values that no rig can have.
+
+use super::{Bushing, RigConfig, RigidBody};
+use crate::rig::error::RigError;
+
+pub fn check(config: &RigConfig) -> Result<(), RigError> {
+    if config.scan_rate_hz == 0 {
+        return Err(bad("scan_rate_hz", "must be at least 1 Hz"));
+    }
+    let bodies = &config.bodies;
+    body("bodies.mass", &bodies.mass)?;
+    body("bodies.arm_a", &bodies.arm_a)?;
+    body("bodies.specimen_a", &bodies.specimen_a)?;
+    body("bodies.arm_b", &bodies.arm_b)?;
+    for (index, spring) in config.leaf_springs.iter().enumerate() {
+        bushing(&format!("leaf_springs[{index}]"), spring)?;
+    }
+    bushing("knife_edge", &config.knife_edge)?;
+    bushing("wire.bushing", &config.wire.bushing)?;
+    bushing("push_rod_a.bushing", &config.push_rod_a.bushing)?;
+    bushing("clamp.loaded", &config.clamp.loaded)?;
+    bushing("clamp.free", &config.clamp.free)?;
+    bushing("contact", &config.contact.bushing())?;
+    if config.load_cells.len() != 3 {
+        return Err(bad("load_cells", &format!("must be three, not {}", config.load_cells.len())));
+    }
+    for (index, cell) in config.load_cells.iter().enumerate() {
+        bushing(&format!("load_cells[{index}]"), cell)?;
+    }
+    bushing("lower_push_rod", &config.lower_push_rod)?;
+    points(config)?;
+    hammer(config)?;
+    sensors(config)?;
+    not_negative("errors.position_m", config.errors.position_m)?;
+    not_negative("errors.aim_m", config.errors.aim_m)?;
+    not_negative("errors.hammer_angle_rad", config.errors.hammer_angle_rad)
+}
+
+fn points(config: &RigConfig) -> Result<(), RigError> {
+    if config.responses.is_empty() {
+        return Err(bad("responses", "is empty: the vibrometer needs a point to aim at"));
+    }
+    if config.impacts.is_empty() {
+        return Err(bad("impacts", "is empty: the hammer needs a point to hit"));
+    }
+    for (index, point) in config.responses.iter().enumerate() {
+        finite(&format!("responses[{index}].position_m"), &point.position_m)?;
+        if config.responses[..index].iter().any(|earlier| earlier.name == point.name) {
+            return Err(bad(
+                &format!("responses[{index}].name"),
+                &format!("{:?} is already a response; names must differ", point.name),
+            ));
+        }
+    }
+    for (index, point) in config.impacts.iter().enumerate() {
+        finite(&format!("impacts[{index}].position_m"), &point.position_m)?;
+        let field = format!("impacts[{index}].direction");
+        finite(&field, &point.direction)?;
+        if point.direction.iter().all(|d| *d == 0.0) {
+            return Err(bad(&field, "must point somewhere: all three components are zero"));
+        }
+        if config.impacts[..index].iter().any(|earlier| earlier.name == point.name) {
+            return Err(bad(
+                &format!("impacts[{index}].name"),
+                &format!("{:?} is already an impact; names must differ", point.name),
+            ));
+        }
+    }
+    finite("spots.ldv_a.position_m", &config.spots.ldv_a.position_m)?;
+    finite("spots.ldv_b.position_m", &config.spots.ldv_b.position_m)?;
+    finite("shaker.position_m", &config.shaker.position_m)?;
+    finite("shaker.gain_n_per_v", &[config.shaker.gain_n_per_v])?;
+    not_negative("shaker.limit_v", config.shaker.limit_v)
+}
+
+fn hammer(config: &RigConfig) -> Result<(), RigError> {
+    let hammer = &config.hammer;
+    positive("hammer.bolt_kg", hammer.bolt_kg)?;
+    positive("hammer.tip_n_per_m", hammer.tip_n_per_m)?;
+    positive("hammer.gap_m", hammer.gap_m)?;
+    positive("hammer.spring_n_per_m", hammer.spring_n_per_m)?;
+    not_negative("hammer.preload_n", hammer.preload_n)?;
+    not_negative("hammer.coil_n", hammer.coil_n)?;
+    fraction("hammer.restitution", hammer.restitution)?;
+    fraction("hammer.warming", hammer.warming)?;
+    positive("hammer.warming_attempts", hammer.warming_attempts)?;
+    not_negative("hammer.speed_scatter", hammer.speed_scatter)?;
+    not_negative("hammer.width_scatter", hammer.width_scatter)?;
+    let mishaps = &hammer.mishaps;
+    fraction("hammer.mishaps.double_hit", mishaps.double_hit)?;
+    fraction("hammer.mishaps.weak", mishaps.weak)?;
+    fraction("hammer.mishaps.overload", mishaps.overload)?;
+    if mishaps.double_hit + mishaps.weak + mishaps.overload > 1.0 {
+        return Err(bad(
+            "hammer.mishaps",
+            "at most one happens per attempt: the three chances must sum to at most 1",
+        ));
+    }
+    range("hammer.mishaps.double_fraction", mishaps.double_fraction)?;
+    range("hammer.mishaps.double_delay_s", mishaps.double_delay_s)?;
+    range("hammer.mishaps.weak_fraction", mishaps.weak_fraction)?;
+    range("hammer.mishaps.overload_factor", mishaps.overload_factor)
+}
+
+fn sensors(config: &RigConfig) -> Result<(), RigError> {
+    let sensors = &config.sensors;
+    let rate_hz = f64::from(config.scan_rate_hz);
+    positive("sensors.range_v", sensors.range_v)?;
+    let scales = [
+        ("sensors.force", sensors.force.units_per_volt),
+        ("sensors.vibrometer", sensors.vibrometer.units_per_volt),
+        ("sensors.ldv_a", sensors.ldv_a.units_per_volt),
+        ("sensors.ldv_b", sensors.ldv_b.units_per_volt),
+        ("sensors.load_cells", sensors.load_cells.units_per_volt),
+        ("sensors.excitation", sensors.excitation.units_per_volt),
+    ];
+    for (sensor, value) in scales {
+        positive(&format!("{sensor}.units_per_volt"), value)?;
+    }
+    let noises = [
+        ("sensors.force.noise_n", sensors.force.noise_n),
+        ("sensors.force.ring_fraction", sensors.force.ring_fraction),
+        ("sensors.vibrometer.floor", sensors.vibrometer.floor),
+        ("sensors.vibrometer.speckle.floor_factor", sensors.vibrometer.speckle.floor_factor),
+        ("sensors.vibrometer.speckle.dropouts_per_s", sensors.vibrometer.speckle.dropouts_per_s),
+        ("sensors.vibrometer.speckle.dropout_floor_factor", sensors.vibrometer.speckle.dropout_floor_factor),
+        ("sensors.ldv_a.floor", sensors.ldv_a.floor),
+        ("sensors.ldv_b.floor", sensors.ldv_b.floor),
+        ("sensors.load_cells.noise_n", sensors.load_cells.noise_n),
+        ("sensors.excitation.noise_n", sensors.excitation.noise_n),
+    ];
+    for (field, value) in noises {
+        not_negative(field, value)?;
+    }
+    positive("sensors.force.ring_hz", sensors.force.ring_hz)?;
+    positive("sensors.force.ring_decay_s", sensors.force.ring_decay_s)?;
+    positive("sensors.vibrometer.speckle.dropout_s", sensors.vibrometer.speckle.dropout_s)?;
+    let delays = [
+        ("sensors.force.delay_s", vec![sensors.force.delay_s]),
+        ("sensors.vibrometer.delay_s", sensors.vibrometer.delay_s.to_vec()),
+        ("sensors.ldv_a.delay_s", vec![sensors.ldv_a.delay_s]),
+        ("sensors.ldv_b.delay_s", vec![sensors.ldv_b.delay_s]),
+        ("sensors.load_cells.delay_s", sensors.load_cells.delay_s.to_vec()),
+        ("sensors.excitation.delay_s", vec![sensors.excitation.delay_s]),
+    ];
+    for (field, values) in delays {
+        for value in values {
+            not_negative(field, value)?;
+            if value * rate_hz > 1e4 {
+                return Err(bad(field, "is more than 10000 scans: give the delay in seconds"));
+            }
+        }
+    }
+    let polarities = [
+        ("sensors.force.polarity", vec![sensors.force.polarity]),
+        ("sensors.vibrometer.polarity", sensors.vibrometer.polarity.to_vec()),
+        ("sensors.ldv_a.polarity", vec![sensors.ldv_a.polarity]),
+        ("sensors.ldv_b.polarity", vec![sensors.ldv_b.polarity]),
+        ("sensors.load_cells.polarity", sensors.load_cells.polarity.to_vec()),
+        ("sensors.excitation.polarity", vec![sensors.excitation.polarity]),
+    ];
+    for (field, values) in polarities {
+        if values.iter().any(|sign| sign.abs() != 1) {
+            return Err(bad(field, "must be 1 or -1"));
+        }
+    }
+    Ok(())
+}
+
+fn body(field: &str, body: &RigidBody) -> Result<(), RigError> {
+    positive(&format!("{field}.mass_kg"), body.mass_kg)?;
+    finite(&format!("{field}.cg_m"), &body.cg_m)?;
+    match (body.inertia_kg_m2, body.box_m) {
+        (Some(_), Some(_)) => Err(bad(field, "has both box_m and inertia_kg_m2: give one of them")),
+        (Some(inertia), None) => {
+            inertia.iter().try_for_each(|value| positive(&format!("{field}.inertia_kg_m2"), *value))
+        }
+        (None, Some(edges)) => edges.iter().try_for_each(|value| positive(&format!("{field}.box_m"), *value)),
+        (None, None) => Err(bad(field, "needs box_m or inertia_kg_m2 to have an inertia")),
+    }
+}
+
+fn bushing(field: &str, bushing: &Bushing) -> Result<(), RigError> {
+    finite(&format!("{field}.position_m"), &bushing.position_m)?;
+    let groups = [
+        ("stiffness_n_per_m", &bushing.stiffness_n_per_m[..]),
+        ("rotation_nm_per_rad", &bushing.rotation_nm_per_rad[..]),
+        ("damping_s", &bushing.damping_s[..]),
+    ];
+    for (name, values) in groups {
+        for value in values {
+            not_negative(&format!("{field}.{name}"), *value)?;
+        }
+    }
+    Ok(())
+}
+
+fn bad(field: &str, reason: &str) -> RigError {
+    RigError::Field { field: field.to_owned(), reason: reason.to_owned(), line: None }
+}
+
+fn finite(field: &str, values: &[f64]) -> Result<(), RigError> {
+    match values.iter().find(|value| !value.is_finite()) {
+        Some(value) => Err(bad(field, &format!("must be finite, not {value}"))),
+        None => Ok(()),
+    }
+}
+
+fn positive(field: &str, value: f64) -> Result<(), RigError> {
+    finite(field, &[value])?;
+    if value > 0.0 { Ok(()) } else { Err(bad(field, &format!("must be greater than zero, not {value}"))) }
+}
+
+fn not_negative(field: &str, value: f64) -> Result<(), RigError> {
+    finite(field, &[value])?;
+    if value >= 0.0 { Ok(()) } else { Err(bad(field, &format!("must not be negative, but is {value}"))) }
+}
+
+fn fraction(field: &str, value: f64) -> Result<(), RigError> {
+    not_negative(field, value)?;
+    if value <= 1.0 { Ok(()) } else { Err(bad(field, &format!("must be between 0 and 1, not {value}"))) }
+}
+
+fn range(field: &str, [low, high]: [f64; 2]) -> Result<(), RigError> {
+    not_negative(field, low)?;
+    not_negative(field, high)?;
+    if low <= high { Ok(()) } else { Err(bad(field, &format!("must be [low, high], not [{low}, {high}]"))) }
+}

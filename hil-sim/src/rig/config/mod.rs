@@ -1,0 +1,348 @@
+//! The parameters of a rig: what a rig TOML may say.
+//!
+//! `rigs/default.toml` is the built-in default and the one home of every number; [`RigConfig::default`] reads the embedded
+//! copy. A user's file states any subset: its tables merge into the default's, its lists replace the default's lists.
+
+mod check;
+mod document;
+mod sensors;
+
+pub use sensors::{Excitation, ForceSensor, LoadCells, Sensors, SpeckleNoise, SpotVibrometer, Vibrometer};
+
+use serde::{Deserialize, Serialize};
+
+use super::error::RigError;
+
+/// The built-in default rig, as text.
+pub const DEFAULT_TOML: &str = include_str!("../../../rigs/default.toml");
+
+/// Everything that describes one rig. SI units; axes and origin as in [`crate::rig`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RigConfig {
+    /// The rig's name, for people.
+    pub name: String,
+    /// Scans per second (Hz).
+    pub scan_rate_hz: u32,
+    /// The rigid bodies.
+    pub bodies: Bodies,
+    /// Ground to moving mass.
+    pub leaf_springs: Vec<Bushing>,
+    /// Moving mass to arm A.
+    pub knife_edge: Bushing,
+    /// Ground to arm A: the vinyl wire that carries arm A when it hangs alone.
+    pub wire: Tether,
+    /// Ground to arm A: the push rod that loads the contact.
+    pub push_rod_a: Tether,
+    /// Arm A to specimen A.
+    pub clamp: Clamp,
+    /// Specimen A (arm A if the clamp is rigid) to arm B: the joint under test.
+    pub contact: Contact,
+    /// Ground to arm B; exactly three.
+    pub load_cells: Vec<Bushing>,
+    /// Ground to arm B.
+    pub lower_push_rod: Bushing,
+    /// Points the 3-D vibrometer may be aimed at.
+    pub responses: Vec<ResponsePoint>,
+    /// Points the hammer may hit.
+    pub impacts: Vec<ImpactPoint>,
+    /// Where the single-point vibrometers look.
+    pub spots: Spots,
+    /// The shaker.
+    pub shaker: Shaker,
+    /// The automatic hammer.
+    pub hammer: Hammer,
+    /// Scales, noise and delays of the channels.
+    pub sensors: Sensors,
+    /// Errors of position, aim and angle.
+    pub errors: Errors,
+}
+
+impl RigConfig {
+    /// Reads a rig file: any subset of the default's fields.
+    ///
+    /// # Errors
+    /// [`RigError::Document`] for text that is not TOML, an unknown field or a wrong type, with its line;
+    /// [`RigError::Field`] for a value that no rig can have.
+    pub fn from_toml(text: &str) -> Result<Self, RigError> {
+        document::read(text)
+    }
+
+    /// The rig written out completely; [`RigConfig::from_toml`] reads it back equal.
+    ///
+    /// # Panics
+    /// Never: every field has a TOML form.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("every field of RigConfig has a TOML form")
+    }
+
+    /// Checks every value, as [`RigConfig::from_toml`] does; for rigs that were changed in code.
+    ///
+    /// # Errors
+    /// [`RigError::Field`] naming the first bad field.
+    pub fn check(&self) -> Result<(), RigError> {
+        check::check(self)
+    }
+}
+
+impl Default for RigConfig {
+    fn default() -> Self {
+        document::read(DEFAULT_TOML).expect("rigs/default.toml is a complete, valid rig: a test reads it")
+    }
+}
+
+/// Which body a point sits on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BodyName {
+    /// The moving mass (substructure A).
+    Mass,
+    /// Arm A (substructure A).
+    ArmA,
+    /// Specimen A (substructure A); arm A itself when the clamp is rigid.
+    SpecimenA,
+    /// Arm B with its specimen (substructure B).
+    ArmB,
+}
+
+/// The four rigid bodies.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bodies {
+    /// Moving mass.
+    pub mass: RigidBody,
+    /// Arm A.
+    pub arm_a: RigidBody,
+    /// Specimen A.
+    pub specimen_a: RigidBody,
+    /// Arm B.
+    pub arm_b: RigidBody,
+}
+
+/// A rigid body: six degrees of freedom at its centre of gravity.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RigidBody {
+    /// Mass (kg).
+    pub mass_kg: f64,
+    /// Centre of gravity (m).
+    pub cg_m: [f64; 3],
+    /// Edge lengths (m) of the homogeneous box that gives the inertia.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub box_m: Option<[f64; 3]>,
+    /// Principal inertia Ixx, Iyy, Izz (kg m²); instead of the box.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inertia_kg_m2: Option<[f64; 3]>,
+}
+
+/// A massless spring and dashpot for all six relative motions at one point.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bushing {
+    /// Where (m).
+    pub position_m: [f64; 3],
+    /// kx, ky, kz (N/m).
+    pub stiffness_n_per_m: [f64; 3],
+    /// krx, kry, krz (N m/rad).
+    pub rotation_nm_per_rad: [f64; 3],
+    /// β (s) of c = β k for x, y, z, rx, ry, rz.
+    pub damping_s: [f64; 6],
+}
+
+/// A support that is there only in some configurations.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tether {
+    /// Present when substructure A is alone.
+    pub in_a: bool,
+    /// Present in the assembly.
+    pub in_ajb: bool,
+    /// The support.
+    pub bushing: Bushing,
+}
+
+/// The clamp between arm A and specimen A.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Clamp {
+    /// No clamp at all: the specimen's inertia is lumped onto arm A.
+    pub rigid: bool,
+    /// Under the normal load: in the assembly.
+    pub loaded: Bushing,
+    /// Without it: substructure A alone.
+    pub free: Bushing,
+}
+
+/// How the contact answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum ContactLaw {
+    /// Stuck: a bushing, whatever the amplitude.
+    Linear,
+}
+
+/// The joint under test.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Contact {
+    /// How it answers.
+    pub law: ContactLaw,
+    /// Where (m).
+    pub position_m: [f64; 3],
+    /// kx, ky, kz (N/m); kz is the tangential contact stiffness.
+    pub stiffness_n_per_m: [f64; 3],
+    /// krx, kry, krz (N m/rad).
+    pub rotation_nm_per_rad: [f64; 3],
+    /// β (s) of c = β k for x, y, z, rx, ry, rz.
+    pub damping_s: [f64; 6],
+}
+
+impl Contact {
+    /// The stuck contact's spring and dashpot.
+    pub fn bushing(&self) -> Bushing {
+        Bushing {
+            position_m: self.position_m,
+            stiffness_n_per_m: self.stiffness_n_per_m,
+            rotation_nm_per_rad: self.rotation_nm_per_rad,
+            damping_s: self.damping_s,
+        }
+    }
+}
+
+/// A point of the 3-D vibrometer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ResponsePoint {
+    /// Its name, unique among responses.
+    pub name: String,
+    /// The body it sits on.
+    pub body: BodyName,
+    /// Nominal position (m).
+    pub position_m: [f64; 3],
+    /// Polluted by speckle noise.
+    #[serde(default)]
+    pub speckle: bool,
+}
+
+/// A point the hammer hits.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImpactPoint {
+    /// Its name, unique among impacts.
+    pub name: String,
+    /// The body it sits on.
+    pub body: BodyName,
+    /// Nominal position (m).
+    pub position_m: [f64; 3],
+    /// Direction of the force on the structure (any length; sign included).
+    pub direction: [f64; 3],
+}
+
+/// Where one single-point vibrometer looks, along z.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spot {
+    /// The body it looks at.
+    pub body: BodyName,
+    /// Where (m).
+    pub position_m: [f64; 3],
+}
+
+/// The two spots beside the contact.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spots {
+    /// On specimen A.
+    pub ldv_a: Spot,
+    /// On arm B's specimen.
+    pub ldv_b: Spot,
+}
+
+/// The shaker: a force along z.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Shaker {
+    /// The body it pushes.
+    pub body: BodyName,
+    /// Where (m).
+    pub position_m: [f64; 3],
+    /// Force per drive (N/V).
+    pub gain_n_per_v: f64,
+    /// The amplifier saturates at ± this drive (V).
+    pub limit_v: f64,
+}
+
+/// The automatic hammer; [`crate::rig::hammer`] says what it does with them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hammer {
+    /// Moving mass of the bolt with its tip (kg).
+    pub bolt_kg: f64,
+    /// Contact stiffness of the tip (N/m).
+    pub tip_n_per_m: f64,
+    /// From the rest stop to the surface (m).
+    pub gap_m: f64,
+    /// Return spring (N/m).
+    pub spring_n_per_m: f64,
+    /// Return spring's force at the rest stop (N).
+    pub preload_n: f64,
+    /// Coil's pull when cold (N).
+    pub coil_n: f64,
+    /// Speed after a contact over speed before it.
+    pub restitution: f64,
+    /// Fraction of the coil's pull lost when warm.
+    pub warming: f64,
+    /// Attempts within a cell to 63 % of that loss.
+    pub warming_attempts: f64,
+    /// Standard deviation of the speed at contact, relative.
+    pub speed_scatter: f64,
+    /// Standard deviation of the contact's width, relative.
+    pub width_scatter: f64,
+    /// What goes wrong now and then.
+    pub mishaps: Mishaps,
+}
+
+/// Chances per attempt (at most one happens), and ranges drawn from evenly.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mishaps {
+    /// Chance of a second pulse.
+    pub double_hit: f64,
+    /// Its peak over the first.
+    pub double_fraction: [f64; 2],
+    /// Its delay after the first (s).
+    pub double_delay_s: [f64; 2],
+    /// Chance of a weak hit.
+    pub weak: f64,
+    /// Its peak over the undisturbed.
+    pub weak_fraction: [f64; 2],
+    /// Chance of a hit beyond the sensors' range.
+    pub overload: f64,
+    /// Its peak over the undisturbed.
+    pub overload_factor: [f64; 2],
+}
+
+/// Standard deviations of what nobody at the rig knows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Errors {
+    /// Each response and impact point along each axis (m), the same in every cell.
+    pub position_m: f64,
+    /// Added anew in each cell (m along each axis).
+    pub aim_m: f64,
+    /// Hammer's tilt about each of the two axes across the impact (rad), anew in each cell.
+    pub hammer_angle_rad: f64,
+}
+
+impl BodyName {
+    /// As rig files write it.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Mass => "mass",
+            Self::ArmA => "arm_a",
+            Self::SpecimenA => "specimen_a",
+            Self::ArmB => "arm_b",
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! What stands on the table: A, B or the assembly.
+
+use std::fmt;
+
+use super::config::BodyName;
+
+/// A configuration of the rig.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Configuration {
+    /// Moving mass, arm A and its specimen; specimen B removed.
+    A,
+    /// Arm B with its specimen; specimen A removed.
+    B,
+    /// Both, joined by the contact.
+    Ajb,
+}
+
+impl Configuration {
+    /// All three.
+    pub const ALL: [Self; 3] = [Self::A, Self::B, Self::Ajb];
+
+    /// `A`, `B` or `AJB`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::A => "A",
+            Self::B => "B",
+            Self::Ajb => "AJB",
+        }
+    }
+
+    /// Whether `body` is there.
+    pub fn has(self, body: BodyName) -> bool {
+        match self {
+            Self::A => body != BodyName::ArmB,
+            Self::B => body == BodyName::ArmB,
+            Self::Ajb => true,
+        }
+    }
+}
+
+impl fmt::Display for Configuration {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.as_str())
+    }
+}
+
+/// Which frequency response is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Displacement per force (m/N).
+    Receptance,
+    /// Velocity per force (m/(s N)).
+    Mobility,
+    /// Acceleration per force (m/(s² N)).
+    Accelerance,
+}

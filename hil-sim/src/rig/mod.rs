@@ -1,0 +1,283 @@
+//! The friction rig: 24 degrees of freedom, a hammer, a shaker and ten channels.
+//!
+//! Axes: x lateral, y vertical (normal load), z horizontal (sliding); origin at the contact's centre; SI units.
+//! One [`Rig`] is one device. It advances by whole scans: [`Rig::scan`] moves structure, bolt and shaker on by one scan period
+//! and samples all channels at its end. The stuck structure is advanced exactly (see [`stepper`]), so the scan rate does not
+//! change the physics.
+//!
+//! **What a record depends on.** Noise, scatter and errors of aim are keyed to (seed, configuration, cell, attempt, purpose)
+//! and counted from the last [`Rig::stage`] or [`Rig::fire`]: never to absolute time, never to what happened in other cells.
+//! [`Rig::stage`] puts the structure at rest. Within a cell an earlier hit's tail is physics and does depend on the scans
+//! that passed since.
+//!
+//! **Budget.** A scan of the assembly at 51.2 kHz costs about 0.1 µs; `benches/rig.rs` measures it.
+
+mod aim;
+pub mod config;
+mod configuration;
+mod error;
+pub mod force;
+pub mod hammer;
+mod key;
+pub mod modal;
+mod plant;
+mod probe;
+pub mod sensors;
+pub mod state_space;
+pub mod stepper;
+pub mod structure;
+
+pub use aim::Aim;
+pub use config::RigConfig;
+pub use configuration::{Configuration, Quantity};
+pub use error::RigError;
+pub use hammer::{Hit, Mishap};
+pub use probe::Probe;
+pub use sensors::{CHANNELS, Channel, Measured};
+pub use structure::exact_frf;
+
+use force::ForceSegment;
+use key::stream;
+use plant::Plant;
+pub use plant::Stepping;
+use sensors::{EXCITATION, FIRST_SIGNAL, FORCE, Sensors};
+use stepper::{ScanForces, Stepper};
+
+/// One rig.
+#[derive(Debug, Clone)]
+pub struct Rig {
+    config: RigConfig,
+    seed: u64,
+    period_s: f64,
+    channels: [Channel; CHANNELS],
+    plants: [Plant; 3],
+    configuration: Configuration,
+    impact: String,
+    response: String,
+    attempt: u32,
+    aim: Aim,
+    stepper: Stepper,
+    sensors: Sensors,
+    /// Hammer forces still to come or acting, on the clock below.
+    pending: Vec<ForceSegment>,
+    /// Scans since the last stage or fire.
+    scans: u64,
+    drive_v: f64,
+    truth: [f64; CHANNELS],
+    coil_pulses_s: Vec<f64>,
+    last_hit: Option<Hit>,
+}
+
+impl Rig {
+    /// A rig at rest, staged in the assembly at the first impact and the first response of `config`.
+    ///
+    /// # Errors
+    /// [`RigError::Field`] for a bad value; [`RigError::Structure`] if the structure's matrices cannot be factored.
+    pub fn new(config: &RigConfig, seed: u64) -> Result<Self, RigError> {
+        Self::with_stepping(config, seed, Stepping::Fastest)
+    }
+
+    /// As [`Rig::new`], with a chosen way of advancing the structure.
+    ///
+    /// # Errors
+    /// As [`Rig::new`].
+    pub fn with_stepping(config: &RigConfig, seed: u64, stepping: Stepping) -> Result<Self, RigError> {
+        config.check()?;
+        let period_s = 1.0 / f64::from(config.scan_rate_hz);
+        let plant = |configuration| Plant::new(config, configuration, stepping, period_s);
+        let plants = [plant(Configuration::A)?, plant(Configuration::B)?, plant(Configuration::Ajb)?];
+        let channels = sensors::channels(&config.sensors);
+        let configuration = Configuration::Ajb;
+        // check() has seen at least one of each.
+        let (impact, response) = (&config.impacts[0], &config.responses[0]);
+        let words = [configuration.as_str(), &impact.name, &response.name];
+        let aim = Aim::new(seed, words, &config.errors, impact, response);
+        let stepper = plants[configuration as usize].aimed(config, &aim, &channels)?;
+        let sensors = Sensors::new(config, &channels, None, stream(seed, &words));
+        let mut rig = Self {
+            seed,
+            period_s,
+            plants,
+            configuration,
+            impact: impact.name.clone(),
+            response: response.name.clone(),
+            attempt: 0,
+            aim,
+            stepper,
+            sensors,
+            channels,
+            pending: Vec::new(),
+            scans: 0,
+            drive_v: 0.0,
+            truth: [0.0; CHANNELS],
+            coil_pulses_s: Vec::new(),
+            last_hit: None,
+            config: config.clone(),
+        };
+        let (impact, response) = (rig.impact.clone(), rig.response.clone());
+        rig.stage(configuration, &impact, &response, 0)?;
+        Ok(rig)
+    }
+
+    /// Scans per second (Hz).
+    pub fn scan_rate_hz(&self) -> u32 {
+        self.config.scan_rate_hz
+    }
+
+    /// The ten channels, in the order of the codes.
+    pub fn channels(&self) -> &[Channel] {
+        &self.channels
+    }
+
+    /// The rig's parameters.
+    pub fn config(&self) -> &RigConfig {
+        &self.config
+    }
+
+    /// The device's seed.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// What stands on the table.
+    pub fn configuration(&self) -> Configuration {
+        self.configuration
+    }
+
+    /// Number of the next attempt within the cell.
+    pub fn attempt(&self) -> u32 {
+        self.attempt
+    }
+
+    /// Moves hammer and vibrometer to a cell. In a laboratory this takes minutes: the structure is at rest afterwards, the
+    /// shaker off, and the next [`Rig::fire`] is number `attempt` of the cell.
+    ///
+    /// # Errors
+    /// [`RigError::UnknownPoint`] listing the names that would do; the rig stays as it was.
+    pub fn stage(
+        &mut self,
+        configuration: Configuration,
+        impact: &str,
+        response: &str,
+        attempt: u32,
+    ) -> Result<(), RigError> {
+        let hit = self.config.impact(configuration, impact)?;
+        let seen = self.config.response(configuration, response)?;
+        let words = [configuration.as_str(), impact, response];
+        let aim = Aim::new(self.seed, words, &self.config.errors, hit, seen);
+        let plant = &self.plants[configuration as usize];
+        let stepper = plant.aimed(&self.config, &aim, &self.channels)?;
+        let speckle = seen.speckle;
+        self.aim = aim;
+        self.stepper = stepper;
+        self.configuration = configuration;
+        impact.clone_into(&mut self.impact);
+        response.clone_into(&mut self.response);
+        self.attempt = attempt;
+        let idle = self.shot(attempt, "idle");
+        let speckle = speckle.then(|| self.shot(attempt, "idle speckle"));
+        self.sensors = Sensors::new(&self.config, &self.channels, speckle, idle);
+        self.pending.clear();
+        self.scans = 0;
+        self.drive_v = 0.0;
+        self.truth = [0.0; CHANNELS];
+        self.coil_pulses_s.clear();
+        self.last_hit = None;
+        Ok(())
+    }
+
+    /// Energises the hammer's coil for `pulse_s` from the next scan on. A pulse that is not a positive number does nothing.
+    ///
+    /// The attempt's number goes up by one for the next fire.
+    pub fn fire(&mut self, pulse_s: f64) {
+        if !(pulse_s.is_finite() && pulse_s > 0.0) {
+            return;
+        }
+        let now_s = self.time_s(self.scans);
+        self.pending.retain(|segment| segment.end_s > now_s);
+        for segment in &mut self.pending {
+            *segment = segment.seen_from(now_s);
+        }
+        let attempt = self.attempt;
+        let hit = hammer::strike(&self.config.hammer, pulse_s, attempt, &mut self.shot(attempt, "hit"));
+        self.pending.extend_from_slice(&hit.contacts);
+        self.sensors.restart(self.shot(attempt, "shot"), self.shot(attempt, "shot speckle"));
+        self.scans = 0;
+        self.coil_pulses_s.push(pulse_s);
+        self.last_hit = Some(hit);
+        self.attempt = attempt.wrapping_add(1);
+    }
+
+    /// Sets the shaker's drive (V), held until it is set again and limited as the amplifier is; not a number mutes it.
+    ///
+    /// The excitation channel reads the force that acted during the scan that it ends.
+    pub fn drive(&mut self, volts: f64) {
+        let limit = self.config.shaker.limit_v;
+        self.drive_v = if volts.is_nan() { 0.0 } else { volts.clamp(-limit, limit) };
+    }
+
+    /// Advances exactly one scan period and samples: one code per channel, in order. A shorter slice takes the first
+    /// channels, a longer one keeps its tail.
+    pub fn scan(&mut self, codes: &mut [i16]) {
+        let (from_s, to_s) = (self.time_s(self.scans), self.time_s(self.scans + 1));
+        self.scans += 1;
+        let shaker_n = self.drive_v * self.config.shaker.gain_n_per_v;
+        self.stepper.advance(&ScanForces { from_s, to_s, hammer: &self.pending, shaker_n });
+        self.truth[FORCE] = self.sensors.hammer_n(&self.pending, from_s, to_s);
+        self.truth[FIRST_SIGNAL..EXCITATION].copy_from_slice(&self.stepper.signals());
+        self.truth[EXCITATION] = shaker_n;
+        if self.pending.first().is_some_and(|segment| segment.end_s <= to_s) {
+            self.pending.retain(|segment| segment.end_s > to_s);
+        }
+        self.sensors.convert(self.truth, codes);
+    }
+
+    fn time_s(&self, scans: u64) -> f64 {
+        scans as f64 * self.period_s
+    }
+
+    fn shot(&self, attempt: u32, purpose: &str) -> key::Stream {
+        let number = attempt.to_string();
+        let words = [self.configuration.as_str(), &self.impact, &self.response, &number, purpose];
+        stream(self.seed, &words)
+    }
+}
+
+/// What only the rig itself knows; for tests.
+impl Rig {
+    /// The true geometry of the cell, errors included.
+    pub fn aim(&self) -> &Aim {
+        &self.aim
+    }
+
+    /// The noise-free signals of the last scan, before delay and polarity, in the channels' units; the hammer's force with
+    /// its cell's ringing.
+    pub fn truth(&self) -> &[f64; CHANNELS] {
+        &self.truth
+    }
+
+    /// Coil-on time (s) of every fire since the last stage.
+    pub fn coil_pulses_s(&self) -> &[f64] {
+        &self.coil_pulses_s
+    }
+
+    /// The last fire since the last stage: its mishap and its contacts, on a clock that starts at the fire.
+    pub fn last_hit(&self) -> Option<&Hit> {
+        self.last_hit.as_ref()
+    }
+
+    /// Mechanical energy of the structure now (J).
+    pub fn energy_j(&self) -> f64 {
+        self.plants[self.configuration as usize].energy_j(&self.stepper)
+    }
+
+    /// True displacement (m) and velocity (m/s) along a probe now; `None` if its body is not there.
+    pub fn motion(&self, probe: &Probe) -> Option<(f64, f64)> {
+        self.plants[self.configuration as usize].motion(&self.stepper, probe)
+    }
+
+    /// Why the staged configuration is stepped by its matrix exponential, if it is.
+    pub fn fallback(&self) -> Option<modal::ModalError> {
+        self.plants[self.configuration as usize].fallback()
+    }
+}

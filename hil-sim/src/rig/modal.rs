@@ -1,0 +1,159 @@
+//! The stuck motion's complex modes: eigenvectors of the state matrix, checked before they are trusted.
+//!
+//! Eigenvalues come from the real Schur form, vectors from inverse iteration. Left vectors are rows of the inverse of the
+//! basis, so that a bad basis shows itself: its condition number and its FRFs against a direct solve decide whether it may
+//! be used. Overdamped modes are real and count once; the others come in conjugate pairs of which one is kept.
+
+use nalgebra::{DMatrix, DVector, Schur};
+use num_complex::Complex;
+
+use super::state_space::StateSpace;
+
+/// A basis with a larger condition number costs more than the eight digits promised.
+const WORST_CONDITION: f64 = 1e7;
+/// Largest deviation of the basis' transfer functions from a direct solve, relative to the largest entry.
+const WORST_DEVIATION: f64 = 1e-8;
+/// Schur sweeps and inverse iterations that are plenty for any basis worth having.
+const SWEEPS: usize = 10_000;
+const ITERATIONS: usize = 3;
+
+/// Why a structure is stepped by its matrix exponential instead.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum ModalError {
+    /// The Schur form did not converge.
+    #[error("the eigenvalues do not converge")]
+    NoEigenvalues,
+    /// Two modes are (nearly) the same: critical damping.
+    #[error("the modes are nearly dependent (condition number {condition:.1e})")]
+    Dependent {
+        /// Condition number of the basis of unit vectors.
+        condition: f64,
+    },
+    /// The basis does not reproduce the transfer functions.
+    #[error("the modes miss the exact transfer functions by {deviation:.1e}")]
+    Inexact {
+        /// Largest deviation over the largest entry.
+        deviation: f64,
+    },
+}
+
+/// One complex mode: z' = λ z + (left · b) f, and x gains weight · Re(right z).
+#[derive(Debug, Clone)]
+pub struct Mode {
+    /// Eigenvalue (1/s), imaginary part not negative.
+    pub lambda: Complex<f64>,
+    /// 2 for one of a conjugate pair, 1 for an overdamped mode.
+    pub weight: f64,
+    /// Right vector (2n).
+    pub right: DVector<Complex<f64>>,
+    /// Left vector (2n), without conjugation.
+    pub left: DVector<Complex<f64>>,
+}
+
+/// All modes, slowest decay first.
+pub fn modes(space: &StateSpace) -> Result<Vec<Mode>, ModalError> {
+    let order = space.order();
+    let schur = Schur::try_new(space.a.clone(), f64::EPSILON, SWEEPS).ok_or(ModalError::NoEigenvalues)?;
+    let mut lambdas: Vec<Complex<f64>> =
+        schur.complex_eigenvalues().iter().copied().filter(|lambda| lambda.im >= 0.0).collect();
+    lambdas.sort_by(|a, b| b.re.total_cmp(&a.re).then(a.im.total_cmp(&b.im)));
+    let states: usize = lambdas.iter().map(|lambda| if lambda.im > 0.0 { 2 } else { 1 }).sum();
+    if states != order || lambdas.iter().any(|lambda| !lambda.is_finite()) {
+        return Err(ModalError::NoEigenvalues);
+    }
+    let complex = space.a.map(Complex::from);
+    let mut found = Vec::with_capacity(lambdas.len());
+    for guess in lambdas {
+        let (lambda, right) = vector(&complex, guess).ok_or(ModalError::NoEigenvalues)?;
+        let weight = if guess.im > 0.0 { 2.0 } else { 1.0 };
+        found.push(Mode { lambda, weight, right, left: DVector::zeros(order) });
+    }
+    invert(&mut found, order)?;
+    verify(space, &found)?;
+    Ok(found)
+}
+
+/// Inverse iteration from `guess`: eigenvalue and unit vector. A real guess stays real.
+fn vector(a: &DMatrix<Complex<f64>>, guess: Complex<f64>) -> Option<(Complex<f64>, DVector<Complex<f64>>)> {
+    let order = a.nrows();
+    // Exactly at the eigenvalue the factorisation may meet a zero pivot; a part in 1e12 beside it converges as fast.
+    let shift = guess * (1.0 + 1e-12) + f64::MIN_POSITIVE;
+    let shifted = a - DMatrix::from_diagonal_element(order, order, shift);
+    let factors = shifted.lu();
+    // Any start with a part in every mode: fixed, so that the result is.
+    let mut x = DVector::from_fn(order, |i, _| {
+        let angle = if guess.im > 0.0 { 1.3 * i as f64 } else { 0.0 };
+        Complex::from_polar(1.0 + 0.37 * (0.9 * i as f64).sin(), angle)
+    });
+    for _ in 0..ITERATIONS {
+        x = factors.solve(&x)?;
+        let norm = x.norm();
+        if !(norm.is_finite() && norm > 0.0) {
+            return None;
+        }
+        x.unscale_mut(norm);
+    }
+    let mut lambda = x.dotc(&(a * &x));
+    if guess.im <= 0.0 {
+        lambda.im = 0.0;
+    }
+    Some((lambda, x))
+}
+
+/// Left vectors from the inverse of the real basis [w Re v, −w Im v | v].
+fn invert(modes: &mut [Mode], order: usize) -> Result<(), ModalError> {
+    let mut basis = DMatrix::zeros(order, order);
+    let mut column = 0;
+    for mode in modes.iter() {
+        basis.set_column(column, &mode.right.map(|v| mode.weight * v.re));
+        column += 1;
+        if mode.lambda.im > 0.0 {
+            basis.set_column(column, &mode.right.map(|v| -mode.weight * v.im));
+            column += 1;
+        }
+    }
+    let singular = basis.clone().singular_values();
+    let condition = singular.max() / singular.min();
+    let dependent = ModalError::Dependent { condition };
+    if condition.is_nan() || condition > WORST_CONDITION {
+        return Err(dependent);
+    }
+    let inverse = basis.try_inverse().ok_or(dependent)?;
+    let mut row = 0;
+    for mode in modes {
+        if mode.lambda.im > 0.0 {
+            let (re, im) = (inverse.row(row), inverse.row(row + 1));
+            mode.left = DVector::from_fn(order, |i, _| Complex::new(re[i], im[i]));
+            row += 2;
+        } else {
+            mode.left = DVector::from_fn(order, |i, _| Complex::from(inverse[(row, i)]));
+            row += 1;
+        }
+    }
+    Ok(())
+}
+
+/// Compares (s − A)⁻¹ from the modes with a direct solve, on, beside and far from the resonances.
+fn verify(space: &StateSpace, modes: &[Mode]) -> Result<(), ModalError> {
+    let order = space.order();
+    let fastest = modes.iter().map(|mode| mode.lambda.norm()).fold(0.0, f64::max);
+    let beside = modes.iter().step_by(3).map(|mode| Complex::new(2.3, mode.lambda.im));
+    let decades = (1..=6).map(|k| Complex::new(0.0, fastest * 10_f64.powi(-k)));
+    let mut worst = 0.0_f64;
+    for s in beside.chain(decades) {
+        let shifted = DMatrix::from_fn(order, order, |i, j| {
+            Complex::from(-space.a[(i, j)]) + if i == j { s } else { Complex::ZERO }
+        });
+        let Some(direct) = shifted.try_inverse() else { continue };
+        let mut sum = DMatrix::zeros(order, order);
+        for mode in modes {
+            sum += &mode.right * mode.left.transpose() * (0.5 * mode.weight / (s - mode.lambda));
+            let (right, left) = (mode.right.conjugate(), mode.left.conjugate());
+            sum += right * left.transpose() * (0.5 * mode.weight / (s - mode.lambda.conj()));
+        }
+        let largest = direct.iter().map(|v| v.norm()).fold(0.0, f64::max);
+        let deviation = (&sum - &direct).iter().map(|v| v.norm()).fold(0.0, f64::max) / largest;
+        worst = if deviation.is_nan() { f64::INFINITY } else { worst.max(deviation) };
+    }
+    if worst > WORST_DEVIATION { Err(ModalError::Inexact { deviation: worst }) } else { Ok(()) }
+}

@@ -1,0 +1,78 @@
+//! A direction at a point of a body: where something is measured or pushed.
+
+use super::config::{BodyName, ImpactPoint, ResponsePoint, RigConfig, Spot};
+use super::{Configuration, RigError};
+
+/// Unit vectors of the axes.
+pub const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// One scalar output (motion along `direction`) or input (force along it).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Probe {
+    /// The body it sits on.
+    pub body: BodyName,
+    /// Position (m).
+    pub position_m: [f64; 3],
+    /// Unit vector.
+    pub direction: [f64; 3],
+}
+
+impl Probe {
+    /// The single-point vibrometer's: along z.
+    pub fn along_z(spot: &Spot) -> Self {
+        Self { body: spot.body, position_m: spot.position_m, direction: AXES[2] }
+    }
+}
+
+impl ResponsePoint {
+    /// x, y and z at the nominal position.
+    pub fn probes(&self) -> [Probe; 3] {
+        AXES.map(|direction| Probe { body: self.body, position_m: self.position_m, direction })
+    }
+}
+
+impl ImpactPoint {
+    /// Along the impact's direction at the nominal position.
+    pub fn probe(&self) -> Probe {
+        Probe { body: self.body, position_m: self.position_m, direction: normalized(self.direction) }
+    }
+}
+
+impl RigConfig {
+    /// The response point `name`, if `configuration` has it.
+    ///
+    /// # Errors
+    /// [`RigError::UnknownPoint`] listing the names that would do.
+    pub fn response(&self, configuration: Configuration, name: &str) -> Result<&ResponsePoint, RigError> {
+        let there = || self.responses.iter().filter(|point| configuration.has(point.body));
+        there().find(|point| point.name == name).ok_or_else(|| RigError::UnknownPoint {
+            kind: "response",
+            name: name.to_owned(),
+            configuration,
+            valid: there().map(|point| point.name.clone()).collect(),
+        })
+    }
+
+    /// The impact point `name`, if `configuration` has it.
+    ///
+    /// # Errors
+    /// [`RigError::UnknownPoint`] listing the names that would do.
+    pub fn impact(&self, configuration: Configuration, name: &str) -> Result<&ImpactPoint, RigError> {
+        let there = || self.impacts.iter().filter(|point| configuration.has(point.body));
+        there().find(|point| point.name == name).ok_or_else(|| RigError::UnknownPoint {
+            kind: "impact",
+            name: name.to_owned(),
+            configuration,
+            valid: there().map(|point| point.name.clone()).collect(),
+        })
+    }
+}
+
+/// `v` at length one; `v` must not be zero.
+pub(super) fn normalized(v: [f64; 3]) -> [f64; 3] {
+    // The largest component goes first, so that neither tiny nor huge vectors leave the range of their squares.
+    let largest = v.iter().fold(0.0_f64, |largest, c| largest.max(c.abs()));
+    let v = v.map(|c| c / largest);
+    let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
+    v.map(|c| c / length)
+}

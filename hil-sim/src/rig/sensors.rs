@@ -1,0 +1,331 @@
+//! The ten channels: from true signals to converter codes.
+//!
+//! code = round(volts / range · 32768), saturating, volts = (delayed signal · polarity + noise) / scale. Noise is drawn for
+//! every channel in every scan, present or not, so that a channel's stream does not depend on the others.
+
+use std::f64::consts::PI;
+
+use num_complex::Complex;
+
+use super::config::{self, Hammer, RigConfig};
+use super::force::ForceSegment;
+use super::hammer::nominal_width_s;
+use super::key::{Stream, normal, uniform};
+
+/// Channels of the rig.
+pub const CHANNELS: usize = 10;
+/// Place of the hammer's force among the channels.
+pub const FORCE: usize = 0;
+/// Place of the first of the structure's signals; they follow in the order of [`super::stepper::SIGNALS`].
+pub const FIRST_SIGNAL: usize = 1;
+/// Places of the 3-D vibrometer.
+const VIBROMETER: [usize; 3] = [1, 2, 3];
+/// Place of the shaker's force.
+pub const EXCITATION: usize = 9;
+
+/// What a channel measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measured {
+    /// Force (N).
+    Force,
+    /// Velocity (m/s).
+    Velocity,
+}
+
+/// One channel of the rig.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channel {
+    /// Its name: `force`, `vib_x` … `excitation`.
+    pub name: &'static str,
+    /// What it measures.
+    pub quantity: Measured,
+    /// `N` or `m/s`.
+    pub unit: &'static str,
+    /// Units per volt.
+    pub units_per_volt: f64,
+    /// The converter spans ± this (V).
+    pub range_v: f64,
+    /// How late the signal is (s).
+    pub delay_s: f64,
+    /// 1, or −1 where the sensor reads backwards.
+    pub polarity: i8,
+    /// The axis it measures along (x, y, z); `None` for the hammer, which measures along the impact.
+    pub axis: Option<usize>,
+}
+
+impl Channel {
+    /// What one converter step is worth, in the channel's unit.
+    pub fn step(&self) -> f64 {
+        self.units_per_volt * self.range_v / 32768.0
+    }
+}
+
+/// The ten channels in order.
+pub fn channels(sensors: &config::Sensors) -> [Channel; CHANNELS] {
+    let channel = |name, quantity, units_per_volt, delay_s, polarity, axis| Channel {
+        name,
+        quantity,
+        unit: if quantity == Measured::Force { "N" } else { "m/s" },
+        units_per_volt,
+        range_v: sensors.range_v,
+        delay_s,
+        polarity,
+        axis,
+    };
+    let vibrometer = |name, axis: usize| {
+        let it = &sensors.vibrometer;
+        channel(name, Measured::Velocity, it.units_per_volt, it.delay_s[axis], it.polarity[axis], Some(axis))
+    };
+    let spot = |name, it: &config::SpotVibrometer| {
+        channel(name, Measured::Velocity, it.units_per_volt, it.delay_s, it.polarity, Some(2))
+    };
+    let cell = |name, index: usize| {
+        let it = &sensors.load_cells;
+        channel(name, Measured::Force, it.units_per_volt, it.delay_s[index], it.polarity[index], Some(2))
+    };
+    let (force, excitation) = (&sensors.force, &sensors.excitation);
+    [
+        channel("force", Measured::Force, force.units_per_volt, force.delay_s, force.polarity, None),
+        vibrometer("vib_x", 0),
+        vibrometer("vib_y", 1),
+        vibrometer("vib_z", 2),
+        spot("ldv_a", &sensors.ldv_a),
+        spot("ldv_b", &sensors.ldv_b),
+        cell("lc_1", 0),
+        cell("lc_2", 1),
+        cell("lc_3", 2),
+        channel(
+            "excitation",
+            Measured::Force,
+            excitation.units_per_volt,
+            excitation.delay_s,
+            excitation.polarity,
+            Some(2),
+        ),
+    ]
+}
+
+/// Everything between the true signals and the codes.
+#[derive(Debug, Clone)]
+pub struct Sensors {
+    codes_per_unit: [f64; CHANNELS],
+    /// Noise (codes rms) of each channel.
+    noise: [f64; CHANNELS],
+    delays: Vec<(usize, DelayLine)>,
+    cell: ForceCell,
+    speckle: Option<Speckle>,
+    stream: Stream,
+}
+
+impl Sensors {
+    /// For a response point that is speckled or not, with the cell's idle `stream` and a stream of its own for speckle.
+    pub fn new(
+        config: &RigConfig,
+        channels: &[Channel; CHANNELS],
+        speckle: Option<Stream>,
+        stream: Stream,
+    ) -> Self {
+        let sensors = &config.sensors;
+        let rate_hz = f64::from(config.scan_rate_hz);
+        // White up to half the scan rate.
+        let white = (rate_hz / 2.0).sqrt();
+        let lc = sensors.load_cells.noise_n;
+        let vib = sensors.vibrometer.floor * white;
+        let mut noise = [
+            sensors.force.noise_n,
+            vib,
+            vib,
+            vib,
+            sensors.ldv_a.floor * white,
+            sensors.ldv_b.floor * white,
+            lc,
+            lc,
+            lc,
+            sensors.excitation.noise_n,
+        ];
+        let mut codes_per_unit = [0.0; CHANNELS];
+        for (at, channel) in channels.iter().enumerate() {
+            codes_per_unit[at] = f64::from(channel.polarity) / channel.step();
+            noise[at] /= channel.step();
+        }
+        let delays = channels.iter().enumerate().filter(|(_, channel)| channel.delay_s > 0.0);
+        Self {
+            codes_per_unit,
+            noise,
+            delays: delays.map(|(at, channel)| (at, DelayLine::new(channel.delay_s * rate_hz))).collect(),
+            cell: ForceCell::new(&sensors.force, &config.hammer, 1.0 / rate_hz),
+            speckle: speckle.map(|stream| Speckle::new(&sensors.vibrometer.speckle, rate_hz, stream)),
+            stream,
+        }
+    }
+
+    /// A hit begins: noise is counted from here.
+    pub fn restart(&mut self, stream: Stream, speckle: Stream) {
+        self.stream = stream;
+        if let Some(it) = &mut self.speckle {
+            it.stream = speckle;
+            it.lost = false;
+        }
+    }
+
+    /// What the hammer's force cell reads (N) at the end of a scan, ringing included.
+    #[inline]
+    pub fn hammer_n(&mut self, hammer: &[ForceSegment], from_s: f64, to_s: f64) -> f64 {
+        self.cell.reads(hammer, from_s, to_s)
+    }
+
+    /// Converts one scan's true signals.
+    #[inline]
+    pub fn convert(&mut self, mut signals: [f64; CHANNELS], codes: &mut [i16]) {
+        for (at, line) in &mut self.delays {
+            signals[*at] = line.pass(signals[*at]);
+        }
+        let mut noise = self.noise;
+        if let Some(speckle) = &mut self.speckle {
+            let (signal, factor) = speckle.next();
+            for at in VIBROMETER {
+                signals[at] *= signal;
+                noise[at] *= factor;
+            }
+        }
+        // A local generator keeps its state in registers over the ten draws.
+        let mut stream = self.stream.clone();
+        let mut exact = [0.0; CHANNELS];
+        for exact in &mut exact {
+            *exact = normal(&mut stream);
+        }
+        self.stream = stream;
+        for at in 0..CHANNELS {
+            exact[at] = signals[at] * self.codes_per_unit[at] + noise[at] * exact[at];
+        }
+        let rounded = exact.map(code);
+        let given = codes.len().min(CHANNELS);
+        codes[..given].copy_from_slice(&rounded[..given]);
+    }
+}
+
+/// Rounded to the nearest code, saturating.
+#[inline]
+fn code(exact: f64) -> i16 {
+    // At 1.5 · 2^52 an f64's last place is one, so the sum rounds and its low bits are the integer: unlike a cast, this needs
+    // no branch and ten of them run side by side. The comparisons send what is not a number to the lower end.
+    const ONES_PLACE: f64 = 6_755_399_441_055_744.0;
+    let above = if exact > -32768.0 { exact } else { -32768.0 };
+    let within = if above < 32767.0 { above } else { 32767.0 };
+    (within + ONES_PLACE).to_bits() as i16
+}
+
+/// The hammer's force cell: reads f + g s²/(s² + 2s/τ + …) f, one light mode above the band.
+///
+/// It scales with the hit and has no static error. g makes the slope with which a half-sine of nominal width sets in start a
+/// ringing of `ring_fraction` of the peak.
+#[derive(Debug, Clone)]
+struct ForceCell {
+    lambda: Complex<f64>,
+    turn: Complex<f64>,
+    gain: f64,
+    /// s²/((s−λ)(s−λ*)) = 1 + 2 Re(residue/(s−λ)).
+    residue: Complex<f64>,
+    z: Complex<f64>,
+}
+
+impl ForceCell {
+    fn new(sensor: &config::ForceSensor, hammer: &Hammer, period_s: f64) -> Self {
+        let omega = 2.0 * PI * sensor.ring_hz;
+        let lambda = Complex::new(-1.0 / sensor.ring_decay_s, omega);
+        Self {
+            lambda,
+            turn: (lambda * period_s).exp(),
+            gain: sensor.ring_fraction * omega * nominal_width_s(hammer) / PI,
+            residue: lambda * lambda / Complex::new(0.0, 2.0 * omega),
+            z: Complex::ZERO,
+        }
+    }
+
+    #[inline]
+    fn reads(&mut self, hammer: &[ForceSegment], from_s: f64, to_s: f64) -> f64 {
+        if hammer.is_empty() && self.z == Complex::ZERO {
+            return 0.0;
+        }
+        self.z *= self.turn;
+        let mut force_n = 0.0;
+        let mut pushed = false;
+        for segment in hammer {
+            pushed |= segment.overlap(from_s, to_s).is_some();
+            self.z += segment.gained(self.lambda, from_s, to_s);
+            force_n += segment.value_n(to_s);
+        }
+        // 1e-18 N s rings with 1e-13 N: gone, and kept out of the denormals.
+        if !pushed && self.z.norm_sqr() < 1e-36 {
+            self.z = Complex::ZERO;
+        }
+        force_n + self.gain * (force_n + 2.0 * (self.residue * self.z).re)
+    }
+}
+
+/// A signal that comes late: the last samples, read between them by the cubic through the four around.
+#[derive(Debug, Clone)]
+struct DelayLine {
+    past: Vec<f64>,
+    at: usize,
+    /// First of the four samples used, in scans ago, and their weights.
+    first: usize,
+    weights: [f64; 4],
+}
+
+impl DelayLine {
+    fn new(delay_scans: f64) -> Self {
+        // The cubic is best in its middle interval; a delay below one scan has no newer sample than the present one.
+        let first = (delay_scans.floor() as usize).saturating_sub(1);
+        let d = delay_scans - first as f64;
+        let mut weights = [1.0; 4];
+        for (i, weight) in weights.iter_mut().enumerate() {
+            for j in (0..4).filter(|j| *j != i) {
+                *weight *= (d - j as f64) / (i as f64 - j as f64);
+            }
+        }
+        Self { past: vec![0.0; first + 4], at: 0, first, weights }
+    }
+
+    fn pass(&mut self, value: f64) -> f64 {
+        let length = self.past.len();
+        self.past[self.at] = value;
+        let ago = |scans: usize| self.past[(self.at + length - scans) % length];
+        let late = (0..4).map(|i| self.weights[i] * ago(self.first + i)).sum();
+        self.at = (self.at + 1) % length;
+        late
+    }
+}
+
+/// A speckled response point: a raised floor, and dropouts that come and go.
+#[derive(Debug, Clone)]
+struct Speckle {
+    begins: f64,
+    ends: f64,
+    floor_factor: f64,
+    dropout_floor_factor: f64,
+    lost: bool,
+    stream: Stream,
+}
+
+impl Speckle {
+    fn new(noise: &config::SpeckleNoise, rate_hz: f64, stream: Stream) -> Self {
+        Self {
+            begins: noise.dropouts_per_s / rate_hz,
+            ends: 1.0 / (noise.dropout_s * rate_hz),
+            floor_factor: noise.floor_factor,
+            dropout_floor_factor: noise.dropout_floor_factor,
+            lost: false,
+            stream,
+        }
+    }
+
+    /// Factors of the signal and of the noise in this scan.
+    fn next(&mut self) -> (f64, f64) {
+        let chance = if self.lost { self.ends } else { self.begins };
+        if uniform(&mut self.stream) < chance {
+            self.lost = !self.lost;
+        }
+        if self.lost { (0.0, self.dropout_floor_factor) } else { (1.0, self.floor_factor) }
+    }
+}

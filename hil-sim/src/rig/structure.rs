@@ -1,0 +1,223 @@
+//! The structure: rigid bodies joined by bushings, as M, C and K.
+//!
+//! A body moves by q = (t, θ) at its centre of gravity; a point r of it by u = t + θ × (r − cg), that is
+//! D = [I, −skew(r − cg); 0, I]. A bushing between two bodies adds Dᵀ diag(k) D to K and Dᵀ diag(β k) D to C with
+//! D = [−D₁, D₂]; ground is a zero row. Six degrees of freedom per body: 18 in A, 6 in B, 24 in AJB; with a rigid clamp the
+//! specimen is lumped onto arm A and A has 12, AJB 18.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6};
+use num_complex::Complex;
+
+use super::config::{BodyName, Bushing, RigConfig, RigidBody};
+use super::{Configuration, Probe, Quantity, RigError};
+
+/// M, C and K of one configuration, SI, in the bodies' own coordinates (m and rad).
+#[derive(Debug, Clone)]
+pub struct Structure {
+    configuration: Configuration,
+    bodies: Vec<(BodyName, [f64; 3])>,
+    rigid_clamp: bool,
+    /// Mass (kg, kg m²), symmetric positive definite, n × n.
+    pub mass: DMatrix<f64>,
+    /// Damping (N s/m, N m s/rad), n × n.
+    pub damping: DMatrix<f64>,
+    /// Stiffness (N/m, N m/rad), n × n.
+    pub stiffness: DMatrix<f64>,
+}
+
+impl Structure {
+    /// Assembles `configuration` of the rig.
+    pub fn new(config: &RigConfig, configuration: Configuration) -> Self {
+        let bodies = &config.bodies;
+        let rigid = config.clamp.rigid;
+        let present: Vec<(BodyName, &RigidBody)> = [
+            (BodyName::Mass, &bodies.mass),
+            (BodyName::ArmA, &bodies.arm_a),
+            (BodyName::SpecimenA, &bodies.specimen_a),
+            (BodyName::ArmB, &bodies.arm_b),
+        ]
+        .into_iter()
+        .filter(|(name, _)| configuration.has(*name) && !(rigid && *name == BodyName::SpecimenA))
+        .collect();
+        let n = 6 * present.len();
+        let mut structure = Self {
+            configuration,
+            bodies: present.iter().map(|(name, body)| (*name, body.cg_m)).collect(),
+            rigid_clamp: rigid,
+            mass: DMatrix::zeros(n, n),
+            damping: DMatrix::zeros(n, n),
+            stiffness: DMatrix::zeros(n, n),
+        };
+        for (index, (_, body)) in present.iter().enumerate() {
+            let mut block = structure.mass.fixed_view_mut::<6, 6>(6 * index, 6 * index);
+            block.copy_from(&body_mass(body));
+        }
+        if let Some((at, cg)) = structure.find(BodyName::ArmA).filter(|_| rigid) {
+            let lever = rigid_motion(bodies.specimen_a.cg_m, cg);
+            let lumped = lever.transpose() * body_mass(&bodies.specimen_a) * lever;
+            let mut block = structure.mass.fixed_view_mut::<6, 6>(at, at);
+            block += lumped;
+        }
+        structure.support(config);
+        structure
+    }
+
+    fn support(&mut self, config: &RigConfig) {
+        let configuration = self.configuration;
+        let in_a = configuration == Configuration::A;
+        if configuration != Configuration::B {
+            for spring in &config.leaf_springs {
+                self.connect(None, BodyName::Mass, spring);
+            }
+            self.connect(Some(BodyName::Mass), BodyName::ArmA, &config.knife_edge);
+            for tether in [&config.wire, &config.push_rod_a] {
+                if if in_a { tether.in_a } else { tether.in_ajb } {
+                    self.connect(None, BodyName::ArmA, &tether.bushing);
+                }
+            }
+            if !config.clamp.rigid {
+                let clamp = if in_a { &config.clamp.free } else { &config.clamp.loaded };
+                self.connect(Some(BodyName::ArmA), BodyName::SpecimenA, clamp);
+            }
+        }
+        if configuration == Configuration::Ajb {
+            self.connect(Some(BodyName::SpecimenA), BodyName::ArmB, &config.contact.bushing());
+        }
+        if configuration != Configuration::A {
+            for cell in &config.load_cells {
+                self.connect(None, BodyName::ArmB, cell);
+            }
+            self.connect(None, BodyName::ArmB, &config.lower_push_rod);
+        }
+    }
+
+    /// Degrees of freedom.
+    pub fn order(&self) -> usize {
+        self.mass.nrows()
+    }
+
+    /// Which configuration this is.
+    pub fn configuration(&self) -> Configuration {
+        self.configuration
+    }
+
+    fn find(&self, body: BodyName) -> Option<(usize, [f64; 3])> {
+        let body = if self.rigid_clamp && body == BodyName::SpecimenA { BodyName::ArmA } else { body };
+        let index = self.bodies.iter().position(|(name, _)| *name == body)?;
+        Some((6 * index, self.bodies[index].1))
+    }
+
+    fn connect(&mut self, from: Option<BodyName>, to: BodyName, bushing: &Bushing) {
+        let mut relative = DMatrix::zeros(6, self.order());
+        for (body, sign) in [(from, -1.0), (Some(to), 1.0)] {
+            if let Some((at, cg)) = body.and_then(|body| self.find(body)) {
+                let mut block = relative.fixed_view_mut::<6, 6>(0, at);
+                block += sign * rigid_motion(bushing.position_m, cg);
+            }
+        }
+        let [kx, ky, kz] = bushing.stiffness_n_per_m;
+        let [krx, kry, krz] = bushing.rotation_nm_per_rad;
+        let k = [kx, ky, kz, krx, kry, krz];
+        for (row, (k, beta)) in k.iter().zip(bushing.damping_s).enumerate() {
+            let d = relative.row(row);
+            let outer = d.transpose() * d;
+            self.stiffness += &outer * *k;
+            self.damping += &outer * (*k * beta);
+        }
+    }
+
+    /// Row of generalised coordinates (length n) that a probe sees, or pushes along; `None` if its body is not there.
+    pub fn row(&self, probe: &Probe) -> Option<DVector<f64>> {
+        let (at, cg) = self.find(probe.body)?;
+        let motion = rigid_motion(probe.position_m, cg);
+        let mut row = DVector::zeros(self.order());
+        for column in 0..6 {
+            row[at + column] = (0..3).map(|axis| probe.direction[axis] * motion[(axis, column)]).sum();
+        }
+        Some(row)
+    }
+
+    /// Exact FRF at the complex frequency `s` (1/s): rows · (s²M + sC + K)⁻¹ · columns, times s for mobility and s² for
+    /// accelerance; shape (outputs, inputs).
+    ///
+    /// # Errors
+    /// [`RigError::MissingBody`] for a probe on a body that is not there; [`RigError::Structure`] if `s` is a pole.
+    pub fn frf(
+        &self,
+        s: Complex<f64>,
+        quantity: Quantity,
+        outputs: &[Probe],
+        inputs: &[Probe],
+    ) -> Result<DMatrix<Complex<f64>>, RigError> {
+        let rows = self.rows(outputs)?;
+        let columns = self.rows(inputs)?;
+        let scale = self.scale();
+        let n = self.order();
+        let dynamic = DMatrix::from_fn(n, n, |i, j| {
+            (s * s * self.mass[(i, j)] + s * self.damping[(i, j)] + self.stiffness[(i, j)])
+                * scale[i]
+                * scale[j]
+        });
+        let forces = DMatrix::from_fn(n, inputs.len(), |i, j| Complex::from(columns[j][i] * scale[i]));
+        let motion = dynamic.lu().solve(&forces).ok_or(RigError::Structure {
+            configuration: self.configuration,
+            what: "the dynamic stiffness is singular at this frequency",
+        })?;
+        let factor = match quantity {
+            Quantity::Receptance => Complex::from(1.0),
+            Quantity::Mobility => s,
+            Quantity::Accelerance => s * s,
+        };
+        let seen = DMatrix::from_fn(outputs.len(), n, |i, j| factor * (rows[i][j] * scale[j]));
+        Ok(seen * motion)
+    }
+
+    fn rows(&self, probes: &[Probe]) -> Result<Vec<DVector<f64>>, RigError> {
+        let missing = |probe: &Probe| RigError::MissingBody {
+            body: probe.body.as_str(),
+            configuration: self.configuration,
+        };
+        probes.iter().map(|probe| self.row(probe).ok_or_else(|| missing(probe))).collect()
+    }
+
+    /// Metres and radians to coordinates of unit mass: their stiffnesses differ by 1e6, which costs a factorisation digits.
+    fn scale(&self) -> DVector<f64> {
+        self.mass.diagonal().map(|m| 1.0 / m.sqrt())
+    }
+}
+
+/// Exact FRFs of `configuration` at each complex frequency of `s` (1/s): one (outputs, inputs) matrix per frequency.
+///
+/// The probes say where: nominal ones come from [`RigConfig::response`] and [`RigConfig::impact`], those of a rig with its
+/// position errors from [`super::Rig::aim`].
+///
+/// # Errors
+/// As [`Structure::frf`].
+pub fn exact_frf(
+    config: &RigConfig,
+    configuration: Configuration,
+    quantity: Quantity,
+    s: &[Complex<f64>],
+    outputs: &[Probe],
+    inputs: &[Probe],
+) -> Result<Vec<DMatrix<Complex<f64>>>, RigError> {
+    let structure = Structure::new(config, configuration);
+    s.iter().map(|s| structure.frf(*s, quantity, outputs, inputs)).collect()
+}
+
+/// Motion of point `at` (translation, rotation) from that of the body's centre of gravity.
+fn rigid_motion(at: [f64; 3], cg: [f64; 3]) -> Matrix6<f64> {
+    let r = [at[0] - cg[0], at[1] - cg[1], at[2] - cg[2]];
+    let skew = Matrix3::new(0.0, -r[2], r[1], r[2], 0.0, -r[0], -r[1], r[0], 0.0);
+    let mut motion = Matrix6::identity();
+    motion.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew);
+    motion
+}
+
+fn body_mass(body: &RigidBody) -> Matrix6<f64> {
+    let m = body.mass_kg;
+    let [a, b, c] = body.box_m.unwrap_or([0.0; 3]);
+    let of_box = [b * b + c * c, a * a + c * c, a * a + b * b].map(|sum| m / 12.0 * sum);
+    let [ixx, iyy, izz] = body.inertia_kg_m2.unwrap_or(of_box);
+    Matrix6::from_diagonal(&[m, m, m, ixx, iyy, izz].into())
+}

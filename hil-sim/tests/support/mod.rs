@@ -1,0 +1,196 @@
+//! A host of the fewest lines, for tests of the virtual board: requests, acknowledgements, samples.
+#![allow(clippy::unwrap_used, dead_code, reason = "test support; each test file uses a part of it")]
+
+use std::time::{Duration, Instant};
+
+use jointrig_hil_sim::link::HostEnd;
+use jointrig_protocol::acknowledge::Acknowledge;
+use jointrig_protocol::answer::{self, Answer, Refusal, Status};
+use jointrig_protocol::block::Block;
+use jointrig_protocol::event::{self, Event};
+use jointrig_protocol::frame::{Accumulator, Kind, encode};
+use jointrig_protocol::hello::Hello;
+use jointrig_protocol::limits::MAX_WIRE;
+use jointrig_protocol::request::{self, Configuration, Fire, Request, Stage};
+use jointrig_protocol::shot::{Phase, Shot};
+
+pub struct SmallHost {
+    link: HostEnd,
+    accumulator: Accumulator,
+    number: u32,
+    pub hello: Option<Hello>,
+    answers: Vec<answer::Numbered>,
+    pub events: Vec<Event>,
+    pub epoch: u32,
+    pub first_scan: u64,
+    pub next_scan: u64,
+    /// Codes of all scans since the stream's start, scan by scan.
+    pub codes: Vec<i16>,
+    pub channels: usize,
+    /// The host never acknowledges beyond this.
+    pub hold_at: u64,
+}
+
+impl SmallHost {
+    /// Shakes hands.
+    pub fn new(link: HostEnd) -> Self {
+        let mut host = Self {
+            link,
+            accumulator: Accumulator::new(),
+            number: 0,
+            hello: None,
+            answers: Vec::new(),
+            events: Vec::new(),
+            epoch: 0,
+            first_scan: 0,
+            next_scan: 0,
+            codes: Vec::new(),
+            channels: 10,
+            hold_at: u64::MAX,
+        };
+        host.send(Kind::Hello, &Hello::host(99).to_bytes());
+        host.until("a Hello", |host| host.hello.is_some());
+        host
+    }
+
+    pub fn send(&mut self, kind: Kind, payload: &[u8]) {
+        let mut wire = [0; MAX_WIRE];
+        self.link.write_all(encode(kind, payload, &mut wire).unwrap()).unwrap();
+    }
+
+    pub fn send_raw(&mut self, bytes: &[u8]) {
+        self.link.write_all(bytes).unwrap();
+    }
+
+    /// Reads for a while and acknowledges what came in order.
+    pub fn pump(&mut self) {
+        let mut bytes = vec![0; 1 << 16];
+        let count = self.link.read(&mut bytes, Duration::from_millis(5)).unwrap();
+        let mut rest = &bytes[..count];
+        let before = self.next_scan;
+        while !rest.is_empty() {
+            let (used, frame) = self.accumulator.feed(rest);
+            rest = &rest[used..];
+            let Some(frame) = frame else { continue };
+            let frame = frame.unwrap();
+            match frame.kind {
+                Kind::Hello => self.hello = Some(Hello::from_bytes(frame.payload).unwrap()),
+                Kind::Answer => {
+                    let answer: answer::Numbered = postcard::from_bytes(frame.payload).unwrap();
+                    // blocks follow on its heels
+                    if let Ok(Answer::Started { epoch, first_scan, .. }) = answer.outcome {
+                        (self.epoch, self.first_scan, self.next_scan) = (epoch, first_scan, first_scan);
+                        self.codes.clear();
+                    }
+                    self.answers.push(answer);
+                }
+                Kind::Event => {
+                    self.events.push(postcard::from_bytes::<event::Numbered>(frame.payload).unwrap().event);
+                }
+                Kind::Samples => {
+                    let block = Block::from_payload(frame.payload).unwrap();
+                    if block.header.epoch == self.epoch && block.header.first_scan == self.next_scan {
+                        self.codes.extend(block.codes());
+                        self.next_scan = block.end_scan();
+                    }
+                }
+                _ => {}
+            }
+        }
+        if self.next_scan != before {
+            self.acknowledge();
+        }
+    }
+
+    pub fn acknowledge(&mut self) {
+        let acknowledge = Acknowledge { epoch: self.epoch, next_scan: self.next_scan.min(self.hold_at) };
+        self.send(Kind::Acknowledge, &acknowledge.to_bytes());
+    }
+
+    pub fn until(&mut self, what: &str, mut done: impl FnMut(&Self) -> bool) {
+        let give_up = Instant::now() + Duration::from_secs(60);
+        while !done(self) {
+            self.pump();
+            assert!(Instant::now() < give_up, "waited in vain for {what}");
+        }
+    }
+
+    pub fn ask(&mut self, request: Request) -> Result<Answer, Refusal> {
+        self.number += 1;
+        let number = self.number;
+        self.ask_as(number, request)
+    }
+
+    pub fn ask_as(&mut self, number: u32, request: Request) -> Result<Answer, Refusal> {
+        self.answers.retain(|answer| answer.number != number);
+        let mut bytes = [0; 400];
+        let used = postcard::to_slice(&request::Numbered { number, request }, &mut bytes).unwrap();
+        self.send(Kind::Request, used);
+        self.until("an answer", |host| host.answers.iter().any(|answer| answer.number == number));
+        let at = self.answers.iter().position(|answer| answer.number == number).unwrap();
+        self.answers.remove(at).outcome
+    }
+
+    pub fn status(&mut self) -> Status {
+        match self.ask(Request::Status) {
+            Ok(Answer::Status(status)) => status,
+            other => panic!("no status but {other:?}"),
+        }
+    }
+
+    pub fn start(&mut self) {
+        assert!(matches!(self.ask(Request::Start), Ok(Answer::Started { .. })));
+    }
+
+    pub fn stage(&mut self, configuration: Configuration, impact: &str, response: &str, attempt: u32) -> u64 {
+        let (impact, response) = (impact.try_into().unwrap(), response.try_into().unwrap());
+        match self.ask(Request::Stage(Stage { configuration, impact, response, attempt })) {
+            Ok(Answer::Staged { at_scan }) => at_scan,
+            other => panic!("not staged: {other:?}"),
+        }
+    }
+
+    /// Scans by which `not_before` must lie ahead so that the device cannot have passed it.
+    pub fn lead(&self) -> u64 {
+        u64::from(self.hello.unwrap().ring_scans / 2) + 64
+    }
+
+    pub fn order(number: u32, pulse_us: u32, not_before: u64) -> Fire {
+        Fire {
+            number,
+            pulse_us,
+            not_before,
+            quiet_limits: heapless::Vec::new(),
+            quiet_window: 0,
+            quiet_patience: 51_200,
+        }
+    }
+
+    /// Arms, fires and waits for the shot's end.
+    pub fn shoot(&mut self, order: Fire) -> Shot {
+        assert_eq!(self.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
+        let number = order.number;
+        assert_eq!(self.ask(Request::Fire(order)), Ok(Answer::Scheduled { number }));
+        self.hold_at = u64::MAX;
+        self.acknowledge();
+        loop {
+            let shot = self.status().shot.unwrap();
+            if shot.number == number
+                && matches!(shot.phase, Phase::Done | Phase::Missed | Phase::NotQuiet | Phase::Cancelled)
+            {
+                return shot;
+            }
+            let from = self.next_scan;
+            self.until("more scans", |host| host.next_scan > from);
+        }
+    }
+
+    /// The record of a shot: every channel from `before` scans before the trigger, `length` scans long.
+    pub fn record(&mut self, trigger: u64, before: u64, length: u64) -> Vec<i16> {
+        let end = trigger - before + length;
+        self.hold_at = end;
+        self.until("the record's end", |host| host.next_scan >= end);
+        let at = |scan: u64| (scan - self.first_scan) as usize * self.channels;
+        self.codes[at(trigger - before)..at(end)].to_vec()
+    }
+}

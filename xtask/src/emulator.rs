@@ -1,0 +1,128 @@
+//! QEMU: the same processor core as the rig's controller, without the rig.
+
+use crate::consent::Consent;
+use crate::project::Project;
+use crate::{command, firmware, packages, setup};
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use std::path::Path;
+use std::process::Command;
+
+/// The emulator of 32-bit Arm machines.
+const PROGRAM: &str = "qemu-system-arm";
+/// The emulated board: QEMU's machine `mps2-an505` (Cortex-M33) and our package are named alike.
+pub const BOARD: &str = "mps2-an505";
+
+/// Options of `cargo xtask qemu`.
+#[derive(Args, Debug, Default)]
+pub struct Options {
+    /// Count instructions instead of following the clock: counts are the same in every run.
+    #[arg(long)]
+    icount: bool,
+    /// An argument for the image itself, read by it through semihosting; may be repeated.
+    #[arg(long = "arg", value_name = "TEXT")]
+    image_arguments: Vec<String>,
+    /// Passed on to qemu-system-arm, for example `-- -serial pty`.
+    #[arg(last = true)]
+    extra: Vec<String>,
+}
+
+/// Makes QEMU available.
+pub fn ensure(consent: Consent) -> Result<()> {
+    if let Some(program) = command::find_program(PROGRAM) {
+        println!("  {PROGRAM}: {}", program.display());
+        return Ok(());
+    }
+    if !packages::available() {
+        bail!("{PROGRAM} is not installed: {}", how_to_install(std::env::consts::OS));
+    }
+    println!("  {PROGRAM}: not installed; the firmware's own binary runs in it, so apt-get installs it");
+    packages::install(&[PROGRAM], consent)?;
+    if command::find_program(PROGRAM).is_none() {
+        bail!("the package {PROGRAM} is installed, but no such program is on PATH: check PATH");
+    }
+    Ok(())
+}
+
+/// Builds the emulated board's image and runs it; QEMU's exit code, which is the image's, decides.
+pub fn run(project: &Project, options: &Options) -> Result<()> {
+    if firmware::board(project, BOARD)?.is_none() {
+        bail!("there is no board image to run: firmware/boards/{BOARD} does not exist yet");
+    }
+    let consent = Consent::new(false);
+    let toolchain = setup::everything(project, consent)?;
+    let image = firmware::build_board(project, &toolchain, BOARD)?;
+    let mut qemu = Command::new(PROGRAM);
+    qemu.args(arguments(&image, options)?);
+    command::run(&mut qemu).context("the emulated board did not end well")
+}
+
+fn arguments(image: &Path, options: &Options) -> Result<Vec<String>> {
+    let image =
+        image.to_str().with_context(|| format!("{} is not UTF-8: choose another folder", image.display()))?;
+    let mut semihosting = "enable=on,target=native".to_owned();
+    for argument in &options.image_arguments {
+        // QEMU splits at commas; a doubled comma is one.
+        semihosting.push_str(",arg=");
+        semihosting.push_str(&argument.replace(',', ",,"));
+    }
+    let mut arguments: Vec<String> =
+        ["-M", BOARD, "-display", "none", "-monitor", "none"].map(String::from).into();
+    if !options.extra.iter().any(|argument| argument == "-serial") {
+        arguments.extend(["-serial", "null"].map(String::from));
+    }
+    arguments.extend(["-semihosting-config".into(), semihosting]);
+    if options.icount {
+        arguments.extend(["-icount", "shift=10,sleep=off"].map(String::from));
+    }
+    arguments.extend(["-kernel".into(), image.into()]);
+    arguments.extend(options.extra.iter().cloned());
+    Ok(arguments)
+}
+
+fn how_to_install(system: &str) -> &'static str {
+    match system {
+        "macos" => "run `brew install qemu`",
+        "windows" => "run `winget install SoftwareFreedomConservancy.QEMU`, and add its folder to PATH",
+        _ => {
+            "install your distribution's package (Fedora: `dnf install qemu-system-arm-core`, Arch: \
+             `pacman -S qemu-system-arm`, Alpine: `apk add qemu-system-arm`)"
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_image_runs_without_display_and_monitor() {
+        let line = arguments(Path::new("/t/mps2-an505"), &Options::default()).expect("UTF-8").join(" ");
+        assert_eq!(
+            line,
+            "-M mps2-an505 -display none -monitor none -serial null -semihosting-config enable=on,target=native \
+             -kernel /t/mps2-an505"
+        );
+    }
+
+    #[test]
+    fn arguments_reach_the_image_and_the_emulator() {
+        let options = Options {
+            icount: true,
+            image_arguments: vec!["bench".into(), "1,2".into()],
+            extra: vec!["-serial".into(), "pty".into()],
+        };
+        let line = arguments(Path::new("i"), &options).expect("UTF-8").join(" ");
+        assert!(
+            line.contains("enable=on,target=native,arg=bench,arg=1,,2 -icount shift=10,sleep=off"),
+            "{line}"
+        );
+        assert!(line.ends_with("-kernel i -serial pty") && !line.contains("null"), "{line}");
+    }
+
+    #[test]
+    fn every_system_is_told_what_to_install() {
+        assert!(how_to_install("macos").contains("brew"));
+        assert!(how_to_install("linux").contains("dnf"));
+    }
+}

@@ -1,0 +1,89 @@
+//! Compiling for the microcontroller: the two `no_std` libraries, and the board images.
+//!
+//! Boards are built one at a time, because cargo would join the features of all that are built together, and the
+//! boards' chip features exclude each other.
+
+use crate::consent::Consent;
+use crate::project::{Package, Project};
+use crate::toolchain::{TARGET, Toolchain};
+use crate::{command, setup, size};
+use anyhow::{Context, Result, bail};
+use std::path::PathBuf;
+
+/// The libraries that run on the microcontroller.
+const LIBRARIES: [&str; 2] = ["jointrig-protocol", "jointrig-firmware"];
+
+/// `cargo xtask firmware`.
+pub fn command(project: &Project, only: Option<&str>) -> Result<()> {
+    let boards = project.boards()?;
+    if let Some(name) = only
+        && !boards.iter().any(|board| board.name == name)
+    {
+        bail!("no board is called {name}: firmware/boards has {}", names(&boards));
+    }
+    let toolchain = setup::target(project, Consent::new(false))?;
+    if boards.is_empty() {
+        println!("  firmware/boards does not exist yet, so there is no image to build");
+        return check(project, &toolchain);
+    }
+    build_boards(project, &toolchain, only)
+}
+
+/// Compiles the two libraries for the microcontroller, which shows that they need neither `std` nor anything the
+/// microcontroller lacks. The log goes to `defmt` there, so that feature is checked, where there is one.
+pub fn check(project: &Project, toolchain: &Toolchain) -> Result<()> {
+    for name in LIBRARIES {
+        let package =
+            project.package(name).with_context(|| format!("the workspace has no package {name}"))?;
+        let mut cargo = command::cargo(&project.root);
+        toolchain.apply(&mut cargo, project);
+        cargo.args(["build", "--release", "--target", TARGET, "--package", name, "--no-default-features"]);
+        if package.features.iter().any(|feature| feature == "defmt") {
+            cargo.args(["--features", "defmt"]);
+        }
+        command::run(&mut cargo).with_context(|| format!("{name} does not compile for {TARGET}"))?;
+    }
+    Ok(())
+}
+
+/// Builds the boards, or the one named, and prints the table of their sizes.
+pub fn build_boards(project: &Project, toolchain: &Toolchain, only: Option<&str>) -> Result<()> {
+    let mut sizes = Vec::new();
+    for board in project.boards()?.iter().filter(|board| only.is_none_or(|name| board.name == name)) {
+        let image = build_board(project, toolchain, &board.name)?;
+        sizes.push((board.name.clone(), size::of_image(&image)?));
+    }
+    print!("\n{}", size::table(&sizes));
+    Ok(())
+}
+
+/// Builds one board's image and returns its path.
+pub fn build_board(project: &Project, toolchain: &Toolchain, name: &str) -> Result<PathBuf> {
+    let missing = || format!("no board is called {name} in firmware/boards");
+    let folder = project.boards_root().with_context(missing)?;
+    let board = board(project, name)?.with_context(missing)?;
+    // One image per board: the binary named as the board, or the only one there is.
+    let binary = board
+        .binaries
+        .iter()
+        .find(|binary| *binary == name)
+        .or(board.binaries.first())
+        .with_context(missing)?;
+    let mut cargo = command::cargo(&folder);
+    toolchain.apply(&mut cargo, project);
+    cargo.args(["build", "--release", "--target", TARGET, "--package", name, "--bin", binary]);
+    command::run(&mut cargo).with_context(|| format!("the image of {name} could not be built"))?;
+    Ok(project.firmware_target().join(TARGET).join("release").join(binary))
+}
+
+/// One board, if it exists.
+pub fn board(project: &Project, name: &str) -> Result<Option<Package>> {
+    Ok(project.boards()?.into_iter().find(|board| board.name == name))
+}
+
+fn names(boards: &[Package]) -> String {
+    if boards.is_empty() {
+        return "no boards yet".to_owned();
+    }
+    boards.iter().map(|board| board.name.as_str()).collect::<Vec<_>>().join(", ")
+}

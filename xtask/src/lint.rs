@@ -1,0 +1,47 @@
+//! Formatting and lints, in both workspaces.
+
+use crate::consent::Consent;
+use crate::project::Project;
+use crate::toolchain::TARGET;
+use crate::{command, locks, setup};
+use anyhow::{Context, Result};
+use std::path::Path;
+
+/// `cargo xtask fmt-check`.
+pub fn formatting(project: &Project) -> Result<()> {
+    let boards = project.boards_root();
+    for folder in [Some(project.root.clone()), boards].into_iter().flatten() {
+        command::run(command::cargo(&folder).args(["fmt", "--all", "--check"]))
+            .with_context(|| format!("not formatted: run `cargo fmt --all` in {}", folder.display()))?;
+    }
+    Ok(())
+}
+
+/// `cargo xtask lint`.
+pub fn all(project: &Project) -> Result<()> {
+    workspace(project)?;
+    let Some(folder) = project.boards_root() else { return Ok(()) };
+    locks::compare(&project.root.join("Cargo.lock"), &folder.join("Cargo.lock"))?;
+    boards(project, &folder)
+}
+
+/// Clippy on the root workspace. It runs in the release profile, like the tests: the build scripts it needs (SQLite's
+/// C code among them) then run once for both.
+fn workspace(project: &Project) -> Result<()> {
+    let mut cargo = command::cargo(&project.root);
+    cargo.args(["clippy", "--workspace", "--all-targets", "--release", "--", "-Dwarnings"]);
+    command::run(&mut cargo)
+        .context("clippy found something: each finding above names its file and its remedy")
+}
+
+/// Clippy on each board, by the compiler that builds it.
+fn boards(project: &Project, folder: &Path) -> Result<()> {
+    let toolchain = setup::target(project, Consent::new(false))?;
+    for board in project.boards()? {
+        let selection = ["--release", "--target", TARGET, "--package", &board.name];
+        let mut clippy = toolchain.clippy(folder, project, &selection);
+        command::run(&mut clippy)
+            .with_context(|| format!("clippy found something in the board {}", board.name))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,26 @@
+//! `cargo xtask setup`: what the machine needs beyond a Rust compiler, made available once.
+
+use crate::consent::Consent;
+use crate::emulator;
+use crate::project::Project;
+use crate::toolchain::{self, Mode, Toolchain};
+use anyhow::Result;
+
+/// The choice a person has, shown by `--help`.
+pub const ENVIRONMENT_HELP: &str = "\
+JOINTRIG_FIRMWARE_TOOLCHAIN chooses the compiler for the microcontroller:
+  auto    (default) what is installed; else `rustup target add`; else the distribution
+  rustup  rustup's target only
+  distro  Debian's rustc-web, rust-web-src and rust-web-clippy; core is built once into a private sysroot";
+
+/// Makes the target and the emulator available, and returns the compiler for the target.
+pub fn everything(project: &Project, consent: Consent) -> Result<Toolchain> {
+    let toolchain = target(project, consent)?;
+    emulator::ensure(consent)?;
+    Ok(toolchain)
+}
+
+/// Makes the target available.
+pub fn target(project: &Project, consent: Consent) -> Result<Toolchain> {
+    toolchain::ensure(project, Mode::from_environment()?, consent)
+}

@@ -1,0 +1,358 @@
+//! The private sysroot: the target's `core` and `alloc`, built once from the distribution's sources.
+//!
+//! Debian's `rustc-web` is a current compiler and `rust-web-src` its library sources (`rust-web-clippy` is its clippy);
+//! none has the microcontroller's target ready-made. This builds `core`, `alloc` and `compiler_builtins` into a folder beside the build's other
+//! products, laid out as rustc expects a sysroot, with a two-line wrapper that makes rustc use it. From then on plain
+//! `cargo build` with `RUSTC` pointing at the wrapper is all it takes. A compiler only reads libraries of its own
+//! version, so the folder's name carries the version.
+//!
+//! It takes about 40 s once. The work is done in a `.partial` folder under a file lock, and renamed when complete: a
+//! folder with the final name is always whole, whatever was interrupted.
+
+use crate::command;
+use crate::consent::Consent;
+use crate::packages;
+use crate::project::Project;
+use crate::toolchain::TARGET;
+use anyhow::{Context, Result, bail};
+use std::fs;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Where Debian's packages put the compiler.
+const RUSTC: &str = "/usr/bin/rustc";
+/// Where they put the driver of clippy.
+pub const CLIPPY: &str = "/usr/bin/clippy-driver";
+/// The packages: a current compiler, its library sources, and its clippy.
+const PACKAGES: [&str; 3] = ["rustc-web", "rust-web-src", "rust-web-clippy"];
+/// The libraries a `no_std` program with an allocator needs.
+const LIBRARIES: [&str; 3] = ["core", "alloc", "compiler_builtins"];
+/// Settings of the caller's environment that must not reach the build of `core`.
+const FOREIGN: [&str; 7] = [
+    "RUSTFLAGS",
+    "CARGO_ENCODED_RUSTFLAGS",
+    "CARGO_BUILD_RUSTFLAGS",
+    "CARGO_BUILD_TARGET",
+    "CARGO_TARGET_DIR",
+    "RUSTC_WRAPPER",
+    "RUSTC_WORKSPACE_WRAPPER",
+];
+
+/// The distribution's compiler with its library sources.
+struct Distribution {
+    /// What `rustc -vV` says: the whole of it decides which sysroot fits.
+    version: String,
+    /// The compiler's own sysroot.
+    sysroot: PathBuf,
+}
+
+impl Distribution {
+    /// What is installed, if it is new enough and has its sources.
+    fn find() -> Result<Option<Self>> {
+        if !command::is_executable(Path::new(RUSTC)) {
+            return Ok(None);
+        }
+        let version = command::output(Command::new(RUSTC).arg("-vV"))?;
+        let sysroot = command::output(Command::new(RUSTC).args(["--print", "sysroot"]))?;
+        let found = Self { version, sysroot: PathBuf::from(sysroot.trim()) };
+        let usable = found.sources().join("core/src/lib.rs").is_file()
+            && command::is_executable(Path::new(CLIPPY))
+            && is_at_least(found.field("release")?, env!("CARGO_PKG_RUST_VERSION"));
+        Ok(usable.then_some(found))
+    }
+
+    fn sources(&self) -> PathBuf {
+        self.sysroot.join("lib/rustlib/src/rust/library")
+    }
+
+    /// One line of `rustc -vV`, such as `host` or `release`.
+    fn field(&self, name: &str) -> Result<&str> {
+        field(&self.version, name)
+            .with_context(|| format!("`{RUSTC} -vV` names no {name}: it answered\n{}", self.version))
+    }
+
+    /// The folder of the sysroot that fits this compiler.
+    fn folder(&self, project: &Project) -> Result<PathBuf> {
+        let mut hasher = DefaultHasher::new();
+        self.version.hash(&mut hasher);
+        let (release, hash) = (self.field("release")?, hasher.finish() as u32);
+        Ok(project.target.join(format!("firmware-sysroot-{TARGET}-{release}-{hash:08x}")))
+    }
+}
+
+/// A finished sysroot that fits the installed compiler; nothing is installed or built.
+pub fn existing(project: &Project) -> Result<Option<PathBuf>> {
+    let Some(distribution) = Distribution::find()? else { return Ok(None) };
+    let folder = distribution.folder(project)?;
+    Ok(is_whole(&folder).then_some(folder))
+}
+
+/// Installs what is missing, builds the sysroot if there is none, and returns the sysroot.
+pub fn ensure(project: &Project, consent: Consent) -> Result<PathBuf> {
+    let distribution = if let Some(found) = Distribution::find()? {
+        found
+    } else {
+        let names = PACKAGES.join(", ");
+        println!("  installing Debian's {names}: a current compiler, its library sources and its clippy");
+        packages::install(&PACKAGES, consent).context("no distribution compiler")?;
+        Distribution::find()?.with_context(|| {
+            format!(
+                "{names} are installed, but {RUSTC} is older than {}, or there is no {CLIPPY}, or no sources: remove \
+                 another compiler's packages, or update the system",
+                env!("CARGO_PKG_RUST_VERSION")
+            )
+        })?
+    };
+    let linker = if let Some(linker) = find_linker(&distribution)? {
+        linker
+    } else {
+        println!(
+            "  installing lld: the target is linked by LLVM's linker, and neither rustup nor the system has it"
+        );
+        packages::install(&["lld"], consent).context("no linker for the target")?;
+        find_linker(&distribution)?
+            .context("lld is installed, but there is no /usr/bin/ld.lld: reinstall it")?
+    };
+    let folder = distribution.folder(project)?;
+    fs::create_dir_all(&project.target)
+        .with_context(|| format!("could not create {}", project.target.display()))?;
+    let lock_path = project.target.join("firmware-sysroot.lock");
+    let lock =
+        fs::File::create(&lock_path).with_context(|| format!("could not create {}", lock_path.display()))?;
+    if lock.try_lock().is_err() {
+        println!("  another set-up is at work on the sysroot: waiting for it");
+    }
+    lock.lock().with_context(|| format!("could not lock {}", lock_path.display()))?;
+    if is_whole(&folder) {
+        println!("  sysroot: {}", folder.display());
+    } else {
+        println!(
+            "  building core and alloc for {TARGET} with {RUSTC} {} (about 40 s)",
+            distribution.field("release")?
+        );
+        complete(&folder, |partial| build(&distribution, partial, &folder)).with_context(|| {
+            format!("the sysroot could not be built; nothing was left in {}", folder.display())
+        })?;
+        println!("  sysroot: {} is complete", folder.display());
+    }
+    // The linker may have moved since (a removed toolchain): the link is made anew when it leads nowhere.
+    let link = linker_link(&folder, &distribution)?;
+    if !command::is_executable(&link) {
+        let _ = fs::remove_file(&link);
+        symlink(&linker, &link).with_context(|| format!("could not link {}", link.display()))?;
+    }
+    Ok(folder)
+}
+
+/// Lets `work` fill a `.partial` folder and renames it to `folder` when that went well: `folder` is whole or absent. The
+/// caller holds the lock, so a leftover is nobody's work in progress.
+fn complete(folder: &Path, work: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    let mut partial = folder.as_os_str().to_owned();
+    partial.push(".partial");
+    let partial = PathBuf::from(partial);
+    for stale in [&*partial, folder] {
+        if stale.exists() {
+            fs::remove_dir_all(stale).with_context(|| format!("could not remove {}", stale.display()))?;
+        }
+    }
+    let result = work(&partial).and_then(|()| {
+        fs::rename(&partial, folder)
+            .with_context(|| format!("could not rename {} to {}", partial.display(), folder.display()))
+    });
+    if result.is_err() {
+        let _ = fs::remove_dir_all(&partial);
+    }
+    result
+}
+
+/// Builds the sysroot in `partial`; the wrapper it writes already names `folder`, where it will end up.
+fn build(distribution: &Distribution, partial: &Path, folder: &Path) -> Result<()> {
+    let package = partial.join("build");
+    write(&package.join("src/lib.rs"), "#![no_std]\n")?;
+    write(
+        &package.join("Cargo.toml"),
+        "[package]\nname = \"sysroot\"\nversion = \"0.0.0\"\nedition = \"2024\"\n\n[workspace]\n\n\
+         [profile.release]\ncodegen-units = 1\ndebug = 1\n",
+    )?;
+    let mut cargo = command::cargo(&package);
+    for name in FOREIGN {
+        cargo.env_remove(name);
+    }
+    cargo
+        .env("RUSTC", RUSTC)
+        // `-Zbuild-std` is the one unstable step; what it makes is used by stable means.
+        .env("RUSTC_BOOTSTRAP", "1")
+        // Debian's source package has no lock file where cargo looks for it; this names the folder outright.
+        .env("__CARGO_TESTS_ONLY_SRC_ROOT", distribution.sources())
+        // With bitcode in the libraries, link-time optimisation reaches into core.
+        .env(format!("CARGO_TARGET_{}_RUSTFLAGS", variable_form(TARGET)), "-Cembed-bitcode=yes")
+        .args(["build", "--release", "-Zbuild-std=core,alloc", "--target", TARGET])
+        .arg("--target-dir")
+        .arg(package.join("target"));
+    command::run(&mut cargo)?;
+
+    let built = package.join("target").join(TARGET).join("release/deps");
+    for library in LIBRARIES {
+        copy_library(library, &built, &libraries(partial))?;
+    }
+    // Build scripts and procedural macros run on this machine: they link to the distribution's own libraries.
+    let host = distribution.field("host")?;
+    let host_folder = partial.join("lib/rustlib").join(host);
+    fs::create_dir_all(host_folder.join("bin"))
+        .with_context(|| format!("could not create {}", host_folder.display()))?;
+    let own = distribution.sysroot.join("lib/rustlib").join(host).join("lib");
+    symlink(&own, host_folder.join("lib")).with_context(|| format!("could not link to {}", own.display()))?;
+
+    let script = format!("#!/bin/sh\nexec {RUSTC} --sysroot {} \"$@\"\n", shell_quoted(folder)?);
+    write(&wrapper(partial), &script)?;
+    fs::set_permissions(wrapper(partial), fs::Permissions::from_mode(0o755))
+        .with_context(|| format!("could not make {} executable", wrapper(partial).display()))?;
+    fs::remove_dir_all(&package).with_context(|| format!("could not remove {}", package.display()))
+}
+
+/// Whether `libraries` holds a compiled `core`.
+pub fn has_core(libraries: &Path) -> bool {
+    !matching(libraries, "core").is_empty()
+}
+
+fn copy_library(name: &str, from: &Path, to: &Path) -> Result<()> {
+    let found = matching(from, name);
+    let [library] = found.as_slice() else {
+        bail!("expected one lib{name}-*.rlib in {}, found {}", from.display(), found.len());
+    };
+    fs::create_dir_all(to).with_context(|| format!("could not create {}", to.display()))?;
+    let file = library.file_name().context("a listed file has a name")?;
+    fs::copy(library, to.join(file)).with_context(|| format!("could not copy {}", library.display()))?;
+    Ok(())
+}
+
+/// The files `lib<name>-*.rlib` of a folder.
+fn matching(folder: &Path, name: &str) -> Vec<PathBuf> {
+    let prefix = format!("lib{name}-");
+    let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
+    let names = |path: &PathBuf| {
+        path.extension().is_some_and(|extension| extension == "rlib")
+            && path.file_name().and_then(|name| name.to_str()).is_some_and(|name| name.starts_with(&prefix))
+    };
+    entries.filter_map(|entry| Some(entry.ok()?.path())).filter(names).collect()
+}
+
+/// LLVM's linker: rustup brings one, some distributions' compilers too, and `lld` is a package.
+fn find_linker(distribution: &Distribution) -> Result<Option<PathBuf>> {
+    let mut sysroots = vec![distribution.sysroot.clone()];
+    // The compiler cargo uses by itself is usually rustup's.
+    if let Ok(sysroot) = command::output(Command::new("rustc").args(["--print", "sysroot"])) {
+        sysroots.push(PathBuf::from(sysroot.trim()));
+    }
+    let host = distribution.field("host")?;
+    let mut candidates: Vec<PathBuf> =
+        sysroots.iter().map(|sysroot| sysroot.join("lib/rustlib").join(host).join("bin/rust-lld")).collect();
+    candidates.push(PathBuf::from("/usr/bin/ld.lld"));
+    Ok(candidates.into_iter().find(|candidate| command::is_executable(candidate)))
+}
+
+fn is_whole(folder: &Path) -> bool {
+    command::is_executable(&wrapper(folder)) && has_core(&libraries(folder))
+}
+
+/// The script in a sysroot that stands in for `rustc`.
+pub fn wrapper(folder: &Path) -> PathBuf {
+    folder.join("bin/rustc")
+}
+
+fn libraries(folder: &Path) -> PathBuf {
+    folder.join("lib/rustlib").join(TARGET).join("lib")
+}
+
+fn linker_link(folder: &Path, distribution: &Distribution) -> Result<PathBuf> {
+    Ok(folder.join("lib/rustlib").join(distribution.field("host")?).join("bin/rust-lld"))
+}
+
+fn write(path: &Path, text: &str) -> Result<()> {
+    let folder = path.parent().with_context(|| format!("{} has no folder", path.display()))?;
+    fs::create_dir_all(folder).with_context(|| format!("could not create {}", folder.display()))?;
+    fs::write(path, text).with_context(|| format!("could not write {}", path.display()))
+}
+
+fn field<'a>(version: &'a str, name: &str) -> Option<&'a str> {
+    version.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(": "))
+}
+
+/// Compares versions such as `1.96.0` and `1.95`; what follows the numbers (`-nightly`) is not looked at.
+fn is_at_least(version: &str, minimum: &str) -> bool {
+    let numbers = |text: &str| -> Vec<u32> {
+        text.split(['.', '-', '+']).map_while(|part| part.parse().ok()).take(3).collect()
+    };
+    numbers(version) >= numbers(minimum)
+}
+
+/// The form of a target's name in cargo's environment variables.
+fn variable_form(target: &str) -> String {
+    target.to_ascii_uppercase().replace(['-', '.'], "_")
+}
+
+fn shell_quoted(path: &Path) -> Result<String> {
+    let text =
+        path.to_str().with_context(|| format!("{} is not UTF-8: choose another folder", path.display()))?;
+    Ok(format!("'{}'", text.replace('\'', r"'\''")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const VERSION: &str = "rustc 1.96.0 (built from a source tarball)\nbinary: rustc\nhost: x86_64-unknown-linux-gnu\n\
+                           release: 1.96.0\nLLVM version: 22.1.8\n";
+
+    #[test]
+    fn fields_of_the_version_are_read() {
+        assert_eq!(field(VERSION, "host"), Some("x86_64-unknown-linux-gnu"));
+        assert_eq!(field(VERSION, "release"), Some("1.96.0"));
+        assert_eq!(field(VERSION, "commit-hash"), None);
+    }
+
+    #[test]
+    fn versions_compare_as_numbers() {
+        assert!(is_at_least("1.96.0", "1.95"));
+        assert!(is_at_least("1.100.0-nightly", "1.95"));
+        assert!(!is_at_least("1.63.0", "1.95"));
+        assert!(!is_at_least("garbage", "1.95"));
+    }
+
+    #[test]
+    fn a_folder_without_core_is_not_a_sysroot() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        assert!(!has_core(folder.path()));
+        fs::write(folder.path().join("libcore-123.rmeta"), "").expect("a writable folder");
+        fs::write(folder.path().join("libcore_other-123.rlib"), "").expect("a writable folder");
+        assert!(!has_core(folder.path()));
+        fs::write(folder.path().join("libcore-123.rlib"), "").expect("a writable folder");
+        assert!(has_core(folder.path()));
+    }
+
+    #[test]
+    fn a_failed_or_interrupted_build_is_never_taken_for_a_whole_one() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let target = folder.path().join("sysroot-1.96.0");
+        let leftover = folder.path().join("sysroot-1.96.0.partial");
+        write(&leftover.join("half"), "").expect("a writable folder");
+
+        let failed = complete(&target, |partial| {
+            assert!(!partial.exists(), "the leftover is removed first");
+            write(&partial.join("half"), "")?;
+            bail!("interrupted")
+        });
+        assert!(failed.is_err() && !target.exists() && !leftover.exists());
+
+        complete(&target, |partial| write(&partial.join("whole"), "")).expect("nothing fails");
+        assert!(target.join("whole").is_file() && !leftover.exists());
+    }
+
+    #[test]
+    fn names_are_put_into_the_form_their_reader_expects() {
+        assert_eq!(variable_form(TARGET), "THUMBV8M_MAIN_NONE_EABIHF");
+        assert_eq!(shell_quoted(Path::new("/a b/it's")).expect("UTF-8"), r"'/a b/it'\''s'");
+    }
+}

@@ -1,0 +1,156 @@
+//! Building and running the tests of the root workspace.
+//!
+//! One profile serves everything: release. The whole-system scenarios simulate minutes of sixteen channels and need its
+//! speed, and a second profile would compile every dependency twice. Binaries and tests are built by one command,
+//! because only then do their dependencies have the same features and are compiled once.
+
+use crate::command;
+use crate::project::Project;
+use anyhow::{Context, Result, bail};
+use std::io::{BufRead, BufReader, Write};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+/// The package of the whole-system scenarios.
+pub const SCENARIOS: &str = "jointrig-tests";
+
+/// The programs the scenarios start, and the variables that carry their paths.
+const PROGRAMS: [(&str, &str, &str); 2] = [
+    ("jointrig", "jointrig", "JOINTRIG_BIN"),
+    ("jointrig-hil-sim", "jointrig-hil-sim", "JOINTRIG_HIL_SIM_BIN"),
+];
+
+/// Which packages are tested.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scope {
+    /// All.
+    Everything,
+    /// All but the whole-system scenarios.
+    WithoutScenarios,
+}
+
+/// How many tests passed, failed and were ignored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    passed: u64,
+    failed: u64,
+    ignored: u64,
+}
+
+impl std::fmt::Display for Counts {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} passed, {} failed, {} ignored", self.passed, self.failed, self.ignored)
+    }
+}
+
+/// Builds the binaries and the tests.
+pub fn build(project: &Project, scope: Scope) -> Result<()> {
+    let mut cargo = command::cargo(&project.root);
+    cargo.args(["build", "--release", "--workspace", "--bins", "--tests", "--examples"]);
+    cargo.args(left_out(scope));
+    command::run(&mut cargo).context("the binaries and tests do not compile")
+}
+
+/// Runs the tests with the paths of the binaries in their environment; `extra` goes to `cargo test`.
+pub fn run(project: &Project, scope: Scope, extra: &[String]) -> Result<Counts> {
+    let mut cargo = command::cargo(&project.root);
+    for (package, binary, variable) in PROGRAMS {
+        if let Some(path) = program(project, package, binary)? {
+            cargo.env(variable, path);
+        } else {
+            println!("  the package {package} has no binary {binary} yet, so {variable} is not set");
+        }
+    }
+    cargo.args(["test", "--release", "--workspace"]).args(left_out(scope)).args(extra);
+    let (counts, success) = watched(&mut cargo, &mut std::io::stdout())?;
+    if !success {
+        bail!(
+            "the tests failed ({counts}): the lines above name them; `cargo xtask test -- <part of a name>` runs fewer"
+        );
+    }
+    Ok(counts)
+}
+
+fn left_out(scope: Scope) -> &'static [&'static str] {
+    match scope {
+        Scope::Everything => &[],
+        Scope::WithoutScenarios => &["--exclude", SCENARIOS],
+    }
+}
+
+/// The path of a built binary, or nothing when the package does not have it.
+fn program(project: &Project, package: &str, binary: &str) -> Result<Option<PathBuf>> {
+    if !project.package(package).is_some_and(|package| package.binaries.iter().any(|name| name == binary)) {
+        return Ok(None);
+    }
+    let path = project.target.join("release").join(format!("{binary}{}", std::env::consts::EXE_SUFFIX));
+    if !path.is_file() {
+        bail!(
+            "{binary} was built, but is not at {}: unset build.target in cargo's configuration, which moves it",
+            path.display()
+        );
+    }
+    Ok(Some(path))
+}
+
+/// Runs the command, passes its output on unchanged to `shown`, and counts what its closing lines report.
+fn watched(command: &mut Command, shown: &mut impl Write) -> Result<(Counts, bool)> {
+    println!("  $ {}", command::line(command));
+    let mut child = command.stdout(Stdio::piped()).spawn().context("could not start cargo")?;
+    let output = child.stdout.take().context("the output was asked for, but is not there")?;
+    let (mut counts, mut reader, mut line) = (Counts::default(), BufReader::new(output), Vec::new());
+    while reader.read_until(b'\n', &mut line).context("could not read the output of cargo test")? > 0 {
+        shown.write_all(&line).context("could not pass the output on")?;
+        count(&String::from_utf8_lossy(&line), &mut counts);
+        line.clear();
+    }
+    let status = child.wait().context("could not wait for cargo test")?;
+    Ok((counts, status.success()))
+}
+
+/// Adds what one closing line of a test program says, such as
+/// `test result: ok. 12 passed; 0 failed; 1 ignored; 0 measured; 0 filtered out; finished in 0.01s`.
+fn count(line: &str, counts: &mut Counts) {
+    let Some(result) = line.strip_prefix("test result: ") else { return };
+    let numbers = result.split_once(". ").map_or("", |(_, numbers)| numbers);
+    for part in numbers.split(';') {
+        let Some((number, what)) = part.trim().split_once(' ') else { continue };
+        let Ok(number) = number.parse::<u64>() else { continue };
+        match what {
+            "passed" => counts.passed += number,
+            "failed" => counts.failed += number,
+            "ignored" => counts.ignored += number,
+            _ => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn closing_lines_are_added_up_and_others_ignored() {
+        let mut counts = Counts::default();
+        for line in [
+            "running 2 tests\n",
+            "test result: ok. 12 passed; 0 failed; 1 ignored; 0 measured; 3 filtered out; finished in 0.01s\n",
+            "test result: FAILED. 3 passed; 2 failed; 0 ignored; 0 measured; 0 filtered out; finished in 1.00s\n",
+            "test result_of_something ... ok\n",
+        ] {
+            count(line, &mut counts);
+        }
+        assert_eq!(counts, Counts { passed: 15, failed: 2, ignored: 1 });
+        assert_eq!(counts.to_string(), "15 passed, 2 failed, 1 ignored");
+    }
+
+    #[test]
+    fn a_failing_command_is_reported_with_its_counts() {
+        let mut command = Command::new("sh");
+        command.args(["-c", "echo 'test result: FAILED. 1 passed; 1 failed; 0 ignored'; exit 101"]);
+        let mut shown = Vec::new();
+        let (counts, success) = watched(&mut command, &mut shown).expect("sh is there");
+        assert_eq!(shown, b"test result: FAILED. 1 passed; 1 failed; 0 ignored\n");
+        assert_eq!((counts.passed, counts.failed, success), (1, 1, false));
+    }
+}
