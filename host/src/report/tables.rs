@@ -2,7 +2,7 @@
 
 use super::drawing::escape;
 use crate::results::number::{band, count, decimals, micro, short, with_scatter};
-use crate::results::{OverCycles, Results, words};
+use crate::results::{MAIN_BAND_HZ, OverCycles, Results, words};
 use std::fmt::Write;
 
 /// Builds one table; cells are escaped, columns after the first `text_columns` are set to the right.
@@ -70,6 +70,7 @@ pub fn joint(results: &Results) -> Option<String> {
         }
     }
     let mut notes: Vec<(String, &str)> = Vec::new();
+    let mut elsewhere = 0;
     for range in bands {
         for joint in results.joint.iter().filter(|j| j.band_hz == range) {
             let k = joint.sliding_stiffness();
@@ -92,12 +93,24 @@ pub fn joint(results: &Results) -> Option<String> {
                 damping.map_or(UNKNOWN.into(), |c| with_scatter(c.mean, c.std)),
                 joint.lines.to_string(),
             ]);
-            let row = format!("{}, {} IDMs, {}", joint.method, joint.idms, band(joint.band_hz));
+            if range != MAIN_BAND_HZ {
+                elsewhere += joint.warnings.len();
+                continue;
+            }
+            let row = format!("{}, {} IDMs", joint.method, joint.idms);
             notes.extend(joint.warnings.iter().map(|w| (row.clone(), w.as_str())));
         }
     }
     let mut html = table.finish();
     html.push_str(&gathered_notes(&notes));
+    if elsewhere > 0 {
+        write!(
+            html,
+            "<p><small>Remarks are on {}; {elsewhere} more, on the other bands, stand in results.json.</small></p>",
+            band(MAIN_BAND_HZ)
+        )
+        .expect("writing into a String cannot fail");
+    }
     Some(html)
 }
 

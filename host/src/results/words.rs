@@ -7,10 +7,13 @@ use super::{Excitation, Force, Hysteresis, Joint, OverCycles, Results, Shape};
 pub fn substructuring(results: &Results) -> Option<String> {
     let joint = results.headline_joint()?;
     let k = joint.sliding_stiffness()?;
-    let rest = if k.std > k.mean.abs() {
-        ": the scatter is larger than the value, so the joint is not identified"
+    let median = short(micro(k.median));
+    let rest = if k.std > super::campaign::UNIDENTIFIED * k.mean.abs() || k.mean <= 0.0 {
+        format!(": the scatter is larger than the value (median {median}), so the joint is not identified")
+    } else if k.std > 0.3 * k.mean.abs() {
+        format!("; single lines scatter widely, their median is {median}")
     } else {
-        ""
+        String::new()
     };
     Some(format!(
         "Substructuring (FBS, {}, {} IDMs, {}) sees {} between the arms along the sliding direction{rest}.",

@@ -1,9 +1,13 @@
-//! Averaged cells into one FRF matrix per configuration, in the geometry's order, without holes.
+//! Averaged cells into one FRF matrix per configuration, in the geometry's order.
+//!
+//! A substructuring matrix has no place for a guess: where a cell is missing that Eq. (3) reads, its impact or its
+//! response location is left out. A cell that Eq. (3) does not read (a spare response, a hit on B in the assembly)
+//! costs nothing: its place holds NaN, and whoever asks for it is refused by name.
 
 use super::averages::CellAverage;
 use crate::spectra::MotionQuantity;
 use crate::substructuring::frf::FrfMatrix;
-use crate::substructuring::geometry::{Configuration, Point};
+use crate::substructuring::geometry::{Configuration, Grouping, Point};
 use nalgebra::DMatrix;
 use num_complex::Complex;
 
@@ -29,9 +33,21 @@ pub fn locations(points: &Configuration) -> Vec<&str> {
     names
 }
 
-/// Puts cells together. Where cells are missing, the impact or location with the most holes is left out, until
-/// none remain: a substructuring matrix has no place for a guess.
+/// Whether Eq. (3), in either form, reads the cell of this impact and this response: Y^A from everything on A to A's
+/// interface, Y^B from B's interface to everything on B, and across the joint from A to B in the assembly.
+fn is_read(configuration: &str, impact: Grouping, response: Grouping) -> bool {
+    let on_a = |g| matches!(g, Grouping::InterfaceA | Grouping::InternalA);
+    match configuration {
+        "A" => on_a(impact) && response == Grouping::InterfaceA,
+        "B" => impact == Grouping::InterfaceB && !on_a(response),
+        _ => on_a(impact) && !on_a(response),
+    }
+}
+
+/// Puts the cells of a configuration together. Where cells are missing that are read, the impact or location with the
+/// largest share of holes is left out, until none remain.
 pub fn assemble(
+    configuration: &str,
     points: &Configuration,
     cells: &[CellAverage],
     sigma_per_s: f64,
@@ -40,12 +56,22 @@ pub fn assemble(
     let input_names = points.input_names();
     let output_names = points.output_names();
     let locations = locations(points);
+    let groupings: Vec<Grouping> = locations
+        .iter()
+        .filter_map(|l| points.channels.iter().find(|c| c.name == *l))
+        .map(|c| c.grouping)
+        .collect();
     let find = |impact: &str, location: &str| {
         cells.iter().find(|c| c.name.impact == impact && c.name.response == location)
     };
-    let (impacts, kept_locations) = complete(points.impacts.len(), locations.len(), |i, l| {
-        find(&points.impacts[i].name, locations[l]).is_some()
-    });
+    let (impacts, kept_locations) = if cells.is_empty() {
+        (Vec::new(), Vec::new())
+    } else {
+        complete(points.impacts.len(), locations.len(), |i, l| {
+            !is_read(configuration, points.impacts[i].grouping, groupings[l])
+                || find(&points.impacts[i].name, locations[l]).is_some()
+        })
+    };
     let left_out = |all: usize, kept: &[usize]| (0..all).filter(|i| !kept.contains(i)).collect::<Vec<_>>();
     let impacts_left_out = left_out(points.impacts.len(), &impacts)
         .into_iter()
@@ -56,20 +82,17 @@ pub fn assemble(
     let channels: Vec<usize> = (0..points.channels.len())
         .filter(|c| kept_locations.iter().any(|l| locations[*l] == points.channels[*c].name))
         .collect();
-    let first = impacts
-        .first()
-        .zip(kept_locations.first())
-        .and_then(|(i, l)| find(&points.impacts[*i].name, locations[*l]));
-    let frf = first.map(|first| {
+    let hole = Complex::new(f64::NAN, f64::NAN);
+    let frf = cells.first().filter(|_| !channels.is_empty() && !impacts.is_empty()).map(|first| {
         let mut lines =
             vec![DMatrix::<Complex<f64>>::zeros(channels.len(), impacts.len()); first.frequency_hz.len()];
         for (column, i) in impacts.iter().enumerate() {
             for (row, c) in channels.iter().enumerate() {
                 let channel = &points.channels[*c];
                 let cell = find(&points.impacts[*i].name, &channel.name)
-                    .expect("only complete rows and columns are kept");
+                    .filter(|cell| cell.frequency_hz.len() == lines.len());
                 for (line, y) in lines.iter_mut().enumerate() {
-                    y[(row, column)] = along(cell, channel, line);
+                    y[(row, column)] = cell.map_or(hole, |cell| along(cell, channel, line));
                 }
             }
         }
@@ -129,11 +152,19 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_is_not_read_costs_nothing() {
+        use Grouping::{InterfaceA, InterfaceB, InternalA, InternalB};
+        // the spare response of A, and hits on B in the assembly
+        assert!(!is_read("A", InterfaceA, InternalA) && !is_read("AJB", InterfaceB, InternalB));
+        assert!(!is_read("AJB", InternalA, InterfaceA));
+        assert!(is_read("A", InternalA, InterfaceA) && is_read("B", InterfaceB, InternalB));
+        assert!(is_read("AJB", InternalA, InternalB) && is_read("AJB", InterfaceA, InterfaceB));
+    }
+
+    #[test]
     fn holes_are_cut_out_with_little_loss() {
-        // one cell of row 2 is missing: the row goes, or the column, not both
-        let (rows, columns) = complete(4, 3, |r, c| (r, c) != (2, 1));
-        assert_eq!(rows.len() * columns.len(), 8.max(9.min(rows.len() * columns.len())));
-        assert!(rows.len() == 3 || columns.len() == 2);
+        // one cell of row 2 is missing: the row is the smaller loss
+        assert_eq!(complete(4, 3, |r, c| (r, c) != (2, 1)), (vec![0, 1, 3], vec![0, 1, 2]));
         // an interrupted campaign: row 3 has not begun, row 2 is half done
         let (rows, columns) = complete(4, 4, |r, c| r < 2 || (r == 2 && c < 2));
         assert_eq!((rows, columns), (vec![0, 1], vec![0, 1, 2, 3]));

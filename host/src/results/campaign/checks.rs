@@ -7,6 +7,9 @@ use crate::results::{Check, OverCycles, Statistics};
 /// Loops stiffer than FBS by more than this: something between arm and specimen gives way.
 const SERIES_RATIO: f64 = 1.5;
 
+/// A scatter over lines of more than this times the mean is no identification.
+pub const UNIDENTIFIED: f64 = 1.5;
+
 /// Name of the check on what lies between the arms and the contact.
 pub const SERIES_COMPLIANCE: &str = "series-compliance";
 /// Name of the check on resonances of one specimen alone.
@@ -27,7 +30,7 @@ pub fn series_compliance(fbs: Option<&Statistics>, loops: Option<OverCycles>) ->
         );
     };
     let (k_fbs, k_loops) = (fbs.mean, loops.mean);
-    if k_fbs <= 0.0 || k_loops <= 0.0 || fbs.std > k_fbs {
+    if k_fbs <= 0.0 || k_loops <= 0.0 || fbs.std > UNIDENTIFIED * k_fbs {
         return Check::new(
             name,
             None,
@@ -142,7 +145,7 @@ mod tests {
     #[test]
     fn a_stiff_clamp_passes_and_noise_decides_nothing() {
         assert_eq!(series_compliance(Some(&fbs(179e6, 9e6)), Some(loops(181e6))).ok, Some(true));
-        assert_eq!(series_compliance(Some(&fbs(26e6, 40e6)), Some(loops(181e6))).ok, None);
+        assert_eq!(series_compliance(Some(&fbs(26e6, 45e6)), Some(loops(181e6))).ok, None);
         assert_eq!(series_compliance(Some(&fbs(280e6, 4e6)), Some(loops(150e6))).ok, None);
         assert_eq!(series_compliance(None, Some(loops(181e6))).ok, None);
         assert_eq!(series_compliance(Some(&fbs(26e6, 1e6)), None).ok, None);

@@ -17,7 +17,7 @@ mod loops;
 mod synthetic;
 
 pub use cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, Measurements};
-pub use checks::{HIDDEN_RESONANCE, SERIES_COMPLIANCE};
+pub use checks::{HIDDEN_RESONANCE, SERIES_COMPLIANCE, UNIDENTIFIED};
 pub use from_store::{AnalyseError, LINK_NOTE, analyse, geometry};
 pub use joint::shaped;
 
@@ -100,7 +100,7 @@ pub fn analyse_measurements<M: Measurements>(
         }
         results.usable_bands.extend(force_band(name, &own));
         results.frfs.extend(chosen::curves(name, points, &own, sigma, measurements.quantity()));
-        let assembled = assemble::assemble(points, &own, sigma, measurements.quantity());
+        let assembled = assemble::assemble(name, points, &own, sigma, measurements.quantity());
         if assembled.frf.is_some() {
             note_left_out(&mut results, name, "impacts", &assembled.impacts_left_out);
             note_left_out(&mut results, name, "response locations", &assembled.responses_left_out);
