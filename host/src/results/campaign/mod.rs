@@ -84,9 +84,7 @@ pub fn analyse_measurements<M: Measurements>(
         impact_loops.extend(outcome.loops);
         results.missing.extend(outcome.complaint);
     }
-    results.missing.extend(measurements.given_up().into_iter().map(|(cell, reason)| {
-        format!("{}: cell {} × {} was given up: {reason}.", cell.configuration, cell.impact, cell.response)
-    }));
+    note_given_up(&mut results, &cells, measurements.given_up());
     note_settings(&mut results, sigma);
     let mut frfs: [Option<FrfMatrix>; 3] = [None, None, None];
     for (place, (name, points)) in configurations(geometry).into_iter().enumerate() {
@@ -167,6 +165,29 @@ fn note_settings(results: &mut Results, sigma_per_s: f64) {
         .insert("force_window_s".into(), serde_json::json!([-window.force_before_s, window.force_after_s]));
     settings.insert("estimator".into(), "H1 on s = σ + iω".into());
     settings.insert("lines_hz".into(), serde_json::json!([LOWEST_HZ, HIGHEST_HZ]));
+}
+
+/// Cells given up, those of one location and one reason in one sentence.
+fn note_given_up(results: &mut Results, planned: &[CellName], given_up: Vec<(CellName, String)>) {
+    let mut groups: Vec<(String, String, String, Vec<String>)> = Vec::new();
+    for (cell, reason) in given_up {
+        let same =
+            groups.iter_mut().find(|g| g.0 == cell.configuration && g.1 == cell.response && g.2 == reason);
+        match same {
+            Some(group) => group.3.push(cell.impact),
+            None => groups.push((cell.configuration, cell.response, reason, vec![cell.impact])),
+        }
+    }
+    for (configuration, response, reason, impacts) in groups {
+        let all =
+            planned.iter().filter(|c| c.configuration == configuration && c.response == response).count();
+        let where_hit = match impacts.len() {
+            n if n > 1 && n == all => format!("all {n} impacts"),
+            n if n > 6 => format!("{n} of {all} impacts"),
+            _ => impacts.join(", "),
+        };
+        results.missing.push(format!("{configuration}: {response} was given up for {where_hit}: {reason}."));
+    }
 }
 
 fn note_missing(results: &mut Results, name: &str, planned: usize, own: &[CellAverage]) {

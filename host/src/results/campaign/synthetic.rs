@@ -279,3 +279,24 @@ fn nothing_measured_is_no_error() {
     assert_eq!(results.checks.iter().filter(|c| c.ok.is_some()).count(), 0);
     assert!(crate::report::page(&results).contains("No stiffness could be found"));
 }
+
+#[test]
+fn cells_given_up_are_told_together() {
+    let cell = |impact: &str, response: &str| CellName {
+        configuration: "A".into(),
+        impact: impact.into(),
+        response: response.into(),
+    };
+    let planned = [cell("AZ1", "A1"), cell("AZ2", "A1"), cell("AZ1", "A4"), cell("AZ2", "A4")];
+    let mut results = Results::new(super::super::Source::default());
+    let reason = || "0 of 3 good after 12 hits".to_owned();
+    let given_up = [&planned[2], &planned[3], &planned[0]].map(|c| (c.clone(), reason())).to_vec();
+    note_given_up(&mut results, &planned, given_up);
+    assert_eq!(
+        results.missing,
+        [
+            "A: A4 was given up for all 2 impacts: 0 of 3 good after 12 hits.",
+            "A: A1 was given up for AZ1: 0 of 3 good after 12 hits."
+        ]
+    );
+}
