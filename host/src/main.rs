@@ -1,2 +1,7 @@
 //! The `jointrig` command.
-fn main() {}
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    jointrig::cli::main()
+}

@@ -1,8 +1,8 @@
 //! Why a record is kept or refused, and by whom it is judged.
 
 use super::plan::{Cell, Plan};
-use super::verdict::{self, RawHit};
 pub use super::verdict::VerdictKind as Kind;
+use super::verdict::{self, RawHit};
 use crate::device::channels::ChannelMap;
 use crate::device::recording::Recording;
 use jointrig_protocol::channel::{Channel, Quantity, Role};
@@ -37,7 +37,11 @@ impl Judge for ByRecord {
             recording.channel(place).iter().map(|code| f64::from(*code) * unit).collect()
         };
         let force_n = channels.place(Role::HammerForce).map(si).unwrap_or_default();
-        let places = channels.channels.iter().enumerate().filter(|(_, channel)| channel.quantity == Quantity::Velocity);
+        let places = channels
+            .channels
+            .iter()
+            .enumerate()
+            .filter(|(_, channel)| channel.quantity == Quantity::Velocity);
         let (names, responses): (Vec<&str>, Vec<Vec<f64>>) =
             places.map(|(place, channel)| (channel.name.as_str(), si(place))).unzip();
         let (wanted, given) = (plan.force.get_ref(), &plan.limits);
@@ -52,8 +56,12 @@ impl Judge for ByRecord {
             ..verdict::Limits::default()
         };
         let missing = recording.gaps.iter().map(ExactSizeIterator::len).sum::<usize>() as u64;
-        let hit =
-            RawHit { fs_hz: f64::from(channels.rate_hz), force_n: &force_n, responses: &responses, missing_samples: missing };
+        let hit = RawHit {
+            fs_hz: f64::from(channels.rate_hz),
+            force_n: &force_n,
+            responses: &responses,
+            missing_samples: missing,
+        };
         // a channel that runs into its converter's end spoils the record whatever the hammer did; channels
         // differ in range, so that each is looked at in its own codes
         if missing == 0

@@ -1,1 +1,127 @@
-//! cli
+//! The command line: one file per subcommand; the contract is in each one's documentation.
+//!
+//! `--json` prints exactly one document to stdout and nothing else goes there; progress, prompts and messages go
+//! to stderr. An error is one to a few lines: what, where, what to do.
+
+mod analyse;
+mod campaign;
+mod completions;
+mod demo;
+mod devices;
+mod error;
+mod info;
+mod interrupt;
+mod measure;
+mod output;
+
+use std::process::ExitCode;
+
+use clap::{ArgAction, Parser, Subcommand};
+
+/// Stiffness of a friction joint, measured: impact campaigns, FRFs, substructuring, hysteresis.
+#[derive(Debug, Parser)]
+#[command(name = "jointrig", version, about, propagate_version = true)]
+pub struct Cli {
+    /// Say more (-v: info, -vv: debug, -vvv: trace); JOINTRIG_LOG does the same, finer.
+    #[arg(short, long, global = true, action = ArgAction::Count)]
+    verbose: u8,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// The whole job on the built-in simulator: campaign, analysis, report.
+    Demo(demo::Demo),
+    /// List what is attached.
+    Devices(devices::Devices),
+    /// Show a device: handshake, channels, firmware version, counters.
+    Info(info::Info),
+    /// Impact campaigns.
+    Campaign(campaign::Campaign),
+    /// Analyse a campaign file: results.json and report.html.
+    Analyse(analyse::Analyse),
+    /// Print completions for a shell.
+    Completions(completions::Completions),
+}
+
+/// Reads the command line, does what it says, and returns the exit code.
+pub fn main() -> ExitCode {
+    // clap prints help and usage errors itself, and exits with 0 and 2
+    let cli = Cli::parse();
+    start_log(cli.verbose);
+    let done = match cli.command {
+        Command::Demo(command) => command.run(),
+        Command::Devices(command) => command.run(),
+        Command::Info(command) => command.run(),
+        Command::Campaign(command) => command.run(),
+        Command::Analyse(command) => command.run(),
+        Command::Completions(command) => {
+            command.run();
+            Ok(())
+        }
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("jointrig: {error}");
+            ExitCode::from(error.code())
+        }
+    }
+}
+
+fn start_log(verbose: u8) {
+    let level = match verbose {
+        0 => "warn",
+        1 => "info",
+        2 => "debug",
+        _ => "trace",
+    };
+    let environment = env_logger::Env::default().filter_or("JOINTRIG_LOG", level);
+    let mut builder = env_logger::Builder::from_env(environment);
+    if verbose > 0 {
+        builder.parse_filters(level);
+    }
+    builder.init();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_well_formed() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn the_contract_is_understood() {
+        for line in [
+            "demo --out d --seed 7",
+            "demo --full --rig rigs/rigid-clamp.toml",
+            "devices --json",
+            "info --device sim: --json",
+            "campaign new p.jrig --paper",
+            "campaign new p.jrig --plan plan.toml",
+            "campaign run p.jrig --device sim: --stage exec:move.sh --yes",
+            "campaign status p.jrig --json",
+            "campaign verify p.jrig",
+            "analyse p.jrig --out d --json",
+            "completions bash",
+        ] {
+            let words = std::iter::once("jointrig").chain(line.split(' '));
+            assert!(Cli::try_parse_from(words).is_ok(), "{line}");
+        }
+        for line in [
+            "",
+            "campaign new p.jrig",
+            "campaign new p.jrig --paper --plan x.toml",
+            "campaign run p.jrig --stage robot",
+            "info",
+        ] {
+            let words = std::iter::once("jointrig").chain(line.split(' ').filter(|word| !word.is_empty()));
+            assert!(Cli::try_parse_from(words).is_err(), "{line}");
+        }
+    }
+}

@@ -1,1 +1,128 @@
-//! report
+//! The report: results shown to people. Two files, `results.json` for scripts and `report.html` to read.
+//!
+//! The page is one self-contained html text: figures are inline SVG, nothing is fetched, it prints. Everything
+//! shown stands in [`Results`]; this room computes no result.
+
+mod drawing;
+mod figures;
+mod page;
+mod panel;
+mod scale;
+mod tables;
+
+pub use page::page;
+
+use crate::results::Results;
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::Path;
+
+/// The file for scripts.
+pub const RESULTS_FILE: &str = "results.json";
+/// The file for people.
+pub const REPORT_FILE: &str = "report.html";
+
+/// Writes `results.json` and `report.html` into `folder`, which is made if it is not there. Each file appears
+/// whole or not at all: it is written beside its place and renamed.
+///
+/// # Errors
+/// The folder cannot be made or written.
+pub fn write(results: &Results, folder: &Path) -> io::Result<()> {
+    fs::create_dir_all(folder)?;
+    let json = results.to_json().map_err(io::Error::other)?;
+    replace(&folder.join(RESULTS_FILE), json.as_bytes())?;
+    replace(&folder.join(REPORT_FILE), page(results).as_bytes())
+}
+
+fn replace(place: &Path, content: &[u8]) -> io::Result<()> {
+    let beside = place.with_extension(format!("{}.part", std::process::id()));
+    let written = File::create(&beside)
+        .and_then(|mut file| file.write_all(content).and_then(|()| file.sync_all()))
+        .and_then(|()| fs::rename(&beside, place));
+    if written.is_err() {
+        // the first error is the one to report
+        let _ = fs::remove_file(&beside);
+    }
+    written
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::{Source, example};
+
+    #[test]
+    fn the_page_shows_the_numbers_of_the_results() {
+        let html = page(&example::results());
+        for text in [
+            "26.8 ± 0.9 N/µm",
+            "148 ± 4",
+            "not k_T",
+            "double hit",
+            "campaign.jrig",
+            "6 IDMs: 26.8",
+            "192 Hz",
+            "32.7 N/µm",
+        ] {
+            assert!(html.contains(text), "`{text}` is not on the page");
+        }
+        assert_eq!(html.matches("<svg").count(), 6);
+    }
+
+    #[test]
+    fn the_page_needs_nothing_from_outside_and_stays_small() {
+        let html = page(&example::results());
+        for outside in ["http:", "https:", "<script", "<link", "src=", "url(h", "@import", "NaN", "inf\""] {
+            assert!(!html.contains(outside), "`{outside}` on the page");
+        }
+        assert!(html.len() < 3_000_000, "{} bytes", html.len());
+    }
+
+    #[test]
+    fn names_from_a_file_cannot_break_the_page() {
+        let mut results =
+            Results::new(Source { file: "<script>alert(1)</script>".into(), ..Source::default() });
+        results.missing.push("<b>".into());
+        let html = page(&results);
+        assert!(!html.contains("<script>") && html.contains("&lt;b&gt;"));
+        assert!(html.contains("No stiffness could be found"));
+    }
+
+    #[test]
+    fn every_part_may_be_missing() {
+        let full = example::results();
+        for part in 0..7 {
+            let mut results = full.clone();
+            match part {
+                0 => results.joint.clear(),
+                1 => results.joint_spectrum = None,
+                2 => results.hysteresis.clear(),
+                3 => results.frfs.truncate(1),
+                4 => results.example_loop = None,
+                5 => results.impact_slopes.truncate(1),
+                _ => results.frfs.iter_mut().for_each(|c| c.magnitude_m_per_n.clear()),
+            }
+            assert!(page(&results).ends_with("</html>\n"));
+        }
+    }
+
+    #[test]
+    fn both_files_are_written_whole_and_no_others() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let place = folder.path().join("new/folder");
+        write(&example::results(), &place).expect("written");
+        write(&example::results(), &place).expect("written over");
+        let mut names: Vec<_> =
+            fs::read_dir(&place).expect("there").map(|e| e.expect("entry").file_name()).collect();
+        names.sort();
+        assert_eq!(names, [REPORT_FILE, RESULTS_FILE]);
+    }
+
+    #[test]
+    #[ignore = "leaves the example's page in the temporary folder, to look at"]
+    fn a_page_to_look_at() {
+        let place = std::env::temp_dir().join("jointrig-report");
+        write(&example::results(), &place).expect("written");
+        println!("{}", place.join(REPORT_FILE).display());
+    }
+}

@@ -1,1 +1,128 @@
-//! results
+//! Results: one document with everything that was found, and what it was found from.
+//!
+//! [`Results`] is `results.json`, field for field, with SI units in the names; the report
+//! ([`crate::report`]) and the terminal summary ([`words`]) show it and add nothing. A value that is not
+//! known is null, never NaN. Every document carries its [`Source`]: file, record ids, settings, version.
+
+pub mod campaign;
+mod check;
+mod completeness;
+mod curves;
+#[cfg(test)]
+pub(crate) mod example;
+mod hysteresis;
+mod joint;
+pub mod number;
+mod source;
+pub mod words;
+
+pub use crate::hysteresis::{Kind as Excitation, OverCycles, Shape};
+pub use crate::substructuring::joint::BandStatistic as Statistics;
+pub use campaign::{AnalyseError, Progress, analyse};
+pub use check::Check;
+pub use completeness::Completeness;
+pub use curves::{FrfCurve, Role, UsableBand, rounded};
+pub use hysteresis::{Force, Hysteresis, ImpactSlope, LoopCurve};
+pub use joint::{Joint, JointSpectrum, Refusal, SpectrumCurve};
+pub use source::{Software, Source, ranges};
+
+use serde::Serialize;
+
+/// The shape's version: 1.
+pub const VERSION: u32 = 1;
+
+/// The band the headline is read from, Hz (the paper's Table 2).
+pub const MAIN_BAND_HZ: [f64; 2] = [300.0, 600.0];
+
+/// All that was found. The first six fields are the contract that scripts rely on; the others are there for
+/// the report and may grow.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Results {
+    /// Version of this shape.
+    pub version: u32,
+    /// Where it comes from.
+    pub source: Source,
+    /// The joint by substructuring: method × IDM set × band.
+    pub joint: Vec<Joint>,
+    /// The same line by line; absent where nothing was identified.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint_spectrum: Option<JointSpectrum>,
+    /// The contact by loops.
+    pub hysteresis: Vec<Hysteresis>,
+    /// Whether the numbers may be believed.
+    pub checks: Vec<Check>,
+    /// Methods that were refused, with the reason.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub refused: Vec<Refusal>,
+    /// What the analysis had to do without, in sentences.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub missing: Vec<String>,
+    /// Kept and refused hits per configuration.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub completeness: Vec<Completeness>,
+    /// A few FRFs to look at.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub frfs: Vec<FrfCurve>,
+    /// Where the hammer's force reaches.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub usable_bands: Vec<UsableBand>,
+    /// One loop to look at.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub example_loop: Option<LoopCurve>,
+    /// The slope of every impact that counts.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub impact_slopes: Vec<ImpactSlope>,
+}
+
+impl Results {
+    /// An empty document about `source`.
+    pub fn new(source: Source) -> Self {
+        Results {
+            version: VERSION,
+            source,
+            joint: Vec::new(),
+            joint_spectrum: None,
+            hysteresis: Vec::new(),
+            checks: Vec::new(),
+            refused: Vec::new(),
+            missing: Vec::new(),
+            completeness: Vec::new(),
+            frfs: Vec::new(),
+            usable_bands: Vec::new(),
+            example_loop: None,
+            impact_slopes: Vec::new(),
+        }
+    }
+
+    /// The substructuring result that the headline quotes: `internal` with the most IDMs over the main band,
+    /// or the nearest thing to it that could be identified.
+    pub fn headline_joint(&self) -> Option<&Joint> {
+        self.joint
+            .iter()
+            .filter(|j| j.band_hz == MAIN_BAND_HZ && j.sliding_stiffness().is_some())
+            .max_by_key(|j| (j.method == "internal", j.method == "internal-printed", j.idms))
+    }
+
+    /// The loops of the impacts, drawn with the raw force.
+    pub fn impact_loops(&self) -> Option<&Hysteresis> {
+        self.hysteresis.iter().find(|h| h.kind == Excitation::Impact && h.force == Force::Raw)
+    }
+
+    /// The check of this name.
+    pub fn check(&self, name: &str) -> Option<&Check> {
+        self.checks.iter().find(|c| c.name == name)
+    }
+
+    /// The document as text, for `results.json` and `--json`.
+    ///
+    /// # Errors
+    /// Only if serialisation itself fails; numbers that are not finite are written as null.
+    pub fn to_json(&self) -> serde_json::Result<String> {
+        let mut text = serde_json::to_string(self)?;
+        text.push('\n');
+        Ok(text)
+    }
+}
+
+#[cfg(test)]
+mod shape;

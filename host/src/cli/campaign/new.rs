@@ -1,0 +1,47 @@
+//! `campaign new`: a file from a plan.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::campaign::plan;
+use crate::campaign::store::Store;
+use crate::cli::error::CliError;
+
+/// Create a campaign file from a plan.
+#[derive(Debug, Args)]
+#[group(id = "from", required = true, multiple = false, args = ["plan", "paper"])]
+pub struct New {
+    /// The campaign file.
+    #[arg(value_name = "FILE.jrig")]
+    file: PathBuf,
+    /// The plan.
+    #[arg(long, value_name = "PLAN.toml")]
+    plan: Option<PathBuf>,
+    /// The paper's plan: 252 cells of 8 hits.
+    #[arg(long)]
+    paper: bool,
+}
+
+impl New {
+    pub fn run(self) -> Result<(), CliError> {
+        let (text, name) = match &self.plan {
+            None => (plan::PAPER.to_owned(), "paper.toml".to_owned()),
+            Some(path) => {
+                let text = std::fs::read_to_string(path).map_err(|source| CliError::File {
+                    path: path.clone(),
+                    doing: "reading the plan",
+                    source,
+                })?;
+                (text, path.display().to_string())
+            }
+        };
+        let store = Store::create(&self.file, &text, &name)?;
+        let cells = store.cells()?;
+        let hits: u32 = cells.iter().map(|row| row.cell.wanted).sum();
+        let path = self.file.display();
+        eprintln!("{path}: {} cells, {hits} hits wanted", cells.len());
+        eprintln!("next: jointrig campaign run {path} --device sim:");
+        Ok(store.close()?)
+    }
+}

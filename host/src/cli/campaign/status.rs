@@ -1,0 +1,93 @@
+//! `campaign status`: how far a campaign is, and why records were refused.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::{Map, Value, json};
+
+use crate::campaign::plan::configuration_name;
+use crate::campaign::rows::CellRow;
+use crate::campaign::store::Store;
+use crate::campaign::tally::{Count, Tally};
+use crate::cli::error::CliError;
+use crate::cli::output;
+
+/// Show, per cell, what is wanted, kept and refused, and why.
+#[derive(Debug, Args)]
+pub struct Status {
+    /// The campaign file.
+    #[arg(value_name = "FILE.jrig")]
+    file: PathBuf,
+    /// One JSON document on stdout.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Status {
+    pub fn run(self) -> Result<(), CliError> {
+        let store = Store::open_read_only(&self.file)?;
+        let (cells, records) = (store.cells()?, store.records()?);
+        let tally = Tally::new(&cells, &records);
+        if self.json {
+            let cells: Vec<Value> = cells.iter().map(|row| cell_json(row, &tally.cell(row.id))).collect();
+            return output::json(&json!({
+                "wanted": tally.wanted(),
+                "kept": tally.kept(),
+                "complete": tally.complete(),
+                "records": records.len(),
+                "cells": cells,
+            }));
+        }
+        let (stored, raw) = store.sample_bytes()?;
+        let started = cells.iter().filter(|row| tally.attempts(row.id) > 0);
+        output::lines(started.map(|row| cell_line(row, &tally.cell(row.id))))?;
+        output::lines([
+            format!(
+                "{} of {} hits kept in {} cells ({} records, {:.1} MB, {:.1} : 1)",
+                tally.kept(),
+                tally.wanted(),
+                cells.len(),
+                records.len(),
+                stored as f64 / 1e6,
+                raw as f64 / stored.max(1) as f64
+            ),
+            match (tally.complete(), tally.given_up()) {
+                (true, _) => "complete".into(),
+                (false, 0) => "not complete: `jointrig campaign run` goes on".into(),
+                (false, n) => format!("not complete; {n} cells were given up"),
+            },
+        ])
+    }
+}
+
+fn refusals(count: &Count) -> impl Iterator<Item = (&'static str, u32)> + '_ {
+    count.refused.iter().map(|(kind, number)| (kind.name(), *number))
+}
+
+fn cell_json(row: &CellRow, count: &Count) -> Value {
+    let refused: Map<String, Value> =
+        refusals(count).map(|(kind, number)| (kind.into(), number.into())).collect();
+    json!({
+        "configuration": configuration_name(row.cell.configuration),
+        "impact": row.cell.impact,
+        "response": row.cell.response,
+        "wanted": count.wanted,
+        "kept": count.kept,
+        "refused": refused,
+        "given_up": row.given_up,
+    })
+}
+
+fn cell_line(row: &CellRow, count: &Count) -> String {
+    let cell = &row.cell;
+    let name = configuration_name(cell.configuration);
+    let mut line =
+        format!("{name:<4} {:<6} {:<4} {}/{}", cell.impact, cell.response, count.kept, count.wanted);
+    for (kind, number) in refusals(count) {
+        line.push_str(&format!(", {number} {kind}"));
+    }
+    if let Some(reason) = &row.given_up {
+        line.push_str(&format!("; given up: {reason}"));
+    }
+    line
+}

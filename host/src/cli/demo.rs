@@ -1,0 +1,115 @@
+//! `demo`: the whole job on the built-in simulator.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::analyse::analyse_into;
+use super::error::CliError;
+use super::{interrupt, measure, output};
+use crate::campaign::plan;
+use crate::campaign::stage::Stage;
+use crate::campaign::store::Store;
+use crate::device::address::Address;
+use crate::results;
+
+/// The whole job on the built-in simulator: campaign, analysis, report.
+#[derive(Debug, Args)]
+pub struct Demo {
+    /// Folder for campaign.jrig, results.json and report.html.
+    #[arg(long, value_name = "DIR", default_value = "jointrig-demo")]
+    out: PathBuf,
+    /// The paper's 2016 impacts instead of a short campaign.
+    #[arg(long)]
+    full: bool,
+    /// Another rig than the built-in one.
+    #[arg(long, value_name = "FILE.toml")]
+    rig: Option<PathBuf>,
+    /// Decides noise, scatter and every error of position.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+/// Notes in the file that tell one demo from another: key and value.
+type Marks = [(&'static str, String); 3];
+
+impl Demo {
+    pub fn run(self) -> Result<(), CliError> {
+        let folder = &self.out;
+        std::fs::create_dir_all(folder).map_err(|source| CliError::File {
+            path: folder.clone(),
+            doing: "making the folder",
+            source,
+        })?;
+        let file = folder.join("campaign.jrig");
+        let store = self.open(&file)?;
+        let again = self.again();
+        let address = Address::Sim { rig: self.rig.clone() };
+        let stop = interrupt::flag();
+        let summary = measure::measure(store, &address, self.seed, Stage::Device, true, stop, &again)?;
+        if summary.interrupted {
+            let file = file.display();
+            eprintln!("`jointrig analyse {file} --out {}` works on what is there", folder.display());
+            return Err(CliError::Bad("stopped before the campaign was complete".into()));
+        }
+        let store = Store::open_read_only(&file)?;
+        let found = analyse_into(&store, folder)?;
+        output::lines(results::words::summary(&found))?;
+        let (stored, raw) = store.sample_bytes()?;
+        output::lines([
+            format!(
+                "campaign.jrig holds {:.0} MB of samples in {:.0} MB ({:.1} : 1, lossless).",
+                raw as f64 / 1e6,
+                stored as f64 / 1e6,
+                raw as f64 / (stored.max(1)) as f64
+            ),
+            format!("Open {} for figures and tables.", folder.join("report.html").display()),
+        ])
+    }
+
+    /// The same command once more.
+    fn again(&self) -> String {
+        let full = if self.full { " --full" } else { "" };
+        let rig = self.rig.as_ref().map(|path| format!(" --rig {}", path.display())).unwrap_or_default();
+        format!("jointrig demo --out {} --seed {}{full}{rig}", self.out.display(), self.seed)
+    }
+
+    fn marks(&self) -> Result<Marks, CliError> {
+        let rig = match &self.rig {
+            None => "built-in".into(),
+            Some(path) => std::fs::read_to_string(path).map_err(|source| CliError::File {
+                path: path.clone(),
+                doing: "reading the rig's description",
+                source,
+            })?,
+        };
+        let plan = if self.full { "paper" } else { "demo" };
+        Ok([("demo_plan", plan.into()), ("demo_seed", self.seed.to_string()), ("demo_rig", rig)])
+    }
+
+    /// The campaign file: a new one, or an earlier run of the very same demo.
+    fn open(&self, file: &Path) -> Result<Store, CliError> {
+        let marks = self.marks()?;
+        if !file.exists() {
+            let (text, name) =
+                if self.full { (plan::PAPER, "paper.toml") } else { (plan::DEMO, "demo.toml") };
+            let store = Store::create(file, text, name)?;
+            for (key, value) in &marks {
+                store.set_meta(key, value)?;
+            }
+            return Ok(store);
+        }
+        let store = Store::open(file)?;
+        for (key, value) in &marks {
+            if store.meta(key)?.as_ref() != Some(value) {
+                let what = key.trim_start_matches("demo_");
+                return Err(CliError::Bad(format!(
+                    "{} holds another campaign (its {what} differs): remove it, or choose another --out",
+                    file.display()
+                )));
+            }
+        }
+        eprintln!("{} is there already: going on with it", file.display());
+        Ok(store)
+    }
+}

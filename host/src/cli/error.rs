@@ -1,0 +1,67 @@
+//! What a command ends with, and the exit code that follows: 0 done, 1 the work could not be done,
+//! 2 the command line was wrong.
+
+use std::io;
+use std::path::PathBuf;
+
+use crate::campaign::plan::PlanError;
+use crate::campaign::runner::RunError;
+use crate::campaign::store_error::StoreError;
+use crate::device::error::DeviceError;
+use crate::results::AnalyseError;
+
+/// Why a command could not do its work.
+#[derive(Debug, thiserror::Error)]
+pub enum CliError {
+    /// The command line says something that cannot be meant.
+    #[error("{0}")]
+    Usage(String),
+    /// The plan.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// The campaign file.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The device.
+    #[error(transparent)]
+    Device(DeviceError),
+    /// The run.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// The analysis.
+    #[error(transparent)]
+    Analyse(#[from] AnalyseError),
+    /// A file or folder.
+    #[error("{path}: {doing}: {source}")]
+    File {
+        /// Which.
+        path: PathBuf,
+        /// What was being done.
+        doing: &'static str,
+        /// What the operating system said.
+        source: io::Error,
+    },
+    /// The work was done and its result is bad.
+    #[error("{0}")]
+    Bad(String),
+}
+
+impl From<DeviceError> for CliError {
+    /// An address that cannot be read is a wrong command line, not a device fault.
+    fn from(error: DeviceError) -> Self {
+        match error {
+            DeviceError::Address { .. } | DeviceError::NotBuilt { .. } => Self::Usage(error.to_string()),
+            other => Self::Device(other),
+        }
+    }
+}
+
+impl CliError {
+    /// The exit code.
+    pub fn code(&self) -> u8 {
+        match self {
+            Self::Usage(_) => 2,
+            _ => 1,
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! `info`: who a device is and how it is.
+
+use clap::Args;
+use serde_json::json;
+
+use super::error::CliError;
+use super::output;
+use crate::device::address::Address;
+use crate::device::session::Session;
+
+/// Show a device: handshake, channels, firmware version, counters.
+#[derive(Debug, Args)]
+pub struct Info {
+    /// Device address, e.g. sim:, serial:/dev/ttyACM0, tcp:127.0.0.1:4000.
+    #[arg(long, value_name = "ADDR")]
+    device: String,
+    /// One JSON document on stdout.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Info {
+    pub fn run(self) -> Result<(), CliError> {
+        let address: Address = self.device.parse()?;
+        let mut session = Session::open(address.open(0)?, &self.device)?;
+        let info = session.info()?;
+        let map = session.channels(&info)?;
+        let status = session.status()?;
+        let hello = *session.hello();
+        if self.json {
+            let channels: Vec<_> = (map.channels.iter().zip(0..))
+                .map(|(channel, place)| {
+                    json!({
+                        "name": channel.name,
+                        "role": format!("{:?}", channel.role),
+                        "unit": channel.quantity.unit(),
+                        "range": map.full_scale(place),
+                        "units_per_code": channel.units_per_code(),
+                        "delay_s": f64::from(channel.delay_ns) * 1e-9,
+                        "bits": channel.bits,
+                    })
+                })
+                .collect();
+            return output::json(&json!({
+                "name": info.board,
+                "address": self.device,
+                "serial": info.serial,
+                "firmware_version": info.version,
+                "target": info.target,
+                "build": format!("{:016x}", info.build),
+                "protocol": format!("{}.{}", hello.major, hello.minor),
+                "schema_hash": format!("{:016x}", hello.schema),
+                "scan_rate_hz": info.scan_rate_hz,
+                "ring_scans": info.ring_scans,
+                "coil_cap_us": info.coil_cap_us,
+                "stage": info.stage,
+                "channels": channels,
+                "hammer": format!("{:?}", status.hammer),
+                "interlock_closed": status.interlock_closed,
+                "emergency_stop": status.emergency_stop,
+                "streaming": status.streaming,
+                "counters": status.counters,
+            }));
+        }
+        let mut text = vec![
+            format!("{} (serial number {}) at {}", info.board, info.serial, self.device),
+            format!("  firmware {} for {}, build {:016x}", info.version, info.target, info.build),
+            format!("  protocol {}.{}, schema {:016x}", hello.major, hello.minor, hello.schema),
+            format!(
+                "  {} scans per second, {:.1} s of them can be sent again",
+                info.scan_rate_hz,
+                f64::from(info.ring_scans) / f64::from(info.scan_rate_hz.max(1))
+            ),
+            format!(
+                "  hammer: {:?}; interlock {}; emergency stop {}",
+                status.hammer,
+                if status.interlock_closed { "closed" } else { "OPEN" },
+                if status.emergency_stop { "LATCHED" } else { "released" },
+            ),
+            format!("  channels ({}):", map.len()),
+        ];
+        text.extend((map.channels.iter().zip(0..)).map(|(channel, place)| {
+            let range = map.full_scale(place).unwrap_or(0.0);
+            format!(
+                "    {place:>2} {:<16} ±{range:.4} {:<6} {:?}",
+                channel.name.as_str(),
+                channel.quantity.unit(),
+                channel.role
+            )
+        }));
+        let counters = status.counters;
+        text.push(format!(
+            "  counters: {} frames in, {} bad; scans produced {}, sent {}, resent {}, dropped {}, missed {}",
+            counters.frames_in,
+            counters.frames_bad,
+            counters.scans_produced,
+            counters.scans_sent,
+            counters.scans_resent,
+            counters.scans_dropped,
+            counters.scans_missed,
+        ));
+        output::lines(text)
+    }
+}

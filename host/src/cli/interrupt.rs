@@ -1,0 +1,21 @@
+//! Ctrl-C: the first one ends the work after the shot in hand, the second one ends the program.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A flag that Ctrl-C (or a polite kill) sets.
+pub fn flag() -> Arc<AtomicBool> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let raised = stop.clone();
+    let set = ctrlc::set_handler(move || {
+        if raised.swap(true, Ordering::Relaxed) {
+            // everything accepted is in the file already
+            std::process::exit(1);
+        }
+        eprintln!("\nstopping after the shot in hand; Ctrl-C again ends at once");
+    });
+    if let Err(error) = set {
+        log::warn!("Ctrl-C cannot be caught ({error}): it will end the program at once");
+    }
+    stop
+}

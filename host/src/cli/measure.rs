@@ -1,0 +1,49 @@
+//! Running a campaign from the command line: `campaign run` and `demo` share it.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use super::error::CliError;
+use crate::campaign::judge::ByRecord;
+use crate::campaign::runner::{self, Options, Summary};
+use crate::campaign::stage::Stage;
+use crate::campaign::store::Store;
+use crate::device::address::Address;
+use crate::device::session::Session;
+
+/// Runs what is left of the campaign in `store`. `again` is the command that resumes it.
+pub fn measure(
+    store: Store,
+    address: &Address,
+    seed: u64,
+    stage: Stage,
+    yes: bool,
+    stop: Arc<AtomicBool>,
+    again: &str,
+) -> Result<Summary, CliError> {
+    let path = store.path().to_owned();
+    let mut session = Session::open(address.open(seed)?, &address.to_string())?;
+    let options = Options { stage, yes, progress: true, stop };
+    let summary = runner::run(store, &mut session, &mut ByRecord, &options)?;
+    tell(&path, &summary, again);
+    Ok(summary)
+}
+
+fn tell(path: &Path, summary: &Summary, again: &str) {
+    let Summary { kept, wanted, hits, given_up, accounts, .. } = summary;
+    eprintln!("{}: {kept} of {wanted} good hits kept ({hits} struck in this run)", path.display());
+    if *given_up > 0 {
+        eprintln!("{given_up} cells were given up: `jointrig campaign status {}` says why", path.display());
+    }
+    if accounts.lost > 0 || accounts.unexplained() > 0 {
+        eprintln!(
+            "samples lost: {} reported by the device, {} unexplained",
+            accounts.lost,
+            accounts.unexplained()
+        );
+    }
+    if summary.interrupted {
+        eprintln!("stopped; `{again}` goes on from here");
+    }
+}

@@ -1,0 +1,30 @@
+//! Printing: one JSON document, or lines for people, on stdout; a closed pipe is no error.
+
+use std::io::{ErrorKind, Write};
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::error::CliError;
+
+/// Prints one JSON document and nothing else.
+pub fn json<T: Serialize>(value: &T) -> Result<(), CliError> {
+    let text = serde_json::to_string_pretty(value)
+        .map_err(|error| CliError::Bad(format!("the answer could not be written as JSON: {error}")))?;
+    lines([text])
+}
+
+/// Prints lines.
+pub fn lines(lines: impl IntoIterator<Item = String>) -> Result<(), CliError> {
+    let mut out = std::io::stdout().lock();
+    for line in lines {
+        match writeln!(out, "{line}") {
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(()),
+            Err(source) => {
+                return Err(CliError::File { path: PathBuf::from("stdout"), doing: "printing", source });
+            }
+            Ok(()) => {}
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,269 @@
+//! Vector drawings as SVG text, made to stand inside one html page.
+
+use std::fmt::Write;
+
+/// How a line looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stroke {
+    /// Colour, as css writes it.
+    pub colour: &'static str,
+    /// Width, px.
+    pub width: f64,
+    /// Dash pattern, empty for a full line.
+    pub dash: &'static str,
+}
+
+impl Stroke {
+    /// A full line.
+    pub const fn new(colour: &'static str, width: f64) -> Self {
+        Stroke { colour, width, dash: "" }
+    }
+
+    /// The same, dashed.
+    #[must_use]
+    pub const fn dashed(self, dash: &'static str) -> Self {
+        Stroke { dash, ..self }
+    }
+}
+
+/// Where a text hangs on its point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Anchor {
+    /// The point is at its left end.
+    Start,
+    /// The point is in its middle.
+    Middle,
+    /// The point is at its right end.
+    End,
+}
+
+/// A rectangle, px.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Area {
+    /// Left edge.
+    pub left: f64,
+    /// Upper edge.
+    pub top: f64,
+    /// Width.
+    pub width: f64,
+    /// Height.
+    pub height: f64,
+}
+
+impl Area {
+    /// Right edge.
+    pub fn right(&self) -> f64 {
+        self.left + self.width
+    }
+
+    /// Lower edge.
+    pub fn bottom(&self) -> f64 {
+        self.top + self.height
+    }
+}
+
+/// A drawing under way.
+#[derive(Debug)]
+pub struct Drawing {
+    name: &'static str,
+    width: f64,
+    height: f64,
+    clips: usize,
+    body: String,
+}
+
+impl Drawing {
+    /// An empty drawing; `name` keeps its ids apart from those of the page's other drawings.
+    pub fn new(name: &'static str, width: f64, height: f64) -> Self {
+        Drawing { name, width, height, clips: 0, body: String::new() }
+    }
+
+    /// A straight line.
+    pub fn line(&mut self, from: [f64; 2], to: [f64; 2], stroke: Stroke) {
+        let path = format!("M{} {}L{} {}", px(from[0]), px(from[1]), px(to[0]), px(to[1]));
+        self.path(&path, stroke);
+    }
+
+    /// A curve through points in pixels; `None` breaks it. Many points in one pixel column are reduced to
+    /// the first, the lowest, the highest and the last, which looks the same.
+    pub fn curve(&mut self, points: &[Option<[f64; 2]>], stroke: Stroke) {
+        let path = path_of(points);
+        if !path.is_empty() {
+            self.path(&path, stroke);
+        }
+    }
+
+    fn path(&mut self, path: &str, stroke: Stroke) {
+        let dash = if stroke.dash.is_empty() {
+            String::new()
+        } else {
+            format!(" stroke-dasharray=\"{}\"", stroke.dash)
+        };
+        self.push(format_args!(
+            "<path d=\"{path}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"{dash}/>",
+            stroke.colour,
+            px(stroke.width)
+        ));
+    }
+
+    /// A filled rectangle.
+    pub fn fill(&mut self, area: Area, colour: &str, opacity: f64) {
+        self.push(format_args!(
+            "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"{colour}\" fill-opacity=\"{opacity}\"/>",
+            px(area.left),
+            px(area.top),
+            px(area.width.max(0.0)),
+            px(area.height.max(0.0))
+        ));
+    }
+
+    /// A dot; hollow when `hollow`.
+    pub fn dot(&mut self, at: [f64; 2], radius: f64, colour: &str, hollow: bool) {
+        let fill = if hollow { "#fff" } else { colour };
+        self.push(format_args!(
+            "<circle cx=\"{}\" cy=\"{}\" r=\"{}\" fill=\"{fill}\" stroke=\"{colour}\" stroke-width=\"1.4\"/>",
+            px(at[0]),
+            px(at[1]),
+            px(radius)
+        ));
+    }
+
+    /// A text; `class` chooses its size and colour in the page's style sheet.
+    pub fn text(&mut self, at: [f64; 2], anchor: Anchor, class: &str, text: &str) {
+        let anchor = match anchor {
+            Anchor::Start => "start",
+            Anchor::Middle => "middle",
+            Anchor::End => "end",
+        };
+        self.push(format_args!(
+            "<text x=\"{}\" y=\"{}\" text-anchor=\"{anchor}\" class=\"{class}\">{}</text>",
+            px(at[0]),
+            px(at[1]),
+            escape(text)
+        ));
+    }
+
+    /// A text that reads upwards.
+    pub fn text_upwards(&mut self, at: [f64; 2], class: &str, text: &str) {
+        self.push(format_args!(
+            "<text transform=\"translate({} {}) rotate(-90)\" text-anchor=\"middle\" class=\"{class}\">{}</text>",
+            px(at[0]),
+            px(at[1]),
+            escape(text)
+        ));
+    }
+
+    /// Draws what `inside` draws, cut off at the edges of `area`.
+    pub fn clipped(&mut self, area: Area, inside: impl FnOnce(&mut Drawing)) {
+        self.clips += 1;
+        let id = format!("{}-{}", self.name, self.clips);
+        self.push(format_args!(
+            "<clipPath id=\"{id}\"><rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/></clipPath><g clip-path=\"url(#{id})\">",
+            px(area.left),
+            px(area.top),
+            px(area.width),
+            px(area.height)
+        ));
+        inside(self);
+        self.body.push_str("</g>");
+    }
+
+    /// The finished drawing; `meaning` is read to those who cannot see it.
+    pub fn finish(self, meaning: &str) -> String {
+        format!(
+            "<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">{}</svg>",
+            px(self.width),
+            px(self.height),
+            escape(meaning),
+            self.body
+        )
+    }
+
+    fn push(&mut self, arguments: std::fmt::Arguments<'_>) {
+        self.body.write_fmt(arguments).expect("writing into a String cannot fail");
+    }
+}
+
+fn path_of(points: &[Option<[f64; 2]>]) -> String {
+    let mut path = String::new();
+    for run in points.split(Option::is_none) {
+        let run: Vec<[f64; 2]> = run.iter().copied().flatten().collect();
+        for (i, p) in thinned(&run).into_iter().enumerate() {
+            path.push(if i == 0 { 'M' } else { 'L' });
+            path.push_str(&px(p[0]));
+            path.push(' ');
+            path.push_str(&px(p[1]));
+        }
+    }
+    path
+}
+
+/// Per pixel column, in the order they come: first, lowest, highest, last.
+fn thinned(run: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let mut kept = Vec::new();
+    for column in run.chunk_by(|a, b| a[0].floor() == b[0].floor()) {
+        if column.len() <= 4 {
+            kept.extend_from_slice(column);
+            continue;
+        }
+        let by_height = |a: &usize, b: &usize| column[*a][1].total_cmp(&column[*b][1]);
+        let mut indices = vec![0, column.len() - 1];
+        indices.extend((0..column.len()).min_by(by_height));
+        indices.extend((0..column.len()).max_by(by_height));
+        indices.sort_unstable();
+        indices.dedup();
+        kept.extend(indices.into_iter().map(|i| column[i]));
+    }
+    kept
+}
+
+/// Pixels to a tenth; far-away values are held where every browser can draw them.
+fn px(value: f64) -> String {
+    let value = if value.is_finite() { value.clamp(-20_000.0, 20_000.0) } else { 0.0 };
+    let text = format!("{value:.1}");
+    text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
+}
+
+/// Text made safe inside html and svg.
+pub fn escape(text: &str) -> String {
+    let mut safe = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => safe.push_str("&amp;"),
+            '<' => safe.push_str("&lt;"),
+            '>' => safe.push_str("&gt;"),
+            '"' => safe.push_str("&quot;"),
+            '\'' => safe.push_str("&#39;"),
+            c => safe.push(c),
+        }
+    }
+    safe
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thousands_of_points_in_a_column_become_four() {
+        let run: Vec<[f64; 2]> =
+            (0..4000).map(|i| [f64::from(i) / 1000.0, f64::from(i * 37 % 101)]).collect();
+        let kept = thinned(&run);
+        assert!(kept.len() <= 16, "{}", kept.len());
+        assert!(kept.iter().any(|p| p[1] == 100.0) && kept.iter().any(|p| p[1] == 0.0));
+    }
+
+    #[test]
+    fn gaps_break_the_curve_and_nothing_is_not_a_number() {
+        let path = path_of(&[Some([0.0, 1.0]), None, Some([2.0, f64::INFINITY]), Some([3.0, f64::NAN])]);
+        assert_eq!(path.matches('M').count(), 2);
+        assert!(!path.contains("NaN") && !path.contains("inf"), "{path}");
+    }
+
+    #[test]
+    fn texts_cannot_break_the_page() {
+        let mut drawing = Drawing::new("x", 10.0, 10.0);
+        drawing.text([0.0, 0.0], Anchor::Start, "tick", "<script>\"&'");
+        assert!(drawing.finish("a<b").contains("&lt;script&gt;&quot;&amp;&#39;"));
+    }
+}

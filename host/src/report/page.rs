@@ -1,0 +1,149 @@
+//! The page: headline, figures and tables in one html text without anything from outside.
+
+use super::drawing::escape;
+use super::{figures, tables};
+use crate::results::{Results, words};
+use std::fmt::Write;
+
+const STYLE: &str = include_str!("style.css");
+
+/// The whole report as html.
+pub fn page(results: &Results) -> String {
+    let mut html = format!(
+        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\
+         <title>Contact stiffness: {file}</title><style>{STYLE}</style></head><body><main>\
+         <h1>Contact stiffness of the joint</h1><p class=\"sub\">{file}, computed by {name} {version}</p>",
+        file = escape(&results.source.file),
+        name = escape(&results.source.software.name),
+        version = escape(&results.source.software.version),
+    );
+    headline(&mut html, results);
+    section(
+        &mut html,
+        "What each measurement sees",
+        &[
+            figure(
+                figures::comparison(results),
+                "FBS takes the motion of the arms and moves it to the contact, so everything between arm and contact counts as part of the \
+                 joint. The loops take the relative motion at the specimens. FBS: main band 300–600 Hz, scatter over lines; loops: scatter over cycles.",
+            ),
+            tables::checks(results),
+        ],
+    );
+    section(
+        &mut html,
+        "Joint by substructuring",
+        &[
+            figure(
+                figures::joint_spectrum(results),
+                "Real part of the joint's dynamic stiffness along the sliding direction. The main band is shaded, with the mean of each set of interface \
+                 deformation modes (IDMs); values beyond the frame are cut.",
+            ),
+            tables::joint(results),
+            refusals(results),
+        ],
+    );
+    section(
+        &mut html,
+        "Contact by loops",
+        &[
+            figure(
+                figures::contact_loop(results),
+                "One impact in the assembly: the specimens' displacements (integrated velocity) and the sum of the load cells T. The slope of the first cycle is the \
+                 contact's stiffness as seen between the two laser spots.",
+            ),
+            figure(figures::impacts(results), "Every hit that counts: along z on A or on the moving mass."),
+            tables::hysteresis(results),
+            figure(
+                figures::specimens(results),
+                "Specimens A and B in the assembly. A peak or a phase step that only one of them has is a resonance of its clamp; loops near it are ellipses.",
+            ),
+        ],
+    );
+    section(
+        &mut html,
+        "Frequency response functions",
+        &[figure(
+            figures::receptances(results),
+            "Receptance by H1, its phase and coherence, at a driving point and across. The main band is shaded yellow; grey, where the hammer's force is \
+             more than 6 dB down.",
+        )],
+    );
+    section(&mut html, "What was measured", &[tables::completeness(results), missing(results)]);
+    section(&mut html, "Where it comes from", &[Some(tables::provenance(results))]);
+    html.push_str("</main></body></html>\n");
+    html
+}
+
+fn headline(html: &mut String, results: &Results) {
+    let found: Vec<String> =
+        [words::substructuring(results), words::impact_loops(results)].into_iter().flatten().collect();
+    if found.is_empty() {
+        put(
+            html,
+            format_args!(
+                "<div class=\"found warn\"><p>No stiffness could be found from this file.</p></div>"
+            ),
+        );
+    } else {
+        paragraphs(html, "found", found.iter().map(String::as_str));
+    }
+    let failed: Vec<&str> =
+        results.checks.iter().filter(|c| c.ok == Some(false)).map(|c| c.meaning.as_str()).collect();
+    if !failed.is_empty() {
+        paragraphs(html, "found warn", failed);
+    }
+}
+
+fn paragraphs<'a>(html: &mut String, class: &str, lines: impl IntoIterator<Item = &'a str>) {
+    put(html, format_args!("<div class=\"{class}\">"));
+    for line in lines {
+        put(html, format_args!("<p>{}</p>", escape(line)));
+    }
+    html.push_str("</div>");
+}
+
+fn section(html: &mut String, title: &str, parts: &[Option<String>]) {
+    if parts.iter().all(Option::is_none) {
+        return;
+    }
+    put(html, format_args!("<h2>{}</h2>", escape(title)));
+    for part in parts.iter().flatten() {
+        html.push_str(part);
+    }
+}
+
+fn figure(svg: Option<String>, caption: &str) -> Option<String> {
+    svg.map(|svg| format!("<figure>{svg}<figcaption>{}</figcaption></figure>", escape(caption)))
+}
+
+fn refusals(results: &Results) -> Option<String> {
+    if results.refused.is_empty() {
+        return None;
+    }
+    let mut html = String::from("<p>Not applicable to this data:</p><ul class=\"notes\">");
+    for r in &results.refused {
+        put(
+            &mut html,
+            format_args!("<li><b>{}, {} IDMs</b>: {}</li>", escape(&r.method), r.idms, escape(&r.reason)),
+        );
+    }
+    html.push_str("</ul>");
+    Some(html)
+}
+
+fn missing(results: &Results) -> Option<String> {
+    if results.missing.is_empty() {
+        return None;
+    }
+    let mut html = String::from("<p>Missing:</p><ul class=\"notes\">");
+    for line in &results.missing {
+        put(&mut html, format_args!("<li>{}</li>", escape(line)));
+    }
+    html.push_str("</ul>");
+    Some(html)
+}
+
+fn put(html: &mut String, arguments: std::fmt::Arguments<'_>) {
+    html.write_fmt(arguments).expect("writing into a String cannot fail");
+}

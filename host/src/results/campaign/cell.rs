@@ -1,0 +1,92 @@
+//! What the analysis asks of a campaign: its geometry, its cells, and the kept hits of one cell in SI units.
+
+use crate::spectra::MotionQuantity;
+use crate::substructuring::geometry::Geometry;
+
+/// One impact position with one response location.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CellName {
+    /// Configuration: `A`, `B` or `AJB`.
+    pub configuration: String,
+    /// The impact's name.
+    pub impact: String,
+    /// The response location's name.
+    pub response: String,
+}
+
+/// The kept hits of a cell. Signals are as they were recorded: delays are told, not corrected.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Cell {
+    /// Sampling rate, Hz.
+    pub fs_hz: f64,
+    /// Kept hits.
+    pub hits: Vec<Hit>,
+    /// How late the scanning vibrometer's axes x, y, z are against the hammer's force, s.
+    pub response_delay_s: [f64; 3],
+    /// How late the contact's signals are against the hammer's force, s.
+    pub contact_delay_s: ContactDelays,
+}
+
+/// How late the signals at the contact are against the hammer's force, s.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ContactDelays {
+    /// Vibrometer on specimen A.
+    pub specimen_a: f64,
+    /// Vibrometer on specimen B.
+    pub specimen_b: f64,
+    /// Load cells.
+    pub load_cells: f64,
+}
+
+/// One kept hit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hit {
+    /// The record's id in the campaign file.
+    pub record: i64,
+    /// Hammer force, N.
+    pub force_n: Vec<f64>,
+    /// Scanning vibrometer along x, y, z at the response location, SI.
+    pub response: [Vec<f64>; 3],
+    /// The signals at the contact, where the rig has them.
+    pub contact: Option<ContactSignals>,
+}
+
+/// The signals at the contact during one hit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ContactSignals {
+    /// Velocity of specimen A along z, m/s.
+    pub specimen_a_m_per_s: Vec<f64>,
+    /// Velocity of specimen B along z, m/s.
+    pub specimen_b_m_per_s: Vec<f64>,
+    /// Sum of the load cells, N.
+    pub tangential_n: Vec<f64>,
+}
+
+/// A campaign as the analysis sees it. Cells are read one at a time, from several threads.
+pub trait Measurements: Sync {
+    /// Why a cell cannot be read.
+    type Error: std::error::Error + Send + Sync + 'static;
+
+    /// Where everything is.
+    fn geometry(&self) -> &Geometry;
+
+    /// Damping of the exponential window that the plan asks for, 1/s.
+    fn sigma_per_s(&self) -> f64;
+
+    /// What the scanning vibrometer measures.
+    fn quantity(&self) -> MotionQuantity;
+
+    /// The plan's cells.
+    fn cells(&self) -> Vec<CellName>;
+
+    /// Cells that were given up, with the reason.
+    fn given_up(&self) -> Vec<(CellName, String)> {
+        Vec::new()
+    }
+
+    /// The kept hits of a cell; none if it was not measured.
+    ///
+    /// # Errors
+    /// The file cannot be read, or a record is damaged.
+    fn read(&self, cell: &CellName) -> Result<Cell, Self::Error>;
+}

@@ -1,0 +1,178 @@
+//! The contact seen from the specimens, in frequency: Δx per newton of T, and the FRFs of both specimens.
+
+use super::averages::ContactAverage;
+use crate::results::{FrfCurve, Role, rounded};
+use num_complex::Complex;
+use std::f64::consts::TAU;
+
+/// Where a resonance of a specimen is looked for, Hz: below, the loops are quasi-static; above, Δx drowns in noise.
+const SEARCH_HZ: [f64; 2] = [100.0, 400.0];
+/// Lines averaged before a peak is looked for: 1.5 Hz at half-hertz lines, well inside a resonance at 192 Hz.
+const SMOOTH: usize = 3;
+
+/// D(s) = Δx / T over frequency, from the hits along z on A and on the moving mass.
+///
+/// T and Δx are both noisy, so neither may stand in the denominator as an auto-spectrum: the hammer's force is
+/// the instrument, D = Σ S_ΔF S_TF* / Σ |S_TF|² over the impacts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ContactCompliance {
+    frequency_hz: Vec<f64>,
+    compliance_m_per_n: Vec<Complex<f64>>,
+}
+
+/// Where the imaginary part of Δx/T is largest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImaginaryPeak {
+    /// Where, Hz.
+    pub frequency_hz: f64,
+    /// |Im D| there over the level of |Re D|.
+    pub over_level: f64,
+    /// |Im D| there over the median of |Im D|.
+    pub over_median: f64,
+}
+
+impl ImaginaryPeak {
+    /// Whether this is a resonance beyond doubt.
+    pub fn stands_out(&self) -> bool {
+        self.over_level > 0.5 && self.over_median > 5.0
+    }
+}
+
+impl ContactCompliance {
+    /// From the averages of each impact; none without impacts.
+    pub fn of(frequency_hz: &[f64], sigma_per_s: f64, impacts: &[&ContactAverage]) -> Option<Self> {
+        if impacts.is_empty() {
+            return None;
+        }
+        let compliance_m_per_n = frequency_hz
+            .iter()
+            .enumerate()
+            .map(|(l, f)| {
+                let s = Complex::new(sigma_per_s, TAU * f);
+                let (mut numerator, mut denominator) = (Complex::default(), 0.0);
+                for impact in impacts {
+                    // per unit of force, so that a position hit more often does not count more
+                    let scale = 1.0 / impact.force[l];
+                    let relative = (impact.cross[0][l] - impact.cross[1][l]) * scale / s;
+                    let tangential = impact.cross[2][l] * scale;
+                    numerator += relative * tangential.conj();
+                    denominator += tangential.norm_sqr();
+                }
+                numerator / denominator
+            })
+            .collect();
+        Some(ContactCompliance { frequency_hz: frequency_hz.to_vec(), compliance_m_per_n })
+    }
+
+    /// The largest imaginary part between 100 and 400 Hz, averaged over three lines.
+    pub fn imaginary_peak(&self) -> Option<ImaginaryPeak> {
+        let inside = |f: f64| (SEARCH_HZ[0]..=SEARCH_HZ[1]).contains(&f);
+        let smooth: Vec<(f64, Complex<f64>)> = self
+            .compliance_m_per_n
+            .windows(SMOOTH)
+            .zip(self.frequency_hz.windows(SMOOTH))
+            .map(|(d, f)| (f[SMOOTH / 2], d.iter().sum::<Complex<f64>>() / SMOOTH as f64))
+            .filter(|(f, d)| inside(*f) && d.re.is_finite() && d.im.is_finite())
+            .collect();
+        if smooth.len() < 30 {
+            return None;
+        }
+        let level = median(smooth.iter().map(|(_, d)| d.re.abs()).collect());
+        let usual = median(smooth.iter().map(|(_, d)| d.im.abs()).collect());
+        let (frequency_hz, top) =
+            smooth.iter().map(|(f, d)| (*f, d.im.abs())).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some(ImaginaryPeak { frequency_hz, over_level: top / level, over_median: top / usual })
+    }
+}
+
+/// The middle of a list that is not empty.
+fn median(mut values: Vec<f64>) -> f64 {
+    let at = values.len() / 2;
+    *values.select_nth_unstable_by(at, f64::total_cmp).1
+}
+
+/// The two specimens' receptances from one impact, for the report; hit and response count positive along +z, so
+/// `sign` is −1 for a hit towards −z.
+pub fn specimen_curves(
+    impact: &str,
+    sign: f64,
+    frequency_hz: &[f64],
+    sigma_per_s: f64,
+    average: &ContactAverage,
+) -> [FrfCurve; 2] {
+    let step_hz = if frequency_hz.len() > 1 { frequency_hz[1] - frequency_hz[0] } else { 0.0 };
+    [(Role::SpecimenA, "x_A", 0), (Role::SpecimenB, "x_B", 1)].map(|(role, output, i)| {
+        let receptance = frequency_hz
+            .iter()
+            .enumerate()
+            .map(|(l, f)| sign * average.cross[i][l] / average.force[l] / Complex::new(sigma_per_s, TAU * f));
+        let (magnitude_m_per_n, phase_deg) =
+            receptance.map(|y| (rounded(y.norm(), 5), rounded(y.arg().to_degrees(), 5))).unzip();
+        let coherence = if average.hits > 1 {
+            (0..frequency_hz.len())
+                .map(|l| average.cross[i][l].norm_sqr() / (average.force[l] * average.auto[i][l]))
+                .map(|c| rounded(if c.is_finite() { c } else { 0.0 }, 5))
+                .collect()
+        } else {
+            Vec::new()
+        };
+        FrfCurve {
+            configuration: "AJB".into(),
+            role,
+            output: output.into(),
+            input: impact.into(),
+            hits: average.hits,
+            first_hz: frequency_hz.first().copied().unwrap_or(0.0),
+            step_hz,
+            magnitude_m_per_n,
+            phase_deg,
+            coherence,
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIGMA: f64 = 2.3;
+
+    /// A contact of 180 N/µm with a resonance of strength `a` at 192 Hz between A and B, seen from one impact.
+    fn seen(a: f64) -> (Vec<f64>, ContactAverage) {
+        let frequency_hz: Vec<f64> = (0..1981).map(|l| 10.0 + 0.5 * f64::from(l)).collect();
+        let lines = frequency_hz.len();
+        let s = |l: usize| Complex::new(SIGMA, TAU * frequency_hz[l]);
+        let w = TAU * 192.0;
+        let tangential: Vec<Complex<f64>> = (0..lines).map(|l| Complex::new(1.0, 0.2 * l as f64)).collect();
+        let relative = |l: usize| {
+            let d = 1.0 / 180e6 * (1.0 + a * w * w / (s(l) * s(l) + 0.02 * w * s(l) + w * w));
+            d * tangential[l] * s(l)
+        };
+        let b: Vec<Complex<f64>> = (0..lines).map(|l| tangential[l] * 1e-8 * s(l)).collect();
+        let average = ContactAverage {
+            hits: 1,
+            force: vec![1.0; lines],
+            cross: [(0..lines).map(|l| b[l] + relative(l)).collect(), b, tangential],
+            auto: [vec![1.0; lines], vec![1.0; lines], vec![1.0; lines]],
+        };
+        (frequency_hz, average)
+    }
+
+    #[test]
+    fn a_resonance_of_one_specimen_is_found_where_it_is() {
+        let (f, average) = seen(0.05);
+        let peak =
+            ContactCompliance::of(&f, SIGMA, &[&average]).and_then(|c| c.imaginary_peak()).expect("lines");
+        assert!((peak.frequency_hz - 192.0).abs() < 1.5, "{peak:?}");
+        assert!(peak.stands_out(), "{peak:?}");
+    }
+
+    #[test]
+    fn without_one_nothing_stands_out() {
+        let (f, average) = seen(0.0);
+        let peak =
+            ContactCompliance::of(&f, SIGMA, &[&average]).and_then(|c| c.imaginary_peak()).expect("lines");
+        assert!(!peak.stands_out() && peak.over_level < 0.01, "{peak:?}");
+        assert_eq!(ContactCompliance::of(&f, SIGMA, &[]), None);
+    }
+}

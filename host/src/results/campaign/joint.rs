@@ -1,0 +1,63 @@
+//! The identified joint in the shape of the results.
+
+use crate::results::{Joint, JointSpectrum, Refusal, SpectrumCurve, rounded};
+use crate::substructuring::identify::Identification;
+use crate::substructuring::idm::Dof;
+use crate::substructuring::joint::{BandStatistic, JointRow};
+use std::collections::BTreeMap;
+
+impl From<&JointRow> for Joint {
+    fn from(row: &JointRow) -> Self {
+        let split = |all: &BTreeMap<Dof, BandStatistic>, rotations: bool| {
+            all.iter()
+                .filter(|(dof, s)| dof.is_rotation() == rotations && s.mean.is_finite() && s.std.is_finite())
+                .map(|(dof, s)| (dof.name().to_owned(), *s))
+                .collect::<BTreeMap<String, BandStatistic>>()
+        };
+        Joint {
+            method: row.method.clone(),
+            idms: row.idms,
+            band_hz: row.band_hz.into(),
+            stiffness_n_per_m: split(&row.stiffness_n_per_m, false),
+            damping_n_s_per_m: split(&row.damping_n_s_per_m, false),
+            stiffness_n_m_per_rad: split(&row.stiffness_n_per_m, true),
+            damping_n_m_s_per_rad: split(&row.damping_n_s_per_m, true),
+            lines: row.lines,
+            warnings: row.warnings.clone(),
+        }
+    }
+}
+
+/// Rows, spectra (translations only: they are what the figures show) and refusals.
+pub fn shaped(found: &Identification) -> (Vec<Joint>, Option<JointSpectrum>, Vec<Refusal>) {
+    let joint = found.joint.iter().map(Joint::from).collect();
+    let refused = found
+        .refused
+        .iter()
+        .map(|r| Refusal { method: r.method.name().into(), idms: r.idms, reason: r.reason.clone() })
+        .collect();
+    let spectrum = found.spectra.first().map(|first| JointSpectrum {
+        frequency_hz: first.frequency_hz.clone(),
+        curves: found
+            .spectra
+            .iter()
+            .flat_map(|s| {
+                let curve = |dof: &Dof| SpectrumCurve {
+                    method: s.method.clone(),
+                    idms: s.idms,
+                    dof: dof.name().into(),
+                    stiffness_n_per_m: column(s.stiffness_n_per_m.get(dof)),
+                    damping_n_s_per_m: column(s.damping_n_s_per_m.get(dof)),
+                };
+                let translations: Vec<&Dof> =
+                    s.stiffness_n_per_m.keys().filter(|dof| !dof.is_rotation()).collect();
+                translations.into_iter().map(curve).collect::<Vec<_>>()
+            })
+            .collect(),
+    });
+    (joint, spectrum, refused)
+}
+
+fn column(values: Option<&Vec<f64>>) -> Vec<Option<f64>> {
+    values.map_or_else(Vec::new, |v| v.iter().map(|v| v.is_finite().then(|| rounded(*v, 6))).collect())
+}

@@ -1,0 +1,200 @@
+//! The loops of the impacts: each counting hit's first cycle, and all of them together.
+
+use super::cell::{ContactDelays, ContactSignals};
+use crate::hysteresis::integration::open_record;
+use crate::hysteresis::{
+    HysteresisError, HysteresisRecord, Kind, OverCycles, RelativeMotion, Shape, analyse,
+};
+use crate::results::{Force, Hysteresis, ImpactSlope, LoopCurve, ranges, rounded};
+
+/// What one hit's first cycle says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImpactLoop {
+    /// The record.
+    pub record: i64,
+    /// The impact's name.
+    pub impact: String,
+    /// Least-squares slope of T on Δx over the first cycle, N/m.
+    pub slope_n_per_m: f64,
+    /// How much of T that line explains, 0…1.
+    pub r_squared: f64,
+    /// Half the swing of Δx, m.
+    pub amplitude_m: f64,
+    /// Frequency of the decay's main mode, Hz.
+    pub frequency_hz: f64,
+    /// Phase by which Δx lags T, degrees.
+    pub phase_deg: f64,
+    /// The shape.
+    pub shape: Shape,
+    /// Samples of the first cycle.
+    pub cycle: [usize; 2],
+}
+
+/// Analyses one hit.
+///
+/// # Errors
+/// The signals hold no whole cycle, or are no numbers.
+pub fn of_hit(
+    record: i64,
+    impact: &str,
+    fs_hz: f64,
+    contact: &ContactSignals,
+    delays: ContactDelays,
+) -> Result<ImpactLoop, HysteresisError> {
+    let [a, b, force_n] = in_step(contact, delays, fs_hz);
+    let found = analyse(&HysteresisRecord {
+        fs_hz,
+        motion: RelativeMotion::Velocity { a_m_per_s: a, b_m_per_s: b },
+        force_n,
+        excitation_hz: None,
+        normal_load_n: None,
+    })?;
+    let first = found.decay_cycles.first().ok_or(HysteresisError::NoMotion)?;
+    Ok(ImpactLoop {
+        record,
+        impact: impact.into(),
+        slope_n_per_m: first.stiffness_n_per_m,
+        r_squared: first.r_squared,
+        amplitude_m: first.amplitude_m,
+        frequency_hz: found.frequency_hz,
+        phase_deg: found.phase_deg,
+        shape: found.shape,
+        cycle: [first.first_sample, first.end_sample],
+    })
+}
+
+/// v_A, v_B and T with their delays against each other taken out.
+fn in_step(contact: &ContactSignals, delays: ContactDelays, fs_hz: f64) -> [Vec<f64>; 3] {
+    let least = delays.specimen_a.min(delays.specimen_b).min(delays.load_cells);
+    let advanced = |signal: &[f64], delay: f64| advance(signal, (delay - least) * fs_hz);
+    [
+        advanced(&contact.specimen_a_m_per_s, delays.specimen_a),
+        advanced(&contact.specimen_b_m_per_s, delays.specimen_b),
+        advanced(&contact.tangential_n, delays.load_cells),
+    ]
+}
+
+/// The signal `samples` earlier (not negative), by straight lines between samples: the loops live far below the
+/// sampling rate. The last value is held.
+fn advance(signal: &[f64], samples: f64) -> Vec<f64> {
+    if samples <= 0.0 || signal.is_empty() {
+        return signal.to_vec();
+    }
+    let (whole, share) = (samples.floor() as usize, samples.fract());
+    let at = |i: usize| signal[i.min(signal.len() - 1)];
+    (0..signal.len()).map(|i| at(i + whole) * (1.0 - share) + at(i + whole + 1) * share).collect()
+}
+
+/// All first cycles together, in the shape of the results; `None` without any.
+pub fn gathered(loops: &[ImpactLoop]) -> Option<Hysteresis> {
+    let over = |value: fn(&ImpactLoop) -> f64| {
+        OverCycles::of(&loops.iter().map(value).filter(|v| v.is_finite()).collect::<Vec<_>>())
+    };
+    let mean = |value: fn(&ImpactLoop) -> f64| over(value).map(|v| v.mean);
+    let slope = over(|l| l.slope_n_per_m)?;
+    let shape = most_common(loops)?;
+    let mut warnings = vec![
+        "Slope over the first cycle of a decay: every mode that the hit excites is in it, also the specimen's tilt on its clamp.".to_owned(),
+    ];
+    let open = loops.iter().filter(|l| l.r_squared < 0.9).count();
+    if open > 0 {
+        warnings.push(format!(
+            "In {open} of {} first cycles a straight line explains less than 90 % of T: local modes open those loops.",
+            loops.len()
+        ));
+    }
+    if slope.mean < 0.0 {
+        warnings.push("A negative slope: the polarity of a vibrometer or of the load cells is wrong.".into());
+    }
+    Some(Hysteresis {
+        force: Force::Raw,
+        kind: Kind::Impact,
+        frequency_hz: mean(|l| l.frequency_hz),
+        amplitude_m: mean(|l| l.amplitude_m),
+        shape,
+        k_t_n_per_m: (shape == Shape::Stuck).then_some(slope),
+        k_eq_n_per_m: Some(slope),
+        // the first cycle of a decay is not closed
+        energy_j: None,
+        friction_coefficient: None,
+        phase_deg: mean(|l| l.phase_deg),
+        records: ranges(loops.iter().map(|l| l.record)),
+        warnings,
+    })
+}
+
+fn most_common(loops: &[ImpactLoop]) -> Option<Shape> {
+    [Shape::Stuck, Shape::Elliptical, Shape::Microslip, Shape::GrossSlip]
+        .into_iter()
+        .rev()
+        .max_by_key(|shape| loops.iter().filter(|l| l.shape == *shape).count())
+        .filter(|_| !loops.is_empty())
+}
+
+/// The slopes one by one.
+pub fn slopes(loops: &[ImpactLoop]) -> Vec<ImpactSlope> {
+    loops
+        .iter()
+        .filter(|l| l.slope_n_per_m.is_finite())
+        .map(|l| ImpactSlope {
+            record: l.record,
+            impact: l.impact.clone(),
+            k_t_n_per_m: rounded(l.slope_n_per_m, 6),
+        })
+        .collect()
+}
+
+/// The loop to show: the one whose slope is the middle of all.
+pub fn middle(loops: &[ImpactLoop]) -> Option<&ImpactLoop> {
+    let mut sorted: Vec<&ImpactLoop> = loops.iter().filter(|l| l.slope_n_per_m.is_finite()).collect();
+    sorted.sort_by(|a, b| a.slope_n_per_m.total_cmp(&b.slope_n_per_m));
+    sorted.get(sorted.len() / 2).copied()
+}
+
+/// Its signals from shortly before the first cycle to four cycles on.
+pub fn drawn(shown: &ImpactLoop, fs_hz: f64, contact: &ContactSignals, delays: ContactDelays) -> LoopCurve {
+    let [a, b, force_n] = in_step(contact, delays, fs_hz);
+    let [start, end] = shown.cycle;
+    let lead = (end - start) / 10;
+    let from = start.saturating_sub(lead);
+    let to = (start + 4 * (end - start)).min(force_n.len());
+    let offset = |v: &[f64]| {
+        v[..start.max(1).min(v.len())].iter().sum::<f64>() / start.max(1).min(v.len()).max(1) as f64
+    };
+    let displacement = |v: &[f64]| -> Vec<f64> { open_record(&v[from..to], offset(v), 1.0 / fs_hz) };
+    let (x_a, x_b) = (displacement(&a), displacement(&b));
+    let rest = offset(&force_n);
+    let short = |values: Vec<f64>| values.into_iter().map(|v| rounded(v, 5)).collect::<Vec<_>>();
+    LoopCurve {
+        record: shown.record,
+        impact: shown.impact.clone(),
+        step_s: 1.0 / fs_hz,
+        displacement_m: short(x_a.iter().zip(&x_b).map(|(a, b)| a - b).collect()),
+        displacement_a_m: short(x_a),
+        displacement_b_m: short(x_b),
+        force_n: short(force_n[from..to].iter().map(|f| f - rest).collect()),
+        cycle: [start - from, end - from],
+        slope_n_per_m: shown.slope_n_per_m,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn signals_are_advanced_by_their_delay() {
+        let ramp: Vec<f64> = (0..10).map(f64::from).collect();
+        assert_eq!(advance(&ramp, 0.0), ramp);
+        let early = advance(&ramp, 1.5);
+        assert_eq!(early[..3], [1.5, 2.5, 3.5]);
+        assert_eq!(early.len(), 10);
+        assert!(advance(&[], 3.0).is_empty());
+    }
+
+    #[test]
+    fn nothing_gives_nothing() {
+        assert_eq!(gathered(&[]), None);
+        assert_eq!(middle(&[]), None);
+    }
+}

@@ -1,0 +1,275 @@
+//! A whole small campaign made up from a known joint: two masses on springs, coupled, hit and measured.
+
+use super::*;
+use crate::spectra::MotionQuantity;
+use crate::substructuring::geometry::Point;
+use std::collections::BTreeSet;
+
+const FS_HZ: f64 = 20_480.0;
+const SAMPLES: usize = 40_960;
+const SIGMA: f64 = 2.3;
+
+/// Contact stiffness in z, N/m.
+const CONTACT: f64 = 180e6;
+
+/// A rig of rigid bodies guided along z: A (mass m_a on k_a), B (m_b on k_b); every point of a body moves alike in z.
+struct Rig {
+    geometry: Geometry,
+    /// Cells that were not measured.
+    absent: BTreeSet<(String, String, String)>,
+    /// One newton on A alone, on B alone, on A and on B in the assembly.
+    units: [Unit; 4],
+}
+
+struct Unit {
+    force: Vec<f64>,
+    velocity: [Vec<f64>; 2],
+}
+
+fn point(name: &str, description: &str, grouping: Grouping, position_m: [f64; 3], axis: usize) -> Point {
+    let mut direction = [0.0; 3];
+    direction[axis] = 1.0;
+    Point { name: name.into(), description: description.into(), grouping, position_m, direction }
+}
+
+fn location(name: &str, grouping: Grouping, position_m: [f64; 3]) -> Vec<Point> {
+    ["x", "y", "z"]
+        .iter()
+        .enumerate()
+        .map(|(axis, letter)| point(name, &format!("{name}:{letter}"), grouping, position_m, axis))
+        .collect()
+}
+
+impl Rig {
+    fn new() -> Self {
+        use Grouping::{InterfaceA, InterfaceB};
+        let at = |x: f64, side: f64| [x, side * 0.02, 0.03];
+        let responses = |on_a: bool| -> Vec<Point> {
+            let (letter, grouping, side) =
+                if on_a { ("A", InterfaceA, 1.0) } else { ("B", InterfaceB, -1.0) };
+            (0..2)
+                .flat_map(|i| {
+                    location(&format!("{letter}{}", i + 1), grouping, at(0.02 * f64::from(i), side))
+                })
+                .collect()
+        };
+        let impacts = |on_a: bool| -> Vec<Point> {
+            let (letter, grouping, side) =
+                if on_a { ("A", InterfaceA, 1.0) } else { ("B", InterfaceB, -1.0) };
+            let mut points = Vec::new();
+            for (axis, name) in [(1, "Y"), (2, "Z")] {
+                for i in 0..2 {
+                    points.push(point(
+                        &format!("{letter}{name}{}", i + 1),
+                        "",
+                        grouping,
+                        at(0.015 * f64::from(i), side),
+                        axis,
+                    ));
+                }
+            }
+            points
+        };
+        let both = |part: &dyn Fn(bool) -> Vec<Point>| [part(true), part(false)].concat();
+        Rig {
+            geometry: Geometry {
+                a: Configuration { channels: responses(true), impacts: impacts(true) },
+                b: Configuration { channels: responses(false), impacts: impacts(false) },
+                ajb: Configuration { channels: both(&responses), impacts: both(&impacts) },
+                virtual_point_a_m: [0.0; 3],
+                virtual_point_b_m: [0.0; 3],
+            },
+            absent: BTreeSet::new(),
+            units: [(false, true), (false, false), (true, true), (true, false)].map(|(c, a)| unit_hit(c, a)),
+        }
+    }
+
+    fn without(mut self, keep: impl Fn(&CellName) -> bool) -> Self {
+        self.absent = self
+            .cells()
+            .into_iter()
+            .filter(|c| !keep(c))
+            .map(|c| (c.configuration, c.impact, c.response))
+            .collect();
+        self
+    }
+
+    fn grouping(&self, configuration: &str, name: &str) -> Grouping {
+        let (_, points) = configurations(&self.geometry)
+            .into_iter()
+            .find(|(n, _)| *n == configuration)
+            .expect("a configuration");
+        points.impacts.iter().chain(&points.channels).find(|p| p.name == name).expect("a point").grouping
+    }
+}
+
+/// Force and velocities of both bodies along one axis after a half-sine hit of 1 N on A or B: velocity Verlet at 6 µs.
+/// The pulse is 25 samples long, so that its aliases stay below 1e-3.
+fn unit_hit(coupled: bool, on_a: bool) -> Unit {
+    let (m, k, c) = ([4.0, 2.0], [8e6, 150e6], [120.0, 900.0]);
+    let (contact, damper) = if coupled { (CONTACT, 600.0) } else { (0.0, 0.0) };
+    let steps = 8;
+    let dt = 1.0 / (FS_HZ * f64::from(steps));
+    let hit = |t: f64| {
+        let share = (t - 0.005) / 1.2e-3;
+        if (0.0..1.0).contains(&share) { (std::f64::consts::PI * share).sin() } else { 0.0 }
+    };
+    let acceleration = |x: [f64; 2], v: [f64; 2], f: f64| -> [f64; 2] {
+        let joint = contact * (x[0] - x[1]) + damper * (v[0] - v[1]);
+        let (on_first, on_second) = if on_a { (f, 0.0) } else { (0.0, f) };
+        [
+            (on_first - joint - k[0] * x[0] - c[0] * v[0]) / m[0],
+            (on_second + joint - k[1] * x[1] - c[1] * v[1]) / m[1],
+        ]
+    };
+    let (mut x, mut v, mut a) = ([0.0f64; 2], [0.0f64; 2], [0.0f64; 2]);
+    let mut unit = Unit { force: Vec::with_capacity(SAMPLES), velocity: [Vec::new(), Vec::new()] };
+    for step in 0..SAMPLES * steps as usize {
+        let t = step as f64 * dt;
+        if step.is_multiple_of(steps as usize) {
+            unit.force.push(hit(t));
+            unit.velocity[0].push(v[0]);
+            unit.velocity[1].push(v[1]);
+        }
+        let half = [v[0] + 0.5 * dt * a[0], v[1] + 0.5 * dt * a[1]];
+        x = [x[0] + dt * half[0], x[1] + dt * half[1]];
+        // damping at the half step's velocity advanced by the old acceleration
+        let ahead = [half[0] + 0.5 * dt * a[0], half[1] + 0.5 * dt * a[1]];
+        a = acceleration(x, ahead, hit(t + dt));
+        v = [half[0] + 0.5 * dt * a[0], half[1] + 0.5 * dt * a[1]];
+    }
+    unit
+}
+
+#[derive(Debug, thiserror::Error)]
+#[error("damaged")]
+struct Damaged;
+
+impl Measurements for Rig {
+    type Error = Damaged;
+
+    fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    fn sigma_per_s(&self) -> f64 {
+        SIGMA
+    }
+
+    fn quantity(&self) -> MotionQuantity {
+        MotionQuantity::Velocity
+    }
+
+    fn cells(&self) -> Vec<CellName> {
+        let mut cells = Vec::new();
+        for (configuration, points) in configurations(&self.geometry) {
+            for impact in &points.impacts {
+                for response in assemble::locations(points) {
+                    cells.push(CellName {
+                        configuration: configuration.into(),
+                        impact: impact.name.clone(),
+                        response: response.into(),
+                    });
+                }
+            }
+        }
+        cells
+    }
+
+    fn read(&self, cell: &CellName) -> Result<Cell, Damaged> {
+        if self.absent.contains(&(cell.configuration.clone(), cell.impact.clone(), cell.response.clone())) {
+            return Ok(Cell::default());
+        }
+        if cell.response == "damaged" {
+            return Err(Damaged);
+        }
+        let hit_on_a = matches!(self.grouping(&cell.configuration, &cell.impact), Grouping::InterfaceA);
+        let seen_on_a = matches!(self.grouping(&cell.configuration, &cell.response), Grouping::InterfaceA);
+        let along_z = cell.impact.contains('Z');
+        let place = self.cells().iter().position(|c| c == cell).expect("a cell of the plan");
+        let coupled = cell.configuration == "AJB";
+        let unit = &self.units[2 * usize::from(coupled) + usize::from(!hit_on_a)];
+        let hits = [50.0, 47.0]
+            .into_iter()
+            .enumerate()
+            .map(|(i, peak)| {
+                // y and z of a body are alike, each moved by hits along it only
+                let scaled = |signal: &[f64]| signal.iter().map(|s| s * peak).collect::<Vec<f64>>();
+                let (still, moved) = (vec![0.0; SAMPLES], scaled(&unit.velocity[usize::from(!seen_on_a)]));
+                let response = if along_z {
+                    [still.clone(), still.clone(), moved]
+                } else {
+                    [still.clone(), moved, still.clone()]
+                };
+                let contact = (coupled && along_z).then(|| {
+                    let [a, b] = [0, 1].map(|body| scaled(&unit.velocity[body]));
+                    // the load cells are B's spring
+                    let x_b = crate::hysteresis::integration::open_record(&b, 0.0, 1.0 / FS_HZ);
+                    let tangential_n = x_b.iter().map(|x| 150e6 * x).collect();
+                    ContactSignals { specimen_a_m_per_s: a, specimen_b_m_per_s: b, tangential_n }
+                });
+                Hit {
+                    record: i64::try_from(10 * place + i).expect("small"),
+                    force_n: scaled(&unit.force),
+                    response,
+                    contact,
+                }
+            })
+            .collect();
+        Ok(Cell { fs_hz: FS_HZ, hits, ..Cell::default() })
+    }
+}
+
+fn quiet(_: Progress) {}
+
+fn run(rig: &Rig) -> Results {
+    analyse_measurements(rig, Results::new(super::super::Source::default()), &quiet)
+}
+
+#[test]
+fn a_known_joint_comes_back_both_ways() {
+    let results = run(&Rig::new());
+    let two = results
+        .joint
+        .iter()
+        .find(|j| j.method == "internal" && j.idms == 2 && j.band_hz == MAIN_BAND_HZ)
+        .expect("two modes are all this rig has");
+    let k = two.sliding_stiffness().expect("z");
+    // aliases of the pulse, 1e-3, grow by |Y_A + Y_B| / |Y_J|, about ten here
+    assert!((k.mean / CONTACT - 1.0).abs() < 0.03, "{k:?}");
+    let loops = results.impact_loops().expect("hits along z on A");
+    // T is B's spring force, from which B's inertia is missing: some tens of per cent at this rig's mode
+    let slope = loops.k_eq_n_per_m.expect("a slope").mean;
+    assert!((0.5..2.0).contains(&(slope / CONTACT)), "{slope}");
+    assert_eq!(results.impact_slopes.len(), 2 * 4 * 2);
+    assert!(results.example_loop.is_some());
+    assert_eq!(results.source.records.len(), 3);
+    assert!(results.check(SERIES_COMPLIANCE).is_some() && results.check(HIDDEN_RESONANCE).is_some());
+    assert!(!results.to_json().expect("serialises").contains("NaN"));
+}
+
+#[test]
+fn without_a_there_are_still_loops() {
+    let results = run(&Rig::new().without(|c| c.configuration != "A"));
+    assert!(results.joint.is_empty());
+    assert!(results.impact_loops().is_some());
+    let missing = results.missing.join("\n");
+    assert!(missing.contains("A has not been measured") && missing.contains("missing: A."), "{missing}");
+}
+
+#[test]
+fn a_hole_costs_a_row_or_column_and_is_told() {
+    let results =
+        run(&Rig::new().without(|c| !(c.configuration == "AJB" && c.impact == "BZ2" && c.response == "A1")));
+    assert!(results.missing.iter().any(|m| m.contains("AJB: 1 of 32 cells")), "{:?}", results.missing);
+    assert!(results.missing.iter().any(|m| m.contains("left out")), "{:?}", results.missing);
+    assert!(results.headline_joint().is_some());
+}
+
+#[test]
+fn nothing_measured_is_no_error() {
+    let results = run(&Rig::new().without(|_| false));
+    assert!(results.joint.is_empty() && results.hysteresis.is_empty());
+    assert_eq!(results.checks.iter().filter(|c| c.ok.is_some()).count(), 0);
+    assert!(crate::report::page(&results).contains("No stiffness could be found"));
+}

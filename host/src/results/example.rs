@@ -1,0 +1,246 @@
+//! A made-up document with everything in it, for tests of the words and the report.
+
+use super::*;
+use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
+
+/// A deterministic scatter in −1…1.
+fn scatter(i: usize) -> f64 {
+    let x = (i as f64 * 12.9898).sin() * 43_758.545_3;
+    2.0 * (x - x.floor()) - 1.0
+}
+
+fn statistics(mean: f64, std: f64) -> Statistics {
+    Statistics { mean, std, median: mean * 0.995, ci95: Some([mean - 0.3 * std, mean + 0.3 * std]) }
+}
+
+fn joint(method: &str, idms: usize, band_hz: [f64; 2], k: f64, std: f64, warnings: &[&str]) -> Joint {
+    let translations = |z: Statistics| {
+        BTreeMap::from([("y".to_owned(), statistics(z.mean * 2.4, z.std)), ("z".to_owned(), z)])
+    };
+    Joint {
+        method: method.into(),
+        idms,
+        band_hz,
+        stiffness_n_per_m: translations(statistics(k, std)),
+        damping_n_s_per_m: translations(statistics(410.0, 90.0)),
+        stiffness_n_m_per_rad: BTreeMap::new(),
+        damping_n_m_s_per_rad: BTreeMap::new(),
+        lines: ((band_hz[1] - band_hz[0]) / 0.5) as usize + 1,
+        warnings: warnings.iter().map(|w| (*w).to_owned()).collect(),
+    }
+}
+
+/// Receptance of a sum of modes at f: (frequency, residue) pairs, 1 % damping.
+fn modes(f: f64, modes: &[(f64, f64)]) -> (f64, f64) {
+    let w = TAU * f;
+    modes.iter().fold((0.0, 0.0), |(re, im), &(fm, a)| {
+        let wm = TAU * fm;
+        let (d, e) = (wm * wm - w * w, 0.02 * wm * w);
+        let n = d * d + e * e;
+        (re + a * d / n, im - a * e / n)
+    })
+}
+
+fn frf(configuration: &str, role: Role, names: [&str; 2], sum: &[(f64, f64)], noise: f64) -> FrfCurve {
+    let lines = 1961;
+    let mut curve = FrfCurve {
+        configuration: configuration.into(),
+        role,
+        output: names[0].into(),
+        input: names[1].into(),
+        hits: 3,
+        first_hz: 20.0,
+        step_hz: 0.5,
+        magnitude_m_per_n: Vec::new(),
+        phase_deg: Vec::new(),
+        coherence: Vec::new(),
+    };
+    for l in 0..lines {
+        let (re, im) = modes(curve.frequency_hz(l), sum);
+        let (re, im) = (re + noise * scatter(2 * l), im + noise * scatter(2 * l + 1));
+        let size = re.hypot(im);
+        curve.magnitude_m_per_n.push(rounded(size, 5));
+        curve.phase_deg.push(rounded(im.atan2(re).to_degrees(), 4));
+        curve.coherence.push(rounded(1.0 / (1.0 + (noise / size).powi(2)), 5));
+    }
+    curve
+}
+
+fn example_loop() -> LoopCurve {
+    let step_s = 1.0 / 51_200.0;
+    let t: Vec<f64> = (0..900).map(|i| i as f64 * step_s).collect();
+    let decay = |t: f64, f: f64, a: f64| a * (-30.0 * t).exp() * (TAU * f * t).sin();
+    let force_n: Vec<f64> = t.iter().map(|&t| decay(t, 208.0, 17.0) + decay(t, 1310.0, 0.8)).collect();
+    let displacement_m: Vec<f64> = t
+        .iter()
+        .zip(&force_n)
+        .map(|(&t, f)| f / 148e6 + decay(t, 192.0, 2e-8) * (60.0 * t).min(1.0))
+        .collect();
+    let displacement_b_m: Vec<f64> = force_n.iter().map(|f| f / 75e6).collect();
+    let displacement_a_m = displacement_m.iter().zip(&displacement_b_m).map(|(d, b)| d + b).collect();
+    LoopCurve {
+        record: 2011,
+        impact: "AZ1".into(),
+        step_s,
+        displacement_m,
+        displacement_a_m,
+        displacement_b_m,
+        force_n,
+        cycle: [0, 246],
+        slope_n_per_m: 148.9e6,
+    }
+}
+
+fn spectrum() -> JointSpectrum {
+    let frequency_hz: Vec<f64> = (0..1601).map(|l| 100.0 + 0.5 * f64::from(l)).collect();
+    let curve = |method: &str, idms: usize, k: f64, size: f64| SpectrumCurve {
+        method: method.into(),
+        idms,
+        dof: "z".into(),
+        stiffness_n_per_m: frequency_hz
+            .iter()
+            .enumerate()
+            .map(|(l, f)| {
+                let peak = 60e6 * (-((f - 208.0) / 9.0).powi(2)).exp() * scatter(l + 31);
+                (l != 700)
+                    .then(|| rounded(k + size * scatter(l + idms) + peak + 2e6 * (f / 60.0 * PI).sin(), 6))
+            })
+            .collect(),
+        damping_n_s_per_m: frequency_hz
+            .iter()
+            .enumerate()
+            .map(|(l, _)| Some(400.0 + 90.0 * scatter(l)))
+            .collect(),
+    };
+    let curves = vec![
+        curve("internal", 2, 52e6, 14e6),
+        curve("internal", 4, 26e6, 5e6),
+        curve("internal", 6, 26.8e6, 1.6e6),
+        curve("internal-printed", 2, 49e6, 17e6),
+        curve("internal-printed", 4, 26e6, 9e6),
+        curve("internal-printed", 6, 25.9e6, 4e6),
+    ];
+    JointSpectrum { frequency_hz, curves }
+}
+
+/// Everything at once: the default rig's numbers, a little noise.
+pub fn results() -> Results {
+    let names =
+        |pairs: &[(&str, &str)]| pairs.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+    let mut results = Results::new(Source {
+        file: "campaign.jrig".into(),
+        kind: "campaign".into(),
+        started: Some("2026-03-02T09:15:00Z".into()),
+        device: names(&[
+            ("name", "simulated rig"),
+            ("address", "sim:"),
+            ("firmware", "0.1.0"),
+            ("schema", "9c1b7a40"),
+        ]),
+        settings: BTreeMap::from([
+            ("sigma_per_s".to_owned(), serde_json::json!(2.3)),
+            ("line_spacing_hz".to_owned(), serde_json::json!(0.5)),
+            ("force_window".to_owned(), serde_json::json!("rectangular, 20 ms")),
+            ("seed".to_owned(), serde_json::json!(7)),
+        ]),
+        records: BTreeMap::from([
+            ("A".to_owned(), ranges(1..=144)),
+            ("B".to_owned(), ranges(150..=257)),
+            ("AJB".to_owned(), ranges((260..=760).chain(2000..=2100))),
+        ]),
+        link: BTreeMap::from([
+            ("frames_received".to_owned(), 1_243_117),
+            ("frames_damaged".to_owned(), 12),
+            ("blocks_asked_again".to_owned(), 14),
+            ("scans_lost".to_owned(), 0),
+        ]),
+        ..Source::default()
+    });
+    let few = "Eq. 3 as printed with 3 internal impacts and 3 internal responses for 6 interface DoFs: rank 3 of 6, biased";
+    for (band, widen) in [([300.0, 600.0], 1.0), ([100.0, 800.0], 6.0), ([100.0, 300.0], 10.0)] {
+        results.joint.push(joint("internal", 2, band, 52.1e6, 9.8e6 * widen, &[]));
+        results.joint.push(joint("internal", 4, band, 26.2e6, 2.1e6 * widen, &[]));
+        results.joint.push(joint("internal", 6, band, 26.81e6, 0.91e6 * widen, &[]));
+        results.joint.push(joint("internal-printed", 6, band, 25.9e6, 3.9e6 * widen, &[few]));
+    }
+    results.joint_spectrum = Some(spectrum());
+    let over = |mean, std, cycles| Some(OverCycles { mean, std, cycles });
+    for (force, k) in [(Force::Raw, 148.2e6), (Force::Corrected, 151.1e6)] {
+        results.hysteresis.push(Hysteresis {
+            force,
+            kind: Excitation::Impact,
+            frequency_hz: Some(207.0),
+            amplitude_m: Some(1.02e-7),
+            shape: Shape::Stuck,
+            k_t_n_per_m: over(k, 4.1e6, 72),
+            k_eq_n_per_m: over(k * 0.99, 4.6e6, 72),
+            energy_j: over(-2.1e-8, 4.0e-8, 72),
+            friction_coefficient: None,
+            phase_deg: Some(3.1),
+            records: ranges(260..=331),
+            warnings: Vec::new(),
+        });
+    }
+    results.checks = vec![
+        Check::new(
+            "series-compliance",
+            Some(false),
+            "The loops at the specimens are 5.5 times stiffer than what FBS sees between the arms: clamp and contact are in series, so the FBS value is not k_T.",
+        )
+        .with("series_stiffness_n_per_m", 32.7e6)
+        .with("ratio", 5.53),
+        Check::new(
+            "hidden-resonance",
+            Some(false),
+            "Specimen A moves out of phase with specimen B near 192 Hz: loops there become ellipses and give k_eq, not k_T.",
+        )
+        .at(192.1),
+        Check::new("reciprocity", None, "Too few pairs were measured both ways to say."),
+    ];
+    results.refused = vec![Refusal {
+        method: "internal".into(),
+        idms: 6,
+        reason: "3 impacts on A and 3 responses on B, but 6 interface DoFs".into(),
+    }];
+    results.missing = vec!["B: cell BZ2 × B4 has 1 of 3 hits.".into()];
+    let done = |configuration: &str, cells, kept, refused: &[(&str, usize)]| Completeness {
+        configuration: configuration.into(),
+        cells,
+        cells_complete: cells,
+        wanted: cells * 3,
+        kept,
+        refused: refused.iter().map(|(v, n)| ((*v).to_owned(), *n)).collect(),
+    };
+    results.completeness = vec![
+        done("A", 48, 144, &[("double hit", 9), ("noisy", 12), ("weak", 2)]),
+        done("B", 36, 108, &[("double hit", 5), ("weak", 3)]),
+        done("AJB", 168, 504, &[("double hit", 31), ("overload", 4), ("noisy", 17), ("weak", 6)]),
+    ];
+    let (a, b, j) = (
+        [(27.3, 0.09), (430.0, 0.4)],
+        [(356.0, 0.5), (840.0, 0.3)],
+        [(208.0, 0.1), (356.0, 0.3), (610.0, 0.2)],
+    );
+    results.frfs = vec![
+        frf("A", Role::DrivingPoint, ["A1:z", "AZ1"], &a, 2e-10),
+        frf("A", Role::Transfer, ["A1:z", "I_MZ"], &[(27.3, 0.09), (430.0, -0.2)], 2e-10),
+        frf("B", Role::DrivingPoint, ["B1:z", "BZ1"], &b, 2e-10),
+        frf("B", Role::Transfer, ["B4:z", "BZ1"], &[(356.0, 0.3), (840.0, -0.2)], 2e-10),
+        frf("AJB", Role::DrivingPoint, ["A1:z", "AZ1"], &j, 2e-10),
+        frf("AJB", Role::Transfer, ["B1:z", "AZ1"], &[(208.0, 0.1), (356.0, -0.1)], 2e-10),
+        frf("AJB", Role::SpecimenA, ["x_A", "I_MZ"], &[(192.0, 0.004), (208.0, 0.1)], 2e-10),
+        frf("AJB", Role::SpecimenB, ["x_B", "I_MZ"], &[(208.0, 0.09)], 2e-10),
+    ];
+    results.usable_bands =
+        ["A", "B", "AJB"].map(|c| UsableBand { configuration: c.into(), band_hz: [0.0, 1985.0] }).to_vec();
+    results.example_loop = Some(example_loop());
+    results.impact_slopes = (0..72)
+        .map(|i| ImpactSlope {
+            record: 260 + i,
+            impact: ["AZ1", "AZ2", "AZ3", "I_MZ"][i as usize % 4].into(),
+            k_t_n_per_m: 148.2e6 + 7e6 * scatter(i as usize),
+        })
+        .collect();
+    results
+}

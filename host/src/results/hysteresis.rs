@@ -1,0 +1,79 @@
+//! The contact by hysteresis loops: numbers per kind of excitation, and one loop to look at.
+
+use super::{Excitation, OverCycles, Shape};
+use serde::Serialize;
+
+/// Which force the loop was drawn with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Force {
+    /// The sum of the load cells as it is.
+    Raw,
+    /// Corrected for the static arm's inertia and the parallel path to ground.
+    Corrected,
+}
+
+/// Loops of one kind, together.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Hysteresis {
+    /// Which force.
+    pub force: Force,
+    /// What moved the contact.
+    pub kind: Excitation,
+    /// Frequency of the excitation (shaker) or of the cycle (impact), Hz.
+    pub frequency_hz: Option<f64>,
+    /// Half the swing of Δx, m (mean over cycles).
+    pub amplitude_m: Option<f64>,
+    /// The shape that most cycles have.
+    pub shape: Shape,
+    /// Slope of T on Δx over the stick part, N/m; null where the loop has none.
+    pub k_t_n_per_m: Option<OverCycles>,
+    /// Slope of T on Δx over the whole loop, N/m.
+    pub k_eq_n_per_m: Option<OverCycles>,
+    /// Area of the closed loop, J.
+    pub energy_j: Option<OverCycles>,
+    /// Friction limit over normal load; null where the contact did not slip or the load is not known.
+    pub friction_coefficient: Option<f64>,
+    /// Phase of T against Δx, degrees.
+    pub phase_deg: Option<f64>,
+    /// Ids of the records used, as closed ranges.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub records: Vec<[i64; 2]>,
+    /// What a reader must know before using these numbers.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
+}
+
+/// One cycle, sample by sample: what the loop figure shows.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LoopCurve {
+    /// The record it is from.
+    pub record: i64,
+    /// The impact's name.
+    pub impact: String,
+    /// Seconds between samples.
+    pub step_s: f64,
+    /// Relative displacement x_A − x_B, m.
+    pub displacement_m: Vec<f64>,
+    /// Displacement of specimen A, m.
+    pub displacement_a_m: Vec<f64>,
+    /// Displacement of specimen B, m.
+    pub displacement_b_m: Vec<f64>,
+    /// Sum of the load cells, N.
+    pub force_n: Vec<f64>,
+    /// Range of samples that is the first cycle.
+    pub cycle: [usize; 2],
+    /// The fitted slope, N/m.
+    pub slope_n_per_m: f64,
+}
+
+/// The slope that one impact gave.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ImpactSlope {
+    /// The record.
+    pub record: i64,
+    /// The impact's name.
+    pub impact: String,
+    /// Slope of the first cycle, N/m.
+    pub k_t_n_per_m: f64,
+}

@@ -1,0 +1,72 @@
+//! The joint by substructuring: numbers over bands, and the spectra they come from.
+
+use super::Statistics;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// One method, one set of interface deformation modes, one band.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Joint {
+    /// The method's name, as on the command line.
+    pub method: String,
+    /// Interface deformation modes of each virtual point: 2, 4 or 6.
+    pub idms: usize,
+    /// The band, ends included, Hz.
+    pub band_hz: [f64; 2],
+    /// Stiffness of the translations by direction (`x`, `y`, `z`), N/m.
+    pub stiffness_n_per_m: BTreeMap<String, Statistics>,
+    /// Damping of the translations by direction, N s/m.
+    pub damping_n_s_per_m: BTreeMap<String, Statistics>,
+    /// Stiffness of the rotations (`rx`, `ry`, `rz`), N m/rad.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub stiffness_n_m_per_rad: BTreeMap<String, Statistics>,
+    /// Damping of the rotations, N m s/rad.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub damping_n_m_s_per_rad: BTreeMap<String, Statistics>,
+    /// Lines of the band that were used.
+    pub lines: usize,
+    /// What a reader must know before using these numbers.
+    pub warnings: Vec<String>,
+}
+
+impl Joint {
+    /// Stiffness along the sliding direction z, N/m.
+    pub fn sliding_stiffness(&self) -> Option<&Statistics> {
+        self.stiffness_n_per_m.get("z")
+    }
+}
+
+/// A method that could not be applied, and why.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Refusal {
+    /// The method's name.
+    pub method: String,
+    /// Interface deformation modes of each virtual point.
+    pub idms: usize,
+    /// The reason, as the method gave it.
+    pub reason: String,
+}
+
+/// Stiffness and damping line by line.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct JointSpectrum {
+    /// The lines, Hz.
+    pub frequency_hz: Vec<f64>,
+    /// One curve for each method, IDM set and direction.
+    pub curves: Vec<SpectrumCurve>,
+}
+
+/// One diagonal term of the joint over frequency.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SpectrumCurve {
+    /// The method's name.
+    pub method: String,
+    /// Interface deformation modes of each virtual point.
+    pub idms: usize,
+    /// Direction: `x`, `y` or `z`.
+    pub dof: String,
+    /// Re Z, N/m; null where the line gave none.
+    pub stiffness_n_per_m: Vec<Option<f64>>,
+    /// Damping, N s/m; null where the line gave none.
+    pub damping_n_s_per_m: Vec<Option<f64>>,
+}

@@ -1,0 +1,76 @@
+//! Numbers as people read them: few digits, units beside them, N/µm for stiffness.
+
+/// `value` with enough decimals to show about three significant digits: 148, 26.8, 0.91, 0.0123.
+pub fn short(value: f64) -> String {
+    decimals(value, places(value, 3))
+}
+
+/// `mean ± std`, both with the decimals that the mean's three or the scatter's two digits need, whichever
+/// is fewer; never `26.8134 ± 4`.
+pub fn with_scatter(mean: f64, std: f64) -> String {
+    let places = places(mean, 3).min(places(std, 2));
+    format!("{} ± {}", decimals(mean, places), decimals(std, places))
+}
+
+/// A stiffness in N/m, shown in N/µm without the unit.
+pub fn micro(stiffness_n_per_m: f64) -> f64 {
+    stiffness_n_per_m * 1e-6
+}
+
+/// A stiffness with its scatter, in N/µm with the unit.
+pub fn stiffness(mean_n_per_m: f64, std_n_per_m: f64) -> String {
+    format!("{} N/µm", with_scatter(micro(mean_n_per_m), micro(std_n_per_m)))
+}
+
+/// A band: `300–600 Hz`.
+pub fn band(band_hz: [f64; 2]) -> String {
+    format!("{}–{} Hz", short(band_hz[0]), short(band_hz[1]))
+}
+
+/// With the thousands apart: 12 345.
+pub fn count(n: u64) -> String {
+    let digits = n.to_string();
+    let mut text = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push('\u{202f}');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+fn places(value: f64, significant: i32) -> usize {
+    if value == 0.0 || !value.is_finite() {
+        return significant.max(1) as usize - 1;
+    }
+    (significant - 1 - value.abs().log10().floor() as i32).clamp(0, 12) as usize
+}
+
+/// `value` with this many decimals and a true minus sign; a dash when it is no number.
+pub fn decimals(value: f64, places: usize) -> String {
+    if !value.is_finite() {
+        return "–".into();
+    }
+    let text = format!("{value:.places$}");
+    let zero = text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.');
+    if zero { text.trim_start_matches('-').to_owned() } else { text.replace('-', "−") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_follow_the_scatter() {
+        assert_eq!(stiffness(26.813e6, 0.912e6), "26.8 ± 0.9 N/µm");
+        assert_eq!(stiffness(148.2e6, 4.1e6), "148 ± 4 N/µm");
+        assert_eq!(stiffness(-12.3e6, 241.0e6), "−12 ± 241 N/µm");
+        assert_eq!(with_scatter(26.8, 0.0), "26.8 ± 0.0");
+        assert_eq!(short(0.012_34), "0.0123");
+        assert_eq!(short(f64::NAN), "–");
+        assert_eq!(band([300.0, 600.0]), "300–600 Hz");
+        assert_eq!(count(1_234_567), "1\u{202f}234\u{202f}567");
+        assert_eq!(decimals(-0.001, 1), "0.0");
+    }
+}

@@ -1,0 +1,222 @@
+//! The same results in plain sentences, for the terminal and for the head of the report.
+
+use super::number::{band, count, micro, short, stiffness};
+use super::{Excitation, Force, Hysteresis, Joint, OverCycles, Results, Shape};
+
+/// What FBS found between the arms, in one sentence.
+pub fn substructuring(results: &Results) -> Option<String> {
+    let joint = results.headline_joint()?;
+    let k = joint.sliding_stiffness()?;
+    let rest = if k.std > k.mean.abs() {
+        ": the scatter is larger than the value, so the joint is not identified"
+    } else {
+        ""
+    };
+    Some(format!(
+        "Substructuring (FBS, {}, {} IDMs, {}) sees {} between the arms along the sliding direction{rest}.",
+        method(&joint.method),
+        joint.idms,
+        band(joint.band_hz),
+        stiffness(k.mean, k.std)
+    ))
+}
+
+/// What the loops of the impacts found, in one sentence.
+pub fn impact_loops(results: &Results) -> Option<String> {
+    let loops = results.impact_loops()?;
+    let (name, k) = slope(loops)?;
+    let of = if k.cycles == 1 {
+        "the first cycle of 1 hit".into()
+    } else {
+        format!("the first cycles of {} hits", count(k.cycles as u64))
+    };
+    Some(format!(
+        "The impacts' own loops, measured at the specimens ({of}), give {name} = {}.",
+        stiffness(k.mean, k.std)
+    ))
+}
+
+/// The slope that may be quoted for a loop, with its name: k_T where it has one, k_eq otherwise.
+pub fn slope(loops: &Hysteresis) -> Option<(&'static str, OverCycles)> {
+    loops.k_t_n_per_m.map(|k| ("k_T", k)).or(loops.k_eq_n_per_m.map(|k| ("k_eq", k)))
+}
+
+/// The method as a tribologist would call it.
+pub fn method(name: &str) -> &str {
+    match name {
+        "internal" => "Eq. 3 in least squares",
+        "internal-printed" => "Eq. 3 as printed",
+        "interface" => "Eq. A.3",
+        "primal-a" => "Eq. A.2, block of A",
+        "primal-b" => "Eq. A.2, block of B",
+        "inverse" => "Eq. A.1",
+        "inverse-ba" => "Eq. A.1, the other block",
+        other => other,
+    }
+}
+
+/// A loop's shape by its name in files.
+pub fn shape_name(shape: Shape) -> &'static str {
+    match shape {
+        Shape::Stuck => "stuck",
+        Shape::Elliptical => "elliptical",
+        Shape::Microslip => "microslip",
+        Shape::GrossSlip => "gross-slip",
+    }
+}
+
+/// What a loop's shape means.
+pub fn shape(shape: Shape) -> &'static str {
+    match shape {
+        Shape::Stuck => "a straight line: the contact sticks",
+        Shape::Elliptical => {
+            "an ellipse: force and displacement are out of phase, so the slope is k_eq, not k_T"
+        }
+        Shape::Microslip => "slightly open: part of the contact slides",
+        Shape::GrossSlip => "a plateau: the whole contact slides",
+    }
+}
+
+/// Which excitation and force a row of loops is about.
+pub fn excitation(loops: &Hysteresis) -> String {
+    let kind = match (loops.kind, loops.frequency_hz) {
+        (Excitation::Impact, _) => "impacts, first cycle".into(),
+        (Excitation::Shaker, Some(f)) => format!("shaker, {} Hz", short(f)),
+        (Excitation::Shaker, None) => "shaker".into(),
+    };
+    match loops.force {
+        Force::Raw => kind,
+        Force::Corrected => format!("{kind}, corrected force"),
+    }
+}
+
+/// A check's outcome in a word.
+pub fn outcome(ok: Option<bool>) -> &'static str {
+    match ok {
+        Some(true) => "passed",
+        Some(false) => "look here",
+        None => "undecided",
+    }
+}
+
+/// One row of the joint table as text.
+fn joint_line(joint: &Joint) -> Option<String> {
+    let k = joint.sliding_stiffness()?;
+    let ci95 = k
+        .ci95
+        .map_or(String::new(), |[low, high]| format!(", 95 % {}…{}", short(micro(low)), short(micro(high))));
+    Some(format!(
+        "  {:<17} {} IDMs  {:>11}  k_z {} (σ over {} lines; median {}{ci95})",
+        joint.method,
+        joint.idms,
+        band(joint.band_hz),
+        stiffness(k.mean, k.std),
+        joint.lines,
+        short(micro(k.median)),
+    ))
+}
+
+/// The whole summary, line by line, as `demo` and `analyse` print it.
+pub fn summary(results: &Results) -> Vec<String> {
+    let mut lines = Vec::new();
+    lines.extend(substructuring(results));
+    lines.extend(impact_loops(results));
+    if lines.is_empty() {
+        lines.push("No stiffness could be found from this file.".into());
+    }
+    for check in &results.checks {
+        let mark = match check.ok {
+            Some(true) => "ok",
+            Some(false) => "!!",
+            None => "??",
+        };
+        lines.push(format!("{mark} {}: {}", check.name, check.meaning));
+    }
+    let table: Vec<String> = results.joint.iter().filter_map(joint_line).collect();
+    if !table.is_empty() {
+        lines.push(String::new());
+        lines.push("Joint stiffness along z, by method, interface modes and band:".into());
+        lines.extend(table);
+    }
+    let loops: Vec<String> = results
+        .hysteresis
+        .iter()
+        .filter_map(|h| {
+            let (name, k) = slope(h)?;
+            Some(format!(
+                "  {:<34} {name} {} ({} cycles; {})",
+                excitation(h),
+                stiffness(k.mean, k.std),
+                count(k.cycles as u64),
+                shape(h.shape)
+            ))
+        })
+        .collect();
+    if !loops.is_empty() {
+        lines.push(String::new());
+        lines.push("Contact stiffness from loops:".into());
+        lines.extend(loops);
+    }
+    if !results.completeness.is_empty() {
+        lines.push(String::new());
+        lines.push("Hits:".into());
+        lines.extend(results.completeness.iter().map(|c| {
+            let refused: Vec<String> =
+                c.refused.iter().filter(|(_, n)| **n > 0).map(|(v, n)| format!("{n} {v}")).collect();
+            let refused = if refused.is_empty() {
+                "none refused".into()
+            } else {
+                format!("refused: {}", refused.join(", "))
+            };
+            format!(
+                "  {:<4} {} of {} kept in {} of {} cells; {refused}",
+                c.configuration, c.kept, c.wanted, c.cells_complete, c.cells
+            )
+        }));
+    }
+    if !results.missing.is_empty() {
+        lines.push(String::new());
+        lines.push("Missing:".into());
+        lines.extend(results.missing.iter().map(|m| format!("  {m}")));
+    }
+    if !results.refused.is_empty() {
+        lines.push(String::new());
+        lines.push("Not applicable here:".into());
+        lines.extend(
+            results.refused.iter().map(|r| format!("  {} with {} IDMs: {}", r.method, r.idms, r.reason)),
+        );
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::example;
+    use super::*;
+
+    #[test]
+    fn the_summary_says_both_numbers_and_that_one_is_not_k_t() {
+        let text = summary(&example::results()).join("\n");
+        assert!(text.contains("26.8 ± 0.9 N/µm between the arms"), "{text}");
+        assert!(text.contains("k_T = 148 ± 4 N/µm"), "{text}");
+        assert!(text.contains("not k_T"), "{text}");
+        assert!(text.contains("double hit"), "{text}");
+    }
+
+    #[test]
+    fn an_empty_document_says_so() {
+        let empty = Results::new(super::super::Source::default());
+        assert_eq!(summary(&empty), ["No stiffness could be found from this file."]);
+    }
+
+    #[test]
+    fn more_scatter_than_value_is_called_not_identified() {
+        let mut results = example::results();
+        for joint in &mut results.joint {
+            if let Some(k) = joint.stiffness_n_per_m.get_mut("z") {
+                k.std = 2.0 * k.mean;
+            }
+        }
+        assert!(substructuring(&results).is_some_and(|s| s.contains("not identified")));
+    }
+}
