@@ -10,7 +10,7 @@ fn plan() -> String {
     SMALL
         .replace("length_s = 2.0", "length_s = 0.1")
         .replace("listen_s = 0.15", "listen_s = 0.02")
-        .replace("pulse_us = 3000", "pulse_us = 2000")
+        .replace("pulse_us = 3450", "pulse_us = 2000")
 }
 
 fn options() -> Options {
