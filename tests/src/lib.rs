@@ -1,1 +1,8 @@
-//! Whole-system scenarios live in this package.
+//! Whole-system scenarios, crossing every wall: plan, runner, session, link, firmware, rig, file, analysis.
+//!
+//! The scenarios stand under `tests/tests/`; what they share stands here. They run the binaries where they
+//! test the command, and the libraries where they look inside.
+#![allow(clippy::unwrap_used, clippy::missing_panics_doc, reason = "a scenario that cannot go on has failed")]
+
+pub mod campaign;
+pub mod command;

@@ -1,7 +1,11 @@
 //! Where hammer and vibrometer really point: nominal geometry and the errors nobody knows.
 //!
-//! A point's own error belongs to its name and stays all campaign long; each cell adds an aiming error and a tilt of the
-//! hammer. All are keyed to (seed, what they are for), so visiting cells in another order changes nothing.
+//! A point's own error belongs to its name and stays all campaign long: where it is, and for an impact also the tilt at which
+//! the hammer's holder meets the surface there. Each cell adds an aiming error. All are keyed to (seed, what they are for),
+//! so visiting cells in another order changes nothing.
+//!
+//! The tilt belongs to the point because the holder and the surface decide it, not the day: drawn anew for A and AJB it would
+//! differ between the configurations, no longer cancel, and pull every decoupled stiffness some 13 % down.
 
 use super::config::{Errors, ImpactPoint, ResponsePoint};
 use super::key::{Stream, normal, stream};
@@ -41,7 +45,8 @@ impl Aim {
             errors.aim_m,
             &mut response_aim,
         );
-        let direction = tilted(impact.probe().direction, errors.hammer_angle_rad, &mut cell("hammer angle"));
+        let mut hammer = stream(seed, &["hammer angle", hit]);
+        let direction = tilted(impact.probe().direction, errors.hammer_angle_rad, &mut hammer);
         Self {
             impact: Probe { body: impact.body, position_m: hit_m, direction },
             response: AXES.map(|axis| Probe { body: response.body, position_m: seen_m, direction: axis }),

@@ -46,7 +46,7 @@ fn errors_point_at_line_and_field() {
         ("name = \"B\"", "name = \"C\"", "must be A, B or AJB"),
         ("direction = [0, -1, 0]", "direction = [0, -2, 0]", "length 1"),
         ("{ name = \"A2\", grouping = 1", "{ name = \"A2\", grouping = 7", "must be 1 to 4"),
-        ("pulse_us = 3000", "pulse_us = 9000", "pulse_bounds_us"),
+        ("pulse_us = 3500", "pulse_us = 9000", "pulse_bounds_us"),
     ] {
         assert!(SMALL.contains(from), "{from}");
         let text = SMALL.replacen(from, to, 1);

@@ -10,7 +10,9 @@ fn plan() -> String {
     SMALL
         .replace("length_s = 2.0", "length_s = 0.1")
         .replace("listen_s = 0.15", "listen_s = 0.02")
-        .replace("pulse_us = 3000", "pulse_us = 2000")
+        // far from the force wanted, so that the loop has something to do
+        .replace("pulse_us = 3500", "pulse_us = 2000")
+        .replace("pulse_bounds_us = [2500, 6000]", "pulse_bounds_us = [500, 8000]")
 }
 
 fn options() -> Options {

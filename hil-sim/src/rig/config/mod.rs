@@ -331,7 +331,7 @@ pub struct Errors {
     pub position_m: f64,
     /// Added anew in each cell (m along each axis).
     pub aim_m: f64,
-    /// Hammer's tilt about each of the two axes across the impact (rad), anew in each cell.
+    /// Hammer's tilt about each of the two axes across the impact (rad), the same in every cell.
     pub hammer_angle_rad: f64,
 }
 

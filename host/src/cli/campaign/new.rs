@@ -10,13 +10,12 @@ use crate::cli::error::CliError;
 
 /// Create a campaign file from a plan.
 #[derive(Debug, Args)]
-#[group(id = "from", required = true, multiple = false, args = ["plan", "paper"])]
 pub struct New {
     /// The campaign file.
     #[arg(value_name = "FILE.jrig")]
     file: PathBuf,
     /// The plan.
-    #[arg(long, value_name = "PLAN.toml")]
+    #[arg(long, value_name = "PLAN.toml", required_unless_present = "paper", conflicts_with = "paper")]
     plan: Option<PathBuf>,
     /// The paper's plan: 252 cells of 8 hits.
     #[arg(long)]

@@ -81,13 +81,8 @@ fn cell_json(row: &CellRow, count: &Count) -> Value {
 fn cell_line(row: &CellRow, count: &Count) -> String {
     let cell = &row.cell;
     let name = configuration_name(cell.configuration);
-    let mut line =
-        format!("{name:<4} {:<6} {:<4} {}/{}", cell.impact, cell.response, count.kept, count.wanted);
-    for (kind, number) in refusals(count) {
-        line.push_str(&format!(", {number} {kind}"));
-    }
-    if let Some(reason) = &row.given_up {
-        line.push_str(&format!("; given up: {reason}"));
-    }
-    line
+    let kept = format!("{name:<4} {:<6} {:<4} {}/{}", cell.impact, cell.response, count.kept, count.wanted);
+    let refused = refusals(count).map(|(kind, number)| format!("{number} {kind}"));
+    let given_up = row.given_up.iter().map(|reason| format!("given up: {reason}"));
+    std::iter::once(kept).chain(refused).chain(given_up).collect::<Vec<_>>().join(", ")
 }

@@ -1,0 +1,60 @@
+//! A small campaign over any transport, and its records as they can be compared.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use jointrig::campaign::judge::ByRecord;
+use jointrig::campaign::runner::{self, Options, Summary};
+use jointrig::campaign::stage::Stage;
+use jointrig::campaign::store::Store;
+use jointrig::device::session::Session;
+use jointrig::device::transport::Transport;
+
+/// A plan of few cells: the geometry and limits of the demo's plan, other cells and hits.
+#[must_use]
+pub fn plan(wanted: u32, cells: &[(&str, &[&str], &[&str])]) -> String {
+    let whole = include_str!("../../docs/plans/demo.toml");
+    let (head, rest) = whole.split_once("[[configuration]]").unwrap();
+    let geometry = &rest[rest.find("[geometry").or_else(|| rest.find("[[geometry")).unwrap()..];
+    let head = head.replace("wanted = 3", &format!("wanted = {wanted}"));
+    let mut text = head;
+    for (name, impacts, responses) in cells {
+        text += &format!("[[configuration]]\nname = {name:?}\nimpacts = {impacts:?}\nresponses = {responses:?}\n\n");
+    }
+    text + geometry
+}
+
+/// One record, reduced to what must be the same in two runs.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Kept {
+    /// Cell and attempt.
+    pub place: (i64, u32),
+    /// Its verdict.
+    pub verdict: &'static str,
+    /// Every code of every channel, relative to the trigger.
+    pub codes: Vec<i16>,
+}
+
+/// Runs the plan over `transport` and returns the summary and all records.
+pub fn run(file: &Path, plan: &str, transport: Box<dyn Transport>) -> (Summary, Vec<Kept>) {
+    let store = Store::create(file, plan, "test plan").unwrap();
+    let mut session = Session::open(transport, "test").unwrap();
+    let options =
+        Options { stage: Stage::Auto, yes: true, progress: false, stop: Arc::new(AtomicBool::new(false)) };
+    let summary = runner::run(store, &mut session, &mut ByRecord, &options).unwrap();
+    (summary, records(file))
+}
+
+/// All records of a campaign file, in order.
+pub fn records(file: &Path) -> Vec<Kept> {
+    let store = Store::open_read_only(file).unwrap();
+    let rows = store.records().unwrap();
+    rows.iter()
+        .map(|row| Kept {
+            place: (row.cell, row.attempt),
+            verdict: row.standing().name(),
+            codes: store.samples(row).unwrap().codes,
+        })
+        .collect()
+}
