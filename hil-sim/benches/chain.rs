@@ -25,7 +25,11 @@ fn processor_s(begun: Instant) -> (f64, &'static str) {
         .filter_map(|task| std::fs::read_to_string(task.path().join("schedstat")).ok())
         .filter_map(|text| text.split_whitespace().next()?.parse::<u64>().ok())
         .sum();
-    if nanoseconds > 0 { (nanoseconds as f64 * 1e-9, "processor") } else { (begun.elapsed().as_secs_f64(), "wall") }
+    if nanoseconds > 0 {
+        (nanoseconds as f64 * 1e-9, "processor")
+    } else {
+        (begun.elapsed().as_secs_f64(), "wall")
+    }
 }
 
 /// Simulated seconds per second of `run`.

@@ -20,7 +20,9 @@ pub fn plan(wanted: u32, cells: &[(&str, &[&str], &[&str])]) -> String {
     let head = head.replace("wanted = 3", &format!("wanted = {wanted}"));
     let mut text = head;
     for (name, impacts, responses) in cells {
-        text += &format!("[[configuration]]\nname = {name:?}\nimpacts = {impacts:?}\nresponses = {responses:?}\n\n");
+        text += &format!(
+            "[[configuration]]\nname = {name:?}\nimpacts = {impacts:?}\nresponses = {responses:?}\n\n"
+        );
     }
     text + geometry
 }
