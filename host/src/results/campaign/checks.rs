@@ -70,8 +70,10 @@ pub fn series_compliance(fbs: Option<&Statistics>, loops: Option<OverCycles>) ->
         return with(Check::new(name, None, meaning));
     }
     let meaning = format!(
-        "FBS on the arms and the loops at the specimens agree within {} %: nothing soft lies between arm and contact, so the FBS value may be read as k_T.",
-        short(100.0 * (SERIES_RATIO - 1.0))
+        "FBS on the arms and the loops at the specimens see stiffness of one size ({} and {} N/µm): nothing soft lies between arm and contact, so the FBS value may be \
+         read as k_T.",
+        short(micro(k_fbs)),
+        short(micro(k_loops))
     );
     with(Check::new(name, Some(true), meaning))
 }

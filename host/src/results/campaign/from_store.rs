@@ -139,6 +139,10 @@ impl CampaignFile {
         source
             .settings
             .insert("virtual_point_m".into(), serde_json::json!(self.plan.geometry.virtual_point_m));
+        // what the simulated rig was seeded with, where it was one
+        if let Some(seed) = store.meta("demo_seed")? {
+            source.settings.insert("seed".into(), seed.into());
+        }
         if let Some(note) = store.meta(LINK_NOTE)? {
             source.link = serde_json::from_str(&note).unwrap_or_default();
         }
