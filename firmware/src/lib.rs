@@ -17,6 +17,7 @@
 #![forbid(unsafe_code)]
 
 pub mod acquire;
+pub mod ad7606b;
 pub mod board;
 mod fmt;
 pub mod friction;
