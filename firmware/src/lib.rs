@@ -26,10 +26,13 @@ pub mod memory;
 pub mod pulse;
 pub mod quiet;
 pub mod receive;
+pub mod report;
 mod requests;
 pub mod ring;
 mod state;
 pub mod transmit;
+#[cfg(feature = "usb")]
+pub mod usb;
 pub mod watch;
 
 pub use state::{Core, Facts};

@@ -135,7 +135,7 @@ impl Layout {
             }
             held_bits -= self.bits;
             let unused = 32 - self.bits;
-            *code = ((held >> held_bits) << unused) as i32 >> unused;
+            *code = ((held >> held_bits) << unused).cast_signed() >> unused;
         }
         Ok(())
     }

@@ -12,6 +12,7 @@ use embedded_hal::spi::{ErrorType as SpiError, Operation, SpiDevice};
 
 /// What is wrong with the chip or its wires.
 #[derive(Clone, Copy, Debug, Default)]
+#[allow(clippy::struct_excessive_bools, reason = "faults come in any combination")]
 pub struct Faults {
     /// BUSY never falls.
     pub busy_stuck: bool,
@@ -165,7 +166,7 @@ fn divide<const WIDTH: u32>(polynomial: u32, data: &[u8]) -> u32 {
     data.iter().fold(0, |crc, byte| {
         (0..8).rev().fold(crc, |crc: u32, i| {
             let out = (crc >> (WIDTH - 1) ^ u32::from(byte >> i)) & 1;
-            (crc << 1 ^ out * polynomial) & ((1 << WIDTH) - 1)
+            ((crc << 1) ^ (out * polynomial)) & ((1 << WIDTH) - 1)
         })
     })
 }
