@@ -86,7 +86,8 @@ impl<S: fmt::Debug, P: fmt::Debug> fmt::Display for Error<S, P> {
             Self::Readback { address, wrote, holds } => {
                 write!(f, "register {address:#04x}: wrote {wrote:#04x}, holds {holds:#04x}")
             }
-            Self::NoRange { range, part } => write!(f, "{part} has no range of {} V", range.full_scale_v()),
+            // not as a number: formatting floats costs 12 kB of flash
+            Self::NoRange { range, part } => write!(f, "{part} has no range {range:?}"),
             Self::NoLayout { part } => write!(f, "{part} cannot send on so many lines"),
             Self::BusyStuck { after_us } => write!(f, "BUSY still high after {after_us} us"),
             Self::Data(CrcMismatch { sent, due }) => {

@@ -14,7 +14,7 @@ use core::future::poll_fn;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering, compiler_fence, fence};
 use core::task::Poll;
 
-use embassy_stm32::interrupt;
+use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::pac::gpdma::regs::{ChBr1, ChLlr};
 use embassy_stm32::pac::gpdma::vals::{Ap, Dreq, Dw, Prio};
 use embassy_stm32::pac::spi::Spi;
