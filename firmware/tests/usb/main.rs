@@ -11,7 +11,7 @@ use embassy_futures::join::join;
 use embassy_futures::select::{Either, select, select3};
 use embassy_futures::{block_on, yield_now};
 use jointrig_firmware::board::{ByteSink, ByteSource};
-use jointrig_firmware::usb::{Buffers, INTERFACE_GUID, Speed, VENDOR_CODE, build};
+use jointrig_firmware::usb::{Buffers, INTERFACE_GUID, PRODUCT_ID, Speed, VENDOR_CODE, VENDOR_ID, build};
 use jointrig_protocol::frame::Accumulator;
 use jointrig_protocol::golden;
 
@@ -101,6 +101,18 @@ fn descriptors_at_both_speeds() {
             assert_eq!(host.string(found.device[15]).await, "jointrig controller");
             assert_eq!(host.string(found.device[16]).await, "0042");
         });
+    }
+}
+
+#[test]
+fn the_udev_rule_is_for_this_device() {
+    let rule = include_str!("../../../docs/udev/70-jointrig.rules");
+    let lines: Vec<&str> = rule.lines().filter(|line| line.starts_with("SUBSYSTEM==")).collect();
+    assert_eq!(lines.len(), 2, "the device and its serial port");
+    for line in lines {
+        assert!(line.contains(&format!("{{idVendor}}==\"{VENDOR_ID:04x}\"")));
+        assert!(line.contains(&format!("{{idProduct}}==\"{PRODUCT_ID:04x}\"")));
+        assert!(line.contains("{product}==\"jointrig controller\""));
     }
 }
 
