@@ -15,7 +15,7 @@ use super::part::{Oversampling, Part};
 use super::range::Range;
 use super::{CHANNELS, Error, registers as reg};
 
-/// A RESET pulse of more than 3.2 µs is a full reset: AD7606B Rev. 0, Table 3, tRESET.
+/// A RESET pulse of more than 3.2 µs is a full reset: AD7606B Rev. 0, "Timing Specifications", tRESET.
 const RESET_NS: u32 = 5_000;
 /// After a full reset the chip loads its own calibration: tDEVICE_SETUP is 253 µs.
 const SETUP_US: u32 = 300;
@@ -58,7 +58,7 @@ impl Default for Settings {
 /// is its RESET pin.
 ///
 /// The port must be of mode 2 (clock idles high, data are taken on its falling edge): AD7606B Rev. 0,
-/// Figure 5 and "Serial Interface".
+/// "Serial Interface".
 #[derive(Debug)]
 pub struct Converter<S, R> {
     spi: S,

@@ -42,8 +42,7 @@ pub const CRC_BYTES: usize = 2;
 /// Most bytes that one line carries after one conversion: eight channels of 18 bits and the CRC.
 pub const LINE_BYTES_MAX: usize = CHANNELS * 18 / 8 + CRC_BYTES;
 
-/// What the channels read while INTERFACE_CHECK is on: AD7606B Rev. 0, Table 28 "Interface Check
-/// Conversion Results".
+/// What the channels read while INTERFACE_CHECK is on: AD7606B Rev. 0, "Interface Check".
 pub const INTERFACE_PATTERN: [u16; CHANNELS] =
     [0xACCA, 0x5CC5, 0xA33A, 0x5335, 0xCAAC, 0xC55C, 0x3AA3, 0x3553];
 

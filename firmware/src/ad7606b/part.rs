@@ -61,7 +61,8 @@ pub struct Part {
     conversion_us: [u16; 9],
 }
 
-/// tCONV, the longest, rounded up to whole µs: AD7606B Rev. 0, Table 3 "Universal Timing Specifications".
+/// tCONV, the longest, rounded up to whole µs: AD7606B Rev. 0, "Timing Specifications"; the
+/// manufacturer's own driver waits as long.
 const CONVERSION_US: [u16; 9] = [1, 3, 5, 10, 20, 41, 81, 162, 324];
 
 /// Eight channels of 16 bits, 800 kSPS, 5 MΩ inputs; filter 11.5 to 23 kHz by range.

@@ -75,7 +75,7 @@ mod tests {
 
     #[test]
     fn codes_are_the_data_sheets() {
-        // AD7606B Rev. 0, Table 10: one step is 305 µV, 152 µV and 76 µV
+        // AD7606B Rev. 0, "ADC Transfer Function": one step is 305 µV, 152 µV and 76 µV
         for (range, step_uv) in [(Range::Volts10, 305.0), (Range::Volts5, 152.0), (Range::Volts2_5, 76.0)] {
             assert!((range.volts(1, 16) * 1e6 - step_uv).abs() < 0.6, "{range:?}");
             assert!((range.volts(-32_768, 16) + range.full_scale_v()).abs() < 1e-6);

@@ -21,7 +21,8 @@ use jointrig_firmware::ad7606b::part::{AD7606B, Oversampling};
 use jointrig_firmware::ad7606b::{CHANNELS, Converter, Error, Range, Settings};
 
 /// How both work. Eight conversions are averaged: 10 µs, which with the read-out of 3.6 µs leaves 5 µs of
-/// the 19.5 µs between two scans. The sum of two ± 10 V sensors must not be ranged lower: see docs/WIRING.md.
+/// the 19.5 µs between two scans. All ranges are
+/// alike, so that all channels have one phase: docs/WIRING.md.
 pub const SETTINGS: Settings = Settings {
     ranges: [Range::Volts10; CHANNELS],
     oversampling: Oversampling::X8,

@@ -165,7 +165,7 @@ impl Ring {
         port.cfg1().write(|w| {
             w.set_dsize(15);
             w.set_fthlv(Fthlv::ONE_FRAME);
-            // 160 MHz / 4: 40 MHz; AD7606B Rev. 0, Table 5, allows it from 2.7 V of VDRIVE on
+            // 160 MHz / 4: 40 MHz; AD7606B Rev. 0, "Timing Specifications", allows it from 2.7 V of VDRIVE on
             w.set_mbr(Mbr::DIV4);
             w.set_rxdmaen(true);
         });
