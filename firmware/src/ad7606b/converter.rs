@@ -194,7 +194,8 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
         Ok(self.read(reg::STATUS)? & reg::RESET_DETECT != 0)
     }
 
-    /// Starts one conversion, waits for its end and reads it through DOUTA.
+    /// Starts one conversion, waits for its end and reads it through DOUTA. With several lines in use, the
+    /// channels of the others stay 0: a single port reads a single line.
     ///
     /// # Errors
     /// [`Error::BusyStuck`], [`Error::Data`], or the port's and pins' own.
