@@ -247,7 +247,7 @@ fn a_host_that_does_not_read_for_half_a_second_loses_nothing() {
             let (came, lost) = collect(&session, way, SECOND / 2).await;
             assert_eq!(lost, 0);
             for (i, (first, code)) in came.iter().enumerate() {
-                assert_eq!((*first, *code), (i as u64 * SCANS, i as i16));
+                assert_eq!((*first, *code), (i as u64 * SCANS, i16::try_from(i).unwrap()));
             }
         });
     }
