@@ -17,6 +17,7 @@
 #![forbid(unsafe_code)]
 
 pub mod acquire;
+pub mod ad7606b;
 pub mod board;
 mod fmt;
 pub mod friction;
@@ -25,10 +26,13 @@ pub mod memory;
 pub mod pulse;
 pub mod quiet;
 pub mod receive;
+pub mod report;
 mod requests;
 pub mod ring;
 mod state;
 pub mod transmit;
+#[cfg(feature = "usb")]
+pub mod usb;
 pub mod watch;
 
 pub use state::{Core, Facts};

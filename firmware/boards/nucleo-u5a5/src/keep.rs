@@ -1,0 +1,120 @@
+//! What outlives a reset: the last panic's words, and how often the controller has started.
+//!
+//! Both lie in RAM that start-up code does not touch. After a power cut they are noise, which a check value
+//! tells from a record; after a watchdog's or our own reset they are what was written.
+
+use core::fmt::{self, Write};
+use core::mem::MaybeUninit;
+use core::panic::PanicInfo;
+use core::ptr::{addr_of, addr_of_mut};
+
+use cortex_m::peripheral::SCB;
+use cortex_m_rt::{ExceptionFrame, exception};
+use embassy_stm32::pac;
+use heapless::String;
+use jointrig_protocol::limits::SENTENCE_BYTES;
+
+/// Marks a record as one of ours ("JRIG").
+const MAGIC: u32 = 0x4A52_4947;
+
+#[derive(Clone, Copy)]
+#[repr(C)]
+struct Record {
+    magic: u32,
+    length: u32,
+    text: [u8; SENTENCE_BYTES],
+    sum: u32,
+}
+
+#[derive(Clone, Copy)]
+#[repr(C)]
+struct Starts {
+    count: u32,
+    inverse: u32,
+}
+
+// SAFETY of the section: both types are plain numbers, of which any bytes are a value; nothing reads them as
+// initialised before they were checked.
+#[unsafe(link_section = ".uninit.jointrig_panic")]
+static mut RECORD: MaybeUninit<Record> = MaybeUninit::uninit();
+#[unsafe(link_section = ".uninit.jointrig_starts")]
+static mut STARTS: MaybeUninit<Starts> = MaybeUninit::uninit();
+
+impl Record {
+    fn sum_of(&self) -> u32 {
+        // FNV-1a: noise that passes both this and the magic is a matter of 2^-64
+        let bytes =
+            self.text.iter().chain(&self.length.to_le_bytes()).copied().collect::<heapless::Vec<u8, 128>>();
+        bytes.iter().fold(0x811C_9DC5, |sum, byte| (sum ^ u32::from(*byte)).wrapping_mul(0x0100_0193))
+    }
+}
+
+/// Says what the last run's panic said, once.
+pub fn take_panic() -> Option<String<SENTENCE_BYTES>> {
+    // SAFETY: called first of all in `main`, before any task or interrupt that could panic runs; the volatile
+    // read takes whatever bytes are there, and all bytes are a `Record`.
+    let record = unsafe { addr_of!(RECORD).cast::<Record>().read_volatile() };
+    // SAFETY: as above; a record is told once.
+    unsafe { addr_of_mut!(RECORD).cast::<u32>().write_volatile(0) };
+    if record.magic != MAGIC || record.sum != record.sum_of() {
+        return None;
+    }
+    let text = core::str::from_utf8(record.text.get(..record.length as usize)?).ok()?;
+    String::try_from(text).ok()
+}
+
+/// Counts this start: 1 after power came, one more after every other reset.
+pub fn count_start() -> u32 {
+    // SAFETY: called once in `main` before anything else runs; any bytes are a `Starts`.
+    let before = unsafe { addr_of!(STARTS).cast::<Starts>().read_volatile() };
+    let count = if before.count == !before.inverse { before.count.wrapping_add(1) } else { 1 };
+    // SAFETY: as above.
+    unsafe { addr_of_mut!(STARTS).cast::<Starts>().write_volatile(Starts { count, inverse: !count }) };
+    count
+}
+
+/// Writes what fits and leaves the rest.
+struct Cut<'a>(&'a mut Record);
+
+impl Write for Cut<'_> {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        for c in text.chars() {
+            let at = self.0.length as usize;
+            let Some(room) = self.0.text.get_mut(at..at + c.len_utf8()) else { return Err(fmt::Error) };
+            c.encode_utf8(room);
+            self.0.length += c.len_utf8() as u32;
+        }
+        Ok(())
+    }
+}
+
+/// Coil off, words kept, reset.
+fn end(what: fmt::Arguments<'_>) -> ! {
+    cortex_m::interrupt::disable();
+    pac::TIM1.bdtr().modify(|w| w.set_moe(false));
+    let mut record = Record { magic: MAGIC, length: 0, text: [0; SENTENCE_BYTES], sum: 0 };
+    // cut where it is full
+    let _ = Cut(&mut record).write_fmt(what);
+    record.sum = record.sum_of();
+    // SAFETY: interrupts are off and nothing returns from here, so that nobody else uses the record.
+    unsafe { addr_of_mut!(RECORD).cast::<Record>().write_volatile(record) };
+    cortex_m::asm::dsb();
+    SCB::sys_reset()
+}
+
+#[panic_handler]
+fn panicked(info: &PanicInfo<'_>) -> ! {
+    match info.location() {
+        // the end of a long path says more than its beginning
+        Some(at) => {
+            let file = at.file().rsplit('/').next().unwrap_or_default();
+            end(format_args!("{file}:{}: {}", at.line(), info.message()))
+        }
+        None => end(format_args!("{}", info.message())),
+    }
+}
+
+#[exception]
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    end(format_args!("hard fault at {:#010x}, called from {:#010x}", frame.pc(), frame.lr()))
+}

@@ -1,0 +1,154 @@
+//! The rig's controller: a NUCLEO-U5A5ZJ-Q with two AD7606B, the hammer's coil and a high-speed USB.
+//!
+//! This crate is wiring; what the instrument does is `jointrig-firmware`. Pins: docs/WIRING.md. What has not
+//! yet been seen on a real board: docs/first-light.md.
+//!
+//! Timing does not depend on software:
+//!
+//! | what | who does it |
+//! |---|---|
+//! | sampling instants | TIM2 drives CONVST of both converters |
+//! | counting them | TIM5 counts TIM2's periods, so that a scan that never came is known to be missing |
+//! | reading 16 channels | the end of BUSY starts SPI1 and SPI2, GPDMA writes rings ([`rings`]) |
+//! | the end of a coil pulse | TIM1 in one-pulse mode; its longest period is the cap ([`coil`]) |
+//! | guard and emergency stop | TIM1's break input, and the coil driver's own gate |
+//! | a program that hangs | the independent watchdog ([`watchdog`]) |
+//!
+//! Two executors: acquisition runs at an interrupt's priority above USB, watch and lights in thread mode.
+#![no_std]
+#![no_main]
+
+mod channels;
+mod chips;
+mod clocks;
+mod coil;
+mod inputs;
+mod keep;
+mod lights;
+mod rings;
+mod scans;
+mod usb;
+mod watchdog;
+
+use defmt_rtt as _;
+use embassy_executor::{InterruptExecutor, Spawner};
+use embassy_stm32::interrupt::{self, InterruptExt, Priority};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use jointrig_firmware::board::{Board, Coil, NoStage, Stage};
+use jointrig_firmware::ring::Slot;
+use jointrig_firmware::{Core, Facts, acquire, watch};
+use jointrig_protocol::limits::{MAX_CHANNELS, scans_per_block};
+use static_cell::{ConstStaticCell, StaticCell};
+
+/// Scans per second: 160 MHz / 3125, without a remainder.
+pub const SCAN_RATE_HZ: u32 = 51_200;
+/// Scans in a full block.
+pub const BLOCK_SCANS: usize = match scans_per_block(MAX_CHANNELS) {
+    Some(scans) => scans,
+    None => unreachable!(),
+};
+/// Blocks that the ring holds: a second and a tenth, 1.9 MB.
+const SLOTS: usize = (SCAN_RATE_HZ as usize * 11 / 10).div_ceil(BLOCK_SCANS);
+
+/// What the tasks share.
+pub type Shared = Core<'static, CriticalSectionRawMutex>;
+
+/// This board.
+pub struct Nucleo;
+
+impl Board for Nucleo {
+    type Mutex = CriticalSectionRawMutex;
+    type Scans = scans::Converters;
+    type Coil = coil::PulseTimer;
+    type Inputs = inputs::Switches;
+    type Source = usb::Source;
+    type Sink = usb::Sink;
+    type Stage = NoStage;
+}
+
+static RING: ConstStaticCell<[Slot; SLOTS]> = ConstStaticCell::new([Slot::EMPTY; SLOTS]);
+static CORE: StaticCell<Shared> = StaticCell::new();
+static ABOVE: InterruptExecutor = InterruptExecutor::new();
+
+/// A vector that nothing else uses serves as the upper executor's software interrupt.
+#[embassy_stm32::interrupt]
+fn LPUART1() {
+    // SAFETY: only this interrupt polls the executor, and it was started before the interrupt was enabled.
+    unsafe { ABOVE.on_interrupt() }
+}
+
+#[embassy_executor::task]
+async fn acquisition(
+    core: &'static Shared,
+    mut scans: scans::Converters,
+    mut coil: coil::PulseTimer,
+    mut inputs: inputs::Switches,
+) {
+    acquire::acquire(core, &mut scans, &mut coil, &mut inputs).await;
+}
+
+#[embassy_executor::task]
+async fn watching(core: &'static Shared) {
+    watch::watch(core).await;
+}
+
+#[embassy_executor::main]
+async fn main(spawner: Spawner) {
+    // before anything else: what the last run left behind
+    let last_panic = keep::take_panic();
+    let boot = keep::count_start();
+    let p = embassy_stm32::init(clocks::config());
+    let dog = watchdog::start(p.IWDG);
+
+    let coil = coil::PulseTimer::new(p.TIM1, p.PE9, p.PE15);
+    let inputs = inputs::Switches::new(p.PF13, p.PF14, p.PF15);
+    let facts = Facts {
+        board: channels::name("nucleo-u5a5"),
+        serial: channels::name(embassy_stm32::uid::uid_hex()),
+        target: channels::text(env!("JOINTRIG_TARGET")),
+        build: env!("JOINTRIG_BUILD").parse().unwrap_or(0),
+        scan_rate_hz: SCAN_RATE_HZ,
+        channels: channels::table(),
+        coil_cap_us: coil.cap_us(),
+        stage: NoStage::PRESENT,
+        boot,
+    };
+    let core: &'static Shared = CORE.init(Core::new(facts, RING.take()));
+    if let Some(text) = last_panic {
+        core.report_panic(text.as_str());
+    }
+
+    let chips = chips::Chips {
+        first: chips::First {
+            port: p.SPI1,
+            clock: p.PA5,
+            sdi: p.PA7,
+            dout: p.PA6,
+            select: p.PA4,
+            reset: p.PE5,
+            busy: p.PE4,
+            dma: p.GPDMA1_CH0,
+        },
+        second: chips::Second {
+            port: p.SPI2,
+            clock: p.PD1,
+            sdi: p.PD4,
+            dout: p.PD3,
+            select: p.PD0,
+            reset: p.PE6,
+            busy: p.PD9,
+            dma: p.GPDMA1_CH1,
+        },
+    };
+    let scans = scans::Converters::new(core, chips, p.TIM2, p.TIM5, p.PA0);
+
+    interrupt::LPUART1.set_priority(Priority::P6);
+    let above = ABOVE.start(interrupt::LPUART1);
+    // each task is spawned once, so that its one place is free
+    above.spawn(defmt::unwrap!(acquisition(core, scans, coil, inputs)));
+    spawner.spawn(defmt::unwrap!(watching(core)));
+    spawner.spawn(defmt::unwrap!(usb::task(core, p.USB_OTG_HS, p.PA12, p.PA11)));
+    spawner.spawn(defmt::unwrap!(watchdog::task(dog)));
+    spawner.spawn(defmt::unwrap!(lights::task(p.PC7, p.PB7, p.PG2)));
+    defmt::info!("jointrig on nucleo-u5a5, start {}", boot);
+}

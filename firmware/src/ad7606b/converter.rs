@@ -1,0 +1,323 @@
+//! One chip: reset, identity, settings, diagnostics, single conversions.
+//!
+//! A register access is two or three bytes at most, so it blocks for a few µs at set-up; only the end
+//! of a conversion is waited for, and never longer than [`BUSY_PATIENCE`] times the data sheet's longest.
+
+use embassy_futures::select::{Either, select};
+use embedded_hal::delay::DelayNs;
+use embedded_hal::digital::OutputPin;
+use embedded_hal::spi::SpiDevice;
+use embedded_hal_async::delay::DelayNs as WaitNs;
+use embedded_hal_async::digital::Wait;
+
+use super::frames::{INTERFACE_PATTERN, LINE_BYTES_MAX, Layout, Lines};
+use super::part::{Oversampling, Part};
+use super::range::Range;
+use super::{CHANNELS, Error, registers as reg};
+
+/// A RESET pulse of more than 3.2 µs is a full reset: AD7606B Rev. 0, "Timing Specifications", tRESET.
+const RESET_NS: u32 = 5_000;
+/// After a full reset the chip loads its own calibration: tDEVICE_SETUP is 253 µs.
+const SETUP_US: u32 = 300;
+/// CONVST must be low for 10 ns before it rises: tLP_CNV. A pin takes longer than that anyway.
+const CONVST_LOW_NS: u32 = 100;
+/// How many times the longest conversion BUSY may last before it is called stuck.
+pub const BUSY_PATIENCE: u32 = 3;
+/// What is watched always: ROM, register map, addresses, BUSY.
+const WATCHED: u8 =
+    reg::ROM_CRC | reg::MEMORY_MAP_CRC | reg::SPI_WRITE | reg::SPI_READ | reg::BUSY_STUCK_HIGH;
+
+/// How the chip is to work.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Each channel's range.
+    pub ranges: [Range; CHANNELS],
+    /// Conversions averaged per sample.
+    pub oversampling: Oversampling,
+    /// Lines in use.
+    pub lines: Lines,
+    /// Whether data and register frames carry a CRC.
+    pub crc: bool,
+    /// Whether filters pass 220 kHz instead of 25 kHz, on parts that can.
+    pub wide_band: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            ranges: [Range::Volts10; CHANNELS],
+            oversampling: Oversampling::X8,
+            lines: Lines::One,
+            crc: true,
+            wide_band: false,
+        }
+    }
+}
+
+/// One chip in software mode (OS0…OS2 tied high), on a port of its own: `S` frames each access with CS, `R`
+/// is its RESET pin.
+///
+/// The port must be of mode 2 (clock idles high, data are taken on its falling edge): AD7606B Rev. 0,
+/// "Serial Interface".
+#[derive(Debug)]
+pub struct Converter<S, R> {
+    spi: S,
+    reset: R,
+    part: &'static Part,
+    settings: Settings,
+    /// The port is in register mode.
+    in_registers: bool,
+    /// Register frames carry a CRC.
+    crc: bool,
+}
+
+/// What a converter's methods return.
+type Done<S, R, T = ()> = Result<
+    T,
+    Error<<S as embedded_hal::spi::ErrorType>::Error, <R as embedded_hal::digital::ErrorType>::Error>,
+>;
+
+impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
+    /// A chip that nothing is known of yet: [`Self::reset`] comes first.
+    pub fn new(spi: S, reset: R, part: &'static Part) -> Self {
+        Self { spi, reset, part, settings: Settings::default(), in_registers: false, crc: false }
+    }
+
+    /// Gives port and pin back, with the chip in ADC mode, for a board that reads data by DMA.
+    ///
+    /// # Errors
+    /// [`Error::Spi`].
+    pub fn into_adc_mode(mut self) -> Done<S, R, (S, R)> {
+        self.leave_registers()?;
+        Ok((self.spi, self.reset))
+    }
+
+    /// Full reset: all registers have their first values again. Then checks that the chip was indeed reset,
+    /// and that it is the right one.
+    ///
+    /// # Errors
+    /// [`Error::NotReset`], [`Error::Identity`], or the port's and pin's own.
+    pub fn reset(&mut self, delay: &mut impl DelayNs) -> Done<S, R> {
+        self.reset.set_high().map_err(Error::Pin)?;
+        delay.delay_ns(RESET_NS);
+        self.reset.set_low().map_err(Error::Pin)?;
+        delay.delay_us(SETUP_US);
+        self.in_registers = false;
+        self.crc = false;
+        // the identity first: a chip that is not there has no status worth reading
+        let found = self.read(reg::ID)?;
+        if !self.part.device_ids.contains(&(found >> 4)) {
+            return Err(Error::Identity { found, part: self.part.name });
+        }
+        let status = self.read(reg::STATUS)?;
+        if status & reg::RESET_DETECT == 0 {
+            return Err(Error::NotReset { status });
+        }
+        Ok(())
+    }
+
+    /// Applies the settings and reads every one of them back.
+    ///
+    /// # Errors
+    /// [`Error::NoRange`], [`Error::NoLayout`] before anything is written; [`Error::Readback`] when the chip
+    /// did not take one.
+    pub fn configure(&mut self, settings: &Settings) -> Done<S, R> {
+        let part = self.part.name;
+        if let Some(range) = settings.ranges.into_iter().find(|range| !self.part.ranges.contains(range)) {
+            return Err(Error::NoRange { range, part });
+        }
+        if Layout::new(self.part, settings.lines, settings.crc).is_none() {
+            return Err(Error::NoLayout { part });
+        }
+        // the CRC first, so that it covers the rest
+        self.watch_itself(settings.crc, false)?;
+        self.write(reg::CONFIG, settings.lines.code() << reg::LINES_SHIFT)?;
+        for (pair, address) in settings.ranges.as_chunks::<2>().0.iter().zip(reg::RANGE_CH1_CH2..) {
+            self.write(address, pair[0].code() | pair[1].code() << 4)?;
+        }
+        if self.part.has_bandwidth {
+            self.write(reg::BANDWIDTH, if settings.wide_band { 0xFF } else { 0 })?;
+        }
+        self.write(reg::OVERSAMPLING, settings.oversampling.code())?;
+        self.settings = *settings;
+        Ok(())
+    }
+
+    /// The settings in force.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Digital errors since they were last asked for; asking clears them. The bits are those of
+    /// [`super::registers`].
+    ///
+    /// # Errors
+    /// The port's own.
+    pub fn digital_errors(&mut self) -> Done<S, R, u8> {
+        let bits = self.read(reg::DIGITAL_DIAG_ERROR)?;
+        if bits != 0 {
+            self.send(reg::write_command(reg::DIGITAL_DIAG_ERROR, bits))?;
+        }
+        Ok(bits)
+    }
+
+    /// Lets the chip look for open inputs on the channels whose bits are set, by itself: an input counts as
+    /// open when it gave small codes for `conversions` in a row and then follows a change of the amplifier's
+    /// common mode, which a driven input does not (AD7606B Rev. 0, "Open Circuit Detection"; each input
+    /// needs 10 kΩ across it at the source end).
+    ///
+    /// # Errors
+    /// The port's own, or [`Error::Readback`].
+    pub fn watch_inputs(&mut self, channels: u8, conversions: u8) -> Done<S, R> {
+        // 1 is the manual way, in which the chip does not judge
+        self.write(reg::OPEN_DETECT_QUEUE, conversions.max(2))?;
+        self.write(reg::OPEN_DETECT_ENABLE, channels)
+    }
+
+    /// Channels that were found open since they were last asked for, one bit each; asking clears them.
+    ///
+    /// # Errors
+    /// The port's own.
+    pub fn open_inputs(&mut self) -> Done<S, R, u8> {
+        let bits = self.read(reg::OPEN_DETECTED)?;
+        if bits != 0 {
+            self.send(reg::write_command(reg::OPEN_DETECTED, bits))?;
+        }
+        Ok(bits)
+    }
+
+    /// Whether the chip was reset since this was last asked: by a dip of its supply, if not by us.
+    ///
+    /// # Errors
+    /// The port's own.
+    pub fn was_reset(&mut self) -> Done<S, R, bool> {
+        Ok(self.read(reg::STATUS)? & reg::RESET_DETECT != 0)
+    }
+
+    /// Starts one conversion, waits for its end and reads it through DOUTA. With several lines in use, the
+    /// channels of the others stay 0: a single port reads a single line.
+    ///
+    /// # Errors
+    /// [`Error::BusyStuck`], [`Error::Data`], or the port's and pins' own.
+    pub async fn convert<C, B>(
+        &mut self,
+        convst: &mut C,
+        busy: &mut B,
+        delay: &mut (impl DelayNs + WaitNs),
+    ) -> Done<S, R, [i32; CHANNELS]>
+    where
+        C: OutputPin<Error = R::Error>,
+        B: Wait<Error = R::Error>,
+    {
+        self.leave_registers()?;
+        convst.set_low().map_err(Error::Pin)?;
+        DelayNs::delay_ns(delay, CONVST_LOW_NS);
+        convst.set_high().map_err(Error::Pin)?;
+        let after_us = BUSY_PATIENCE * self.part.conversion_us(self.settings.oversampling);
+        match select(busy.wait_for_low(), WaitNs::delay_us(delay, after_us)).await {
+            Either::First(fallen) => fallen.map_err(Error::Pin)?,
+            Either::Second(()) => return Err(Error::BusyStuck { after_us }),
+        }
+        // all of it on the first line, whichever others are in use: what follows a line's own data is not read
+        let layout = Layout::new(self.part, self.settings.lines, self.settings.crc)
+            .ok_or(Error::NoLayout { part: self.part.name })?;
+        let mut line = [0; LINE_BYTES_MAX];
+        let line = &mut line[..layout.bytes()];
+        // zeros on SDI: anything else could be a command
+        self.spi.transfer_in_place(line).map_err(Error::Spi)?;
+        let mut codes = [0; CHANNELS];
+        layout.decode(line, &mut codes).map_err(Error::Data)?;
+        Ok(codes)
+    }
+
+    /// Lets the chip send its known pattern in place of a conversion, checks what arrives, and then what the
+    /// chip found wrong with itself.
+    ///
+    /// # Errors
+    /// [`Error::Pattern`], [`Error::Digital`], and all of [`Self::convert`].
+    pub async fn self_test<C, B>(
+        &mut self,
+        convst: &mut C,
+        busy: &mut B,
+        delay: &mut (impl DelayNs + WaitNs),
+    ) -> Done<S, R>
+    where
+        C: OutputPin<Error = R::Error>,
+        B: Wait<Error = R::Error>,
+    {
+        self.watch_itself(self.crc, true)?;
+        // the first conversion after the switch is still an old one
+        self.convert(convst, busy, delay).await?;
+        let codes = self.convert(convst, busy, delay).await?;
+        self.watch_itself(self.crc, false)?;
+        let on_line = CHANNELS / self.settings.lines.count();
+        for (channel, (code, due)) in codes.into_iter().zip(INTERFACE_PATTERN).take(on_line).enumerate() {
+            // an 18-bit part sends the pattern in its upper 16 bits
+            let found = (code >> (self.part.bits - 16)) as u16;
+            if found != due {
+                return Err(Error::Pattern { channel, found });
+            }
+        }
+        match self.digital_errors()? {
+            0 => Ok(()),
+            bits => Err(Error::Digital { bits }),
+        }
+    }
+
+    /// Writes DIGITAL_DIAG_ENABLE. The frame that switches the CRC on has none yet; the one that switches it
+    /// off still has one.
+    fn watch_itself(&mut self, crc: bool, pattern: bool) -> Done<S, R> {
+        let value = WATCHED
+            | if crc { reg::INTERFACE_CRC } else { 0 }
+            | if pattern { reg::INTERFACE_CHECK } else { 0 };
+        self.enter_registers()?;
+        self.send(reg::write_command(reg::DIGITAL_DIAG_ENABLE, value))?;
+        self.crc = crc;
+        self.confirm(reg::DIGITAL_DIAG_ENABLE, value)
+    }
+
+    fn write(&mut self, address: u8, value: u8) -> Done<S, R> {
+        self.enter_registers()?;
+        self.send(reg::write_command(address, value))?;
+        self.confirm(address, value)
+    }
+
+    fn confirm(&mut self, address: u8, wrote: u8) -> Done<S, R> {
+        let holds = self.read(address)?;
+        if holds == wrote { Ok(()) } else { Err(Error::Readback { address, wrote, holds }) }
+    }
+
+    fn read(&mut self, address: u8) -> Done<S, R, u8> {
+        self.send(reg::read_command(address))?;
+        self.in_registers = true;
+        // the answer comes with whatever frame is next: the same command again changes nothing
+        let [echo, value, crc] = self.send(reg::read_command(address))?;
+        if self.crc && crc != reg::frame_crc([echo, value]) {
+            return Err(Error::RegisterCrc { address });
+        }
+        Ok(value)
+    }
+
+    fn enter_registers(&mut self) -> Done<S, R> {
+        if !self.in_registers {
+            self.read(reg::ID)?;
+        }
+        Ok(())
+    }
+
+    fn leave_registers(&mut self) -> Done<S, R> {
+        if self.in_registers {
+            self.send(reg::LEAVE)?;
+            self.in_registers = false;
+        }
+        Ok(())
+    }
+
+    /// One frame; returns what the chip said meanwhile.
+    fn send(&mut self, command: [u8; 2]) -> Done<S, R, [u8; 3]> {
+        let mut frame = [command[0], command[1], reg::frame_crc(command)];
+        let used = if self.crc { 3 } else { 2 };
+        self.spi.transfer_in_place(&mut frame[..used]).map_err(Error::Spi)?;
+        Ok(frame)
+    }
+}

@@ -1,0 +1,203 @@
+//! What comes out of the DOUT lines after a conversion, and the CRC behind it.
+//!
+//! Channels come in order, most significant bit first, shared evenly between the lines in use: one line
+//! carries V1…V8, two carry V1…V4 and V5…V8, and so on. With the CRC on, each line ends with 16 bits over the
+//! data of that line alone (AD7606B Rev. 0, "Interface CRC Checksum").
+
+use crc::{Algorithm, Crc, Table};
+
+use super::CHANNELS;
+use super::part::Part;
+
+/// Lines on which data comes out at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Lines {
+    /// DOUTA.
+    One,
+    /// DOUTA and DOUTB.
+    Two,
+    /// DOUTA to DOUTD.
+    Four,
+    /// DOUTA to DOUTH (AD7606C only).
+    Eight,
+}
+
+impl Lines {
+    /// Its code in the CONFIG register.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub const fn count(self) -> usize {
+        1 << self as u8
+    }
+}
+
+/// Bytes of the CRC at the end of a line's data.
+pub const CRC_BYTES: usize = 2;
+/// Most bytes that one line carries after one conversion: eight channels of 18 bits and the CRC.
+pub const LINE_BYTES_MAX: usize = CHANNELS * 18 / 8 + CRC_BYTES;
+
+/// What the channels read while INTERFACE_CHECK is on: AD7606B Rev. 0, "Interface Check".
+pub const INTERFACE_PATTERN: [u16; CHANNELS] =
+    [0xACCA, 0x5CC5, 0xA33A, 0x5335, 0xCAAC, 0xC55C, 0x3AA3, 0x3553];
+
+/// x¹⁶ + x¹⁴ + x¹³ + x¹² + x¹⁰ + x⁸ + x⁶ + x⁴ + x³ + x + 1 from zero.
+const DATA_CRC: Algorithm<u16> = Algorithm {
+    width: 16,
+    poly: 0x755B,
+    init: 0,
+    refin: false,
+    refout: false,
+    xorout: 0,
+    // of "123456789", worked out bit by bit in the test below
+    check: 0x2E8F,
+    residue: 0,
+};
+const DATA: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&DATA_CRC);
+
+/// The CRC over a line's data.
+#[must_use]
+pub fn data_crc(data: &[u8]) -> u16 {
+    DATA.checksum(data)
+}
+
+/// A line's CRC is not that of its data.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct CrcMismatch {
+    /// What the chip sent.
+    pub sent: u16,
+    /// What its data ask for.
+    pub due: u16,
+}
+
+/// How one line's data are laid out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Layout {
+    bits: u8,
+    channels: usize,
+    crc: bool,
+}
+
+impl Layout {
+    /// The layout of each of `lines` lines; `None` when the part has not so many, or when a line would not
+    /// be whole bytes (18 bits on four or eight lines).
+    #[must_use]
+    pub fn new(part: &Part, lines: Lines, crc: bool) -> Option<Self> {
+        let channels = CHANNELS / lines.count();
+        let whole = (channels * usize::from(part.bits)).is_multiple_of(8);
+        (lines <= part.most_lines && whole).then_some(Self { bits: part.bits, channels, crc })
+    }
+
+    /// Channels on one line.
+    #[must_use]
+    pub const fn channels(&self) -> usize {
+        self.channels
+    }
+
+    /// Bytes that one line carries after one conversion.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.data_bytes() + if self.crc { CRC_BYTES } else { 0 }
+    }
+
+    fn data_bytes(&self) -> usize {
+        self.channels * usize::from(self.bits) / 8
+    }
+
+    /// Reads one line's bytes into the codes of its channels, sign extended. What `line` or `codes` is too
+    /// short for is left out.
+    ///
+    /// # Errors
+    /// [`CrcMismatch`], and then `codes` is untouched.
+    pub fn decode(&self, line: &[u8], codes: &mut [i32]) -> Result<(), CrcMismatch> {
+        let (data, rest) = line.split_at(self.data_bytes().min(line.len()));
+        if self.crc {
+            let sent = rest.first_chunk().map_or(0, |bytes| u16::from_be_bytes(*bytes));
+            let due = data_crc(data);
+            if sent != due {
+                return Err(CrcMismatch { sent, due });
+            }
+        }
+        let (mut held, mut held_bits) = (0_u32, 0_u8);
+        let mut bytes = data.iter();
+        for code in codes.iter_mut().take(self.channels) {
+            while held_bits < self.bits {
+                let Some(byte) = bytes.next() else { return Ok(()) };
+                held = held << 8 | u32::from(*byte);
+                held_bits += 8;
+            }
+            held_bits -= self.bits;
+            let unused = 32 - self.bits;
+            *code = ((held >> held_bits) << unused).cast_signed() >> unused;
+        }
+        Ok(())
+    }
+}
+
+/// Words of one 16-bit chip on one line: eight codes and the CRC.
+pub const CHIP_WORDS: usize = CHANNELS + 1;
+
+/// Checks the words that one 16-bit chip sent on one line.
+///
+/// # Errors
+/// [`CrcMismatch`].
+pub fn check_words(words: &[u16; CHIP_WORDS]) -> Result<(), CrcMismatch> {
+    let [codes @ .., sent] = words;
+    let mut digest = DATA.digest();
+    for code in codes {
+        digest.update(&code.to_be_bytes());
+    }
+    let due = digest.finalize();
+    if *sent == due { Ok(()) } else { Err(CrcMismatch { sent: *sent, due }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::part::{AD7606B, AD7606C_18};
+    use super::*;
+
+    /// The polynomial division, bit by bit, as the data sheet describes it.
+    fn by_hand(data: &[u8]) -> u16 {
+        let bits = data.iter().flat_map(|byte| (0..8).rev().map(move |i| byte >> i & 1));
+        bits.fold(0, |crc: u16, bit| {
+            let out = crc >> 15 ^ u16::from(bit);
+            crc << 1 ^ if out == 1 { 0x755B } else { 0 }
+        })
+    }
+
+    #[test]
+    fn the_crc_is_the_polynomials() {
+        for data in [&b"123456789"[..], &[0; 16], &[0xFF; 16], &[0x12, 0x34]] {
+            assert_eq!(data_crc(data), by_hand(data));
+        }
+    }
+
+    #[test]
+    fn an_18_bit_line_is_read_bit_by_bit() {
+        let layout = Layout::new(&AD7606C_18, Lines::Two, false).expect("four times 18 bits are nine bytes");
+        let mut codes = [0; 4];
+        // 0x1FFFF, 0x20000, 1, 0x3FFFF
+        let packed: u128 = 0x1_FFFF << 54 | 0x2_0000 << 36 | 1 << 18 | 0x3_FFFF;
+        let line = &packed.to_be_bytes()[16 - 9..];
+        assert_eq!(layout.decode(line, &mut codes), Ok(()));
+        assert_eq!(codes, [131_071, -131_072, 1, -1]);
+        assert_eq!(Layout::new(&AD7606C_18, Lines::Four, true), None);
+        assert_eq!(Layout::new(&AD7606B, Lines::Eight, true), None);
+    }
+
+    #[test]
+    fn words_and_bytes_agree() {
+        let mut words = [1_u16, 0x8000, 0xFFFF, 4, 5, 6, 7, 0x7FFF, 0];
+        let bytes: [u8; 16] = core::array::from_fn(|i| words[i / 2].to_be_bytes()[i % 2]);
+        words[8] = data_crc(&bytes);
+        assert_eq!(check_words(&words), Ok(()));
+        words[3] ^= 1;
+        assert!(check_words(&words).is_err());
+    }
+}

@@ -1,0 +1,126 @@
+//! What differs between the parts that fit one footprint.
+
+use super::frames::Lines;
+use super::range::Range;
+
+/// How many conversions the chip averages into one sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Oversampling {
+    /// One: none.
+    X1,
+    /// Two.
+    X2,
+    /// Four.
+    X4,
+    /// Eight.
+    X8,
+    /// Sixteen.
+    X16,
+    /// Thirty-two.
+    X32,
+    /// Sixty-four.
+    X64,
+    /// A hundred and twenty-eight.
+    X128,
+    /// Two hundred and fifty-six.
+    X256,
+}
+
+impl Oversampling {
+    /// What OS_RATIO of the OVERSAMPLING register means by it.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// Conversions per sample.
+    #[must_use]
+    pub const fn ratio(self) -> u16 {
+        1 << self as u8
+    }
+}
+
+/// One part: what the driver must know to tell it from its relatives and to read it.
+#[derive(Debug, PartialEq)]
+pub struct Part {
+    /// Its name.
+    pub name: &'static str,
+    /// DEVICE_ID, the upper half of the ID register. The AD7606C's data sheet says 3; chips that answer 2
+    /// have been met, so both are taken.
+    pub device_ids: &'static [u8],
+    /// Bits of a conversion.
+    pub bits: u8,
+    /// Ranges of its inputs, single-ended and bipolar.
+    pub ranges: &'static [Range],
+    /// Most lines on which data can come out at once.
+    pub most_lines: Lines,
+    /// Whether each channel's filter can be told to pass 220 kHz instead of 25 kHz (BANDWIDTH register).
+    pub has_bandwidth: bool,
+    /// Longest time from CONVST to the end of BUSY, µs, by [`Oversampling`].
+    conversion_us: [u16; 9],
+}
+
+/// tCONV, the longest, rounded up to whole µs: AD7606B Rev. 0, "Timing Specifications"; the
+/// manufacturer's own driver waits as long.
+const CONVERSION_US: [u16; 9] = [1, 3, 5, 10, 20, 41, 81, 162, 324];
+
+/// Eight channels of 16 bits, 800 kSPS, 5 MΩ inputs; filter 11.5 to 23 kHz by range.
+pub const AD7606B: Part = Part {
+    name: "AD7606B",
+    device_ids: &[1],
+    bits: 16,
+    ranges: &[Range::Volts2_5, Range::Volts5, Range::Volts10],
+    most_lines: Lines::Four,
+    has_bandwidth: false,
+    conversion_us: CONVERSION_US,
+};
+
+/// Ranges of the AD7606C that this driver uses: the single-ended bipolar ones.
+const C_RANGES: &[Range] =
+    &[Range::Volts2_5, Range::Volts5, Range::Volts6_25, Range::Volts10, Range::Volts12_5];
+
+/// Eight channels of 16 bits, 1 MSPS, 1 MΩ inputs; filter 25 or 220 kHz.
+pub const AD7606C_16: Part = Part {
+    name: "AD7606C-16",
+    device_ids: &[3, 2],
+    bits: 16,
+    ranges: C_RANGES,
+    most_lines: Lines::Eight,
+    has_bandwidth: true,
+    conversion_us: CONVERSION_US,
+};
+
+/// Eight channels of 18 bits, else as the AD7606C-16.
+pub const AD7606C_18: Part = Part { name: "AD7606C-18", bits: 18, ..AD7606C_16 };
+
+impl Part {
+    /// Longest time from CONVST to the end of BUSY, µs.
+    #[must_use]
+    pub const fn conversion_us(&self, oversampling: Oversampling) -> u32 {
+        self.conversion_us[oversampling as usize] as u32
+    }
+
+    /// By how much a sample lags the instant of CONVST, ns: half of the time over which it is averaged.
+    #[must_use]
+    pub const fn averaging_delay_ns(&self, oversampling: Oversampling) -> u32 {
+        match oversampling {
+            Oversampling::X1 => 0,
+            _ => self.conversion_us(oversampling) * 500,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sixteen_conversions_do_not_fit_a_scan_at_51_2_khz_but_eight_do() {
+        let scan_us = 1e6 / 51_200.0;
+        assert!(f64::from(AD7606B.conversion_us(Oversampling::X8)) < scan_us);
+        assert!(f64::from(AD7606B.conversion_us(Oversampling::X16)) > scan_us);
+        assert_eq!(AD7606B.averaging_delay_ns(Oversampling::X8), 5_000);
+        assert_eq!((Oversampling::X8.code(), Oversampling::X8.ratio()), (3, 8));
+    }
+}

@@ -1,0 +1,129 @@
+//! Descriptors: who the device is, and which interfaces it has.
+
+use core::sync::atomic::AtomicU8;
+
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
+use embassy_usb::class::cdc_acm::{CdcAcmClass, State};
+use embassy_usb::driver::Driver;
+use embassy_usb::msos::{
+    CompatibleIdFeatureDescriptor, PropertyData, RegistryPropertyFeatureDescriptor, windows_version,
+};
+use embassy_usb::{Builder, Config, UsbDevice};
+
+use super::link::{Bulk, Choice, Sink, Source};
+
+/// pid.codes, the registry that gives product ids to open hardware.
+pub const VENDOR_ID: u16 = 0x1209;
+/// pid.codes' first test id: for use inside a laboratory. A rig that is sold or given away needs an id of
+/// its own, here and in docs/udev/70-jointrig.rules.
+pub const PRODUCT_ID: u16 = 0x0001;
+/// The request by which Windows asks for the descriptors that are its own.
+pub const VENDOR_CODE: u8 = 0x4A;
+/// By which a Windows program finds the vendor interface.
+pub const INTERFACE_GUID: &str = "{6C1E3B6A-58F0-4C4B-9D0E-6A2F1B7D9E35}";
+/// Class, subclass and protocol that mean "the vendor's own".
+const VENDOR_CLASS: u8 = 0xFF;
+
+/// What the bus came up at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Speed {
+    /// 12 Mbit/s: eight channels at most at 51.2 kHz.
+    Full,
+    /// 480 Mbit/s.
+    High,
+}
+
+impl Speed {
+    /// Bytes of a bulk packet; at either speed no other size is legal for what we need (USB 2.0, 5.8.3).
+    #[must_use]
+    pub const fn bulk_packet(self) -> u16 {
+        match self {
+            Self::Full => 64,
+            Self::High => 512,
+        }
+    }
+}
+
+/// Memory for descriptors and the serial port's state. It outlives the device that is built in it.
+pub struct Buffers<'d> {
+    config: [u8; 192],
+    bos: [u8; 64],
+    msos: [u8; 256],
+    control: [u8; 128],
+    serial_port: State<'d>,
+    choice: Choice,
+}
+
+impl Default for Buffers<'_> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Buffers<'_> {
+    /// Empty.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            config: [0; 192],
+            bos: [0; 64],
+            msos: [0; 256],
+            control: [0; 128],
+            serial_port: State::new(),
+            choice: Choice {
+                active: AtomicU8::new(0),
+                changed: Signal::<CriticalSectionRawMutex, ()>::new(),
+            },
+        }
+    }
+}
+
+/// A built device. `device` must be run beside whatever uses `source` and `sink`.
+pub struct Usb<'d, D: Driver<'d>> {
+    /// The device: enumeration and control requests.
+    pub device: UsbDevice<'d, D>,
+    /// Bytes from the host.
+    pub source: Source<'d, D>,
+    /// Bytes to the host.
+    pub sink: Sink<'d, D>,
+}
+
+/// Builds the device. `serial` tells this board from all others: a host finds its rig by it.
+pub fn build<'d, D: Driver<'d>>(
+    driver: D,
+    buffers: &'d mut Buffers<'d>,
+    serial: &'d str,
+    speed: Speed,
+) -> Usb<'d, D> {
+    let mut config = Config::new(VENDOR_ID, PRODUCT_ID);
+    config.manufacturer = Some("jointrig");
+    config.product = Some("jointrig controller");
+    config.serial_number = Some(serial);
+    config.max_power = 500;
+    let Buffers { config: configuration, bos, msos, control, serial_port, choice } = buffers;
+    let mut builder = Builder::new(driver, config, configuration, bos, msos, control);
+    builder.msos_descriptor(windows_version::WIN8_1, VENDOR_CODE);
+
+    let packet = speed.bulk_packet();
+    let (out, into) = {
+        let mut function = builder.function(VENDOR_CLASS, 0, 0);
+        function.msos_feature(CompatibleIdFeatureDescriptor::new("WINUSB", ""));
+        function.msos_feature(RegistryPropertyFeatureDescriptor::new(
+            "DeviceInterfaceGUIDs",
+            PropertyData::RegMultiSz(&[INTERFACE_GUID]),
+        ));
+        let mut interface = function.interface();
+        let mut alternate = interface.alt_setting(VENDOR_CLASS, 0, 0, None);
+        (alternate.endpoint_bulk_out(None, packet), alternate.endpoint_bulk_in(None, packet))
+    };
+    let (sender, receiver) = CdcAcmClass::new(&mut builder, serial_port, packet).split();
+
+    let choice: &Choice = choice;
+    Usb {
+        device: builder.build(),
+        source: Source::new(Bulk(out), receiver, choice),
+        sink: Sink::new(Bulk(into), sender, choice),
+    }
+}
