@@ -1,0 +1,2 @@
+//! Bench.
+pub fn run() -> ! { semihosting::process::exit(0) }
