@@ -15,7 +15,7 @@
 //! | [`BLOCK_AT`] | 484 | simulator | scans missed before the block, then the block |
 //! | [`TO_DEVICE_AT`] | 64 Ki | simulator | bytes for the board, a ring |
 //! | [`TO_HOST_AT`] | 64 Ki | board | bytes for the host, a ring |
-//! | [`LOG_AT`] | 64 Ki | board | encoded log lines, a ring |
+//! | [`LOG_AT`] | 64 Ki | board | log lines, each its level's first letter and text, a ring |
 //!
 //! Heads and tails count bytes since the start, modulo 2³²; everything is little-endian.
 
@@ -226,6 +226,16 @@ pub struct Setup {
     pub slots: u32,
     /// The channels of a scan.
     pub channels: Vec<Channel, MAX_CHANNELS>,
+}
+
+/// Writes a message into `buffer`; `None` when it does not fit.
+pub fn to_text<'a, T: Serialize>(message: &T, buffer: &'a mut [u8]) -> Option<&'a [u8]> {
+    postcard::to_slice(message, buffer).ok().map(|used| &*used)
+}
+
+/// Reads a message; `None` when it is not one.
+pub fn from_text<'a, T: Deserialize<'a>>(text: &'a [u8]) -> Option<T> {
+    postcard::from_bytes(text).ok()
 }
 
 #[cfg(test)]

@@ -20,7 +20,7 @@ mod counter;
 mod device;
 mod executor;
 mod fault;
-mod log;
+mod lines;
 mod memory;
 mod parts;
 mod port;
@@ -52,7 +52,7 @@ fn serve() -> ! {
         eprintln!("nobody serves this board's front end: use the device address qemu:, which starts both");
         process::exit(2)
     }
-    port::serve_by(port::simulator);
+    lines::start();
     device::run(&port::set_up())
 }
 

@@ -8,7 +8,7 @@ use heapless::String;
 use jointrig_firmware::board::{self, Delivered};
 use jointrig_firmware::lockstep::{
     BLOCK_AT, EMERGENCY_STOP, HELD, INTERLOCK_CLOSED, LOCAL_RESET, MUST_PANIC, NEVER, Op, RING_BYTES,
-    TEXT_AT, TEXT_BYTES, TO_DEVICE_AT, TO_HOST_AT,
+    TEXT_AT, TEXT_BYTES, TO_DEVICE_AT, TO_HOST_AT, from_text, to_text,
 };
 use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, COIL_PULSE_CAP_US};
@@ -172,7 +172,7 @@ impl board::Stage for Stage {
 
     fn go(&mut self, place: &Place) -> Result<(), Refusal> {
         let mut text = [0; TEXT_BYTES];
-        let Ok(order) = postcard::to_slice(place, &mut text) else {
+        let Some(order) = to_text(place, &mut text) else {
             return Err(refusal("the stage order does not fit"));
         };
         let length = memory::write_text(order);
@@ -182,7 +182,7 @@ impl board::Stage for Stage {
         }
         let used = (reply.length as usize).min(text.len());
         memory::read(TEXT_AT, &mut text[..used]);
-        Err(postcard::from_bytes(&text[..used]).unwrap_or_else(|_| refusal("the stage's refusal is unreadable")))
+        Err(from_text(&text[..used]).unwrap_or_else(|| refusal("the stage's refusal is unreadable")))
     }
 }
 

@@ -5,7 +5,7 @@ use core::cell::{Cell, RefCell};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::waitqueue::WakerRegistration;
-use jointrig_firmware::lockstep::{Ask, NEVER, Op, Reply, Setup, TEXT_AT, TEXT_BYTES};
+use jointrig_firmware::lockstep::{Ask, NEVER, Op, Reply, Setup, TEXT_AT, TEXT_BYTES, from_text};
 use jointrig_protocol::golden;
 use semihosting::io::{Read, Stdin, Stdout, Write, stdin, stdout};
 use semihosting::{eprintln, process};
@@ -125,7 +125,7 @@ pub fn set_up() -> Setup {
     let mut text = [0; TEXT_BYTES];
     let used = (reply.length as usize).min(text.len());
     memory::read(TEXT_AT, &mut text[..used]);
-    if let Ok(setup) = postcard::from_bytes(&text[..used]) {
+    if let Some(setup) = from_text(&text[..used]) {
         return setup;
     }
     eprintln!("the simulator's set-up cannot be read: image and simulator are of different sources");
