@@ -59,6 +59,19 @@ impl Scanned for InHand<'_> {
     }
 }
 
+/// Whether any code is at the end of the converter's range.
+fn over_range(codes: &[[u8; 2]]) -> bool {
+    // sign and next bit differ in every code beyond half of the range: two codes at a time tell the usual
+    // block, which needs no closer look
+    let (words, rest) = codes.as_flattened().as_chunks::<4>();
+    let large = words.iter().fold(0, |large, word| {
+        let word = u32::from_le_bytes(*word);
+        large | (word ^ (word << 1))
+    }) & 0x8000_8000;
+    (large != 0 || !rest.is_empty())
+        && codes.iter().any(|pair| matches!(i16::from_le_bytes(*pair), i16::MAX | i16::MIN))
+}
+
 impl<M: RawMutex> Core<'_, M> {
     /// A front end that can be held waits here: without a stream, and half a ring ahead of the host.
     async fn wait_until_it_may_run(&self) {
@@ -105,7 +118,7 @@ impl<M: RawMutex> Core<'_, M> {
         let (pairs, _) = samples.as_chunks::<2>();
         let count = (usize::from(delivered.scans) * channels).min(pairs.len() / channels * channels);
         let codes = &pairs[..count];
-        let over = codes.iter().any(|pair| matches!(i16::from_le_bytes(*pair), i16::MAX | i16::MIN));
+        let over = over_range(codes);
         self.with(|state| {
             if delivered.missed > 0 {
                 state.counters.scans_missed += u64::from(delivered.missed);
@@ -125,9 +138,7 @@ impl<M: RawMutex> Core<'_, M> {
             }
             let outcome = state.hammer.block(&block, state.friction.as_ref());
             if let Some(friction) = &state.friction {
-                let sum: f32 =
-                    (0..scans).map(|scan| friction.of_scan(&|channel| block.code(scan, channel))).sum();
-                state.friction_n = sum / scans as f32;
+                state.friction_n = friction.mean_of(scans, |scan, channel| block.code(scan, channel));
             }
             let flags = if over { OVER_RANGE } else { 0 } | if outcome.trigger { TRIGGER } else { 0 };
             if state.streaming {
@@ -138,5 +149,27 @@ impl<M: RawMutex> Core<'_, M> {
             state.next_scan += scans as u64;
             state.tell(&outcome);
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_ends_of_the_range_are_seen_wherever_they_stand() {
+        for end in [i16::MIN, i16::MAX] {
+            for count in 1..=9 {
+                for at in 0..count {
+                    let mut codes = [[0x34, 0x12]; 9];
+                    assert!(!over_range(&codes[..count]));
+                    codes[at] = end.to_le_bytes();
+                    assert!(over_range(&codes[..count]), "{end} at {at} of {count}");
+                }
+            }
+        }
+        for near in [i16::MIN + 1, i16::MAX - 1, i16::MAX / 2 + 1, -1, 0] {
+            assert!(!over_range(&[near.to_le_bytes(); 8]));
+        }
     }
 }
