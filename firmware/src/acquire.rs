@@ -21,14 +21,14 @@ pub async fn acquire<M: RawMutex, S: Scans, C: Coil, I: Inputs>(
     coil: &mut C,
     inputs: &mut I,
 ) -> ! {
-    let mut samples = [0; BLOCK_SAMPLE_BYTES];
+    let mut samples = Aligned([0; BLOCK_SAMPLE_BYTES]);
     loop {
         if scans.can_be_held() {
             core.wait_until_it_may_run().await;
         }
-        let delivered = scans.next(&mut samples).await;
+        let delivered = scans.next(&mut samples.0).await;
         core.watch_inputs(inputs);
-        core.take(delivered, &samples);
+        core.take(delivered, &samples.0);
         match core.with(|state| state.coil.take()) {
             Some(CoilOrder::Pulse(width_us)) => coil.pulse(width_us.min(coil.cap_us())),
             Some(CoilOrder::Off) => coil.off(),
@@ -37,6 +37,10 @@ pub async fn acquire<M: RawMutex, S: Scans, C: Coil, I: Inputs>(
         core.to_send.signal(());
     }
 }
+
+/// Words are copied faster than bytes.
+#[repr(align(4))]
+struct Aligned([u8; BLOCK_SAMPLE_BYTES]);
 
 /// The block in hand, for the hammer's machine.
 struct InHand<'a> {

@@ -94,7 +94,9 @@ pub struct Frame<'a> {
 /// let wire = writer.seal(2).unwrap();
 /// assert_eq!(wire.last(), Some(&0));
 /// ```
+#[repr(C, align(4))]
 pub struct Writer {
+    // first and aligned: a block's samples begin 16 bytes on, and are copied by words
     plain: [u8; MAX_FRAME],
     wire: [u8; MAX_WIRE],
 }

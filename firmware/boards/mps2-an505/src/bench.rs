@@ -66,7 +66,7 @@ fn step(number: usize) -> Option<Step> {
         };
         Request::Fire(order)
     };
-    let trigger = Trigger { level_n: 1.0, flight_scans: 51_200, listen_scans: 153_600, hold_off_scans: 256 };
+    let trigger = Trigger { level_n: 1.0, flight_scans: 51_200, listen_scans: 3_800, hold_off_scans: 256 };
     let place =
         Stage { configuration: Configuration::Ajb, impact: text("AZ3"), response: text("B4"), attempt: 2 };
     let arm = Request::Arm { valid_ms: 60_000 };

@@ -10,7 +10,7 @@
 //! | argument | what |
 //! |---|---|
 //! | `serve` | runs the firmware for a simulator, which starts QEMU itself |
-//! | `golden` | compares all golden vectors of the wire with this build's frames |
+//! | `golden` | compares all golden vectors of the wire with this build's frames, and copies of memory with their originals |
 //! | `bench` | counts instructions; QEMU must run with `-icount shift=10,sleep=off` |
 #![no_std]
 #![no_main]
@@ -27,8 +27,12 @@ mod port;
 mod stack;
 mod time;
 
-// brings the critical section of a single core
+use core::hint::black_box;
+
+// the critical section of a single core
 use cortex_m as _;
+// memcpy
+use jointrig_copy as _;
 use jointrig_protocol::golden;
 use semihosting::experimental::env::args;
 use semihosting::{eprintln, println, process};
@@ -57,6 +61,10 @@ fn serve() -> ! {
 }
 
 fn vectors() -> ! {
+    if !copies_agree() {
+        eprintln!("memcpy does not copy");
+        process::exit(1)
+    }
     match golden::check() {
         Ok(count) => {
             println!("golden {count} vectors agree");
@@ -67,4 +75,19 @@ fn vectors() -> ! {
             process::exit(1)
         }
     }
+}
+
+/// Copies of every length up to a hundred bytes, from and to every alignment.
+fn copies_agree() -> bool {
+    let original: [u8; 112] = core::array::from_fn(|i| i as u8 + 1);
+    (0..=100).all(|length| {
+        (0..64).all(|alignments| {
+            let (from, to) = (alignments % 8, alignments / 8);
+            let mut copy = [0; 112];
+            black_box(&mut copy)[to..to + length].copy_from_slice(&black_box(&original)[from..from + length]);
+            copy.iter().enumerate().all(|(i, byte)| {
+                *byte == if (to..to + length).contains(&i) { original[i - to + from] } else { 0 }
+            })
+        })
+    })
 }
