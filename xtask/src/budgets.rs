@@ -49,7 +49,7 @@ const COMMANDS: [Budget; 13] = [
     budget("status", "Status", 6_500),
     budget("start", "Start", 5_000),
     budget("stop", "Stop", 5_000),
-    budget("resend", "Resend of one block, with the block", 30_000),
+    budget("resend", "Resend of fifteen scans, with the two blocks that hold them", 30_000),
     budget("trigger", "Trigger", 5_000),
     budget("load_cells", "LoadCells", 6_500),
     budget("arm", "Arm, with its event", 6_000),
