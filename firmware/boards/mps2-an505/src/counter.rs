@@ -20,7 +20,7 @@ pub fn start() {
 }
 
 /// Ticks since some instant, modulo 2³².
-#[inline(always)]
+#[inline]
 pub fn ticks() -> u32 {
     // SAFETY: as in `start`; reading the value has no effect.
     !unsafe { ptr::read_volatile(TIMER.add(1)) }

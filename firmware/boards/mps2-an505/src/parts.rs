@@ -33,14 +33,14 @@ impl board::Board for Emulated {
 pub struct Scans {
     per_block: u64,
     rate_hz: u64,
-    scans: u64,
+    taken: u64,
     blocks: u32,
 }
 
 impl Scans {
     /// Converters that deliver so many scans a block.
     pub fn new(per_block: usize, rate_hz: u32) -> Self {
-        Self { per_block: per_block as u64, rate_hz: u64::from(rate_hz), scans: 0, blocks: 0 }
+        Self { per_block: per_block as u64, rate_hz: u64::from(rate_hz), taken: 0, blocks: 0 }
     }
 }
 
@@ -50,9 +50,9 @@ impl board::Scans for Scans {
     }
 
     async fn next(&mut self, block: &mut [u8; BLOCK_SAMPLE_BYTES]) -> Delivered {
-        self.scans += self.per_block;
+        self.taken += self.per_block;
         // the instant of the block's last scan, rounded up to the clock's microsecond
-        let at_us = (self.scans * 1_000_000).div_ceil(self.rate_hz);
+        let at_us = (self.taken * 1_000_000).div_ceil(self.rate_hz);
         poll_fn(|context| {
             port::with(|port| {
                 if port.reply.blocks != self.blocks {

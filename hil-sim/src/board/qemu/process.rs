@@ -95,7 +95,10 @@ impl Emulator {
     pub fn explained(&self, sentence: String) -> String {
         self.kill();
         let complaints = self.complaints.lock().unwrap_or_else(PoisonError::into_inner);
-        complaints.lines().next().map_or(sentence.clone(), |first| format!("{sentence} ({first})"))
+        match complaints.lines().next() {
+            Some(first) => format!("{sentence} ({first})"),
+            None => sentence,
+        }
     }
 }
 
