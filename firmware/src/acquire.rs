@@ -21,14 +21,14 @@ pub async fn acquire<M: RawMutex, S: Scans, C: Coil, I: Inputs>(
     coil: &mut C,
     inputs: &mut I,
 ) -> ! {
-    let mut samples = [0; BLOCK_SAMPLE_BYTES];
+    let mut samples = Aligned([0; BLOCK_SAMPLE_BYTES]);
     loop {
         if scans.can_be_held() {
             core.wait_until_it_may_run().await;
         }
-        let delivered = scans.next(&mut samples).await;
+        let delivered = scans.next(&mut samples.0).await;
         core.watch_inputs(inputs);
-        core.take(delivered, &samples);
+        core.take(delivered, &samples.0);
         match core.with(|state| state.coil.take()) {
             Some(CoilOrder::Pulse(width_us)) => coil.pulse(width_us.min(coil.cap_us())),
             Some(CoilOrder::Off) => coil.off(),
@@ -37,6 +37,10 @@ pub async fn acquire<M: RawMutex, S: Scans, C: Coil, I: Inputs>(
         core.to_send.signal(());
     }
 }
+
+/// Words are copied faster than bytes.
+#[repr(align(4))]
+struct Aligned([u8; BLOCK_SAMPLE_BYTES]);
 
 /// The block in hand, for the hammer's machine.
 struct InHand<'a> {
@@ -57,6 +61,19 @@ impl Scanned for InHand<'_> {
     fn code(&self, scan: usize, channel: usize) -> i16 {
         i16::from_le_bytes(self.samples[scan * self.channels + channel])
     }
+}
+
+/// Whether any code is at the end of the converter's range.
+fn over_range(codes: &[[u8; 2]]) -> bool {
+    // sign and next bit differ in every code beyond half of the range: two codes at a time tell the usual
+    // block, which needs no closer look
+    let (words, rest) = codes.as_flattened().as_chunks::<4>();
+    let large = words.iter().fold(0, |large, word| {
+        let word = u32::from_le_bytes(*word);
+        large | (word ^ (word << 1))
+    }) & 0x8000_8000;
+    (large != 0 || !rest.is_empty())
+        && codes.iter().any(|pair| matches!(i16::from_le_bytes(*pair), i16::MAX | i16::MIN))
 }
 
 impl<M: RawMutex> Core<'_, M> {
@@ -105,7 +122,7 @@ impl<M: RawMutex> Core<'_, M> {
         let (pairs, _) = samples.as_chunks::<2>();
         let count = (usize::from(delivered.scans) * channels).min(pairs.len() / channels * channels);
         let codes = &pairs[..count];
-        let over = codes.iter().any(|pair| matches!(i16::from_le_bytes(*pair), i16::MAX | i16::MIN));
+        let over = over_range(codes);
         self.with(|state| {
             if delivered.missed > 0 {
                 state.counters.scans_missed += u64::from(delivered.missed);
@@ -125,9 +142,7 @@ impl<M: RawMutex> Core<'_, M> {
             }
             let outcome = state.hammer.block(&block, state.friction.as_ref());
             if let Some(friction) = &state.friction {
-                let sum: f32 =
-                    (0..scans).map(|scan| friction.of_scan(&|channel| block.code(scan, channel))).sum();
-                state.friction_n = sum / scans as f32;
+                state.friction_n = friction.mean_of(scans, |scan, channel| block.code(scan, channel));
             }
             let flags = if over { OVER_RANGE } else { 0 } | if outcome.trigger { TRIGGER } else { 0 };
             if state.streaming {
@@ -138,5 +153,27 @@ impl<M: RawMutex> Core<'_, M> {
             state.next_scan += scans as u64;
             state.tell(&outcome);
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_ends_of_the_range_are_seen_wherever_they_stand() {
+        for end in [i16::MIN, i16::MAX] {
+            for count in 1..=9 {
+                for at in 0..count {
+                    let mut codes = [[0x34, 0x12]; 9];
+                    assert!(!over_range(&codes[..count]));
+                    codes[at] = end.to_le_bytes();
+                    assert!(over_range(&codes[..count]), "{end} at {at} of {count}");
+                }
+            }
+        }
+        for near in [i16::MIN + 1, i16::MAX - 1, i16::MAX / 2 + 1, -1, 0] {
+            assert!(!over_range(&[near.to_le_bytes(); 8]));
+        }
     }
 }

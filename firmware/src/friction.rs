@@ -45,6 +45,12 @@ impl Friction {
         self.weights = RowVector3::repeat(1.0) * matrix * Matrix3::from_diagonal(&self.newtons_per_code);
     }
 
+    /// The mean of T over some scans, N: since T is linear in the codes, they are summed as they are.
+    pub fn mean_of(&self, scans: usize, code: impl Fn(usize, usize) -> i16) -> f32 {
+        let sums = self.places.map(|place| (0..scans).map(|scan| i32::from(code(scan, place))).sum::<i32>());
+        (self.weights * Vector3::from(sums.map(|sum| sum as f32))).x / scans as f32
+    }
+
     /// T of one scan, N.
     pub fn of_scan(&self, codes: &impl Fn(usize) -> i16) -> f32 {
         let [a, b, c] = self.places;

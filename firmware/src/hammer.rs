@@ -55,7 +55,6 @@ pub trait Scanned {
     fn code(&self, scan: usize, channel: usize) -> i16;
 }
 
-#[expect(clippy::large_enum_variant, reason = "no heap; there is one machine")]
 enum State {
     Disarmed,
     Armed { until: u64 },

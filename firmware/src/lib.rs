@@ -22,6 +22,7 @@ pub mod board;
 mod fmt;
 pub mod friction;
 pub mod hammer;
+pub mod lockstep;
 pub mod memory;
 pub mod pulse;
 pub mod quiet;

@@ -153,7 +153,7 @@ mod tests {
         half_sine(9.0, 0.41e-3, 0.5, scan_s).take(300).for_each(|f| pulse.feed(f));
         let felt = pulse.felt();
         assert!((felt.rebound_ratio - 0.18).abs() < 2e-3, "{felt:?}");
-        assert!((felt.rebound_after as i32 - 310).abs() <= 1, "{felt:?}");
+        assert!(felt.rebound_after.abs_diff(310) <= 1, "{felt:?}");
     }
 
     #[test]

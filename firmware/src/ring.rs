@@ -6,13 +6,14 @@
 use jointrig_protocol::block::{GAP, Header};
 use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
 
-/// One block in the ring.
+/// One block in the ring; the samples first, so that they are aligned and copied by words.
 #[derive(Clone, Copy)]
+#[repr(C, align(8))]
 pub struct Slot {
+    samples: [u8; BLOCK_SAMPLE_BYTES],
     first_scan: u64,
     flags: u8,
     scans: u8,
-    samples: [u8; BLOCK_SAMPLE_BYTES],
 }
 
 impl Slot {

@@ -6,10 +6,7 @@
 //! as a frame of its own.
 
 use crate::limits::{CRC_BYTES, MAX_FRAME, MAX_WIRE};
-
-/// CRC-32/ISO-HDLC (the one of Ethernet and zlib), sixteen bytes at a time: its tables cost 16 KiB of
-/// flash and save some ten instructions a byte.
-static CRC: crc::Crc<u32, crc::Table<16>> = crc::Crc::<u32, crc::Table<16>>::new(&crc::CRC_32_ISO_HDLC);
+use crate::seal::{checksum, stuff};
 
 /// What a frame carries. Kinds only ever grow at the end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,7 +94,9 @@ pub struct Frame<'a> {
 /// let wire = writer.seal(2).unwrap();
 /// assert_eq!(wire.last(), Some(&0));
 /// ```
+#[repr(C, align(4))]
 pub struct Writer {
+    // first and aligned: a block's samples begin 16 bytes on, and are copied by words
     plain: [u8; MAX_FRAME],
     wire: [u8; MAX_WIRE],
 }
@@ -130,11 +129,10 @@ impl Writer {
         if end + CRC_BYTES > MAX_FRAME {
             return Err(FrameError::TooLong);
         }
-        let crc = CRC.checksum(&self.plain[..end]).to_le_bytes();
+        let crc = checksum(&self.plain[..end]).to_le_bytes();
         self.plain[end..end + CRC_BYTES].copy_from_slice(&crc);
-        let length = cobs::encode(&self.plain[..end + CRC_BYTES], &mut self.wire);
-        self.wire[length] = 0;
-        Ok(&self.wire[..=length])
+        let length = stuff(&self.plain[..end + CRC_BYTES], &mut self.wire).ok_or(FrameError::TooLong)?;
+        Ok(&self.wire[..length])
     }
 
     /// Writes a postcard value as the payload, and seals.
@@ -223,7 +221,7 @@ impl Accumulator {
         let plain = &bytes[..length];
         let (content, crc) = plain.split_last_chunk::<CRC_BYTES>().ok_or(FrameError::Malformed)?;
         let (kind, payload) = content.split_first().ok_or(FrameError::Malformed)?;
-        if CRC.checksum(content) != u32::from_le_bytes(*crc) {
+        if checksum(content) != u32::from_le_bytes(*crc) {
             return Err(FrameError::Crc);
         }
         let kind = Kind::from_byte(*kind).ok_or(FrameError::UnknownKind(*kind))?;

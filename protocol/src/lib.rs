@@ -23,4 +23,5 @@ pub mod hello;
 pub mod limits;
 pub mod request;
 pub mod schema;
+mod seal;
 pub mod shot;

@@ -57,6 +57,15 @@ pub fn run(project: &Project, options: &Options) -> Result<()> {
     command::run(&mut qemu).context("the emulated board did not end well")
 }
 
+/// Runs an image with one argument and returns what it says.
+pub fn listen(image: &Path, argument: &str, icount: bool) -> Result<String> {
+    let options = Options { icount, image_arguments: vec![argument.to_owned()], extra: Vec::new() };
+    let mut qemu = Command::new(PROGRAM);
+    qemu.args(arguments(image, &options)?);
+    println!("  $ {}", command::line(&qemu));
+    command::output(&mut qemu).context("the emulated board did not end well")
+}
+
 fn arguments(image: &Path, options: &Options) -> Result<Vec<String>> {
     let image =
         image.to_str().with_context(|| format!("{} is not UTF-8: choose another folder", image.display()))?;

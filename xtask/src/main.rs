@@ -5,6 +5,7 @@
 //! (the message says what, where and what to do), 2 for a command line that makes no sense.
 
 mod bench;
+mod budgets;
 mod command;
 mod consent;
 mod emulator;
@@ -58,6 +59,8 @@ enum Task {
     Test(suite::Options),
     /// Run the emulated board in QEMU.
     Qemu(emulator::Options),
+    /// Count what the firmware costs in the emulator, write the table of it, and enforce its limits.
+    Budgets,
     /// Write the rig controller's image to the board on the desk.
     Flash {
         /// Write the image and return, without staying attached to show its log.
@@ -92,6 +95,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Lint => lint::all(&project),
         Task::Test(options) => suite::run(&project, &options),
         Task::Qemu(options) => emulator::run(&project, &options),
+        Task::Budgets => budgets::command(&project),
         Task::Flash { detach } => flash::run(&project, detach),
         Task::Bench { extra } => bench::run(&project, &extra),
     }

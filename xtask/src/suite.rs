@@ -5,7 +5,7 @@ use crate::firmware;
 use crate::project::Project;
 use crate::tests_run::{self, Scope};
 use crate::toolchain::Toolchain;
-use crate::{command, lint, setup};
+use crate::{budgets, command, emulator, lint, setup};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::fmt::Write;
@@ -45,7 +45,7 @@ struct Step {
 }
 
 /// The plan. The cheap steps come first, so that a slip shows early.
-const STEPS: [Step; 8] = [
+const STEPS: [Step; 9] = [
     Step {
         name: "setup",
         purpose: "the microcontroller target and QEMU are available",
@@ -64,7 +64,12 @@ const STEPS: [Step; 8] = [
     Step { name: "test", purpose: "unit, property and whole-system tests", slow: false, action: tests },
     Step { name: "docs", purpose: "the documentation builds without warnings", slow: true, action: docs },
     Step { name: "boards", purpose: "the board images, and their sizes", slow: true, action: boards },
-    // The tests of the image inside QEMU belong here, after the image is built.
+    Step {
+        name: "emulator",
+        purpose: "the image in QEMU: golden vectors, records, faults, budgets",
+        slow: true,
+        action: emulated,
+    },
 ];
 
 /// How a step ended.
@@ -219,6 +224,19 @@ fn boards(run: &mut Run) -> Result<String> {
     }
     firmware::build_boards(run.project, run.toolchain()?, None)?;
     Ok(format!("{} images", boards.len()))
+}
+
+fn emulated(run: &mut Run) -> Result<String> {
+    let (project, toolchain) = (run.project, run.toolchain()?);
+    if firmware::board(project, emulator::BOARD)?.is_none() {
+        println!("  firmware/boards/{} does not exist yet", emulator::BOARD);
+        return Ok("no image yet".to_owned());
+    }
+    let image = firmware::build_board(project, toolchain, emulator::BOARD)?;
+    print!("{}", emulator::listen(&image, "golden", false)?);
+    let counts = tests_run::run_in_emulator(project, &image)?;
+    let cost = budgets::check(project, toolchain)?;
+    Ok(format!("{counts}; {cost}"))
 }
 
 #[cfg(test)]

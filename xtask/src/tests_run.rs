@@ -8,7 +8,7 @@ use crate::command;
 use crate::project::Project;
 use anyhow::{Context, Result, bail};
 use std::io::{BufRead, BufReader, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The package of the whole-system scenarios.
@@ -67,6 +67,24 @@ pub fn run(project: &Project, scope: Scope, extra: &[String]) -> Result<Counts> 
         bail!(
             "the tests failed ({counts}): the lines above name them; `cargo xtask test -- <part of a name>` runs fewer"
         );
+    }
+    Ok(counts)
+}
+
+/// The variable that carries the path of the emulated board's image.
+const IMAGE: &str = "JOINTRIG_MPS2_IMAGE";
+/// The tests that need it, by the name of their file.
+const IN_EMULATOR: &str = "qemu";
+
+/// Runs the tests of the emulated board.
+pub fn run_in_emulator(project: &Project, image: &Path) -> Result<Counts> {
+    let mut cargo = command::cargo(&project.root);
+    cargo.env(IMAGE, image);
+    // `--workspace`, so that the dependencies have the features they were built with
+    cargo.args(["test", "--release", "--workspace", "--test", IN_EMULATOR]);
+    let (counts, success) = watched(&mut cargo, &mut std::io::stdout())?;
+    if !success {
+        bail!("the emulated board failed its tests ({counts}): the lines above name them");
     }
     Ok(counts)
 }

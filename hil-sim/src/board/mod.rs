@@ -5,6 +5,8 @@
 //! time stands still; so a run is repeatable bit for bit however fast host and machine are.
 
 mod parts;
+#[cfg(unix)]
+pub mod qemu;
 
 use std::cell::RefCell;
 use std::pin::Pin;
@@ -107,7 +109,7 @@ fn run(rig: Rig, options: &Options, link: &DeviceEnd, controls: &Arc<Controls>) 
     let channels: &'static [_] = describe(rig.channels());
     let rate_hz = rig.scan_rate_hz();
     let per_block = scans_per_block(channels.len()).expect("the rig has ten channels");
-    let slots = (f64::from(rate_hz) * RING_S / per_block as f64).ceil() as usize;
+    let slots = ring_slots(rate_hz, per_block);
     let facts = Facts {
         board: name("jointrig-sim"),
         serial: name(&format!("sim-{:016x}", options.seed)),
@@ -164,6 +166,11 @@ fn futures(
             jointrig_firmware::watch::watch(&d).await;
         }),
     ]
+}
+
+/// Blocks that the ring must hold.
+fn ring_slots(rate_hz: u32, per_block: usize) -> usize {
+    (f64::from(rate_hz) * RING_S / per_block as f64).ceil() as usize
 }
 
 fn name(value: &str) -> jointrig_protocol::channel::Name {

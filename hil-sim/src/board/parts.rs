@@ -130,15 +130,19 @@ impl Scans for VirtualScans {
         // the instant of the block's last scan, rounded up to the clock's microsecond
         Timer::at(Instant::from_micros((self.scans * 1_000_000).div_ceil(self.rate_hz))).await;
         self.sampling.set(false);
-        let mut rig = self.rig.borrow_mut();
-        let mut codes = [0; jointrig_protocol::limits::MAX_CHANNELS];
-        for scan in block.chunks_exact_mut(2 * self.channels).take(self.per_block) {
-            rig.scan(&mut codes[..self.channels]);
-            for (bytes, code) in scan.as_chunks_mut::<2>().0.iter_mut().zip(codes) {
-                *bytes = code.to_le_bytes();
-            }
-        }
+        fill(&mut self.rig.borrow_mut(), self.channels, self.per_block, block);
         Delivered { scans: self.per_block as u8, missed: 0 }
+    }
+}
+
+/// Lets the rig go on by one block and writes its codes.
+pub(super) fn fill(rig: &mut Rig, channels: usize, per_block: usize, block: &mut [u8; BLOCK_SAMPLE_BYTES]) {
+    let mut codes = [0; jointrig_protocol::limits::MAX_CHANNELS];
+    for scan in block.chunks_exact_mut(2 * channels).take(per_block) {
+        rig.scan(&mut codes[..channels]);
+        for (bytes, code) in scan.as_chunks_mut::<2>().0.iter_mut().zip(codes) {
+            *bytes = code.to_le_bytes();
+        }
     }
 }
 

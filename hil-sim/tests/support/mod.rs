@@ -29,6 +29,10 @@ pub struct SmallHost {
     pub channels: usize,
     /// The host never acknowledges beyond this.
     pub hold_at: u64,
+    /// The scan after the last that has come.
+    pub latest: u64,
+    /// Scans that are missing before `latest`, as (first, end).
+    pub gaps: Vec<(u64, u64)>,
 }
 
 impl SmallHost {
@@ -47,10 +51,17 @@ impl SmallHost {
             codes: Vec::new(),
             channels: 10,
             hold_at: u64::MAX,
+            latest: 0,
+            gaps: Vec::new(),
         };
         host.send(Kind::Hello, &Hello::host(99).to_bytes());
         host.until("a Hello", |host| host.hello.is_some());
         host
+    }
+
+    /// The bare link.
+    pub fn into_link(self) -> HostEnd {
+        self.link
     }
 
     pub fn send(&mut self, kind: Kind, payload: &[u8]) {
@@ -80,6 +91,8 @@ impl SmallHost {
                     // blocks follow on its heels
                     if let Ok(Answer::Started { epoch, first_scan, .. }) = answer.outcome {
                         (self.epoch, self.first_scan, self.next_scan) = (epoch, first_scan, first_scan);
+                        self.latest = first_scan;
+                        self.gaps.clear();
                         self.codes.clear();
                     }
                     self.answers.push(answer);
@@ -89,9 +102,19 @@ impl SmallHost {
                 }
                 Kind::Samples => {
                     let block = Block::from_payload(frame.payload).unwrap();
-                    if block.header.epoch == self.epoch && block.header.first_scan == self.next_scan {
-                        self.codes.extend(block.codes());
-                        self.next_scan = block.end_scan();
+                    if block.header.epoch == self.epoch {
+                        let first = block.header.first_scan;
+                        if first > self.latest {
+                            self.gaps.push((self.latest, first));
+                            // lost for good: the record that this host keeps begins anew
+                            (self.first_scan, self.next_scan) = (first, first);
+                            self.codes.clear();
+                        }
+                        if first == self.next_scan {
+                            self.codes.extend(block.codes());
+                            self.next_scan = block.end_scan();
+                        }
+                        self.latest = self.latest.max(block.end_scan());
                     }
                 }
                 _ => {}

@@ -1,0 +1,192 @@
+//! The board's parts, as the firmware's contract asks for them, through the shared memory.
+
+use core::future::poll_fn;
+use core::task::Poll;
+
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use heapless::String;
+use jointrig_firmware::board::{self, Delivered};
+use jointrig_firmware::lockstep::{
+    BLOCK_AT, EMERGENCY_STOP, HELD, INTERLOCK_CLOSED, LOCAL_RESET, MUST_PANIC, NEVER, Op, RING_BYTES,
+    TEXT_AT, TEXT_BYTES, TO_DEVICE_AT, TO_HOST_AT, from_text, to_text,
+};
+use jointrig_protocol::answer::Refusal;
+use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, COIL_PULSE_CAP_US};
+use jointrig_protocol::request::Stage as Place;
+
+use crate::{memory, port};
+
+/// The emulated board: a name for its parts.
+pub enum Emulated {}
+
+impl board::Board for Emulated {
+    type Mutex = CriticalSectionRawMutex;
+    type Scans = Scans;
+    type Coil = Coil;
+    type Inputs = Inputs;
+    type Source = Source;
+    type Sink = Sink;
+    type Stage = Stage;
+}
+
+/// Converters whose blocks the simulator delivers.
+pub struct Scans {
+    per_block: u64,
+    rate_hz: u64,
+    taken: u64,
+    blocks: u32,
+}
+
+impl Scans {
+    /// Converters that deliver so many scans a block.
+    pub fn new(per_block: usize, rate_hz: u32) -> Self {
+        Self { per_block: per_block as u64, rate_hz: u64::from(rate_hz), taken: 0, blocks: 0 }
+    }
+}
+
+impl board::Scans for Scans {
+    fn can_be_held(&self) -> bool {
+        port::with(|port| port.reply.inputs & HELD != 0)
+    }
+
+    async fn next(&mut self, block: &mut [u8; BLOCK_SAMPLE_BYTES]) -> Delivered {
+        self.taken += self.per_block;
+        // the instant of the block's last scan, rounded up to the clock's microsecond
+        let at_us = (self.taken * 1_000_000).div_ceil(self.rate_hz);
+        poll_fn(|context| {
+            port::with(|port| {
+                if port.reply.blocks != self.blocks {
+                    port.ask.block_us = NEVER;
+                    return Poll::Ready(());
+                }
+                port.ask.block_us = at_us;
+                port.block.register(context.waker());
+                Poll::Pending
+            })
+        })
+        .await;
+        self.blocks = self.blocks.wrapping_add(1);
+        assert!(port::with(|port| port.reply.inputs) & MUST_PANIC == 0, "the simulator asked for a panic");
+        let mut missed = [0; 4];
+        memory::read(BLOCK_AT, &mut missed);
+        memory::read(BLOCK_AT + 4, block);
+        Delivered { scans: self.per_block as u8, missed: u32::from_le_bytes(missed) }
+    }
+}
+
+/// The coil of the simulated hammer, which ends any pulse at the cap by itself.
+pub struct Coil;
+
+impl board::Coil for Coil {
+    fn cap_us(&self) -> u32 {
+        COIL_PULSE_CAP_US
+    }
+
+    fn pulse(&mut self, width_us: u32) {
+        port::turn(Op::Pulse, width_us.min(COIL_PULSE_CAP_US));
+    }
+
+    fn off(&mut self) {
+        port::turn(Op::Off, 0);
+    }
+}
+
+/// Guard and emergency stop of the simulated rig.
+pub struct Inputs;
+
+impl Inputs {
+    fn bit(bit: u32) -> bool {
+        port::with(|port| port.reply.inputs & bit != 0)
+    }
+}
+
+impl board::Inputs for Inputs {
+    fn interlock_closed(&mut self) -> bool {
+        Self::bit(INTERLOCK_CLOSED)
+    }
+
+    fn emergency_stop(&mut self) -> bool {
+        Self::bit(EMERGENCY_STOP)
+    }
+
+    fn local_reset(&mut self) -> bool {
+        port::with(|port| {
+            let turned = port.reply.inputs & LOCAL_RESET != 0;
+            port.reply.inputs &= !LOCAL_RESET;
+            turned
+        })
+    }
+}
+
+/// Bytes from the host.
+pub struct Source;
+
+impl board::ByteSource for Source {
+    async fn read(&mut self, buffer: &mut [u8]) -> usize {
+        poll_fn(|context| {
+            port::with(|port| {
+                let tail = port.ask.to_device_tail;
+                let waiting = port.reply.to_device_head.wrapping_sub(tail);
+                if waiting == 0 {
+                    port.bytes.register(context.waker());
+                    return Poll::Pending;
+                }
+                let count = buffer.len().min(waiting as usize);
+                memory::read_ring(TO_DEVICE_AT, tail, &mut buffer[..count]);
+                port.ask.to_device_tail = tail.wrapping_add(count as u32);
+                Poll::Ready(count)
+            })
+        })
+        .await
+    }
+}
+
+/// Bytes to the host.
+pub struct Sink;
+
+impl board::ByteSink for Sink {
+    async fn write(&mut self, frame: &[u8]) {
+        poll_fn(|context| {
+            port::with(|port| {
+                let head = port.ask.to_host_head;
+                let room = RING_BYTES - head.wrapping_sub(port.reply.to_host_tail);
+                port.ask.to_host_full = u32::from((room as usize) < frame.len());
+                if port.ask.to_host_full != 0 {
+                    port.room.register(context.waker());
+                    return Poll::Pending;
+                }
+                memory::write_ring(TO_HOST_AT, head, frame);
+                port.ask.to_host_head = head.wrapping_add(frame.len() as u32);
+                Poll::Ready(())
+            })
+        })
+        .await;
+    }
+}
+
+/// The simulator moves hammer and laser.
+pub struct Stage;
+
+impl board::Stage for Stage {
+    const PRESENT: bool = true;
+
+    fn go(&mut self, place: &Place) -> Result<(), Refusal> {
+        let mut text = [0; TEXT_BYTES];
+        let Some(order) = to_text(place, &mut text) else {
+            return Err(refusal("the stage order does not fit"));
+        };
+        let length = memory::write_text(order);
+        let reply = port::turn(Op::Stage, length);
+        if reply.length == 0 {
+            return Ok(());
+        }
+        let used = (reply.length as usize).min(text.len());
+        memory::read(TEXT_AT, &mut text[..used]);
+        Err(from_text(&text[..used]).unwrap_or_else(|| refusal("the stage's refusal is unreadable")))
+    }
+}
+
+fn refusal(sentence: &str) -> Refusal {
+    // the sentences here are shorter than what fits
+    Refusal::Stage(String::try_from(sentence).unwrap_or_default())
+}

@@ -1,0 +1,133 @@
+//! Taking turns with whoever serves this board, and what both sides have said last.
+
+use core::cell::{Cell, RefCell};
+
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::waitqueue::WakerRegistration;
+use jointrig_firmware::lockstep::{Ask, NEVER, Op, Reply, Setup, TEXT_AT, TEXT_BYTES, from_text};
+use jointrig_protocol::golden;
+use semihosting::io::{Read, Stdin, Stdout, Write, stdin, stdout};
+use semihosting::{eprintln, process};
+
+use crate::memory;
+
+/// The board's side of the port.
+pub struct Port {
+    /// What will be said at the next turn.
+    pub ask: Ask,
+    /// What was answered last.
+    pub reply: Reply,
+    /// The acquisition task.
+    pub block: WakerRegistration,
+    /// The receiving task.
+    pub bytes: WakerRegistration,
+    /// The transmitting task.
+    pub room: WakerRegistration,
+}
+
+/// Who serves the board: takes an ask, gives a reply.
+pub type Server = fn(&Ask) -> Reply;
+
+static PORT: Mutex<CriticalSectionRawMutex, RefCell<Port>> = Mutex::new(RefCell::new(Port {
+    ask: Ask {
+        op: 0,
+        argument: 0,
+        alarm_us: NEVER,
+        block_us: NEVER,
+        to_device_tail: 0,
+        to_host_head: 0,
+        to_host_full: 0,
+        log_head: 0,
+    },
+    reply: Reply {
+        now_us: 0,
+        inputs: 0,
+        blocks: 0,
+        to_device_head: 0,
+        to_host_tail: 0,
+        log_tail: 0,
+        length: 0,
+    },
+    block: WakerRegistration::new(),
+    bytes: WakerRegistration::new(),
+    room: WakerRegistration::new(),
+}));
+
+static SERVER: Mutex<CriticalSectionRawMutex, Cell<Server>> = Mutex::new(Cell::new(simulator));
+
+/// Chooses who serves the board.
+pub fn serve_by(server: Server) {
+    SERVER.lock(|cell| cell.set(server));
+}
+
+/// The port, for a moment.
+pub fn with<R>(f: impl FnOnce(&mut Port) -> R) -> R {
+    PORT.lock(|port| f(&mut port.borrow_mut()))
+}
+
+/// One turn: says what the board wants, and returns when it is this side's turn again.
+pub fn turn(op: Op, argument: u32) -> Reply {
+    let server = SERVER.lock(Cell::get);
+    with(|port| {
+        port.ask.op = op as u32;
+        port.ask.argument = argument;
+        port.reply = server(&port.ask);
+        port.reply
+    })
+}
+
+/// All tasks wait: lets time go on, and wakes those whose event has come.
+pub fn idle(alarm_us: u64) {
+    with(|port| port.ask.alarm_us = alarm_us);
+    let before = with(|port| port.reply);
+    let reply = turn(Op::Idle, 0);
+    crate::time::set(reply.now_us);
+    with(|port| {
+        if reply.blocks != before.blocks {
+            port.block.wake();
+        }
+        if reply.to_device_head != port.ask.to_device_tail {
+            port.bytes.wake();
+        }
+        if reply.to_host_tail != before.to_host_tail {
+            port.room.wake();
+        }
+    });
+}
+
+/// Serves by the simulator: a byte on the standard output rings, a byte on the standard input answers.
+pub fn simulator(ask: &Ask) -> Reply {
+    static PIPES: Mutex<CriticalSectionRawMutex, RefCell<Option<(Stdin, Stdout)>>> =
+        Mutex::new(RefCell::new(None));
+    memory::write_ask(&ask.to_words());
+    let answered = PIPES.lock(|pipes| {
+        let mut pipes = pipes.borrow_mut();
+        if pipes.is_none() {
+            *pipes = stdin().ok().zip(stdout().ok());
+        }
+        let (input, output) = pipes.as_mut()?;
+        output.write_all(&[1]).ok()?;
+        let mut byte = [0];
+        input.read(&mut byte).ok().filter(|count| *count == 1)
+    });
+    if answered.is_none() {
+        // the simulator has gone, and this board with it
+        process::exit(0)
+    }
+    Reply::from_words(&memory::read_reply())
+}
+
+/// Introduces the board and hears what it is to be.
+pub fn set_up() -> Setup {
+    let agreeing = golden::check().unwrap_or(0);
+    let reply = turn(Op::Start, agreeing as u32);
+    let mut text = [0; TEXT_BYTES];
+    let used = (reply.length as usize).min(text.len());
+    memory::read(TEXT_AT, &mut text[..used]);
+    if let Some(setup) = from_text(&text[..used]) {
+        return setup;
+    }
+    eprintln!("the simulator's set-up cannot be read: image and simulator are of different sources");
+    process::exit(2)
+}

@@ -1,0 +1,271 @@
+//! Lockstep: how an emulated board and the simulator that serves it share memory and take turns.
+//!
+//! The emulated board has real memory of its own and 16 MB that a process of the PC can map. What a wired
+//! board does with converters, coil, inputs and a USB port, it does through that memory: it writes an
+//! [`Ask`], rings, and stands still until the simulator has written a [`Reply`]. One of the two runs at
+//! any instant, and the board's time is what the reply says. So no clock of the PC enters any result, and
+//! the memory needs no other guard.
+//!
+//! | offset | bytes | written by | what |
+//! |---|---|---|---|
+//! | [`MAGIC_AT`] | 4 | simulator, once | [`MAGIC`]: somebody serves this memory |
+//! | [`ASK_AT`] | 64 | board | [`Ask`] |
+//! | [`REPLY_AT`] | 64 | simulator | [`Reply`] |
+//! | [`TEXT_AT`] | 4096 | whoever has the turn | [`Setup`], a stage order and its refusal, a last sentence |
+//! | [`BLOCK_AT`] | 484 | simulator | scans missed before the block, then the block |
+//! | [`TO_DEVICE_AT`] | 64 Ki | simulator | bytes for the board, a ring |
+//! | [`TO_HOST_AT`] | 64 Ki | board | bytes for the host, a ring |
+//! | [`LOG_AT`] | 64 Ki | board | log lines, each its level's first letter and text, a ring |
+//!
+//! Heads and tails count bytes since the start, modulo 2³²; everything is little-endian.
+
+use heapless::Vec;
+use jointrig_protocol::channel::{Channel, Name};
+use jointrig_protocol::limits::MAX_CHANNELS;
+use serde::{Deserialize, Serialize};
+
+/// Where the board finds the memory.
+pub const BASE: usize = 0x8000_0000;
+/// Its size: QEMU insists on exactly this much.
+pub const BYTES: usize = 16 << 20;
+/// Changes with this layout, so that an image and a simulator of different sources refuse each other.
+pub const MAGIC: u32 = 0x4A52_4C02;
+/// Where [`MAGIC`] stands.
+pub const MAGIC_AT: usize = 0;
+/// Where the board's words stand.
+pub const ASK_AT: usize = 0x40;
+/// Where the simulator's words stand.
+pub const REPLY_AT: usize = 0x80;
+/// Where longer messages stand, their length in [`Ask::argument`] or [`Reply::length`].
+pub const TEXT_AT: usize = 0x1000;
+/// The longest of them.
+pub const TEXT_BYTES: usize = 0x1000;
+/// Where a block of scans stands.
+pub const BLOCK_AT: usize = 0x2000;
+/// Where the ring of bytes for the board begins.
+pub const TO_DEVICE_AT: usize = 0x1_0000;
+/// Where the ring of bytes for the host begins.
+pub const TO_HOST_AT: usize = 0x2_0000;
+/// Where the ring of log lines begins.
+pub const LOG_AT: usize = 0x3_0000;
+/// The length of each ring, a power of two.
+pub const RING_BYTES: u32 = 0x1_0000;
+/// An instant that never comes.
+pub const NEVER: u64 = u64::MAX;
+
+/// What the board wants when it rings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Op {
+    /// It has started and needs its [`Setup`]; the argument is the number of golden vectors that agree,
+    /// or 0 when one differs.
+    Start = 1,
+    /// All tasks wait: for a block, an alarm, bytes, or room for bytes.
+    Idle = 2,
+    /// The coil on, for as many µs as the argument says.
+    Pulse = 3,
+    /// The coil off.
+    Off = 4,
+    /// The stage order of as many bytes as the argument says; the reply's length is that of a refusal, or 0.
+    Stage = 5,
+    /// The firmware has panicked; a sentence of as many bytes as the argument says tells why.
+    Panic = 6,
+}
+
+impl Op {
+    /// The wish that a word means.
+    #[must_use]
+    pub const fn from_word(word: u32) -> Option<Self> {
+        Some(match word {
+            1 => Self::Start,
+            2 => Self::Idle,
+            3 => Self::Pulse,
+            4 => Self::Off,
+            5 => Self::Stage,
+            6 => Self::Panic,
+            _ => return None,
+        })
+    }
+}
+
+/// The guard is closed.
+pub const INTERLOCK_CLOSED: u32 = 1;
+/// The emergency stop is pressed.
+pub const EMERGENCY_STOP: u32 = 2;
+/// Somebody turns the reset key; it counts once, with the next block.
+pub const LOCAL_RESET: u32 = 4;
+/// The clock of the scans waits for the host's acknowledgements.
+pub const HELD: u32 = 8;
+/// For tests: the acquisition task must panic.
+pub const MUST_PANIC: u32 = 16;
+
+/// Words of an ask or a reply.
+pub const WORDS: usize = 10;
+
+/// The board's words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ask {
+    /// An [`Op`].
+    pub op: u32,
+    /// Belongs to the wish.
+    pub argument: u32,
+    /// The next alarm, µs; [`NEVER`] for none.
+    pub alarm_us: u64,
+    /// The instant of the block that is waited for, µs; [`NEVER`] when the converters rest.
+    pub block_us: u64,
+    /// Bytes taken from the ring for the board.
+    pub to_device_tail: u32,
+    /// Bytes put into the ring for the host.
+    pub to_host_head: u32,
+    /// Whether a frame waits for room in it.
+    pub to_host_full: u32,
+    /// Bytes put into the ring of logs.
+    pub log_head: u32,
+}
+
+impl Ask {
+    /// As they stand in memory.
+    #[must_use]
+    pub const fn to_words(&self) -> [u32; WORDS] {
+        [
+            self.op,
+            self.argument,
+            self.alarm_us as u32,
+            (self.alarm_us >> 32) as u32,
+            self.block_us as u32,
+            (self.block_us >> 32) as u32,
+            self.to_device_tail,
+            self.to_host_head,
+            self.to_host_full,
+            self.log_head,
+        ]
+    }
+
+    /// From memory.
+    #[must_use]
+    pub const fn from_words(words: &[u32; WORDS]) -> Self {
+        Self {
+            op: words[0],
+            argument: words[1],
+            alarm_us: joined(words[2], words[3]),
+            block_us: joined(words[4], words[5]),
+            to_device_tail: words[6],
+            to_host_head: words[7],
+            to_host_full: words[8],
+            log_head: words[9],
+        }
+    }
+}
+
+/// The simulator's words.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Reply {
+    /// The board's time, µs.
+    pub now_us: u64,
+    /// Bits: the inputs, and how the board is run.
+    pub inputs: u32,
+    /// Blocks delivered since the start.
+    pub blocks: u32,
+    /// Bytes put into the ring for the board.
+    pub to_device_head: u32,
+    /// Bytes taken from the ring for the host.
+    pub to_host_tail: u32,
+    /// Bytes taken from the ring of logs.
+    pub log_tail: u32,
+    /// Bytes of text.
+    pub length: u32,
+}
+
+impl Reply {
+    /// As they stand in memory.
+    #[must_use]
+    pub const fn to_words(&self) -> [u32; WORDS] {
+        [
+            self.now_us as u32,
+            (self.now_us >> 32) as u32,
+            self.inputs,
+            self.blocks,
+            self.to_device_head,
+            self.to_host_tail,
+            self.log_tail,
+            self.length,
+            0,
+            0,
+        ]
+    }
+
+    /// From memory.
+    #[must_use]
+    pub const fn from_words(words: &[u32; WORDS]) -> Self {
+        Self {
+            now_us: joined(words[0], words[1]),
+            inputs: words[2],
+            blocks: words[3],
+            to_device_head: words[4],
+            to_host_tail: words[5],
+            log_tail: words[6],
+            length: words[7],
+        }
+    }
+}
+
+const fn joined(low: u32, high: u32) -> u64 {
+    (high as u64) << 32 | low as u64
+}
+
+/// What an emulated board is told at its start, in postcard.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Setup {
+    /// Serial number.
+    pub serial: Name,
+    /// Scans per second.
+    pub scan_rate_hz: u32,
+    /// Count of starts.
+    pub boot: u32,
+    /// Blocks that the ring must hold.
+    pub slots: u32,
+    /// The channels of a scan.
+    pub channels: Vec<Channel, MAX_CHANNELS>,
+}
+
+/// Writes a message into `buffer`; `None` when it does not fit.
+pub fn to_text<'a, T: Serialize>(message: &T, buffer: &'a mut [u8]) -> Option<&'a [u8]> {
+    postcard::to_slice(message, buffer).ok().map(|used| &*used)
+}
+
+/// Reads a message; `None` when it is not one.
+pub fn from_text<'a, T: Deserialize<'a>>(text: &'a [u8]) -> Option<T> {
+    postcard::from_bytes(text).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_come_back_as_they_went() {
+        let ask = Ask {
+            op: Op::Stage as u32,
+            argument: 7,
+            alarm_us: 0x1_0000_0002,
+            block_us: NEVER,
+            to_device_tail: 3,
+            to_host_head: 4,
+            to_host_full: 1,
+            log_head: u32::MAX,
+        };
+        assert_eq!(Ask::from_words(&ask.to_words()), ask);
+        assert_eq!(Op::from_word(ask.op), Some(Op::Stage));
+        assert_eq!(Op::from_word(0), None);
+        let reply = Reply {
+            now_us: 0xFFFF_FFFF_0000_0001,
+            inputs: INTERLOCK_CLOSED | HELD,
+            blocks: 9,
+            to_device_head: 1,
+            to_host_tail: 2,
+            log_tail: 3,
+            length: 4,
+        };
+        assert_eq!(Reply::from_words(&reply.to_words()), reply);
+    }
+}

@@ -1,0 +1,190 @@
+//! The emulated board: the firmware's binary in QEMU, over the simulated rig, in lockstep.
+//!
+//! QEMU runs the same code as the rig's controller has. Its converters, coil, inputs, stage and link are
+//! memory that it shares with this process ([`shared_ram`]), and a byte through a pipe hands the turn over
+//! ([`jointrig_firmware::lockstep`]). While one side works the other stands still, so a run is the native
+//! board's, block for block, whatever the machine is doing. To the host it is a [`HostEnd`] like any other.
+
+mod process;
+mod server;
+pub mod shared_ram;
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use crate::board::{Controls, Options};
+use crate::link::{DeviceEnd, HostEnd, pair};
+use crate::rig::{Rig, RigConfig, RigError};
+use process::Emulator;
+use server::Server;
+
+/// How long an image may take to introduce itself: a loaded machine starts QEMU in a second or two.
+const START_LIMIT: Duration = Duration::from_secs(60);
+
+/// Why an emulated board could not start.
+#[derive(Debug, thiserror::Error)]
+pub enum QemuError {
+    /// The rig's description is wrong.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+    /// There is no image.
+    #[error("there is no firmware image {0}: `cargo xtask firmware --board mps2-an505` builds it")]
+    NoImage(PathBuf),
+    /// There is no emulator.
+    #[error("could not start qemu-system-arm: {0}; `cargo xtask setup` installs it")]
+    NoEmulator(std::io::Error),
+    /// The shared memory could not be made.
+    #[error("could not make 16 MB of shared memory in {}: {source}", folder.display())]
+    Memory {
+        /// Where it was to be.
+        folder: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// The thread could not be made.
+    #[error("the emulated board could not start its thread: {0}")]
+    Thread(std::io::Error),
+    /// The image did not start as it should.
+    #[error("the firmware image did not start: {0}")]
+    Start(String),
+}
+
+/// Faults that a test declares.
+#[derive(Debug, Default)]
+pub struct Faults {
+    stall_from: AtomicU64,
+    stall_scans: AtomicU64,
+    panic: AtomicBool,
+}
+
+impl Faults {
+    /// From the block with this scan on, and for so many scans, the link moves nothing either way while
+    /// the board's time goes on, as when a PC is busy.
+    pub fn stall_link(&self, from_scan: u64, scans: u64) {
+        self.stall_from.store(from_scan, Ordering::Release);
+        self.stall_scans.store(scans, Ordering::Release);
+    }
+
+    /// Whether the link is stalled once so many scans were produced.
+    fn stalled(&self, scans: u64) -> bool {
+        let from = self.stall_from.load(Ordering::Acquire);
+        let count = self.stall_scans.load(Ordering::Acquire);
+        count > 0 && scans >= from && scans < from.saturating_add(count)
+    }
+
+    /// The acquisition task panics at its next block.
+    pub fn panic(&self) {
+        self.panic.store(true, Ordering::Release);
+    }
+}
+
+/// A running emulated board. Dropping it stops QEMU.
+pub struct QemuBoard {
+    link: DeviceEnd,
+    controls: Arc<Controls>,
+    faults: Arc<Faults>,
+    failure: Arc<Mutex<Option<String>>>,
+    emulator: Arc<Emulator>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl QemuBoard {
+    /// Starts this image over the rig that `rig_toml` describes (the built-in one if `None`).
+    ///
+    /// # Errors
+    /// [`QemuError`], which says what to do.
+    pub fn start(image: &Path, rig_toml: Option<&str>, seed: u64) -> Result<(Self, HostEnd), QemuError> {
+        let config = match rig_toml {
+            Some(text) => RigConfig::from_toml(text)?,
+            None => RigConfig::default(),
+        };
+        Self::start_with(image, &config, &Options { seed, ..Options::default() })
+    }
+
+    /// Starts this image over this rig. The order of polling is the image's own.
+    ///
+    /// # Errors
+    /// [`QemuError`], which says what to do.
+    pub fn start_with(
+        image: &Path,
+        config: &RigConfig,
+        options: &Options,
+    ) -> Result<(Self, HostEnd), QemuError> {
+        let rig = Rig::new(config, options.seed)?;
+        if !image.is_file() {
+            return Err(QemuError::NoImage(image.to_path_buf()));
+        }
+        let (emulator, pipes, ram) = Emulator::start(image)?;
+        let emulator = Arc::new(emulator);
+        let (host, device) = pair();
+        let (controls, faults) = (Arc::new(Controls::default()), Arc::new(Faults::default()));
+        let failure = Arc::new(Mutex::new(None));
+        let (started, has_started) = sync_channel(1);
+        let thread = std::thread::Builder::new().name("emulated board".into()).spawn({
+            let (device, options, failure) = (device.clone(), options.clone(), Arc::clone(&failure));
+            let (controls, faults) = (Arc::clone(&controls), Arc::clone(&faults));
+            move || {
+                let mut server = Server::new(rig, &options, &device, &controls, &faults, pipes, ram);
+                let outcome = server.start().and_then(|()| {
+                    // nobody listens any more when starting took too long
+                    let _ = started.send(());
+                    server.serve()
+                });
+                if let Err(sentence) = outcome {
+                    log::error!(target: "qemu", "{sentence}");
+                    *failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(sentence);
+                }
+                device.close();
+            }
+        });
+        let thread = thread.map_err(QemuError::Thread)?;
+        let board = Self { link: device, controls, faults, failure, emulator, thread: Some(thread) };
+        match has_started.recv_timeout(START_LIMIT) {
+            Ok(()) => Ok((board, host)),
+            Err(RecvTimeoutError::Timeout) => {
+                board.emulator.kill();
+                Err(QemuError::Start(format!("it said nothing for {} s", START_LIMIT.as_secs())))
+            }
+            Err(RecvTimeoutError::Disconnected) => {
+                let sentence = board.failure().unwrap_or_else(|| "its thread panicked".into());
+                Err(QemuError::Start(board.emulator.explained(sentence)))
+            }
+        }
+    }
+
+    /// Buttons and observations at the rig's side.
+    pub fn controls(&self) -> &Controls {
+        &self.controls
+    }
+
+    /// Faults to be declared.
+    pub fn faults(&self) -> &Faults {
+        &self.faults
+    }
+
+    /// Why the board stopped by itself, if it did: the firmware's last sentence, or that QEMU ended.
+    pub fn failure(&self) -> Option<String> {
+        self.failure.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// QEMU's process id.
+    pub fn process_id(&self) -> u32 {
+        self.emulator.id()
+    }
+}
+
+impl Drop for QemuBoard {
+    fn drop(&mut self) {
+        self.link.close();
+        // the thread ends at the board's next turn; a board that takes none is stopped
+        self.emulator.end(|| self.thread.as_ref().is_none_or(JoinHandle::is_finished));
+        if let Some(thread) = self.thread.take() {
+            // a panic of the thread has been printed by itself
+            let _ = thread.join();
+        }
+    }
+}

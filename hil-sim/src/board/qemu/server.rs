@@ -1,0 +1,293 @@
+//! The simulator's side of the turns: the rig, the clock and the link.
+
+use std::cell::RefCell;
+use std::io::{self, Read, Write};
+use std::pin::pin;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::task::{Context, Poll, Waker};
+
+use jointrig_firmware::board::{ByteSink, ByteSource, Coil, Inputs, Stage};
+use jointrig_firmware::lockstep::{
+    Ask, BLOCK_AT, EMERGENCY_STOP, HELD, INTERLOCK_CLOSED, LOCAL_RESET, LOG_AT, MUST_PANIC, NEVER, Op,
+    RING_BYTES, Reply, Setup, TEXT_AT, TEXT_BYTES, TO_DEVICE_AT, TO_HOST_AT, from_text, to_text,
+};
+use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, scans_per_block};
+use jointrig_protocol::{golden, request};
+use log::Level;
+use serde::Serialize;
+
+use super::Faults;
+use super::process::Pipes;
+use super::shared_ram::SharedRam;
+use crate::board::parts::{VirtualCoil, VirtualInputs, VirtualStage, describe, fill};
+use crate::board::{Controls, Options, name, ring_slots};
+use crate::executor::Woken;
+use crate::link::DeviceEnd;
+use crate::rig::Rig;
+
+/// Why serving ended, in a sentence.
+type Ended = String;
+
+/// What a wish came to.
+enum Next {
+    Answer,
+    End,
+}
+
+/// Everything of one emulated board on this side.
+pub struct Server {
+    rig: Rc<RefCell<Rig>>,
+    coil: VirtualCoil,
+    inputs: VirtualInputs,
+    stage: VirtualStage,
+    faults: Arc<Faults>,
+    link: DeviceEnd,
+    woken: Arc<Woken>,
+    waker: Waker,
+    pipes: Pipes,
+    ram: SharedRam,
+    setup: Setup,
+    per_block: usize,
+    free_running: bool,
+    reply: Reply,
+    log: Vec<u8>,
+}
+
+impl Server {
+    /// Not started yet.
+    pub fn new(
+        rig: Rig,
+        options: &Options,
+        link: &DeviceEnd,
+        controls: &Arc<Controls>,
+        faults: &Arc<Faults>,
+        pipes: Pipes,
+        ram: SharedRam,
+    ) -> Self {
+        let channels = describe(rig.channels());
+        let per_block = scans_per_block(channels.len()).expect("the rig has ten channels");
+        let setup = Setup {
+            serial: name(&format!("qemu-{:016x}", options.seed)),
+            scan_rate_hz: rig.scan_rate_hz(),
+            boot: options.boot,
+            slots: ring_slots(rig.scan_rate_hz(), per_block) as u32,
+            channels: channels.iter().cloned().collect(),
+        };
+        let rig = Rc::new(RefCell::new(rig));
+        let woken = Arc::new(Woken::default());
+        Self {
+            coil: VirtualCoil::new(&rig, controls),
+            inputs: VirtualInputs::new(controls),
+            stage: VirtualStage::new(&rig),
+            faults: Arc::clone(faults),
+            link: link.clone(),
+            waker: Waker::from(Arc::clone(&woken)),
+            woken,
+            pipes,
+            ram,
+            setup,
+            per_block,
+            free_running: options.free_running,
+            reply: Reply { inputs: INTERLOCK_CLOSED, ..Reply::default() },
+            log: Vec::new(),
+            rig,
+        }
+    }
+
+    /// The first turn: the board introduces itself and hears what it is.
+    pub fn start(&mut self) -> Result<(), Ended> {
+        let ask = self.wait()?;
+        self.ram.forget_name();
+        if Op::from_word(ask.op) != Some(Op::Start) {
+            return Err("it does not begin as this simulator's firmware does: build both anew".into());
+        }
+        if ask.argument as usize != golden::COMMITTED.len() {
+            return Err("its frames differ from the golden vectors: build both anew".into());
+        }
+        self.put_text(&self.setup.clone())?;
+        self.set_inputs();
+        self.answer()
+    }
+
+    /// Takes turns until the link is closed or the board breaks down.
+    pub fn serve(&mut self) -> Result<(), Ended> {
+        loop {
+            let ask = self.wait()?;
+            self.show_log(&ask).map_err(broken)?;
+            self.reply.length = 0;
+            match Op::from_word(ask.op) {
+                Some(Op::Idle) => match self.idle(&ask).map_err(broken)? {
+                    Next::Answer => {}
+                    Next::End => return Ok(()),
+                },
+                Some(Op::Pulse) => self.coil.pulse(ask.argument),
+                Some(Op::Off) => self.coil.off(),
+                Some(Op::Stage) => self.go(ask.argument)?,
+                Some(Op::Panic) => {
+                    let text = self.ram.text(ask.argument).map_err(broken)?;
+                    return Err(format!("the firmware broke down: {}", String::from_utf8_lossy(&text)));
+                }
+                Some(Op::Start) | None => {
+                    return Err(format!("the firmware asks for something unknown ({})", ask.op));
+                }
+            }
+            self.answer()?;
+        }
+    }
+
+    /// Waits for this side's turn.
+    fn wait(&mut self) -> Result<Ask, Ended> {
+        let mut byte = [0];
+        match self.pipes.ring.read(&mut byte) {
+            Ok(1) => self.ram.ask().map_err(broken),
+            Ok(_) => Err("QEMU ended by itself".into()),
+            Err(error) => Err(broken(error)),
+        }
+    }
+
+    fn answer(&mut self) -> Result<(), Ended> {
+        self.ram.reply(&self.reply).and_then(|()| self.pipes.answer.write_all(&[1])).map_err(broken)
+    }
+
+    /// All of the board's tasks wait: gives them what has come, or lets time go on.
+    fn idle(&mut self, ask: &Ask) -> io::Result<Next> {
+        loop {
+            if self.link.is_closed() {
+                return Ok(Next::End);
+            }
+            self.woken.take();
+            let stalled = self.faults.stalled(self.scans());
+            if !stalled {
+                let room_made = self.move_out(ask)? && ask.to_host_full != 0;
+                if self.move_in(ask)? || room_made {
+                    return Ok(Next::Answer);
+                }
+            }
+            if stalled || self.free_running || ask.block_us != NEVER {
+                self.go_on(ask)?;
+                return Ok(Next::Answer);
+            }
+            self.link.sleep(&self.woken);
+        }
+    }
+
+    /// Scans that the converters have produced.
+    fn scans(&self) -> u64 {
+        u64::from(self.reply.blocks) * self.per_block as u64
+    }
+
+    /// Jumps to the next alarm or to the end of the block that is waited for.
+    fn go_on(&mut self, ask: &Ask) -> io::Result<()> {
+        let next = ask.alarm_us.min(ask.block_us);
+        if next == NEVER {
+            return Err(io::Error::other("the board waits for something that cannot come: no alarm is set"));
+        }
+        self.reply.now_us = self.reply.now_us.max(next);
+        if ask.block_us <= self.reply.now_us {
+            let mut block = [0; 4 + BLOCK_SAMPLE_BYTES];
+            let (_missed, samples) = block.split_at_mut(4);
+            let samples = samples.first_chunk_mut().expect("the block is that long");
+            fill(&mut self.rig.borrow_mut(), self.setup.channels.len(), self.per_block, samples);
+            self.ram.write(BLOCK_AT, &block)?;
+            self.reply.blocks += 1;
+            self.set_inputs();
+        }
+        Ok(())
+    }
+
+    fn set_inputs(&mut self) {
+        let bit = |on: bool, bit: u32| if on { bit } else { 0 };
+        self.reply.inputs = bit(self.inputs.interlock_closed(), INTERLOCK_CLOSED)
+            | bit(self.inputs.emergency_stop(), EMERGENCY_STOP)
+            | bit(self.inputs.local_reset(), LOCAL_RESET)
+            | bit(!self.free_running && !self.faults.stalled(self.scans()), HELD)
+            | bit(self.faults.panic.load(Ordering::Acquire), MUST_PANIC);
+    }
+
+    /// Bytes from the board to the host; whether any could go.
+    fn move_out(&mut self, ask: &Ask) -> io::Result<bool> {
+        let tail = self.reply.to_host_tail;
+        let count = ask.to_host_head.wrapping_sub(tail).min(RING_BYTES);
+        if count == 0 {
+            return Ok(false);
+        }
+        let mut bytes = vec![0; count as usize];
+        self.ram.read_ring(TO_HOST_AT, tail, &mut bytes)?;
+        let taken = once(self.link.write(&bytes), &self.waker).is_ready();
+        if taken {
+            self.reply.to_host_tail = tail.wrapping_add(count);
+        }
+        Ok(taken)
+    }
+
+    /// Bytes from the host to the board; whether there were any.
+    fn move_in(&mut self, ask: &Ask) -> io::Result<bool> {
+        let head = self.reply.to_device_head;
+        let room = RING_BYTES - head.wrapping_sub(ask.to_device_tail);
+        let mut bytes = [0; 4096];
+        let room = bytes.len().min(room as usize);
+        if room == 0 {
+            return Ok(true);
+        }
+        let Poll::Ready(count) = once(self.link.read(&mut bytes[..room]), &self.waker) else {
+            return Ok(false);
+        };
+        self.ram.write_ring(TO_DEVICE_AT, head, &bytes[..count])?;
+        self.reply.to_device_head = head.wrapping_add(count as u32);
+        Ok(true)
+    }
+
+    /// Moves hammer and laser.
+    fn go(&mut self, length: u32) -> Result<(), Ended> {
+        let text = self.ram.text(length).map_err(broken)?;
+        let place: request::Stage = from_text(&text)
+            .ok_or("the firmware's stage order is unreadable: build image and simulator anew")?;
+        if let Err(refusal) = self.stage.go(&place) {
+            self.put_text(&refusal)?;
+        }
+        Ok(())
+    }
+
+    fn put_text<T: Serialize>(&mut self, message: &T) -> Result<(), Ended> {
+        let mut buffer = [0; TEXT_BYTES];
+        let text = to_text(message, &mut buffer).ok_or("a message does not fit the shared memory")?;
+        self.reply.length = text.len() as u32;
+        self.ram.write(TEXT_AT, text).map_err(broken)
+    }
+
+    /// Passes the board's log lines on to this program's log.
+    fn show_log(&mut self, ask: &Ask) -> io::Result<()> {
+        // a board that breaks down says so by other means
+        let count = ask.log_head.wrapping_sub(self.reply.log_tail);
+        if count == 0 || count > RING_BYTES {
+            return Ok(());
+        }
+        let from = self.log.len();
+        self.log.resize(from + count as usize, 0);
+        self.ram.read_ring(LOG_AT, self.reply.log_tail, &mut self.log[from..])?;
+        self.reply.log_tail = ask.log_head;
+        while let Some(end) = self.log.iter().position(|byte| *byte == b'\n') {
+            let line: Vec<u8> = self.log.drain(..=end).collect();
+            let line = String::from_utf8_lossy(&line[..end]);
+            let level = match line.chars().next() {
+                Some('E') => Level::Error,
+                Some('W') => Level::Warn,
+                Some('I') => Level::Info,
+                _ => Level::Debug,
+            };
+            log::log!(target: "qemu", level, "{}", line.get(1..).unwrap_or(""));
+        }
+        Ok(())
+    }
+}
+
+/// Polls once: the link's futures either act at once or remember the waker.
+fn once<F: Future>(future: F, waker: &Waker) -> Poll<F::Output> {
+    pin!(future).poll(&mut Context::from_waker(waker))
+}
+
+fn broken(error: io::Error) -> Ended {
+    format!("the emulated board's memory or pipe failed: {error}")
+}

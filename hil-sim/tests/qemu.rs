@@ -1,0 +1,200 @@
+//! The emulated board: the firmware's binary gives the native board's records, and breaks down safely.
+//!
+//! These tests need the image and QEMU; `cargo xtask test` builds and names the first and installs the
+//! second. Without `JOINTRIG_MPS2_IMAGE` they say so and pass.
+#![cfg(unix)]
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use jointrig_hil_sim::board::qemu::{QemuBoard, QemuError};
+use jointrig_hil_sim::board::{Options, VirtualBoard};
+use jointrig_hil_sim::rig::RigConfig;
+use jointrig_protocol::answer::{Answer, Hammer, Refusal};
+use jointrig_protocol::event::{Event, Loss, Reason};
+use jointrig_protocol::request::{Configuration, Request};
+use jointrig_protocol::shot::Phase;
+use support::SmallHost;
+
+/// A coil pulse for some 50 N on the default rig, from cold (its description says so).
+const PULSE_US: u32 = 3_500;
+
+fn image() -> Option<PathBuf> {
+    let image = std::env::var_os("JOINTRIG_MPS2_IMAGE").map(PathBuf::from);
+    if image.is_none() {
+        eprintln!("left out: JOINTRIG_MPS2_IMAGE names no image; `cargo xtask test` builds one and sets it");
+    }
+    image
+}
+
+fn board(seed: u64) -> Option<(QemuBoard, SmallHost)> {
+    let (board, link) = QemuBoard::start(&image()?, None, seed).unwrap();
+    Some((board, SmallHost::new(link)))
+}
+
+/// Two hits in one cell and one in another: their records relative to the trigger.
+fn three_shots(host: &mut SmallHost) -> Vec<Vec<i16>> {
+    host.start();
+    let mut records = Vec::new();
+    let mut from = host.stage(Configuration::Ajb, "AZ3", "B3", 0);
+    for number in 1..=3 {
+        if number == 3 {
+            from = host.stage(Configuration::B, "BY1", "B4", 0);
+        }
+        let shot = host.shoot(SmallHost::order(number, PULSE_US, from + host.lead()));
+        assert_eq!(shot.phase, Phase::Done);
+        records.push(host.record(shot.trigger, 256, 20_480));
+        from = host.hold_at;
+    }
+    records
+}
+
+#[test]
+fn the_binary_gives_the_native_boards_records_sample_for_sample() {
+    let Some((emulated, mut host)) = board(11) else { return };
+    let in_qemu = three_shots(&mut host);
+    let options = Options { seed: 11, ..Options::default() };
+    let (native, link) = VirtualBoard::start_with(&RigConfig::default(), &options).unwrap();
+    let natively = three_shots(&mut SmallHost::new(link));
+    assert_eq!(in_qemu, natively);
+    assert_eq!(emulated.controls().coil_pulses_us(), native.controls().coil_pulses_us());
+    let Some((_other, mut host)) = board(12) else { return };
+    assert_ne!(three_shots(&mut host), natively, "another seed is another run");
+}
+
+#[test]
+fn the_emulated_board_names_itself() {
+    let Some((board, mut host)) = board(1) else { return };
+    let Ok(Answer::Info(info)) = host.ask(Request::Info) else { panic!("no info") };
+    assert_eq!(info.board, "mps2-an505");
+    assert_eq!(info.target, "thumbv8m.main-none-eabihf");
+    assert_eq!((info.channels, info.scan_rate_hz, info.stage), (10, 51_200, true));
+    assert!(info.ring_scans >= 51_200, "the ring holds a second");
+    let (native, link) = VirtualBoard::start(None, 1).unwrap();
+    let mut other = SmallHost::new(link);
+    for index in 0..info.channels {
+        assert_eq!(host.ask(Request::Channel { index }), other.ask(Request::Channel { index }));
+    }
+    assert_eq!(host.hello.unwrap().schema, other.hello.unwrap().schema);
+    drop((board, native));
+}
+
+#[test]
+fn qemu_ends_with_its_board() {
+    let Some((board, host)) = board(1) else { return };
+    let process = PathBuf::from(format!("/proc/{}", board.process_id()));
+    drop(board);
+    assert!(!process.exists(), "the process is gone and reaped");
+    drop(host);
+}
+
+#[test]
+fn what_is_no_image_is_refused_with_a_reason() {
+    if image().is_none() {
+        return;
+    }
+    let refused = |path: &str| match QemuBoard::start(&PathBuf::from(path), None, 1) {
+        Ok(_) => panic!("{path} started"),
+        Err(error) => error,
+    };
+    assert!(matches!(refused("/nowhere/image"), QemuError::NoImage(_)));
+    let message = refused("Cargo.toml").to_string();
+    assert!(message.contains("did not start") && !message.contains('\n'), "{message}");
+}
+
+#[test]
+fn a_stage_order_that_cannot_be_is_refused_through_the_firmware() {
+    let Some((_board, mut host)) = board(1) else { return };
+    host.start();
+    let (impact, response) = ("NOWHERE".try_into().unwrap(), "B3".try_into().unwrap());
+    let order =
+        jointrig_protocol::request::Stage { configuration: Configuration::Ajb, impact, response, attempt: 0 };
+    let Err(Refusal::Stage(sentence)) = host.ask(Request::Stage(order)) else { panic!("not refused") };
+    assert!(sentence.contains("NOWHERE"), "{sentence}");
+}
+
+#[test]
+fn a_flood_of_garbage_is_counted_and_harms_nothing() {
+    let Some((board, mut host)) = board(1) else { return };
+    host.start();
+    let garbage: Vec<u8> = (0..400_000_u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
+    for piece in garbage.chunks(20_000) {
+        host.send_raw(piece);
+        host.pump();
+    }
+    host.send_raw(&[0]);
+    let status = host.status();
+    assert!(status.counters.frames_bad > 100, "{status:?}");
+    assert_eq!(status.hammer, Hammer::Disarmed);
+    assert_eq!((board.failure(), board.controls().coil_pulses_us().len()), (None, 0));
+}
+
+/// Stalls the link for so many scans while the hammer is armed, and reads on.
+fn stalled(scans: u64) -> Option<(QemuBoard, SmallHost, u64)> {
+    let (board, mut host) = board(5)?;
+    host.start();
+    // the board runs half a ring beyond this and not further, so the stall begins at a known scan
+    let hold = host.first_scan + 51_200;
+    host.hold_at = hold;
+    host.until("a second", |host| host.next_scan >= hold);
+    assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
+    let from = hold + host.lead() - 64 - 2_400;
+    board.faults().stall_link(from, scans);
+    host.hold_at = u64::MAX;
+    host.acknowledge();
+    let end = from + scans + 51_200;
+    host.until("the stall's end", |host| host.latest >= end);
+    Some((board, host, from))
+}
+
+#[test]
+fn a_link_that_stalls_for_half_a_second_loses_nothing() {
+    let Some((board, mut host, _)) = stalled(25_600) else { return };
+    let status = host.status();
+    assert_eq!(status.counters.scans_dropped, 0, "{status:?}");
+    assert!(host.gaps.is_empty(), "{:?}", host.gaps);
+    assert_eq!(status.hammer, Hammer::Armed, "half a second is no silence");
+    assert_eq!(board.failure(), None);
+}
+
+#[test]
+fn a_link_that_stalls_for_five_seconds_loses_what_is_reported_and_disarms() {
+    let Some((board, mut host, from)) = stalled(256_000) else { return };
+    let status = host.status();
+    let lost: Vec<(u64, u64)> = host
+        .events
+        .iter()
+        .filter_map(|event| match event {
+            Event::Lost { first_scan, scans, why: Loss::LinkSlow, .. } => {
+                Some((*first_scan, first_scan + u64::from(*scans)))
+            }
+            _ => None,
+        })
+        .collect();
+    assert_eq!(lost, host.gaps, "what is missing is what was reported");
+    let missing: u64 = lost.iter().map(|(first, end)| end - first).sum();
+    assert_eq!(status.counters.scans_dropped, missing);
+    assert!(missing > 150_000 && lost[0].0 >= from - 51_200, "{lost:?} from {from}");
+    assert_eq!(status.hammer, Hammer::Disarmed);
+    assert!(host.events.contains(&Event::Disarmed(Reason::LinkLost)), "{:?}", host.events);
+    assert_eq!((status.epoch, status.streaming), (host.epoch, true), "no reset");
+    assert_eq!((board.failure(), board.controls().coil_pulses_us().len()), (None, 0));
+}
+
+#[test]
+fn a_panic_in_a_task_ends_the_board_with_its_sentence() {
+    let Some((board, mut host)) = board(1) else { return };
+    host.start();
+    board.faults().panic();
+    let mut link = host.into_link();
+    let mut bytes = [0; 4096];
+    while link.read(&mut bytes, Duration::from_secs(10)).is_ok_and(|count| count > 0) {}
+    let error = link.read(&mut bytes, Duration::from_secs(10)).unwrap_err();
+    assert_eq!(error.kind(), std::io::ErrorKind::BrokenPipe);
+    let sentence = board.failure().unwrap();
+    assert!(sentence.contains("the simulator asked for a panic"), "{sentence}");
+    assert!(board.controls().coil_pulses_us().is_empty());
+}

@@ -1,0 +1,222 @@
+//! `cargo xtask budgets`: what the firmware costs, counted in the emulator, and its limits.
+//!
+//! The image's own benchmark counts executed instructions under QEMU's counted clock; two runs must agree to the
+//! instruction. Instructions are not cycles, and another compiler counts differently: the limits leave room for that.
+
+use crate::consent::Consent;
+use crate::project::Project;
+use crate::toolchain::Toolchain;
+use crate::{emulator, firmware, setup, size};
+use anyhow::{Context, Result, bail};
+use std::fmt::Write;
+use std::path::Path;
+
+/// Where the table is written, from the repository's root.
+const PAGE: &str = "docs/firmware-budgets.md";
+
+/// One figure: its name in the image's report, its heading in the table, its limit.
+struct Budget {
+    name: &'static str,
+    what: &'static str,
+    limit: u64,
+}
+
+const fn budget(name: &'static str, what: &'static str, limit: u64) -> Budget {
+    Budget { name, what, limit }
+}
+
+/// Instructions per scan of sixteen channels.
+const SCANS: [Budget; 4] = [
+    budget("scan.steady", "streaming, hammer at rest", 800),
+    budget("scan.waiting", "streaming, judging three channels for quiet", 800),
+    budget("scan.flight", "streaming, hammer in flight", 800),
+    budget("scan.listening", "streaming, following force and friction after contact", 800),
+];
+
+/// Instructions for what a scan's cost is made of, and for frames.
+const PARTS: [Budget; 5] = [
+    budget("frame.seal", "CRC-32 and COBS of a full block of samples (15 scans)", 7_000),
+    budget("part.copy_480", "one copy of a block's samples (there are four on the way)", 600),
+    budget("frame.seal_short", "CRC-32 and COBS of an acknowledgement", 500),
+    budget("frame.read", "finding and checking a frame of the longest size", 20_000),
+    budget("greet", "a handshake, heard and answered", 4_500),
+];
+
+/// Instructions from the first byte of a request to the last of its answer.
+const COMMANDS: [Budget; 13] = [
+    budget("info", "Info", 8_000),
+    budget("channel", "Channel", 5_500),
+    budget("status", "Status", 6_500),
+    budget("start", "Start", 5_000),
+    budget("stop", "Stop", 5_000),
+    budget("resend", "Resend of fifteen scans, with the two blocks that hold them", 30_000),
+    budget("trigger", "Trigger", 5_000),
+    budget("load_cells", "LoadCells", 6_500),
+    budget("arm", "Arm, with its event", 6_000),
+    budget("disarm", "Disarm, with its event", 8_000),
+    budget("fire", "Fire, with sixteen limits of quiet", 12_000),
+    budget("stage", "Stage (virtual rigs only)", 8_500),
+    budget("emergency_stop", "EmergencyStop, with its events", 12_000),
+];
+
+/// Instructions from a delivered block to what must follow from it.
+const LATENCIES: [Budget; 5] = [
+    budget("latency.coil_on", "block delivered → coil on", 8_000),
+    budget("latency.coil_off", "block with the guard open delivered → coil off", 8_000),
+    budget("block.contact", "block with the trigger, until all tasks rest", 25_000),
+    budget("block.guard", "block with the guard open, until all tasks rest", 25_000),
+    budget("block.worst", "the worst block of the whole run", 30_000),
+];
+
+/// Bytes.
+const MEMORY: [Budget; 3] = [
+    budget("flash", "flash: code, constants, initial values", 128 << 10),
+    budget("ram", "RAM: variables, the ring of a second of sixteen channels among them", 2 << 20),
+    budget("stack", "stack, high-water mark of the benchmark", 32 << 10),
+];
+
+/// The figures of one image.
+struct Figures(Vec<(String, u64)>);
+
+impl Figures {
+    fn of(&self, name: &str) -> Result<u64> {
+        let found = self.0.iter().find(|(known, _)| known == name);
+        found.map(|(_, value)| *value).with_context(|| format!("the image's benchmark reports no {name}"))
+    }
+}
+
+/// `cargo xtask budgets`.
+pub fn command(project: &Project) -> Result<()> {
+    let toolchain = setup::everything(project, Consent::new(false))?;
+    let figures = measure(project, &toolchain)?;
+    let page = page(&figures)?;
+    let path = project.root.join(PAGE);
+    std::fs::create_dir_all(project.root.join("docs"))?;
+    std::fs::write(&path, &page).with_context(|| format!("could not write {}", path.display()))?;
+    print!("{page}");
+    enforce(&figures)
+}
+
+/// Counts and compares with the limits; returns a remark.
+pub fn check(project: &Project, toolchain: &Toolchain) -> Result<String> {
+    let figures = measure(project, toolchain)?;
+    enforce(&figures)?;
+    Ok(format!("{} instructions per scan", figures.of("scan.steady")?))
+}
+
+fn measure(project: &Project, toolchain: &Toolchain) -> Result<Figures> {
+    let image = firmware::build_board(project, toolchain, emulator::BOARD)?;
+    let first = emulator::listen(&image, "bench", true)?;
+    let second = emulator::listen(&image, "bench", true)?;
+    if first != second {
+        bail!("two runs of the benchmark differ, which must not be:\n{first}\n{second}");
+    }
+    figures(&first, &image)
+}
+
+fn figures(report: &str, image: &Path) -> Result<Figures> {
+    let mut figures = parse(report)?;
+    let sizes = size::of_image(image)?;
+    figures.0.extend([("flash".to_owned(), sizes.flash()), ("ram".to_owned(), sizes.ram())]);
+    Ok(figures)
+}
+
+fn parse(report: &str) -> Result<Figures> {
+    let lines = report.lines().map(|line| {
+        let words: Vec<&str> = line.split(' ').collect();
+        match words[..] {
+            ["figure", name, value] => Ok((name.to_owned(), value.parse()?)),
+            _ => bail!("the image's benchmark said something else than a figure: {line}"),
+        }
+    });
+    lines.collect::<Result<_>>().map(Figures)
+}
+
+fn all() -> impl Iterator<Item = &'static Budget> {
+    SCANS.iter().chain(&PARTS).chain(&COMMANDS).chain(&LATENCIES).chain(&MEMORY)
+}
+
+fn enforce(figures: &Figures) -> Result<()> {
+    let mut over = Vec::new();
+    for budget in all() {
+        let value = figures.of(budget.name)?;
+        if value > budget.limit {
+            over.push(format!("{} ({}): {value}, allowed {}", budget.name, budget.what, budget.limit));
+        }
+    }
+    if over.is_empty() {
+        return Ok(());
+    }
+    bail!(
+        "the firmware costs more than its budget: {}. Make it cheaper, or raise the limit in xtask/src/budgets.rs \
+         and say why",
+        over.join("; ")
+    )
+}
+
+fn page(figures: &Figures) -> Result<String> {
+    let mut page = String::from(
+        "# What the firmware costs\n\n\
+         Counted by the firmware's own benchmark in QEMU (`firmware/boards/mps2-an505/src/bench.rs`): the real tasks\n\
+         over sixteen channels of small noise at 51.2 kHz, everything included: the block is taken, judged for the\n\
+         hammer, kept in the ring, sealed and handed to the link; acknowledgements, reports and the executor too.\n\
+         Instructions of a Cortex-M33, equal in every run of one compiler; they are not cycles. At 160 MHz a scan\n\
+         has 3125 cycles, and a block of 15 scans 46 875.\n\n\
+         This page is written by `cargo xtask budgets`; `cargo xtask test` fails when a limit is exceeded.\n",
+    );
+    table(&mut page, figures, "Instructions per scan", &SCANS)?;
+    let (scan, seal) = (figures.of("scan.steady")?, figures.of("frame.seal")?.div_ceil(15));
+    let copies = (4 * figures.of("part.copy_480")?).div_ceil(15);
+    let rest = scan.saturating_sub(seal + copies);
+    // Writing into a String cannot fail.
+    let _ = writeln!(
+        page,
+        "\nWhere they go at rest: {seal} CRC-32 and COBS, about {copies} for four copies, and {rest} for the rest \
+         (over-range,\nfriction, hammer, ring, tasks and their wake-ups, acknowledgements, reports)."
+    );
+    table(&mut page, figures, "Instructions per frame and part", &PARTS)?;
+    table(&mut page, figures, "Instructions per command", &COMMANDS)?;
+    table(&mut page, figures, "Instructions of the longest ways", &LATENCIES)?;
+    table(&mut page, figures, "Bytes", &MEMORY)?;
+    Ok(page)
+}
+
+fn table(page: &mut String, figures: &Figures, title: &str, budgets: &[Budget]) -> Result<()> {
+    let _ = write!(page, "\n## {title}\n\n| what | measured | limit |\n|---|---:|---:|\n");
+    for budget in budgets {
+        let _ = writeln!(page, "| {} | {} | {} |", budget.what, figures.of(budget.name)?, budget.limit);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report(value: u64) -> Figures {
+        Figures(all().map(|budget| (budget.name.to_owned(), budget.limit.min(value))).collect())
+    }
+
+    #[test]
+    fn a_report_is_figures_and_nothing_else() {
+        let figures = parse("figure scan.steady 572\nfigure stack 15188\n").expect("two figures");
+        assert_eq!(figures.of("scan.steady").expect("it is there"), 572);
+        assert!(figures.of("scan.waiting").is_err());
+        assert!(parse("qemu: something is wrong\n").is_err());
+    }
+
+    #[test]
+    fn what_is_over_its_limit_is_named() {
+        assert!(enforce(&report(u64::MAX)).is_ok(), "the limit itself is allowed");
+        let mut figures = report(100);
+        figures.0[0].1 = 801;
+        let message = enforce(&figures).expect_err("over the limit").to_string();
+        assert!(message.contains("scan.steady (streaming, hammer at rest): 801, allowed 800"), "{message}");
+    }
+
+    #[test]
+    fn the_page_has_every_figure() {
+        let page = page(&report(100)).expect("all figures are there");
+        assert!(all().all(|budget| page.contains(&format!("| {} | 100 | {} |", budget.what, budget.limit))));
+    }
+}
