@@ -163,6 +163,9 @@ pub enum Poller {
 impl Poller {
     /// Takes the futures of one device. With [`Polling::Tasks`], executor and tasks are leaked: embassy
     /// asks for `'static`, and a device that was run so lives until its program ends.
+    ///
+    /// # Panics
+    /// Never: a task storage that was just made is free.
     pub fn new(
         polling: Polling,
         futures: Vec<Pin<Box<dyn Future<Output = ()>>>>,

@@ -120,7 +120,7 @@ pub fn pseudo_terminal(board: &mut HostEnd, name: impl FnOnce(&str)) -> io::Resu
     reader.set_timeout(POLL)?;
     let mut writer = master;
     // a peer that does not read stalls the link, as a real one would; the board's time then stands still
-    writer.set_timeout(Duration::from_secs(365 * 24 * 3600))?;
+    writer.set_timeout(Duration::from_hours(365 * 24))?;
     name(&path);
     let outcome = bridge(board, reader, writer);
     drop(keeper);

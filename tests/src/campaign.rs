@@ -1,5 +1,6 @@
 //! A small campaign over any transport, and its records as they can be compared.
 
+use std::fmt::Write;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -20,9 +21,12 @@ pub fn plan(wanted: u32, cells: &[(&str, &[&str], &[&str])]) -> String {
     let head = head.replace("wanted = 3", &format!("wanted = {wanted}"));
     let mut text = head;
     for (name, impacts, responses) in cells {
-        text += &format!(
-            "[[configuration]]\nname = {name:?}\nimpacts = {impacts:?}\nresponses = {responses:?}\n\n"
-        );
+        // writing to a string cannot fail
+        writeln!(
+            text,
+            "[[configuration]]\nname = {name:?}\nimpacts = {impacts:?}\nresponses = {responses:?}\n"
+        )
+        .unwrap();
     }
     text + geometry
 }

@@ -5,7 +5,8 @@
 //! | `sim:` or `sim:RIG.toml` | the simulated rig, built in or described in a file |
 //! | `serial:PATH` | a serial port or pseudo-terminal |
 //! | `tcp:HOST:PORT` | a socket |
-//! | `qemu:`, `usb:`, `replay:` | known, but not served by this version |
+//! | `qemu:` or `qemu:IMAGE` | the firmware in the emulator, over the built-in rig |
+//! | `usb:`, `replay:` | known, but not served by this version |
 
 use std::fmt;
 use std::path::PathBuf;
@@ -26,6 +27,11 @@ pub enum Address {
     Serial(PathBuf),
     /// A socket, as `host:port`.
     Tcp(String),
+    /// The emulator: with the image named by the environment, or with this one.
+    Qemu {
+        /// The firmware image for the emulated board.
+        image: Option<PathBuf>,
+    },
 }
 
 impl FromStr for Address {
@@ -46,10 +52,9 @@ impl FromStr for Address {
                 }
                 _ => Err(wrong("name host and port (1 to 65535), e.g. tcp:127.0.0.1:4000")),
             },
-            "qemu" | "usb" | "replay" => {
-                Err(DeviceError::NotBuilt { given: given.into(), scheme: scheme.into() })
-            }
-            _ => Err(wrong("known are sim:, serial: and tcp:")),
+            "qemu" => Ok(Self::Qemu { image: (!rest.is_empty()).then(|| rest.into()) }),
+            "usb" | "replay" => Err(DeviceError::NotBuilt { given: given.into(), scheme: scheme.into() }),
+            _ => Err(wrong("known are sim:, serial:, tcp: and qemu:")),
         }
     }
 }
@@ -61,6 +66,8 @@ impl fmt::Display for Address {
             Self::Sim { rig: Some(path) } => write!(f, "sim:{}", path.display()),
             Self::Serial(path) => write!(f, "serial:{}", path.display()),
             Self::Tcp(place) => write!(f, "tcp:{place}"),
+            Self::Qemu { image: None } => f.write_str("qemu:"),
+            Self::Qemu { image: Some(path) } => write!(f, "qemu:{}", path.display()),
         }
     }
 }
@@ -76,6 +83,7 @@ impl Address {
             Self::Sim { rig } => open_sim(rig.as_deref(), seed),
             Self::Serial(path) => Ok(Box::new(super::serial::Serial::open(path)?)),
             Self::Tcp(place) => Ok(Box::new(super::tcp::Tcp::open(place)?)),
+            Self::Qemu { image } => open_qemu(image.as_deref(), seed),
         }
     }
 }
@@ -83,6 +91,19 @@ impl Address {
 #[cfg(feature = "sim")]
 fn open_sim(rig: Option<&std::path::Path>, seed: u64) -> Result<Box<dyn Transport>, DeviceError> {
     Ok(Box::new(super::sim::Sim::open(rig, seed)?))
+}
+
+#[cfg(feature = "sim")]
+fn open_qemu(image: Option<&std::path::Path>, seed: u64) -> Result<Box<dyn Transport>, DeviceError> {
+    Ok(Box::new(super::qemu::Qemu::open(image, seed)?))
+}
+
+#[cfg(not(feature = "sim"))]
+fn open_qemu(image: Option<&std::path::Path>, _seed: u64) -> Result<Box<dyn Transport>, DeviceError> {
+    Err(DeviceError::NotBuilt {
+        given: Address::Qemu { image: image.map(Into::into) }.to_string(),
+        scheme: "qemu".into(),
+    })
 }
 
 #[cfg(not(feature = "sim"))]
@@ -99,9 +120,15 @@ mod tests {
 
     #[test]
     fn every_form_is_read_and_written_alike() {
-        for text in
-            ["sim:", "sim:rigs/stiff.toml", "serial:/dev/ttyACM0", "tcp:127.0.0.1:4000", "tcp:[::1]:9"]
-        {
+        for text in [
+            "sim:",
+            "sim:rigs/stiff.toml",
+            "serial:/dev/ttyACM0",
+            "tcp:127.0.0.1:4000",
+            "tcp:[::1]:9",
+            "qemu:",
+            "qemu:x.elf",
+        ] {
             let address: Address = text.parse().expect(text);
             assert_eq!(address.to_string(), text);
         }
@@ -115,7 +142,7 @@ mod tests {
             ("tcp:localhost", "host and port"),
             ("tcp:localhost:0", "host and port"),
             ("bluetooth:x", "known are"),
-            ("qemu:", "not built into this version"),
+            ("usb:", "not built into this version"),
             ("usb:", "not built into this version"),
             ("replay:x.bin", "not built into this version"),
         ] {

@@ -12,6 +12,8 @@ pub(crate) mod fake;
 pub mod faulty;
 mod inbox;
 pub mod link;
+#[cfg(feature = "sim")]
+mod qemu;
 pub mod recording;
 mod requests;
 mod serial;

@@ -115,10 +115,10 @@ impl Server {
     pub fn serve(&mut self) -> Result<(), Ended> {
         loop {
             let ask = self.wait()?;
-            self.show_log(&ask).map_err(broken)?;
+            self.show_log(&ask).map_err(|error| broken(&error))?;
             self.reply.length = 0;
             match Op::from_word(ask.op) {
-                Some(Op::Idle) => match self.idle(&ask).map_err(broken)? {
+                Some(Op::Idle) => match self.idle(&ask).map_err(|error| broken(&error))? {
                     Next::Answer => {}
                     Next::End => return Ok(()),
                 },
@@ -126,7 +126,7 @@ impl Server {
                 Some(Op::Off) => self.coil.off(),
                 Some(Op::Stage) => self.go(ask.argument)?,
                 Some(Op::Panic) => {
-                    let text = self.ram.text(ask.argument).map_err(broken)?;
+                    let text = self.ram.text(ask.argument).map_err(|error| broken(&error))?;
                     return Err(format!("the firmware broke down: {}", String::from_utf8_lossy(&text)));
                 }
                 Some(Op::Start) | None => {
@@ -141,14 +141,17 @@ impl Server {
     fn wait(&mut self) -> Result<Ask, Ended> {
         let mut byte = [0];
         match self.pipes.ring.read(&mut byte) {
-            Ok(1) => self.ram.ask().map_err(broken),
+            Ok(1) => self.ram.ask().map_err(|error| broken(&error)),
             Ok(_) => Err("QEMU ended by itself".into()),
-            Err(error) => Err(broken(error)),
+            Err(error) => Err(broken(&error)),
         }
     }
 
     fn answer(&mut self) -> Result<(), Ended> {
-        self.ram.reply(&self.reply).and_then(|()| self.pipes.answer.write_all(&[1])).map_err(broken)
+        self.ram
+            .reply(&self.reply)
+            .and_then(|()| self.pipes.answer.write_all(&[1]))
+            .map_err(|error| broken(&error))
     }
 
     /// All of the board's tasks wait: gives them what has come, or lets time go on.
@@ -241,7 +244,7 @@ impl Server {
 
     /// Moves hammer and laser.
     fn go(&mut self, length: u32) -> Result<(), Ended> {
-        let text = self.ram.text(length).map_err(broken)?;
+        let text = self.ram.text(length).map_err(|error| broken(&error))?;
         let place: request::Stage = from_text(&text)
             .ok_or("the firmware's stage order is unreadable: build image and simulator anew")?;
         if let Err(refusal) = self.stage.go(&place) {
@@ -254,7 +257,7 @@ impl Server {
         let mut buffer = [0; TEXT_BYTES];
         let text = to_text(message, &mut buffer).ok_or("a message does not fit the shared memory")?;
         self.reply.length = text.len() as u32;
-        self.ram.write(TEXT_AT, text).map_err(broken)
+        self.ram.write(TEXT_AT, text).map_err(|error| broken(&error))
     }
 
     /// Passes the board's log lines on to this program's log.
@@ -288,6 +291,6 @@ fn once<F: Future>(future: F, waker: &Waker) -> Poll<F::Output> {
     pin!(future).poll(&mut Context::from_waker(waker))
 }
 
-fn broken(error: io::Error) -> Ended {
+fn broken(error: &io::Error) -> Ended {
     format!("the emulated board's memory or pipe failed: {error}")
 }

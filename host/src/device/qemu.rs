@@ -1,0 +1,61 @@
+//! `qemu:` and `qemu:IMAGE`: the firmware as a Cortex-M33 binary in the emulator, over the simulated rig.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use jointrig_hil_sim::board::qemu::QemuBoard;
+use jointrig_hil_sim::link::HostEnd;
+
+use super::error::DeviceError;
+use super::transport::Transport;
+
+/// Where the image is, when the address does not say: this variable's value.
+pub const IMAGE_VARIABLE: &str = "JOINTRIG_MPS2_IMAGE";
+
+/// A running emulator.
+pub struct Qemu {
+    link: HostEnd,
+    // dropped after the link: the emulator ends then
+    board: QemuBoard,
+}
+
+impl Qemu {
+    /// Starts the emulator with this image, or with the one that [`IMAGE_VARIABLE`] names.
+    ///
+    /// # Errors
+    /// [`DeviceError::Open`] when there is no image or the emulator does not start.
+    pub fn open(image: Option<&Path>, seed: u64) -> Result<Self, DeviceError> {
+        let address = || image.map_or_else(|| "qemu:".into(), |path| format!("qemu:{}", path.display()));
+        let open = |why: String| DeviceError::Open { address: address(), why };
+        let image = image
+            .map(Path::to_path_buf)
+            .or_else(|| std::env::var_os(IMAGE_VARIABLE).map(PathBuf::from))
+            .ok_or_else(|| {
+                open(format!(
+                    "no image is named: build one with `cargo xtask firmware --board mps2-an505` and write \
+                     qemu:IMAGE, or set {IMAGE_VARIABLE}"
+                ))
+            })?;
+        let (board, link) = QemuBoard::start(&image, None, seed).map_err(|error| open(error.to_string()))?;
+        Ok(Self { link, board })
+    }
+
+    /// The reason why the emulator ended, where it is known, instead of a bare broken pipe.
+    fn explained(&self, error: io::Error) -> io::Error {
+        match self.board.failure() {
+            Some(why) => io::Error::new(error.kind(), why),
+            None => error,
+        }
+    }
+}
+
+impl Transport for Qemu {
+    fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        self.link.read(buf, timeout).map_err(|error| self.explained(error))
+    }
+
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.link.write_all(bytes).map_err(|error| self.explained(error))
+    }
+}
