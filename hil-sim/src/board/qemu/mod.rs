@@ -23,7 +23,7 @@ use process::Emulator;
 use server::Server;
 
 /// How long an image may take to introduce itself: a loaded machine starts QEMU in a second or two.
-const START_LIMIT: Duration = Duration::from_secs(60);
+const START_LIMIT: Duration = Duration::from_mins(1);
 
 /// Why an emulated board could not start.
 #[derive(Debug, thiserror::Error)]

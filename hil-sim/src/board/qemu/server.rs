@@ -288,6 +288,7 @@ fn once<F: Future>(future: F, waker: &Waker) -> Poll<F::Output> {
     pin!(future).poll(&mut Context::from_waker(waker))
 }
 
+#[expect(clippy::needless_pass_by_value, reason = "it is what `map_err` passes")]
 fn broken(error: io::Error) -> Ended {
     format!("the emulated board's memory or pipe failed: {error}")
 }
