@@ -1,4 +1,5 @@
 //! The hammer waits until the structure is quiet: the FRF of a second hit is as good as the exact one.
+#![allow(clippy::unwrap_used)]
 
 use jointrig::campaign::store::Store;
 use jointrig::device::address::Address;

@@ -1,4 +1,5 @@
 //! The same seed gives the same records, whatever carries them and whatever the link loses.
+#![allow(clippy::unwrap_used)]
 
 use jointrig::device::address::Address;
 use jointrig::device::faulty::{Faults, Faulty};

@@ -131,7 +131,7 @@ impl SmallHost {
     }
 
     pub fn until(&mut self, what: &str, mut done: impl FnMut(&Self) -> bool) {
-        let give_up = Instant::now() + Duration::from_secs(60);
+        let give_up = Instant::now() + Duration::from_mins(1);
         while !done(self) {
             self.pump();
             assert!(Instant::now() < give_up, "waited in vain for {what}");

@@ -1,0 +1,49 @@
+//! `jointrig demo`, as a user runs it: known physics in, recovered physics out.
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use jointrig_tests::command::jointrig;
+use serde_json::Value;
+
+/// Runs the demo and returns its results.
+fn demo(out: &Path, arguments: &[&str]) -> Value {
+    let run =
+        jointrig().arg("demo").arg("--out").arg(out).args(["--seed", "7"]).args(arguments).output().unwrap();
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    assert!(out.join("report.html").is_file() && out.join("campaign.jrig").is_file());
+    serde_json::from_str(&std::fs::read_to_string(out.join("results.json")).unwrap()).unwrap()
+}
+
+/// k_z of a method with six IDMs over 300–600 Hz, N/µm.
+fn sliding_stiffness(results: &Value, method: &str) -> f64 {
+    let rows = results["joint"].as_array().unwrap();
+    let wanted = |row: &&Value| {
+        row["method"] == method && row["idms"] == 6 && row["band_hz"] == serde_json::json!([300.0, 600.0])
+    };
+    let row = rows.iter().find(wanted).unwrap_or_else(|| panic!("no row of {method}"));
+    row["stiffness_n_per_m"]["z"]["mean"].as_f64().unwrap() * 1e-6
+}
+
+/// Clamp and contact are in series on the default rig: substructuring sees 26.8 N/µm there, of a contact of 180,
+/// and the results must say that this is not k_T. 22 to 31 leaves room for 0.5 mm and 2° of error.
+#[test]
+fn the_default_rig_shows_clamp_and_contact_in_series() {
+    let folder = tempfile::tempdir().unwrap();
+    let results = demo(folder.path(), &[]);
+    let k = sliding_stiffness(&results, "internal");
+    assert!((22.0..31.0).contains(&k), "{k} N/µm");
+    let checks = results["checks"].as_array().unwrap();
+    let series = checks.iter().find(|check| check["name"] == "series-compliance").unwrap();
+    assert_eq!(series["ok"], false, "{series}");
+}
+
+/// With a rigid clamp and no errors of position, substructuring sees the contact itself: 180 N/µm within 5 %.
+#[test]
+fn the_rigid_clamp_shows_the_contact() {
+    let folder = tempfile::tempdir().unwrap();
+    let rig = Path::new(env!("CARGO_MANIFEST_DIR")).join("../hil-sim/rigs/rigid-clamp.toml");
+    let results = demo(folder.path(), &["--rig", rig.to_str().unwrap()]);
+    let k = sliding_stiffness(&results, "internal");
+    assert!((k / 180.0 - 1.0).abs() < 0.05, "{k} N/µm");
+}
