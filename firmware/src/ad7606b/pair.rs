@@ -50,7 +50,7 @@ const WATCHED_BLOCKS: u32 = 32;
 /// Finds scans that a chip never delivered, by comparing what was read with a hardware count of CONVST.
 ///
 /// When a block has just arrived, as many edges have been counted as scans were read; one or two more when the
-/// interrupt that looked came late. A lag that never vanishes over [`WATCHED_BLOCKS`] blocks is a conversion
+/// interrupt that looked came late. A lag that never vanishes over `WATCHED_BLOCKS` blocks is a conversion
 /// whose end was not seen.
 #[derive(Clone, Copy, Debug)]
 pub struct Slip {

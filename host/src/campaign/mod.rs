@@ -2,7 +2,7 @@
 //!
 //! [`runner::run`] walks the cells of the plan: hammer and laser are brought there ([`stage`]), shots are fired at
 //! repeatable scans ([`shot`]) with a pulse that finds the target force ([`pulse`]), each record is judged
-//! ([`judge`]) and stored on a thread of its own ([`keeper`], [`store`]).
+//! ([`judge`]) and stored on a thread of its own (`keeper`, [`store`]).
 
 pub mod codec;
 pub mod judge;

@@ -129,7 +129,7 @@ impl NpzFile {
         }
     }
 
-    /// A complex (or real) array as Complex<f64>.
+    /// A complex (or real) array as `Complex<f64>`.
     ///
     /// # Errors
     /// When it is missing, text, or damaged.
