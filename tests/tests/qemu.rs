@@ -8,11 +8,11 @@ use jointrig_tests::campaign::{Kept, plan, run};
 
 fn over(address: &str) -> Vec<Kept> {
     let three_cells =
-        plan(1, &[("A", &["AZ3"], &["A3"]), ("B", &["BY1"], &["B4"]), ("AJB", &["AZ3"], &["B3"])]);
+        plan(2, &[("A", &["AZ3"], &["A3"]), ("B", &["BY1"], &["B4"]), ("AJB", &["AZ3"], &["B3"])]);
     let folder = tempfile::tempdir().unwrap();
     let transport = address.parse::<Address>().unwrap().open(7).unwrap();
     let (summary, records) = run(&folder.path().join("c.jrig"), &three_cells, transport);
-    assert_eq!((summary.kept, summary.accounts.unexplained()), (3, 0));
+    assert_eq!((summary.kept, summary.accounts.unexplained()), (6, 0));
     records
 }
 
