@@ -49,15 +49,7 @@ impl<M: RawMutex> Core<'_, M> {
             }
             Request::Fire(order) => {
                 self.with(|state| {
-                    if !state.streaming {
-                        return Err(Refusal::NotStreaming);
-                    }
-                    if state.emergency_stop {
-                        return Err(Refusal::EmergencyStop);
-                    }
-                    if !state.interlock_closed {
-                        return Err(Refusal::Interlock);
-                    }
+                    state.may_move()?;
                     state.hammer.fire(order)
                 })?;
                 Ok(Answer::Scheduled { number: order.number })
@@ -141,15 +133,7 @@ impl<M: RawMutex> Core<'_, M> {
 
     fn arm(&self, valid_ms: u32) -> Result<Answer, Refusal> {
         self.with(|state| {
-            if !state.streaming {
-                return Err(Refusal::NotStreaming);
-            }
-            if state.emergency_stop {
-                return Err(Refusal::EmergencyStop);
-            }
-            if !state.interlock_closed {
-                return Err(Refusal::Interlock);
-            }
+            state.may_move()?;
             state.hammer.arm(state.next_scan, valid_ms)?;
             state.say(Event::Armed);
             Ok(Answer::Done)

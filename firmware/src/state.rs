@@ -7,7 +7,7 @@ use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::Instant;
 use heapless::{Deque, String};
-use jointrig_protocol::answer::{self, Counters, Info};
+use jointrig_protocol::answer::{self, Counters, Info, Refusal};
 use jointrig_protocol::channel::{Channel, Name};
 use jointrig_protocol::event::{self, Event, Loss, Reason};
 use jointrig_protocol::limits;
@@ -180,6 +180,20 @@ impl State<'_> {
     pub fn disarm(&mut self, reason: Reason) {
         let outcome = self.hammer.disarm(reason);
         self.tell(&outcome);
+    }
+
+    /// Whether anything may move at all: the one gate before arming and before a shot.
+    pub fn may_move(&self) -> Result<(), Refusal> {
+        if !self.streaming {
+            return Err(Refusal::NotStreaming);
+        }
+        if self.emergency_stop {
+            return Err(Refusal::EmergencyStop);
+        }
+        if !self.interlock_closed {
+            return Err(Refusal::Interlock);
+        }
+        Ok(())
     }
 
     /// Latches the emergency stop.

@@ -117,12 +117,4 @@ mod tests {
         names.sort();
         assert_eq!(names, [REPORT_FILE, RESULTS_FILE]);
     }
-
-    #[test]
-    #[ignore = "leaves the example's page in the temporary folder, to look at"]
-    fn a_page_to_look_at() {
-        let place = std::env::temp_dir().join("jointrig-report");
-        write(&example::results(), &place).expect("written");
-        println!("{}", place.join(REPORT_FILE).display());
-    }
 }
