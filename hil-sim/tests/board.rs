@@ -13,10 +13,7 @@ use jointrig_protocol::hello::Hello;
 use jointrig_protocol::limits::COIL_PULSE_CAP_US;
 use jointrig_protocol::request::{Configuration, Request};
 use jointrig_protocol::shot::Phase;
-use support::SmallHost;
-
-/// A coil pulse for some 50 N on the default rig, from cold (its description says so).
-const PULSE_US: u32 = 3_500;
+use support::{PULSE_US, SmallHost};
 
 fn board(seed: u64) -> (VirtualBoard, SmallHost) {
     with(&Options { seed, ..Options::default() })
@@ -27,26 +24,9 @@ fn with(options: &Options) -> (VirtualBoard, SmallHost) {
     (board, SmallHost::new(link))
 }
 
-/// Two hits in one cell and one in another: their records relative to the trigger.
 fn scenario(options: &Options, dawdle: bool) -> Vec<Vec<i16>> {
     let (_board, mut host) = with(options);
-    host.start();
-    let mut records = Vec::new();
-    let mut from = host.stage(Configuration::Ajb, "AZ3", "B3", 0);
-    for number in 1..=3 {
-        if number == 3 {
-            from = host.stage(Configuration::B, "BY1", "B4", 0);
-        }
-        if dawdle {
-            // a slow host: the board's time must stand still meanwhile
-            (0..20).for_each(|_| host.pump());
-        }
-        let shot = host.shoot(SmallHost::order(number, PULSE_US, from + host.lead()));
-        assert_eq!(shot.phase, Phase::Done);
-        records.push(host.record(shot.trigger, 256, 20_480));
-        from = host.hold_at;
-    }
-    records
+    host.three_shots(dawdle)
 }
 
 #[test]

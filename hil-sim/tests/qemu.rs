@@ -19,9 +19,6 @@ use jointrig_protocol::request::{Configuration, Request};
 use jointrig_protocol::shot::Phase;
 use support::SmallHost;
 
-/// A coil pulse for some 50 N on the default rig, from cold (its description says so).
-const PULSE_US: u32 = 3_500;
-
 fn image() -> Option<PathBuf> {
     let image = std::env::var_os("JOINTRIG_MPS2_IMAGE").map(PathBuf::from);
     if image.is_none() {
@@ -35,34 +32,17 @@ fn board(seed: u64) -> Option<(QemuBoard, SmallHost)> {
     Some((board, SmallHost::new(link)))
 }
 
-/// Two hits in one cell and one in another: their records relative to the trigger.
-fn three_shots(host: &mut SmallHost) -> Vec<Vec<i16>> {
-    host.start();
-    let mut records = Vec::new();
-    let mut from = host.stage(Configuration::Ajb, "AZ3", "B3", 0);
-    for number in 1..=3 {
-        if number == 3 {
-            from = host.stage(Configuration::B, "BY1", "B4", 0);
-        }
-        let shot = host.shoot(SmallHost::order(number, PULSE_US, from + host.lead()));
-        assert_eq!(shot.phase, Phase::Done);
-        records.push(host.record(shot.trigger, 256, 20_480));
-        from = host.hold_at;
-    }
-    records
-}
-
 #[test]
 fn the_binary_gives_the_native_boards_records_sample_for_sample() {
     let Some((emulated, mut host)) = board(11) else { return };
-    let in_qemu = three_shots(&mut host);
+    let in_qemu = host.three_shots(false);
     let options = Options { seed: 11, ..Options::default() };
     let (native, link) = VirtualBoard::start_with(&RigConfig::default(), &options).unwrap();
-    let natively = three_shots(&mut SmallHost::new(link));
+    let natively = SmallHost::new(link).three_shots(false);
     assert_eq!(in_qemu, natively);
     assert_eq!(emulated.controls().coil_pulses_us(), native.controls().coil_pulses_us());
     let Some((_other, mut host)) = board(12) else { return };
-    assert_ne!(three_shots(&mut host), natively, "another seed is another run");
+    assert_ne!(host.three_shots(false), natively, "another seed is another run");
 }
 
 #[test]

@@ -14,6 +14,13 @@ use jointrig_protocol::limits::MAX_WIRE;
 use jointrig_protocol::request::{self, Configuration, Fire, Request, Stage};
 use jointrig_protocol::shot::{Phase, Shot};
 
+/// A coil pulse for some 50 N on the default rig, from cold (its description says so).
+pub const PULSE_US: u32 = 3_500;
+/// Scans of a record before its trigger.
+const BEFORE: u64 = 256;
+/// Scans of a record.
+const LENGTH: u64 = 20_480;
+
 pub struct SmallHost {
     link: HostEnd,
     accumulator: Accumulator,
@@ -98,7 +105,15 @@ impl SmallHost {
                     self.answers.push(answer);
                 }
                 Kind::Event => {
-                    self.events.push(postcard::from_bytes::<event::Numbered>(frame.payload).unwrap().event);
+                    let event = postcard::from_bytes::<event::Numbered>(frame.payload).unwrap().event;
+                    if let Event::Shot(shot) = &event
+                        && shot.phase == Phase::Listening
+                    {
+                        // Events overtake the blocks they tell of. Acknowledged beyond the record's end, the board
+                        // might pass the next shot's scan before it hears of that shot.
+                        self.hold_at = self.hold_at.min(end_of_record(shot));
+                    }
+                    self.events.push(event);
                 }
                 Kind::Samples => {
                     let block = Block::from_payload(frame.payload).unwrap();
@@ -208,12 +223,38 @@ impl SmallHost {
         }
     }
 
-    /// The record of a shot: every channel from `before` scans before the trigger, `length` scans long.
-    pub fn record(&mut self, trigger: u64, before: u64, length: u64) -> Vec<i16> {
-        let end = trigger - before + length;
+    /// The record of a shot: every channel, scan by scan.
+    pub fn record(&mut self, shot: &Shot) -> Vec<i16> {
+        let end = end_of_record(shot);
         self.hold_at = end;
         self.until("the record's end", |host| host.next_scan >= end);
         let at = |scan: u64| (scan - self.first_scan) as usize * self.channels;
-        self.codes[at(trigger - before)..at(end)].to_vec()
+        self.codes[at(shot.trigger - BEFORE)..at(end)].to_vec()
     }
+
+    /// Two hits in one cell and one in another: their records. A host that dawdles leaves the board waiting.
+    pub fn three_shots(&mut self, dawdle: bool) -> Vec<Vec<i16>> {
+        self.start();
+        let mut records = Vec::new();
+        let mut from = self.stage(Configuration::Ajb, "AZ3", "B3", 0);
+        for number in 1..=3 {
+            if number == 3 {
+                from = self.stage(Configuration::B, "BY1", "B4", 0);
+            }
+            if dawdle {
+                // the board's time must stand still meanwhile
+                (0..20).for_each(|_| self.pump());
+            }
+            let shot = self.shoot(Self::order(number, PULSE_US, from + self.lead()));
+            assert_eq!(shot.phase, Phase::Done);
+            records.push(self.record(&shot));
+            from = self.hold_at;
+        }
+        records
+    }
+}
+
+/// The scan after a record's last.
+fn end_of_record(shot: &Shot) -> u64 {
+    shot.trigger - BEFORE + LENGTH
 }
