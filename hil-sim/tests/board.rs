@@ -121,6 +121,8 @@ fn a_repeated_request_fires_once() {
         assert_eq!(host.ask_as(1000, order.clone()), Ok(Answer::Scheduled { number: 5 }));
     }
     let end = at + 2 * 51_200;
+    host.hold_at = u64::MAX;
+    host.acknowledge();
     host.until("two seconds", |host| host.next_scan >= end);
     assert_eq!(host.ask_as(1000, order.clone()), Ok(Answer::Scheduled { number: 5 }));
     assert_eq!(host.ask(order.clone()), Err(Refusal::NotArmed));

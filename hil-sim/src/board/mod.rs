@@ -134,6 +134,9 @@ fn run(rig: Rig, options: &Options, link: &DeviceEnd, controls: &Arc<Controls>) 
         }
         if sampling.get() || options.free_running {
             assert!(jump(), "the simulated board waits for something that cannot come: no alarm is set");
+            // Polled whatever the flag says: embassy sets it for the first of several tasks only, and the thread that
+            // woke that one may not have come to set it yet.
+            poller.poll();
         } else {
             link.sleep(&woken);
         }

@@ -40,6 +40,8 @@ pub struct SmallHost {
     pub latest: u64,
     /// Scans that are missing before `latest`, as (first, end).
     pub gaps: Vec<(u64, u64)>,
+    /// A shot is waited for, whose record will be read.
+    shooting: bool,
 }
 
 impl SmallHost {
@@ -60,6 +62,7 @@ impl SmallHost {
             hold_at: u64::MAX,
             latest: 0,
             gaps: Vec::new(),
+            shooting: false,
         };
         host.send(Kind::Hello, &Hello::host(99).to_bytes());
         host.until("a Hello", |host| host.hello.is_some());
@@ -108,6 +111,7 @@ impl SmallHost {
                     let event = postcard::from_bytes::<event::Numbered>(frame.payload).unwrap().event;
                     if let Event::Shot(shot) = &event
                         && shot.phase == Phase::Listening
+                        && self.shooting
                     {
                         // Events overtake the blocks they tell of. Acknowledged beyond the record's end, the board
                         // might pass the next shot's scan before it hears of that shot.
@@ -182,13 +186,15 @@ impl SmallHost {
 
     pub fn stage(&mut self, configuration: Configuration, impact: &str, response: &str, attempt: u32) -> u64 {
         let (impact, response) = (impact.try_into().unwrap(), response.try_into().unwrap());
+        // the board must not pass the shot's scan before it hears of the shot
+        self.hold_at = self.next_scan;
         match self.ask(Request::Stage(Stage { configuration, impact, response, attempt })) {
             Ok(Answer::Staged { at_scan }) => at_scan,
             other => panic!("not staged: {other:?}"),
         }
     }
 
-    /// Scans by which `not_before` must lie ahead so that the device cannot have passed it.
+    /// Scans by which `not_before` must lie ahead of a held acknowledgement so that the device cannot have passed it.
     pub fn lead(&self) -> u64 {
         u64::from(self.hello.unwrap().ring_scans / 2) + 64
     }
@@ -206,6 +212,7 @@ impl SmallHost {
 
     /// Arms, fires and waits for the shot's end.
     pub fn shoot(&mut self, order: Fire) -> Shot {
+        self.shooting = true;
         assert_eq!(self.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
         let number = order.number;
         assert_eq!(self.ask(Request::Fire(order)), Ok(Answer::Scheduled { number }));
@@ -216,10 +223,10 @@ impl SmallHost {
             if shot.number == number
                 && matches!(shot.phase, Phase::Done | Phase::Missed | Phase::NotQuiet | Phase::Cancelled)
             {
+                self.shooting = false;
                 return shot;
             }
-            let from = self.next_scan;
-            self.until("more scans", |host| host.next_scan > from);
+            self.pump();
         }
     }
 
