@@ -1,38 +1,51 @@
 //! Acquisition: blocks of scans from the converters, through the hammer's machine, into the ring.
 //!
 //! One block is 15 scans of 16 channels, 293 µs at 51.2 kHz: that is the time this task has for each. What
-//! it does with a block is bounded and done under one lock; the coil's order, if one comes of it, is
-//! carried out right after.
+//! it does with a block is bounded and done under one lock; the orders for coil and drive that come of it
+//! are carried out right after.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
+use embassy_time::Instant;
 use jointrig_protocol::block::{OVER_RANGE, TRIGGER};
 use jointrig_protocol::event::{Event, Loss, Reason};
 use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
 
 use crate::Core;
-use crate::board::{Coil, Delivered, Inputs, Scans};
+use crate::board::{Coil, Delivered, Drive, Inputs, Scans};
 use crate::hammer::{CoilOrder, Scanned};
 use crate::ring::Range;
 
 /// Runs for ever.
-pub async fn acquire<M: RawMutex, S: Scans, C: Coil, I: Inputs>(
+pub async fn acquire<M: RawMutex, S: Scans, C: Coil, D: Drive, I: Inputs>(
     core: &Core<'_, M>,
     scans: &mut S,
     coil: &mut C,
+    drive: &mut D,
     inputs: &mut I,
 ) -> ! {
     let mut samples = Aligned([0; BLOCK_SAMPLE_BYTES]);
+    let mut codes = [0; BLOCK_SAMPLE_BYTES / 2];
     loop {
         if scans.can_be_held() {
             core.wait_until_it_may_run().await;
         }
         let delivered = scans.next(&mut samples.0).await;
         core.watch_inputs(inputs);
-        core.take(delivered, &samples.0);
-        match core.with(|state| state.coil.take()) {
+        let given = core.take(delivered, &samples.0, &mut codes);
+        let (coil_order, drive_off) =
+            core.with(|state| (state.coil.take(), core::mem::take(&mut state.drive_off)));
+        match coil_order {
             Some(CoilOrder::Pulse(width_us)) => coil.pulse(width_us.min(coil.cap_us())),
             Some(CoilOrder::Off) => coil.off(),
             None => {}
+        }
+        if drive_off {
+            drive.rest();
+        } else if given > 0 && drive.play(&codes[..given]).is_err() {
+            core.with(|state| {
+                let stops = state.shaker.halt(Reason::RanDry);
+                state.tell_of_shaker(stops);
+            });
         }
         core.to_send.signal(());
     }
@@ -111,20 +124,23 @@ impl<M: RawMutex> Core<'_, M> {
                 state.say(Event::Interlock(closed));
             }
             if !closed {
-                state.disarm(Reason::Interlock);
+                state.bring_to_rest(Reason::Interlock);
             }
         });
     }
 
-    /// Takes one delivered block.
-    fn take(&self, delivered: Delivered, samples: &[u8; BLOCK_SAMPLE_BYTES]) {
+    /// Takes one delivered block, and writes the codes for the drive; how many there are.
+    fn take(&self, delivered: Delivered, samples: &[u8; BLOCK_SAMPLE_BYTES], codes: &mut [i16]) -> usize {
         let channels = self.facts.channels.len();
         let (pairs, _) = samples.as_chunks::<2>();
         let count = (usize::from(delivered.scans) * channels).min(pairs.len() / channels * channels);
-        let codes = &pairs[..count];
-        let over = over_range(codes);
+        let pairs = &pairs[..count];
+        let over = over_range(pairs);
         self.with(|state| {
+            state.last_block = Instant::now();
             if delivered.missed > 0 {
+                // whatever was to move was to move by what these scans would have shown
+                state.bring_to_rest(Reason::FrontEnd);
                 state.counters.scans_missed += u64::from(delivered.missed);
                 if state.streaming {
                     // what waited to be sent may still hold an unreported loss of its own
@@ -135,10 +151,10 @@ impl<M: RawMutex> Core<'_, M> {
                 }
                 state.next_scan += u64::from(delivered.missed);
             }
-            let block = InHand { first_scan: state.next_scan, channels, samples: codes };
+            let block = InHand { first_scan: state.next_scan, channels, samples: pairs };
             let scans = block.scans();
             if scans == 0 {
-                return;
+                return 0;
             }
             let outcome = state.hammer.block(&block, state.friction.as_ref());
             if let Some(friction) = &state.friction {
@@ -150,9 +166,15 @@ impl<M: RawMutex> Core<'_, M> {
                 state.counters.scans_dropped += dropped;
                 state.counters.scans_produced += scans as u64;
             }
+            let moves = state.shaker.moves();
+            if moves {
+                let events = state.shaker.block(&block, &mut codes[..scans]);
+                state.tell_of_shaker(events.into_iter().flatten());
+            }
             state.next_scan += scans as u64;
             state.tell(&outcome);
-        });
+            if moves { scans } else { 0 }
+        })
     }
 }
 

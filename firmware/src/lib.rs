@@ -1,4 +1,4 @@
-//! The rig's controller above its board: acquisition, hammer, link and safety.
+//! The rig's controller above its board: acquisition, hammer, shaker, link and safety.
 //!
 //! The same code runs on the controller, in the emulator and inside the simulator. It owns no static, no
 //! executor, no time driver and no logger: a board makes one [`Core`] and runs the four asynchronous
@@ -9,7 +9,7 @@
 //! | [`acquire::acquire`] | takes blocks of scans from the converters, judges them for the hammer, puts them in the ring | the front end counts missed scans; they are reported as lost ranges |
 //! | [`receive::receive`] | finds frames in incoming bytes and carries out requests | the host asks again |
 //! | [`transmit::transmit`] | sends answers first, then events, then blocks sent again, then new blocks | blocks wait in the ring; what leaves it unsent is reported as lost |
-//! | [`watch::watch`] | disarms when the host falls silent, reports counters | – |
+//! | [`watch::watch`] | disarms hammer and stops shaker when the host falls silent, reports counters | – |
 //!
 //! The scan index is the only clock for results; `embassy-time` serves timeouts. Results never depend on
 //! the order in which an executor polls the four.
@@ -30,6 +30,8 @@ pub mod receive;
 pub mod report;
 mod requests;
 pub mod ring;
+pub mod shaker;
+pub mod sine;
 mod state;
 pub mod transmit;
 #[cfg(feature = "usb")]

@@ -12,13 +12,15 @@
 //! | [`ASK_AT`] | 64 | board | [`Ask`] |
 //! | [`REPLY_AT`] | 64 | simulator | [`Reply`] |
 //! | [`TEXT_AT`] | 4096 | whoever has the turn | [`Setup`], a stage order and its refusal, a last sentence |
-//! | [`BLOCK_AT`] | 484 | simulator | scans missed before the block, then the block |
+//! | [`BLOCK_AT`] | 492 | simulator | a [`Delivery`], then the block |
+//! | [`DRIVE_AT`] | 480 | board | codes for the shaker's drive |
 //! | [`TO_DEVICE_AT`] | 64 Ki | simulator | bytes for the board, a ring |
 //! | [`TO_HOST_AT`] | 64 Ki | board | bytes for the host, a ring |
 //! | [`LOG_AT`] | 64 Ki | board | log lines, each its level's first letter and text, a ring |
 //!
 //! Heads and tails count bytes since the start, modulo 2³²; everything is little-endian.
 
+use crate::ad7606b::trouble::Trouble;
 use heapless::Vec;
 use jointrig_protocol::channel::{Channel, Name};
 use jointrig_protocol::limits::MAX_CHANNELS;
@@ -29,7 +31,7 @@ pub const BASE: usize = 0x8000_0000;
 /// Its size: QEMU insists on exactly this much.
 pub const BYTES: usize = 16 << 20;
 /// Changes with this layout, so that an image and a simulator of different sources refuse each other.
-pub const MAGIC: u32 = 0x4A52_4C02;
+pub const MAGIC: u32 = 0x4A52_4C03;
 /// Where [`MAGIC`] stands.
 pub const MAGIC_AT: usize = 0;
 /// Where the board's words stand.
@@ -42,6 +44,10 @@ pub const TEXT_AT: usize = 0x1000;
 pub const TEXT_BYTES: usize = 0x1000;
 /// Where a block of scans stands.
 pub const BLOCK_AT: usize = 0x2000;
+/// Output of the shaker's drive at the largest code, V.
+pub const DRIVE_FULL_SCALE_V: f32 = 10.0;
+/// Where codes for the shaker's drive stand, each of 16 bits.
+pub const DRIVE_AT: usize = 0x3000;
 /// Where the ring of bytes for the board begins.
 pub const TO_DEVICE_AT: usize = 0x1_0000;
 /// Where the ring of bytes for the host begins.
@@ -70,6 +76,10 @@ pub enum Op {
     Stage = 5,
     /// The firmware has panicked; a sentence of as many bytes as the argument says tells why.
     Panic = 6,
+    /// As many codes for the shaker's drive as the argument says: for the scans of the next block.
+    Play = 7,
+    /// The shaker's drive to rest.
+    Rest = 8,
 }
 
 impl Op {
@@ -83,6 +93,8 @@ impl Op {
             4 => Self::Off,
             5 => Self::Stage,
             6 => Self::Panic,
+            7 => Self::Play,
+            8 => Self::Rest,
             _ => return None,
         })
     }
@@ -213,6 +225,56 @@ const fn joined(low: u32, high: u32) -> u64 {
     (high as u64) << 32 | low as u64
 }
 
+/// Bytes of a [`Delivery`].
+pub const DELIVERY_BYTES: usize = 12;
+
+/// What stands before a block.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Delivery {
+    /// Scans that were lost before the block.
+    pub missed: u32,
+    /// Scans in the block.
+    pub scans: u32,
+    /// What went wrong, if anything.
+    pub trouble: Option<Trouble>,
+}
+
+impl Delivery {
+    /// As it stands in memory.
+    #[must_use]
+    pub fn to_bytes(&self) -> [u8; DELIVERY_BYTES] {
+        let trouble = match self.trouble {
+            None => 0,
+            Some(Trouble::Silent) => 1,
+            Some(Trouble::Crc) => 2,
+            Some(Trouble::Overrun) => 3,
+            Some(Trouble::Dma) => 4,
+            Some(Trouble::Slipped(_)) => 5,
+        };
+        let mut bytes = [0; DELIVERY_BYTES];
+        for (place, word) in bytes.as_chunks_mut().0.iter_mut().zip([self.missed, self.scans, trouble]) {
+            *place = u32::to_le_bytes(word);
+        }
+        bytes
+    }
+
+    /// From memory. What slipped is what is missing.
+    #[must_use]
+    pub fn from_bytes(bytes: &[u8; DELIVERY_BYTES]) -> Self {
+        let word = |place: usize| bytes.as_chunks().0.get(place).map_or(0, |word| u32::from_le_bytes(*word));
+        let missed = word(0);
+        let trouble = match word(2) {
+            1 => Some(Trouble::Silent),
+            2 => Some(Trouble::Crc),
+            3 => Some(Trouble::Overrun),
+            4 => Some(Trouble::Dma),
+            5 => Some(Trouble::Slipped(missed)),
+            _ => None,
+        };
+        Self { missed, scans: word(1), trouble }
+    }
+}
+
 /// What an emulated board is told at its start, in postcard.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Setup {
@@ -257,6 +319,10 @@ mod tests {
         assert_eq!(Ask::from_words(&ask.to_words()), ask);
         assert_eq!(Op::from_word(ask.op), Some(Op::Stage));
         assert_eq!(Op::from_word(0), None);
+        for trouble in [None, Some(Trouble::Silent), Some(Trouble::Crc), Some(Trouble::Slipped(30))] {
+            let delivery = Delivery { missed: 30, scans: 24, trouble };
+            assert_eq!(Delivery::from_bytes(&delivery.to_bytes()), delivery);
+        }
         let reply = Reply {
             now_us: 0xFFFF_FFFF_0000_0001,
             inputs: INTERLOCK_CLOSED | HELD,

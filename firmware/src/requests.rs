@@ -32,7 +32,7 @@ impl<M: RawMutex> Core<'_, M> {
             Request::Start => Ok(self.start()),
             Request::Stop => {
                 self.with(|state| {
-                    state.disarm(Reason::StreamEnded);
+                    state.bring_to_rest(Reason::StreamEnded);
                     state.streaming = false;
                 });
                 Ok(Answer::Done)
@@ -49,7 +49,7 @@ impl<M: RawMutex> Core<'_, M> {
             }
             Request::Fire(order) => {
                 self.with(|state| {
-                    state.may_move()?;
+                    state.may_strike()?;
                     state.hammer.fire(order)
                 })?;
                 Ok(Answer::Scheduled { number: order.number })
@@ -59,6 +59,17 @@ impl<M: RawMutex> Core<'_, M> {
                 self.with(crate::state::State::stop_everything);
                 Ok(Answer::Done)
             }
+            Request::Shake(order) => self.with(|state| {
+                state.may_shake()?;
+                let runs = state.shaker.shake(state.next_scan, order)?;
+                state.tell_of_shaker(runs);
+                Ok(Answer::Done)
+            }),
+            Request::Rest => self.with(|state| {
+                let stops = state.shaker.stop(Reason::Asked);
+                state.tell_of_shaker(stops);
+                Ok(Answer::Done)
+            }),
         }
     }
 
@@ -74,6 +85,8 @@ impl<M: RawMutex> Core<'_, M> {
             emergency_stop: state.emergency_stop,
             friction_n: state.friction_n,
             shot: state.hammer.shot(),
+            shaker: state.shaker.state(),
+            drive_v: state.shaker.amplitude_v(),
             counters: state.counters,
         })
     }
@@ -81,7 +94,7 @@ impl<M: RawMutex> Core<'_, M> {
     /// A new stream is a new epoch; the scan index goes on.
     fn start(&self) -> Answer {
         let answer = self.with(|state| {
-            state.disarm(Reason::StreamEnded);
+            state.bring_to_rest(Reason::StreamEnded);
             // the boot count leaves room for 65536 streams of each start
             state.epoch = (self.facts.boot << 16) | (state.streams & 0xFFFF);
             state.streams += 1;
@@ -133,7 +146,7 @@ impl<M: RawMutex> Core<'_, M> {
 
     fn arm(&self, valid_ms: u32) -> Result<Answer, Refusal> {
         self.with(|state| {
-            state.may_move()?;
+            state.may_strike()?;
             state.hammer.arm(state.next_scan, valid_ms)?;
             state.say(Event::Armed);
             Ok(Answer::Done)
@@ -145,12 +158,11 @@ impl<M: RawMutex> Core<'_, M> {
         if !P::PRESENT {
             return Err(Refusal::Unsupported);
         }
-        let busy = self.with(|state| {
-            matches!(state.hammer.state(), Hammer::Waiting | Hammer::Firing | Hammer::Listening)
-        });
-        if busy {
-            return Err(Refusal::Busy);
-        }
+        self.with(|state| match state.hammer.state() {
+            Hammer::Waiting | Hammer::Firing | Hammer::Listening => Err(Refusal::Busy),
+            _ if state.shaker.moves() => Err(Refusal::ShakerRuns),
+            _ => Ok(()),
+        })?;
         stage.go(place)?;
         Ok(Answer::Staged { at_scan: self.with(|state| state.next_scan) })
     }

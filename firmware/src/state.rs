@@ -17,6 +17,7 @@ use crate::friction::Friction;
 use crate::hammer::{CoilOrder, Hammer, Outcome};
 use crate::memory::Memory;
 use crate::ring::{Range, Ring, Slot};
+use crate::shaker::Shaker;
 
 /// Events that wait for the link.
 const EVENTS: usize = 16;
@@ -44,6 +45,8 @@ pub struct Facts<'a> {
     pub coil_cap_us: u32,
     /// Whether the board has a stage.
     pub stage: bool,
+    /// Full scale of the shaker's drive, V; 0 without a shaker.
+    pub drive_v: f32,
     /// How often the device has started; the first stream's epoch.
     pub boot: u32,
 }
@@ -61,6 +64,7 @@ pub struct Core<'a, M: RawMutex> {
 pub(crate) struct State<'a> {
     pub ring: Ring<'a>,
     pub hammer: Hammer,
+    pub shaker: Shaker,
     pub friction: Option<Friction>,
     pub friction_n: f32,
     pub memory: Memory,
@@ -79,10 +83,14 @@ pub(crate) struct State<'a> {
     pub next_scan: u64,
     pub acknowledged: u64,
     pub last_heard: Instant,
+    /// When the front end last delivered.
+    pub last_block: Instant,
     pub interlock_closed: bool,
     pub emergency_stop: bool,
     /// An order for the coil that arose outside the acquisition task.
     pub coil: Option<CoilOrder>,
+    /// The drive must rest at once.
+    pub drive_off: bool,
 }
 
 impl<'a, M: RawMutex> Core<'a, M> {
@@ -99,6 +107,7 @@ impl<'a, M: RawMutex> Core<'a, M> {
         let state = State {
             ring: Ring::new(slots, 2 * facts.channels.len()),
             hammer,
+            shaker: Shaker::new(facts.channels, facts.scan_rate_hz, facts.drive_v),
             friction: Friction::new(facts.channels),
             friction_n: 0.0,
             memory: Memory::new(),
@@ -115,10 +124,12 @@ impl<'a, M: RawMutex> Core<'a, M> {
             next_scan: 0,
             acknowledged: 0,
             last_heard: Instant::from_ticks(0),
+            last_block: Instant::from_ticks(0),
             // closed and released until the board says otherwise, which it does with the first block
             interlock_closed: true,
             emergency_stop: false,
             coil: None,
+            drive_off: false,
         };
         Self { facts, state: Mutex::new(RefCell::new(state)), to_send: Signal::new(), may_run: Signal::new() }
     }
@@ -147,6 +158,7 @@ impl<'a, M: RawMutex> Core<'a, M> {
             ring_scans: self.ring_scans(),
             coil_cap_us: self.facts.coil_cap_us,
             stage: self.facts.stage,
+            drive_v: self.facts.drive_v,
         }
     }
 }
@@ -182,7 +194,36 @@ impl State<'_> {
         self.tell(&outcome);
     }
 
-    /// Whether anything may move at all: the one gate before arming and before a shot.
+    /// Brings everything that moves to rest, for a reason: the hammer is disarmed, the shaker ramps down.
+    pub fn bring_to_rest(&mut self, reason: Reason) {
+        self.disarm(reason);
+        let stops = self.shaker.stop(reason);
+        self.tell_of_shaker(stops);
+    }
+
+    /// Queues what the shaker has to tell, if anything.
+    pub fn tell_of_shaker(&mut self, events: impl IntoIterator<Item = Event>) {
+        for event in events {
+            self.say(event);
+        }
+    }
+
+    /// Whether the hammer may be armed, or fired.
+    pub fn may_strike(&self) -> Result<(), Refusal> {
+        self.may_move()?;
+        if self.shaker.moves() { Err(Refusal::ShakerRuns) } else { Ok(()) }
+    }
+
+    /// Whether the shaker may run.
+    pub fn may_shake(&self) -> Result<(), Refusal> {
+        self.may_move()?;
+        match self.hammer.state() {
+            answer::Hammer::Disarmed | answer::Hammer::HoldOff => Ok(()),
+            _ => Err(Refusal::HammerArmed),
+        }
+    }
+
+    /// Whether anything may move at all: the one gate before arming, before a shot and before the shaker.
     pub fn may_move(&self) -> Result<(), Refusal> {
         if !self.streaming {
             return Err(Refusal::NotStreaming);
@@ -204,8 +245,11 @@ impl State<'_> {
             self.say(Event::EmergencyStop(true));
         }
         self.disarm(Reason::EmergencyStop);
-        // whatever state the machine believes in
+        let stops = self.shaker.halt(Reason::EmergencyStop);
+        self.tell_of_shaker(stops);
+        // whatever states the machines believe in
         self.coil = Some(CoilOrder::Off);
+        self.drive_off = true;
     }
 
     /// Queues the report of scans that were lost, if any.

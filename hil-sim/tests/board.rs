@@ -3,7 +3,7 @@
 
 mod support;
 
-use jointrig_hil_sim::board::{Options, VirtualBoard};
+use jointrig_hil_sim::board::{Controls, Options, VirtualBoard};
 use jointrig_hil_sim::executor::Polling;
 use jointrig_hil_sim::rig::RigConfig;
 use jointrig_protocol::answer::{Answer, Hammer, Refusal};
@@ -13,7 +13,7 @@ use jointrig_protocol::hello::Hello;
 use jointrig_protocol::limits::COIL_PULSE_CAP_US;
 use jointrig_protocol::request::{Configuration, Request};
 use jointrig_protocol::shot::Phase;
-use support::{PULSE_US, SmallHost};
+use support::{PULSE_US, SmallHost, scenarios};
 
 fn board(seed: u64) -> (VirtualBoard, SmallHost) {
     with(&Options { seed, ..Options::default() })
@@ -121,8 +121,7 @@ fn a_repeated_request_fires_once() {
         assert_eq!(host.ask_as(1000, order.clone()), Ok(Answer::Scheduled { number: 5 }));
     }
     let end = at + 2 * 51_200;
-    host.hold_at = u64::MAX;
-    host.acknowledge();
+    host.release();
     host.until("two seconds", |host| host.next_scan >= end);
     assert_eq!(host.ask_as(1000, order.clone()), Ok(Answer::Scheduled { number: 5 }));
     assert_eq!(host.ask(order.clone()), Err(Refusal::NotArmed));
@@ -206,4 +205,27 @@ fn garbage_is_counted_and_harms_nothing() {
     let status = host.status();
     assert!(status.counters.frames_bad > 10, "{status:?}");
     assert_eq!(status.hammer, Hammer::Disarmed);
+}
+
+#[test]
+fn hammer_and_shaker_keep_every_promise() {
+    let on_a_board = |scenario: fn(&Controls, &mut SmallHost)| {
+        let (board, mut host) = board(3);
+        scenario(board.controls(), &mut host);
+        scenarios::the_coil_kept_its_cap(board.controls());
+    };
+    on_a_board(scenarios::a_shot_without_arming_is_refused);
+    on_a_board(scenarios::one_arming_allows_one_shot);
+    on_a_board(scenarios::hammer_and_shaker_exclude_each_other);
+    on_a_board(|_, host| scenarios::the_shaker_pushes_as_ordered_and_comes_to_rest(host));
+    on_a_board(|_, host| scenarios::a_limit_brings_the_shaker_to_rest(host));
+    on_a_board(scenarios::a_stop_in_mid_pulse_takes_the_coil_away);
+    on_a_board(scenarios::a_stop_takes_the_shaker_away_without_a_ramp);
+    on_a_board(scenarios::an_open_guard_brings_the_shaker_to_rest);
+}
+
+#[test]
+fn a_host_that_is_gone_leaves_nothing_moving() {
+    let (board, mut host) = with(&Options { seed: 1, free_running: true, ..Options::default() });
+    scenarios::a_host_that_is_gone_leaves_nothing_moving(board.controls(), &mut host);
 }

@@ -10,14 +10,14 @@ mod support;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use jointrig_hil_sim::board::qemu::{QemuBoard, QemuError};
-use jointrig_hil_sim::board::{Options, VirtualBoard};
+use jointrig_firmware::ad7606b::trouble::Trouble;
+use jointrig_hil_sim::board::qemu::{ConverterFault, QemuBoard, QemuError};
+use jointrig_hil_sim::board::{Controls, Options, VirtualBoard};
 use jointrig_hil_sim::rig::RigConfig;
 use jointrig_protocol::answer::{Answer, Hammer, Refusal};
 use jointrig_protocol::event::{Event, Loss, Reason};
 use jointrig_protocol::request::{Configuration, Request};
-use jointrig_protocol::shot::Phase;
-use support::SmallHost;
+use support::{SmallHost, scenarios};
 
 fn image() -> Option<PathBuf> {
     let image = std::env::var_os("JOINTRIG_MPS2_IMAGE").map(PathBuf::from);
@@ -177,4 +177,67 @@ fn a_panic_in_a_task_ends_the_board_with_its_sentence() {
     let sentence = board.failure().unwrap();
     assert!(sentence.contains("the simulator asked for a panic"), "{sentence}");
     assert!(board.controls().coil_pulses_us().is_empty());
+}
+
+#[test]
+fn hammer_and_shaker_keep_every_promise() {
+    let on_a_board = |scenario: fn(&Controls, &mut SmallHost)| {
+        let Some((board, mut host)) = board(3) else { return };
+        scenario(board.controls(), &mut host);
+        scenarios::the_coil_kept_its_cap(board.controls());
+        assert_eq!(board.failure(), None);
+    };
+    on_a_board(scenarios::a_shot_without_arming_is_refused);
+    on_a_board(scenarios::one_arming_allows_one_shot);
+    on_a_board(scenarios::hammer_and_shaker_exclude_each_other);
+    on_a_board(|_, host| scenarios::the_shaker_pushes_as_ordered_and_comes_to_rest(host));
+    on_a_board(|_, host| scenarios::a_limit_brings_the_shaker_to_rest(host));
+    on_a_board(scenarios::a_stop_in_mid_pulse_takes_the_coil_away);
+    on_a_board(scenarios::a_stop_takes_the_shaker_away_without_a_ramp);
+    on_a_board(scenarios::an_open_guard_brings_the_shaker_to_rest);
+}
+
+#[test]
+fn a_host_that_is_gone_leaves_nothing_moving() {
+    let Some(image) = image() else { return };
+    let options = Options { seed: 1, free_running: true, ..Options::default() };
+    let (board, link) = QemuBoard::start_with(&image, &RigConfig::default(), &options).unwrap();
+    scenarios::a_host_that_is_gone_leaves_nothing_moving(board.controls(), &mut SmallHost::new(link));
+    assert_eq!(board.failure(), None);
+}
+
+/// Breaks the converters of an armed board.
+fn broken_converters(fault: ConverterFault, scans: u64) -> Option<SmallHost> {
+    let (board, mut host) = board(7)?;
+    host.start();
+    host.hold_at = host.first_scan;
+    assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
+    // a shot that waits for a scan that the failure swallows
+    let from = host.first_scan + 51_200;
+    let order = Request::Fire(SmallHost::order(1, 3_000, from + 24));
+    assert_eq!(host.ask(order), Ok(Answer::Scheduled { number: 1 }));
+    board.faults().break_converters(fault, from, scans);
+    host.release();
+    scenarios::after_a_front_end_failure(&mut host, from, scans);
+    assert_eq!((board.failure(), board.controls().coil_pulses_us().len()), (None, 0));
+    Some(host)
+}
+
+#[test]
+fn converters_that_fail_disarm_and_are_reported() {
+    // stuck for a second; one bad scan costs its block; late by a few blocks
+    for (trouble, scans) in [(Trouble::Silent, 51_200), (Trouble::Crc, 24), (Trouble::Overrun, 240)] {
+        let Some(host) = broken_converters(ConverterFault::Noticed(trouble), scans) else { return };
+        let words = trouble.to_string();
+        let told = |event: &&Event| matches!(event, Event::Fault(text) if text.as_str() == words);
+        assert_eq!(host.events.iter().filter(told).count(), 1, "told once: {:?}", host.events);
+    }
+}
+
+#[test]
+fn converters_that_hang_the_board_disarm_it_too() {
+    let Some(host) = broken_converters(ConverterFault::Hung, 102_400) else { return };
+    let at = |wanted: &Event| host.events.iter().position(|event| event == wanted);
+    let lost = host.events.iter().position(|event| matches!(event, Event::Lost { .. }));
+    assert!(at(&Event::Disarmed(Reason::FrontEnd)) < lost, "while it hangs, not after it");
 }

@@ -103,6 +103,8 @@ pub enum Refusal {
     OutOfBounds(String<SENTENCE_BYTES>),
     /// The stage cannot go there.
     Stage(String<SENTENCE_BYTES>),
+    /// The hammer is armed, or has a shot in hand.
+    HammerArmed,
 }
 
 impl core::fmt::Display for Refusal {
@@ -127,6 +129,7 @@ impl core::fmt::Display for Refusal {
             Self::PulseOutOfBounds { cap_us } => write!(f, "the coil pulse must be 1 to {cap_us} us"),
             Self::ShotRepeated { last } => write!(f, "this shot number was used before (last: {last})"),
             Self::OutOfBounds(what) | Self::Stage(what) => f.write_str(what),
+            Self::HammerArmed => f.write_str("the hammer is armed; disarm it before using the shaker"),
         }
     }
 }
@@ -156,6 +159,8 @@ pub struct Info {
     pub coil_cap_us: u32,
     /// Whether it can be told where hammer and laser are.
     pub stage: bool,
+    /// Full scale of the shaker's drive, V; 0 without a shaker.
+    pub drive_v: f32,
 }
 
 /// What the hammer does.
@@ -174,6 +179,20 @@ pub enum Hammer {
     Listening,
     /// The hammer rests before the next arming.
     HoldOff,
+}
+
+/// What the shaker does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Shaker {
+    /// Nothing.
+    Resting,
+    /// The amplitude is on its way to what was ordered.
+    Slewing,
+    /// The amplitude is what was ordered.
+    Steady,
+    /// The amplitude is on its way to rest.
+    Stopping,
 }
 
 /// Counters since the device started. They never go back within a boot.
@@ -222,6 +241,10 @@ pub struct Status {
     pub friction_n: f32,
     /// The last shot, if any.
     pub shot: Option<Shot>,
+    /// What the shaker does.
+    pub shaker: Shaker,
+    /// Amplitude of its drive now, V.
+    pub drive_v: f32,
     /// What was sent and lost.
     pub counters: Counters,
 }

@@ -50,15 +50,21 @@ pub enum Event {
     Fault(String<SENTENCE_BYTES>),
     /// The last run ended in a panic, and this is what it said.
     Panic(String<SENTENCE_BYTES>),
+    /// The shaker runs.
+    ShakerRuns,
+    /// The shaker is being brought to rest.
+    ShakerStops(Reason),
+    /// The shaker has come to rest.
+    ShakerRests,
 }
 
-/// Why the hammer disarmed.
+/// Why the hammer disarmed, or the shaker stops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Reason {
     /// The host asked for it.
     Asked,
-    /// The arming expired.
+    /// The arming, or the order to the shaker, expired.
     Expired,
     /// The shot is over.
     Fired,
@@ -70,6 +76,15 @@ pub enum Reason {
     EmergencyStop,
     /// The stream ended or began anew.
     StreamEnded,
+    /// A channel went beyond the limit of the order to the shaker.
+    Limit {
+        /// Place in the scan, from 0.
+        channel: u8,
+    },
+    /// The drive was given its codes too late, and rests.
+    RanDry,
+    /// The front end lost scans, or none came for [`crate::limits::SCAN_SILENCE_MS`]: nothing moves blindly.
+    FrontEnd,
 }
 
 /// Why scans were lost.

@@ -7,13 +7,13 @@
 use heapless::{String, Vec};
 
 use crate::acknowledge::Acknowledge;
-use crate::answer::{self, Answer, Counters, Hammer, Info, Refusal, Status};
+use crate::answer::{self, Answer, Counters, Hammer, Info, Refusal, Shaker, Status};
 use crate::block::{Header, OVER_RANGE, TRIGGER};
 use crate::channel::{Axis, Channel, Quantity, Role};
 use crate::event::{self, Event, Loss, Reason};
 use crate::frame::{FrameError, Kind, Writer};
 use crate::hello::{Hello, Role as HelloRole};
-use crate::request::{self, Configuration, Fire, Request, Stage, Trigger};
+use crate::request::{self, Configuration, Fire, Request, Shake, Stage, Trigger};
 use crate::shot::{Phase, Shot};
 
 macro_rules! golden {
@@ -33,10 +33,12 @@ golden!(
     started,
     refused,
     fire,
+    shake,
     stage,
     trigger,
     resend,
     shot_event,
+    shaker_event,
     lost_event,
     counters_event,
     samples,
@@ -106,6 +108,7 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
                 ring_scans: 64_000,
                 coil_cap_us: 8_000,
                 stage: false,
+                drive_v: 10.0,
             })),
         ),
         (
@@ -133,6 +136,8 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
                 emergency_stop: false,
                 friction_n: -1.5,
                 shot: Some(SHOT),
+                shaker: Shaker::Resting,
+                drive_v: 0.0,
                 counters: COUNTERS,
             })),
         ),
@@ -149,6 +154,10 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
         // three of sixteen fit
         let _ = quiet_limits.push(limit);
     }
+    let mut shake_limits = Vec::new();
+    for limit in [0.0, 0.0, 0.02] {
+        let _ = shake_limits.push(limit);
+    }
     let requests = [
         (
             "fire",
@@ -159,6 +168,16 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
                 quiet_limits,
                 quiet_window: 256,
                 quiet_patience: 1_536_000,
+            }),
+        ),
+        (
+            "shake",
+            Request::Shake(Shake {
+                step: Shake::step_of(200.0, 51_200),
+                amplitude_v: 2.5,
+                slew_v_per_s: 5.0,
+                valid_ms: 30_000,
+                limits: shake_limits,
             }),
         ),
         (
@@ -188,6 +207,7 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
 
     let events = [
         ("shot_event", Event::Shot(SHOT)),
+        ("shaker_event", Event::ShakerStops(Reason::Limit { channel: 2 })),
         ("lost_event", Event::Lost { epoch: 3, first_scan: 24, scans: 24, why: Loss::LinkSlow }),
         ("counters_event", Event::Counters(COUNTERS)),
     ];

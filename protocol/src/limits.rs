@@ -31,6 +31,20 @@ pub const COIL_PULSE_CAP_US: u32 = 8_000;
 /// Longest time for which one arming holds, in ms.
 pub const ARM_VALID_CAP_MS: u32 = 60_000;
 
+/// A front end that delivers nothing for this long has failed: hammer and shaker come to rest (ms of the
+/// device's time).
+pub const SCAN_SILENCE_MS: u32 = 100;
+
+/// Longest time for which one order keeps the shaker running, in ms: a host that wants more renews it.
+pub const SHAKE_VALID_CAP_MS: u32 = 60_000;
+
+/// Shortest time in which the shaker's drive may go from rest to its full scale, in ms; every stop that is
+/// not an emergency takes the same slope down.
+pub const SHAKE_RAMP_MS: u32 = 50;
+
+/// The shaker's highest frequency, as a part of the scan rate: so many scans make one cycle at least.
+pub const SHAKE_SCANS_PER_CYCLE: u32 = 10;
+
 /// A host that has not been heard for this long is gone: the hammer disarms (ms of the device's time).
 pub const LINK_SILENCE_MS: u32 = 1_000;
 

@@ -62,6 +62,10 @@ pub enum Request {
     Stage(Stage),
     /// Stop everything that moves; only a local action at the rig re-arms. → `Done`
     EmergencyStop,
+    /// A sine from the shaker, for a bounded time; while it runs, another amplitude, frequency or time. → `Done`
+    Shake(Shake),
+    /// Bring the shaker to rest, over a ramp. → `Done`
+    Rest,
 }
 
 /// How the force pulse is recognised.
@@ -93,6 +97,33 @@ pub struct Fire {
     pub quiet_window: u16,
     /// Give up when the structure is not quiet after this many scans from `not_before`.
     pub quiet_patience: u32,
+}
+
+/// A sine from the shaker.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Shake {
+    /// Turn per scan, in parts of 2³²: frequency × 2³² / scan rate. So the frequency is exact to the scans'
+    /// clock, and a change of it keeps the phase.
+    pub step: u32,
+    /// Amplitude of the drive, V; refused when over the board's full scale.
+    pub amplitude_v: f32,
+    /// How fast the amplitude goes there, V/s; refused when faster than full scale in
+    /// [`crate::limits::SHAKE_RAMP_MS`].
+    pub slew_v_per_s: f32,
+    /// How long it holds, ms: at most [`crate::limits::SHAKE_VALID_CAP_MS`]. Then the shaker comes to rest, over
+    /// a ramp, unless it was ordered anew.
+    pub valid_ms: u32,
+    /// Magnitudes that bring the shaker to rest, one per channel in the channel's unit; 0 leaves a channel out.
+    pub limits: Vec<f32, MAX_CHANNELS>,
+}
+
+impl Shake {
+    /// The turn per scan that makes `frequency_hz` at `scan_rate_hz`, to 2⁻³³ of a turn.
+    #[must_use]
+    pub fn step_of(frequency_hz: f64, scan_rate_hz: u32) -> u32 {
+        // a negative or too large frequency saturates, and the device refuses it
+        (frequency_hz / f64::from(scan_rate_hz) * 4_294_967_296.0 + 0.5) as u32
+    }
 }
 
 /// A configuration of the rig.

@@ -26,9 +26,10 @@ const fn budget(name: &'static str, what: &'static str, limit: u64) -> Budget {
 }
 
 /// Instructions per scan of sixteen channels.
-const SCANS: [Budget; 4] = [
+const SCANS: [Budget; 5] = [
     budget("scan.steady", "streaming, hammer at rest", 800),
     budget("scan.waiting", "streaming, judging three channels for quiet", 800),
+    budget("scan.shaking", "streaming, shaker running, two channels within limits", 1_000),
     budget("scan.flight", "streaming, hammer in flight", 800),
     budget("scan.listening", "streaming, following force and friction after contact", 800),
 ];
@@ -43,7 +44,7 @@ const PARTS: [Budget; 5] = [
 ];
 
 /// Instructions from the first byte of a request to the last of its answer.
-const COMMANDS: [Budget; 13] = [
+const COMMANDS: [Budget; 15] = [
     budget("info", "Info", 8_000),
     budget("channel", "Channel", 5_500),
     budget("status", "Status", 6_500),
@@ -55,6 +56,8 @@ const COMMANDS: [Budget; 13] = [
     budget("arm", "Arm, with its event", 6_000),
     budget("disarm", "Disarm, with its event", 8_000),
     budget("fire", "Fire, with sixteen limits of quiet", 12_000),
+    budget("shake", "Shake, with six limits and its event", 8_000),
+    budget("rest", "Rest, with its event", 6_000),
     budget("stage", "Stage (virtual rigs only)", 8_500),
     budget("emergency_stop", "EmergencyStop, with its events", 12_000),
 ];

@@ -26,6 +26,7 @@ pub mod pair;
 pub mod part;
 pub mod range;
 pub mod registers;
+pub mod trouble;
 
 pub use converter::{Converter, Settings};
 pub use error::Error;

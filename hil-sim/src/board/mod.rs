@@ -4,6 +4,7 @@
 //! link is a pair of byte queues. Without a stream, and half a ring ahead of the host's acknowledgement, its
 //! time stands still; so a run is repeatable bit for bit however fast host and machine are.
 
+mod drive;
 mod parts;
 #[cfg(unix)]
 pub mod qemu;
@@ -16,6 +17,7 @@ use std::thread::JoinHandle;
 
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use heapless::String as Text;
+use jointrig_firmware::board::Drive;
 use jointrig_firmware::ring::Slot;
 use jointrig_firmware::{Core, Facts};
 use jointrig_protocol::limits::{COIL_PULSE_CAP_US, scans_per_block};
@@ -23,6 +25,7 @@ use jointrig_protocol::limits::{COIL_PULSE_CAP_US, scans_per_block};
 use crate::executor::{Poller, Polling, Woken, jump};
 use crate::link::{DeviceEnd, HostEnd, pair};
 use crate::rig::{Rig, RigConfig, RigError};
+use drive::VirtualDrive;
 pub use parts::{Controls, Virtual};
 use parts::{VirtualCoil, VirtualInputs, VirtualScans, VirtualStage, describe};
 
@@ -110,6 +113,7 @@ fn run(rig: Rig, options: &Options, link: &DeviceEnd, controls: &Arc<Controls>) 
     let rate_hz = rig.scan_rate_hz();
     let per_block = scans_per_block(channels.len()).expect("the rig has ten channels");
     let slots = ring_slots(rate_hz, per_block);
+    let drive = VirtualDrive::default();
     let facts = Facts {
         board: name("jointrig-sim"),
         serial: name(&format!("sim-{:016x}", options.seed)),
@@ -119,15 +123,16 @@ fn run(rig: Rig, options: &Options, link: &DeviceEnd, controls: &Arc<Controls>) 
         channels,
         coil_cap_us: COIL_PULSE_CAP_US,
         stage: true,
+        drive_v: drive.full_scale_v(),
         boot: options.boot,
     };
     let core: Rc<Core<'static, NoopRawMutex>> =
         Rc::new(Core::new(facts, Box::leak(vec![Slot::EMPTY; slots].into_boxed_slice())));
     let rig = Rc::new(RefCell::new(rig));
-    let scans = VirtualScans::new(&rig, channels.len(), per_block, rate_hz, !options.free_running);
+    let scans = VirtualScans::new(&rig, &drive, channels.len(), per_block, rate_hz, !options.free_running);
     let sampling = scans.sampling();
     let woken = Arc::new(Woken::default());
-    let mut poller = Poller::new(options.polling, futures(&core, &rig, scans, link, controls), &woken);
+    let mut poller = Poller::new(options.polling, futures(&core, &rig, scans, drive, link, controls), &woken);
     while !link.is_closed() {
         while woken.take() {
             poller.poll();
@@ -147,6 +152,7 @@ fn futures(
     core: &Rc<Core<'static, NoopRawMutex>>,
     rig: &Rc<RefCell<Rig>>,
     mut scans: VirtualScans,
+    mut drive: VirtualDrive,
     link: &DeviceEnd,
     controls: &Arc<Controls>,
 ) -> Vec<Pin<Box<dyn Future<Output = ()>>>> {
@@ -157,7 +163,7 @@ fn futures(
     let (a, b, c, d) = (Rc::clone(core), Rc::clone(core), Rc::clone(core), Rc::clone(core));
     vec![
         Box::pin(async move {
-            jointrig_firmware::acquire::acquire(&a, &mut scans, &mut coil, &mut inputs).await;
+            jointrig_firmware::acquire::acquire(&a, &mut scans, &mut coil, &mut drive, &mut inputs).await;
         }),
         Box::pin(async move {
             jointrig_firmware::receive::receive(&b, &mut source, &mut stage).await;

@@ -13,6 +13,7 @@ use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, COIL_PULSE_CAP_US};
 use jointrig_protocol::request;
 
+use super::drive::VirtualDrive;
 use crate::link::DeviceEnd;
 use crate::rig::{self, Configuration, Measured, Rig};
 
@@ -23,6 +24,7 @@ impl Board for Virtual {
     type Mutex = NoopRawMutex;
     type Scans = VirtualScans;
     type Coil = VirtualCoil;
+    type Drive = VirtualDrive;
     type Inputs = VirtualInputs;
     type Source = DeviceEnd;
     type Sink = DeviceEnd;
@@ -92,6 +94,7 @@ pub(super) fn describe(channels: &[rig::Channel]) -> &'static [Channel] {
 /// Converters whose samples are the rig's.
 pub struct VirtualScans {
     rig: Rc<RefCell<Rig>>,
+    drive: VirtualDrive,
     channels: usize,
     per_block: usize,
     rate_hz: u64,
@@ -103,14 +106,15 @@ pub struct VirtualScans {
 impl VirtualScans {
     pub(super) fn new(
         rig: &Rc<RefCell<Rig>>,
+        drive: &VirtualDrive,
         channels: usize,
         per_block: usize,
         rate_hz: u32,
         held: bool,
     ) -> Self {
-        let rig = Rc::clone(rig);
+        let (rig, drive) = (Rc::clone(rig), drive.clone());
         let rate_hz = u64::from(rate_hz);
-        Self { rig, channels, per_block, rate_hz, scans: 0, held, sampling: Rc::default() }
+        Self { rig, drive, channels, per_block, rate_hz, scans: 0, held, sampling: Rc::default() }
     }
 
     /// True while the converters run, that is while virtual time may go on.
@@ -130,15 +134,22 @@ impl Scans for VirtualScans {
         // the instant of the block's last scan, rounded up to the clock's microsecond
         Timer::at(Instant::from_micros((self.scans * 1_000_000).div_ceil(self.rate_hz))).await;
         self.sampling.set(false);
-        fill(&mut self.rig.borrow_mut(), self.channels, self.per_block, block);
+        fill(&mut self.rig.borrow_mut(), &self.drive, self.channels, self.per_block, block);
         Delivered { scans: self.per_block as u8, missed: 0 }
     }
 }
 
-/// Lets the rig go on by one block and writes its codes.
-pub(super) fn fill(rig: &mut Rig, channels: usize, per_block: usize, block: &mut [u8; BLOCK_SAMPLE_BYTES]) {
+/// Lets the rig go on by one block, driven as was ordered, and writes its codes.
+pub(super) fn fill(
+    rig: &mut Rig,
+    drive: &VirtualDrive,
+    channels: usize,
+    per_block: usize,
+    block: &mut [u8; BLOCK_SAMPLE_BYTES],
+) {
     let mut codes = [0; jointrig_protocol::limits::MAX_CHANNELS];
     for scan in block.chunks_exact_mut(2 * channels).take(per_block) {
+        rig.drive(drive.next_v());
         rig.scan(&mut codes[..channels]);
         for (bytes, code) in scan.as_chunks_mut::<2>().0.iter_mut().zip(codes) {
             *bytes = code.to_le_bytes();
@@ -170,8 +181,15 @@ impl Coil for VirtualCoil {
     }
 
     fn off(&mut self) {
-        // the rig takes a pulse whole, at its beginning: the few milliseconds that are left of one cannot
-        // be taken back here, and the cap bounds them
+        let mut rig = self.rig.borrow_mut();
+        rig.coil_off();
+        // what the rig felt: the last pulse may have been cut short
+        if let (Some(felt), Some(told)) = (
+            rig.coil_pulses_s().last(),
+            self.controls.pulses_us.lock().unwrap_or_else(PoisonError::into_inner).last_mut(),
+        ) {
+            *told = (*told).min((felt * 1e6).round() as u32);
+        }
     }
 }
 

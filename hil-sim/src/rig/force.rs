@@ -35,6 +35,12 @@ impl ForceSegment {
         self.end_s - self.start_s
     }
 
+    /// What had begun by `now_s`: an elastic contact whole, a steady force until then.
+    pub fn until(&self, now_s: f64) -> Option<Self> {
+        let end_s = if self.omega > 0.0 { self.end_s } else { self.end_s.min(now_s) };
+        (self.start_s <= now_s).then_some(Self { end_s, ..*self })
+    }
+
     /// Argument of the sine at `t_s` (rad).
     pub fn angle(&self, t_s: f64) -> f64 {
         self.omega * (t_s - self.start_s) + self.phase

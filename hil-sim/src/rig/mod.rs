@@ -208,6 +208,24 @@ impl Rig {
         self.attempt = attempt.wrapping_add(1);
     }
 
+    /// Ends the coil's pulse now, if it lasts: the bolt flies as after a pulse of the time that has passed. A bolt that has
+    /// already touched the structure has done so, and only what the coil would still have pressed is gone.
+    pub fn coil_off(&mut self) {
+        let now_s = self.time_s(self.scans);
+        let Some(hit) = self.last_hit.as_mut().filter(|hit| now_s < hit.pulse_s) else { return };
+        let (attempt, ordered) = (hit.attempt, std::mem::take(&mut hit.contacts));
+        let mut cut = hammer::strike(&self.config.hammer, now_s, attempt, &mut self.shot(attempt, "hit"));
+        if ordered.first().is_some_and(|contact| contact.start_s <= now_s) {
+            cut.contacts = ordered.iter().filter_map(|contact| contact.until(now_s)).collect();
+        }
+        self.pending.retain(|segment| !ordered.contains(segment));
+        self.pending.extend_from_slice(&cut.contacts);
+        if let Some(last) = self.coil_pulses_s.last_mut() {
+            *last = now_s;
+        }
+        self.last_hit = Some(cut);
+    }
+
     /// Sets the shaker's drive (V), held until it is set again and limited as the amplifier is; not a number mutes it.
     ///
     /// The excitation channel reads the force that acted during the scan that it ends.

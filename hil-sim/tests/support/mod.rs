@@ -1,6 +1,8 @@
 //! A host of the fewest lines, for tests of the virtual board: requests, acknowledgements, samples.
 #![allow(clippy::unwrap_used, dead_code, reason = "test support; each test file uses a part of it")]
 
+pub mod scenarios;
+
 use std::time::{Duration, Instant};
 
 use jointrig_hil_sim::link::HostEnd;
@@ -149,6 +151,29 @@ impl SmallHost {
         self.send(Kind::Acknowledge, &acknowledge.to_bytes());
     }
 
+    /// The scan that the board was last told of.
+    pub fn acknowledged(&self) -> u64 {
+        self.next_scan.min(self.hold_at)
+    }
+
+    /// Lets a held board go on.
+    pub fn release(&mut self) {
+        self.hold_at = u64::MAX;
+        self.acknowledge();
+    }
+
+    /// Reads so many scans more.
+    pub fn go_on(&mut self, scans: u64) {
+        let end = self.next_scan + scans;
+        self.until("scans", |host| host.next_scan >= end);
+    }
+
+    /// The phases of all shots that were told of.
+    pub fn phases(&self) -> Vec<Phase> {
+        let phase = |event: &Event| if let Event::Shot(shot) = event { Some(shot.phase) } else { None };
+        self.events.iter().filter_map(phase).collect()
+    }
+
     pub fn until(&mut self, what: &str, mut done: impl FnMut(&Self) -> bool) {
         let give_up = Instant::now() + Duration::from_mins(1);
         while !done(self) {
@@ -216,8 +241,7 @@ impl SmallHost {
         assert_eq!(self.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
         let number = order.number;
         assert_eq!(self.ask(Request::Fire(order)), Ok(Answer::Scheduled { number }));
-        self.hold_at = u64::MAX;
-        self.acknowledge();
+        self.release();
         loop {
             let shot = self.status().shot.unwrap();
             if shot.number == number

@@ -54,7 +54,9 @@ impl Info {
                 "ring_scans": info.ring_scans,
                 "coil_cap_us": info.coil_cap_us,
                 "stage": info.stage,
+                "drive_v": info.drive_v,
                 "channels": channels,
+                "shaker": format!("{:?}", status.shaker),
                 "hammer": format!("{:?}", status.hammer),
                 "interlock_closed": status.interlock_closed,
                 "emergency_stop": status.emergency_stop,
@@ -72,8 +74,9 @@ impl Info {
                 f64::from(info.ring_scans) / f64::from(info.scan_rate_hz.max(1))
             ),
             format!(
-                "  hammer: {:?}; interlock {}; emergency stop {}",
+                "  hammer: {:?}; shaker: {}; interlock {}; emergency stop {}",
                 status.hammer,
+                if info.drive_v > 0.0 { format!("{:?}", status.shaker) } else { "none".into() },
                 if status.interlock_closed { "closed" } else { "OPEN" },
                 if status.emergency_stop { "LATCHED" } else { "released" },
             ),

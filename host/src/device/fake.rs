@@ -10,7 +10,7 @@ use std::ops::Range;
 use std::time::Duration;
 
 use jointrig_protocol::acknowledge::Acknowledge;
-use jointrig_protocol::answer::{self, Answer, Counters, Hammer, Info, Refusal, Status};
+use jointrig_protocol::answer::{self, Answer, Counters, Hammer, Info, Refusal, Shaker, Status};
 use jointrig_protocol::block::{GAP, Header, RESENT};
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
 use jointrig_protocol::event::{self, Event, Loss};
@@ -169,6 +169,7 @@ impl Fake {
                 ring_scans: RING,
                 coil_cap_us: 8_000,
                 stage: self.stage_known,
+                drive_v: 0.0,
             }),
             Request::Channel { index } => {
                 let role = *ROLES.get(usize::from(index)).ok_or(Refusal::NoSuchChannel)?;
@@ -183,6 +184,7 @@ impl Fake {
                     bits: 16,
                 })
             }
+            Request::Shake(_) | Request::Rest => return Err(Refusal::Unsupported),
             Request::Status => Answer::Status(Status {
                 epoch: self.epoch,
                 streaming: self.streaming,
@@ -194,6 +196,8 @@ impl Fake {
                 emergency_stop: false,
                 friction_n: 0.0,
                 shot: self.shot,
+                shaker: Shaker::Resting,
+                drive_v: 0.0,
                 counters: Counters {
                     scans_produced: self.next_scan,
                     scans_dropped: self.dropped,

@@ -34,6 +34,8 @@ fn name(request: &Request) -> &'static str {
         Request::Fire(_) => "fire",
         Request::Stage(_) => "stage",
         Request::EmergencyStop => "emergency stop",
+        Request::Shake(_) => "shake",
+        Request::Rest => "rest",
     }
 }
 

@@ -11,7 +11,8 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use heapless::Vec;
 use jointrig_firmware::lockstep::{
-    Ask, BLOCK_AT, INTERLOCK_CLOSED, Op, RING_BYTES, Reply, Setup, TO_DEVICE_AT, to_text,
+    Ask, BLOCK_AT, DELIVERY_BYTES, Delivery, INTERLOCK_CLOSED, Op, RING_BYTES, Reply, Setup, TO_DEVICE_AT,
+    to_text,
 };
 use jointrig_protocol::acknowledge::Acknowledge;
 use jointrig_protocol::block::HEADER_PAYLOAD;
@@ -19,7 +20,7 @@ use jointrig_protocol::channel::{Axis, Channel, Name, Quantity, Role};
 use jointrig_protocol::frame::{Accumulator, Kind, Writer};
 use jointrig_protocol::hello::Hello;
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, MAX_CHANNELS};
-use jointrig_protocol::request::{Configuration, Fire, Numbered, Request, Stage, Trigger};
+use jointrig_protocol::request::{Configuration, Fire, Numbered, Request, Shake, Stage, Trigger};
 use semihosting::{eprintln, println, process};
 
 use crate::{counter, device, memory, port, stack};
@@ -70,6 +71,17 @@ fn step(number: usize) -> Option<Step> {
     let place =
         Stage { configuration: Configuration::Ajb, impact: text("AZ3"), response: text("B4"), attempt: 2 };
     let arm = Request::Arm { valid_ms: 60_000 };
+    let mut limits = Vec::new();
+    for limit in [0.0, 0.0, 0.0, 0.0, 0.5, 0.5] {
+        let _ = limits.push(limit);
+    }
+    let shake = Shake {
+        step: Shake::step_of(200.0, RATE_HZ),
+        amplitude_v: 5.0,
+        slew_v_per_s: 100.0,
+        valid_ms: 60_000,
+        limits,
+    };
     Some(match number {
         0 => Step::Greet,
         1 => Step::Ask("info", Request::Info),
@@ -84,19 +96,24 @@ fn step(number: usize) -> Option<Step> {
         10 => Step::Ask("fire", fire(1, 3)),
         11 => Step::Stream("scan.waiting", 1_024),
         12 => Step::Ask("disarm", Request::Disarm),
-        13 | 23 => Step::Ask("", arm),
-        14 => Step::Ask("", fire(2, 0)),
-        15 | 25 => Step::Stream("", 1),
-        16 => Step::Stream("scan.flight", 64),
-        17 => Step::Contact("block.contact"),
-        18 => Step::Stream("scan.listening", 256),
-        19 => Step::Ask("resend", Request::Resend { epoch: 0, first_scan: 49_000, scans: 15 }),
-        20 => Step::Ask("stop", Request::Stop),
-        21 => Step::Ask("", Request::Start),
-        22 => Step::Stream("", 64),
-        24 => Step::Ask("", fire(3, 0)),
-        26 => Step::Guard("block.guard"),
-        27 => Step::Ask("emergency_stop", Request::EmergencyStop),
+        13 => Step::Ask("shake", Request::Shake(shake)),
+        14 => Step::Stream("scan.shaking", 1_024),
+        15 => Step::Ask("rest", Request::Rest),
+        // the ramp down, and the noise of the blocks after it
+        16 => Step::Stream("", 256),
+        17 | 27 => Step::Ask("", arm),
+        18 => Step::Ask("", fire(2, 0)),
+        19 | 29 => Step::Stream("", 1),
+        20 => Step::Stream("scan.flight", 64),
+        21 => Step::Contact("block.contact"),
+        22 => Step::Stream("scan.listening", 256),
+        23 => Step::Ask("resend", Request::Resend { epoch: 0, first_scan: 49_000, scans: 15 }),
+        24 => Step::Ask("stop", Request::Stop),
+        25 => Step::Ask("", Request::Start),
+        26 => Step::Stream("", 64),
+        28 => Step::Ask("", fire(3, 0)),
+        30 => Step::Guard("block.guard"),
+        31 => Step::Ask("emergency_stop", Request::EmergencyStop),
         _ => return None,
     })
 }
@@ -223,7 +240,7 @@ impl Bench {
             Some(Op::Idle) => self.idle(ask),
             Some(Op::Pulse) => self.note_coil("latency.coil_on"),
             Some(Op::Off) => self.note_coil("latency.coil_off"),
-            Some(Op::Stage) => {}
+            Some(Op::Stage | Op::Play | Op::Rest) => {}
             Some(Op::Start | Op::Panic) | None => broken("an unknown wish"),
         }
         self.reply
@@ -276,7 +293,7 @@ impl Bench {
                 self.stream(ask);
                 // every fourth scan from the third on shows force
                 for scan in (2..PER_BLOCK as usize).step_by(4) {
-                    memory::write(BLOCK_AT + 4 + scan * 2 * MAX_CHANNELS, &HIT.to_le_bytes());
+                    memory::write(BLOCK_AT + DELIVERY_BYTES + scan * 2 * MAX_CHANNELS, &HIT.to_le_bytes());
                 }
             }
             Step::Guard(_) => {
@@ -315,12 +332,12 @@ impl Bench {
         self.reply.now_us = ask.block_us;
         self.since_block = 0;
         self.left -= 1;
-        memory::write(BLOCK_AT, &[0; 4]);
-        memory::write(BLOCK_AT + 4, &self.noise[self.blocks as usize % NOISES]);
+        memory::write(BLOCK_AT, &Delivery { scans: PER_BLOCK as u32, ..Delivery::default() }.to_bytes());
+        memory::write(BLOCK_AT + DELIVERY_BYTES, &self.noise[self.blocks as usize % NOISES]);
         self.blocks += 1;
         self.reply.blocks = self.blocks;
         if self.blocks.is_multiple_of(ACKNOWLEDGE_EVERY) {
-            let epoch = if self.step <= 21 { 1 << 16 } else { (1 << 16) + 1 };
+            let epoch = if self.step <= 25 { 1 << 16 } else { (1 << 16) + 1 };
             let next_scan = u64::from(self.blocks - 1) * PER_BLOCK;
             self.say(Kind::Acknowledge, &Acknowledge { epoch, next_scan }.to_bytes());
         }

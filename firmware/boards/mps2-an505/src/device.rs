@@ -1,7 +1,7 @@
 //! The device: the firmware's four functions as tasks over this board's parts.
 
 use heapless::{String, Vec};
-use jointrig_firmware::board::Board;
+use jointrig_firmware::board::{self, Board};
 use jointrig_firmware::lockstep::Setup;
 use jointrig_firmware::ring::Slot;
 use jointrig_firmware::{Core, Facts};
@@ -10,12 +10,13 @@ use jointrig_protocol::limits::{COIL_PULSE_CAP_US, MAX_CHANNELS, scans_per_block
 use static_cell::{ConstStaticCell, StaticCell};
 
 use crate::executor;
-use crate::parts::{Coil, Emulated, Inputs, Scans, Sink, Source, Stage};
+use crate::parts::{Coil, Drive, Emulated, Inputs, Scans, Sink, Source, Stage};
 
 /// A second of sixteen channels at 51.2 kHz.
 const SLOTS: usize = 3_414;
 
-type Shared = Core<'static, <Emulated as Board>::Mutex>;
+/// What the tasks share.
+pub type Shared = Core<'static, <Emulated as Board>::Mutex>;
 
 /// Runs the firmware for ever.
 pub fn run(setup: &Setup) -> ! {
@@ -34,11 +35,12 @@ pub fn run(setup: &Setup) -> ! {
         channels,
         coil_cap_us: COIL_PULSE_CAP_US,
         stage: true,
+        drive_v: board::Drive::full_scale_v(&Drive),
         boot: setup.boot,
     };
     let slots = (setup.slots as usize).clamp(1, SLOTS);
     let core: &'static Shared = CORE.init(Core::new(facts, &mut MEMORY.take()[..slots]));
-    let scans = Scans::new(per_block, setup.scan_rate_hz);
+    let scans = Scans::new(core, per_block, setup.scan_rate_hz);
     executor::run(|spawner| {
         const ONCE: &str = "each task is made once";
         spawner.spawn(acquire(core, scans).expect(ONCE));
@@ -50,7 +52,7 @@ pub fn run(setup: &Setup) -> ! {
 
 #[embassy_executor::task]
 async fn acquire(core: &'static Shared, mut scans: Scans) {
-    jointrig_firmware::acquire::acquire(core, &mut scans, &mut Coil, &mut Inputs).await;
+    jointrig_firmware::acquire::acquire(core, &mut scans, &mut Coil, &mut Drive, &mut Inputs).await;
 }
 
 #[embassy_executor::task]

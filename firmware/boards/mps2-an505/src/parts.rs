@@ -5,15 +5,18 @@ use core::task::Poll;
 
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use heapless::String;
-use jointrig_firmware::board::{self, Delivered};
+use jointrig_firmware::ad7606b::trouble::Trouble;
+use jointrig_firmware::board::{self, Delivered, RanDry};
 use jointrig_firmware::lockstep::{
-    BLOCK_AT, EMERGENCY_STOP, HELD, INTERLOCK_CLOSED, LOCAL_RESET, MUST_PANIC, NEVER, Op, RING_BYTES,
-    TEXT_AT, TEXT_BYTES, TO_DEVICE_AT, TO_HOST_AT, from_text, to_text,
+    BLOCK_AT, DELIVERY_BYTES, DRIVE_AT, DRIVE_FULL_SCALE_V, Delivery, EMERGENCY_STOP, HELD, INTERLOCK_CLOSED,
+    LOCAL_RESET, MUST_PANIC, NEVER, Op, RING_BYTES, TEXT_AT, TEXT_BYTES, TO_DEVICE_AT, TO_HOST_AT, from_text,
+    to_text,
 };
 use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, COIL_PULSE_CAP_US};
 use jointrig_protocol::request::Stage as Place;
 
+use crate::device::Shared;
 use crate::{memory, port};
 
 /// The emulated board: a name for its parts.
@@ -23,6 +26,7 @@ impl board::Board for Emulated {
     type Mutex = CriticalSectionRawMutex;
     type Scans = Scans;
     type Coil = Coil;
+    type Drive = Drive;
     type Inputs = Inputs;
     type Source = Source;
     type Sink = Sink;
@@ -31,16 +35,19 @@ impl board::Board for Emulated {
 
 /// Converters whose blocks the simulator delivers.
 pub struct Scans {
+    core: &'static Shared,
     per_block: u64,
     rate_hz: u64,
     taken: u64,
     blocks: u32,
+    last_report: Option<Trouble>,
 }
 
 impl Scans {
     /// Converters that deliver so many scans a block.
-    pub fn new(per_block: usize, rate_hz: u32) -> Self {
-        Self { per_block: per_block as u64, rate_hz: u64::from(rate_hz), taken: 0, blocks: 0 }
+    pub fn new(core: &'static Shared, per_block: usize, rate_hz: u32) -> Self {
+        let (per_block, rate_hz) = (per_block as u64, u64::from(rate_hz));
+        Self { core, per_block, rate_hz, taken: 0, blocks: 0, last_report: None }
     }
 }
 
@@ -67,10 +74,19 @@ impl board::Scans for Scans {
         .await;
         self.blocks = self.blocks.wrapping_add(1);
         assert!(port::with(|port| port.reply.inputs) & MUST_PANIC == 0, "the simulator asked for a panic");
-        let mut missed = [0; 4];
-        memory::read(BLOCK_AT, &mut missed);
-        memory::read(BLOCK_AT + 4, block);
-        Delivered { scans: self.per_block as u8, missed: u32::from_le_bytes(missed) }
+        let mut head = [0; DELIVERY_BYTES];
+        memory::read(BLOCK_AT, &mut head);
+        let delivery = Delivery::from_bytes(&head);
+        memory::read(BLOCK_AT + DELIVERY_BYTES, block);
+        if self.last_report != delivery.trouble {
+            self.last_report = delivery.trouble;
+            if let Some(trouble) = delivery.trouble {
+                self.core.report_fault(trouble);
+            }
+        }
+        // the clock of the conversions went on while some were lost
+        self.taken = self.taken - self.per_block + u64::from(delivery.scans) + u64::from(delivery.missed);
+        Delivered { scans: delivery.scans as u8, missed: delivery.missed }
     }
 }
 
@@ -88,6 +104,28 @@ impl board::Coil for Coil {
 
     fn off(&mut self) {
         port::turn(Op::Off, 0);
+    }
+}
+
+/// The drive of the simulated shaker.
+pub struct Drive;
+
+impl board::Drive for Drive {
+    fn full_scale_v(&self) -> f32 {
+        DRIVE_FULL_SCALE_V
+    }
+
+    fn play(&mut self, codes: &[i16]) -> Result<(), RanDry> {
+        for (place, code) in codes.iter().take(BLOCK_SAMPLE_BYTES / 2).enumerate() {
+            memory::write(DRIVE_AT + 2 * place, &code.to_le_bytes());
+        }
+        port::turn(Op::Play, codes.len() as u32);
+        // the simulator's clock stands still until it has them
+        Ok(())
+    }
+
+    fn rest(&mut self) {
+        port::turn(Op::Rest, 0);
     }
 }
 

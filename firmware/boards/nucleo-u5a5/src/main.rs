@@ -34,7 +34,7 @@ use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use jointrig_firmware::board::{Board, Coil, NoStage, Stage};
+use jointrig_firmware::board::{Board, Coil, NoDrive, NoStage, Stage};
 use jointrig_firmware::ring::Slot;
 use jointrig_firmware::{Core, Facts, acquire, watch};
 use jointrig_protocol::limits::{MAX_CHANNELS, scans_per_block};
@@ -60,6 +60,7 @@ impl Board for Nucleo {
     type Mutex = CriticalSectionRawMutex;
     type Scans = scans::Converters;
     type Coil = coil::PulseTimer;
+    type Drive = NoDrive;
     type Inputs = inputs::Switches;
     type Source = usb::Source;
     type Sink = usb::Sink;
@@ -84,7 +85,7 @@ async fn acquisition(
     mut coil: coil::PulseTimer,
     mut inputs: inputs::Switches,
 ) {
-    acquire::acquire(core, &mut scans, &mut coil, &mut inputs).await;
+    acquire::acquire(core, &mut scans, &mut coil, &mut NoDrive, &mut inputs).await;
 }
 
 #[embassy_executor::task]
@@ -111,6 +112,7 @@ async fn main(spawner: Spawner) {
         channels: channels::table(),
         coil_cap_us: coil.cap_us(),
         stage: NoStage::PRESENT,
+        drive_v: 0.0,
         boot,
     };
     let core: &'static Shared = CORE.init(Core::new(facts, RING.take()));

@@ -5,12 +5,12 @@
 //! ([`jointrig_firmware::lockstep`]). While one side works the other stands still, so a run is the native
 //! board's, block for block, whatever the machine is doing. To the host it is a [`HostEnd`] like any other.
 
+mod faults;
 mod process;
 mod server;
 pub mod shared_ram;
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -19,6 +19,7 @@ use std::time::Duration;
 use crate::board::{Controls, Options};
 use crate::link::{DeviceEnd, HostEnd, pair};
 use crate::rig::{Rig, RigConfig, RigError};
+pub use faults::{ConverterFault, Faults};
 use process::Emulator;
 use server::Server;
 
@@ -51,35 +52,6 @@ pub enum QemuError {
     /// The image did not start as it should.
     #[error("the firmware image did not start: {0}")]
     Start(String),
-}
-
-/// Faults that a test declares.
-#[derive(Debug, Default)]
-pub struct Faults {
-    stall_from: AtomicU64,
-    stall_scans: AtomicU64,
-    panic: AtomicBool,
-}
-
-impl Faults {
-    /// From the block with this scan on, and for so many scans, the link moves nothing either way while
-    /// the board's time goes on, as when a PC is busy.
-    pub fn stall_link(&self, from_scan: u64, scans: u64) {
-        self.stall_from.store(from_scan, Ordering::Release);
-        self.stall_scans.store(scans, Ordering::Release);
-    }
-
-    /// Whether the link is stalled once so many scans were produced.
-    fn stalled(&self, scans: u64) -> bool {
-        let from = self.stall_from.load(Ordering::Acquire);
-        let count = self.stall_scans.load(Ordering::Acquire);
-        count > 0 && scans >= from && scans < from.saturating_add(count)
-    }
-
-    /// The acquisition task panics at its next block.
-    pub fn panic(&self) {
-        self.panic.store(true, Ordering::Release);
-    }
 }
 
 /// A running emulated board. Dropping it stops QEMU.

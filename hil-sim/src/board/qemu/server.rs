@@ -5,13 +5,13 @@ use std::io::{self, Read, Write};
 use std::pin::pin;
 use std::rc::Rc;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::task::{Context, Poll, Waker};
 
-use jointrig_firmware::board::{ByteSink, ByteSource, Coil, Inputs, Stage};
+use jointrig_firmware::board::{ByteSink, ByteSource, Coil, Drive, Inputs, Stage};
 use jointrig_firmware::lockstep::{
-    Ask, BLOCK_AT, EMERGENCY_STOP, HELD, INTERLOCK_CLOSED, LOCAL_RESET, LOG_AT, MUST_PANIC, NEVER, Op,
-    RING_BYTES, Reply, Setup, TEXT_AT, TEXT_BYTES, TO_DEVICE_AT, TO_HOST_AT, from_text, to_text,
+    Ask, BLOCK_AT, DELIVERY_BYTES, DRIVE_AT, EMERGENCY_STOP, HELD, INTERLOCK_CLOSED, LOCAL_RESET, LOG_AT,
+    MUST_PANIC, NEVER, Op, RING_BYTES, Reply, Setup, TEXT_AT, TEXT_BYTES, TO_DEVICE_AT, TO_HOST_AT,
+    from_text, to_text,
 };
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, scans_per_block};
 use jointrig_protocol::{golden, request};
@@ -21,6 +21,7 @@ use serde::Serialize;
 use super::Faults;
 use super::process::Pipes;
 use super::shared_ram::SharedRam;
+use crate::board::drive::VirtualDrive;
 use crate::board::parts::{VirtualCoil, VirtualInputs, VirtualStage, describe, fill};
 use crate::board::{Controls, Options, name, ring_slots};
 use crate::executor::Woken;
@@ -40,6 +41,7 @@ enum Next {
 pub struct Server {
     rig: Rc<RefCell<Rig>>,
     coil: VirtualCoil,
+    drive: VirtualDrive,
     inputs: VirtualInputs,
     stage: VirtualStage,
     faults: Arc<Faults>,
@@ -52,6 +54,8 @@ pub struct Server {
     per_block: usize,
     free_running: bool,
     reply: Reply,
+    /// Scans since the start, lost ones among them.
+    produced: u64,
     log: Vec<u8>,
 }
 
@@ -79,6 +83,7 @@ impl Server {
         let woken = Arc::new(Woken::default());
         Self {
             coil: VirtualCoil::new(&rig, controls),
+            drive: VirtualDrive::default(),
             inputs: VirtualInputs::new(controls),
             stage: VirtualStage::new(&rig),
             faults: Arc::clone(faults),
@@ -91,6 +96,7 @@ impl Server {
             per_block,
             free_running: options.free_running,
             reply: Reply { inputs: INTERLOCK_CLOSED, ..Reply::default() },
+            produced: 0,
             log: Vec::new(),
             rig,
         }
@@ -124,6 +130,8 @@ impl Server {
                 },
                 Some(Op::Pulse) => self.coil.pulse(ask.argument),
                 Some(Op::Off) => self.coil.off(),
+                Some(Op::Play) => self.play(ask.argument).map_err(|error| broken(&error))?,
+                Some(Op::Rest) => self.drive.rest(),
                 Some(Op::Stage) => self.go(ask.argument)?,
                 Some(Op::Panic) => {
                     let text = self.ram.text(ask.argument).map_err(|error| broken(&error))?;
@@ -161,7 +169,7 @@ impl Server {
                 return Ok(Next::End);
             }
             self.woken.take();
-            let stalled = self.faults.stalled(self.scans());
+            let stalled = self.faults.stalled(self.produced);
             if !stalled {
                 let room_made = self.move_out(ask)? && ask.to_host_full != 0;
                 if self.move_in(ask)? || room_made {
@@ -176,24 +184,25 @@ impl Server {
         }
     }
 
-    /// Scans that the converters have produced.
-    fn scans(&self) -> u64 {
-        u64::from(self.reply.blocks) * self.per_block as u64
-    }
-
     /// Jumps to the next alarm or to the end of the block that is waited for.
     fn go_on(&mut self, ask: &Ask) -> io::Result<()> {
-        let next = ask.alarm_us.min(ask.block_us);
+        let block_us = self.faults.delivered_at(ask.block_us, self.setup.scan_rate_hz, self.per_block);
+        let next = ask.alarm_us.min(block_us);
         if next == NEVER {
             return Err(io::Error::other("the board waits for something that cannot come: no alarm is set"));
         }
         self.reply.now_us = self.reply.now_us.max(next);
-        if ask.block_us <= self.reply.now_us {
-            let mut block = [0; 4 + BLOCK_SAMPLE_BYTES];
-            let (_missed, samples) = block.split_at_mut(4);
-            let samples = samples.first_chunk_mut().expect("the block is that long");
-            fill(&mut self.rig.borrow_mut(), self.setup.channels.len(), self.per_block, samples);
-            self.ram.write(BLOCK_AT, &block)?;
+        if block_us <= self.reply.now_us {
+            let delivery = self.faults.delivery(self.produced, self.per_block);
+            let (channels, per_block) = (self.setup.channels.len(), self.per_block);
+            let mut samples = [0; BLOCK_SAMPLE_BYTES];
+            // what is lost has happened all the same
+            for _ in 0..delivery.missed as usize / per_block + usize::from(delivery.scans > 0) {
+                fill(&mut self.rig.borrow_mut(), &self.drive, channels, per_block, &mut samples);
+            }
+            self.ram.write(BLOCK_AT, &delivery.to_bytes())?;
+            self.ram.write(BLOCK_AT + DELIVERY_BYTES, &samples)?;
+            self.produced += u64::from(delivery.missed + delivery.scans);
             self.reply.blocks += 1;
             self.set_inputs();
         }
@@ -205,8 +214,8 @@ impl Server {
         self.reply.inputs = bit(self.inputs.interlock_closed(), INTERLOCK_CLOSED)
             | bit(self.inputs.emergency_stop(), EMERGENCY_STOP)
             | bit(self.inputs.local_reset(), LOCAL_RESET)
-            | bit(!self.free_running && !self.faults.stalled(self.scans()), HELD)
-            | bit(self.faults.panic.load(Ordering::Acquire), MUST_PANIC);
+            | bit(!self.free_running && !self.faults.stalled(self.produced), HELD)
+            | bit(self.faults.must_panic(), MUST_PANIC);
     }
 
     /// Bytes from the board to the host; whether any could go.
@@ -240,6 +249,17 @@ impl Server {
         self.ram.write_ring(TO_DEVICE_AT, head, &bytes[..count])?;
         self.reply.to_device_head = head.wrapping_add(count as u32);
         Ok(true)
+    }
+
+    /// Takes codes for the drive.
+    fn play(&mut self, count: u32) -> io::Result<()> {
+        let mut bytes = [0; BLOCK_SAMPLE_BYTES];
+        let length = (2 * count as usize).min(bytes.len());
+        self.ram.read(DRIVE_AT, &mut bytes[..length])?;
+        let codes: Vec<i16> =
+            bytes[..length].as_chunks().0.iter().map(|pair| i16::from_le_bytes(*pair)).collect();
+        // a drive in virtual time does not run dry
+        self.drive.play(&codes).map_err(|_| io::Error::other("the simulated drive ran dry"))
     }
 
     /// Moves hammer and laser.

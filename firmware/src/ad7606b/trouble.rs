@@ -1,0 +1,30 @@
+//! What goes wrong with the converters while they run, in the words that reach the host.
+
+use core::fmt;
+
+/// A front end's trouble. The scans that it cost are reported as a lost range besides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Trouble {
+    /// No block came: BUSY does not fall, or nothing starts the read-out.
+    Silent,
+    /// A scan's CRC is wrong.
+    Crc,
+    /// Conversions whose end was not seen.
+    Slipped(u32),
+    /// The reader was too late for the rings.
+    Overrun,
+    /// The DMA reported an error.
+    Dma,
+}
+
+impl fmt::Display for Trouble {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Silent => f.write_str("BUSY stuck, or no read-out: no block came"),
+            Self::Crc => f.write_str("converter data: wrong CRC"),
+            Self::Slipped(scans) => write!(f, "{scans} conversions were never read"),
+            Self::Overrun => f.write_str("acquisition was too late for its rings"),
+            Self::Dma => f.write_str("DMA error while reading the converters"),
+        }
+    }
+}

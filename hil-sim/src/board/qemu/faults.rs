@@ -1,0 +1,112 @@
+//! Faults that a test declares: of the link, of the converters, of the program itself.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use jointrig_firmware::ad7606b::trouble::Trouble;
+use jointrig_firmware::lockstep::{Delivery, NEVER};
+
+/// What the converters do wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ConverterFault {
+    /// The board notices, says this, and delivers nothing.
+    Noticed(Trouble),
+    /// Nothing is delivered, and nobody on the board says anything: it waits.
+    Hung,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Converters {
+    fault: ConverterFault,
+    from_scan: u64,
+    scans: u64,
+}
+
+impl Converters {
+    fn covers(&self, scan: u64) -> bool {
+        scan >= self.from_scan && scan < self.from_scan + self.scans
+    }
+}
+
+/// The faults of one board.
+#[derive(Debug, Default)]
+pub struct Faults {
+    stall_from: AtomicU64,
+    stall_scans: AtomicU64,
+    panic: AtomicBool,
+    converters: Mutex<Option<Converters>>,
+}
+
+impl Faults {
+    /// From the block with this scan on, and for so many scans, the link moves nothing either way while
+    /// the board's time goes on, as when a PC is busy.
+    pub fn stall_link(&self, from_scan: u64, scans: u64) {
+        self.stall_from.store(from_scan, Ordering::Release);
+        self.stall_scans.store(scans, Ordering::Release);
+    }
+
+    /// From the block with this scan on, and for so many scans, the converters fail.
+    pub fn break_converters(&self, fault: ConverterFault, from_scan: u64, scans: u64) {
+        *self.converters.lock().unwrap_or_else(PoisonError::into_inner) =
+            Some(Converters { fault, from_scan, scans });
+    }
+
+    /// The acquisition task panics at its next block.
+    pub fn panic(&self) {
+        self.panic.store(true, Ordering::Release);
+    }
+
+    pub(super) fn must_panic(&self) -> bool {
+        self.panic.load(Ordering::Acquire)
+    }
+
+    /// Whether the link is stalled once so many scans were produced.
+    pub(super) fn stalled(&self, scans: u64) -> bool {
+        let from = self.stall_from.load(Ordering::Acquire);
+        let count = self.stall_scans.load(Ordering::Acquire);
+        count > 0 && scans >= from && scans < from.saturating_add(count)
+    }
+
+    fn converters(&self) -> Option<Converters> {
+        *self.converters.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// When the block comes that is waited for, and whose last scan is converted at `due_us`.
+    pub(super) fn delivered_at(&self, due_us: u64, rate_hz: u32, per_block: usize) -> u64 {
+        let Some(broken) = self.converters().filter(|broken| broken.fault == ConverterFault::Hung) else {
+            return due_us;
+        };
+        if due_us == NEVER {
+            return due_us;
+        }
+        let end_scan = (u128::from(due_us) * u128::from(rate_hz) / 1_000_000) as u64;
+        let first_scan = end_scan.saturating_sub(per_block as u64);
+        if !broken.covers(first_scan) {
+            return due_us;
+        }
+        let blocks = lost_blocks(&broken, first_scan, per_block);
+        due_us + (blocks * per_block as u64 * 1_000_000).div_ceil(u64::from(rate_hz))
+    }
+
+    /// The delivery after so many scans.
+    pub(super) fn delivery(&self, produced: u64, per_block: usize) -> Delivery {
+        let whole = Delivery { missed: 0, scans: per_block as u32, trouble: None };
+        match self.converters() {
+            Some(broken) if broken.covers(produced) => match broken.fault {
+                ConverterFault::Noticed(trouble) => {
+                    Delivery { missed: per_block as u32, scans: 0, trouble: Some(trouble) }
+                }
+                ConverterFault::Hung => {
+                    let blocks = lost_blocks(&broken, produced, per_block);
+                    Delivery { missed: (blocks * per_block as u64) as u32, ..whole }
+                }
+            },
+            _ => whole,
+        }
+    }
+}
+
+/// Blocks from `first_scan` on that do not come.
+fn lost_blocks(broken: &Converters, first_scan: u64, per_block: usize) -> u64 {
+    (broken.from_scan + broken.scans - first_scan).div_ceil(per_block as u64)
+}

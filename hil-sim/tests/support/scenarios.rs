@@ -1,0 +1,207 @@
+//! What must hold on every virtual board, native or emulated: each scenario takes a board's buttons and a host.
+
+use jointrig_hil_sim::board::Controls;
+use jointrig_hil_sim::rig::RigConfig;
+use jointrig_protocol::answer::{Answer, Hammer, Refusal, Shaker};
+use jointrig_protocol::event::{Event, Reason};
+use jointrig_protocol::limits::{COIL_PULSE_CAP_US, SHAKE_RAMP_MS};
+use jointrig_protocol::request::{Configuration, Request, Shake};
+use jointrig_protocol::shot::Phase;
+
+use super::{PULSE_US, SmallHost};
+
+const RATE: u32 = 51_200;
+/// Place of the excitation channel in a scan.
+const EXCITATION: usize = 9;
+const AMPLITUDE_V: f32 = 2.0;
+
+/// An order for 200 Hz that rises in a tenth of a second.
+pub fn shake() -> Shake {
+    Shake {
+        step: Shake::step_of(200.0, RATE),
+        amplitude_v: AMPLITUDE_V,
+        slew_v_per_s: 20.0,
+        valid_ms: 30_000,
+        limits: heapless::Vec::new(),
+    }
+}
+
+/// Whatever was ordered, no pulse was longer than the cap.
+pub fn the_coil_kept_its_cap(controls: &Controls) {
+    let pulses = controls.coil_pulses_us();
+    assert!(pulses.iter().all(|pulse| *pulse <= COIL_PULSE_CAP_US), "{pulses:?}");
+}
+
+pub fn a_shot_without_arming_is_refused(controls: &Controls, host: &mut SmallHost) {
+    host.start();
+    let order = Request::Fire(SmallHost::order(1, PULSE_US, 0));
+    assert_eq!(host.ask(order), Err(Refusal::NotArmed));
+    host.go_on(RATE.into());
+    assert_eq!(host.status().hammer, Hammer::Disarmed);
+    assert!(controls.coil_pulses_us().is_empty());
+}
+
+pub fn one_arming_allows_one_shot(controls: &Controls, host: &mut SmallHost) {
+    host.start();
+    let at = host.stage(Configuration::Ajb, "AZ3", "A3", 0);
+    assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
+    let order = |number, not_before| Request::Fire(SmallHost::order(number, PULSE_US, not_before));
+    assert_eq!(host.ask(order(1, at + host.lead())), Ok(Answer::Scheduled { number: 1 }));
+    assert_eq!(host.ask(order(2, 0)), Err(Refusal::Busy), "while the first one waits");
+    host.release();
+    host.until("the shot", |host| host.phases().contains(&Phase::Done));
+    assert_eq!(host.ask(order(3, 0)), Err(Refusal::NotArmed), "after the first one");
+    host.go_on(2 * u64::from(RATE));
+    assert_eq!(controls.coil_pulses_us(), [PULSE_US]);
+    assert_eq!(host.status().hammer, Hammer::Disarmed);
+}
+
+pub fn hammer_and_shaker_exclude_each_other(controls: &Controls, host: &mut SmallHost) {
+    assert_eq!(host.ask(Request::Shake(shake())), Err(Refusal::NotStreaming));
+    host.start();
+    assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
+    assert_eq!(host.ask(Request::Shake(shake())), Err(Refusal::HammerArmed));
+    assert_eq!(host.ask(Request::Disarm), Ok(Answer::Done));
+    assert_eq!(host.ask(Request::Shake(shake())), Ok(Answer::Done));
+    let order = || Request::Fire(SmallHost::order(1, PULSE_US, 0));
+    assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Err(Refusal::ShakerRuns));
+    assert_eq!(host.ask(order()), Err(Refusal::ShakerRuns));
+    host.go_on(RATE.into());
+    assert_eq!(host.status().shaker, Shaker::Steady);
+    assert_eq!(host.ask(Request::Rest), Ok(Answer::Done));
+    host.until("rest", |host| host.events.contains(&Event::ShakerRests));
+    assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
+    assert!(controls.coil_pulses_us().is_empty());
+}
+
+/// Peak code of the excitation channel in some last scans.
+fn excitation(host: &SmallHost, scans: usize) -> i16 {
+    let first = host.codes.len() - scans * host.channels;
+    let codes = host.codes[first..].iter().skip(EXCITATION).step_by(host.channels);
+    codes.map(|code| code.saturating_abs()).max().unwrap()
+}
+
+pub fn the_shaker_pushes_as_ordered_and_comes_to_rest(host: &mut SmallHost) {
+    host.start();
+    assert_eq!(host.ask(Request::Shake(shake())), Ok(Answer::Done));
+    host.go_on(RATE.into());
+    let status = host.status();
+    assert_eq!((status.shaker, status.drive_v), (Shaker::Steady, AMPLITUDE_V));
+    let config = RigConfig::default();
+    let newtons = f64::from(AMPLITUDE_V) * config.shaker.gain_n_per_v;
+    let code = newtons / config.sensors.excitation.units_per_volt / 10.0 * 32_768.0;
+    // ten cycles; noise of the force cell adds some codes to the peak
+    let peak = f64::from(excitation(host, 2_560));
+    assert!((peak / code - 1.0).abs() < 0.02, "{peak} for {code}");
+    assert_eq!(host.ask(Request::Rest), Ok(Answer::Done));
+    host.until("rest", |host| host.events.contains(&Event::ShakerRests));
+    host.go_on(u64::from(RATE / 1000 * SHAKE_RAMP_MS) + 5_120);
+    assert!(f64::from(excitation(host, 2_560)) < 0.02 * code);
+    assert_eq!(host.status().shaker, Shaker::Resting);
+}
+
+pub fn a_limit_brings_the_shaker_to_rest(host: &mut SmallHost) {
+    host.start();
+    let config = RigConfig::default();
+    let mut order = shake();
+    for _ in 0..EXCITATION {
+        order.limits.push(0.0).unwrap();
+    }
+    // half of the force that the order would come to
+    order.limits.push((f64::from(AMPLITUDE_V) * config.shaker.gain_n_per_v / 2.0) as f32).unwrap();
+    assert_eq!(host.ask(Request::Shake(order)), Ok(Answer::Done));
+    host.until("rest", |host| host.events.contains(&Event::ShakerRests));
+    let reason = Reason::Limit { channel: EXCITATION as u8 };
+    assert!(host.events.contains(&Event::ShakerStops(reason)), "{:?}", host.events);
+}
+
+pub fn a_stop_in_mid_pulse_takes_the_coil_away(controls: &Controls, host: &mut SmallHost) {
+    host.start();
+    host.stage(Configuration::Ajb, "AZ3", "A3", 0);
+    let held = host.acknowledged();
+    // the held board halts half a ring on, a hundred scans (2 ms) or a few blocks after the coil went on
+    let halt = held + u64::from(host.hello.unwrap().ring_scans / 2);
+    assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
+    let order = Request::Fire(SmallHost::order(1, COIL_PULSE_CAP_US, halt - 100));
+    assert_eq!(host.ask(order), Ok(Answer::Scheduled { number: 1 }));
+    host.until("the coil", |host| host.phases().contains(&Phase::Firing));
+    host.until("the halt", |host| host.next_scan >= halt);
+    assert_eq!(controls.coil_pulses_us(), [COIL_PULSE_CAP_US]);
+    controls.press_emergency_stop(true);
+    host.release();
+    host.until("the stop", |host| host.events.contains(&Event::EmergencyStop(true)));
+    host.go_on(RATE.into());
+    // 100 scans and two blocks of 24 at most
+    let pulses = controls.coil_pulses_us();
+    assert!(pulses.len() == 1 && (1_000..3_000).contains(&pulses[0]), "{pulses:?}");
+    let status = host.status();
+    assert!(status.emergency_stop);
+    assert!(matches!(status.hammer, Hammer::Disarmed | Hammer::HoldOff), "{status:?}");
+    assert_eq!(host.ask(Request::Arm { valid_ms: 1000 }), Err(Refusal::EmergencyStop));
+}
+
+pub fn a_stop_takes_the_shaker_away_without_a_ramp(controls: &Controls, host: &mut SmallHost) {
+    host.start();
+    assert_eq!(host.ask(Request::Shake(shake())), Ok(Answer::Done));
+    host.go_on(RATE.into());
+    controls.press_emergency_stop(true);
+    host.until("the stop", |host| host.events.contains(&Event::EmergencyStop(true)));
+    assert!(host.events.contains(&Event::ShakerStops(Reason::EmergencyStop)));
+    let status = host.status();
+    assert_eq!((status.shaker, status.drive_v), (Shaker::Resting, 0.0));
+    host.go_on(RATE.into());
+    assert!(excitation(host, 2_560) < 20);
+    assert_eq!(host.ask(Request::Shake(shake())), Err(Refusal::EmergencyStop));
+}
+
+pub fn an_open_guard_brings_the_shaker_to_rest(controls: &Controls, host: &mut SmallHost) {
+    host.start();
+    assert_eq!(host.ask(Request::Shake(shake())), Ok(Answer::Done));
+    controls.open_guard(true);
+    host.until("rest", |host| host.events.contains(&Event::ShakerRests));
+    assert!(host.events.contains(&Event::ShakerStops(Reason::Interlock)));
+    assert_eq!(host.ask(Request::Shake(shake())), Err(Refusal::Interlock));
+}
+
+/// Needs a board whose time goes on without its host.
+pub fn a_host_that_is_gone_leaves_nothing_moving(controls: &Controls, host: &mut SmallHost) {
+    host.start();
+    assert_eq!(host.ask(Request::Shake(shake())), Ok(Answer::Done));
+    silence(host);
+    let status = host.status();
+    assert_eq!((status.shaker, status.drive_v), (Shaker::Resting, 0.0));
+    assert!(host.events.contains(&Event::ShakerStops(Reason::LinkLost)), "{:?}", host.events);
+    assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
+    silence(host);
+    assert_eq!(host.status().hammer, Hammer::Disarmed);
+    assert!(host.events.contains(&Event::Disarmed(Reason::LinkLost)), "{:?}", host.events);
+    assert!(controls.coil_pulses_us().is_empty());
+}
+
+/// Says and reads nothing for many seconds of the board's time.
+fn silence(host: &mut SmallHost) {
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    host.pump();
+}
+
+/// What a board says and does when its front end fails for so long.
+pub fn after_a_front_end_failure(host: &mut SmallHost, from: u64, scans: u64) {
+    let end = from + scans + u64::from(RATE);
+    host.until("the end of the failure", |host| host.latest >= end);
+    let missing: u64 = host.gaps.iter().map(|(first, end)| end - first).sum();
+    let status = host.status();
+    assert_eq!(status.counters.scans_missed, missing, "what is missing is what was counted");
+    assert!(missing >= scans && missing < scans + 48, "{missing} of {scans}");
+    let told: u64 = host
+        .events
+        .iter()
+        .map(|event| match event {
+            Event::Lost { scans, .. } => u64::from(*scans),
+            _ => 0,
+        })
+        .sum();
+    assert_eq!(told, missing, "what is missing is what was told");
+    assert!(host.events.contains(&Event::Disarmed(Reason::FrontEnd)), "{:?}", host.events);
+    assert_eq!(status.hammer, Hammer::Disarmed);
+    assert!(status.streaming && status.epoch == host.epoch, "no reset");
+}
