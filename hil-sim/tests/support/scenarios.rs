@@ -191,7 +191,8 @@ pub fn after_a_front_end_failure(host: &mut SmallHost, from: u64, scans: u64) {
     let missing: u64 = host.gaps.iter().map(|(first, end)| end - first).sum();
     let status = host.status();
     assert_eq!(status.counters.scans_missed, missing, "what is missing is what was counted");
-    assert!(missing >= scans && missing < scans + 48, "{missing} of {scans}");
+    // to whole blocks
+    assert!(missing > 0 && missing.abs_diff(scans) <= 24, "{missing} of {scans}");
     let told: u64 = host
         .events
         .iter()

@@ -67,6 +67,16 @@ impl Faults {
         count > 0 && scans >= from && scans < from.saturating_add(count)
     }
 
+    /// Whether the board's clock waits for nobody once so many scans were produced: what a host is not sent it cannot
+    /// acknowledge, so a board must not wait for that until it has delivered again.
+    pub(super) fn let_run(&self, scans: u64, per_block: usize) -> bool {
+        let again = 2 * per_block as u64;
+        let failing = |broken: Converters| {
+            scans + again >= broken.from_scan && scans < broken.from_scan + broken.scans + again
+        };
+        self.stalled(scans) || self.converters().is_some_and(failing)
+    }
+
     fn converters(&self) -> Option<Converters> {
         *self.converters.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -214,7 +214,7 @@ impl Server {
         self.reply.inputs = bit(self.inputs.interlock_closed(), INTERLOCK_CLOSED)
             | bit(self.inputs.emergency_stop(), EMERGENCY_STOP)
             | bit(self.inputs.local_reset(), LOCAL_RESET)
-            | bit(!self.free_running && !self.faults.stalled(self.produced), HELD)
+            | bit(!self.free_running && !self.faults.let_run(self.produced, self.per_block), HELD)
             | bit(self.faults.must_panic(), MUST_PANIC);
     }
 
