@@ -66,7 +66,8 @@ pub enum Op {
     /// It has started and needs its [`Setup`]; the argument is the number of golden vectors that agree,
     /// or 0 when one differs.
     Start = 1,
-    /// All tasks wait: for a block, an alarm, bytes, or room for bytes.
+    /// All tasks wait: for a block, an alarm, bytes, or room for bytes. With an argument of 1 bytes come and go by
+    /// the UART, which the simulator does not see: it answers soon, whatever has come.
     Idle = 2,
     /// The coil on, for as many µs as the argument says.
     Pulse = 3,

@@ -2,8 +2,9 @@
 #![forbid(unsafe_code)]
 
 use std::net::TcpListener;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 use jointrig_hil_sim::board::VirtualBoard;
@@ -34,6 +35,9 @@ struct Serve {
     /// The rig's description; the built-in rig if left out.
     #[arg(long, value_name = "FILE.toml")]
     rig: Option<PathBuf>,
+    /// The firmware's image, to run under QEMU in place of the native board; it talks over its UART at the TCP address.
+    #[arg(long, value_name = "IMAGE", requires = "tcp", conflicts_with = "pty")]
+    image: Option<PathBuf>,
     /// Decides noise, scatter and every error of position.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -58,6 +62,9 @@ fn run(options: &Serve) -> Result<(), Box<dyn std::error::Error>> {
         ),
         None => None,
     };
+    if let (Some(image), Some(address)) = (&options.image, &options.tcp) {
+        return serve_image(image, address, rig.as_deref(), options.seed);
+    }
     let (_board, mut host) = VirtualBoard::start(rig.as_deref(), options.seed)?;
     if let Some(address) = &options.tcp {
         let listener = TcpListener::bind(address).map_err(|error| {
@@ -69,6 +76,33 @@ fn run(options: &Serve) -> Result<(), Box<dyn std::error::Error>> {
         serve_terminal(&mut host)?;
     }
     Ok(())
+}
+
+/// Runs the image until it ends: QEMU itself listens at the address.
+#[cfg(unix)]
+fn serve_image(
+    image: &Path,
+    address: &str,
+    rig: Option<&str>,
+    seed: u64,
+) -> Result<(), Box<dyn std::error::Error>> {
+    use jointrig_hil_sim::board::Options;
+    use jointrig_hil_sim::board::qemu::QemuBoard;
+    use jointrig_hil_sim::rig::RigConfig;
+
+    let config = rig.map_or_else(|| Ok(RigConfig::default()), RigConfig::from_toml)?;
+    let uart = Some(format!("tcp:{address},server=on,wait=off"));
+    let options = Options { seed, uart, ..Options::default() };
+    let (board, mut link) = QemuBoard::start_with(image, &config, &options)?;
+    println!("tcp:{address}");
+    // nothing comes this way; it ends with the board
+    while link.read(&mut [0; 64], Duration::from_secs(1)).is_ok() {}
+    Err(board.failure().unwrap_or_else(|| "the emulated board has ended".into()).into())
+}
+
+#[cfg(not(unix))]
+fn serve_image(_: &Path, _: &str, _: Option<&str>, _: u64) -> Result<(), Box<dyn std::error::Error>> {
+    Err("the emulated board needs shared memory as Unix systems have it".into())
 }
 
 #[cfg(unix)]

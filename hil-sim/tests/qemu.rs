@@ -7,6 +7,8 @@
 
 mod support;
 
+use std::io::{Read, Write};
+use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -14,9 +16,13 @@ use jointrig_firmware::ad7606b::trouble::Trouble;
 use jointrig_hil_sim::board::qemu::{ConverterFault, QemuBoard, QemuError};
 use jointrig_hil_sim::board::{Controls, Options, VirtualBoard};
 use jointrig_hil_sim::rig::RigConfig;
-use jointrig_protocol::answer::{Answer, Hammer, Refusal};
+use jointrig_protocol::answer::{self, Answer, Hammer, Refusal};
+use jointrig_protocol::block::Block;
 use jointrig_protocol::event::{Event, Loss, Reason};
-use jointrig_protocol::request::{Configuration, Request};
+use jointrig_protocol::frame::{Accumulator, Kind, encode};
+use jointrig_protocol::hello::Hello;
+use jointrig_protocol::limits::MAX_WIRE;
+use jointrig_protocol::request::{Configuration, Numbered, Request};
 use support::{SmallHost, scenarios};
 
 fn image() -> Option<PathBuf> {
@@ -240,4 +246,57 @@ fn converters_that_hang_the_board_disarm_it_too() {
     let at = |wanted: &Event| host.events.iter().position(|event| event == wanted);
     let lost = host.events.iter().position(|event| matches!(event, Event::Lost { .. }));
     assert!(at(&Event::Disarmed(Reason::FrontEnd)) < lost, "while it hangs, not after it");
+}
+
+#[test]
+fn the_uart_is_a_link_too() {
+    let Some(image) = image() else { return };
+    let socket = std::env::temp_dir().join(format!("jointrig-uart-{}", std::process::id()));
+    let uart = Some(format!("unix:{},server=on,wait=off", socket.display()));
+    let options = Options { seed: 1, uart, ..Options::default() };
+    let (board, _link) = QemuBoard::start_with(&image, &RigConfig::default(), &options).unwrap();
+    let mut line = UnixStream::connect(&socket).unwrap();
+    line.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
+    let mut wire = [0; MAX_WIRE];
+    line.write_all(encode(Kind::Hello, &Hello::host(5).to_bytes(), &mut wire).unwrap()).unwrap();
+    let (mut accumulator, mut heard, mut bytes) = (Accumulator::new(), Vec::new(), [0; 512]);
+    let mut number = 0;
+    let mut ask = |line: &mut UnixStream, request: Request| {
+        number += 1;
+        let mut bytes = [0; 64];
+        let numbered = postcard::to_slice(&Numbered { number, request }, &mut bytes).unwrap();
+        line.write_all(encode(Kind::Request, numbered, &mut [0; MAX_WIRE]).unwrap()).unwrap();
+    };
+    // the handshake, an answer, and a second of samples that nobody has acknowledged
+    let mut scans = 0;
+    while scans < 20_000 {
+        let count = line.read(&mut bytes).unwrap();
+        let mut rest = &bytes[..count];
+        while !rest.is_empty() {
+            let (used, frame) = accumulator.feed(rest);
+            rest = &rest[used..];
+            let Some(frame) = frame else { continue };
+            let frame = frame.unwrap();
+            match frame.kind {
+                Kind::Hello => {
+                    assert_eq!(Hello::from_bytes(frame.payload).unwrap().session, 5);
+                    ask(&mut line, Request::Info);
+                }
+                Kind::Answer => {
+                    heard.push(
+                        postcard::from_bytes::<answer::Numbered>(frame.payload).unwrap().outcome.unwrap(),
+                    );
+                    if heard.len() == 1 {
+                        ask(&mut line, Request::Start);
+                    }
+                }
+                Kind::Samples => scans += u32::from(Block::from_payload(frame.payload).unwrap().header.scans),
+                _ => {}
+            }
+        }
+    }
+    assert!(matches!(&heard[..], [Answer::Info(info), Answer::Started { .. }] if info.board == "mps2-an505"));
+    drop(board);
+    // QEMU made it
+    let _ = std::fs::remove_file(socket);
 }

@@ -29,7 +29,7 @@ const fn budget(name: &'static str, what: &'static str, limit: u64) -> Budget {
 const SCANS: [Budget; 5] = [
     budget("scan.steady", "streaming, hammer at rest", 800),
     budget("scan.waiting", "streaming, judging three channels for quiet", 800),
-    budget("scan.shaking", "streaming, shaker running, two channels within limits", 1_000),
+    budget("scan.shaking", "streaming, shaker running, two channels within limits", 800),
     budget("scan.flight", "streaming, hammer in flight", 800),
     budget("scan.listening", "streaming, following force and friction after contact", 800),
 ];

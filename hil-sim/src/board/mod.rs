@@ -43,6 +43,9 @@ pub struct Options {
     pub free_running: bool,
     /// The device's count of its own starts.
     pub boot: u32,
+    /// For an emulated board: its link is UART 0, connected to this (QEMU's `-serial`), and not the end returned. Such a
+    /// run is not repeatable.
+    pub uart: Option<String>,
 }
 
 /// Why a board could not start or has stopped.

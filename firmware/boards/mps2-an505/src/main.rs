@@ -9,7 +9,7 @@
 //!
 //! | argument | what |
 //! |---|---|
-//! | `serve` | runs the firmware for a simulator, which starts QEMU itself |
+//! | `serve` | runs the firmware for a simulator, which starts QEMU itself; with the further argument `uart`, the link is UART 0 |
 //! | `golden` | compares all golden vectors of the wire with this build's frames, and copies of memory with their originals |
 //! | `bench` | counts instructions; QEMU must run with `-icount shift=10,sleep=off` |
 #![no_std]
@@ -26,6 +26,7 @@ mod parts;
 mod port;
 mod stack;
 mod time;
+mod uart;
 
 use core::hint::black_box;
 
@@ -40,8 +41,15 @@ use semihosting::{eprintln, println, process};
 #[cortex_m_rt::entry]
 fn main() -> ! {
     // a command line that cannot be read is treated as none
-    match args::<256>().ok().as_ref().and_then(|mut words| words.next()) {
-        Some(Ok("serve")) => serve(),
+    let words = args::<256>().ok();
+    let mut words = words.as_ref().into_iter().flatten();
+    match words.next() {
+        Some(Ok("serve")) => {
+            if words.next() == Some(Ok("uart")) {
+                uart::start();
+            }
+            serve()
+        }
         Some(Ok("golden")) => vectors(),
         Some(Ok("bench")) => bench::run(),
         _ => {

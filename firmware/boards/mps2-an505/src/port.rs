@@ -81,16 +81,17 @@ pub fn turn(op: Op, argument: u32) -> Reply {
 pub fn idle(alarm_us: u64) {
     with(|port| port.ask.alarm_us = alarm_us);
     let before = with(|port| port.reply);
-    let reply = turn(Op::Idle, 0);
+    let by_uart = crate::uart::is_link();
+    let reply = turn(Op::Idle, u32::from(by_uart));
     crate::time::set(reply.now_us);
     with(|port| {
         if reply.blocks != before.blocks {
             port.block.wake();
         }
-        if reply.to_device_head != port.ask.to_device_tail {
+        if by_uart || reply.to_device_head != port.ask.to_device_tail {
             port.bytes.wake();
         }
-        if reply.to_host_tail != before.to_host_tail {
+        if by_uart || reply.to_host_tail != before.to_host_tail {
             port.room.wake();
         }
     });

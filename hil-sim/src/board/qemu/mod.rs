@@ -90,7 +90,7 @@ impl QemuBoard {
         if !image.is_file() {
             return Err(QemuError::NoImage(image.to_path_buf()));
         }
-        let (emulator, pipes, ram) = Emulator::start(image)?;
+        let (emulator, pipes, ram) = Emulator::start(image, options.uart.as_deref())?;
         let emulator = Arc::new(emulator);
         let (host, device) = pair();
         let (controls, faults) = (Arc::new(Controls::default()), Arc::new(Faults::default()));

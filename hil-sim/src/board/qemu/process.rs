@@ -30,17 +30,18 @@ pub struct Emulator {
 }
 
 impl Emulator {
-    /// Starts QEMU with this image.
-    pub fn start(image: &Path) -> Result<(Self, Pipes, SharedRam), QemuError> {
+    /// Starts QEMU with this image; `uart` is what QEMU connects UART 0 to, as the board's link.
+    pub fn start(image: &Path, uart: Option<&str>) -> Result<(Self, Pipes, SharedRam), QemuError> {
         let memory = |source| QemuError::Memory { folder: shared_ram::folder(), source };
         let ram = SharedRam::create().map_err(memory)?;
         let path = ram.path().map(|path| path.display().to_string()).unwrap_or_default();
+        let argument = if uart.is_some() { ",arg=uart" } else { "" };
         let mut command = Command::new(PROGRAM);
         command
             .args(["-M", "mps2-an505,memory-backend=r", "-display", "none", "-monitor", "none"])
-            .args(["-serial", "null"])
+            .args(["-serial", uart.unwrap_or("null")])
             .args(["-object", &format!("memory-backend-file,id=r,size=16M,mem-path={path},share=on")])
-            .args(["-semihosting-config", "enable=on,target=native,arg=serve"])
+            .args(["-semihosting-config", &format!("enable=on,target=native,arg=serve{argument}")])
             .arg("-kernel")
             .arg(image)
             .stdin(Stdio::piped())

@@ -6,6 +6,7 @@ use std::pin::pin;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::task::{Context, Poll, Waker};
+use std::time::Duration;
 
 use jointrig_firmware::board::{ByteSink, ByteSource, Coil, Drive, Inputs, Stage};
 use jointrig_firmware::lockstep::{
@@ -27,6 +28,9 @@ use crate::board::{Controls, Options, name, ring_slots};
 use crate::executor::Woken;
 use crate::link::DeviceEnd;
 use crate::rig::Rig;
+
+/// How long a board whose link is its UART may stand still.
+const UART_LOOK: Duration = Duration::from_micros(200);
 
 /// Why serving ended, in a sentence.
 type Ended = String;
@@ -178,6 +182,10 @@ impl Server {
             }
             if stalled || self.free_running || ask.block_us != NEVER {
                 self.go_on(ask)?;
+                return Ok(Next::Answer);
+            }
+            if ask.argument == 1 {
+                std::thread::sleep(UART_LOOK);
                 return Ok(Next::Answer);
             }
             self.link.sleep(&self.woken);
