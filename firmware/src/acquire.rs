@@ -6,19 +6,20 @@
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use jointrig_protocol::block::{OVER_RANGE, TRIGGER};
-use jointrig_protocol::event::{Event, Loss, Reason};
+use jointrig_protocol::event::{Event, Loss};
 use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
 
 use crate::Core;
-use crate::board::{Coil, Delivered, Inputs, Scans};
+use crate::board::{Coil, Delivered, Drive, Inputs, Scans};
 use crate::hammer::{CoilOrder, Scanned};
 use crate::ring::Range;
 
 /// Runs for ever.
-pub async fn acquire<M: RawMutex, S: Scans, C: Coil, I: Inputs>(
+pub async fn acquire<M: RawMutex, S: Scans, C: Coil, D: Drive, I: Inputs>(
     core: &Core<'_, M>,
     scans: &mut S,
     coil: &mut C,
+    drive: &mut D,
     inputs: &mut I,
 ) -> ! {
     let mut samples = Aligned([0; BLOCK_SAMPLE_BYTES]);
@@ -31,7 +32,10 @@ pub async fn acquire<M: RawMutex, S: Scans, C: Coil, I: Inputs>(
         core.take(delivered, &samples.0);
         match core.with(|state| state.coil.take()) {
             Some(CoilOrder::Pulse(width_us)) => coil.pulse(width_us.min(coil.cap_us())),
-            Some(CoilOrder::Off) => coil.off(),
+            Some(CoilOrder::Off) => {
+                coil.off();
+                drive.rest();
+            }
             None => {}
         }
         core.to_send.signal(());
@@ -92,27 +96,17 @@ impl<M: RawMutex> Core<'_, M> {
     }
 
     /// Interlock and emergency stop, once a block. The hardware acts on both by itself; this is how the
-    /// machine learns of it.
+    /// machine learns of it. A board whose inputs interrupt tells sooner ([`Core::see_inputs`]).
     fn watch_inputs(&self, inputs: &mut impl Inputs) {
         let closed = inputs.interlock_closed();
         let pressed = inputs.emergency_stop();
         let reset = inputs.local_reset();
         self.with(|state| {
-            if pressed {
-                if !state.emergency_stop {
-                    state.stop_everything();
-                }
-            } else if state.emergency_stop && reset {
+            if state.emergency_stop && !pressed && reset {
                 state.emergency_stop = false;
                 state.say(Event::EmergencyStop(false));
             }
-            if closed != state.interlock_closed {
-                state.interlock_closed = closed;
-                state.say(Event::Interlock(closed));
-            }
-            if !closed {
-                state.disarm(Reason::Interlock);
-            }
+            state.heed(closed, pressed);
         });
     }
 

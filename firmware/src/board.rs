@@ -1,4 +1,4 @@
-//! What a board must bring: scans, a coil, two inputs, bytes in, bytes out, and perhaps a stage.
+//! What a board must bring: scans, a coil, a drive, two inputs, bytes in, bytes out, and perhaps a stage.
 //!
 //! The contract is small on purpose. Everything that can be decided above it is decided above it, where
 //! a PC can test it; what stands here is what only hardware can do. A board groups its parts under
@@ -18,6 +18,8 @@ pub trait Board {
     type Scans: Scans;
     /// The hammer's coil.
     type Coil: Coil;
+    /// The shaker's drive.
+    type Drive: Drive;
     /// Interlock, emergency stop, local reset.
     type Inputs: Inputs;
     /// Bytes from the host.
@@ -63,6 +65,43 @@ pub trait Coil {
 
     /// De-energises the coil at once.
     fn off(&mut self);
+}
+
+/// The shaker's drive: a converter that plays one code per scan, from the scans' own timer.
+pub trait Drive {
+    /// Output at the largest code, V; 0 when the board drives no shaker.
+    fn full_scale_v(&self) -> f32;
+
+    /// Takes the codes of as many scans as the block that was just delivered had. They are played without
+    /// a gap after those given before; what follows the last code given is rest (0 V).
+    ///
+    /// # Errors
+    /// [`RanDry`] when the converter has already passed the end of what was given before: it rests, and took nothing.
+    fn play(&mut self, codes: &[i16]) -> Result<(), RanDry>;
+
+    /// To rest at once, whatever was given before.
+    fn rest(&mut self);
+}
+
+/// The drive was given its codes too late.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct RanDry;
+
+/// A board without a shaker.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoDrive;
+
+impl Drive for NoDrive {
+    fn full_scale_v(&self) -> f32 {
+        0.0
+    }
+
+    fn play(&mut self, _codes: &[i16]) -> Result<(), RanDry> {
+        Err(RanDry)
+    }
+
+    fn rest(&mut self) {}
 }
 
 /// Inputs at the rig that no host can overrule.

@@ -44,7 +44,8 @@ pub struct Facts<'a> {
     pub coil_cap_us: u32,
     /// Whether the board has a stage.
     pub stage: bool,
-    /// How often the device has started; the first stream's epoch.
+    /// Tells this start from all others: one more than the last start's, or a number that none had. Its low 16 bits
+    /// are the upper ones of the first stream's epoch.
     pub boot: u32,
 }
 
@@ -127,6 +128,25 @@ impl<'a, M: RawMutex> Core<'a, M> {
         self.state.lock(|state| f(&mut state.borrow_mut()))
     }
 
+    /// Guard and emergency stop as they are now, told by a board whose inputs interrupt; from any task, whatever
+    /// acquisition does. The host hears of a change even when no blocks come.
+    ///
+    /// Returns whether the caller must take the coil's current away at once. Acquisition gets the same
+    /// order, so that one of the two carries it out when the other is stuck.
+    #[must_use]
+    pub fn see_inputs(&self, interlock_closed: bool, emergency_stop: bool) -> bool {
+        let danger = !interlock_closed || emergency_stop;
+        self.with(|state| {
+            state.heed(interlock_closed, emergency_stop);
+            if danger {
+                // whatever state the machine believes in
+                state.coil = Some(CoilOrder::Off);
+            }
+        });
+        self.to_send.signal(());
+        danger
+    }
+
     /// Scans that can be sent again.
     pub fn ring_scans(&self) -> u32 {
         self.with(|state| state.ring.capacity_scans())
@@ -196,6 +216,21 @@ impl State<'_> {
         Ok(())
     }
 
+    /// Heeds guard and emergency stop as they are now. Releasing the stop is not heeded here: that takes a
+    /// reset at the rig.
+    pub fn heed(&mut self, interlock_closed: bool, pressed: bool) {
+        if pressed && !self.emergency_stop {
+            self.stop_everything();
+        }
+        if interlock_closed != self.interlock_closed {
+            self.interlock_closed = interlock_closed;
+            self.say(Event::Interlock(interlock_closed));
+        }
+        if !interlock_closed {
+            self.disarm(Reason::Interlock);
+        }
+    }
+
     /// Latches the emergency stop.
     pub fn stop_everything(&mut self) {
         if !self.emergency_stop {
@@ -215,5 +250,85 @@ impl State<'_> {
             warning!("{} scans from {} were lost", scans, range.first_scan);
             self.say(Event::Lost { epoch: self.epoch, first_scan: range.first_scan, scans, why });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+    use jointrig_protocol::channel::{Axis, Quantity, Role};
+    use std::vec::Vec;
+
+    use super::*;
+
+    /// A device that streams and whose hammer is armed.
+    fn armed<'a>(channels: &'a [Channel], slots: &'a mut [Slot]) -> Core<'a, NoopRawMutex> {
+        let facts = Facts {
+            board: Name::new(),
+            serial: Name::new(),
+            target: String::new(),
+            build: 0,
+            scan_rate_hz: 51_200,
+            channels,
+            coil_cap_us: 8_000,
+            stage: false,
+            boot: 1,
+        };
+        let core = Core::new(facts, slots);
+        core.with(|state| {
+            state.streaming = true;
+            state.hammer.arm(0, 1_000).expect("a hammer at rest");
+        });
+        core
+    }
+
+    fn channel(role: Role) -> Channel {
+        Channel {
+            name: Name::new(),
+            role,
+            quantity: Quantity::Force,
+            units_per_volt: 1.0,
+            range_v: 10.0,
+            delay_ns: 0,
+            bits: 16,
+        }
+    }
+
+    fn said(core: &Core<'_, NoopRawMutex>) -> Vec<Event> {
+        core.with(|state| core::iter::from_fn(|| state.events.pop_front()).map(|event| event.event).collect())
+    }
+
+    #[test]
+    fn inputs_are_heeded_and_told_without_a_block() {
+        let channels = [channel(Role::HammerForce), channel(Role::Response(Axis::Z))];
+        let mut slots = [Slot::EMPTY; 2];
+        let core = armed(&channels, &mut slots);
+        assert!(!core.see_inputs(true, false));
+        assert_eq!(said(&core), []);
+        assert!(core.to_send.try_take().is_some());
+
+        assert!(core.see_inputs(false, false));
+        assert_eq!(said(&core), [Event::Interlock(false), Event::Disarmed(Reason::Interlock)]);
+        assert_eq!(core.with(|state| state.coil.take()), Some(CoilOrder::Off));
+        assert_eq!(core.with(|state| state.may_move()), Err(Refusal::Interlock));
+        // the same again: nothing new to tell, but still an order
+        assert!(core.see_inputs(false, false));
+        assert_eq!(said(&core), []);
+        assert_eq!(core.with(|state| state.coil.take()), Some(CoilOrder::Off));
+        assert!(!core.see_inputs(true, false));
+        assert_eq!(said(&core), [Event::Interlock(true)]);
+    }
+
+    #[test]
+    fn an_emergency_stop_stays_when_its_button_is_released() {
+        let channels = [channel(Role::HammerForce)];
+        let mut slots = [Slot::EMPTY; 2];
+        let core = armed(&channels, &mut slots);
+        assert!(core.see_inputs(true, true));
+        assert_eq!(said(&core), [Event::EmergencyStop(true), Event::Disarmed(Reason::EmergencyStop)]);
+        assert!(!core.see_inputs(true, false));
+        assert_eq!(said(&core), []);
+        assert_eq!(core.with(|state| state.may_move()), Err(Refusal::EmergencyStop));
     }
 }

@@ -16,7 +16,7 @@ use embassy_futures::select::{Either, select, select4};
 use embassy_futures::{block_on, yield_now};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use host::{Host, Interface};
-use jointrig_firmware::board::{Coil, Delivered, Inputs, NoStage, Scans};
+use jointrig_firmware::board::{Coil, Delivered, Inputs, NoDrive, NoStage, Scans};
 use jointrig_firmware::ring::Slot;
 use jointrig_firmware::usb::{Buffers, Speed, build};
 use jointrig_firmware::{Core, Facts, acquire, receive, transmit};
@@ -115,7 +115,7 @@ fn run<F: Future<Output = ()>>(speed: Speed, scenario: impl FnOnce(Session) -> F
         let mut scans = OnDemand { due, block: 0 };
         select4(
             usb.device.run(),
-            acquire::acquire(&core, &mut scans, &mut NoCoil, &mut AllWell),
+            acquire::acquire(&core, &mut scans, &mut NoCoil, &mut NoDrive, &mut AllWell),
             receive::receive(&core, &mut usb.source, &mut NoStage),
             transmit::transmit(&core, &mut usb.sink),
         )

@@ -16,6 +16,7 @@ use std::thread::JoinHandle;
 
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use heapless::String as Text;
+use jointrig_firmware::board::NoDrive;
 use jointrig_firmware::ring::Slot;
 use jointrig_firmware::{Core, Facts};
 use jointrig_protocol::limits::{COIL_PULSE_CAP_US, scans_per_block};
@@ -157,7 +158,7 @@ fn futures(
     let (a, b, c, d) = (Rc::clone(core), Rc::clone(core), Rc::clone(core), Rc::clone(core));
     vec![
         Box::pin(async move {
-            jointrig_firmware::acquire::acquire(&a, &mut scans, &mut coil, &mut inputs).await;
+            jointrig_firmware::acquire::acquire(&a, &mut scans, &mut coil, &mut NoDrive, &mut inputs).await;
         }),
         Box::pin(async move {
             jointrig_firmware::receive::receive(&b, &mut source, &mut stage).await;

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_time::{Instant, Timer};
-use jointrig_firmware::board::{Board, Coil, Delivered, Inputs, Scans, Stage};
+use jointrig_firmware::board::{Board, Coil, Delivered, Inputs, NoDrive, Scans, Stage};
 use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, COIL_PULSE_CAP_US};
@@ -23,6 +23,7 @@ impl Board for Virtual {
     type Mutex = NoopRawMutex;
     type Scans = VirtualScans;
     type Coil = VirtualCoil;
+    type Drive = NoDrive;
     type Inputs = VirtualInputs;
     type Source = DeviceEnd;
     type Sink = DeviceEnd;

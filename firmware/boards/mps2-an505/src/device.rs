@@ -1,7 +1,7 @@
 //! The device: the firmware's four functions as tasks over this board's parts.
 
 use heapless::{String, Vec};
-use jointrig_firmware::board::Board;
+use jointrig_firmware::board::{Board, NoDrive};
 use jointrig_firmware::lockstep::Setup;
 use jointrig_firmware::ring::Slot;
 use jointrig_firmware::{Core, Facts};
@@ -50,7 +50,7 @@ pub fn run(setup: &Setup) -> ! {
 
 #[embassy_executor::task]
 async fn acquire(core: &'static Shared, mut scans: Scans) {
-    jointrig_firmware::acquire::acquire(core, &mut scans, &mut Coil, &mut Inputs).await;
+    jointrig_firmware::acquire::acquire(core, &mut scans, &mut Coil, &mut NoDrive, &mut Inputs).await;
 }
 
 #[embassy_executor::task]

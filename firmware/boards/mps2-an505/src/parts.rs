@@ -23,6 +23,7 @@ impl board::Board for Emulated {
     type Mutex = CriticalSectionRawMutex;
     type Scans = Scans;
     type Coil = Coil;
+    type Drive = board::NoDrive;
     type Inputs = Inputs;
     type Source = Source;
     type Sink = Sink;

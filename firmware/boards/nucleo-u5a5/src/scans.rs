@@ -28,8 +28,10 @@ use crate::rings::{self, FIRST, SECOND};
 use crate::{BLOCK_SCANS, SCAN_RATE_HZ, Shared, watchdog};
 use core::sync::atomic::Ordering;
 
-/// CONVST is low for the first µs of each period and rises then: counts of 160 MHz.
-const CONVST_LOW: u32 = 160;
+/// Counts of the timers per second.
+pub const TIMER_HZ: u32 = 160_000_000;
+/// CONVST is low for the first µs of each period and rises then: counts of TIM2.
+pub const CONVST_LOW: u32 = TIMER_HZ / 1_000_000;
 /// A block takes 0.29 ms; this long without one is silence.
 const PATIENCE: Duration = Duration::from_millis(5);
 /// Between two tries to set silent converters up.
