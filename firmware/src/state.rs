@@ -257,10 +257,13 @@ impl State<'_> {
 mod tests {
     extern crate std;
     use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+    use jointrig_protocol::answer::Answer;
     use jointrig_protocol::channel::{Axis, Quantity, Role};
+    use jointrig_protocol::request::Request;
     use std::vec::Vec;
 
     use super::*;
+    use crate::board::NoStage;
 
     /// A device that streams and whose hammer is armed.
     fn armed<'a>(channels: &'a [Channel], slots: &'a mut [Slot]) -> Core<'a, NoopRawMutex> {
@@ -330,5 +333,28 @@ mod tests {
         assert!(!core.see_inputs(true, false));
         assert_eq!(said(&core), []);
         assert_eq!(core.with(|state| state.may_move()), Err(Refusal::EmergencyStop));
+    }
+
+    #[test]
+    fn no_two_streams_of_some_starts_have_one_epoch() {
+        let channels = [channel(Role::HammerForce)];
+        let mut epochs = Vec::new();
+        // a number of the RNG's, and the resets after it, over the end of what an epoch holds of it
+        for boot in [0xCAFE_FFFE_u32, 0xCAFE_FFFF, 0xCAFF_0000] {
+            let mut slots = [Slot::EMPTY; 2];
+            let mut core = armed(&channels, &mut slots);
+            core.facts.boot = boot;
+            for streams in [0, 1, 0xFFFF] {
+                core.with(|state| state.streams = streams);
+                let Ok(Answer::Started { epoch, .. }) = core.carry_out(&Request::Start, &mut NoStage) else {
+                    panic!("a stream can always be started");
+                };
+                epochs.push(epoch);
+            }
+        }
+        assert_eq!(epochs[..3], [0xFFFE_0000, 0xFFFE_0001, 0xFFFE_FFFF]);
+        epochs.sort_unstable();
+        epochs.dedup();
+        assert_eq!(epochs.len(), 9);
     }
 }
