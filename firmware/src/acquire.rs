@@ -105,27 +105,17 @@ impl<M: RawMutex> Core<'_, M> {
     }
 
     /// Interlock and emergency stop, once a block. The hardware acts on both by itself; this is how the
-    /// machine learns of it.
+    /// machine learns of it. A board whose inputs interrupt tells sooner ([`Core::see_inputs`]).
     fn watch_inputs(&self, inputs: &mut impl Inputs) {
         let closed = inputs.interlock_closed();
         let pressed = inputs.emergency_stop();
         let reset = inputs.local_reset();
         self.with(|state| {
-            if pressed {
-                if !state.emergency_stop {
-                    state.stop_everything();
-                }
-            } else if state.emergency_stop && reset {
+            if state.emergency_stop && !pressed && reset {
                 state.emergency_stop = false;
                 state.say(Event::EmergencyStop(false));
             }
-            if closed != state.interlock_closed {
-                state.interlock_closed = closed;
-                state.say(Event::Interlock(closed));
-            }
-            if !closed {
-                state.bring_to_rest(Reason::Interlock);
-            }
+            state.heed(closed, pressed);
         });
     }
 

@@ -1,4 +1,4 @@
-//! What a board must bring: scans, a coil, two inputs, bytes in, bytes out, and perhaps a stage.
+//! What a board must bring: scans, a coil, a drive, two inputs, bytes in, bytes out, and perhaps a stage.
 //!
 //! The contract is small on purpose. Everything that can be decided above it is decided above it, where
 //! a PC can test it; what stands here is what only hardware can do. A board groups its parts under

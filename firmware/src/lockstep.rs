@@ -246,7 +246,7 @@ impl Delivery {
     pub fn to_bytes(&self) -> [u8; DELIVERY_BYTES] {
         let trouble = match self.trouble {
             None => 0,
-            Some(Trouble::Silent) => 1,
+            Some(Trouble::Silent(..)) => 1,
             Some(Trouble::Crc) => 2,
             Some(Trouble::Overrun) => 3,
             Some(Trouble::Dma) => 4,
@@ -259,13 +259,13 @@ impl Delivery {
         bytes
     }
 
-    /// From memory. What slipped is what is missing.
+    /// From memory. What slipped is what is missing; the emulated converters are silent from the start.
     #[must_use]
     pub fn from_bytes(bytes: &[u8; DELIVERY_BYTES]) -> Self {
         let word = |place: usize| bytes.as_chunks().0.get(place).map_or(0, |word| u32::from_le_bytes(*word));
         let missed = word(0);
         let trouble = match word(2) {
-            1 => Some(Trouble::Silent),
+            1 => Some(Trouble::Silent(0, 0)),
             2 => Some(Trouble::Crc),
             3 => Some(Trouble::Overrun),
             4 => Some(Trouble::Dma),
@@ -320,7 +320,7 @@ mod tests {
         assert_eq!(Ask::from_words(&ask.to_words()), ask);
         assert_eq!(Op::from_word(ask.op), Some(Op::Stage));
         assert_eq!(Op::from_word(0), None);
-        for trouble in [None, Some(Trouble::Silent), Some(Trouble::Crc), Some(Trouble::Slipped(30))] {
+        for trouble in [None, Some(Trouble::Silent(0, 0)), Some(Trouble::Crc), Some(Trouble::Slipped(30))] {
             let delivery = Delivery { missed: 30, scans: 24, trouble };
             assert_eq!(Delivery::from_bytes(&delivery.to_bytes()), delivery);
         }

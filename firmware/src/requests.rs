@@ -95,9 +95,9 @@ impl<M: RawMutex> Core<'_, M> {
     fn start(&self) -> Answer {
         let answer = self.with(|state| {
             state.bring_to_rest(Reason::StreamEnded);
-            // the boot count leaves room for 65536 streams of each start
-            state.epoch = (self.facts.boot << 16) | (state.streams & 0xFFFF);
-            state.streams += 1;
+            // each start has room for 65536 streams; after those its epochs run on rather than repeat
+            state.epoch = (self.facts.boot << 16).wrapping_add(state.streams);
+            state.streams = state.streams.wrapping_add(1);
             state.ring.restart(state.epoch);
             state.resends.clear();
             state.counters.scans_produced = 0;

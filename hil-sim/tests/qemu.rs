@@ -232,7 +232,7 @@ fn broken_converters(fault: ConverterFault, scans: u64) -> Option<SmallHost> {
 #[test]
 fn converters_that_fail_disarm_and_are_reported() {
     // stuck for a second; one bad scan costs its block; late by a few blocks
-    for (trouble, scans) in [(Trouble::Silent, 51_200), (Trouble::Crc, 24), (Trouble::Overrun, 240)] {
+    for (trouble, scans) in [(Trouble::Silent(0, 0), 51_200), (Trouble::Crc, 24), (Trouble::Overrun, 240)] {
         let Some(host) = broken_converters(ConverterFault::Noticed(trouble), scans) else { return };
         let words = trouble.to_string();
         let told = |event: &&Event| matches!(event, Event::Fault(text) if text.as_str() == words);

@@ -73,7 +73,7 @@ const LATENCIES: [Budget; 5] = [
 
 /// Bytes.
 const MEMORY: [Budget; 3] = [
-    budget("flash", "flash: code, constants, initial values", 128 << 10),
+    budget("flash", "flash: code, constants, initial values", size::FLASH_LIMIT),
     budget("ram", "RAM: variables, the ring of a second of sixteen channels among them", 2 << 20),
     budget("stack", "stack, high-water mark of the benchmark", 32 << 10),
 ];

@@ -46,7 +46,7 @@ pub fn check(project: &Project, toolchain: &Toolchain) -> Result<()> {
     Ok(())
 }
 
-/// Builds the boards, or the one named, and prints the table of their sizes.
+/// Builds the boards, or the one named, prints the table of their sizes, and fails when one takes too much flash.
 pub fn build_boards(project: &Project, toolchain: &Toolchain, only: Option<&str>) -> Result<()> {
     let mut sizes = Vec::new();
     for board in project.boards()?.iter().filter(|board| only.is_none_or(|name| board.name == name)) {
@@ -54,7 +54,7 @@ pub fn build_boards(project: &Project, toolchain: &Toolchain, only: Option<&str>
         sizes.push((board.name.clone(), size::of_image(&image)?));
     }
     print!("\n{}", size::table(&sizes));
-    Ok(())
+    size::enforce(&sizes)
 }
 
 /// Builds one board's image and returns its path.

@@ -3,11 +3,15 @@
 //! Flash holds code, constants and the initial values of variables (text + rodata + data); RAM holds the variables
 //! (data + bss). The stack has no section: what RAM is left over is the stack's.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use object::elf::{SHF_ALLOC, SHF_EXECINSTR, SHF_WRITE};
 use object::{Object, ObjectSection, SectionFlags, SectionKind};
 use std::fmt::Write;
 use std::path::Path;
+
+/// Bytes of flash that no image may exceed: it then also fits the smaller controllers of the same family, and a growth
+/// that nobody wanted shows.
+pub const FLASH_LIMIT: u64 = 128 << 10;
 
 /// The sizes of an image's parts, in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -84,6 +88,23 @@ pub fn table(images: &[(String, Sizes)]) -> String {
     text
 }
 
+/// Fails when an image takes more flash than [`FLASH_LIMIT`], and names it.
+pub fn enforce(images: &[(String, Sizes)]) -> Result<()> {
+    let over: Vec<String> = images
+        .iter()
+        .filter(|(_, sizes)| sizes.flash() > FLASH_LIMIT)
+        .map(|(name, sizes)| format!("{name} takes {} bytes", sizes.flash()))
+        .collect();
+    if over.is_empty() {
+        return Ok(());
+    }
+    bail!(
+        "too much flash: {}, allowed {FLASH_LIMIT}. Make the image smaller, or raise the limit in xtask/src/size.rs and \
+         say why",
+        over.join(", ")
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -134,5 +155,15 @@ mod tests {
         assert_eq!(lines[0], "board            text    rodata      data       bss      flash        RAM");
         assert_eq!(lines[1], "nucleo-u5a5      1000       264        30      4104       1294       4134");
         assert!(lines[2].starts_with("x  "));
+    }
+
+    #[test]
+    fn an_image_over_its_flash_is_named() {
+        let limit = Sizes { text: FLASH_LIMIT - 10, rodata: 6, data: 4, bss: 1 << 20 };
+        let over = Sizes { data: 5, ..limit };
+        assert!(enforce(&[("a".into(), limit)]).is_ok(), "the limit itself is allowed");
+        let message = enforce(&[("a".into(), limit), ("b".into(), over)]).expect_err("over").to_string();
+        assert!(message.contains("b takes 131073 bytes, allowed 131072"), "{message}");
+        assert!(!message.contains("a takes"), "{message}");
     }
 }

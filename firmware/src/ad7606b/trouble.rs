@@ -5,8 +5,8 @@ use core::fmt;
 /// A front end's trouble. The scans that it cost are reported as a lost range besides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trouble {
-    /// No block came: BUSY does not fall, or nothing starts the read-out.
-    Silent,
+    /// No block came: blocks that each converter had sent. BUSY does not fall, or nothing starts the read-out.
+    Silent(u32, u32),
     /// A scan's CRC is wrong.
     Crc,
     /// Conversions whose end was not seen.
@@ -20,7 +20,10 @@ pub enum Trouble {
 impl fmt::Display for Trouble {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Silent => f.write_str("BUSY stuck, or no read-out: no block came"),
+            Self::Silent(first, second) => write!(
+                f,
+                "BUSY stuck, or no read-out: after {first} and {second} blocks of converters 1 and 2"
+            ),
             Self::Crc => f.write_str("converter data: wrong CRC"),
             Self::Slipped(scans) => write!(f, "{scans} conversions were never read"),
             Self::Overrun => f.write_str("acquisition was too late for its rings"),

@@ -8,7 +8,7 @@ use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AfType, Flex, Input, Level, Output, OutputType, Pin, Pull, Speed};
 use embassy_stm32::mode::Blocking;
 use embassy_stm32::peripherals::{
-    GPDMA1_CH0, GPDMA1_CH1, PA4, PA5, PA6, PA7, PD0, PD1, PD3, PD4, PD9, PE4, PE5, PE6, SPI1, SPI2,
+    GPDMA1_CH0, GPDMA1_CH1, PA5, PA6, PA7, PD0, PD1, PD3, PD4, PD9, PE4, PE5, PE6, PE12, SPI1, SPI2,
 };
 use embassy_stm32::spi::mode::Master;
 use embassy_stm32::spi::{self, Config, Instance, MODE_2, MisoPin, MosiPin, RxDma, SckPin, Spi};
@@ -32,7 +32,7 @@ pub const SETTINGS: Settings = Settings {
 };
 /// Clock for registers: slow, because nothing waits for it.
 const REGISTER_HZ: Hertz = Hertz(2_500_000);
-/// The serial port's own select pin: alternate function 5 of PA4 (SPI1_NSS) and PD0 (SPI2_NSS).
+/// The serial port's own select pin: alternate function 5 of PE12 (SPI1_NSS) and PD0 (SPI2_NSS).
 const SELECT_FUNCTION: u8 = 5;
 /// Conversions of small codes before an input counts as open: 5 ms.
 const OPEN_AFTER: u8 = 255;
@@ -71,7 +71,7 @@ where
 }
 
 /// Channels 1 to 8.
-pub type First = Chip<SPI1, PA5, PA7, PA6, PA4, PE5, PE4, GPDMA1_CH0>;
+pub type First = Chip<SPI1, PA5, PA7, PA6, PE12, PE5, PE4, GPDMA1_CH0>;
 /// Channels 9 to 16.
 pub type Second = Chip<SPI2, PD1, PD4, PD3, PD0, PE6, PD9, GPDMA1_CH1>;
 

@@ -1,4 +1,4 @@
-//! What outlives a reset: the last panic's words, and how often the controller has started.
+//! What outlives a reset: the last panic's words, and which start of the controller this is.
 //!
 //! Both lie in RAM that start-up code does not touch. After a power cut they are noise, which a check value
 //! tells from a record; after a watchdog's or our own reset they are what was written.
@@ -30,7 +30,18 @@ struct Record {
 #[repr(C)]
 struct Starts {
     count: u32,
-    inverse: u32,
+    /// Drawn when power came.
+    first: u32,
+    sum: u32,
+}
+
+/// Which start this is.
+#[derive(Clone, Copy)]
+pub struct Start {
+    /// 1 after power came, one more after every other reset.
+    pub count: u32,
+    /// One more with every reset, another one after power came.
+    pub boot: u32,
 }
 
 // SAFETY of the section: both types are plain numbers, of which any bytes are a value; nothing reads them as
@@ -63,14 +74,20 @@ pub fn take_panic() -> Option<String<SENTENCE_BYTES>> {
     String::try_from(text).ok()
 }
 
-/// Counts this start: 1 after power came, one more after every other reset.
-pub fn count_start() -> u32 {
-    // SAFETY: called once in `main` before anything else runs; any bytes are a `Starts`.
+/// Counts this start; `draw` gives the first number after power came.
+pub fn count_start(draw: impl FnOnce() -> u32) -> Start {
+    let sum = |count: u32, first: u32| !(count ^ first.rotate_left(16)) ^ MAGIC;
+    // SAFETY: called once in `main` before any task runs, and no interrupt uses it; any bytes are a `Starts`.
     let before = unsafe { addr_of!(STARTS).cast::<Starts>().read_volatile() };
-    let count = if before.count == !before.inverse { before.count.wrapping_add(1) } else { 1 };
+    let (count, first) = if before.sum == sum(before.count, before.first) {
+        (before.count.wrapping_add(1), before.first)
+    } else {
+        (1, draw())
+    };
+    let now = Starts { count, first, sum: sum(count, first) };
     // SAFETY: as above.
-    unsafe { addr_of_mut!(STARTS).cast::<Starts>().write_volatile(Starts { count, inverse: !count }) };
-    count
+    unsafe { addr_of_mut!(STARTS).cast::<Starts>().write_volatile(now) };
+    Start { count, boot: first.wrapping_add(count).wrapping_sub(1) }
 }
 
 /// Writes what fits and leaves the rest.

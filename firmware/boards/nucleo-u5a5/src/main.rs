@@ -10,11 +10,14 @@
 //! | sampling instants | TIM2 drives CONVST of both converters |
 //! | counting them | TIM5 counts TIM2's periods, so that a scan that never came is known to be missing |
 //! | reading 16 channels | the end of BUSY starts SPI1 and SPI2, GPDMA writes rings ([`rings`]) |
-//! | the end of a coil pulse | TIM1 in one-pulse mode; its longest period is the cap ([`coil`]) |
+//! | the beginning of a coil pulse | TIM2 starts TIM1 ([`coil`]) |
+//! | its end | TIM1 in one-pulse mode; its longest period is the cap |
+//! | the shaker's codes | TIM2 asks for each; the DMA brings them, and rest behind them ([`drive`]) |
 //! | guard and emergency stop | TIM1's break input, and the coil driver's own gate |
 //! | a program that hangs | the independent watchdog ([`watchdog`]) |
 //!
-//! Two executors: acquisition runs at an interrupt's priority above USB, watch and lights in thread mode.
+//! Three executors: guard and emergency stop ([`guard`]) above acquisition, acquisition above USB, watch and lights in
+//! thread mode.
 #![no_std]
 #![no_main]
 
@@ -22,9 +25,13 @@ mod channels;
 mod chips;
 mod clocks;
 mod coil;
+mod dma;
+mod drive;
+mod guard;
 mod inputs;
 mod keep;
 mod lights;
+mod nonce;
 mod rings;
 mod scans;
 mod usb;
@@ -34,7 +41,8 @@ use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use jointrig_firmware::board::{Board, Coil, NoDrive, NoStage, Stage};
+use jointrig_copy as _;
+use jointrig_firmware::board::{Board, Coil, NoStage, Stage};
 use jointrig_firmware::ring::Slot;
 use jointrig_firmware::{Core, Facts, acquire, watch};
 use jointrig_protocol::limits::{MAX_CHANNELS, scans_per_block};
@@ -60,7 +68,7 @@ impl Board for Nucleo {
     type Mutex = CriticalSectionRawMutex;
     type Scans = scans::Converters;
     type Coil = coil::PulseTimer;
-    type Drive = NoDrive;
+    type Drive = drive::ShakerDrive;
     type Inputs = inputs::Switches;
     type Source = usb::Source;
     type Sink = usb::Sink;
@@ -69,13 +77,23 @@ impl Board for Nucleo {
 
 static RING: ConstStaticCell<[Slot; SLOTS]> = ConstStaticCell::new([Slot::EMPTY; SLOTS]);
 static CORE: StaticCell<Shared> = StaticCell::new();
+/// Acquisition's.
 static ABOVE: InterruptExecutor = InterruptExecutor::new();
+/// The guard's.
+static TOP: InterruptExecutor = InterruptExecutor::new();
 
-/// A vector that nothing else uses serves as the upper executor's software interrupt.
+/// A vector that nothing else uses serves as acquisition's software interrupt.
 #[embassy_stm32::interrupt]
 fn LPUART1() {
     // SAFETY: only this interrupt polls the executor, and it was started before the interrupt was enabled.
     unsafe { ABOVE.on_interrupt() }
+}
+
+/// Another one serves the guard.
+#[embassy_stm32::interrupt]
+fn UART5() {
+    // SAFETY: as above.
+    unsafe { TOP.on_interrupt() }
 }
 
 #[embassy_executor::task]
@@ -83,9 +101,10 @@ async fn acquisition(
     core: &'static Shared,
     mut scans: scans::Converters,
     mut coil: coil::PulseTimer,
+    mut drive: drive::ShakerDrive,
     mut inputs: inputs::Switches,
 ) {
-    acquire::acquire(core, &mut scans, &mut coil, &mut NoDrive, &mut inputs).await;
+    acquire::acquire(core, &mut scans, &mut coil, &mut drive, &mut inputs).await;
 }
 
 #[embassy_executor::task]
@@ -97,9 +116,15 @@ async fn watching(core: &'static Shared) {
 async fn main(spawner: Spawner) {
     // before anything else: what the last run left behind
     let last_panic = keep::take_panic();
-    let boot = keep::count_start();
     let p = embassy_stm32::init(clocks::config());
     let dog = watchdog::start(p.IWDG);
+    let mut without_nonce = false;
+    let start = keep::count_start(|| {
+        nonce::draw().unwrap_or_else(|| {
+            without_nonce = true;
+            1
+        })
+    });
 
     let coil = coil::PulseTimer::new(p.TIM1, p.PE9, p.PE15);
     let inputs = inputs::Switches::new(p.PF13, p.PF14, p.PF15);
@@ -112,12 +137,15 @@ async fn main(spawner: Spawner) {
         channels: channels::table(),
         coil_cap_us: coil.cap_us(),
         stage: NoStage::PRESENT,
-        drive_v: 0.0,
-        boot,
+        drive_v: drive::FULL_SCALE_V,
+        boot: start.boot,
     };
     let core: &'static Shared = CORE.init(Core::new(facts, RING.take()));
     if let Some(text) = last_panic {
         core.report_panic(text.as_str());
+    }
+    if without_nonce {
+        core.report_fault("no random number: streams after a power cut may have old epochs");
     }
 
     let chips = chips::Chips {
@@ -126,7 +154,7 @@ async fn main(spawner: Spawner) {
             clock: p.PA5,
             sdi: p.PA7,
             dout: p.PA6,
-            select: p.PA4,
+            select: p.PE12,
             reset: p.PE5,
             busy: p.PE4,
             dma: p.GPDMA1_CH0,
@@ -144,13 +172,18 @@ async fn main(spawner: Spawner) {
     };
     let scans = scans::Converters::new(core, chips, p.TIM2, p.TIM5, p.PA0);
 
+    let drive = drive::ShakerDrive::new(p.DAC1, p.PA4, p.PE10, p.GPDMA1_CH2, p.GPDMA1_CH3);
+
+    interrupt::UART5.set_priority(Priority::P5);
+    let top = TOP.start(interrupt::UART5);
     interrupt::LPUART1.set_priority(Priority::P6);
     let above = ABOVE.start(interrupt::LPUART1);
     // each task is spawned once, so that its one place is free
-    above.spawn(defmt::unwrap!(acquisition(core, scans, coil, inputs)));
+    top.spawn(defmt::unwrap!(guard::task(core)));
+    above.spawn(defmt::unwrap!(acquisition(core, scans, coil, drive, inputs)));
     spawner.spawn(defmt::unwrap!(watching(core)));
     spawner.spawn(defmt::unwrap!(usb::task(core, p.USB_OTG_HS, p.PA12, p.PA11)));
     spawner.spawn(defmt::unwrap!(watchdog::task(dog)));
     spawner.spawn(defmt::unwrap!(lights::task(p.PC7, p.PB7, p.PG2)));
-    defmt::info!("jointrig on nucleo-u5a5, start {}", boot);
+    defmt::info!("jointrig on nucleo-u5a5, start {}, boot {:#010x}", start.count, start.boot);
 }

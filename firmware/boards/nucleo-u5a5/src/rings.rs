@@ -24,6 +24,7 @@ use embassy_sync::waitqueue::AtomicWaker;
 use jointrig_firmware::ad7606b::frames::CHIP_WORDS;
 
 use crate::BLOCK_SCANS;
+use crate::dma::{self, Carries};
 
 /// Blocks in each ring.
 pub const BLOCKS: u32 = 8;
@@ -85,12 +86,7 @@ impl Ring {
     pub fn stop(&self) {
         self.port.cr1().modify(|w| w.set_spe(false));
         self.port.autocr().modify(|w| w.set_trigen(false));
-        let channel = GPDMA1.ch(self.channel);
-        if channel.cr().read().en() {
-            channel.cr().modify(|w| w.set_susp(true));
-            while !channel.sr().read().suspf() {}
-        }
-        channel.cr().write(|w| w.set_reset(true));
+        dma::stop(self.channel);
     }
 
     /// Makes both ready for the next conversion. The pins must have their functions already.
@@ -104,14 +100,7 @@ impl Ring {
 
     fn start_channel(&'static self, request: u8) {
         let items = self.items.0.get() as u32;
-        let link = |to: u32| {
-            let mut llr = ChLlr(0);
-            llr.set_ub1(true);
-            llr.set_uda(true);
-            llr.set_ull(true);
-            llr.set_la(((items + to * size_of::<Item>() as u32) as u16) >> 2);
-            llr.0
-        };
+        let link = |to: u32| dma::link(items + to * size_of::<Item>() as u32, Carries::Destination).0;
         let mut count = ChBr1(0);
         count.set_bndt(size_of::<Block>() as u16);
         let first = self.blocks.get() as u32;
@@ -125,15 +114,6 @@ impl Ring {
         fence(Ordering::SeqCst);
 
         let channel = GPDMA1.ch(self.channel);
-        channel.fcr().write(|w| {
-            w.set_tcf(true);
-            w.set_htf(true);
-            w.set_dtef(true);
-            w.set_ulef(true);
-            w.set_usef(true);
-            w.set_suspf(true);
-            w.set_tof(true);
-        });
         channel.lbar().write(|w| w.set_lba((items >> 16) as u16));
         channel.tr1().write(|w| {
             w.set_sdw(Dw::HALF_WORD);

@@ -19,17 +19,20 @@ use embassy_stm32::timer::simple_pwm::PwmPin;
 use embassy_stm32::timer::{Ch1, Channel};
 use embassy_time::{Duration, Timer, with_timeout};
 use jointrig_firmware::ad7606b::pair::{PAIR_BYTES, Slip, join};
+use jointrig_firmware::ad7606b::trouble::Trouble;
 use jointrig_firmware::board::{Delivered, Scans};
 use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
 
-use crate::chips::{Chips, Fault};
+use crate::chips::{self, Chips};
 use crate::lights::{FAULT, SCANNING};
 use crate::rings::{self, FIRST, SECOND};
 use crate::{BLOCK_SCANS, SCAN_RATE_HZ, Shared, watchdog};
 use core::sync::atomic::Ordering;
 
-/// CONVST is low for the first µs of each period and rises then: counts of 160 MHz.
-const CONVST_LOW: u32 = 160;
+/// Counts of the timers per second.
+pub const TIMER_HZ: u32 = 160_000_000;
+/// CONVST is low for the first µs of each period and rises then: counts of TIM2.
+pub const CONVST_LOW: u32 = TIMER_HZ / 1_000_000;
 /// A block takes 0.29 ms; this long without one is silence.
 const PATIENCE: Duration = Duration::from_millis(5);
 /// Between two tries to set silent converters up.
@@ -37,36 +40,25 @@ const RETRY: Duration = Duration::from_millis(20);
 
 /// What went wrong with the converters.
 #[derive(Debug, PartialEq)]
-enum Trouble {
+enum Fault {
     /// Which converter, and why it cannot be set up.
-    SetUp(u8, Fault),
-    /// No block came: blocks that each had sent. BUSY does not fall, or nothing starts the ports.
-    Silent(u32, u32),
-    /// A scan's CRC is wrong.
-    Crc,
-    /// Conversions whose end was not seen.
-    Slipped(u32),
-    /// The reader was too late.
-    Overrun,
-    /// The DMA reported an error.
-    Dma,
+    SetUp(u8, chips::Fault),
+    /// While they ran.
+    Running(Trouble),
 }
 
-impl fmt::Display for Trouble {
+impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::SetUp(number, fault) => write!(f, "converter {number}: {fault}"),
-            Self::Silent(first, second) => {
-                write!(
-                    f,
-                    "BUSY stuck, or no read-out: after {first} and {second} blocks of converters 1 and 2"
-                )
-            }
-            Self::Crc => f.write_str("converter data: wrong CRC"),
-            Self::Slipped(scans) => write!(f, "{scans} conversions were never read"),
-            Self::Overrun => f.write_str("acquisition was too late for its rings"),
-            Self::Dma => f.write_str("DMA error while reading the converters"),
+            Self::Running(trouble) => trouble.fmt(f),
         }
+    }
+}
+
+impl From<Trouble> for Fault {
+    fn from(trouble: Trouble) -> Self {
+        Self::Running(trouble)
     }
 }
 
@@ -93,7 +85,7 @@ pub struct Converters {
     /// Up to where scans have been delivered or reported missing, in TIM5's count.
     accounted: u32,
     slips: [Slip; 2],
-    last_report: Option<Trouble>,
+    last_report: Option<Fault>,
 }
 
 impl Converters {
@@ -136,13 +128,13 @@ impl Converters {
     }
 
     /// Resets, sets up and tests both, with CONVST as an ordinary pin.
-    async fn set_up(&mut self) -> Result<(), Trouble> {
+    async fn set_up(&mut self) -> Result<(), Fault> {
         FIRST.stop();
         SECOND.stop();
         self.convst.enable_channel(Channel::Ch1, false);
         let mut convst = Output::new(self.convst_pin.reborrow(), Level::High, Speed::High);
-        self.chips.first.set_up(&mut convst).await.map_err(|fault| Trouble::SetUp(1, fault))?;
-        self.chips.second.set_up(&mut convst).await.map_err(|fault| Trouble::SetUp(2, fault))?;
+        self.chips.first.set_up(&mut convst).await.map_err(|fault| Fault::SetUp(1, fault))?;
+        self.chips.second.set_up(&mut convst).await.map_err(|fault| Fault::SetUp(2, fault))?;
         Ok(())
     }
 
@@ -195,7 +187,7 @@ impl Converters {
         self.accounted = from.wrapping_add(joined.scans as u32);
         self.block = self.block.wrapping_add(1);
         if joined.crc_wrong {
-            self.trouble(Trouble::Crc);
+            self.report(Trouble::Crc.into());
         } else {
             SCANNING.store(true, Ordering::Relaxed);
             FAULT.store(false, Ordering::Relaxed);
@@ -203,17 +195,17 @@ impl Converters {
         Ok(Delivered { scans: joined.scans as u8, missed })
     }
 
-    /// Remembers the remedy and reports the trouble, unless it is the one reported last.
-    fn trouble(&mut self, trouble: Trouble) {
+    /// Remembers the remedy and reports the fault, unless it is the one reported last.
+    fn report(&mut self, fault: Fault) {
         SCANNING.store(false, Ordering::Relaxed);
         FAULT.store(true, Ordering::Relaxed);
-        self.next = match trouble {
-            Trouble::SetUp(..) | Trouble::Silent(..) | Trouble::Dma => Next::SetUp,
-            Trouble::Crc | Trouble::Slipped(_) | Trouble::Overrun => Next::Join,
+        self.next = match fault {
+            Fault::SetUp(..) | Fault::Running(Trouble::Silent(..) | Trouble::Dma) => Next::SetUp,
+            Fault::Running(Trouble::Crc | Trouble::Slipped(_) | Trouble::Overrun) => Next::Join,
         };
-        if self.last_report.as_ref() != Some(&trouble) {
-            self.core.report_fault(&trouble);
-            self.last_report = Some(trouble);
+        if self.last_report.as_ref() != Some(&fault) {
+            self.core.report_fault(&fault);
+            self.last_report = Some(fault);
         }
     }
 
@@ -232,8 +224,8 @@ impl Scans for Converters {
         if self.next == Next::SetUp {
             match self.set_up().await {
                 Ok(()) => self.next = Next::Join,
-                Err(trouble) => {
-                    self.trouble(trouble);
+                Err(fault) => {
+                    self.report(fault);
                     Timer::after(RETRY).await;
                     return self.nothing();
                 }
@@ -245,7 +237,7 @@ impl Scans for Converters {
         match self.read(block).await {
             Ok(delivered) => delivered,
             Err(trouble) => {
-                self.trouble(trouble);
+                self.report(trouble.into());
                 self.nothing()
             }
         }
