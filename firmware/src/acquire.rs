@@ -41,14 +41,25 @@ pub async fn acquire<M: RawMutex, S: Scans, C: Coil, D: Drive, I: Inputs>(
         }
         if drive_off {
             drive.rest();
-        } else if given > 0 && drive.play(&codes[..given]).is_err() {
+        } else if given.codes > 0 && drive.play(&codes[..given.codes]).is_err() {
             core.with(|state| {
                 let stops = state.shaker.halt(Reason::RanDry);
                 state.tell_of_shaker(stops);
             });
+        } else if given.last {
+            // a drive that has just taken codes takes their end
+            let _ = drive.play(&[]);
         }
         core.to_send.signal(());
     }
+}
+
+/// What a block has yielded for the drive.
+#[derive(Clone, Copy, Default)]
+struct Given {
+    codes: usize,
+    /// The shaker is at rest after these.
+    last: bool,
 }
 
 /// Words are copied faster than bytes.
@@ -119,8 +130,8 @@ impl<M: RawMutex> Core<'_, M> {
         });
     }
 
-    /// Takes one delivered block, and writes the codes for the drive; how many there are.
-    fn take(&self, delivered: Delivered, samples: &[u8; BLOCK_SAMPLE_BYTES], codes: &mut [i16]) -> usize {
+    /// Takes one delivered block, and writes the codes for the drive.
+    fn take(&self, delivered: Delivered, samples: &[u8; BLOCK_SAMPLE_BYTES], codes: &mut [i16]) -> Given {
         let channels = self.facts.channels.len();
         let (pairs, _) = samples.as_chunks::<2>();
         let count = (usize::from(delivered.scans) * channels).min(pairs.len() / channels * channels);
@@ -144,7 +155,7 @@ impl<M: RawMutex> Core<'_, M> {
             let block = InHand { first_scan: state.next_scan, channels, samples: pairs };
             let scans = block.scans();
             if scans == 0 {
-                return 0;
+                return Given::default();
             }
             let outcome = state.hammer.block(&block, state.friction.as_ref());
             if let Some(friction) = &state.friction {
@@ -163,7 +174,7 @@ impl<M: RawMutex> Core<'_, M> {
             }
             state.next_scan += scans as u64;
             state.tell(&outcome);
-            if moves { scans } else { 0 }
+            Given { codes: if moves { scans } else { 0 }, last: moves && !state.shaker.moves() }
         })
     }
 }

@@ -75,6 +75,9 @@ pub trait Drive {
     /// Takes the codes of as many scans as the block that was just delivered had. They are played without
     /// a gap after those given before; what follows the last code given is rest (0 V).
     ///
+    /// No codes at all say that a motion ends here: what was given is still played, and the next codes
+    /// begin another one, whenever they come.
+    ///
     /// # Errors
     /// [`RanDry`] when the converter has already passed the end of what was given before: it rests, and took nothing.
     fn play(&mut self, codes: &[i16]) -> Result<(), RanDry>;

@@ -49,6 +49,8 @@ pub trait Words {
 pub struct Feed {
     /// The scan after the last one that was given a code; none at rest.
     end: Option<u32>,
+    /// Nothing belongs to what was given any more.
+    ended: bool,
     /// What rounding has left over, in parts of a step.
     owed: i32,
 }
@@ -56,20 +58,25 @@ pub struct Feed {
 impl Feed {
     /// At rest.
     pub const fn new() -> Self {
-        Self { end: None, owed: 0 }
+        Self { end: None, ended: false, owed: 0 }
     }
 
-    /// Puts codes behind those given before, or [`LEAD`] scans ahead when there are none. `now` counts the words that
-    /// the player has taken since it began at the ring's first; it may wrap.
+    /// Puts codes behind those given before, or [`LEAD`] scans ahead when there are none or when they have ended.
+    /// No codes are an end. `now` counts the words that the player has taken since it began at the ring's
+    /// first; it may wrap.
     ///
     /// # Errors
     /// [`RanDry`], with the whole ring at rest: when the player has reached the end of what was given before,
     /// when so much was given that it would meet what is not yet erased, or when the eraser has not erased.
     pub fn play(&mut self, now: u32, codes: &[i16], words: &mut impl Words) -> Result<(), RanDry> {
         if codes.is_empty() {
+            self.ended = true;
             return Ok(());
         }
-        let begin = self.end.unwrap_or(now.wrapping_add(LEAD));
+        let begin = match self.end {
+            Some(end) if !self.ended || (LEAD..=RING).contains(&end.wrapping_sub(now)) => end,
+            _ => now.wrapping_add(LEAD),
+        };
         let count = codes.len() as u32;
         let ahead = i64::from(begin.wrapping_sub(now).cast_signed());
         let in_time = ahead >= i64::from(AHEAD);
@@ -82,6 +89,7 @@ impl Feed {
             words.set(place(begin.wrapping_add(scan)), self.word(*code));
         }
         self.end = Some(begin.wrapping_add(count));
+        self.ended = false;
         Ok(())
     }
 
@@ -290,6 +298,28 @@ mod tests {
         feed.play(0, &[-20_000; BLOCK], &mut converter.memory).expect("in time");
         feed.rest(&mut converter.memory);
         assert!(converter.memory.0.iter().all(|word| *word == REST));
+    }
+
+    #[test]
+    fn a_motion_that_ended_is_played_whole_and_the_next_begins_at_any_time() {
+        for pause in [0, 10, 30, LEAD, LEAD + 10, 10 * RING] {
+            let mut converter = Converter::at(0);
+            let mut feed = Feed::new();
+            let (blocks, words) = song(8);
+            for (i, block) in blocks.enumerate() {
+                if i == 4 {
+                    feed.play(converter.now, &[], &mut converter.memory).expect("an end");
+                    converter.scans(pause);
+                }
+                feed.play(converter.now, &block, &mut converter.memory).expect("in time");
+                converter.scans(BLOCK as u32);
+            }
+            converter.scans(2 * RING);
+            // all of both, in order; between them rest, and not more than the pause makes
+            let heard: Vec<u32> = converter.heard().iter().copied().filter(|word| *word != REST).collect();
+            assert_eq!(heard, words, "after {pause}");
+            assert!(converter.heard().len() <= words.len() + pause as usize, "after {pause}");
+        }
     }
 
     #[test]
