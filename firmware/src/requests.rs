@@ -87,6 +87,7 @@ impl<M: RawMutex> Core<'_, M> {
             shot: state.hammer.shot(),
             shaker: state.shaker.state(),
             drive_v: state.shaker.amplitude_v(),
+            controlled: state.shaker.controlled(),
             counters: state.counters,
         })
     }

@@ -15,9 +15,10 @@ use jointrig_protocol::answer::{self, Refusal};
 use jointrig_protocol::channel::Channel;
 use jointrig_protocol::event::{Event, Reason};
 use jointrig_protocol::limits::{MAX_CHANNELS, SHAKE_RAMP_MS, SHAKE_SCANS_PER_CYCLE, SHAKE_VALID_CAP_MS};
-use jointrig_protocol::request::Shake;
+use jointrig_protocol::request::{Control, Shake};
 
 use crate::hammer::Scanned;
+use crate::servo::{Servo, Trouble};
 use crate::sine::sine;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,7 +36,8 @@ struct Bound {
 }
 
 /// The machine.
-pub struct Shaker {
+pub struct Shaker<'a> {
+    channels: &'a [Channel],
     rate_hz: u32,
     full_scale_v: f32,
     units_per_code: Vec<f32, MAX_CHANNELS>,
@@ -48,12 +50,14 @@ pub struct Shaker {
     /// Change of the amplitude from one scan to the next, V.
     slew_v: f32,
     bounds: Vec<Bound, MAX_CHANNELS>,
+    servo: Option<Servo>,
 }
 
-impl Shaker {
+impl<'a> Shaker<'a> {
     /// At rest. A `full_scale_v` of 0 is a board without a shaker.
-    pub fn new(channels: &[Channel], rate_hz: u32, full_scale_v: f32) -> Self {
+    pub fn new(channels: &'a [Channel], rate_hz: u32, full_scale_v: f32) -> Self {
         Self {
+            channels,
             rate_hz,
             full_scale_v,
             units_per_code: channels.iter().map(|channel| channel.units_per_code().abs() as f32).collect(),
@@ -64,6 +68,7 @@ impl Shaker {
             ordered_v: 0.0,
             slew_v: 0.0,
             bounds: Vec::new(),
+            servo: None,
         }
     }
 
@@ -82,6 +87,11 @@ impl Shaker {
         self.amplitude_v
     }
 
+    /// Amplitude that was last measured of what is controlled, m or N; 0 when the drive itself is.
+    pub fn controlled(&self) -> f32 {
+        self.servo.as_ref().map_or(0.0, Servo::measured)
+    }
+
     /// Whether the drive wants codes.
     pub fn moves(&self) -> bool {
         self.state != State::Resting
@@ -95,7 +105,8 @@ impl Shaker {
     /// Accepts an order; from rest, the sine begins at its zero. An order that is refused changes nothing.
     ///
     /// # Errors
-    /// [`Refusal::Unsupported`] without a shaker; [`Refusal::OutOfBounds`] says which bound.
+    /// [`Refusal::Unsupported`] without a shaker, or without the channels that measure what is to be controlled;
+    /// [`Refusal::OutOfBounds`] says which bound.
     pub fn shake(&mut self, now: u64, order: &Shake) -> Result<Option<Event>, Refusal> {
         if self.full_scale_v <= 0.0 {
             return Err(Refusal::Unsupported);
@@ -121,13 +132,33 @@ impl Shaker {
                 "the shaker's limits must be finite, not negative, and no more than there are channels",
             );
         }
+        let target = match order.control {
+            Control::Drive => order.amplitude_v,
+            Control::Displacement { amplitude_m: target } | Control::Force { amplitude_n: target } => target,
+        };
+        if !(target.is_finite() && (target > 0.0 || order.control == Control::Drive)) {
+            return refuse("the controlled amplitude must be above 0");
+        }
+        let mut servo = Servo::new(self.channels, self.rate_hz, order.control, order.step, order.amplitude_v);
+        if servo.is_none() && order.control != Control::Drive {
+            return Err(Refusal::Unsupported);
+        }
         let was_resting = self.state == State::Resting;
         if was_resting {
             self.angle = 0;
             self.amplitude_v = 0.0;
         }
         self.step = order.step;
-        self.ordered_v = order.amplitude_v;
+        self.ordered_v = match (&mut servo, &self.servo) {
+            (None, _) => order.amplitude_v,
+            // an order renewed or changed goes on from the drive that it finds
+            (Some(servo), Some(before)) if !was_resting => {
+                servo.continues(before);
+                self.ordered_v.clamp(servo.first_v(), order.amplitude_v)
+            }
+            (Some(servo), _) => servo.first_v(),
+        };
+        self.servo = servo;
         self.slew_v = order.slew_v_per_s / self.rate_hz as f32;
         self.bounds = self.bounds_of(&order.limits);
         self.state =
@@ -173,7 +204,10 @@ impl Shaker {
             }
         }
         let code_per_v = f32::from(i16::MAX) / self.full_scale_v;
-        for code in codes {
+        for (scan, code) in codes.iter_mut().enumerate() {
+            if stops.is_none() {
+                stops = self.correct(block, scan);
+            }
             // the amplitude is at most full scale, so that the product is a code; it is rounded to the nearest
             let exact = self.amplitude_v * code_per_v * sine(self.angle);
             *code = (exact + 0.5_f32.copysign(exact)) as i16;
@@ -189,6 +223,21 @@ impl Shaker {
             self.state = State::Resting;
         }
         [stops, rests.then_some(Event::ShakerRests)]
+    }
+
+    /// Lets the controller see a scan, and follows it. What it measures need not be in phase with what is driven.
+    fn correct(&mut self, block: &impl Scanned, scan: usize) -> Option<Event> {
+        let State::Running { .. } = self.state else { return None };
+        let servo = self.servo.as_mut()?;
+        match servo.feed(block, scan, self.angle, self.step, self.ordered_v) {
+            Ok(None) => None,
+            Ok(Some(wanted_v)) => {
+                self.ordered_v = wanted_v;
+                None
+            }
+            Err(Trouble::Runaway) => self.stop(Reason::Runaway),
+            Err(Trouble::Weak) => self.stop(Reason::Weak),
+        }
     }
 
     fn exceeded(&self, block: &impl Scanned) -> Option<Bound> {
@@ -232,7 +281,7 @@ mod tests {
         }
     }
 
-    fn shaker(full_scale_v: f32) -> Shaker {
+    fn shaker(full_scale_v: f32) -> Shaker<'static> {
         let channel = Channel {
             name: Name::new(),
             role: Role::Response(Axis::Z),
@@ -242,12 +291,13 @@ mod tests {
             delay_ns: 0,
             bits: 16,
         };
-        Shaker::new(&[channel], RATE, full_scale_v)
+        Shaker::new(std::vec![channel].leak(), RATE, full_scale_v)
     }
 
     fn order(frequency_hz: f64, amplitude_v: f32) -> Shake {
         Shake {
             step: Shake::step_of(frequency_hz, RATE),
+            control: Control::Drive,
             amplitude_v,
             slew_v_per_s: 100.0,
             valid_ms: 1000,

@@ -65,7 +65,7 @@ pub struct Core<'a, M: RawMutex> {
 pub(crate) struct State<'a> {
     pub ring: Ring<'a>,
     pub hammer: Hammer,
-    pub shaker: Shaker,
+    pub shaker: Shaker<'a>,
     pub friction: Option<Friction>,
     pub friction_n: f32,
     pub memory: Memory,

@@ -245,6 +245,8 @@ pub struct Status {
     pub shaker: Shaker,
     /// Amplitude of its drive now, V.
     pub drive_v: f32,
+    /// Amplitude that was last measured of what is controlled, m or N; 0 when the drive itself is.
+    pub controlled: f32,
     /// What was sent and lost.
     pub counters: Counters,
 }

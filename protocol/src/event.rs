@@ -81,6 +81,10 @@ pub enum Reason {
         /// Place in the scan, from 0.
         channel: u8,
     },
+    /// What the shaker controls is half as large again as ordered.
+    Runaway,
+    /// The largest drive that the order allows does not reach the ordered amplitude.
+    Weak,
     /// The drive was given its codes too late, and rests.
     RanDry,
     /// The front end lost scans, or none came for [`crate::limits::SCAN_SILENCE_MS`]: nothing moves blindly.

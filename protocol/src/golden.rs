@@ -13,7 +13,7 @@ use crate::channel::{Axis, Channel, Quantity, Role};
 use crate::event::{self, Event, Loss, Reason};
 use crate::frame::{FrameError, Kind, Writer};
 use crate::hello::{Hello, Role as HelloRole};
-use crate::request::{self, Configuration, Fire, Request, Shake, Stage, Trigger};
+use crate::request::{self, Configuration, Control, Fire, Request, Shake, Stage, Trigger};
 use crate::shot::{Phase, Shot};
 
 macro_rules! golden {
@@ -138,6 +138,7 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
                 shot: Some(SHOT),
                 shaker: Shaker::Resting,
                 drive_v: 0.0,
+                controlled: 0.0,
                 counters: COUNTERS,
             })),
         ),
@@ -174,6 +175,7 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
             "shake",
             Request::Shake(Shake {
                 step: Shake::step_of(200.0, 51_200),
+                control: Control::Displacement { amplitude_m: 1.5e-7 },
                 amplitude_v: 2.5,
                 slew_v_per_s: 5.0,
                 valid_ms: 30_000,

@@ -99,13 +99,33 @@ pub struct Fire {
     pub quiet_patience: u32,
 }
 
+/// What the shaker's order holds constant.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub enum Control {
+    /// The drive itself.
+    Drive,
+    /// The relative displacement of the specimens, from their two vibrometers.
+    Displacement {
+        /// Amplitude, m.
+        amplitude_m: f32,
+    },
+    /// The excitation's force.
+    Force {
+        /// Amplitude, N.
+        amplitude_n: f32,
+    },
+}
+
 /// A sine from the shaker.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Shake {
     /// Turn per scan, in parts of 2³²: frequency × 2³² / scan rate. So the frequency is exact to the scans'
     /// clock, and a change of it keeps the phase.
     pub step: u32,
-    /// Amplitude of the drive, V; refused when over the board's full scale.
+    /// What has which amplitude.
+    pub control: Control,
+    /// The drive's amplitude, V, and when something else is controlled the drive's largest; refused when over the
+    /// board's full scale.
     pub amplitude_v: f32,
     /// How fast the amplitude goes there, V/s; refused when faster than full scale in
     /// [`crate::limits::SHAKE_RAMP_MS`].

@@ -5,7 +5,7 @@ use jointrig_hil_sim::rig::RigConfig;
 use jointrig_protocol::answer::{Answer, Hammer, Refusal, Shaker};
 use jointrig_protocol::event::{Event, Reason};
 use jointrig_protocol::limits::{COIL_PULSE_CAP_US, SHAKE_RAMP_MS};
-use jointrig_protocol::request::{Configuration, Request, Shake};
+use jointrig_protocol::request::{Configuration, Control, Request, Shake};
 use jointrig_protocol::shot::Phase;
 
 use super::{PULSE_US, SmallHost};
@@ -19,6 +19,7 @@ const AMPLITUDE_V: f32 = 2.0;
 pub fn shake() -> Shake {
     Shake {
         step: Shake::step_of(200.0, RATE),
+        control: Control::Drive,
         amplitude_v: AMPLITUDE_V,
         slew_v_per_s: 20.0,
         valid_ms: 30_000,

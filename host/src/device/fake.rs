@@ -198,6 +198,7 @@ impl Fake {
                 shot: self.shot,
                 shaker: Shaker::Resting,
                 drive_v: 0.0,
+                controlled: 0.0,
                 counters: Counters {
                     scans_produced: self.next_scan,
                     scans_dropped: self.dropped,

@@ -20,7 +20,7 @@ use jointrig_protocol::channel::{Axis, Channel, Name, Quantity, Role};
 use jointrig_protocol::frame::{Accumulator, Kind, Writer};
 use jointrig_protocol::hello::Hello;
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, MAX_CHANNELS};
-use jointrig_protocol::request::{Configuration, Fire, Numbered, Request, Shake, Stage, Trigger};
+use jointrig_protocol::request::{Configuration, Control, Fire, Numbered, Request, Shake, Stage, Trigger};
 use semihosting::{eprintln, println, process};
 
 use crate::{counter, device, memory, port, stack};
@@ -77,6 +77,7 @@ fn step(number: usize) -> Option<Step> {
     }
     let shake = Shake {
         step: Shake::step_of(200.0, RATE_HZ),
+        control: Control::Drive,
         amplitude_v: 5.0,
         slew_v_per_s: 100.0,
         valid_ms: 60_000,
