@@ -352,10 +352,10 @@ mod tests {
         // the fastest slew, and a frequency so low that the codes show the amplitude's own change
         let fast = |frequency, amplitude| Shake { slew_v_per_s: 200.0, ..order(frequency, amplitude) };
         for (frequency, amplitude) in [(100.0, 10.0), (130.0, 0.1), (90.0, 10.0), (90.0, 0.0)] {
-            shaker.shake(now, &fast(frequency, amplitude)).unwrap();
+            shaker.shake(now, &fast(frequency, amplitude)).expect("an order within bounds");
             all.extend(run(&mut shaker, &mut now, 140, 0).0);
         }
-        shaker.shake(now, &fast(100.0, 10.0)).unwrap();
+        shaker.shake(now, &fast(100.0, 10.0)).expect("an order within bounds");
         all.extend(run(&mut shaker, &mut now, 150, 0).0);
         assert_eq!(shaker.stop(Reason::Asked), Some(Event::ShakerStops(Reason::Asked)));
         let (codes, told) = run(&mut shaker, &mut now, 120, 0);
@@ -372,14 +372,14 @@ mod tests {
     #[test]
     fn an_order_expires_into_a_ramp() {
         let (mut shaker, mut now) = (shaker(FULL_V), 1_000_000);
-        shaker.shake(now, &order(200.0, 5.0)).unwrap();
+        shaker.shake(now, &order(200.0, 5.0)).expect("an order within bounds");
         let (_, told) = run(&mut shaker, &mut now, 51_200 / 24, 0);
         assert!(told.is_empty());
         let (_, told) = run(&mut shaker, &mut now, 200, 0);
         assert_eq!(told, [Event::ShakerStops(Reason::Expired), Event::ShakerRests]);
         assert_eq!((shaker.state(), shaker.amplitude_v()), (answer::Shaker::Resting, 0.0));
         // renewed in time, it goes on
-        shaker.shake(now, &order(200.0, 5.0)).unwrap();
+        shaker.shake(now, &order(200.0, 5.0)).expect("an order within bounds");
         for _ in 0..5 {
             assert!(run(&mut shaker, &mut now, 1500, 0).1.is_empty());
             assert_eq!(shaker.shake(now, &order(200.0, 5.0)), Ok(None));
@@ -391,8 +391,8 @@ mod tests {
         let (mut shaker, mut now) = (shaker(FULL_V), 0);
         // 0.01 m/s of 0.05 m/s full scale
         let mut limited = order(200.0, 5.0);
-        limited.limits.push(0.01).unwrap();
-        shaker.shake(now, &limited).unwrap();
+        limited.limits.push(0.01).expect("room for a limit");
+        shaker.shake(now, &limited).expect("an order within bounds");
         assert!(run(&mut shaker, &mut now, 100, -6_553).1.is_empty());
         let (_, told) = run(&mut shaker, &mut now, 1, -6_555);
         assert_eq!(told, [Event::ShakerStops(Reason::Limit { channel: 0 })]);
@@ -429,13 +429,13 @@ mod tests {
     #[test]
     fn an_emergency_leaves_nothing_to_ramp() {
         let (mut shaker, mut now) = (shaker(FULL_V), 0);
-        shaker.shake(now, &order(200.0, 5.0)).unwrap();
+        shaker.shake(now, &order(200.0, 5.0)).expect("an order within bounds");
         run(&mut shaker, &mut now, 200, 0);
         assert_eq!(shaker.halt(Reason::EmergencyStop), Some(Event::ShakerStops(Reason::EmergencyStop)));
         assert!(!shaker.moves());
         assert_eq!(shaker.halt(Reason::EmergencyStop), None);
         // and the next order begins from nothing
-        shaker.shake(now, &order(200.0, 5.0)).unwrap();
+        shaker.shake(now, &order(200.0, 5.0)).expect("an order within bounds");
         let (codes, _) = run(&mut shaker, &mut now, 1, 0);
         // 24 scans at 100 V/s are 0.047 V
         assert!(codes.iter().all(|code| code.abs() <= 154), "{codes:?}");

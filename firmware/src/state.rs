@@ -62,6 +62,7 @@ pub struct Core<'a, M: RawMutex> {
     pub(crate) may_run: Signal<M, ()>,
 }
 
+#[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own, true or not")]
 pub(crate) struct State<'a> {
     pub ring: Ring<'a>,
     pub hammer: Hammer,
