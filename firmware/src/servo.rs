@@ -25,8 +25,12 @@ const LEAST_S: f32 = 0.08;
 const PART: f32 = 0.3;
 /// Largest factor of one correction, and its inverse the smallest.
 const FACTOR: f32 = 1.2;
-/// The way up begins at this part of the drive's bound.
-const FIRST_PART: f32 = 0.01;
+/// The factor while the amplitude is less than [`FAR`] of what was ordered: what the delay still hides is then harmless.
+const FACTOR_FAR: f32 = 1.6;
+/// See [`FACTOR_FAR`].
+const FAR: f32 = 0.25;
+/// The way up begins at this part of the drive's bound: even in a resonance that is far below a small order.
+const FIRST_PART: f32 = 0.001;
 /// An amplitude this many times what was ordered is a runaway.
 const RUNAWAY: f32 = 1.5;
 /// Measurements at the drive's bound without reaching the amplitude, until that is told.
@@ -129,7 +133,11 @@ impl Servo {
         // noise alone may measure nothing at all
         let ratio = self.target / self.measured.max(f32::MIN_POSITIVE);
         if !(0.5..=2.0).contains(&ratio) {
-            return if ratio > 1.0 { FACTOR } else { 1.0 / FACTOR };
+            return match ratio {
+                far if far > 1.0 / FAR => FACTOR_FAR,
+                below if below > 1.0 => FACTOR,
+                _ => 1.0 / FACTOR,
+            };
         }
         // ratio^PART = e^(PART ln ratio), by the series of ln around 1 in (r − 1)/(r + 1), good to 1e-4 in this range
         let y = (ratio - 1.0) / (ratio + 1.0);
