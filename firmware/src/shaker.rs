@@ -151,10 +151,11 @@ impl<'a> Shaker<'a> {
         self.step = order.step;
         self.ordered_v = match (&mut servo, &self.servo) {
             (None, _) => order.amplitude_v,
-            // an order renewed or changed goes on from the drive that it finds
+            // an order renewed or changed goes on from the drive that it finds; not by clamp, whose panic can print
+            // floats and with that costs 16 kB of flash
             (Some(servo), Some(before)) if !was_resting => {
                 servo.continues(before);
-                self.ordered_v.clamp(servo.first_v(), order.amplitude_v)
+                self.ordered_v.max(servo.first_v()).min(order.amplitude_v)
             }
             (Some(servo), _) => servo.first_v(),
         };
