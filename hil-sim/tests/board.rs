@@ -3,7 +3,7 @@
 
 mod support;
 
-use jointrig_hil_sim::board::{Controls, Options, VirtualBoard};
+use jointrig_hil_sim::board::{Options, VirtualBoard};
 use jointrig_hil_sim::executor::Polling;
 use jointrig_hil_sim::rig::RigConfig;
 use jointrig_protocol::answer::{Answer, Hammer, Refusal};
@@ -209,19 +209,11 @@ fn garbage_is_counted_and_harms_nothing() {
 
 #[test]
 fn hammer_and_shaker_keep_every_promise() {
-    let on_a_board = |scenario: fn(&Controls, &mut SmallHost)| {
+    for scenario in scenarios::ALL {
         let (board, mut host) = board(3);
         scenario(board.controls(), &mut host);
         scenarios::the_coil_kept_its_cap(board.controls());
-    };
-    on_a_board(scenarios::a_shot_without_arming_is_refused);
-    on_a_board(scenarios::one_arming_allows_one_shot);
-    on_a_board(scenarios::hammer_and_shaker_exclude_each_other);
-    on_a_board(|_, host| scenarios::the_shaker_pushes_as_ordered_and_comes_to_rest(host));
-    on_a_board(|_, host| scenarios::a_limit_brings_the_shaker_to_rest(host));
-    on_a_board(scenarios::a_stop_in_mid_pulse_takes_the_coil_away);
-    on_a_board(scenarios::a_stop_takes_the_shaker_away_without_a_ramp);
-    on_a_board(scenarios::an_open_guard_brings_the_shaker_to_rest);
+    }
 }
 
 #[test]

@@ -27,13 +27,28 @@ pub fn shake() -> Shake {
     }
 }
 
+/// What holds between a board's buttons and its host.
+pub type Scenario = fn(&Controls, &mut SmallHost);
+
+/// Those for a board whose time waits for its host.
+pub const ALL: [Scenario; 8] = [
+    a_shot_without_arming_is_refused,
+    one_arming_allows_one_shot,
+    hammer_and_shaker_exclude_each_other,
+    the_shaker_pushes_as_ordered_and_comes_to_rest,
+    a_limit_brings_the_shaker_to_rest,
+    a_stop_in_mid_pulse_takes_the_coil_away,
+    a_stop_takes_the_shaker_away_without_a_ramp,
+    an_open_guard_brings_the_shaker_to_rest,
+];
+
 /// Whatever was ordered, no pulse was longer than the cap.
 pub fn the_coil_kept_its_cap(controls: &Controls) {
     let pulses = controls.coil_pulses_us();
     assert!(pulses.iter().all(|pulse| *pulse <= COIL_PULSE_CAP_US), "{pulses:?}");
 }
 
-pub fn a_shot_without_arming_is_refused(controls: &Controls, host: &mut SmallHost) {
+fn a_shot_without_arming_is_refused(controls: &Controls, host: &mut SmallHost) {
     host.start();
     let order = Request::Fire(SmallHost::order(1, PULSE_US, 0));
     assert_eq!(host.ask(order), Err(Refusal::NotArmed));
@@ -42,7 +57,7 @@ pub fn a_shot_without_arming_is_refused(controls: &Controls, host: &mut SmallHos
     assert!(controls.coil_pulses_us().is_empty());
 }
 
-pub fn one_arming_allows_one_shot(controls: &Controls, host: &mut SmallHost) {
+fn one_arming_allows_one_shot(controls: &Controls, host: &mut SmallHost) {
     host.start();
     let at = host.stage(Configuration::Ajb, "AZ3", "A3", 0);
     assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
@@ -57,7 +72,7 @@ pub fn one_arming_allows_one_shot(controls: &Controls, host: &mut SmallHost) {
     assert_eq!(host.status().hammer, Hammer::Disarmed);
 }
 
-pub fn hammer_and_shaker_exclude_each_other(controls: &Controls, host: &mut SmallHost) {
+fn hammer_and_shaker_exclude_each_other(controls: &Controls, host: &mut SmallHost) {
     assert_eq!(host.ask(Request::Shake(shake())), Err(Refusal::NotStreaming));
     host.start();
     assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
@@ -82,7 +97,7 @@ fn excitation(host: &SmallHost, scans: usize) -> i16 {
     codes.map(|code| code.saturating_abs()).max().unwrap()
 }
 
-pub fn the_shaker_pushes_as_ordered_and_comes_to_rest(host: &mut SmallHost) {
+fn the_shaker_pushes_as_ordered_and_comes_to_rest(_: &Controls, host: &mut SmallHost) {
     host.start();
     assert_eq!(host.ask(Request::Shake(shake())), Ok(Answer::Done));
     host.go_on(RATE.into());
@@ -101,7 +116,7 @@ pub fn the_shaker_pushes_as_ordered_and_comes_to_rest(host: &mut SmallHost) {
     assert_eq!(host.status().shaker, Shaker::Resting);
 }
 
-pub fn a_limit_brings_the_shaker_to_rest(host: &mut SmallHost) {
+fn a_limit_brings_the_shaker_to_rest(_: &Controls, host: &mut SmallHost) {
     host.start();
     let config = RigConfig::default();
     let mut order = shake();
@@ -116,7 +131,7 @@ pub fn a_limit_brings_the_shaker_to_rest(host: &mut SmallHost) {
     assert!(host.events.contains(&Event::ShakerStops(reason)), "{:?}", host.events);
 }
 
-pub fn a_stop_in_mid_pulse_takes_the_coil_away(controls: &Controls, host: &mut SmallHost) {
+fn a_stop_in_mid_pulse_takes_the_coil_away(controls: &Controls, host: &mut SmallHost) {
     host.start();
     host.stage(Configuration::Ajb, "AZ3", "A3", 0);
     let held = host.acknowledged();
@@ -141,7 +156,7 @@ pub fn a_stop_in_mid_pulse_takes_the_coil_away(controls: &Controls, host: &mut S
     assert_eq!(host.ask(Request::Arm { valid_ms: 1000 }), Err(Refusal::EmergencyStop));
 }
 
-pub fn a_stop_takes_the_shaker_away_without_a_ramp(controls: &Controls, host: &mut SmallHost) {
+fn a_stop_takes_the_shaker_away_without_a_ramp(controls: &Controls, host: &mut SmallHost) {
     host.start();
     assert_eq!(host.ask(Request::Shake(shake())), Ok(Answer::Done));
     host.go_on(RATE.into());
@@ -155,7 +170,7 @@ pub fn a_stop_takes_the_shaker_away_without_a_ramp(controls: &Controls, host: &m
     assert_eq!(host.ask(Request::Shake(shake())), Err(Refusal::EmergencyStop));
 }
 
-pub fn an_open_guard_brings_the_shaker_to_rest(controls: &Controls, host: &mut SmallHost) {
+fn an_open_guard_brings_the_shaker_to_rest(controls: &Controls, host: &mut SmallHost) {
     host.start();
     assert_eq!(host.ask(Request::Shake(shake())), Ok(Answer::Done));
     controls.open_guard(true);
