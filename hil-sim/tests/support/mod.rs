@@ -151,11 +151,6 @@ impl SmallHost {
         self.send(Kind::Acknowledge, &acknowledge.to_bytes());
     }
 
-    /// The scan that the board was last told of.
-    pub fn acknowledged(&self) -> u64 {
-        self.next_scan.min(self.hold_at)
-    }
-
     /// Lets a held board go on.
     pub fn release(&mut self) {
         self.hold_at = u64::MAX;

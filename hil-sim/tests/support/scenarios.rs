@@ -134,14 +134,18 @@ fn a_limit_brings_the_shaker_to_rest(_: &Controls, host: &mut SmallHost) {
 fn a_stop_in_mid_pulse_takes_the_coil_away(controls: &Controls, host: &mut SmallHost) {
     host.start();
     host.stage(Configuration::Ajb, "AZ3", "A3", 0);
-    let held = host.acknowledged();
-    // the held board halts half a ring on, a hundred scans (2 ms) or a few blocks after the coil went on
-    let halt = held + u64::from(host.hello.unwrap().ring_scans / 2);
+    // A held board halts half a ring on. The order is given while it stands, and it is let run to a second halt, a hundred
+    // scans (2 ms) or a few blocks after the coil went on.
+    let half = u64::from(host.hello.unwrap().ring_scans / 2);
+    let (first, second) = (host.hold_at, host.hold_at + 10_240);
+    host.until("the first halt", |host| host.next_scan >= first + half);
     assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
-    let order = Request::Fire(SmallHost::order(1, COIL_PULSE_CAP_US, halt - 100));
+    let order = Request::Fire(SmallHost::order(1, COIL_PULSE_CAP_US, second + half - 100));
     assert_eq!(host.ask(order), Ok(Answer::Scheduled { number: 1 }));
+    host.hold_at = second;
+    host.acknowledge();
     host.until("the coil", |host| host.phases().contains(&Phase::Firing));
-    host.until("the halt", |host| host.next_scan >= halt);
+    host.until("the second halt", |host| host.next_scan >= second + half);
     assert_eq!(controls.coil_pulses_us(), [COIL_PULSE_CAP_US]);
     controls.press_emergency_stop(true);
     host.release();
