@@ -11,7 +11,7 @@ use crate::device::session::Session;
 /// Show a device: handshake, channels, firmware version, counters.
 #[derive(Debug, Args)]
 pub struct Info {
-    /// Device address, e.g. sim:, serial:/dev/ttyACM0, tcp:127.0.0.1:4000.
+    /// Device address, e.g. sim:, usb:, serial:/dev/ttyACM0, tcp:127.0.0.1:4000.
     #[arg(long, value_name = "ADDR")]
     device: String,
     /// One JSON document on stdout.

@@ -23,3 +23,4 @@ mod sim;
 pub mod stream;
 mod tcp;
 pub mod transport;
+pub mod usb;
