@@ -1,4 +1,5 @@
-//! Watching: a silent host disarms the hammer, and the counters are told once a second.
+//! Watching: a silent host disarms the hammer, dropped log lines are counted, and the counters are told once a
+//! second.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_time::{Duration, Instant, Timer};
@@ -26,6 +27,9 @@ pub async fn watch<M: RawMutex>(core: &Core<'_, M>) -> ! {
             if armed && silent >= u64::from(LINK_SILENCE_MS) {
                 warning!("the host is silent: disarming");
                 state.disarm(Reason::LinkLost);
+            }
+            if let Some(tap) = core.logs {
+                state.counters.logs_dropped = tap.dropped();
             }
             if state.streaming && periods.is_multiple_of(REPORT_EVERY) {
                 let counters = state.counters;
