@@ -15,7 +15,7 @@
 //! | [`BLOCK_AT`] | 484 | simulator | scans missed before the block, then the block |
 //! | [`TO_DEVICE_AT`] | 64 Ki | simulator | bytes for the board, a ring |
 //! | [`TO_HOST_AT`] | 64 Ki | board | bytes for the host, a ring |
-//! | [`LOG_AT`] | 64 Ki | board | log lines, each its level's first letter and text, a ring |
+//! | [`LOG_AT`] | 64 Ki | board | log lines, encoded as for the link ([`crate::logs`]), a ring |
 //!
 //! Heads and tails count bytes since the start, modulo 2³²; everything is little-endian.
 
@@ -29,7 +29,7 @@ pub const BASE: usize = 0x8000_0000;
 /// Its size: QEMU insists on exactly this much.
 pub const BYTES: usize = 16 << 20;
 /// Changes with this layout, so that an image and a simulator of different sources refuse each other.
-pub const MAGIC: u32 = 0x4A52_4C02;
+pub const MAGIC: u32 = 0x4A52_4C03;
 /// Where [`MAGIC`] stands.
 pub const MAGIC_AT: usize = 0;
 /// Where the board's words stand.

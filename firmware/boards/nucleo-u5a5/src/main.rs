@@ -25,12 +25,12 @@ mod coil;
 mod inputs;
 mod keep;
 mod lights;
+mod probe;
 mod rings;
 mod scans;
 mod usb;
 mod watchdog;
 
-use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -97,6 +97,7 @@ async fn main(spawner: Spawner) {
     // before anything else: what the last run left behind
     let last_panic = keep::take_panic();
     let boot = keep::count_start();
+    probe::start();
     let p = embassy_stm32::init(clocks::config());
     let dog = watchdog::start(p.IWDG);
 
@@ -106,14 +107,14 @@ async fn main(spawner: Spawner) {
         board: channels::name("nucleo-u5a5"),
         serial: channels::name(embassy_stm32::uid::uid_hex()),
         target: channels::text(env!("JOINTRIG_TARGET")),
-        build: env!("JOINTRIG_BUILD").parse().unwrap_or(0),
+        build: jointrig_board_log::build_id(),
         scan_rate_hz: SCAN_RATE_HZ,
         channels: channels::table(),
         coil_cap_us: coil.cap_us(),
         stage: NoStage::PRESENT,
         boot,
     };
-    let core: &'static Shared = CORE.init(Core::new(facts, RING.take()));
+    let core: &'static Shared = CORE.init(Core::new(facts, RING.take()).with_logs(&jointrig_board_log::TAP));
     if let Some(text) = last_panic {
         core.report_panic(text.as_str());
     }

@@ -44,11 +44,11 @@ fn choose_serial(serials: &[Option<&str>], wanted: Option<&str>) -> Result<usize
         let names: Vec<_> = serials.iter().map(|serial| format!("usb:{}", serial.unwrap_or("?"))).collect();
         names.join(", ")
     };
-    let meant = |serial: &Option<&str>| match wanted {
+    let meant = |serial: Option<&str>| match wanted {
         Some(wanted) => serial.is_some_and(|serial| serial.eq_ignore_ascii_case(wanted)),
         None => true,
     };
-    let mut places = (0..serials.len()).filter(|place| meant(&serials[*place]));
+    let mut places = (0..serials.len()).filter(|place| meant(serials[*place]));
     match (places.next(), places.next(), wanted) {
         (Some(place), None, _) => Ok(place),
         (Some(_), Some(_), None) => {
