@@ -1,7 +1,7 @@
 //! `usb:` and `usb:SERIAL`: the controller's vendor interface, two bulk endpoints that carry frames.
 //!
 //! Nothing but a name chooses this way over the serial port: the controller answers on the interface on which
-//! it was last spoken to. [`attached`] looks, [`Usb::open`] opens, [`queue`] keeps transfers waiting for bytes.
+//! it was last spoken to. [`attached`] looks, [`Usb::open`] opens, and transfers are kept waiting for bytes.
 
 mod attached;
 mod queue;
