@@ -8,7 +8,7 @@
 //! |---|---|---|
 //! | [`acquire::acquire`] | takes blocks of scans from the converters, judges them for the hammer, puts them in the ring | the front end counts missed scans; they are reported as lost ranges |
 //! | [`receive::receive`] | finds frames in incoming bytes and carries out requests | the host asks again |
-//! | [`transmit::transmit`] | sends answers first, then events, then blocks sent again, then new blocks | blocks wait in the ring; what leaves it unsent is reported as lost |
+//! | [`transmit::transmit`] | sends answers first, then events, then blocks sent again, then new blocks, then log lines | blocks wait in the ring; what leaves it unsent is reported as lost |
 //! | [`watch::watch`] | disarms hammer and stops shaker when the host falls silent, reports counters | – |
 //!
 //! The scan index is the only clock for results; `embassy-time` serves timeouts. Results never depend on
@@ -25,6 +25,7 @@ pub mod friction;
 pub mod hammer;
 pub mod lock_in;
 pub mod lockstep;
+pub mod logs;
 pub mod memory;
 pub mod pulse;
 pub mod quiet;

@@ -16,7 +16,7 @@
 //! | [`DRIVE_AT`] | 480 | board | codes for the shaker's drive |
 //! | [`TO_DEVICE_AT`] | 64 Ki | simulator | bytes for the board, a ring |
 //! | [`TO_HOST_AT`] | 64 Ki | board | bytes for the host, a ring |
-//! | [`LOG_AT`] | 64 Ki | board | log lines, each its level's first letter and text, a ring |
+//! | [`LOG_AT`] | 64 Ki | board | log lines, encoded as for the link ([`crate::logs`]), a ring |
 //!
 //! Heads and tails count bytes since the start, modulo 2³²; everything is little-endian.
 

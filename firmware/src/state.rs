@@ -15,6 +15,7 @@ use jointrig_protocol::limits;
 use crate::fmt::{info, warning};
 use crate::friction::Friction;
 use crate::hammer::{CoilOrder, Hammer, Outcome};
+use crate::logs::Tap;
 use crate::memory::Memory;
 use crate::ring::{Range, Ring, Slot};
 use crate::shaker::Shaker;
@@ -55,6 +56,7 @@ pub struct Facts<'a> {
 /// Everything that the tasks of one device share.
 pub struct Core<'a, M: RawMutex> {
     pub(crate) facts: Facts<'a>,
+    pub(crate) logs: Option<&'a Tap<M>>,
     pub(crate) state: Mutex<M, RefCell<State<'a>>>,
     /// There is something to transmit.
     pub(crate) to_send: Signal<M, ()>,
@@ -133,7 +135,20 @@ impl<'a, M: RawMutex> Core<'a, M> {
             coil: None,
             drive_off: false,
         };
-        Self { facts, state: Mutex::new(RefCell::new(state)), to_send: Signal::new(), may_run: Signal::new() }
+        Self {
+            facts,
+            logs: None,
+            state: Mutex::new(RefCell::new(state)),
+            to_send: Signal::new(),
+            may_run: Signal::new(),
+        }
+    }
+
+    /// The same with log lines for the host, which a board's logger puts into `tap`.
+    #[must_use]
+    pub fn with_logs(mut self, tap: &'a Tap<M>) -> Self {
+        self.logs = Some(tap);
+        self
     }
 
     pub(crate) fn with<R>(&self, f: impl FnOnce(&mut State<'a>) -> R) -> R {

@@ -1,4 +1,4 @@
-//! Transmitting: answers first, then events, then blocks sent again, then new blocks.
+//! Transmitting: answers first, then events, then blocks sent again, then new blocks, then log lines.
 //!
 //! A request is therefore never starved by samples: it waits for at most the one frame that is on its
 //! way. When the link is slower than the samples, blocks wait in the ring, and what leaves it unsent is
@@ -57,8 +57,15 @@ impl<M: RawMutex> Core<'_, M> {
                 }
                 state.counters.events_dropped += 1;
             }
-            state.resent_block(writer).or_else(|| state.new_block(writer))
+            state.resent_block(writer).or_else(|| state.new_block(writer)).or_else(|| self.log_lines(writer))
         })
+    }
+
+    /// Lines wait until the next look, a tenth of a second at most: none is worth a wake-up of its own.
+    fn log_lines(&self, writer: &mut Writer) -> Option<usize> {
+        let length = self.logs?.take(writer.payload_mut())?;
+        writer.restart(Kind::Log);
+        Some(length)
     }
 }
 

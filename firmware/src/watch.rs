@@ -1,4 +1,5 @@
-//! Watching: a silent host disarms the hammer and stops the shaker, as does a silent front end; the counters are told once a second.
+//! Watching: a silent host disarms the hammer and stops the shaker, as does a silent front end; dropped log lines are
+//! counted, and the counters are told once a second.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_time::{Duration, Instant, Timer};
@@ -33,6 +34,9 @@ pub async fn watch<M: RawMutex>(core: &Core<'_, M>) -> ! {
                 warning!("no scans: everything comes to rest");
                 // its ramp waits for the next block, as its codes do: without blocks the drive rests already
                 state.bring_to_rest(Reason::FrontEnd);
+            }
+            if let Some(tap) = core.logs {
+                state.counters.logs_dropped = tap.dropped();
             }
             if state.streaming && periods.is_multiple_of(REPORT_EVERY) {
                 let counters = state.counters;

@@ -17,6 +17,7 @@ use embassy_futures::{block_on, yield_now};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use host::{Host, Interface};
 use jointrig_firmware::board::{Coil, Delivered, Inputs, NoDrive, NoStage, Scans};
+use jointrig_firmware::logs::Tap;
 use jointrig_firmware::ring::Slot;
 use jointrig_firmware::usb::{Buffers, Speed, build};
 use jointrig_firmware::{Core, Facts, acquire, receive, transmit};
@@ -84,6 +85,7 @@ impl Inputs for AllWell {
 
 fn run<F: Future<Output = ()>>(speed: Speed, scenario: impl FnOnce(Session) -> F) {
     let due: &'static Cell<usize> = Box::leak(Box::default());
+    let logs: &'static Tap<NoopRawMutex> = Box::leak(Box::default());
     let bus = Bus::default();
     let device = async {
         let channels: Vec<Channel> = (0..16)
@@ -110,7 +112,7 @@ fn run<F: Future<Output = ()>>(speed: Speed, scenario: impl FnOnce(Session) -> F
             boot: 1,
         };
         let mut slots = vec![Slot::EMPTY; SECOND];
-        let core: Core<'_, NoopRawMutex> = Core::new(facts, &mut slots);
+        let core: Core<'_, NoopRawMutex> = Core::new(facts, &mut slots).with_logs(logs);
         let mut buffers = Buffers::new();
         let mut usb = build(Device(bus.clone()), &mut buffers, "0042", speed);
         let mut scans = OnDemand { due, block: 0 };
@@ -122,8 +124,8 @@ fn run<F: Future<Output = ()>>(speed: Speed, scenario: impl FnOnce(Session) -> F
         )
         .await;
     };
-    let session =
-        Session { host: Host(bus.clone()), speed, due, number: Cell::new(1), waiting: RefCell::default() };
+    let (host, number, waiting) = (Host(bus.clone()), Cell::new(1), RefCell::default());
+    let session = Session { host, speed, due, logs, number, waiting };
     assert!(matches!(block_on(select(device, scenario(session))), Either::Second(())));
 }
 
@@ -132,6 +134,7 @@ struct Session {
     host: Host,
     speed: Speed,
     due: &'static Cell<usize>,
+    logs: &'static Tap<NoopRawMutex>,
     number: Cell<u32>,
     waiting: RefCell<Vec<Heard>>,
 }
@@ -144,6 +147,8 @@ enum Heard {
     Event(Event),
     /// First scan, first code, whether it was sent again.
     Block(u64, i16, bool),
+    /// Encoded log lines.
+    Log(Vec<u8>),
 }
 
 impl Session {
@@ -180,6 +185,7 @@ impl Session {
                 let resent = block.header.flags & RESENT != 0;
                 Heard::Block(block.header.first_scan, block.codes().next().unwrap(), resent)
             }
+            Kind::Log => Heard::Log(frame.payload.to_vec()),
             other => panic!("a device says no {other:?}"),
         }
     }
@@ -267,6 +273,49 @@ fn after_five_seconds_the_loss_is_a_range_and_nothing_is_unexplained() {
         assert_eq!(came.last().unwrap().0, (5 * SECOND as u64 - 1) * SCANS, "up to the newest");
         // and requests are answered as ever
         assert!(matches!(session.ask(way, Request::Status).await, Answer::Status(_)));
+    });
+}
+
+#[test]
+fn log_lines_wait_for_every_block_and_are_dropped_first() {
+    run(Speed::High, async |session| {
+        let way = session.plug().await;
+        session.ask(way, Request::Start).await;
+        let mut line = [1; 50];
+        line[49] = 0;
+        for _ in 0..SECOND / 4 {
+            session.produce(2).await;
+            session.logs.push(&line);
+        }
+        let dropped = session.logs.dropped() as usize;
+        assert!(dropped > SECOND / 8, "the host reads nothing, so lines are dropped ({dropped})");
+        let (mut blocks, mut lines) = (0, 0);
+        while lines + dropped < SECOND / 4 {
+            match session.next(way).await {
+                Heard::Block(first, ..) => {
+                    assert_eq!((first, lines), (blocks as u64 * SCANS, 0), "no line before a block");
+                    blocks += 1;
+                }
+                Heard::Log(bytes) => {
+                    assert_eq!(bytes.len() % line.len(), 0, "whole lines");
+                    assert!(bytes.chunks(line.len()).all(|one| one == line));
+                    lines += bytes.len() / line.len();
+                }
+                _ => {}
+            }
+        }
+        assert_eq!(blocks, SECOND / 4 * 2, "no block was lost");
+        assert_eq!(session.logs.dropped() as usize, dropped);
+    });
+}
+
+#[test]
+fn what_was_said_before_a_host_came_is_told_to_the_first_one() {
+    run(Speed::High, async |session| {
+        session.logs.push(b"early\0");
+        let way = session.plug().await;
+        let heard = session.hear(way).await;
+        assert!(matches!(&heard, Heard::Log(bytes) if bytes == b"early\0"), "{heard:?}");
     });
 }
 

@@ -25,3 +25,4 @@ pub mod request;
 pub mod schema;
 mod seal;
 pub mod shot;
+pub mod usb;

@@ -8,7 +8,7 @@ use crate::project::{Package, Project};
 use crate::toolchain::{TARGET, Toolchain};
 use crate::{command, setup, size};
 use anyhow::{Context, Result, bail};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The libraries that run on the microcontroller.
 const LIBRARIES: [&str; 2] = ["jointrig-protocol", "jointrig-firmware"];
@@ -73,7 +73,23 @@ pub fn build_board(project: &Project, toolchain: &Toolchain, name: &str) -> Resu
     toolchain.apply(&mut cargo, project);
     cargo.args(["build", "--release", "--target", TARGET, "--package", name, "--bin", binary]);
     command::run(&mut cargo).with_context(|| format!("the image of {name} could not be built"))?;
-    Ok(project.firmware_target().join(TARGET).join("release").join(binary))
+    let image = project.firmware_target().join(TARGET).join("release").join(binary);
+    keep_log_table(project, &image)?;
+    Ok(image)
+}
+
+/// Keeps a copy of the image under its build id, by which a host finds the strings of the log that it sends: a
+/// controller may run an older build than the newest one here.
+fn keep_log_table(project: &Project, image: &Path) -> Result<()> {
+    let folder = project.target.join(jointrig_logs::FOLDER);
+    let bytes = std::fs::read(image).with_context(|| format!("could not read {}", image.display()))?;
+    let Some(build) = jointrig_logs::build_id(&bytes) else {
+        bail!("{} has no build id: its build.rs must link with build-id.x and --build-id", image.display());
+    };
+    let table = folder.join(jointrig_logs::file_name(build));
+    std::fs::create_dir_all(&folder)
+        .and_then(|()| std::fs::write(&table, bytes))
+        .with_context(|| format!("could not keep the log strings in {}", table.display()))
 }
 
 /// One board, if it exists.

@@ -43,7 +43,7 @@ enum Task {
         #[arg(long)]
         yes: bool,
     },
-    /// Build the board images and print how much flash and RAM each takes.
+    /// Build the board images, keep their log strings, and print how much flash and RAM each takes.
     #[command(after_help = setup::ENVIRONMENT_HELP)]
     Firmware {
         /// Only this board (its package name); all boards when absent.

@@ -10,20 +10,14 @@ use embassy_usb::msos::{
     CompatibleIdFeatureDescriptor, PropertyData, RegistryPropertyFeatureDescriptor, windows_version,
 };
 use embassy_usb::{Builder, Config, UsbDevice};
+use jointrig_protocol::usb::{INTERFACE_CLASS, PRODUCT, PRODUCT_ID, VENDOR_ID};
 
 use super::link::{Bulk, Choice, Sink, Source};
 
-/// pid.codes, the registry that gives product ids to open hardware.
-pub const VENDOR_ID: u16 = 0x1209;
-/// pid.codes' first test id: for use inside a laboratory. A rig that is sold or given away needs an id of
-/// its own, here and in docs/udev/70-jointrig.rules.
-pub const PRODUCT_ID: u16 = 0x0001;
 /// The request by which Windows asks for the descriptors that are its own.
 pub const VENDOR_CODE: u8 = 0x4A;
 /// By which a Windows program finds the vendor interface.
 pub const INTERFACE_GUID: &str = "{6C1E3B6A-58F0-4C4B-9D0E-6A2F1B7D9E35}";
-/// Class, subclass and protocol that mean "the vendor's own".
-const VENDOR_CLASS: u8 = 0xFF;
 
 /// What the bus came up at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,7 +93,7 @@ pub fn build<'d, D: Driver<'d>>(
 ) -> Usb<'d, D> {
     let mut config = Config::new(VENDOR_ID, PRODUCT_ID);
     config.manufacturer = Some("jointrig");
-    config.product = Some("jointrig controller");
+    config.product = Some(PRODUCT);
     config.serial_number = Some(serial);
     config.max_power = 500;
     let Buffers { config: configuration, bos, msos, control, serial_port, choice } = buffers;
@@ -108,14 +102,14 @@ pub fn build<'d, D: Driver<'d>>(
 
     let packet = speed.bulk_packet();
     let (out, into) = {
-        let mut function = builder.function(VENDOR_CLASS, 0, 0);
+        let mut function = builder.function(INTERFACE_CLASS, 0, 0);
         function.msos_feature(CompatibleIdFeatureDescriptor::new("WINUSB", ""));
         function.msos_feature(RegistryPropertyFeatureDescriptor::new(
             "DeviceInterfaceGUIDs",
             PropertyData::RegMultiSz(&[INTERFACE_GUID]),
         ));
         let mut interface = function.interface();
-        let mut alternate = interface.alt_setting(VENDOR_CLASS, 0, 0, None);
+        let mut alternate = interface.alt_setting(INTERFACE_CLASS, 0, 0, None);
         (alternate.endpoint_bulk_out(None, packet), alternate.endpoint_bulk_in(None, packet))
     };
     let (sender, receiver) = CdcAcmClass::new(&mut builder, serial_port, packet).split();

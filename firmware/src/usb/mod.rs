@@ -19,5 +19,5 @@
 mod device;
 mod link;
 
-pub use device::{Buffers, INTERFACE_GUID, PRODUCT_ID, Speed, Usb, VENDOR_CODE, VENDOR_ID, build};
+pub use device::{Buffers, INTERFACE_GUID, Speed, Usb, VENDOR_CODE, build};
 pub use link::{Sink, Source};

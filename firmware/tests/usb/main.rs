@@ -11,9 +11,10 @@ use embassy_futures::join::join;
 use embassy_futures::select::{Either, select, select3};
 use embassy_futures::{block_on, yield_now};
 use jointrig_firmware::board::{ByteSink, ByteSource};
-use jointrig_firmware::usb::{Buffers, INTERFACE_GUID, PRODUCT_ID, Speed, VENDOR_CODE, VENDOR_ID, build};
+use jointrig_firmware::usb::{Buffers, INTERFACE_GUID, Speed, VENDOR_CODE, build};
 use jointrig_protocol::frame::Accumulator;
 use jointrig_protocol::golden;
+use jointrig_protocol::usb::{PRODUCT, PRODUCT_ID, VENDOR_ID};
 
 use bus::{Bus, Device};
 use host::{Host, Interface, Stall};
@@ -98,7 +99,7 @@ fn descriptors_at_both_speeds() {
             assert_eq!(bulk, [&(2, packet); 4]);
             assert_eq!(found.interfaces.iter().map(|i| i.class).collect::<Vec<_>>(), [0xFF, 0x02, 0x0A]);
             assert_eq!(host.string(found.device[14]).await, "jointrig");
-            assert_eq!(host.string(found.device[15]).await, "jointrig controller");
+            assert_eq!(host.string(found.device[15]).await, PRODUCT);
             assert_eq!(host.string(found.device[16]).await, "0042");
         });
     }
@@ -112,7 +113,7 @@ fn the_udev_rule_is_for_this_device() {
     for line in lines {
         assert!(line.contains(&format!("{{idVendor}}==\"{VENDOR_ID:04x}\"")));
         assert!(line.contains(&format!("{{idProduct}}==\"{PRODUCT_ID:04x}\"")));
-        assert!(line.contains("{product}==\"jointrig controller\""));
+        assert!(line.contains(&format!("{{product}}==\"{PRODUCT}\"")));
     }
 }
 

@@ -255,8 +255,15 @@ impl Runner<'_> {
         let attempt = self.tally.add(row.id, judgement.kind == Kind::Good);
         self.progress.judged(&row.cell, &judgement, self.tally.kept());
         log::debug!("{:?} attempt {attempt}: {} ({})", row.cell, judgement.kind, judgement.sentence);
+        self.keep_log()?;
         let (cell, session, utc) = (row.id, self.session_id, utc_now());
         still(self.keeper.record(NewRecord { cell, attempt, session, utc, recording, judgement }))
+    }
+
+    /// Keeps what the controller has logged.
+    fn keep_log(&mut self) -> Result<(), RunError> {
+        let lines = self.session.log_lines();
+        lines.into_iter().try_for_each(|line| still(self.keeper.log(format!("controller: {line}"))))
     }
 
     fn give_up(&mut self, row: &CellRow, reason: &str) -> Result<(), RunError> {
@@ -284,7 +291,7 @@ impl Runner<'_> {
     }
 
     /// Ends stream and file; of two errors the first one counts.
-    fn end(self, walked: Result<(), RunError>) -> Result<Summary, RunError> {
+    fn end(mut self, walked: Result<(), RunError>) -> Result<Summary, RunError> {
         self.progress.finish();
         let accounts = if walked.is_ok() {
             self.session.disarm().and_then(|()| self.session.finish())
@@ -304,6 +311,8 @@ impl Runner<'_> {
             // a keeper that is gone says so below
             let _ = self.keeper.log(text);
         }
+        // here too a keeper that is gone says so below
+        let _ = self.keep_log();
         let closed = self.keeper.finish();
         match &walked {
             Err(RunError::KeeperGone) | Ok(()) => closed?,

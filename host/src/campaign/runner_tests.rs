@@ -3,7 +3,10 @@ use crate::campaign::judge::by_summary::ByShotSummary;
 use crate::campaign::plan::SMALL;
 use crate::device::fake::Fake;
 use crate::device::faulty::{Faults, Faulty};
+use crate::device::logs::Tables;
 use crate::device::transport::Transport;
+use jointrig_logs::example::{WARNING, image, line};
+use jointrig_logs::file_name;
 use std::path::Path;
 
 fn plan() -> String {
@@ -74,6 +77,24 @@ fn a_campaign_is_complete_and_the_same_over_any_link() {
         assert!(content(&clean) == content(&spoilt), "seed {seed}: other records");
         assert_eq!(distances(&clean), distances(&spoilt), "hits of a cell are at fixed distances");
     }
+}
+
+#[test]
+fn what_the_controller_logs_is_kept_with_the_campaign() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // the build that the fake names
+    std::fs::write(folder.path().join(file_name(1)), image(1)).expect("written");
+    let path = create(&folder, "c.jrig", &plan());
+    let fake = Fake::scripted(|fake| fake.says = vec![line(WARNING, 3, &[7, 0, 0, 0])]);
+    let mut session = Session::open(Box::new(fake), "fake:").expect("answers");
+    session.look_for_log_tables(Tables::in_folders(vec![folder.path().into()]));
+    let store = Store::open(&path).expect("opens");
+    let summary = run(store, &mut session, &mut ByShotSummary, &options()).expect("runs");
+    let file = rusqlite::Connection::open(&path).expect("opens");
+    let sql = "SELECT count(*) FROM log WHERE text = 'controller: WARN 0.000003 pressure 7'";
+    let kept: u64 = file.query_row(sql, [], |row| row.get(0)).expect("counted");
+    // a shot takes two requests and more, each of which is answered with a line
+    assert!(kept >= 2 * summary.hits, "{kept} lines of {} hits", summary.hits);
 }
 
 /// Judges as usual, and stops the run after some records.

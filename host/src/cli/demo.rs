@@ -46,7 +46,8 @@ impl Demo {
         let again = self.again();
         let address = Address::Sim { rig: self.rig.clone() };
         let stop = interrupt::flag();
-        let summary = measure::measure(store, &address, self.seed, Stage::Device, true, stop, &again)?;
+        let device = measure::Device { address: &address, seed: self.seed, log_tables: None };
+        let summary = measure::measure(store, device, Stage::Device, true, stop, &again)?;
         if summary.interrupted {
             let file = file.display();
             eprintln!("`jointrig analyse {file} --out {}` works on what is there", folder.display());

@@ -1,11 +1,13 @@
-//! `devices`: what is attached. Ports are listed, not opened: opening could reset a stranger's device.
+//! `devices`: what is attached. Controllers and ports are listed, not opened: opening could reset a stranger's device.
 
 use clap::Args;
+use jointrig_protocol::usb::PRODUCT;
 use serde::Serialize;
 use serialport::SerialPortType;
 
 use super::error::CliError;
 use super::output;
+use crate::device::usb;
 
 /// List what is attached.
 #[derive(Debug, Args)]
@@ -27,6 +29,14 @@ impl Devices {
         let mut found = Vec::new();
         if cfg!(feature = "sim") {
             found.push(Found { address: "sim:".into(), name: "built-in simulated rig".into(), serial: None });
+        }
+        match usb::attached() {
+            Ok(list) => found.extend(list.into_iter().map(|one| Found {
+                address: one.address(),
+                name: PRODUCT.into(),
+                serial: one.serial,
+            })),
+            Err(error) => log::warn!("USB devices cannot be listed: {error}"),
         }
         match serialport::available_ports() {
             Ok(ports) => found.extend(ports.into_iter().map(|port| {

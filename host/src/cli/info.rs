@@ -1,19 +1,25 @@
 //! `info`: who a device is and how it is.
 
+use std::path::PathBuf;
+
 use clap::Args;
 use serde_json::json;
 
 use super::error::CliError;
 use super::output;
 use crate::device::address::Address;
+use crate::device::logs::Tables;
 use crate::device::session::Session;
 
 /// Show a device: handshake, channels, firmware version, counters.
 #[derive(Debug, Args)]
 pub struct Info {
-    /// Device address, e.g. sim:, serial:/dev/ttyACM0, tcp:127.0.0.1:4000.
+    /// Device address, e.g. sim:, usb:, serial:/dev/ttyACM0, tcp:127.0.0.1:4000.
     #[arg(long, value_name = "ADDR")]
     device: String,
+    /// Folder of the tables by which the controller's log lines are read (else JOINTRIG_LOG_TABLES).
+    #[arg(long, value_name = "DIR")]
+    log_tables: Option<PathBuf>,
     /// One JSON document on stdout.
     #[arg(long)]
     json: bool,
@@ -23,6 +29,7 @@ impl Info {
     pub fn run(self) -> Result<(), CliError> {
         let address: Address = self.device.parse()?;
         let mut session = Session::open(address.open(0)?, &self.device)?;
+        session.look_for_log_tables(Tables::new(self.log_tables));
         let info = session.info()?;
         let map = session.channels(&info)?;
         let status = session.status()?;
@@ -93,7 +100,7 @@ impl Info {
         }));
         let counters = status.counters;
         text.push(format!(
-            "  counters: {} frames in, {} bad; scans produced {}, sent {}, resent {}, dropped {}, missed {}",
+            "  counters: {} frames in, {} bad; scans produced {}, sent {}, resent {}, dropped {}, missed {}; log lines dropped {}",
             counters.frames_in,
             counters.frames_bad,
             counters.scans_produced,
@@ -101,6 +108,7 @@ impl Info {
             counters.scans_resent,
             counters.scans_dropped,
             counters.scans_missed,
+            counters.logs_dropped,
         ));
         output::lines(text)
     }

@@ -1,6 +1,6 @@
 //! Running a campaign from the command line: `campaign run` and `demo` share it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -10,20 +10,31 @@ use crate::campaign::runner::{self, Options, Summary};
 use crate::campaign::stage::Stage;
 use crate::campaign::store::Store;
 use crate::device::address::Address;
+use crate::device::logs::Tables;
 use crate::device::session::Session;
+
+/// What measures.
+pub struct Device<'a> {
+    pub address: &'a Address,
+    /// Seed of a simulated rig.
+    pub seed: u64,
+    /// Folder of the tables of log strings, where one is named.
+    pub log_tables: Option<PathBuf>,
+}
 
 /// Runs what is left of the campaign in `store`. `again` is the command that resumes it.
 pub fn measure(
     store: Store,
-    address: &Address,
-    seed: u64,
+    device: Device<'_>,
     stage: Stage,
     yes: bool,
     stop: Arc<AtomicBool>,
     again: &str,
 ) -> Result<Summary, CliError> {
     let path = store.path().to_owned();
+    let Device { address, seed, log_tables } = device;
     let mut session = Session::open(address.open(seed)?, &address.to_string())?;
+    session.look_for_log_tables(Tables::new(log_tables));
     let options = Options { stage, yes, progress: true, stop };
     let summary = runner::run(store, &mut session, &mut ByRecord, &options)?;
     tell(&path, &summary, again);

@@ -102,6 +102,8 @@ mod tests {
             "demo --full --rig rigs/rigid-clamp.toml",
             "devices --json",
             "info --device sim: --json",
+            "info --device usb: --log-tables tables",
+            "campaign run p.jrig --device usb:0042 --log-tables tables",
             "campaign new p.jrig --paper",
             "campaign new p.jrig --plan plan.toml",
             "campaign run p.jrig --device sim: --stage exec:move.sh --yes",

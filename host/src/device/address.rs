@@ -6,7 +6,8 @@
 //! | `serial:PATH` | a serial port or pseudo-terminal |
 //! | `tcp:HOST:PORT` | a socket |
 //! | `qemu:` or `qemu:IMAGE` | the firmware in the emulator, over the built-in rig |
-//! | `usb:`, `replay:` | known, but not served by this version |
+//! | `usb:` or `usb:SERIAL` | the controller's vendor interface: the only one attached, or by serial number |
+//! | `replay:` | known, but not served by this version |
 
 use std::fmt;
 use std::path::PathBuf;
@@ -25,6 +26,11 @@ pub enum Address {
     },
     /// A serial port.
     Serial(PathBuf),
+    /// The vendor interface of an attached controller.
+    Usb {
+        /// Its serial number; the only one attached without.
+        serial: Option<String>,
+    },
     /// A socket, as `host:port`.
     Tcp(String),
     /// The emulator: with the image named by the environment, or with this one.
@@ -41,11 +47,12 @@ impl FromStr for Address {
         let wrong = |why: &str| DeviceError::Address { given: given.into(), why: why.into() };
         let (scheme, rest) = given
             .split_once(':')
-            .ok_or_else(|| wrong("write e.g. sim:, serial:/dev/ttyACM0 or tcp:127.0.0.1:4000"))?;
+            .ok_or_else(|| wrong("write e.g. sim:, usb:, serial:/dev/ttyACM0 or tcp:127.0.0.1:4000"))?;
         match scheme {
             "sim" => Ok(Self::Sim { rig: (!rest.is_empty()).then(|| rest.into()) }),
             "serial" if rest.is_empty() => Err(wrong("name the port, e.g. serial:/dev/ttyACM0")),
             "serial" => Ok(Self::Serial(rest.into())),
+            "usb" => Ok(Self::Usb { serial: (!rest.is_empty()).then(|| rest.into()) }),
             "tcp" => match rest.rsplit_once(':') {
                 Some((host, port)) if !host.is_empty() && port.parse::<u16>().is_ok_and(|port| port > 0) => {
                     Ok(Self::Tcp(rest.into()))
@@ -53,8 +60,8 @@ impl FromStr for Address {
                 _ => Err(wrong("name host and port (1 to 65535), e.g. tcp:127.0.0.1:4000")),
             },
             "qemu" => Ok(Self::Qemu { image: (!rest.is_empty()).then(|| rest.into()) }),
-            "usb" | "replay" => Err(DeviceError::NotBuilt { given: given.into(), scheme: scheme.into() }),
-            _ => Err(wrong("known are sim:, serial:, tcp: and qemu:")),
+            "replay" => Err(DeviceError::NotBuilt { given: given.into(), scheme: scheme.into() }),
+            _ => Err(wrong("known are sim:, serial:, usb:, tcp: and qemu:")),
         }
     }
 }
@@ -65,6 +72,7 @@ impl fmt::Display for Address {
             Self::Sim { rig: None } => f.write_str("sim:"),
             Self::Sim { rig: Some(path) } => write!(f, "sim:{}", path.display()),
             Self::Serial(path) => write!(f, "serial:{}", path.display()),
+            Self::Usb { serial } => write!(f, "usb:{}", serial.as_deref().unwrap_or_default()),
             Self::Tcp(place) => write!(f, "tcp:{place}"),
             Self::Qemu { image: None } => f.write_str("qemu:"),
             Self::Qemu { image: Some(path) } => write!(f, "qemu:{}", path.display()),
@@ -82,6 +90,7 @@ impl Address {
         match self {
             Self::Sim { rig } => open_sim(rig.as_deref(), seed),
             Self::Serial(path) => Ok(Box::new(super::serial::Serial::open(path)?)),
+            Self::Usb { serial } => Ok(Box::new(super::usb::Usb::open(serial.as_deref())?)),
             Self::Tcp(place) => Ok(Box::new(super::tcp::Tcp::open(place)?)),
             Self::Qemu { image } => open_qemu(image.as_deref(), seed),
         }
@@ -124,6 +133,8 @@ mod tests {
             "sim:",
             "sim:rigs/stiff.toml",
             "serial:/dev/ttyACM0",
+            "usb:",
+            "usb:0034001A3433510437363934",
             "tcp:127.0.0.1:4000",
             "tcp:[::1]:9",
             "qemu:",
@@ -142,8 +153,6 @@ mod tests {
             ("tcp:localhost", "host and port"),
             ("tcp:localhost:0", "host and port"),
             ("bluetooth:x", "known are"),
-            ("usb:", "not built into this version"),
-            ("usb:", "not built into this version"),
             ("replay:x.bin", "not built into this version"),
         ] {
             let said = text.parse::<Address>().expect_err(text).to_string();

@@ -5,6 +5,10 @@ use std::io;
 use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::hello::Mismatch;
 
+/// What to do about "permission denied" on Linux.
+pub(super) const INSTALL_UDEV_RULE: &str = "install docs/udev/70-jointrig.rules (`sudo cp` it to /etc/udev/rules.d, \
+     then `sudo udevadm control --reload && sudo udevadm trigger`)";
+
 /// Why a device could not be reached or used.
 #[derive(Debug, thiserror::Error)]
 pub enum DeviceError {
@@ -18,7 +22,7 @@ pub enum DeviceError {
     },
     /// The address is a known form that this build does not serve.
     #[error(
-        "device address `{given}`: `{scheme}:` is not built into this version; use sim:, serial: or tcp:"
+        "device address `{given}`: `{scheme}:` is not built into this version; use sim:, serial:, usb: or tcp:"
     )]
     NotBuilt {
         /// What was given.

@@ -43,6 +43,8 @@ pub struct Fake {
     pub newtons_per_us: f32,
     /// After this many requests the cable is pulled.
     pub dies_after: Option<u32>,
+    /// Payloads of log frames, one sent before each answer, from the beginning again after the last.
+    pub says: Vec<Vec<u8>>,
     /// Whether it knows a stage.
     pub stage_known: bool,
     pub hello: Hello,
@@ -73,6 +75,7 @@ impl Default for Fake {
             reach_us: 1_000,
             newtons_per_us: 0.025,
             dies_after: None,
+            says: Vec::new(),
             stage_known: true,
             hello: Hello::device(0, 5, RING),
             accumulator: Accumulator::new(),
@@ -141,6 +144,10 @@ impl Fake {
         }
         assert!(asked.number > self.last_number, "numbers increase");
         self.last_number = asked.number;
+        if !self.says.is_empty() {
+            let payload = self.says[asked.number as usize % self.says.len()].clone();
+            self.send(Kind::Log, &payload);
+        }
         let mut again = Vec::new();
         let outcome = self.carry_out(asked.request, &mut again);
         let numbered = answer::Numbered { number: asked.number, outcome };

@@ -9,6 +9,7 @@ use jointrig_protocol::frame::{Frame, Kind};
 use jointrig_protocol::hello::{Hello, Mismatch};
 use jointrig_protocol::shot::{Phase, Shot};
 
+use super::logs::DeviceLog;
 use super::stream::Stream;
 
 /// Events that wait for somebody to read them; the oldest go first when nobody does.
@@ -38,6 +39,8 @@ pub struct Inbox {
     pub strangers: u64,
     /// The highest epoch among the strangers.
     pub stranger_epoch: Option<u32>,
+    /// What the device logs.
+    pub log: DeviceLog,
 }
 
 /// A stream that was asked for: its first blocks follow the answer closely, so that it must begin the
@@ -52,6 +55,11 @@ pub struct Starting {
 }
 
 impl Inbox {
+    /// Empty, for a device that logs.
+    pub fn with_log(log: DeviceLog) -> Self {
+        Self { log, ..Self::default() }
+    }
+
     /// Sorts one frame.
     pub fn take(&mut self, frame: Frame<'_>) {
         match frame.kind {
@@ -65,7 +73,7 @@ impl Inbox {
                 Err(error) => log::warn!("an event that cannot be read was dropped: {error}"),
             },
             Kind::Hello => self.hello = Some(Hello::from_bytes(frame.payload)),
-            Kind::Log => log::trace!("device log, {} bytes", frame.payload.len()),
+            Kind::Log => self.log.take(frame.payload),
             Kind::Request | Kind::Acknowledge => log::debug!("a frame that only a host sends was ignored"),
         }
     }

@@ -12,6 +12,7 @@ pub(crate) mod fake;
 pub mod faulty;
 mod inbox;
 pub mod link;
+pub mod logs;
 #[cfg(feature = "sim")]
 mod qemu;
 pub mod recording;
@@ -23,3 +24,4 @@ mod sim;
 pub mod stream;
 mod tcp;
 pub mod transport;
+pub mod usb;

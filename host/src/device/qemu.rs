@@ -15,6 +15,7 @@ pub const IMAGE_VARIABLE: &str = "JOINTRIG_MPS2_IMAGE";
 
 /// A running emulator.
 pub struct Qemu {
+    image: PathBuf,
     link: HostEnd,
     // dropped after the link: the emulator ends then
     board: QemuBoard,
@@ -38,7 +39,7 @@ impl Qemu {
                 ))
             })?;
         let (board, link) = QemuBoard::start(&image, None, seed).map_err(|error| open(error.to_string()))?;
-        Ok(Self { link, board })
+        Ok(Self { image, link, board })
     }
 
     /// The reason why the emulator ended, where it is known, instead of a bare broken pipe.
@@ -57,5 +58,9 @@ impl Transport for Qemu {
 
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.link.write_all(bytes).map_err(|error| self.explained(error))
+    }
+
+    fn image(&self) -> Option<&Path> {
+        Some(&self.image)
     }
 }

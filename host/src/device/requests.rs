@@ -87,6 +87,7 @@ impl Session {
         match self.ask(Request::Info)? {
             Answer::Info(info) => {
                 self.rate_hz = f64::from(info.scan_rate_hz);
+                self.inbox.log.know_build(info.build);
                 Ok(info)
             }
             other => Err(self.wrong("info", &other)),

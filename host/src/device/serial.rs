@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serialport::{ErrorKind, SerialPort};
 
-use super::error::DeviceError;
+use super::error::{DeviceError, INSTALL_UDEV_RULE};
 use super::transport::Transport;
 
 /// Any rate will do: USB serial ports ignore it.
@@ -32,9 +32,7 @@ impl Serial {
         let mut port = serialport::new(name.clone(), BAUD).timeout(timeout).open().map_err(|error| {
             let why = match error.kind {
                 ErrorKind::Io(io::ErrorKind::PermissionDenied) => format!(
-                    "permission denied: install docs/udev/70-jointrig.rules (`sudo cp` it to /etc/udev/rules.d, then \
-                     `sudo udevadm control --reload && sudo udevadm trigger`), or add yourself to the group that \
-                     owns {name}"
+                    "permission denied: {INSTALL_UDEV_RULE}, or add yourself to the group that owns {name}"
                 ),
                 ErrorKind::NoDevice | ErrorKind::Io(io::ErrorKind::NotFound) => {
                     "there is no such port: is the controller plugged in? `jointrig devices` lists what is attached".into()

@@ -28,6 +28,7 @@ use jointrig_protocol::shot::Shot;
 use super::error::DeviceError;
 use super::inbox::Inbox;
 use super::link::Link;
+use super::logs::{DeviceLog, Tables};
 use super::stream::{Accounts, Stream};
 use super::transport::Transport;
 
@@ -82,9 +83,10 @@ impl Session {
     /// No answer, or another version: both are named.
     pub fn open(transport: Box<dyn Transport>, address: &str) -> Result<Self, DeviceError> {
         let now = Instant::now();
+        let log = DeviceLog::of(address, transport.image());
         let mut session = Self {
             link: Link::new(transport),
-            inbox: Inbox::default(),
+            inbox: Inbox::with_log(log),
             address: address.into(),
             hello: Hello::host(nonce()),
             next_number: 1,
@@ -133,6 +135,22 @@ impl Session {
     /// What errors call the device.
     pub fn address(&self) -> &str {
         &self.address
+    }
+
+    /// Where the table of the device's log strings is looked for; to be said before [`Session::info`], by which
+    /// its build becomes known. Without it, only in the image of an emulator.
+    pub fn look_for_log_tables(&mut self, tables: Tables) {
+        self.inbox.log.tables = tables;
+    }
+
+    /// What the device has logged since the last call, each line its level and text; some hundred are kept.
+    pub fn log_lines(&mut self) -> Vec<String> {
+        self.inbox.log.lines()
+    }
+
+    /// Bytes of the device's log that made no line: damaged, or without a table.
+    pub fn undecoded_log_bytes(&self) -> u64 {
+        self.inbox.log.undecoded()
     }
 
     /// The device's introduction.

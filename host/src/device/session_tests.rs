@@ -1,6 +1,8 @@
 use super::*;
 use crate::device::fake::{Fake, RING};
 use crate::device::faulty::{Faults, Faulty};
+use jointrig_logs::example::{WARNING, image, line};
+use jointrig_logs::file_name;
 use jointrig_protocol::request::Fire;
 
 fn open(transport: impl Transport + 'static) -> Session {
@@ -46,6 +48,45 @@ fn a_faulty_link_gives_the_same_samples_and_every_scan_is_accounted_for() {
         assert!(clean == spoilt, "seed {seed}: other samples");
         assert_eq!((accounts.unexplained(), accounts.lost), (0, 0), "{accounts:?}");
         assert!(accounts.recovered > 0 && bad > 0, "{accounts:?}, {bad} bad frames");
+    }
+}
+
+/// Log frames in the stream, of every kind of content.
+fn logs() -> Vec<Vec<u8>> {
+    let garbage = |seed: u32| {
+        (0..400_u32).map(|i| (i.wrapping_add(seed).wrapping_mul(2_654_435_761) >> 13) as u8).collect()
+    };
+    let mut says: Vec<Vec<u8>> = (0..20).map(garbage).collect();
+    says.extend([vec![], vec![0; 400], line(WARNING, 3, &[7, 0, 0, 0])]);
+    says
+}
+
+#[test]
+fn log_frames_of_any_content_change_no_sample() {
+    let (clean, ..) = measure(Fake::default());
+    let (spoken, accounts, bad) = measure(Fake::scripted(|fake| fake.says = logs()));
+    assert!(clean == spoken, "other samples");
+    assert_eq!((accounts.unexplained(), accounts.lost, bad), (0, 0, 0));
+}
+
+#[test]
+fn a_log_is_read_by_the_table_of_the_build_and_counted_without_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // the build that the fake names
+    std::fs::write(folder.path().join(file_name(1)), image(1)).expect("written");
+    for (folders, text) in [(vec![folder.path().into()], Some("WARN 0.000003 pressure 7")), (vec![], None)] {
+        let encoded = line(WARNING, 3, &[7, 0, 0, 0]);
+        let mut session = open(Fake::scripted(|fake| fake.says = vec![encoded.clone()]));
+        session.look_for_log_tables(Tables::in_folders(folders));
+        session.status().expect("status");
+        assert!(session.log_lines().is_empty(), "which build it is, nobody knows yet");
+        session.info().expect("info");
+        session.status().expect("status");
+        let (lines, undecoded) = (session.log_lines(), session.undecoded_log_bytes());
+        match text {
+            Some(text) => assert_eq!((lines, undecoded), (vec![text.to_owned(); 3], 0)),
+            None => assert_eq!((lines.len(), undecoded), (0, 3 * encoded.len() as u64)),
+        }
     }
 }
 

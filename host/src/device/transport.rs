@@ -1,6 +1,7 @@
 //! Bytes to and from a device, whatever carries them.
 
 use std::io;
+use std::path::Path;
 use std::time::Duration;
 
 /// A byte pipe to one device. It owes nobody frames: bytes may arrive in any portion, and may be lost.
@@ -18,6 +19,12 @@ pub trait Transport: Send {
     /// # Errors
     /// The device or its cable is gone.
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// The image that the device at the other end was started with, where that is known: its log strings
+    /// are in it.
+    fn image(&self) -> Option<&Path> {
+        None
+    }
 }
 
 impl<T: Transport + ?Sized> Transport for Box<T> {
@@ -27,5 +34,9 @@ impl<T: Transport + ?Sized> Transport for Box<T> {
 
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
         (**self).write_all(bytes)
+    }
+
+    fn image(&self) -> Option<&Path> {
+        (**self).image()
     }
 }

@@ -30,7 +30,7 @@ pub fn run(setup: &Setup) -> ! {
         board: Name::try_from("mps2-an505").unwrap_or_default(),
         serial: setup.serial.clone(),
         target: String::try_from(env!("JOINTRIG_TARGET")).unwrap_or_default(),
-        build: 0,
+        build: jointrig_board_log::build_id(),
         scan_rate_hz: setup.scan_rate_hz,
         channels,
         coil_cap_us: COIL_PULSE_CAP_US,
@@ -39,7 +39,8 @@ pub fn run(setup: &Setup) -> ! {
         boot: setup.boot,
     };
     let slots = (setup.slots as usize).clamp(1, SLOTS);
-    let core: &'static Shared = CORE.init(Core::new(facts, &mut MEMORY.take()[..slots]));
+    let core: &'static Shared =
+        CORE.init(Core::new(facts, &mut MEMORY.take()[..slots]).with_logs(&jointrig_board_log::TAP));
     let scans = Scans::new(core, per_block, setup.scan_rate_hz);
     executor::run(|spawner| {
         const ONCE: &str = "each task is made once";

@@ -32,12 +32,12 @@ mod inputs;
 mod keep;
 mod lights;
 mod nonce;
+mod probe;
 mod rings;
 mod scans;
 mod usb;
 mod watchdog;
 
-use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -116,6 +116,7 @@ async fn watching(core: &'static Shared) {
 async fn main(spawner: Spawner) {
     // before anything else: what the last run left behind
     let last_panic = keep::take_panic();
+    probe::start();
     let p = embassy_stm32::init(clocks::config());
     let dog = watchdog::start(p.IWDG);
     let mut without_nonce = false;
@@ -132,7 +133,7 @@ async fn main(spawner: Spawner) {
         board: channels::name("nucleo-u5a5"),
         serial: channels::name(embassy_stm32::uid::uid_hex()),
         target: channels::text(env!("JOINTRIG_TARGET")),
-        build: env!("JOINTRIG_BUILD").parse().unwrap_or(0),
+        build: jointrig_board_log::build_id(),
         scan_rate_hz: SCAN_RATE_HZ,
         channels: channels::table(),
         coil_cap_us: coil.cap_us(),
@@ -140,7 +141,7 @@ async fn main(spawner: Spawner) {
         drive_v: drive::FULL_SCALE_V,
         boot: start.boot,
     };
-    let core: &'static Shared = CORE.init(Core::new(facts, RING.take()));
+    let core: &'static Shared = CORE.init(Core::new(facts, RING.take()).with_logs(&jointrig_board_log::TAP));
     if let Some(text) = last_panic {
         core.report_panic(text.as_str());
     }

@@ -20,6 +20,7 @@ use crate::board::{Controls, Options};
 use crate::link::{DeviceEnd, HostEnd, pair};
 use crate::rig::{Rig, RigConfig, RigError};
 pub use faults::{ConverterFault, Faults};
+use jointrig_logs::Table;
 use process::Emulator;
 use server::Server;
 
@@ -90,6 +91,7 @@ impl QemuBoard {
         if !image.is_file() {
             return Err(QemuError::NoImage(image.to_path_buf()));
         }
+        let strings = Table::read(image).map_err(|error| log::warn!(target: "qemu", "{error}")).ok();
         let (emulator, pipes, ram) = Emulator::start(image, options.uart.as_deref())?;
         let emulator = Arc::new(emulator);
         let (host, device) = pair();
@@ -100,13 +102,15 @@ impl QemuBoard {
             let (device, options, failure) = (device.clone(), options.clone(), Arc::clone(&failure));
             let (controls, faults) = (Arc::clone(&controls), Arc::clone(&faults));
             move || {
-                let mut server = Server::new(rig, &options, &device, &controls, &faults, pipes, ram);
+                let mut server =
+                    Server::new(rig, &options, &device, &controls, &faults, pipes, ram).with_strings(strings);
                 let outcome = server.start().and_then(|()| {
                     // nobody listens any more when starting took too long
                     let _ = started.send(());
                     server.serve()
                 });
                 if let Err(sentence) = outcome {
+                    server.last_lines().for_each(|line| log::warn!(target: "qemu", "before the end: {line}"));
                     log::error!(target: "qemu", "{sentence}");
                     *failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(sentence);
                 }

@@ -1,6 +1,7 @@
 //! The simulator's side of the turns: the rig, the clock and the link.
 
 use std::cell::RefCell;
+use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::pin::pin;
 use std::rc::Rc;
@@ -14,9 +15,9 @@ use jointrig_firmware::lockstep::{
     MUST_PANIC, NEVER, Op, RING_BYTES, Reply, Setup, TEXT_AT, TEXT_BYTES, TO_DEVICE_AT, TO_HOST_AT,
     from_text, to_text,
 };
+use jointrig_logs::Table;
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, scans_per_block};
 use jointrig_protocol::{golden, request};
-use log::Level;
 use serde::Serialize;
 
 use super::Faults;
@@ -31,6 +32,9 @@ use crate::rig::Rig;
 
 /// How long a board whose link is its UART may stand still.
 const UART_LOOK: Duration = Duration::from_micros(200);
+
+/// How many of the newest log lines are remembered.
+const SAID: usize = 16;
 
 /// Why serving ended, in a sentence.
 type Ended = String;
@@ -60,7 +64,10 @@ pub struct Server {
     reply: Reply,
     /// Scans since the start, lost ones among them.
     produced: u64,
-    log: Vec<u8>,
+    /// The image's log strings, where it has any.
+    strings: Option<Table>,
+    /// The newest log lines.
+    said: VecDeque<String>,
 }
 
 impl Server {
@@ -101,9 +108,16 @@ impl Server {
             free_running: options.free_running,
             reply: Reply { inputs: INTERLOCK_CLOSED, ..Reply::default() },
             produced: 0,
-            log: Vec::new(),
+            strings: None,
+            said: VecDeque::new(),
             rig,
         }
+    }
+
+    /// The same, reading the image's log lines by these strings.
+    pub fn with_strings(mut self, strings: Option<Table>) -> Self {
+        self.strings = strings;
+        self
     }
 
     /// The first turn: the board introduces itself and hears what it is.
@@ -125,7 +139,7 @@ impl Server {
     pub fn serve(&mut self) -> Result<(), Ended> {
         loop {
             let ask = self.wait()?;
-            self.show_log(&ask).map_err(|error| broken(&error))?;
+            self.hear_log(&ask).map_err(|error| broken(&error))?;
             self.reply.length = 0;
             match Op::from_word(ask.op) {
                 Some(Op::Idle) => match self.idle(&ask).map_err(|error| broken(&error))? {
@@ -288,29 +302,32 @@ impl Server {
         self.ram.write(TEXT_AT, text).map_err(|error| broken(&error))
     }
 
-    /// Passes the board's log lines on to this program's log.
-    fn show_log(&mut self, ask: &Ask) -> io::Result<()> {
+    /// Reads the board's log lines as they arise. The link brings the same ones to the host, which shows them;
+    /// here they are for whoever looks closer, and for the report of a board that broke down.
+    fn hear_log(&mut self, ask: &Ask) -> io::Result<()> {
         // a board that breaks down says so by other means
         let count = ask.log_head.wrapping_sub(self.reply.log_tail);
         if count == 0 || count > RING_BYTES {
             return Ok(());
         }
-        let from = self.log.len();
-        self.log.resize(from + count as usize, 0);
-        self.ram.read_ring(LOG_AT, self.reply.log_tail, &mut self.log[from..])?;
+        let mut bytes = vec![0; count as usize];
+        self.ram.read_ring(LOG_AT, self.reply.log_tail, &mut bytes)?;
         self.reply.log_tail = ask.log_head;
-        while let Some(end) = self.log.iter().position(|byte| *byte == b'\n') {
-            let line: Vec<u8> = self.log.drain(..=end).collect();
-            let line = String::from_utf8_lossy(&line[..end]);
-            let level = match line.chars().next() {
-                Some('E') => Level::Error,
-                Some('W') => Level::Warn,
-                Some('I') => Level::Info,
-                _ => Level::Debug,
-            };
-            log::log!(target: "qemu", level, "{}", line.get(1..).unwrap_or(""));
-        }
+        let (said, Some(strings)) = (&mut self.said, &self.strings) else { return Ok(()) };
+        // each turn hands over whole lines
+        strings.lines(&bytes, |line| {
+            log::debug!(target: "qemu", "{} {}", line.level, line.text);
+            if said.len() == SAID {
+                said.pop_front();
+            }
+            said.push_back(format!("{} {}", line.level, line.text));
+        });
         Ok(())
+    }
+
+    /// The newest log lines, oldest first.
+    pub fn last_lines(&self) -> impl Iterator<Item = &str> {
+        self.said.iter().map(String::as_str)
     }
 }
 

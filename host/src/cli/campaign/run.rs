@@ -16,7 +16,7 @@ pub struct Run {
     /// The campaign file.
     #[arg(value_name = "FILE.jrig")]
     file: PathBuf,
-    /// Device address, e.g. sim:, serial:/dev/ttyACM0, tcp:127.0.0.1:4000.
+    /// Device address, e.g. sim:, usb:, serial:/dev/ttyACM0, tcp:127.0.0.1:4000.
     #[arg(long, value_name = "ADDR")]
     device: String,
     /// Who moves hammer and laser: auto, manual, device or exec:COMMAND.
@@ -28,6 +28,9 @@ pub struct Run {
     /// Seed of a simulated rig.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// Folder of the tables by which the controller's log lines are read (else JOINTRIG_LOG_TABLES).
+    #[arg(long, value_name = "DIR")]
+    log_tables: Option<PathBuf>,
 }
 
 impl Run {
@@ -36,7 +39,8 @@ impl Run {
         let store = Store::open(&self.file)?;
         let again = format!("jointrig campaign run {} --device {address}", self.file.display());
         let stop = interrupt::flag();
-        let summary = measure::measure(store, &address, self.seed, self.stage, self.yes, stop, &again)?;
+        let device = measure::Device { address: &address, seed: self.seed, log_tables: self.log_tables };
+        let summary = measure::measure(store, device, self.stage, self.yes, stop, &again)?;
         if summary.interrupted {
             return Err(CliError::Bad("stopped before the campaign was complete".into()));
         }

@@ -1,0 +1,190 @@
+//! The controller's own log: encoded bytes from the link to lines in this program's log.
+//!
+//! The bytes mean nothing without the table of strings of the one build that the controller runs
+//! ([`jointrig_logs`]). It is looked for once, when the first line comes: in the image itself where an
+//! emulator was started from one, then in folders. Lines that come before the controller has said what
+//! build it is wait; without a table it is said once where to put it, and the bytes are counted.
+
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+
+use jointrig_logs::{FOLDER, Line, Table, file_name};
+
+/// Names a folder of tables.
+pub const FOLDER_VARIABLE: &str = "JOINTRIG_LOG_TABLES";
+
+/// Bytes that wait for the build to be known.
+const WAITING_BYTES: usize = 65_536;
+
+/// Lines kept for whoever stores them; the oldest go first when nobody does.
+const LINES_KEPT: usize = 256;
+
+/// Where tables of log strings are looked for.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Tables {
+    folders: Vec<PathBuf>,
+}
+
+impl Tables {
+    /// In `folder`, else in the one that [`FOLDER_VARIABLE`] names; and in any case in [`FOLDER`] beside the folder
+    /// of this program, which is `target/log-tables` for one that cargo has built.
+    pub fn new(folder: Option<PathBuf>) -> Self {
+        let named = folder.or_else(|| std::env::var_os(FOLDER_VARIABLE).map(PathBuf::from));
+        let program = std::env::current_exe().ok();
+        let beside = program.as_deref().and_then(Path::parent).and_then(Path::parent);
+        Self { folders: named.into_iter().chain(beside.map(|folder| folder.join(FOLDER))).collect() }
+    }
+
+    /// In these folders and nowhere else.
+    pub fn in_folders(folders: Vec<PathBuf>) -> Self {
+        Self { folders }
+    }
+
+    /// The table of this build: in `image` if that is what it is, or in one of the folders.
+    ///
+    /// # Errors
+    /// A sentence: what was looked at, and what was wrong with it.
+    fn find(&self, build: u64, image: Option<&Path>) -> Result<Table, String> {
+        if image.is_none() && self.folders.is_empty() {
+            return Err("no place to look was named".into());
+        }
+        let mut looked = Vec::new();
+        let places = image.map(Path::to_path_buf).into_iter();
+        for path in places.chain(self.folders.iter().map(|folder| folder.join(file_name(build)))) {
+            if !path.is_file() {
+                looked.push(format!("no {}", path.display()));
+                continue;
+            }
+            match Table::read(&path) {
+                Ok(table) if table.build() == build => return Ok(table),
+                Ok(table) => looked.push(format!("{} is build {:016x}", path.display(), table.build())),
+                Err(error) => looked.push(error.to_string()),
+            }
+        }
+        Err(looked.join("; "))
+    }
+}
+
+/// How far the way from bytes to lines is known.
+#[derive(Default)]
+enum Reading {
+    /// The controller has not said which build it is.
+    #[default]
+    BuildUnknown,
+    /// Nothing has come since it has.
+    NotLooked(u64),
+    With(Box<Table>),
+    Without,
+}
+
+/// What one controller says.
+#[derive(Default)]
+pub(super) struct DeviceLog {
+    /// What messages call it.
+    address: String,
+    pub tables: Tables,
+    /// The image that an emulator was started with.
+    image: Option<PathBuf>,
+    reading: Reading,
+    waiting: Vec<u8>,
+    lines: VecDeque<Line>,
+    undecoded: u64,
+}
+
+impl DeviceLog {
+    /// Of the device that messages call `address`, and that was started with `image` where that is known.
+    pub fn of(address: &str, image: Option<&Path>) -> Self {
+        Self { address: address.into(), image: image.map(Into::into), ..Self::default() }
+    }
+
+    /// Takes the payload of a log frame.
+    pub fn take(&mut self, payload: &[u8]) {
+        if let Reading::NotLooked(build) = self.reading {
+            self.reading = match self.tables.find(build, self.image.as_deref()) {
+                Ok(table) => Reading::With(Box::new(table)),
+                Err(looked) => {
+                    log::warn!(
+                        "{}: what the controller logs cannot be shown, for want of the table of build \
+                         {build:016x} ({looked}): put the image that it runs into one of these folders as {}, as \
+                         `cargo xtask firmware` does with what it builds, or name another folder by --log-tables or \
+                         {FOLDER_VARIABLE}",
+                        self.address,
+                        file_name(build)
+                    );
+                    Reading::Without
+                }
+            };
+        }
+        match &self.reading {
+            Reading::BuildUnknown if self.waiting.len() + payload.len() <= WAITING_BYTES => {
+                self.waiting.extend_from_slice(payload);
+            }
+            Reading::With(table) => {
+                let lost = table.lines(payload, |line| {
+                    log::log!(target: "controller", line.level, "{}", line.text);
+                    if self.lines.len() == LINES_KEPT {
+                        self.lines.pop_front();
+                    }
+                    self.lines.push_back(line);
+                });
+                if lost > 0 {
+                    log::debug!("{lost} bytes of the controller's log make no line");
+                }
+                self.undecoded += lost as u64;
+            }
+            _ => self.undecoded += payload.len() as u64,
+        }
+    }
+
+    /// The controller has said which build it is: what has waited can be read.
+    pub fn know_build(&mut self, build: u64) {
+        if matches!(self.reading, Reading::BuildUnknown) {
+            self.reading = Reading::NotLooked(build);
+            let waiting = std::mem::take(&mut self.waiting);
+            if !waiting.is_empty() {
+                self.take(&waiting);
+            }
+        }
+    }
+
+    /// The lines since the last call, each its level and text.
+    pub fn lines(&mut self) -> Vec<String> {
+        self.lines.drain(..).map(|line| format!("{} {}", line.level, line.text)).collect()
+    }
+
+    /// Bytes that made no line.
+    pub fn undecoded(&self) -> u64 {
+        self.undecoded
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_wait_for_the_build_and_are_counted_without_a_table() {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(folder.path().join(file_name(7)), b"no image").expect("written");
+        let tables = Tables::in_folders(vec![folder.path().into()]);
+        assert!(tables.find(7, None).err().is_some_and(|why| why.contains("no ELF image")));
+        assert!(tables.find(8, None).err().is_some_and(|why| why.contains(&file_name(8))));
+        let mut log = DeviceLog { tables, ..DeviceLog::default() };
+        log.take(&[1; 100]);
+        assert_eq!(log.undecoded(), 0, "they wait");
+        log.know_build(8);
+        assert_eq!(log.undecoded(), 100);
+        log.take(&[1, 2, 0]);
+        assert_eq!((log.undecoded(), log.lines().len()), (103, 0));
+    }
+
+    #[test]
+    fn what_waits_is_bounded() {
+        let mut log = DeviceLog::default();
+        for _ in 0..1_000 {
+            log.take(&[1; 400]);
+        }
+        assert!(log.waiting.len() <= WAITING_BYTES);
+        assert_eq!(log.waiting.len() as u64 + log.undecoded(), 400_000);
+    }
+}
