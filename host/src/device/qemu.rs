@@ -12,6 +12,16 @@ use super::transport::Transport;
 
 /// Where the image is, when the address does not say: this variable's value.
 pub const IMAGE_VARIABLE: &str = "JOINTRIG_MPS2_IMAGE";
+/// Where it is else, from the folder above this program's: there `cargo xtask firmware` leaves it for a program that cargo
+/// has built.
+pub const BUILT: &str = "firmware/thumbv8m.main-none-eabihf/release/mps2-an505";
+
+/// The image that `cargo xtask firmware` has built beside this program, if any.
+fn built() -> Option<PathBuf> {
+    let program = std::env::current_exe().ok()?;
+    let image = program.parent()?.parent()?.join(BUILT);
+    image.is_file().then_some(image)
+}
 
 /// A running emulator.
 pub struct Qemu {
@@ -22,7 +32,7 @@ pub struct Qemu {
 }
 
 impl Qemu {
-    /// Starts the emulator with this image, or with the one that [`IMAGE_VARIABLE`] names.
+    /// Starts the emulator with this image, or with the one that [`IMAGE_VARIABLE`] names, or with the one [`BUILT`].
     ///
     /// # Errors
     /// [`DeviceError::Open`] when there is no image or the emulator does not start.
@@ -32,10 +42,11 @@ impl Qemu {
         let image = image
             .map(Path::to_path_buf)
             .or_else(|| std::env::var_os(IMAGE_VARIABLE).map(PathBuf::from))
+            .or_else(built)
             .ok_or_else(|| {
                 open(format!(
-                    "no image is named: build one with `cargo xtask firmware --board mps2-an505` and write \
-                     qemu:IMAGE, or set {IMAGE_VARIABLE}"
+                    "there is no firmware image: build one with `cargo xtask firmware --board mps2-an505`; one that \
+                     lies elsewhere is named by qemu:IMAGE or {IMAGE_VARIABLE}"
                 ))
             })?;
         let (board, link) = QemuBoard::start(&image, None, seed).map_err(|error| open(error.to_string()))?;
