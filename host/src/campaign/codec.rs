@@ -25,6 +25,17 @@ pub enum CodecError {
     /// The blob ends in mid-channel, has bytes left, or its channels differ in length.
     #[error("the samples' bytes are cut or overgrown")]
     Shape,
+    /// The file system or the file's structure keeps them back.
+    #[error("the samples cannot be read: {0}")]
+    Unreadable(String),
+    /// The bytes are not those that were stored.
+    #[error("checksum of the stored bytes {found:08x}, should be {stored:08x}")]
+    Bytes {
+        /// Of what was read.
+        found: u32,
+        /// Of what was written.
+        stored: u32,
+    },
     /// The codes are not those that were stored.
     #[error("checksum {found:08x}, stored {stored:08x}")]
     Checksum {
@@ -109,7 +120,7 @@ mod tests {
         for place in (0..blob.len()).step_by(97) {
             let mut bad = blob.clone();
             bad[place] ^= 0x10;
-            // a bit of padding may be free; then the codes are whole
+            // a bit of padding may be free; then the codes are whole (and the checksum over the stored bytes is not)
             if let Ok(read) = decode(&bad, 3, 1_000, crc) {
                 assert_eq!(read, codes);
             }

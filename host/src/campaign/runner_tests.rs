@@ -80,12 +80,19 @@ fn a_campaign_is_complete_and_the_same_over_any_link() {
 struct StopAfter(u32, Arc<AtomicBool>);
 
 impl Judge for StopAfter {
-    fn judge(&mut self, cell: &Cell, plan: &Plan, channels: &ChannelMap, recording: &Recording) -> Judgement {
+    fn judge(
+        &mut self,
+        cell: &Cell,
+        plan: &Plan,
+        channels: &ChannelMap,
+        recording: &Recording,
+        others: &Others,
+    ) -> Judgement {
         self.0 = self.0.saturating_sub(1);
         if self.0 == 0 {
             self.1.store(true, Ordering::Relaxed);
         }
-        ByShotSummary.judge(cell, plan, channels, recording)
+        ByShotSummary.judge(cell, plan, channels, recording, others)
     }
 }
 
@@ -144,7 +151,7 @@ fn a_cell_that_never_succeeds_is_given_up_with_a_reason() {
     let summary = run_on(&path, Fake::default(), &options(), &mut ByShotSummary).expect("runs");
     assert_eq!((summary.kept, summary.given_up), (0, 7));
     let cells = Store::open_read_only(&path).expect("opens").cells().expect("cells");
-    assert_eq!(cells[0].given_up.as_deref(), Some("0 of 2 good after 3 hits"));
+    assert_eq!(cells[0].given_up.as_deref(), Some("0 of 2 good after 3 hits, at least 1 needed"));
 }
 
 #[test]

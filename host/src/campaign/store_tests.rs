@@ -63,8 +63,8 @@ fn record(cell: i64, attempt: u32, session: i64, kind: Kind) -> NewRecord {
         gaps: vec![3..7, 9..10],
         shot,
     };
-    let judgement = Judgement { kind, measure: 0.1, limit: 0.02, sentence: "because".into() };
-    NewRecord { cell, attempt, session, utc: utc_now(), recording, judgement }
+    let judgement = Judgement { kind, measure: 0.1, limit: 0.02, sentence: "because".into(), peak_n: 49.5 };
+    NewRecord { cell, attempt, session, utc: utc_now(), utc_error_s: Some(0.003), recording, judgement }
 }
 
 #[test]
@@ -78,7 +78,7 @@ fn records_come_back_bit_for_bit_and_can_be_read_while_another_writes() {
     assert_eq!(cells.len(), store.plan().expect("plan").cells().len());
     for attempt in 0..3 {
         let kind = if attempt == 1 { Kind::DoubleHit } else { Kind::Good };
-        store.insert(&record(cells[0].id, attempt, session, kind)).expect("stored");
+        store.insert(&record(cells[0].id, attempt, session, kind), &Counters::new()).expect("stored");
     }
     let rows = reader.records().expect("rows");
     assert_eq!(rows.iter().map(RecordRow::kept).collect::<Vec<_>>(), [true, false, true]);
@@ -92,7 +92,10 @@ fn records_come_back_bit_for_bit_and_can_be_read_while_another_writes() {
     store.overrule(rows[1].id, Kind::Good, "looked at it").expect("overruled");
     assert!(reader.records().expect("rows")[1].kept());
     assert_eq!(reader.verify().expect("checked"), []);
-    assert!(store.insert(&record(cells[0].id, 0, session, Kind::Good)).is_err(), "an attempt is stored once");
+    assert!(
+        store.insert(&record(cells[0].id, 0, session, Kind::Good), &Counters::new()).is_err(),
+        "an attempt is stored once"
+    );
     store.close().expect("closed");
 }
 
@@ -103,7 +106,9 @@ fn raw_records_cannot_be_changed_and_damage_is_named() {
     let mut store = Store::create(&path, SMALL, "small.toml").expect("created");
     let session = store.begin_session(&info(), &map()).expect("session");
     let ids: Vec<i64> = (0..4)
-        .map(|attempt| store.insert(&record(1, attempt, session, Kind::Good)).expect("stored"))
+        .map(|attempt| {
+            store.insert(&record(1, attempt, session, Kind::Good), &Counters::new()).expect("stored")
+        })
         .collect();
     let change = |sql: &str| store.connection.execute(sql, []);
     assert!(change("UPDATE records SET measure = 0").is_err());
@@ -119,7 +124,7 @@ fn raw_records_cannot_be_changed_and_damage_is_named() {
     let named: Vec<_> =
         store.verify().expect("checked").into_iter().filter_map(|damage| damage.record).collect();
     assert_eq!(named, ids[1..]);
-    let row = RecordRow { id: ids[1], ..reader_row(&store, ids[0]) };
+    let row = RecordRow { id: ids[1], ..store.record(ids[0]).expect("there") };
     let said = store.samples(&row).expect_err("damaged").to_string();
     assert!(said.contains(&format!("record {}", ids[1])), "{said}");
 }
@@ -137,11 +142,6 @@ fn wrong_files_are_refused_in_words() {
     store.close().expect("closed");
     assert!(matches!(Store::open(&at("a.jrig")), Err(StoreError::Newer { found: 99, .. })));
     assert!(matches!(Store::create(&at("a.jrig"), PAPER, "p"), Err(StoreError::Exists { .. })));
-    assert!(matches!(Store::create(&at("no/b.jrig"), PAPER, "p"), Err(StoreError::Sqlite { .. })));
+    assert!(matches!(Store::create(&at("no/b.jrig"), PAPER, "p"), Err(StoreError::Lock { .. })));
     assert!(!at("a.jrig-wal").exists(), "one file only");
-}
-
-fn reader_row(store: &Store, id: i64) -> RecordRow {
-    let sql = format!("SELECT {COLUMNS} FROM records WHERE id = ?1");
-    store.all(&sql, [id], RecordRow::read, "testing").expect("a row").remove(0)
 }

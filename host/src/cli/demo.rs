@@ -7,6 +7,7 @@ use clap::Args;
 use super::analyse::analyse_into;
 use super::error::CliError;
 use super::{interrupt, measure, output};
+use crate::campaign::judge::ByRecord;
 use crate::campaign::plan;
 use crate::campaign::stage::Stage;
 use crate::campaign::store::Store;
@@ -46,7 +47,8 @@ impl Demo {
         let again = self.again();
         let address = Address::Sim { rig: self.rig.clone() };
         let stop = interrupt::flag();
-        let summary = measure::measure(store, &address, self.seed, Stage::Device, true, stop, &again)?;
+        let summary =
+            measure::measure(store, &address, self.seed, Stage::Device, true, stop, &again, &mut ByRecord)?;
         if summary.interrupted {
             let file = file.display();
             eprintln!("`jointrig analyse {file} --out {}` works on what is there", folder.display());

@@ -106,6 +106,11 @@ mod tests {
             "campaign new p.jrig --plan plan.toml",
             "campaign run p.jrig --device sim: --stage exec:move.sh --yes",
             "campaign status p.jrig --json",
+            "campaign run p.jrig --device sim: --plan edited.toml --bell",
+            "campaign show p.jrig AJB/AZ1/B2 --json --no-figure",
+            "campaign drop p.jrig 3 4 --reason x",
+            "campaign keep p.jrig 3",
+            "campaign backup p.jrig q.jrig",
             "campaign verify p.jrig",
             "analyse p.jrig --out d --json",
             "completions bash",
@@ -118,6 +123,7 @@ mod tests {
             "campaign new p.jrig",
             "campaign new p.jrig --paper --plan x.toml",
             "campaign run p.jrig --stage robot",
+            "campaign drop p.jrig",
             "info",
         ] {
             let words = std::iter::once("jointrig").chain(line.split(' ').filter(|word| !word.is_empty()));
