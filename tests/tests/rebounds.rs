@@ -1,6 +1,8 @@
 //! Double hits on simulated records: every rebound from 2 % on is found, and clean hits raise no alarm.
 #![allow(clippy::unwrap_used)]
 
+use std::fmt::Write;
+
 use jointrig::campaign::judge::{ByRecord, Judge, Kind};
 use jointrig::campaign::others::Others;
 use jointrig::campaign::plan::{Cell, DEMO, Plan};
@@ -153,7 +155,8 @@ fn every_rebound_from_two_per_cent_on_is_found_in_simulated_hits() {
                 }
             }
         }
-        table += &format!("{:.0} %: {found} of {cases}\n", 100.0 * fraction);
+        // writing to a string cannot fail
+        writeln!(table, "{:.0} %: {found} of {cases}", 100.0 * fraction).unwrap();
         assert!(found * 100 >= cases * 95, "{table}");
     }
     println!("{table}");

@@ -2,6 +2,10 @@
 //!
 //! The blob is, for each channel, the chunk's length (u32, little-endian) and the chunk; a chunk is a
 //! standalone pco file of `i16`. From Python: `pcodec.standalone.simple_decompress(chunk)`.
+//! `docs/compare_codecs.py` compares pco with zstd on a campaign's records. On the paper's campaign, simulated: pco 3.5 : 1; zstd at most
+//! 2.9 : 1 (level 19, a hundred times slower), and 2.6 : 1 at the level that is as fast as pco (3). Byte-wise tricks in front of zstd
+//! (differences, low bytes apart) make it worse: the low byte is noise.
+//!
 //! The CRC-32 (zlib's) runs over the codes as little-endian i16, channel after channel.
 
 use pco::standalone::{simple_compress, simple_decompress};

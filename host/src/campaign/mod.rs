@@ -5,6 +5,7 @@
 //! ([`judge`]) and stored on a thread of its own (`keeper`, [`store`]).
 
 mod backup;
+pub mod check;
 mod clock;
 pub mod codec;
 mod earlier;

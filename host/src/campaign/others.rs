@@ -52,7 +52,7 @@ impl Others {
         let band = found.band(low_hz, high_hz);
         // `variance` is the real part's; the imaginary part has as much
         let variance: f64 = band.variance.iter().flatten().map(|variance| 2.0 * variance).sum();
-        let power: f64 = band.h1.iter().flatten().map(|h| h.norm_sqr()).sum();
+        let power: f64 = band.h1.iter().flatten().map(num_complex::Complex::norm_sqr).sum();
         (power > 0.0).then(|| (variance / power).sqrt())
     }
 

@@ -21,6 +21,9 @@ use super::store_error::{StoreError, sqlite};
 /// How long to wait for another process's lock on the file.
 const PATIENCE: Duration = Duration::from_secs(5);
 
+/// Columns of a cell, in the order of the tables.
+type CellColumns = (i64, String, String, String, u32, Option<String>, Option<String>);
+
 /// An open campaign file.
 #[derive(Debug)]
 pub struct Store {
@@ -213,8 +216,7 @@ impl Store {
             let configuration: String = row.get(1)?;
             Ok((row.get(0)?, configuration, row.get(2)?, row.get(3)?, row.get(4)?, row.get(5)?, row.get(6)?))
         };
-        type Columns = (i64, String, String, String, u32, Option<String>, Option<String>);
-        let rows: Vec<Columns> = self.all(&sql, [], read, "reading cells")?;
+        let rows: Vec<CellColumns> = self.all(&sql, [], read, "reading cells")?;
         rows.into_iter()
             .map(|(id, configuration, impact, response, wanted, given_up, settled)| {
                 let configuration = configuration_named(&configuration)

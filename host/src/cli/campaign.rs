@@ -1,6 +1,7 @@
-//! `campaign new | run | status | show | drop | keep | verify | backup`.
+//! `campaign new | run | status | show | drop | keep | check | verify | backup`.
 
 mod backup;
+mod check;
 mod judged;
 mod new;
 mod run;
@@ -33,6 +34,8 @@ enum Command {
     Drop(judged::Overrule),
     /// Take records into the analysis, whatever their verdict.
     Keep(judged::Overrule),
+    /// Check the sign of every channel, and hammer against vibrometer on a known mass.
+    Check(check::Check),
     /// Check every record's checksum; exits with 1 on any damage.
     Verify(verify::Verify),
     /// Copy a campaign file, also while it is being written.
@@ -48,6 +51,7 @@ impl Campaign {
             Command::Show(command) => command.run(),
             Command::Drop(command) => command.drop(),
             Command::Keep(command) => command.keep(),
+            Command::Check(command) => command.run(),
             Command::Verify(command) => command.run(),
             Command::Backup(command) => command.run(),
         }

@@ -110,6 +110,7 @@ mod tests {
             "campaign show p.jrig AJB/AZ1/B2 --json --no-figure",
             "campaign drop p.jrig 3 4 --reason x",
             "campaign keep p.jrig 3",
+            "campaign check p.jrig --mass 1.2 --cell B/BZ1/B1",
             "campaign backup p.jrig q.jrig",
             "campaign verify p.jrig",
             "analyse p.jrig --out d --json",
@@ -124,6 +125,7 @@ mod tests {
             "campaign new p.jrig --paper --plan x.toml",
             "campaign run p.jrig --stage robot",
             "campaign drop p.jrig",
+            "campaign check p.jrig --mass 1.2",
             "info",
         ] {
             let words = std::iter::once("jointrig").chain(line.split(' ').filter(|word| !word.is_empty()));

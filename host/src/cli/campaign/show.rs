@@ -116,7 +116,8 @@ impl Show {
     }
 }
 
-fn find<'a>(cells: &'a [CellRow], name: &str) -> Result<&'a CellRow, CliError> {
+/// The cell of that name.
+pub(super) fn find<'a>(cells: &'a [CellRow], name: &str) -> Result<&'a CellRow, CliError> {
     let called = |row: &CellRow| {
         let cell = &row.cell;
         format!("{}/{}/{}", configuration_name(cell.configuration), cell.impact, cell.response)
