@@ -1,10 +1,11 @@
 //! Checks on stored records: does every channel have the sign that its role promises, and do hammer and vibrometer agree on a
 //! mass that is known?
 //!
-//! **Polarity.** A hit gives energy to the place that it strikes. Over the first millisecond the structure near it follows the
-//! force, so a velocity along the hit's direction begins with the force's sign. Such a sign is measured by the early motion's mean over
-//! its rms, in −1 … 1, over all kept hits along that axis, nearest first; a wrong plug or a turned head gives a clear negative.
-//! Vibrometers on the specimens and load cells follow hits along z in the same way: a load cell is positive when arm B moves along +z.
+//! **Polarity.** A hit gives energy to the place that it strikes: over the pulse, force times velocity along it is positive, whatever
+//! the structure. So a response's sign is Σ F v / √(Σ F² Σ v²), in −1 … 1, over the kept hits along its axis, nearest first (on the
+//! paper's campaign, simulated, 0.6 to 0.96 within 31 mm); a wrong plug or a turned head gives a clear negative. Vibrometers on the specimens
+//! and load cells are further off, and follow hits along z on A within the first millisecond: their sign is its mean over its
+//! rms; a load cell is positive when arm B moves along +z. So is the force's own: it pushes.
 //!
 //! **Ratio calibration.** On a free, rigid mass m the hammer's impulse is the change of momentum: ∫F dt = m Δv, whatever the shape of
 //! the pulse. The ratio ∫F dt / (m Δv) is 1 when the sensitivities of hammer and vibrometer fit each other; else one of them is wrong by
@@ -94,7 +95,11 @@ pub fn polarity(store: &Store) -> Result<Vec<Polarity>, StoreError> {
         for row in candidates {
             let Some(hit) = hit(store, &plan, row)? else { continue };
             let own = hit.map.channels.iter().position(|other| other.name == channel.name);
-            if let Some(sign) = own.and_then(|own| early_sign(&hit, own, axis)) {
+            let sign = match (channel.role, axis) {
+                (Role::Response(_), Some(axis)) => own.and_then(|own| power_sign(&hit, own, axis)),
+                _ => own.and_then(|own| early_sign(&hit, own, axis)),
+            };
+            if let Some(sign) = sign {
                 signs.push(sign);
                 records.push(hit.record);
             }
@@ -195,6 +200,25 @@ fn hit(store: &Store, plan: &Plan, row: &RecordRow) -> Result<Option<Hit>, Store
     let pulse = map.place(Role::HammerForce).and_then(|place| Pulse::locate(&signals[place]));
     let found = pulse.zip(geometry(plan, &cell.cell.impact, &cell.cell.response));
     Ok(found.map(|(pulse, (direction, _))| Hit { record: row.id, direction, map, signals, pulse }))
+}
+
+/// Force times velocity along the hit, summed over the pulse, as a part of what it could be at most.
+fn power_sign(hit: &Hit, place: usize, axis: usize) -> Option<f64> {
+    let rate = f64::from(hit.map.rate_hz);
+    let late = (f64::from(hit.map.channels[place].delay_ns) * 1e-9 * rate) as usize;
+    let (force, signal) = (hit.signals.get(hit.map.place(Role::HammerForce)?)?, hit.signals.get(place)?);
+    let Pulse { start, end, offset_n, .. } = hit.pulse;
+    let before = signal.get((start + late).checked_sub((REST_S * rate) as usize)?..start + late)?;
+    let rest = before.iter().sum::<f64>() / before.len().max(1) as f64;
+    let pairs = force.get(start..end)?.iter().zip(signal.get(start + late..end + late)?);
+    let (mut both, mut forces, mut motions) = (0.0, 0.0, 0.0);
+    for (f, v) in pairs.map(|(f, v)| (f - offset_n, v - rest)) {
+        both += f * v;
+        forces += f * f;
+        motions += v * v;
+    }
+    let most = (forces * motions).sqrt();
+    (most > 0.0).then_some(hit.direction[axis].signum() * both / most)
 }
 
 /// The mean over the rms of a channel in the first millisecond, positive along the hit (the force itself: positive at all).
