@@ -2,6 +2,10 @@
 //!
 //! The blob is, for each channel, the chunk's length (u32, little-endian) and the chunk; a chunk is a
 //! standalone pco file of `i16`. From Python: `pcodec.standalone.simple_decompress(chunk)`.
+//! `docs/compare_codecs.py` compares pco with zstd on a campaign's records. On the paper's campaign, simulated: pco 3.5 : 1; zstd at most
+//! 2.9 : 1 (level 19, a hundred times slower), and 2.6 : 1 at the level that is as fast as pco (3). Byte-wise tricks in front of zstd
+//! (differences, low bytes apart) make it worse: the low byte is noise.
+//!
 //! The CRC-32 (zlib's) runs over the codes as little-endian i16, channel after channel.
 
 use pco::standalone::{simple_compress, simple_decompress};
@@ -25,6 +29,17 @@ pub enum CodecError {
     /// The blob ends in mid-channel, has bytes left, or its channels differ in length.
     #[error("the samples' bytes are cut or overgrown")]
     Shape,
+    /// The file system or the file's structure keeps them back.
+    #[error("the samples cannot be read: {0}")]
+    Unreadable(String),
+    /// The bytes are not those that were stored.
+    #[error("checksum of the stored bytes {found:08x}, should be {stored:08x}")]
+    Bytes {
+        /// Of what was read.
+        found: u32,
+        /// Of what was written.
+        stored: u32,
+    },
     /// The codes are not those that were stored.
     #[error("checksum {found:08x}, stored {stored:08x}")]
     Checksum {
@@ -109,7 +124,7 @@ mod tests {
         for place in (0..blob.len()).step_by(97) {
             let mut bad = blob.clone();
             bad[place] ^= 0x10;
-            // a bit of padding may be free; then the codes are whole
+            // a bit of padding may be free; then the codes are whole (and the checksum over the stored bytes is not)
             if let Ok(read) = decode(&bad, 3, 1_000, crc) {
                 assert_eq!(read, codes);
             }

@@ -1,6 +1,8 @@
 //! Why a record is kept or refused, and by whom it is judged.
 
+use super::others::{self, Others};
 use super::plan::{Cell, Plan};
+use super::rows::Samples;
 pub use super::verdict::VerdictKind as Kind;
 use super::verdict::{self, RawHit};
 use crate::device::channels::ChannelMap;
@@ -18,12 +20,22 @@ pub struct Judgement {
     pub limit: f64,
     /// Both in words.
     pub sentence: String,
+    /// Peak of the band-limited force, N; 0 where there is no pulse.
+    pub peak_n: f64,
 }
 
 /// Whoever judges records. It works on the raw record, before anything is derived from it.
 pub trait Judge {
-    /// Judges one record of `cell`; called once per record, in order of measurement.
-    fn judge(&mut self, cell: &Cell, plan: &Plan, channels: &ChannelMap, recording: &Recording) -> Judgement;
+    /// Judges one record of `cell`, of which `others` are the good records so far; called once per record, in order of
+    /// measurement.
+    fn judge(
+        &mut self,
+        cell: &Cell,
+        plan: &Plan,
+        channels: &ChannelMap,
+        recording: &Recording,
+        others: &Others,
+    ) -> Judgement;
 }
 
 /// Judges by the raw record itself ([`verdict::judge`]): hammer force and every velocity of the record, in SI.
@@ -31,7 +43,14 @@ pub trait Judge {
 pub struct ByRecord;
 
 impl Judge for ByRecord {
-    fn judge(&mut self, _: &Cell, plan: &Plan, channels: &ChannelMap, recording: &Recording) -> Judgement {
+    fn judge(
+        &mut self,
+        _: &Cell,
+        plan: &Plan,
+        channels: &ChannelMap,
+        recording: &Recording,
+        others: &Others,
+    ) -> Judgement {
         let si = |place: usize| -> Vec<f64> {
             let unit = channels.channels.get(place).map_or(f64::NAN, Channel::units_per_code);
             recording.channel(place).iter().map(|code| f64::from(*code) * unit).collect()
@@ -44,10 +63,11 @@ impl Judge for ByRecord {
             .filter(|(_, channel)| channel.quantity == Quantity::Velocity);
         let (names, responses): (Vec<&str>, Vec<Vec<f64>>) =
             places.map(|(place, channel)| (channel.name.as_str(), si(place))).unzip();
-        let (wanted, given) = (plan.force.get_ref(), &plan.limits);
+        let (wanted, given) = (plan.force.get_ref(), plan.limits.get_ref());
         let limits = verdict::Limits {
             // so that noise does not hide a rebound of just the limit
             rebound_fraction: 0.6 * given.rebound_ratio,
+            rebound_after_s: given.rebound_after_s,
             weak_fraction: given.weak_n / wanted.target_n,
             strong_fraction: given.strong_n / wanted.target_n,
             force_range_n: channels.place(Role::HammerForce).map(|place| range(&channels.channels[place])),
@@ -62,21 +82,52 @@ impl Judge for ByRecord {
             responses: &responses,
             missing_samples: missing,
         };
+        let found = verdict::judge(hit, &limits, Some(wanted.target_n));
+        let judged = |kind, measure, limit, sentence| Judgement {
+            kind,
+            measure,
+            limit,
+            sentence,
+            peak_n: found.peak_n,
+        };
         // a channel that runs into its converter's end spoils the record whatever the hammer did; channels
         // differ in range, so that each is looked at in its own codes
         if missing == 0
             && let Some((name, touched)) = over_range(channels, recording)
         {
             let sentence = format!("channel {name} stands at the end of its range for {touched} samples");
-            return Judgement { kind: Kind::Overload, measure: touched as f64, limit: 1.0, sentence };
+            return judged(Kind::Overload, touched as f64, 1.0, sentence);
         }
-        let found = verdict::judge(hit, &limits, Some(wanted.target_n));
+        if found.verdict == Kind::Good
+            && let Some((name, ratio)) = noisier(channels, recording, others, given.noise_ratio)
+        {
+            let limit = given.noise_ratio;
+            let sentence = format!(
+                "channel {name} is {ratio:.1} times as noisy as in the cell's other records (at most {limit:.1})"
+            );
+            return judged(Kind::Noisy, ratio, limit, sentence);
+        }
         let sentence = match found.verdict {
-            Kind::Noisy => name_responses(&found.sentence, &names),
-            _ => found.sentence,
+            Kind::Noisy | Kind::Overload => name_responses(&found.sentence, &names),
+            _ => found.sentence.clone(),
         };
-        Judgement { kind: found.verdict, measure: found.measure, limit: found.limit, sentence }
+        judged(found.verdict, found.measure, found.limit, sentence)
     }
+}
+
+/// The channel that is noisier than `limit` times its usual noise, and by what ratio; the worst of several.
+fn noisier<'a>(
+    channels: &'a ChannelMap,
+    recording: &Recording,
+    others: &Others,
+    limit: f64,
+) -> Option<(&'a str, f64)> {
+    let noise = others::channel_noise(channels, &Samples::of(recording));
+    let ratios = channels.channels.iter().zip(noise).enumerate().filter_map(|(place, (channel, noise))| {
+        let usual = others.usual_noise(place).filter(|usual| *usual > 0.0)?;
+        Some((channel.name.as_str(), noise / usual))
+    });
+    ratios.filter(|(_, ratio)| *ratio > limit).max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Full scale of a channel in its unit.

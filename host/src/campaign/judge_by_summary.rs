@@ -3,6 +3,7 @@
 use jointrig_protocol::channel::Role;
 
 use super::{Judge, Judgement, Kind};
+use crate::campaign::others::Others;
 use crate::campaign::plan::{Cell, Plan};
 use crate::device::channels::ChannelMap;
 use crate::device::recording::Recording;
@@ -12,10 +13,18 @@ use crate::device::recording::Recording;
 pub(crate) struct ByShotSummary;
 
 impl Judge for ByShotSummary {
-    fn judge(&mut self, _: &Cell, plan: &Plan, channels: &ChannelMap, recording: &Recording) -> Judgement {
-        let (shot, limits) = (&recording.shot, &plan.limits);
+    fn judge(
+        &mut self,
+        _: &Cell,
+        plan: &Plan,
+        channels: &ChannelMap,
+        recording: &Recording,
+        _: &Others,
+    ) -> Judgement {
+        let (shot, limits) = (&recording.shot, plan.limits.get_ref());
+        let peak_n = f64::from(shot.peak_n);
         let missing: usize = recording.gaps.iter().map(ExactSizeIterator::len).sum();
-        let judged = |kind, measure, limit, sentence| Judgement { kind, measure, limit, sentence };
+        let judged = |kind, measure, limit, sentence| Judgement { kind, measure, limit, sentence, peak_n };
         if missing > 0 {
             return judged(Kind::Gap, missing as f64, 0.0, format!("{missing} samples are missing"));
         }

@@ -6,7 +6,7 @@
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
-use super::rows::NewRecord;
+use super::rows::{Counters, NewRecord};
 use super::store::Store;
 use super::store_error::StoreError;
 
@@ -15,8 +15,11 @@ const QUEUE: usize = 2;
 
 /// What is to be stored.
 enum Entry {
-    Record(Box<NewRecord>),
+    Record(Box<NewRecord>, Counters),
     GivenUp { cell: i64, reason: String },
+    Settled { cell: i64, reason: String },
+    Redo { cell: i64, reason: String },
+    Link { session: i64, counters: Counters },
     Log(String),
 }
 
@@ -37,11 +40,29 @@ impl Keeper {
         Self { queue: Some(queue), thread: Some(thread) }
     }
 
-    /// Stores a record; waits only when the disk is two records behind. Returns whether the keeper still
-    /// works: if not, [`Keeper::finish`] says why.
+    /// Stores a record, with the link's counters so far; waits only when the disk is two records behind. Returns whether the
+    /// keeper still works: if not, [`Keeper::finish`] says why.
     #[must_use]
-    pub fn record(&self, record: NewRecord) -> bool {
-        self.send(Entry::Record(Box::new(record)))
+    pub fn record(&self, record: NewRecord, counters: Counters) -> bool {
+        self.send(Entry::Record(Box::new(record), counters))
+    }
+
+    /// A cell is done with what it has. Returns as [`Keeper::record`] does.
+    #[must_use]
+    pub fn settle(&self, cell: i64, reason: &str) -> bool {
+        self.send(Entry::Settled { cell, reason: reason.into() })
+    }
+
+    /// A person wants a cell struck anew: its good records are overruled. Returns as [`Keeper::record`] does.
+    #[must_use]
+    pub fn redo(&self, cell: i64, reason: &str) -> bool {
+        self.send(Entry::Redo { cell, reason: reason.into() })
+    }
+
+    /// The link's counters at the end of a session. Returns as [`Keeper::record`] does.
+    #[must_use]
+    pub fn link(&self, session: i64, counters: Counters) -> bool {
+        self.send(Entry::Link { session, counters })
     }
 
     /// Gives a cell up. Returns as [`Keeper::record`] does.
@@ -90,9 +111,14 @@ impl Drop for Keeper {
 fn keep(store: &Store, entries: &Receiver<Entry>) -> Result<(), StoreError> {
     for entry in entries {
         match entry {
-            Entry::Record(record) => {
-                store.insert(&record)?;
+            Entry::Record(record, counters) => {
+                store.insert(&record, &counters)?;
             }
+            Entry::Settled { cell, reason } => store.settle(cell, &reason)?,
+            Entry::Redo { cell, reason } => {
+                store.redo(cell, &reason)?;
+            }
+            Entry::Link { session, counters } => store.note_link(session, &counters)?,
             Entry::GivenUp { cell, reason } => store.give_up(cell, &reason)?,
             Entry::Log(text) => store.log(&text)?,
         }

@@ -43,11 +43,16 @@ pub struct Plan {
     /// How the device recognises a hit.
     pub trigger: Spanned<TriggerPlan>,
     /// Why a record is refused.
-    pub limits: Limits,
+    pub limits: Spanned<Limits>,
     /// How long the hammer waits between hits.
     pub settle: Spanned<Settle>,
     /// How the FRFs are to be windowed.
     pub window: Window,
+    /// When a cell's FRFs are good enough to stop before all wanted hits; never, without it.
+    pub enough: Option<Spanned<Enough>>,
+    /// What is behind the device's channels; those that are not named are taken as the device describes them.
+    #[serde(default)]
+    pub channel: Vec<Spanned<SensorPlan>>,
     /// The structures, in the order in which they are measured.
     pub configuration: Vec<ConfigurationPlan>,
     /// Where everything is.
@@ -72,9 +77,9 @@ pub struct RecordPlan {
 pub struct Hits {
     /// Good ones wanted.
     pub wanted: u32,
-    /// Good ones below which a cell cannot be used.
+    /// Good ones that are enough, if the attempts run out or the FRFs are good enough; below it a cell cannot be used.
     pub minimum: u32,
-    /// Attempts after which a cell is given up.
+    /// Attempts after which a cell ends: settled with the minimum or more, given up with less.
     pub most: u32,
 }
 
@@ -116,7 +121,7 @@ pub struct Limits {
     pub strong_n: f64,
     /// A later contact of this part of the peak is a double hit.
     pub rebound_ratio: f64,
-    /// Contacts are looked for from this time after the trigger on, s.
+    /// A later contact counts from this long after the first one on (start to start), s.
     pub rebound_after_s: f64,
     /// A record this many times noisier than the cell's others is refused.
     pub noise_ratio: f64,
@@ -142,6 +147,36 @@ pub struct Settle {
 pub struct Window {
     /// Decay of the exponential window on force and response, 1/s.
     pub exponential_per_s: f64,
+}
+
+/// When a cell's FRFs are good enough.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Enough {
+    /// Random error of the averaged FRFs as a part of them; with `hits.minimum` good hits or more, less than this ends a cell.
+    pub random_error: f64,
+    /// The band that counts, Hz.
+    pub band_hz: [f64; 2],
+}
+
+/// What is behind a channel of the device. What is given is held against what the device says.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorPlan {
+    /// The channel's name on the device.
+    pub name: String,
+    /// The sensor's model.
+    pub model: Option<String>,
+    /// Its serial number.
+    pub serial: Option<String>,
+    /// When it was calibrated, YYYY-MM-DD.
+    pub calibrated: Option<String>,
+    /// V per SI unit, without sign.
+    pub sensitivity_v: Option<f64>,
+    /// 1, or -1 where a positive quantity gives a negative voltage.
+    pub polarity: Option<i8>,
+    /// Full scale in SI units.
+    pub range: Option<f64>,
 }
 
 /// One structure: every impact is combined with every response.

@@ -64,8 +64,69 @@ impl Plan {
             at,
             "settle.bound_s must lie between 0 and 55",
         )?;
+        self.check_limits()?;
+        self.check_sensors()?;
         self.check_geometry()?;
         self.check_configurations()
+    }
+
+    fn check_limits(&self) -> Result<(), Wrong> {
+        let (limits, at) = (self.limits.get_ref(), self.limits.span().start);
+        for (good, what) in [
+            (
+                0.0 < limits.weak_n && limits.weak_n < limits.strong_n,
+                "limits: 0 < weak_n < strong_n must hold",
+            ),
+            (
+                0.0 < limits.rebound_ratio && limits.rebound_ratio < 1.0,
+                "limits.rebound_ratio must lie between 0 and 1",
+            ),
+            (
+                (0.0..1.0).contains(&limits.rebound_after_s),
+                "limits.rebound_after_s must be at least 0 and under 1",
+            ),
+            (limits.noise_ratio > 1.0, "limits.noise_ratio must be over 1"),
+        ] {
+            if !good {
+                return Err((at, what.to_owned()));
+            }
+        }
+        let Some(enough) = &self.enough else { return Ok(()) };
+        let (wanted, at) = (enough.get_ref(), enough.span().start);
+        let [low, high] = wanted.band_hz;
+        if !(wanted.random_error > 0.0 && wanted.random_error < 1.0) {
+            Err((at, "enough.random_error must lie between 0 and 1".into()))
+        } else if !(0.0 <= low && low < high && high <= f64::from(self.record.get_ref().rate_hz) / 2.0) {
+            Err((at, "enough.band_hz must be [low, high], at most half of record.rate_hz".into()))
+        } else {
+            Ok(())
+        }
+    }
+
+    fn check_sensors(&self) -> Result<(), Wrong> {
+        let mut seen = HashSet::new();
+        for channel in &self.channel {
+            let (at, sensor) = (channel.span().start, channel.get_ref());
+            let name = &sensor.name;
+            let positive = |value: Option<f64>| value.is_none_or(|value| value > 0.0 && value.is_finite());
+            let what = if !seen.insert(name) {
+                format!("channel: `{name}` stands twice")
+            } else if !positive(sensor.sensitivity_v) || !positive(sensor.range) {
+                format!("channel `{name}`: sensitivity_v and range must be over 0 (the sign is its polarity)")
+            } else if sensor.polarity.is_some_and(|sign| sign.abs() != 1) {
+                format!("channel `{name}`: polarity must be 1 or -1")
+            } else if sensor
+                .calibrated
+                .as_ref()
+                .is_some_and(|date| date.parse::<jiff::civil::Date>().is_err())
+            {
+                format!("channel `{name}`: calibrated must be a date, YYYY-MM-DD")
+            } else {
+                continue;
+            };
+            return Err((at, what));
+        }
+        Ok(())
     }
 
     fn check_geometry(&self) -> Result<(), Wrong> {

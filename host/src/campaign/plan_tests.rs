@@ -47,6 +47,9 @@ fn errors_point_at_line_and_field() {
         ("direction = [0, -1, 0]", "direction = [0, -2, 0]", "length 1"),
         ("{ name = \"A2\", grouping = 1", "{ name = \"A2\", grouping = 7", "must be 1 to 4"),
         ("pulse_us = 3500", "pulse_us = 9000", "pulse_bounds_us"),
+        ("noise_ratio = 3.0", "noise_ratio = 0.5", "limits.noise_ratio"),
+        ("weak_n = 30.0", "weak_n = 80.0", "limits: 0 < weak_n < strong_n"),
+        ("rebound_after_s = 0.001", "rebound_after_s = -1.0", "limits.rebound_after_s"),
     ] {
         assert!(SMALL.contains(from), "{from}");
         let text = SMALL.replacen(from, to, 1);
@@ -55,8 +58,27 @@ fn errors_point_at_line_and_field() {
         let said = wrong.to_string();
         assert!(said.contains(word), "{to}: {said}");
         // a range between fields is told at the table that holds them
-        let near = if word.contains('.') || word.contains("<=") || word.contains("bounds") { 6 } else { 0 };
+        let near = if word.contains('.') || word.contains('<') || word.contains("bounds") { 6 } else { 0 };
         assert!(wrong.line <= line && wrong.line + near >= line, "{to}: line {line}, said {said}");
         assert!(said.starts_with("my.toml:"), "{said}");
+    }
+}
+
+#[test]
+fn what_may_be_left_out_is_checked_where_it_stands() {
+    let with = |more: &str| Plan::parse(&format!("{SMALL}\n{more}\n"), "my.toml");
+    let good = "[enough]\nrandom_error = 0.02\nband_hz = [100, 800]\n[[channel]]\nname = \"force\"\nserial = \"1\"\n\
+                calibrated = \"2026-02-03\"\npolarity = -1\nsensitivity_v = 0.0224";
+    assert_eq!(with(good).expect("good").channel[0].get_ref().polarity, Some(-1));
+    for (more, word) in [
+        ("[enough]\nrandom_error = 2.0\nband_hz = [100, 800]", "enough.random_error"),
+        ("[enough]\nrandom_error = 0.1\nband_hz = [900, 800]", "enough.band_hz"),
+        ("[[channel]]\nname = \"a\"\npolarity = 0", "polarity"),
+        ("[[channel]]\nname = \"a\"\nsensitivity_v = -1.0", "sensitivity_v"),
+        ("[[channel]]\nname = \"a\"\ncalibrated = \"last May\"", "calibrated"),
+        ("[[channel]]\nname = \"a\"\n[[channel]]\nname = \"a\"", "twice"),
+    ] {
+        let said = with(more).expect_err(more).to_string();
+        assert!(said.contains(word), "{said}");
     }
 }

@@ -1,13 +1,15 @@
 //! Rows of the campaign file as the rest of the program sees them.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
-use jointrig_protocol::shot::Shot;
+use jointrig_protocol::shot::{Phase, Shot};
 use rusqlite::Row;
 use rusqlite::types::Type;
 
 use super::judge::{Judgement, Kind};
 use super::plan::Cell;
+use super::seal;
 use crate::device::recording::Recording;
 
 /// A cell of the plan.
@@ -19,6 +21,8 @@ pub struct CellRow {
     pub cell: Cell,
     /// Why it was given up, if it was.
     pub given_up: Option<String>,
+    /// Why it is done with fewer good hits than wanted, but enough, if it is.
+    pub settled: Option<String>,
 }
 
 /// What was connected.
@@ -40,6 +44,9 @@ pub struct SessionInfo {
     pub schema_hash: u64,
 }
 
+/// Counters of a link by name.
+pub type Counters = BTreeMap<String, u64>;
+
 /// A record to be stored.
 #[derive(Clone, Debug)]
 pub struct NewRecord {
@@ -51,6 +58,8 @@ pub struct NewRecord {
     pub session: i64,
     /// When its trigger was, RFC 3339.
     pub utc: String,
+    /// How wrong that may be, ± s; unknown without a clock to fit.
+    pub utc_error_s: Option<f64>,
     /// The raw samples; none where the bolt did not arrive.
     pub recording: Recording,
     /// What it was judged to be.
@@ -70,6 +79,8 @@ pub struct RecordRow {
     pub session: i64,
     /// When its trigger was, RFC 3339.
     pub utc: String,
+    /// How wrong that may be, ± s.
+    pub utc_error_s: Option<f64>,
     /// Epoch of the stream that it was cut from.
     pub epoch: u32,
     /// Scan index of its first sample.
@@ -82,6 +93,8 @@ pub struct RecordRow {
     pub channels: usize,
     /// The device's summary.
     pub shot: Shot,
+    /// Peak of the band-limited force, N; 0 where there was no pulse.
+    pub peak_n: f64,
     /// Missing samples, as index ranges.
     pub gaps: Vec<Range<usize>>,
     /// The verdict at the time.
@@ -94,8 +107,13 @@ pub struct RecordRow {
     pub sentence: String,
     /// CRC-32 of the raw codes.
     pub crc: u32,
+    /// CRC-32 of the bytes that hold them in the file; a file of version 1 has none.
+    pub bytes_crc: Option<u32>,
     /// What a person made of it later.
     pub overruled: Option<Kind>,
+    /// What is wrong with this description of the record, if anything is: nothing else in it can be trusted then, and
+    /// it is not kept.
+    pub damage: Option<String>,
 }
 
 impl RecordRow {
@@ -106,36 +124,117 @@ impl RecordRow {
 
     /// Whether analysis uses it.
     pub fn kept(&self) -> bool {
-        self.standing() == Kind::Good && self.scans > 0
+        self.damage.is_none() && self.standing() == Kind::Good && self.scans > 0
     }
 
+    /// A record of which nothing but its place in the index can be read.
+    pub(super) fn unreadable(id: i64, cell: i64, attempt: u32, what: String) -> Self {
+        Self {
+            id,
+            cell,
+            attempt,
+            session: 0,
+            utc: String::new(),
+            utc_error_s: None,
+            epoch: 0,
+            first_scan: 0,
+            trigger_index: 0,
+            scans: 0,
+            channels: 0,
+            shot: Shot {
+                number: 0,
+                phase: Phase::Cancelled,
+                fired_at: 0,
+                trigger: 0,
+                pulse_us: 0,
+                peak_n: 0.0,
+                width_us: 0.0,
+                rebound_ratio: 0.0,
+                rebound_after: 0,
+                friction_peak_n: 0.0,
+                quiet_ratio: 0.0,
+            },
+            peak_n: 0.0,
+            gaps: Vec::new(),
+            verdict: Kind::Gap,
+            measure: 0.0,
+            limit: 0.0,
+            sentence: String::new(),
+            crc: 0,
+            bytes_crc: None,
+            overruled: None,
+            damage: Some(what),
+        }
+    }
+
+    /// Reads a row of [`super::seal::COLUMNS`], the seal, and the last overruling verdict.
     pub(super) fn read(row: &Row<'_>) -> rusqlite::Result<Self> {
         let wrong =
             |place: usize, name: &str| rusqlite::Error::InvalidColumnType(place, name.into(), Type::Text);
-        let (shot, gaps): (String, String) = (row.get(10)?, row.get(11)?);
-        let verdict: String = row.get(12)?;
-        let overruled: Option<String> = row.get(17)?;
-        Ok(Self {
+        let (shot, gaps): (String, String) = (row.get(12)?, row.get(13)?);
+        let verdict: String = row.get(14)?;
+        let overruled: Option<String> = row.get(SEAL + 1)?;
+        let device_peak: f64 = row.get(11)?;
+        let mut read = Self {
             id: row.get(0)?,
             cell: row.get(1)?,
             attempt: row.get(2)?,
             session: row.get(3)?,
             utc: row.get(4)?,
+            utc_error_s: row.get(21)?,
             epoch: row.get(5)?,
             first_scan: row.get(6)?,
             trigger_index: row.get(7)?,
             scans: row.get(8)?,
             channels: row.get(9)?,
-            shot: serde_json::from_str(&shot).map_err(|_| wrong(10, "shot"))?,
-            gaps: serde_json::from_str(&gaps).map_err(|_| wrong(11, "gaps"))?,
-            verdict: Kind::named(&verdict).ok_or_else(|| wrong(12, "verdict"))?,
-            measure: row.get(13)?,
-            limit: row.get(14)?,
-            sentence: row.get(15)?,
-            crc: row.get(16)?,
+            shot: serde_json::from_str(&shot).map_err(|_| wrong(12, "shot"))?,
+            peak_n: row.get::<_, Option<f64>>(20)?.unwrap_or(device_peak),
+            gaps: serde_json::from_str(&gaps).map_err(|_| wrong(13, "gaps"))?,
+            verdict: Kind::named(&verdict).ok_or_else(|| wrong(14, "verdict"))?,
+            measure: row.get(15)?,
+            limit: row.get(16)?,
+            sentence: row.get(17)?,
+            crc: row.get(18)?,
+            bytes_crc: row.get(22)?,
             overruled: overruled.as_deref().and_then(Kind::named),
-        })
+            damage: None,
+        };
+        let whole = match row.get::<_, Option<u32>>(SEAL)? {
+            Some(stored) => seal::of_row(row)? == stored,
+            None => row.get::<_, u32>(19)? == first_seal(&read),
+        };
+        if !whole {
+            read.damage = Some("its description was changed".into());
+        }
+        Ok(read)
     }
+}
+
+/// Place of the seal in a row.
+const SEAL: usize = seal::COLUMNS.len();
+
+/// A verdict that a person overruled.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Overrule {
+    /// Which record.
+    pub record: i64,
+    /// When, RFC 3339.
+    pub utc: String,
+    /// What it counts as since then.
+    pub verdict: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// What a plan says about the sensor behind a channel.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Sensor {
+    /// Its model.
+    pub model: Option<String>,
+    /// Its serial number.
+    pub serial: Option<String>,
+    /// When it was calibrated, YYYY-MM-DD.
+    pub calibrated: Option<String>,
 }
 
 /// The samples of a stored record.
@@ -150,6 +249,12 @@ pub struct Samples {
 }
 
 impl Samples {
+    /// Those of a record that is not stored yet.
+    pub fn of(recording: &Recording) -> Self {
+        let Recording { codes, channels, trigger_index, .. } = recording;
+        Self { codes: codes.clone(), channels: *channels, trigger_index: *trigger_index }
+    }
+
     /// The raw codes of one channel; empty outside the map.
     pub fn channel(&self, place: usize) -> &[i16] {
         let scans = self.codes.len().checked_div(self.channels).unwrap_or(0);
@@ -166,8 +271,8 @@ pub struct Damage {
     pub what: String,
 }
 
-/// CRC-32 over everything that describes a record (its samples have their own).
-pub(super) fn seal(row: &RecordRow) -> u32 {
+/// The seal of version 1: a CRC-32 over everything that describes a record, as text.
+pub(super) fn first_seal(row: &RecordRow) -> u32 {
     let text = format!(
         "{} {} {} {} {} {} {} {} {} {:?} {:?} {} {:?} {:?} {} {}",
         row.cell,

@@ -101,12 +101,19 @@ fn what_the_controller_logs_is_kept_with_the_campaign() {
 struct StopAfter(u32, Arc<AtomicBool>);
 
 impl Judge for StopAfter {
-    fn judge(&mut self, cell: &Cell, plan: &Plan, channels: &ChannelMap, recording: &Recording) -> Judgement {
+    fn judge(
+        &mut self,
+        cell: &Cell,
+        plan: &Plan,
+        channels: &ChannelMap,
+        recording: &Recording,
+        others: &Others,
+    ) -> Judgement {
         self.0 = self.0.saturating_sub(1);
         if self.0 == 0 {
             self.1.store(true, Ordering::Relaxed);
         }
-        ByShotSummary.judge(cell, plan, channels, recording)
+        ByShotSummary.judge(cell, plan, channels, recording, others)
     }
 }
 
@@ -146,6 +153,80 @@ fn a_vanished_device_is_an_error_that_loses_nothing() {
 }
 
 #[test]
+fn a_device_that_restarts_in_mid_record_is_an_error_that_loses_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let whole = create(&folder, "whole.jrig", &plan());
+    run_on(&whole, Fake::default(), &options(), &mut ByShotSummary).expect("runs");
+    for after in [25, 33, 41] {
+        let path = create(&folder, &format!("{after}.jrig"), &plan());
+        let fake = Fake::scripted(|fake| fake.restarts_after = Some(after));
+        let error = run_on(&path, fake, &options(), &mut ByShotSummary).expect_err("its stream is gone");
+        assert!(error.to_string().contains("fake:"), "{error}");
+        let before = content(&path);
+        assert!(before[..] == content(&whole)[..before.len()]);
+        run_on(&path, Fake::default(), &options(), &mut ByShotSummary).expect("runs");
+        assert!(content(&path) == content(&whole), "after {after} requests");
+    }
+}
+
+#[test]
+fn attempts_that_run_out_settle_a_cell_with_enough_good_hits() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // the first pulses are too weak
+    let text = plan().replace("wanted = 2", "wanted = 8");
+    let path = create(&folder, "a.jrig", &text);
+    let summary = run_on(&path, Fake::default(), &options(), &mut ByShotSummary).expect("runs");
+    let store = Store::open_read_only(&path).expect("opens");
+    let (cells, records) = (store.cells().expect("cells"), store.records().expect("records"));
+    let first = cells[0].settled.clone().expect("not all of its eight hits were good");
+    assert!(first.contains("of 8 good after 8 hits"), "{first}");
+    assert_eq!(summary.given_up, 0);
+    assert!(Tally::new(&cells, &records).complete());
+    assert!(cells[1..].iter().all(|cell| cell.settled.is_none()));
+}
+
+#[test]
+fn a_cell_ends_early_when_its_frfs_are_good_enough() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = plan().replace("wanted = 2", "wanted = 8").replace("minimum = 1", "minimum = 3");
+    let text = text.replace("pulse_us = 2000", "pulse_us = 3000");
+    let kept = |name: &str, error: f64| {
+        let more = format!("{text}\n[enough]\nrandom_error = {error}\nband_hz = [200.0, 2000.0]\n");
+        let path = create(&folder, name, &more);
+        let summary = run_on(&path, Fake::default(), &options(), &mut ByShotSummary).expect("runs");
+        let cells = Store::open_read_only(&path).expect("opens").cells().expect("cells");
+        (summary.kept, cells.iter().filter(|cell| cell.settled.is_some()).count())
+    };
+    let (all, few) = (kept("strict.jrig", 1e-9), kept("lax.jrig", 0.5));
+    assert_eq!(all, (56, 0));
+    assert_eq!(few, (21, 7), "three good hits are enough everywhere");
+}
+
+#[test]
+fn a_sensor_that_is_not_the_plans_is_refused_before_anything_moves() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (n, (more, word)) in [
+        ("name = \"ch9\"", "no channel `ch9`"),
+        ("name = \"ch0\"\npolarity = -1", "channel.polarity"),
+        ("name = \"ch0\"\nsensitivity_v = 0.02", "channel.sensitivity_v"),
+        ("name = \"ch0\"\nrange = 50.0", "channel.range"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let path = create(&folder, &format!("{n}.jrig"), &format!("{}\n[[channel]]\n{more}\n", plan()));
+        let error = run_on(&path, Fake::default(), &options(), &mut ByShotSummary).expect_err("unfit");
+        assert!(error.to_string().contains(word), "{error}");
+    }
+    let good = "[[channel]]\nname = \"ch0\"\nmodel = \"M\"\nserial = \"S7\"\ncalibrated = \"2026-01-31\"\nrange = 327.68";
+    let path = create(&folder, "good.jrig", &format!("{}\n{good}\n", plan()));
+    run_on(&path, Fake::default(), &options(), &mut ByShotSummary).expect("runs");
+    let sensors = Store::open_read_only(&path).expect("opens").sensors(1).expect("sensors");
+    assert_eq!(sensors[0].serial.as_deref(), Some("S7"));
+    assert_eq!(sensors[1].serial, None);
+}
+
+#[test]
 fn a_bolt_that_does_not_arrive_is_weak_and_the_pulse_grows() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = create(&folder, "a.jrig", &plan());
@@ -165,7 +246,7 @@ fn a_cell_that_never_succeeds_is_given_up_with_a_reason() {
     let summary = run_on(&path, Fake::default(), &options(), &mut ByShotSummary).expect("runs");
     assert_eq!((summary.kept, summary.given_up), (0, 7));
     let cells = Store::open_read_only(&path).expect("opens").cells().expect("cells");
-    assert_eq!(cells[0].given_up.as_deref(), Some("0 of 2 good after 3 hits"));
+    assert_eq!(cells[0].given_up.as_deref(), Some("0 of 2 good after 3 hits, at least 1 needed"));
 }
 
 #[test]

@@ -1,13 +1,18 @@
 //! The tables of a campaign file, and their version.
+//!
+//! A file of an older version is brought up step by step when it is opened for writing; reading never changes it.
 
 /// Marks the file as ours (`JRIG`).
 pub const APPLICATION_ID: i32 = i32::from_be_bytes(*b"JRIG");
 
 /// Version of the tables, in SQLite's `user_version`.
-pub const VERSION: i32 = 1;
+pub const VERSION: i32 = 2;
 
-/// Creates version 1. Raw records are append-only: triggers refuse any change.
-pub const CREATE: &str = "
+/// `STEPS[n]` turns version n into version n + 1; a new file takes them all. A step that was released is frozen.
+pub const STEPS: [&str; VERSION as usize] = [FIRST, SEALS];
+
+/// Version 1. Raw records are append-only: triggers refuse any change.
+const FIRST: &str = "
 CREATE TABLE meta (
     key   TEXT PRIMARY KEY,
     value TEXT NOT NULL
@@ -104,4 +109,40 @@ CREATE TRIGGER records_stay BEFORE UPDATE ON records
 BEGIN SELECT RAISE(ABORT, 'a raw record is never changed'); END;
 CREATE TRIGGER records_remain BEFORE DELETE ON records
 BEGIN SELECT RAISE(ABORT, 'a raw record is never deleted'); END;
+";
+
+/// Version 2: what was found when a record was stored, with a seal over all of it; the link's counters; the sensors.
+const SEALS: &str = "
+-- one row per record, stored with it. bytes_crc32 runs over the bytes in records.samples, seal over every other
+-- column of both rows (see seal.rs)
+CREATE TABLE seals (
+    record      INTEGER PRIMARY KEY REFERENCES records(id),
+    peak_n      REAL NOT NULL,
+    utc_error_s REAL,
+    bytes_crc32 INTEGER NOT NULL,
+    seal        INTEGER NOT NULL
+) STRICT;
+CREATE TRIGGER seals_stay BEFORE UPDATE ON seals
+BEGIN SELECT RAISE(ABORT, 'a record''s seal is never changed'); END;
+CREATE TRIGGER seals_remain BEFORE DELETE ON seals
+BEGIN SELECT RAISE(ABORT, 'a record''s seal is never deleted'); END;
+
+-- counters of a session's link so far, a JSON object of numbers
+CREATE TABLE links (
+    session  INTEGER PRIMARY KEY REFERENCES sessions(id),
+    counters TEXT NOT NULL
+) STRICT;
+
+-- what the plan says about the sensor behind a channel; sensitivity and polarity are in channels.units_per_volt
+CREATE TABLE sensors (
+    session    INTEGER NOT NULL REFERENCES sessions(id),
+    place      INTEGER NOT NULL,
+    model      TEXT,
+    serial     TEXT,
+    calibrated TEXT,
+    PRIMARY KEY (session, place)
+) STRICT;
+
+-- why a cell is done with fewer good hits than wanted, but enough
+ALTER TABLE cells ADD COLUMN settled TEXT;
 ";

@@ -2,20 +2,27 @@
 
 use jointrig_protocol::channel::Channel;
 use rusqlite::{Row, params};
+use toml::Spanned;
 
-use super::rows::SessionInfo;
+use super::plan::Plan;
+use super::rows::{Counters, Sensor, SessionInfo};
 use super::store::{Store, utc_now};
 use super::store_error::{StoreError, sqlite};
 use crate::device::channels::ChannelMap;
 
 impl Store {
-    /// Notes a connection to a device and its channels; returns its id.
+    /// Notes a connection to a device, its channels, and the sensors that the plan names behind them; returns its id.
     pub fn begin_session(&mut self, info: &SessionInfo, channels: &ChannelMap) -> Result<i64, StoreError> {
-        let path = self.path.clone();
-        self.write_session(info, channels).map_err(|error| sqlite(&path, "noting the session", error))
+        let (path, plan) = (self.path.clone(), self.plan()?);
+        self.write_session(info, channels, &plan).map_err(|error| sqlite(&path, "noting the session", error))
     }
 
-    fn write_session(&mut self, info: &SessionInfo, channels: &ChannelMap) -> rusqlite::Result<i64> {
+    fn write_session(
+        &mut self,
+        info: &SessionInfo,
+        channels: &ChannelMap,
+        plan: &Plan,
+    ) -> rusqlite::Result<i64> {
         let transaction = self.connection.transaction()?;
         transaction.execute(
             "INSERT INTO sessions (utc, address, board, serial, firmware_version, target, build, schema_hash, \
@@ -53,6 +60,14 @@ impl Store {
                     channel.bits,
                 ],
             )?;
+            let named =
+                plan.channel.iter().map(Spanned::get_ref).find(|sensor| sensor.name == channel.name.as_str());
+            if let Some(sensor) = named {
+                transaction.execute(
+                    "INSERT INTO sensors VALUES (?1, ?2, ?3, ?4, ?5)",
+                    params![session, place, sensor.model, sensor.serial, sensor.calibrated],
+                )?;
+            }
         }
         transaction.commit()?;
         Ok(session)
@@ -88,6 +103,51 @@ impl Store {
             })
             .collect::<Result<_, StoreError>>()?;
         Ok(ChannelMap { id: 0, rate_hz, channels })
+    }
+
+    /// What is known of the sensors of one session's channels, in their order.
+    pub fn sensors(&self, session: i64) -> Result<Vec<Sensor>, StoreError> {
+        let mut sensors = vec![Sensor::default(); self.channels(session)?.len()];
+        if self.version > 1 {
+            let sql = "SELECT place, model, serial, calibrated FROM sensors WHERE session = ?1";
+            let read = |row: &Row<'_>| {
+                let sensor = Sensor { model: row.get(1)?, serial: row.get(2)?, calibrated: row.get(3)? };
+                Ok((row.get::<_, usize>(0)?, sensor))
+            };
+            for (place, sensor) in self.all(sql, [session], read, "reading sensors")? {
+                if let Some(known) = sensors.get_mut(place) {
+                    *known = sensor;
+                }
+            }
+        }
+        Ok(sensors)
+    }
+
+    /// Notes the counters of a session's link.
+    pub fn note_link(&self, session: i64, counters: &Counters) -> Result<(), StoreError> {
+        let text = serde_json::to_string(counters)
+            .map_err(|error| self.content(format!("the link's counters cannot be written: {error}")))?;
+        self.connection
+            .execute("INSERT OR REPLACE INTO links VALUES (?1, ?2)", params![session, text])
+            .map(|_| ())
+            .map_err(self.failed("noting the link's counters"))
+    }
+
+    /// The counters of the link, summed over all sessions that noted them.
+    pub fn link_counters(&self) -> Result<Counters, StoreError> {
+        let mut sum = Counters::new();
+        if self.version > 1 {
+            let texts: Vec<String> =
+                self.all("SELECT counters FROM links", [], |row| row.get(0), "reading the link's counters")?;
+            for text in texts {
+                let counters: Counters = serde_json::from_str(&text)
+                    .map_err(|error| self.content(format!("the link's counters cannot be read: {error}")))?;
+                for (name, count) in counters {
+                    *sum.entry(name).or_default() += count;
+                }
+            }
+        }
+        Ok(sum)
     }
 
     /// The sessions of this file: id, and what was connected.

@@ -24,6 +24,19 @@ pub enum Stage {
     Exec(String),
 }
 
+/// What came of moving hammer and laser.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moved {
+    /// They are in place from this scan on.
+    InPlace(u64),
+    /// A person wants the good hits of this cell struck anew, and will be asked again.
+    Redo,
+    /// A person leaves this cell for a later run.
+    Skip,
+    /// A person wants to go back to the cell before.
+    Back,
+}
+
 /// Why hammer and laser are not in place.
 #[derive(Debug, thiserror::Error)]
 pub enum StageError {
@@ -78,32 +91,45 @@ impl Stage {
         }
     }
 
-    /// Brings hammer and laser to `cell`, whose next attempt is `attempt`. Returns the first scan for which
-    /// that holds; the acknowledgement is held at or before it. `yes` answers a manual prompt.
+    /// Brings hammer and laser to `cell`, whose next attempt is `attempt`; `what` tells a person where they belong and how
+    /// far the cell is. In place, the acknowledgement is held at or before the scan that is returned. `yes` answers a prompt.
     ///
     /// # Errors
     /// They are not in place, and why.
-    pub fn go(&self, session: &mut Session, cell: &Cell, attempt: u32, yes: bool) -> Result<u64, StageError> {
+    pub fn go(
+        &self,
+        session: &mut Session,
+        cell: &Cell,
+        attempt: u32,
+        what: &str,
+        yes: bool,
+    ) -> Result<Moved, StageError> {
         match self {
             Self::Device | Self::Auto => {
                 let name = |text: &str| text.try_into().map_err(|_| StageError::Name(text.into()));
                 let (impact, response) = (name(&cell.impact)?, name(&cell.response)?);
                 let configuration = cell.configuration;
-                return Ok(session.stage(StageRequest { configuration, impact, response, attempt })?);
+                let request = StageRequest { configuration, impact, response, attempt };
+                return Ok(Moved::InPlace(session.stage(request)?));
             }
-            Self::Manual => meanwhile(session, || ask(cell, yes))?,
+            Self::Manual => match meanwhile(session, || ask(what, yes))? {
+                Key::Accept => {}
+                Key::Redo => return Ok(Moved::Redo),
+                Key::Skip => return Ok(Moved::Skip),
+                Key::Back => return Ok(Moved::Back),
+            },
             Self::Exec(command) => meanwhile(session, || execute(command, cell, attempt))?,
         }
         session.hold_acknowledgement(Some(session.expected()?));
-        Ok(session.status()?.next_scan)
+        Ok(Moved::InPlace(session.status()?.next_scan))
     }
 }
 
 /// Keeps the stream going while somebody moves things; what is measured meanwhile is of no use.
-fn meanwhile(
+fn meanwhile<T: Send>(
     session: &mut Session,
-    work: impl FnOnce() -> Result<(), StageError> + Send,
-) -> Result<(), StageError> {
+    work: impl FnOnce() -> Result<T, StageError> + Send,
+) -> Result<T, StageError> {
     session.hold_acknowledgement(None);
     std::thread::scope(|scope| {
         let worker = scope.spawn(work);
@@ -120,25 +146,49 @@ fn meanwhile(
     })
 }
 
-fn ask(cell: &Cell, yes: bool) -> Result<(), StageError> {
-    let name = configuration_name(cell.configuration);
-    let mut screen = std::io::stderr();
-    let said = write!(
-        screen,
-        "\nstructure {name}: hammer to {}, laser to {} — Enter when in place, q to stop: ",
-        cell.impact, cell.response
-    )
-    .and_then(|()| screen.flush());
+/// What a person may answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Key {
+    Accept,
+    Redo,
+    Skip,
+    Back,
+}
+
+fn ask(what: &str, yes: bool) -> Result<Key, StageError> {
+    prompt(what, yes, &mut std::io::stdin().lock(), &mut std::io::stderr())
+}
+
+/// Asks until there is an answer that can be understood.
+fn prompt(
+    what: &str,
+    yes: bool,
+    keys: &mut impl BufRead,
+    screen: &mut impl Write,
+) -> Result<Key, StageError> {
+    // a closed screen is no reason to stop: without answers there is an error below
+    let _ = write!(screen, "\n{what}\n");
     if yes {
-        // nobody reads it, so a closed screen is no reason to stop
-        drop(said.and_then(|()| writeln!(screen, "yes")));
-        return Ok(());
+        let _ = writeln!(screen, "in place? yes (--yes)");
+        return Ok(Key::Accept);
     }
-    let mut line = String::new();
-    match std::io::stdin().lock().read_line(&mut line) {
-        Ok(0) | Err(_) => Err(StageError::NobodyThere),
-        Ok(_) if line.trim().eq_ignore_ascii_case("q") => Err(StageError::Stopped),
-        Ok(_) => Ok(()),
+    loop {
+        let _ = write!(screen, "Enter when in place; r redo this cell, s skip it, b back one cell, q quit: ")
+            .and_then(|()| screen.flush());
+        let mut line = String::new();
+        if !matches!(keys.read_line(&mut line), Ok(length) if length > 0) {
+            return Err(StageError::NobodyThere);
+        }
+        match line.trim().to_ascii_lowercase().as_str() {
+            "" | "a" | "y" => return Ok(Key::Accept),
+            "r" => return Ok(Key::Redo),
+            "s" => return Ok(Key::Skip),
+            "b" => return Ok(Key::Back),
+            "q" => return Err(StageError::Stopped),
+            other => {
+                let _ = writeln!(screen, "`{other}` is none of these");
+            }
+        }
     }
 }
 
@@ -170,6 +220,25 @@ mod tests {
         assert!("robot".parse::<Stage>().is_err());
         assert_eq!(Stage::Auto.decided(false), Stage::Manual);
         assert_eq!(Stage::Auto.decided(true), Stage::Device);
+    }
+
+    #[test]
+    fn a_person_may_accept_redo_skip_go_back_and_quit() {
+        let answered = |keys: &str| {
+            let mut screen = Vec::new();
+            let key = prompt("hammer to AZ1", false, &mut keys.as_bytes(), &mut screen);
+            (key, String::from_utf8(screen).expect("text"))
+        };
+        for (keys, wanted) in
+            [("\n", Key::Accept), ("r\n", Key::Redo), ("S\n", Key::Skip), ("x\nb\n", Key::Back)]
+        {
+            let (key, screen) = answered(keys);
+            assert_eq!(key.expect(keys), wanted);
+            assert!(screen.contains("hammer to AZ1") && screen.contains("q quit"), "{screen}");
+            assert_eq!(screen.contains("`x` is none of these"), keys.starts_with('x'));
+        }
+        assert!(matches!(answered("q\n").0, Err(StageError::Stopped)));
+        assert!(matches!(answered("").0, Err(StageError::NobodyThere)));
     }
 
     #[cfg(unix)]

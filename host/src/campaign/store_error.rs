@@ -38,6 +38,44 @@ pub enum StoreError {
         /// Ours.
         known: i32,
     },
+    /// Another process writes it.
+    #[error(
+        "{path} is being written by another jointrig ({holder}): end that one first; reading it is always possible"
+    )]
+    Busy {
+        /// The file.
+        path: PathBuf,
+        /// Who writes it.
+        holder: String,
+    },
+    /// It cannot be locked for writing.
+    #[error("{path} cannot be opened for writing: {source}; the folder must exist and be writable")]
+    Lock {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// It lies on a network share.
+    #[error(
+        "{path} lies on a network share ({kind}), where a record that was accepted could be lost: run the campaign on a \
+         local disk and copy it with `jointrig campaign backup`"
+    )]
+    Share {
+        /// The file.
+        path: PathBuf,
+        /// The kind of file system.
+        kind: String,
+    },
+    /// Records wait beside a file that cannot be written.
+    #[error(
+        "{path} was not closed in order and lies where nothing can be written: copy it to a local disk together with \
+         {path}-wal, which holds its last records"
+    )]
+    Unfinished {
+        /// The file.
+        path: PathBuf,
+    },
     /// A record cannot be read.
     #[error("{path}: record {record} is damaged ({source}); `jointrig campaign verify` lists all damage")]
     Damaged {
@@ -59,6 +97,16 @@ pub enum StoreError {
     /// The plan cannot be read.
     #[error(transparent)]
     Plan(#[from] PlanError),
+    /// A plan does not go on from what was measured.
+    #[error("{source_name} cannot take over from the plan in {path}: {what}")]
+    PlanChange {
+        /// The file.
+        path: PathBuf,
+        /// The new plan.
+        source_name: String,
+        /// What does not fit, and what to do.
+        what: String,
+    },
     /// SQLite failed.
     #[error("{path}: {doing}: {source}{hint}")]
     Sqlite {
@@ -78,6 +126,9 @@ pub(super) fn sqlite(path: &Path, doing: &'static str, source: rusqlite::Error) 
     let hint = match source.sqlite_error_code() {
         Some(ErrorCode::DiskFull) => {
             "; free some space, then run the same command again: nothing accepted is lost"
+        }
+        Some(ErrorCode::SystemIoFailure) => {
+            "; is the disk whole, and is there space on it? nothing accepted is lost: run the same command again"
         }
         Some(ErrorCode::ReadOnly) => "; the file or its folder is read-only",
         Some(ErrorCode::CannotOpen) => "; does the folder exist, and may you write there?",

@@ -16,8 +16,19 @@ pub struct Count {
     pub attempts: u32,
     /// Whether it was given up.
     pub given_up: bool,
+    /// Whether it is done with fewer good hits than wanted, but enough.
+    pub settled: bool,
+    /// Records whose description is damaged.
+    pub damaged: u32,
     /// Refused records by verdict.
     pub refused: BTreeMap<Kind, u32>,
+}
+
+impl Count {
+    /// Whether it has all that it needs.
+    pub fn done(&self) -> bool {
+        self.kept >= self.wanted || self.settled
+    }
 }
 
 /// How far a campaign is.
@@ -32,14 +43,16 @@ impl Tally {
         let mut counts: HashMap<i64, Count> = cells
             .iter()
             .map(|row| {
-                let given_up = row.given_up.is_some();
-                (row.id, Count { wanted: row.cell.wanted, given_up, ..Count::default() })
+                let (given_up, settled) = (row.given_up.is_some(), row.settled.is_some());
+                (row.id, Count { wanted: row.cell.wanted, given_up, settled, ..Count::default() })
             })
             .collect();
         for record in records {
             let count = counts.entry(record.cell).or_default();
             count.attempts = count.attempts.max(record.attempt + 1);
-            if record.kept() {
+            if record.damage.is_some() {
+                count.damaged += 1;
+            } else if record.kept() {
                 count.kept += 1;
             } else {
                 *count.refused.entry(record.standing()).or_default() += 1;
@@ -55,7 +68,7 @@ impl Tally {
 
     /// Whether the cell needs more hits.
     pub fn open(&self, id: i64) -> bool {
-        self.cells.get(&id).is_some_and(|count| count.kept < count.wanted && !count.given_up)
+        self.cells.get(&id).is_some_and(|count| !count.given_up && !count.done())
     }
 
     /// Hits tried in the cell: the number of its next attempt.
@@ -74,6 +87,18 @@ impl Tally {
         count.attempts += 1;
         count.kept += u32::from(good);
         count.attempts - 1
+    }
+
+    /// A cell is done with what it has.
+    pub fn settle(&mut self, id: i64) {
+        self.cells.entry(id).or_default().settled = true;
+    }
+
+    /// A cell is struck anew: its good records count no more.
+    pub fn redo(&mut self, id: i64) {
+        let count = self.cells.entry(id).or_default();
+        *count.refused.entry(Kind::Dropped).or_default() += count.kept;
+        (count.kept, count.settled, count.given_up) = (0, false, false);
     }
 
     /// Gives a cell up.
@@ -96,8 +121,8 @@ impl Tally {
         self.cells.values().filter(|count| count.given_up).count() as u64
     }
 
-    /// Whether every cell has what it wants.
+    /// Whether every cell has what it wants, or enough.
     pub fn complete(&self) -> bool {
-        self.cells.values().all(|count| count.kept >= count.wanted)
+        self.cells.values().all(Count::done)
     }
 }

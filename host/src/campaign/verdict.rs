@@ -43,11 +43,14 @@ pub enum VerdictKind {
     /// Samples are missing.
     #[serde(rename = "gap")]
     Gap,
+    /// A person refused it; no check ever says so.
+    #[serde(rename = "dropped")]
+    Dropped,
 }
 
 impl VerdictKind {
     /// Every kind, good first.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Good,
         Self::DoubleHit,
         Self::Overload,
@@ -56,6 +59,7 @@ impl VerdictKind {
         Self::Strong,
         Self::Mistimed,
         Self::Gap,
+        Self::Dropped,
     ];
 
     /// The kind of that name.
@@ -74,6 +78,7 @@ impl VerdictKind {
             VerdictKind::Strong => "strong",
             VerdictKind::Mistimed => "mistimed",
             VerdictKind::Gap => "gap",
+            VerdictKind::Dropped => "dropped",
         }
     }
 }
@@ -108,6 +113,8 @@ pub struct Limits {
     /// A second pulse counts from this fraction of the main one's height. Rebounds from 2 % on must be found; the ringing of a
     /// force cell (3 % at 6 kHz) leaves less than 0.3 % in the matched filter.
     pub rebound_fraction: f64,
+    /// A second pulse counts from this long after the start of the first on, s; 0 counts all.
+    pub rebound_after_s: f64,
     /// A pulse below this fraction of the reference peak is weak.
     pub weak_fraction: f64,
     /// A pulse above this fraction of the reference peak is strong.
@@ -129,6 +136,7 @@ impl Default for Limits {
     fn default() -> Self {
         Limits {
             rebound_fraction: 0.012,
+            rebound_after_s: 0.0,
             weak_fraction: 0.4,
             strong_fraction: 2.0,
             dropout_ratio: 10.0,
@@ -204,7 +212,14 @@ pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) ->
             }
         }
     }
-    if let Some(second) = double_hit::find(hit.force_n, &pulse, limits.rebound_fraction) {
+    for (channel, x) in hit.responses.iter().enumerate() {
+        if let Some(found) = clipping::plateau(x, dropout::quantum(x)) {
+            let name = format!("response {channel}");
+            return verdict(VerdictKind::Overload, found.level, found.limit, found.sentence(&name, "in SI"));
+        }
+    }
+    let from = (limits.rebound_after_s * hit.fs_hz) as usize;
+    if let Some(second) = double_hit::find(hit.force_n, &pulse, limits.rebound_fraction, from) {
         let after_ms = 1e3 * (second.start as f64 - pulse.start as f64) / hit.fs_hz;
         let sentence = format!(
             "a second pulse of {:.2} N ({:.1} % of the first), {after_ms:.2} ms from the first",

@@ -1,7 +1,11 @@
-//! `campaign new | run | status | verify`.
+//! `campaign new | run | status | show | drop | keep | check | verify | backup`.
 
+mod backup;
+mod check;
+mod judged;
 mod new;
 mod run;
+mod show;
 mod status;
 mod verify;
 
@@ -24,8 +28,18 @@ enum Command {
     Run(run::Run),
     /// Show, per cell, what is wanted, kept and refused, and why.
     Status(status::Status),
+    /// Show a cell: its records, their verdicts, and a figure.
+    Show(show::Show),
+    /// Leave records out of the analysis, whatever their verdict.
+    Drop(judged::Overrule),
+    /// Take records into the analysis, whatever their verdict.
+    Keep(judged::Overrule),
+    /// Check the sign of every channel, and hammer against vibrometer on a known mass.
+    Check(check::Check),
     /// Check every record's checksum; exits with 1 on any damage.
     Verify(verify::Verify),
+    /// Copy a campaign file, also while it is being written.
+    Backup(backup::Backup),
 }
 
 impl Campaign {
@@ -34,7 +48,12 @@ impl Campaign {
             Command::New(command) => command.run(),
             Command::Run(command) => command.run(),
             Command::Status(command) => command.run(),
+            Command::Show(command) => command.run(),
+            Command::Drop(command) => command.drop(),
+            Command::Keep(command) => command.keep(),
+            Command::Check(command) => command.run(),
             Command::Verify(command) => command.run(),
+            Command::Backup(command) => command.run(),
         }
     }
 }

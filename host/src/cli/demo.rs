@@ -7,6 +7,7 @@ use clap::Args;
 use super::analyse::analyse_into;
 use super::error::CliError;
 use super::{interrupt, measure, output};
+use crate::campaign::judge::ByRecord;
 use crate::campaign::plan;
 use crate::campaign::stage::Stage;
 use crate::campaign::store::Store;
@@ -47,7 +48,7 @@ impl Demo {
         let address = Address::Sim { rig: self.rig.clone() };
         let stop = interrupt::flag();
         let device = measure::Device { address: &address, seed: self.seed, log_tables: None };
-        let summary = measure::measure(store, device, Stage::Device, true, stop, &again)?;
+        let summary = measure::measure(store, device, Stage::Device, true, stop, &again, &mut ByRecord)?;
         if summary.interrupted {
             let file = file.display();
             eprintln!("`jointrig analyse {file} --out {}` works on what is there", folder.display());

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use super::error::CliError;
-use crate::campaign::judge::ByRecord;
+use crate::campaign::judge::Judge;
 use crate::campaign::runner::{self, Options, Summary};
 use crate::campaign::stage::Stage;
 use crate::campaign::store::Store;
@@ -23,6 +23,7 @@ pub struct Device<'a> {
 }
 
 /// Runs what is left of the campaign in `store`. `again` is the command that resumes it.
+#[expect(clippy::too_many_arguments, reason = "each is one option of a command line")]
 pub fn measure(
     store: Store,
     device: Device<'_>,
@@ -30,15 +31,32 @@ pub fn measure(
     yes: bool,
     stop: Arc<AtomicBool>,
     again: &str,
+    judge: &mut dyn Judge,
 ) -> Result<Summary, CliError> {
     let path = store.path().to_owned();
     let Device { address, seed, log_tables } = device;
     let mut session = Session::open(address.open(seed)?, &address.to_string())?;
     session.look_for_log_tables(Tables::new(log_tables));
     let options = Options { stage, yes, progress: true, stop };
-    let summary = runner::run(store, &mut session, &mut ByRecord, &options)?;
+    let summary = runner::run(store, &mut session, judge, &options)?;
     tell(&path, &summary, again);
+    tell_size(&path)?;
     Ok(summary)
+}
+
+/// How large the file is, and what compression made of its samples.
+fn tell_size(path: &Path) -> Result<(), CliError> {
+    let (stored, raw) = Store::open_read_only(path)?.sample_bytes()?;
+    let whole = std::fs::metadata(path).map_or(0, |file| file.len());
+    let ratio = raw as f64 / stored.max(1) as f64;
+    eprintln!(
+        "{}: {:.1} MB on disk; samples {:.1} MB, stored in {:.1} MB ({ratio:.2} : 1, lossless)",
+        path.display(),
+        whole as f64 / 1e6,
+        raw as f64 / 1e6,
+        stored as f64 / 1e6
+    );
+    Ok(())
 }
 
 fn tell(path: &Path, summary: &Summary, again: &str) {

@@ -108,6 +108,12 @@ mod tests {
             "campaign new p.jrig --plan plan.toml",
             "campaign run p.jrig --device sim: --stage exec:move.sh --yes",
             "campaign status p.jrig --json",
+            "campaign run p.jrig --device sim: --plan edited.toml --bell",
+            "campaign show p.jrig AJB/AZ1/B2 --json --no-figure",
+            "campaign drop p.jrig 3 4 --reason x",
+            "campaign keep p.jrig 3",
+            "campaign check p.jrig --mass 1.2 --cell B/BZ1/B1",
+            "campaign backup p.jrig q.jrig",
             "campaign verify p.jrig",
             "analyse p.jrig --out d --json",
             "completions bash",
@@ -120,6 +126,8 @@ mod tests {
             "campaign new p.jrig",
             "campaign new p.jrig --paper --plan x.toml",
             "campaign run p.jrig --stage robot",
+            "campaign drop p.jrig",
+            "campaign check p.jrig --mass 1.2",
             "info",
         ] {
             let words = std::iter::once("jointrig").chain(line.split(' ').filter(|word| !word.is_empty()));

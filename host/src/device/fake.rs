@@ -45,6 +45,8 @@ pub struct Fake {
     pub dies_after: Option<u32>,
     /// Payloads of log frames, one sent before each answer, from the beginning again after the last.
     pub says: Vec<Vec<u8>>,
+    /// After this many requests it starts anew: its stream is gone, its memory too.
+    pub restarts_after: Option<u32>,
     /// Whether it knows a stage.
     pub stage_known: bool,
     pub hello: Hello,
@@ -76,6 +78,7 @@ impl Default for Fake {
             newtons_per_us: 0.025,
             dies_after: None,
             says: Vec::new(),
+            restarts_after: None,
             stage_known: true,
             hello: Hello::device(0, 5, RING),
             accumulator: Accumulator::new(),
@@ -137,6 +140,16 @@ impl Fake {
     fn answer(&mut self, asked: Numbered) {
         if let Some(left) = &mut self.dies_after {
             *left = left.saturating_sub(1);
+        }
+        if let Some(left) = &mut self.restarts_after {
+            *left = left.saturating_sub(1);
+            if *left == 0 {
+                self.restarts_after = None;
+                self.epoch += 1;
+                (self.streaming, self.armed, self.fire, self.shot) = (false, false, None, None);
+                self.memory.clear();
+                self.ring.clear();
+            }
         }
         if let Some((_, wire)) = self.memory.iter().find(|(number, _)| *number == asked.number) {
             self.out.extend(wire.clone());

@@ -7,6 +7,7 @@ mod drawing;
 mod figures;
 mod page;
 mod panel;
+pub mod records;
 mod scale;
 mod tables;
 

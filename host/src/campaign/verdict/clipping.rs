@@ -57,3 +57,69 @@ pub(super) fn response(x: &[f64], range: f64) -> Option<Clipped> {
     let samples = x.iter().filter(|v| v.abs() >= AT_RANGE * range).count();
     (samples > 0).then_some(Clipped { level: range, limit: range, samples })
 }
+
+/// A plateau has at least this many samples ...
+const SHORTEST: usize = 4;
+
+/// ... and all plateaus together this many. A sharp top of a structure that was just hit may stand level for half as long: among 500
+/// clean simulated hits, three did for four to six samples.
+const IN_ALL: usize = 12;
+
+/// Samples within this many steps of the converter are one level: rounding and the noise of what comes after the saturated stage.
+const LEVEL_STEPS: f64 = 3.0;
+
+/// A smooth top falls by three times the level's width over one more half of its length; a corner by far more.
+const CORNER: f64 = 10.0;
+
+/// ... and by more than noise would, rms: where there is noise, its highest samples may stand level by chance.
+const NOISE: f64 = 6.0;
+
+/// A response that stands at its highest or lowest value below full scale, with corners at both ends: an amplifier or decoder before
+/// the converter is saturated. `step` is the converter's step. A slow mode is flat at its top too, but round.
+pub(super) fn plateau(x: &[f64], step: f64) -> Option<Clipped> {
+    let largest = x.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+    // a few steps in all: nothing can be told
+    if largest < 100.0 * step {
+        return None;
+    }
+    let noise = noise(x);
+    [1.0, -1.0].into_iter().find_map(|sign| {
+        let top = x.iter().fold(f64::NEG_INFINITY, |most, v| most.max(sign * v));
+        let slack = LEVEL_STEPS * step;
+        let fall = (CORNER * slack).max(NOISE * noise);
+        let (mut start, mut level) = (None, 0);
+        for i in 0..=x.len() {
+            let inside = x.get(i).is_some_and(|v| top - sign * v <= slack);
+            match (inside, start) {
+                (true, None) => start = Some(i),
+                (false, Some(from)) => {
+                    start = None;
+                    let half = (i - from).div_ceil(2);
+                    let fallen = |at: Option<usize>| {
+                        at.and_then(|at| x.get(at)).is_some_and(|v| top - sign * v > fall)
+                    };
+                    if i - from >= SHORTEST
+                        && fallen((from + 1).checked_sub(half + 1))
+                        && fallen(Some(i - 1 + half))
+                    {
+                        level += i - from;
+                    }
+                }
+                _ => {}
+            }
+        }
+        (level >= IN_ALL).then_some(Clipped { level: sign * top, limit: sign * top, samples: level })
+    })
+}
+
+/// Rms of white noise under the motion: from the median of third differences, which have 20 times its power.
+fn noise(x: &[f64]) -> f64 {
+    let mut differences: Vec<f64> =
+        x.windows(4).map(|w| (w[0] - 3.0 * w[1] + 3.0 * w[2] - w[3]).abs()).collect();
+    let middle = differences.len() / 2;
+    if differences.is_empty() {
+        return 0.0;
+    }
+    // the median of |x| is 0.6745 σ
+    *differences.select_nth_unstable_by(middle, f64::total_cmp).1 / (20f64.sqrt() * 0.6745)
+}

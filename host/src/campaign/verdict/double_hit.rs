@@ -23,8 +23,9 @@ const VALLEY: f64 = 0.7;
 /// The baseline is the median of such blocks: no pulse fills half of one, and slow drift of the amplifier is no pulse.
 const BASELINE_BLOCK: usize = 512;
 
-/// The strongest second pulse, if one reaches `limit` of the main pulse's height (and six times the noise).
-pub(super) fn find(force_n: &[f64], pulse: &Pulse, limit: f64) -> Option<Second> {
+/// The strongest second pulse, if one reaches `limit` of the main pulse's height (and six times the noise). After the main pulse it
+/// counts from `from` samples after that pulse's start on (start to start, or peak to peak).
+pub(super) fn find(force_n: &[f64], pulse: &Pulse, limit: f64, from: usize) -> Option<Second> {
     if let Some(second) = hump(force_n, pulse, limit) {
         return Some(second);
     }
@@ -35,7 +36,9 @@ pub(super) fn find(force_n: &[f64], pulse: &Pulse, limit: f64) -> Option<Second>
     let rest = above_baseline(force_n);
     // Two samples of margin: the pulse's foot below 2 % is not a second pulse.
     let before = 0..(pulse.start.saturating_sub(2 + width));
-    let after = (pulse.end + 2)..rest.len().saturating_sub(width);
+    // a pulse of another width than the filter's is found a little early
+    let soonest = (pulse.start + from).saturating_sub(width / 8).max(pulse.end + 2);
+    let after = soonest..rest.len().saturating_sub(width);
     before
         .chain(after)
         .map(|start| {

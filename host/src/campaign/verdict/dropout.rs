@@ -56,7 +56,7 @@ fn third_differences(x: &[f64], block: usize) -> Vec<f64> {
 }
 
 /// The converter's step: the smallest difference between neighbours. A quiet, coarse channel has a median difference of zero.
-fn quantum(x: &[f64]) -> f64 {
+pub(super) fn quantum(x: &[f64]) -> f64 {
     let largest = x.iter().fold(0.0f64, |m, v| m.max(v.abs()));
     x.windows(2)
         .map(|w| (w[1] - w[0]).abs())

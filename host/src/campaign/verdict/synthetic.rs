@@ -168,3 +168,32 @@ fn the_other_kinds() {
         .collect();
     assert_eq!(verdict(&merged, &[], &Limits::default()).verdict, VerdictKind::DoubleHit);
 }
+
+#[test]
+fn a_saturated_amplifier_below_full_scale_is_an_overload_and_a_round_top_is_not() {
+    let mut dice = Dice::new();
+    for case in 0..60 {
+        let pulse = clean(&mut dice);
+        let force = force(&[pulse], 12_800, &mut dice);
+        let noise = [0.0, 1e-6, 8e-6][case % 3];
+        // slow modes have flat tops too
+        let hz = dice.uniform(20.0, 900.0);
+        let motion: Vec<f64> = (0..12_800)
+            .map(|i| {
+                let t = i as f64 / FS - pulse.0;
+                let ring = if t > 0.0 { 6e-3 * (-8.0 * t).exp() * (TAU * hz * t).sin() } else { 0.0 };
+                ring + noise * dice.gauss()
+            })
+            .collect();
+        let rounded = |x: f64| (x / 0.31e-6).round() * 0.31e-6;
+        let round: Vec<f64> = motion.iter().copied().map(rounded).collect();
+        let v = verdict(&force, &[round], &Limits::default());
+        // without noise even the corner at the hit counts as a jump
+        assert_ne!(v.verdict, VerdictKind::Overload, "case {case}, {hz} Hz: {v:?}");
+        let top = motion.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+        let flat = motion.iter().map(|x| rounded(x.clamp(-0.85 * top, 0.85 * top))).collect();
+        let v = verdict(&force, &[flat], &Limits::default());
+        assert_eq!(v.verdict, VerdictKind::Overload, "case {case}, {hz} Hz: {v:?}");
+        assert!((v.measure.abs() / (0.85 * top) - 1.0).abs() < 0.01, "{v:?}");
+    }
+}

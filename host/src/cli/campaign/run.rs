@@ -4,11 +4,16 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use crate::campaign::judge::{ByRecord, Judge, Judgement, Kind};
+use crate::campaign::others::Others;
+use crate::campaign::plan::{Cell, Plan};
 use crate::campaign::stage::Stage;
 use crate::campaign::store::Store;
 use crate::cli::error::CliError;
 use crate::cli::{interrupt, measure};
 use crate::device::address::Address;
+use crate::device::channels::ChannelMap;
+use crate::device::recording::Recording;
 
 /// Measure what is left of a campaign.
 #[derive(Debug, Args)]
@@ -25,6 +30,12 @@ pub struct Run {
     /// Answer every prompt with yes.
     #[arg(long)]
     yes: bool,
+    /// Go on with this edited plan from now on.
+    #[arg(long, value_name = "PLAN.toml")]
+    plan: Option<PathBuf>,
+    /// Ring the terminal's bell at every verdict, twice at a refusal.
+    #[arg(long)]
+    bell: bool,
     /// Seed of a simulated rig.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -36,14 +47,59 @@ pub struct Run {
 impl Run {
     pub fn run(self) -> Result<(), CliError> {
         let address: Address = self.device.parse()?;
-        let store = Store::open(&self.file)?;
+        let mut store = Store::open(&self.file)?;
+        self.settle_plan(&mut store)?;
         let again = format!("jointrig campaign run {} --device {address}", self.file.display());
         let stop = interrupt::flag();
         let device = measure::Device { address: &address, seed: self.seed, log_tables: self.log_tables };
-        let summary = measure::measure(store, device, self.stage, self.yes, stop, &again)?;
+        let mut judge = Ringing { rings: self.bell };
+        let summary = measure::measure(store, device, self.stage, self.yes, stop, &again, &mut judge)?;
         if summary.interrupted {
             return Err(CliError::Bad("stopped before the campaign was complete".into()));
         }
         Ok(())
+    }
+
+    /// Takes an edited plan over; without being told to, says that there is one.
+    fn settle_plan(&self, store: &mut Store) -> Result<(), CliError> {
+        if let Some(path) = &self.plan {
+            let text = std::fs::read_to_string(path).map_err(|source| CliError::File {
+                path: path.clone(),
+                doing: "reading the plan",
+                source,
+            })?;
+            return Ok(store.take_over(&text, &path.display().to_string())?);
+        }
+        let (text, source) = store.plan_text()?;
+        // a plan that is gone, or was built in, was not edited
+        if std::fs::read_to_string(&source).is_ok_and(|now| now != text) {
+            eprintln!(
+                "{source} was edited since: going on with the plan in {}; `--plan {source}` takes the new one over",
+                self.file.display()
+            );
+        }
+        Ok(())
+    }
+}
+
+/// Judges by the record, and lets a person at the rig hear it.
+struct Ringing {
+    rings: bool,
+}
+
+impl Judge for Ringing {
+    fn judge(
+        &mut self,
+        cell: &Cell,
+        plan: &Plan,
+        channels: &ChannelMap,
+        recording: &Recording,
+        others: &Others,
+    ) -> Judgement {
+        let judgement = ByRecord.judge(cell, plan, channels, recording, others);
+        if self.rings {
+            eprint!("{}", if judgement.kind == Kind::Good { "\x07" } else { "\x07\x07" });
+        }
+        judgement
     }
 }

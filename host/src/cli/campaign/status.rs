@@ -39,16 +39,17 @@ impl Status {
             }));
         }
         let (stored, raw) = store.sample_bytes()?;
+        let size = std::fs::metadata(&self.file).map_or(0, |file| file.len());
         let started = cells.iter().filter(|row| tally.attempts(row.id) > 0);
         output::lines(started.map(|row| cell_line(row, &tally.cell(row.id))))?;
         output::lines([
             format!(
-                "{} of {} hits kept in {} cells ({} records, {:.1} MB, {:.1} : 1)",
+                "{} of {} hits kept in {} cells ({} records; {:.1} MB, samples {:.2} : 1)",
                 tally.kept(),
                 tally.wanted(),
                 cells.len(),
                 records.len(),
-                stored as f64 / 1e6,
+                size as f64 / 1e6,
                 raw as f64 / stored.max(1) as f64
             ),
             match (tally.complete(), tally.given_up()) {
@@ -75,6 +76,8 @@ fn cell_json(row: &CellRow, count: &Count) -> Value {
         "kept": count.kept,
         "refused": refused,
         "given_up": row.given_up,
+        "settled": row.settled,
+        "damaged": count.damaged,
     })
 }
 
@@ -84,5 +87,13 @@ fn cell_line(row: &CellRow, count: &Count) -> String {
     let kept = format!("{name:<4} {:<6} {:<4} {}/{}", cell.impact, cell.response, count.kept, count.wanted);
     let refused = refusals(count).map(|(kind, number)| format!("{number} {kind}"));
     let given_up = row.given_up.iter().map(|reason| format!("given up: {reason}"));
-    std::iter::once(kept).chain(refused).chain(given_up).collect::<Vec<_>>().join(", ")
+    let settled = row.settled.iter().map(|reason| format!("settled: {reason}"));
+    let damaged = (count.damaged > 0).then(|| format!("{} damaged", count.damaged));
+    std::iter::once(kept)
+        .chain(refused)
+        .chain(damaged)
+        .chain(given_up)
+        .chain(settled)
+        .collect::<Vec<_>>()
+        .join(", ")
 }

@@ -28,7 +28,10 @@ impl Verify {
         if damage.is_empty() {
             output::lines([format!("{path}: {} records, all whole", store.records()?.len())])
         } else {
-            Err(CliError::Bad(format!("{path}: {} damaged; analysis leaves those out", damage.len())))
+            Err(CliError::Bad(format!(
+                "{path}: {} damaged; analysis leaves damaged records out",
+                damage.len()
+            )))
         }
     }
 }

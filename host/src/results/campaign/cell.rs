@@ -21,6 +21,8 @@ pub struct Cell {
     pub fs_hz: f64,
     /// Kept hits.
     pub hits: Vec<Hit>,
+    /// What is said about records that were kept and cannot be used.
+    pub left_out: Vec<String>,
     /// How late the scanning vibrometer's axes x, y, z are against the hammer's force, s.
     pub response_delay_s: [f64; 3],
     /// How late the contact's signals are against the hammer's force, s.

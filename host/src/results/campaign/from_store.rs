@@ -19,9 +19,6 @@ use std::sync::{Mutex, PoisonError};
 /// Scans kept before the trigger: the force window begins 1 ms before the pulse, which is 51 scans at 51.2 kHz.
 const LEAD_S: f64 = 1.25e-3;
 
-/// Name of the note in which a campaign keeps the counters of its link (a JSON object of numbers).
-pub const LINK_NOTE: &str = "link";
-
 /// Why a campaign file cannot be analysed, or a cell of it not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum AnalyseError {
@@ -143,9 +140,7 @@ impl CampaignFile {
         if let Some(seed) = store.meta("demo_seed")? {
             source.settings.insert("seed".into(), seed.into());
         }
-        if let Some(note) = store.meta(LINK_NOTE)? {
-            source.link = serde_json::from_str(&note).unwrap_or_default();
-        }
+        source.link = store.link_counters()?;
         Ok(source)
     }
 
@@ -263,13 +258,27 @@ impl Measurements for CampaignFile {
         let Some(planned) = self.cells.iter().find(|c| c.name == *cell) else { return Ok(Cell::default()) };
         self.with_reader(|store| {
             let mut whole = Cell::default();
-            for record in self.records_of(planned.id).iter().filter(|r| r.kept()) {
-                let (hit, about) = self.hit(store, record)?;
-                let mut hits = std::mem::take(&mut whole.hits);
-                hits.push(hit);
-                whole = Cell { hits, ..about };
+            let mut left_out = Vec::new();
+            for record in self.records_of(planned.id) {
+                if let Some(what) = &record.damage {
+                    left_out.push(format!("record {} is damaged ({what}) and was left out", record.id));
+                }
+                if !record.kept() {
+                    continue;
+                }
+                match self.hit(store, record) {
+                    Ok((hit, about)) => {
+                        let mut hits = std::mem::take(&mut whole.hits);
+                        hits.push(hit);
+                        whole = Cell { hits, ..about };
+                    }
+                    Err(AnalyseError::Store(StoreError::Damaged { record, source, .. })) => {
+                        left_out.push(format!("record {record} is damaged ({source}) and was left out"));
+                    }
+                    Err(other) => return Err(other),
+                }
             }
-            Ok(whole)
+            Ok(Cell { left_out, ..whole })
         })
     }
 }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::campaign::judge::{Judgement, Kind};
 use crate::campaign::plan::SMALL;
-use crate::campaign::rows::{NewRecord, SessionInfo};
+use crate::campaign::rows::{Counters, NewRecord, SessionInfo};
 use crate::campaign::store::utc_now;
 use crate::device::recording::Recording;
 use jointrig_protocol::channel::{Axis, Channel};
@@ -110,16 +110,18 @@ fn campaign(path: &Path) -> Store {
         for (attempt, (peak, kind)) in
             [(50.0, Kind::Good), (48.0, Kind::DoubleHit), (46.0, Kind::Good)].into_iter().enumerate()
         {
-            let judgement = Judgement { kind, measure: 0.0, limit: 0.0, sentence: "made up".into() };
+            let judgement =
+                Judgement { kind, measure: 0.0, limit: 0.0, sentence: "made up".into(), peak_n: peak };
             let record = NewRecord {
                 cell: cell.id,
                 attempt: attempt as u32,
                 session,
                 utc: utc_now(),
+                utc_error_s: None,
                 recording: recording(&map, peak),
                 judgement,
             };
-            store.insert(&record).expect("stored");
+            store.insert(&record, &Counters::new()).expect("stored");
         }
     }
     store
@@ -129,7 +131,7 @@ fn campaign(path: &Path) -> Store {
 fn a_campaign_that_stopped_half_way_gives_what_it_can() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = campaign(&folder.path().join("half.jrig"));
-    store.set_meta(LINK_NOTE, r#"{"frames_received":17}"#).expect("noted");
+    store.note_link(1, &[("frames_received".to_owned(), 17)].into()).expect("noted");
     let results = analyse(&store, &|_| {}).expect("readable");
     let loops = results.impact_loops().expect("hits along z on A");
     let slope = loops.k_t_n_per_m.expect("a straight line");

@@ -18,7 +18,7 @@ mod synthetic;
 
 pub use cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, Measurements};
 pub use checks::{HIDDEN_RESONANCE, SERIES_COMPLIANCE, UNIDENTIFIED};
-pub use from_store::{AnalyseError, LINK_NOTE, analyse, geometry};
+pub use from_store::{AnalyseError, analyse, geometry};
 pub use joint::shaped;
 
 use super::{Completeness, MAIN_BAND_HZ, Results, UsableBand, ranges, words};
@@ -56,7 +56,7 @@ pub struct Progress {
 struct CellOutcome {
     average: Option<CellAverage>,
     loops: Vec<ImpactLoop>,
-    complaint: Option<String>,
+    complaints: Vec<String>,
 }
 
 /// Fills `results` (which has its source already) from the measurements.
@@ -82,7 +82,7 @@ pub fn analyse_measurements<M: Measurements>(
     for outcome in outcomes {
         averages.extend(outcome.average);
         impact_loops.extend(outcome.loops);
-        results.missing.extend(outcome.complaint);
+        results.missing.extend(outcome.complaints);
     }
     note_given_up(&mut results, &cells, measurements.given_up());
     note_settings(&mut results, sigma);
@@ -126,18 +126,21 @@ fn counts_for_contact(geometry: &Geometry, name: &CellName) -> bool {
 }
 
 fn one_cell<M: Measurements>(measurements: &M, geometry: &Geometry, name: &CellName) -> CellOutcome {
-    let mut outcome = CellOutcome { average: None, loops: Vec::new(), complaint: None };
-    let complain = |what: &dyn std::fmt::Display| {
-        Some(format!("{}: cell {} × {}: {what}.", name.configuration, name.impact, name.response))
+    let mut outcome = CellOutcome { average: None, loops: Vec::new(), complaints: Vec::new() };
+    let complaint = |what: &dyn std::fmt::Display| {
+        format!("{}: cell {} × {}: {what}.", name.configuration, name.impact, name.response)
     };
     let cell = match measurements.read(name) {
-        Ok(cell) if cell.hits.is_empty() => return outcome,
         Ok(cell) => cell,
         Err(error) => {
-            outcome.complaint = complain(&error);
+            outcome.complaints.push(complaint(&error));
             return outcome;
         }
     };
+    outcome.complaints.extend(cell.left_out.iter().map(|what| complaint(what)));
+    if cell.hits.is_empty() {
+        return outcome;
+    }
     let contact = counts_for_contact(geometry, name);
     if contact {
         for hit in &cell.hits {
@@ -145,14 +148,16 @@ fn one_cell<M: Measurements>(measurements: &M, geometry: &Geometry, name: &CellN
             match loops::of_hit(hit.record, &name.impact, cell.fs_hz, signals, cell.contact_delay_s) {
                 Ok(found) => outcome.loops.push(found),
                 Err(error) => {
-                    outcome.complaint = complain(&format!("record {} gives no loop: {error}", hit.record));
+                    outcome
+                        .complaints
+                        .push(complaint(&format!("record {} gives no loop: {error}", hit.record)));
                 }
             }
         }
     }
     match average(name.clone(), cell, measurements.sigma_per_s(), measurements.quantity(), contact) {
         Ok(averaged) => outcome.average = Some(averaged),
-        Err(error) => outcome.complaint = complain(&error),
+        Err(error) => outcome.complaints.push(complaint(&error)),
     }
     outcome
 }

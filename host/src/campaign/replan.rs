@@ -1,0 +1,100 @@
+//! Going on with an edited plan: what was measured stays valid, or the plan is refused.
+
+use std::collections::HashSet;
+
+use rusqlite::params;
+
+use super::plan::{Cell, Plan, configuration_name};
+use super::store::{Store, utc_now};
+use super::store_error::{StoreError, sqlite};
+
+impl Store {
+    /// Takes over the plan in `text`, which errors call `source`. Hits, force, limits and settling may change, and cells may be
+    /// added; cells without records may go. Cells that were given up or settled get another chance. The plans before stay in
+    /// the file.
+    ///
+    /// # Errors
+    /// The plan is wrong, or what was measured already would not fit it.
+    pub fn take_over(&mut self, text: &str, source: &str) -> Result<(), StoreError> {
+        let (new, old) = (Plan::parse(text, source)?, self.plan()?);
+        let refuse = |what: String| {
+            Err(StoreError::PlanChange { path: self.path.clone(), source_name: source.into(), what })
+        };
+        let rows = self.cells()?;
+        let measured: HashSet<i64> = self.records()?.iter().map(|record| record.cell).collect();
+        if !measured.is_empty() && new.record.get_ref() != old.record.get_ref() {
+            return refuse(
+                "[record] must stay as it is, because records were measured with it; create a new campaign"
+                    .into(),
+            );
+        }
+        let cells = new.cells();
+        for row in rows.iter().filter(|row| measured.contains(&row.id)) {
+            let Cell { configuration, impact, response, .. } = &row.cell;
+            if !cells.iter().any(|cell| same(cell, &row.cell)) {
+                let name = configuration_name(*configuration);
+                return refuse(format!(
+                    "the cell {name}/{impact}/{response} has records and must stay in it"
+                ));
+            }
+            if let Some(point) = moved(&old, &new, impact, response) {
+                return refuse(format!(
+                    "`{point}` has records and must stay where it is; give the other place another name"
+                ));
+            }
+        }
+        let path = self.path.clone();
+        let mut write = || {
+            let transaction = self.connection.transaction()?;
+            for row in rows.iter().filter(|row| !measured.contains(&row.id)) {
+                if !cells.iter().any(|cell| same(cell, &row.cell)) {
+                    transaction.execute("DELETE FROM cells WHERE id = ?1", [row.id])?;
+                }
+            }
+            for cell in &cells {
+                transaction.execute(
+                    "INSERT INTO cells (configuration, impact, response, wanted) VALUES (?1, ?2, ?3, ?4) \
+                     ON CONFLICT (configuration, impact, response) \
+                     DO UPDATE SET wanted = excluded.wanted, given_up = NULL, settled = NULL",
+                    params![configuration_name(cell.configuration), cell.impact, cell.response, cell.wanted],
+                )?;
+            }
+            transaction.execute(
+                "INSERT INTO plan (utc, source, text) VALUES (?1, ?2, ?3)",
+                params![utc_now(), source, text],
+            )?;
+            transaction.execute(
+                "INSERT INTO log (utc, text) VALUES (?1, ?2)",
+                params![utc_now(), format!("the plan {source} took over")],
+            )?;
+            transaction.commit()
+        };
+        write().map_err(|error| sqlite(&path, "taking over the plan", error))
+    }
+}
+
+fn same(one: &Cell, other: &Cell) -> bool {
+    (one.configuration, &one.impact, &one.response) == (other.configuration, &other.impact, &other.response)
+}
+
+/// The first of the two points that the new plan puts elsewhere.
+fn moved<'a>(old: &Plan, new: &Plan, impact: &'a str, response: &'a str) -> Option<&'a str> {
+    let impact_of = |plan: &Plan| {
+        plan.geometry.impact.iter().map(toml::Spanned::get_ref).find(|point| point.name == impact).cloned()
+    };
+    let response_of = |plan: &Plan| {
+        plan.geometry
+            .response
+            .iter()
+            .map(toml::Spanned::get_ref)
+            .find(|point| point.name == response)
+            .cloned()
+    };
+    if impact_of(old) != impact_of(new) {
+        Some(impact)
+    } else if response_of(old) != response_of(new) {
+        Some(response)
+    } else {
+        None
+    }
+}

@@ -1,0 +1,174 @@
+//! `campaign show`: the records of one cell, why each is kept or refused, and what they look like.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use crate::campaign::plan::configuration_name;
+use crate::campaign::rows::{CellRow, Overrule, RecordRow};
+use crate::campaign::store::Store;
+use crate::campaign::store_error::StoreError;
+use crate::cli::error::CliError;
+use crate::cli::output;
+use crate::report::records::{Shown, records};
+use jointrig_protocol::channel::Role;
+
+/// Show a cell: its records, their verdicts, and a figure.
+#[derive(Debug, Args)]
+pub struct Show {
+    /// The campaign file.
+    #[arg(value_name = "FILE.jrig")]
+    file: PathBuf,
+    /// The cell as CONFIGURATION/IMPACT/RESPONSE, for example AJB/AZ1/B2.
+    #[arg(value_name = "CELL")]
+    cell: String,
+    /// Where to write the figure; without it FILE-CONFIGURATION-IMPACT-RESPONSE.svg in the current folder.
+    #[arg(long, value_name = "FILE.svg", conflicts_with = "no_figure")]
+    figure: Option<PathBuf>,
+    /// Write no figure.
+    #[arg(long)]
+    no_figure: bool,
+    /// One JSON document on stdout.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Show {
+    pub fn run(self) -> Result<(), CliError> {
+        let store = Store::open_read_only(&self.file)?;
+        let cells = store.cells()?;
+        let row = find(&cells, &self.cell)?;
+        let records: Vec<RecordRow> =
+            store.records()?.into_iter().filter(|record| record.cell == row.id).collect();
+        let overrules = if records.is_empty() { Vec::new() } else { store.overrules()? };
+        let figure =
+            if self.no_figure || records.is_empty() { None } else { self.draw(&store, row, &records)? };
+        if self.json {
+            let records: Vec<Value> = records.iter().map(|record| as_json(record, &overrules)).collect();
+            return output::json(&json!({
+                "configuration": configuration_name(row.cell.configuration),
+                "impact": row.cell.impact,
+                "response": row.cell.response,
+                "wanted": row.cell.wanted,
+                "given_up": row.given_up,
+                "settled": row.settled,
+                "records": records,
+                "figure": figure,
+            }));
+        }
+        let mut lines =
+            vec![format!("{}: {} records, {} good hits wanted", self.cell, records.len(), row.cell.wanted)];
+        lines.extend(row.given_up.iter().map(|reason| format!("given up: {reason}")));
+        lines.extend(row.settled.iter().map(|reason| format!("settled: {reason}")));
+        for record in &records {
+            lines.push(line(record));
+            let own = overrules.iter().filter(|overrule| overrule.record == record.id);
+            lines.extend(own.map(|overrule| {
+                format!("        a person, {}: {} ({})", overrule.utc, overrule.verdict, overrule.reason)
+            }));
+        }
+        lines.extend(figure.iter().map(|path| format!("figure: {}", path.display())));
+        output::lines(lines)
+    }
+
+    /// Draws what can be read; a damaged record is in the list only.
+    fn draw(&self, store: &Store, row: &CellRow, rows: &[RecordRow]) -> Result<Option<PathBuf>, CliError> {
+        let mut shown = Vec::new();
+        for record in rows.iter().filter(|record| record.damage.is_none() && record.scans > 0) {
+            let samples = match store.samples(record) {
+                Ok(samples) => samples,
+                Err(error @ StoreError::Damaged { .. }) => {
+                    eprintln!("{error}");
+                    continue;
+                }
+                Err(error) => return Err(error.into()),
+            };
+            let channels = store.channels(record.session)?;
+            let (Some(force), Some(responses)) = (channels.place(Role::HammerForce), channels.responses())
+            else {
+                continue;
+            };
+            shown.push(Shown {
+                record: record.id,
+                kept: record.kept(),
+                verdict: record.standing().name(),
+                rate_hz: f64::from(channels.rate_hz),
+                trigger: record.trigger_index,
+                force_n: channels.to_si(force, samples.channel(force)),
+                response_m_per_s: responses.map(|place| channels.to_si(place, samples.channel(place))),
+            });
+        }
+        let cell = &row.cell;
+        let name = configuration_name(cell.configuration);
+        let title = format!("{name}: hammer at {}, laser at {}", cell.impact, cell.response);
+        let Some(figure) = records(&title, &shown) else { return Ok(None) };
+        let path = self.figure.clone().unwrap_or_else(|| {
+            let stem = self.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            PathBuf::from(format!("{stem}-{name}-{}-{}.svg", cell.impact, cell.response))
+        });
+        std::fs::write(&path, figure).map_err(|source| CliError::File {
+            path: path.clone(),
+            doing: "writing the figure",
+            source,
+        })?;
+        Ok(Some(path))
+    }
+}
+
+/// The cell of that name.
+pub(super) fn find<'a>(cells: &'a [CellRow], name: &str) -> Result<&'a CellRow, CliError> {
+    let called = |row: &CellRow| {
+        let cell = &row.cell;
+        format!("{}/{}/{}", configuration_name(cell.configuration), cell.impact, cell.response)
+    };
+    cells.iter().find(|row| called(row) == name).ok_or_else(|| {
+        let example = cells.first().map(called).unwrap_or_default();
+        CliError::Usage(format!(
+            "there is no cell `{name}`: write CONFIGURATION/IMPACT/RESPONSE, for example {example}"
+        ))
+    })
+}
+
+fn line(record: &RecordRow) -> String {
+    if let Some(damage) = &record.damage {
+        return format!("{:>6}  damaged: {damage}", record.id);
+    }
+    let error = record.utc_error_s.map_or("unknown error".into(), |error| format!("± {error:.3} s"));
+    format!(
+        "{:>6}  {:<10} {:6.2} N  {:5} us  {}  ({} {error})",
+        record.id,
+        record.verdict.name(),
+        record.peak_n,
+        record.shot.pulse_us,
+        record.sentence,
+        record.utc,
+    )
+}
+
+fn as_json(record: &RecordRow, overrules: &[Overrule]) -> Value {
+    let overruled: Vec<Value> = overrules
+        .iter()
+        .filter(|overrule| overrule.record == record.id)
+        .map(
+            |overrule| json!({ "utc": overrule.utc, "verdict": overrule.verdict, "reason": overrule.reason }),
+        )
+        .collect();
+    json!({
+        "record": record.id,
+        "attempt": record.attempt,
+        "session": record.session,
+        "utc": record.utc,
+        "utc_error_s": record.utc_error_s,
+        "verdict": record.verdict.name(),
+        "measure": record.measure,
+        "limit": record.limit,
+        "sentence": record.sentence,
+        "kept": record.kept(),
+        "overruled": overruled,
+        "damage": record.damage,
+        "peak_n": record.peak_n,
+        "pulse_us": record.shot.pulse_us,
+        "scans": record.scans,
+    })
+}
