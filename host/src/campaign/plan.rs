@@ -50,6 +50,8 @@ pub struct Plan {
     pub window: Window,
     /// When a cell's FRFs are good enough to stop before all wanted hits; never, without it.
     pub enough: Option<Spanned<Enough>>,
+    /// The shaker's levels before and after the campaign; none, without it.
+    pub shaker: Option<Spanned<ShakerPlan>>,
     /// What is behind the device's channels; those that are not named are taken as the device describes them.
     #[serde(default)]
     pub channel: Vec<Spanned<SensorPlan>>,
@@ -147,6 +149,31 @@ pub struct Settle {
 pub struct Window {
     /// Decay of the exponential window on force and response, 1/s.
     pub exponential_per_s: f64,
+}
+
+/// The shaker's levels: every frequency at every amplitude, measured before and after the hammer's cells so that wear shows.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ShakerPlan {
+    /// Frequencies, Hz.
+    pub frequencies_hz: Vec<f64>,
+    /// Amplitudes of the specimens' relative displacement, m.
+    pub amplitudes_m: Vec<f64>,
+}
+
+impl ShakerPlan {
+    /// How many levels there are, each time.
+    pub fn levels(&self) -> usize {
+        self.frequencies_hz.len() * self.amplitudes_m.len()
+    }
+
+    /// What becomes of them today, for whoever counts on them.
+    pub fn remark(&self) -> String {
+        format!(
+            "the plan's {} levels of the shaker, before and after, are not measured by this version: its cells are",
+            self.levels()
+        )
+    }
 }
 
 /// When a cell's FRFs are good enough.

@@ -2,10 +2,13 @@
 
 use std::collections::HashSet;
 
-use jointrig_protocol::limits::{ARM_VALID_CAP_MS, COIL_PULSE_CAP_US, NAME_BYTES};
+use jointrig_protocol::limits::{ARM_VALID_CAP_MS, COIL_PULSE_CAP_US, NAME_BYTES, SHAKE_SCANS_PER_CYCLE};
 use toml::Spanned;
 
 use super::plan::{Plan, configuration_named};
+
+/// No contact is shaken further than this, m: a plan in µm is caught here.
+const LARGEST_AMPLITUDE_M: f64 = 1e-3;
 
 /// Where in the text something is wrong, and what.
 type Wrong = (usize, String);
@@ -65,6 +68,7 @@ impl Plan {
             "settle.bound_s must lie between 0 and 55",
         )?;
         self.check_limits()?;
+        self.check_shaker()?;
         self.check_sensors()?;
         self.check_geometry()?;
         self.check_configurations()
@@ -100,6 +104,26 @@ impl Plan {
             Err((at, "enough.band_hz must be [low, high], at most half of record.rate_hz".into()))
         } else {
             Ok(())
+        }
+    }
+
+    fn check_shaker(&self) -> Result<(), Wrong> {
+        let Some(shaker) = &self.shaker else { return Ok(()) };
+        let (levels, at) = (shaker.get_ref(), shaker.span().start);
+        // the device refuses more than a tenth of the scan rate
+        let highest = f64::from(self.record.get_ref().rate_hz) / f64::from(SHAKE_SCANS_PER_CYCLE);
+        let within = |values: &[f64], most: f64| {
+            !values.is_empty() && values.iter().all(|value| *value > 0.0 && *value <= most)
+        };
+        if !within(&levels.frequencies_hz, highest) {
+            Err((at, format!("shaker.frequencies_hz must be over 0 and at most {highest}, one or more")))
+        } else if within(&levels.amplitudes_m, LARGEST_AMPLITUDE_M) {
+            Ok(())
+        } else {
+            Err((
+                at,
+                format!("shaker.amplitudes_m must be over 0 and at most {LARGEST_AMPLITUDE_M}, one or more"),
+            ))
         }
     }
 

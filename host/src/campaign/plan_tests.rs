@@ -71,6 +71,9 @@ fn what_may_be_left_out_is_checked_where_it_stands() {
                 calibrated = \"2026-02-03\"\npolarity = -1\nsensitivity_v = 0.0224";
     assert_eq!(with(good).expect("good").channel[0].get_ref().polarity, Some(-1));
     for (more, word) in [
+        ("[shaker]\nfrequencies_hz = [100]\namplitudes_m = [0.1]", "shaker.amplitudes_m"),
+        ("[shaker]\nfrequencies_hz = []\namplitudes_m = [1e-7]", "shaker.frequencies_hz"),
+        ("[shaker]\nfrequencies_hz = [6000]\namplitudes_m = [1e-7]", "shaker.frequencies_hz"),
         ("[enough]\nrandom_error = 2.0\nband_hz = [100, 800]", "enough.random_error"),
         ("[enough]\nrandom_error = 0.1\nband_hz = [900, 800]", "enough.band_hz"),
         ("[[channel]]\nname = \"a\"\npolarity = 0", "polarity"),

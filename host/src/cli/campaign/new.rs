@@ -40,6 +40,9 @@ impl New {
         let hits: u32 = cells.iter().map(|row| row.cell.wanted).sum();
         let path = self.file.display();
         eprintln!("{path}: {} cells, {hits} hits wanted", cells.len());
+        if let Some(shaker) = &store.plan()?.shaker {
+            eprintln!("{}", shaker.get_ref().remark());
+        }
         eprintln!("next: jointrig campaign run {path} --device sim:");
         Ok(store.close()?)
     }

@@ -49,6 +49,9 @@ impl Run {
         let address: Address = self.device.parse()?;
         let mut store = Store::open(&self.file)?;
         self.settle_plan(&mut store)?;
+        if let Some(shaker) = &store.plan()?.shaker {
+            eprintln!("{}", shaker.get_ref().remark());
+        }
         let again = format!("jointrig campaign run {} --device {address}", self.file.display());
         let stop = interrupt::flag();
         let device = measure::Device { address: &address, seed: self.seed, log_tables: self.log_tables };
