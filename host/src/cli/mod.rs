@@ -9,6 +9,7 @@ mod completions;
 mod demo;
 mod devices;
 mod error;
+mod frf;
 mod info;
 mod interrupt;
 mod measure;
@@ -41,6 +42,8 @@ enum Command {
     Campaign(campaign::Campaign),
     /// Analyse a campaign file: results.json and report.html.
     Analyse(analyse::Analyse),
+    /// FRFs of impact records from anywhere.
+    Frf(frf::Frf),
     /// Print completions for a shell.
     Completions(completions::Completions),
 }
@@ -56,6 +59,7 @@ pub fn main() -> ExitCode {
         Command::Info(command) => command.run(),
         Command::Campaign(command) => command.run(),
         Command::Analyse(command) => command.run(),
+        Command::Frf(command) => command.run(),
         Command::Completions(command) => {
             command.run();
             Ok(())
@@ -109,6 +113,8 @@ mod tests {
             "campaign verify p.jrig",
             "analyse p.jrig --out d --json",
             "completions bash",
+            "frf records.npz --json",
+            "frf records.npz --out x.npz --quantity receptance --delay -1e-6,2e-6 --band 100:800",
         ] {
             let words = std::iter::once("jointrig").chain(line.split(' '));
             assert!(Cli::try_parse_from(words).is_ok(), "{line}");

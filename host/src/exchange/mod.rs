@@ -1,7 +1,7 @@
 //! Formats of other programs, in and out: the only room between analysis and foreign files.
 //!
 //! [`npz`] and [`npz_output`] are the array layer; [`frf_npz`] and [`record_npz`] say which arrays make an FRF matrix, impact records or a
-//! hysteresis record; [`positions`] reads the pyFBS workbook, as xlsx or as a folder of csv tables.
+//! hysteresis record; [`positions`] reads the pyFBS workbook, as xlsx or as a folder of csv tables; [`uff`] is the universal file.
 
 pub mod frf_npz;
 pub mod npz;
@@ -9,6 +9,7 @@ pub mod npz_output;
 pub mod positions;
 pub mod record_npz;
 mod tables;
+pub mod uff;
 
 pub use frf_npz::{Extra, read_frf, write_frf};
 pub use npz::NpzError;

@@ -20,6 +20,7 @@ pub struct SpectraAverage {
     s_ff: Vec<f64>,
     outputs: Vec<Output>,
     keep_hits: bool,
+    noise_ratio: Option<f64>,
     kept_force: Vec<Vec<Complex<f64>>>,
 }
 
@@ -85,6 +86,7 @@ impl SpectraAverage {
                 .collect(),
             fft,
             keep_hits: false,
+            noise_ratio: None,
             kept_force: Vec::new(),
         }
     }
@@ -93,6 +95,13 @@ impl SpectraAverage {
     #[must_use]
     pub fn with_jackknife(mut self) -> Self {
         self.keep_hits = true;
+        self
+    }
+
+    /// Hv for this ratio of noise powers, response over force, (SI/N)²; see [`hv`].
+    #[must_use]
+    pub fn with_noise_ratio(mut self, ratio: Option<f64>) -> Self {
+        self.noise_ratio = ratio;
         self
     }
 
@@ -216,7 +225,7 @@ impl SpectraAverage {
             };
             line.h1.push(first);
             line.h2.push(h2(s_xf, s_xx) * advance);
-            line.hv.push(hv(s_ff, s_xf, s_xx, None) * advance);
+            line.hv.push(hv(s_ff, s_xf, s_xx, self.noise_ratio) * advance);
             line.coherence.push(coherence);
             line.variance.push(variance_of_part(first, coherence, self.hits));
         }

@@ -22,7 +22,7 @@ pub struct AveragedFrf {
     pub h1: Vec<Vec<Complex<f64>>>,
     /// H2 = S_xx / S_fx: biased by noise in the response, not in the force.
     pub h2: Vec<Vec<Complex<f64>>>,
-    /// Hv: the phase of the cross-spectrum with the geometric mean of |H1| and |H2|.
+    /// Hv: between H1 and H2, for noise in both; by default the geometric mean of their sizes.
     pub hv: Vec<Vec<Complex<f64>>>,
     /// γ² = |S_xf|² / (S_ff S_xx); NaN with a single hit, where it is 1 whatever the noise.
     pub coherence: Vec<Vec<f64>>,

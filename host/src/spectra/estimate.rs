@@ -33,6 +33,9 @@ pub struct FrfSettings {
     /// Whether the variance by jackknife is wanted too; the spectra of all hits are kept for it.
     #[serde(default)]
     pub jackknife: bool,
+    /// Ratio of noise powers for Hv, response over force, (SI/N)²; None is noise in proportion to the signals.
+    #[serde(default)]
+    pub noise_ratio: Option<f64>,
 }
 
 impl Default for FrfSettings {
@@ -43,6 +46,7 @@ impl Default for FrfSettings {
             delay_s: Vec::new(),
             transform_samples: None,
             jackknife: false,
+            noise_ratio: None,
         }
     }
 }
@@ -65,7 +69,8 @@ pub fn estimate(
     }
     let window = &settings.windowing;
     let decay = window.decay(records.fs_hz, samples);
-    let mut average = SpectraAverage::new(records.fs_hz, transform, outputs);
+    let mut average =
+        SpectraAverage::new(records.fs_hz, transform, outputs).with_noise_ratio(settings.noise_ratio);
     if settings.jackknife {
         average = average.with_jackknife();
     }
