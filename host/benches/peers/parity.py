@@ -20,18 +20,22 @@ def spectra():
     for name, array in (("H1", "frf"), ("H2", "h2"), ("Hv", "hv")):
         theirs = peer.get_FRF(name, frf_form="mobility")[:, 0, 1:]
         mine = ours[array][1:, :, 0].T
-        differences[name] = float(np.max(np.abs(theirs - mine)) / np.mean(np.abs(theirs)))
+        size = np.maximum(np.abs(theirs), np.mean(np.abs(theirs)))
+        differences[name] = float(np.max(np.abs(theirs - mine) / size))
     differences["coherence"] = float(np.max(np.abs(peer.get_coherence()[:, 1:] - ours["coherence"][1:].T)))
     return differences
 
 
 def plain(value):
+    """For JSON; floats as text, because every digit counts."""
     if isinstance(value, np.ndarray):
         if np.iscomplexobj(value):
-            return {"re": value.real.tolist(), "im": value.imag.tolist()}
-        return value.tolist()
+            return {"re": plain(value.real), "im": plain(value.imag)}
+        return plain(value.tolist())
     if isinstance(value, np.generic):
-        return value.item()
+        return plain(value.item())
+    if isinstance(value, float):
+        return repr(value)
     if isinstance(value, dict):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):

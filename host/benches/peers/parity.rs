@@ -17,7 +17,7 @@ use num_complex::Complex;
 use serde_json::Value;
 use std::path::Path;
 
-/// Spectra must agree to this part of the mean |H|, coherences absolutely.
+/// Spectra must agree to this part of |H| (of its mean where that is larger), coherences absolutely.
 const SPECTRA: f64 = 1e-9;
 /// pyuff prints 12 digits of a double, 6 of a place beside it.
 const DOUBLE_TEXT: f64 = 5e-12;

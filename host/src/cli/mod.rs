@@ -10,6 +10,7 @@ mod demo;
 mod devices;
 mod error;
 mod frf;
+mod import;
 mod info;
 mod interrupt;
 mod measure;
@@ -44,6 +45,8 @@ enum Command {
     Analyse(analyse::Analyse),
     /// FRFs of impact records from anywhere.
     Frf(frf::Frf),
+    /// Bring FRFs or impact records from elsewhere into jointrig's own files.
+    Import(import::Import),
     /// Print completions for a shell.
     Completions(completions::Completions),
 }
@@ -60,6 +63,7 @@ pub fn main() -> ExitCode {
         Command::Campaign(command) => command.run(),
         Command::Analyse(command) => command.run(),
         Command::Frf(command) => command.run(),
+        Command::Import(command) => command.run(),
         Command::Completions(command) => {
             command.run();
             Ok(())
@@ -114,6 +118,8 @@ mod tests {
             "analyse p.jrig --out d --json",
             "completions bash",
             "frf records.npz --json",
+            "import A.uff --out A.npz",
+            "import r.npz --into c.jrig --configuration A --impact AZ1 --response A1",
             "frf records.npz --out x.npz --quantity receptance --delay -1e-6,2e-6 --band 100:800",
         ] {
             let words = std::iter::once("jointrig").chain(line.split(' '));

@@ -1,9 +1,11 @@
 //! Formats of other programs, in and out: the only room between analysis and foreign files.
 //!
 //! [`npz`] and [`npz_output`] are the array layer; [`frf_npz`] and [`record_npz`] say which arrays make an FRF matrix, impact records or a
-//! hysteresis record; [`positions`] reads the pyFBS workbook, as xlsx or as a folder of csv tables; [`uff`] is the universal file.
+//! hysteresis record; [`positions`] reads the pyFBS workbook, as xlsx or as a folder of csv tables; [`uff`] is the universal file,
+//! [`frf_uff`] says which of its functions make an FRF matrix.
 
 pub mod frf_npz;
+pub mod frf_uff;
 pub mod npz;
 pub mod npz_output;
 pub mod positions;
