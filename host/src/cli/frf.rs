@@ -93,7 +93,8 @@ impl From<FrfQuantity> for MotionQuantity {
     }
 }
 
-fn band(text: &str) -> Result<(f64, f64), String> {
+/// A band of frequencies, Hz.
+pub(super) fn band(text: &str) -> Result<(f64, f64), String> {
     let wrong = || format!("`{text}` is no band: give two frequencies in Hz, the lower first, as in 300:600");
     let (low, high) = text.split_once(':').ok_or_else(wrong)?;
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|f| f.is_finite() && *f >= 0.0);

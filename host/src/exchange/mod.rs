@@ -9,9 +9,12 @@ pub mod frf_uff;
 pub mod npz;
 pub mod npz_output;
 pub mod positions;
+pub mod positions_output;
 pub mod record_npz;
 mod tables;
+pub mod tables_output;
 pub mod uff;
+pub mod uff_output;
 
 pub use frf_npz::{Extra, read_frf, write_frf};
 pub use npz::NpzError;
