@@ -56,7 +56,7 @@ pub struct Frf {
     #[arg(long, value_name = "SAMPLES")]
     pad_to: Option<usize>,
     /// How late each response is against the force, s (repeat, or a list with commas).
-    #[arg(long, value_name = "S", value_delimiter = ',', allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", value_delimiter = ',', allow_hyphen_values = true)]
     delay: Vec<f64>,
     /// Lines to give, Hz; all when absent.
     #[arg(long, value_name = "LO:HI", value_parser = band)]

@@ -6,7 +6,7 @@
 //! format has no field for, is in text 4 as `sigma 2.3 1/s`.
 
 use super::uff::{
-    Abscissa, Axis, Contents, DataSet, Dof, Encoding, Function, Precision, Values, WriteError, kind,
+    Abscissa, Axis, Contents, DataSet, Dof, Encoding, Function, Precision, Values, WriteError, count, kind,
     quantity, read,
 };
 use crate::substructuring::frf::{FrfMatrix, Quantity};
@@ -195,18 +195,17 @@ pub fn to_functions(
     ];
     let damping =
         if frf.sigma_per_s == 0.0 { String::new() } else { format!("sigma {} 1/s", frf.sigma_per_s) };
-    let sensors: Vec<&str> = frf.outputs.iter().map(|name| split(name).0).collect();
+    let mut sensors: Vec<&str> = Vec::new();
+    for (sensor, _) in frf.outputs.iter().map(|name| split(name)) {
+        if !sensors.contains(&sensor) {
+            sensors.push(sensor);
+        }
+    }
     let mut sets = Vec::with_capacity(frf.outputs.len() * frf.inputs.len());
     for (column, input) in frf.inputs.iter().enumerate() {
         for (row, output) in frf.outputs.iter().enumerate() {
             let (sensor, direction) = split(output);
-            let node = sensors.iter().take(row).fold(Vec::new(), |mut seen: Vec<&str>, name| {
-                if !seen.contains(name) {
-                    seen.push(name);
-                }
-                seen
-            });
-            let node = node.iter().position(|name| *name == sensor).unwrap_or(node.len()) as i64 + 1;
+            let node = sensors.iter().position(|name| *name == sensor).map_or(0, |at| count(at) + 1);
             sets.push(DataSet::Function(Box::new(Function {
                 id: [
                     format!("{output} / {input}"),
@@ -222,7 +221,7 @@ pub fn to_functions(
                 response: Dof { entity: sensor.into(), node, direction },
                 reference: Dof {
                     entity: input.clone(),
-                    node: 101 + column as i64,
+                    node: 101 + count(column),
                     direction: input_directions.get(column).copied().unwrap_or(0),
                 },
                 precision: Precision::Double,
@@ -240,7 +239,7 @@ pub fn to_functions(
 /// Sensor and direction of an output's name.
 fn split(name: &str) -> (&str, i64) {
     let axis =
-        |axis: &str| ["x", "y", "z", "rx", "ry", "rz"].iter().position(|a| *a == axis).map(|i| i as i64 + 1);
+        |axis: &str| ["x", "y", "z", "rx", "ry", "rz"].iter().position(|a| *a == axis).map(|i| count(i) + 1);
     name.rsplit_once(':').and_then(|(sensor, a)| Some((sensor, axis(a)?))).unwrap_or((name, 0))
 }
 

@@ -3,7 +3,7 @@
 use super::frf_uff::{FrfUffError, to_functions, write_uff};
 use super::uff::{
     Abscissa, Axis, ByteOrder, DataSet, Dof, Encoding, Function, Header, Node, Precision, Units, Values,
-    kind, quantity,
+    count, kind, quantity,
 };
 use crate::spectra::{ImpactRecords, MotionQuantity};
 use crate::substructuring::frf::FrfMatrix;
@@ -83,7 +83,7 @@ pub fn write_records(
                 id: [format!("hit {hit}"), String::new(), String::new(), String::new(), String::new()],
                 kind: kind::TIME,
                 number: 0,
-                version: hit as i64 + 1,
+                version: count(hit) + 1,
                 load_case: 0,
                 response: dof,
                 reference: Dof { entity: impact.into(), node: 101, direction: 0 },
@@ -99,7 +99,7 @@ pub fn write_records(
         sets.push(function(at_impact, force_n, quantity::FORCE, "N"));
         let three = responses.len() == 3;
         for (i, x) in responses.iter().enumerate() {
-            let direction = if three { i as i64 + 1 } else { 0 };
+            let direction = if three { count(i) + 1 } else { 0 };
             sets.push(function(Dof { entity: response.into(), node: 1, direction }, x, motion, unit));
         }
     }
@@ -137,7 +137,7 @@ fn nodes(points: &Configuration) -> Vec<Node> {
 /// ±1, 2, 3 where the direction is an axis's, 0 where it is oblique.
 fn direction(point: &Point) -> i64 {
     (0..3).find(|axis| point.direction[*axis].abs() == 1.0).map_or(0, |axis| {
-        let number = axis as i64 + 1;
+        let number = count(axis) + 1;
         if point.direction[axis] < 0.0 { -number } else { number }
     })
 }

@@ -19,12 +19,15 @@ pub struct SpectraAverage {
     force: Channel,
     s_ff: Vec<f64>,
     outputs: Vec<Output>,
+    /// One for each thread: a channel's working memory stays in that core's cache.
+    workers: Vec<Channel>,
+    failed: Option<SpectraError>,
     keep_hits: bool,
     noise_ratio: Option<f64>,
     kept_force: Vec<Vec<Complex<f64>>>,
 }
 
-/// Working memory of one channel's transform, used again for every hit.
+/// Working memory of one channel's transform, used again for every channel and hit.
 struct Channel {
     signal: Vec<f64>,
     spectrum: Vec<Complex<f64>>,
@@ -33,7 +36,6 @@ struct Channel {
 
 /// A response and its sums.
 struct Output {
-    channel: Channel,
     s_xf: Vec<Complex<f64>>,
     s_xx: Vec<f64>,
     kept: Vec<Vec<Complex<f64>>>,
@@ -55,11 +57,7 @@ impl Channel {
         fill: impl FnOnce(&mut [f64]),
     ) -> Result<(), SpectraError> {
         fill(&mut self.signal);
-        // a sum of finite values is finite unless it overflows: one pass without branches, the search only after it
-        if !self.signal.iter().map(|v| v * 0.0).sum::<f64>().is_finite() {
-            let sample = self.signal.iter().position(|v| !v.is_finite()).unwrap_or(0);
-            return Err(SpectraError::NotFinite { sample });
-        }
+        check_finite(&self.signal)?;
         fft.process_with_scratch(&mut self.signal, &mut self.spectrum, &mut self.scratch)
             .map_err(|e| SpectraError::Transform(e.to_string()))
     }
@@ -78,12 +76,15 @@ impl SpectraAverage {
             s_ff: vec![0.0; lines],
             outputs: (0..outputs)
                 .map(|_| Output {
-                    channel: Channel::new(&*fft),
                     s_xf: vec![Complex::default(); lines],
                     s_xx: vec![0.0; lines],
                     kept: Vec::new(),
                 })
                 .collect(),
+            workers: (0..rayon::current_num_threads().min(outputs).max(1))
+                .map(|_| Channel::new(&*fft))
+                .collect(),
+            failed: None,
             fft,
             keep_hits: false,
             noise_ratio: None,
@@ -117,42 +118,55 @@ impl SpectraAverage {
             if signal.len() != self.samples {
                 return Err(SpectraError::Samples { found: signal.len(), expected: self.samples });
             }
+            // before anything is summed: a refused hit leaves the average as it was
+            check_finite(signal)?;
         }
         self.add_with(|out| out.copy_from_slice(force_n), |o, out| out.copy_from_slice(&responses[o]))
     }
 
     /// Adds one hit whose windowed force and responses (by output) are written straight into the transforms' memory, which
-    /// holds the values of the hit before. Responses are filled, transformed and summed in parallel.
+    /// holds other values before. Responses are filled, transformed and summed in parallel.
     ///
     /// # Errors
-    /// A value that is not a number; the sums are then as they were.
+    /// A value that is not a number. Some responses of the hit may be in the sums then, so that the average is spent: this
+    /// and [`SpectraAverage::finish`] give the same error from then on.
     pub fn add_with(
         &mut self,
         force: impl FnOnce(&mut [f64]),
         response: impl Fn(usize, &mut [f64]) + Sync,
     ) -> Result<(), SpectraError> {
+        if let Some(error) = &self.failed {
+            return Err(error.clone());
+        }
         let fft = &*self.fft;
         self.force.transform(fft, force)?;
-        // all transforms first: a hit that fails half way must leave the sums untouched
-        self.outputs
-            .par_iter_mut()
-            .enumerate()
-            .try_for_each(|(o, output)| output.channel.transform(fft, |out| response(o, out)))?;
         let force = &self.force.spectrum;
+        let keep = self.keep_hits;
+        let share = self.outputs.len().div_ceil(self.workers.len()).max(1);
+        let summed: Result<(), SpectraError> =
+            self.outputs.par_chunks_mut(share).zip(&mut self.workers).enumerate().try_for_each(
+                |(part, (outputs, worker))| {
+                    for (i, output) in outputs.iter_mut().enumerate() {
+                        worker.transform(fft, |out| response(part * share + i, out))?;
+                        let sums = output.s_xf.iter_mut().zip(&mut output.s_xx);
+                        for ((s_xf, s_xx), (x, f)) in sums.zip(worker.spectrum.iter().zip(force)) {
+                            *s_xf += x * f.conj();
+                            *s_xx += x.norm_sqr();
+                        }
+                        if keep {
+                            output.kept.push(worker.spectrum.clone());
+                        }
+                    }
+                    Ok(())
+                },
+            );
+        if let Err(error) = summed {
+            self.failed = Some(error.clone());
+            return Err(error);
+        }
         for (sum, f) in self.s_ff.iter_mut().zip(force) {
             *sum += f.norm_sqr();
         }
-        let keep = self.keep_hits;
-        self.outputs.par_iter_mut().for_each(|output| {
-            let sums = output.s_xf.iter_mut().zip(&mut output.s_xx);
-            for ((s_xf, s_xx), (x, f)) in sums.zip(output.channel.spectrum.iter().zip(force)) {
-                *s_xf += x * f.conj();
-                *s_xx += x.norm_sqr();
-            }
-            if keep {
-                output.kept.push(output.channel.spectrum.clone());
-            }
-        });
         if keep {
             self.kept_force.push(self.force.spectrum.clone());
         }
@@ -167,8 +181,11 @@ impl SpectraAverage {
     /// variance is infinite.
     ///
     /// # Errors
-    /// When no hit was added.
+    /// When no hit was added, or adding one failed half way.
     pub fn finish(&self, sigma_per_s: f64, delay_s: &[f64]) -> Result<AveragedFrf, SpectraError> {
+        if let Some(error) = &self.failed {
+            return Err(error.clone());
+        }
         if self.hits == 0 {
             return Err(SpectraError::NoHits);
         }
@@ -257,4 +274,15 @@ struct Line {
     hv: Vec<Complex<f64>>,
     coherence: Vec<f64>,
     variance: Vec<f64>,
+}
+
+/// Refuses NaN and infinite values, naming the first.
+fn check_finite(signal: &[f64]) -> Result<(), SpectraError> {
+    // blocks without branches inside are several values per cycle
+    let fine = |block: &[f64]| block.iter().fold(true, |fine, v| fine & v.is_finite());
+    if signal.chunks(64).all(fine) {
+        return Ok(());
+    }
+    let sample = signal.iter().position(|v| !v.is_finite()).unwrap_or(0);
+    Err(SpectraError::NotFinite { sample })
 }

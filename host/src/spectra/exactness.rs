@@ -163,6 +163,10 @@ fn a_hit_that_is_not_a_number_leaves_the_average_as_it_was() {
     let error = average.add(&[1.0, 5.0, 0.0, 0.0], &[vec![1.0, 2.0, f64::NAN, 0.0]]);
     assert_eq!(error, Err(SpectraError::NotFinite { sample: 2 }));
     assert_eq!(average.finish(0.0, &[]).expect("a hit").h1, before);
+    // written straight into the transforms the hit is half in, so that the average says so for ever
+    let error = average.add_with(|f| f.fill(1.0), |_, x| x.fill(f64::INFINITY));
+    assert_eq!(error, Err(SpectraError::NotFinite { sample: 0 }));
+    assert_eq!(average.finish(0.0, &[]), Err(SpectraError::NotFinite { sample: 0 }));
 }
 
 /// Normal deviates from proptest's generator.

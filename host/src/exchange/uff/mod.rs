@@ -114,7 +114,7 @@ pub struct Contents {
 /// Reads all data sets of a file's bytes; large ones in parallel.
 pub fn read(bytes: &[u8]) -> Contents {
     enum Read {
-        Set(DataSet),
+        Set(Box<DataSet>),
         Fault(Fault),
         Skipped(Skipped),
     }
@@ -147,7 +147,7 @@ pub fn read(bytes: &[u8]) -> Contents {
                 data_set => return Read::Skipped(Skipped { data_set, offset: block.offset }),
             };
             match set {
-                Ok(set) => Read::Set(set),
+                Ok(set) => Read::Set(Box::new(set)),
                 Err(wrong) => fault(block.number, wrong),
             }
         })
@@ -155,12 +155,17 @@ pub fn read(bytes: &[u8]) -> Contents {
     let mut contents = Contents::default();
     for item in read {
         match item {
-            Read::Set(set) => contents.sets.push(set),
+            Read::Set(set) => contents.sets.push(*set),
             Read::Fault(fault) => contents.faults.push(fault),
             Read::Skipped(skipped) => contents.skipped.push(skipped),
         }
     }
     contents
+}
+
+/// A count as the format's whole numbers are.
+pub(super) fn count(n: usize) -> i64 {
+    i64::try_from(n).unwrap_or(i64::MAX)
 }
 
 /// Why a data set cannot be written.

@@ -15,8 +15,7 @@ pub(super) fn parse(word: &[u8]) -> Option<f64> {
 fn quick(word: &[u8]) -> Option<f64> {
     let (negative, mut rest) = match word {
         [b'-', rest @ ..] => (true, rest),
-        [b'+', rest @ ..] => (false, rest),
-        rest => (false, rest),
+        [b'+', rest @ ..] | rest => (false, rest),
     };
     let (mut mantissa, mut digits, mut exponent, mut after_point) = (0u64, 0, 0i32, false);
     while let [byte, tail @ ..] = rest {
@@ -139,7 +138,7 @@ mod tests {
             ("3", 3.0),
             ("1.e+03", 1000.0),
             ("inf", f64::INFINITY),
-            ("1.2345678901234567e+00", 1.2345678901234567),
+            ("1.2345678901234567e+00", 1.234_567_890_123_456_7),
         ] {
             assert_eq!(parse(text.as_bytes()), Some(value), "{text}");
         }

@@ -1,5 +1,6 @@
 //! Data set 2412: elements. Format 6I10; for beams 3I10 more; 8I10.
 
+use super::count;
 use super::text::{Lines, Output, Words, Wrong, integers};
 
 /// Descriptors of beams, which have a line more: rod, linear, tapered, curved and parabolic beam.
@@ -42,7 +43,7 @@ pub(super) fn read(lines: Lines<'_>) -> Result<Vec<Element>, Wrong> {
         let mut next = |what: &str| words.integer(what);
         let (label, descriptor) = (next("an element's number")?, next("the element's kind")?);
         let (physical, material) = (next("the element's properties")?, next("the element's material")?);
-        let (color, count) = (next("the element's colour")?, next("the element's count of nodes")?);
+        let (color, many) = (next("the element's colour")?, next("the element's count of nodes")?);
         let beam = if BEAMS.contains(&descriptor) {
             Some(Beam {
                 orientation: next("the beam's orientation")?,
@@ -52,7 +53,7 @@ pub(super) fn read(lines: Lines<'_>) -> Result<Vec<Element>, Wrong> {
         } else {
             None
         };
-        let nodes = (0..count).map(|_| next("a node of the element")).collect::<Result<_, _>>()?;
+        let nodes = (0..many).map(|_| next("a node of the element")).collect::<Result<_, _>>()?;
         elements.push(Element { label, descriptor, physical, material, color, beam, nodes });
     }
     Ok(elements)
@@ -67,7 +68,7 @@ pub(super) fn write(elements: &[Element], out: &mut Output) -> Result<(), String
                 e.label, e.descriptor
             ));
         }
-        let first = [e.label, e.descriptor, e.physical, e.material, e.color, e.nodes.len() as i64];
+        let first = [e.label, e.descriptor, e.physical, e.material, e.color, count(e.nodes.len())];
         out.line(&integers("a number of an element", &first, 10)?);
         if let Some(Beam { orientation, first_section, second_section }) = e.beam {
             out.line(&integers("a number of a beam", &[orientation, first_section, second_section], 10)?);

@@ -390,7 +390,7 @@ pub(super) fn write(f: &Function, out: &mut Output) -> Result<(), String> {
         Abscissa::Even { start, step } => (start, step),
         Abscissa::Uneven(_) => (0.0, 0.0),
     };
-    let line = integers("the count of values", &[kind, count as i64, i64::from(even)], 10)?;
+    let line = integers("the count of values", &[kind, super::count(count), i64::from(even)], 10)?;
     out.bytes.extend_from_slice(line.as_bytes());
     for value in [start, step, f.z] {
         number::print(&mut out.bytes, value, 13, 6);

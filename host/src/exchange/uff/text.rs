@@ -254,7 +254,8 @@ pub(super) fn integers(what: &str, values: &[i64], width: usize) -> Result<Strin
         if text.len() >= width {
             return Err(format!("{what} is {value}: at most {} characters are possible", width - 1));
         }
-        line.push_str(&format!("{text:>width$}"));
+        line.extend(std::iter::repeat_n(' ', width - text.len()));
+        line.push_str(&text);
     }
     Ok(line)
 }
