@@ -8,10 +8,11 @@ use jointrig_protocol::hello::Hello;
 use jointrig_protocol::limits::{BLOCK_HEADER_BYTES, BLOCK_SAMPLE_BYTES, MAX_WIRE};
 use jointrig_protocol::request;
 use libfuzzer_sys::fuzz_target;
+use std::hint::black_box;
 
 fn payload(bytes: &[u8]) {
-    drop((Hello::from_bytes(bytes), Acknowledge::from_bytes(bytes)));
-    drop(postcard::from_bytes::<request::Numbered>(bytes));
+    black_box((Hello::from_bytes(bytes), Acknowledge::from_bytes(bytes)));
+    let _ = black_box(postcard::from_bytes::<request::Numbered>(bytes));
 }
 
 fuzz_target!(|bytes: &[u8]| {

@@ -74,7 +74,9 @@ fn records(folder: &Path) -> Outcome {
         let (mut f, mut x) = (vec![0.0; samples], vec![0.0; samples]);
         window.force_into(force, &decay, origin_s, &mut f);
         window.response_into(&responses[0], &decay, origin_s, &mut x);
-        x.iter_mut().for_each(|x| *x *= 1e4);
+        for x in &mut x {
+            *x *= 1e4;
+        }
         average.add(&f, std::slice::from_ref(&x))?;
         windowed.force_n.push(f);
         windowed.response.push(vec![x]);
@@ -149,7 +151,7 @@ fn sets() -> Vec<DataSet> {
 }
 
 fn function(kind: i64, encoding: Encoding, precision: Precision, even: bool, complex: bool) -> Function {
-    let value = |i: usize| ((7 * i + 3) % 11) as f64 * 10f64.powi(i as i32 % 7 - 5) - 2.5;
+    let value = |i: usize| ((7 * i + 3) % 11) as f64 * 10f64.powf((i % 7) as f64 - 5.0) - 2.5;
     let number = |v: f64| if precision == Precision::Single { f64::from(v as f32) } else { v };
     Function {
         id: ["parity".into(), String::new(), String::new(), String::new(), String::new()],

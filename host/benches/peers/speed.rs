@@ -86,7 +86,10 @@ fn numbers(count: usize, seed: u64) -> Vec<f64> {
         .collect()
 }
 
-fn ours() -> Result<Vec<(&'static str, Vec<f64>)>, Box<dyn std::error::Error>> {
+/// A job's name and its times, s.
+type Times = (&'static str, Vec<f64>);
+
+fn ours() -> Result<Vec<Times>, Box<dyn std::error::Error>> {
     let mut all = Vec::new();
     {
         let records = ImpactRecords {
@@ -150,7 +153,7 @@ fn function(i: usize, encoding: Encoding) -> Function {
         version: 0,
         load_case: 0,
         response: Dof { entity: "A1".into(), node: 1, direction: 1 },
-        reference: Dof { entity: "AZ1".into(), node: 1 + i as i64, direction: 3 },
+        reference: Dof { entity: "AZ1".into(), node: 1, direction: 3 },
         precision: Precision::Double,
         abscissa: Abscissa::Even { start: 0.0, step: 0.25 },
         values: Values::Complex(parts.chunks(2).map(|p| Complex::new(p[0], p[1])).collect()),

@@ -65,7 +65,7 @@ pub(super) fn split(bytes: &[u8]) -> Vec<Result<Block<'_>, Unusable>> {
         blocks.push(if closed {
             Ok(block)
         } else {
-            let reason = "the file ends within this data set (there is no closing -1)".to_string();
+            let reason = "the file ends within this data set (there is no closing -1): it was cut off, copy or export it again".to_string();
             Err(Unusable { number, wrong: Wrong { offset: bytes.len(), reason } })
         });
     }

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 fn text(longest: usize) -> impl Strategy<Value = String> {
     proptest::string::string_regex(&format!("([!-~äµ°²]([ -~äµ°²]{{0,{}}}[!-~äµ°²])?)?", longest - 2))
         .expect("a pattern")
-        .prop_filter("NONE is nothing", |t| t != "NONE")
+        .prop_filter("NONE is nothing, and -1 an end", |t| t != "NONE" && t != "-1")
 }
 
 /// A value, and what `digits` digits (or single precision) keep of it.
@@ -168,6 +168,7 @@ fn what_does_not_fit_is_refused_by_name() {
     assert_eq!((error.place, error.data_set), (2, 82));
     assert!(error.to_string().contains("80 characters"), "{error}");
     assert!(write(&[line("a\nb")]).expect_err("two lines").to_string().contains("control character"));
+    assert!(write(&[line("-1")]).expect_err("a delimiter").to_string().contains("end the data set"));
 }
 
 #[test]

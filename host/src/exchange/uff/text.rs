@@ -228,6 +228,9 @@ impl Output {
     /// A line of text, `NONE` for nothing.
     pub fn label(&mut self, what: &str, text: &str) -> Result<(), String> {
         let line = label(what, text, 80)?;
+        if super::blocks::is_delimiter(line.as_bytes()) {
+            return Err(format!("{what} is `{text}`, which would end the data set: say it in words"));
+        }
         self.line(&line);
         Ok(())
     }
