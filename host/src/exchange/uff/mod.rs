@@ -14,6 +14,7 @@ mod any_bytes;
 mod blocks;
 #[cfg(test)]
 mod foreign;
+mod function;
 mod number;
 #[cfg(test)]
 mod round_trip;
@@ -27,8 +28,8 @@ mod set58_values;
 mod set82;
 mod text;
 
+pub use function::{Abscissa, Axis, ByteOrder, Dof, Encoding, Function, Precision, Values, kind, quantity};
 pub use set15::Node;
-pub use set58::{Abscissa, Axis, ByteOrder, Dof, Encoding, Function, Precision, Values, kind, quantity};
 pub use set82::TraceLine;
 pub use set151::Header;
 pub use set164::Units;

@@ -5,8 +5,9 @@
 //! are also places of 4 bytes beside values of 8, as the standard has it.
 
 use super::blocks::Block;
+use super::function::{Abscissa, ByteOrder, Encoding, Function, Precision, Values};
 use super::number;
-use super::set58::{self, Abscissa, ByteOrder, Encoding, Function, Precision, Shape, Values};
+use super::set58::{self, Shape};
 use super::text::{Lines, Output, Words, Wrong};
 use num_complex::Complex;
 
