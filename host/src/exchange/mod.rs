@@ -4,6 +4,8 @@
 //! hysteresis record; [`positions`] reads the pyFBS workbook, as xlsx or as a folder of csv tables; [`uff`] is the universal file,
 //! [`frf_uff`] says which of its functions make an FRF matrix.
 
+#[cfg(test)]
+mod any_bytes;
 pub mod frf_npz;
 pub mod frf_uff;
 pub mod npz;
