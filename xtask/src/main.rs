@@ -14,6 +14,7 @@ mod flash;
 mod lint;
 mod locks;
 mod packages;
+mod parity;
 mod project;
 mod setup;
 mod size;
@@ -67,6 +68,8 @@ enum Task {
         #[arg(long)]
         detach: bool,
     },
+    /// Compare spectra and universal files with pyFRF and pyuff: numbers, or times.
+    Parity(parity::Options),
     /// Run every benchmark of the workspace.
     Bench {
         /// Passed to `cargo bench`, for example a part of a benchmark's name.
@@ -97,6 +100,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Qemu(options) => emulator::run(&project, &options),
         Task::Budgets => budgets::command(&project),
         Task::Flash { detach } => flash::run(&project, detach),
+        Task::Parity(options) => parity::run(&project, &options),
         Task::Bench { extra } => bench::run(&project, &extra),
     }
 }

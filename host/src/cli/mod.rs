@@ -9,6 +9,9 @@ mod completions;
 mod demo;
 mod devices;
 mod error;
+mod export;
+mod frf;
+mod import;
 mod info;
 mod interrupt;
 mod measure;
@@ -41,6 +44,12 @@ enum Command {
     Campaign(campaign::Campaign),
     /// Analyse a campaign file: results.json and report.html.
     Analyse(analyse::Analyse),
+    /// Write everything that a campaign file holds for other programs.
+    Export(export::Export),
+    /// FRFs of impact records from anywhere.
+    Frf(frf::Frf),
+    /// Bring FRFs or impact records from elsewhere into jointrig's own files.
+    Import(import::Import),
     /// Print completions for a shell.
     Completions(completions::Completions),
 }
@@ -56,6 +65,9 @@ pub fn main() -> ExitCode {
         Command::Info(command) => command.run(),
         Command::Campaign(command) => command.run(),
         Command::Analyse(command) => command.run(),
+        Command::Export(command) => command.run(),
+        Command::Frf(command) => command.run(),
+        Command::Import(command) => command.run(),
         Command::Completions(command) => {
             command.run();
             Ok(())
@@ -117,6 +129,11 @@ mod tests {
             "campaign verify p.jrig",
             "analyse p.jrig --out d --json",
             "completions bash",
+            "frf records.npz --json",
+            "import A.uff --out A.npz",
+            "export c.jrig --format uff58 --out d",
+            "import r.npz --into c.jrig --configuration A --impact AZ1 --response A1",
+            "frf records.npz --out x.npz --quantity receptance --delay -1e-6,2e-6 --band 100:800",
         ] {
             let words = std::iter::once("jointrig").chain(line.split(' '));
             assert!(Cli::try_parse_from(words).is_ok(), "{line}");

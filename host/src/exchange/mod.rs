@@ -1,14 +1,22 @@
 //! Formats of other programs, in and out: the only room between analysis and foreign files.
 //!
 //! [`npz`] and [`npz_output`] are the array layer; [`frf_npz`] and [`record_npz`] say which arrays make an FRF matrix, impact records or a
-//! hysteresis record; [`positions`] reads the pyFBS workbook, as xlsx or as a folder of csv tables.
+//! hysteresis record; [`positions`] reads the pyFBS workbook, as xlsx or as a folder of csv tables; [`uff`] is the universal file,
+//! [`frf_uff`] says which of its functions make an FRF matrix.
 
+#[cfg(test)]
+mod any_bytes;
 pub mod frf_npz;
+pub mod frf_uff;
 pub mod npz;
 pub mod npz_output;
 pub mod positions;
+pub mod positions_output;
 pub mod record_npz;
 mod tables;
+pub mod tables_output;
+pub mod uff;
+pub mod uff_output;
 
 pub use frf_npz::{Extra, read_frf, write_frf};
 pub use npz::NpzError;

@@ -1,189 +1,288 @@
-//! Averaged FRFs, one hit at a time: auto- and cross-spectra accumulate, nothing else is kept.
+//! Averaged FRFs, one hit at a time: auto- and cross-spectra accumulate, the signals are gone when the hit is in.
 
 use super::SpectraError;
-use crate::substructuring::frf::{FrfMatrix, Quantity};
-use nalgebra::DMatrix;
+use super::averaged::{AveragedFrf, variance_of_part};
+use super::estimators::{h1, h2, hv};
+use super::jackknife;
 use num_complex::Complex;
+use rayon::prelude::*;
 use realfft::{RealFftPlanner, RealToComplex};
-use serde::Serialize;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Sums of spectra over the hits so far. Spectra are Fourier transforms (sum × Δt), so S has units of N² s² and so on.
+/// Sums of spectra over the hits so far.
 pub struct SpectraAverage {
     fs_hz: f64,
     samples: usize,
     fft: Arc<dyn RealToComplex<f64>>,
     hits: usize,
+    force: Channel,
     s_ff: Vec<f64>,
-    s_xf: Vec<Vec<Complex<f64>>>,
-    s_xx: Vec<Vec<f64>>,
+    outputs: Vec<Output>,
+    /// One for each thread: a channel's working memory stays in that core's cache.
+    workers: Vec<Channel>,
+    failed: Option<SpectraError>,
+    keep_hits: bool,
+    noise_ratio: Option<f64>,
+    kept_force: Vec<Vec<Complex<f64>>>,
 }
 
-/// FRFs of one impact position, averaged over its good hits. Per-line vectors are indexed \[line\]; per-output ones \[line\]\[output\].
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct AveragedFrf {
-    /// Frequency of each line, Hz.
-    pub frequency_hz: Vec<f64>,
-    /// Damping of the exponential window, 1/s: the FRFs are on s = σ + iω.
-    pub sigma_per_s: f64,
-    /// Hits averaged.
-    pub hits: usize,
-    /// Mean auto-spectrum of the force, N² s².
-    pub s_ff: Vec<f64>,
-    /// H1 = S_xf / S_ff, response per newton.
-    pub h1: Vec<Vec<Complex<f64>>>,
-    /// H2 = S_xx / S_fx: biased by noise in the response, not in the force.
-    pub h2: Vec<Vec<Complex<f64>>>,
-    /// Hv: the phase of the cross-spectrum with the geometric mean of |H1| and |H2|.
-    pub hv: Vec<Vec<Complex<f64>>>,
-    /// γ² = |S_xf|² / (S_ff S_xx); NaN with a single hit, where it is 1 whatever the noise.
-    pub coherence: Vec<Vec<f64>>,
-    /// Variance of the real part of H1, and of its imaginary part: |H1|²(1 − γ²)/(2 n γ²). The complex variance E|δH|² is
-    /// twice that. NaN with a single hit.
-    pub variance: Vec<Vec<f64>>,
+/// Working memory of one channel's transform, used again for every channel and hit.
+struct Channel {
+    signal: Vec<f64>,
+    spectrum: Vec<Complex<f64>>,
+    scratch: Vec<Complex<f64>>,
+}
+
+/// A response and its sums.
+struct Output {
+    s_xf: Vec<Complex<f64>>,
+    s_xx: Vec<f64>,
+    kept: Vec<Vec<Complex<f64>>>,
+}
+
+impl Channel {
+    fn new(fft: &dyn RealToComplex<f64>) -> Self {
+        Channel {
+            signal: fft.make_input_vec(),
+            spectrum: fft.make_output_vec(),
+            scratch: fft.make_scratch_vec(),
+        }
+    }
+
+    /// Transforms what `fill` writes into the signal.
+    fn transform(
+        &mut self,
+        fft: &dyn RealToComplex<f64>,
+        fill: impl FnOnce(&mut [f64]),
+    ) -> Result<(), SpectraError> {
+        fill(&mut self.signal);
+        check_finite(&self.signal)?;
+        fft.process_with_scratch(&mut self.signal, &mut self.spectrum, &mut self.scratch)
+            .map_err(|e| SpectraError::Transform(e.to_string()))
+    }
 }
 
 impl SpectraAverage {
-    /// For records of `samples` samples and `outputs` responses.
+    /// For records of `samples` samples (zero padding included) and `outputs` responses.
     pub fn new(fs_hz: f64, samples: usize, outputs: usize) -> Self {
         let fft = RealFftPlanner::new().plan_fft_forward(samples);
         let lines = samples / 2 + 1;
         SpectraAverage {
             fs_hz,
             samples,
-            fft,
             hits: 0,
+            force: Channel::new(&*fft),
             s_ff: vec![0.0; lines],
-            s_xf: vec![vec![Complex::default(); lines]; outputs],
-            s_xx: vec![vec![0.0; lines]; outputs],
+            outputs: (0..outputs)
+                .map(|_| Output {
+                    s_xf: vec![Complex::default(); lines],
+                    s_xx: vec![0.0; lines],
+                    kept: Vec::new(),
+                })
+                .collect(),
+            workers: (0..rayon::current_num_threads().min(outputs).max(1))
+                .map(|_| Channel::new(&*fft))
+                .collect(),
+            failed: None,
+            fft,
+            keep_hits: false,
+            noise_ratio: None,
+            kept_force: Vec::new(),
         }
+    }
+
+    /// Keeps the spectra of every hit, so that `finish` can leave each out in turn: hits × channels × lines complex numbers.
+    #[must_use]
+    pub fn with_jackknife(mut self) -> Self {
+        self.keep_hits = true;
+        self
+    }
+
+    /// Hv for this ratio of noise powers, response over force, (SI/N)²; see [`hv`].
+    #[must_use]
+    pub fn with_noise_ratio(mut self, ratio: Option<f64>) -> Self {
+        self.noise_ratio = ratio;
+        self
     }
 
     /// Adds one hit: its windowed force, N, and its windowed responses, SI.
     ///
     /// # Errors
     /// When the number of samples or responses differs from the others, or a value is not a number.
-    pub fn add(&mut self, force_n: Vec<f64>, responses: Vec<Vec<f64>>) -> Result<(), SpectraError> {
-        if responses.len() != self.s_xf.len() {
-            return Err(SpectraError::Responses { found: responses.len(), expected: self.s_xf.len() });
+    pub fn add(&mut self, force_n: &[f64], responses: &[Vec<f64>]) -> Result<(), SpectraError> {
+        if responses.len() != self.outputs.len() {
+            return Err(SpectraError::Responses { found: responses.len(), expected: self.outputs.len() });
         }
-        let force = self.spectrum(force_n)?;
-        // All transforms first: a hit that fails half way must leave the sums untouched.
-        let responses: Vec<_> = responses.into_iter().map(|x| self.spectrum(x)).collect::<Result<_, _>>()?;
-        for (sum, f) in self.s_ff.iter_mut().zip(&force) {
+        for signal in std::iter::once(force_n).chain(responses.iter().map(Vec::as_slice)) {
+            if signal.len() != self.samples {
+                return Err(SpectraError::Samples { found: signal.len(), expected: self.samples });
+            }
+            // before anything is summed: a refused hit leaves the average as it was
+            check_finite(signal)?;
+        }
+        self.add_with(|out| out.copy_from_slice(force_n), |o, out| out.copy_from_slice(&responses[o]))
+    }
+
+    /// Adds one hit whose windowed force and responses (by output) are written straight into the transforms' memory, which
+    /// holds other values before. Responses are filled, transformed and summed in parallel.
+    ///
+    /// # Errors
+    /// A value that is not a number. Some responses of the hit may be in the sums then, so that the average is spent: this
+    /// and [`SpectraAverage::finish`] give the same error from then on.
+    pub fn add_with(
+        &mut self,
+        force: impl FnOnce(&mut [f64]),
+        response: impl Fn(usize, &mut [f64]) + Sync,
+    ) -> Result<(), SpectraError> {
+        if let Some(error) = &self.failed {
+            return Err(error.clone());
+        }
+        let fft = &*self.fft;
+        self.force.transform(fft, force)?;
+        let force = &self.force.spectrum;
+        let keep = self.keep_hits;
+        let share = self.outputs.len().div_ceil(self.workers.len()).max(1);
+        let summed: Result<(), SpectraError> =
+            self.outputs.par_chunks_mut(share).zip(&mut self.workers).enumerate().try_for_each(
+                |(part, (outputs, worker))| {
+                    for (i, output) in outputs.iter_mut().enumerate() {
+                        worker.transform(fft, |out| response(part * share + i, out))?;
+                        let sums = output.s_xf.iter_mut().zip(&mut output.s_xx);
+                        for ((s_xf, s_xx), (x, f)) in sums.zip(worker.spectrum.iter().zip(force)) {
+                            *s_xf += x * f.conj();
+                            *s_xx += x.norm_sqr();
+                        }
+                        if keep {
+                            output.kept.push(worker.spectrum.clone());
+                        }
+                    }
+                    Ok(())
+                },
+            );
+        if let Err(error) = summed {
+            self.failed = Some(error.clone());
+            return Err(error);
+        }
+        for (sum, f) in self.s_ff.iter_mut().zip(force) {
             *sum += f.norm_sqr();
         }
-        for (output, x) in responses.iter().enumerate() {
-            for line in 0..force.len() {
-                self.s_xf[output][line] += x[line] * force[line].conj();
-                self.s_xx[output][line] += x[line].norm_sqr();
-            }
+        if keep {
+            self.kept_force.push(self.force.spectrum.clone());
         }
         self.hits += 1;
         Ok(())
     }
 
-    /// The averaged FRFs on s = σ + iω, where σ is the damping of the window that `add`'s signals went through.
+    /// The averaged FRFs on s = σ + iω, where σ is the damping of the window that the signals went through.
     ///
     /// A channel measured late by `delay_s[output]` relative to the force is corrected by e^(+sτ). Missing delays are 0.
+    /// Where the force has no energy (0 Hz of a signal without mean), nothing is known: H and coherence are 0 there and the
+    /// variance is infinite.
     ///
     /// # Errors
-    /// When no hit was added.
+    /// When no hit was added, or adding one failed half way.
     pub fn finish(&self, sigma_per_s: f64, delay_s: &[f64]) -> Result<AveragedFrf, SpectraError> {
+        if let Some(error) = &self.failed {
+            return Err(error.clone());
+        }
         if self.hits == 0 {
             return Err(SpectraError::NoHits);
         }
-        let n = self.hits as f64;
-        let lines = self.s_ff.len();
-        let outputs = self.s_xf.len();
         let frequency_hz: Vec<f64> =
-            (0..lines).map(|l| l as f64 * self.fs_hz / self.samples as f64).collect();
+            (0..self.s_ff.len()).map(|l| l as f64 * self.fs_hz / self.samples as f64).collect();
+        let lines: Vec<_> = frequency_hz
+            .par_iter()
+            .enumerate()
+            .map(|(l, f)| self.line(l, Complex::new(sigma_per_s, TAU * f), delay_s))
+            .collect();
+        // spectra are Fourier transforms: sum × Δt
+        let scale = self.hits as f64 * self.fs_hz * self.fs_hz;
         let mut out = AveragedFrf {
             frequency_hz,
             sigma_per_s,
             hits: self.hits,
-            s_ff: self.s_ff.iter().map(|s| s / n).collect(),
-            h1: Vec::with_capacity(lines),
-            h2: Vec::with_capacity(lines),
-            hv: Vec::with_capacity(lines),
-            coherence: Vec::with_capacity(lines),
-            variance: Vec::with_capacity(lines),
+            s_ff: self.s_ff.iter().map(|s| s / scale).collect(),
+            h1: Vec::with_capacity(lines.len()),
+            h2: Vec::with_capacity(lines.len()),
+            hv: Vec::with_capacity(lines.len()),
+            coherence: Vec::with_capacity(lines.len()),
+            variance: Vec::with_capacity(lines.len()),
+            jackknife: self.keep_hits.then(|| self.jackknife(sigma_per_s, delay_s)),
         };
-        for line in 0..lines {
-            let s = Complex::new(sigma_per_s, TAU * out.frequency_hz[line]);
-            let mut rows = (vec![], vec![], vec![], vec![], vec![]);
-            for output in 0..outputs {
-                let (s_ff, s_xf, s_xx) = (self.s_ff[line], self.s_xf[output][line], self.s_xx[output][line]);
-                let advance = (s * delay_s.get(output).copied().unwrap_or(0.0)).exp();
-                let h1 = s_xf / s_ff;
-                rows.0.push(h1 * advance);
-                rows.1.push(s_xx / s_xf.conj() * advance);
-                rows.2.push(s_xf / s_xf.norm() * (s_xx / s_ff).sqrt() * advance);
-                // A single hit is always coherent with itself: that says nothing about noise.
-                let coherence = if self.hits > 1 { s_xf.norm_sqr() / (s_ff * s_xx) } else { f64::NAN };
-                rows.3.push(coherence);
-                rows.4.push(variance_of_part(h1 * advance, coherence, self.hits));
-            }
-            out.h1.push(rows.0);
-            out.h2.push(rows.1);
-            out.hv.push(rows.2);
-            out.coherence.push(rows.3);
-            out.variance.push(rows.4);
+        for line in lines {
+            out.h1.push(line.h1);
+            out.h2.push(line.h2);
+            out.hv.push(line.hv);
+            out.coherence.push(line.coherence);
+            out.variance.push(line.variance);
         }
         Ok(out)
     }
 
-    fn spectrum(&self, mut signal: Vec<f64>) -> Result<Vec<Complex<f64>>, SpectraError> {
-        if signal.len() != self.samples {
-            return Err(SpectraError::Samples { found: signal.len(), expected: self.samples });
+    fn line(&self, l: usize, s: Complex<f64>, delay_s: &[f64]) -> Line {
+        let n = self.outputs.len();
+        let mut line = Line {
+            h1: Vec::with_capacity(n),
+            h2: Vec::with_capacity(n),
+            hv: Vec::with_capacity(n),
+            coherence: Vec::with_capacity(n),
+            variance: Vec::with_capacity(n),
+        };
+        let s_ff = self.s_ff[l];
+        for (o, output) in self.outputs.iter().enumerate() {
+            let (s_xf, s_xx) = (output.s_xf[l], output.s_xx[l]);
+            let advance = (s * delay_s.get(o).copied().unwrap_or(0.0)).exp();
+            let first = h1(s_ff, s_xf) * advance;
+            // A single hit is always coherent with itself: that says nothing about noise.
+            let coherence = match (self.hits, s_ff * s_xx) {
+                (1, _) => f64::NAN,
+                (_, 0.0) => 0.0,
+                (_, power) => s_xf.norm_sqr() / power,
+            };
+            line.h1.push(first);
+            line.h2.push(h2(s_xf, s_xx) * advance);
+            line.hv.push(hv(s_ff, s_xf, s_xx, self.noise_ratio) * advance);
+            line.coherence.push(coherence);
+            line.variance.push(variance_of_part(first, coherence, self.hits));
         }
-        if let Some(sample) = signal.iter().position(|v| !v.is_finite()) {
-            return Err(SpectraError::NotFinite { sample });
-        }
-        let mut out = self.fft.make_output_vec();
-        self.fft.process(&mut signal, &mut out).map_err(|e| SpectraError::Transform(e.to_string()))?;
-        for value in &mut out {
-            *value /= self.fs_hz;
-        }
-        Ok(out)
+        line
+    }
+
+    /// Variance by leaving out each hit in turn, \[line\]\[output\].
+    fn jackknife(&self, sigma_per_s: f64, delay_s: &[f64]) -> Vec<Vec<f64>> {
+        (0..self.s_ff.len())
+            .into_par_iter()
+            .map(|l| {
+                let force: Vec<_> = self.kept_force.iter().map(|f| f[l]).collect();
+                let of_output = |(o, output): (usize, &Output)| {
+                    let response: Vec<_> = output.kept.iter().map(|x| x[l]).collect();
+                    // |e^(sτ)|², for the advance that H is multiplied with
+                    let gain = (2.0 * sigma_per_s * delay_s.get(o).copied().unwrap_or(0.0)).exp();
+                    gain * jackknife::variance_of_part(&force, &response)
+                };
+                self.outputs.iter().enumerate().map(of_output).collect()
+            })
+            .collect()
     }
 }
 
-/// |H|²(1 − γ²)/(2 n γ²): variance of the real, and of the imaginary part of H1 (Bendat and Piersol).
-pub fn variance_of_part(h1: Complex<f64>, coherence: f64, hits: usize) -> f64 {
-    h1.norm_sqr() * (1.0 - coherence).max(0.0) / (2.0 * hits as f64 * coherence)
+/// All estimates of one line, by output.
+struct Line {
+    h1: Vec<Complex<f64>>,
+    h2: Vec<Complex<f64>>,
+    hv: Vec<Complex<f64>>,
+    coherence: Vec<f64>,
+    variance: Vec<f64>,
 }
 
-impl AveragedFrf {
-    /// Only the lines with `low_hz` ≤ f ≤ `high_hz`.
-    #[must_use]
-    pub fn band(&self, low_hz: f64, high_hz: f64) -> AveragedFrf {
-        let from = self.frequency_hz.partition_point(|f| *f < low_hz);
-        let to = self.frequency_hz.partition_point(|f| *f <= high_hz).max(from);
-        AveragedFrf {
-            frequency_hz: self.frequency_hz[from..to].to_vec(),
-            sigma_per_s: self.sigma_per_s,
-            hits: self.hits,
-            s_ff: self.s_ff[from..to].to_vec(),
-            h1: self.h1[from..to].to_vec(),
-            h2: self.h2[from..to].to_vec(),
-            hv: self.hv[from..to].to_vec(),
-            coherence: self.coherence[from..to].to_vec(),
-            variance: self.variance[from..to].to_vec(),
-        }
+/// Refuses NaN and infinite values, naming the first.
+fn check_finite(signal: &[f64]) -> Result<(), SpectraError> {
+    // blocks without branches inside are several values per cycle
+    let fine = |block: &[f64]| block.iter().fold(true, |fine, v| fine & v.is_finite());
+    if signal.chunks(64).all(fine) {
+        return Ok(());
     }
-
-    /// H1 as an FRF matrix with one input.
-    pub fn to_matrix(&self, quantity: Quantity, outputs: Vec<String>, input: String) -> FrfMatrix {
-        let lines = self.h1.iter().map(|row| DMatrix::from_column_slice(row.len(), 1, row)).collect();
-        FrfMatrix {
-            frequency_hz: self.frequency_hz.clone(),
-            sigma_per_s: self.sigma_per_s,
-            quantity,
-            outputs,
-            inputs: vec![input],
-            lines,
-        }
-    }
+    let sample = signal.iter().position(|v| !v.is_finite()).unwrap_or(0);
+    Err(SpectraError::NotFinite { sample })
 }

@@ -1,7 +1,8 @@
 //! From impact records to averaged FRFs: where each hit begins, windows, spectra.
 
 use super::SpectraError;
-use super::average::{AveragedFrf, SpectraAverage};
+use super::average::SpectraAverage;
+use super::averaged::AveragedFrf;
 use super::pulse::Pulse;
 use super::records::ImpactRecords;
 use super::window::Windowing;
@@ -26,11 +27,27 @@ pub struct FrfSettings {
     pub origin: Origin,
     /// How late each response channel is against the force, s; empty means 0.
     pub delay_s: Vec<f64>,
+    /// Length of the transform, samples: longer than the records pads them with zeros (after the windows). None is the records' length.
+    #[serde(default)]
+    pub transform_samples: Option<usize>,
+    /// Whether the variance by jackknife is wanted too; the spectra of all hits are kept for it.
+    #[serde(default)]
+    pub jackknife: bool,
+    /// Ratio of noise powers for Hv, response over force, (SI/N)²; None is noise in proportion to the signals.
+    #[serde(default)]
+    pub noise_ratio: Option<f64>,
 }
 
 impl Default for FrfSettings {
     fn default() -> Self {
-        FrfSettings { windowing: Windowing::default(), origin: Origin::PulseStart, delay_s: Vec::new() }
+        FrfSettings {
+            windowing: Windowing::default(),
+            origin: Origin::PulseStart,
+            delay_s: Vec::new(),
+            transform_samples: None,
+            jackknife: false,
+            noise_ratio: None,
+        }
     }
 }
 
@@ -46,19 +63,34 @@ pub fn estimate(
     let first = used.iter().position(|u| *u).ok_or(SpectraError::NoHits)?;
     let samples = records.force_n.get(first).ok_or(SpectraError::NoHits)?.len();
     let outputs = records.response.get(first).ok_or(SpectraError::NoHits)?.len();
-    let mut average = SpectraAverage::new(records.fs_hz, samples, outputs);
+    let transform = settings.transform_samples.unwrap_or(samples);
+    if transform < samples {
+        return Err(SpectraError::Padding { transform, samples });
+    }
+    let window = &settings.windowing;
+    let decay = window.decay(records.fs_hz, samples);
+    let mut average =
+        SpectraAverage::new(records.fs_hz, transform, outputs).with_noise_ratio(settings.noise_ratio);
+    if settings.jackknife {
+        average = average.with_jackknife();
+    }
     let hits = records.force_n.iter().zip(&records.response).zip(used).enumerate();
     for (hit, ((force, responses), _)) in hits.filter(|(_, (_, used))| **used) {
+        if responses.len() != outputs {
+            return Err(SpectraError::Responses { found: responses.len(), expected: outputs });
+        }
+        if let Some(odd) = responses.iter().chain([force]).find(|x| x.len() != samples) {
+            return Err(SpectraError::Samples { found: odd.len(), expected: samples });
+        }
         let origin_s = match settings.origin {
             Origin::At(seconds) => seconds,
             Origin::PulseStart => {
                 Pulse::locate(force).ok_or(SpectraError::NoPulse { hit })?.start as f64 / records.fs_hz
             }
         };
-        let window = &settings.windowing;
-        average.add(
-            window.force(force, records.fs_hz, origin_s),
-            responses.iter().map(|x| window.response(x, records.fs_hz, origin_s)).collect(),
+        average.add_with(
+            |out| window.force_into(force, &decay, origin_s, out),
+            |o, out| window.response_into(&responses[o], &decay, origin_s, out),
         )?;
     }
     average.finish(settings.windowing.sigma_per_s, &settings.delay_s)

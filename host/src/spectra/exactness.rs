@@ -98,22 +98,75 @@ fn the_variance_formula_predicts_the_scatter() {
     let (force, x) = (force[..512].to_vec(), x[..512].to_vec());
     let line = 20;
     let mut parts = Vec::new();
-    let mut predicted = 0.0;
+    let (mut predicted, mut left_out) = (0.0, 0.0);
     let trials = 150;
     for _ in 0..trials {
-        let mut average = SpectraAverage::new(FS, 512, 1);
+        let mut average = SpectraAverage::new(FS, 512, 1).with_jackknife();
         for _ in 0..16 {
             let noisy = x.iter().map(|x| x + 20.0 * noise.next()).collect();
-            average.add(force.clone(), vec![noisy]).expect("alike");
+            average.add(&force, &[noisy]).expect("alike");
         }
         let y = average.finish(0.0, &[]).expect("hits");
         parts.push(y.h1[line][0].re);
         predicted += y.variance[line][0] / f64::from(trials);
+        left_out += y.jackknife.expect("asked for")[line][0] / f64::from(trials);
     }
     let mean = parts.iter().sum::<f64>() / parts.len() as f64;
     let seen = parts.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / parts.len() as f64;
     // a variance from 150 trials is known to 12 %; three times that
     assert!((seen / predicted - 1.0).abs() < 0.36, "seen {seen:e}, predicted {predicted:e}");
+    assert!((seen / left_out - 1.0).abs() < 0.36, "seen {seen:e}, jackknife {left_out:e}");
+}
+
+#[test]
+fn zero_padding_adds_lines_and_moves_none() {
+    let (records, h) = records(100, 0);
+    let settings = FrfSettings { transform_samples: Some(4 * N), ..FrfSettings::default() };
+    let mut plain = FrfSettings::default();
+    plain.windowing.force_after_s = 0.01;
+    let mut settings = FrfSettings { windowing: plain.windowing, ..settings };
+    let y = estimate(&records, &[true], &settings).expect("one hit");
+    let unpadded = estimate(&records, &[true], &plain).expect("one hit");
+    assert!((y.h1[4 * 180][0] - unpadded.h1[180][0]).norm() < 1e-12 * y.h1[4 * 180][0].norm());
+    // a line between the others is exact too: the response has died away before the record ends
+    let s = Complex::new(2.3, TAU * y.frequency_hz[721]);
+    assert!(((y.h1[721][0] - exact(&h, s)) / exact(&h, s)).norm() < 1e-10);
+    settings.transform_samples = Some(N - 1);
+    assert_eq!(
+        estimate(&records, &[true], &settings),
+        Err(SpectraError::Padding { transform: N - 1, samples: N })
+    );
+}
+
+#[test]
+fn a_force_without_mean_leaves_no_nan_at_zero_frequency() {
+    let mut average = SpectraAverage::new(4.0, 4, 1);
+    for _ in 0..2 {
+        average.add(&[1.0, -1.0, 1.0, -1.0], &[vec![1.0, 0.0, 0.0, 0.0]]).expect("alike");
+    }
+    let y = average.finish(0.0, &[]).expect("hits");
+    for l in 0..2 {
+        assert_eq!(
+            (y.h1[l][0].norm(), y.h2[l][0].norm(), y.hv[l][0].norm(), y.coherence[l][0]),
+            (0.0, 0.0, 0.0, 0.0)
+        );
+        assert_eq!(y.variance[l][0], f64::INFINITY);
+    }
+    assert!((y.h1[2][0].re - 0.25).abs() < 1e-15);
+}
+
+#[test]
+fn a_hit_that_is_not_a_number_leaves_the_average_as_it_was() {
+    let mut average = SpectraAverage::new(4.0, 4, 1);
+    average.add(&[1.0, 0.0, 0.0, 0.0], &[vec![1.0, 2.0, 0.0, 0.0]]).expect("alike");
+    let before = average.finish(0.0, &[]).expect("a hit").h1;
+    let error = average.add(&[1.0, 5.0, 0.0, 0.0], &[vec![1.0, 2.0, f64::NAN, 0.0]]);
+    assert_eq!(error, Err(SpectraError::NotFinite { sample: 2 }));
+    assert_eq!(average.finish(0.0, &[]).expect("a hit").h1, before);
+    // written straight into the transforms the hit is half in, so that the average says so for ever
+    let error = average.add_with(|f| f.fill(1.0), |_, x| x.fill(f64::INFINITY));
+    assert_eq!(error, Err(SpectraError::NotFinite { sample: 0 }));
+    assert_eq!(average.finish(0.0, &[]), Err(SpectraError::NotFinite { sample: 0 }));
 }
 
 /// Normal deviates from proptest's generator.

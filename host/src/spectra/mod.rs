@@ -1,17 +1,22 @@
 //! Spectra: impact records in, averaged FRFs with coherence and variance out.
 //!
 //! [`pulse`] finds the hit, [`window`] cuts and weights, [`average`] accumulates S_ff, S_xf and S_xx one hit at a time,
-//! [`estimate`](mod@estimate) does all three over a set of records, [`band`] says where the hammer excited anything. Which hits are good is
+//! [`estimators`] and [`jackknife`] make FRFs and their scatter of the sums, [`estimate`](mod@estimate) does all of it over a set of
+//! records, [`band`] says where the hammer excited anything. Which hits are good is
 //! decided elsewhere, on the raw records: the force window hides a second pulse that the response keeps.
 
 pub mod average;
+pub mod averaged;
 pub mod band;
 pub mod estimate;
+pub mod estimators;
+pub mod jackknife;
 pub mod pulse;
 pub mod records;
 pub mod window;
 
-pub use average::{AveragedFrf, SpectraAverage};
+pub use average::SpectraAverage;
+pub use averaged::AveragedFrf;
 pub use band::{UsableBand, usable_band};
 pub use estimate::{FrfSettings, Origin, estimate};
 pub use pulse::Pulse;
@@ -51,6 +56,16 @@ pub enum SpectraError {
     NoPulse {
         /// Index of the hit.
         hit: usize,
+    },
+    /// The transform is shorter than the records.
+    #[error(
+        "a transform of {transform} samples is shorter than the records of {samples}: zero padding makes it longer"
+    )]
+    Padding {
+        /// Length asked for.
+        transform: usize,
+        /// Length of the records.
+        samples: usize,
     },
     /// The transform failed (a length it cannot do).
     #[error("Fourier transform: {0}")]

@@ -26,11 +26,12 @@ fn stated_processing_is_reproduced() {
         windowing: Windowing {
             force_before_s: 5e-3,
             force_after_s: 3e-3,
+            force_taper_s: 0.0,
             sigma_per_s: 2.3,
             force_weighting: ForceWeighting::Rectangular,
         },
         origin: Origin::At(5e-3),
-        delay_s: vec![],
+        ..FrfSettings::default()
     };
     let y = estimate(&records, &[true; 3], &settings).expect("three good hits");
     let scale = expected["mean_abs_h1"].as_f64().expect("a number");

@@ -7,6 +7,7 @@
 //! records processed elsewhere must be reproducible.
 
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 
 /// Whether the force is weighted exponentially too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -25,6 +26,9 @@ pub struct Windowing {
     pub force_before_s: f64,
     /// The force is kept until this long after the origin, s (ends included).
     pub force_after_s: f64,
+    /// After that it falls to zero along half a cosine of this length, s; 0 cuts it off.
+    #[serde(default)]
+    pub force_taper_s: f64,
     /// Damping σ of the exponential window, 1/s; 0 is no window.
     pub sigma_per_s: f64,
     /// Whether the force is weighted too.
@@ -38,44 +42,72 @@ impl Default for Windowing {
         Windowing {
             force_before_s: 1e-3,
             force_after_s: 3e-3,
+            force_taper_s: 0.0,
             sigma_per_s: 2.3,
             force_weighting: ForceWeighting::Exponential,
         }
     }
 }
 
+/// e^(−σ i/fs) of every sample i: made once for all channels and hits of one rate and length.
+#[derive(Debug, Clone)]
+pub struct Decay {
+    fs_hz: f64,
+    weights: Vec<f64>,
+}
+
 impl Windowing {
-    /// The windowed force (N) of a hit with its origin at `origin_s` from the record's start.
-    pub fn force(&self, force_n: &[f64], fs_hz: f64, origin_s: f64) -> Vec<f64> {
-        let kept = origin_s - self.force_before_s..=origin_s + self.force_after_s;
-        let weighted = self.force_weighting == ForceWeighting::Exponential;
-        force_n
-            .iter()
-            .enumerate()
-            .map(|(i, f)| {
-                let t = i as f64 / fs_hz;
-                if !kept.contains(&t) {
-                    0.0
-                } else if weighted {
-                    f * (-self.sigma_per_s * (t - origin_s)).exp()
-                } else {
-                    *f
-                }
-            })
-            .collect()
+    /// The weights for records of `samples` samples.
+    pub fn decay(&self, fs_hz: f64, samples: usize) -> Decay {
+        let weights = (0..samples).map(|i| (-self.sigma_per_s * (i as f64 / fs_hz)).exp()).collect();
+        Decay { fs_hz, weights }
     }
 
-    /// The windowed response (SI) of the same hit.
-    pub fn response(&self, response: &[f64], fs_hz: f64, origin_s: f64) -> Vec<f64> {
-        let everywhere = self.force_weighting == ForceWeighting::Exponential;
-        response
-            .iter()
-            .enumerate()
-            .map(|(i, x)| {
-                let t = i as f64 / fs_hz - origin_s;
-                if everywhere || t > 0.0 { x * (-self.sigma_per_s * t).exp() } else { *x }
-            })
-            .collect()
+    /// Writes the windowed force (N) of a hit with its origin at `origin_s` from the record's start into `out`; what `out` is longer
+    /// than the record (zero padding) becomes 0.
+    pub fn force_into(&self, force_n: &[f64], decay: &Decay, origin_s: f64, out: &mut [f64]) {
+        out.fill(0.0);
+        let (from, to) = (origin_s - self.force_before_s, origin_s + self.force_after_s);
+        let first = ((from * decay.fs_hz).floor().max(0.0) as usize).min(force_n.len());
+        let last = (((to + self.force_taper_s) * decay.fs_hz).ceil().max(-1.0) + 1.0) as usize;
+        let scale = match self.force_weighting {
+            ForceWeighting::Exponential => (self.sigma_per_s * origin_s).exp(),
+            ForceWeighting::Rectangular => 1.0,
+        };
+        for i in first..last.min(force_n.len()).min(out.len()) {
+            let t = i as f64 / decay.fs_hz;
+            let kept = if t < from || t > to + self.force_taper_s {
+                0.0
+            } else if t <= to {
+                1.0
+            } else {
+                0.5 + 0.5 * (PI * (t - to) / self.force_taper_s).cos()
+            };
+            let weight = match self.force_weighting {
+                ForceWeighting::Exponential => scale * decay.weights[i],
+                ForceWeighting::Rectangular => scale,
+            };
+            out[i] = kept * weight * force_n[i];
+        }
+    }
+
+    /// Writes the windowed response (SI) of the same hit into `out`.
+    pub fn response_into(&self, response: &[f64], decay: &Decay, origin_s: f64, out: &mut [f64]) {
+        let kept = response.len().min(out.len());
+        // samples up to the origin stay as they are where only the response is weighted
+        let plain = match self.force_weighting {
+            ForceWeighting::Exponential => 0,
+            ForceWeighting::Rectangular => {
+                (0..kept).position(|i| i as f64 / decay.fs_hz > origin_s).unwrap_or(kept)
+            }
+        };
+        out[..plain].copy_from_slice(&response[..plain]);
+        let scale = (self.sigma_per_s * origin_s).exp();
+        let weights = &decay.weights[plain..kept];
+        for ((out, x), weight) in out[plain..kept].iter_mut().zip(&response[plain..kept]).zip(weights) {
+            *out = x * (scale * weight);
+        }
+        out[kept..].fill(0.0);
     }
 }
 
@@ -91,8 +123,28 @@ mod tests {
             sigma_per_s: 0.0,
             ..Windowing::default()
         };
-        let kept = w.force(&[1.0; 10], 1000.0, 0.004);
-        assert_eq!(kept, [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
+        let mut kept = [9.0; 12];
+        w.force_into(&[1.0; 10], &w.decay(1000.0, 10), 0.004, &mut kept);
+        assert_eq!(kept, [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn the_taper_is_half_a_cosine_after_the_window() {
+        let w = Windowing {
+            force_before_s: 0.001,
+            force_after_s: 0.002,
+            force_taper_s: 0.004,
+            sigma_per_s: 0.0,
+            ..Windowing::default()
+        };
+        let mut kept = [9.0; 14];
+        w.force_into(&[1.0; 14], &w.decay(1000.0, 14), 0.004, &mut kept);
+        // full at 6 ms, half at 8 ms, none at 10 ms
+        assert!((kept[8] - 0.5).abs() < 1e-12 && kept[6] == 1.0 && kept[10].abs() < 1e-12, "{kept:?}");
+        assert!(kept[7] > kept[8] && kept[8] > kept[9] && kept[11..] == [0.0; 3], "{kept:?}");
+        // a window beyond the record is no fault
+        w.force_into(&[1.0; 3], &w.decay(1000.0, 3), 9.0, &mut kept);
+        assert_eq!(kept, [0.0; 14]);
     }
 
     #[test]
@@ -102,8 +154,9 @@ mod tests {
             force_weighting: ForceWeighting::Rectangular,
             ..Windowing::default()
         };
-        let x = w.response(&[1.0; 3], 10.0, 0.1);
-        assert_eq!(x[..2], [1.0, 1.0]);
+        let mut x = [9.0; 4];
+        w.response_into(&[1.0; 3], &w.decay(10.0, 3), 0.1, &mut x);
+        assert_eq!((x[0], x[1], x[3]), (1.0, 1.0, 0.0));
         assert!((x[2] - (-1.0f64).exp()).abs() < 1e-15);
     }
 }

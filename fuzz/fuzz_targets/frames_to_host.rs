@@ -1,0 +1,34 @@
+//! What the host hears: any bytes as a stream of frames, and their payloads; payloads also without a frame.
+#![no_main]
+
+use jointrig_protocol::block::Block;
+use jointrig_protocol::frame::{Accumulator, Kind};
+use jointrig_protocol::hello::Hello;
+use jointrig_protocol::{answer, event};
+use libfuzzer_sys::fuzz_target;
+
+fn payload(kind: Kind, bytes: &[u8]) {
+    match kind {
+        Kind::Hello => drop(Hello::from_bytes(bytes)),
+        Kind::Answer => drop(postcard::from_bytes::<answer::Numbered>(bytes)),
+        Kind::Event => drop(postcard::from_bytes::<event::Numbered>(bytes)),
+        Kind::Samples => drop(Block::from_payload(bytes).map(|block| block.codes().count())),
+        Kind::Request | Kind::Acknowledge | Kind::Log => {}
+    }
+}
+
+fuzz_target!(|bytes: &[u8]| {
+    let mut accumulator = Accumulator::new();
+    let mut rest = bytes;
+    while !rest.is_empty() {
+        let (used, found) = accumulator.feed(rest);
+        assert!(used > 0);
+        if let Some(Ok(frame)) = found {
+            payload(frame.kind, frame.payload);
+        }
+        rest = &rest[used..];
+    }
+    for kind in [Kind::Hello, Kind::Answer, Kind::Event, Kind::Samples] {
+        payload(kind, bytes);
+    }
+});

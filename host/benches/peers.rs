@@ -1,0 +1,40 @@
+//! jointrig beside the programs that laboratories use: the same numbers (`parity`), and the time both take (`speed`).
+//!
+//! `cargo xtask parity` and `cargo xtask parity --speed` prepare Python with pyFRF and pyuff and start this. Without
+//! `JOINTRIG_PYTHON` the speed of our own side is printed alone.
+
+#[path = "peers/parity.rs"]
+mod parity;
+#[path = "peers/speed.rs"]
+mod speed;
+
+use std::process::{Command, ExitCode};
+
+type Outcome = Result<(), Box<dyn std::error::Error>>;
+
+fn main() -> ExitCode {
+    let python = std::env::var("JOINTRIG_PYTHON").ok();
+    let parity_wanted = std::env::args().any(|word| word == "parity");
+    let done = match (parity_wanted, &python) {
+        (true, Some(python)) => parity::run(python),
+        (true, None) => Err("JOINTRIG_PYTHON names no interpreter: run `cargo xtask parity`".into()),
+        (false, _) => speed::run(python.as_deref()),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Runs a script of the folder `peers` and gives what it prints.
+fn script(python: &str, name: &str, argument: &str) -> Result<String, Box<dyn std::error::Error>> {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/peers/");
+    let output = Command::new(python).arg(format!("{path}{name}")).arg(argument).output()?;
+    if !output.status.success() {
+        return Err(format!("{name} failed:\n{}", String::from_utf8_lossy(&output.stderr)).into());
+    }
+    Ok(String::from_utf8(output.stdout)?)
+}

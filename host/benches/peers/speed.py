@@ -1,0 +1,70 @@
+"""The peers' times for the jobs of peers.rs, seconds, five of each, as one JSON document on stdout."""
+
+import json
+import os
+import sys
+import tempfile
+import time
+
+import numpy as np
+import pyFRF
+import pyuff
+
+RUNS = 5
+
+
+def times(job, before=lambda: None):
+    seconds = []
+    for _ in range(RUNS):
+        before()
+        start = time.perf_counter()
+        job()
+        seconds.append(time.perf_counter() - start)
+    return seconds
+
+
+def spectra(hits, responses, samples):
+    rng = np.random.default_rng(1)
+    force = rng.standard_normal((hits, 1, samples))
+    response = rng.standard_normal((hits, responses, samples))
+
+    def job():
+        frf = pyFRF.FRF(51200, force, response, exc_type="f", resp_type="v", copy=False)
+        frf.get_H1()
+        frf.get_coherence()
+
+    return times(job)
+
+
+def universal(functions, lines, binary, folder):
+    rng = np.random.default_rng(2)
+    x = 0.25 * np.arange(lines)
+    sets = [
+        pyuff.prepare_58(
+            binary=binary, func_type=4, rsp_node=1, rsp_dir=1, ref_node=1 + i, ref_dir=3,
+            data=rng.standard_normal(lines) + 1j * rng.standard_normal(lines), x=x, id1="speed",
+            rsp_ent_name="A1", ref_ent_name="AZ1", abscissa_spacing=1, abscissa_spec_data_type=18,
+            ordinate_spec_data_type=11, orddenom_spec_data_type=13,
+        )
+        for i in range(functions)
+    ]
+    path = os.path.join(folder, "speed.uff")
+
+    def remove():
+        if os.path.exists(path):
+            os.remove(path)
+
+    write = times(lambda: pyuff.UFF(path).write_sets(sets, mode="add"), before=remove)
+    read = times(lambda: pyuff.UFF(path).read_sets())
+    return write, read
+
+
+job = json.loads(sys.argv[1])
+with tempfile.TemporaryDirectory() as folder:
+    ascii_write, ascii_read = universal(job["functions"], job["lines"], 0, folder)
+    binary_write, binary_read = universal(job["functions"], job["lines"], 1, folder)
+print(json.dumps({
+    "spectra": spectra(job["hits"], job["responses"], job["samples"]),
+    "ascii write": ascii_write, "ascii read": ascii_read,
+    "binary write": binary_write, "binary read": binary_read,
+}))

@@ -1,0 +1,320 @@
+//! `frf`: FRFs of impact records from anywhere, good hits only.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+
+use super::error::CliError;
+use super::output;
+use crate::campaign::verdict::{Limits, Verdict, VerdictKind, judge_all};
+use crate::exchange::npz::Array;
+use crate::exchange::{Extra, read_impacts, write_frf};
+use crate::spectra::{
+    AveragedFrf, ForceWeighting, FrfSettings, ImpactRecords, MotionQuantity, Origin, UsableBand, Windowing,
+    estimate, usable_band,
+};
+
+/// FRFs of impact records from anywhere: verdict on every hit, average of the good ones.
+///
+/// RECORDS.npz holds `fs` (Hz), `force` (hit, sample) in N, `response` (hit, channel, sample) in SI and `quantity`
+/// (velocity, acceleration or displacement). FRFs are on s = sigma + i 2 pi f: the exponential window's damping is part of s,
+/// not an error of the result.
+#[derive(Debug, Args)]
+pub struct Frf {
+    /// The records.
+    #[arg(value_name = "RECORDS.npz")]
+    records: PathBuf,
+    /// Print verdicts, settings and the usable band as one JSON document.
+    #[arg(long)]
+    json: bool,
+    /// Write the FRFs: frequency, frf (H1), h2, hv, coherence, variance.
+    #[arg(long, value_name = "FILE.npz")]
+    out: Option<PathBuf>,
+    /// Quantity of the FRFs; that of the records when absent.
+    #[arg(long, value_enum)]
+    quantity: Option<FrfQuantity>,
+    /// Damping of the exponential window, 1/s; 0 for none.
+    #[arg(long, value_name = "PER_S", default_value_t = Windowing::default().sigma_per_s)]
+    sigma: f64,
+    /// The force is kept from this long before the pulse, s.
+    #[arg(long, value_name = "S", default_value_t = Windowing::default().force_before_s)]
+    force_before: f64,
+    /// The force is kept until this long after the pulse's start, s.
+    #[arg(long, value_name = "S", default_value_t = Windowing::default().force_after_s)]
+    force_after: f64,
+    /// After that it falls to zero along half a cosine of this length, s.
+    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    force_taper: f64,
+    /// Leave the force rectangular and weight the response alone (the widespread habit, not exact).
+    #[arg(long)]
+    plain_force: bool,
+    /// Time of the hits from the records' start, s; where each pulse starts when absent.
+    #[arg(long, value_name = "S")]
+    origin: Option<f64>,
+    /// Length of the transform, samples; longer than the records pads them with zeros.
+    #[arg(long, value_name = "SAMPLES")]
+    pad_to: Option<usize>,
+    /// How late each response is against the force, s (repeat, or a list with commas).
+    #[arg(long, value_name = "S", value_delimiter = ',', allow_hyphen_values = true)]
+    delay: Vec<f64>,
+    /// Lines to give, Hz; all when absent.
+    #[arg(long, value_name = "LO:HI", value_parser = band)]
+    band: Option<(f64, f64)>,
+    /// Give the variance of leaving out each hit in turn, too (array `variance_jackknife`).
+    #[arg(long)]
+    jackknife: bool,
+    /// Ratio of noise powers for Hv, response over force, (SI/N)²; noise in proportion to the signals when absent.
+    #[arg(long, value_name = "RATIO")]
+    noise_ratio: Option<f64>,
+    /// Names of the responses (repeat, or a list with commas).
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    outputs: Vec<String>,
+    /// Name of the impact.
+    #[arg(long, value_name = "NAME", default_value = "impact")]
+    input: String,
+}
+
+/// What an FRF's numerator is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum FrfQuantity {
+    Receptance,
+    Mobility,
+    Accelerance,
+}
+
+impl From<FrfQuantity> for MotionQuantity {
+    fn from(quantity: FrfQuantity) -> Self {
+        match quantity {
+            FrfQuantity::Receptance => MotionQuantity::Displacement,
+            FrfQuantity::Mobility => MotionQuantity::Velocity,
+            FrfQuantity::Accelerance => MotionQuantity::Acceleration,
+        }
+    }
+}
+
+/// A band of frequencies, Hz.
+pub(super) fn band(text: &str) -> Result<(f64, f64), String> {
+    let wrong = || format!("`{text}` is no band: give two frequencies in Hz, the lower first, as in 300:600");
+    let (low, high) = text.split_once(':').ok_or_else(wrong)?;
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|f| f.is_finite() && *f >= 0.0);
+    match (number(low), number(high)) {
+        (Some(low), Some(high)) if low <= high => Ok((low, high)),
+        _ => Err(wrong()),
+    }
+}
+
+impl Frf {
+    pub fn run(self) -> Result<(), CliError> {
+        self.check()?;
+        let records = read_impacts(&self.records).map_err(|e| CliError::Bad(e.to_string()))?;
+        let names = self.names(records.response.first().map_or(0, Vec::len))?;
+        let verdicts = judge_all(&records, &Limits::default(), None);
+        let used: Vec<bool> = verdicts.iter().map(|v| v.verdict == VerdictKind::Good).collect();
+        if !used.contains(&true) {
+            if self.json {
+                output::json(&self.document(&records, &verdicts, None))?;
+            }
+            let why: Vec<String> = verdicts
+                .iter()
+                .enumerate()
+                .map(|(i, v)| format!("hit {i}: {}, {}", v.verdict, v.sentence))
+                .collect();
+            return Err(CliError::Bad(format!(
+                "{}: no hit is good, so there is nothing to average; measure again\n  {}",
+                self.records.display(),
+                why.join("\n  ")
+            )));
+        }
+        let settings = self.settings();
+        let found = estimate(&records, &used, &settings)
+            .map_err(|e| CliError::Bad(format!("{}: {e}", self.records.display())))?;
+        let excited = usable_band(&found.frequency_hz, &found.s_ff, 6.0);
+        let quantity = self.quantity.map_or(records.quantity, MotionQuantity::from);
+        let mut found = found.converted(records.quantity, quantity);
+        if let Some((low, high)) = self.band {
+            found = found.band(low, high);
+            if found.frequency_hz.is_empty() {
+                return Err(CliError::Usage(format!(
+                    "there is no line between {low} and {high} Hz: widen --band"
+                )));
+            }
+        }
+        if let Some(path) = &self.out {
+            let matrix = found.to_matrix(quantity.frf(), names.clone(), self.input.clone());
+            write_frf(path, &matrix, &extras(&found)).map_err(|e| CliError::Bad(e.to_string()))?;
+        }
+        if self.json {
+            return output::json(&self.document(
+                &records,
+                &verdicts,
+                Some((&found, excited, quantity, &names)),
+            ));
+        }
+        output::lines(self.words(&verdicts, &found, excited))
+    }
+
+    /// What cannot be meant.
+    fn check(&self) -> Result<(), CliError> {
+        let wrong = |text: String| Err(CliError::Usage(text));
+        for (name, value) in [
+            ("--sigma", self.sigma),
+            ("--force-before", self.force_before),
+            ("--force-after", self.force_after),
+            ("--force-taper", self.force_taper),
+            ("--noise-ratio", self.noise_ratio.unwrap_or(0.0)),
+            ("--origin", self.origin.unwrap_or(0.0)),
+        ] {
+            if !value.is_finite() || value < 0.0 {
+                return wrong(format!("{name} is {value}: a number of 0 or more is needed"));
+            }
+        }
+        match self.delay.iter().find(|d| !d.is_finite()) {
+            Some(delay) => wrong(format!("--delay is {delay}: a finite number of seconds is needed")),
+            None => Ok(()),
+        }
+    }
+
+    fn names(&self, channels: usize) -> Result<Vec<String>, CliError> {
+        for (name, given) in [("--outputs", self.outputs.len()), ("--delay", self.delay.len())] {
+            if given != 0 && given != channels {
+                return Err(CliError::Usage(format!(
+                    "{name} has {given} entries and {} has {channels} responses: give one for each, or none",
+                    self.records.display()
+                )));
+            }
+        }
+        let repeated = (1..self.outputs.len()).find(|i| self.outputs[..*i].contains(&self.outputs[*i]));
+        match repeated {
+            Some(i) => {
+                Err(CliError::Usage(format!("--outputs has `{}` twice: names must differ", self.outputs[i])))
+            }
+            None if self.outputs.is_empty() => Ok((1..=channels).map(|i| format!("response {i}")).collect()),
+            None => Ok(self.outputs.clone()),
+        }
+    }
+
+    fn settings(&self) -> FrfSettings {
+        FrfSettings {
+            windowing: Windowing {
+                force_before_s: self.force_before,
+                force_after_s: self.force_after,
+                force_taper_s: self.force_taper,
+                sigma_per_s: self.sigma,
+                force_weighting: if self.plain_force {
+                    ForceWeighting::Rectangular
+                } else {
+                    ForceWeighting::Exponential
+                },
+            },
+            origin: self.origin.map_or(Origin::PulseStart, Origin::At),
+            delay_s: self.delay.clone(),
+            transform_samples: self.pad_to,
+            jackknife: self.jackknife,
+            noise_ratio: self.noise_ratio,
+        }
+    }
+
+    fn document(
+        &self,
+        records: &ImpactRecords,
+        verdicts: &[Verdict],
+        found: Option<(&AveragedFrf, Option<UsableBand>, MotionQuantity, &[String])>,
+    ) -> Value {
+        let hits: Vec<Value> = verdicts
+            .iter()
+            .enumerate()
+            .map(|(index, v)| {
+                json!({
+                    "index": index, "verdict": v.verdict, "measure": v.measure, "limit": v.limit,
+                    "sentence": v.sentence, "peak_n": v.peak_n, "start_s": v.start_s,
+                })
+            })
+            .collect();
+        let mut document = json!({
+            "records": self.records.display().to_string(),
+            "fs_hz": records.fs_hz,
+            "hits": hits,
+            "used": found.map_or(0, |(y, ..)| y.hits),
+            "settings": self.settings(),
+        });
+        if let Some((y, band, quantity, names)) = found {
+            document["quantity"] = json!(quantity.frf());
+            document["outputs"] = json!(names);
+            document["input"] = json!(self.input);
+            document["lines"] = json!(y.frequency_hz.len());
+            document["usable_band_hz"] = json!(band.map(|b| [b.low_hz, b.high_hz]));
+            document["median_coherence"] = json!(median_coherence(y, band));
+        }
+        document
+    }
+
+    fn words(&self, verdicts: &[Verdict], found: &AveragedFrf, excited: Option<UsableBand>) -> Vec<String> {
+        let mut lines: Vec<String> = verdicts
+            .iter()
+            .enumerate()
+            .map(|(i, v)| format!("hit {i}: {} ({})", v.verdict, v.sentence))
+            .collect();
+        lines.push(format!("{} of {} hits averaged", found.hits, verdicts.len()));
+        if let Some(band) = excited {
+            lines.push(format!(
+                "the hammer excites {:.0} … {:.0} Hz (−6 dB of the force's auto-spectrum)",
+                band.low_hz, band.high_hz
+            ));
+        }
+        match &self.out {
+            Some(path) => lines.push(format!("FRFs are in {}", path.display())),
+            None => lines.push("nothing was written: --out FILE.npz keeps the FRFs".into()),
+        }
+        lines
+    }
+}
+
+/// Median coherence of each response over the lines that were excited; none for a single hit.
+fn median_coherence(y: &AveragedFrf, band: Option<UsableBand>) -> Option<Vec<f64>> {
+    let band = band?;
+    let inside = y.band(band.low_hz, band.high_hz);
+    let outputs = inside.coherence.first()?.len();
+    (0..outputs)
+        .map(|o| {
+            let mut values: Vec<f64> = inside.coherence.iter().map(|row| row[o]).collect();
+            values.sort_by(f64::total_cmp);
+            values.get(values.len() / 2).copied().filter(|v| v.is_finite())
+        })
+        .collect()
+}
+
+/// The arrays beside H1.
+fn extras(y: &AveragedFrf) -> Vec<Extra> {
+    let real = |name: &str, rows: &[Vec<f64>]| {
+        let shape = vec![rows.len(), rows.first().map_or(0, Vec::len)];
+        Extra::Real(name.into(), Array { shape, values: rows.concat() })
+    };
+    let complex = |name: &str, rows: &[Vec<num_complex::Complex<f64>>]| {
+        let shape = vec![rows.len(), rows.first().map_or(0, Vec::len), 1];
+        Extra::Complex(name.into(), Array { shape, values: rows.concat() })
+    };
+    let mut extras = vec![
+        real("coherence", &y.coherence),
+        real("variance", &y.variance),
+        complex("h2", &y.h2),
+        complex("hv", &y.hv),
+    ];
+    extras.extend(y.jackknife.as_ref().map(|rows| real("variance_jackknife", rows)));
+    let force = Array { shape: vec![y.s_ff.len()], values: y.s_ff.clone() };
+    extras.push(Extra::Real("force_spectrum".into(), force));
+    extras
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_band_is_two_frequencies_in_order() {
+        assert_eq!(band("300:600"), Ok((300.0, 600.0)));
+        for text in ["300", "600:300", "-1:5", "a:b", "1:inf", ""] {
+            assert!(band(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,305 @@
+//! FRF matrices in universal files: one function of type 4 for each pair of output and input.
+//!
+//! The response entity is the sensor, its direction (1, 2, 3) the axis: outputs are called `A1:x` where a sensor has several, else `A1`.
+//! The reference entity is the impact; its direction is signed, and the value stands as measured, not multiplied by that
+//! sign. The ordinate's quantity is 8, 11 or 12 (receptance, mobility, accelerance). The damping of an exponential window, which the
+//! format has no field for, is in text 4 as `sigma 2.3 1/s`.
+
+use super::uff::{
+    Abscissa, Axis, Contents, DataSet, Dof, Encoding, Function, Precision, Values, WriteError, count, kind,
+    quantity, read,
+};
+use crate::substructuring::frf::{FrfMatrix, Quantity};
+use nalgebra::DMatrix;
+use num_complex::Complex;
+use std::path::{Path, PathBuf};
+
+/// Why a universal file does not give FRFs.
+#[derive(Debug, thiserror::Error)]
+pub enum FrfUffError {
+    /// The file cannot be read at all.
+    #[error("{}: cannot be read: {source}", path.display())]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// What is in it is no FRF matrix.
+    #[error("{}: {reason}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and what is needed.
+        reason: String,
+    },
+}
+
+/// Reads the FRFs of a universal file into one matrix, outputs and inputs in the order of their first appearance. The second
+/// value says what was left out or is missing; missing pairs hold NaN.
+///
+/// # Errors
+/// [`FrfUffError`] when there is no FRF, or they differ in lines, quantity or damping.
+pub fn read_frf_uff(path: &Path) -> Result<(FrfMatrix, Vec<String>), FrfUffError> {
+    let bytes = std::fs::read(path).map_err(|source| FrfUffError::Open { path: path.into(), source })?;
+    from_contents(&read(&bytes)).map_err(|reason| FrfUffError::Content { path: path.into(), reason })
+}
+
+/// The same from what was read of a file.
+///
+/// # Errors
+/// The reason in words.
+pub fn from_contents(contents: &Contents) -> Result<(FrfMatrix, Vec<String>), String> {
+    let mut warnings: Vec<String> = contents.faults.iter().map(|f| format!("{f}; left out")).collect();
+    let functions: Vec<(&Function, &[Complex<f64>])> = contents
+        .sets
+        .iter()
+        .filter_map(|set| match set {
+            DataSet::Function(f) if f.kind == kind::FRF => match &f.values {
+                Values::Complex(values) => Some((&**f, values.as_slice())),
+                Values::Real(_) => None,
+            },
+            _ => None,
+        })
+        .collect();
+    let Some((first, values)) = functions.first() else {
+        let why = warnings.first().map_or_else(String::new, |w| format!(" ({w})"));
+        return Err(format!("there is no complex FRF (data set 58 of function type 4) in it{why}"));
+    };
+    let quantity = quantity_of(first)?;
+    let (lines, sigma_per_s) = (values.len(), sigma(first)?);
+    let outputs = names(functions.iter().map(|(f, _)| (&f.response, true)));
+    let inputs = names(functions.iter().map(|(f, _)| (&f.reference, false)));
+    let order = |names: &[String]| {
+        let mut distinct: Vec<String> = Vec::new();
+        for name in names {
+            if !distinct.contains(name) {
+                distinct.push(name.clone());
+            }
+        }
+        distinct
+    };
+    let (rows, columns) = (order(&outputs), order(&inputs));
+    let hole = Complex::new(f64::NAN, f64::NAN);
+    let mut found = vec![DMatrix::from_element(rows.len(), columns.len(), hole); lines];
+    let mut filled = DMatrix::from_element(rows.len(), columns.len(), false);
+    for (((f, values), output), input) in functions.iter().zip(&outputs).zip(&inputs) {
+        let differs = |what: &str| {
+            Err(format!("the FRF from `{input}` to `{output}` has another {what} than the first"))
+        };
+        if values.len() != lines || f.abscissa != first.abscissa {
+            return differs("frequency axis");
+        }
+        if quantity_of(f)? != quantity {
+            return differs("quantity");
+        }
+        if sigma(f)?.to_bits() != sigma_per_s.to_bits() {
+            return differs("damping of the exponential window");
+        }
+        let (Some(row), Some(column)) =
+            (rows.iter().position(|n| n == output), columns.iter().position(|n| n == input))
+        else {
+            continue;
+        };
+        if std::mem::replace(&mut filled[(row, column)], true) {
+            return Err(format!(
+                "there are two FRFs from `{input}` to `{output}`: keep one, or split the file"
+            ));
+        }
+        for (y, value) in found.iter_mut().zip(*values) {
+            y[(row, column)] = *value;
+        }
+    }
+    let holes = filled.iter().filter(|there| !**there).count();
+    if holes > 0 {
+        warnings
+            .push(format!("{holes} of {} pairs of output and input are missing and hold NaN", filled.len()));
+    }
+    let frf = FrfMatrix {
+        frequency_hz: (0..lines).map(|i| first.abscissa.at(i)).collect(),
+        sigma_per_s,
+        quantity,
+        outputs: rows,
+        inputs: columns,
+        lines: found,
+    };
+    frf.check().map_err(|e| e.to_string())?;
+    Ok((frf, warnings))
+}
+
+/// The names of DoFs: with the axis where `axes` is asked for and the entity has several directions.
+fn names<'a>(dofs: impl Iterator<Item = (&'a Dof, bool)> + Clone) -> Vec<String> {
+    let entity = |dof: &Dof| if dof.entity.is_empty() { dof.node.to_string() } else { dof.entity.clone() };
+    let all: Vec<(String, i64, bool)> =
+        dofs.map(|(dof, axes)| (entity(dof), dof.direction.abs(), axes)).collect();
+    all.iter()
+        .map(|(name, direction, axes)| {
+            let several = all.iter().any(|(other, d, _)| other == name && d != direction);
+            match direction {
+                1..=6 if *axes && several => {
+                    format!("{name}:{}", ["x", "y", "z", "rx", "ry", "rz"][*direction as usize - 1])
+                }
+                _ => name.clone(),
+            }
+        })
+        .collect()
+}
+
+fn quantity_of(f: &Function) -> Result<Quantity, String> {
+    match f.axes[1].quantity {
+        quantity::DISPLACEMENT => Ok(Quantity::Receptance),
+        quantity::VELOCITY => Ok(Quantity::Mobility),
+        quantity::ACCELERATION => Ok(Quantity::Accelerance),
+        other => Err(format!(
+            "an FRF's ordinate is of type {other}: 8 (displacement), 11 (velocity) or 12 (acceleration) per force is needed"
+        )),
+    }
+}
+
+/// The damping that text 4 tells, 1/s; 0 where it tells none.
+fn sigma(f: &Function) -> Result<f64, String> {
+    let words: Vec<&str> = f.id[3].split_whitespace().collect();
+    match words[..] {
+        ["sigma", value, "1/s"] => value.parse().map_err(|_| format!("`{}` is no damping", f.id[3])),
+        _ => Ok(0.0),
+    }
+}
+
+/// The FRFs as functions. `input_directions` are the impacts' directions (±1, 2, 3; 0 unknown), one for each input. Outputs called
+/// `NAME:x` and so on become the sensor NAME with a direction.
+///
+/// # Errors
+/// The matrix contradicts itself, or a name is longer than the format's 10 characters (when written).
+pub fn to_functions(
+    frf: &FrfMatrix,
+    input_directions: &[i64],
+    encoding: Encoding,
+) -> Result<Vec<DataSet>, String> {
+    frf.check().map_err(|e| e.to_string())?;
+    let (ordinate, label, unit) = match frf.quantity {
+        Quantity::Receptance => (quantity::DISPLACEMENT, "Displacement", "m"),
+        Quantity::Mobility => (quantity::VELOCITY, "Velocity", "m/s"),
+        Quantity::Accelerance => (quantity::ACCELERATION, "Acceleration", "m/s^2"),
+    };
+    let axis = |quantity, label: &str, unit: &str| Axis {
+        quantity,
+        exponents: [0; 3],
+        label: label.into(),
+        unit: unit.into(),
+    };
+    let axes = [
+        axis(quantity::FREQUENCY, "Frequency", "Hz"),
+        axis(ordinate, label, unit),
+        axis(quantity::FORCE, "Excitation Force", "N"),
+        Axis::default(),
+    ];
+    let damping =
+        if frf.sigma_per_s == 0.0 { String::new() } else { format!("sigma {} 1/s", frf.sigma_per_s) };
+    let mut sensors: Vec<&str> = Vec::new();
+    for (sensor, _) in frf.outputs.iter().map(|name| split(name)) {
+        if !sensors.contains(&sensor) {
+            sensors.push(sensor);
+        }
+    }
+    let mut sets = Vec::with_capacity(frf.outputs.len() * frf.inputs.len());
+    for (column, input) in frf.inputs.iter().enumerate() {
+        for (row, output) in frf.outputs.iter().enumerate() {
+            let (sensor, direction) = split(output);
+            let node = sensors.iter().position(|name| *name == sensor).map_or(0, |at| count(at) + 1);
+            sets.push(DataSet::Function(Box::new(Function {
+                id: [
+                    format!("{output} / {input}"),
+                    String::new(),
+                    String::new(),
+                    damping.clone(),
+                    String::new(),
+                ],
+                kind: kind::FRF,
+                number: 0,
+                version: 0,
+                load_case: 0,
+                response: Dof { entity: sensor.into(), node, direction },
+                reference: Dof {
+                    entity: input.clone(),
+                    node: 101 + count(column),
+                    direction: input_directions.get(column).copied().unwrap_or(0),
+                },
+                precision: Precision::Double,
+                abscissa: Abscissa::of(&frf.frequency_hz),
+                values: Values::Complex(frf.lines.iter().map(|y| y[(row, column)]).collect()),
+                z: 0.0,
+                axes: axes.clone(),
+                encoding,
+            })));
+        }
+    }
+    Ok(sets)
+}
+
+/// Sensor and direction of an output's name.
+fn split(name: &str) -> (&str, i64) {
+    let axis =
+        |axis: &str| ["x", "y", "z", "rx", "ry", "rz"].iter().position(|a| *a == axis).map(|i| count(i) + 1);
+    name.rsplit_once(':').and_then(|(sensor, a)| Some((sensor, axis(a)?))).unwrap_or((name, 0))
+}
+
+/// Writes data sets to a file.
+///
+/// # Errors
+/// What does not fit the format, or the disk's.
+pub fn write_uff(path: &Path, sets: &[DataSet]) -> Result<(), FrfUffError> {
+    let content = |e: WriteError| FrfUffError::Content { path: path.into(), reason: e.to_string() };
+    let bytes = super::uff::write(sets).map_err(content)?;
+    std::fs::write(path, bytes).map_err(|source| FrfUffError::Open { path: path.into(), source })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::uff::{ByteOrder, write};
+    use super::*;
+
+    fn frf() -> FrfMatrix {
+        FrfMatrix {
+            frequency_hz: vec![300.0, 320.0, 340.0],
+            sigma_per_s: 2.3,
+            quantity: Quantity::Mobility,
+            outputs: vec!["A1:x".into(), "A1:z".into(), "A4".into()],
+            inputs: vec!["AZ1".into(), "AX1".into()],
+            lines: (0..3)
+                .map(|l| DMatrix::from_fn(3, 2, |r, c| Complex::new(l as f64 + 0.25, (10 * r + c) as f64)))
+                .collect(),
+        }
+    }
+
+    #[test]
+    fn a_matrix_comes_back_in_its_order_with_its_damping() {
+        for encoding in [Encoding::Ascii, Encoding::Binary(ByteOrder::Big)] {
+            let sets = to_functions(&frf(), &[-3, 1], encoding).expect("consistent");
+            let bytes = write(&sets).expect("writable");
+            let (back, warnings) = from_contents(&read(&bytes)).expect("FRFs");
+            assert_eq!((back, warnings), (frf(), vec![]));
+        }
+    }
+
+    #[test]
+    fn a_missing_pair_is_nan_and_said() {
+        let mut sets = to_functions(&frf(), &[-3, 1], Encoding::Ascii).expect("consistent");
+        sets.remove(1);
+        let (back, warnings) = from_contents(&read(&write(&sets).expect("writable"))).expect("FRFs");
+        assert!(back.check_finite().is_err() && warnings[0].contains("1 of 6"), "{warnings:?}");
+    }
+
+    #[test]
+    fn doubles_and_strangers_are_refused_by_name() {
+        let mut sets = to_functions(&frf(), &[-3, 1], Encoding::Ascii).expect("consistent");
+        sets.push(sets[0].clone());
+        let error =
+            |sets: &[DataSet]| from_contents(&read(&write(sets).expect("writable"))).expect_err("refused");
+        assert!(error(&sets).contains("two FRFs from `AZ1` to `A1:x`"), "{}", error(&sets));
+        if let Some(DataSet::Function(f)) = sets.last_mut() {
+            f.axes[1].quantity = quantity::FORCE;
+        }
+        assert!(error(&sets).contains("type 13"));
+        assert!(error(&[]).contains("no complex FRF"));
+    }
+}

@@ -1,0 +1,98 @@
+//! FRFs and records as text with commas: one row for each line or sample, one heading for each column.
+
+use crate::spectra::ImpactRecords;
+use crate::substructuring::frf::FrfMatrix;
+use std::path::{Path, PathBuf};
+
+/// A table that cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: cannot be written: {source}", path.display())]
+pub struct TableError {
+    path: PathBuf,
+    source: csv::Error,
+}
+
+/// `frequency_hz`, and for each pair `OUTPUT/INPUT re`, `… im`, `… coherence` (line, output, input). A missing value is empty.
+///
+/// # Errors
+/// [`TableError`].
+pub fn write_frf(path: &Path, frf: &FrfMatrix, coherence: &[f64]) -> Result<(), TableError> {
+    let pairs = || (0..frf.outputs.len()).flat_map(|o| (0..frf.inputs.len()).map(move |i| (o, i)));
+    let text = |v: f64| if v.is_finite() { v.to_string() } else { String::new() };
+    write(path, |out| {
+        let heading = pairs().flat_map(|(o, i)| {
+            ["re", "im", "coherence"].map(|part| format!("{}/{} {part}", frf.outputs[o], frf.inputs[i]))
+        });
+        out.write_record(std::iter::once("frequency_hz".to_string()).chain(heading))?;
+        for (line, y) in frf.lines.iter().enumerate() {
+            let row = pairs().flat_map(|(o, i)| {
+                let at = (line * frf.outputs.len() + o) * frf.inputs.len() + i;
+                let coherence = coherence.get(at).copied().unwrap_or(f64::NAN);
+                [text(y[(o, i)].re), text(y[(o, i)].im), text(coherence)]
+            });
+            out.write_record(std::iter::once(frf.frequency_hz[line].to_string()).chain(row))?;
+        }
+        Ok(())
+    })
+}
+
+/// `hit`, `time_s`, `force_n` and the responses in SI, hit after hit.
+///
+/// # Errors
+/// [`TableError`].
+pub fn write_records(path: &Path, records: &ImpactRecords) -> Result<(), TableError> {
+    let channels = records.response.first().map_or(0, Vec::len);
+    write(path, |out| {
+        let heading = ["hit", "time_s", "force_n"].map(String::from);
+        out.write_record(heading.into_iter().chain((1..=channels).map(|c| format!("response_{c}"))))?;
+        for (hit, (force, responses)) in records.force_n.iter().zip(&records.response).enumerate() {
+            for (i, f) in force.iter().enumerate() {
+                let row = [hit.to_string(), (i as f64 / records.fs_hz).to_string(), f.to_string()];
+                let values = responses.iter().map(|x| x.get(i).map_or(String::new(), ToString::to_string));
+                out.write_record(row.into_iter().chain(values))?;
+            }
+        }
+        Ok(())
+    })
+}
+
+fn write(
+    path: &Path,
+    rows: impl FnOnce(&mut csv::Writer<std::fs::File>) -> Result<(), csv::Error>,
+) -> Result<(), TableError> {
+    csv::Writer::from_path(path)
+        .and_then(|mut out| {
+            rows(&mut out)?;
+            Ok(out.flush()?)
+        })
+        .map_err(|source| TableError { path: path.into(), source })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::substructuring::frf::Quantity;
+    use nalgebra::DMatrix;
+    use num_complex::Complex;
+
+    #[test]
+    fn every_digit_is_kept_and_a_hole_is_empty() {
+        let dir = tempfile::tempdir().expect("a temporary folder");
+        let path = dir.path().join("frf.csv");
+        let value = Complex::new(0.1 + 0.2, -1e-12);
+        let frf = FrfMatrix {
+            frequency_hz: vec![10.5],
+            sigma_per_s: 0.0,
+            quantity: Quantity::Mobility,
+            outputs: vec!["A1:x".into(), "A1:y".into()],
+            inputs: vec!["AZ1".into()],
+            lines: vec![DMatrix::from_column_slice(2, 1, &[value, Complex::new(f64::NAN, 0.0)])],
+        };
+        write_frf(&path, &frf, &[0.75, f64::NAN]).expect("written");
+        let mut table = csv::Reader::from_path(&path).expect("readable");
+        assert_eq!(table.headers().expect("headings").get(1), Some("A1:x/AZ1 re"));
+        let row = table.records().next().expect("a row").expect("readable");
+        assert_eq!(row.get(1).expect("re").parse(), Ok(value.re));
+        assert_eq!(row.iter().collect::<Vec<_>>()[2..], ["-0.000000000001", "0.75", "", "0", ""]);
+    }
+}

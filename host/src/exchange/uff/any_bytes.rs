@@ -1,0 +1,50 @@
+//! Whatever the bytes: no panic, no hang, and every good data set before the damage is still read.
+
+use super::round_trip::set;
+use super::*;
+use proptest::collection::vec;
+use proptest::prelude::*;
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, rng_seed: proptest::test_runner::RngSeed::Fixed(15), ..ProptestConfig::default() })]
+
+    #[test]
+    fn truncated_at_any_byte_the_sets_before_are_read(sets in vec(set(), 1..4)) {
+        let bytes = write(&sets).expect("writable");
+        let ends: Vec<usize> = (1..=sets.len()).map(|n| write(&sets[..n]).expect("writable").len()).collect();
+        for length in 0..bytes.len() {
+            let whole = ends.iter().filter(|end| **end <= length).count();
+            let read = read(&bytes[..length]);
+            // the last line's end may be missing
+            prop_assert!(read.sets.len() == whole || (read.sets.len() == whole + 1 && ends.contains(&(length + 1))));
+            prop_assert_eq!(&read.sets[..], &sets[..read.sets.len()]);
+        }
+    }
+
+    #[test]
+    fn a_flipped_byte_harms_no_set_before_it(sets in vec(set(), 1..4), at in any::<prop::sample::Index>(), value in any::<u8>()) {
+        let mut bytes = write(&sets).expect("writable");
+        let at = at.index(bytes.len());
+        bytes[at] = value;
+        let read = read(&bytes);
+        let before = (1..=sets.len()).take_while(|n| write(&sets[..*n]).expect("writable").len() <= at).count();
+        prop_assert_eq!(&read.sets[..before], &sets[..before]);
+    }
+
+    #[test]
+    fn noise_is_survived(noise in vec(any::<u8>(), 0..4000), words in vec("(    -1|    58|    58b     1     2|    15|  2412|  [0-9]{1,9}|[-+.0-9eEdD]{1,30}| {1,20}|\r|\n|\n|\n)", 0..300)) {
+        read(&noise);
+        let read = read(words.concat().as_bytes());
+        prop_assert!(read.sets.len() + read.faults.len() + read.skipped.len() <= words.len());
+    }
+}
+
+#[test]
+fn a_count_that_promises_too_much_reserves_nothing() {
+    let good = write(&[DataSet::Function(Box::new(super::foreign::small()))]).expect("writable");
+    let text = String::from_utf8(good).expect("ASCII");
+    let huge = text.replacen("         6         2         1", "         6 999999999         1", 1);
+    assert_ne!(text, huge);
+    let read = read(huge.as_bytes());
+    assert!(read.sets.is_empty() && read.faults[0].reason.contains("999999999"), "{:?}", read.faults);
+}

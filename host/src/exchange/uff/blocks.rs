@@ -1,0 +1,131 @@
+//! Where each data set begins and ends: by its lines of `-1`, and by byte counts where the data are binary.
+
+use super::text::{Lines, Wrong};
+use super::{set58, set58_values};
+
+/// One data set's bytes.
+pub(super) struct Block<'a> {
+    /// Its number.
+    pub number: u32,
+    /// Byte offset of its opening `-1`.
+    pub offset: usize,
+    /// What follows the number on its line, and where.
+    pub identifier: &'a [u8],
+    pub identifier_offset: usize,
+    /// All lines after that, without the closing one; for 58b without the binary data.
+    pub body: &'a [u8],
+    pub body_offset: usize,
+    /// The binary data of 58b.
+    pub binary: Option<&'a [u8]>,
+}
+
+/// A place that should be a data set and is none.
+pub(super) struct Unusable {
+    pub number: u32,
+    pub wrong: Wrong,
+}
+
+/// Splits a file into its data sets.
+pub(super) fn split(bytes: &[u8]) -> Vec<Result<Block<'_>, Unusable>> {
+    let mut blocks = Vec::new();
+    let mut lines = Lines::new(bytes, 0);
+    while let Some((offset, line)) = lines.next() {
+        if !is_delimiter(line) {
+            continue;
+        }
+        // a second `-1` at once: the first one closed something that had not been opened
+        let Some((identifier_offset, identifier)) = lines.next_unless(is_delimiter) else { continue };
+        let digits = identifier.iter().skip_while(|b| **b == b' ').take_while(|b| b.is_ascii_digit()).count();
+        let blanks = identifier.iter().take_while(|b| **b == b' ').count();
+        let number =
+            std::str::from_utf8(&identifier[blanks..blanks + digits]).ok().and_then(|t| t.parse().ok());
+        let Some(number) = number else {
+            let reason = "after a line of -1 there is no number of a data set".to_string();
+            blocks.push(Err(Unusable { number: 0, wrong: Wrong { offset: identifier_offset, reason } }));
+            skip_to_end(&mut lines);
+            continue;
+        };
+        let identifier = &identifier[blanks + digits..];
+        let body_offset = lines.offset();
+        let mut block =
+            Block { number, offset, identifier, identifier_offset, body: &[], body_offset, binary: None };
+        let closed = if number == 58 && set58::is_binary(identifier) {
+            let header_end = (0..set58::HEADER_LINES).all(|_| lines.next_unless(is_delimiter).is_some());
+            block.body = &bytes[body_offset..lines.offset()];
+            if header_end {
+                close_binary(bytes, &mut lines, &mut block)
+            } else {
+                skip_to_end(&mut lines).is_some()
+            }
+        } else {
+            let end = skip_to_end(&mut lines);
+            block.body = &bytes[body_offset..end.unwrap_or(bytes.len())];
+            end.is_some()
+        };
+        blocks.push(if closed {
+            Ok(block)
+        } else {
+            let reason = "the file ends within this data set (there is no closing -1): it was cut off, copy or export it again".to_string();
+            Err(Unusable { number, wrong: Wrong { offset: bytes.len(), reason } })
+        });
+    }
+    blocks
+}
+
+/// A line of `-1` in the first six columns; writers that forget the blanks before it are forgiven.
+pub(super) fn is_delimiter(line: &[u8]) -> bool {
+    let end = line.iter().rposition(|b| !b.is_ascii_whitespace()).map_or(0, |at| at + 1);
+    end <= 6 && line[..end].ends_with(b"-1") && line[..end - 2].iter().all(|b| *b == b' ')
+}
+
+/// Moves behind the next line of `-1` and gives the offset where that line begins. At the very end of a file, without an end of
+/// its line, it must stand in its columns: ` -1` there may be the rest of a number that was cut off.
+fn skip_to_end(lines: &mut Lines<'_>) -> Option<usize> {
+    while let Some((offset, line)) = lines.next() {
+        if is_delimiter(line) && (lines.ended() || line.starts_with(b"    -1")) {
+            return Some(offset);
+        }
+    }
+    None
+}
+
+/// Finds the end of the binary data and moves behind the closing `-1`. False when the file ends before it.
+fn close_binary<'a>(bytes: &'a [u8], lines: &mut Lines<'a>, block: &mut Block<'a>) -> bool {
+    let start = lines.offset();
+    // counts that the header allows, each tried against what stands behind it
+    for count in set58_values::byte_counts(block) {
+        let Some(end) = start.checked_add(count).filter(|end| *end <= bytes.len()) else { continue };
+        if let Some(after) = delimiter_at(bytes, end) {
+            block.binary = Some(&bytes[start..end]);
+            lines.jump(after);
+            return true;
+        }
+    }
+    // none fits: the next `-1` that ends a line and is followed by the end of the file or another `-1`
+    let mut from = start;
+    while let Some(at) = memchr::memmem::find(&bytes[from..], b"    -1").map(|at| from + at) {
+        if let Some(after) = delimiter_at(bytes, at) {
+            let next = Lines::new(&bytes[after..], after).next();
+            if next.is_none_or(|(_, line)| is_delimiter(line)) {
+                block.binary = Some(&bytes[start..at]);
+                lines.jump(after);
+                return true;
+            }
+        }
+        from = at + 1;
+    }
+    lines.jump(bytes.len());
+    false
+}
+
+/// The offset behind a line of `-1` that begins at `at`, or behind one false line end there.
+fn delimiter_at(bytes: &[u8], at: usize) -> Option<usize> {
+    let rest = &bytes[at..];
+    let blank =
+        [&b"\r\n"[..], b"\n", b"\r"].iter().find(|end| rest.starts_with(end)).map_or(0, |end| end.len());
+    [0, blank].into_iter().find_map(|skipped| {
+        let mut lines = Lines::new(&rest[skipped..], at + skipped);
+        let (_, line) = lines.next()?;
+        is_delimiter(line).then(|| lines.offset())
+    })
+}

@@ -1,0 +1,237 @@
+//! The values of data sets 58 and 58b.
+//!
+//! Text: 6E13.5 for single precision, 4E20.12 for double, with 2(E13.5,E20.12) and E13.5,2E20.12 where places stand between double values.
+//! Binary: the same row of numbers as IEEE floats. Places beside double values are double here, as the common programs write them; read
+//! are also places of 4 bytes beside values of 8, as the standard has it.
+
+use super::blocks::Block;
+use super::function::{Abscissa, ByteOrder, Encoding, Function, Precision, Values};
+use super::number;
+use super::set58::{self, Shape};
+use super::text::{Lines, Output, Words, Wrong};
+use num_complex::Complex;
+
+impl Shape {
+    /// Numbers of each value: its place where places are stored, and one or two parts.
+    fn numbers(&self) -> usize {
+        usize::from(!self.even) + 1 + usize::from(self.complex)
+    }
+}
+
+/// Widths in bytes of place and part that a file may have, the likely first.
+fn widths(shape: &Shape) -> [(usize, usize); 3] {
+    match (shape.precision, shape.even) {
+        (Precision::Single, _) => [(4, 4), (8, 8), (8, 4)],
+        (Precision::Double, _) => [(8, 8), (4, 8), (4, 4)],
+    }
+}
+
+/// Bytes of all values with these widths.
+fn bytes_for(shape: &Shape, (place, part): (usize, usize)) -> Option<usize> {
+    let places = if shape.even { 0 } else { place };
+    shape.points.checked_mul(places + part * (1 + usize::from(shape.complex)))
+}
+
+/// How many bytes the data of a 58b may have: what its header announces, and what its form of data needs. Writers disagree.
+pub(super) fn byte_counts(block: &Block<'_>) -> Vec<usize> {
+    let identifier = String::from_utf8_lossy(block.identifier);
+    let announced: Option<usize> = identifier.split_whitespace().nth(4).and_then(|word| word.parse().ok());
+    let mut counts: Vec<usize> = Vec::new();
+    if let Some(shape) = set58::shape_of(block) {
+        counts.extend(widths(&shape).into_iter().filter_map(|w| bytes_for(&shape, w)));
+    }
+    counts.extend(announced);
+    counts
+}
+
+/// Values in binary.
+pub(super) fn read_binary(
+    data: &[u8],
+    shape: &Shape,
+    block: &Block<'_>,
+) -> Result<(Abscissa, Values, Encoding), Wrong> {
+    let identifier = String::from_utf8_lossy(block.identifier);
+    let mut words = identifier.split_whitespace().skip(1);
+    let wrong = |reason: String| Wrong { offset: block.identifier_offset, reason };
+    let order = match words.next() {
+        Some("1") => ByteOrder::Little,
+        Some("2") => ByteOrder::Big,
+        other => {
+            return Err(wrong(format!(
+                "the byte order is `{}`: 1 (little) or 2 (big) is known",
+                other.unwrap_or("")
+            )));
+        }
+    };
+    if let Some(format) = words.next().filter(|format| !["2", "0"].contains(format)) {
+        return Err(wrong(format!(
+            "the floats are of format `{format}`: 2 (IEEE 754) is known, write the file so"
+        )));
+    }
+    let fitting = widths(shape).into_iter().find(|w| bytes_for(shape, *w) == Some(data.len()));
+    let Some((place, part)) = fitting else {
+        let offset = block.body_offset + block.body.len();
+        let reason = format!("{} bytes of binary data do not make {} values", data.len(), shape.points);
+        return Err(Wrong { offset, reason });
+    };
+    let float = |bytes: &[u8]| match (bytes, order) {
+        (&[a, b, c, d], ByteOrder::Little) => f32::from_le_bytes([a, b, c, d]).into(),
+        (&[a, b, c, d], ByteOrder::Big) => f32::from_be_bytes([a, b, c, d]).into(),
+        (&[a, b, c, d, e, f, g, h], ByteOrder::Little) => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
+        (&[a, b, c, d, e, f, g, h], ByteOrder::Big) => f64::from_be_bytes([a, b, c, d, e, f, g, h]),
+        // widths are 4 or 8
+        _ => f64::NAN,
+    };
+    let place = if shape.even { 0 } else { place };
+    let all = data.chunks_exact((place + part * (1 + usize::from(shape.complex))).max(1));
+    let places = if shape.even { Vec::new() } else { all.clone().map(|v| float(&v[..place])).collect() };
+    let values = if shape.complex {
+        Values::Complex(
+            all.map(|v| Complex::new(float(&v[place..place + part]), float(&v[place + part..]))).collect(),
+        )
+    } else {
+        Values::Real(all.map(|v| float(&v[place..])).collect())
+    };
+    Ok((abscissa(shape, places), values, Encoding::Binary(order)))
+}
+
+/// Values in text: by columns, or by words where the columns are not the standard's.
+pub(super) fn read_text(lines: Lines<'_>, shape: &Shape) -> Result<(Abscissa, Values, Encoding), Wrong> {
+    let start = lines.offset();
+    let wanted = shape.points.checked_mul(shape.numbers());
+    let numbers = match by_columns(lines.clone(), shape) {
+        Some(numbers) if Some(numbers.len()) == wanted => numbers,
+        _ => by_words(lines)?,
+    };
+    if Some(numbers.len()) != wanted {
+        let reason = format!(
+            "{} values of {} numbers each are announced and {} numbers are there",
+            shape.points,
+            shape.numbers(),
+            numbers.len()
+        );
+        return Err(Wrong { offset: start, reason });
+    }
+    let (place, all) = (usize::from(!shape.even), numbers.chunks_exact(shape.numbers()));
+    let places = if shape.even { Vec::new() } else { all.clone().map(|v| v[0]).collect() };
+    let values = match (shape.complex, shape.even) {
+        (true, _) => Values::Complex(all.map(|v| Complex::new(v[place], v[place + 1])).collect()),
+        (false, true) => Values::Real(numbers),
+        (false, false) => Values::Real(all.map(|v| v[place]).collect()),
+    };
+    Ok((abscissa(shape, places), values, Encoding::Ascii))
+}
+
+fn abscissa(shape: &Shape, places: Vec<f64>) -> Abscissa {
+    if shape.even {
+        Abscissa::Even { start: shape.start, step: shape.step }
+    } else {
+        Abscissa::Uneven(places)
+    }
+}
+
+/// Column widths of a line, repeated: places beside double values are narrower.
+fn column_widths(complex: bool, precision: Precision, even: bool) -> &'static [usize] {
+    match (precision, even, complex) {
+        (Precision::Single, ..) => &[13; 6],
+        (Precision::Double, true, _) => &[20; 4],
+        (Precision::Double, false, false) => &[13, 20, 13, 20],
+        (Precision::Double, false, true) => &[13, 20, 20],
+    }
+}
+
+fn by_columns(lines: Lines<'_>, shape: &Shape) -> Option<Vec<f64>> {
+    let widths = column_widths(shape.complex, shape.precision, shape.even);
+    // a number takes 13 bytes or more
+    let mut numbers = Vec::with_capacity(lines.rest().len() / 13 + 1);
+    for (_, line) in lines {
+        let mut rest = line;
+        for width in widths {
+            if rest.trim_ascii_start().is_empty() {
+                rest = &[];
+                break;
+            }
+            let (field, after) = rest.split_at_checked(*width).unwrap_or((rest, &[]));
+            // a column that begins with a digit may have begun one column earlier
+            if field[0].is_ascii_digit() {
+                return None;
+            }
+            numbers.push(number::parse(field.trim_ascii())?);
+            rest = after;
+        }
+        if !rest.trim_ascii().is_empty() {
+            return None;
+        }
+    }
+    Some(numbers)
+}
+
+fn by_words(lines: Lines<'_>) -> Result<Vec<f64>, Wrong> {
+    let mut words = Words::new(lines);
+    let mut numbers = Vec::new();
+    while !words.is_empty() {
+        numbers.push(words.real("a value")?);
+    }
+    Ok(numbers)
+}
+
+/// Bytes of a function's binary data as written here.
+pub(super) fn byte_count(f: &Function) -> usize {
+    let width = if f.precision == Precision::Single { 4 } else { 8 };
+    let parts = 1 + usize::from(matches!(f.values, Values::Complex(_)));
+    f.values.len() * width * (parts + usize::from(matches!(f.abscissa, Abscissa::Uneven(_))))
+}
+
+/// Writes the values as the function's encoding says.
+pub(super) fn write(f: &Function, out: &mut Output) {
+    match f.encoding {
+        Encoding::Ascii => write_text(f, out),
+        Encoding::Binary(order) => write_binary(f, order, &mut out.bytes),
+    }
+}
+
+/// All numbers of a function in the order of the file.
+fn for_each_number(f: &Function, mut take: impl FnMut(f64)) {
+    for i in 0..f.values.len() {
+        if let Abscissa::Uneven(places) = &f.abscissa {
+            take(places[i]);
+        }
+        match &f.values {
+            Values::Real(values) => take(values[i]),
+            Values::Complex(values) => {
+                take(values[i].re);
+                take(values[i].im);
+            }
+        }
+    }
+}
+
+fn write_text(f: &Function, out: &mut Output) {
+    let (complex, even) =
+        (matches!(f.values, Values::Complex(_)), matches!(f.abscissa, Abscissa::Even { .. }));
+    let widths = column_widths(complex, f.precision, even);
+    out.bytes.reserve(f.values.len() * (widths.iter().sum::<usize>() + 1));
+    let mut column = 0;
+    for_each_number(f, |value| {
+        let width = widths[column];
+        number::print(&mut out.bytes, value, width, if width == 13 { 5 } else { 12 });
+        column += 1;
+        if column == widths.len() {
+            out.bytes.push(b'\n');
+            column = 0;
+        }
+    });
+    if column > 0 {
+        out.bytes.push(b'\n');
+    }
+}
+
+fn write_binary(f: &Function, order: ByteOrder, out: &mut Vec<u8>) {
+    out.reserve(byte_count(f));
+    for_each_number(f, |value| match (f.precision, order) {
+        (Precision::Single, ByteOrder::Little) => out.extend_from_slice(&(value as f32).to_le_bytes()),
+        (Precision::Single, ByteOrder::Big) => out.extend_from_slice(&(value as f32).to_be_bytes()),
+        (Precision::Double, ByteOrder::Little) => out.extend_from_slice(&value.to_le_bytes()),
+        (Precision::Double, ByteOrder::Big) => out.extend_from_slice(&value.to_be_bytes()),
+    });
+}

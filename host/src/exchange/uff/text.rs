@@ -1,0 +1,264 @@
+//! Lines, columns and words of a universal file, and the same on the way out.
+
+use super::number;
+use std::borrow::Cow;
+
+/// What is wrong at which byte of the file.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Wrong {
+    pub offset: usize,
+    pub reason: String,
+}
+
+/// Lines with the byte offset of each; ended by LF, CR LF or CR.
+#[derive(Clone)]
+pub(super) struct Lines<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    base: usize,
+    ended: bool,
+}
+
+impl<'a> Lines<'a> {
+    /// The lines of `bytes`, which begin at `base` of the file.
+    pub fn new(bytes: &'a [u8], base: usize) -> Self {
+        Lines { bytes, at: 0, base, ended: true }
+    }
+
+    /// Offset in the file of what has not been read.
+    pub fn offset(&self) -> usize {
+        self.base + self.at
+    }
+
+    /// Whether the line read last had an end; the last one of a file may have none.
+    pub fn ended(&self) -> bool {
+        self.ended
+    }
+
+    /// What has not been read.
+    pub fn rest(&self) -> &'a [u8] {
+        &self.bytes[self.at..]
+    }
+
+    /// Goes on at this offset of the file.
+    pub fn jump(&mut self, offset: usize) {
+        self.at = offset.saturating_sub(self.base).min(self.bytes.len());
+    }
+
+    /// The next line, unless it is one that `stop` names: then nothing is read.
+    pub fn next_unless(&mut self, stop: impl Fn(&[u8]) -> bool) -> Option<(usize, &'a [u8])> {
+        let mut ahead = self.clone();
+        let line = ahead.next().filter(|(_, line)| !stop(line))?;
+        self.at = ahead.at;
+        Some(line)
+    }
+
+    /// The next line as text, or what is missing.
+    pub fn text(&mut self, what: &str) -> Result<Record<'a>, Wrong> {
+        let offset = self.offset();
+        let (offset, line) =
+            self.next().ok_or_else(|| Wrong { offset, reason: format!("the line of {what} is missing") })?;
+        Ok(Record { offset, text: decode(line) })
+    }
+}
+
+impl<'a> Iterator for Lines<'a> {
+    type Item = (usize, &'a [u8]);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let rest = self.rest();
+        if rest.is_empty() {
+            return None;
+        }
+        let offset = self.offset();
+        let end = memchr::memchr2(b'\n', b'\r', rest).unwrap_or(rest.len());
+        let width = match rest.get(end..) {
+            Some([b'\r', b'\n', ..]) => 2,
+            Some([_, ..]) => 1,
+            _ => 0,
+        };
+        self.at += end + width;
+        self.ended = width > 0;
+        Some((offset, &rest[..end]))
+    }
+}
+
+/// UTF-8 where it is valid, else Latin-1.
+fn decode(line: &[u8]) -> Cow<'_, str> {
+    std::str::from_utf8(line)
+        .map_or_else(|_| Cow::Owned(line.iter().map(|b| char::from(*b)).collect()), Cow::Borrowed)
+}
+
+/// One line as text, cut by columns.
+pub(super) struct Record<'a> {
+    pub offset: usize,
+    text: Cow<'a, str>,
+}
+
+impl Record<'_> {
+    /// The whole line without blanks around it; `NONE` means nothing.
+    pub fn label(&self) -> String {
+        unless_none(self.text.trim())
+    }
+
+    /// The fields of these widths (in characters), without blanks around them; missing ones are empty.
+    pub fn columns<const N: usize>(&self, widths: [usize; N]) -> [String; N] {
+        let mut chars = self.text.chars();
+        widths.map(|width| chars.by_ref().take(width).collect::<String>().trim().to_string())
+    }
+
+    /// The words.
+    pub fn words(&self) -> Vec<&str> {
+        self.text.split_whitespace().collect()
+    }
+
+    /// An error of this line.
+    pub fn wrong(&self, reason: impl Into<String>) -> Wrong {
+        Wrong { offset: self.offset, reason: reason.into() }
+    }
+}
+
+/// A label with `NONE` read as nothing.
+pub(super) fn unless_none(label: &str) -> String {
+    if label == "NONE" { String::new() } else { label.to_string() }
+}
+
+/// A whole number; an empty field is 0, as in Fortran, and `3.` is 3.
+pub(super) fn integer(field: &str) -> Option<i64> {
+    if field.is_empty() {
+        return Some(0);
+    }
+    field.parse().ok().or_else(|| {
+        let value = number::parse(field.as_bytes())?;
+        (value.fract() == 0.0 && value.abs() < 1e15).then_some(value as i64)
+    })
+}
+
+/// A real number; an empty field is 0.
+pub(super) fn real(field: &str) -> Option<f64> {
+    if field.is_empty() { Some(0.0) } else { number::parse(field.as_bytes()) }
+}
+
+/// Words of many lines in a row, each with its offset: for data sets that are nothing but numbers.
+pub(super) struct Words<'a> {
+    lines: Lines<'a>,
+    line: &'a [u8],
+    at: usize,
+}
+
+impl<'a> Words<'a> {
+    pub fn new(lines: Lines<'a>) -> Self {
+        let at = lines.offset();
+        Words { lines, line: &[], at }
+    }
+
+    /// The next word and its offset.
+    pub fn next_word(&mut self) -> Option<(usize, &'a [u8])> {
+        loop {
+            let blanks = self.line.iter().take_while(|b| b.is_ascii_whitespace()).count();
+            let (line, at) = (&self.line[blanks..], self.at + blanks);
+            if line.is_empty() {
+                (self.at, self.line) = self.lines.next()?;
+                continue;
+            }
+            let length = line.iter().position(u8::is_ascii_whitespace).unwrap_or(line.len());
+            (self.line, self.at) = (&line[length..], at + length);
+            return Some((at, &line[..length]));
+        }
+    }
+
+    /// The next number.
+    pub fn real(&mut self, what: &str) -> Result<f64, Wrong> {
+        let Some((offset, word)) = self.next_word() else {
+            let offset = self.lines.offset();
+            return Err(Wrong { offset, reason: format!("{what} is missing") });
+        };
+        number::parse(word).ok_or_else(|| Wrong {
+            offset,
+            reason: format!("`{}` is no number, {what} is expected", String::from_utf8_lossy(word)),
+        })
+    }
+
+    /// The next whole number.
+    pub fn integer(&mut self, what: &str) -> Result<i64, Wrong> {
+        let offset = self.at;
+        let value = self.real(what)?;
+        if value.fract() == 0.0 && value.abs() < 1e15 {
+            Ok(value as i64)
+        } else {
+            Err(Wrong { offset, reason: format!("{what} is {value}, a whole number is expected") })
+        }
+    }
+
+    /// Whether nothing but blanks is left.
+    pub fn is_empty(&mut self) -> bool {
+        let (lines, line, at) = (self.lines.clone(), self.line, self.at);
+        let empty = self.next_word().is_none();
+        (self.lines, self.line, self.at) = (lines, line, at);
+        empty
+    }
+}
+
+/// Lines on their way out.
+#[derive(Default)]
+pub(super) struct Output {
+    pub bytes: Vec<u8>,
+}
+
+impl Output {
+    pub fn into_bytes(self) -> Vec<u8> {
+        self.bytes
+    }
+
+    /// Opens a data set; `after` follows the number.
+    pub fn open(&mut self, number: u32, after: &str) {
+        self.line(&format!("{:>6}", -1));
+        self.line(&format!("{number:>6}{after}"));
+    }
+
+    pub fn close(&mut self) {
+        self.line(&format!("{:>6}", -1));
+    }
+
+    pub fn line(&mut self, text: &str) {
+        self.bytes.extend_from_slice(text.as_bytes());
+        self.bytes.push(b'\n');
+    }
+
+    /// A line of text, `NONE` for nothing.
+    pub fn label(&mut self, what: &str, text: &str) -> Result<(), String> {
+        let line = label(what, text, 80)?;
+        if super::blocks::is_delimiter(line.as_bytes()) {
+            return Err(format!("{what} is `{text}`, which would end the data set: say it in words"));
+        }
+        self.line(&line);
+        Ok(())
+    }
+}
+
+/// A text that fits `width` characters, `NONE` for nothing, padded with blanks.
+pub(super) fn label(what: &str, text: &str, width: usize) -> Result<String, String> {
+    let text = if text.is_empty() { "NONE" } else { text };
+    if text.chars().count() > width {
+        return Err(format!("{what} `{text}` is longer than {width} characters: shorten it"));
+    }
+    if text.chars().any(char::is_control) {
+        return Err(format!("{what} {text:?} has a control character: take it out"));
+    }
+    Ok(format!("{text:<width$}"))
+}
+
+/// Whole numbers right-justified in columns of one width.
+pub(super) fn integers(what: &str, values: &[i64], width: usize) -> Result<String, String> {
+    let mut line = String::new();
+    for value in values {
+        let text = value.to_string();
+        // a full column would run into its neighbour
+        if text.len() >= width {
+            return Err(format!("{what} is {value}: at most {} characters are possible", width - 1));
+        }
+        line.extend(std::iter::repeat_n(' ', width - text.len()));
+        line.push_str(&text);
+    }
+    Ok(line)
+}

@@ -1,0 +1,143 @@
+//! A campaign's FRFs and records as universal files: header, units, nodes and functions.
+
+use super::frf_uff::{FrfUffError, to_functions, write_uff};
+use super::uff::{
+    Abscissa, Axis, ByteOrder, DataSet, Dof, Encoding, Function, Header, Node, Precision, Units, Values,
+    count, kind, quantity,
+};
+use crate::spectra::{ImpactRecords, MotionQuantity};
+use crate::substructuring::frf::FrfMatrix;
+use crate::substructuring::geometry::{Configuration, Point};
+use std::path::Path;
+
+/// Small, exact, and read by everybody.
+const ENCODING: Encoding = Encoding::Binary(ByteOrder::Little);
+
+/// Writes a configuration: its FRFs (those with values), their coherences (line, output, input) where there are some, and its points as nodes:
+/// sensors from 1, impacts from 101.
+///
+/// # Errors
+/// What does not fit the format, or the disk's.
+pub fn write_frf(
+    path: &Path,
+    frf: &FrfMatrix,
+    coherence: &[f64],
+    points: &Configuration,
+) -> Result<(), FrfUffError> {
+    let directions: Vec<i64> = frf
+        .inputs
+        .iter()
+        .map(|name| points.impacts.iter().find(|p| p.name == *name).map_or(0, direction))
+        .collect();
+    let functions = to_functions(frf, &directions, ENCODING)
+        .map_err(|reason| FrfUffError::Content { path: path.into(), reason })?;
+    let mut sets = start();
+    sets.push(DataSet::NodesDouble(nodes(points)));
+    let inputs = frf.inputs.len();
+    for (pair, function) in functions.into_iter().enumerate() {
+        let (input, output) = (pair / frf.outputs.len(), pair % frf.outputs.len());
+        let DataSet::Function(function) = function else { continue };
+        let Values::Complex(values) = &function.values else { continue };
+        // a pair that was not measured is left out: readers take a gap for what it is
+        if values.iter().any(|v| !v.re.is_finite() || !v.im.is_finite()) {
+            continue;
+        }
+        let of_pair: Vec<f64> = (0..frf.lines.len())
+            .filter_map(|line| coherence.get((line * frf.outputs.len() + output) * inputs + input).copied())
+            .collect();
+        if of_pair.len() == frf.lines.len() && of_pair.iter().all(|v| v.is_finite()) {
+            sets.push(DataSet::Function(Box::new(Function {
+                kind: kind::COHERENCE,
+                values: Values::Real(of_pair),
+                axes: [function.axes[0].clone(), Axis::default(), Axis::default(), Axis::default()],
+                ..(*function).clone()
+            })));
+        }
+        sets.push(DataSet::Function(function));
+    }
+    write_uff(path, &sets)
+}
+
+/// Writes the hits of a cell as time responses: force, then the responses (along x, y, z where there are three), hit after hit; the
+/// version is the hit's number.
+///
+/// # Errors
+/// What does not fit the format, or the disk's.
+pub fn write_records(
+    path: &Path,
+    records: &ImpactRecords,
+    response: &str,
+    impact: &str,
+) -> Result<(), FrfUffError> {
+    let (motion, unit) = match records.quantity {
+        MotionQuantity::Displacement => (quantity::DISPLACEMENT, "m"),
+        MotionQuantity::Velocity => (quantity::VELOCITY, "m/s"),
+        MotionQuantity::Acceleration => (quantity::ACCELERATION, "m/s^2"),
+    };
+    let mut sets = start();
+    for (hit, (force_n, responses)) in records.force_n.iter().zip(&records.response).enumerate() {
+        let function = |dof: Dof, values: &[f64], quantity: i64, unit: &str| {
+            let axis = |quantity, unit: &str| Axis { quantity, unit: unit.into(), ..Axis::default() };
+            let places: Vec<f64> = (0..values.len()).map(|i| i as f64 / records.fs_hz).collect();
+            DataSet::Function(Box::new(Function {
+                id: [format!("hit {hit}"), String::new(), String::new(), String::new(), String::new()],
+                kind: kind::TIME,
+                number: 0,
+                version: count(hit) + 1,
+                load_case: 0,
+                response: dof,
+                reference: Dof { entity: impact.into(), node: 101, direction: 0 },
+                precision: Precision::Double,
+                abscissa: Abscissa::of(&places),
+                values: Values::Real(values.to_vec()),
+                z: 0.0,
+                axes: [axis(quantity::TIME, "s"), axis(quantity, unit), Axis::default(), Axis::default()],
+                encoding: ENCODING,
+            }))
+        };
+        let at_impact = Dof { entity: impact.into(), node: 101, direction: 0 };
+        sets.push(function(at_impact, force_n, quantity::FORCE, "N"));
+        let three = responses.len() == 3;
+        for (i, x) in responses.iter().enumerate() {
+            let direction = if three { count(i) + 1 } else { 0 };
+            sets.push(function(Dof { entity: response.into(), node: 1, direction }, x, motion, unit));
+        }
+    }
+    write_uff(path, &sets)
+}
+
+fn start() -> Vec<DataSet> {
+    let header = Header { program: "jointrig".into(), ..Header::default() };
+    vec![DataSet::Header(header), DataSet::Units(Units::si())]
+}
+
+fn nodes(points: &Configuration) -> Vec<Node> {
+    let mut sensors: Vec<&Point> = Vec::new();
+    for channel in &points.channels {
+        if !sensors.iter().any(|p| p.name == channel.name) {
+            sensors.push(channel);
+        }
+    }
+    let numbered = |points: Vec<&Point>, from: i64| {
+        points
+            .into_iter()
+            .zip(from..)
+            .map(|(point, label)| Node {
+                label,
+                definition_system: 0,
+                displacement_system: 0,
+                color: 1,
+                position: point.position_m,
+            })
+            .collect::<Vec<_>>()
+    };
+    [numbered(sensors, 1), numbered(points.impacts.iter().collect(), 101)].concat()
+}
+
+/// ±1, 2, 3 where the direction is an axis's, 0 where it is oblique.
+fn direction(point: &Point) -> i64 {
+    (0..3).find(|axis| point.direction[*axis].abs() == 1.0).map_or(0, |axis| {
+        let number = count(axis) + 1;
+        if point.direction[axis] < 0.0 { -number } else { number }
+    })
+}
