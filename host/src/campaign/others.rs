@@ -68,9 +68,11 @@ impl Others {
         let origin_s = pulse.start as f64 / fs_hz;
         let average =
             self.average.get_or_insert_with(|| SpectraAverage::new(fs_hz, force_n.len(), responses.len()));
-        let added = average.add(
-            window.force(&force_n, fs_hz, origin_s),
-            responses.iter().map(|place| window.response(&si(*place), fs_hz, origin_s)).collect(),
+        let decay = window.decay(fs_hz, force_n.len());
+        let responses = responses.map(si);
+        let added = average.add_with(
+            |out| window.force_into(&force_n, &decay, origin_s, out),
+            |axis, out| window.response_into(&responses[axis], &decay, origin_s, out),
         );
         if let Err(error) = added {
             log::warn!("a good record does not enter the cell's FRFs: {error}");

@@ -10,7 +10,8 @@ use super::error::CliError;
 use super::output;
 use crate::campaign::judge::{ByRecord, Judge};
 use crate::campaign::plan::{Cell, configuration_name};
-use crate::campaign::rows::{NewRecord, SessionInfo};
+use crate::campaign::others::Others;
+use crate::campaign::rows::{Counters, NewRecord, Samples, SessionInfo};
 use crate::campaign::store::{Store, utc_now};
 use crate::device::channels::ChannelMap;
 use crate::device::recording::Recording;
@@ -97,20 +98,26 @@ impl Import {
             })
             .collect::<Result<_, CliError>>()?;
         let session = store.begin_session(&self.session(), &map)?;
-        let mut kept = 0;
+        let (mut kept, mut others) = (0, Others::default());
         let hits = recordings.len();
         for (hit, recording) in recordings.into_iter().enumerate() {
-            let judgement = ByRecord.judge(&row.1, &plan, &map, &recording);
+            let judgement = ByRecord.judge(&row.1, &plan, &map, &recording, &others);
+            if judgement.kind == crate::campaign::judge::Kind::Good {
+                others.learn(&plan, &map, &Samples::of(&recording));
+            }
             kept += usize::from(judgement.kind == crate::campaign::judge::Kind::Good);
             eprintln!("hit {hit}: {} ({})", judgement.kind, judgement.sentence);
-            store.insert(&NewRecord {
+            let record = NewRecord {
                 cell: row.0,
                 attempt: attempt + hit as u32,
                 session,
                 utc: utc_now(),
+                // when it was measured is not known here
+                utc_error_s: None,
                 recording,
                 judgement,
-            })?;
+            };
+            store.insert(&record, &Counters::default())?;
         }
         let rounding: Vec<String> = map
             .channels

@@ -23,7 +23,6 @@ pub struct Device<'a> {
 }
 
 /// Runs what is left of the campaign in `store`. `again` is the command that resumes it.
-#[expect(clippy::too_many_arguments, reason = "each is one option of a command line")]
 pub fn measure(
     store: Store,
     device: Device<'_>,
