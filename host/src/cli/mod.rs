@@ -9,6 +9,7 @@ mod completions;
 mod demo;
 mod devices;
 mod error;
+mod identify;
 mod info;
 mod interrupt;
 mod measure;
@@ -41,6 +42,8 @@ enum Command {
     Campaign(campaign::Campaign),
     /// Analyse a campaign file: results.json and report.html.
     Analyse(analyse::Analyse),
+    /// Identify a joint from FRFs measured anywhere.
+    Identify(identify::Identify),
     /// Print completions for a shell.
     Completions(completions::Completions),
 }
@@ -56,6 +59,7 @@ pub fn main() -> ExitCode {
         Command::Info(command) => command.run(),
         Command::Campaign(command) => command.run(),
         Command::Analyse(command) => command.run(),
+        Command::Identify(command) => command.run(),
         Command::Completions(command) => {
             command.run();
             Ok(())
@@ -108,6 +112,7 @@ mod tests {
             "campaign status p.jrig --json",
             "campaign verify p.jrig",
             "analyse p.jrig --out d --json",
+            "identify --a A.npz --b B.npz --ajb AJB.npz --geometry p.xlsx --method internal,inverse --idms 4,6 --band 300:600 --json",
             "completions bash",
         ] {
             let words = std::iter::once("jointrig").chain(line.split(' '));
@@ -119,6 +124,8 @@ mod tests {
             "campaign new p.jrig --paper --plan x.toml",
             "campaign run p.jrig --stage robot",
             "info",
+            "identify --a A.npz --b B.npz --ajb AJB.npz",
+            "identify --a A.npz --b B.npz --ajb AJB.npz --geometry p.xlsx --method none",
         ] {
             let words = std::iter::once("jointrig").chain(line.split(' ').filter(|word| !word.is_empty()));
             assert!(Cli::try_parse_from(words).is_err(), "{line}");

@@ -12,7 +12,10 @@
 //! All FRFs of a campaign must share one exponential window: every method is algebraic in s, so it is exact on
 //! s = σ + iω, but only if A, B and AJB are on the same s. Degrees of freedom are ordered x, y, z, rx, ry, rz.
 
+pub mod averaged;
+pub mod cmif;
 pub mod consistency;
+pub mod coupling;
 pub mod decoupling;
 pub mod frf;
 pub mod geometry;
@@ -21,6 +24,7 @@ pub mod idm;
 mod interface_data;
 pub mod joint;
 pub mod method;
+pub mod noise;
 pub mod pseudo_inverse;
 mod reduced;
 pub mod vpt;
