@@ -10,6 +10,7 @@ use super::identify::VirtualPointQuality;
 use super::idm::IdmSet;
 use super::interface_data::{Found, InterfaceError, Measured, VirtualPoint, balance, scaled};
 use super::method::Method;
+use super::plausibility::{passivity, reciprocity};
 use super::vpt::{reduce_inputs, reduce_outputs};
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
@@ -79,9 +80,10 @@ impl Reduced {
     }
 
     pub(super) fn quality(&self, rooms: &Rooms<'_>) -> Vec<VirtualPointQuality> {
-        [("A", rooms.a, &self.vp_a), ("B", rooms.b, &self.vp_b)]
+        [("A", rooms.a, &self.vp_a, &self.y_a), ("B", rooms.b, &self.vp_b, &self.y_b)]
             .into_iter()
-            .filter_map(|(substructure, file, vp)| {
+            .filter_map(|(substructure, file, vp, y)| {
+                let s: Vec<Complex<f64>> = (0..y.len()).map(|l| file.frf.s(l)).collect();
                 let lines = file.block(&vp.rows, &vp.columns).ok()?;
                 Some(VirtualPointQuality {
                     substructure,
@@ -92,6 +94,8 @@ impl Reduced {
                     impacts: vp.columns.names.clone(),
                     frequency_hz: file.frf.frequency_hz.clone(),
                     consistency: consistency(&lines, &vp.responses, &vp.impacts),
+                    passivity: passivity(y, &s),
+                    reciprocity: reciprocity(y),
                 })
             })
             .collect()

@@ -90,6 +90,11 @@ fn check_case(name: &str) {
             let impact = quality.consistency.overall_impact[l] - number(&wanted["overall_impact"], line);
             assert!(sensor.abs() < 1e-9 && impact.abs() < 1e-9);
         }
+        // the rig is a passive, reciprocal structure; with fewer modes than it moves in, neither is seen exactly
+        if quality.idms == 6 {
+            assert!(quality.passivity.iter().all(|p| *p == 1.0), "{:?}", quality.passivity);
+            assert!(quality.reciprocity > 1.0 - 1e-9, "{}", quality.reciprocity);
+        }
         assert!(quality.condition_responses < 50.0 && quality.condition_impacts < 50.0);
     }
 }
