@@ -13,7 +13,7 @@ use jointrig::substructuring::geometry::Grouping;
 use jointrig::substructuring::{Band, Dof, IdmSet, Method, identify};
 use jointrig_hil_sim::rig::Configuration;
 use rayon::prelude::*;
-use simulated::{campaign, geometry, measure, rigid_rig};
+use simulated::{campaign, geometry, measure, measure_with_hits, rigid_rig};
 
 const CAMPAIGNS: u64 = 20;
 const BAND: Band = Band { low_hz: 300.0, high_hz: 600.0 };
@@ -131,7 +131,8 @@ fn the_interval_covers_the_contact_of_a_loud_campaign() {
 fn the_bootstrap_agrees_with_the_propagated_noise() {
     let (config, geometry) = (rigid_rig(180e6), geometry());
     let band = Band { low_hz: 400.0, high_hz: 460.0 };
-    let ajb = measure(&config, Configuration::Ajb, &geometry.ajb, LOUD, 1, [band.low_hz, band.high_hz]);
+    let ajb =
+        measure_with_hits(&config, Configuration::Ajb, &geometry.ajb, LOUD, 1, [band.low_hz, band.high_hz]);
     let priors = Priors::default();
     let prepared =
         Prepared::of(&ajb.frf, Some(&ajb.noise), &geometry, IdmSet::Six, band, &priors).expect("data");

@@ -30,7 +30,7 @@ const WIDTH_S: f64 = 0.41e-3;
 pub struct Measurement {
     pub frf: FrfMatrix,
     pub noise: FrfNoise,
-    /// The hits of every sensor and impact, for the bootstrap.
+    /// The hits of every sensor and impact, where they were kept.
     pub hits: Vec<CellHits>,
 }
 
@@ -66,7 +66,7 @@ pub fn campaign(config: &RigConfig, floor: f64, seed: u64, band_hz: [f64; 2]) ->
     }
 }
 
-/// One configuration of it.
+/// One configuration of it, averaged; the hits are forgotten.
 pub fn measure(
     config: &RigConfig,
     configuration: Configuration,
@@ -74,6 +74,30 @@ pub fn measure(
     floor: f64,
     seed: u64,
     band_hz: [f64; 2],
+) -> Measurement {
+    simulate(config, configuration, points, floor, seed, band_hz, false)
+}
+
+/// The same with every hit's spectra, for the bootstrap: hundreds of megabytes for a wide band.
+pub fn measure_with_hits(
+    config: &RigConfig,
+    configuration: Configuration,
+    points: &Points,
+    floor: f64,
+    seed: u64,
+    band_hz: [f64; 2],
+) -> Measurement {
+    simulate(config, configuration, points, floor, seed, band_hz, true)
+}
+
+fn simulate(
+    config: &RigConfig,
+    configuration: Configuration,
+    points: &Points,
+    floor: f64,
+    seed: u64,
+    band_hz: [f64; 2],
+    keep_hits: bool,
 ) -> Measurement {
     let structure = Structure::new(config, configuration);
     let first = (band_hz[0] * RECORD_S).ceil() as usize;
@@ -129,7 +153,7 @@ pub fn measure(
         let mut cell: Option<CellHits> = None;
         for o in 0..rows {
             let (mut sum, mut square) = (vec![Complex::default(); lines.len()], vec![0.0; lines.len()]);
-            let mut cross = vec![Vec::with_capacity(HITS); lines.len()];
+            let mut cross = vec![Vec::new(); lines.len()];
             for _ in 0..HITS {
                 let mut signal: Vec<f64> = (0..samples)
                     .map(|t| {
@@ -142,7 +166,9 @@ pub fn measure(
                     let n = spectrum[first + l] / (RATE_HZ * force);
                     sum[l] += n;
                     square[l] += n.norm_sqr();
-                    cross[l].push((lines[l][(o, i)] + n) * force * force);
+                    if keep_hits {
+                        cross[l].push((lines[l][(o, i)] + n) * force * force);
+                    }
                 }
             }
             for l in 0..lines.len() {
@@ -151,6 +177,9 @@ pub fn measure(
                 // of a part of the mean: half the complex sample variance, over the hits
                 variance[l][(o, i)] =
                     (square[l] - HITS as f64 * mean.norm_sqr()) / (HITS - 1) as f64 / HITS as f64 / 2.0;
+            }
+            if !keep_hits {
+                continue;
             }
             // the three axes of a sensor stand together in the workbook
             let channel = &points.channels[o];
