@@ -1,6 +1,5 @@
 //! `jointrig identify` as a script sees it: documents, exit codes, and the reason of every refusal.
 
-use jointrig::exchange::npz::Array;
 use jointrig::exchange::{read_frf, write_frf};
 use jointrig::substructuring::FrfMatrix;
 use serde_json::Value;
@@ -92,31 +91,6 @@ fn every_method_finds_the_contact_of_a_rigid_clamp() {
     let best = &found["recommended"][0];
     assert!((best["joint"]["z"]["stiffness"].as_f64().expect("a number") / 180e6 - 1.0).abs() < 1e-3);
     assert_eq!(best["noise_known"], false);
-}
-
-#[test]
-fn the_fit_needs_the_variance_and_says_so() {
-    let files = Files::of("frf_rigid");
-    files.refused(&["--method", "fit"], &["fit with 6 IDMs", "variance"]);
-    let path = files.folder.path().join("AJB.npz");
-    let frf = read_frf(&path).expect("test data");
-    let values: Vec<f64> = frf
-        .lines
-        .iter()
-        .flat_map(|y| y.transpose().iter().map(|v| 1e-8 * v.norm_sqr()).collect::<Vec<_>>())
-        .collect();
-    let shape = vec![frf.lines.len(), frf.outputs.len(), frf.inputs.len()];
-    let variance = jointrig::exchange::Extra::Real("variance".into(), Array { shape, values });
-    write_frf(&path, &frf, &[variance]).expect("written");
-    let out = files.identify(&["--method", "fit", "--band", "300:600", "--json"]);
-    assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
-    let found: Value = serde_json::from_slice(&out.stdout).expect("one JSON document");
-    let z = &found["joint"][0]["stiffness_n_per_m"]["z"];
-    let (mean, low, high) = (z["mean"].as_f64(), z["ci95"][0].as_f64(), z["ci95"][1].as_f64());
-    let (mean, low, high) = (mean.expect("k"), low.expect("low"), high.expect("high"));
-    // exact data, and a little bias taken out that they do not have
-    assert!((mean / 180e6 - 1.0).abs() < 1e-3 && low < 180e6 && 180e6 < high, "{z}");
-    assert_eq!(found["recommended"][0]["noise_known"], true);
 }
 
 #[test]

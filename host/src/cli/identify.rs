@@ -10,9 +10,9 @@ use super::error::CliError;
 use super::output;
 use crate::exchange::npz::NpzFile;
 use crate::exchange::{NpzError, PositionsError, read_frf, read_positions};
-use crate::results::campaign::{BANDS_HZ, DIRECT, FIT, shaped};
-use crate::results::{Refusal, Results, Source, words};
-use crate::substructuring::averaged::{Prepared, Priors};
+use crate::results::campaign::{BANDS_HZ, shaped};
+use crate::results::{Results, Source, words};
+use crate::substructuring::averaged::{Priors, averaged};
 use crate::substructuring::noise::FrfNoise;
 use crate::substructuring::{Band, FrfMatrix, Geometry, IdmSet, Method, identify};
 use nalgebra::DMatrix;
@@ -34,9 +34,9 @@ pub struct Identify {
     /// Where sensors and impacts are: the pyFBS workbook (.xlsx), a folder of its tables as .csv, or .toml.
     #[arg(long, value_name = "FILE")]
     geometry: PathBuf,
-    /// Decoupling methods, by name [default: all that work line by line, and `fit` where AJB has its variance].
+    /// Decoupling methods, by name [default: all].
     #[arg(long = "method", value_name = "METHOD", value_delimiter = ',')]
-    methods: Vec<Asked>,
+    methods: Vec<Method>,
     /// Interface deformation modes of each virtual point: 2, 4 or 6 [default: all three].
     #[arg(long, value_name = "N", value_delimiter = ',', value_parser = idm_set)]
     idms: Vec<IdmSet>,
@@ -66,28 +66,18 @@ impl Identify {
         for note in notes {
             eprintln!("jointrig: {note}");
         }
-        let by_line: Vec<Method> = if self.methods.is_empty() {
-            Method::ALL.to_vec()
-        } else {
-            self.methods
-                .iter()
-                .filter_map(|m| if let Asked::ByLine(m) = m { Some(*m) } else { None })
-                .collect()
-        };
-        let fit = self.methods.contains(&Asked::Fit) || (self.methods.is_empty() && noise.is_some());
+        let methods = if self.methods.is_empty() { Method::ALL.to_vec() } else { self.methods.clone() };
         let idms = if self.idms.is_empty() { IdmSet::ALL.to_vec() } else { self.idms.clone() };
         let bands = if self.bands.is_empty() { default_bands(&ajb)? } else { self.bands.clone() };
         let mut results = Results::new(self.source());
-        if !by_line.is_empty() {
-            let found = identify(&a, &b, &ajb, &geometry, &by_line, &idms, &bands).map_err(bad)?;
-            let (joint, spectrum, refused) = shaped(&found);
-            results.joint = joint;
-            results.joint_spectrum = spectrum;
-            results.refused = refused;
-        }
+        let found = identify(&a, &b, &ajb, &geometry, &methods, &idms, &bands).map_err(bad)?;
+        let (joint, spectrum, refused) = shaped(&found);
+        results.joint = joint;
+        results.joint_spectrum = spectrum;
+        results.refused = refused;
         // the estimates with an interval need whole rigid motions
-        if idms.contains(&IdmSet::Six) && (fit || by_line.contains(&Method::Inverse)) {
-            self.with_intervals(&mut results, &ajb, noise.as_ref(), &geometry, &bands, fit);
+        if idms.contains(&IdmSet::Six) && methods.contains(&Method::Inverse) {
+            self.with_intervals(&mut results, &ajb, noise.as_ref(), &geometry, &bands);
         }
         let printed =
             if self.json { output::json(&results) } else { output::lines(words::summary(&results)) };
@@ -98,7 +88,7 @@ impl Identify {
         }
     }
 
-    /// The recommended estimate over each band, and the fit where it was asked for.
+    /// The recommended estimate over each band.
     fn with_intervals(
         &self,
         results: &mut Results,
@@ -106,7 +96,6 @@ impl Identify {
         noise: Option<&FrfNoise>,
         geometry: &Geometry,
         bands: &[Band],
-        fit: bool,
     ) {
         let priors = Priors {
             position_m: self.position_error,
@@ -114,21 +103,9 @@ impl Identify {
             hammer_angle_rad: self.angle_error,
         };
         for band in bands {
-            let prepared = Prepared::of(ajb, noise, geometry, IdmSet::Six, *band, &priors);
-            if let Ok(prepared) = &prepared {
-                results.recommended.push(prepared.estimate());
-            }
-            // without the fit the reason is among the refusals of `inverse` already
-            if !fit {
-                continue;
-            }
-            match prepared.and_then(|prepared| prepared.fit()) {
-                Ok(fitted) => results.joint.push((&fitted).into()),
-                Err(error) => results.refused.push(Refusal {
-                    method: FIT.into(),
-                    idms: IdmSet::Six.count(),
-                    reason: error.to_string(),
-                }),
+            // where it cannot be had, the reason is among the refusals of `inverse` already
+            if let Ok(estimate) = averaged(ajb, noise, geometry, IdmSet::Six, *band, &priors) {
+                results.recommended.push(estimate);
             }
         }
     }
@@ -144,24 +121,6 @@ impl Identify {
             source.settings.insert(name.into(), path.display().to_string().into());
         }
         source
-    }
-}
-
-/// A method by name.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Asked {
-    ByLine(Method),
-    Fit,
-}
-
-impl FromStr for Asked {
-    type Err = String;
-    fn from_str(name: &str) -> Result<Self, String> {
-        match name {
-            FIT => Ok(Asked::Fit),
-            DIRECT => Err("`direct` divides T by Δx of the same hits, which FRF files do not hold: it is part of `jointrig analyse`".into()),
-            _ => name.parse().map(Asked::ByLine).map_err(|e: String| format!("{e}, {FIT}")),
-        }
     }
 }
 

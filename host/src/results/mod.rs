@@ -104,9 +104,7 @@ impl Results {
     pub fn headline_joint(&self) -> Option<&Joint> {
         self.joint
             .iter()
-            .filter(|j| {
-                j.band_hz == MAIN_BAND_HZ && j.method != campaign::FIT && j.sliding_stiffness().is_some()
-            })
+            .filter(|j| j.band_hz == MAIN_BAND_HZ && j.sliding_stiffness().is_some())
             .max_by_key(|j| (j.method == "internal", j.method == "internal-printed", j.idms))
     }
 

@@ -54,7 +54,6 @@ pub fn method(name: &str) -> &str {
         "primal-b" => "Eq. A.2, block of B",
         "inverse" => "Eq. A.1",
         "inverse-ba" => "Eq. A.1, the other block",
-        "fit" => "maximum likelihood",
         "direct" => "T/Δx at the specimens",
         "internal-aa" => "Eq. 1 rearranged for A alone",
         "internal-ab" => "Eq. 1 rearranged for hits on B seen on A",

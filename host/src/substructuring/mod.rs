@@ -8,7 +8,7 @@
 //! 4. [`decoupling`]: one file per method, all returning Z^J per line; [`pseudo_inverse`] inverts without truncating.
 //! 5. [`joint`]: K and C per line and over bands, with scatter, interval and warnings.
 //! 6. [`identify`](mod@identify): the front door that does all of it.
-//! 7. [`averaged`](mod@averaged): the estimate to quote, with its interval; [`averaged::fit()`]; the bootstrap over hits. [`noise`] is what they start from.
+//! 7. [`averaged`](mod@averaged): the estimate to quote, with its interval; the bootstrap over hits. [`noise`] is what they start from.
 //! 8. [`coupling`]: the other way round, from parts to the assembly; [`cmif`](mod@cmif): how many modes the interface needs;
 //!    [`plausibility`]: passivity and reciprocity.
 //!

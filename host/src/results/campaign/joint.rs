@@ -1,7 +1,6 @@
 //! The identified joint in the shape of the results.
 
 use crate::results::{Joint, JointSpectrum, Refusal, SpectrumCurve, rounded};
-use crate::substructuring::averaged::Fitted;
 use crate::substructuring::identify::Identification;
 use crate::substructuring::idm::Dof;
 use crate::substructuring::joint::{BandStatistic, JointRow};
@@ -34,60 +33,6 @@ impl From<&JointRow> for Joint {
         }
     }
 }
-
-impl From<&Fitted> for Joint {
-    /// `mean` and `median` are the fitted value, `std` its standard deviation.
-    fn from(fitted: &Fitted) -> Self {
-        let value =
-            |mean: f64, std: f64, ci95: Option<[f64; 2]>| BandStatistic { mean, std, median: mean, ci95 };
-        let side = |rotations: bool, damping: bool| -> BTreeMap<String, BandStatistic> {
-            fitted
-                .joint
-                .iter()
-                .filter(|(dof, _)| dof.is_rotation() == rotations)
-                .map(|(dof, d)| {
-                    let of = if damping {
-                        let half = 1.96 * d.damping_std;
-                        value(d.damping, d.damping_std, Some([d.damping - half, d.damping + half]))
-                    } else {
-                        value(d.stiffness, d.std, d.identified.then_some(d.ci95))
-                    };
-                    (dof.name().to_owned(), of)
-                })
-                .collect()
-        };
-        let mut warnings = Vec::new();
-        if let Some(z) = fitted.joint.get(&Dof::Z) {
-            if !z.identified {
-                warnings.push(format!(
-                    "not identified: the noise exceeds the joint's admittance; k_z is above {:.4e} N/m",
-                    z.ci95[0]
-                ));
-            }
-            if z.chi_square_per_dof > 2.0 {
-                warnings.push(format!(
-                    "χ² per degree of freedom is {:.1}: a spring and a damper do not explain the data as well as their noise would let them",
-                    z.chi_square_per_dof
-                ));
-            }
-        }
-        Joint {
-            method: FIT.into(),
-            idms: fitted.idms,
-            band_hz: fitted.band_hz.into(),
-            stiffness_n_per_m: side(false, false),
-            damping_n_s_per_m: side(false, true),
-            stiffness_n_m_per_rad: side(true, false),
-            damping_n_m_s_per_rad: side(true, true),
-            coupling_si: BTreeMap::new(),
-            lines: fitted.lines,
-            warnings,
-        }
-    }
-}
-
-/// Name of the parametric method.
-pub const FIT: &str = "fit";
 
 /// Rows, spectra (translations only: they are what the figures show) and refusals.
 pub fn shaped(found: &Identification) -> (Vec<Joint>, Option<JointSpectrum>, Vec<Refusal>) {

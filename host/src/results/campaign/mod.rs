@@ -20,11 +20,11 @@ pub use cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, Measurements}
 pub use checks::{HIDDEN_RESONANCE, SERIES_COMPLIANCE, UNIDENTIFIED};
 pub use contact::DIRECT;
 pub use from_store::{AnalyseError, LINK_NOTE, analyse, geometry};
-pub use joint::{FIT, shaped};
+pub use joint::shaped;
 
-use super::{Completeness, MAIN_BAND_HZ, Refusal, Results, UsableBand, ranges, words};
+use super::{Completeness, MAIN_BAND_HZ, Results, UsableBand, ranges, words};
 use crate::spectra::{Windowing, usable_band};
-use crate::substructuring::averaged::{Prepared, Priors};
+use crate::substructuring::averaged::{Priors, averaged};
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping};
 use crate::substructuring::identify::identify;
@@ -272,18 +272,8 @@ fn recommend(
     results.source.settings.insert("priors".into(), serde_json::json!(priors));
     for [low_hz, high_hz] in BANDS_HZ {
         let band = Band { low_hz, high_hz };
-        match Prepared::of(ajb, Some(&noise), geometry, IdmSet::Six, band, &priors) {
-            Ok(prepared) => {
-                results.recommended.push(prepared.estimate());
-                match prepared.fit() {
-                    Ok(fitted) => results.joint.push((&fitted).into()),
-                    Err(error) => results.refused.push(Refusal {
-                        method: FIT.into(),
-                        idms: IdmSet::Six.count(),
-                        reason: error.to_string(),
-                    }),
-                }
-            }
+        match averaged(ajb, Some(&noise), geometry, IdmSet::Six, band, &priors) {
+            Ok(estimate) => results.recommended.push(estimate),
             Err(error) => {
                 results.missing.push(format!("No estimate with an interval by Eq. A.1: {error}."));
                 return;

@@ -12,11 +12,9 @@
 mod assembly;
 mod bias;
 mod bootstrap;
-mod fit;
 mod sensitivity;
 
 pub use bootstrap::{CellHits, Replicates};
-pub use fit::{Fitted, FittedDof, fit};
 
 use super::frf::FrfMatrix;
 use super::geometry::Geometry;
@@ -73,17 +71,6 @@ pub enum AveragedError {
         frequency_hz: f64,
         /// Why.
         source: RankLost,
-    },
-    /// A cell's variance is not known, and without it there is no likelihood.
-    #[error("AJB came without the variance of every interface cell (a single hit has none): a fit needs it")]
-    NoiseUnknown,
-    /// The fit does not settle.
-    #[error(
-        "the fit did not settle in {steps} steps: the data hold no joint of springs and dampers over this band"
-    )]
-    NoConvergence {
-        /// Steps tried.
-        steps: usize,
     },
     /// Spectra of hits that do not belong to the FRFs.
     #[error("the hits' spectra do not fit the FRFs: {reason}")]
@@ -192,7 +179,7 @@ pub fn averaged(
     Ok(Prepared::of(ajb, noise, geometry, idms, band, priors)?.estimate())
 }
 
-/// The assembly decoupled line by line, and the weights of its lines: what estimate, fit and bootstrap share.
+/// The assembly decoupled line by line, and the weights of its lines: what estimate and bootstrap share.
 pub struct Prepared {
     band_hz: Band,
     priors: Priors,
