@@ -66,7 +66,9 @@ mod tests {
     #[test]
     fn a_sensor_turned_round_is_neither() {
         let (mut lines, s) = structure();
-        lines.iter_mut().for_each(|y| y.row_mut(1).neg_mut());
+        for y in &mut lines {
+            y.row_mut(1).neg_mut();
+        }
         assert_eq!(passivity(&lines, &s), [1.0, 0.0]);
         assert!(reciprocity(&lines) < 1e-12);
     }
