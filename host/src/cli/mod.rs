@@ -11,6 +11,7 @@ mod devices;
 mod error;
 mod export;
 mod frf;
+mod identify;
 mod import;
 mod info;
 mod interrupt;
@@ -50,6 +51,8 @@ enum Command {
     Frf(frf::Frf),
     /// Bring FRFs or impact records from elsewhere into jointrig's own files.
     Import(import::Import),
+    /// Identify a joint from FRFs measured anywhere.
+    Identify(identify::Identify),
     /// Print completions for a shell.
     Completions(completions::Completions),
 }
@@ -68,6 +71,7 @@ pub fn main() -> ExitCode {
         Command::Export(command) => command.run(),
         Command::Frf(command) => command.run(),
         Command::Import(command) => command.run(),
+        Command::Identify(command) => command.run(),
         Command::Completions(command) => {
             command.run();
             Ok(())
@@ -128,6 +132,7 @@ mod tests {
             "campaign backup p.jrig q.jrig",
             "campaign verify p.jrig",
             "analyse p.jrig --out d --json",
+            "identify --a A.npz --b B.npz --ajb AJB.npz --geometry p.xlsx --method internal,inverse --idms 4,6 --band 300:600 --json",
             "completions bash",
             "frf records.npz --json",
             "import A.uff --out A.npz",
@@ -146,6 +151,8 @@ mod tests {
             "campaign drop p.jrig",
             "campaign check p.jrig --mass 1.2",
             "info",
+            "identify --a A.npz --b B.npz --ajb AJB.npz",
+            "identify --a A.npz --b B.npz --ajb AJB.npz --geometry p.xlsx --method none",
         ] {
             let words = std::iter::once("jointrig").chain(line.split(' ').filter(|word| !word.is_empty()));
             assert!(Cli::try_parse_from(words).is_err(), "{line}");

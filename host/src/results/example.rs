@@ -26,6 +26,7 @@ fn joint(method: &str, idms: usize, band_hz: [f64; 2], k: f64, std: f64, warning
         damping_n_s_per_m: translations(statistics(410.0, 90.0)),
         stiffness_n_m_per_rad: BTreeMap::new(),
         damping_n_m_s_per_rad: BTreeMap::new(),
+        coupling_si: BTreeMap::new(),
         lines: ((band_hz[1] - band_hz[0]) / 0.5) as usize + 1,
         warnings: warnings.iter().map(|w| (*w).to_owned()).collect(),
     }

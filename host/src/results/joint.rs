@@ -23,6 +23,9 @@ pub struct Joint {
     /// Damping of the rotations, N m s/rad.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub damping_n_m_s_per_rad: BTreeMap<String, Statistics>,
+    /// Stiffness between two degrees of freedom (`y-z`, `z-rx`, …): N/m, N/rad or N m/rad.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub coupling_si: BTreeMap<String, Statistics>,
     /// Lines of the band that were used.
     pub lines: usize,
     /// What a reader must know before using these numbers.

@@ -17,6 +17,7 @@ mod source;
 pub mod words;
 
 pub use crate::hysteresis::{Kind as Excitation, OverCycles, Shape};
+pub use crate::substructuring::averaged::Averaged;
 pub use crate::substructuring::joint::BandStatistic as Statistics;
 pub use campaign::{AnalyseError, Progress, analyse};
 pub use check::Check;
@@ -44,6 +45,9 @@ pub struct Results {
     pub source: Source,
     /// The joint by substructuring: method × IDM set × band.
     pub joint: Vec<Joint>,
+    /// The estimates to quote, each with its interval, by band; needs six motions of both virtual points in the assembly.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub recommended: Vec<Averaged>,
     /// The same line by line; absent where nothing was identified.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joint_spectrum: Option<JointSpectrum>,
@@ -81,6 +85,7 @@ impl Results {
             version: VERSION,
             source,
             joint: Vec::new(),
+            recommended: Vec::new(),
             joint_spectrum: None,
             hysteresis: Vec::new(),
             checks: Vec::new(),

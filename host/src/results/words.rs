@@ -54,6 +54,10 @@ pub fn method(name: &str) -> &str {
         "primal-b" => "Eq. A.2, block of B",
         "inverse" => "Eq. A.1",
         "inverse-ba" => "Eq. A.1, the other block",
+        "direct" => "T/Δx at the specimens",
+        "internal-aa" => "Eq. 1 rearranged for A alone",
+        "internal-ab" => "Eq. 1 rearranged for hits on B seen on A",
+        "internal-bb" => "Eq. 1 rearranged for B alone",
         other => other,
     }
 }
@@ -109,9 +113,9 @@ fn joint_line(joint: &Joint) -> Option<String> {
         .ci95
         .map_or(String::new(), |[low, high]| format!(", 95 % {}…{}", short(micro(low)), short(micro(high))));
     Some(format!(
-        "  {:<17} {} IDMs  {:>11}  k_z {} (σ over {} lines; median {}{ci95})",
+        "  {:<17} {}  {:>11}  k_z {} (σ over {} lines; median {}{ci95})",
         joint.method,
-        joint.idms,
+        if joint.idms == 0 { "      ".to_owned() } else { format!("{} IDMs", joint.idms) },
         band(joint.band_hz),
         stiffness(k.mean, k.std),
         joint.lines,
@@ -134,6 +138,16 @@ pub fn summary(results: &Results) -> Vec<String> {
             None => "??",
         };
         lines.push(format!("{mark} {}: {}", check.name, check.meaning));
+    }
+    if !results.recommended.is_empty() {
+        lines.push(String::new());
+        lines.push("Recommended (Eq. A.1, averaged as an admittance before it is inverted):".into());
+        lines.extend(
+            results
+                .recommended
+                .iter()
+                .filter_map(|r| Some(format!("  {:>11}  {}", band(r.band_hz.into()), r.statement()?))),
+        );
     }
     let table: Vec<String> = results.joint.iter().filter_map(joint_line).collect();
     if !table.is_empty() {

@@ -106,6 +106,10 @@ pub struct VirtualPointQuality {
     pub frequency_hz: Vec<f64>,
     /// What the virtual point keeps of motion and force.
     pub consistency: Consistency,
+    /// Fraction of lines with a passive driving point, by degree of freedom in the set's order.
+    pub passivity: Vec<f64>,
+    /// Mean coherence of Y_ij with Y_ji at the virtual point.
+    pub reciprocity: f64,
 }
 
 /// All that was identified.

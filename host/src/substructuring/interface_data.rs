@@ -21,6 +21,22 @@ pub enum InterfaceError {
         /// Why.
         source: VptError,
     },
+    /// The geometry's points for it are not in the file at all.
+    #[error(
+        "virtual point of {substructure}: {file} has none of its {kind} ({wanted}); the file has: {available}. Names must agree between geometry and file"
+    )]
+    NoPoints {
+        /// `A` or `B`.
+        substructure: &'static str,
+        /// Which FRF file.
+        file: &'static str,
+        /// `responses` or `impacts`.
+        kind: &'static str,
+        /// Names the geometry gives them.
+        wanted: String,
+        /// Names in the file.
+        available: String,
+    },
     /// The chosen cells hold a NaN.
     #[error("{file}: {source}")]
     Frf {
@@ -98,6 +114,23 @@ impl Measured<'_> {
         let fail = |source| InterfaceError::VirtualPoint { substructure, file: self.file, source };
         let rows = self.outputs(&[grouping]);
         let columns = self.inputs(&[grouping]);
+        let lost = |kind, points: &[Point], names: Vec<String>, available: &[String]| {
+            let wanted: Vec<String> =
+                points.iter().zip(names).filter(|(p, _)| p.grouping == grouping).map(|(_, n)| n).collect();
+            let (wanted, available) = (wanted.join(", "), available.join(", "));
+            InterfaceError::NoPoints { substructure, file: self.file, kind, wanted, available }
+        };
+        if rows.at.is_empty() {
+            return Err(lost(
+                "responses",
+                &self.points.channels,
+                self.points.output_names(),
+                &self.frf.outputs,
+            ));
+        }
+        if columns.at.is_empty() {
+            return Err(lost("impacts", &self.points.impacts, self.points.input_names(), &self.frf.inputs));
+        }
         let responses = vpt::responses(&rows.points, origin, idms, None).map_err(fail)?;
         let impacts = vpt::impacts(&columns.points, origin, idms, None).map_err(fail)?;
         Ok(VirtualPoint { rows, columns, responses, impacts })

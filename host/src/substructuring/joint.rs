@@ -113,6 +113,9 @@ pub struct JointSpectrum {
     pub stiffness_n_per_m: BTreeMap<Dof, Vec<f64>>,
     /// C per degree of freedom and line, N s/m (N m s/rad for rotations).
     pub damping_n_s_per_m: BTreeMap<Dof, Vec<f64>>,
+    /// K between two degrees of freedom (`y-z` and so on, each pair once, the mean of both places) per line: N/m between
+    /// translations, N/rad (N m/m) between a translation and a rotation, N m/rad between rotations.
+    pub coupling_si: BTreeMap<String, Vec<f64>>,
 }
 
 impl JointSpectrum {
@@ -138,12 +141,23 @@ impl JointSpectrum {
             stiffness_n_per_m.insert(dof, k);
             damping_n_s_per_m.insert(dof, c);
         }
+        let mut coupling_si = BTreeMap::new();
+        for (i, one) in idms.dofs().iter().enumerate() {
+            for (j, other) in idms.dofs().iter().enumerate().skip(i + 1) {
+                let k = z.iter().zip(frequency_hz).map(|(z, f)| {
+                    let s = Complex::new(sigma_per_s, std::f64::consts::TAU * f);
+                    stiffness_and_damping(0.5 * (z[(i, j)] + z[(j, i)]), s).0
+                });
+                coupling_si.insert(format!("{one}-{other}"), k.collect());
+            }
+        }
         JointSpectrum {
             method: method.into(),
             idms: idms.count(),
             frequency_hz: frequency_hz.to_vec(),
             stiffness_n_per_m,
             damping_n_s_per_m,
+            coupling_si,
         }
     }
 
@@ -154,27 +168,33 @@ impl JointSpectrum {
         if lines.is_empty() {
             return None;
         }
-        let statistics = |spectra: &BTreeMap<Dof, Vec<f64>>| {
-            spectra
-                .iter()
-                .filter_map(|(&dof, values)| {
-                    let band: Vec<f64> = lines.iter().map(|&l| values[l]).collect();
-                    BandStatistic::of(&band).map(|s| (dof, s))
-                })
-                .collect::<BTreeMap<_, _>>()
-        };
-        let stiffness_n_per_m = statistics(&self.stiffness_n_per_m);
+        let stiffness_n_per_m = statistics(&self.stiffness_n_per_m, &lines);
         let warnings = stiffness_n_per_m.get(&Dof::Z).map(scatter_warnings).unwrap_or_default();
         Some(JointRow {
             method: self.method.clone(),
             idms: self.idms,
             band_hz: band,
             stiffness_n_per_m,
-            damping_n_s_per_m: statistics(&self.damping_n_s_per_m),
+            damping_n_s_per_m: statistics(&self.damping_n_s_per_m, &lines),
+            coupling_si: statistics(&self.coupling_si, &lines),
             lines: lines.len(),
             warnings,
         })
     }
+}
+
+/// Statistics of each spectrum over these lines.
+fn statistics<K: Ord + Clone>(
+    spectra: &BTreeMap<K, Vec<f64>>,
+    lines: &[usize],
+) -> BTreeMap<K, BandStatistic> {
+    spectra
+        .iter()
+        .filter_map(|(key, values)| {
+            let band: Vec<f64> = lines.iter().map(|&l| values[l]).collect();
+            BandStatistic::of(&band).map(|s| (key.clone(), s))
+        })
+        .collect()
 }
 
 /// One row of `joint` in the results: a method, an IDM set, a band.
@@ -190,6 +210,8 @@ pub struct JointRow {
     pub stiffness_n_per_m: BTreeMap<Dof, BandStatistic>,
     /// C of each degree of freedom, N s/m (N m s/rad for rotations).
     pub damping_n_s_per_m: BTreeMap<Dof, BandStatistic>,
+    /// K between each two degrees of freedom, as in [`JointSpectrum::coupling_si`].
+    pub coupling_si: BTreeMap<String, BandStatistic>,
     /// Lines in the band.
     pub lines: usize,
     /// What a reader must know before using the figures.

@@ -21,11 +21,17 @@ pub enum Method {
     Inverse,
     /// Eq. (A.1), block c(B), c(A).
     InverseBa,
+    /// Tol and Özgüven's rearrangement of Eq. (1) for hits and responses on A.
+    InternalAa,
+    /// Theirs for hits on B and responses on A.
+    InternalAb,
+    /// Theirs for hits and responses on B.
+    InternalBb,
 }
 
 impl Method {
-    /// All of them, in the order of the results.
-    pub const ALL: [Method; 7] = [
+    /// Those of the paper, in the order of the results.
+    pub const PAPER: [Method; 7] = [
         Method::Internal,
         Method::InternalPrinted,
         Method::Interface,
@@ -33,6 +39,20 @@ impl Method {
         Method::PrimalB,
         Method::Inverse,
         Method::InverseBa,
+    ];
+
+    /// All of them, in the order of the results.
+    pub const ALL: [Method; 10] = [
+        Method::Internal,
+        Method::InternalPrinted,
+        Method::Interface,
+        Method::PrimalA,
+        Method::PrimalB,
+        Method::Inverse,
+        Method::InverseBa,
+        Method::InternalAa,
+        Method::InternalAb,
+        Method::InternalBb,
     ];
 
     /// The name in command lines and results.
@@ -45,6 +65,9 @@ impl Method {
             Method::PrimalB => "primal-b",
             Method::Inverse => "inverse",
             Method::InverseBa => "inverse-ba",
+            Method::InternalAa => "internal-aa",
+            Method::InternalAb => "internal-ab",
+            Method::InternalBb => "internal-bb",
         }
     }
 }

@@ -8,11 +8,17 @@
 //! 4. [`decoupling`]: one file per method, all returning Z^J per line; [`pseudo_inverse`] inverts without truncating.
 //! 5. [`joint`]: K and C per line and over bands, with scatter, interval and warnings.
 //! 6. [`identify`](mod@identify): the front door that does all of it.
+//! 7. [`averaged`](mod@averaged): the estimate to quote, with its interval; the bootstrap over hits. [`noise`] is what they start from.
+//! 8. [`coupling`]: the other way round, from parts to the assembly; [`cmif`](mod@cmif): how many modes the interface needs;
+//!    [`plausibility`]: passivity and reciprocity.
 //!
 //! All FRFs of a campaign must share one exponential window: every method is algebraic in s, so it is exact on
 //! s = σ + iω, but only if A, B and AJB are on the same s. Degrees of freedom are ordered x, y, z, rx, ry, rz.
 
+pub mod averaged;
+pub mod cmif;
 pub mod consistency;
+pub mod coupling;
 pub mod decoupling;
 pub mod frf;
 pub mod geometry;
@@ -21,6 +27,8 @@ pub mod idm;
 mod interface_data;
 pub mod joint;
 pub mod method;
+pub mod noise;
+pub mod plausibility;
 pub mod pseudo_inverse;
 mod reduced;
 pub mod vpt;

@@ -10,6 +10,7 @@ use super::identify::VirtualPointQuality;
 use super::idm::IdmSet;
 use super::interface_data::{Found, InterfaceError, Measured, VirtualPoint, balance, scaled};
 use super::method::Method;
+use super::plausibility::{passivity, reciprocity};
 use super::vpt::{reduce_inputs, reduce_outputs};
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
@@ -79,9 +80,10 @@ impl Reduced {
     }
 
     pub(super) fn quality(&self, rooms: &Rooms<'_>) -> Vec<VirtualPointQuality> {
-        [("A", rooms.a, &self.vp_a), ("B", rooms.b, &self.vp_b)]
+        [("A", rooms.a, &self.vp_a, &self.y_a), ("B", rooms.b, &self.vp_b, &self.y_b)]
             .into_iter()
-            .filter_map(|(substructure, file, vp)| {
+            .filter_map(|(substructure, file, vp, y)| {
+                let s: Vec<Complex<f64>> = (0..y.len()).map(|l| file.frf.s(l)).collect();
                 let lines = file.block(&vp.rows, &vp.columns).ok()?;
                 Some(VirtualPointQuality {
                     substructure,
@@ -92,6 +94,8 @@ impl Reduced {
                     impacts: vp.columns.names.clone(),
                     frequency_hz: file.frf.frequency_hz.clone(),
                     consistency: consistency(&lines, &vp.responses, &vp.impacts),
+                    passivity: passivity(y, &s),
+                    reciprocity: reciprocity(y),
                 })
             })
             .collect()
@@ -99,15 +103,11 @@ impl Reduced {
 
     pub(super) fn solve(&self, rooms: &Rooms<'_>, method: Method) -> Solved {
         match method {
-            Method::Internal => self.internals(
-                rooms,
-                &[Grouping::InterfaceA, Grouping::InternalA],
-                &[Grouping::InterfaceB, Grouping::InternalB],
-                false,
-            ),
-            Method::InternalPrinted => {
-                self.internals(rooms, &[Grouping::InternalA], &[Grouping::InternalB], true)
-            }
+            Method::Internal => self.internals(rooms, Side::B, Side::A, Internals::All),
+            Method::InternalPrinted => self.internals(rooms, Side::B, Side::A, Internals::Printed),
+            Method::InternalAa => self.internals(rooms, Side::A, Side::A, Internals::All),
+            Method::InternalAb => self.internals(rooms, Side::A, Side::B, Internals::All),
+            Method::InternalBb => self.internals(rooms, Side::B, Side::B, Internals::All),
             Method::Interface => {
                 let y = self.assembly(rooms)?;
                 self.per_line(rooms, |l| interface(&self.y_a[l], &self.y_b[l], &y[l])).map(|z| (z, vec![]))
@@ -149,22 +149,29 @@ impl Reduced {
         Ok(lines)
     }
 
-    /// Both forms of Eq. (3): P, Q from the substructures, M from the assembly, at the internals that both have.
-    fn internals(
-        &self,
-        rooms: &Rooms<'_>,
-        impacts_on_a: &[Grouping],
-        responses_on_b: &[Grouping],
-        printed: bool,
-    ) -> Solved {
+    /// Both forms of Eq. (3) and its sisters: P, Q from the substructures, M from the assembly, at the internals that both have.
+    fn internals(&self, rooms: &Rooms<'_>, seen: Side, hit: Side, which: Internals) -> Solved {
+        let printed = which == Internals::Printed;
         let d = balance(self.idms);
-        let (columns_a, columns_ajb) = shared(&rooms.a.inputs(impacts_on_a), &rooms.ajb.inputs(impacts_on_a));
-        let (rows_b, rows_ajb) = shared(&rooms.b.outputs(responses_on_b), &rooms.ajb.outputs(responses_on_b));
-        let q_raw = rooms.a.block(&self.vp_a.rows, &columns_a)?;
-        let p_raw = rooms.b.block(&rows_b, &self.vp_b.columns)?;
-        let m = rooms.ajb.block(&rows_ajb, &columns_ajb)?;
-        let q = |l: usize| scaled(&reduce_outputs(&self.vp_a.responses.t, &q_raw[l]), Some(&d), None);
-        let p = |l: usize| scaled(&reduce_inputs(&p_raw[l], &self.vp_b.impacts.t), None, Some(&d));
+        let alone = |side| match side {
+            Side::A => (rooms.a, &self.vp_a),
+            Side::B => (rooms.b, &self.vp_b),
+        };
+        let ((seen_file, seen_vp), (hit_file, hit_vp)) = (alone(seen), alone(hit));
+        let (seen_on, hit_on) = (seen.responses(which), hit.impacts(which));
+        let (columns, columns_ajb) = shared(&hit_file.inputs(hit_on), &rooms.ajb.inputs(hit_on));
+        let (rows, rows_ajb) = shared(&seen_file.outputs(seen_on), &rooms.ajb.outputs(seen_on));
+        let q_raw = hit_file.block(&hit_vp.rows, &columns)?;
+        let p_raw = seen_file.block(&rows, &seen_vp.columns)?;
+        let mut m = rooms.ajb.block(&rows_ajb, &columns_ajb)?;
+        if seen == hit {
+            // the substructure alone minus the assembly
+            for (m, own) in m.iter_mut().zip(seen_file.block(&rows, &columns)?) {
+                *m = own - &*m;
+            }
+        }
+        let q = |l: usize| scaled(&reduce_outputs(&hit_vp.responses.t, &q_raw[l]), Some(&d), None);
+        let p = |l: usize| scaled(&reduce_inputs(&p_raw[l], &seen_vp.impacts.t), None, Some(&d));
         let mut notes = Vec::new();
         if printed && !m.is_empty() {
             let (n_b, n_a) = m[0].shape();
@@ -203,6 +210,40 @@ impl Reduced {
                 })
             })
             .collect()
+    }
+}
+
+/// A substructure.
+#[derive(Clone, Copy, PartialEq)]
+enum Side {
+    A,
+    B,
+}
+
+/// Which points count as internal.
+#[derive(Clone, Copy, PartialEq)]
+enum Internals {
+    /// All that was measured on the substructure, its interface points too; A's internal responses are spares and stay out.
+    All,
+    /// Grouping 3 and 4 only, as the paper has them.
+    Printed,
+}
+
+impl Side {
+    fn impacts(self, which: Internals) -> &'static [Grouping] {
+        match (self, which) {
+            (Side::A, Internals::All) => &[Grouping::InterfaceA, Grouping::InternalA],
+            (Side::A, Internals::Printed) => &[Grouping::InternalA],
+            (Side::B, Internals::All) => &[Grouping::InterfaceB, Grouping::InternalB],
+            (Side::B, Internals::Printed) => &[Grouping::InternalB],
+        }
+    }
+
+    fn responses(self, which: Internals) -> &'static [Grouping] {
+        match (self, which) {
+            (Side::A, Internals::All) => &[Grouping::InterfaceA],
+            _ => self.impacts(which),
+        }
     }
 }
 

@@ -6,8 +6,10 @@
 
 use super::averages::CellAverage;
 use crate::spectra::MotionQuantity;
+use crate::spectra::averaged::variance_of_part;
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::{Configuration, Grouping, Point};
+use crate::substructuring::noise::FrfNoise;
 use nalgebra::DMatrix;
 use num_complex::Complex;
 
@@ -106,6 +108,38 @@ pub fn assemble(
         }
     });
     Assembled { frf, impacts_left_out, responses_left_out }
+}
+
+/// Variance of the real part of every cell of `frf`, from coherence and hits; NaN where a cell has a single hit, or none.
+pub fn noise(points: &Configuration, frf: &FrfMatrix, cells: &[CellAverage]) -> FrfNoise {
+    let place = |names: &[String], wanted: &String| names.iter().position(|n| n == wanted);
+    let (outputs, inputs) = (points.output_names(), points.input_names());
+    let (rows, columns) = (frf.outputs.len(), frf.inputs.len());
+    let mut variance = vec![DMatrix::from_element(rows, columns, f64::NAN); frf.lines.len()];
+    for (column, input) in frf.inputs.iter().enumerate() {
+        for (row, output) in frf.outputs.iter().enumerate() {
+            let (Some(i), Some(o)) = (place(&inputs, input), place(&outputs, output)) else { continue };
+            let (impact, channel) = (&points.impacts[i], &points.channels[o]);
+            let own = |c: &&CellAverage| c.name.impact == impact.name && c.name.response == channel.name;
+            let Some(cell) = cells.iter().find(own).filter(|c| c.frequency_hz.len() == variance.len()) else {
+                continue;
+            };
+            for (line, v) in variance.iter_mut().enumerate() {
+                v[(row, column)] = (0..3)
+                    .filter(|axis| channel.direction[*axis] != 0.0)
+                    .map(|axis| {
+                        let part = variance_of_part(
+                            cell.h1[axis][line],
+                            cell.coherence[axis][line],
+                            cell.records.len(),
+                        );
+                        part * channel.direction[axis].powi(2)
+                    })
+                    .sum();
+            }
+        }
+    }
+    FrfNoise { variance }
 }
 
 /// The response along the channel's direction from the vibrometer's x, y, z.

@@ -2,7 +2,8 @@
 
 use super::contact::ContactCompliance;
 use crate::results::number::{micro, short};
-use crate::results::{Check, OverCycles, Statistics};
+use crate::results::{Check, Joint, MAIN_BAND_HZ, OverCycles, Results, Statistics};
+use crate::substructuring::Dof;
 
 /// Loops stiffer than FBS by more than this: something between arm and specimen gives way.
 const SERIES_RATIO: f64 = 1.5;
@@ -10,10 +11,35 @@ const SERIES_RATIO: f64 = 1.5;
 /// A scatter over lines of more than this times the mean is no identification.
 pub const UNIDENTIFIED: f64 = 1.5;
 
+/// A scatter of T/Δx over lines below this fraction of its mean is clear enough to compare with.
+const CLEAR: f64 = 0.3;
+
 /// Name of the check on what lies between the arms and the contact.
 pub const SERIES_COMPLIANCE: &str = "series-compliance";
 /// Name of the check on resonances of one specimen alone.
 pub const HIDDEN_RESONANCE: &str = "hidden-resonance";
+
+/// What FBS sees between the arms over the main band: the recommended estimate where it identified something, or the
+/// headline's method.
+pub fn between_the_arms(results: &Results) -> Option<Statistics> {
+    let z = results
+        .recommended
+        .iter()
+        .find(|r| <[f64; 2]>::from(r.band_hz) == MAIN_BAND_HZ)
+        .and_then(|r| r.joint.get(&Dof::Z))
+        .filter(|z| z.identified);
+    z.map(|z| Statistics { mean: z.stiffness, std: z.std, median: z.stiffness, ci95: Some(z.ci95) })
+        .or_else(|| results.headline_joint().and_then(|j| j.sliding_stiffness()).copied())
+}
+
+/// What the specimens' own vibrometers see: T/Δx in frequency where it is clear, or the impacts' loops.
+pub fn at_the_specimens(direct: Option<&Joint>, loops: Option<OverCycles>) -> Option<OverCycles> {
+    direct
+        .and_then(|joint| Some((joint.sliding_stiffness()?, joint.lines)))
+        .filter(|(k, _)| k.std < CLEAR * k.mean)
+        .map(|(k, lines)| OverCycles { mean: k.mean, std: k.std, cycles: lines })
+        .or(loops)
+}
 
 /// Compares what FBS sees between the arms with what the loops see at the specimens.
 ///
@@ -47,7 +73,7 @@ pub fn series_compliance(fbs: Option<&Statistics>, loops: Option<OverCycles>) ->
     if ratio > SERIES_RATIO {
         let series = 1.0 / (1.0 / k_fbs - 1.0 / k_loops);
         let meaning = format!(
-            "The loops at the specimens are {} times stiffer than what FBS sees between the arms ({} against {} N/µm). Clamp and contact are in series, and the clamp gives way: \
+            "The contact measured at the specimens is {} times stiffer than what FBS sees between the arms ({} against {} N/µm). Clamp and contact are in series, and the clamp gives way: \
              the FBS value is not k_T. What lies between arms and contact has about {} N/µm by itself.",
             short(ratio),
             short(micro(k_loops)),
@@ -62,7 +88,7 @@ pub fn series_compliance(fbs: Option<&Statistics>, loops: Option<OverCycles>) ->
     }
     if ratio < 1.0 / SERIES_RATIO {
         let meaning = format!(
-            "The loops at the specimens are softer than what FBS sees between the arms ({} against {} N/µm): no series compliance explains that. Look at the loops' shape \
+            "The contact measured at the specimens is softer than what FBS sees between the arms ({} against {} N/µm): no series compliance explains that. Look at the loops' shape \
              and at the FBS methods' agreement first.",
             short(micro(k_loops)),
             short(micro(k_fbs))
@@ -70,7 +96,7 @@ pub fn series_compliance(fbs: Option<&Statistics>, loops: Option<OverCycles>) ->
         return with(Check::new(name, None, meaning));
     }
     let meaning = format!(
-        "FBS on the arms and the loops at the specimens see stiffness of one size ({} and {} N/µm): nothing soft lies between arm and contact, so the FBS value may be \
+        "FBS on the arms and the vibrometers at the specimens see stiffness of one size ({} and {} N/µm): nothing soft lies between arm and contact, so the FBS value may be \
          read as k_T.",
         short(micro(k_fbs)),
         short(micro(k_loops))

@@ -1,12 +1,20 @@
 //! The contact seen from the specimens, in frequency: Δx per newton of T, and the FRFs of both specimens.
 
 use super::averages::ContactAverage;
-use crate::results::{FrfCurve, Role, rounded};
+use crate::results::{FrfCurve, Joint, Role, rounded};
+use crate::substructuring::joint::{BandStatistic, stiffness_and_damping};
 use num_complex::Complex;
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 /// Where a resonance of a specimen is looked for, Hz: below, the loops are quasi-static; above, Δx drowns in noise.
 const SEARCH_HZ: [f64; 2] = [100.0, 400.0];
+/// Where T/Δx is read, Hz: above the specimens' resonance, below where Δx drowns in noise.
+const DIRECT_HZ: [f64; 2] = [250.0, 400.0];
+/// Lines averaged before a stiffness is read: 5 Hz at half-hertz lines.
+const DIRECT_LINES: usize = 10;
+/// Name of that method.
+pub const DIRECT: &str = "direct";
 /// Lines averaged before a peak is looked for: 1.5 Hz at half-hertz lines, well inside a resonance at 192 Hz.
 const SMOOTH: usize = 3;
 
@@ -62,6 +70,48 @@ impl ContactCompliance {
             })
             .collect();
         Some(ContactCompliance { frequency_hz: frequency_hz.to_vec(), compliance_m_per_n })
+    }
+
+    /// Z^J_z = T/Δx over 250–400 Hz as a row of its own: the contact itself, whatever the clamp does.
+    ///
+    /// Δx is averaged over some lines before it is divided by, because 1/(D + n) falls where noise prevails. The band lies above
+    /// the specimen's resonance near 192 Hz and below where Δx drowns. T is the load cells' sum: the static arm's inertia adds
+    /// some per cent to it, growing with f².
+    pub fn direct(&self, sigma_per_s: f64) -> Option<Joint> {
+        let inside: Vec<usize> = (0..self.frequency_hz.len())
+            .filter(|&l| (DIRECT_HZ[0]..=DIRECT_HZ[1]).contains(&self.frequency_hz[l]))
+            .collect();
+        let (stiffness, damping): (Vec<f64>, Vec<f64>) = inside
+            .chunks(DIRECT_LINES)
+            .filter(|lines| lines.len() == DIRECT_LINES)
+            .filter_map(|lines| {
+                let n = lines.len() as f64;
+                let d = lines.iter().map(|&l| self.compliance_m_per_n[l]).sum::<Complex<f64>>() / n;
+                let f = lines.iter().map(|&l| self.frequency_hz[l]).sum::<f64>() / n;
+                let z = d.inv();
+                z.is_finite().then(|| stiffness_and_damping(z, Complex::new(sigma_per_s, TAU * f)))
+            })
+            .unzip();
+        let (k, c) = (BandStatistic::of(&stiffness)?, BandStatistic::of(&damping)?);
+        let along_z = |s| BTreeMap::from([("z".to_owned(), s)]);
+        let mut warnings = vec![
+            "T is the load cells' sum, not the force at the contact: the static arm's inertia adds some per cent, growing with the frequency's square".to_owned(),
+        ];
+        if k.std > 0.5 * k.mean.abs() {
+            warnings.push("Δx is buried in noise here: no stiffness can be read from it".to_owned());
+        }
+        Some(Joint {
+            method: DIRECT.into(),
+            idms: 0,
+            band_hz: DIRECT_HZ,
+            stiffness_n_per_m: along_z(k),
+            damping_n_s_per_m: along_z(c),
+            stiffness_n_m_per_rad: BTreeMap::new(),
+            damping_n_m_s_per_rad: BTreeMap::new(),
+            coupling_si: BTreeMap::new(),
+            lines: stiffness.len() * DIRECT_LINES,
+            warnings,
+        })
     }
 
     /// The largest imaginary part between 100 and 400 Hz, averaged over three lines.
@@ -164,6 +214,11 @@ mod tests {
         let peak =
             ContactCompliance::of(&f, SIGMA, &[&average]).and_then(|c| c.imaginary_peak()).expect("lines");
         assert!((peak.frequency_hz - 192.0).abs() < 1.5, "{peak:?}");
+        // the resonance's tail above 250 Hz makes the contact look a little stiffer
+        let direct =
+            ContactCompliance::of(&f, SIGMA, &[&average]).and_then(|c| c.direct(SIGMA)).expect("lines");
+        let k = direct.sliding_stiffness().expect("z").mean;
+        assert!((180e6..200e6).contains(&k), "{k}");
         assert!(peak.stands_out(), "{peak:?}");
     }
 
@@ -173,6 +228,11 @@ mod tests {
         let peak =
             ContactCompliance::of(&f, SIGMA, &[&average]).and_then(|c| c.imaginary_peak()).expect("lines");
         assert!(!peak.stands_out() && peak.over_level < 0.01, "{peak:?}");
+        let direct =
+            ContactCompliance::of(&f, SIGMA, &[&average]).and_then(|c| c.direct(SIGMA)).expect("lines");
+        // exact but for rounding
+        assert!((direct.sliding_stiffness().expect("z").mean / 180e6 - 1.0).abs() < 1e-9);
+        assert_eq!((direct.band_hz, direct.idms, direct.lines), ([250.0, 400.0], 0, 300));
         assert_eq!(ContactCompliance::of(&f, SIGMA, &[]), None);
     }
 }

@@ -22,6 +22,12 @@ impl From<&JointRow> for Joint {
             damping_n_s_per_m: split(&row.damping_n_s_per_m, false),
             stiffness_n_m_per_rad: split(&row.stiffness_n_per_m, true),
             damping_n_m_s_per_rad: split(&row.damping_n_s_per_m, true),
+            coupling_si: row
+                .coupling_si
+                .iter()
+                .filter(|(_, s)| s.mean.is_finite() && s.std.is_finite())
+                .map(|(pair, s)| (pair.clone(), *s))
+                .collect(),
             lines: row.lines,
             warnings: row.warnings.clone(),
         }

@@ -18,11 +18,13 @@ mod synthetic;
 
 pub use cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, Measurements};
 pub use checks::{HIDDEN_RESONANCE, SERIES_COMPLIANCE, UNIDENTIFIED};
+pub use contact::DIRECT;
 pub use from_store::{AnalyseError, analyse, geometry};
 pub use joint::shaped;
 
 use super::{Completeness, MAIN_BAND_HZ, Results, UsableBand, ranges, words};
 use crate::spectra::{Windowing, usable_band};
+use crate::substructuring::averaged::{Priors, averaged};
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping};
 use crate::substructuring::identify::identify;
@@ -106,6 +108,7 @@ pub fn analyse_measurements<M: Measurements>(
         frfs[place] = assembled.frf;
     }
     substructure(&mut results, geometry, &frfs);
+    recommend(&mut results, geometry, &frfs, &averages);
     at_the_contact(&mut results, measurements, &averages, &impact_loops, sigma);
     results
 }
@@ -259,6 +262,31 @@ fn substructure(results: &mut Results, geometry: &Geometry, frfs: &[Option<FrfMa
     }
 }
 
+/// The estimates to quote, with their intervals, from the assembly alone.
+fn recommend(
+    results: &mut Results,
+    geometry: &Geometry,
+    frfs: &[Option<FrfMatrix>; 3],
+    averages: &[CellAverage],
+) {
+    let Some(ajb) = &frfs[2] else { return };
+    let own: Vec<CellAverage> =
+        averages.iter().filter(|a| a.name.configuration == CONFIGURATIONS[2]).cloned().collect();
+    let noise = assemble::noise(&geometry.ajb, ajb, &own);
+    let priors = Priors::default();
+    results.source.settings.insert("priors".into(), serde_json::json!(priors));
+    for [low_hz, high_hz] in BANDS_HZ {
+        let band = Band { low_hz, high_hz };
+        match averaged(ajb, Some(&noise), geometry, IdmSet::Six, band, &priors) {
+            Ok(estimate) => results.recommended.push(estimate),
+            Err(error) => {
+                results.missing.push(format!("No estimate with an interval by Eq. A.1: {error}."));
+                return;
+            }
+        }
+    }
+}
+
 fn at_the_contact<M: Measurements>(
     results: &mut Results,
     measurements: &M,
@@ -297,11 +325,15 @@ fn at_the_contact<M: Measurements>(
             results.frfs.extend(specimen_curves(name, sign(name), &cell.frequency_hz, sigma_per_s, sum));
         }
     }
-    let loop_slope = results.impact_loops().and_then(words::slope).map(|(_, k)| k);
+    let direct = compliance.as_ref().and_then(|c| c.direct(sigma_per_s));
     let series = {
-        let fbs = results.headline_joint().and_then(|j| j.sliding_stiffness());
-        checks::series_compliance(fbs, loop_slope)
+        let loops = results.impact_loops().and_then(words::slope).map(|(_, k)| k);
+        checks::series_compliance(
+            checks::between_the_arms(results).as_ref(),
+            checks::at_the_specimens(direct.as_ref(), loops),
+        )
     };
+    results.joint.extend(direct);
     results.checks.push(series);
     results.checks.push(checks::hidden_resonance(compliance.as_ref()));
 }

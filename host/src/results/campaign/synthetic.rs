@@ -251,7 +251,8 @@ fn a_known_joint_comes_back_both_ways() {
 #[test]
 fn without_a_there_are_still_loops() {
     let results = run(&Rig::new().without(|c| c.configuration != "A"));
-    assert!(results.joint.is_empty());
+    // the specimens' own T/Δx needs the assembly only
+    assert!(results.joint.iter().all(|j| j.method == "direct"));
     assert!(results.impact_loops().is_some());
     let missing = results.missing.join("\n");
     assert!(missing.contains("A has not been measured") && missing.contains("missing: A."), "{missing}");

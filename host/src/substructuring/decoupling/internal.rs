@@ -9,6 +9,11 @@ use nalgebra::{Complex, DMatrix};
 /// `p` = Y^B_{i,c} (responses on B × n_c), `q` = Y^A_{c,i} (n_c × impacts on A), `m` = Y^AJB_{i(B),i(A)}; because
 /// M = P G⁻¹ Q exactly, P and Q are inverted whole and M, which is singular for n_i > n_c, never is.
 ///
+/// Tol and Özgüven's other three rearrangements of Eq. (1) are the same sentence with other factors, and are evaluated here
+/// too: hits and responses on A with M = Y^A_ii − Y^AJB_ii, P = Y^A_ic, Q = Y^A_ci; hits on B seen on A with
+/// M = Y^AJB_{i(A),i(B)}, P = Y^A_ic, Q = Y^B_ci; both on B with M = Y^B_ii − Y^AJB_ii, P = Y^B_ic, Q = Y^B_ci. Where M is a difference
+/// of two measurements it is small against both, and noise tells.
+///
 /// # Errors
 /// Too few internals, or P or Q without full rank.
 pub fn internal(
@@ -23,8 +28,10 @@ pub fn internal(
     if responses.min(impacts) < needed {
         return Err(DecouplingError::TooFewInternals { impacts, responses, needed });
     }
-    let p_plus = full_rank_inverse(p, "P = Y^B between B's responses and the virtual point")?;
-    let q_plus = full_rank_inverse(q, "Q = Y^A between the virtual point and A's impacts")?;
+    let p_plus =
+        full_rank_inverse(p, "P, the admittance between the virtual point and the internal responses,")?;
+    let q_plus =
+        full_rank_inverse(q, "Q, the admittance between the internal impacts and the virtual point,")?;
     let g = full_rank_inverse(&(p_plus * m * q_plus), "P⁺ M Q⁺")?;
     Ok(full_rank_inverse(&(g - y_a - y_b), "the joint's admittance")?)
 }

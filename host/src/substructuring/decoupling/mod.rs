@@ -24,13 +24,13 @@ use super::pseudo_inverse::RankLost;
 pub enum DecouplingError {
     /// The least-squares form needs at least n_c internal degrees of freedom on both sides.
     #[error(
-        "{impacts} impacts on A and {responses} responses on B, but {needed} interface DoFs: with fewer internals than \
+        "{impacts} internal impacts and {responses} internal responses, but {needed} interface DoFs: with fewer internals than \
          interface DoFs the joint is seen only through the forces they generate (biased); measure more, or use fewer IDMs"
     )]
     TooFewInternals {
-        /// n_iA: impacts on A.
+        /// Internal impacts (on A for Eq. 3).
         impacts: usize,
-        /// n_iB: responses on B.
+        /// Internal responses (on B for Eq. 3).
         responses: usize,
         /// n_c.
         needed: usize,

@@ -1,0 +1,92 @@
+//! The assembly's interface cells over a band: receptances, their noise, and the two virtual points they reduce to.
+
+use super::sensitivity::Layout;
+use super::{AveragedError, Line};
+use crate::substructuring::frf::FrfMatrix;
+use crate::substructuring::geometry::{Geometry, Grouping};
+use crate::substructuring::idm::IdmSet;
+use crate::substructuring::interface_data::{Found, Measured};
+use crate::substructuring::joint::Band;
+use crate::substructuring::noise::FrfNoise;
+use nalgebra::{Complex, DMatrix};
+
+/// Noise variances are averaged over this many Hz on either side before lines are weighed with them.
+const SMOOTH_HZ: f64 = 10.0;
+
+/// The assembly's FRFs reduced to its two virtual points, with what is needed to trace an error back to its cell.
+pub(super) struct Assembly {
+    pub(super) frequency_hz: Vec<f64>,
+    pub(super) s: Vec<Complex<f64>>,
+    /// Interface cells (channels of A then B × impacts on A then B), receptance, m/N.
+    pub(super) cells: Vec<Line>,
+    /// Variance of the cells' real parts; none where it is not known.
+    pub(super) variance: Option<Vec<DMatrix<f64>>>,
+    pub(super) layout: Layout,
+    /// Names of the cells' rows and columns.
+    pub(super) outputs: Vec<String>,
+    pub(super) inputs: Vec<String>,
+}
+
+impl Assembly {
+    pub(super) fn of(
+        ajb: &FrfMatrix,
+        noise: Option<&FrfNoise>,
+        geometry: &Geometry,
+        idms: IdmSet,
+        band: Band,
+    ) -> Result<Assembly, AveragedError> {
+        let in_band: Vec<usize> = (0..ajb.frequency_hz.len())
+            .filter(|&l| ajb.frequency_hz[l] > 0.0 && band.contains(ajb.frequency_hz[l]))
+            .collect();
+        if in_band.is_empty() {
+            return Err(AveragedError::EmptyBand { low_hz: band.low_hz, high_hz: band.high_hz });
+        }
+        let file = Measured { file: "AJB", frf: ajb, points: &geometry.ajb };
+        let a = file.virtual_point(Grouping::InterfaceA, geometry, idms)?;
+        let b = file.virtual_point(Grouping::InterfaceB, geometry, idms)?;
+        let (rows, columns) = (joined(&a.rows, &b.rows), joined(&a.columns, &b.columns));
+        let cut = ajb.band(band.low_hz.max(f64::MIN_POSITIVE), band.high_hz);
+        let cells = Measured { frf: &cut, ..file }.block(&rows, &columns)?;
+        let order = ajb.quantity.order_of_s();
+        let s: Vec<Complex<f64>> = in_band.iter().map(|&l| ajb.s(l)).collect();
+        let cells = cells.iter().zip(&s).map(|(y, s)| y * s.powi(-order)).collect();
+        let variance = noise
+            .map(|noise| {
+                noise.check(ajb)?;
+                let receptance = noise.to_receptance(ajb);
+                let kept = FrfNoise {
+                    variance: in_band
+                        .iter()
+                        .map(|&l| {
+                            DMatrix::from_fn(rows.at.len(), columns.at.len(), |r, c| {
+                                receptance.variance[l][(rows.at[r], columns.at[c])]
+                            })
+                        })
+                        .collect(),
+                };
+                let frequency_hz: Vec<f64> = in_band.iter().map(|&l| ajb.frequency_hz[l]).collect();
+                Ok::<_, AveragedError>(kept.smoothed(&frequency_hz, SMOOTH_HZ).variance)
+            })
+            .transpose()?
+            // a cell without any known variance makes the whole unknown: half an interval is none
+            .filter(|v| v.iter().all(|line| line.iter().all(|v| v.is_finite())));
+        let frequency_hz = in_band.iter().map(|&l| ajb.frequency_hz[l]).collect();
+        let layout = Layout::new(&a, &b, &rows, &columns, geometry, idms);
+        Ok(Assembly { frequency_hz, s, cells, variance, layout, outputs: rows.names, inputs: columns.names })
+    }
+
+    /// Mean distance of the lines, Hz.
+    pub(super) fn step_hz(&self) -> f64 {
+        let n = self.frequency_hz.len();
+        if n < 2 { f64::INFINITY } else { (self.frequency_hz[n - 1] - self.frequency_hz[0]) / (n - 1) as f64 }
+    }
+}
+
+fn joined(first: &Found, second: &Found) -> Found {
+    let both = |a: &[String], b: &[String]| a.iter().chain(b).cloned().collect();
+    Found {
+        names: both(&first.names, &second.names),
+        points: first.points.iter().chain(&second.points).cloned().collect(),
+        at: first.at.iter().chain(&second.at).copied().collect(),
+    }
+}

@@ -1,0 +1,46 @@
+//! What noise does to the compliance in second order: drawn, because it has no short closed form.
+
+use super::assembly::Assembly;
+use super::{Line, compliance, invert};
+use nalgebra::Complex;
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rayon::prelude::*;
+
+/// Pairs of draws per line; hundreds of lines average what is left.
+const PAIRS: u64 = 4;
+/// Fixed, so that the same data give the same figures.
+const SEED: u64 = 0x6A6F_696E;
+
+/// E\[y(Y + n)\] − y(Y) per line and degree of freedom; zero where the noise is not known. A pair ±n cancels the linear part, so few
+/// draws do.
+pub(super) fn of(assembly: &Assembly, impedance: &[Line]) -> Vec<Vec<Complex<f64>>> {
+    let n = impedance[0].nrows() / 2;
+    let Some(variance) = &assembly.variance else {
+        return vec![vec![Complex::default(); n]; impedance.len()];
+    };
+    (0..impedance.len())
+        .into_par_iter()
+        .map(|l| {
+            // a stream of its own for every line: the order of threads cannot matter
+            let mut stream = Xoshiro256PlusPlus::seed_from_u64(SEED ^ ((l as u64) << 20));
+            let mut normal = || -> f64 { StandardNormal.sample(&mut stream) };
+            let y = assembly.layout.reduce(&assembly.cells[l]);
+            let mut sum = vec![Complex::default(); n];
+            for _ in 0..PAIRS {
+                let noise = variance[l].map(|v| Complex::new(normal(), normal()) * v.sqrt());
+                let noise = assembly.layout.reduce(&noise);
+                // a draw that makes Y singular to rounding has probability zero, and says nothing
+                let (Ok(plus), Ok(minus)) = (invert(&(&y + &noise)), invert(&(&y - &noise))) else {
+                    continue;
+                };
+                for (d, sum) in sum.iter_mut().enumerate() {
+                    let mean = 0.5 * (compliance(&plus, d) + compliance(&minus, d));
+                    *sum += (mean - compliance(&impedance[l], d)) / PAIRS as f64;
+                }
+            }
+            sum
+        })
+        .collect()
+}

@@ -1,0 +1,349 @@
+//! The recommended estimate: Eq. (A.1) line by line, averaged as a compliance before it is inverted, with an interval.
+//!
+//! Eq. (A.1) needs neither Y^A nor Y^B, so a clamp that changes between the configurations cannot touch it. Of every line the
+//! joint's compliance along one degree of freedom, 1/Z^J_dd, is taken: noise enters it almost linearly, while Z^J_dd =
+//! 1/(y + n) falls towards zero where |n| > |y|, so that a mean of stiffness over lines is pulled down by noise alone. The compliance of a
+//! spring and a damper hardly changes over a band; it is averaged with the weights that each line's noise deserves, and
+//! inverted once.
+//!
+//! [`sensitivity`] holds the linear propagation: dy/dY of every cell, from which noise and errors of position, aim and angle
+//! follow alike. What noise does in second order (the bias) is drawn, in pairs ±n whose linear parts cancel.
+
+mod assembly;
+mod bias;
+mod bootstrap;
+mod sensitivity;
+
+pub use bootstrap::{CellHits, Replicates};
+
+use super::frf::FrfMatrix;
+use super::geometry::Geometry;
+use super::idm::{Dof, IdmSet};
+use super::interface_data::{InterfaceError, balance};
+use super::joint::{Band, stiffness_and_damping};
+use super::noise::{FrfNoise, NoiseError, shared_by_lines};
+use super::pseudo_inverse::{RankLost, full_rank_inverse};
+use assembly::Assembly;
+use nalgebra::{Complex, DMatrix};
+use rayon::prelude::*;
+use sensitivity::Sums;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+type Line = DMatrix<Complex<f64>>;
+
+/// 95 % of a normal distribution lie within this many standard deviations.
+const NORMAL_95: f64 = 1.96;
+/// Above this relative half width the compliance cannot be told from zero well enough: the stiffness has no upper limit worth a name.
+const UNIDENTIFIED: f64 = 0.6;
+
+/// Standard deviations of what nobody at the rig knows. They belong to the experiment and are stated with the result.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Priors {
+    /// Where a sensor or an impact really is, m along each axis; the same in all its cells.
+    pub position_m: f64,
+    /// Added anew at each re-aim of a cell, m along each axis, for the sensor and for the hammer.
+    pub aim_m: f64,
+    /// The hammer's tilt about each axis across its direction, rad; the same in all cells of an impact.
+    pub hammer_angle_rad: f64,
+}
+
+impl Default for Priors {
+    /// 0.5 mm, 0.2 mm, 2°: a careful campaign by hand.
+    fn default() -> Self {
+        Priors { position_m: 0.5e-3, aim_m: 0.2e-3, hammer_angle_rad: 2f64.to_radians() }
+    }
+}
+
+/// Why the estimate cannot be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum AveragedError {
+    /// The virtual points cannot be formed, or a cell is not a number.
+    #[error(transparent)]
+    Interface(#[from] InterfaceError),
+    /// The noise belongs to other FRFs.
+    #[error("AJB: {0}")]
+    Noise(#[from] NoiseError),
+    /// A block is singular at a line.
+    #[error("at {frequency_hz} Hz: {source}")]
+    Line {
+        /// The line, Hz.
+        frequency_hz: f64,
+        /// Why.
+        source: RankLost,
+    },
+    /// Spectra of hits that do not belong to the FRFs.
+    #[error("the hits' spectra do not fit the FRFs: {reason}")]
+    Hits {
+        /// What does not fit.
+        reason: String,
+    },
+    /// No line in the band.
+    #[error("no line of AJB lies in the band {low_hz}–{high_hz} Hz")]
+    EmptyBand {
+        /// Lowest frequency, Hz.
+        low_hz: f64,
+        /// Highest frequency, Hz.
+        high_hz: f64,
+    },
+}
+
+/// One degree of freedom of the joint with its uncertainty. N/m and N s/m; N m/rad and N m s/rad for rotations.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct DofEstimate {
+    /// Stiffness, the noise's bias taken out.
+    pub stiffness: f64,
+    /// Standard deviation of the stiffness, linear propagation.
+    pub std: f64,
+    /// Of it, from the FRFs' noise.
+    pub std_noise: f64,
+    /// Of it, from errors of position, aim and angle.
+    pub std_geometry: f64,
+    /// 95 % interval: the compliance's, inverted, so it reaches further up than down.
+    pub ci95: [f64; 2],
+    /// What noise alone added to the stiffness: expectation with noise minus value without; already taken out.
+    pub bias: f64,
+    /// Damping.
+    pub damping: f64,
+    /// Whether the compliance differs from zero clearly enough for a number to be given.
+    pub identified: bool,
+}
+
+/// The estimate over one band.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Averaged {
+    /// The band, Hz.
+    pub band_hz: Band,
+    /// Lines averaged.
+    pub lines: usize,
+    /// The interface deformation modes.
+    pub idms: usize,
+    /// What was assumed of positions and angles.
+    pub priors: Priors,
+    /// Whether the FRFs' noise was known.
+    pub noise_known: bool,
+    /// By degree of freedom.
+    pub joint: BTreeMap<Dof, DofEstimate>,
+}
+
+impl Averaged {
+    /// The result for the sliding direction in a sentence; never a bare number.
+    pub fn statement(&self) -> Option<String> {
+        let z = self.joint.get(&Dof::Z)?;
+        let micro = |k: f64| k * 1e-6;
+        let origin = if self.noise_known {
+            ""
+        } else {
+            " (the FRFs came without their variance, so the interval holds errors of position and angle only)"
+        };
+        Some(if z.identified {
+            format!(
+                "k_z = {:.1} N/µm, 95 % interval {:.1}…{:.1}{origin}.",
+                micro(z.stiffness),
+                micro(z.ci95[0]),
+                micro(z.ci95[1])
+            )
+        } else {
+            format!(
+                "not identified: the noise exceeds the joint's admittance; the data only say that k_z is above {:.1} N/µm{origin}.",
+                micro(z.ci95[0])
+            )
+        })
+    }
+}
+
+/// The inverse of one line's interface admittance, and the joint's compliance along `d` by Eq. (A.1), both blocks averaged.
+fn compliance(z: &Line, d: usize) -> Complex<f64> {
+    let n = z.nrows() / 2;
+    -(0.5 * (z[(d, n + d)] + z[(n + d, d)])).inv()
+}
+
+fn invert(y: &Line) -> Result<Line, RankLost> {
+    full_rank_inverse(y, "the assembly's interface admittance")
+}
+
+/// The recommended estimate of the joint over `band` from the assembly alone.
+///
+/// `noise` is in the FRFs' own quantity. Every degree of freedom gets its own weights.
+///
+/// # Errors
+/// [`AveragedError`]: an interface that cannot be formed, a NaN, a singular line, an empty band.
+pub fn averaged(
+    ajb: &FrfMatrix,
+    noise: Option<&FrfNoise>,
+    geometry: &Geometry,
+    idms: IdmSet,
+    band: Band,
+    priors: &Priors,
+) -> Result<Averaged, AveragedError> {
+    Ok(Prepared::of(ajb, noise, geometry, idms, band, priors)?.estimate())
+}
+
+/// The assembly decoupled line by line, and the weights of its lines: what estimate and bootstrap share.
+pub struct Prepared {
+    band_hz: Band,
+    priors: Priors,
+    idms: IdmSet,
+    sigma_per_s: f64,
+    order_of_s: i32,
+    assembly: Assembly,
+    /// Inverse of the interface admittance per line.
+    impedance: Vec<Line>,
+    /// What noise adds to the compliance \[degree of freedom\]\[line\].
+    bias: Vec<Vec<Complex<f64>>>,
+    /// Sensitivities \[degree of freedom\]\[line\].
+    sums: Vec<Vec<Sums>>,
+    /// Normalised \[degree of freedom\]\[line\].
+    weights: Vec<Vec<f64>>,
+}
+
+impl Prepared {
+    /// Decouples `ajb` over `band` and weighs its lines; arguments as of [`averaged`].
+    ///
+    /// # Errors
+    /// As [`averaged`].
+    pub fn of(
+        ajb: &FrfMatrix,
+        noise: Option<&FrfNoise>,
+        geometry: &Geometry,
+        idms: IdmSet,
+        band: Band,
+        priors: &Priors,
+    ) -> Result<Prepared, AveragedError> {
+        let assembly = Assembly::of(ajb, noise, geometry, idms, band)?;
+        let impedance: Vec<Line> = assembly
+            .cells
+            .par_iter()
+            .zip(&assembly.frequency_hz)
+            .map(|(cells, &frequency_hz)| {
+                invert(&assembly.layout.reduce(cells))
+                    .map_err(|source| AveragedError::Line { frequency_hz, source })
+            })
+            .collect::<Result<_, AveragedError>>()?;
+        let by_line = bias::of(&assembly, &impedance);
+        let all = 0..idms.count();
+        let bias = all.clone().map(|d| by_line.iter().map(|line| line[d]).collect()).collect();
+        let sums: Vec<Vec<Sums>> = all
+            .map(|d| {
+                (0..impedance.len()).into_par_iter().map(|l| assembly.sums(l, &impedance[l], d)).collect()
+            })
+            .collect();
+        let shared = shared_by_lines(ajb.sigma_per_s, assembly.step_hz());
+        let weights = sums.iter().map(|lines| weights(lines, shared, priors)).collect();
+        Ok(Prepared {
+            band_hz: band,
+            priors: *priors,
+            idms,
+            sigma_per_s: ajb.sigma_per_s,
+            order_of_s: ajb.quantity.order_of_s(),
+            assembly,
+            impedance,
+            bias,
+            sums,
+            weights,
+        })
+    }
+
+    /// The estimate with its interval.
+    pub fn estimate(&self) -> Averaged {
+        let joint = (self.idms.dofs().iter().enumerate())
+            .map(|(d, &dof)| {
+                // N/m for translations, N m/rad for rotations
+                (dof, self.estimate_of(d).scaled(balance(self.idms)[d].powi(2)))
+            })
+            .collect();
+        Averaged {
+            band_hz: self.band_hz,
+            lines: self.impedance.len(),
+            idms: self.idms.count(),
+            priors: self.priors,
+            noise_known: self.assembly.variance.is_some(),
+            joint,
+        }
+    }
+
+    /// How many independent lines one line's noise is worth less than: see [`shared_by_lines`].
+    fn shared(&self) -> f64 {
+        shared_by_lines(self.sigma_per_s, self.assembly.step_hz())
+    }
+
+    fn mean_s(&self, d: usize) -> Complex<f64> {
+        self.assembly.s.iter().zip(&self.weights[d]).map(|(s, w)| s * *w).sum()
+    }
+
+    /// One degree of freedom, rotations scaled: averages the compliance, propagates, inverts.
+    fn estimate_of(&self, d: usize) -> DofEstimate {
+        let (mut y, mut drawn) = (Complex::<f64>::default(), Complex::<f64>::default());
+        for (l, w) in self.weights[d].iter().enumerate() {
+            y += compliance(&self.impedance[l], d) * *w;
+            drawn += self.bias[d][l] * *w;
+        }
+        let s = self.mean_s(d);
+        let (stiffness, damping) = stiffness_and_damping((y - drawn).inv(), s);
+        let total = Sums::weighted(&self.sums[d], &self.weights[d]);
+        // dK = −K² dy, to the loss factor's square
+        let to_stiffness = stiffness * stiffness;
+        DofEstimate {
+            stiffness,
+            std: 0.0,
+            std_noise: 0.0,
+            std_geometry: to_stiffness * total.geometry_variance(&self.priors).sqrt(),
+            ci95: [stiffness; 2],
+            bias: stiffness_and_damping(y.inv(), s).0 - stiffness,
+            damping,
+            identified: true,
+        }
+        .with_noise(to_stiffness * (total.noise_variance * self.shared()).sqrt())
+    }
+}
+
+/// The 95 % interval of a stiffness whose compliance is normally distributed, and whether the upper end is a number.
+fn interval(stiffness: f64, std: f64) -> ([f64; 2], bool) {
+    let relative = NORMAL_95 * std / stiffness.abs();
+    let identified = relative < UNIDENTIFIED && stiffness > 0.0;
+    let high = if identified { stiffness / (1.0 - relative) } else { f64::INFINITY };
+    ([stiffness / (1.0 + relative), high], identified)
+}
+
+impl DofEstimate {
+    /// The same with this standard deviation of the noise.
+    fn with_noise(self, std_noise: f64) -> DofEstimate {
+        let std = std_noise.hypot(self.std_geometry);
+        let (ci95, identified) = interval(self.stiffness, std);
+        DofEstimate { std, std_noise, ci95, identified, ..self }
+    }
+
+    /// The same with rotations in N m/rad: all but the verdict times `scale`.
+    fn scaled(self, scale: f64) -> DofEstimate {
+        DofEstimate {
+            stiffness: scale * self.stiffness,
+            std: scale * self.std,
+            std_noise: scale * self.std_noise,
+            std_geometry: scale * self.std_geometry,
+            ci95: self.ci95.map(|k| scale * k),
+            bias: scale * self.bias,
+            damping: scale * self.damping,
+            identified: self.identified,
+        }
+    }
+}
+
+/// Normalised weights: the inverse of what each line's noise leaves after averaging, plus what geometry does to it.
+fn weights(lines: &[Sums], shared: f64, priors: &Priors) -> Vec<f64> {
+    let averaging = (lines.len() as f64 / shared).max(1.0);
+    let raw: Vec<f64> = lines
+        .iter()
+        .map(|line| 1.0 / (line.noise_variance + line.geometry_variance(priors) * averaging))
+        .map(|w| if w.is_finite() { w } else { 0.0 })
+        .collect();
+    let sum: f64 = raw.iter().sum();
+    if sum > 0.0 {
+        raw.iter().map(|w| w / sum).collect()
+    } else {
+        // neither noise nor geometry: every line is as good as the other
+        vec![1.0 / lines.len() as f64; lines.len()]
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,217 @@
+//! Linear propagation: what an error of one cell, one position or one angle does to the joint's compliance.
+//!
+//! δ(Y⁻¹) = −Y⁻¹ δY Y⁻¹, so the sensitivity of y = 1/Z^J_dd to the cells is a sum of two dyads, Φ = −y²/2 Σ (T_uᵀ u)(T_f v)ᵀ with u a row and
+//! v a column of Y⁻¹. A sensor wrong by δ reads e·(θ × δ) more, where θ is the rotation of its virtual point; a hit wrong
+//! by δ adds the moment δ × e; a hammer tilted by α pushes along e + α × e. All three are errors of cells, so one Φ
+//! serves them all.
+
+use super::assembly::Assembly;
+use super::{Line, Priors, compliance};
+use crate::substructuring::geometry::{Geometry, Point};
+use crate::substructuring::idm::{Dof, IdmSet};
+use crate::substructuring::interface_data::{Found, VirtualPoint, balance};
+use nalgebra::{Complex, DMatrix, Vector3};
+
+type C = Complex<f64>;
+
+/// A channel or impact as the propagation needs it.
+struct Place {
+    direction: Vector3<f64>,
+    offset: Vector3<f64>,
+    /// 0 for A's virtual point, 1 for B's.
+    side: usize,
+    /// Which sensor: its axes share one error of position.
+    point: usize,
+}
+
+/// Transformations of both virtual points as one, and where everything is.
+pub(super) struct Layout {
+    /// 2n_c × channels and impacts × 2n_c, rotations scaled.
+    t_u: DMatrix<f64>,
+    t_f: DMatrix<f64>,
+    channels: Vec<Place>,
+    impacts: Vec<Place>,
+    points: usize,
+    idms: IdmSet,
+}
+
+impl Layout {
+    pub(super) fn new(
+        a: &VirtualPoint,
+        b: &VirtualPoint,
+        rows: &Found,
+        columns: &Found,
+        geometry: &Geometry,
+        idms: IdmSet,
+    ) -> Layout {
+        let n = idms.count();
+        let d = balance(idms);
+        let (rows_a, columns_a) = (a.rows.at.len(), a.columns.at.len());
+        let t_u = DMatrix::from_fn(2 * n, rows.at.len(), |r, c| match (r < n, c < rows_a) {
+            (true, true) => a.responses.t[(r, c)] * d[r],
+            (false, false) => b.responses.t[(r - n, c - rows_a)] * d[r - n],
+            _ => 0.0,
+        });
+        let t_f = DMatrix::from_fn(columns.at.len(), 2 * n, |r, c| match (r < columns_a, c < n) {
+            (true, true) => a.impacts.t[(r, c)] * d[c],
+            (false, false) => b.impacts.t[(r - columns_a, c - n)] * d[c - n],
+            _ => 0.0,
+        });
+        let origins = [geometry.virtual_point_a_m, geometry.virtual_point_b_m].map(Vector3::from);
+        let place = |p: &Point, side: usize, point: usize| Place {
+            direction: p.direction(),
+            offset: p.position() - origins[side],
+            side,
+            point,
+        };
+        let mut names: Vec<&str> = Vec::new();
+        let mut channels = Vec::new();
+        for (i, channel) in rows.points.iter().enumerate() {
+            let at = names.iter().position(|name| *name == channel.name).unwrap_or(names.len());
+            if at == names.len() {
+                names.push(&channel.name);
+            }
+            channels.push(place(channel, usize::from(i >= rows_a), at));
+        }
+        let impacts = columns
+            .points
+            .iter()
+            .enumerate()
+            .map(|(i, impact)| place(impact, usize::from(i >= columns_a), i))
+            .collect();
+        Layout { t_u, t_f, channels, impacts, points: names.len(), idms }
+    }
+
+    /// T_u Y T_f: cells onto both virtual points, rotations scaled.
+    pub(super) fn reduce(&self, cells: &Line) -> Line {
+        self.t_u.map(C::from) * cells * self.t_f.map(C::from)
+    }
+
+    pub(super) fn cell_count(&self) -> (usize, usize) {
+        (self.channels.len(), self.impacts.len())
+    }
+}
+
+/// Weighted sums over lines of the sensitivities to what is common to all lines, and of the noise's variance.
+#[derive(Clone)]
+pub(super) struct Sums {
+    pub(super) noise_variance: f64,
+    channel_position: Vec<Vector3<C>>,
+    impact_position: Vec<Vector3<C>>,
+    impact_angle: Vec<Vector3<C>>,
+    /// Per sensor and impact.
+    channel_aim: Vec<Vector3<C>>,
+    impact_aim: Vec<Vector3<C>>,
+}
+
+impl Sums {
+    /// Σ w · line, in the lines' order; variances with w².
+    pub(super) fn weighted(lines: &[Sums], weights: &[f64]) -> Sums {
+        let mut total = lines[0].clone();
+        total.noise_variance = 0.0;
+        total.parts().into_iter().flatten().for_each(|v| *v = Vector3::zeros());
+        for (line, &w) in lines.iter().zip(weights) {
+            total.noise_variance += w * w * line.noise_variance;
+            let mut line = line.clone();
+            for (sum, part) in total.parts().into_iter().zip(line.parts()) {
+                sum.iter_mut().zip(part).for_each(|(a, b)| *a += *b * C::from(w));
+            }
+        }
+        total
+    }
+
+    fn parts(&mut self) -> [&mut Vec<Vector3<C>>; 5] {
+        [
+            &mut self.channel_position,
+            &mut self.impact_position,
+            &mut self.impact_angle,
+            &mut self.channel_aim,
+            &mut self.impact_aim,
+        ]
+    }
+
+    /// Sensitivities to every error of geometry, each in standard deviations of its prior.
+    pub(super) fn columns(&self, priors: &Priors) -> Vec<C> {
+        [
+            (&self.channel_position, priors.position_m),
+            (&self.impact_position, priors.position_m),
+            (&self.channel_aim, priors.aim_m),
+            (&self.impact_aim, priors.aim_m),
+            (&self.impact_angle, priors.hammer_angle_rad),
+        ]
+        .into_iter()
+        .flat_map(|(all, prior)| all.iter().flat_map(move |v| v.iter().map(move |c| *c * prior)))
+        .collect()
+    }
+
+    /// Variance of the real part from errors of position, aim and angle.
+    pub(super) fn geometry_variance(&self, priors: &Priors) -> f64 {
+        self.columns(priors).iter().map(|c| c.re * c.re).sum()
+    }
+}
+
+impl Assembly {
+    /// Sensitivities of the joint's compliance along `d` at line `l`, whose inverse admittance is `z`.
+    pub(super) fn sums(&self, l: usize, z: &Line, d: usize) -> Sums {
+        let layout = &self.layout;
+        let n = z.nrows() / 2;
+        let scale = -compliance(z, d).powi(2) * 0.5;
+        let (t_u, t_f) = (layout.t_u.map(C::from), layout.t_f.map(C::from));
+        let phi = [(d, n + d), (n + d, d)].map(|(row, column)| {
+            t_u.transpose() * z.row(row).transpose() * (&t_f * z.column(column)).transpose() * scale
+        });
+        let phi = &phi[0] + &phi[1];
+        let cells = &self.cells[l];
+        let (channels, impacts) = layout.cell_count();
+        let mut sums = Sums {
+            noise_variance: 0.0,
+            channel_position: vec![Vector3::zeros(); layout.points],
+            impact_position: vec![Vector3::zeros(); impacts],
+            impact_angle: vec![Vector3::zeros(); impacts],
+            channel_aim: vec![Vector3::zeros(); layout.points * impacts],
+            impact_aim: vec![Vector3::zeros(); layout.points * impacts],
+        };
+        if let Some(variance) = &self.variance {
+            for i in 0..impacts {
+                for o in 0..channels {
+                    sums.noise_variance += phi[(o, i)].norm_sqr() * variance[l][(o, i)];
+                }
+            }
+        }
+        let motion = t_u * cells;
+        let wrench = cells * t_f;
+        for (o, channel) in layout.channels.iter().enumerate() {
+            for (i, impact) in layout.impacts.iter().enumerate() {
+                let factor = phi[(o, i)];
+                let rotation = layout.vector(|at| motion[(channel.side * n + at, i)], true);
+                let by_channel = cross(channel.direction, rotation) * factor;
+                let force = layout.vector(|at| wrench[(o, impact.side * n + at)], false);
+                let moment = layout.vector(|at| wrench[(o, impact.side * n + at)], true);
+                let by_impact = cross(impact.direction, moment) * factor;
+                // δY = (force + moment × r) · δe
+                let tilt = force - cross(impact.offset, moment);
+                let cell = channel.point * impacts + i;
+                sums.channel_position[channel.point] += by_channel;
+                sums.channel_aim[cell] += by_channel;
+                sums.impact_position[i] += by_impact;
+                sums.impact_aim[cell] += by_impact;
+                sums.impact_angle[i] += cross(impact.direction, tilt) * factor;
+            }
+        }
+        sums
+    }
+}
+
+impl Layout {
+    /// The three translations or rotations of a virtual point out of its degrees of freedom, in metres or radians; zero where
+    /// the IDM set does not carry one.
+    fn vector(&self, at: impl Fn(usize) -> C, rotation: bool) -> Vector3<C> {
+        let d = balance(self.idms);
+        let axes = if rotation { [Dof::Rx, Dof::Ry, Dof::Rz] } else { [Dof::X, Dof::Y, Dof::Z] };
+        Vector3::from(axes.map(|dof| self.idms.position(dof).map_or(C::default(), |i| at(i) / d[i])))
+    }
+}
+
+fn cross(a: Vector3<f64>, b: Vector3<C>) -> Vector3<C> {
+    a.map(C::from).cross(&b)
+}

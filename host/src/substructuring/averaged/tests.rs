@@ -1,0 +1,106 @@
+use super::*;
+use crate::exchange::{read_frf, read_positions};
+use std::path::{Path, PathBuf};
+
+fn data(file: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file)
+}
+
+const BAND: Band = Band { low_hz: 300.0, high_hz: 600.0 };
+const NOWHERE_WRONG: Priors = Priors { position_m: 0.0, aim_m: 0.0, hammer_angle_rad: 0.0 };
+
+fn rigid() -> (FrfMatrix, Geometry) {
+    (
+        read_frf(&data("frf_rigid/AJB.npz")).expect("test data"),
+        read_positions(&data("positions/positions.xlsx")).expect("test data").geometry,
+    )
+}
+
+#[test]
+fn exact_data_give_the_contact_exactly() {
+    let (ajb, geometry) = rigid();
+    let found = averaged(&ajb, None, &geometry, IdmSet::Six, BAND, &NOWHERE_WRONG).expect("exact data");
+    let z = found.joint[&Dof::Z];
+    // Y^J of K + sC is averaged over lines and inverted at the mean s: the loss factor's square, (1.5e-5 · ω)², differs
+    // over the band by 1e-3 at most
+    assert!((z.stiffness / 180e6 - 1.0).abs() < 1e-3, "{z:?}");
+    assert!((found.joint[&Dof::Y].stiffness / 260e6 - 1.0).abs() < 1e-3);
+    assert!((found.joint[&Dof::Rx].stiffness / 22.0 - 1.0).abs() < 1e-3);
+    assert!((z.damping / (180e6 * 1.5e-5) - 1.0).abs() < 1e-2, "{z:?}");
+    assert_eq!(z.std, 0.0);
+    assert!(z.identified);
+}
+
+/// The propagation against what moving sensors and impacts by hand really does, for a degree of freedom where it matters.
+#[test]
+fn the_sensitivity_is_the_difference_quotient() {
+    let (ajb, geometry) = rigid();
+    // without priors all weights are even, whatever is moved
+    let estimate = |geometry: &Geometry, dof: Dof| {
+        averaged(&ajb, None, geometry, IdmSet::Six, BAND, &NOWHERE_WRONG).expect("exact data").joint[&dof]
+            .stiffness
+    };
+    let mut squares = BTreeMap::from([(Dof::Z, 0.0), (Dof::Rx, 0.0)]);
+    let step = 1e-7;
+    let mut moved = Vec::new();
+    for axis in 0..3 {
+        for name in ["A1", "A2", "A3", "B1", "B2", "B3"] {
+            let mut one = geometry.clone();
+            one.ajb.channels.iter_mut().filter(|p| p.name == name).for_each(|p| p.position_m[axis] += step);
+            moved.push(one);
+        }
+        for i in 0..geometry.ajb.impacts.len() {
+            let mut one = geometry.clone();
+            one.ajb.impacts[i].position_m[axis] += step;
+            moved.push(one);
+        }
+    }
+    for (dof, square) in &mut squares {
+        let base = estimate(&geometry, *dof);
+        *square = moved.iter().map(|one| ((estimate(one, *dof) - base) / step).powi(2)).sum();
+    }
+    let one_metre = Priors { position_m: 1.0, ..NOWHERE_WRONG };
+    let prepared =
+        Prepared::of(&ajb, None, &geometry, IdmSet::Six, BAND, &NOWHERE_WRONG).expect("exact data");
+    let propagated = |d: usize| {
+        let y = Sums::weighted(&prepared.sums[d], &prepared.weights[d]).geometry_variance(&one_metre).sqrt();
+        let k = prepared.estimate_of(d).stiffness;
+        k * k * y * balance(IdmSet::Six)[d].powi(2)
+    };
+    let quotient = squares[&Dof::Rx].sqrt();
+    // a one-sided quotient with steps of 1e-7 m over 4 cm, and the loss factor's square
+    assert!((propagated(3) / quotient - 1.0).abs() < 1e-2, "{} against {quotient}", propagated(3));
+    // k_z is the force without any rotation: a position wrong alike in every cell cannot touch it, 40 mm or not
+    assert!(
+        propagated(2) < 1e-6 * 180e6 / 0.04 && squares[&Dof::Z].sqrt() < 1e-3 * 180e6 / 0.04,
+        "{squares:?}"
+    );
+}
+
+#[test]
+fn noise_above_the_joint_is_said_and_no_bare_number_given() {
+    let (ajb, geometry) = rigid();
+    let loud = FrfNoise { variance: ajb.lines.iter().map(|y| y.map(|v| 100.0 * v.norm_sqr())).collect() };
+    let found =
+        averaged(&ajb, Some(&loud), &geometry, IdmSet::Six, BAND, &Priors::default()).expect("answers");
+    let z = found.joint[&Dof::Z];
+    assert!(!z.identified && z.ci95[1].is_infinite(), "{z:?}");
+    assert!(found.statement().expect("z is there").starts_with("not identified"));
+}
+
+#[test]
+fn what_is_missing_is_refused_by_name() {
+    let (mut ajb, geometry) = rigid();
+    let nowhere = Band { low_hz: 2000.0, high_hz: 3000.0 };
+    let refuse = |ajb: &FrfMatrix, noise: Option<&FrfNoise>, band| {
+        averaged(ajb, noise, &geometry, IdmSet::Six, band, &Priors::default())
+            .expect_err("refused")
+            .to_string()
+    };
+    assert!(refuse(&ajb, None, nowhere).contains("2000–3000 Hz"));
+    assert!(refuse(&ajb, Some(&FrfNoise { variance: vec![] }), BAND).contains("0 lines"));
+    let row = ajb.outputs.iter().position(|o| o == "A1:x").expect("a channel of A");
+    ajb.lines[5][(row, 0)].re = f64::NAN;
+    let text = refuse(&ajb, None, BAND);
+    assert!(text.contains("A1:x") && text.contains("320 Hz"), "{text}");
+}

@@ -1,0 +1,212 @@
+//! The CMIF of the paper's Eq. (B.1): which motions the joint adds, and so which interface deformation modes it needs.
+//!
+//! The singular values of Y^AJB − blkdiag(Y^A, Y^B) show per line how many independent motions the coupling changes; each left
+//! vector, projected onto the rigid motions of both virtual points, says which.
+
+use super::frf::{FrfError, FrfMatrix, block};
+use super::geometry::{Geometry, Grouping};
+use super::idm::{Dof, IdmSet, rigid_row};
+use super::vpt::ROTATION_LENGTH_M;
+use nalgebra::{Complex, DMatrix, DVector, Vector3};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// A set that explains this fraction of what all six motions explain is enough.
+const ENOUGH: f64 = 0.95;
+
+/// Singular values and what they are made of, line by line.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Cmif {
+    /// Lines, Hz.
+    pub frequency_hz: Vec<f64>,
+    /// Singular values per line, m/N, largest first.
+    pub singular_values: Vec<Vec<f64>>,
+    /// Participation \[line\]\[vector\]\[motion x, y, z, rx, ry, rz\] of each left vector: by how much its square shrinks when both virtual
+    /// points lose that motion; 0…1.
+    pub participation: Vec<Vec<[f64; 6]>>,
+    /// What the sets explain of the whole, by size 2, 4, 6, weighted with the squares of the singular values; 0…1.
+    pub explained: BTreeMap<usize, f64>,
+    /// Number of modes suggested.
+    pub suggested: usize,
+    /// Why.
+    pub reason: String,
+}
+
+/// Singular values, participation of their left vectors, and what the three sets and everything explain of the whole.
+type OneLine = (Vec<f64>, Vec<[f64; 6]>, [f64; 4]);
+
+/// Left vectors per line that are looked at: twelve interface motions at most.
+const VECTORS: usize = 12;
+
+/// The CMIF of the assembly against its parts; rows and columns are matched by name, and the substructures' internals count too.
+/// Responses that only the assembly has are left out, and so are spare ones (Grouping 3), which no virtual point uses.
+///
+/// # Errors
+/// A value that is not a number, a name that stands twice, or lines that differ in number.
+pub fn cmif(a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix, geometry: &Geometry) -> Result<Cmif, FrfError> {
+    let difference = difference(a, b, ajb)?;
+    let rigid = rigid_motions(&difference.outputs, geometry);
+    let lines: Vec<OneLine> = difference
+        .lines
+        .par_iter()
+        .map(|line| {
+            let svd = line.clone().svd(true, false);
+            let mut order: Vec<usize> = (0..svd.singular_values.len()).collect();
+            order.sort_by(|i, j| svd.singular_values[*j].total_cmp(&svd.singular_values[*i]));
+            let values: Vec<f64> = order.iter().map(|&i| svd.singular_values[i]).collect();
+            let mut explained = [0.0; 4];
+            let mut participation = Vec::new();
+            if let Some(left) = &svd.u {
+                for &i in order.iter().take(VECTORS) {
+                    let vector = left.column(i).clone_owned();
+                    let power = svd.singular_values[i].powi(2);
+                    let all = rigid.kept(&Dof::ALL, &vector);
+                    for (sum, set) in explained.iter_mut().zip(IdmSet::ALL) {
+                        *sum += power * rigid.kept(set.dofs(), &vector);
+                    }
+                    explained[3] += power;
+                    participation.push(Dof::ALL.map(|dof| {
+                        let others: Vec<Dof> = Dof::ALL.into_iter().filter(|d| *d != dof).collect();
+                        (all - rigid.kept(&others, &vector)).max(0.0)
+                    }));
+                }
+            }
+            (values, participation, explained)
+        })
+        .collect();
+    let mut total = [0.0; 4];
+    for (_, _, explained) in &lines {
+        // every line counts alike, or resonances would decide alone
+        if explained[3] > 0.0 {
+            total
+                .iter_mut()
+                .zip(explained)
+                .for_each(|(sum, e)| *sum += e / explained[3] / lines.len() as f64);
+        }
+    }
+    let explained: BTreeMap<usize, f64> =
+        IdmSet::ALL.iter().zip(total).map(|(set, e)| (set.count(), e)).collect();
+    let suggested = IdmSet::ALL
+        .into_iter()
+        .find(|set| explained[&set.count()] >= ENOUGH * total[2])
+        .unwrap_or(IdmSet::Six);
+    let percent = |n: usize| format!("{n} explain {:.0} %", 100.0 * explained[&n]);
+    let reason = format!(
+        "of the motion that coupling adds, {}, {} and {}: {} modes are the fewest that keep {:.0} % of what all six do",
+        percent(2),
+        percent(4),
+        percent(6),
+        suggested.count(),
+        100.0 * ENOUGH
+    );
+    let (singular_values, participation) = lines.into_iter().map(|(v, p, _)| (v, p)).unzip();
+    Ok(Cmif {
+        frequency_hz: difference.frequency_hz,
+        singular_values,
+        participation,
+        explained,
+        suggested: suggested.count(),
+        reason,
+    })
+}
+
+/// Y^AJB − blkdiag(Y^A, Y^B) in receptance, in the assembly's order.
+fn difference(a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix) -> Result<FrfMatrix, FrfError> {
+    let (a, b, mut whole) = (a.to_receptance()?, b.to_receptance()?, ajb.to_receptance()?);
+    for part in [&a, &b] {
+        if part.lines.len() != whole.lines.len() {
+            return Err(FrfError::LineCount { frequencies: part.lines.len(), matrices: whole.lines.len() });
+        }
+        let place = |names: &[String], all: &[String]| -> Vec<(usize, usize)> {
+            names
+                .iter()
+                .enumerate()
+                .filter_map(|(i, name)| Some((i, all.iter().position(|n| n == name)?)))
+                .collect()
+        };
+        let (rows, columns) = (place(&part.outputs, &whole.outputs), place(&part.inputs, &whole.inputs));
+        for (line, own) in whole.lines.iter_mut().zip(&part.lines) {
+            for &(r, row) in &rows {
+                for &(c, column) in &columns {
+                    line[(row, column)] -= own[(r, c)];
+                }
+            }
+        }
+    }
+    whole.check_finite()?;
+    Ok(whole)
+}
+
+/// Rigid motions of both virtual points at the assembly's channels: one column per point and motion.
+struct Rigid {
+    columns: DMatrix<f64>,
+}
+
+fn rigid_motions(outputs: &[String], geometry: &Geometry) -> Rigid {
+    let names = geometry.ajb.output_names();
+    let mut columns = DMatrix::zeros(outputs.len(), 12);
+    for (row, output) in outputs.iter().enumerate() {
+        let Some(at) = names.iter().position(|n| n == output) else { continue };
+        let point = &geometry.ajb.channels[at];
+        let (side, origin) = match point.grouping {
+            Grouping::InterfaceA | Grouping::InternalA => (0, geometry.virtual_point_a_m),
+            Grouping::InterfaceB | Grouping::InternalB => (6, geometry.virtual_point_b_m),
+        };
+        let motion = rigid_row(point.direction(), point.position() - Vector3::from(origin));
+        for (d, value) in motion.into_iter().enumerate() {
+            columns[(row, side + d)] = if d < 3 { value } else { value / ROTATION_LENGTH_M };
+        }
+    }
+    Rigid { columns }
+}
+
+impl Rigid {
+    /// Squared length of a unit vector's projection onto these motions of both virtual points.
+    fn kept(&self, dofs: &[Dof], vector: &DVector<Complex<f64>>) -> f64 {
+        let chosen: Vec<usize> =
+            [0, 6].iter().flat_map(|side| dofs.iter().map(move |d| side + *d as usize)).collect();
+        let all: Vec<usize> = (0..self.columns.nrows()).collect();
+        let basis = block(&self.columns.map(Complex::from), &all, &chosen).qr().q();
+        (basis.adjoint() * vector).norm_squared()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::exchange::{read_frf, read_positions};
+    use serde_json::Value;
+    use std::path::{Path, PathBuf};
+
+    fn data(file: &str) -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file)
+    }
+
+    #[test]
+    fn singular_values_are_those_of_an_independent_implementation() {
+        for case in ["frf_rigid", "frf_default"] {
+            let frf = |file: &str| read_frf(&data(case).join(file)).expect("test data");
+            let geometry = read_positions(&data("positions/positions.xlsx")).expect("test data").geometry;
+            let found = cmif(&frf("A.npz"), &frf("B.npz"), &frf("AJB.npz"), &geometry).expect("exact data");
+            let text = std::fs::read_to_string(data(case).join("expected.json")).expect("test data");
+            let expected: Value = serde_json::from_str(&text).expect("JSON");
+            for line in ["300", "500"] {
+                let l = found.frequency_hz.iter().position(|f| f.to_string() == line).expect("the line");
+                let values = expected["cmif"][line].as_array().expect("values");
+                assert_eq!(values.len(), 8);
+                for (value, found_value) in values.iter().zip(&found.singular_values[l]) {
+                    // both are decompositions in double precision
+                    let wanted = value.as_f64().expect("a number");
+                    assert!((found_value - wanted).abs() < 1e-9 * found.singular_values[l][0]);
+                }
+            }
+            // the arms are rigid bodies: six motions of each virtual point are all there is
+            assert!(found.explained[&6] > 0.9, "{:?}", found.explained);
+            assert!(found.reason.contains("modes are the fewest"), "{}", found.reason);
+            for vectors in &found.participation {
+                assert!(vectors.iter().flatten().all(|p| (0.0..=1.0 + 1e-12).contains(p)));
+            }
+        }
+    }
+}

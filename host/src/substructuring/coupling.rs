@@ -1,0 +1,236 @@
+//! Coupling: the assembly's admittance from its parts, with or without a compliant joint.
+
+use super::frf::{FrfError, FrfMatrix};
+use super::pseudo_inverse::{RankLost, full_rank_inverse};
+use nalgebra::{Complex, DMatrix};
+
+/// Why parts cannot be coupled.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CouplingError {
+    /// A name is missing or stands twice.
+    #[error(transparent)]
+    Frf(#[from] FrfError),
+    /// The parts are on different lines, in different quantities, or under different windows.
+    #[error(
+        "`{name}` does not fit the first part ({what}): couple FRFs of the same lines, quantity and window only"
+    )]
+    Unlike {
+        /// The part.
+        name: String,
+        /// What differs.
+        what: &'static str,
+    },
+    /// A matrix has another shape than the others ask for.
+    #[error("{what} is {rows} × {columns}, {wanted_rows} × {wanted_columns} is needed")]
+    Shape {
+        /// Which matrix.
+        what: &'static str,
+        /// Its rows.
+        rows: usize,
+        /// Its columns.
+        columns: usize,
+        /// Rows needed.
+        wanted_rows: usize,
+        /// Columns needed.
+        wanted_columns: usize,
+    },
+    /// The interface flexibility is singular: one constraint says what others say already.
+    #[error(transparent)]
+    Singular(#[from] RankLost),
+}
+
+/// The paper's Eq. (1): Ỹ = Y − Y B_fᵀ (B_u Y B_fᵀ + Y^J)⁻¹ B_u Y.
+///
+/// `y` (outputs × inputs) holds the uncoupled parts, `b_u` (m × outputs) and `b_f` (m × inputs) the signed Boolean
+/// matrices of the m couplings. With `joint` = Y^J (m × m) the interface gives way; without it this is the rigid coupling
+/// of LM-FBS, the limit Y^J = 0.
+///
+/// # Errors
+/// Shapes that do not fit; redundant couplings.
+pub fn couple(
+    y: &DMatrix<Complex<f64>>,
+    b_u: &DMatrix<f64>,
+    b_f: &DMatrix<f64>,
+    joint: Option<&DMatrix<Complex<f64>>>,
+) -> Result<DMatrix<Complex<f64>>, CouplingError> {
+    let m = b_u.nrows();
+    let fits = |what, found: (usize, usize), wanted: (usize, usize)| {
+        let ((rows, columns), (wanted_rows, wanted_columns)) = (found, wanted);
+        if found == wanted {
+            Ok(())
+        } else {
+            Err(CouplingError::Shape { what, rows, columns, wanted_rows, wanted_columns })
+        }
+    };
+    fits("B of the responses", b_u.shape(), (m, y.nrows()))?;
+    fits("B of the forces", b_f.shape(), (m, y.ncols()))?;
+    if m == 0 {
+        return Ok(y.clone());
+    }
+    let gap = b_u.map(Complex::from) * y;
+    let push = y * b_f.transpose().map(Complex::from);
+    let mut flexibility = &gap * b_f.transpose().map(Complex::from);
+    if let Some(joint) = joint {
+        fits("Y^J", joint.shape(), (m, m))?;
+        flexibility += joint;
+    }
+    Ok(y - push * full_rank_inverse(&flexibility, "the interface flexibility B Y Bᵀ + Y^J")? * gap)
+}
+
+/// Parts in block-diagonal form; every output and input is called `part/name` afterwards.
+///
+/// # Errors
+/// Parts that differ in lines, quantity or window; names that stand twice.
+pub fn block_diagonal(parts: &[(&str, &FrfMatrix)]) -> Result<FrfMatrix, CouplingError> {
+    let mut whole = FrfMatrix {
+        frequency_hz: Vec::new(),
+        sigma_per_s: 0.0,
+        quantity: super::Quantity::Receptance,
+        outputs: Vec::new(),
+        inputs: Vec::new(),
+        lines: Vec::new(),
+    };
+    if let Some((_, first)) = parts.first() {
+        whole.frequency_hz.clone_from(&first.frequency_hz);
+        (whole.sigma_per_s, whole.quantity) = (first.sigma_per_s, first.quantity);
+    }
+    for (name, part) in parts {
+        part.check()?;
+        let unlike = |what| CouplingError::Unlike { name: (*name).into(), what };
+        if part.quantity != whole.quantity {
+            return Err(unlike("quantity"));
+        }
+        if part.sigma_per_s != whole.sigma_per_s {
+            return Err(unlike("window"));
+        }
+        if part.frequency_hz != whole.frequency_hz {
+            return Err(unlike("lines"));
+        }
+        whole.outputs.extend(part.outputs.iter().map(|o| format!("{name}/{o}")));
+        whole.inputs.extend(part.inputs.iter().map(|i| format!("{name}/{i}")));
+    }
+    let (rows, columns) = (whole.outputs.len(), whole.inputs.len());
+    whole.lines = (0..whole.frequency_hz.len())
+        .map(|l| {
+            let mut line = DMatrix::zeros(rows, columns);
+            let (mut r, mut c) = (0, 0);
+            for (_, part) in parts {
+                let y = &part.lines[l];
+                line.view_mut((r, c), y.shape()).copy_from(y);
+                (r, c) = (r + y.nrows(), c + y.ncols());
+            }
+            line
+        })
+        .collect();
+    whole.check()?;
+    Ok(whole)
+}
+
+/// The signed Boolean matrix whose row k says: `pairs[k].0` minus `pairs[k].1`, among `names`.
+///
+/// # Errors
+/// A name that is not there.
+pub fn boolean(names: &[String], pairs: &[(&str, &str)]) -> Result<DMatrix<f64>, CouplingError> {
+    let mut b = DMatrix::zeros(pairs.len(), names.len());
+    for (k, (plus, minus)) in pairs.iter().enumerate() {
+        for (name, sign) in [(plus, 1.0), (minus, -1.0)] {
+            let at = names.iter().position(|n| n == name).ok_or_else(|| FrfError::MissingName {
+                side: "degrees of freedom to couple",
+                name: (*name).to_string(),
+                available: names.join(", "),
+            })?;
+            b[(k, at)] += sign;
+        }
+    }
+    Ok(b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Quantity;
+    use super::*;
+    use std::f64::consts::TAU;
+
+    /// Receptance of springs (n × n) and masses at f: (K − ω²M)⁻¹.
+    fn receptance(k: &DMatrix<f64>, m: &DMatrix<f64>, f: f64) -> DMatrix<Complex<f64>> {
+        let w = TAU * f;
+        let z = DMatrix::from_fn(k.nrows(), k.ncols(), |r, c| {
+            // a loss factor keeps it regular everywhere
+            Complex::new(k[(r, c)] - w * w * m[(r, c)], 0.01 * k[(r, c)])
+        });
+        z.try_inverse().expect("damped")
+    }
+
+    fn part(names: &[&str], k: &DMatrix<f64>, m: &DMatrix<f64>, lines: &[f64]) -> FrfMatrix {
+        let names: Vec<String> = names.iter().map(|n| (*n).to_string()).collect();
+        FrfMatrix {
+            frequency_hz: lines.to_vec(),
+            sigma_per_s: 0.0,
+            quantity: Quantity::Receptance,
+            outputs: names.clone(),
+            inputs: names,
+            lines: lines.iter().map(|f| receptance(k, m, *f)).collect(),
+        }
+    }
+
+    /// Two chains of two masses, coupled at one end of each, against the matrices of the whole.
+    #[test]
+    fn coupling_is_direct_assembly() {
+        let lines = [40.0, 95.0, 210.0];
+        let chain = |k: f64, ground: f64| DMatrix::from_row_slice(2, 2, &[k + ground, -k, -k, k]);
+        let (ka, kb) = (chain(2e6, 1e6), chain(3e6, 5e5));
+        let (ma, mb) = (DMatrix::from_diagonal_element(2, 2, 1.4), DMatrix::from_diagonal_element(2, 2, 2.2));
+        let (a, b) = (part(&["in", "end"], &ka, &ma, &lines), part(&["in", "end"], &kb, &mb, &lines));
+        let y = block_diagonal(&[("A", &a), ("B", &b)]).expect("alike");
+        let pairs = [("A/end", "B/end")];
+        let (b_u, b_f) =
+            (boolean(&y.outputs, &pairs).expect("named"), boolean(&y.inputs, &pairs).expect("named"));
+        let whole = |extra: Option<f64>| {
+            let mut k = DMatrix::zeros(4, 4);
+            k.view_mut((0, 0), (2, 2)).copy_from(&ka);
+            k.view_mut((2, 2), (2, 2)).copy_from(&kb);
+            let mut m = DMatrix::zeros(4, 4);
+            m.view_mut((0, 0), (2, 2)).copy_from(&ma);
+            m.view_mut((2, 2), (2, 2)).copy_from(&mb);
+            if let Some(spring) = extra {
+                for (r, c, sign) in [(1, 1, 1.0), (3, 3, 1.0), (1, 3, -1.0), (3, 1, -1.0)] {
+                    k[(r, c)] += sign * spring;
+                }
+            }
+            (k, m)
+        };
+        let spring = 7e6;
+        let (k, m) = whole(Some(spring));
+        for (l, f) in lines.iter().enumerate() {
+            let joint = DMatrix::from_element(1, 1, Complex::new(spring, 0.01 * spring).inv());
+            let coupled = couple(&y.lines[l], &b_u, &b_f, Some(&joint)).expect("regular");
+            let direct = receptance(&k, &m, *f);
+            // rounding of 4 × 4 inverses
+            assert!((&coupled - &direct).norm() < 1e-12 * direct.norm());
+            let rigid = couple(&y.lines[l], &b_u, &b_f, None).expect("regular");
+            // compatibility, and the limit of a stiff joint
+            assert!((&b_u.map(Complex::from) * &rigid).norm() < 1e-12 * rigid.norm());
+            let stiff = DMatrix::from_element(1, 1, Complex::new(1e-18, 0.0));
+            let limit = couple(&y.lines[l], &b_u, &b_f, Some(&stiff)).expect("regular");
+            assert!((rigid - &limit).norm() < 1e-9 * limit.norm());
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused_by_name() {
+        let one = DMatrix::from_element(1, 1, 1.0);
+        let a = part(&["p"], &one, &one, &[1.0, 2.0]);
+        let mut b = a.clone();
+        b.frequency_hz[1] = 3.0;
+        let text = block_diagonal(&[("A", &a), ("B", &b)]).expect_err("other lines").to_string();
+        assert!(text.contains("`B`") && text.contains("lines"), "{text}");
+        let text = boolean(&a.outputs, &[("p", "q")]).expect_err("no q").to_string();
+        assert!(text.contains("`q`"), "{text}");
+        // the same constraint twice
+        let y = block_diagonal(&[("A", &a), ("B", &a)]).expect("alike");
+        let twice = boolean(&y.outputs, &[("A/p", "B/p"), ("A/p", "B/p")]).expect("named");
+        assert!(matches!(couple(&y.lines[0], &twice, &twice, None), Err(CouplingError::Singular(_))));
+        let wide = DMatrix::zeros(1, 3);
+        assert!(matches!(couple(&y.lines[0], &wide, &wide, None), Err(CouplingError::Shape { .. })));
+    }
+}

@@ -1,0 +1,75 @@
+//! What every structure obeys: driving points take energy in, and cause and effect may change places.
+
+use super::consistency::coherence_of;
+use nalgebra::{Complex, DMatrix};
+
+/// Per degree of freedom the fraction of lines, 0…1, at which the driving-point mobility s Y_dd has no negative real part.
+///
+/// On s = σ + iω with σ ≥ 0 a passive structure has none at all; lines that do are wrong in phase, sign or position.
+/// `lines` are receptances with equal rows and columns; none without lines.
+pub fn passivity(lines: &[DMatrix<Complex<f64>>], s: &[Complex<f64>]) -> Vec<f64> {
+    let n = lines.first().map_or(0, DMatrix::nrows);
+    (0..n)
+        .map(|d| {
+            let passive = lines.iter().zip(s).filter(|(y, s)| (y[(d, d)] * **s).re >= 0.0).count();
+            passive as f64 / lines.len() as f64
+        })
+        .collect()
+}
+
+/// Mean over lines and pairs of coh(Y_ij, Y_ji), 0…1: 1 for a reciprocal structure. NaN without pairs or lines.
+pub fn reciprocity(lines: &[DMatrix<Complex<f64>>]) -> f64 {
+    let (mut sum, mut count) = (0.0, 0usize);
+    for y in lines {
+        for i in 0..y.nrows() {
+            for j in i + 1..y.nrows() {
+                sum += coherence_of(y[(i, j)], y[(j, i)]);
+                count += 1;
+            }
+        }
+    }
+    sum / count as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    /// Two masses on damped springs: (s²M + sC + K)⁻¹.
+    fn structure() -> (Vec<DMatrix<Complex<f64>>>, Vec<Complex<f64>>) {
+        let s: Vec<Complex<f64>> = (1..60).map(|l| Complex::new(2.3, TAU * 5.0 * f64::from(l))).collect();
+        let lines = s
+            .iter()
+            .map(|s| {
+                let spring = (s * 1e-4 + 1.0) * 1e6;
+                let z = DMatrix::from_row_slice(
+                    2,
+                    2,
+                    &[spring * 2.0 + s * s, -spring, -spring, spring + s * s * 2.0],
+                );
+                z.try_inverse().expect("damped")
+            })
+            .collect();
+        (lines, s)
+    }
+
+    #[test]
+    fn a_structure_is_passive_and_reciprocal() {
+        let (lines, s) = structure();
+        assert_eq!(passivity(&lines, &s), [1.0, 1.0]);
+        // rounding of a 2 × 2 inverse
+        assert!((reciprocity(&lines) - 1.0).abs() < 1e-12);
+        assert!(reciprocity(&[]).is_nan() && passivity(&[], &[]).is_empty());
+    }
+
+    #[test]
+    fn a_sensor_turned_round_is_neither() {
+        let (mut lines, s) = structure();
+        for y in &mut lines {
+            y.row_mut(1).neg_mut();
+        }
+        assert_eq!(passivity(&lines, &s), [1.0, 0.0]);
+        assert!(reciprocity(&lines) < 1e-12);
+    }
+}

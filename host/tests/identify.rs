@@ -1,0 +1,181 @@
+//! `jointrig identify` as a script sees it: documents, exit codes, and the reason of every refusal.
+
+use jointrig::exchange::{read_frf, write_frf};
+use jointrig::substructuring::FrfMatrix;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn data(file: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file)
+}
+
+/// Three FRF files and a geometry in a folder of their own, to be spoilt.
+struct Files {
+    folder: tempfile::TempDir,
+    geometry: PathBuf,
+}
+
+impl Files {
+    fn of(case: &str) -> Files {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        for file in ["A.npz", "B.npz", "AJB.npz"] {
+            std::fs::copy(data(case).join(file), folder.path().join(file)).expect("copied");
+        }
+        Files { folder, geometry: data("positions/positions.xlsx") }
+    }
+
+    fn change(&self, file: &str, change: impl FnOnce(&mut FrfMatrix)) {
+        let path = self.folder.path().join(file);
+        let mut frf = read_frf(&path).expect("test data");
+        change(&mut frf);
+        write_frf(&path, &frf, &[]).expect("written");
+    }
+
+    /// The csv tables without the lines that begin with `name`.
+    fn without_sensor(&mut self, name: &str) {
+        let folder = self.folder.path().join("geometry");
+        std::fs::create_dir(&folder).expect("a folder");
+        for entry in std::fs::read_dir(data("positions/csv")).expect("test data") {
+            let from = entry.expect("an entry").path();
+            let text = std::fs::read_to_string(&from).expect("text");
+            let kept: Vec<&str> =
+                text.lines().filter(|line| !line.starts_with(&format!("{name},"))).collect();
+            std::fs::write(folder.join(from.file_name().expect("a name")), kept.join("\n")).expect("written");
+        }
+        self.geometry = folder;
+    }
+
+    fn identify(&self, further: &[&str]) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_jointrig"));
+        command.arg("identify");
+        for (flag, file) in [("--a", "A.npz"), ("--b", "B.npz"), ("--ajb", "AJB.npz")] {
+            command.arg(flag).arg(self.folder.path().join(file));
+        }
+        command.arg("--geometry").arg(&self.geometry).args(further).output().expect("the command runs")
+    }
+
+    /// Exit code 1, one to a few lines of reason on stderr.
+    fn refused(&self, further: &[&str], parts: &[&str]) {
+        let out = self.identify(further);
+        let text = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert_eq!(out.status.code(), Some(1), "{text}");
+        for part in parts {
+            assert!(text.contains(part), "`{part}` is not in: {text}");
+        }
+        assert!(text.lines().count() <= 6, "{text}");
+    }
+}
+
+#[test]
+fn every_method_finds_the_contact_of_a_rigid_clamp() {
+    let out = Files::of("frf_rigid").identify(&["--idms", "6", "--band", "300:600", "--json"]);
+    assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
+    let found: Value = serde_json::from_slice(&out.stdout).expect("one JSON document");
+    assert_eq!(found["version"], 1);
+    let rows = found["joint"].as_array().expect("rows");
+    for row in rows {
+        let z = &row["stiffness_n_per_m"]["z"];
+        let mean = z["mean"].as_f64().expect("a number");
+        if row["method"] != "internal-printed" {
+            // exact data and exact methods; conditioning leaves 1e-8
+            assert!((mean / 180e6 - 1.0).abs() < 1e-5, "{row}");
+            // the rig's joint is diagonal
+            let coupling = row["coupling_si"]["y-z"]["mean"].as_f64().expect("a number");
+            assert!(coupling.abs() < 1e3, "{row}");
+        }
+        assert_eq!(row["lines"], 76);
+        assert!(z["ci95"].is_array() && row["warnings"].is_array());
+        assert!(row["damping_n_s_per_m"]["z"]["mean"].is_number());
+    }
+    let best = &found["recommended"][0];
+    assert!((best["joint"]["z"]["stiffness"].as_f64().expect("a number") / 180e6 - 1.0).abs() < 1e-3);
+    assert_eq!(best["noise_known"], false);
+}
+
+#[test]
+fn default_bands_are_the_papers() {
+    let out = Files::of("frf_default").identify(&["--json", "--method", "inverse", "--idms", "2"]);
+    let found: Value = serde_json::from_slice(&out.stdout).expect("one JSON document");
+    let bands: Vec<&Value> =
+        found["joint"].as_array().expect("rows").iter().map(|row| &row["band_hz"]).collect();
+    assert_eq!(
+        bands,
+        [
+            &serde_json::json!([300.0, 600.0]),
+            &serde_json::json!([100.0, 800.0]),
+            &serde_json::json!([100.0, 300.0])
+        ]
+    );
+}
+
+#[test]
+fn a_sensor_set_of_rank_five_is_refused() {
+    let mut files = Files::of("frf_rigid");
+    files.without_sensor("A3");
+    files
+        .refused(&["--method", "inverse", "--idms", "6"], &["inverse with 6 IDMs", "5 of 6 motions", "A1:x"]);
+    // what fewer modes allow is still answered
+    let out = files.identify(&["--method", "inverse", "--idms", "2", "--json"]);
+    assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
+}
+
+#[test]
+fn three_internals_for_six_modes_are_refused() {
+    let files = Files::of("frf_rigid");
+    files.change("AJB.npz", |frf| {
+        let (outputs, inputs): (Vec<String>, Vec<String>) = (
+            frf.outputs.iter().filter(|o| o.starts_with("B4")).cloned().collect(),
+            frf.inputs.iter().filter(|i| i.starts_with("I_")).cloned().collect(),
+        );
+        assert_eq!((outputs.len(), inputs.len()), (3, 3));
+        *frf = frf.select(&outputs, &inputs).expect("they are there");
+    });
+    files.refused(
+        &["--method", "internal", "--idms", "6"],
+        &["internal with 6 IDMs", "3 internal impacts and 3 internal responses", "6 interface DoFs"],
+    );
+    // the printed form answers, and says what it is worth
+    let out = files.identify(&["--method", "internal-printed", "--idms", "6", "--band", "300:600", "--json"]);
+    assert_eq!(out.status.code(), Some(0));
+    let found: Value = serde_json::from_slice(&out.stdout).expect("one JSON document");
+    let warnings = found["joint"][0]["warnings"].to_string();
+    assert!(warnings.contains("Π has rank 3 of 6"), "{warnings}");
+}
+
+#[test]
+fn lines_that_are_no_numbers_are_refused() {
+    let files = Files::of("frf_rigid");
+    files.change("B.npz", |frf| frf.lines[3].iter_mut().for_each(|v| v.re = f64::NAN));
+    files.refused(
+        &["--method", "interface", "--idms", "6"],
+        &["interface with 6 IDMs", "B: ", "not a number at 312 Hz"],
+    );
+}
+
+#[test]
+fn files_on_other_lines_are_refused() {
+    let files = Files::of("frf_rigid");
+    files.change("B.npz", |frf| frf.frequency_hz.iter_mut().for_each(|f| *f += 0.5));
+    files.refused(&[], &["B is on other frequency lines than A", "300.5 Hz against 300 Hz"]);
+    let files = Files::of("frf_rigid");
+    files.change("AJB.npz", |frf| *frf = frf.band(300.0, 500.0));
+    files.refused(&[], &["AJB", "51 lines against 76"]);
+}
+
+#[test]
+fn names_that_do_not_meet_are_refused() {
+    let files = Files::of("frf_rigid");
+    files.change("AJB.npz", |frf| frf.outputs.iter_mut().for_each(|o| o.insert(0, '_')));
+    files.refused(&["--method", "inverse"], &["AJB has none of its responses", "A1:x", "_A1:x"]);
+}
+
+#[test]
+fn a_missing_file_and_a_wrong_command_line_differ_in_their_code() {
+    let files = Files::of("frf_rigid");
+    std::fs::remove_file(files.folder.path().join("B.npz")).expect("removed");
+    files.refused(&[], &["B.npz", "cannot be opened"]);
+    for wrong in [&["--idms", "3"][..], &["--band", "600:300"], &["--method", "none"]] {
+        assert_eq!(files.identify(wrong).status.code(), Some(2), "{wrong:?}");
+    }
+}
