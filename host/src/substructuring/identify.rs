@@ -108,7 +108,7 @@ pub struct VirtualPointQuality {
     pub consistency: Consistency,
     /// Fraction of lines with a passive driving point, by degree of freedom in the set's order.
     pub passivity: Vec<f64>,
-    /// Mean coherence of Y_ij with Y_ji at the virtual point.
+    /// How far Y_ij equals Y_ji at the virtual point, 0…1; rotations in metres over 40 mm.
     pub reciprocity: f64,
 }
 

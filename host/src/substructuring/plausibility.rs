@@ -1,6 +1,5 @@
 //! What every structure obeys: driving points take energy in, and cause and effect may change places.
 
-use super::consistency::coherence_of;
 use nalgebra::{Complex, DMatrix};
 
 /// Per degree of freedom the fraction of lines, 0…1, at which the driving-point mobility s Y_dd has no negative real part.
@@ -17,18 +16,25 @@ pub fn passivity(lines: &[DMatrix<Complex<f64>>], s: &[Complex<f64>]) -> Vec<f64
         .collect()
 }
 
-/// Mean over lines and pairs of coh(Y_ij, Y_ji), 0…1: 1 for a reciprocal structure. NaN without pairs or lines.
+/// Mean over lines of Σ |Y_ij + Y_ji|² / Σ 2(|Y_ij|² + |Y_ji|²) over all pairs i < j, 0…1: 1 for a reciprocal structure.
+///
+/// The pairs of a line are taken together, so that a coupling which symmetry makes zero, and rounding does not, counts for
+/// nothing. Rows and columns should have one unit. NaN without pairs or lines.
 pub fn reciprocity(lines: &[DMatrix<Complex<f64>>]) -> f64 {
-    let (mut sum, mut count) = (0.0, 0usize);
+    let mut values = Vec::new();
     for y in lines {
+        let (mut common, mut whole) = (0.0, 0.0);
         for i in 0..y.nrows() {
             for j in i + 1..y.nrows() {
-                sum += coherence_of(y[(i, j)], y[(j, i)]);
-                count += 1;
+                common += (y[(i, j)] + y[(j, i)]).norm_sqr();
+                whole += 2.0 * (y[(i, j)].norm_sqr() + y[(j, i)].norm_sqr());
             }
         }
+        if whole > 0.0 {
+            values.push(common / whole);
+        }
     }
-    sum / count as f64
+    values.iter().sum::<f64>() / values.len() as f64
 }
 
 #[cfg(test)]

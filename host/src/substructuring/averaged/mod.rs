@@ -6,7 +6,7 @@
 //! spring and a damper hardly changes over a band; it is averaged with the weights that each line's noise deserves, and
 //! inverted once.
 //!
-//! [`sensitivity`] holds the linear propagation: dy/dY of every cell, from which noise and errors of position, aim and angle
+//! `sensitivity` holds the linear propagation: dy/dY of every cell, from which noise and errors of position, aim and angle
 //! follow alike. What noise does in second order (the bias) is drawn, in pairs ±n whose linear parts cancel.
 
 mod assembly;
