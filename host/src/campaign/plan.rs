@@ -170,7 +170,7 @@ impl ShakerPlan {
     /// What becomes of them today, for whoever counts on them.
     pub fn remark(&self) -> String {
         format!(
-            "the plan's {} levels of the shaker, before and after, are not measured by this version: its cells are",
+            "the plan's {} levels of the shaker, before and after, are not measured by this version; only its cells are",
             self.levels()
         )
     }
