@@ -31,7 +31,8 @@ fuzz_target!(|bytes: &[u8]| {
     let mut wire = [0; MAX_WIRE];
     let sent = &bytes[..bytes.len().min(BLOCK_HEADER_BYTES + BLOCK_SAMPLE_BYTES - 1)];
     let frame = encode(Kind::Request, sent, &mut wire).expect("short enough");
-    accumulator.feed(&[0]);
+    // what it ends is none of this frame's business
+    let _ = accumulator.feed(&[0]);
     let (_, found) = accumulator.feed(frame);
     let heard = found.expect("a whole frame").expect("a good one");
     assert_eq!((heard.kind, heard.payload), (Kind::Request, sent));
