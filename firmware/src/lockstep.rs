@@ -137,6 +137,18 @@ pub struct Ask {
 }
 
 impl Ask {
+    /// No wish, nothing moved, nothing waited for.
+    pub const NOTHING: Self = Self {
+        op: 0,
+        argument: 0,
+        alarm_us: NEVER,
+        block_us: NEVER,
+        to_device_tail: 0,
+        to_host_head: 0,
+        to_host_full: 0,
+        log_head: 0,
+    };
+
     /// As they stand in memory.
     #[must_use]
     pub const fn to_words(&self) -> [u32; WORDS] {

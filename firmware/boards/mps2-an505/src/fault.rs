@@ -5,7 +5,7 @@ use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, exception};
 use heapless::String;
-use jointrig_firmware::lockstep::{Ask, NEVER, Op};
+use jointrig_firmware::lockstep::{Ask, Op};
 use semihosting::io::Write as _;
 use semihosting::{eprintln, process};
 
@@ -33,16 +33,7 @@ unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
 fn report(sentence: &str) -> ! {
     if memory::is_served() {
         let length = memory::write_text(sentence.as_bytes());
-        let last = Ask {
-            op: Op::Panic as u32,
-            argument: length,
-            alarm_us: NEVER,
-            block_us: NEVER,
-            to_device_tail: 0,
-            to_host_head: 0,
-            to_host_full: 0,
-            log_head: 0,
-        };
+        let last = Ask { op: Op::Panic as u32, argument: length, ..Ask::NOTHING };
         memory::write_ask(&last.to_words());
         if let Ok(mut pipe) = semihosting::io::stdout() {
             // the simulator hears of the end in any case, by the pipe's

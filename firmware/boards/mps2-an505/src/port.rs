@@ -5,7 +5,7 @@ use core::cell::{Cell, RefCell};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::waitqueue::WakerRegistration;
-use jointrig_firmware::lockstep::{Ask, NEVER, Op, Reply, Setup, TEXT_AT, TEXT_BYTES, from_text};
+use jointrig_firmware::lockstep::{Ask, Op, Reply, Setup, TEXT_AT, TEXT_BYTES, from_text};
 use jointrig_protocol::golden;
 use semihosting::io::{Read, Stdin, Stdout, Write, stdin, stdout};
 use semihosting::{eprintln, process};
@@ -30,16 +30,7 @@ pub struct Port {
 pub type Server = fn(&Ask) -> Reply;
 
 static PORT: Mutex<CriticalSectionRawMutex, RefCell<Port>> = Mutex::new(RefCell::new(Port {
-    ask: Ask {
-        op: 0,
-        argument: 0,
-        alarm_us: NEVER,
-        block_us: NEVER,
-        to_device_tail: 0,
-        to_host_head: 0,
-        to_host_full: 0,
-        log_head: 0,
-    },
+    ask: Ask::NOTHING,
     reply: Reply {
         now_us: 0,
         inputs: 0,
