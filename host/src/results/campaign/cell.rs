@@ -1,5 +1,6 @@
 //! What the analysis asks of a campaign: its geometry, its cells, and the kept hits of one cell in SI units.
 
+use crate::campaign::frfs::ImportedFrf;
 use crate::spectra::MotionQuantity;
 use crate::substructuring::geometry::Geometry;
 
@@ -84,6 +85,14 @@ pub trait Measurements: Sync {
     /// Cells that were given up, with the reason.
     fn given_up(&self) -> Vec<(CellName, String)> {
         Vec::new()
+    }
+
+    /// FRFs of a configuration that were measured elsewhere.
+    ///
+    /// # Errors
+    /// They are damaged, or the file cannot be read.
+    fn imported(&self, _configuration: &str) -> Result<Option<ImportedFrf>, Self::Error> {
+        Ok(None)
     }
 
     /// The kept hits of a cell; none if it was not measured.

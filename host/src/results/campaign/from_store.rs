@@ -2,6 +2,7 @@
 
 use super::cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, Measurements};
 use super::{Progress, completeness};
+use crate::campaign::frfs::ImportedFrf;
 use crate::campaign::plan::{Plan, configuration_name};
 use crate::campaign::rows::RecordRow;
 use crate::campaign::store::Store;
@@ -252,6 +253,10 @@ impl Measurements for CampaignFile {
 
     fn given_up(&self) -> Vec<(CellName, String)> {
         self.cells.iter().filter_map(|c| Some((c.name.clone(), c.given_up.clone()?))).collect()
+    }
+
+    fn imported(&self, configuration: &str) -> Result<Option<ImportedFrf>, AnalyseError> {
+        self.with_reader(|store| Ok(store.frf(configuration)?))
     }
 
     fn read(&self, cell: &CellName) -> Result<Cell, AnalyseError> {
