@@ -152,13 +152,21 @@ fn default_bands(frf: &FrfMatrix) -> Result<Vec<Band>, CliError> {
 /// The geometry, and what a reader must know about it.
 fn read_geometry(path: &Path) -> Result<(Geometry, Vec<String>), CliError> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
-        let text = std::fs::read_to_string(path).map_err(|source| CliError::File {
+        let text = std::fs::read_to_string(path).map_err(|source| CliError::Read {
             path: path.into(),
             doing: "reading the geometry",
             source,
         })?;
         let geometry: Geometry =
-            toml::from_str(&text).map_err(|e| CliError::Bad(format!("{}: {e}", path.display())))?;
+            toml::from_str(&text).map_err(|e| {
+                let line = e.span().map_or(1, |at| 1 + text[..at.start].matches('\n').count());
+                CliError::Bad(format!(
+                    "{}, line {line}: {}; a geometry has `a`, `b` and `ajb`, each with `channels` and `impacts`, and both \
+                     virtual points (docs/coming-from-pyfbs.md)",
+                    path.display(),
+                    e.message()
+                ))
+            })?;
         return Ok((geometry, Vec::new()));
     }
     let positions = read_positions(path).map_err(|e: PositionsError| bad(e))?;

@@ -3,6 +3,7 @@
 use super::frf_npz::{read_frf, read_frf_noise};
 use super::frf_uff::{FrfUffError, read_frf_uff};
 use super::npz::NpzError;
+use crate::advice;
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::noise::FrfNoise;
 use std::fs::File;
@@ -24,7 +25,7 @@ pub struct FrfFile {
 #[derive(Debug, thiserror::Error)]
 pub enum FrfFileError {
     /// It cannot be read at all.
-    #[error("{}: cannot be read: {source}; give an .npz FRF file or a universal file (.uff, .unv)", path.display())]
+    #[error("{}: cannot be read: {source}; {}", path.display(), advice::reading(source))]
     Open {
         /// The file.
         path: PathBuf,

@@ -60,7 +60,7 @@ pub fn from_contents(contents: &Contents) -> Result<(ImpactRecords, Vec<String>)
     let Some((first, samples)) = hits.first().and_then(|hit| hit.first()) else {
         let why = warnings.first().map_or_else(String::new, |w| format!(" ({w})"));
         return Err(format!(
-            "there is no force over time in it (data set 58 of function type 1 with an ordinate of type 13){why}"
+            "there is no force over time in it (data set 58 of function type 1 with an ordinate of type 13){why}: give an npz of impact records, or a universal file with time responses"
         ));
     };
     let Abscissa::Even { step, .. } = first.abscissa else {

@@ -27,7 +27,7 @@ impl New {
         let (text, name) = match &self.plan {
             None => (plan::PAPER.to_owned(), "paper.toml".to_owned()),
             Some(path) => {
-                let text = std::fs::read_to_string(path).map_err(|source| CliError::File {
+                let text = std::fs::read_to_string(path).map_err(|source| CliError::Read {
                     path: path.clone(),
                     doing: "reading the plan",
                     source,

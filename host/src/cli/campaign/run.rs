@@ -66,7 +66,7 @@ impl Run {
     /// Takes an edited plan over; without being told to, says that there is one.
     fn settle_plan(&self, store: &mut Store) -> Result<(), CliError> {
         if let Some(path) = &self.plan {
-            let text = std::fs::read_to_string(path).map_err(|source| CliError::File {
+            let text = std::fs::read_to_string(path).map_err(|source| CliError::Read {
                 path: path.clone(),
                 doing: "reading the plan",
                 source,
