@@ -61,7 +61,7 @@ impl Row {
         let mut hasher = crc32fast::Hasher::new();
         let texts =
             [&self.configuration, &self.utc, &self.source, &self.quantity, &self.outputs, &self.inputs];
-        let texts = texts.map(|text| text.as_bytes());
+        let texts = texts.map(String::as_bytes);
         let sigma = self.sigma_per_s.to_le_bytes();
         let blobs = [&self.frequency, &self.frf, self.variance.as_ref().unwrap_or(const { &Vec::new() })];
         for part in texts.into_iter().chain([&sigma[..]]).chain(blobs.map(Vec::as_slice)) {

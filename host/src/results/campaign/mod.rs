@@ -118,7 +118,7 @@ pub fn analyse_measurements<M: Measurements>(
         frfs[place] = assembled.frf;
     }
     substructure(&mut results, geometry, &frfs);
-    recommend(&mut results, geometry, &frfs[2], noises[2].as_ref());
+    recommend(&mut results, geometry, frfs[2].as_ref(), noises[2].as_ref());
     at_the_contact(&mut results, measurements, &averages, &impact_loops, sigma);
     results
 }
@@ -273,7 +273,7 @@ fn substructure(results: &mut Results, geometry: &Geometry, frfs: &[Option<FrfMa
 }
 
 /// The estimates to quote, with their intervals, from the assembly alone.
-fn recommend(results: &mut Results, geometry: &Geometry, ajb: &Option<FrfMatrix>, noise: Option<&FrfNoise>) {
+fn recommend(results: &mut Results, geometry: &Geometry, ajb: Option<&FrfMatrix>, noise: Option<&FrfNoise>) {
     let Some(ajb) = ajb else { return };
     let priors = Priors::default();
     results.source.settings.insert("priors".into(), serde_json::json!(priors));
