@@ -6,10 +6,13 @@
 pub const APPLICATION_ID: i32 = i32::from_be_bytes(*b"JRIG");
 
 /// Version of the tables, in SQLite's `user_version`.
-pub const VERSION: i32 = 2;
+pub const VERSION: i32 = 3;
 
 /// `STEPS[n]` turns version n into version n + 1; a new file takes them all. A step that was released is frozen.
-pub const STEPS: [&str; VERSION as usize] = [FIRST, SEALS];
+pub const STEPS: [&str; VERSION as usize] = [FIRST, SEALS, LEVELS];
+
+/// The first version whose files hold levels of the shaker.
+pub const WITH_LEVELS: i32 = 3;
 
 /// Version 1. Raw records are append-only: triggers refuse any change.
 const FIRST: &str = "
@@ -145,4 +148,37 @@ CREATE TABLE sensors (
 
 -- why a cell is done with fewer good hits than wanted, but enough
 ALTER TABLE cells ADD COLUMN settled TEXT;
+";
+
+/// Version 3: levels of the shaker.
+const LEVELS: &str = "
+-- one row per level that was recorded: a sine held in steady state, or a sweep from rest to rest. amplitude and reached are m, N
+-- or V as control is displacement, force or drive. The seal runs over all other columns but samples (see levels.rs)
+CREATE TABLE levels (
+    id           INTEGER PRIMARY KEY,
+    session      INTEGER NOT NULL REFERENCES sessions(id),
+    utc          TEXT NOT NULL,
+    moment       TEXT NOT NULL,
+    frequency_hz REAL NOT NULL,
+    end_hz       REAL,
+    control      TEXT NOT NULL,
+    amplitude    REAL NOT NULL,
+    reached      REAL NOT NULL,
+    overshoot    REAL NOT NULL,
+    settle_s     REAL NOT NULL,
+    drive_v      REAL NOT NULL,
+    epoch        INTEGER NOT NULL,
+    first_scan   INTEGER NOT NULL,
+    scans        INTEGER NOT NULL,
+    channels     INTEGER NOT NULL,
+    gaps         TEXT NOT NULL,
+    crc32        INTEGER NOT NULL,
+    bytes_crc32  INTEGER NOT NULL,
+    seal         INTEGER NOT NULL,
+    samples      BLOB NOT NULL
+) STRICT;
+CREATE TRIGGER levels_stay BEFORE UPDATE ON levels
+BEGIN SELECT RAISE(ABORT, 'a raw record is never changed'); END;
+CREATE TRIGGER levels_remain BEFORE DELETE ON levels
+BEGIN SELECT RAISE(ABORT, 'a raw record is never deleted'); END;
 ";

@@ -1,6 +1,8 @@
 //! The contact by hysteresis loops: numbers per kind of excitation, and one loop to look at.
 
 use super::{Excitation, OverCycles, Shape};
+use crate::hysteresis::impact::DecayCycle;
+use crate::hysteresis::{LoopAnalysis, ShapeEvidence};
 use serde::Serialize;
 
 /// Which force the loop was drawn with.
@@ -30,18 +32,62 @@ pub struct Hysteresis {
     pub k_t_n_per_m: Option<OverCycles>,
     /// Slope of T on Δx over the whole loop, N/m.
     pub k_eq_n_per_m: Option<OverCycles>,
+    /// Peak secant of the averaged loop, N/m: another quantity beside a hidden resonance, under its own name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub k_secant_n_per_m: Option<f64>,
+    /// Magnitude of the ratio of fundamentals T₁/Δx₁, N/m: as the secant.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub k_fundamental_n_per_m: Option<f64>,
     /// Area of the closed loop, J.
     pub energy_j: Option<OverCycles>,
+    /// Friction limit μN from the plateau's median, N; only in gross slip.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub friction_limit_n: Option<f64>,
     /// Friction limit over normal load; null where the contact did not slip or the load is not known.
     pub friction_coefficient: Option<f64>,
     /// Phase of T against Δx, degrees.
     pub phase_deg: Option<f64>,
+    /// What the shape was told from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape_evidence: Option<ShapeEvidence>,
+    /// Every cycle of one record's decay.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub decay_cycles: Vec<DecayCycle>,
+    /// Before or after the hammer's cells, for a level of a campaign.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub moment: Option<&'static str>,
     /// Ids of the records used, as closed ranges.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub records: Vec<[i64; 2]>,
     /// What a reader must know before using these numbers.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
+}
+
+impl Hysteresis {
+    /// One record's loops, drawn with this force.
+    pub fn of(found: &LoopAnalysis, force: Force) -> Self {
+        Self {
+            force,
+            kind: found.kind,
+            frequency_hz: Some(found.frequency_hz),
+            amplitude_m: Some(found.amplitude_m),
+            shape: found.shape,
+            k_t_n_per_m: found.k_t_n_per_m,
+            k_eq_n_per_m: Some(found.k_eq_n_per_m),
+            k_secant_n_per_m: found.k_secant_n_per_m,
+            k_fundamental_n_per_m: found.k_fundamental_n_per_m.map(num_complex::Complex::norm),
+            energy_j: found.energy_j,
+            friction_limit_n: found.friction_limit_n,
+            friction_coefficient: found.friction_coefficient,
+            phase_deg: Some(found.phase_deg),
+            shape_evidence: found.shape_evidence,
+            decay_cycles: found.decay_cycles.clone(),
+            moment: None,
+            records: Vec::new(),
+            warnings: found.warnings.clone(),
+        }
+    }
 }
 
 /// One cycle, sample by sample: what the loop figure shows.

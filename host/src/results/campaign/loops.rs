@@ -1,6 +1,7 @@
 //! The loops of the impacts: each counting hit's first cycle, and all of them together.
 
 use super::cell::{ContactDelays, ContactSignals};
+use crate::hysteresis::delays;
 use crate::hysteresis::integration::open_record;
 use crate::hysteresis::{
     HysteresisError, HysteresisRecord, Kind, OverCycles, RelativeMotion, Shape, analyse,
@@ -65,24 +66,9 @@ pub fn of_hit(
 
 /// v_A, v_B and T with their delays against each other taken out.
 fn in_step(contact: &ContactSignals, delays: ContactDelays, fs_hz: f64) -> [Vec<f64>; 3] {
-    let least = delays.specimen_a.min(delays.specimen_b).min(delays.load_cells);
-    let advanced = |signal: &[f64], delay: f64| advance(signal, (delay - least) * fs_hz);
-    [
-        advanced(&contact.specimen_a_m_per_s, delays.specimen_a),
-        advanced(&contact.specimen_b_m_per_s, delays.specimen_b),
-        advanced(&contact.tangential_n, delays.load_cells),
-    ]
-}
-
-/// The signal `samples` earlier (not negative), by straight lines between samples: the loops live far below the
-/// sampling rate. The last value is held.
-fn advance(signal: &[f64], samples: f64) -> Vec<f64> {
-    if samples <= 0.0 || signal.is_empty() {
-        return signal.to_vec();
-    }
-    let (whole, share) = (samples.floor() as usize, samples.fract());
-    let at = |i: usize| signal[i.min(signal.len() - 1)];
-    (0..signal.len()).map(|i| at(i + whole) * (1.0 - share) + at(i + whole + 1) * share).collect()
+    let ContactSignals { specimen_a_m_per_s, specimen_b_m_per_s, tangential_n } = contact.clone();
+    let delays = [delays.specimen_a, delays.specimen_b, delays.load_cells];
+    delays::in_step([specimen_a_m_per_s, specimen_b_m_per_s, tangential_n], delays, fs_hz)
 }
 
 /// All first cycles together, in the shape of the results; `None` without any.
@@ -114,10 +100,16 @@ pub fn gathered(loops: &[ImpactLoop]) -> Option<Hysteresis> {
         shape,
         k_t_n_per_m: (shape == Shape::Stuck).then_some(slope),
         k_eq_n_per_m: Some(slope),
+        k_secant_n_per_m: None,
+        k_fundamental_n_per_m: None,
         // the first cycle of a decay is not closed
         energy_j: None,
+        friction_limit_n: None,
         friction_coefficient: None,
         phase_deg: mean(|l| l.phase_deg),
+        shape_evidence: None,
+        decay_cycles: Vec::new(),
+        moment: None,
         records: ranges(loops.iter().map(|l| l.record)),
         warnings,
     })
@@ -181,16 +173,6 @@ pub fn drawn(shown: &ImpactLoop, fs_hz: f64, contact: &ContactSignals, delays: C
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn signals_are_advanced_by_their_delay() {
-        let ramp: Vec<f64> = (0..10).map(f64::from).collect();
-        assert_eq!(advance(&ramp, 0.0), ramp);
-        let early = advance(&ramp, 1.5);
-        assert_eq!(early[..3], [1.5, 2.5, 3.5]);
-        assert_eq!(early.len(), 10);
-        assert!(advance(&[], 3.0).is_empty());
-    }
 
     #[test]
     fn nothing_gives_nothing() {
