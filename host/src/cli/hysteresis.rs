@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::error::CliError;
+use super::number::{not_negative, positive};
 use super::output;
 use crate::exchange::read_hysteresis;
 use crate::hysteresis::{Correction, HysteresisError, HysteresisRecord, analyse};
@@ -75,17 +76,5 @@ impl Loops {
             }
         }
         source
-    }
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    not_negative(text)
-        .and_then(|value| if value > 0.0 { Ok(value) } else { Err("write a number over 0".into()) })
-}
-
-fn not_negative(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value >= 0.0 && value.is_finite() => Ok(value),
-        _ => Err("write a number that is not negative".into()),
     }
 }

@@ -17,6 +17,7 @@ mod import;
 mod info;
 mod interrupt;
 mod measure;
+mod number;
 mod output;
 mod shaker;
 

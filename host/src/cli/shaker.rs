@@ -7,6 +7,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::error::CliError;
+use super::number::positive;
 use super::{interrupt, output};
 use crate::campaign::level::{Held, Level, Moment};
 use crate::campaign::levels::LevelRow;
@@ -273,13 +274,6 @@ fn prompt(yes: bool, levels: usize) -> Result<(), CliError> {
         Ok(length) if length > 0 && line.trim().is_empty() => Ok(()),
         Ok(length) if length > 0 => Err(CliError::Bad("stopped at the prompt; nothing has moved".into())),
         _ => Err(CliError::Bad("nobody is there to answer (no terminal): use --yes".into())),
-    }
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
-        _ => Err("write a number over 0".into()),
     }
 }
 

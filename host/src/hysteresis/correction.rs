@@ -27,8 +27,8 @@ impl Correction {
     pub fn applied(&self, record: &HysteresisRecord) -> HysteresisRecord {
         let fs_hz = record.fs_hz;
         let acceleration = match &record.motion {
-            RelativeMotion::Velocity { b_m_per_s, .. } => slopes(b_m_per_s, fs_hz),
-            RelativeMotion::Displacement { b_m, .. } => slopes(&slopes(b_m, fs_hz), fs_hz),
+            RelativeMotion::Velocity { b_m_per_s, .. } => rates(b_m_per_s, fs_hz),
+            RelativeMotion::Displacement { b_m, .. } => rates(&rates(b_m, fs_hz), fs_hz),
         };
         let force_n = record
             .force_n
@@ -40,8 +40,8 @@ impl Correction {
     }
 }
 
-/// Central differences, one-sided at the ends.
-fn slopes(x: &[f64], fs_hz: f64) -> Vec<f64> {
+/// Rate of change of `x` per second: central differences, one-sided at the ends.
+pub fn rates(x: &[f64], fs_hz: f64) -> Vec<f64> {
     let last = x.len().saturating_sub(1);
     (0..x.len())
         .map(|i| {

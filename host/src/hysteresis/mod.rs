@@ -17,6 +17,7 @@ pub mod delays;
 pub mod impact;
 pub mod integration;
 pub mod loops;
+pub mod reconstruction;
 pub mod record;
 pub mod shape;
 pub mod static_arm;

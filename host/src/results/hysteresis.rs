@@ -53,6 +53,12 @@ pub struct Hysteresis {
     /// Every cycle of one record's decay.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub decay_cycles: Vec<DecayCycle>,
+    /// The decay's cycles over all hits, from the first one on.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub decay: Vec<DecayStep>,
+    /// Id of the shaker's level in the campaign file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub level: Option<i64>,
     /// Before or after the hammer's cells, for a level of a campaign.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub moment: Option<&'static str>,
@@ -62,6 +68,19 @@ pub struct Hysteresis {
     /// What a reader must know before using these numbers.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
+}
+
+/// One cycle of the decay over all hits that count.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DecayStep {
+    /// Which cycle, from 1.
+    pub cycle: usize,
+    /// Least-squares slope of T on Δx over it, N/m; `cycles` counts the hits.
+    pub k_eq_n_per_m: OverCycles,
+    /// Phase by which Δx lags T, degrees (mean over hits).
+    pub phase_deg: f64,
+    /// Half the swing of Δx, m (mean over hits).
+    pub amplitude_m: f64,
 }
 
 impl Hysteresis {
@@ -83,6 +102,8 @@ impl Hysteresis {
             phase_deg: Some(found.phase_deg),
             shape_evidence: found.shape_evidence,
             decay_cycles: found.decay_cycles.clone(),
+            decay: Vec::new(),
+            level: None,
             moment: None,
             records: Vec::new(),
             warnings: found.warnings.clone(),
@@ -120,6 +141,29 @@ pub struct ImpactSlope {
     pub record: i64,
     /// The impact's name.
     pub impact: String,
-    /// Slope of the first cycle, N/m.
-    pub k_t_n_per_m: f64,
+    /// Least-squares slope of T on Δx over the first cycle, N/m.
+    pub k_eq_n_per_m: f64,
+}
+
+/// One cycle of a level of the shaker, averaged over its record.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ShakerLoop {
+    /// The level's id in the campaign file.
+    pub level: i64,
+    /// Frequency, Hz.
+    pub frequency_hz: f64,
+    /// Before or after the hammer's cells.
+    pub moment: &'static str,
+    /// Its shape.
+    pub shape: Shape,
+    /// Least-squares slope over the whole loop, N/m.
+    pub slope_n_per_m: f64,
+    /// Δx over one cycle, equidistant in time, m.
+    pub displacement_m: Vec<f64>,
+    /// T of the same points, N.
+    pub force_n: Vec<f64>,
+    /// Displacement of specimen A over the record's first cycle, m.
+    pub displacement_a_m: Vec<f64>,
+    /// Displacement of specimen B over the same, m.
+    pub displacement_b_m: Vec<f64>,
 }

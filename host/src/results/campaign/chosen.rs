@@ -49,6 +49,27 @@ pub fn curves(
         .collect()
 }
 
+/// A point of each arm along z from `impact`, in the assembly: what the specimens are compared with.
+pub fn arms(
+    impact: &str,
+    points: &Configuration,
+    cells: &[CellAverage],
+    sigma_per_s: f64,
+    quantity: MotionQuantity,
+) -> Vec<FrfCurve> {
+    let Some(hit) = points.impacts.iter().find(|p| p.name == impact) else { return Vec::new() };
+    let arm = |role: Role, grouping: Grouping| {
+        let measured = |channel: &&Point| channel.grouping == grouping && channel.direction[2].abs() > 0.9;
+        points.channels.iter().filter(measured).find_map(|channel| {
+            let own = |c: &&CellAverage| c.name.impact == impact && c.name.response == channel.name;
+            let cell = cells.iter().filter(|c| c.name.configuration == "AJB").find(own)?;
+            Some(curve("AJB", role, hit, channel, cell, sigma_per_s, quantity))
+        })
+    };
+    let both = [arm(Role::ArmA, Grouping::InterfaceA), arm(Role::ArmB, Grouping::InterfaceB)];
+    both.into_iter().flatten().collect()
+}
+
 fn on_a(grouping: Grouping) -> bool {
     matches!(grouping, Grouping::InterfaceA | Grouping::InternalA)
 }
