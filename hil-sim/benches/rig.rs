@@ -40,6 +40,27 @@ fn shaker_modal(bencher: Bencher) {
     });
 }
 
+/// The contact in gross slip, at 30 Hz: every scan is done in steps.
+#[divan::bench(args = ["stuck", "jenkins", "iwan"])]
+fn shaker_slip(bencher: Bencher, case: &str) {
+    let text =
+        if case == "iwan" { include_str!("../rigs/iwan.toml") } else { include_str!("../rigs/jenkins.toml") };
+    let config = RigConfig::from_toml(text).expect("a shipped rig stands");
+    let mut rig = Rig::new(&config, 1).expect("a shipped rig stands");
+    let volts = if case == "stuck" { 0.1 } else { 5.0 };
+    let mut codes = [0_i16; CHANNELS];
+    bencher.counter(ItemsCount::new(1_u64)).bench_local(|| {
+        for scan in 0..SECOND {
+            let angle = std::f64::consts::TAU * 30.0 * scan as f64 / SECOND as f64;
+            rig.drive(volts * angle.sin());
+            rig.scan(&mut codes);
+            black_box(&codes);
+        }
+    });
+    let slid_m = rig.joint().map_or(0.0, |joint| joint.slid_m);
+    assert_eq!(slid_m > 0.0, case != "stuck", "it slides where it should");
+}
+
 fn record(bencher: Bencher, configuration: &str, stepping: Stepping, seconds: u64) {
     let configuration = match configuration {
         "A" => Configuration::A,

@@ -2,10 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
 
-use jointrig_hil_sim::rig::config::DEFAULT_TOML;
+use jointrig_hil_sim::rig::config::{ContactLaw, DEFAULT_TOML};
 use jointrig_hil_sim::rig::{Rig, RigConfig, RigError};
 
-const SHIPPED: [(&str, &str); 7] = [
+const SHIPPED: [(&str, &str); 9] = [
     ("default", include_str!("../rigs/default.toml")),
     ("rigid-clamp", include_str!("../rigs/rigid-clamp.toml")),
     ("clamp-half", include_str!("../rigs/clamp-half.toml")),
@@ -13,6 +13,8 @@ const SHIPPED: [(&str, &str); 7] = [
     ("noisy", include_str!("../rigs/noisy.toml")),
     ("contact-120", include_str!("../rigs/contact-120.toml")),
     ("contact-240", include_str!("../rigs/contact-240.toml")),
+    ("jenkins", include_str!("../rigs/jenkins.toml")),
+    ("iwan", include_str!("../rigs/iwan.toml")),
 ];
 
 #[test]
@@ -38,7 +40,7 @@ fn every_shipped_rig_stands_under_its_name() {
 
 #[test]
 fn shipped_variants_change_what_they_say_and_nothing_else() {
-    let [default, _, half, double, noisy, soft, hard] =
+    let [default, _, half, double, noisy, soft, hard, jenkins, iwan] =
         SHIPPED.map(|(_, text)| RigConfig::from_toml(text).unwrap());
     let loaded =
         |rig: &RigConfig| (rig.clamp.loaded.stiffness_n_per_m[2], rig.clamp.loaded.rotation_nm_per_rad[0]);
@@ -48,6 +50,11 @@ fn shipped_variants_change_what_they_say_and_nothing_else() {
     assert_eq!(noisy.sensors.vibrometer.floor, 2e-7);
     assert_eq!(soft.contact.stiffness_n_per_m, [1.8e8, 2.6e8, 1.2e8]);
     assert_eq!(hard.contact.stiffness_n_per_m, [1.8e8, 2.6e8, 2.4e8]);
+    for (slips, law) in [(jenkins, ContactLaw::Jenkins), (iwan, ContactLaw::Iwan)] {
+        assert!(slips.contact.law == law && slips.clamp.rigid);
+        assert_eq!(slips.contact.friction_coefficient * slips.contact.normal_load_n, 180.0);
+        assert_eq!(slips.contact.stiffness_n_per_m, default.contact.stiffness_n_per_m);
+    }
     let mut back = soft;
     back.name.clone_from(&default.name);
     back.contact = default.contact.clone();
@@ -95,8 +102,11 @@ fn wrong_files_are_told_what_and_where() {
     assert!(error.contains("line 1"), "{error}");
     let error = complaint("[contact]\nposition_m = [0, 0]\n");
     assert!(error.contains("line 2"), "{error}");
-    let error = complaint("[contact]\nlaw = \"jenkins\"\n");
-    assert!(error.contains("line 2") && error.contains("linear"), "{error}");
+    let error = complaint("[contact]\nlaw = \"coulomb\"\n");
+    assert!(
+        error.contains("line 2") && ["linear", "jenkins", "iwan"].iter().all(|law| error.contains(law)),
+        "{error}"
+    );
     let error = complaint(
         "[[impacts]]\nname = \"P\"\nbody = \"arm_a\"\nposition_m = [0, 0, 0]\ndirection = [0, 0, 0]\n",
     );
@@ -105,6 +115,26 @@ fn wrong_files_are_told_what_and_where() {
     assert!(error.contains("three") && error.contains("line 1"), "{error}");
     let error = complaint("[hammer.mishaps]\nweak = 0.99\n");
     assert!(error.contains("sum to at most 1"), "{error}");
+}
+
+#[test]
+fn contacts_that_cannot_be_are_refused_with_their_field() {
+    for (lines, field, words) in [
+        ("normal_load_n = -1.0", "contact.normal_load_n", "negative"),
+        ("friction_coefficient = nan", "contact.friction_coefficient", "finite"),
+        ("slip_step_s = 0.0", "contact.slip_step_s", "greater than zero"),
+        ("slip_step_s = 1e-9", "contact.slip_step_s", "1000 steps"),
+        ("iwan.elements = 0", "contact.iwan.elements", "1 to 1000"),
+        ("iwan.spread = 1.5", "contact.iwan.spread", "between 0 and 1"),
+        ("stiffness_n_per_m = [1e8, 1e8, 0.0]", "contact.stiffness_n_per_m", "kz"),
+    ] {
+        let error = complaint(&format!("[contact]\nlaw = \"iwan\"\n{lines}\n"));
+        assert!(error.contains(field) && error.contains("line 3") && error.contains(words), "{error}");
+    }
+    // A light body on a stiff contact, scanned slowly: the step is too long, and that is said when the rig is built.
+    let text = "[contact]\nlaw = \"jenkins\"\nslip_step_s = 1.0\n[bodies.specimen_a]\nmass_kg = 1e-4\n";
+    let error = Rig::new(&RigConfig::from_toml(text).unwrap(), 1).unwrap_err().to_string();
+    assert!(error.contains("contact.slip_step_s") && error.contains("try"), "{error}");
 }
 
 #[test]

@@ -26,7 +26,7 @@ use crate::executor::{Poller, Polling, Woken, jump};
 use crate::link::{DeviceEnd, HostEnd, pair};
 use crate::rig::{Rig, RigConfig, RigError};
 use drive::VirtualDrive;
-pub use parts::{Controls, Virtual};
+pub use parts::{Controls, Seen, Virtual};
 use parts::{VirtualCoil, VirtualInputs, VirtualScans, VirtualStage, describe};
 
 /// Seconds of scans that the ring holds, at least.
@@ -132,7 +132,7 @@ fn run(rig: Rig, options: &Options, link: &DeviceEnd, controls: &Arc<Controls>) 
     let core: Rc<Core<'static, NoopRawMutex>> =
         Rc::new(Core::new(facts, Box::leak(vec![Slot::EMPTY; slots].into_boxed_slice())));
     let rig = Rc::new(RefCell::new(rig));
-    let scans = VirtualScans::new(&rig, &drive, channels.len(), per_block, rate_hz, !options.free_running);
+    let scans = VirtualScans::new(&rig, &drive, controls, per_block, !options.free_running);
     let sampling = scans.sampling();
     let woken = Arc::new(Woken::default());
     let mut poller = Poller::new(options.polling, futures(&core, &rig, scans, drive, link, controls), &woken);

@@ -15,7 +15,7 @@ use jointrig_protocol::request;
 
 use super::drive::VirtualDrive;
 use crate::link::DeviceEnd;
-use crate::rig::{self, Configuration, Measured, Rig};
+use crate::rig::{self, Configuration, JointState, Measured, Rig, RigError, config};
 
 /// The native virtual board.
 pub struct Virtual;
@@ -38,6 +38,23 @@ pub struct Controls {
     pressed: AtomicBool,
     reset: AtomicBool,
     pulses_us: Mutex<Vec<u32>>,
+    /// A normal load that the rig has not heard of yet (N).
+    normal_load_n: Mutex<Option<f64>>,
+    watches_joint: AtomicBool,
+    seen: Mutex<Seen>,
+}
+
+/// What the rig has come to by the end of a block.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Seen {
+    /// Scans since the start, lost ones among them.
+    pub scans: u64,
+    /// The scan after the last in which the shaker was driven; 0 when it never was.
+    pub driven_until: u64,
+    /// The drive in the last scan, V.
+    pub drive_v: f64,
+    /// The joint, while it is watched ([`Controls::watch_joint`]); `None` outside the assembly.
+    pub joint: Option<JointState>,
 }
 
 impl Controls {
@@ -59,6 +76,26 @@ impl Controls {
     /// Every pulse that the coil was given, µs, as the rig felt it.
     pub fn coil_pulses_us(&self) -> Vec<u32> {
         self.pulses_us.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Sets the normal load, N, from the next block on.
+    ///
+    /// # Errors
+    /// [`RigError::Field`] for a load that is negative or no number.
+    pub fn set_normal_load(&self, normal_load_n: f64) -> Result<(), RigError> {
+        config::normal_load(normal_load_n)?;
+        *self.normal_load_n.lock().unwrap_or_else(PoisonError::into_inner) = Some(normal_load_n);
+        Ok(())
+    }
+
+    /// Watches the joint from the next block on, which costs more than the block itself.
+    pub fn watch_joint(&self) {
+        self.watches_joint.store(true, Ordering::Release);
+    }
+
+    /// What the rig had come to by the end of the last block.
+    pub fn seen(&self) -> Seen {
+        *self.seen.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -95,6 +132,7 @@ pub(super) fn describe(channels: &[rig::Channel]) -> &'static [Channel] {
 pub struct VirtualScans {
     rig: Rc<RefCell<Rig>>,
     drive: VirtualDrive,
+    controls: Arc<Controls>,
     channels: usize,
     per_block: usize,
     rate_hz: u64,
@@ -107,14 +145,13 @@ impl VirtualScans {
     pub(super) fn new(
         rig: &Rc<RefCell<Rig>>,
         drive: &VirtualDrive,
-        channels: usize,
+        controls: &Arc<Controls>,
         per_block: usize,
-        rate_hz: u32,
         held: bool,
     ) -> Self {
-        let (rig, drive) = (Rc::clone(rig), drive.clone());
-        let rate_hz = u64::from(rate_hz);
-        Self { rig, drive, channels, per_block, rate_hz, scans: 0, held, sampling: Rc::default() }
+        let (channels, rate_hz) = (rig.borrow().channels().len(), u64::from(rig.borrow().scan_rate_hz()));
+        let (rig, drive, controls) = (Rc::clone(rig), drive.clone(), Arc::clone(controls));
+        Self { rig, drive, controls, channels, per_block, rate_hz, scans: 0, held, sampling: Rc::default() }
     }
 
     /// True while the converters run, that is while virtual time may go on.
@@ -134,7 +171,7 @@ impl Scans for VirtualScans {
         // the instant of the block's last scan, rounded up to the clock's microsecond
         Timer::at(Instant::from_micros((self.scans * 1_000_000).div_ceil(self.rate_hz))).await;
         self.sampling.set(false);
-        fill(&mut self.rig.borrow_mut(), &self.drive, self.channels, self.per_block, block);
+        fill(&mut self.rig.borrow_mut(), &self.drive, &self.controls, self.channels, self.per_block, block);
         Delivered { scans: self.per_block as u8, missed: 0 }
     }
 }
@@ -143,18 +180,32 @@ impl Scans for VirtualScans {
 pub(super) fn fill(
     rig: &mut Rig,
     drive: &VirtualDrive,
+    controls: &Controls,
     channels: usize,
     per_block: usize,
     block: &mut [u8; BLOCK_SAMPLE_BYTES],
 ) {
     let mut codes = [0; jointrig_protocol::limits::MAX_CHANNELS];
+    if let Some(load) = controls.normal_load_n.lock().unwrap_or_else(PoisonError::into_inner).take() {
+        rig.set_normal_load(load).expect("the load was checked when it was ordered");
+    }
+    let mut seen = controls.seen();
     for scan in block.chunks_exact_mut(2 * channels).take(per_block) {
-        rig.drive(drive.next_v());
+        seen.drive_v = drive.next_v();
+        seen.scans += 1;
+        if seen.drive_v != 0.0 {
+            seen.driven_until = seen.scans;
+        }
+        rig.drive(seen.drive_v);
         rig.scan(&mut codes[..channels]);
         for (bytes, code) in scan.as_chunks_mut::<2>().0.iter_mut().zip(codes) {
             *bytes = code.to_le_bytes();
         }
     }
+    if controls.watches_joint.load(Ordering::Acquire) {
+        seen.joint = rig.joint();
+    }
+    *controls.seen.lock().unwrap_or_else(PoisonError::into_inner) = seen;
 }
 
 /// The rig's coil behind a timer that ends any pulse at the cap.

@@ -86,6 +86,15 @@ pub fn phi(x: Complex<f64>) -> Complex<f64> {
     (1..=16).rev().fold(Complex::ONE, |sum, k| sum * x / f64::from(k + 1) + 1.0)
 }
 
+/// φ₂(x) = (eˣ − 1 − x) / x², to rounding also near zero: of a force that rises linearly from nothing.
+pub fn phi_rising(x: Complex<f64>) -> Complex<f64> {
+    if x.norm_sqr() > 0.25 {
+        return (phi(x) - 1.0) / x;
+    }
+    // Σ xᵏ / (k + 2)!
+    0.5 * (1..=16).rev().fold(Complex::ONE, |sum, k| sum * x / f64::from(k + 2) + 1.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -97,6 +106,8 @@ mod tests {
             // Both forms lose at most a few roundings at |x| = 1/2.
             assert!((phi(x * (1.0 - 1e-12)) - phi(x * (1.0 + 1e-12))).norm() < 1e-11);
             assert!((phi(x) - (x.exp() - 1.0) / x).norm() < 1e-15);
+            assert!((phi_rising(x * (1.0 - 1e-12)) - phi_rising(x * (1.0 + 1e-12))).norm() < 1e-11);
+            assert!((phi_rising(x) - (x.exp() - 1.0 - x) / (x * x)).norm() < 2e-15);
         }
     }
 

@@ -3,7 +3,7 @@
 //! Axes: x lateral, y vertical (normal load), z horizontal (sliding); origin at the contact's centre; SI units.
 //! One [`Rig`] is one device. It advances by whole scans: [`Rig::scan`] moves structure, bolt and shaker on by one scan period
 //! and samples all channels at its end. The stuck structure is advanced exactly (see [`stepper`]), so the scan rate does not
-//! change the physics.
+//! change the physics; a contact that slips ([`sliders`]) is advanced in steps of its own.
 //!
 //! **What a record depends on.** Noise, scatter and errors of aim are keyed to (seed, configuration, cell, attempt, purpose)
 //! and counted from the last [`Rig::stage`] or [`Rig::fire`]: never to absolute time, never to what happened in other cells.
@@ -18,11 +18,13 @@ mod configuration;
 mod error;
 pub mod force;
 pub mod hammer;
+mod joint_state;
 mod key;
 pub mod modal;
 mod plant;
 mod probe;
 pub mod sensors;
+pub mod sliders;
 pub mod state_space;
 pub mod stepper;
 pub mod structure;
@@ -32,6 +34,7 @@ pub use config::RigConfig;
 pub use configuration::{Configuration, Quantity};
 pub use error::RigError;
 pub use hammer::{Hit, Mishap};
+pub use joint_state::JointState;
 pub use probe::Probe;
 pub use sensors::{CHANNELS, Channel, Measured};
 pub use structure::exact_frf;
@@ -41,7 +44,7 @@ use key::stream;
 use plant::Plant;
 pub use plant::Stepping;
 use sensors::{EXCITATION, FIRST_SIGNAL, FORCE, Sensors};
-use stepper::{ScanForces, Stepper};
+use stepper::{ScanForces, Slipping, Span, Stepper};
 
 /// One rig.
 #[derive(Debug, Clone)]
@@ -57,6 +60,8 @@ pub struct Rig {
     attempt: u32,
     aim: Aim,
     stepper: Stepper,
+    /// The joint's sliders, if it can slip and is there.
+    slipping: Option<Slipping>,
     sensors: Sensors,
     /// Hammer forces still to come or acting, on the clock below.
     pending: Vec<ForceSegment>,
@@ -92,7 +97,7 @@ impl Rig {
         let (impact, response) = (&config.impacts[0], &config.responses[0]);
         let words = [configuration.as_str(), &impact.name, &response.name];
         let aim = Aim::new(seed, words, &config.errors, impact, response);
-        let stepper = plants[configuration as usize].aimed(config, &aim, &channels)?;
+        let (stepper, slipping) = plants[configuration as usize].aimed(config, &aim, &channels)?;
         let sensors = Sensors::new(config, &channels, None, stream(seed, &words));
         let mut rig = Self {
             seed,
@@ -104,6 +109,7 @@ impl Rig {
             attempt: 0,
             aim,
             stepper,
+            slipping,
             sensors,
             channels,
             pending: Vec::new(),
@@ -166,10 +172,11 @@ impl Rig {
         let words = [configuration.as_str(), impact, response];
         let aim = Aim::new(self.seed, words, &self.config.errors, hit, seen);
         let plant = &self.plants[configuration as usize];
-        let stepper = plant.aimed(&self.config, &aim, &self.channels)?;
+        let (stepper, slipping) = plant.aimed(&self.config, &aim, &self.channels)?;
         let speckle = seen.speckle;
         self.aim = aim;
         self.stepper = stepper;
+        self.slipping = slipping;
         self.configuration = configuration;
         impact.clone_into(&mut self.impact);
         response.clone_into(&mut self.response);
@@ -234,13 +241,31 @@ impl Rig {
         self.drive_v = if volts.is_nan() { 0.0 } else { volts.clamp(-limit, limit) };
     }
 
+    /// Sets the normal load N (N) from the next scan on, as the pneumatic actuator does: the contact carries at most μN along z. It
+    /// stays through later stagings. The linear law has no limit, whatever the load.
+    ///
+    /// # Errors
+    /// [`RigError::Field`] for a load that is negative or no number; the rig stays as it was.
+    pub fn set_normal_load(&mut self, normal_load_n: f64) -> Result<(), RigError> {
+        config::normal_load(normal_load_n)?;
+        self.config.contact.normal_load_n = normal_load_n;
+        if let Some(slipping) = &mut self.slipping {
+            slipping.load(normal_load_n);
+        }
+        Ok(())
+    }
+
     /// Advances exactly one scan period and samples: one code per channel, in order. A shorter slice takes the first
     /// channels, a longer one keeps its tail.
     pub fn scan(&mut self, codes: &mut [i16]) {
         let (from_s, to_s) = (self.time_s(self.scans), self.time_s(self.scans + 1));
         self.scans += 1;
         let shaker_n = self.drive_v * self.config.shaker.gain_n_per_v;
-        self.stepper.advance(&ScanForces { from_s, to_s, hammer: &self.pending, shaker_n });
+        let forces = ScanForces { from_s, to_s, hammer: &self.pending, shaker_n };
+        match &mut self.slipping {
+            None => self.stepper.advance(Span::Scan, &forces),
+            Some(slipping) => slipping.advance(&mut self.stepper, &forces),
+        }
         self.truth[FORCE] = self.sensors.hammer_n(&self.pending, from_s, to_s);
         self.truth[FIRST_SIGNAL..EXCITATION].copy_from_slice(&self.stepper.signals());
         self.truth[EXCITATION] = shaker_n;
@@ -286,7 +311,14 @@ impl Rig {
 
     /// Mechanical energy of the structure now (J).
     pub fn energy_j(&self) -> f64 {
-        self.plants[self.configuration as usize].energy_j(&self.stepper)
+        let plant = &self.plants[self.configuration as usize];
+        plant.energy_j(&self.config.contact, &self.stepper, self.slipping.as_ref())
+    }
+
+    /// The joint now; `None` outside the assembly.
+    pub fn joint(&self) -> Option<JointState> {
+        let plant = &self.plants[self.configuration as usize];
+        plant.joint_state(&self.config.contact, &self.stepper, self.slipping.as_ref())
     }
 
     /// True displacement (m) and velocity (m/s) along a probe now; `None` if its body is not there.

@@ -4,14 +4,15 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::config::RigConfig;
+use super::config::{BodyName, Contact, ContactLaw, RigConfig};
 use super::modal::{ModalError, Mode, modes};
 use super::probe::{AXES, Probe};
 use super::sensors::{CHANNELS, Channel, FIRST_SIGNAL};
+use super::sliders::Sliders;
 use super::state_space::StateSpace;
-use super::stepper::{Aimed, ExponentialStepper, ModalStepper, Stepper};
+use super::stepper::{Aimed, ExponentialStepper, Joint, ModalStepper, Slipping, Stepper};
 use super::structure::Structure;
-use super::{Aim, Configuration, RigError};
+use super::{Aim, Configuration, JointState, RigError};
 
 /// How the structure is advanced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -62,13 +63,13 @@ impl Plant {
         Ok(Self { structure, space, way, period_s })
     }
 
-    /// A stepper at rest that sees and pushes where `aim` says.
+    /// A stepper at rest that sees and pushes where `aim` says, and the sliders of its joint if it can slip.
     pub(super) fn aimed(
         &self,
         config: &RigConfig,
         aim: &Aim,
         channels: &[Channel; CHANNELS],
-    ) -> Result<Stepper, RigError> {
+    ) -> Result<(Stepper, Option<Slipping>), RigError> {
         let missing = |probe: &Probe| RigError::MissingBody {
             body: probe.body.as_str(),
             configuration: self.structure.configuration(),
@@ -81,8 +82,7 @@ impl Plant {
         // A load cell's signal is its spring force kz · z on arm B.
         let cell = |index: usize| {
             let it = &config.load_cells[index];
-            let probe =
-                Probe { body: super::config::BodyName::ArmB, position_m: it.position_m, direction: AXES[2] };
+            let probe = Probe { body: BodyName::ArmB, position_m: it.position_m, direction: AXES[2] };
             let row = self.structure.row(&probe).map(|row| self.space.displacement(&row));
             row.unwrap_or_else(nothing) * it.stiffness_n_per_m[2]
         };
@@ -104,17 +104,89 @@ impl Plant {
             // Without its body the shaker pushes nothing.
             shaker: self.structure.row(&pushed).map_or_else(nothing, |row| self.space.input(&row)),
             steps: std::array::from_fn(|signal| channels[FIRST_SIGNAL + signal].step()),
+            joint: self.joint(&config.contact),
         };
-        Ok(match &self.way {
-            Way::Modal(modes) => Stepper::Modal(ModalStepper::new(modes, &aimed, self.period_s)),
+        let stepper = match &self.way {
+            Way::Modal(modes) => Stepper::Modal(Box::new(ModalStepper::new(modes, &aimed, self.period_s))),
             Way::Exponential { a, turn, .. } => {
                 Stepper::Exponential(ExponentialStepper::new(a, turn, &aimed, self.period_s))
             }
+        };
+        let Some(joint) = &aimed.joint else { return Ok((stepper, None)) };
+        let Some(sliders) = Sliders::new(&config.contact, joint.step_s) else { return Ok((stepper, None)) };
+        let slipping = Slipping::new(sliders, joint, &stepper).ok_or_else(|| RigError::Field {
+            field: "contact.slip_step_s".to_owned(),
+            reason: format!(
+                "is too long for so stiff a contact on so light bodies: try {:.0e}",
+                joint.step_s / 4.0
+            ),
+            line: None,
+        })?;
+        Ok((stepper, Some(slipping)))
+    }
+
+    /// The joint, where there is one that can slip.
+    fn joint(&self, contact: &Contact) -> Option<Joint> {
+        if contact.law == ContactLaw::Linear {
+            return None;
+        }
+        let row = self.relative(contact)?;
+        // A hair's breadth keeps a whole quotient from being rounded up.
+        let steps = (self.period_s / contact.slip_step_s * (1.0 - 1e-9)).ceil().max(1.0);
+        Some(Joint {
+            row: self.space.displacement(&row) + self.space.velocity(&row) * contact.damping_s[2],
+            column: self.space.input(&row),
+            steps: steps as u32,
+            step_s: self.period_s / steps,
         })
     }
 
-    pub(super) fn energy_j(&self, stepper: &Stepper) -> f64 {
-        self.space.energy_j(&stepper.state())
+    /// Row of the structure that reads specimen A's motion less B's along z at the contact; `None` outside the assembly.
+    fn relative(&self, contact: &Contact) -> Option<DVector<f64>> {
+        let at =
+            |body| self.structure.row(&Probe { body, position_m: contact.position_m, direction: AXES[2] });
+        Some(at(BodyName::SpecimenA)? - at(BodyName::ArmB)?)
+    }
+
+    /// The joint now; `None` outside the assembly.
+    pub(super) fn joint_state(
+        &self,
+        contact: &Contact,
+        stepper: &Stepper,
+        slipping: Option<&Slipping>,
+    ) -> Option<JointState> {
+        let row = self.relative(contact)?;
+        let x = stepper.state();
+        let relative_m = self.space.displacement(&row).dot(&x);
+        let Some(sliders) = slipping.map(Slipping::sliders) else {
+            let speed = self.space.velocity(&row).dot(&x);
+            let force_n = contact.stiffness_n_per_m[2] * (relative_m + contact.damping_s[2] * speed);
+            return Some(JointState {
+                relative_m,
+                force_n,
+                limit_n: f64::INFINITY,
+                sliding: 0.0,
+                slid_m: 0.0,
+                friction_j: 0.0,
+            });
+        };
+        Some(JointState {
+            relative_m,
+            force_n: sliders.force_n(),
+            limit_n: sliders.limit_n(),
+            sliding: sliders.sliding(),
+            slid_m: sliders.slid_m(),
+            friction_j: sliders.friction_j(),
+        })
+    }
+
+    pub(super) fn energy_j(&self, contact: &Contact, stepper: &Stepper, slipping: Option<&Slipping>) -> f64 {
+        let x = stepper.state();
+        let stuck_j = self.space.energy_j(&x);
+        let (Some(slipping), Some(row)) = (slipping, self.relative(contact)) else { return stuck_j };
+        let relative_m = self.space.displacement(&row).dot(&x);
+        stuck_j - 0.5 * contact.stiffness_n_per_m[2] * relative_m * relative_m
+            + slipping.sliders().stored_j(relative_m)
     }
 
     pub(super) fn motion(&self, stepper: &Stepper, probe: &Probe) -> Option<(f64, f64)> {

@@ -52,6 +52,8 @@ pub struct Plan {
     pub enough: Option<Spanned<Enough>>,
     /// The shaker's levels before and after the campaign; none, without it.
     pub shaker: Option<Spanned<ShakerPlan>>,
+    /// What is known of contact and static arm; without it, only what the records say.
+    pub contact: Option<Spanned<ContactPlan>>,
     /// What is behind the device's channels; those that are not named are taken as the device describes them.
     #[serde(default)]
     pub channel: Vec<Spanned<SensorPlan>>,
@@ -167,13 +169,26 @@ impl ShakerPlan {
         self.frequencies_hz.len() * self.amplitudes_m.len()
     }
 
-    /// What becomes of them today, for whoever counts on them.
-    pub fn remark(&self) -> String {
+    /// What is to be done about them, for whoever counts on them.
+    pub fn remark(&self, file: &std::path::Path) -> String {
         format!(
-            "the plan's {} levels of the shaker, before and after, are not measured by this version; only its cells are",
-            self.levels()
+            "the plan's {} levels of the shaker, before and after the cells: `jointrig shaker {} --device ADDR` measures them",
+            self.levels(),
+            file.display()
         )
     }
+}
+
+/// What is known of contact and static arm beforehand, from drawings or a balance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ContactPlan {
+    /// The normal load, N.
+    pub normal_load_n: Option<f64>,
+    /// Stiffness to ground beside the load cells, over theirs.
+    pub parallel_path: Option<f64>,
+    /// Effective mass of the static arm at the contact, kg; identified where it is not given.
+    pub effective_mass_kg: Option<f64>,
 }
 
 /// When a cell's FRFs are good enough.

@@ -69,6 +69,7 @@ impl Plan {
         )?;
         self.check_limits()?;
         self.check_shaker()?;
+        self.check_contact()?;
         self.check_sensors()?;
         self.check_geometry()?;
         self.check_configurations()
@@ -124,6 +125,20 @@ impl Plan {
                 at,
                 format!("shaker.amplitudes_m must be over 0 and at most {LARGEST_AMPLITUDE_M}, one or more"),
             ))
+        }
+    }
+
+    fn check_contact(&self) -> Result<(), Wrong> {
+        let Some(contact) = &self.contact else { return Ok(()) };
+        let (known, at) = (contact.get_ref(), contact.span().start);
+        let within =
+            |value: Option<f64>, least: f64| value.is_none_or(|value| value.is_finite() && value >= least);
+        if !(within(known.normal_load_n, f64::MIN_POSITIVE) && within(known.effective_mass_kg, 0.0)) {
+            Err((at, "contact: normal_load_n must be over 0, effective_mass_kg not negative".into()))
+        } else if within(known.parallel_path, 0.0) && known.parallel_path.is_none_or(|path| path < 1.0) {
+            Ok(())
+        } else {
+            Err((at, "contact.parallel_path is a ratio of stiffness, from 0 to 1".into()))
         }
     }
 

@@ -72,6 +72,8 @@ fn what_may_be_left_out_is_checked_where_it_stands() {
     assert_eq!(with(good).expect("good").channel[0].get_ref().polarity, Some(-1));
     for (more, word) in [
         ("[shaker]\nfrequencies_hz = [100]\namplitudes_m = [0.1]", "shaker.amplitudes_m"),
+        ("[contact]\nnormal_load_n = 0", "contact: normal_load_n"),
+        ("[contact]\nparallel_path = 1.0133", "contact.parallel_path"),
         ("[shaker]\nfrequencies_hz = []\namplitudes_m = [1e-7]", "shaker.frequencies_hz"),
         ("[shaker]\nfrequencies_hz = [6000]\namplitudes_m = [1e-7]", "shaker.frequencies_hz"),
         ("[enough]\nrandom_error = 2.0\nband_hz = [100, 800]", "enough.random_error"),

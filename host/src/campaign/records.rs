@@ -224,10 +224,17 @@ impl Store {
 
     /// Bytes of all samples as stored, and as raw codes.
     pub fn sample_bytes(&self) -> Result<(u64, u64), StoreError> {
-        let sql =
-            "SELECT coalesce(sum(length(samples)), 0), coalesce(sum(2 * scans * channels), 0) FROM records";
+        let levels = if self.version >= super::schema::WITH_LEVELS {
+            "UNION ALL SELECT length(samples), 2 * scans * channels FROM levels"
+        } else {
+            ""
+        };
+        let sql = format!(
+            "SELECT coalesce(sum(stored), 0), coalesce(sum(raw), 0) FROM \
+             (SELECT length(samples) AS stored, 2 * scans * channels AS raw FROM records {levels})"
+        );
         self.connection
-            .query_row(sql, [], |row| Ok((row.get(0)?, row.get(1)?)))
+            .query_row(&sql, [], |row| Ok((row.get(0)?, row.get(1)?)))
             .map_err(self.failed("measuring the file"))
     }
 
@@ -253,6 +260,7 @@ impl Store {
                 damage.push(Damage { record: None, what: error.to_string() });
             }
         }
+        damage.extend(self.verify_levels()?);
         Ok(damage)
     }
 }

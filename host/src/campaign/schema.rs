@@ -6,13 +6,16 @@
 pub const APPLICATION_ID: i32 = i32::from_be_bytes(*b"JRIG");
 
 /// Version of the tables, in SQLite's `user_version`.
-pub const VERSION: i32 = 3;
+pub const VERSION: i32 = 4;
 
 /// `STEPS[n]` turns version n into version n + 1; a new file takes them all. A step that was released is frozen.
-pub const STEPS: [&str; VERSION as usize] = [FIRST, SEALS, FRFS];
+pub const STEPS: [&str; VERSION as usize] = [FIRST, SEALS, FRFS, LEVELS];
 
 /// The first version whose files hold FRFs from elsewhere.
 pub const WITH_FRFS: i32 = 3;
+
+/// The first version whose files hold levels of the shaker.
+pub const WITH_LEVELS: i32 = 4;
 
 /// Version 1. Raw records are append-only: triggers refuse any change.
 const FIRST: &str = "
@@ -172,4 +175,37 @@ CREATE TRIGGER frfs_stay BEFORE UPDATE ON frfs
 BEGIN SELECT RAISE(ABORT, 'imported FRFs are never changed'); END;
 CREATE TRIGGER frfs_remain BEFORE DELETE ON frfs
 BEGIN SELECT RAISE(ABORT, 'imported FRFs are never deleted'); END;
+";
+
+/// Version 4: levels of the shaker.
+const LEVELS: &str = "
+-- one row per level that was recorded: a sine held in steady state, or a sweep from rest to rest. amplitude and reached are m, N
+-- or V as control is displacement, force or drive. The seal runs over all other columns but samples (see levels.rs)
+CREATE TABLE levels (
+    id           INTEGER PRIMARY KEY,
+    session      INTEGER NOT NULL REFERENCES sessions(id),
+    utc          TEXT NOT NULL,
+    moment       TEXT NOT NULL,
+    frequency_hz REAL NOT NULL,
+    end_hz       REAL,
+    control      TEXT NOT NULL,
+    amplitude    REAL NOT NULL,
+    reached      REAL NOT NULL,
+    overshoot    REAL NOT NULL,
+    settle_s     REAL NOT NULL,
+    drive_v      REAL NOT NULL,
+    epoch        INTEGER NOT NULL,
+    first_scan   INTEGER NOT NULL,
+    scans        INTEGER NOT NULL,
+    channels     INTEGER NOT NULL,
+    gaps         TEXT NOT NULL,
+    crc32        INTEGER NOT NULL,
+    bytes_crc32  INTEGER NOT NULL,
+    seal         INTEGER NOT NULL,
+    samples      BLOB NOT NULL
+) STRICT;
+CREATE TRIGGER levels_stay BEFORE UPDATE ON levels
+BEGIN SELECT RAISE(ABORT, 'a raw record is never changed'); END;
+CREATE TRIGGER levels_remain BEFORE DELETE ON levels
+BEGIN SELECT RAISE(ABORT, 'a raw record is never deleted'); END;
 ";

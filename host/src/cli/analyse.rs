@@ -7,9 +7,10 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget};
 
 use super::error::CliError;
+use super::number::{not_negative, positive};
 use super::output;
 use crate::campaign::store::Store;
-use crate::results::{self, Results};
+use crate::results::{self, KnownContact, Results};
 
 /// Analyse a campaign file: results.json and report.html.
 #[derive(Debug, Args)]
@@ -20,6 +21,15 @@ pub struct Analyse {
     /// Folder for results.json and report.html.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Effective mass of the static arm at the contact, kg; identified from the records without it.
+    #[arg(long, value_name = "KG", value_parser = not_negative)]
+    effective_mass: Option<f64>,
+    /// Stiffness to ground beside the load cells, over theirs [default: the plan's].
+    #[arg(long, value_name = "RATIO", value_parser = not_negative)]
+    parallel_path: Option<f64>,
+    /// Normal load, N, for the friction coefficient [default: the plan's].
+    #[arg(long, value_name = "N", value_parser = positive)]
+    normal_load: Option<f64>,
     /// Print results.json on stdout too.
     #[arg(long)]
     json: bool,
@@ -28,19 +38,24 @@ pub struct Analyse {
 impl Analyse {
     pub fn run(self) -> Result<(), CliError> {
         let store = Store::open_read_only(&self.file)?;
-        let found = analyse_into(&store, &self.out)?;
+        let known = KnownContact {
+            normal_load_n: self.normal_load,
+            parallel_path: self.parallel_path,
+            effective_mass_kg: self.effective_mass,
+        };
+        let found = analyse_into(&store, known, &self.out)?;
         if self.json { output::json(&found) } else { output::lines(results::words::summary(&found)) }
     }
 }
 
 /// Analyses what the file holds and writes `results.json` and `report.html` into `folder`.
-pub fn analyse_into(store: &Store, folder: &Path) -> Result<Results, CliError> {
+pub fn analyse_into(store: &Store, known: KnownContact, folder: &Path) -> Result<Results, CliError> {
     let bar = if std::io::stderr().is_terminal() {
         ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr())
     } else {
         ProgressBar::hidden()
     };
-    let found = results::analyse(store, &|progress| {
+    let found = results::analyse(store, known, &|progress| {
         bar.set_length(progress.total as u64);
         bar.set_position(progress.done as u64);
     })?;

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use crate::advice;
 use crate::campaign::plan::PlanError;
 use crate::campaign::runner::RunError;
+use crate::campaign::shaking::ShakeError;
 use crate::campaign::store_error::StoreError;
 use crate::device::error::DeviceError;
 use crate::results::AnalyseError;
@@ -29,6 +30,9 @@ pub enum CliError {
     /// The run.
     #[error(transparent)]
     Run(#[from] RunError),
+    /// The shaker's levels.
+    #[error(transparent)]
+    Shake(#[from] ShakeError),
     /// The analysis.
     #[error(transparent)]
     Analyse(#[from] AnalyseError),

@@ -11,12 +11,15 @@ mod devices;
 mod error;
 mod export;
 mod frf;
+mod hysteresis;
 mod identify;
 mod import;
 mod info;
 mod interrupt;
 mod measure;
+mod number;
 mod output;
+mod shaker;
 
 use std::process::ExitCode;
 
@@ -43,12 +46,16 @@ enum Command {
     Info(info::Info),
     /// Impact campaigns.
     Campaign(campaign::Campaign),
+    /// Measure levels of the shaker into a campaign file.
+    Shaker(shaker::Shaker),
     /// Analyse a campaign file: results.json and report.html.
     Analyse(analyse::Analyse),
     /// Write everything that a campaign file holds for other programs.
     Export(export::Export),
     /// FRFs of impact records from anywhere.
     Frf(frf::Frf),
+    /// Loops of a time record from anywhere.
+    Hysteresis(hysteresis::Loops),
     /// Bring FRFs or impact records from elsewhere into jointrig's own files.
     Import(import::Import),
     /// Identify a joint from FRFs measured anywhere.
@@ -67,9 +74,11 @@ pub fn main() -> ExitCode {
         Command::Devices(command) => command.run(),
         Command::Info(command) => command.run(),
         Command::Campaign(command) => command.run(),
+        Command::Shaker(command) => command.run(),
         Command::Analyse(command) => command.run(),
         Command::Export(command) => command.run(),
         Command::Frf(command) => command.run(),
+        Command::Hysteresis(command) => command.run(),
         Command::Import(command) => command.run(),
         Command::Identify(command) => command.run(),
         Command::Completions(command) => {
@@ -135,6 +144,12 @@ mod tests {
             "identify --a A.npz --b B.npz --ajb AJB.npz --geometry p.xlsx --method internal,inverse --idms 4,6 --band 300:600 --json",
             "completions bash",
             "frf records.npz --json",
+            "hysteresis record.npz --json",
+            "hysteresis record.npz --effective-mass 1.56 --parallel-path 0.0133 --normal-load 300",
+            "shaker p.jrig --device sim: --freq 100 200 250 --amplitude 1e-7 1.5e-7",
+            "shaker p.jrig --device sim: --freq 100,200 --control force --amplitude 5 --when after --yes --json",
+            "shaker p.jrig --device sim: --sweep 100:400 --control drive --amplitude 0.1 --rate 10",
+            "shaker p.jrig --device sim: --max-drive 2 --limit LDV_A=2e-3 --limit LC1=50",
             "import A.uff --out A.npz",
             "export c.jrig --format uff58 --out d",
             "import r.npz --into c.jrig --configuration A --impact AZ1 --response A1",
@@ -149,6 +164,12 @@ mod tests {
             "campaign new p.jrig --paper --plan x.toml",
             "campaign run p.jrig --stage robot",
             "campaign drop p.jrig",
+            "shaker p.jrig",
+            "shaker p.jrig --device sim: --sweep 100:400",
+            "shaker p.jrig --device sim: --sweep 100:400 --freq 3 --amplitude 1",
+            "shaker p.jrig --device sim: --freq 0",
+            "shaker p.jrig --device sim: --control loud",
+            "hysteresis",
             "campaign check p.jrig --mass 1.2",
             "info",
             "identify --a A.npz --b B.npz --ajb AJB.npz",

@@ -19,6 +19,7 @@ pub mod recording;
 mod requests;
 mod serial;
 pub mod session;
+mod shaking;
 #[cfg(feature = "sim")]
 mod sim;
 pub mod stream;

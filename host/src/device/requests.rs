@@ -74,7 +74,7 @@ impl Session {
         DeviceError::WrongAnswer { address: self.address.clone(), request, got: format!("{got:?}") }
     }
 
-    fn ask_done(&mut self, request: Request) -> Result<(), DeviceError> {
+    pub(super) fn ask_done(&mut self, request: Request) -> Result<(), DeviceError> {
         let asked = name(&request);
         match self.ask(request)? {
             Answer::Done => Ok(()),
@@ -139,9 +139,10 @@ impl Session {
         if status.epoch != epoch {
             return Err(self.restarted());
         }
-        self.wait_for(status.next_scan)?;
+        let end = self.end_of_stream(&status);
+        self.wait_for(end)?;
         if let Some(stream) = &mut self.inbox.stream {
-            stream.note_tail(status.next_scan, true);
+            stream.note_tail(end, true);
         }
         Ok(self.accounts())
     }

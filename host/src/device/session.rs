@@ -66,6 +66,8 @@ pub struct Session {
     pub(super) reply: Option<answer::Numbered>,
     pub(super) rate_hz: f64,
     pub(super) ended: bool,
+    /// Whether the shaker may be moving at this session's order.
+    pub(super) shakes: bool,
     errand: Option<Errand>,
     resend_tries: (u64, u32),
     tail: Option<u64>,
@@ -94,6 +96,7 @@ impl Session {
             reply: None,
             rate_hz: 51_200.0,
             ended: false,
+            shakes: false,
             errand: None,
             resend_tries: (0, 0),
             tail: None,
@@ -229,7 +232,7 @@ impl Session {
         {
             self.inbox.note_status(status);
             self.check_epoch(status)?;
-            self.tail = Some(status.next_scan);
+            self.tail = Some(self.end_of_stream(status));
         }
         if self.waiting == Some(answer.number) {
             self.waiting = None;
@@ -263,6 +266,15 @@ impl Session {
             _ => {}
         }
         Ok(())
+    }
+
+    /// The scan after the stream's last: a converter that runs on after the end produces scans that belong to no stream.
+    pub(super) fn end_of_stream(&self, status: &Status) -> u64 {
+        let stream = self.inbox.stream.as_ref().filter(|stream| self.ended && stream.epoch() == status.epoch);
+        let counters = &status.counters;
+        stream.map_or(status.next_scan, |stream| {
+            stream.first_scan() + counters.scans_produced + counters.scans_missed
+        })
     }
 
     fn check_epoch(&self, status: &Status) -> Result<(), DeviceError> {
@@ -350,7 +362,7 @@ impl Session {
     }
 
     /// Sends a request that nobody waits for.
-    fn background(&mut self, request: Request) -> Result<u32, DeviceError> {
+    pub(super) fn background(&mut self, request: Request) -> Result<u32, DeviceError> {
         let number = self.next_number;
         self.next_number += 1;
         self.link
@@ -370,6 +382,12 @@ impl Session {
     pub(super) fn restarted(&self) -> DeviceError {
         let epoch = self.inbox.stream.as_ref().map_or(0, Stream::epoch);
         DeviceError::Restarted { address: self.address.clone(), epoch }
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        self.rest_at_last();
     }
 }
 

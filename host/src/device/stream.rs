@@ -84,6 +84,11 @@ impl Stream {
         self.epoch
     }
 
+    /// The first scan.
+    pub fn first_scan(&self) -> u64 {
+        self.first_scan
+    }
+
     /// The next scan that has not arrived; everything before it has, or is lost for good.
     pub fn expected(&self) -> u64 {
         self.expected

@@ -1,6 +1,7 @@
 //! The front door: a record in, its loop's figures out.
 
 use super::HysteresisError;
+use super::compliance::{ContactCompliance, ImaginaryPeak, SEARCH_HZ};
 use super::cycles::{Cycle, steady, synchronous_average};
 use super::impact::{DecayCycle, FIRST_CYCLES, decay, dominant_frequency};
 use super::loops::{
@@ -161,6 +162,12 @@ fn shaker(
     })
 }
 
+/// A resonance of one specimen that the record itself shows.
+fn hidden_resonance(record: &HysteresisRecord) -> Option<ImaginaryPeak> {
+    let contact = ContactCompliance::of_record(record, SEARCH_HZ)?;
+    contact.imaginary_peak().filter(ImaginaryPeak::stands_out)
+}
+
 fn impact(record: &HysteresisRecord, motion: &Relative) -> Result<LoopAnalysis, HysteresisError> {
     let decay = decay(motion, &record.force_n, record.fs_hz)?;
     let used = &decay.cycles[..FIRST_CYCLES.min(decay.cycles.len())];
@@ -175,6 +182,7 @@ fn impact(record: &HysteresisRecord, motion: &Relative) -> Result<LoopAnalysis, 
     } else {
         Shape::Stuck
     };
+    let hidden = hidden_resonance(record);
     let mut warnings = vec![
         "slope over the first cycles of a decay: every mode that the hit excites is in it, so it is not the contact's stiffness alone".to_string(),
     ];
@@ -185,6 +193,12 @@ fn impact(record: &HysteresisRecord, motion: &Relative) -> Result<LoopAnalysis, 
             100.0 * worst
         ));
     }
+    if let Some(peak) = hidden {
+        warnings.push(format!(
+            "this slope is k_eq, not k_T: near {:.0} Hz Δx and T are out of phase, so that a resonance of one specimen is in it",
+            peak.frequency_hz
+        ));
+    }
     Ok(LoopAnalysis {
         kind: Kind::Impact,
         frequency_hz: decay.frequency_hz,
@@ -192,7 +206,7 @@ fn impact(record: &HysteresisRecord, motion: &Relative) -> Result<LoopAnalysis, 
         force_amplitude_n: 0.5 * swing(&record.force_n[used[0].first_sample..used[0].end_sample]),
         shape,
         shape_evidence: None,
-        k_t_n_per_m: (shape == Shape::Stuck).then_some(k),
+        k_t_n_per_m: (shape == Shape::Stuck && hidden.is_none()).then_some(k),
         k_eq_n_per_m: k,
         energy_j: None,
         k_secant_n_per_m: None,

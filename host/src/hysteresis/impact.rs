@@ -29,6 +29,8 @@ pub struct DecayCycle {
     pub r_squared: f64,
     /// Half the swing of Δx, m.
     pub amplitude_m: f64,
+    /// Phase by which Δx lags T at the mode, degrees.
+    pub phase_deg: f64,
     /// Frequency of the dominant mode in this cycle, Hz (phase advance of T to the next cycle).
     pub frequency_hz: f64,
 }
@@ -92,6 +94,7 @@ pub(super) fn decay(motion: &Relative, force_n: &[f64], fs_hz: f64) -> Result<De
                 stiffness_n_per_m,
                 r_squared: stiffness_n_per_m * slope(t, x),
                 amplitude_m: 0.5 * swing(x),
+                phase_deg: (tones[c] / tone(&displacement_m, e[0], e[1])).arg().to_degrees(),
                 frequency_hz: frequency_hz * (1.0 + advance / TAU),
             }
         })

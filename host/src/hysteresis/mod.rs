@@ -6,18 +6,25 @@
 //!
 //! Definitions are fixed here and nowhere else: k_T is the least-squares slope of the stick part; k_eq that of the whole loop; the peak
 //! secant and the ratio of fundamentals carry their own names. T is taken as given: the load cells' sum is not T at the
-//! contact (the static arm's inertia adds 2.4 % at 250 Hz), and whoever corrects it analyses the corrected record beside the raw one.
+//! contact (the static arm's inertia adds 2.4 % at 250 Hz). [`correction`] makes the contact's force of it, by what [`static_arm`]
+//! identified, and the corrected record is analysed beside the raw one. [`compliance`] looks at the same signals in frequency.
 
 pub mod analyse;
+pub mod compliance;
+pub mod correction;
 pub mod cycles;
+pub mod delays;
 pub mod impact;
 pub mod integration;
 pub mod loops;
+pub mod reconstruction;
 pub mod record;
 pub mod shape;
+pub mod static_arm;
 mod stick;
 
 pub use analyse::{Kind, LoopAnalysis, analyse};
+pub use correction::Correction;
 pub use loops::OverCycles;
 pub use record::{HysteresisRecord, RelativeMotion};
 pub use shape::{Shape, ShapeEvidence};

@@ -67,7 +67,7 @@ mod tests {
         ] {
             assert!(html.contains(text), "`{text}` is not on the page");
         }
-        assert_eq!(html.matches("<svg").count(), 6);
+        assert_eq!(html.matches("<svg").count(), 9);
     }
 
     #[test]

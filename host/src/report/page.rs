@@ -27,6 +27,7 @@ pub fn page(results: &Results) -> String {
                 "FBS takes the motion of the arms and moves it to the contact, so everything between arm and contact counts as part of the \
                  joint. The loops take the relative motion at the specimens. FBS: main band 300–600 Hz, scatter over lines; loops: scatter over cycles.",
             ),
+            tables::side_by_side(results),
             tables::checks(results),
         ],
     );
@@ -53,10 +54,25 @@ pub fn page(results: &Results) -> String {
                  contact's stiffness as seen between the two laser spots.",
             ),
             figure(figures::impacts(results), "Every hit that counts: along z on A or on the moving mass."),
+            tables::decay(results),
+            figure(
+                figures::levels(results),
+                "The shaker's levels. Round marks are k_T of straight loops, square ones k_eq of ellipses or of slip; full before the hammer's cells, hollow after them.",
+            ),
+            figure(
+                figures::shaker_loops(results),
+                "Loops of the shaker, averaged over the record's cycles, and both specimens over one cycle. Beside a resonance of one specimen Δx leaves the phase of T, and the \
+                 line opens to an ellipse.",
+            ),
             tables::hysteresis(results),
+            tables::static_arm(results),
             figure(
                 figures::specimens(results),
-                "Specimens A and B in the assembly. A peak or a phase step that only one of them has is a resonance of its clamp; loops near it are ellipses.",
+                "Specimens A and B and both arms in the assembly, from one impact. A peak or a phase step that only one specimen has is a resonance of its clamp; loops near it are ellipses.",
+            ),
+            figure(
+                figures::rebuilt(results),
+                "The decay of both specimens after one hit, and the same put together from decaying sinusoids: the mode that all share, and for A the hidden resonance beside it.",
             ),
         ],
     );
@@ -77,7 +93,10 @@ pub fn page(results: &Results) -> String {
 
 fn headline(html: &mut String, results: &Results) {
     let found: Vec<String> =
-        [words::substructuring(results), words::impact_loops(results)].into_iter().flatten().collect();
+        [words::substructuring(results), words::impact_loops(results), words::shaker_loops(results)]
+            .into_iter()
+            .flatten()
+            .collect();
     if found.is_empty() {
         put(
             html,

@@ -2,7 +2,7 @@
 
 use super::drawing::escape;
 use crate::results::number::{band, count, decimals, micro, short, with_scatter};
-use crate::results::{MAIN_BAND_HZ, OverCycles, Results, words};
+use crate::results::{MAIN_BAND_HZ, OverCycles, Results, side_by_side, words};
 use std::fmt::Write;
 
 /// Builds one table; cells are escaped, columns after the first `text_columns` are set to the right.
@@ -135,6 +135,55 @@ fn gathered_notes(notes: &[(String, &str)]) -> String {
     html
 }
 
+/// FBS and loops side by side, each with what it is.
+pub fn side_by_side(results: &Results) -> Option<String> {
+    let kinds = side_by_side::kinds(results);
+    if kinds.is_empty() {
+        return None;
+    }
+    let mut html = String::from(
+        "<table class=\"checks\"><thead><tr><th>found by</th><th class=\"n\">k ± σ, N/µm</th><th>what it is</th></tr></thead><tbody>",
+    );
+    for kind in kinds {
+        write!(
+            html,
+            "<tr><td>{}</td><td class=\"n\">{}</td><td>{}</td></tr>",
+            escape(&kind.found),
+            with_scatter(micro(kind.mean_n_per_m), micro(kind.std_n_per_m)),
+            escape(&kind.meaning)
+        )
+        .expect("writing into a String cannot fail");
+    }
+    html.push_str("</tbody></table>");
+    Some(html)
+}
+
+/// The decay's cycles after the hits: slope and phase of each.
+pub fn decay(results: &Results) -> Option<String> {
+    let steps = &results.impact_loops()?.decay;
+    if steps.len() < 2 {
+        return None;
+    }
+    let mut table =
+        Table::new(0, &["cycle after the hit", "k_eq ± σ over hits, N/µm", "Δx lags T, °", "Δx, nm"]);
+    for step in steps {
+        let k = step.k_eq_n_per_m;
+        table.row([
+            step.cycle.to_string(),
+            with_scatter(micro(k.mean), micro(k.std)),
+            decimals(step.phase_deg, 1),
+            format!("± {}", short(step.amplitude_m * 1e9)),
+        ]);
+    }
+    Some(table.finish())
+}
+
+/// What the corrected force was corrected by.
+pub fn static_arm(results: &Results) -> Option<String> {
+    let arm = results.static_arm.as_ref()?;
+    Some(format!("<p>{}</p>", escape(words::static_arm(arm).trim_end_matches(':'))))
+}
+
 /// Loops: stiffness, energy, phase.
 pub fn hysteresis(results: &Results) -> Option<String> {
     if results.hysteresis.is_empty() {
@@ -146,6 +195,7 @@ pub fn hysteresis(results: &Results) -> Option<String> {
         "Δx, nm",
         "k_T ± σ, N/µm",
         "k_eq ± σ, N/µm",
+        "peak secant, |T₁/Δx₁|, N/µm",
         "energy ± σ, µJ",
         "phase, °",
         "μ",
@@ -155,6 +205,8 @@ pub fn hysteresis(results: &Results) -> Option<String> {
     let over = |value: Option<OverCycles>, scale: f64| {
         value.map_or(UNKNOWN.into(), |v| with_scatter(v.mean * scale, v.std * scale))
     };
+    // a remark stands once, at the first row that has it
+    let mut told: Vec<&String> = Vec::new();
     for h in &results.hysteresis {
         let cycles = h.k_t_n_per_m.or(h.k_eq_n_per_m).map_or(UNKNOWN.into(), |k| k.cycles.to_string());
         table.row([
@@ -163,14 +215,20 @@ pub fn hysteresis(results: &Results) -> Option<String> {
             h.amplitude_m.map_or(UNKNOWN.into(), |a| format!("± {}", short(a * 1e9))),
             over(h.k_t_n_per_m, 1e-6),
             over(h.k_eq_n_per_m, 1e-6),
+            h.k_secant_n_per_m
+                .zip(h.k_fundamental_n_per_m)
+                .map_or(UNKNOWN.into(), |(secant, fundamental)| {
+                    format!("{}, {}", short(micro(secant)), short(micro(fundamental)))
+                }),
             over(h.energy_j, 1e6),
             h.phase_deg.map_or(UNKNOWN.into(), |p| decimals(p, 1)),
             h.friction_coefficient.map_or(UNKNOWN.into(), short),
             cycles,
         ]);
-        for warning in &h.warnings {
+        for warning in h.warnings.iter().filter(|warning| !told.contains(warning)) {
             table.note(heads.len(), warning);
         }
+        told.extend(&h.warnings);
     }
     Some(table.finish())
 }

@@ -14,6 +14,10 @@ pub enum Role {
     SpecimenA,
     /// The vibrometer on specimen B.
     SpecimenB,
+    /// A point on the arm of A, from the impact that the specimens' curves are from.
+    ArmA,
+    /// A point on the arm of B, from the same.
+    ArmB,
 }
 
 /// One FRF: receptance with coherence.

@@ -13,18 +13,22 @@ pub(crate) mod example;
 mod hysteresis;
 mod joint;
 pub mod number;
+mod reconstruction;
+pub mod side_by_side;
 mod source;
 pub mod words;
 
+pub use crate::hysteresis::static_arm::Identified;
 pub use crate::hysteresis::{Kind as Excitation, OverCycles, Shape};
 pub use crate::substructuring::averaged::Averaged;
 pub use crate::substructuring::joint::BandStatistic as Statistics;
-pub use campaign::{AnalyseError, Progress, analyse};
+pub use campaign::{AnalyseError, KnownContact, Progress, analyse};
 pub use check::Check;
 pub use completeness::Completeness;
 pub use curves::{FrfCurve, Role, UsableBand, rounded};
-pub use hysteresis::{Force, Hysteresis, ImpactSlope, LoopCurve};
+pub use hysteresis::{DecayStep, Force, Hysteresis, ImpactSlope, LoopCurve, ShakerLoop};
 pub use joint::{Joint, JointSpectrum, Refusal, SpectrumCurve};
+pub use reconstruction::Reconstruction;
 pub use source::{Software, Source, ranges};
 
 use serde::Serialize;
@@ -73,6 +77,15 @@ pub struct Results {
     /// One loop to look at.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub example_loop: Option<LoopCurve>,
+    /// What the corrected force was corrected by.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub static_arm: Option<Identified>,
+    /// A loop of the shaker at each frequency.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub shaker_loops: Vec<ShakerLoop>,
+    /// The specimens' decay put together from two sinusoids.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reconstruction: Option<Reconstruction>,
     /// The slope of every impact that counts.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub impact_slopes: Vec<ImpactSlope>,
@@ -95,6 +108,9 @@ impl Results {
             frfs: Vec::new(),
             usable_bands: Vec::new(),
             example_loop: None,
+            static_arm: None,
+            shaker_loops: Vec::new(),
+            reconstruction: None,
             impact_slopes: Vec::new(),
         }
     }

@@ -1,7 +1,9 @@
 //! The same results in plain sentences, for the terminal and for the head of the report.
 
-use super::number::{band, count, micro, short, stiffness};
-use super::{Excitation, Force, Hysteresis, Joint, OverCycles, Results, Shape};
+use super::number::{band, count, decimals, micro, short, stiffness};
+use super::side_by_side;
+use super::{Excitation, Force, Hysteresis, Identified, Joint, OverCycles, Results, Shape};
+use crate::hysteresis::static_arm::Basis;
 
 /// What FBS found between the arms, in one sentence.
 pub fn substructuring(results: &Results) -> Option<String> {
@@ -39,6 +41,30 @@ pub fn impact_loops(results: &Results) -> Option<String> {
     ))
 }
 
+/// What the shaker's loops found, in one sentence: k_T where they stick, with its range over frequency and amplitude.
+pub fn shaker_loops(results: &Results) -> Option<String> {
+    let rows: Vec<&Hysteresis> =
+        results.hysteresis.iter().filter(|h| h.kind == Excitation::Shaker && h.force == Force::Raw).collect();
+    let values: Vec<f64> = rows.iter().filter_map(|h| h.k_t_n_per_m).map(|k| micro(k.mean)).collect();
+    let ellipses = rows.iter().filter(|h| h.shape == Shape::Elliptical).count();
+    let aside = match ellipses {
+        0 => String::new(),
+        n => format!("; {n} of {} loops are ellipses and give only k_eq", rows.len()),
+    };
+    let (low, high) =
+        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    match values.len() {
+        0 if rows.is_empty() => None,
+        0 => Some(format!("None of the shaker's {} loops gives k_T.", rows.len())),
+        1 => Some(format!("The shaker's loop gives k_T = {} N/µm{aside}.", short(low))),
+        n => Some(format!(
+            "The shaker's loops ({n}) give k_T = {} to {} N/µm{aside}.",
+            short(low),
+            short(high)
+        )),
+    }
+}
+
 /// The slope that may be quoted for a loop, with its name: k_T where it has one, k_eq otherwise.
 pub fn slope(loops: &Hysteresis) -> Option<(&'static str, OverCycles)> {
     loops.k_t_n_per_m.map(|k| ("k_T", k)).or(loops.k_eq_n_per_m.map(|k| ("k_eq", k)))
@@ -60,6 +86,20 @@ pub fn method(name: &str) -> &str {
         "internal-bb" => "Eq. 1 rearranged for B alone",
         other => other,
     }
+}
+
+/// What the corrected force was corrected by, and how that is known.
+pub fn static_arm(arm: &Identified) -> String {
+    let basis = match arm.basis {
+        Basis::Given => "as stated",
+        Basis::Hits => "from hits on B alone",
+        Basis::Levels => "from stuck loops at several frequencies",
+    };
+    format!(
+        "With the force at the contact, F = {} T + {} kg x\u{308}_B ({basis}):",
+        decimals(1.0 + arm.correction.parallel_path, 4),
+        decimals(arm.correction.effective_mass_kg, 2)
+    )
 }
 
 /// A loop's shape by its name in files.
@@ -86,15 +126,19 @@ pub fn shape(shape: Shape) -> &'static str {
 
 /// Which excitation and force a row of loops is about.
 pub fn excitation(loops: &Hysteresis) -> String {
-    let kind = match (loops.kind, loops.frequency_hz) {
+    let mut words = match (loops.kind, loops.frequency_hz) {
         (Excitation::Impact, _) => "impacts, first cycle".into(),
         (Excitation::Shaker, Some(f)) => format!("shaker, {} Hz", short(f)),
         (Excitation::Shaker, None) => "shaker".into(),
     };
-    match loops.force {
-        Force::Raw => kind,
-        Force::Corrected => format!("{kind}, corrected force"),
+    if let Some(moment) = loops.moment {
+        words += ", ";
+        words += moment;
     }
+    if loops.force == Force::Corrected {
+        words += ", corrected force";
+    }
+    words
 }
 
 /// A check's outcome in a word.
@@ -128,6 +172,7 @@ pub fn summary(results: &Results) -> Vec<String> {
     let mut lines = Vec::new();
     lines.extend(substructuring(results));
     lines.extend(impact_loops(results));
+    lines.extend(shaker_loops(results));
     if lines.is_empty() {
         lines.push("No stiffness could be found from this file.".into());
     }
@@ -155,24 +200,28 @@ pub fn summary(results: &Results) -> Vec<String> {
         lines.push("Joint stiffness along z, by method, interface modes and band:".into());
         lines.extend(table);
     }
-    let loops: Vec<String> = results
+    let kinds = side_by_side::kinds(results);
+    if !kinds.is_empty() {
+        lines.push(String::new());
+        lines.push("What was found along z, side by side (raw force), in N/µm:".into());
+        for kind in kinds {
+            let k = stiffness(kind.mean_n_per_m, kind.std_n_per_m);
+            lines.push(format!("  {:<44} {k}: {}", kind.found, kind.meaning));
+        }
+    }
+    let corrected: Vec<String> = results
         .hysteresis
         .iter()
+        .filter(|h| h.force == Force::Corrected)
         .filter_map(|h| {
             let (name, k) = slope(h)?;
-            Some(format!(
-                "  {:<34} {name} {} ({} cycles; {})",
-                excitation(h),
-                stiffness(k.mean, k.std),
-                count(k.cycles as u64),
-                shape(h.shape)
-            ))
+            Some(format!("  {:<44} {name} {}", excitation(h), stiffness(k.mean, k.std)))
         })
         .collect();
-    if !loops.is_empty() {
+    if let (Some(arm), false) = (&results.static_arm, corrected.is_empty()) {
         lines.push(String::new());
-        lines.push("Contact stiffness from loops:".into());
-        lines.extend(loops);
+        lines.push(static_arm(arm));
+        lines.extend(corrected);
     }
     if !results.completeness.is_empty() {
         lines.push(String::new());
@@ -215,7 +264,7 @@ mod tests {
     fn the_summary_says_both_numbers_and_that_one_is_not_k_t() {
         let text = summary(&example::results()).join("\n");
         assert!(text.contains("26.8 ± 0.9 N/µm between the arms"), "{text}");
-        assert!(text.contains("k_T = 148 ± 4 N/µm"), "{text}");
+        assert!(text.contains("k_eq = 148 ± 4 N/µm"), "{text}");
         assert!(text.contains("not k_T"), "{text}");
         assert!(text.contains("double hit"), "{text}");
     }

@@ -53,6 +53,7 @@ pub struct Server {
     inputs: VirtualInputs,
     stage: VirtualStage,
     faults: Arc<Faults>,
+    controls: Arc<Controls>,
     link: DeviceEnd,
     woken: Arc<Woken>,
     waker: Waker,
@@ -98,6 +99,7 @@ impl Server {
             inputs: VirtualInputs::new(controls),
             stage: VirtualStage::new(&rig),
             faults: Arc::clone(faults),
+            controls: Arc::clone(controls),
             link: link.clone(),
             waker: Waker::from(Arc::clone(&woken)),
             woken,
@@ -220,7 +222,14 @@ impl Server {
             let mut samples = [0; BLOCK_SAMPLE_BYTES];
             // what is lost has happened all the same
             for _ in 0..delivery.missed as usize / per_block + usize::from(delivery.scans > 0) {
-                fill(&mut self.rig.borrow_mut(), &self.drive, channels, per_block, &mut samples);
+                fill(
+                    &mut self.rig.borrow_mut(),
+                    &self.drive,
+                    &self.controls,
+                    channels,
+                    per_block,
+                    &mut samples,
+                );
             }
             self.ram.write(BLOCK_AT, &delivery.to_bytes())?;
             self.ram.write(BLOCK_AT + DELIVERY_BYTES, &samples)?;

@@ -1,7 +1,12 @@
 //! Values that no rig can have.
 
-use super::{Bushing, RigConfig, RigidBody};
+use super::{Bushing, ContactLaw, RigConfig, RigidBody};
 use crate::rig::error::RigError;
+
+/// Steps into which a scan may be divided in slip.
+const MOST_SLIP_STEPS: f64 = 1000.0;
+/// Elements of an Iwan contact: more would only cost time.
+const MOST_ELEMENTS: u32 = 1000;
 
 pub fn check(config: &RigConfig) -> Result<(), RigError> {
     if config.scan_rate_hz == 0 {
@@ -20,7 +25,7 @@ pub fn check(config: &RigConfig) -> Result<(), RigError> {
     bushing("push_rod_a.bushing", &config.push_rod_a.bushing)?;
     bushing("clamp.loaded", &config.clamp.loaded)?;
     bushing("clamp.free", &config.clamp.free)?;
-    bushing("contact", &config.contact.bushing())?;
+    contact(config)?;
     if config.load_cells.len() != 3 {
         return Err(bad("load_cells", &format!("must be three, not {}", config.load_cells.len())));
     }
@@ -34,6 +39,36 @@ pub fn check(config: &RigConfig) -> Result<(), RigError> {
     not_negative("errors.position_m", config.errors.position_m)?;
     not_negative("errors.aim_m", config.errors.aim_m)?;
     not_negative("errors.hammer_angle_rad", config.errors.hammer_angle_rad)
+}
+
+fn contact(config: &RigConfig) -> Result<(), RigError> {
+    let contact = &config.contact;
+    bushing("contact", &contact.bushing())?;
+    not_negative("contact.friction_coefficient", contact.friction_coefficient)?;
+    normal_load(contact.normal_load_n)?;
+    positive("contact.slip_step_s", contact.slip_step_s)?;
+    if 1.0 / f64::from(config.scan_rate_hz) / contact.slip_step_s > MOST_SLIP_STEPS {
+        return Err(bad("contact.slip_step_s", "makes more than 1000 steps of a scan: 5e-6 is fine enough"));
+    }
+    if !(1..=MOST_ELEMENTS).contains(&contact.iwan.elements) {
+        return Err(bad(
+            "contact.iwan.elements",
+            &format!("must be 1 to {MOST_ELEMENTS}, not {}", contact.iwan.elements),
+        ));
+    }
+    fraction("contact.iwan.spread", contact.iwan.spread)?;
+    if contact.law != ContactLaw::Linear && contact.stiffness_n_per_m[2] <= 0.0 {
+        return Err(bad(
+            "contact.stiffness_n_per_m",
+            "needs kz greater than zero for a contact that can slip",
+        ));
+    }
+    Ok(())
+}
+
+/// A normal load that a contact can have (N).
+pub fn normal_load(normal_load_n: f64) -> Result<(), RigError> {
+    not_negative("contact.normal_load_n", normal_load_n)
 }
 
 fn points(config: &RigConfig) -> Result<(), RigError> {

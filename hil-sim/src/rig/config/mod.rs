@@ -7,6 +7,7 @@ mod check;
 mod document;
 mod sensors;
 
+pub(crate) use check::normal_load;
 pub use sensors::{Excitation, ForceSensor, LoadCells, Sensors, SpeckleNoise, SpotVibrometer, Vibrometer};
 
 use serde::{Deserialize, Serialize};
@@ -180,6 +181,29 @@ pub struct Clamp {
 pub enum ContactLaw {
     /// Stuck: a bushing, whatever the amplitude.
     Linear,
+    /// Along z a slider behind the spring and dashpot: stuck up to μN, gross slip beyond.
+    Jenkins,
+    /// Along z many of them in parallel, whose limits differ: microslip, then gross slip at μN.
+    Iwan,
+}
+
+/// How the limits of an Iwan contact's elements differ. The stiffness is shared evenly.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Iwan {
+    /// How many.
+    pub elements: u32,
+    /// The limits spread evenly over 1 ± this times their mean.
+    pub spread: f64,
+}
+
+impl Iwan {
+    /// Each element's part of μN, the weakest first: the means of as many equal parts of the distribution.
+    pub fn shares(&self) -> Vec<f64> {
+        let count = f64::from(self.elements);
+        let share = |i: u32| (1.0 + self.spread * ((2.0 * f64::from(i) + 1.0) / count - 1.0)) / count;
+        (0..self.elements).map(share).collect()
+    }
 }
 
 /// The joint under test.
@@ -196,6 +220,14 @@ pub struct Contact {
     pub rotation_nm_per_rad: [f64; 3],
     /// β (s) of c = β k for x, y, z, rx, ry, rz.
     pub damping_s: [f64; 6],
+    /// μ: the contact carries at most μN along z. The linear law has no limit.
+    pub friction_coefficient: f64,
+    /// N (N), at the start; [`crate::rig::Rig::set_normal_load`] changes it.
+    pub normal_load_n: f64,
+    /// Longest step while something slips (s).
+    pub slip_step_s: f64,
+    /// The distribution of an Iwan contact.
+    pub iwan: Iwan,
 }
 
 impl Contact {

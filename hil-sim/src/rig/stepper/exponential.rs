@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Vector2};
 
-use super::{Aimed, SIGNALS, ScanForces};
+use super::{Aimed, Joint, SIGNALS, ScanForces, Span};
 
 /// Steps x' = A x + b f exactly.
 #[derive(Debug, Clone)]
@@ -19,6 +19,32 @@ pub struct ExponentialStepper {
     shaker: DVector<f64>,
     /// Effect of a whole scan of a sine of the keyed Ω (its bits), as [`forced`] gives it.
     whole_scans: Vec<(u64, DMatrix<f64>)>,
+    joint: Option<Jointed>,
+    kept: DVector<f64>,
+}
+
+/// What the joint adds.
+#[derive(Debug, Clone)]
+struct Jointed {
+    row: DVector<f64>,
+    /// Gained over a scan and over a step from a newton that falls to nothing, and from one that rises from it (2n × 2).
+    scan: DMatrix<f64>,
+    step: DMatrix<f64>,
+    /// e^{Ah} of a step, and what the shaker's newton does in it.
+    turn: DMatrix<f64>,
+    shaker: DVector<f64>,
+}
+
+impl Jointed {
+    fn new(a: &DMatrix<f64>, joint: &Joint, shaker: &DVector<f64>, period_s: f64) -> Self {
+        Self {
+            row: joint.row.clone(),
+            scan: ramps(a, &joint.column, period_s),
+            step: ramps(a, &joint.column, joint.step_s),
+            turn: ExponentialStepper::turn(a, joint.step_s),
+            shaker: forced(a, shaker, 0.0, joint.step_s).column(0).into_owned(),
+        }
+    }
 }
 
 impl ExponentialStepper {
@@ -37,6 +63,8 @@ impl ExponentialStepper {
             hammer: aimed.hammer.clone(),
             shaker,
             whole_scans: Vec::new(),
+            joint: aimed.joint.as_ref().map(|joint| Jointed::new(a, joint, &aimed.shaker, period_s)),
+            kept: DVector::zeros(order),
         }
     }
 
@@ -45,18 +73,22 @@ impl ExponentialStepper {
         (a * period_s).exp()
     }
 
-    /// Advances one scan period.
-    pub fn advance(&mut self, forces: &ScanForces<'_>) {
-        self.turn.mul_to(&self.x, &mut self.next);
+    /// Advances one scan period, or one of its steps.
+    pub fn advance(&mut self, span: Span, forces: &ScanForces<'_>) {
+        let (turn, shaker) = match (&self.joint, span) {
+            (Some(joint), Span::Step) => (&joint.turn, &joint.shaker),
+            _ => (&*self.turn, &self.shaker),
+        };
+        turn.mul_to(&self.x, &mut self.next);
         std::mem::swap(&mut self.x, &mut self.next);
         if forces.shaker_n != 0.0 {
-            self.x.axpy(forces.shaker_n, &self.shaker, 1.0);
+            self.x.axpy(forces.shaker_n, shaker, 1.0);
         }
         for segment in forces.hammer {
             let Some((a, b)) = segment.overlap(forces.from_s, forces.to_s) else { continue };
             let angle = segment.angle(a);
             let sine = Vector2::new(angle.sin(), angle.cos()) * segment.amplitude_n;
-            if a == forces.from_s && b == forces.to_s {
+            if span == Span::Scan && a == forces.from_s && b == forces.to_s {
                 let gained = self.whole_scan(segment.omega) * sine;
                 self.x += gained;
             } else {
@@ -64,6 +96,33 @@ impl ExponentialStepper {
                 self.x += (&*self.a * (forces.to_s - b)).exp() * gained;
             }
         }
+    }
+
+    /// As [`super::ModalStepper::push`].
+    pub fn push(&mut self, span: Span, from_n: f64, to_n: f64) {
+        let Some(joint) = &self.joint else { return };
+        let ramps = if span == Span::Scan { &joint.scan } else { &joint.step };
+        self.x += ramps * Vector2::new(from_n, to_n);
+    }
+
+    /// y of the joint now (m).
+    pub fn joint(&self) -> f64 {
+        self.joint.as_ref().map_or(0.0, |joint| joint.row.dot(&self.x))
+    }
+
+    /// As [`super::ModalStepper::receptance`].
+    pub fn receptance(&self) -> f64 {
+        self.joint.as_ref().map_or(0.0, |joint| joint.row.dot(&joint.step.column(1)))
+    }
+
+    /// Remembers how it stands.
+    pub fn keep(&mut self) {
+        self.kept.copy_from(&self.x);
+    }
+
+    /// Goes back there.
+    pub fn go_back(&mut self) {
+        self.x.copy_from(&self.kept);
     }
 
     /// The signals now.
@@ -102,4 +161,19 @@ fn forced(a: &DMatrix<f64>, b: &DVector<f64>, omega: f64, h: f64) -> DMatrix<f64
     augmented[(order, order + 1)] = omega;
     augmented[(order + 1, order)] = -omega;
     (augmented * h).exp().view((0, order), (order, 2)).into_owned()
+}
+
+/// What the state has gained after `h` from b f with f falling from one to nothing, and rising from nothing to one: 2n × 2.
+fn ramps(a: &DMatrix<f64>, b: &DVector<f64>, h: f64) -> DMatrix<f64> {
+    let order = a.nrows();
+    // [A h, b h, 0; 0, 0, 1; 0, 0, 0]: its exponential holds what one held and one rising newton do.
+    let mut augmented = DMatrix::zeros(order + 2, order + 2);
+    augmented.view_mut((0, 0), (order, order)).copy_from(&(a * h));
+    augmented.view_mut((0, order), (order, 1)).copy_from(&(b * h));
+    augmented[(order, order + 1)] = 1.0;
+    let mut gained = augmented.exp().view((0, order), (order, 2)).into_owned();
+    let rising = gained.column(1).into_owned();
+    let mut falling = gained.column_mut(0);
+    falling -= rising;
+    gained
 }

@@ -1,13 +1,17 @@
-//! Advancing the stuck structure by one scan, exactly.
+//! Advancing the structure by one scan: stuck exactly, slipping in steps.
 //!
 //! Stuck motion is linear, so nothing is integrated numerically: [`ModalStepper`] turns each complex mode by e^{λT};
 //! [`ExponentialStepper`] multiplies the whole state by e^{AT}, slower, for structures whose modes are dependent.
+//! A contact that can slip stays linear for the steppers: what its sliders do not carry is a force between the specimens
+//! ([`Slipping`]).
 
 mod exponential;
 mod modal;
+mod slipping;
 
 pub use exponential::ExponentialStepper;
 pub use modal::ModalStepper;
+pub use slipping::Slipping;
 
 use nalgebra::DVector;
 
@@ -27,6 +31,30 @@ pub struct Aimed {
     pub shaker: DVector<f64>,
     /// Size of one converter step of each signal, in its own unit.
     pub steps: [f64; SIGNALS],
+    /// The joint, if it can slip.
+    pub joint: Option<Joint>,
+}
+
+/// Where a joint that can slip is seen and pushed, in state coordinates (2n).
+#[derive(Debug, Clone)]
+pub struct Joint {
+    /// Row of y = Δ + β Δ', with Δ the displacement of specimen A less that of B along z.
+    pub row: DVector<f64>,
+    /// Column of a force that pushes A along z and B against it.
+    pub column: DVector<f64>,
+    /// Steps of a scan in which something slips.
+    pub steps: u32,
+    /// How long one is (s).
+    pub step_s: f64,
+}
+
+/// How far one call goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Span {
+    /// A scan period.
+    Scan,
+    /// One step of [`Joint::step_s`].
+    Step,
 }
 
 /// One scan's forces.
@@ -46,35 +74,66 @@ pub struct ScanForces<'a> {
 #[derive(Debug, Clone)]
 pub enum Stepper {
     /// By complex modes.
-    Modal(ModalStepper),
+    Modal(Box<ModalStepper>),
     /// By matrix exponential.
     Exponential(ExponentialStepper),
 }
 
-impl Stepper {
-    /// Advances one scan period.
-    #[inline]
-    pub fn advance(&mut self, forces: &ScanForces<'_>) {
-        match self {
-            Self::Modal(stepper) => stepper.advance(forces),
-            Self::Exponential(stepper) => stepper.advance(forces),
+/// Hands a call on to whichever it is.
+macro_rules! either {
+    ($stepper:expr, $it:ident => $call:expr) => {
+        match $stepper {
+            Self::Modal($it) => $call,
+            Self::Exponential($it) => $call,
         }
+    };
+}
+
+impl Stepper {
+    /// Advances one span.
+    #[inline]
+    pub fn advance(&mut self, span: Span, forces: &ScanForces<'_>) {
+        either!(self, stepper => stepper.advance(span, forces));
+    }
+
+    /// Adds what a force between the specimens has done over the span just passed, in which it went from the first to the second
+    /// of these (N).
+    #[inline]
+    pub fn push(&mut self, span: Span, from_n: f64, to_n: f64) {
+        either!(self, stepper => stepper.push(span, from_n, to_n));
+    }
+
+    /// y of the joint now (m); 0 without a joint that can slip.
+    #[inline]
+    pub fn joint(&self) -> f64 {
+        either!(self, stepper => stepper.joint())
+    }
+
+    /// What y gains over a step from a force between the specimens that rises to a newton (m/N).
+    pub fn receptance(&self) -> f64 {
+        either!(self, stepper => stepper.receptance())
+    }
+
+    /// Remembers how it stands.
+    #[inline]
+    pub fn keep(&mut self) {
+        either!(self, stepper => stepper.keep());
+    }
+
+    /// Goes back there.
+    #[inline]
+    pub fn go_back(&mut self) {
+        either!(self, stepper => stepper.go_back());
     }
 
     /// The signals now.
     #[inline]
     pub fn signals(&self) -> [f64; SIGNALS] {
-        match self {
-            Self::Modal(stepper) => stepper.signals(),
-            Self::Exponential(stepper) => stepper.signals(),
-        }
+        either!(self, stepper => stepper.signals())
     }
 
     /// The state x (2n).
     pub fn state(&self) -> DVector<f64> {
-        match self {
-            Self::Modal(stepper) => stepper.state(),
-            Self::Exponential(stepper) => stepper.state(),
-        }
+        either!(self, stepper => stepper.state())
     }
 }

@@ -8,65 +8,125 @@ use std::sync::Arc;
 use nalgebra::DVector;
 use num_complex::Complex;
 
-use super::{Aimed, SIGNALS, ScanForces};
-use crate::rig::force::phi;
+use super::{Aimed, Joint, SIGNALS, ScanForces, Span};
+use crate::rig::force::{phi, phi_rising};
 use crate::rig::modal::Mode;
 
 /// A mode is left out when it moves no signal by more than this part of a converter step: far below rounding of anything
 /// that is ever read, and far above the denormals that would slow the loop down.
 const NEGLIGIBLE_STEPS: f64 = 1e-9;
 
+/// One number per mode: real parts, imaginary parts.
+#[derive(Debug, Clone, Default)]
+struct Parts {
+    re: Vec<f64>,
+    im: Vec<f64>,
+}
+
+impl Parts {
+    fn zeros(count: usize) -> Self {
+        Self { re: vec![0.0; count], im: vec![0.0; count] }
+    }
+
+    fn add(&mut self, gain: &Self, factor: f64) {
+        for (z, gain) in self.re.iter_mut().zip(&gain.re) {
+            *z += gain * factor;
+        }
+        for (z, gain) in self.im.iter_mut().zip(&gain.im) {
+            *z += gain * factor;
+        }
+    }
+}
+
+impl FromIterator<Complex<f64>> for Parts {
+    fn from_iter<I: IntoIterator<Item = Complex<f64>>>(values: I) -> Self {
+        let (re, im) = values.into_iter().map(|value| (value.re, value.im)).unzip();
+        Self { re, im }
+    }
+}
+
+/// What a span of time does to the modes.
+#[derive(Debug, Clone)]
+struct Pace {
+    /// e^{λh}.
+    turn: Parts,
+    /// Gained from a newton of the shaker, held.
+    shaker: Parts,
+    /// Gained from a newton between the specimens that falls to nothing, and from one that rises from it.
+    falling: Parts,
+    rising: Parts,
+}
+
+impl Pace {
+    fn new(modes: &[Mode], shaker: &DVector<f64>, joint: Option<&Joint>, h: f64) -> Self {
+        let gains = |column: &DVector<f64>, shape: &dyn Fn(Complex<f64>) -> Complex<f64>| -> Parts {
+            modes.iter().map(|mode| project(mode, column) * shape(mode.lambda * h) * h).collect()
+        };
+        let of_joint = |shape: &dyn Fn(Complex<f64>) -> Complex<f64>| {
+            joint.map_or_else(Parts::default, |joint| gains(&joint.column, shape))
+        };
+        Self {
+            turn: modes.iter().map(|mode| (mode.lambda * h).exp()).collect(),
+            shaker: gains(shaker, &phi),
+            falling: of_joint(&|x| phi(x) - phi_rising(x)),
+            rising: of_joint(&phi_rising),
+        }
+    }
+}
+
+fn project(mode: &Mode, column: &DVector<f64>) -> Complex<f64> {
+    mode.left.iter().zip(column.iter()).map(|(left, b)| left * b).sum()
+}
+
 /// Steps z' = λ z + b f exactly.
 #[derive(Debug, Clone)]
 pub struct ModalStepper {
     modes: Arc<Vec<Mode>>,
-    turn_re: Vec<f64>,
-    turn_im: Vec<f64>,
-    z_re: Vec<f64>,
-    z_im: Vec<f64>,
+    scan: Pace,
+    /// A step of a scan in which something slips; without a joint that can, as long as the scan.
+    step: Pace,
+    z: Parts,
     rows_re: Vec<[f64; SIGNALS]>,
     rows_im: Vec<[f64; SIGNALS]>,
     hammer: Vec<Complex<f64>>,
-    shaker_re: Vec<f64>,
-    shaker_im: Vec<f64>,
+    /// Reads y of the joint: Σ re · re + im · im.
+    joint: Parts,
     negligible: Vec<f64>,
     active: usize,
+    /// As it was: `z` and `active`.
+    kept: (Parts, usize),
 }
 
 impl ModalStepper {
     /// At rest, with the scan period `period_s`.
     pub fn new(modes: &Arc<Vec<Mode>>, aimed: &Aimed, period_s: f64) -> Self {
         let count = modes.len();
-        let project = |mode: &Mode, column: &DVector<f64>| -> Complex<f64> {
-            mode.left.iter().zip(column.iter()).map(|(left, b)| left * b).sum()
+        let joint = aimed.joint.as_ref();
+        let pace = |h| Pace::new(modes, &aimed.shaker, joint, h);
+        let scan = pace(period_s);
+        let read = |mode: &Mode, row: &DVector<f64>| -> Complex<f64> {
+            row.iter().zip(mode.right.iter()).map(|(r, v)| v * (r * mode.weight)).sum()
         };
         let mut stepper = Self {
-            modes: Arc::clone(modes),
-            turn_re: Vec::with_capacity(count),
-            turn_im: Vec::with_capacity(count),
-            z_re: vec![0.0; count],
-            z_im: vec![0.0; count],
+            step: joint.map_or_else(|| scan.clone(), |joint| pace(joint.step_s)),
+            scan,
+            z: Parts::zeros(count),
             rows_re: Vec::with_capacity(count),
             rows_im: Vec::with_capacity(count),
-            hammer: Vec::with_capacity(count),
-            shaker_re: Vec::with_capacity(count),
-            shaker_im: Vec::with_capacity(count),
+            hammer: modes.iter().map(|mode| project(mode, &aimed.hammer)).collect(),
+            joint: modes
+                .iter()
+                .map(|mode| joint.map_or(Complex::ZERO, |joint| read(mode, &joint.row).conj()))
+                .collect(),
             negligible: Vec::with_capacity(count),
             active: 0,
+            kept: (Parts::zeros(count), 0),
+            modes: Arc::clone(modes),
         };
         for mode in modes.iter() {
-            let turn = (mode.lambda * period_s).exp();
-            stepper.turn_re.push(turn.re);
-            stepper.turn_im.push(turn.im);
-            let seen = aimed.rows.each_ref().map(|row| -> Complex<f64> {
-                row.iter().zip(mode.right.iter()).map(|(r, v)| v * (r * mode.weight)).sum()
-            });
+            let seen = aimed.rows.each_ref().map(|row| read(mode, row));
             stepper.rows_re.push(seen.map(|c| c.re));
             stepper.rows_im.push(seen.map(|c| -c.im));
-            stepper.hammer.push(project(mode, &aimed.hammer));
-            let held = project(mode, &aimed.shaker) * phi(mode.lambda * period_s) * period_s;
-            stepper.shaker_re.push(held.re);
-            stepper.shaker_im.push(held.im);
             let steps = seen.iter().zip(aimed.steps).map(|(c, step)| c.norm() / step).fold(0.0, f64::max);
             // A mode that no signal sees may go at any size; the floor keeps 0/0 away.
             stepper.negligible.push((NEGLIGIBLE_STEPS / steps.max(1e-30)).powi(2));
@@ -74,12 +134,16 @@ impl ModalStepper {
         stepper
     }
 
-    /// Advances one scan period.
+    /// Advances one scan period, or one of its steps.
     #[inline]
-    pub fn advance(&mut self, forces: &ScanForces<'_>) {
+    pub fn advance(&mut self, span: Span, forces: &ScanForces<'_>) {
+        let pace = match span {
+            Span::Scan => &self.scan,
+            Span::Step => &self.step,
+        };
         let count = self.active;
-        let (z_re, z_im) = (&mut self.z_re[..count], &mut self.z_im[..count]);
-        let (turn_re, turn_im) = (&self.turn_re[..count], &self.turn_im[..count]);
+        let (z_re, z_im) = (&mut self.z.re[..count], &mut self.z.im[..count]);
+        let (turn_re, turn_im) = (&pace.turn.re[..count], &pace.turn.im[..count]);
         for k in 0..count {
             let re = z_re[k] * turn_re[k] - z_im[k] * turn_im[k];
             z_im[k] = z_re[k] * turn_im[k] + z_im[k] * turn_re[k];
@@ -88,12 +152,7 @@ impl ModalStepper {
         let mut pushed = false;
         if forces.shaker_n != 0.0 {
             pushed = true;
-            for (z, gain) in self.z_re.iter_mut().zip(&self.shaker_re) {
-                *z += gain * forces.shaker_n;
-            }
-            for (z, gain) in self.z_im.iter_mut().zip(&self.shaker_im) {
-                *z += gain * forces.shaker_n;
-            }
+            self.z.add(&pace.shaker, forces.shaker_n);
         }
         for segment in forces.hammer {
             if segment.overlap(forces.from_s, forces.to_s).is_none() {
@@ -102,19 +161,63 @@ impl ModalStepper {
             pushed = true;
             for (k, (mode, input)) in self.modes.iter().zip(&self.hammer).enumerate() {
                 let gain = input * segment.gained(mode.lambda, forces.from_s, forces.to_s);
-                self.z_re[k] += gain.re;
-                self.z_im[k] += gain.im;
+                self.z.re[k] += gain.re;
+                self.z.im[k] += gain.im;
             }
         }
         if pushed {
             self.active = self.modes.len();
         } else if let Some(last) = count.checked_sub(1) {
-            let size = self.z_re[last] * self.z_re[last] + self.z_im[last] * self.z_im[last];
+            let size = self.z.re[last] * self.z.re[last] + self.z.im[last] * self.z.im[last];
             if size < self.negligible[last] {
-                (self.z_re[last], self.z_im[last]) = (0.0, 0.0);
+                (self.z.re[last], self.z.im[last]) = (0.0, 0.0);
                 self.active = last;
             }
         }
+    }
+
+    /// Adds what a force between the specimens has done over the span just passed, in which it went from the first to the second
+    /// of these (N).
+    #[inline]
+    pub fn push(&mut self, span: Span, from_n: f64, to_n: f64) {
+        let pace = match span {
+            Span::Scan => &self.scan,
+            Span::Step => &self.step,
+        };
+        self.active = self.modes.len();
+        if from_n != 0.0 {
+            self.z.add(&pace.falling, from_n);
+        }
+        if to_n != 0.0 {
+            self.z.add(&pace.rising, to_n);
+        }
+    }
+
+    /// y of the joint now (m).
+    #[inline]
+    pub fn joint(&self) -> f64 {
+        read_parts(&self.joint, &self.z, self.active)
+    }
+
+    /// What y gains over a step from a force that rises to a newton (m/N).
+    pub fn receptance(&self) -> f64 {
+        read_parts(&self.joint, &self.step.rising, self.modes.len())
+    }
+
+    /// Remembers how it stands.
+    #[inline]
+    pub fn keep(&mut self) {
+        let (kept, active) = &mut self.kept;
+        kept.re.copy_from_slice(&self.z.re);
+        kept.im.copy_from_slice(&self.z.im);
+        *active = self.active;
+    }
+
+    /// Goes back there.
+    #[inline]
+    pub fn go_back(&mut self) {
+        std::mem::swap(&mut self.z, &mut self.kept.0);
+        self.active = self.kept.1;
     }
 
     /// The signals now.
@@ -122,7 +225,7 @@ impl ModalStepper {
     pub fn signals(&self) -> [f64; SIGNALS] {
         let count = self.active;
         let (rows_re, rows_im) = (&self.rows_re[..count], &self.rows_im[..count]);
-        let (z_re, z_im) = (&self.z_re[..count], &self.z_im[..count]);
+        let (z_re, z_im) = (&self.z.re[..count], &self.z.im[..count]);
         // Two sums at a time: one alone waits for its own last addition.
         let (mut even, mut odd) = ([0.0; SIGNALS], [0.0; SIGNALS]);
         let paired = count & !1;
@@ -146,9 +249,18 @@ impl ModalStepper {
         let order = self.modes.first().map_or(0, |mode| mode.right.len());
         let mut x = DVector::zeros(order);
         for (k, mode) in self.modes.iter().enumerate() {
-            let z = Complex::new(self.z_re[k], self.z_im[k]) * mode.weight;
+            let z = Complex::new(self.z.re[k], self.z.im[k]) * mode.weight;
             x += mode.right.map(|v| (v * z).re);
         }
         x
     }
+}
+
+fn read_parts(row: &Parts, z: &Parts, count: usize) -> f64 {
+    let (mut re, mut im) = (0.0, 0.0);
+    for k in 0..count {
+        re += row.re[k] * z.re[k];
+        im += row.im[k] * z.im[k];
+    }
+    re + im
 }

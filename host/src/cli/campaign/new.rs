@@ -35,7 +35,7 @@ impl New {
         let path = self.file.display();
         eprintln!("{path}: {} cells, {hits} hits wanted", cells.len());
         if let Some(shaker) = &store.plan()?.shaker {
-            eprintln!("{}", shaker.get_ref().remark());
+            eprintln!("{}", shaker.get_ref().remark(&self.file));
         }
         eprintln!("next: jointrig campaign run {path} --device sim:");
         Ok(store.close()?)

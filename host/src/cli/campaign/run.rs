@@ -50,9 +50,7 @@ impl Run {
         let address: Address = self.device.parse()?;
         let mut store = Store::open(&self.file)?;
         self.settle_plan(&mut store)?;
-        if let Some(shaker) = &store.plan()?.shaker {
-            eprintln!("{}", shaker.get_ref().remark());
-        }
+        self.mention_shaker(&store)?;
         let again = format!("jointrig campaign run {} --device {address}", self.file.display());
         let stop = interrupt::flag();
         let device = measure::Device { address: &address, seed: self.seed, log_tables: self.log_tables };
@@ -60,6 +58,16 @@ impl Run {
         let summary = measure::measure(store, device, self.stage, self.yes, stop, &again, &mut judge)?;
         if summary.interrupted {
             return Err(CliError::Bad("stopped before the campaign was complete".into()));
+        }
+        Ok(())
+    }
+
+    /// The shaker's levels are a command of their own: says so as long as some of the plan's are missing.
+    fn mention_shaker(&self, store: &Store) -> Result<(), CliError> {
+        if let Some(shaker) = &store.plan()?.shaker
+            && store.levels()?.len() < 2 * shaker.get_ref().levels()
+        {
+            eprintln!("{}", shaker.get_ref().remark(&self.file));
         }
         Ok(())
     }

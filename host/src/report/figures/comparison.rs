@@ -5,7 +5,7 @@ use super::super::panel::{BLUE, FAINT, INK, Panel, VERMILION};
 use super::super::scale::Scale;
 use super::WIDTH;
 use crate::results::number::{micro, stiffness};
-use crate::results::{MAIN_BAND_HZ, Results, words};
+use crate::results::{MAIN_BAND_HZ, Results, side_by_side};
 
 struct Row {
     label: String,
@@ -72,15 +72,13 @@ fn rows(results: &Results) -> Vec<Row> {
             colour: BLUE,
         })
     });
-    let loops = results.hysteresis.iter().filter_map(|h| {
-        let (name, k) = words::slope(h)?;
-        Some(Row {
-            label: format!("{name}, {}", words::excitation(h)),
-            mean: micro(k.mean),
-            std: micro(k.std),
-            median: None,
-            colour: VERMILION,
-        })
+    // the kinds that are measured at the specimens; FBS stands above by every method
+    let loops = side_by_side::kinds(results).into_iter().filter(|k| k.found.starts_with("k_")).map(|k| Row {
+        label: k.found,
+        mean: micro(k.mean_n_per_m),
+        std: micro(k.std_n_per_m),
+        median: None,
+        colour: VERMILION,
     });
     joint.chain(loops).collect()
 }

@@ -15,7 +15,7 @@ pub fn impacts(results: &Results) -> Option<String> {
     }
     let mut columns: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     for slope in &results.impact_slopes {
-        columns.entry(&slope.impact).or_default().push(micro(slope.k_t_n_per_m));
+        columns.entry(&slope.impact).or_default().push(micro(slope.k_eq_n_per_m));
     }
     let range = middle_range(columns.values().flatten().copied(), 1.0, 0.15)?;
     let area = Area { left: 70.0, top: 14.0, width: WIDTH - 70.0 - 130.0, height: 190.0 };
@@ -27,7 +27,7 @@ pub fn impacts(results: &Results) -> Option<String> {
     let y_ticks = panel.y.ticks(5);
     let mut drawing = Drawing::new("impacts", WIDTH, area.bottom() + 44.0);
     panel.grid(&mut drawing, &[], &y_ticks);
-    if let Some(k) = results.impact_loops().and_then(|h| h.k_t_n_per_m) {
+    if let Some(k) = results.impact_loops().and_then(|h| h.k_eq_n_per_m) {
         let (mean, std) = (micro(k.mean), micro(k.std));
         let (top, bottom) = (panel.y.place_within(mean + std), panel.y.place_within(mean - std));
         drawing.fill(Area { top, height: bottom - top, ..area }, VERMILION, 0.12);

@@ -4,14 +4,20 @@ mod comparison;
 mod contact_loop;
 mod impacts;
 mod joint_spectrum;
+mod levels;
+mod rebuilt;
 mod receptances;
+mod shaker_loops;
 mod specimens;
 
 pub use comparison::comparison;
 pub use contact_loop::contact_loop;
 pub use impacts::impacts;
 pub use joint_spectrum::joint_spectrum;
+pub use levels::levels;
+pub use rebuilt::rebuilt;
 pub use receptances::receptances;
+pub use shaker_loops::shaker_loops;
 pub use specimens::specimens;
 
 use super::drawing::Stroke;

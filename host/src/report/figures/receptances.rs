@@ -78,8 +78,8 @@ fn last_hz(curve: &FrfCurve) -> f64 {
 
 fn stroke(curve: &FrfCurve) -> Stroke {
     match curve.role {
-        Role::DrivingPoint | Role::SpecimenB => Stroke::new(BLUE, 1.0),
-        Role::Transfer | Role::SpecimenA => Stroke::new(VERMILION, 1.0),
+        Role::DrivingPoint | Role::SpecimenB | Role::ArmB => Stroke::new(BLUE, 1.0),
+        Role::Transfer | Role::SpecimenA | Role::ArmA => Stroke::new(VERMILION, 1.0),
     }
 }
 

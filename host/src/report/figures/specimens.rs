@@ -10,13 +10,18 @@ use crate::results::{FrfCurve, Results, Role};
 
 const SHOWN_HZ: [f64; 2] = [100.0, 400.0];
 
-/// Magnitude and phase of x_A and x_B over the hammer's force, 100–400 Hz.
+/// Magnitude and phase of x_A and x_B over the hammer's force, 100–400 Hz, with a point of each arm where there is one.
 pub fn specimens(results: &Results) -> Option<String> {
     let of = |role| results.frfs.iter().find(|c| c.role == role && c.configuration == "AJB");
-    let curves = [
+    let mut curves = vec![
         (of(Role::SpecimenA)?, Stroke::new(VERMILION, 1.2), "specimen A"),
         (of(Role::SpecimenB)?, Stroke::new(BLUE, 1.2), "specimen B"),
     ];
+    let arms = [
+        (of(Role::ArmA), Stroke::new(VERMILION, 1.0).dashed("6 3"), "arm A"),
+        (of(Role::ArmB), Stroke::new(BLUE, 1.0).dashed("6 3"), "arm B"),
+    ];
+    curves.extend(arms.into_iter().filter_map(|(curve, stroke, name)| Some((curve?, stroke, name))));
     let resonance = results.check("hidden-resonance").and_then(|c| c.frequency_hz);
     let inside = |c: &FrfCurve, values: &[f64]| -> Vec<(f64, f64)> {
         let lines = values.iter().enumerate().map(|(l, v)| (c.frequency_hz(l), *v));

@@ -1,6 +1,8 @@
 //! What the analysis asks of a campaign: its geometry, its cells, and the kept hits of one cell in SI units.
 
 use crate::campaign::frfs::ImportedFrf;
+use crate::campaign::level::{Level, Moment};
+use crate::hysteresis::HysteresisRecord;
 use crate::spectra::MotionQuantity;
 use crate::substructuring::geometry::Geometry;
 
@@ -65,6 +67,30 @@ pub struct ContactSignals {
     pub tangential_n: Vec<f64>,
 }
 
+/// A level of the shaker.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShakerLevel {
+    /// Its id in the campaign file.
+    pub id: i64,
+    /// Before or after the hammer's cells.
+    pub moment: Moment,
+    /// What was ordered.
+    pub level: Level,
+    /// The signals at the contact, in step.
+    pub record: HysteresisRecord,
+}
+
+/// What is known of contact and static arm beforehand.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct KnownContact {
+    /// The normal load, N.
+    pub normal_load_n: Option<f64>,
+    /// Stiffness to ground beside the load cells, over theirs.
+    pub parallel_path: Option<f64>,
+    /// Effective mass of the static arm at the contact, kg.
+    pub effective_mass_kg: Option<f64>,
+}
+
 /// A campaign as the analysis sees it. Cells are read one at a time, from several threads.
 pub trait Measurements: Sync {
     /// Why a cell cannot be read.
@@ -93,6 +119,16 @@ pub trait Measurements: Sync {
     /// They are damaged, or the file cannot be read.
     fn imported(&self, _configuration: &str) -> Result<Option<ImportedFrf>, Self::Error> {
         Ok(None)
+    }
+
+    /// The shaker's levels, and complaints about those that cannot be used.
+    fn shaker_levels(&self) -> (Vec<ShakerLevel>, Vec<String>) {
+        (Vec::new(), Vec::new())
+    }
+
+    /// What is known of contact and static arm beforehand.
+    fn known_contact(&self) -> KnownContact {
+        KnownContact::default()
     }
 
     /// The kept hits of a cell; none if it was not measured.

@@ -21,19 +21,28 @@ pub fn of_cells(
     };
     let chosen = choose(points, &|impact, channel| find(impact, channel).is_some());
     let curve = |(role, impact, channel): (Role, &Point, &Point)| {
-        let cell = find(impact, channel)?;
-        let order = quantity.frf().order_of_s();
-        let s = |f: &f64| Complex::new(sigma_per_s, TAU * f);
-        let receptance = cell.h1[2].iter().zip(&cell.frequency_hz).map(|(h, f)| h * s(f).powi(-order));
-        let several = cell.records.len() > 1;
-        let coherence = cell.coherence[2].iter().filter(|_| several);
-        Some(FrfCurve {
-            hits: cell.records.len(),
-            coherence: coherence.map(|c| rounded(if c.is_finite() { *c } else { 0.0 }, 5)).collect(),
-            ..curve(configuration, (role, impact, channel), &cell.frequency_hz, receptance)
-        })
+        Some(of_cell(configuration, (role, impact, channel), find(impact, channel)?, sigma_per_s, quantity))
     };
     chosen.into_iter().filter_map(curve).collect()
+}
+
+fn of_cell(
+    configuration: &str,
+    pair: (Role, &Point, &Point),
+    cell: &CellAverage,
+    sigma_per_s: f64,
+    quantity: MotionQuantity,
+) -> FrfCurve {
+    let order = quantity.frf().order_of_s();
+    let s = |f: &f64| Complex::new(sigma_per_s, TAU * f);
+    let receptance = cell.h1[2].iter().zip(&cell.frequency_hz).map(|(h, f)| h * s(f).powi(-order));
+    let several = cell.records.len() > 1;
+    let coherence = cell.coherence[2].iter().filter(|_| several);
+    FrfCurve {
+        hits: cell.records.len(),
+        coherence: coherence.map(|c| rounded(if c.is_finite() { *c } else { 0.0 }, 5)).collect(),
+        ..curve(configuration, pair, &cell.frequency_hz, receptance)
+    }
 }
 
 /// The curves of FRFs that were measured elsewhere; none where their lines are not evenly spaced.
@@ -92,6 +101,27 @@ fn choose<'p>(
         .into_iter()
         .filter_map(|(role, pair)| pair.map(|(impact, channel, _)| (role, *impact, *channel)))
         .collect()
+}
+
+/// A point of each arm along z from `impact`, in the assembly: what the specimens are compared with.
+pub fn arms(
+    impact: &str,
+    points: &Configuration,
+    cells: &[CellAverage],
+    sigma_per_s: f64,
+    quantity: MotionQuantity,
+) -> Vec<FrfCurve> {
+    let Some(hit) = points.impacts.iter().find(|p| p.name == impact) else { return Vec::new() };
+    let arm = |role: Role, grouping: Grouping| {
+        let measured = |channel: &&Point| channel.grouping == grouping && channel.direction[2].abs() > 0.9;
+        points.channels.iter().filter(measured).find_map(|channel| {
+            let own = |c: &&CellAverage| c.name.impact == impact && c.name.response == channel.name;
+            let cell = cells.iter().filter(|c| c.name.configuration == "AJB").find(own)?;
+            Some(of_cell("AJB", (role, hit, channel), cell, sigma_per_s, quantity))
+        })
+    };
+    let both = [arm(Role::ArmA, Grouping::InterfaceA), arm(Role::ArmB, Grouping::InterfaceB)];
+    both.into_iter().flatten().collect()
 }
 
 /// Receptance along the two directions, hit and response both counted positive along z: a driving point starts at 0°.

@@ -1,53 +1,25 @@
 //! The contact seen from the specimens, in frequency: Δx per newton of T, and the FRFs of both specimens.
 
 use super::averages::ContactAverage;
+pub use crate::hysteresis::compliance::ContactCompliance;
 use crate::results::{FrfCurve, Joint, Role, rounded};
 use crate::substructuring::joint::{BandStatistic, stiffness_and_damping};
 use num_complex::Complex;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// Where a resonance of a specimen is looked for, Hz: below, the loops are quasi-static; above, Δx drowns in noise.
-const SEARCH_HZ: [f64; 2] = [100.0, 400.0];
 /// Where T/Δx is read, Hz: above the specimens' resonance, below where Δx drowns in noise.
 const DIRECT_HZ: [f64; 2] = [250.0, 400.0];
 /// Lines averaged before a stiffness is read: 5 Hz at half-hertz lines.
 const DIRECT_LINES: usize = 10;
 /// Name of that method.
 pub const DIRECT: &str = "direct";
-/// Lines averaged before a peak is looked for: 1.5 Hz at half-hertz lines, well inside a resonance at 192 Hz.
-const SMOOTH: usize = 3;
-
-/// D(s) = Δx / T over frequency, from the hits along z on A and on the moving mass.
-///
-/// T and Δx are both noisy, so neither may stand in the denominator as an auto-spectrum: the hammer's force is
-/// the instrument, D = Σ S_ΔF S_TF* / Σ |S_TF|² over the impacts.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ContactCompliance {
-    frequency_hz: Vec<f64>,
-    compliance_m_per_n: Vec<Complex<f64>>,
-}
-
-/// Where the imaginary part of Δx/T is largest.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ImaginaryPeak {
-    /// Where, Hz.
-    pub frequency_hz: f64,
-    /// |Im D| there over the level of |Re D|.
-    pub over_level: f64,
-    /// |Im D| there over the median of |Im D|.
-    pub over_median: f64,
-}
-
-impl ImaginaryPeak {
-    /// Whether this is a resonance beyond doubt.
-    pub fn stands_out(&self) -> bool {
-        self.over_level > 0.5 && self.over_median > 5.0
-    }
-}
 
 impl ContactCompliance {
     /// From the averages of each impact; none without impacts.
+    ///
+    /// T and Δx are both noisy, so neither may stand in the denominator as an auto-spectrum: the hammer's force is
+    /// the instrument, D = Σ S_ΔF S_TF* / Σ |S_TF|² over the impacts.
     pub fn of(frequency_hz: &[f64], sigma_per_s: f64, impacts: &[&ContactAverage]) -> Option<Self> {
         if impacts.is_empty() {
             return None;
@@ -113,32 +85,6 @@ impl ContactCompliance {
             warnings,
         })
     }
-
-    /// The largest imaginary part between 100 and 400 Hz, averaged over three lines.
-    pub fn imaginary_peak(&self) -> Option<ImaginaryPeak> {
-        let inside = |f: f64| (SEARCH_HZ[0]..=SEARCH_HZ[1]).contains(&f);
-        let smooth: Vec<(f64, Complex<f64>)> = self
-            .compliance_m_per_n
-            .windows(SMOOTH)
-            .zip(self.frequency_hz.windows(SMOOTH))
-            .map(|(d, f)| (f[SMOOTH / 2], d.iter().sum::<Complex<f64>>() / SMOOTH as f64))
-            .filter(|(f, d)| inside(*f) && d.re.is_finite() && d.im.is_finite())
-            .collect();
-        if smooth.len() < 30 {
-            return None;
-        }
-        let level = median(smooth.iter().map(|(_, d)| d.re.abs()).collect());
-        let usual = median(smooth.iter().map(|(_, d)| d.im.abs()).collect());
-        let (frequency_hz, top) =
-            smooth.iter().map(|(f, d)| (*f, d.im.abs())).max_by(|a, b| a.1.total_cmp(&b.1))?;
-        Some(ImaginaryPeak { frequency_hz, over_level: top / level, over_median: top / usual })
-    }
-}
-
-/// The middle of a list that is not empty.
-fn median(mut values: Vec<f64>) -> f64 {
-    let at = values.len() / 2;
-    *values.select_nth_unstable_by(at, f64::total_cmp).1
 }
 
 /// The two specimens' receptances from one impact, for the report; hit and response count positive along +z, so

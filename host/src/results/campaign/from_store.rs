@@ -1,14 +1,19 @@
 //! The campaign file as measurements: records decoded, in SI units, one cell at a time, from any thread.
 
-use super::cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, Measurements};
+use super::cell::{
+    Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel,
+};
 use super::{Progress, completeness};
 use crate::campaign::frfs::ImportedFrf;
+use crate::campaign::levels::LevelRow;
 use crate::campaign::plan::{Plan, configuration_name};
 use crate::campaign::rows::RecordRow;
+use crate::campaign::shaking;
 use crate::campaign::store::Store;
 use crate::campaign::store_error::StoreError;
 use crate::campaign::tally::Tally;
 use crate::device::channels::ChannelMap;
+use crate::hysteresis::HysteresisRecord;
 use crate::results::{Completeness, Results, Source};
 use crate::spectra::MotionQuantity;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
@@ -41,12 +46,16 @@ pub enum AnalyseError {
     Quantity(String),
 }
 
-/// Everything that a campaign file says about the joint.
+/// Everything that a campaign file says about the joint. What is `known` beforehand counts more than what the plan says.
 ///
 /// # Errors
 /// The file itself cannot be read. What is missing or damaged in it is told in the results instead.
-pub fn analyse(store: &Store, progress: &(dyn Fn(Progress) + Sync)) -> Result<Results, AnalyseError> {
-    let file = CampaignFile::open(store)?;
+pub fn analyse(
+    store: &Store,
+    known: KnownContact,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Results, AnalyseError> {
+    let file = CampaignFile::open(store, known)?;
     let mut results = Results::new(file.source(store)?);
     results.completeness = file.completeness();
     Ok(super::analyse_measurements(&file, results, progress))
@@ -61,6 +70,7 @@ struct PlannedCell {
 struct CampaignFile {
     path: PathBuf,
     plan: Plan,
+    known: KnownContact,
     geometry: Geometry,
     quantity: MotionQuantity,
     cells: Vec<PlannedCell>,
@@ -72,8 +82,14 @@ struct CampaignFile {
 }
 
 impl CampaignFile {
-    fn open(store: &Store) -> Result<Self, AnalyseError> {
+    fn open(store: &Store, known: KnownContact) -> Result<Self, AnalyseError> {
         let plan = store.plan()?;
+        let planned = plan.contact.as_ref().map(|contact| *contact.get_ref()).unwrap_or_default();
+        let known = KnownContact {
+            normal_load_n: known.normal_load_n.or(planned.normal_load_n),
+            parallel_path: known.parallel_path.or(planned.parallel_path),
+            effective_mass_kg: known.effective_mass_kg.or(planned.effective_mass_kg),
+        };
         let (rows, all) = (store.cells()?, store.records()?);
         let tally = Tally::new(&rows, &all);
         let cells = rows
@@ -100,6 +116,7 @@ impl CampaignFile {
             path: store.path().into(),
             geometry: geometry(&plan),
             quantity: response_quantity(channels.values())?,
+            known,
             plan,
             cells,
             tally,
@@ -232,6 +249,22 @@ impl CampaignFile {
     }
 }
 
+impl CampaignFile {
+    fn level(&self, store: &Store, row: &LevelRow) -> Result<ShakerLevel, String> {
+        if let Some(what) = &row.damage {
+            return Err(format!("it is damaged ({what}) and was left out"));
+        }
+        if !row.gaps.is_empty() {
+            return Err("samples of it were lost on the way: measure it again".into());
+        }
+        let channels = self.channels.get(&row.session).ok_or("its session is missing")?;
+        let samples = store.level_samples(row).map_err(|error| error.to_string())?;
+        let record = shaking::record(channels, &samples, &row.level).map_err(|error| error.to_string())?;
+        let record = HysteresisRecord { normal_load_n: self.known.normal_load_n, ..record };
+        Ok(ShakerLevel { id: row.id, moment: row.moment, level: row.level, record })
+    }
+}
+
 impl Measurements for CampaignFile {
     type Error = AnalyseError;
 
@@ -257,6 +290,27 @@ impl Measurements for CampaignFile {
 
     fn imported(&self, configuration: &str) -> Result<Option<ImportedFrf>, AnalyseError> {
         self.with_reader(|store| Ok(store.frf(configuration)?))
+    }
+
+    fn known_contact(&self) -> KnownContact {
+        self.known
+    }
+
+    fn shaker_levels(&self) -> (Vec<ShakerLevel>, Vec<String>) {
+        let (mut levels, mut complaints) = (Vec::new(), Vec::new());
+        let read = self.with_reader(|store| {
+            for row in store.levels()? {
+                match self.level(store, &row) {
+                    Ok(level) => levels.push(level),
+                    Err(why) => {
+                        complaints.push(format!("Shaker, {} ({}): {why}.", row.level, row.moment.name()));
+                    }
+                }
+            }
+            Ok(())
+        });
+        complaints.extend(read.err().map(|error| format!("The shaker's levels: {error}.")));
+        (levels, complaints)
     }
 
     fn read(&self, cell: &CellName) -> Result<Cell, AnalyseError> {

@@ -1,11 +1,19 @@
 //! The loops of the impacts: each counting hit's first cycle, and all of them together.
 
 use super::cell::{ContactDelays, ContactSignals};
+use crate::hysteresis::correction::rates;
+use crate::hysteresis::delays;
+use crate::hysteresis::impact::DecayCycle;
 use crate::hysteresis::integration::open_record;
+use crate::hysteresis::loops::slope;
+use crate::hysteresis::reconstruction::decaying;
 use crate::hysteresis::{
-    HysteresisError, HysteresisRecord, Kind, OverCycles, RelativeMotion, Shape, analyse,
+    Correction, HysteresisError, HysteresisRecord, Kind, OverCycles, RelativeMotion, Shape, analyse,
 };
-use crate::results::{Force, Hysteresis, ImpactSlope, LoopCurve, ranges, rounded};
+use crate::results::number::short;
+use crate::results::{
+    Check, DecayStep, Force, Hysteresis, Identified, ImpactSlope, LoopCurve, Reconstruction, ranges, rounded,
+};
 
 /// What one hit's first cycle says.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,7 +36,14 @@ pub struct ImpactLoop {
     pub shape: Shape,
     /// Samples of the first cycle.
     pub cycle: [usize; 2],
+    /// Least-squares slope of specimen B's acceleration on Δx over it, 1/s²: what the arm's inertia adds per kg.
+    pub acceleration_per_m: f64,
+    /// The first cycles of the decay.
+    pub decay: Vec<DecayCycle>,
 }
+
+/// Cycles of a decay that are told: later ones drown, or carry the lowest modes alone.
+const DECAY_CYCLES: usize = 8;
 
 /// Analyses one hit.
 ///
@@ -42,6 +57,7 @@ pub fn of_hit(
     delays: ContactDelays,
 ) -> Result<ImpactLoop, HysteresisError> {
     let [a, b, force_n] = in_step(contact, delays, fs_hz);
+    let acceleration = rates(&b, fs_hz);
     let found = analyse(&HysteresisRecord {
         fs_hz,
         motion: RelativeMotion::Velocity { a_m_per_s: a, b_m_per_s: b },
@@ -50,6 +66,9 @@ pub fn of_hit(
         normal_load_n: None,
     })?;
     let first = found.decay_cycles.first().ok_or(HysteresisError::NoMotion)?;
+    let (from, to) = (first.first_sample, first.end_sample);
+    // the loop to be drawn begins with the first cycle
+    let displacement = &found.loop_displacement_m[..(to - from).min(found.loop_displacement_m.len())];
     Ok(ImpactLoop {
         record,
         impact: impact.into(),
@@ -59,40 +78,29 @@ pub fn of_hit(
         frequency_hz: found.frequency_hz,
         phase_deg: found.phase_deg,
         shape: found.shape,
-        cycle: [first.first_sample, first.end_sample],
+        cycle: [from, to],
+        acceleration_per_m: slope(displacement, &acceleration[from..from + displacement.len()]),
+        decay: found.decay_cycles[..DECAY_CYCLES.min(found.decay_cycles.len())].to_vec(),
     })
 }
 
 /// v_A, v_B and T with their delays against each other taken out.
 fn in_step(contact: &ContactSignals, delays: ContactDelays, fs_hz: f64) -> [Vec<f64>; 3] {
-    let least = delays.specimen_a.min(delays.specimen_b).min(delays.load_cells);
-    let advanced = |signal: &[f64], delay: f64| advance(signal, (delay - least) * fs_hz);
-    [
-        advanced(&contact.specimen_a_m_per_s, delays.specimen_a),
-        advanced(&contact.specimen_b_m_per_s, delays.specimen_b),
-        advanced(&contact.tangential_n, delays.load_cells),
-    ]
+    let ContactSignals { specimen_a_m_per_s, specimen_b_m_per_s, tangential_n } = contact.clone();
+    let delays = [delays.specimen_a, delays.specimen_b, delays.load_cells];
+    delays::in_step([specimen_a_m_per_s, specimen_b_m_per_s, tangential_n], delays, fs_hz)
 }
 
-/// The signal `samples` earlier (not negative), by straight lines between samples: the loops live far below the
-/// sampling rate. The last value is held.
-fn advance(signal: &[f64], samples: f64) -> Vec<f64> {
-    if samples <= 0.0 || signal.is_empty() {
-        return signal.to_vec();
-    }
-    let (whole, share) = (samples.floor() as usize, samples.fract());
-    let at = |i: usize| signal[i.min(signal.len() - 1)];
-    (0..signal.len()).map(|i| at(i + whole) * (1.0 - share) + at(i + whole + 1) * share).collect()
-}
-
-/// All first cycles together, in the shape of the results; `None` without any.
-pub fn gathered(loops: &[ImpactLoop]) -> Option<Hysteresis> {
-    let over = |value: fn(&ImpactLoop) -> f64| {
+/// All first cycles together, in the shape of the results: with the raw force, and with the corrected one where the static arm is
+/// known. None without any.
+pub fn gathered(loops: &[ImpactLoop], arm: Option<&Identified>) -> Vec<Hysteresis> {
+    let over = |value: &dyn Fn(&ImpactLoop) -> f64| {
         OverCycles::of(&loops.iter().map(value).filter(|v| v.is_finite()).collect::<Vec<_>>())
     };
-    let mean = |value: fn(&ImpactLoop) -> f64| over(value).map(|v| v.mean);
-    let slope = over(|l| l.slope_n_per_m)?;
-    let shape = most_common(loops)?;
+    let mean = |value: fn(&ImpactLoop) -> f64| over(&value).map(|v| v.mean);
+    let (Some(raw), Some(shape)) = (over(&|l| l.slope_n_per_m), most_common(loops)) else {
+        return Vec::new();
+    };
     let mut warnings = vec![
         "Slope over the first cycle of a decay: every mode that the hit excites is in it, also the specimen's tilt on its clamp.".to_owned(),
     ];
@@ -103,24 +111,73 @@ pub fn gathered(loops: &[ImpactLoop]) -> Option<Hysteresis> {
             loops.len()
         ));
     }
-    if slope.mean < 0.0 {
+    if raw.mean < 0.0 {
         warnings.push("A negative slope: the polarity of a vibrometer or of the load cells is wrong.".into());
     }
-    Some(Hysteresis {
-        force: Force::Raw,
+    let row = |force, slope: OverCycles, decay| Hysteresis {
+        force,
         kind: Kind::Impact,
         frequency_hz: mean(|l| l.frequency_hz),
         amplitude_m: mean(|l| l.amplitude_m),
         shape,
         k_t_n_per_m: (shape == Shape::Stuck).then_some(slope),
         k_eq_n_per_m: Some(slope),
+        k_secant_n_per_m: None,
+        k_fundamental_n_per_m: None,
         // the first cycle of a decay is not closed
         energy_j: None,
+        friction_limit_n: None,
         friction_coefficient: None,
         phase_deg: mean(|l| l.phase_deg),
+        shape_evidence: None,
+        decay_cycles: Vec::new(),
+        decay,
+        level: None,
+        moment: None,
         records: ranges(loops.iter().map(|l| l.record)),
-        warnings,
-    })
+        warnings: warnings.clone(),
+    };
+    let mut rows = vec![row(Force::Raw, raw, decay(loops))];
+    // a least-squares slope is linear in the force
+    let corrected = arm.and_then(|arm| {
+        let Correction { effective_mass_kg, parallel_path } = arm.correction;
+        over(&|l| (1.0 + parallel_path) * l.slope_n_per_m + effective_mass_kg * l.acceleration_per_m)
+    });
+    rows.extend(corrected.map(|slope| row(Force::Corrected, slope, Vec::new())));
+    rows
+}
+
+/// The decay's cycles over all hits.
+fn decay(loops: &[ImpactLoop]) -> Vec<DecayStep> {
+    (0..DECAY_CYCLES)
+        .filter_map(|c| {
+            let here: Vec<&DecayCycle> = loops.iter().filter_map(|l| l.decay.get(c)).collect();
+            let over = |value: fn(&DecayCycle) -> f64| {
+                OverCycles::of(&here.iter().map(|d| value(d)).filter(|v| v.is_finite()).collect::<Vec<_>>())
+            };
+            Some(DecayStep {
+                cycle: c + 1,
+                k_eq_n_per_m: over(|d| d.stiffness_n_per_m)?,
+                phase_deg: over(|d| d.phase_deg)?.mean,
+                amplitude_m: over(|d| d.amplitude_m)?.mean,
+            })
+        })
+        .collect()
+}
+
+/// Takes the name k_T from the first cycles' slope unless the contact in frequency shows that no resonance hides in it.
+pub fn judge(row: &mut Hysteresis, hidden: &Check) {
+    if hidden.ok == Some(true) || row.k_t_n_per_m.is_none() {
+        return;
+    }
+    row.k_t_n_per_m = None;
+    row.warnings.push(match (hidden.ok, hidden.frequency_hz) {
+        (Some(false), Some(f)) => format!(
+            "This slope is k_eq, not k_T: a resonance of one specimen at {} Hz is excited by every hit and moves Δx without the force.",
+            short(f)
+        ),
+        _ => "This slope is called k_eq: whether a resonance of one specimen is in it cannot be told from these records.".into(),
+    });
 }
 
 fn most_common(loops: &[ImpactLoop]) -> Option<Shape> {
@@ -139,7 +196,7 @@ pub fn slopes(loops: &[ImpactLoop]) -> Vec<ImpactSlope> {
         .map(|l| ImpactSlope {
             record: l.record,
             impact: l.impact.clone(),
-            k_t_n_per_m: rounded(l.slope_n_per_m, 6),
+            k_eq_n_per_m: rounded(l.slope_n_per_m, 6),
         })
         .collect()
 }
@@ -178,23 +235,62 @@ pub fn drawn(shown: &ImpactLoop, fs_hz: f64, contact: &ContactSignals, delays: C
     }
 }
 
+/// Length of the decay that is put together again, s: long enough to tell 192 Hz from 208 Hz.
+const REBUILT_S: f64 = 0.1;
+
+/// Every so many samples are kept of it.
+const THINNED: usize = 8;
+
+/// The specimens' decay from the second cycle on, put together from the hidden resonance and the common mode.
+pub fn rebuilt(
+    shown: &ImpactLoop,
+    fs_hz: f64,
+    contact: &ContactSignals,
+    delays: ContactDelays,
+    hidden_hz: f64,
+) -> Option<Reconstruction> {
+    let [a, b, _] = in_step(contact, delays, fs_hz);
+    let from = shown.cycle[1];
+    let to = (from + (REBUILT_S * fs_hz) as usize).min(a.len());
+    let rest = shown.cycle[0].max(1);
+    let displacement = |v: &[f64]| -> Vec<f64> {
+        let offset = v[..rest].iter().sum::<f64>() / rest as f64;
+        open_record(v, offset, 1.0 / fs_hz)
+            .get(from..to)
+            .unwrap_or_default()
+            .iter()
+            .step_by(THINNED)
+            .copied()
+            .collect()
+    };
+    let (x_a, x_b) = (displacement(&a), displacement(&b));
+    let step_s = THINNED as f64 / fs_hz;
+    let common_hz = shown.frequency_hz;
+    let both = decaying(&x_a, 1.0 / step_s, &[hidden_hz, common_hz])?;
+    let alone = decaying(&x_a, 1.0 / step_s, &[common_hz])?;
+    let of_b = decaying(&x_b, 1.0 / step_s, &[common_hz])?;
+    let short = |values: Vec<f64>| values.into_iter().map(|v| rounded(v, 5)).collect::<Vec<_>>();
+    Some(Reconstruction {
+        record: shown.record,
+        hidden_hz,
+        common_hz,
+        step_s,
+        displacement_a_m: short(x_a),
+        displacement_b_m: short(x_b),
+        rebuilt_a_m: short(both.signal),
+        rebuilt_b_m: short(of_b.signal),
+        explained_a: [both.explained, alone.explained],
+        explained_b: of_b.explained,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn signals_are_advanced_by_their_delay() {
-        let ramp: Vec<f64> = (0..10).map(f64::from).collect();
-        assert_eq!(advance(&ramp, 0.0), ramp);
-        let early = advance(&ramp, 1.5);
-        assert_eq!(early[..3], [1.5, 2.5, 3.5]);
-        assert_eq!(early.len(), 10);
-        assert!(advance(&[], 3.0).is_empty());
-    }
-
-    #[test]
     fn nothing_gives_nothing() {
-        assert_eq!(gathered(&[]), None);
+        assert_eq!(gathered(&[], None), []);
         assert_eq!(middle(&[]), None);
     }
 }

@@ -5,6 +5,7 @@
 //! assembly only, substructuring needs all three configurations.
 
 mod assemble;
+mod at_contact;
 mod averages;
 mod cell;
 mod checks;
@@ -14,16 +15,18 @@ mod from_store;
 mod imported;
 mod joint;
 mod loops;
+mod shaker;
+mod static_arm;
 #[cfg(test)]
 mod synthetic;
 
-pub use cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, Measurements};
+pub use cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel};
 pub use checks::{HIDDEN_RESONANCE, SERIES_COMPLIANCE, UNIDENTIFIED};
 pub use contact::DIRECT;
 pub use from_store::{AnalyseError, analyse, geometry};
 pub use joint::shaped;
 
-use super::{Completeness, MAIN_BAND_HZ, Results, UsableBand, ranges, words};
+use super::{Completeness, MAIN_BAND_HZ, Results, UsableBand, ranges};
 use crate::spectra::{Windowing, usable_band};
 use crate::substructuring::averaged::{Priors, averaged};
 use crate::substructuring::frf::FrfMatrix;
@@ -33,8 +36,8 @@ use crate::substructuring::idm::IdmSet;
 use crate::substructuring::joint::Band;
 use crate::substructuring::method::Method;
 use crate::substructuring::noise::FrfNoise;
-use averages::{CellAverage, ContactAverage, HIGHEST_HZ, LOWEST_HZ, average};
-use contact::{ContactCompliance, specimen_curves};
+use at_contact::at_the_contact;
+use averages::{CellAverage, HIGHEST_HZ, LOWEST_HZ, average};
 use loops::ImpactLoop;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -138,6 +141,12 @@ fn counts_for_contact(geometry: &Geometry, name: &CellName) -> bool {
         })
 }
 
+/// Whether hits at this impact drive the load cells through arm B alone: what the static arm is identified from.
+fn drives_the_cells(geometry: &Geometry, name: &CellName) -> bool {
+    name.configuration == "B"
+        && geometry.b.impacts.iter().any(|p| p.name == name.impact && p.grouping == Grouping::InterfaceB)
+}
+
 fn one_cell<M: Measurements>(measurements: &M, geometry: &Geometry, name: &CellName) -> CellOutcome {
     let mut outcome = CellOutcome { average: None, loops: Vec::new(), complaints: Vec::new() };
     let complaint = |what: &dyn std::fmt::Display| {
@@ -168,6 +177,7 @@ fn one_cell<M: Measurements>(measurements: &M, geometry: &Geometry, name: &CellN
             }
         }
     }
+    let contact = contact || drives_the_cells(geometry, name);
     match average(name.clone(), cell, measurements.sigma_per_s(), measurements.quantity(), contact) {
         Ok(averaged) => outcome.average = Some(averaged),
         Err(error) => outcome.complaints.push(complaint(&error)),
@@ -287,70 +297,6 @@ fn recommend(results: &mut Results, geometry: &Geometry, ajb: Option<&FrfMatrix>
             }
         }
     }
-}
-
-fn at_the_contact<M: Measurements>(
-    results: &mut Results,
-    measurements: &M,
-    averages: &[CellAverage],
-    impact_loops: &[ImpactLoop],
-    sigma_per_s: f64,
-) {
-    results.hysteresis.extend(loops::gathered(impact_loops));
-    results.impact_slopes = loops::slopes(impact_loops);
-    results.example_loop = example_loop(measurements, averages, impact_loops);
-    let counting: Vec<(&CellAverage, &ContactAverage)> =
-        averages.iter().filter_map(|c| Some((c, c.contact.as_ref()?))).collect();
-    let mut by_impact: Vec<(&str, ContactAverage)> = Vec::new();
-    for (cell, contact) in &counting {
-        match by_impact.iter_mut().find(|(name, _)| *name == cell.name.impact) {
-            Some((_, sum)) if sum.force.len() == contact.force.len() => sum.add(contact),
-            Some(_) => {}
-            None => by_impact.push((&cell.name.impact, (*contact).clone())),
-        }
-    }
-    let mut compliance = None;
-    if let Some((cell, _)) = counting.first() {
-        let sums: Vec<&ContactAverage> =
-            by_impact.iter().map(|(_, c)| c).filter(|c| c.force.len() == cell.frequency_hz.len()).collect();
-        compliance = ContactCompliance::of(&cell.frequency_hz, sigma_per_s, &sums);
-        // the moving mass drives the contact as the shaker does; any other impact will do
-        let geometry = measurements.geometry();
-        let mass = |name: &str| {
-            geometry.ajb.impacts.iter().any(|p| p.name == name && p.grouping == Grouping::InternalA)
-        };
-        let sign = |name: &str| {
-            geometry.ajb.impacts.iter().find(|p| p.name == name).map_or(1.0, |p| p.direction[2].signum())
-        };
-        let shown = by_impact.iter().max_by_key(|(name, _)| mass(name));
-        if let Some((name, sum)) = shown {
-            results.frfs.extend(specimen_curves(name, sign(name), &cell.frequency_hz, sigma_per_s, sum));
-        }
-    }
-    let direct = compliance.as_ref().and_then(|c| c.direct(sigma_per_s));
-    let series = {
-        let loops = results.impact_loops().and_then(words::slope).map(|(_, k)| k);
-        checks::series_compliance(
-            checks::between_the_arms(results).as_ref(),
-            checks::at_the_specimens(direct.as_ref(), loops),
-        )
-    };
-    results.joint.extend(direct);
-    results.checks.push(series);
-    results.checks.push(checks::hidden_resonance(compliance.as_ref()));
-}
-
-/// The signals of the hit whose slope is the middle of all, read once more.
-fn example_loop<M: Measurements>(
-    measurements: &M,
-    averages: &[CellAverage],
-    impact_loops: &[ImpactLoop],
-) -> Option<super::LoopCurve> {
-    let shown = loops::middle(impact_loops)?;
-    let name = &averages.iter().find(|c| c.records.contains(&shown.record))?.name;
-    let cell = measurements.read(name).ok()?;
-    let hit = cell.hits.iter().find(|h| h.record == shown.record)?;
-    Some(loops::drawn(shown, cell.fs_hz, hit.contact.as_ref()?, cell.contact_delay_s))
 }
 
 /// Kept and refused hits of one configuration, from counts per cell: (wanted, kept, refused by verdict).

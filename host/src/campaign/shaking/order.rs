@@ -1,0 +1,190 @@
+//! The orders of one level: what the device is told, renewed as long as the level lasts.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use jointrig_protocol::answer::{Info, Shaker};
+use jointrig_protocol::channel::Role;
+use jointrig_protocol::request::Shake;
+
+use super::Options;
+use super::error::{ShakeError, Shortfall};
+use crate::campaign::level::{Held, Level};
+use crate::device::channels::ChannelMap;
+use crate::device::session::Session;
+use jointrig_protocol::event::Reason;
+
+/// How long an order holds, ms of the device.
+const VALID_MS: u32 = 10_000;
+
+/// After this much of the device's clock it is renewed, s. A virtual board may be half its ring further than its host knows.
+const RENEW_S: f64 = 3.0;
+
+/// The channels at the contact stop the shaker at this part of their full scale: beyond it there is nothing to be recorded.
+const OF_FULL_SCALE: f64 = 0.95;
+
+/// The drive's amplitude changes at most by its full scale in half a second.
+const SLEW_PER_S: f64 = 2.0;
+
+/// Limits by channel name, SI units; those of a whole level.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Limits(pub Vec<(String, f64)>);
+
+impl Limits {
+    /// The limit of each channel, in the order of the scan; 0 where there is none.
+    pub fn of(&self, channels: &ChannelMap) -> Vec<f64> {
+        (0..channels.len())
+            .map(|place| {
+                let channel = &channels.channels[place];
+                let own = self.0.iter().find(|(name, _)| name == channel.name.as_str());
+                match channel.role {
+                    _ if own.is_some() => own.map_or(0.0, |(_, limit)| *limit),
+                    Role::SpecimenA | Role::SpecimenB | Role::LoadCell | Role::Excitation => {
+                        OF_FULL_SCALE * channels.full_scale(place).unwrap_or(0.0)
+                    }
+                    _ => 0.0,
+                }
+            })
+            .collect()
+    }
+}
+
+/// The order that holds, and when it is renewed.
+pub struct Orders {
+    order: Shake,
+    level: Level,
+    rate_hz: u32,
+    renew_at: u64,
+    channels: ChannelMap,
+    stop: Arc<AtomicBool>,
+}
+
+impl Orders {
+    pub fn new(channels: &ChannelMap, info: &Info, level: &Level, options: &Options) -> Self {
+        let full_v = f64::from(info.drive_v);
+        let (amplitude_v, slew) = match level.held {
+            Held::Drive => (level.amplitude, level.amplitude),
+            _ => (options.most_drive_v.unwrap_or(full_v), full_v),
+        };
+        let limits = options.limits.of(channels).into_iter().map(|limit| limit as f32).collect();
+        let order = Shake {
+            step: Shake::step_of(level.frequency_hz, channels.rate_hz),
+            control: level.held.control(level.amplitude),
+            amplitude_v: amplitude_v as f32,
+            slew_v_per_s: (SLEW_PER_S * slew) as f32,
+            valid_ms: VALID_MS,
+            limits,
+        };
+        Self {
+            order,
+            level: *level,
+            rate_hz: channels.rate_hz,
+            renew_at: 0,
+            channels: channels.clone(),
+            stop: options.stop.clone(),
+        }
+    }
+
+    /// Gives the first order; returns a scan from which on it holds.
+    pub fn begin(&mut self, session: &mut Session) -> Result<u64, ShakeError> {
+        let _ = session.shaker_stopped();
+        session.shake(self.order.clone())?;
+        let now = session.status()?.next_scan;
+        self.renew_at = now + (RENEW_S * f64::from(self.rate_hz)) as u64;
+        Ok(now)
+    }
+
+    /// Scans per second.
+    pub fn rate_hz(&self) -> f64 {
+        f64::from(self.rate_hz)
+    }
+
+    /// Another frequency, with the phase going on.
+    pub fn tune(&mut self, session: &mut Session, frequency_hz: f64) -> Result<(), ShakeError> {
+        self.order.step = Shake::step_of(frequency_hz, self.rate_hz);
+        self.renew(session)
+    }
+
+    /// Waits for `scan`, and keeps the order alive meanwhile.
+    ///
+    /// # Errors
+    /// The user interrupts, the shaker stopped, or the device is gone.
+    pub fn go_on(&mut self, session: &mut Session, scan: u64) -> Result<(), ShakeError> {
+        loop {
+            let next = scan.min(self.renew_at);
+            let stop = &self.stop;
+            if session.wait_until(next, |_| stop.load(Ordering::Relaxed))? {
+                return Err(ShakeError::Interrupted);
+            }
+            if let Some(reason) = session.shaker_stopped() {
+                return Err(self.stopped(Some(reason)));
+            }
+            if next == scan {
+                return Ok(());
+            }
+            self.renew(session)?;
+        }
+    }
+
+    /// A shaker that stopped unheard must not be started again by a renewal.
+    fn renew(&mut self, session: &mut Session) -> Result<(), ShakeError> {
+        self.still_runs(session)?;
+        session.shake(self.order.clone())?;
+        self.renew_at = session.expected()? + (RENEW_S * f64::from(self.rate_hz)) as u64;
+        Ok(())
+    }
+
+    /// Whether the shaker runs as ordered.
+    pub fn still_runs(&self, session: &mut Session) -> Result<(), ShakeError> {
+        match session.status()?.shaker {
+            Shaker::Slewing | Shaker::Steady => Ok(()),
+            Shaker::Resting | Shaker::Stopping => {
+                let reason = session.shaker_stopped();
+                Err(self.stopped(reason))
+            }
+        }
+    }
+
+    fn stopped(&self, reason: Option<Reason>) -> ShakeError {
+        if reason == Some(Reason::Weak) {
+            return ShakeError::Short(Shortfall::Weak { drive_v: f64::from(self.order.amplitude_v) });
+        }
+        let limit = |channel: u8| self.order.limits.get(usize::from(channel)).copied().unwrap_or(0.0);
+        ShakeError::Stopped {
+            level: self.level.to_string(),
+            why: super::error::in_words(reason, &self.channels, limit),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jointrig_protocol::channel::{Channel, Quantity};
+
+    #[test]
+    fn channels_at_the_contact_are_limited_and_a_users_limit_counts_more() {
+        let channel = |name: &str, role| Channel {
+            name: name.parse().expect("short"),
+            role,
+            quantity: Quantity::Velocity,
+            units_per_volt: -1e-3,
+            range_v: 10.0,
+            delay_ns: 0,
+            bits: 16,
+        };
+        let channels = ChannelMap {
+            id: 0,
+            rate_hz: 51_200,
+            channels: vec![
+                channel("hammer", Role::HammerForce),
+                channel("LDV_A", Role::SpecimenA),
+                channel("LDV_B", Role::SpecimenB),
+            ],
+        };
+        let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-8);
+        assert!(near(&Limits::default().of(&channels), &[0.0, 9.5e-3, 9.5e-3]));
+        let own = Limits(vec![("LDV_B".into(), 2e-3), ("hammer".into(), 1.0)]);
+        assert!(near(&own.of(&channels), &[1.0, 9.5e-3, 2e-3]));
+    }
+}

@@ -1,0 +1,80 @@
+//! `hysteresis`: the loops of any time record.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::error::CliError;
+use super::number::{not_negative, positive};
+use super::output;
+use crate::exchange::read_hysteresis;
+use crate::hysteresis::{Correction, HysteresisError, HysteresisRecord, analyse};
+use crate::results::{Force, Hysteresis, Results, Source, words};
+
+/// Loops of a time record measured anywhere: stiffness, energy, shape, friction.
+///
+/// RECORD.npz holds `fs` (Hz), `velocity_a` and `velocity_b` (m/s) or `displacement_a` and `displacement_b` (m), `force` (N) or
+/// `load_cells` (cell, sample), and where known `excitation` (Hz; an impact has none) and `normal_load` (N).
+#[derive(Debug, Args)]
+pub struct Loops {
+    /// The record.
+    #[arg(value_name = "RECORD.npz")]
+    record: PathBuf,
+    /// Print results.json on stdout instead of a summary.
+    #[arg(long)]
+    json: bool,
+    /// Normal load, N, for the friction coefficient; that of the record without it.
+    #[arg(long, value_name = "N", value_parser = positive)]
+    normal_load: Option<f64>,
+    /// Effective mass of the static arm at the contact, kg: with it, loops of the corrected force stand beside the raw ones.
+    #[arg(long, value_name = "KG", value_parser = not_negative)]
+    effective_mass: Option<f64>,
+    /// Stiffness to ground beside the load cells, over theirs (a lower push rod).
+    #[arg(long, value_name = "RATIO", value_parser = not_negative)]
+    parallel_path: Option<f64>,
+}
+
+impl Loops {
+    pub fn run(self) -> Result<(), CliError> {
+        let bad = |what: String| CliError::Bad(format!("{}: {what}", self.record.display()));
+        let mut record = read_hysteresis(&self.record).map_err(|error| CliError::Bad(error.to_string()))?;
+        record.normal_load_n = self.normal_load.or(record.normal_load_n);
+        let mut results = Results::new(self.source(&record));
+        let found = |record: &HysteresisRecord, force| -> Result<Hysteresis, HysteresisError> {
+            Ok(Hysteresis::of(&analyse(record)?, force))
+        };
+        results.hysteresis.push(found(&record, Force::Raw).map_err(|error| bad(error.to_string()))?);
+        if self.effective_mass.is_some() || self.parallel_path.is_some() {
+            let correction = Correction {
+                effective_mass_kg: self.effective_mass.unwrap_or(0.0),
+                parallel_path: self.parallel_path.unwrap_or(0.0),
+            };
+            let corrected = correction.applied(&record);
+            results
+                .hysteresis
+                .push(found(&corrected, Force::Corrected).map_err(|error| bad(error.to_string()))?);
+        }
+        if self.json { output::json(&results) } else { output::lines(words::summary(&results)) }
+    }
+
+    fn source(&self, record: &HysteresisRecord) -> Source {
+        let mut source = Source {
+            file: self.record.file_name().unwrap_or(self.record.as_os_str()).to_string_lossy().into_owned(),
+            kind: "record".into(),
+            ..Source::default()
+        };
+        let settings = [
+            ("sampling_rate_hz", Some(record.fs_hz)),
+            ("excitation_hz", record.excitation_hz),
+            ("normal_load_n", record.normal_load_n),
+            ("effective_mass_kg", self.effective_mass),
+            ("parallel_path", self.parallel_path),
+        ];
+        for (name, value) in settings {
+            if let Some(value) = value {
+                source.settings.insert(name.into(), value.into());
+            }
+        }
+        source
+    }
+}

@@ -1,0 +1,305 @@
+//! `shaker`: closed-loop sine levels, stored in the campaign file.
+
+use std::io::{BufRead, Write};
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::error::CliError;
+use super::number::positive;
+use super::{interrupt, output};
+use crate::campaign::level::{Held, Level, Moment};
+use crate::campaign::levels::LevelRow;
+use crate::campaign::plan::Plan;
+use crate::campaign::shaking::{self, CRITERION, Limits, Options, Outcome, Summary};
+use crate::campaign::store::Store;
+use crate::device::address::Address;
+use crate::device::logs::Tables;
+use crate::device::session::Session;
+use crate::hysteresis::{LoopAnalysis, Shape, analyse};
+use crate::results::number::{decimals, micro};
+use crate::results::words;
+
+/// Measure levels of the shaker: each is brought to its amplitude, recorded in steady state and stored.
+///
+/// Without --freq and --amplitude: the plan's levels. Levels that the file holds already are skipped, so that the same command
+/// resumes. The structure on the table must be the assembly.
+#[derive(Debug, Args)]
+pub struct Shaker {
+    /// The campaign file.
+    #[arg(value_name = "FILE.jrig")]
+    file: PathBuf,
+    /// Device address, e.g. sim:, usb:, serial:/dev/ttyACM0, tcp:127.0.0.1:4000.
+    #[arg(long, value_name = "ADDR")]
+    device: String,
+    /// Frequencies, Hz; those of the plan without it.
+    #[arg(long = "freq", value_name = "HZ", num_args = 1.., value_delimiter = ',', value_parser = positive)]
+    frequencies: Vec<f64>,
+    /// Amplitudes of what is held: m, N or V; those of the plan (relative displacement) without it.
+    #[arg(long = "amplitude", value_name = "M", num_args = 1.., value_delimiter = ',', value_parser = positive)]
+    amplitudes: Vec<f64>,
+    /// What is held: displacement (of specimen A against B), force (of the excitation) or drive (open loop).
+    #[arg(long, value_name = "WHAT", default_value = "displacement")]
+    control: Held,
+    /// Sweep from LO to HI Hz in place of single frequencies.
+    #[arg(long, value_name = "LO:HI", conflicts_with = "frequencies", value_parser = range, requires = "amplitudes")]
+    sweep: Option<[f64; 2]>,
+    /// How fast a sweep goes, Hz/s.
+    #[arg(long, value_name = "HZ_PER_S", default_value_t = 20.0, value_parser = positive)]
+    rate: f64,
+    /// Before or after the hammer's cells [default: before, as long as no hit is recorded].
+    #[arg(long, value_name = "MOMENT")]
+    when: Option<Moment>,
+    /// Shortest record in steady state, s; twenty cycles at least.
+    #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = positive)]
+    seconds: f64,
+    /// The drive's largest amplitude, V [default: its full scale].
+    #[arg(long, value_name = "V", value_parser = positive)]
+    max_drive: Option<f64>,
+    /// Magnitude of a channel (SI) that stops the shaker [default: 95 % of full scale at the contact]; may be given again.
+    #[arg(long = "limit", value_name = "CHANNEL=VALUE", value_parser = limit)]
+    limits: Vec<(String, f64)>,
+    /// Answer every prompt with yes.
+    #[arg(long)]
+    yes: bool,
+    /// Print what was measured as one JSON document.
+    #[arg(long)]
+    json: bool,
+    /// Seed of a simulated rig.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Folder of the tables by which the controller's log lines are read (else JOINTRIG_LOG_TABLES).
+    #[arg(long, value_name = "DIR")]
+    log_tables: Option<PathBuf>,
+}
+
+impl Shaker {
+    pub fn run(self) -> Result<(), CliError> {
+        let address: Address = self.device.parse()?;
+        let mut store = Store::open(&self.file)?;
+        let plan = store.plan()?;
+        let levels = self.levels(&plan)?;
+        let moment = match self.when {
+            Some(moment) => moment,
+            None if store.records()?.is_empty() => Moment::Before,
+            None => Moment::After,
+        };
+        let mut session = Session::open(address.open(self.seed)?, &address.to_string())?;
+        session.look_for_log_tables(Tables::new(self.log_tables.clone()));
+        let info = session.info()?;
+        if info.drive_v > 0.0 && !info.stage {
+            prompt(self.yes, levels.len())?;
+        }
+        eprintln!("{} levels, {} the hammer's cells; {CRITERION}", levels.len(), moment.name());
+        let options = Options {
+            levels,
+            moment,
+            seconds: self.seconds,
+            sweep_hz_per_s: self.rate,
+            most_drive_v: self.max_drive,
+            limits: Limits(self.limits.clone()),
+            stop: interrupt::flag(),
+        };
+        let mut seen = Vec::new();
+        let summary = shaking::run(&mut store, &mut session, &options, &mut |store, level, outcome| {
+            let Some(outcome) = outcome else {
+                eprint!("{level}: ");
+                return;
+            };
+            let (line, value) = told(store, outcome);
+            eprintln!("{line}");
+            seen.push(value);
+        });
+        if summary.is_err() {
+            eprintln!();
+        }
+        let summary = summary?;
+        store.close()?;
+        if self.json {
+            output::json(&json!({
+                "file": self.file.display().to_string(),
+                "when": moment.name(),
+                "settled": CRITERION,
+                "levels": seen,
+            }))?;
+        }
+        self.end(&options, &summary)
+    }
+
+    fn levels(&self, plan: &Plan) -> Result<Vec<Level>, CliError> {
+        if let Some([low, high]) = self.sweep {
+            let level = |amplitude: &f64| Level {
+                frequency_hz: low,
+                end_hz: Some(high),
+                held: self.control,
+                amplitude: *amplitude,
+            };
+            return Ok(self.amplitudes.iter().map(level).collect());
+        }
+        let planned = plan.shaker.as_ref().map(toml::Spanned::get_ref);
+        let chosen = |own: &[f64], planned: Option<&Vec<f64>>, flag: &str| {
+            let list = if own.is_empty() { planned.cloned().unwrap_or_default() } else { own.to_vec() };
+            if list.is_empty() {
+                return Err(CliError::Usage(format!(
+                    "the plan has no levels of the shaker: say which by {flag}"
+                )));
+            }
+            Ok(list)
+        };
+        let frequencies = chosen(&self.frequencies, planned.map(|p| &p.frequencies_hz), "--freq HZ…")?;
+        // the plan's amplitudes are displacements
+        let planned = planned.filter(|_| self.control == Held::Displacement);
+        let amplitudes = chosen(&self.amplitudes, planned.map(|p| &p.amplitudes_m), "--amplitude")?;
+        let level = |frequency_hz: f64, amplitude: f64| Level {
+            frequency_hz,
+            end_hz: None,
+            held: self.control,
+            amplitude,
+        };
+        Ok(frequencies.iter().flat_map(|f| amplitudes.iter().map(move |a| level(*f, *a))).collect())
+    }
+
+    fn end(&self, options: &Options, summary: &Summary) -> Result<(), CliError> {
+        let count = |which: fn(&Outcome) -> bool| summary.outcomes.iter().filter(|o| which(o)).count();
+        let (stored, known) =
+            (count(|o| matches!(o, Outcome::Stored(_))), count(|o| matches!(o, Outcome::Known(_))));
+        let path = self.file.display();
+        eprintln!("{path}: {stored} levels recorded, {known} were there; the shaker is at rest");
+        if summary.interrupted && summary.outcomes.len() < options.levels.len() {
+            return Err(CliError::Bad("stopped; the same command goes on from here".into()));
+        }
+        let short = count(|o| matches!(o, Outcome::Short(..)));
+        if short > 0 {
+            let message =
+                format!("{short} of {} levels were not reached, as said above", options.levels.len());
+            return Err(CliError::Bad(message));
+        }
+        eprintln!("next: jointrig analyse {path} --out DIR");
+        Ok(())
+    }
+}
+
+/// What a person reads of a level, and what a script does.
+fn told(store: &Store, outcome: &Outcome) -> (String, Value) {
+    let (row, is_new) = match outcome {
+        Outcome::Known(row) => (row, false),
+        Outcome::Stored(row) => (row, true),
+        Outcome::Short(level, why) => {
+            let value = json!({
+                "frequency_hz": level.frequency_hz, "end_hz": level.end_hz, "control": level.held.name(),
+                "amplitude": level.amplitude, "recorded": false, "why": why.to_string(),
+            });
+            return (why.to_string(), value);
+        }
+    };
+    let found = look(store, row);
+    let settled = row.settled;
+    let mut value = json!({
+        "id": row.id,
+        "frequency_hz": row.level.frequency_hz,
+        "end_hz": row.level.end_hz,
+        "control": row.level.held.name(),
+        "amplitude": row.level.amplitude,
+        "recorded": true,
+        "new": is_new,
+        "reached": settled.reached,
+        "overshoot": settled.overshoot,
+        "settled_after_s": settled.after_s,
+        "drive_v": settled.drive_v,
+        "scans": row.scans,
+    });
+    let mut line = if is_new {
+        format!(
+            "{} after {} s, at most {} % on the way, {} V",
+            row.level.held.show(settled.reached),
+            decimals(settled.after_s, 1),
+            decimals(100.0 * settled.overshoot, 0),
+            decimals(settled.drive_v, 3)
+        )
+    } else {
+        format!("{}: in the file already", row.level)
+    };
+    match found {
+        Some(Ok(found)) => {
+            let (name, k) = match found.k_t_n_per_m {
+                Some(k) if found.shape == Shape::Stuck => ("k_T", k),
+                _ => ("k_eq", found.k_eq_n_per_m),
+            };
+            line += &format!(
+                "; raw {name} {} N/µm, {} ({} cycles)",
+                decimals(micro(k.mean), 1),
+                words::shape_name(found.shape),
+                k.cycles
+            );
+            value["shape"] = json!(found.shape);
+            value["k_t_n_per_m"] = json!(found.k_t_n_per_m);
+            value["k_eq_n_per_m"] = json!(found.k_eq_n_per_m);
+        }
+        Some(Err(why)) => line += &format!("; no loop: {why}"),
+        None => line += "; recorded from rest to rest",
+    }
+    (line, value)
+}
+
+/// A first look at the loop, with the raw force; none for a sweep, which has none.
+fn look(store: &Store, row: &LevelRow) -> Option<Result<LoopAnalysis, String>> {
+    if row.level.end_hz.is_some() {
+        return None;
+    }
+    let read = || {
+        let channels = store.channels(row.session).map_err(|error| error.to_string())?;
+        let samples = store.level_samples(row).map_err(|error| error.to_string())?;
+        let record = shaking::record(&channels, &samples, &row.level).map_err(|error| error.to_string())?;
+        analyse(&record).map_err(|error| error.to_string())
+    };
+    Some(read())
+}
+
+/// Asks whoever stands at the rig, before anything moves.
+fn prompt(yes: bool, levels: usize) -> Result<(), CliError> {
+    eprint!(
+        "\n{levels} levels of the shaker. On the table: the assembly, under its normal load; the stinger attached, the amplifier on, \
+         nobody's hand near the rig.\n"
+    );
+    if yes {
+        eprintln!("ready? yes (--yes)");
+        return Ok(());
+    }
+    eprint!("Enter when ready; q quit: ");
+    // a closed screen is no reason to stop: without an answer there is an error below
+    let _ = std::io::stderr().flush();
+    let mut line = String::new();
+    match std::io::stdin().lock().read_line(&mut line) {
+        Ok(length) if length > 0 && line.trim().is_empty() => Ok(()),
+        Ok(length) if length > 0 => Err(CliError::Bad("stopped at the prompt; nothing has moved".into())),
+        _ => Err(CliError::Bad("nobody is there to answer (no terminal): use --yes".into())),
+    }
+}
+
+fn range(text: &str) -> Result<[f64; 2], String> {
+    let wrong = "write LO:HI in Hz, two different numbers over 0";
+    let (low, high) = text.split_once(':').ok_or(wrong)?;
+    let ends = [positive(low).map_err(|_| wrong)?, positive(high).map_err(|_| wrong)?];
+    if ends[0] == ends[1] { Err(wrong.into()) } else { Ok(ends) }
+}
+
+fn limit(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or("write CHANNEL=VALUE")?;
+    Ok((name.to_owned(), positive(value)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_and_limits_are_read() {
+        assert_eq!(range("100:400"), Ok([100.0, 400.0]));
+        for wrong in ["100", "100:", "100:100", "-1:5", "a:b"] {
+            assert!(range(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(limit("LDV_A=2e-3"), Ok(("LDV_A".into(), 2e-3)));
+        assert!(limit("LDV_A").is_err() && limit("LDV_A=-1").is_err());
+    }
+}

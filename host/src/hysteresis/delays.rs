@@ -1,0 +1,44 @@
+//! Signals brought into step: what each channel's decoder and converter cost is taken out.
+
+/// The signals with their delays (s) against one another taken out: all are as late as the least late one afterwards.
+pub fn in_step<const N: usize>(signals: [Vec<f64>; N], delays_s: [f64; N], fs_hz: f64) -> [Vec<f64>; N] {
+    let least = delays_s.into_iter().fold(f64::INFINITY, f64::min);
+    let mut delays = delays_s.into_iter();
+    signals.map(|signal| {
+        let delay = delays.next().unwrap_or(least);
+        advance(signal, (delay - least) * fs_hz)
+    })
+}
+
+/// The signal `samples` earlier (not negative), by straight lines between samples: loops live far below the
+/// sampling rate. The last value is held.
+fn advance(signal: Vec<f64>, samples: f64) -> Vec<f64> {
+    if samples <= 0.0 || signal.is_empty() {
+        return signal;
+    }
+    let (whole, share) = (samples.floor() as usize, samples.fract());
+    let at = |i: usize| signal[i.min(signal.len() - 1)];
+    (0..signal.len()).map(|i| at(i + whole) * (1.0 - share) + at(i + whole + 1) * share).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn signals_are_advanced_by_their_delay() {
+        let ramp: Vec<f64> = (0..10).map(f64::from).collect();
+        assert_eq!(advance(ramp.clone(), 0.0), ramp);
+        let early = advance(ramp, 1.5);
+        assert_eq!(early[..3], [1.5, 2.5, 3.5]);
+        assert_eq!(early.len(), 10);
+        assert!(advance(vec![], 3.0).is_empty());
+    }
+
+    #[test]
+    fn the_least_late_signal_stays_where_it_is() {
+        let ramp: Vec<f64> = (0..10).map(f64::from).collect();
+        let [a, b] = in_step([ramp.clone(), ramp.clone()], [0.2, 0.1], 20.0);
+        assert_eq!((a[0], &b), (2.0, &ramp));
+    }
+}

@@ -1,0 +1,215 @@
+//! The static arm between contact and load cells, identified: its effective mass m at the contact and the parallel path ρ in
+//! F = (1 + ρ) T + m ẍ_B (see [`super::correction`]).
+//!
+//! Two ways. **Hits on B alone**: the force at the contact is the hammer's, moved to the virtual point; both m and ρ come from one
+//! least-squares fit over frequency. **Stuck loops at several frequencies**: T/Δx = k/(1 + ρ) − m/(1 + ρ) · ẍ_B/Δx must give one k
+//! at all of them; ρ cannot be told from k this way and must be known. A contact with a hidden resonance gives no one k, and the fit's
+//! residual says so.
+
+use super::HysteresisError;
+use super::correction::Correction;
+use super::record::{HysteresisRecord, RelativeMotion};
+use num_complex::Complex;
+use serde::Serialize;
+use std::f64::consts::TAU;
+
+/// A worse fit (rms residual of the force, as a part of it) identifies nothing.
+pub const WORST_RESIDUAL: f64 = 0.03;
+
+/// Levels must spread this far in frequency, highest over lowest.
+const SPREAD: f64 = 1.5;
+
+/// Where the correction is from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Basis {
+    /// Stated by the user or the plan.
+    Given,
+    /// Fitted to hits on B alone.
+    Hits,
+    /// Fitted to stuck loops at several frequencies.
+    Levels,
+}
+
+/// An identified correction.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Identified {
+    /// m and ρ.
+    #[serde(flatten)]
+    pub correction: Correction,
+    /// Where they are from.
+    pub basis: Basis,
+    /// rms of what the fit leaves of the force, as a part of it; 0 where they were given.
+    pub residual: f64,
+}
+
+/// Amplitudes of one steady level.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tones {
+    /// Circular frequency, rad/s.
+    pub omega_rad_s: f64,
+    /// Δx, m.
+    pub relative_m: Complex<f64>,
+    /// x_B, m.
+    pub b_m: Complex<f64>,
+    /// T, N.
+    pub force_n: Complex<f64>,
+}
+
+impl Tones {
+    /// Of a steady record of known excitation, over its whole cycles.
+    ///
+    /// # Errors
+    /// The signals do not fit together, or there is no excitation frequency or whole cycle.
+    pub fn of(record: &HysteresisRecord) -> Result<Self, HysteresisError> {
+        record.check()?;
+        let frequency_hz = record.excitation_hz.ok_or(HysteresisError::Excitation(0.0))?;
+        let period = record.fs_hz / frequency_hz;
+        let cycles = (record.force_n.len() as f64 / period).floor();
+        let whole = (cycles * period).round() as usize;
+        if whole == 0 {
+            let (samples, points) = (record.force_n.len(), period as usize);
+            return Err(HysteresisError::NoCycle { frequency_hz, samples, points });
+        }
+        let omega_rad_s = TAU * frequency_hz;
+        let tone = |x: &[f64]| -> Complex<f64> {
+            let mean = x[..whole].iter().sum::<f64>() / whole as f64;
+            let sum: Complex<f64> = x[..whole]
+                .iter()
+                .enumerate()
+                .map(|(i, v)| Complex::cis(-omega_rad_s * i as f64 / record.fs_hz) * (v - mean))
+                .sum();
+            2.0 * sum / whole as f64
+        };
+        let integrated = Complex::new(0.0, omega_rad_s);
+        let (a, b) = match &record.motion {
+            RelativeMotion::Velocity { a_m_per_s, b_m_per_s } => {
+                (tone(a_m_per_s) / integrated, tone(b_m_per_s) / integrated)
+            }
+            RelativeMotion::Displacement { a_m, b_m } => (tone(a_m), tone(b_m)),
+        };
+        Ok(Self { omega_rad_s, relative_m: a - b, b_m: b, force_n: tone(&record.force_n) })
+    }
+}
+
+/// From lines of (T/F, ẍ_B/F) with F known at the contact; `parallel_path` is fitted where it is not known. None without lines, or
+/// where the fit leaves too much or gives no mass.
+pub fn from_known_force(
+    lines: &[(Complex<f64>, Complex<f64>)],
+    parallel_path: Option<f64>,
+) -> Option<Identified> {
+    let n = lines.len() as f64;
+    let real: Vec<(f64, f64)> = lines.iter().map(|(t, a)| (t.re, a.re)).collect();
+    let (factor, mass) = match parallel_path {
+        Some(path) => {
+            let factor = 1.0 + path;
+            let (ay, aa) =
+                real.iter().fold((0.0, 0.0), |(ay, aa), (t, a)| (ay + a * (1.0 - factor * t), aa + a * a));
+            (factor, ay / aa)
+        }
+        None => least_squares(real.iter().map(|(t, a)| ([*t, *a], 1.0)))?,
+    };
+    let squares: f64 = real.iter().map(|(t, a)| (factor * t + mass * a - 1.0).powi(2)).sum();
+    accepted(factor - 1.0, mass, (squares / n).sqrt(), Basis::Hits)
+}
+
+/// From stuck levels; none with too few frequencies, or where no one stiffness explains them.
+pub fn from_levels(levels: &[Tones], parallel_path: f64) -> Option<Identified> {
+    let (low, high) =
+        levels.iter().fold((f64::INFINITY, 0.0f64), |(l, h), t| (l.min(t.omega_rad_s), h.max(t.omega_rad_s)));
+    let mut distinct: Vec<f64> = levels.iter().map(|t| t.omega_rad_s).collect();
+    distinct.sort_by(f64::total_cmp);
+    distinct.dedup_by(|a, b| (*a / *b - 1.0).abs() < 1e-3);
+    if distinct.len() < 3 || high < SPREAD * low {
+        return None;
+    }
+    let points: Vec<(f64, f64)> = levels
+        .iter()
+        .map(|t| {
+            let inertia = t.omega_rad_s.powi(2) * t.b_m / t.relative_m;
+            (inertia.re, (t.force_n / t.relative_m).re)
+        })
+        .collect();
+    let (stiffness, slope) = least_squares(points.iter().map(|(x, y)| ([1.0, *x], *y)))?;
+    let squares: f64 = points.iter().map(|(x, y)| (stiffness + slope * x - y).powi(2)).sum();
+    let residual = (squares / points.len() as f64).sqrt() / stiffness.abs();
+    accepted(parallel_path, slope * (1.0 + parallel_path), residual, Basis::Levels)
+}
+
+fn accepted(parallel_path: f64, effective_mass_kg: f64, residual: f64, basis: Basis) -> Option<Identified> {
+    (effective_mass_kg > 0.0 && residual < WORST_RESIDUAL && parallel_path > -0.1).then_some(Identified {
+        correction: Correction { effective_mass_kg, parallel_path },
+        basis,
+        residual,
+    })
+}
+
+/// p, q of p x₀ + q x₁ = y; none where the two cannot be told apart.
+fn least_squares(rows: impl Iterator<Item = ([f64; 2], f64)>) -> Option<(f64, f64)> {
+    let (mut aa, mut ab, mut bb, mut ay, mut by) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for ([a, b], y) in rows {
+        aa += a * a;
+        ab += a * b;
+        bb += b * b;
+        ay += a * y;
+        by += b * y;
+    }
+    let determinant = aa * bb - ab * ab;
+    (determinant > 1e-12 * aa * bb)
+        .then(|| ((ay * bb - by * ab) / determinant, (by * aa - ay * ab) / determinant))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MASS: f64 = 1.56;
+    const CELLS: f64 = 150e6;
+    const PATH: f64 = 0.0133;
+
+    fn level(frequency_hz: f64, contact: f64) -> Tones {
+        let w = TAU * frequency_hz;
+        let stiffness = CELLS * (1.0 + PATH) - MASS * w * w;
+        let b = 20.0 / stiffness;
+        Tones {
+            omega_rad_s: w,
+            relative_m: Complex::from_polar(20.0 / contact, 0.3),
+            b_m: Complex::from_polar(b, 0.3),
+            force_n: Complex::from_polar(CELLS * b, 0.3),
+        }
+    }
+
+    #[test]
+    fn a_known_force_gives_mass_and_path() {
+        let lines: Vec<_> = (100..600)
+            .step_by(5)
+            .map(|f| {
+                let one = level(f64::from(f), 180e6);
+                let w2 = one.omega_rad_s.powi(2);
+                let turned = Complex::from_polar(20.0, 0.3);
+                (one.force_n / turned, -w2 * one.b_m / turned)
+            })
+            .collect();
+        let found = from_known_force(&lines, None).expect("a fit");
+        assert!((found.correction.effective_mass_kg - MASS).abs() < 1e-6, "{found:?}");
+        assert!((found.correction.parallel_path - PATH).abs() < 1e-9 && found.residual < 1e-9);
+        let given = from_known_force(&lines, Some(PATH)).expect("a fit");
+        assert!((given.correction.effective_mass_kg - MASS).abs() < 1e-6, "{given:?}");
+        // a force that is not the contact's
+        let wrong: Vec<_> = lines.iter().map(|(t, a)| (t * 1.2, a * -0.4)).collect();
+        assert_eq!(from_known_force(&wrong, Some(PATH)), None);
+        assert_eq!(from_known_force(&[], None), None);
+    }
+
+    #[test]
+    fn stuck_levels_give_the_mass_and_a_hidden_resonance_none() {
+        let stuck: Vec<Tones> = [100.0, 200.0, 300.0, 500.0].map(|f| level(f, 180e6)).to_vec();
+        let found = from_levels(&stuck, PATH).expect("a fit");
+        assert!((found.correction.effective_mass_kg / MASS - 1.0).abs() < 1e-6, "{found:?}");
+        let hidden =
+            [(100.0, 140e6), (250.0, 190e6), (300.0, 173e6), (500.0, 165e6)].map(|(f, k)| level(f, k));
+        assert_eq!(from_levels(&hidden, PATH), None);
+        assert_eq!(from_levels(&stuck[..2], PATH), None);
+        assert_eq!(from_levels(&[stuck[0], stuck[0], stuck[0]], PATH), None);
+    }
+}

@@ -1,0 +1,63 @@
+//! The static arm from hits on B alone, where the hammer is the force at the contact.
+
+use super::averages::{CellAverage, ContactAverage};
+use crate::hysteresis::static_arm::{Identified, from_known_force};
+use crate::substructuring::geometry::{Configuration, Point};
+use crate::substructuring::idm::{Dof, IdmSet};
+use crate::substructuring::vpt;
+use nalgebra::Vector3;
+use num_complex::Complex;
+use std::f64::consts::TAU;
+
+/// Where the fit reads, Hz: above the hammer's drift, below the first mode of the arm on its cells.
+const FIT_HZ: [f64; 2] = [100.0, 600.0];
+
+/// Fits mass and parallel path to the hits on B alone; none without a whole set of them.
+///
+/// The hits are moved to the virtual point by the impacts' transformation, so that a hit beside the contact counts with its lever.
+pub fn from_hits(
+    averages: &[CellAverage],
+    points: &Configuration,
+    virtual_point_m: [f64; 3],
+    sigma_per_s: f64,
+    parallel_path: Option<f64>,
+) -> Option<Identified> {
+    let mut hit: Vec<(&Point, ContactAverage)> = Vec::new();
+    let mut frequency_hz: &[f64] = &[];
+    for cell in averages.iter().filter(|cell| cell.name.configuration == "B") {
+        let Some(contact) = &cell.contact else { continue };
+        if frequency_hz.is_empty() {
+            frequency_hz = &cell.frequency_hz;
+        }
+        match hit.iter_mut().find(|(point, _)| point.name == cell.name.impact) {
+            Some((_, sum)) if sum.force.len() == contact.force.len() => sum.add(contact),
+            Some(_) => {}
+            None => {
+                let point = points.impacts.iter().find(|point| point.name == cell.name.impact)?;
+                if contact.force.len() == frequency_hz.len() {
+                    hit.push((point, contact.clone()));
+                }
+            }
+        }
+    }
+    let impacts: Vec<Point> = hit.iter().map(|(point, _)| (*point).clone()).collect();
+    let transformation = vpt::impacts(&impacts, Vector3::from(virtual_point_m), IdmSet::Six, None).ok()?;
+    let z = IdmSet::Six.position(Dof::Z)?;
+    let lines: Vec<(Complex<f64>, Complex<f64>)> = frequency_hz
+        .iter()
+        .enumerate()
+        .filter(|(_, f)| (FIT_HZ[0]..=FIT_HZ[1]).contains(*f))
+        .map(|(l, f)| {
+            let per_newton = |signal: usize| -> Complex<f64> {
+                hit.iter()
+                    .enumerate()
+                    .map(|(i, (_, sum))| sum.cross[signal][l] / sum.force[l] * transformation.t[(i, z)])
+                    .sum()
+            };
+            // the cells' sum, and B's acceleration from its velocity
+            (per_newton(2), per_newton(1) * Complex::new(sigma_per_s, TAU * f))
+        })
+        .filter(|(t, a)| t.is_finite() && a.is_finite())
+        .collect();
+    from_known_force(&lines, parallel_path)
+}
