@@ -15,6 +15,8 @@ pub mod positions;
 pub mod positions_output;
 pub mod record_npz;
 pub mod record_uff;
+#[cfg(test)]
+mod round_trips;
 mod tables;
 pub mod tables_output;
 pub mod uff;

@@ -9,6 +9,9 @@ pub const LOWEST_HZ: f64 = 10.0;
 /// Lines above this are not used by any band, Hz.
 pub const HIGHEST_HZ: f64 = 1000.0;
 
+/// Lines in one value of a cell's force spectrum.
+pub const FORCE_LINES: usize = 16;
+
 /// Averaged FRFs of one cell on s = σ + iω, as measured (not yet receptances).
 #[derive(Debug, Clone)]
 pub struct CellAverage {
@@ -22,7 +25,8 @@ pub struct CellAverage {
     pub h1: [Vec<Complex<f64>>; 3],
     /// Coherence of x, y, z \[axis\]\[line\]; NaN for a single hit.
     pub coherence: [Vec<f64>; 3],
-    /// Auto-spectrum of the force over all lines up to half the sampling rate, N² s².
+    /// Auto-spectrum of the force up to half the sampling rate, N² s²: means of [`FORCE_LINES`] lines each. All lines of all cells
+    /// would be most of what an analysis remembers.
     pub force_spectrum: Vec<f64>,
     /// Distance of lines, Hz.
     pub step_hz: f64,
@@ -78,7 +82,8 @@ pub fn average(
     };
     let all = estimate(&ImpactRecords { fs_hz: cell.fs_hz, force_n, response, quantity }, &used, &settings)?;
     let step_hz = all.frequency_hz.get(1).copied().unwrap_or(0.0);
-    let force_spectrum = all.s_ff.clone();
+    let mean = |lines: &[f64]| lines.iter().sum::<f64>() / lines.len() as f64;
+    let force_spectrum = all.s_ff.chunks(FORCE_LINES).map(mean).collect();
     let kept = all.band(LOWEST_HZ, HIGHEST_HZ);
     let output = |o: usize| kept.h1.iter().map(|row| row[o]).collect::<Vec<_>>();
     let coherence = |o: usize| kept.coherence.iter().map(|row| row[o]).collect::<Vec<_>>();

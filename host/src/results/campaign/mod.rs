@@ -37,7 +37,7 @@ use crate::substructuring::joint::Band;
 use crate::substructuring::method::Method;
 use crate::substructuring::noise::FrfNoise;
 use at_contact::at_the_contact;
-use averages::{CellAverage, HIGHEST_HZ, LOWEST_HZ, average};
+use averages::{CellAverage, FORCE_LINES, HIGHEST_HZ, LOWEST_HZ, average};
 use loops::ImpactLoop;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -254,7 +254,9 @@ fn force_band(name: &str, own: &[CellAverage]) -> Option<UsableBand> {
     let mean: Vec<f64> = (0..first.force_spectrum.len())
         .map(|l| alike().map(|c| c.force_spectrum[l]).sum::<f64>() / count)
         .collect();
-    let frequency_hz: Vec<f64> = (0..mean.len()).map(|l| l as f64 * first.step_hz).collect();
+    let frequency_hz: Vec<f64> = (0..mean.len())
+        .map(|block| first.step_hz * ((block * FORCE_LINES) as f64 + 0.5 * (FORCE_LINES - 1) as f64))
+        .collect();
     let band = usable_band(&frequency_hz, &mean, 6.0)?;
     Some(UsableBand { configuration: name.into(), band_hz: [band.low_hz, band.high_hz] })
 }
