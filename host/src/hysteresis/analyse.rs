@@ -9,7 +9,7 @@ use super::loops::{
 };
 use super::record::{HysteresisRecord, Relative};
 use super::shape::{Shape, ShapeEvidence, shape};
-use super::stick::{friction_limit, stick_stiffness, strokes};
+use super::stick::{friction_limit, slope_over, stick_part, strokes};
 use num_complex::Complex;
 use serde::Serialize;
 
@@ -128,7 +128,8 @@ fn shaker(
             None
         }
         Shape::Microslip | Shape::GrossSlip => {
-            let values: Vec<f64> = cycles.iter().filter_map(|c| stick_stiffness(c, &strokes)).collect();
+            let part = stick_part(&mean, &strokes);
+            let values: Vec<f64> = cycles.iter().filter_map(|c| slope_over(c, &strokes, part)).collect();
             if values.len() < cycles.len() {
                 warnings.push(format!(
                     "{} of {} cycles have too few samples on the stick part: sample faster, or excite more slowly",

@@ -13,11 +13,13 @@ pub struct Decaying {
     pub modes: Vec<[f64; 3]>,
     /// The sum, sample by sample.
     pub signal: Vec<f64>,
-    /// Part of the signal's variance that it explains.
+    /// The straight line beneath it: what the integration of a velocity leaves.
+    pub trend: Vec<f64>,
+    /// Part of the signal's variance about that line that the sum explains.
     pub explained: f64,
 }
 
-/// The best sum of one sinusoid of each frequency (one or two), with the best of some decay rates and a constant; none for a signal that
+/// The best sum of one sinusoid of each frequency (one or two), with the best of some decay rates and a straight line; none for a signal that
 /// does not move or holds fewer samples than unknowns.
 pub fn decaying(signal: &[f64], fs_hz: f64, frequencies_hz: &[f64]) -> Option<Decaying> {
     let rates: Vec<Vec<f64>> = match frequencies_hz.len() {
@@ -30,24 +32,29 @@ pub fn decaying(signal: &[f64], fs_hz: f64, frequencies_hz: &[f64]) -> Option<De
 }
 
 fn fitted(signal: &[f64], fs_hz: f64, frequencies_hz: &[f64], rates: &[f64]) -> Option<Decaying> {
-    let unknowns = 2 * rates.len() + 1;
+    let unknowns = 2 * rates.len() + 2;
     if signal.len() < 2 * unknowns {
         return None;
     }
     let basis = DMatrix::from_fn(signal.len(), unknowns, |i, column| {
         let t = i as f64 / fs_hz;
         let Some((frequency, rate)) = frequencies_hz.get(column / 2).zip(rates.get(column / 2)) else {
-            return 1.0;
+            // in parts of the signal's length, so that the columns are of one size
+            return if column % 2 == 0 { 1.0 } else { i as f64 / signal.len() as f64 };
         };
         let angle = TAU * frequency * t;
         (-rate * t).exp() * if column % 2 == 0 { angle.cos() } else { angle.sin() }
     });
     let wanted = DVector::from_column_slice(signal);
     let coefficients = (basis.transpose() * &basis).cholesky()?.solve(&(basis.transpose() * &wanted));
-    let sum = &basis * &coefficients;
-    let mean = wanted.mean();
-    let variance: f64 = wanted.iter().map(|v| (v - mean).powi(2)).sum();
-    let left: f64 = wanted.iter().zip(sum.iter()).map(|(v, s)| (v - s).powi(2)).sum();
+    let line = |i: usize| {
+        basis[(i, unknowns - 2)] * coefficients[unknowns - 2]
+            + basis[(i, unknowns - 1)] * coefficients[unknowns - 1]
+    };
+    let trend: Vec<f64> = (0..signal.len()).map(line).collect();
+    let sum: Vec<f64> = (&basis * &coefficients).iter().zip(&trend).map(|(all, line)| all - line).collect();
+    let variance: f64 = signal.iter().zip(&trend).map(|(v, line)| (v - line).powi(2)).sum();
+    let left: f64 = signal.iter().zip(&trend).zip(&sum).map(|((v, line), s)| (v - line - s).powi(2)).sum();
     (variance > 0.0).then(|| Decaying {
         modes: frequencies_hz
             .iter()
@@ -55,7 +62,8 @@ fn fitted(signal: &[f64], fs_hz: f64, frequencies_hz: &[f64], rates: &[f64]) -> 
             .enumerate()
             .map(|(m, (f, d))| [*f, *d, coefficients[2 * m].hypot(coefficients[2 * m + 1])])
             .collect(),
-        signal: sum.iter().copied().collect(),
+        signal: sum,
+        trend,
         explained: 1.0 - left / variance,
     })
 }
@@ -71,15 +79,16 @@ mod tests {
             .map(|i| {
                 let t = f64::from(i) / fs;
                 let mode = |f: f64, d: f64, a: f64, p: f64| a * (-d * t).exp() * (TAU * f * t + p).cos();
-                mode(192.0, 45.0, 3e-8, 1.0) + mode(208.0, 10.0, 1e-7, 0.2) + 5e-9
+                mode(192.0, 45.0, 3e-8, 1.0) + mode(208.0, 10.0, 1e-7, 0.2) + 5e-9 - 1e-6 * t
             })
             .collect();
         let both = decaying(&signal, fs, &[192.0, 208.0]).expect("a fit");
         assert!(both.explained > 0.999_999, "{both:?}");
         assert!((both.modes[0][2] / 3e-8 - 1.0).abs() < 1e-6 && (both.modes[1][2] / 1e-7 - 1.0).abs() < 1e-6);
+        assert!((both.trend[511] - (5e-9 - 1e-6 * 511.0 / fs)).abs() < 1e-12);
         let one = decaying(&signal, fs, &[208.0]).expect("a fit");
         assert!(one.explained < 0.99, "{}", one.explained);
         assert_eq!(decaying(&[0.0; 100], fs, &[208.0]), None);
-        assert_eq!(decaying(&signal[..6], fs, &[208.0]), None);
+        assert_eq!(decaying(&signal[..7], fs, &[208.0]), None);
     }
 }

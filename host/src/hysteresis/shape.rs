@@ -6,8 +6,8 @@
 //! tells gross slip from microslip.
 
 use super::cycles::Cycle;
-use super::loops::fundamental_stiffness;
-use super::stick::{final_tangent, stick_stiffness, strokes};
+use super::loops::{fundamental_stiffness, harmonics};
+use super::stick::{final_tangent, slope_over, stick_part, strokes};
 use serde::Serialize;
 
 /// The shape of a loop.
@@ -33,6 +33,8 @@ pub struct ShapeEvidence {
     pub nonlinearity_noise: f64,
     /// Phase by which Δx lags T at the fundamental, degrees.
     pub phase_deg: f64,
+    /// Harmonics 2…5 of T over its fundamental.
+    pub harmonics: [f64; 4],
     /// Tangent at the end of the strokes over the stiffness after the reversal.
     pub final_tangent: f64,
 }
@@ -68,11 +70,12 @@ pub(super) fn shape(mean: &Cycle, cycles: &[Cycle]) -> (Shape, ShapeEvidence) {
     let variance = scatter.sum::<f64>() / n;
     let nonlinearity_noise = (variance / (n - 1.0).max(1.0)).sqrt() / force;
     let strokes = strokes(mean);
-    let initial = stick_stiffness(mean, &strokes).unwrap_or(k);
+    let initial = slope_over(mean, &strokes, stick_part(mean, &strokes)).unwrap_or(k);
     let evidence = ShapeEvidence {
         nonlinearity: rms(&of_mean) / force,
         nonlinearity_noise,
         phase_deg: fundamental_stiffness(mean).arg().to_degrees(),
+        harmonics: harmonics(mean),
         final_tangent: final_tangent(mean, &strokes, initial),
     };
     let shape = if evidence.nonlinearity > NONLINEAR.max(SIGNIFICANT * nonlinearity_noise) {

@@ -50,8 +50,8 @@ pub fn page(results: &Results) -> String {
         &[
             figure(
                 figures::contact_loop(results),
-                "One impact in the assembly: the specimens' displacements (integrated velocity) and the sum of the load cells T. The slope of the first cycle is the \
-                 contact's stiffness as seen between the two laser spots.",
+                "One impact in the assembly: the specimens' displacements (integrated velocity) and the sum of the load cells T. The slope of the first cycle holds \
+                 every mode that the hit excites.",
             ),
             figure(figures::impacts(results), "Every hit that counts: along z on A or on the moving mass."),
             tables::decay(results),

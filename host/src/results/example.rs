@@ -134,7 +134,7 @@ fn levels() -> Vec<Hysteresis> {
         for (moment, worn) in [("before", 1.0), ("after", 0.99)] {
             let amplitudes: &[f64] = if moment == "before" { &[1e-7, 2e-7] } else { &[] };
             for amplitude in amplitudes {
-                let slope = Some(OverCycles { mean: k * worn, std: 2e6, cycles: 100 });
+                let slope = Some(OverCycles { mean: k * worn, std: 2e6, cycles: 100, ci95: None });
                 rows.push(Hysteresis {
                     force: Force::Raw,
                     kind: Excitation::Shaker,
@@ -145,7 +145,7 @@ fn levels() -> Vec<Hysteresis> {
                     k_eq_n_per_m: slope,
                     k_secant_n_per_m: Some(1.1 * k),
                     k_fundamental_n_per_m: Some(1.1 * k),
-                    energy_j: Some(OverCycles { mean: 1e-8, std: 2e-8, cycles: 100 }),
+                    energy_j: Some(OverCycles { mean: 1e-8, std: 2e-8, cycles: 100, ci95: None }),
                     friction_limit_n: None,
                     friction_coefficient: None,
                     phase_deg: Some(if shape == Shape::Stuck { 1.0 } else { 65.0 }),
@@ -242,7 +242,7 @@ pub fn results() -> Results {
         results.joint.push(joint("internal-printed", 6, band, 25.9e6, 3.9e6 * widen, &[few]));
     }
     results.joint_spectrum = Some(spectrum());
-    let over = |mean, std, cycles| Some(OverCycles { mean, std, cycles });
+    let over = |mean, std, cycles| Some(OverCycles { mean, std, cycles, ci95: None });
     for (force, k) in [(Force::Raw, 148.2e6), (Force::Corrected, 151.1e6)] {
         results.hysteresis.push(Hysteresis {
             force,
@@ -263,7 +263,12 @@ pub fn results() -> Results {
             decay: (1..=8)
                 .map(|cycle| DecayStep {
                     cycle,
-                    k_eq_n_per_m: OverCycles { mean: k - 9e6 * cycle as f64, std: 5e6, cycles: 72 },
+                    k_eq_n_per_m: OverCycles {
+                        mean: k - 9e6 * cycle as f64,
+                        std: 5e6,
+                        cycles: 72,
+                        ci95: None,
+                    },
                     phase_deg: 4.0 * cycle as f64,
                     amplitude_m: 1e-7 / cycle as f64,
                 })

@@ -52,10 +52,23 @@ fn a_loop_has_its_fields_and_null_for_the_unknown() {
         assert_eq!(row["force"], force);
         assert_eq!((&row["kind"], &row["shape"]), (&Value::from("impact"), &Value::from("stuck")));
         numbers(row, &["frequency_hz", "amplitude_m", "phase_deg"]);
-        for quantity in ["k_t_n_per_m", "k_eq_n_per_m", "energy_j"] {
+        for quantity in ["k_eq_n_per_m", "energy_j"] {
             numbers(&row[quantity], &["mean", "std", "cycles"]);
         }
+        // a resonance hides in the example: no impact gives k_T
+        assert!(row.get("k_t_n_per_m").is_some_and(Value::is_null));
         assert!(row.get("friction_coefficient").is_some_and(Value::is_null));
+    }
+    let levels: Vec<&Value> =
+        v["hysteresis"].as_array().expect("a list").iter().filter(|row| row["kind"] == "shaker").collect();
+    assert!(levels.len() > 3);
+    for row in levels {
+        assert_eq!(row["k_t_n_per_m"].is_null(), row["shape"] == "elliptical");
+        numbers(
+            row,
+            &["frequency_hz", "amplitude_m", "phase_deg", "k_secant_n_per_m", "k_fundamental_n_per_m"],
+        );
+        assert_eq!(row["moment"], "before");
     }
     assert_eq!(serde_json::to_value(Shape::GrossSlip).expect("serialises"), "gross-slip");
     assert_eq!(serde_json::to_value(Excitation::Shaker).expect("serialises"), "shaker");

@@ -1,7 +1,7 @@
 //! FBS and loops side by side (the paper's Tables 2 and 3): every kind of stiffness that was found, and what it is.
 
 use super::number::{band, count, decimals, short};
-use super::{Excitation, Force, Hysteresis, OverCycles, Results};
+use super::{Excitation, Force, Hysteresis, OverCycles, Results, words};
 
 /// One kind of stiffness.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,8 +23,23 @@ const LATER_CYCLE: usize = 4;
 pub fn kinds(results: &Results) -> Vec<Kind> {
     let mut kinds: Vec<Kind> = substructuring(results).into_iter().collect();
     kinds.extend(direct(results));
-    kinds.extend(shaker(results));
+    kinds.extend(shaker(results, Force::Raw));
     kinds.extend(impacts(results));
+    kinds
+}
+
+/// The loops with the corrected force, the shaker's by frequency.
+pub fn corrected(results: &Results) -> Vec<Kind> {
+    let mut kinds = shaker(results, Force::Corrected);
+    let of_impacts = |h: &&Hysteresis| h.kind == Excitation::Impact && h.force == Force::Corrected;
+    if let Some((name, k)) = results.hysteresis.iter().find(of_impacts).and_then(words::slope) {
+        kinds.push(Kind {
+            found: format!("{name}, impacts, first cycle of {} hits", count(k.cycles as u64)),
+            mean_n_per_m: k.mean,
+            std_n_per_m: k.std,
+            meaning: String::new(),
+        });
+    }
     kinds
 }
 
@@ -55,10 +70,10 @@ fn direct(results: &Results) -> Option<Kind> {
     })
 }
 
-/// The steady loops of one frequency, raw force: those that are k_T, and those that are only k_eq.
-fn shaker(results: &Results) -> Vec<Kind> {
+/// The steady loops of each frequency with this force: those that are k_T, and those that are only k_eq.
+fn shaker(results: &Results, force: Force) -> Vec<Kind> {
     let rows: Vec<&Hysteresis> =
-        results.hysteresis.iter().filter(|h| h.kind == Excitation::Shaker && h.force == Force::Raw).collect();
+        results.hysteresis.iter().filter(|h| h.kind == Excitation::Shaker && h.force == force).collect();
     let mut frequencies: Vec<f64> = rows.iter().filter_map(|h| h.frequency_hz).collect();
     frequencies.sort_by(f64::total_cmp);
     frequencies.dedup_by(|a, b| (*a / *b - 1.0).abs() < 1e-3);
@@ -175,7 +190,7 @@ mod tests {
 
     #[test]
     fn levels_are_pooled_with_what_is_between_them() {
-        let one = |mean| OverCycles { mean, std: 3.0, cycles: 10 };
+        let one = |mean| OverCycles { mean, std: 3.0, cycles: 10, ci95: None };
         assert_eq!(pooled(&[one(100.0)]), Some((100.0, 3.0)));
         assert_eq!(pooled(&[one(96.0), one(104.0)]), Some((100.0, 5.0)));
         assert_eq!(pooled(&[]), None);

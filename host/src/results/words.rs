@@ -209,19 +209,15 @@ pub fn summary(results: &Results) -> Vec<String> {
             lines.push(format!("  {:<44} {k}: {}", kind.found, kind.meaning));
         }
     }
-    let corrected: Vec<String> = results
-        .hysteresis
-        .iter()
-        .filter(|h| h.force == Force::Corrected)
-        .filter_map(|h| {
-            let (name, k) = slope(h)?;
-            Some(format!("  {:<44} {name} {}", excitation(h), stiffness(k.mean, k.std)))
-        })
-        .collect();
+    let corrected = side_by_side::corrected(results);
     if let (Some(arm), false) = (&results.static_arm, corrected.is_empty()) {
         lines.push(String::new());
         lines.push(static_arm(arm));
-        lines.extend(corrected);
+        lines.extend(
+            corrected.iter().map(|kind| {
+                format!("  {:<44} {}", kind.found, stiffness(kind.mean_n_per_m, kind.std_n_per_m))
+            }),
+        );
     }
     if !results.completeness.is_empty() {
         lines.push(String::new());

@@ -4,7 +4,7 @@ use super::super::drawing::{Anchor, Area, Drawing, Stroke};
 use super::super::panel::{BLUE, GREEN, INK, Panel, VERMILION, legend};
 use super::super::scale::{Scale, middle_range};
 use super::WIDTH;
-use crate::results::number::{micro, short};
+use crate::results::number::{decimals, micro};
 use crate::results::{Excitation, Force, Hysteresis, OverCycles, Results, words};
 
 /// One level, ready to be drawn.
@@ -131,7 +131,10 @@ fn panel(drawing: &mut Drawing, area: Area, dots: &[Dot], range: [f64; 2], axis:
                 }
             }
         }
-        entries.push((Stroke::new(colour, 1.6), format!("{} {}", short(*centre), axis.unit)));
+        entries.push((
+            Stroke::new(colour, 1.6),
+            format!("{} {}", decimals(*centre, if *centre < 10.0 { 1 } else { 0 }), axis.unit),
+        ));
     }
     legend(drawing, [area.left, 44.0], &entries);
     panel.axes(drawing, (&x_ticks, Some(axis.label)), (&y_ticks, Some("stiffness in N/µm")));

@@ -47,7 +47,7 @@ fn one(drawing: &mut Drawing, shown: &ShakerLoop, left: f64, width: f64, first: 
         x: Scale::linear(horizontal, [area.left, area.right()]),
         y: Scale::linear(vertical, [area.bottom(), area.top]),
     };
-    let (x_ticks, y_ticks) = (panel.x.ticks(3), panel.y.ticks(5));
+    let (x_ticks, y_ticks) = (panel.x.ticks(5), panel.y.ticks(5));
     panel.grid(drawing, &x_ticks, &y_ticks);
     let closed = || x.iter().copied().zip(t.iter().copied()).chain([(x[0], t[0])]);
     panel.curve(drawing, closed(), Stroke::new(INK, 1.3));

@@ -37,7 +37,7 @@ pub fn at_the_specimens(direct: Option<&Joint>, loops: Option<OverCycles>) -> Op
     direct
         .and_then(|joint| Some((joint.sliding_stiffness()?, joint.lines)))
         .filter(|(k, _)| k.std < CLEAR * k.mean)
-        .map(|(k, lines)| OverCycles { mean: k.mean, std: k.std, cycles: lines })
+        .map(|(k, lines)| OverCycles { mean: k.mean, std: k.std, cycles: lines, ci95: None })
         .or(loops)
 }
 
@@ -157,7 +157,7 @@ mod tests {
     }
 
     fn loops(mean: f64) -> OverCycles {
-        OverCycles { mean, std: 4e6, cycles: 70 }
+        OverCycles { mean, std: 4e6, cycles: 70, ci95: None }
     }
 
     #[test]

@@ -134,7 +134,7 @@ fn a_campaign_that_stopped_half_way_gives_what_it_can() {
     store.note_link(1, &[("frames_received".to_owned(), 17)].into()).expect("noted");
     let results = analyse(&store, KnownContact::default(), &|_| {}).expect("readable");
     let loops = results.impact_loops().expect("hits along z on A");
-    let slope = loops.k_t_n_per_m.expect("a straight line");
+    let slope = loops.k_eq_n_per_m.expect("a straight line");
     // 16-bit steps: 0.3 µm/s in 2 mm/s
     assert!((slope.mean / SLOPE - 1.0).abs() < 0.01, "{slope:?}");
     // AZ1 counts, AY1 does not: two locations with two good hits

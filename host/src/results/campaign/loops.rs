@@ -270,13 +270,14 @@ pub fn rebuilt(
     let alone = decaying(&x_a, 1.0 / step_s, &[common_hz])?;
     let of_b = decaying(&x_b, 1.0 / step_s, &[common_hz])?;
     let short = |values: Vec<f64>| values.into_iter().map(|v| rounded(v, 5)).collect::<Vec<_>>();
+    let level = |x: Vec<f64>, trend: &[f64]| x.into_iter().zip(trend).map(|(v, line)| v - line).collect();
     Some(Reconstruction {
         record: shown.record,
         hidden_hz,
         common_hz,
         step_s,
-        displacement_a_m: short(x_a),
-        displacement_b_m: short(x_b),
+        displacement_a_m: short(level(x_a, &both.trend)),
+        displacement_b_m: short(level(x_b, &of_b.trend)),
         rebuilt_a_m: short(both.signal),
         rebuilt_b_m: short(of_b.signal),
         explained_a: [both.explained, alone.explained],

@@ -40,6 +40,9 @@ pub fn from_hits(
             }
         }
     }
+    if hit.is_empty() {
+        return None;
+    }
     let impacts: Vec<Point> = hit.iter().map(|(point, _)| (*point).clone()).collect();
     let transformation = vpt::impacts(&impacts, Vector3::from(virtual_point_m), IdmSet::Six, None).ok()?;
     let z = IdmSet::Six.position(Dof::Z)?;

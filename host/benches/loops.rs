@@ -1,0 +1,169 @@
+//! Loops and all their figures from 60 s of ten channels at 51.2 kHz, beside a numpy script in the same run.
+//!
+//! `cargo bench -p jointrig --bench loops`; with `JOINTRIG_PYTHON` naming an interpreter that has numpy its side is run too, and
+//! both must find the same numbers.
+
+use jointrig::campaign::level::{Held, Level};
+use jointrig::campaign::rows::Samples;
+use jointrig::campaign::shaking::record;
+use jointrig::device::channels::ChannelMap;
+use jointrig::hysteresis::{Correction, LoopAnalysis, analyse};
+use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
+use serde_json::{Value, json};
+use std::f64::consts::TAU;
+use std::hint::black_box;
+use std::process::{Command, ExitCode};
+use std::time::Instant;
+
+const RATE_HZ: u32 = 51_200;
+const SECONDS: usize = 60;
+/// A cycle of no whole number of samples: 204.8.
+const FREQUENCY_HZ: f64 = 250.0;
+const RUNS: usize = 5;
+const MASS_KG: f64 = 1.56;
+const PATH: f64 = 0.0133;
+/// Both sides' figures agree to this: they interpolate between samples in different ways.
+const ALIKE: f64 = 2e-3;
+
+type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
+
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Outcome<()> {
+    let map = channels()?;
+    let samples = Samples { codes: codes(&map), channels: map.len(), trigger_index: 0 };
+    let level =
+        Level { frequency_hz: FREQUENCY_HZ, end_hz: None, held: Held::Displacement, amplitude: 1.5e-7 };
+    let mut found = both(&map, &samples, &level)?;
+    let mut times = Vec::new();
+    for _ in 0..RUNS {
+        let begun = Instant::now();
+        found = black_box(both(black_box(&map), black_box(&samples), &level)?);
+        times.push(begun.elapsed().as_secs_f64());
+    }
+    let ours = median(&mut times);
+    let megabytes = (2 * samples.codes.len()) as f64 / 1e6;
+    println!(
+        "{SECONDS} s of {} channels at {RATE_HZ} Hz: {megabytes:.1} MB of codes; median of {RUNS}",
+        map.len()
+    );
+    println!(
+        "jointrig: {ours:.3} s, {:.0} MB/s, {:.0} times real time",
+        megabytes / ours,
+        SECONDS as f64 / ours
+    );
+    let Ok(python) = std::env::var("JOINTRIG_PYTHON") else {
+        println!("numpy: not run (JOINTRIG_PYTHON names no interpreter)");
+        return Ok(());
+    };
+    let theirs = numpy(&python, &samples, &map)?;
+    for (name, mine) in figures(&found) {
+        let other = theirs["figures"][name].as_f64().ok_or(format!("loops.py gave no {name}"))?;
+        if (mine / other - 1.0).abs() > ALIKE {
+            return Err(format!("{name}: {mine} here, {other} by numpy").into());
+        }
+    }
+    let mut seconds: Vec<f64> = serde_json::from_value(theirs["seconds"].clone())?;
+    let peer = median(&mut seconds);
+    println!("numpy: {peer:.3} s, {:.0} MB/s; ratio {:.1}", megabytes / peer, peer / ours);
+    Ok(())
+}
+
+/// Loops of the raw and of the corrected force.
+fn both(map: &ChannelMap, samples: &Samples, level: &Level) -> Outcome<[LoopAnalysis; 2]> {
+    let raw = record(map, samples, level)?;
+    let corrected = Correction { effective_mass_kg: MASS_KG, parallel_path: PATH }.applied(&raw);
+    Ok([analyse(&raw)?, analyse(&corrected)?])
+}
+
+/// The figures that both sides must agree in.
+fn figures(found: &[LoopAnalysis; 2]) -> Vec<(&'static str, f64)> {
+    let [raw, corrected] = found;
+    vec![
+        ("k_eq", raw.k_eq_n_per_m.mean),
+        ("secant", raw.k_secant_n_per_m.unwrap_or(f64::NAN)),
+        ("fundamental", raw.k_fundamental_n_per_m.map_or(f64::NAN, |k| k.norm())),
+        ("energy", raw.energy_j.map_or(f64::NAN, |e| e.mean)),
+        ("amplitude", raw.amplitude_m),
+        ("corrected_k_eq", corrected.k_eq_n_per_m.mean),
+    ]
+}
+
+fn channels() -> Outcome<ChannelMap> {
+    let roles = [
+        ("force", Role::HammerForce, Quantity::Force, 44.6),
+        ("x", Role::Response(Axis::X), Quantity::Velocity, 5e-3),
+        ("y", Role::Response(Axis::Y), Quantity::Velocity, 5e-3),
+        ("z", Role::Response(Axis::Z), Quantity::Velocity, 5e-3),
+        ("ldv_a", Role::SpecimenA, Quantity::Velocity, 1e-3),
+        ("ldv_b", Role::SpecimenB, Quantity::Velocity, 1e-3),
+        ("cell_1", Role::LoadCell, Quantity::Force, 20.0),
+        ("cell_2", Role::LoadCell, Quantity::Force, 20.0),
+        ("cell_3", Role::LoadCell, Quantity::Force, 20.0),
+        ("excitation", Role::Excitation, Quantity::Force, 44.6),
+    ];
+    let channel = |(name, role, quantity, scale): (&str, Role, Quantity, f32)| -> Outcome<Channel> {
+        let name = name.try_into().map_err(|_| "a channel's name is too long")?;
+        Ok(Channel { name, role, quantity, units_per_volt: scale, range_v: 10.0, delay_ns: 0, bits: 16 })
+    };
+    let channels = roles.into_iter().map(channel).collect::<Outcome<Vec<Channel>>>()?;
+    Ok(ChannelMap { id: 0, rate_hz: RATE_HZ, channels })
+}
+
+/// x_A, x_B and T of a contact of 180 N/µm that loses some energy, with noise on everything.
+fn codes(map: &ChannelMap) -> Vec<i16> {
+    let n = SECONDS * RATE_HZ as usize;
+    let w = TAU * FREQUENCY_HZ;
+    let mut state = 1_u64;
+    let mut noise = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    };
+    let mut codes = Vec::with_capacity(n * map.len());
+    for (place, channel) in map.channels.iter().enumerate() {
+        let (amplitude, phase) = match channel.role {
+            Role::SpecimenA => (4.0e-7 * w, TAU / 4.0),
+            Role::SpecimenB => (2.5e-7 * w, TAU / 4.0),
+            Role::LoadCell => (9.0, 0.06),
+            _ => (0.0, 0.0),
+        };
+        let units = map.channels[place].units_per_code();
+        codes.extend((0..n).map(|i| {
+            let t = i as f64 / f64::from(RATE_HZ);
+            (amplitude * (w * t + phase).sin() / units + 3.0 * noise()).round() as i16
+        }));
+    }
+    codes
+}
+
+fn numpy(python: &str, samples: &Samples, map: &ChannelMap) -> Outcome<Value> {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("codes.bin");
+    std::fs::write(&path, samples.codes.iter().flat_map(|c| c.to_le_bytes()).collect::<Vec<u8>>())?;
+    let place = |role| map.place(role).ok_or("no such channel");
+    let job = json!({
+        "path": path, "channels": map.len(), "rate": RATE_HZ, "frequency": FREQUENCY_HZ, "runs": RUNS,
+        "mass": MASS_KG, "parallel": PATH, "a": place(Role::SpecimenA)?, "b": place(Role::SpecimenB)?,
+        "cells": map.places(Role::LoadCell),
+        "units": map.channels.iter().map(Channel::units_per_code).collect::<Vec<_>>(),
+    });
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/peers/loops.py");
+    let output = Command::new(python).arg(script).arg(job.to_string()).output()?;
+    if !output.status.success() {
+        return Err(format!("loops.py failed:\n{}", String::from_utf8_lossy(&output.stderr)).into());
+    }
+    Ok(serde_json::from_slice(&output.stdout)?)
+}
+
+fn median(times: &mut [f64]) -> f64 {
+    times.sort_by(f64::total_cmp);
+    times[times.len() / 2]
+}
