@@ -1,7 +1,7 @@
 //! The campaign file as measurements: records decoded, in SI units, one cell at a time, from any thread.
 
 use super::cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, Measurements};
-use super::{Progress, completeness};
+use super::{Progress, Wanted, completeness};
 use crate::campaign::plan::{Plan, configuration_name};
 use crate::campaign::rows::RecordRow;
 use crate::campaign::store::Store;
@@ -44,11 +44,15 @@ pub enum AnalyseError {
 ///
 /// # Errors
 /// The file itself cannot be read. What is missing or damaged in it is told in the results instead.
-pub fn analyse(store: &Store, progress: &(dyn Fn(Progress) + Sync)) -> Result<Results, AnalyseError> {
+pub fn analyse(
+    store: &Store,
+    wanted: Wanted,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Results, AnalyseError> {
     let file = CampaignFile::open(store)?;
     let mut results = Results::new(file.source(store)?);
     results.completeness = file.completeness();
-    Ok(super::analyse_measurements(&file, results, progress))
+    Ok(super::analyse_measurements(&file, results, wanted, progress))
 }
 
 struct PlannedCell {
