@@ -1,12 +1,16 @@
 //! jointrig beside the programs that laboratories use: the same numbers (`parity`), and the time both take (`speed`).
 //!
-//! `cargo xtask parity` and `cargo xtask parity --speed` prepare Python with pyFRF and pyuff and start this. Without
+//! `cargo xtask parity` and `cargo xtask parity --speed` prepare Python with pyFRF, pyuff and pyFBS and start this. Without
 //! `JOINTRIG_PYTHON` the speed of our own side is printed alone.
 
 #[path = "peers/parity.rs"]
 mod parity;
+#[path = "peers/pyfbs_parity.rs"]
+mod pyfbs_parity;
 #[path = "peers/speed.rs"]
 mod speed;
+#[path = "peers/substructuring_speed.rs"]
+mod substructuring_speed;
 
 use std::process::{Command, ExitCode};
 
@@ -16,9 +20,9 @@ fn main() -> ExitCode {
     let python = std::env::var("JOINTRIG_PYTHON").ok();
     let parity_wanted = std::env::args().any(|word| word == "parity");
     let done = match (parity_wanted, &python) {
-        (true, Some(python)) => parity::run(python),
+        (true, Some(python)) => both(parity::run(python), pyfbs_parity::run(python)),
         (true, None) => Err("JOINTRIG_PYTHON names no interpreter: run `cargo xtask parity`".into()),
-        (false, _) => speed::run(python.as_deref()),
+        (false, _) => both(substructuring_speed::run(python.as_deref()), speed::run(python.as_deref())),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -26,6 +30,14 @@ fn main() -> ExitCode {
             eprintln!("error: {error}");
             ExitCode::FAILURE
         }
+    }
+}
+
+/// One room's failure does not hide the other's.
+fn both(first: Outcome, second: Outcome) -> Outcome {
+    match (first, second) {
+        (Err(one), Err(other)) => Err(format!("{one}\n  {other}").into()),
+        (one, other) => one.and(other),
     }
 }
 

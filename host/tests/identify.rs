@@ -93,6 +93,68 @@ fn every_method_finds_the_contact_of_a_rigid_clamp() {
     assert_eq!(best["noise_known"], false);
 }
 
+/// Universal files of another program (58b), their names in the DOF labels, against an independent implementation's figures.
+#[test]
+fn universal_files_are_read_as_npz_is() {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_jointrig"));
+    command.arg("identify");
+    for (flag, file) in [("--a", "uff/A.uff"), ("--b", "uff/B.uff"), ("--ajb", "uff/AJB.uff")] {
+        command.arg(flag).arg(data(file));
+    }
+    command.arg("--geometry").arg(data("positions/positions.xlsx")).args(["--band", "300:600", "--json"]);
+    let out = command.output().expect("the command runs");
+    assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
+    let found: Value = serde_json::from_slice(&out.stdout).expect("one JSON document");
+    let text = std::fs::read_to_string(data("uff/expected.json")).expect("test data");
+    let expected: Value = serde_json::from_str(&text).expect("JSON");
+    for wanted in expected["joint"].as_array().expect("rows") {
+        let same = |row: &&Value| row["method"] == wanted["method"] && row["idms"] == wanted["idms"];
+        let row = found["joint"].as_array().expect("rows").iter().find(same).expect("the same methods");
+        let number = |v: &Value| v.as_f64().expect("a number");
+        let (k, truth) = (number(&row["stiffness_n_per_m"]["z"]["mean"]), number(&wanted["mean"]));
+        // where the method is exact it is the contact's 180 N/µm; elsewhere one function of the same data
+        assert!((k / truth - 1.0).abs() < number(&wanted["tol"]["mean"]), "{wanted}: {k}");
+        assert_eq!(row["lines"], wanted["lines"]);
+    }
+}
+
+#[test]
+fn a_damaged_universal_file_is_refused_with_its_name() {
+    let files = Files::of("frf_rigid");
+    let path = files.folder.path().join("A.uff");
+    std::fs::write(&path, "    -1\n    58\nnothing\n").expect("written");
+    let out = files.identify(&["--a", path.to_str().expect("a name")]);
+    let text = String::from_utf8_lossy(&out.stderr);
+    // given twice is a wrong command line; alone it is bad data
+    assert_eq!(out.status.code(), Some(2), "{text}");
+    let out = Command::new(env!("CARGO_BIN_EXE_jointrig"))
+        .arg("identify")
+        .arg("--a")
+        .arg(&path)
+        .arg("--b")
+        .arg(data("uff/B.uff"))
+        .arg("--ajb")
+        .arg(data("uff/AJB.uff"))
+        .arg("--geometry")
+        .arg(&files.geometry)
+        .output()
+        .expect("the command runs");
+    let text = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(1), "{text}");
+    assert!(text.contains("A.uff") && text.contains("no complex FRF"), "{text}");
+}
+
+#[test]
+fn modes_are_chosen_by_name() {
+    let files = Files::of("frf_rigid");
+    let out = files.identify(&["--idms", "x,z,ry", "--idms", "6", "--method", "inverse", "--json"]);
+    assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
+    let found: Value = serde_json::from_slice(&out.stdout).expect("one JSON document");
+    let row = &found["joint"][0];
+    assert_eq!((&row["idms"], &row["modes"]), (&Value::from(3), &serde_json::json!(["x", "z", "ry"])));
+    assert!(row["stiffness_n_per_m"]["y"].is_null() && row["stiffness_n_m_per_rad"]["ry"].is_object());
+}
+
 #[test]
 fn default_bands_are_the_papers() {
     let out = Files::of("frf_default").identify(&["--json", "--method", "inverse", "--idms", "2"]);
@@ -175,7 +237,7 @@ fn a_missing_file_and_a_wrong_command_line_differ_in_their_code() {
     let files = Files::of("frf_rigid");
     std::fs::remove_file(files.folder.path().join("B.npz")).expect("removed");
     files.refused(&[], &["B.npz", "cannot be opened"]);
-    for wrong in [&["--idms", "3"][..], &["--band", "600:300"], &["--method", "none"]] {
+    for wrong in [&["--idms", "3"][..], &["--idms", "x,q"], &["--band", "600:300"], &["--method", "none"]] {
         assert_eq!(files.identify(wrong).status.code(), Some(2), "{wrong:?}");
     }
 }

@@ -8,7 +8,7 @@ use jointrig::campaign::shaking::{self, Limits, Options, Outcome, ShakeError, Sh
 use jointrig::campaign::store::Store;
 use jointrig::device::address::Address;
 use jointrig::device::session::Session;
-use jointrig::results::{Excitation, Force, Hysteresis, KnownContact, Results, Shape, analyse};
+use jointrig::results::{Excitation, Force, Hysteresis, Results, Shape, Wanted, analyse};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -69,7 +69,7 @@ impl Bench {
     fn analysed(&self) -> Results {
         let store = Store::open_read_only(&self.file).unwrap();
         assert_eq!(store.verify().unwrap(), []);
-        analyse(&store, KnownContact::default(), &|_| {}).unwrap()
+        analyse(&store, Wanted::default(), &|_| {}).unwrap()
     }
 }
 

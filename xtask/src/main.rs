@@ -68,7 +68,7 @@ enum Task {
         #[arg(long)]
         detach: bool,
     },
-    /// Compare spectra and universal files with pyFRF and pyuff: numbers, or times.
+    /// Compare spectra, universal files and virtual points with pyFRF, pyuff and pyFBS: numbers, or times.
     Parity(parity::Options),
     /// Run every benchmark of the workspace.
     Bench {

@@ -10,7 +10,7 @@ use super::error::CliError;
 use super::number::{not_negative, positive};
 use super::output;
 use crate::campaign::store::Store;
-use crate::results::{self, KnownContact, Results};
+use crate::results::{self, KnownContact, Results, Wanted};
 
 /// Analyse a campaign file: results.json and report.html.
 #[derive(Debug, Args)]
@@ -30,6 +30,9 @@ pub struct Analyse {
     /// Normal load, N, for the friction coefficient [default: the plan's].
     #[arg(long, value_name = "N", value_parser = positive)]
     normal_load: Option<f64>,
+    /// Draw the hits of every interface cell anew this often, for an interval that needs no model of the noise (1000 is usual).
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    bootstrap: usize,
     /// Print results.json on stdout too.
     #[arg(long)]
     json: bool,
@@ -43,19 +46,19 @@ impl Analyse {
             parallel_path: self.parallel_path,
             effective_mass_kg: self.effective_mass,
         };
-        let found = analyse_into(&store, known, &self.out)?;
+        let found = analyse_into(&store, Wanted { replicates: self.bootstrap, known }, &self.out)?;
         if self.json { output::json(&found) } else { output::lines(results::words::summary(&found)) }
     }
 }
 
 /// Analyses what the file holds and writes `results.json` and `report.html` into `folder`.
-pub fn analyse_into(store: &Store, known: KnownContact, folder: &Path) -> Result<Results, CliError> {
+pub fn analyse_into(store: &Store, wanted: Wanted, folder: &Path) -> Result<Results, CliError> {
     let bar = if std::io::stderr().is_terminal() {
         ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr())
     } else {
         ProgressBar::hidden()
     };
-    let found = results::analyse(store, known, &|progress| {
+    let found = results::analyse(store, wanted, &|progress| {
         bar.set_length(progress.total as u64);
         bar.set_position(progress.done as u64);
     })?;

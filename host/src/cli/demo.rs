@@ -13,7 +13,7 @@ use crate::campaign::stage::Stage;
 use crate::campaign::store::Store;
 use crate::device::address::Address;
 use crate::results;
-use crate::results::KnownContact;
+use crate::results::Wanted;
 
 /// The whole job on the built-in simulator: campaign, analysis, report.
 #[derive(Debug, Args)]
@@ -56,7 +56,7 @@ impl Demo {
             return Err(CliError::Bad("stopped before the campaign was complete".into()));
         }
         let store = Store::open_read_only(&file)?;
-        let found = analyse_into(&store, KnownContact::default(), folder)?;
+        let found = analyse_into(&store, Wanted::default(), folder)?;
         output::lines(results::words::summary(&found))?;
         let (stored, raw) = store.sample_bytes()?;
         output::lines([

@@ -19,7 +19,7 @@ use crate::exchange::npz::Array;
 use crate::exchange::positions_output::write_positions;
 use crate::exchange::{Extra, tables_output, uff_output, write_frf, write_impacts};
 use crate::results;
-use crate::results::KnownContact;
+use crate::results::Wanted;
 use crate::spectra::{AveragedFrf, FrfSettings, ImpactRecords, MotionQuantity, Windowing, estimate};
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::Configuration;
@@ -146,7 +146,7 @@ impl Export {
         if told.is_empty() {
             told.push("no good hit is in the file yet: there are no FRFs to export".into());
         }
-        analyse_into(&store, KnownContact::default(), &self.out)?;
+        analyse_into(&store, Wanted::default(), &self.out)?;
         told.push(format!("geometry, results.json and report.html are in {}", self.out.display()));
         output::lines(told)
     }

@@ -8,19 +8,19 @@ use clap::Args;
 
 use super::error::CliError;
 use super::output;
-use crate::exchange::{PositionsError, read_frf, read_frf_noise, read_positions};
-use crate::results::campaign::{BANDS_HZ, shaped};
+use crate::exchange::{FrfFile, PositionsError, read_frf_file, read_positions};
+use crate::results::campaign::{BANDS_HZ, fill};
 use crate::results::{Results, Source, words};
 use crate::substructuring::averaged::{Priors, averaged};
 use crate::substructuring::noise::FrfNoise;
-use crate::substructuring::{Band, FrfMatrix, Geometry, IdmSet, Method, identify};
+use crate::substructuring::{Band, Dof, FrfMatrix, Geometry, IdmSet, Method, identify};
 
 /// Identify a joint from FRFs of A, B and the assembly, measured anywhere.
 ///
 /// Prints what could be identified; exits with 1 and the reason when anything that was asked for had to be refused.
 #[derive(Debug, Args)]
 pub struct Identify {
-    /// FRFs of substructure A alone (.npz).
+    /// FRFs of substructure A alone: .npz, or a universal file (58 or 58b; .uff, .unv).
     #[arg(long, value_name = "FILE")]
     a: PathBuf,
     /// FRFs of substructure B alone.
@@ -35,9 +35,10 @@ pub struct Identify {
     /// Decoupling methods, by name [default: all].
     #[arg(long = "method", value_name = "METHOD", value_delimiter = ',')]
     methods: Vec<Method>,
-    /// Interface deformation modes of each virtual point: 2, 4 or 6 [default: all three].
-    #[arg(long, value_name = "N", value_delimiter = ',', value_parser = idm_set)]
-    idms: Vec<IdmSet>,
+    /// Interface deformation modes of each virtual point: 2, 4 or 6 (several with commas), or one set by the names of its modes, for
+    /// example x,z,ry; x…rz are rigid, ex…bzy flexible as in pyFBS. Repeats [default: 2,4,6].
+    #[arg(long, value_name = "N|MODES")]
+    idms: Vec<IdmSets>,
     /// Bands in Hz, ends included [default: 300:600, 100:800 and 100:300, as far as the files reach].
     #[arg(long = "band", value_name = "LO:HI", value_delimiter = ',', value_parser = band)]
     bands: Vec<Band>,
@@ -57,22 +58,19 @@ pub struct Identify {
 
 impl Identify {
     pub fn run(self) -> Result<(), CliError> {
-        let frf = |path: &Path| read_frf(path).map_err(bad);
-        let (a, b, ajb) = (frf(&self.a)?, frf(&self.b)?, frf(&self.ajb)?);
+        let (a, b, ajb) = (read(&self.a)?.frf, read(&self.b)?.frf, read(&self.ajb)?);
         let (geometry, notes) = read_geometry(&self.geometry)?;
-        let noise = read_frf_noise(&self.ajb, &ajb).map_err(bad)?;
+        let FrfFile { frf: ajb, noise, .. } = ajb;
         for note in notes {
             eprintln!("jointrig: {note}");
         }
         let methods = if self.methods.is_empty() { Method::ALL.to_vec() } else { self.methods.clone() };
-        let idms = if self.idms.is_empty() { IdmSet::ALL.to_vec() } else { self.idms.clone() };
+        let asked = self.idms.iter().flat_map(|sets| sets.0.iter().copied());
+        let idms: Vec<IdmSet> = if self.idms.is_empty() { IdmSet::ALL.to_vec() } else { asked.collect() };
         let bands = if self.bands.is_empty() { default_bands(&ajb)? } else { self.bands.clone() };
         let mut results = Results::new(self.source());
         let found = identify(&a, &b, &ajb, &geometry, &methods, &idms, &bands).map_err(bad)?;
-        let (joint, spectrum, refused) = shaped(&found);
-        results.joint = joint;
-        results.joint_spectrum = spectrum;
-        results.refused = refused;
+        fill(&mut results, [&a, &b, &ajb], &geometry, &found);
         // the estimates with an interval need whole rigid motions
         if idms.contains(&IdmSet::Six) && methods.contains(&Method::Inverse) {
             self.with_intervals(&mut results, &ajb, noise.as_ref(), &geometry, &bands);
@@ -177,9 +175,36 @@ fn bad(error: impl std::fmt::Display) -> CliError {
     CliError::Bad(error.to_string())
 }
 
-fn idm_set(text: &str) -> Result<IdmSet, String> {
-    let count: usize = text.parse().map_err(|_| format!("`{text}` is no number: 2, 4 or 6"))?;
-    IdmSet::from_count(count).ok_or_else(|| format!("there is no set of {count} modes: 2, 4 or 6"))
+/// What one `--idms` asks for: the paper's sets by their sizes, or one set by its modes.
+#[derive(Debug, Clone, PartialEq)]
+struct IdmSets(Vec<IdmSet>);
+
+impl FromStr for IdmSets {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let words: Vec<&str> = text.split(',').map(str::trim).collect();
+        let sizes: Result<Vec<usize>, _> = words.iter().map(|w| w.parse()).collect();
+        if let Ok(sizes) = sizes {
+            let set = |count| {
+                IdmSet::from_count(count).ok_or_else(|| {
+                    format!("there is no set of {count} modes: 2, 4 or 6, or name the modes (x,z,ry)")
+                })
+            };
+            return sizes.into_iter().map(set).collect::<Result<_, _>>().map(IdmSets);
+        }
+        let modes: Vec<Dof> = words.iter().map(|w| w.parse()).collect::<Result<_, _>>()?;
+        let set = IdmSet::of(&modes).ok_or_else(|| format!("`{text}` names a mode twice"))?;
+        Ok(IdmSets(vec![set]))
+    }
+}
+
+/// FRFs from an npz or a universal file; what was left out is said.
+fn read(path: &Path) -> Result<FrfFile, CliError> {
+    let file = read_frf_file(path).map_err(bad)?;
+    for warning in &file.warnings {
+        eprintln!("jointrig: {}: {warning}", path.display());
+    }
+    Ok(file)
 }
 
 fn band(text: &str) -> Result<Band, String> {
@@ -210,8 +235,13 @@ mod tests {
         for wrong in ["300", "600:300", "a:b", "300:inf", "-1:5"] {
             assert!(band(wrong).is_err(), "{wrong}");
         }
-        assert_eq!(idm_set("4"), Ok(IdmSet::Four));
-        assert!(idm_set("3").is_err_and(|e| e.contains("2, 4 or 6")));
+        assert_eq!("4".parse(), Ok(IdmSets(vec![IdmSet::Four])));
+        assert_eq!("2, 6".parse(), Ok(IdmSets(vec![IdmSet::Two, IdmSet::Six])));
+        let chosen = IdmSet::of(&[Dof::X, Dof::Z, Dof::Ry]).expect("three modes");
+        assert_eq!("x,z,ry".parse(), Ok(IdmSets(vec![chosen])));
+        assert!("3".parse::<IdmSets>().is_err_and(|e| e.contains("2, 4 or 6")));
+        assert!("x,q".parse::<IdmSets>().is_err_and(|e| e.contains("`q`")));
+        assert!("x,x".parse::<IdmSets>().is_err_and(|e| e.contains("twice")));
         assert!(not_negative("-0.1").is_err() && not_negative("5e-4").is_ok());
     }
 }

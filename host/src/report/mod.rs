@@ -71,6 +71,26 @@ mod tests {
     }
 
     #[test]
+    fn the_page_shows_the_estimate_to_quote_and_how_well_the_interface_is_held() {
+        let mut results = example::results();
+        example::add_interface(&mut results);
+        let html = page(&results);
+        for text in [
+            "95 % interval 25.7…27.7",
+            "25.7 … 27.7",
+            "CMIF: 4 modes suggested",
+            "Quality of the virtual points",
+            "A2:z 0.81",
+            "N m/rad",
+            "not identified",
+            "Hits drawn anew 500 times",
+        ] {
+            assert!(html.contains(text), "`{text}` is not on the page");
+        }
+        assert_eq!(html.matches("<svg").count(), 7);
+    }
+
+    #[test]
     fn the_page_needs_nothing_from_outside_and_stays_small() {
         let html = page(&example::results());
         for outside in ["http:", "https:", "<script", "<link", "src=", "url(h", "@import", "NaN", "inf\""] {

@@ -1,6 +1,7 @@
 //! A made-up document with everything in it, for tests of the words and the report.
 
 use super::*;
+use crate::substructuring::IdmSet;
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
@@ -21,12 +22,15 @@ fn joint(method: &str, idms: usize, band_hz: [f64; 2], k: f64, std: f64, warning
     Joint {
         method: method.into(),
         idms,
+        modes: IdmSet::from_count(idms).map_or_else(Vec::new, IdmSet::dofs),
         band_hz,
         stiffness_n_per_m: translations(statistics(k, std)),
         damping_n_s_per_m: translations(statistics(410.0, 90.0)),
         stiffness_n_m_per_rad: BTreeMap::new(),
         damping_n_m_s_per_rad: BTreeMap::new(),
+        stiffness_flexible_si: BTreeMap::new(),
         coupling_si: BTreeMap::new(),
+        coupling_damping_si: BTreeMap::new(),
         lines: ((band_hz[1] - band_hz[0]) / 0.5) as usize + 1,
         warnings: warnings.iter().map(|w| (*w).to_owned()).collect(),
     }
@@ -349,4 +353,57 @@ pub fn results() -> Results {
         })
         .collect();
     results
+}
+
+/// What only a campaign with all three configurations has: the estimate to quote, the virtual points, the CMIF, hits drawn anew.
+pub fn add_interface(results: &mut Results) {
+    use crate::substructuring::averaged::{DofEstimate, Priors, Replicates};
+    use crate::substructuring::{Band, Dof};
+    let band_hz = Band { low_hz: MAIN_BAND_HZ[0], high_hz: MAIN_BAND_HZ[1] };
+    let z = DofEstimate {
+        stiffness: 26.7e6,
+        std: 0.5e6,
+        std_noise: 0.2e6,
+        std_geometry: 0.45e6,
+        ci95: [25.7e6, 27.7e6],
+        bias: -0.02e6,
+        damping: 410.0,
+        identified: true,
+    };
+    let lost = DofEstimate { stiffness: 20.0, ci95: [8.0, f64::INFINITY], identified: false, ..z };
+    let joint = BTreeMap::from([(Dof::Z, z), (Dof::Rx, lost)]);
+    results.recommended = vec![Averaged {
+        band_hz,
+        lines: 601,
+        idms: 6,
+        priors: Priors::default(),
+        noise_known: true,
+        joint: joint.clone(),
+    }];
+    let hits = Replicates { bias: 0.0, std: 0.21e6, median: 26.7e6, ci95: [26.3e6, 27.1e6] };
+    results.bootstrap =
+        Some(Bootstrap { band_hz, replicates: 500, seed: 1, hits: BTreeMap::from([(Dof::Z, hits)]), joint });
+    results.virtual_points = vec![VirtualPoint {
+        substructure: "A".into(),
+        idms: 6,
+        modes: IdmSet::Six.dofs(),
+        condition_responses: 4.2,
+        condition_impacts: 3.1,
+        overall_sensor: 0.991,
+        overall_impact: 0.984,
+        sensors: BTreeMap::from([("A1:x".to_owned(), 0.99), ("A2:z".to_owned(), 0.81)]),
+        impacts: BTreeMap::from([("AZ1".to_owned(), 0.97)]),
+        passivity: IdmSet::Six.dofs().into_iter().map(|d| (d, 1.0)).collect(),
+        reciprocity: 0.998,
+    }];
+    let frequency_hz: Vec<f64> = (20..1000).map(f64::from).collect();
+    results.interface_modes = Some(InterfaceModes {
+        singular_values_m_per_n: (0..13)
+            .map(|c| frequency_hz.iter().map(|f| 1e-3 / f / 10f64.powi(c)).collect())
+            .collect(),
+        frequency_hz,
+        explained: BTreeMap::from([(2, 0.7), (4, 0.96), (6, 0.99)]),
+        suggested: 4,
+        reason: "4 explain 96 %".into(),
+    });
 }

@@ -1,6 +1,7 @@
 //! The joint by substructuring: numbers over bands, and the spectra they come from.
 
 use super::Statistics;
+use crate::substructuring::Dof;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -9,8 +10,10 @@ use std::collections::BTreeMap;
 pub struct Joint {
     /// The method's name, as on the command line.
     pub method: String,
-    /// Interface deformation modes of each virtual point: 2, 4 or 6.
+    /// Interface deformation modes of each virtual point: 2, 4, 6, or another choice.
     pub idms: usize,
+    /// Which ones; none where no virtual point is used.
+    pub modes: Vec<Dof>,
     /// The band, ends included, Hz.
     pub band_hz: [f64; 2],
     /// Stiffness of the translations by direction (`x`, `y`, `z`), N/m.
@@ -23,9 +26,15 @@ pub struct Joint {
     /// Damping of the rotations, N m s/rad.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub damping_n_m_s_per_rad: BTreeMap<String, Statistics>,
+    /// Stiffness of flexible interface modes by name: N m for extensions, N m² for the others.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub stiffness_flexible_si: BTreeMap<String, Statistics>,
     /// Stiffness between two degrees of freedom (`y-z`, `z-rx`, …): N/m, N/rad or N m/rad.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub coupling_si: BTreeMap<String, Statistics>,
+    /// Damping between them, in the same units times seconds.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub coupling_damping_si: BTreeMap<String, Statistics>,
     /// Lines of the band that were used.
     pub lines: usize,
     /// What a reader must know before using these numbers.

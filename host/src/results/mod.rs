@@ -11,6 +11,7 @@ mod curves;
 #[cfg(test)]
 pub(crate) mod example;
 mod hysteresis;
+mod interface;
 mod joint;
 pub mod number;
 mod reconstruction;
@@ -22,11 +23,12 @@ pub use crate::hysteresis::static_arm::Identified;
 pub use crate::hysteresis::{Kind as Excitation, OverCycles, Shape};
 pub use crate::substructuring::averaged::Averaged;
 pub use crate::substructuring::joint::BandStatistic as Statistics;
-pub use campaign::{AnalyseError, KnownContact, Progress, analyse};
+pub use campaign::{AnalyseError, KnownContact, Progress, Wanted, analyse};
 pub use check::Check;
 pub use completeness::Completeness;
 pub use curves::{FrfCurve, Role, UsableBand, rounded};
 pub use hysteresis::{DecayStep, Force, Hysteresis, ImpactSlope, LoopCurve, ShakerLoop};
+pub use interface::{Bootstrap, InterfaceModes, VirtualPoint};
 pub use joint::{Joint, JointSpectrum, Refusal, SpectrumCurve};
 pub use reconstruction::Reconstruction;
 pub use source::{Software, Source, ranges};
@@ -52,6 +54,15 @@ pub struct Results {
     /// The estimates to quote, each with its interval, by band; needs six motions of both virtual points in the assembly.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub recommended: Vec<Averaged>,
+    /// The same by drawing hits anew, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bootstrap: Option<Bootstrap>,
+    /// Quality of the virtual points.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub virtual_points: Vec<VirtualPoint>,
+    /// Which motions coupling adds, and the set of modes that suggests.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interface_modes: Option<InterfaceModes>,
     /// The same line by line; absent where nothing was identified.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joint_spectrum: Option<JointSpectrum>,
@@ -99,6 +110,9 @@ impl Results {
             source,
             joint: Vec::new(),
             recommended: Vec::new(),
+            bootstrap: None,
+            virtual_points: Vec::new(),
+            interface_modes: None,
             joint_spectrum: None,
             hysteresis: Vec::new(),
             checks: Vec::new(),

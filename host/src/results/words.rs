@@ -2,11 +2,29 @@
 
 use super::number::{band, count, decimals, micro, short, stiffness};
 use super::side_by_side;
-use super::{Excitation, Force, Hysteresis, Identified, Joint, OverCycles, Results, Shape};
+use super::{
+    Bootstrap, Excitation, Force, Hysteresis, Identified, Joint, MAIN_BAND_HZ, OverCycles, Results, Shape,
+};
 use crate::hysteresis::static_arm::Basis;
+use crate::substructuring::Dof;
 
-/// What FBS found between the arms, in one sentence.
+/// What FBS found between the arms, in one sentence: the recommended estimate, or else the headline's method.
 pub fn substructuring(results: &Results) -> Option<String> {
+    recommended(results).or_else(|| by_one_method(results))
+}
+
+/// The recommended estimate over the main band.
+fn recommended(results: &Results) -> Option<String> {
+    let estimate = results.recommended.iter().find(|r| <[f64; 2]>::from(r.band_hz) == MAIN_BAND_HZ)?;
+    Some(format!(
+        "Substructuring (FBS, Eq. A.1 averaged as an admittance, {} IDMs, {}) sees between the arms, along the sliding direction: {}",
+        estimate.idms,
+        band(MAIN_BAND_HZ),
+        estimate.statement()?
+    ))
+}
+
+fn by_one_method(results: &Results) -> Option<String> {
     let joint = results.headline_joint()?;
     let k = joint.sliding_stiffness()?;
     let median = short(micro(k.median));
@@ -24,6 +42,27 @@ pub fn substructuring(results: &Results) -> Option<String> {
         band(joint.band_hz),
         stiffness(k.mean, k.std)
     ))
+}
+
+/// What drawing the hits anew said of the sliding direction.
+pub fn bootstrapped(bootstrap: &Bootstrap) -> String {
+    let z = bootstrap.hits.get(&Dof::Z).zip(bootstrap.joint.get(&Dof::Z));
+    let said = z.map_or_else(
+        || "k_z was not among them".to_owned(),
+        |(hits, whole)| {
+            let high = if whole.identified { short(micro(whole.ci95[1])) } else { "no upper limit".into() };
+            format!(
+                "k_z scatters by {} N/µm from hit to hit; with errors of position and angle, 95 % {}…{high} N/µm",
+                short(micro(hits.std)),
+                short(micro(whole.ci95[0]))
+            )
+        },
+    );
+    format!(
+        "Hits drawn anew {} times ({}): {said}.",
+        count(bootstrap.replicates as u64),
+        band(bootstrap.band_hz.into())
+    )
 }
 
 /// What the loops of the impacts found, in one sentence.
@@ -156,8 +195,14 @@ fn joint_line(joint: &Joint) -> Option<String> {
     let ci95 = k
         .ci95
         .map_or(String::new(), |[low, high]| format!(", 95 % {}…{}", short(micro(low)), short(micro(high))));
+    // never a bare number where the lines scatter by more than the value
+    let verdict = if k.std > super::campaign::UNIDENTIFIED * k.mean.abs() || k.mean <= 0.0 {
+        "; not identified"
+    } else {
+        ""
+    };
     Some(format!(
-        "  {:<17} {}  {:>11}  k_z {} (σ over {} lines; median {}{ci95})",
+        "  {:<17} {}  {:>11}  k_z {} (σ over {} lines; median {}{ci95}){verdict}",
         joint.method,
         if joint.idms == 0 { "      ".to_owned() } else { format!("{} IDMs", joint.idms) },
         band(joint.band_hz),
@@ -194,11 +239,21 @@ pub fn summary(results: &Results) -> Vec<String> {
                 .filter_map(|r| Some(format!("  {:>11}  {}", band(r.band_hz.into()), r.statement()?))),
         );
     }
-    let table: Vec<String> = results.joint.iter().filter_map(joint_line).collect();
+    if let Some(bootstrap) = &results.bootstrap {
+        lines.push(String::new());
+        lines.push(bootstrapped(bootstrap));
+    }
+    // a campaign is analysed in every way: the main band is enough to read here
+    let read_here =
+        |j: &&Joint| results.source.kind != "campaign" || j.band_hz == MAIN_BAND_HZ || j.idms == 0;
+    let table: Vec<String> = results.joint.iter().filter(read_here).filter_map(joint_line).collect();
     if !table.is_empty() {
         lines.push(String::new());
         lines.push("Joint stiffness along z, by method, interface modes and band:".into());
         lines.extend(table);
+        if results.joint.iter().any(|j| !read_here(&j)) {
+            lines.push("  (the other bands stand in results.json and report.html)".into());
+        }
     }
     let kinds = side_by_side::kinds(results);
     if !kinds.is_empty() {

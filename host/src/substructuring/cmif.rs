@@ -61,13 +61,13 @@ pub fn cmif(a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix, geometry: &Geometry) 
                 for &i in order.iter().take(VECTORS) {
                     let vector = left.column(i).clone_owned();
                     let power = svd.singular_values[i].powi(2);
-                    let all = rigid.kept(&Dof::ALL, &vector);
+                    let all = rigid.kept(&Dof::RIGID, &vector);
                     for (sum, set) in explained.iter_mut().zip(IdmSet::ALL) {
-                        *sum += power * rigid.kept(set.dofs(), &vector);
+                        *sum += power * rigid.kept(&set.dofs(), &vector);
                     }
                     explained[3] += power;
-                    participation.push(Dof::ALL.map(|dof| {
-                        let others: Vec<Dof> = Dof::ALL.into_iter().filter(|d| *d != dof).collect();
+                    participation.push(Dof::RIGID.map(|dof| {
+                        let others: Vec<Dof> = Dof::RIGID.into_iter().filter(|d| *d != dof).collect();
                         (all - rigid.kept(&others, &vector)).max(0.0)
                     }));
                 }

@@ -126,6 +126,11 @@ pub fn block_diagonal(parts: &[(&str, &FrfMatrix)]) -> Result<FrfMatrix, Couplin
     Ok(whole)
 }
 
+/// \[I, −I\]: the first `n` degrees of freedom against the next.
+pub fn boolean_difference(n: usize) -> DMatrix<f64> {
+    DMatrix::from_fn(n, 2 * n, |r, c| f64::from(i8::from(c == r)) - f64::from(i8::from(c == n + r)))
+}
+
 /// The signed Boolean matrix whose row k says: `pairs[k].0` minus `pairs[k].1`, among `names`.
 ///
 /// # Errors

@@ -1,13 +1,14 @@
 //! The front door: three FRF matrices and the geometry in, the joint's stiffness by every method asked for out.
 
+use super::back_coupling::BackCoupling;
 use super::consistency::Consistency;
 use super::frf::{FrfError, FrfMatrix, Quantity};
 use super::geometry::Geometry;
-use super::idm::IdmSet;
+use super::idm::{Dof, IdmSet};
 use super::interface_data::Measured;
 use super::joint::{Band, JointRow, JointSpectrum};
 use super::method::Method;
-use super::reduced::{Reduced, Rooms};
+use super::reduced::{Reduced, Rooms, Solution};
 use serde::Serialize;
 
 /// Why nothing at all can be identified from these files.
@@ -87,6 +88,29 @@ pub struct Refused {
     pub reason: String,
 }
 
+/// What a form of Eq. (3) had for internals: n_i against n_c, and whether P and Q see every interface motion.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Internals {
+    /// Which form.
+    pub method: Method,
+    /// n_c.
+    pub idms: usize,
+    /// n_i of the impacts.
+    pub impacts: usize,
+    /// n_i of the responses.
+    pub responses: usize,
+    /// The line that ranks and condition numbers are of, Hz.
+    pub frequency_hz: f64,
+    /// Rank of P to rounding.
+    pub rank_p: usize,
+    /// Rank of Q to rounding.
+    pub rank_q: usize,
+    /// Condition number of P, rotations scaled by 40 mm: by how much noise may be blown up.
+    pub condition_p: f64,
+    /// Condition number of Q.
+    pub condition_q: f64,
+}
+
 /// Quality of the virtual points of A alone and B alone for one IDM set.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VirtualPointQuality {
@@ -94,6 +118,8 @@ pub struct VirtualPointQuality {
     pub substructure: &'static str,
     /// Number of interface deformation modes.
     pub idms: usize,
+    /// Which ones.
+    pub modes: Vec<Dof>,
     /// Condition number of R_u, rotations scaled by 40 mm.
     pub condition_responses: f64,
     /// Condition number of R_f, rotations scaled by 40 mm.
@@ -123,6 +149,10 @@ pub struct Identification {
     pub refused: Vec<Refused>,
     /// Quality of A's and B's virtual points.
     pub virtual_points: Vec<VirtualPointQuality>,
+    /// n_i, n_c and ranks of the forms of Eq. (3) that were asked for.
+    pub internals: Vec<Internals>,
+    /// A and B coupled by what `inverse` gave with the most modes over the first band, against the measured assembly.
+    pub back_coupling: Option<BackCoupling>,
 }
 
 /// Identifies the joint from FRFs of A, B and AJB (all three alike in lines, quantity and window).
@@ -170,7 +200,15 @@ pub fn identify(
         ajb: Measured { file: "AJB", frf: &files[2], points: &geometry.ajb },
         geometry,
     };
-    let mut out = Identification { joint: vec![], spectra: vec![], refused: vec![], virtual_points: vec![] };
+    let mut out = Identification {
+        joint: vec![],
+        spectra: vec![],
+        refused: vec![],
+        virtual_points: vec![],
+        internals: vec![],
+        back_coupling: None,
+    };
+    let mut coupled_modes = 0;
     for &set in idms {
         let reduced = Reduced::of(&rooms, set);
         if let Ok(reduced) = &reduced {
@@ -182,7 +220,14 @@ pub fn identify(
                 Err(error) => Err(error.clone().into()),
             };
             match z {
-                Ok((z, notes)) => {
+                Ok(Solution { z, notes, internals }) => {
+                    out.internals.extend(internals);
+                    if let (Ok(reduced), Method::Inverse, true) =
+                        (&reduced, method, set.count() > coupled_modes)
+                    {
+                        coupled_modes = set.count();
+                        out.back_coupling = reduced.back_coupling(&rooms, &z, bands[0]);
+                    }
                     let spectrum = JointSpectrum::of(
                         method.name(),
                         set,

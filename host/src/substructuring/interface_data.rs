@@ -155,9 +155,9 @@ impl Measured<'_> {
     }
 }
 
-/// 1 for translations, the scaling length for rotations: after D Y D all entries are m/N.
+/// 1 for translations, the scaling length for rotations (its square for modes that grow so): after D Y D all entries are m/N.
 pub(crate) fn balance(idms: IdmSet) -> Vec<f64> {
-    idms.dofs().iter().map(|d| if d.is_rotation() { ROTATION_LENGTH_M } else { 1.0 }).collect()
+    idms.dofs().iter().map(|d| ROTATION_LENGTH_M.powi(d.power_of_length())).collect()
 }
 
 /// diag(left) Y diag(right), with 1 where a side is not given.

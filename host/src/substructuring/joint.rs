@@ -107,15 +107,19 @@ pub struct JointSpectrum {
     pub method: String,
     /// Number of interface deformation modes.
     pub idms: usize,
+    /// Which ones.
+    pub modes: Vec<Dof>,
     /// Frequency of each line, Hz.
     pub frequency_hz: Vec<f64>,
-    /// K per degree of freedom and line, N/m (N m/rad for rotations).
+    /// K per degree of freedom and line, N/m (N m/rad for rotations, N m for extensions, N m² for the other flexible modes).
     pub stiffness_n_per_m: BTreeMap<Dof, Vec<f64>>,
     /// C per degree of freedom and line, N s/m (N m s/rad for rotations).
     pub damping_n_s_per_m: BTreeMap<Dof, Vec<f64>>,
     /// K between two degrees of freedom (`y-z` and so on, each pair once, the mean of both places) per line: N/m between
     /// translations, N/rad (N m/m) between a translation and a rotation, N m/rad between rotations.
     pub coupling_si: BTreeMap<String, Vec<f64>>,
+    /// C between them, in the same units times seconds.
+    pub coupling_damping_si: BTreeMap<String, Vec<f64>>,
 }
 
 impl JointSpectrum {
@@ -142,22 +146,31 @@ impl JointSpectrum {
             damping_n_s_per_m.insert(dof, c);
         }
         let mut coupling_si = BTreeMap::new();
+        let mut coupling_damping_si = BTreeMap::new();
         for (i, one) in idms.dofs().iter().enumerate() {
             for (j, other) in idms.dofs().iter().enumerate().skip(i + 1) {
-                let k = z.iter().zip(frequency_hz).map(|(z, f)| {
-                    let s = Complex::new(sigma_per_s, std::f64::consts::TAU * f);
-                    stiffness_and_damping(0.5 * (z[(i, j)] + z[(j, i)]), s).0
-                });
-                coupling_si.insert(format!("{one}-{other}"), k.collect());
+                let pair = format!("{one}-{other}");
+                let (k, c): (Vec<f64>, Vec<f64>) = z
+                    .iter()
+                    .zip(frequency_hz)
+                    .map(|(z, f)| {
+                        let s = Complex::new(sigma_per_s, std::f64::consts::TAU * f);
+                        stiffness_and_damping(0.5 * (z[(i, j)] + z[(j, i)]), s)
+                    })
+                    .unzip();
+                coupling_damping_si.insert(pair.clone(), c);
+                coupling_si.insert(pair, k);
             }
         }
         JointSpectrum {
             method: method.into(),
             idms: idms.count(),
+            modes: idms.dofs(),
             frequency_hz: frequency_hz.to_vec(),
             stiffness_n_per_m,
             damping_n_s_per_m,
             coupling_si,
+            coupling_damping_si,
         }
     }
 
@@ -173,10 +186,12 @@ impl JointSpectrum {
         Some(JointRow {
             method: self.method.clone(),
             idms: self.idms,
+            modes: self.modes.clone(),
             band_hz: band,
             stiffness_n_per_m,
             damping_n_s_per_m: statistics(&self.damping_n_s_per_m, &lines),
             coupling_si: statistics(&self.coupling_si, &lines),
+            coupling_damping_si: statistics(&self.coupling_damping_si, &lines),
             lines: lines.len(),
             warnings,
         })
@@ -204,6 +219,8 @@ pub struct JointRow {
     pub method: String,
     /// Number of interface deformation modes.
     pub idms: usize,
+    /// Which ones.
+    pub modes: Vec<Dof>,
     /// The band, Hz.
     pub band_hz: Band,
     /// K of each degree of freedom, N/m (N m/rad for rotations).
@@ -212,6 +229,8 @@ pub struct JointRow {
     pub damping_n_s_per_m: BTreeMap<Dof, BandStatistic>,
     /// K between each two degrees of freedom, as in [`JointSpectrum::coupling_si`].
     pub coupling_si: BTreeMap<String, BandStatistic>,
+    /// C between them.
+    pub coupling_damping_si: BTreeMap<String, BandStatistic>,
     /// Lines in the band.
     pub lines: usize,
     /// What a reader must know before using the figures.

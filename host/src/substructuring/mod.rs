@@ -4,18 +4,20 @@
 //!
 //! 1. [`frf`]: FRF matrices with named rows and columns, turned into receptances by dividing by s = σ + iω.
 //! 2. [`geometry`]: where the points are and what each is for (`Grouping`).
-//! 3. [`idm`], [`vpt`]: measured points onto the six motions of a virtual point; [`consistency`] says what is lost.
+//! 3. [`idm`], [`vpt`]: measured points onto the motions of a virtual point ([`virtual_points`]: of any number of them);
+//!    [`consistency`] says what is lost.
 //! 4. [`decoupling`]: one file per method, all returning Z^J per line; [`pseudo_inverse`] inverts without truncating.
 //! 5. [`joint`]: K and C per line and over bands, with scatter, interval and warnings.
 //! 6. [`identify`](mod@identify): the front door that does all of it.
 //! 7. [`averaged`](mod@averaged): the estimate to quote, with its interval; the bootstrap over hits. [`noise`] is what they start from.
 //! 8. [`coupling`]: the other way round, from parts to the assembly; [`cmif`](mod@cmif): how many modes the interface needs;
-//!    [`plausibility`]: passivity and reciprocity.
+//!    [`back_coupling`]: whether the joint found gives the measured assembly; [`plausibility`]: passivity and reciprocity; [`semm`](mod@semm): a model corrected by a measurement.
 //!
 //! All FRFs of a campaign must share one exponential window: every method is algebraic in s, so it is exact on
 //! s = σ + iω, but only if A, B and AJB are on the same s. Degrees of freedom are ordered x, y, z, rx, ry, rz.
 
 pub mod averaged;
+pub mod back_coupling;
 pub mod cmif;
 pub mod consistency;
 pub mod coupling;
@@ -31,6 +33,8 @@ pub mod noise;
 pub mod plausibility;
 pub mod pseudo_inverse;
 mod reduced;
+pub mod semm;
+pub mod virtual_points;
 pub mod vpt;
 
 pub use frf::{FrfError, FrfMatrix, Quantity};

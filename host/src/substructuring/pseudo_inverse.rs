@@ -33,6 +33,12 @@ pub fn rank(a: &DMatrix<Complex<f64>>) -> usize {
     pivots_above_rounding(&a.clone().col_piv_qr())
 }
 
+/// Largest over smallest singular value; infinite for a singular matrix.
+pub fn condition(a: &DMatrix<Complex<f64>>) -> f64 {
+    let values = a.clone().svd(false, false).singular_values;
+    values.max() / values.min()
+}
+
 /// The (pseudo-)inverse of a matrix of full rank: A⁻¹, (AᴴA)⁻¹Aᴴ when tall, Aᴴ(AAᴴ)⁻¹ when wide.
 ///
 /// # Errors

@@ -1,11 +1,11 @@
-//! The virtual point transformation: measured responses and impacts onto the interface's rigid motions.
+//! The virtual point transformation: measured responses and impacts onto the interface's deformation modes.
 //!
-//! Each response is a row eᵀ \[I, −skew(r)\] of R_u (channel × degree of freedom), each impact one of R_f. With
+//! Each response is a row of R_u, eᵀ \[I, −skew(r)\] for rigid modes (channel × degree of freedom), each impact one of R_f. With
 //! weights W: T_u = (R_uᵀ W R_u)⁻¹ R_uᵀ W and T_f = W⁻¹ R_f (R_fᵀ W⁻¹ R_f)⁻¹, and Y_vp = T_u Y T_f
 //! (the paper's Sec. 2.4; van der Seijs et al.).
 
 use super::geometry::Point;
-use super::idm::{IdmSet, rigid_row};
+use super::idm::IdmSet;
 use nalgebra::{Complex, DMatrix, Vector3};
 
 /// Rotations are compared with translations through this length, m: about the distance of the rig's sensors
@@ -125,10 +125,9 @@ fn weighted_inverse(
 ) -> Result<(DMatrix<f64>, DMatrix<f64>, f64), VptError> {
     let dofs = idms.dofs();
     let r = DMatrix::from_fn(points.len(), dofs.len(), |i, d| {
-        rigid_row(points[i].direction(), points[i].position() - virtual_point_m)[dofs[d] as usize]
+        dofs[d].displacement(points[i].position() - virtual_point_m).dot(&points[i].direction())
     });
-    let per_length: Vec<f64> =
-        dofs.iter().map(|d| if d.is_rotation() { 1.0 / ROTATION_LENGTH_M } else { 1.0 }).collect();
+    let per_length: Vec<f64> = dofs.iter().map(|d| ROTATION_LENGTH_M.powi(-d.power_of_length())).collect();
     let scaled = DMatrix::from_fn(r.nrows(), r.ncols(), |i, d| row_scale[i] * r[(i, d)] * per_length[d]);
     let needed = dofs.len();
     let svd = scaled.clone().svd(true, true);

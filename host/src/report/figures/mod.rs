@@ -3,6 +3,7 @@
 mod comparison;
 mod contact_loop;
 mod impacts;
+mod interface_modes;
 mod joint_spectrum;
 mod levels;
 mod rebuilt;
@@ -13,6 +14,7 @@ mod specimens;
 pub use comparison::comparison;
 pub use contact_loop::contact_loop;
 pub use impacts::impacts;
+pub use interface_modes::interface_modes;
 pub use joint_spectrum::joint_spectrum;
 pub use levels::levels;
 pub use rebuilt::rebuilt;

@@ -75,12 +75,15 @@ impl ContactCompliance {
         Some(Joint {
             method: DIRECT.into(),
             idms: 0,
+            modes: Vec::new(),
             band_hz: DIRECT_HZ,
             stiffness_n_per_m: along_z(k),
             damping_n_s_per_m: along_z(c),
             stiffness_n_m_per_rad: BTreeMap::new(),
             damping_n_m_s_per_rad: BTreeMap::new(),
+            stiffness_flexible_si: BTreeMap::new(),
             coupling_si: BTreeMap::new(),
+            coupling_damping_si: BTreeMap::new(),
             lines: stiffness.len() * DIRECT_LINES,
             warnings,
         })

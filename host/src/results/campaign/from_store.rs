@@ -3,7 +3,7 @@
 use super::cell::{
     Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel,
 };
-use super::{Progress, completeness};
+use super::{Progress, Wanted, completeness};
 use crate::campaign::frfs::ImportedFrf;
 use crate::campaign::levels::LevelRow;
 use crate::campaign::plan::{Plan, configuration_name};
@@ -52,13 +52,13 @@ pub enum AnalyseError {
 /// The file itself cannot be read. What is missing or damaged in it is told in the results instead.
 pub fn analyse(
     store: &Store,
-    known: KnownContact,
+    wanted: Wanted,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Results, AnalyseError> {
-    let file = CampaignFile::open(store, known)?;
+    let file = CampaignFile::open(store, wanted.known)?;
     let mut results = Results::new(file.source(store)?);
     results.completeness = file.completeness();
-    Ok(super::analyse_measurements(&file, results, progress))
+    Ok(super::analyse_measurements(&file, results, wanted, progress))
 }
 
 struct PlannedCell {

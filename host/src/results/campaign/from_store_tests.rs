@@ -132,7 +132,7 @@ fn a_campaign_that_stopped_half_way_gives_what_it_can() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = campaign(&folder.path().join("half.jrig"));
     store.note_link(1, &[("frames_received".to_owned(), 17)].into()).expect("noted");
-    let results = analyse(&store, KnownContact::default(), &|_| {}).expect("readable");
+    let results = analyse(&store, Wanted::default(), &|_| {}).expect("readable");
     let loops = results.impact_loops().expect("hits along z on A");
     let slope = loops.k_eq_n_per_m.expect("a straight line");
     // 16-bit steps: 0.3 µm/s in 2 mm/s
@@ -156,7 +156,7 @@ fn a_new_campaign_is_no_error() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = Store::create(&folder.path().join("new.jrig"), SMALL, "small.toml").expect("created");
     let seen = std::sync::atomic::AtomicUsize::new(0);
-    let results = analyse(&store, KnownContact::default(), &|p| {
+    let results = analyse(&store, Wanted::default(), &|p| {
         seen.fetch_max(p.done, std::sync::atomic::Ordering::Relaxed);
     })
     .expect("readable");

@@ -8,34 +8,40 @@ use std::collections::BTreeMap;
 
 impl From<&JointRow> for Joint {
     fn from(row: &JointRow) -> Self {
-        let split = |all: &BTreeMap<Dof, BandStatistic>, rotations: bool| {
+        let split = |all: &BTreeMap<Dof, BandStatistic>, is: fn(Dof) -> bool| {
             all.iter()
-                .filter(|(dof, s)| dof.is_rotation() == rotations && s.mean.is_finite() && s.std.is_finite())
+                .filter(|(dof, s)| is(**dof) && s.mean.is_finite() && s.std.is_finite())
                 .map(|(dof, s)| (dof.name().to_owned(), *s))
                 .collect::<BTreeMap<String, BandStatistic>>()
         };
         Joint {
             method: row.method.clone(),
             idms: row.idms,
+            modes: row.modes.clone(),
             band_hz: row.band_hz.into(),
-            stiffness_n_per_m: split(&row.stiffness_n_per_m, false),
-            damping_n_s_per_m: split(&row.damping_n_s_per_m, false),
-            stiffness_n_m_per_rad: split(&row.stiffness_n_per_m, true),
-            damping_n_m_s_per_rad: split(&row.damping_n_s_per_m, true),
-            coupling_si: row
-                .coupling_si
-                .iter()
-                .filter(|(_, s)| s.mean.is_finite() && s.std.is_finite())
-                .map(|(pair, s)| (pair.clone(), *s))
-                .collect(),
+            stiffness_n_per_m: split(&row.stiffness_n_per_m, Dof::is_translation),
+            damping_n_s_per_m: split(&row.damping_n_s_per_m, Dof::is_translation),
+            stiffness_n_m_per_rad: split(&row.stiffness_n_per_m, Dof::is_rotation),
+            damping_n_m_s_per_rad: split(&row.damping_n_s_per_m, Dof::is_rotation),
+            stiffness_flexible_si: split(&row.stiffness_n_per_m, Dof::is_flexible),
+            coupling_si: finite(&row.coupling_si),
+            coupling_damping_si: finite(&row.coupling_damping_si),
             lines: row.lines,
             warnings: row.warnings.clone(),
         }
     }
 }
 
+/// Without what is no number.
+fn finite(all: &BTreeMap<String, BandStatistic>) -> BTreeMap<String, BandStatistic> {
+    all.iter()
+        .filter(|(_, s)| s.mean.is_finite() && s.std.is_finite())
+        .map(|(pair, s)| (pair.clone(), *s))
+        .collect()
+}
+
 /// Rows, spectra (translations only: they are what the figures show) and refusals.
-pub fn shaped(found: &Identification) -> (Vec<Joint>, Option<JointSpectrum>, Vec<Refusal>) {
+pub(super) fn shaped(found: &Identification) -> (Vec<Joint>, Option<JointSpectrum>, Vec<Refusal>) {
     let joint = found.joint.iter().map(Joint::from).collect();
     let refused = found
         .refused
@@ -56,7 +62,7 @@ pub fn shaped(found: &Identification) -> (Vec<Joint>, Option<JointSpectrum>, Vec
                     damping_n_s_per_m: column(s.damping_n_s_per_m.get(dof)),
                 };
                 let translations: Vec<&Dof> =
-                    s.stiffness_n_per_m.keys().filter(|dof| !dof.is_rotation()).collect();
+                    s.stiffness_n_per_m.keys().filter(|dof| dof.is_translation()).collect();
                 translations.into_iter().map(curve).collect::<Vec<_>>()
             })
             .collect(),

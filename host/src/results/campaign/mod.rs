@@ -12,7 +12,10 @@ mod checks;
 mod chosen;
 mod contact;
 mod from_store;
+mod hit_spectra;
 mod imported;
+mod interface;
+mod interface_checks;
 mod joint;
 mod loops;
 mod shaker;
@@ -24,11 +27,12 @@ pub use cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact,
 pub use checks::{HIDDEN_RESONANCE, SERIES_COMPLIANCE, UNIDENTIFIED};
 pub use contact::DIRECT;
 pub use from_store::{AnalyseError, analyse, geometry};
-pub use joint::shaped;
+pub use interface::fill;
+pub use interface_checks::{BACK_COUPLING, INTERFACE_MODES, INTERNALS, SAME_IN_ALL};
 
-use super::{Completeness, MAIN_BAND_HZ, Results, UsableBand, ranges};
+use super::{Bootstrap, Completeness, MAIN_BAND_HZ, Results, UsableBand, ranges};
 use crate::spectra::{Windowing, usable_band};
-use crate::substructuring::averaged::{Priors, averaged};
+use crate::substructuring::averaged::{Averaged, AveragedError, CellHits, Prepared, Priors};
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping};
 use crate::substructuring::identify::identify;
@@ -45,8 +49,20 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// The bands that means are taken over, Hz; the first is the main one.
 pub const BANDS_HZ: [[f64; 2]; 3] = [MAIN_BAND_HZ, [100.0, 800.0], [100.0, 300.0]];
 
-/// The methods that a campaign is analysed with.
-pub const METHODS: [Method; 2] = [Method::Internal, Method::InternalPrinted];
+/// The methods whose spectra a campaign's results keep and show; of all others they keep the bands.
+const SHOWN: [Method; 3] = [Method::Internal, Method::InternalPrinted, Method::Inverse];
+
+/// What is wanted beyond the usual, and what is known beforehand.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Wanted {
+    /// Replicates of the bootstrap over hits; 0 for none.
+    pub replicates: usize,
+    /// Contact and static arm.
+    pub known: KnownContact,
+}
+
+/// The bootstrap's seed: the same file gives the same figures.
+const SEED: u64 = 1;
 
 const CONFIGURATIONS: [&str; 3] = ["A", "B", "AJB"];
 
@@ -62,6 +78,7 @@ pub struct Progress {
 /// What came of one cell.
 struct CellOutcome {
     average: Option<CellAverage>,
+    hits: Option<CellHits>,
     loops: Vec<ImpactLoop>,
     complaints: Vec<String>,
 }
@@ -70,6 +87,7 @@ struct CellOutcome {
 pub fn analyse_measurements<M: Measurements>(
     measurements: &M,
     mut results: Results,
+    wanted: Wanted,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Results {
     let cells = measurements.cells();
@@ -79,15 +97,17 @@ pub fn analyse_measurements<M: Measurements>(
     let outcomes: Vec<CellOutcome> = cells
         .par_iter()
         .map(|name| {
-            let outcome = one_cell(measurements, geometry, name);
+            let outcome = one_cell(measurements, geometry, name, wanted.replicates > 0);
             progress(Progress { done: done.fetch_add(1, Ordering::Relaxed) + 1, total: cells.len() });
             outcome
         })
         .collect();
     let mut averages = Vec::new();
     let mut impact_loops = Vec::new();
+    let mut hits = Vec::new();
     for outcome in outcomes {
         averages.extend(outcome.average);
+        hits.extend(outcome.hits);
         impact_loops.extend(outcome.loops);
         results.missing.extend(outcome.complaints);
     }
@@ -121,7 +141,7 @@ pub fn analyse_measurements<M: Measurements>(
         frfs[place] = assembled.frf;
     }
     substructure(&mut results, geometry, &frfs);
-    recommend(&mut results, geometry, frfs[2].as_ref(), noises[2].as_ref());
+    recommend(&mut results, geometry, frfs[2].as_ref(), noises[2].as_ref(), &hits, wanted);
     at_the_contact(&mut results, measurements, &averages, &impact_loops, sigma);
     results
 }
@@ -147,8 +167,13 @@ fn drives_the_cells(geometry: &Geometry, name: &CellName) -> bool {
         && geometry.b.impacts.iter().any(|p| p.name == name.impact && p.grouping == Grouping::InterfaceB)
 }
 
-fn one_cell<M: Measurements>(measurements: &M, geometry: &Geometry, name: &CellName) -> CellOutcome {
-    let mut outcome = CellOutcome { average: None, loops: Vec::new(), complaints: Vec::new() };
+fn one_cell<M: Measurements>(
+    measurements: &M,
+    geometry: &Geometry,
+    name: &CellName,
+    keep_hits: bool,
+) -> CellOutcome {
+    let mut outcome = CellOutcome { average: None, hits: None, loops: Vec::new(), complaints: Vec::new() };
     let complaint = |what: &dyn std::fmt::Display| {
         format!("{}: cell {} × {}: {what}.", name.configuration, name.impact, name.response)
     };
@@ -178,6 +203,13 @@ fn one_cell<M: Measurements>(measurements: &M, geometry: &Geometry, name: &CellN
         }
     }
     let contact = contact || drives_the_cells(geometry, name);
+    if keep_hits {
+        match hit_spectra::of(name, &geometry.ajb, &cell, measurements.sigma_per_s(), measurements.quantity())
+        {
+            Ok(hits) => outcome.hits = hits,
+            Err(error) => outcome.complaints.push(complaint(&error)),
+        }
+    }
     match average(name.clone(), cell, measurements.sigma_per_s(), measurements.quantity(), contact) {
         Ok(averaged) => outcome.average = Some(averaged),
         Err(error) => outcome.complaints.push(complaint(&error)),
@@ -273,32 +305,64 @@ fn substructure(results: &mut Results, geometry: &Geometry, frfs: &[Option<FrfMa
         .filter(|b| a.frequency_hz.iter().any(|f| (b[0]..=b[1]).contains(f)))
         .map(|[low_hz, high_hz]| Band { low_hz, high_hz })
         .collect();
-    match identify(a, b, ajb, geometry, &METHODS, &IdmSet::ALL, &bands) {
+    match identify(a, b, ajb, geometry, &Method::ALL, &IdmSet::ALL, &bands) {
         Ok(found) => {
-            let (joint, spectrum, refused) = shaped(&found);
-            results.joint = joint;
-            results.joint_spectrum = spectrum;
-            results.refused = refused;
+            interface::fill(results, [a, b, ajb], geometry, &found);
+            if let Some(spectrum) = &mut results.joint_spectrum {
+                spectrum.curves.retain(|c| SHOWN.iter().any(|m| m.name() == c.method));
+            }
         }
         Err(error) => results.missing.push(format!("Substructuring was not possible: {error}.")),
     }
 }
 
 /// The estimates to quote, with their intervals, from the assembly alone.
-fn recommend(results: &mut Results, geometry: &Geometry, ajb: Option<&FrfMatrix>, noise: Option<&FrfNoise>) {
+fn recommend(
+    results: &mut Results,
+    geometry: &Geometry,
+    ajb: Option<&FrfMatrix>,
+    noise: Option<&FrfNoise>,
+    hits: &[CellHits],
+    wanted: Wanted,
+) {
     let Some(ajb) = ajb else { return };
     let priors = Priors::default();
     results.source.settings.insert("priors".into(), serde_json::json!(priors));
     for [low_hz, high_hz] in BANDS_HZ {
         let band = Band { low_hz, high_hz };
-        match averaged(ajb, noise, geometry, IdmSet::Six, band, &priors) {
-            Ok(estimate) => results.recommended.push(estimate),
+        match Prepared::of(ajb, noise, geometry, IdmSet::Six, band, &priors) {
+            Ok(prepared) => {
+                let estimate = prepared.estimate();
+                if wanted.replicates > 0 && [low_hz, high_hz] == MAIN_BAND_HZ {
+                    match draw(&prepared, &estimate, hits, wanted.replicates) {
+                        Ok(drawn) => results.bootstrap = Some(drawn),
+                        Err(error) => results.missing.push(format!("No bootstrap over hits: {error}.")),
+                    }
+                }
+                results.recommended.push(estimate);
+            }
             Err(error) => {
                 results.missing.push(format!("No estimate with an interval by Eq. A.1: {error}."));
                 return;
             }
         }
     }
+}
+
+/// The bootstrap, and the estimate with its scatter.
+fn draw(
+    prepared: &Prepared,
+    estimate: &Averaged,
+    hits: &[CellHits],
+    replicates: usize,
+) -> Result<Bootstrap, AveragedError> {
+    let drawn = prepared.bootstrap(hits, replicates, SEED)?;
+    let joint = estimate
+        .joint
+        .iter()
+        .filter_map(|(dof, whole)| Some((*dof, whole.with_hits(drawn.get(dof)?))))
+        .collect();
+    Ok(Bootstrap { band_hz: estimate.band_hz, replicates, seed: SEED, hits: drawn, joint })
 }
 
 /// Kept and refused hits of one configuration, from counts per cell: (wanted, kept, refused by verdict).

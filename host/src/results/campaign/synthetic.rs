@@ -223,7 +223,7 @@ impl Measurements for Rig {
 fn quiet(_: Progress) {}
 
 fn run(rig: &Rig) -> Results {
-    analyse_measurements(rig, Results::new(super::super::Source::default()), &quiet)
+    analyse_measurements(rig, Results::new(super::super::Source::default()), Wanted::default(), &quiet)
 }
 
 #[test]

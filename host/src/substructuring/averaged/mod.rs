@@ -72,6 +72,11 @@ pub enum AveragedError {
         /// Why.
         source: RankLost,
     },
+    /// Modes whose errors of position are not propagated.
+    #[error(
+        "an estimate with an interval is made of rigid interface modes only, not of {0}: errors of position are not propagated for flexible ones"
+    )]
+    Flexible(Dof),
     /// Spectra of hits that do not belong to the FRFs.
     #[error("the hits' spectra do not fit the FRFs: {reason}")]
     Hits {
@@ -210,6 +215,9 @@ impl Prepared {
         band: Band,
         priors: &Priors,
     ) -> Result<Prepared, AveragedError> {
+        if let Some(flexible) = idms.dofs().into_iter().find(|dof| dof.is_flexible()) {
+            return Err(AveragedError::Flexible(flexible));
+        }
         let assembly = Assembly::of(ajb, noise, geometry, idms, band)?;
         let impedance: Vec<Line> = assembly
             .cells

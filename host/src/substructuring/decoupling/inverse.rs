@@ -1,7 +1,7 @@
 //! Eq. (A.1): inverse substructuring.
 
 use super::super::pseudo_inverse::full_rank_inverse;
-use super::DecouplingError;
+use super::{ASSEMBLY, DecouplingError};
 use nalgebra::{Complex, DMatrix};
 
 /// Which off-diagonal block of Eq. (A.1) is read. For exact data of a reciprocal structure they are equal.
@@ -22,11 +22,15 @@ pub fn inverse(
     block: InverseBlock,
     y_ajb: &DMatrix<Complex<f64>>,
 ) -> Result<DMatrix<Complex<f64>>, DecouplingError> {
-    let n = y_ajb.nrows() / 2;
+    Ok(inverse_of(block, &full_rank_inverse(y_ajb, ASSEMBLY)?))
+}
+
+/// The same where (Y^AJB_cc)⁻¹ is at hand.
+pub fn inverse_of(block: InverseBlock, z_ajb: &DMatrix<Complex<f64>>) -> DMatrix<Complex<f64>> {
+    let n = z_ajb.nrows() / 2;
     let at = match block {
         InverseBlock::Ab => (0, n),
         InverseBlock::Ba => (n, 0),
     };
-    let z = full_rank_inverse(y_ajb, "the assembly's interface admittance")?;
-    Ok(-z.view(at, (n, n)).clone_owned())
+    -z_ajb.view(at, (n, n)).clone_owned()
 }

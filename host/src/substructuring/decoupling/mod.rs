@@ -5,19 +5,24 @@
 //! c stands for the interface (virtual point) degrees of freedom, i for internal ones. Rows and columns of
 //! rotations may be scaled by a length before: the methods are equivariant, and rounding likes it.
 
+mod fixture;
 mod interface;
 mod internal;
 mod internal_printed;
 mod inverse;
 mod primal;
 
+pub use fixture::{Weakening, remove_fixture};
 pub use interface::interface;
 pub use internal::internal;
 pub use internal_printed::{internal_printed, observed_rank};
-pub use inverse::{InverseBlock, inverse};
-pub use primal::{PrimalBlock, primal};
+pub use inverse::{InverseBlock, inverse, inverse_of};
+pub use primal::{PrimalBlock, primal, primal_of};
 
 use super::pseudo_inverse::RankLost;
+
+/// What a singular Y^AJB_cc is called.
+pub(super) const ASSEMBLY: &str = "the assembly's interface admittance";
 
 /// Why a method cannot be applied to this data.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

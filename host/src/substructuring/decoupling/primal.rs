@@ -1,7 +1,7 @@
 //! Eq. (A.2): primal decoupling.
 
 use super::super::pseudo_inverse::full_rank_inverse;
-use super::DecouplingError;
+use super::{ASSEMBLY, DecouplingError};
 use nalgebra::{Complex, DMatrix};
 
 /// Which diagonal block of Eq. (A.2) is read. (The off-diagonal ones are Eq. (A.1) again.)
@@ -24,11 +24,22 @@ pub fn primal(
     y_s: &DMatrix<Complex<f64>>,
     y_ajb: &DMatrix<Complex<f64>>,
 ) -> Result<DMatrix<Complex<f64>>, DecouplingError> {
+    primal_of(block, y_s, &full_rank_inverse(y_ajb, ASSEMBLY)?)
+}
+
+/// The same where (Y^AJB_cc)⁻¹ is at hand.
+///
+/// # Errors
+/// Y^S is singular.
+pub fn primal_of(
+    block: PrimalBlock,
+    y_s: &DMatrix<Complex<f64>>,
+    z_ajb: &DMatrix<Complex<f64>>,
+) -> Result<DMatrix<Complex<f64>>, DecouplingError> {
     let n = y_s.nrows();
     let at = match block {
         PrimalBlock::A => 0,
         PrimalBlock::B => n,
     };
-    let z = full_rank_inverse(y_ajb, "the assembly's interface admittance")?;
-    Ok(z.view((at, at), (n, n)) - full_rank_inverse(y_s, "the substructure's interface admittance")?)
+    Ok(z_ajb.view((at, at), (n, n)) - full_rank_inverse(y_s, "the substructure's interface admittance")?)
 }

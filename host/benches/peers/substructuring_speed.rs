@@ -1,0 +1,277 @@
+//! Virtual points and the paper's seven methods on 3600 lines, 27 × 24 → 12 × 12, beside a numpy notebook in the same run; and the
+//! bootstrap of 1000 replicates of the paper's campaign.
+
+use super::{Outcome, script};
+use jointrig::exchange::npz::Array;
+use jointrig::exchange::{Extra, read_frf, read_positions, write_frf};
+use jointrig::substructuring::averaged::{CellHits, Prepared, Priors};
+use jointrig::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
+use jointrig::substructuring::{Band, Dof, FrfMatrix, IdmSet, Method, identify, vpt};
+use nalgebra::{Complex, DMatrix, Vector3};
+use serde_json::Value;
+use std::hint::black_box;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+const LINES: usize = 3600;
+const RUNS: usize = 5;
+/// How many times as fast as numpy it must be.
+const WANTED: f64 = 5.0;
+/// Both must find the same stiffness to this part.
+const SAME: f64 = 1e-6;
+const BAND: Band = Band { low_hz: 300.0, high_hz: 3000.0 };
+
+const REPLICATES: usize = 1000;
+const HITS: usize = 8;
+/// 300–600 Hz at half-hertz lines.
+const MAIN_LINES: usize = 601;
+/// Seconds that the bootstrap may take on two cores.
+const BOOTSTRAP_S: f64 = 60.0;
+
+fn data(file: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file)
+}
+
+fn both(a: impl Fn(Grouping) -> bool) -> impl Fn(&Point) -> bool {
+    move |p| a(p.grouping)
+}
+
+/// One more sensor and three more impacts on A: 27 channels and 24 impacts in the assembly. A is rigid where they are, so their FRFs
+/// follow from the others.
+fn widened(mut frf: FrfMatrix, points: &mut Configuration) -> Result<FrfMatrix, Box<dyn std::error::Error>> {
+    let on_a = both(|g| g == Grouping::InterfaceA);
+    let own = |points: &[Point]| points.iter().filter(|p| on_a(p)).cloned().collect::<Vec<Point>>();
+    let at = |names: &[String], wanted: &[Point]| -> Vec<usize> {
+        names
+            .iter()
+            .enumerate()
+            .filter(|(_, n)| wanted.iter().any(|p| p.description == **n))
+            .map(|(i, _)| i)
+            .collect()
+    };
+    let (channels, impacts) = (own(&points.channels), own(&points.impacts));
+    let u = vpt::responses(&channels, Vector3::zeros(), IdmSet::Six, None)?;
+    let f = vpt::impacts(&impacts, Vector3::zeros(), IdmSet::Six, None)?;
+    let moved = |p: &Point, name: &str, description: String| Point {
+        name: name.into(),
+        description,
+        position_m: [p.position_m[0] + 0.007, p.position_m[1] - 0.011, p.position_m[2] + 0.013],
+        ..p.clone()
+    };
+    let more_channels: Vec<Point> = channels[..3]
+        .iter()
+        .zip(["x", "y", "z"])
+        .map(|(p, axis)| moved(p, "A5", format!("A5:{axis}")))
+        .collect();
+    let more_impacts: Vec<Point> = [0, 3, 6]
+        .iter()
+        .zip(["AZ4", "AY4", "AX4"])
+        .map(|(i, name)| moved(&impacts[*i], name, name.into()))
+        .collect();
+    let r = |points: &[Point]| {
+        DMatrix::from_fn(points.len(), 6, |i, d| {
+            Complex::from(Dof::RIGID[d].displacement(points[i].position()).dot(&points[i].direction()))
+        })
+    };
+    let (rows, columns) = (at(&frf.outputs, &channels), at(&frf.inputs, &impacts));
+    let (to_rows, to_columns) =
+        (r(&more_channels) * u.t.map(Complex::from), f.t.map(Complex::from) * r(&more_impacts).transpose());
+    for y in &mut frf.lines {
+        let (n, m) = y.shape();
+        let mut wide = y.clone().resize(n + 3, m + 3, Complex::default());
+        let known = DMatrix::from_fn(rows.len(), m, |i, j| y[(rows[i], j)]);
+        wide.view_mut((n, 0), (3, m)).copy_from(&(&to_rows * known));
+        let known = DMatrix::from_fn(n + 3, columns.len(), |i, j| wide[(i, columns[j])]);
+        wide.view_mut((0, m), (n + 3, 3)).copy_from(&(known * &to_columns));
+        *y = wide;
+    }
+    frf.outputs.extend(more_channels.iter().map(|p| p.description.clone()));
+    frf.inputs.extend(more_impacts.iter().map(|p| p.name.clone()));
+    points.channels.extend(more_channels);
+    points.impacts.extend(more_impacts);
+    Ok(frf)
+}
+
+/// The exact FRFs of a rigid clamp, repeated until there are `lines` of them from 300 Hz on.
+fn tiled(file: &str, lines: usize) -> Result<FrfMatrix, Box<dyn std::error::Error>> {
+    let exact = read_frf(&data("frf_rigid").join(file))?;
+    let step = (BAND.high_hz - BAND.low_hz) / LINES as f64;
+    Ok(FrfMatrix {
+        frequency_hz: (0..lines).map(|l| BAND.low_hz + step * l as f64).collect(),
+        lines: (0..lines).map(|l| exact.lines[l % exact.lines.len()].clone()).collect(),
+        ..exact
+    })
+}
+
+pub fn run(python: Option<&str>) -> Outcome {
+    let mut geometry = read_positions(&data("positions/positions.xlsx"))?.geometry;
+    let a = widened(tiled("A.npz", LINES)?, &mut geometry.a)?;
+    let b = tiled("B.npz", LINES)?;
+    let ajb = widened(tiled("AJB.npz", LINES)?, &mut geometry.ajb)?;
+    let mut ours = Vec::new();
+    let mut found = None;
+    for _ in 0..RUNS {
+        let start = Instant::now();
+        let one = identify(black_box(&a), &b, &ajb, &geometry, &Method::PAPER, &[IdmSet::Six], &[BAND])?;
+        ours.push(start.elapsed().as_secs_f64());
+        found = Some(one);
+    }
+    let (found, mine) = (found.ok_or("no run")?, median(&mut ours));
+    println!(
+        "virtual points and {} methods on {LINES} lines, {} × {} → 12 × 12, with consistency, couplings and back-coupling: {mine:.3} s (median of {RUNS})",
+        Method::PAPER.len(),
+        ajb.outputs.len(),
+        ajb.inputs.len()
+    );
+    let mut short = Vec::new();
+    if let Some(python) = python {
+        let folder = tempfile::tempdir()?;
+        let file = folder.path().join("job.npz");
+        for_numpy(&file, &a, &b, &ajb, &geometry)?;
+        let answer: Value =
+            serde_json::from_str(&script(python, "substructuring_speed.py", &file.display().to_string())?)?;
+        let mut times: Vec<f64> = serde_json::from_value(answer["seconds"].clone())?;
+        let theirs = median(&mut times);
+        let ratio = theirs / mine;
+        println!(
+            "the same in numpy, without consistency, couplings and back-coupling: {theirs:.3} s; ratio {ratio:.1} (wanted {WANTED})"
+        );
+        if ratio < WANTED {
+            short.push(format!("only {ratio:.1} times as fast as numpy"));
+        }
+        for row in &found.joint {
+            let (k, other) = (
+                row.stiffness_n_per_m[&Dof::Z].mean,
+                answer["k_z"][&row.method].as_f64().unwrap_or(f64::NAN),
+            );
+            if ((k - other) / k).abs().is_nan() || ((k - other) / k).abs() > SAME {
+                short.push(format!("{}: k_z {k:e} here, {other:e} in numpy", row.method));
+            }
+        }
+    }
+    let seconds = bootstrap()?;
+    println!(
+        "bootstrap of {REPLICATES} replicates, {HITS} hits in each of 108 interface cells, {MAIN_LINES} lines: {seconds:.1} s (at most {BOOTSTRAP_S})"
+    );
+    if seconds > BOOTSTRAP_S {
+        short.push("the bootstrap takes too long".into());
+    }
+    if short.is_empty() { Ok(()) } else { Err(short.join("\n  ").into()) }
+}
+
+fn median(times: &mut [f64]) -> f64 {
+    times.sort_by(f64::total_cmp);
+    times.get(times.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+fn for_numpy(file: &Path, a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix, geometry: &Geometry) -> Outcome {
+    let complex = |name: &str, y: &FrfMatrix| {
+        let values = y.lines.iter().flat_map(|y| y.transpose().iter().copied().collect::<Vec<_>>()).collect();
+        Extra::Complex(
+            name.into(),
+            Array { shape: vec![y.lines.len(), y.outputs.len(), y.inputs.len()], values },
+        )
+    };
+    let vectors = |name: String, points: &[&Point], of: fn(&Point) -> [f64; 3]| {
+        let values = points.iter().flat_map(|p| of(p)).collect();
+        Extra::Real(name, Array { shape: vec![points.len(), 3], values })
+    };
+    let mut extras = Vec::new();
+    // the notebook takes the interface first
+    let interface_first = |y: &FrfMatrix,
+                           points: &Configuration,
+                           own: Grouping|
+     -> Result<FrfMatrix, Box<dyn std::error::Error>> {
+        let ordered = |points: &[Point], names: Vec<String>| -> Vec<String> {
+            let of = |want: bool| {
+                points
+                    .iter()
+                    .zip(&names)
+                    .filter(move |(p, _)| (p.grouping == own) == want)
+                    .map(|(_, n)| n.clone())
+            };
+            of(true).chain(of(false)).collect()
+        };
+        Ok(y.select(
+            &ordered(&points.channels, points.output_names()),
+            &ordered(&points.impacts, points.input_names()),
+        )?)
+    };
+    let a = interface_first(a, &geometry.a, Grouping::InterfaceA)?;
+    // A's spare response is no internal
+    let spare = |name: &String| {
+        geometry.a.channels.iter().any(|c| c.description == *name && c.grouping == Grouping::InternalA)
+    };
+    let used: Vec<String> = a.outputs.iter().filter(|o| !spare(o)).cloned().collect();
+    let a = a.select(&used, &a.inputs)?;
+    let b = interface_first(b, &geometry.b, Grouping::InterfaceB)?;
+    extras.extend([complex("a", &a), complex("b", &b), complex("ajb", ajb)]);
+    for (side, own, inner) in
+        [("a", Grouping::InterfaceA, Grouping::InternalA), ("b", Grouping::InterfaceB, Grouping::InternalB)]
+    {
+        let channels: Vec<&Point> = geometry.ajb.channels.iter().filter(|p| p.grouping == own).collect();
+        let impacts: Vec<&Point> = geometry.ajb.impacts.iter().filter(|p| p.grouping == own).collect();
+        for (kind, points) in [("channel", &channels), ("impact", &impacts)] {
+            extras.push(vectors(format!("{kind}_{side}_position"), points, |p| p.position_m));
+            extras.push(vectors(format!("{kind}_{side}_direction"), points, |p| p.direction));
+        }
+        let places = |name: String, points: &[&Point], names: &[String]| {
+            let values: Vec<i64> = points
+                .iter()
+                .filter_map(|p| names.iter().position(|n| *n == p.description))
+                .map(|i| i as i64)
+                .collect();
+            Extra::Real(
+                name,
+                Array { shape: vec![values.len()], values: values.iter().map(|i| *i as f64).collect() },
+            )
+        };
+        let with_inner = |points: &[Point]| -> Vec<Point> {
+            let of = |g: Grouping| points.iter().filter(move |p| p.grouping == g).cloned();
+            of(own).chain(of(inner)).collect()
+        };
+        let (all_out, all_in) = (with_inner(&geometry.ajb.channels), with_inner(&geometry.ajb.impacts));
+        extras.push(places(format!("out_{side}"), &channels, &ajb.outputs));
+        extras.push(places(format!("in_{side}"), &impacts, &ajb.inputs));
+        extras.push(places(format!("all_out_{side}"), &all_out.iter().collect::<Vec<_>>(), &ajb.outputs));
+        extras.push(places(format!("all_in_{side}"), &all_in.iter().collect::<Vec<_>>(), &ajb.inputs));
+    }
+    write_frf(file, ajb, &extras)?;
+    Ok(())
+}
+
+/// Seconds for all replicates; the hits' spectra are at hand, as the analysis has them.
+fn bootstrap() -> Result<f64, Box<dyn std::error::Error>> {
+    let geometry = read_positions(&data("positions/positions.xlsx"))?.geometry;
+    let mut ajb = tiled("AJB.npz", MAIN_LINES)?;
+    ajb.frequency_hz = (0..MAIN_LINES).map(|l| 300.0 + 0.5 * l as f64).collect();
+    let band = Band { low_hz: 300.0, high_hz: 600.0 };
+    let prepared = Prepared::of(&ajb, None, &geometry, IdmSet::Six, band, &Priors::default())?;
+    let interface = both(|g| matches!(g, Grouping::InterfaceA | Grouping::InterfaceB));
+    let mut cells: Vec<CellHits> = Vec::new();
+    for impact in geometry.ajb.impacts.iter().filter(|p| interface(p)) {
+        let column = ajb.inputs.iter().position(|i| *i == impact.name).ok_or("an impact")?;
+        for channels in geometry.ajb.channels.chunks(3).filter(|c| interface(&c[0])) {
+            let rows: Vec<usize> = channels
+                .iter()
+                .filter_map(|c| ajb.outputs.iter().position(|o| *o == c.description))
+                .collect();
+            let hit = |h: usize| Complex::from(1.0 + 1e-3 * h as f64);
+            cells.push(CellHits {
+                input: impact.name.clone(),
+                outputs: channels.iter().map(|c| c.description.clone()).collect(),
+                auto: vec![vec![1.0; HITS]; MAIN_LINES],
+                cross: ajb
+                    .lines
+                    .iter()
+                    .map(|y| {
+                        rows.iter().map(|&r| (0..HITS).map(|h| y[(r, column)] * hit(h)).collect()).collect()
+                    })
+                    .collect(),
+            });
+        }
+    }
+    let start = Instant::now();
+    black_box(prepared.bootstrap(&cells, REPLICATES, 1)?);
+    Ok(start.elapsed().as_secs_f64())
+}

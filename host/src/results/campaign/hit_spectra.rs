@@ -1,0 +1,58 @@
+//! Spectra of single hits, for the bootstrap: only the assembly's interface cells, only the main band.
+
+use super::cell::{Cell, CellName};
+use crate::results::MAIN_BAND_HZ;
+use crate::spectra::{FrfSettings, ImpactRecords, MotionQuantity, SpectraError, Windowing, estimate};
+use crate::substructuring::averaged::CellHits;
+use crate::substructuring::geometry::{Configuration, Grouping, Point};
+use num_complex::Complex;
+
+/// The spectra of every hit of a cell of the assembly's interface; none for another cell, or for a single hit.
+///
+/// # Errors
+/// Hits that cannot be transformed.
+pub fn of(
+    name: &CellName,
+    points: &Configuration,
+    cell: &Cell,
+    sigma_per_s: f64,
+    quantity: MotionQuantity,
+) -> Result<Option<CellHits>, SpectraError> {
+    let interface = |p: &&Point| matches!(p.grouping, Grouping::InterfaceA | Grouping::InterfaceB);
+    let channels: Vec<&Point> =
+        points.channels.iter().filter(interface).filter(|p| p.name == name.response).collect();
+    let there = points.impacts.iter().filter(interface).any(|p| p.name == name.impact);
+    if name.configuration != "AJB" || channels.is_empty() || !there || cell.hits.len() < 2 {
+        return Ok(None);
+    }
+    let settings = FrfSettings {
+        windowing: Windowing { sigma_per_s, ..Windowing::default() },
+        delay_s: cell.response_delay_s.to_vec(),
+        ..FrfSettings::default()
+    };
+    let (mut auto, mut cross) = (Vec::<Vec<f64>>::new(), Vec::<Vec<Vec<Complex<f64>>>>::new());
+    for hit in &cell.hits {
+        let one = ImpactRecords {
+            fs_hz: cell.fs_hz,
+            force_n: vec![hit.force_n.clone()],
+            response: vec![hit.response.to_vec()],
+            quantity,
+        };
+        let y = estimate(&one, &[true], &settings)?.band(MAIN_BAND_HZ[0], MAIN_BAND_HZ[1]);
+        auto.resize(y.s_ff.len(), Vec::new());
+        cross.resize(y.s_ff.len(), vec![Vec::new(); channels.len()]);
+        for (l, s_ff) in y.s_ff.iter().enumerate() {
+            auto[l].push(*s_ff);
+            for (of_channel, channel) in cross[l].iter_mut().zip(&channels) {
+                let along: Complex<f64> = (0..3).map(|axis| y.h1[l][axis] * channel.direction[axis]).sum();
+                of_channel.push(along * *s_ff);
+            }
+        }
+    }
+    Ok(Some(CellHits {
+        input: name.impact.clone(),
+        outputs: channels.iter().map(|c| c.description.clone()).collect(),
+        auto,
+        cross,
+    }))
+}

@@ -1,0 +1,133 @@
+//! The proof of the pudding: A and B coupled by the identified joint must be the measured assembly.
+
+use super::coupling::{boolean_difference, couple};
+use super::frf::FrfMatrix;
+use super::joint::Band;
+use super::pseudo_inverse::full_rank_inverse;
+use nalgebra::{Complex, DMatrix};
+use rayon::prelude::*;
+use serde::Serialize;
+
+type Line = DMatrix<Complex<f64>>;
+
+/// Lines within ± this many Hz are judged together by their median: a single antiresonance decides nothing.
+const AROUND_HZ: f64 = 25.0;
+
+/// How far the coupled assembly is from the measured one, line by line.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BackCoupling {
+    /// Lines, Hz.
+    pub frequency_hz: Vec<f64>,
+    /// ‖coupled − measured‖ / ‖measured‖ over both virtual points, rotations in metres over 40 mm.
+    pub error: Vec<f64>,
+}
+
+impl BackCoupling {
+    /// Couples Y^A and Y^B (n_c × n_c) by Eq. (1) with one spring and damper for all lines, K + sC: the mean of `z` over `band`.
+    /// None when no line lies in the band, or the mean joint has no inverse.
+    pub fn of(
+        axis: &FrfMatrix,
+        y_a: &[Line],
+        y_b: &[Line],
+        y_ajb: &[Line],
+        z: &[Line],
+        band: Band,
+    ) -> Option<BackCoupling> {
+        let n = y_a.first()?.nrows();
+        let inside: Vec<usize> =
+            (0..axis.frequency_hz.len()).filter(|&l| band.contains(axis.frequency_hz[l])).collect();
+        let mut stiffness = DMatrix::<f64>::zeros(n, n);
+        let mut damping = DMatrix::<f64>::zeros(n, n);
+        for &l in &inside {
+            let s = axis.s(l);
+            let c = z[l].map(|z| z.im / s.im);
+            stiffness += (z[l].map(|z| z.re) - &c * s.re) / inside.len() as f64;
+            damping += c / inside.len() as f64;
+        }
+        let b = boolean_difference(n);
+        let error = (0..axis.frequency_hz.len())
+            .into_par_iter()
+            .map(|l| {
+                let s = axis.s(l);
+                let joint = DMatrix::from_fn(n, n, |r, c| s * damping[(r, c)] + stiffness[(r, c)]);
+                let joint = full_rank_inverse(&joint, "the mean joint").ok()?;
+                let mut y = Line::zeros(2 * n, 2 * n);
+                y.view_mut((0, 0), (n, n)).copy_from(&y_a[l]);
+                y.view_mut((n, n), (n, n)).copy_from(&y_b[l]);
+                let coupled = couple(&y, &b, &b, Some(&joint)).ok()?;
+                Some((coupled - &y_ajb[l]).norm() / y_ajb[l].norm())
+            })
+            .collect::<Option<Vec<f64>>>()?;
+        (!inside.is_empty()).then(|| BackCoupling { frequency_hz: axis.frequency_hz.clone(), error })
+    }
+
+    /// Median error of the lines within ± 25 Hz of each line.
+    pub fn smoothed(&self) -> Vec<f64> {
+        self.frequency_hz
+            .iter()
+            .map(|f| {
+                let from = self.frequency_hz.partition_point(|g| *g < f - AROUND_HZ);
+                let to = self.frequency_hz.partition_point(|g| *g <= f + AROUND_HZ);
+                super::joint::median(&self.error[from..to])
+            })
+            .collect()
+    }
+
+    /// The lowest frequency from which on, up to `high_hz`, the smoothed error stays below `allowed`; none if it does not at
+    /// `high_hz`.
+    pub fn agrees_from(&self, high_hz: f64, allowed: f64) -> Option<f64> {
+        let end = self.frequency_hz.partition_point(|f| *f <= high_hz);
+        let smooth = self.smoothed();
+        let start = smooth[..end].iter().rposition(|e| *e >= allowed || e.is_nan()).map_or(0, |at| at + 1);
+        (start < end).then(|| self.frequency_hz[start])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::frf::Quantity;
+    use super::*;
+
+    /// Two single masses on springs, joined by 1e6 N/m below 200 Hz and by half of it above.
+    fn measured() -> (FrfMatrix, [Vec<Line>; 4]) {
+        let frequency_hz: Vec<f64> = (20..400).map(f64::from).collect();
+        let axis = FrfMatrix {
+            frequency_hz: frequency_hz.clone(),
+            sigma_per_s: 2.0,
+            quantity: Quantity::Receptance,
+            outputs: vec![],
+            inputs: vec![],
+            lines: vec![],
+        };
+        let one = |z: Complex<f64>| Line::from_element(1, 1, z.inv());
+        let mut all: [Vec<Line>; 4] = Default::default();
+        for (l, &f) in frequency_hz.iter().enumerate() {
+            let s = axis.s(l);
+            let spring = |k: f64| s * (1e-4 * k) + k;
+            let (a, b) = (s * s * 1.3 + spring(2e5), s * s * 0.7 + spring(4e5));
+            let z = if f < 200.0 { spring(1e6) } else { spring(5e5) };
+            let whole = Line::from_row_slice(2, 2, &[a + z, -z, -z, b + z]);
+            all[0].push(one(a));
+            all[1].push(one(b));
+            all[2].push(whole.try_inverse().expect("damped"));
+            all[3].push(Line::from_element(1, 1, z));
+        }
+        (axis, all)
+    }
+
+    #[test]
+    fn the_right_joint_gives_the_assembly_and_a_wrong_one_says_from_where() {
+        let (axis, [a, b, ajb, z]) = measured();
+        let above = Band { low_hz: 250.0, high_hz: 350.0 };
+        let found = BackCoupling::of(&axis, &a, &b, &ajb, &z, above).expect("lines");
+        let l = 300 - 20;
+        // rounding of 2 × 2 inverses
+        assert!(found.error[l] < 1e-10 && found.error[100 - 20] > 0.05, "{:?}", found.error);
+        let from = found.agrees_from(350.0, 1e-3).expect("agrees above");
+        // the median's window is 25 Hz wide on either side
+        assert!((from - 200.0).abs() <= 1.0, "{from}");
+        assert_eq!(found.agrees_from(150.0, 1e-6), None);
+        let nowhere = Band { low_hz: 1e4, high_hz: 2e4 };
+        assert_eq!(BackCoupling::of(&axis, &a, &b, &ajb, &z, nowhere), None);
+    }
+}

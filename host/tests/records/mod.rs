@@ -1,0 +1,205 @@
+//! Impact records of a rig without waiting for them: the exact FRFs at each cell's true (wrong) geometry, times the hammer's
+//! spectrum, back into time, with the sensors' noise. What the analysis sees is what it would read from a campaign file.
+
+use jointrig::exchange::read_positions;
+use jointrig::results::campaign::{Cell, CellName, ContactDelays, ContactSignals, Hit, Measurements};
+use jointrig::spectra::MotionQuantity;
+use jointrig::substructuring::geometry::{Geometry, Grouping};
+use jointrig_hil_sim::rig::config::BodyName;
+use jointrig_hil_sim::rig::structure::Structure;
+use jointrig_hil_sim::rig::{Aim, Configuration, Probe, RigConfig};
+use nalgebra::{Complex, DMatrix, DVector};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use realfft::RealFftPlanner;
+use std::convert::Infallible;
+use std::f64::consts::{PI, TAU};
+use std::path::Path;
+
+type C = Complex<f64>;
+
+const RATE_HZ: f64 = 51_200.0;
+const RECORD_S: f64 = 2.0;
+const SAMPLES: usize = 102_400;
+const HITS: usize = 2;
+/// Records are made on s = σ + iω, where they have decayed before they begin anew, and multiplied by e^(σt) afterwards.
+const SIGMA: f64 = 6.0;
+/// The hammer's half-sine, and where it begins.
+const PEAK_N: f64 = 50.0;
+const WIDTH_S: f64 = 0.41e-3;
+const START_S: f64 = 5e-3;
+/// The force is smoothed away between these, Hz: far above the analysis, so that nothing rings.
+const TAPER_HZ: [f64; 2] = [2000.0, 4000.0];
+
+/// The assembly of a rig, hit at its interface and on its moving mass.
+pub struct Assembly {
+    config: RigConfig,
+    geometry: Geometry,
+    structure: Structure,
+    /// Receptance between generalised coordinates, line by line from 0 Hz, on s = σ + iω.
+    compliance: Vec<DMatrix<C>>,
+    force: Vec<C>,
+    seed: u64,
+}
+
+impl Assembly {
+    pub fn of(config: RigConfig, seed: u64) -> Assembly {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/positions/positions.xlsx");
+        let geometry = read_positions(&path).expect("test data").geometry;
+        let structure = Structure::new(&config, Configuration::Ajb);
+        let lines = (TAPER_HZ[1] * RECORD_S) as usize;
+        let scale = structure.mass.diagonal().map(|m| 1.0 / m.sqrt());
+        let compliance = (0..lines)
+            .map(|l| {
+                let s = variable(l);
+                // coordinates of unit mass, or metres and radians cost digits
+                let z = DMatrix::from_fn(scale.len(), scale.len(), |i, j| {
+                    (s * s * structure.mass[(i, j)]
+                        + s * structure.damping[(i, j)]
+                        + structure.stiffness[(i, j)])
+                        * scale[i]
+                        * scale[j]
+                });
+                let inverse = z.try_inverse().expect("damped");
+                DMatrix::from_fn(scale.len(), scale.len(), |i, j| inverse[(i, j)] * scale[i] * scale[j])
+            })
+            .collect();
+        let force = (0..lines).map(|l| half_sine(variable(l)) * taper(l as f64 / RECORD_S)).collect();
+        Assembly { config, geometry, structure, compliance, force, seed }
+    }
+
+    fn signal(&self, spectrum: impl Fn(usize) -> C, floor: f64, stream: &mut Xoshiro256PlusPlus) -> Vec<f64> {
+        let fft = RealFftPlanner::<f64>::new().plan_fft_inverse(SAMPLES);
+        let mut lines = fft.make_input_vec();
+        for (l, value) in lines.iter_mut().enumerate().take(self.force.len()) {
+            *value = spectrum(l);
+        }
+        lines[0].im = 0.0;
+        let mut signal = fft.make_output_vec();
+        fft.process(&mut lines, &mut signal).expect("lengths fit");
+        let step_hz = 1.0 / RECORD_S;
+        for (t, value) in signal.iter_mut().enumerate() {
+            let white: f64 = StandardNormal.sample(stream);
+            *value = *value * step_hz * (SIGMA * t as f64 / RATE_HZ).exp() + floor * white;
+        }
+        signal
+    }
+
+    fn row(&self, probe: &Probe) -> DVector<C> {
+        self.structure.row(probe).expect("its body is there").map(Complex::from)
+    }
+}
+
+impl Measurements for Assembly {
+    type Error = Infallible;
+
+    fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    fn sigma_per_s(&self) -> f64 {
+        2.3
+    }
+
+    fn quantity(&self) -> MotionQuantity {
+        MotionQuantity::Velocity
+    }
+
+    fn cells(&self) -> Vec<CellName> {
+        let interface = |g| matches!(g, Grouping::InterfaceA | Grouping::InterfaceB);
+        let mut cells = Vec::new();
+        for impact in &self.geometry.ajb.impacts {
+            for channel in self.geometry.ajb.channels.iter().step_by(3).filter(|c| interface(c.grouping)) {
+                // of the moving mass one cell is enough: its hits count at the contact only
+                let mass = impact.grouping == Grouping::InternalA && impact.direction[2].abs() > 0.9;
+                if interface(impact.grouping) || (mass && channel.name == "A1") {
+                    cells.push(CellName {
+                        configuration: "AJB".into(),
+                        impact: impact.name.clone(),
+                        response: channel.name.clone(),
+                    });
+                }
+            }
+        }
+        cells
+    }
+
+    fn read(&self, cell: &CellName) -> Result<Cell, Infallible> {
+        let config = &self.config;
+        let impact =
+            config.impact(Configuration::Ajb, &cell.impact).expect("the workbook's impacts are the rig's");
+        let response = config.response(Configuration::Ajb, &cell.response).expect("and its responses");
+        let words = ["AJB", cell.impact.as_str(), cell.response.as_str()];
+        let aim = Aim::new(self.seed, words, &config.errors, impact, response);
+        let column = self.row(&aim.impact);
+        // generalised motion per newton of this hit
+        let motion: Vec<DVector<C>> = self.compliance.iter().map(|y| y * &column).collect();
+        let velocity = |probe: &Probe| -> Vec<C> {
+            let row = self.row(probe);
+            motion.iter().enumerate().map(|(l, m)| row.dot(m) * variable(l) * self.force[l]).collect()
+        };
+        let responses = aim.response.map(|probe| velocity(&probe));
+        let spots = [&config.spots.ldv_a, &config.spots.ldv_b].map(|spot| velocity(&Probe::along_z(spot)));
+        // the load cells' springs carry T: kz · z of arm B at each
+        let tangential: Vec<C> = config
+            .load_cells
+            .iter()
+            .map(|cell| {
+                let probe =
+                    Probe { body: BodyName::ArmB, position_m: cell.position_m, direction: [0.0, 0.0, 1.0] };
+                self.row(&probe) * Complex::from(cell.stiffness_n_per_m[2])
+            })
+            .fold(Vec::new(), |sum: Vec<C>, row| {
+                let own = motion.iter().enumerate().map(|(l, m)| row.dot(m) * self.force[l]);
+                if sum.is_empty() { own.collect() } else { sum.iter().zip(own).map(|(a, b)| a + b).collect() }
+            });
+        let seed = cell
+            .impact
+            .bytes()
+            .chain(cell.response.bytes())
+            .fold(self.seed, |seed, byte| seed.wrapping_mul(31).wrapping_add(u64::from(byte)));
+        let mut stream = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let nyquist = (RATE_HZ / 2.0).sqrt();
+        let floor = config.sensors.vibrometer.floor * nyquist;
+        let spot_floor = config.sensors.ldv_a.floor * nyquist;
+        let cell_noise = config.sensors.load_cells.noise_n * (config.load_cells.len() as f64).sqrt();
+        let hits = (0..HITS)
+            .map(|h| Hit {
+                record: i64::try_from(h).expect("few hits") + 1,
+                force_n: self.signal(|l| self.force[l], config.sensors.force.noise_n, &mut stream),
+                response: [0, 1, 2].map(|axis| self.signal(|l| responses[axis][l], floor, &mut stream)),
+                contact: Some(ContactSignals {
+                    specimen_a_m_per_s: self.signal(|l| spots[0][l], spot_floor, &mut stream),
+                    specimen_b_m_per_s: self.signal(|l| spots[1][l], spot_floor, &mut stream),
+                    tangential_n: self.signal(|l| tangential[l], cell_noise, &mut stream),
+                }),
+            })
+            .collect();
+        Ok(Cell {
+            fs_hz: RATE_HZ,
+            hits,
+            left_out: Vec::new(),
+            response_delay_s: [0.0; 3],
+            contact_delay_s: ContactDelays::default(),
+        })
+    }
+}
+
+/// s of a line, 1/s.
+fn variable(line: usize) -> C {
+    Complex::new(SIGMA, TAU * line as f64 / RECORD_S)
+}
+
+/// The hammer's spectrum on s, N s.
+fn half_sine(s: C) -> C {
+    let turn = PI / WIDTH_S;
+    let end = (-s * WIDTH_S).exp() + 1.0;
+    (-s * START_S).exp() * PEAK_N * turn * end / (s * s + turn * turn)
+}
+
+fn taper(frequency_hz: f64) -> f64 {
+    let [from, to] = TAPER_HZ;
+    let part = ((frequency_hz - from) / (to - from)).clamp(0.0, 1.0);
+    0.5 * (1.0 + (PI * part).cos())
+}
