@@ -96,7 +96,7 @@ fn a_contact_of_240_is_found_through_the_same_clamp() {
 fn hits_drawn_anew_scatter_as_the_noise_does() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../hil-sim/rigs/noisy.toml");
     let config = RigConfig::from_toml(&std::fs::read_to_string(path).expect("a rig")).expect("readable");
-    let wanted = Wanted { replicates: 100 };
+    let wanted = Wanted { replicates: 100, ..Wanted::default() };
     let results =
         analyse_measurements(&Assembly::of(config, 5), Results::new(Source::default()), wanted, &|_| {});
     let drawn = results.bootstrap.as_ref().expect("two hits in every cell");

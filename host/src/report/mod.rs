@@ -87,7 +87,7 @@ mod tests {
         ] {
             assert!(html.contains(text), "`{text}` is not on the page");
         }
-        assert_eq!(html.matches("<svg").count(), 7);
+        assert_eq!(html.matches("<svg").count(), 10);
     }
 
     #[test]
