@@ -6,6 +6,7 @@
 //! files or screens: arrays and geometry in, numbers out.
 #![forbid(unsafe_code)]
 
+mod advice;
 pub mod campaign;
 pub mod cli;
 pub mod device;

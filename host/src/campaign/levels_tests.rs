@@ -80,11 +80,11 @@ fn nothing_of_a_level_can_be_changed_unseen() {
 
 /// Files from before there were levels are read without any, and get room for them when they are written.
 #[test]
-fn a_file_of_version_2_has_no_levels_until_it_is_brought_up() {
+fn a_file_of_version_3_has_no_levels_until_it_is_brought_up() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("old.jrig");
     let store = Store::create(&path, SMALL, "small").expect("created");
-    store.connection.execute_batch("DROP TABLE levels; PRAGMA user_version = 2;").expect("made older");
+    store.connection.execute_batch("DROP TABLE levels; PRAGMA user_version = 3;").expect("made older");
     store.close().expect("closed");
     let store = Store::open_read_only(&path).expect("read as it is");
     assert!(store.levels().expect("none").is_empty() && store.verify().expect("whole").is_empty());

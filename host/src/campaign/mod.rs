@@ -9,6 +9,7 @@ pub mod check;
 mod clock;
 pub mod codec;
 mod earlier;
+pub mod frfs;
 pub mod judge;
 mod keeper;
 pub mod level;

@@ -16,7 +16,7 @@ pub const SMALL: &str = include_str!("../../../docs/plans/small.toml");
 
 /// What is wrong with a plan, and where.
 #[derive(Debug, thiserror::Error)]
-#[error("{source_name}:{line}: {what}")]
+#[error("{source_name}:{line}: {what} (docs/campaigns.md explains every field)")]
 pub struct PlanError {
     /// The file.
     pub source_name: String,
@@ -368,11 +368,15 @@ impl Plan {
     }
 }
 
-/// What toml says, with the text that it points at.
+/// What toml says, with the line that it points at.
 fn field(text: &str, wrong: &toml::de::Error) -> String {
     let said = wrong.message().to_owned();
-    match wrong.span().and_then(|span| text.get(span)).map(|at| at.lines().next().unwrap_or("").trim()) {
-        Some(at) if !at.is_empty() && !said.contains(at) => format!("{said} (at `{at}`)"),
+    let line = wrong.span().and_then(|span| {
+        let from = text.get(..span.start)?.rfind('\n').map_or(0, |end| end + 1);
+        Some(text.get(from..)?.lines().next()?.trim())
+    });
+    match line {
+        Some(line) if !line.is_empty() && !said.contains(line) => format!("{said} (at `{line}`)"),
         _ => said,
     }
 }

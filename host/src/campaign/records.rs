@@ -256,6 +256,11 @@ impl Store {
             damage.push(Damage { record: Some(record.id), what });
         }
         damage.extend(self.verify_levels()?);
+        for row in self.frf_rows()? {
+            if let Err(error) = self.frf_of(row.id) {
+                damage.push(Damage { record: None, what: error.to_string() });
+            }
+        }
         Ok(damage)
     }
 }

@@ -6,13 +6,16 @@
 pub const APPLICATION_ID: i32 = i32::from_be_bytes(*b"JRIG");
 
 /// Version of the tables, in SQLite's `user_version`.
-pub const VERSION: i32 = 3;
+pub const VERSION: i32 = 4;
 
 /// `STEPS[n]` turns version n into version n + 1; a new file takes them all. A step that was released is frozen.
-pub const STEPS: [&str; VERSION as usize] = [FIRST, SEALS, LEVELS];
+pub const STEPS: [&str; VERSION as usize] = [FIRST, SEALS, FRFS, LEVELS];
+
+/// The first version whose files hold FRFs from elsewhere.
+pub const WITH_FRFS: i32 = 3;
 
 /// The first version whose files hold levels of the shaker.
-pub const WITH_LEVELS: i32 = 3;
+pub const WITH_LEVELS: i32 = 4;
 
 /// Version 1. Raw records are append-only: triggers refuse any change.
 const FIRST: &str = "
@@ -150,7 +153,31 @@ CREATE TABLE sensors (
 ALTER TABLE cells ADD COLUMN settled TEXT;
 ";
 
-/// Version 3: levels of the shaker.
+/// Version 3: FRFs that were measured elsewhere.
+const FRFS: &str = "
+-- the latest row of a configuration counts. frequency, frf and variance are f64, little-endian: frf (line, output, input) with real
+-- and imaginary part in turn, variance (line, output, input) of the real part. outputs and inputs are JSON lists of names
+CREATE TABLE frfs (
+    id            INTEGER PRIMARY KEY,
+    configuration TEXT NOT NULL,
+    utc           TEXT NOT NULL,
+    source        TEXT NOT NULL,
+    quantity      TEXT NOT NULL,
+    sigma_per_s   REAL NOT NULL,
+    outputs       TEXT NOT NULL,
+    inputs        TEXT NOT NULL,
+    frequency     BLOB NOT NULL,
+    frf           BLOB NOT NULL,
+    variance      BLOB,
+    crc32         INTEGER NOT NULL
+) STRICT;
+CREATE TRIGGER frfs_stay BEFORE UPDATE ON frfs
+BEGIN SELECT RAISE(ABORT, 'imported FRFs are never changed'); END;
+CREATE TRIGGER frfs_remain BEFORE DELETE ON frfs
+BEGIN SELECT RAISE(ABORT, 'imported FRFs are never deleted'); END;
+";
+
+/// Version 4: levels of the shaker.
 const LEVELS: &str = "
 -- one row per level that was recorded: a sine held in steady state, or a sweep from rest to rest. amplitude and reached are m, N
 -- or V as control is displacement, force or drive. The seal runs over all other columns but samples (see levels.rs)

@@ -23,7 +23,7 @@ pub enum StoreError {
         path: PathBuf,
     },
     /// Some other file.
-    #[error("{path} is not a campaign file")]
+    #[error("{path} is not a campaign file: give the .jrig file that `jointrig campaign new` made")]
     Foreign {
         /// The file.
         path: PathBuf,
@@ -129,6 +129,9 @@ pub(super) fn sqlite(path: &Path, doing: &'static str, source: rusqlite::Error) 
         }
         Some(ErrorCode::SystemIoFailure) => {
             "; is the disk whole, and is there space on it? nothing accepted is lost: run the same command again"
+        }
+        Some(ErrorCode::DatabaseCorrupt) => {
+            "; the file was cut off or damaged: go on from a copy that `jointrig campaign backup` made"
         }
         Some(ErrorCode::ReadOnly) => "; the file or its folder is read-only",
         Some(ErrorCode::CannotOpen) => "; does the folder exist, and may you write there?",

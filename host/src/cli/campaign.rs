@@ -4,6 +4,7 @@ mod backup;
 mod check;
 mod judged;
 mod new;
+mod plan_file;
 mod run;
 mod show;
 mod status;

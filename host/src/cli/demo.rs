@@ -80,7 +80,7 @@ impl Demo {
     fn marks(&self) -> Result<Marks, CliError> {
         let rig = match &self.rig {
             None => "built-in".into(),
-            Some(path) => std::fs::read_to_string(path).map_err(|source| CliError::File {
+            Some(path) => std::fs::read_to_string(path).map_err(|source| CliError::Read {
                 path: path.clone(),
                 doing: "reading the rig's description",
                 source,

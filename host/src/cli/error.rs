@@ -4,6 +4,7 @@
 use std::io;
 use std::path::PathBuf;
 
+use crate::advice;
 use crate::campaign::plan::PlanError;
 use crate::campaign::runner::RunError;
 use crate::campaign::shaking::ShakeError;
@@ -35,8 +36,18 @@ pub enum CliError {
     /// The analysis.
     #[error(transparent)]
     Analyse(#[from] AnalyseError),
-    /// A file or folder.
-    #[error("{path}: {doing}: {source}")]
+    /// A file that is read.
+    #[error("{path}: {doing}: {source}; {}", advice::reading(source))]
+    Read {
+        /// Which.
+        path: PathBuf,
+        /// What was being done.
+        doing: &'static str,
+        /// What the operating system said.
+        source: io::Error,
+    },
+    /// A file or folder that is written.
+    #[error("{path}: {doing}: {source}; {}", advice::writing(source))]
     File {
         /// Which.
         path: PathBuf,

@@ -10,6 +10,7 @@ use num_complex::Complex;
 use super::analyse::analyse_into;
 use super::error::CliError;
 use super::{frf, output};
+use crate::campaign::frfs::ImportedFrf;
 use crate::campaign::plan::configuration_name;
 use crate::campaign::rows::RecordRow;
 use crate::campaign::store::Store;
@@ -29,7 +30,7 @@ const LEAD_S: f64 = 1.25e-3;
 /// Write everything that a campaign file holds for other programs.
 ///
 /// DIR/geometry: csv tables in the form of the pyFBS workbook. DIR/frf: one file for each configuration, H1 of the good hits
-/// with coherence and variance. DIR/records: one file for each cell with all its hits. DIR/results.json and report.html.
+/// with coherence and variance, or what was imported. DIR/records: one file for each cell with all its hits. DIR/results.json and report.html.
 #[derive(Debug, Args)]
 pub struct Export {
     /// The campaign file.
@@ -126,6 +127,9 @@ impl Export {
                         ))
                     })?;
                 }
+            }
+            if matrix.is_none() {
+                matrix = store.frf(name)?.map(Matrix::imported);
             }
             if let Some(matrix) = matrix {
                 let path = folders[1].join(name).with_extension(self.format.extension());
@@ -272,6 +276,20 @@ impl Matrix {
                 outputs,
                 inputs,
             },
+        }
+    }
+
+    /// FRFs from elsewhere; their coherence is not known.
+    fn imported(imported: ImportedFrf) -> Self {
+        let ImportedFrf { frf, noise, .. } = imported;
+        let entries = frf.lines.len() * frf.outputs.len() * frf.inputs.len();
+        // C order is the transpose's columns
+        let variance =
+            noise.map(|n| n.variance.iter().flat_map(|v| v.transpose().data.as_vec().clone()).collect());
+        Matrix {
+            coherence: vec![f64::NAN; entries],
+            variance: variance.unwrap_or_else(|| vec![f64::NAN; entries]),
+            frf,
         }
     }
 

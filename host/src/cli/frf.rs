@@ -9,7 +9,8 @@ use super::error::CliError;
 use super::output;
 use crate::campaign::verdict::{Limits, Verdict, VerdictKind, judge_all};
 use crate::exchange::npz::Array;
-use crate::exchange::{Extra, read_impacts, write_frf};
+use crate::exchange::record_uff::read_record_file;
+use crate::exchange::{Extra, write_frf};
 use crate::spectra::{
     AveragedFrf, ForceWeighting, FrfSettings, ImpactRecords, MotionQuantity, Origin, UsableBand, Windowing,
     estimate, usable_band,
@@ -17,13 +18,13 @@ use crate::spectra::{
 
 /// FRFs of impact records from anywhere: verdict on every hit, average of the good ones.
 ///
-/// RECORDS.npz holds `fs` (Hz), `force` (hit, sample) in N, `response` (hit, channel, sample) in SI and `quantity`
-/// (velocity, acceleration or displacement). FRFs are on s = sigma + i 2 pi f: the exponential window's damping is part of s,
+/// RECORDS is an npz that holds `fs` (Hz), `force` (hit, sample) in N, `response` (hit, channel, sample) in SI and `quantity`
+/// (velocity, acceleration or displacement), or a universal file of time responses, each hit's force first. FRFs are on s = sigma + i 2 pi f: the exponential window's damping is part of s,
 /// not an error of the result.
 #[derive(Debug, Args)]
 pub struct Frf {
     /// The records.
-    #[arg(value_name = "RECORDS.npz")]
+    #[arg(value_name = "RECORDS")]
     records: PathBuf,
     /// Print verdicts, settings and the usable band as one JSON document.
     #[arg(long)]
@@ -107,7 +108,11 @@ pub(super) fn band(text: &str) -> Result<(f64, f64), String> {
 impl Frf {
     pub fn run(self) -> Result<(), CliError> {
         self.check()?;
-        let records = read_impacts(&self.records).map_err(|e| CliError::Bad(e.to_string()))?;
+        let (records, warnings) =
+            read_record_file(&self.records).map_err(|e| CliError::Bad(e.to_string()))?;
+        for warning in &warnings {
+            eprintln!("{}: {warning}", self.records.display());
+        }
         let names = self.names(records.response.first().map_or(0, Vec::len))?;
         let verdicts = judge_all(&records, &Limits::default(), None);
         let used: Vec<bool> = verdicts.iter().map(|v| v.verdict == VerdictKind::Good).collect();

@@ -8,14 +8,12 @@ use clap::Args;
 
 use super::error::CliError;
 use super::output;
-use crate::exchange::npz::NpzFile;
-use crate::exchange::{NpzError, PositionsError, read_frf, read_positions};
+use crate::exchange::{PositionsError, read_frf, read_frf_noise, read_positions};
 use crate::results::campaign::{BANDS_HZ, shaped};
 use crate::results::{Results, Source, words};
 use crate::substructuring::averaged::{Priors, averaged};
 use crate::substructuring::noise::FrfNoise;
 use crate::substructuring::{Band, FrfMatrix, Geometry, IdmSet, Method, identify};
-use nalgebra::DMatrix;
 
 /// Identify a joint from FRFs of A, B and the assembly, measured anywhere.
 ///
@@ -62,7 +60,7 @@ impl Identify {
         let frf = |path: &Path| read_frf(path).map_err(bad);
         let (a, b, ajb) = (frf(&self.a)?, frf(&self.b)?, frf(&self.ajb)?);
         let (geometry, notes) = read_geometry(&self.geometry)?;
-        let noise = read_noise(&self.ajb, &ajb).map_err(bad)?;
+        let noise = read_frf_noise(&self.ajb, &ajb).map_err(bad)?;
         for note in notes {
             eprintln!("jointrig: {note}");
         }
@@ -154,39 +152,25 @@ fn default_bands(frf: &FrfMatrix) -> Result<Vec<Band>, CliError> {
 /// The geometry, and what a reader must know about it.
 fn read_geometry(path: &Path) -> Result<(Geometry, Vec<String>), CliError> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
-        let text = std::fs::read_to_string(path).map_err(|source| CliError::File {
+        let text = std::fs::read_to_string(path).map_err(|source| CliError::Read {
             path: path.into(),
             doing: "reading the geometry",
             source,
         })?;
         let geometry: Geometry =
-            toml::from_str(&text).map_err(|e| CliError::Bad(format!("{}: {e}", path.display())))?;
+            toml::from_str(&text).map_err(|e| {
+                let line = e.span().map_or(1, |at| 1 + text[..at.start].matches('\n').count());
+                CliError::Bad(format!(
+                    "{}, line {line}: {}; a geometry has `a`, `b` and `ajb`, each with `channels` and `impacts`, and both \
+                     virtual points (docs/coming-from-pyfbs.md)",
+                    path.display(),
+                    e.message()
+                ))
+            })?;
         return Ok((geometry, Vec::new()));
     }
     let positions = read_positions(path).map_err(|e: PositionsError| bad(e))?;
     Ok((positions.geometry, positions.warnings))
-}
-
-/// The array `variance` (line, output, input) of an FRF file, where it has one: of the real part of each value.
-fn read_noise(path: &Path, frf: &FrfMatrix) -> Result<Option<FrfNoise>, NpzError> {
-    let mut file = NpzFile::open(path)?;
-    if !file.has("variance") {
-        return Ok(None);
-    }
-    let (lines, rows, columns) = (frf.lines.len(), frf.outputs.len(), frf.inputs.len());
-    let expected = format!("the variance of each value's real part, shape ({lines}, {rows}, {columns})");
-    let array = file.real("variance", &expected)?;
-    // FRFs of a single impact have no axis of inputs
-    let fits = array.shape == [lines, rows, columns] || (columns == 1 && array.shape == [lines, rows]);
-    if !fits || rows * columns == 0 {
-        return Err(file.unexpected("variance", &format!("has shape {:?}", array.shape), &expected));
-    }
-    let variance = array
-        .values
-        .chunks(rows * columns)
-        .map(|line| DMatrix::from_row_slice(rows, columns, line))
-        .collect();
-    Ok(Some(FrfNoise { variance }))
 }
 
 fn bad(error: impl std::fmt::Display) -> CliError {

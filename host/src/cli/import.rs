@@ -1,280 +1,166 @@
 //! `import`: FRFs and impact records from elsewhere.
 
+mod quantised;
+mod records;
+
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
-use jointrig_protocol::shot::{Phase, Shot};
 
 use super::error::CliError;
 use super::output;
-use crate::campaign::judge::{ByRecord, Judge};
-use crate::campaign::others::Others;
-use crate::campaign::plan::{Cell, configuration_name};
-use crate::campaign::rows::{Counters, NewRecord, Samples, SessionInfo};
-use crate::campaign::store::{Store, utc_now};
-use crate::device::channels::ChannelMap;
-use crate::device::recording::Recording;
-use crate::exchange::frf_uff::read_frf_uff;
-use crate::exchange::{read_impacts, write_frf};
-use crate::spectra::{ImpactRecords, MotionQuantity, Pulse};
-
-/// Codes on either side of zero that the largest value of a channel becomes: full scale stays free, so that nothing reads as overload.
-const TOP_CODE: f64 = 32_000.0;
+use crate::campaign::judge::Kind;
+use crate::campaign::plan::{configuration_name, configuration_named};
+use crate::campaign::store::Store;
+use crate::exchange::npz::Array;
+use crate::exchange::{Extra, FrfFile, read_frf_file, write_frf};
+use crate::results;
+use crate::substructuring::frf::FrfMatrix;
+use crate::substructuring::geometry::Configuration as Points;
+use crate::substructuring::noise::FrfNoise;
+use records::CellName;
 
 /// Bring FRFs or impact records from elsewhere into jointrig's own files.
 ///
-/// FRFs: a universal file (58, 58b) becomes an npz FRF file. Impact records: an npz of one impact position with the three
-/// axes x, y, z of one response location goes into a campaign file, where every hit is judged like a measured one.
+/// FRFs (npz, or universal file 58, 58b) become an npz FRF file with --out, or go into a campaign file with --into and
+/// --configuration: they stand in for that configuration, as if it had been measured here. Impact records of one impact position
+/// and one response location along x, y, z (npz, or time responses in a universal file) go into a cell of a campaign file
+/// with --impact and --response too, where every hit is judged like a measured one.
 #[derive(Debug, Args)]
 pub struct Import {
-    /// A universal file with FRFs, or an npz of impact records.
+    /// An npz or universal file.
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// FRFs: the npz file to write.
     #[arg(long, value_name = "FILE.npz", conflicts_with = "into", required_unless_present = "into")]
     out: Option<PathBuf>,
-    /// Records: the campaign file that they go into (`jointrig campaign new` makes one).
-    #[arg(long, value_name = "FILE.jrig", requires_all = ["configuration", "impact", "response"])]
+    /// The campaign file that they go into (`jointrig campaign new` makes one).
+    #[arg(long, value_name = "FILE.jrig", requires = "configuration")]
     into: Option<PathBuf>,
-    /// Records: the configuration that was hit (A, B or AJB).
-    #[arg(long, value_name = "NAME")]
+    /// The configuration that was measured (A, B or AJB).
+    #[arg(long, value_name = "NAME", requires = "into")]
     configuration: Option<String>,
     /// Records: the impact's name in the plan.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", requires_all = ["into", "response"])]
     impact: Option<String>,
     /// Records: the response location's name in the plan.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", requires_all = ["into", "impact"])]
     response: Option<String>,
+}
+
+fn bad(error: impl std::fmt::Display) -> CliError {
+    CliError::Bad(error.to_string())
 }
 
 impl Import {
     pub fn run(self) -> Result<(), CliError> {
-        match (&self.out, &self.into) {
-            (Some(out), _) => self.frfs(out),
-            (None, Some(into)) => self.records(into),
-            (None, None) => {
-                Err(CliError::Usage("give --out FILE.npz for FRFs, or --into FILE.jrig for records".into()))
+        match (&self.out, &self.into, &self.configuration, &self.impact, &self.response) {
+            (Some(out), ..) => self.convert(out),
+            (None, Some(into), Some(configuration), Some(impact), Some(response)) => {
+                records::import(&self.file, into, &CellName { configuration, impact, response })
             }
+            (None, Some(into), Some(configuration), ..) => self.frfs(into, configuration),
+            _ => Err(CliError::Usage(
+                "give --out FILE.npz for an FRF file, or --into FILE.jrig with --configuration (and for records --impact \
+                 and --response)"
+                    .into(),
+            )),
         }
     }
 
-    fn frfs(&self, out: &Path) -> Result<(), CliError> {
-        let bad = |error: &dyn std::fmt::Display| CliError::Bad(error.to_string());
-        let (frf, warnings) = read_frf_uff(&self.file).map_err(|e| bad(&e))?;
-        for warning in &warnings {
+    fn read(&self) -> Result<FrfFile, CliError> {
+        let file = read_frf_file(&self.file).map_err(bad)?;
+        for warning in &file.warnings {
             eprintln!("{}: {warning}", self.file.display());
         }
-        write_frf(out, &frf, &[]).map_err(|e| bad(&e))?;
-        output::lines([format!(
-            "{}: {} of {} outputs, {} inputs, {} lines",
-            out.display(),
-            frf.quantity,
-            frf.outputs.len(),
-            frf.inputs.len(),
-            frf.lines.len()
-        )])
+        Ok(file)
     }
 
-    fn records(&self, into: &Path) -> Result<(), CliError> {
-        let records = read_impacts(&self.file).map_err(|e| CliError::Bad(e.to_string()))?;
-        let mut store = Store::open(into)?;
-        let plan = store.plan()?;
-        let (row, attempt) = self.cell(&store)?;
-        let (map, codes) = quantised(&records)
-            .map_err(|reason| CliError::Bad(format!("{}: {reason}", self.file.display())))?;
-        let recordings: Vec<Recording> = codes
-            .into_iter()
-            .zip(&records.force_n)
-            .enumerate()
-            .map(|(hit, (codes, force_n))| {
-                let pulse = Pulse::locate(force_n).ok_or_else(|| {
-                    CliError::Bad(format!(
-                        "{}: hit {hit} has no force pulse: take it out",
-                        self.file.display()
-                    ))
-                })?;
-                Ok(recording(hit, codes, map.len(), &pulse))
-            })
-            .collect::<Result<_, CliError>>()?;
-        let session = store.begin_session(&self.session(), &map)?;
-        let (mut kept, mut others) = (0, Others::default());
-        let hits = recordings.len();
-        for (hit, recording) in recordings.into_iter().enumerate() {
-            let judgement = ByRecord.judge(&row.1, &plan, &map, &recording, &others);
-            if judgement.kind == crate::campaign::judge::Kind::Good {
-                others.learn(&plan, &map, &Samples::of(&recording));
-            }
-            kept += usize::from(judgement.kind == crate::campaign::judge::Kind::Good);
-            eprintln!("hit {hit}: {} ({})", judgement.kind, judgement.sentence);
-            let record = NewRecord {
-                cell: row.0,
-                attempt: attempt + hit as u32,
-                session,
-                utc: utc_now(),
-                // when it was measured is not known here
-                utc_error_s: None,
-                recording,
-                judgement,
-            };
-            store.insert(&record, &Counters::default())?;
-        }
-        let rounding: Vec<String> = map
-            .channels
-            .iter()
-            .map(|c| format!("{} {:.1e} {}", c.name, 0.5 * c.units_per_code().abs(), c.quantity.unit()))
-            .collect();
-        store.log(&format!("imported {hits} hits from {}", self.file.display()))?;
-        store.close()?;
-        output::lines([
-            format!("{}: {kept} of {hits} hits are good", into.display()),
-            format!("stored in 16 bits, rounded by at most: {}", rounding.join(", ")),
-        ])
+    fn convert(&self, out: &Path) -> Result<(), CliError> {
+        let FrfFile { frf, noise, .. } = self.read()?;
+        let extras: Vec<Extra> = noise.iter().map(|noise| variance(&frf, noise)).collect();
+        write_frf(out, &frf, &extras).map_err(bad)?;
+        output::lines([format!("{}: {}", out.display(), described(&frf))])
     }
 
-    /// The cell's id and name, and the first attempt that is free in it.
-    fn cell(&self, store: &Store) -> Result<((i64, Cell), u32), CliError> {
-        let wanted =
-            [&self.configuration, &self.impact, &self.response].map(|name| name.as_deref().unwrap_or(""));
-        let found = store.cells()?.into_iter().find(|row| {
-            let Cell { configuration, impact, response, .. } = &row.cell;
-            [configuration_name(*configuration), impact, response] == wanted
-        });
-        let Some(row) = found else {
-            return Err(CliError::Usage(format!(
-                "{} has no cell of configuration `{}`, impact `{}`, response `{}`: `jointrig campaign status` lists its cells",
-                store.path().display(),
-                wanted[0],
-                wanted[1],
-                wanted[2]
+    /// FRFs of a whole configuration into a campaign file.
+    fn frfs(&self, into: &Path, name: &str) -> Result<(), CliError> {
+        let configuration = configuration_named(name).ok_or_else(|| {
+            CliError::Usage(format!(
+                "there is no configuration `{name}`: A, B or AJB (which is A joined to B)"
+            ))
+        })?;
+        let FrfFile { frf, noise, .. } = self.read()?;
+        let store = Store::open(into)?;
+        let geometry = results::campaign::geometry(&store.plan()?);
+        let points = match name {
+            "A" => &geometry.a,
+            "B" => &geometry.b,
+            _ => &geometry.ajb,
+        };
+        check_names(&self.file, &frf, name, points).map_err(CliError::Bad)?;
+        let cells = store.cells()?;
+        let own = |id: i64| {
+            cells.iter().any(|row| row.id == id && configuration_name(row.cell.configuration) == name)
+        };
+        let kept = store.records()?.iter().filter(|r| own(r.cell) && r.verdict == Kind::Good).count();
+        if kept > 0 {
+            return Err(CliError::Bad(format!(
+                "{}: {name} has {kept} good hits of its own, which FRFs would stand beside: import into a campaign that has \
+                 none there",
+                into.display()
             )));
-        };
-        let attempts = store.records()?.iter().filter(|r| r.cell == row.id).map(|r| r.attempt + 1).max();
-        Ok(((row.id, row.cell), attempts.unwrap_or(0)))
-    }
-
-    fn session(&self) -> SessionInfo {
-        let name = self.file.file_name().unwrap_or(self.file.as_os_str()).to_string_lossy();
-        SessionInfo {
-            address: format!("file:{name}"),
-            board: "imported".into(),
-            serial: String::new(),
-            firmware_version: String::new(),
-            target: String::new(),
-            build: 0,
-            schema_hash: 0,
         }
+        let source = self.file.file_name().unwrap_or(self.file.as_os_str()).to_string_lossy();
+        store.insert_frf(configuration, &source, &frf, noise.as_ref())?;
+        store.log(&format!("imported FRFs of {name} from {}", self.file.display()))?;
+        store.close()?;
+        let mut told = vec![format!("{}: {name}: {}", into.display(), described(&frf))];
+        if noise.is_none() {
+            told.push(
+                "the file tells no variance of its values: what is identified from them has no interval from their noise"
+                    .into(),
+            );
+        }
+        output::lines(told)
     }
 }
 
-/// The records as 16-bit codes, channel after channel for each hit, with the scales that belong to them.
-fn quantised(records: &ImpactRecords) -> Result<(ChannelMap, Vec<Vec<i16>>), String> {
-    let rate_hz = records.fs_hz.round();
-    if !(1.0..=f64::from(u32::MAX)).contains(&rate_hz) || (rate_hz - records.fs_hz).abs() > 1e-6 * rate_hz {
-        return Err(format!("the sampling rate of {} Hz is no whole number: resample", records.fs_hz));
-    }
-    let channels = records.response.first().map_or(0, Vec::len);
-    if channels != 3 {
-        return Err(format!(
-            "there are {channels} responses: the three axes x, y, z of one location are needed"
-        ));
-    }
-    let quantity = match records.quantity {
-        MotionQuantity::Displacement => Quantity::Displacement,
-        MotionQuantity::Velocity => Quantity::Velocity,
-        MotionQuantity::Acceleration => Quantity::Acceleration,
-    };
-    let kinds = [
-        ("force", Role::HammerForce, Quantity::Force),
-        ("x", Role::Response(Axis::X), quantity),
-        ("y", Role::Response(Axis::Y), quantity),
-        ("z", Role::Response(Axis::Z), quantity),
-    ];
-    let signal = |hit: usize, place: usize| -> &[f64] {
-        if place == 0 { &records.force_n[hit] } else { &records.response[hit][place - 1] }
-    };
-    let mut map = ChannelMap { id: 0, rate_hz: rate_hz as u32, channels: Vec::new() };
-    for (place, (name, role, quantity)) in kinds.into_iter().enumerate() {
-        let mut largest = 0.0f64;
-        for hit in 0..records.force_n.len() {
-            if let Some(sample) = signal(hit, place).iter().position(|v| !v.is_finite()) {
-                return Err(format!("hit {hit}, {name}, sample {sample} is not a number: take the hit out"));
-            }
-            largest = signal(hit, place).iter().fold(largest, |m, v| m.max(v.abs()));
+/// Names that the plan does not have are a mistake; points of the plan that were not measured are said.
+fn check_names(file: &Path, frf: &FrfMatrix, name: &str, points: &Points) -> Result<(), String> {
+    let sides =
+        [("outputs", &frf.outputs, points.output_names()), ("inputs", &frf.inputs, points.input_names())];
+    for (side, found, known) in sides {
+        let strange: Vec<&str> = found.iter().filter(|n| !known.contains(n)).map(String::as_str).collect();
+        if !strange.is_empty() {
+            return Err(format!(
+                "{}: {side} {} are not among those of {name} in the plan ({}): rename them, or add them to the plan's geometry",
+                file.display(),
+                strange.join(", "),
+                known.join(", ")
+            ));
         }
-        let range_v = 10.0f32;
-        // code 32000 for the largest value, rounded up to what a float holds
-        let units_per_volt = (largest.max(1e-30) * 32_768.0 / TOP_CODE / f64::from(range_v)) as f32;
-        map.channels.push(Channel {
-            name: name.parse().map_err(|_| format!("`{name}` is too long a name"))?,
-            role,
-            quantity,
-            units_per_volt,
-            range_v,
-            delay_ns: 0,
-            bits: 16,
-        });
+        let absent: Vec<&str> = known.iter().filter(|n| !found.contains(n)).map(String::as_str).collect();
+        if !absent.is_empty() {
+            eprintln!("{}: {side} of the plan that are not in it: {}", file.display(), absent.join(", "));
+        }
     }
-    let codes = (0..records.force_n.len())
-        .map(|hit| {
-            (0..map.len())
-                .flat_map(|place| {
-                    let unit = map.channels[place].units_per_code();
-                    signal(hit, place).iter().map(move |v| (v / unit).round() as i16)
-                })
-                .collect()
-        })
-        .collect();
-    Ok((map, codes))
+    Ok(())
 }
 
-fn recording(hit: usize, codes: Vec<i16>, channels: usize, pulse: &Pulse) -> Recording {
-    Recording {
-        epoch: 0,
-        first_scan: 0,
-        trigger_index: pulse.start,
-        channels,
-        codes,
-        gaps: Vec::new(),
-        shot: Shot {
-            number: hit as u32,
-            phase: Phase::Done,
-            fired_at: 0,
-            trigger: pulse.start as u64,
-            pulse_us: 0,
-            peak_n: pulse.peak_n as f32,
-            width_us: 0.0,
-            rebound_ratio: 0.0,
-            rebound_after: 0,
-            friction_peak_n: 0.0,
-            quiet_ratio: 0.0,
-        },
-    }
+fn described(frf: &FrfMatrix) -> String {
+    format!(
+        "{} of {} outputs, {} inputs, {} lines",
+        frf.quantity,
+        frf.outputs.len(),
+        frf.inputs.len(),
+        frf.lines.len()
+    )
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sixteen_bits_keep_each_channel_to_its_own_rounding() {
-        let records = ImpactRecords {
-            fs_hz: 51_200.0,
-            force_n: vec![vec![0.0, 50.0, 0.1], vec![0.0, -25.0, 0.0]],
-            response: vec![vec![vec![1e-6, -2e-3, 0.0], vec![0.0; 3], vec![1.0, 2.0, 3.0]]; 2],
-            quantity: MotionQuantity::Velocity,
-        };
-        let (map, codes) = quantised(&records).expect("three axes");
-        for (place, wanted) in
-            [(0, &records.force_n[0]), (1, &records.response[0][0]), (3, &records.response[0][2])]
-        {
-            let unit = map.channels[place].units_per_code();
-            for (code, value) in codes[0][3 * place..].iter().zip(wanted) {
-                assert!((f64::from(*code) * unit - value).abs() <= 0.5001 * unit, "{place}");
-                assert!(code.unsigned_abs() <= 32_001);
-            }
-        }
-        let two = ImpactRecords { response: vec![vec![vec![0.0; 3]; 2]; 2], ..records };
-        assert!(quantised(&two).expect_err("two axes").contains("x, y, z"));
-    }
+fn variance(frf: &FrfMatrix, noise: &FrfNoise) -> Extra {
+    let shape = vec![frf.lines.len(), frf.outputs.len(), frf.inputs.len()];
+    // C order is the transpose's columns
+    let values = noise.variance.iter().flat_map(|v| v.transpose().iter().copied().collect::<Vec<_>>());
+    Extra::Real("variance".into(), Array { shape, values: values.collect() })
 }

@@ -4,6 +4,7 @@
 use super::npz::{Array, NpzError, NpzFile};
 use super::npz_output::NpzOutput;
 use crate::substructuring::frf::{FrfMatrix, Quantity};
+use crate::substructuring::noise::FrfNoise;
 use nalgebra::DMatrix;
 use num_complex::Complex;
 use std::path::Path;
@@ -52,6 +53,31 @@ pub fn read_frf(path: &Path) -> Result<FrfMatrix, NpzError> {
     let matrix = FrfMatrix { frequency_hz, sigma_per_s, quantity, outputs, inputs, lines };
     matrix.check().map_err(|e| file.content(e.to_string()))?;
     Ok(matrix)
+}
+
+/// The array `variance` (line, output, input) of an FRF file, where it has one: of the real part of each value.
+///
+/// # Errors
+/// [`NpzError`] naming what does not fit.
+pub fn read_frf_noise(path: &Path, frf: &FrfMatrix) -> Result<Option<FrfNoise>, NpzError> {
+    let mut file = NpzFile::open(path)?;
+    if !file.has("variance") {
+        return Ok(None);
+    }
+    let (lines, rows, columns) = (frf.lines.len(), frf.outputs.len(), frf.inputs.len());
+    let expected = format!("the variance of each value's real part, shape ({lines}, {rows}, {columns})");
+    let array = file.real("variance", &expected)?;
+    // FRFs of a single impact have no axis of inputs
+    let fits = array.shape == [lines, rows, columns] || (columns == 1 && array.shape == [lines, rows]);
+    if !fits || rows * columns == 0 {
+        return Err(file.unexpected("variance", &format!("has shape {:?}", array.shape), &expected));
+    }
+    let variance = array
+        .values
+        .chunks(rows * columns)
+        .map(|line| DMatrix::from_row_slice(rows, columns, line))
+        .collect();
+    Ok(Some(FrfNoise { variance }))
 }
 
 /// Writes an FRF file, with further arrays beside it.

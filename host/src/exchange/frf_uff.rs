@@ -9,6 +9,7 @@ use super::uff::{
     Abscissa, Axis, Contents, DataSet, Dof, Encoding, Function, Precision, Values, WriteError, count, kind,
     quantity, read,
 };
+use crate::advice;
 use crate::substructuring::frf::{FrfMatrix, Quantity};
 use nalgebra::DMatrix;
 use num_complex::Complex;
@@ -18,8 +19,16 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum FrfUffError {
     /// The file cannot be read at all.
-    #[error("{}: cannot be read: {source}", path.display())]
+    #[error("{}: cannot be read: {source}; {}", path.display(), advice::reading(source))]
     Open {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file cannot be written.
+    #[error("{}: cannot be written: {source}; {}", path.display(), advice::writing(source))]
+    Write {
         /// The file.
         path: PathBuf,
         /// Why.
@@ -64,7 +73,9 @@ pub fn from_contents(contents: &Contents) -> Result<(FrfMatrix, Vec<String>), St
         .collect();
     let Some((first, values)) = functions.first() else {
         let why = warnings.first().map_or_else(String::new, |w| format!(" ({w})"));
-        return Err(format!("there is no complex FRF (data set 58 of function type 4) in it{why}"));
+        return Err(format!(
+            "there is no complex FRF (data set 58 of function type 4) in it{why}: give an npz FRF file, or a universal file with FRFs"
+        ));
     };
     let quantity = quantity_of(first)?;
     let (lines, sigma_per_s) = (values.len(), sigma(first)?);
@@ -250,7 +261,7 @@ fn split(name: &str) -> (&str, i64) {
 pub fn write_uff(path: &Path, sets: &[DataSet]) -> Result<(), FrfUffError> {
     let content = |e: WriteError| FrfUffError::Content { path: path.into(), reason: e.to_string() };
     let bytes = super::uff::write(sets).map_err(content)?;
-    std::fs::write(path, bytes).map_err(|source| FrfUffError::Open { path: path.into(), source })
+    std::fs::write(path, bytes).map_err(|source| FrfUffError::Write { path: path.into(), source })
 }
 
 #[cfg(test)]

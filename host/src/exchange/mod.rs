@@ -2,10 +2,11 @@
 //!
 //! [`npz`] and [`npz_output`] are the array layer; [`frf_npz`] and [`record_npz`] say which arrays make an FRF matrix, impact records or a
 //! hysteresis record; [`positions`] reads the pyFBS workbook, as xlsx or as a folder of csv tables; [`uff`] is the universal file,
-//! [`frf_uff`] says which of its functions make an FRF matrix.
+//! [`frf_uff`] says which of its functions make an FRF matrix, [`frf_file`] takes either form.
 
 #[cfg(test)]
 mod any_bytes;
+pub mod frf_file;
 pub mod frf_npz;
 pub mod frf_uff;
 pub mod npz;
@@ -13,12 +14,15 @@ pub mod npz_output;
 pub mod positions;
 pub mod positions_output;
 pub mod record_npz;
+pub mod record_uff;
 mod tables;
 pub mod tables_output;
 pub mod uff;
 pub mod uff_output;
 
-pub use frf_npz::{Extra, read_frf, write_frf};
+pub use frf_file::{FrfFile, FrfFileError, read_frf_file};
+pub use frf_npz::{Extra, read_frf, read_frf_noise, write_frf};
+pub use frf_uff::FrfUffError;
 pub use npz::NpzError;
 pub use positions::{PositionsError, read_positions};
 pub use record_npz::{read_hysteresis, read_impacts, write_hysteresis, write_impacts};

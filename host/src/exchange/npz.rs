@@ -3,6 +3,7 @@
 //! Reads real, complex and text arrays of any numpy width, either byte order and either memory order; always
 //! gives C order and the widest type. Every error names the file, the array and what was expected of it.
 
+use crate::advice;
 use npyz::npz::NpzArchive;
 use npyz::{DType, NpyFile, Order, TypeChar};
 use num_complex::Complex;
@@ -14,7 +15,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum NpzError {
     /// The file is not there, not readable, or no npz archive.
-    #[error("{}: cannot be opened as npz: {source}", path.display())]
+    #[error("{}: cannot be opened as npz: {source}; {}", path.display(), advice::reading(source))]
     Open {
         /// The file.
         path: PathBuf,
@@ -54,7 +55,7 @@ pub enum NpzError {
         reason: String,
     },
     /// The file cannot be written.
-    #[error("{}: cannot be written: {source}", path.display())]
+    #[error("{}: cannot be written: {source}; {}", path.display(), advice::writing(source))]
     Write {
         /// The file.
         path: PathBuf,

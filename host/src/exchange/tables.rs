@@ -76,5 +76,10 @@ pub(super) fn csv_tables(path: &Path) -> Result<BTreeMap<String, Table>, Positio
         }
         tables.insert(sheet.to_string(), table);
     }
+    if tables.is_empty() {
+        return Err(fail(
+            "the folder has no .csv tables; they are named Channels_A.csv, Impacts_A.csv and so on".into(),
+        ));
+    }
     Ok(tables)
 }

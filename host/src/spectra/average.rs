@@ -16,7 +16,8 @@ pub struct SpectraAverage {
     samples: usize,
     fft: Arc<dyn RealToComplex<f64>>,
     hits: usize,
-    force: Channel,
+    /// Force spectra of the hits being added.
+    forces: Vec<Vec<Complex<f64>>>,
     s_ff: Vec<f64>,
     outputs: Vec<Output>,
     /// One for each thread: a channel's working memory stays in that core's cache.
@@ -54,12 +55,18 @@ impl Channel {
     fn transform(
         &mut self,
         fft: &dyn RealToComplex<f64>,
-        fill: impl FnOnce(&mut [f64]),
+        fill: impl Fn(&mut [f64]),
     ) -> Result<(), SpectraError> {
         fill(&mut self.signal);
-        check_finite(&self.signal)?;
         fft.process_with_scratch(&mut self.signal, &mut self.spectrum, &mut self.scratch)
-            .map_err(|e| SpectraError::Transform(e.to_string()))
+            .map_err(|e| SpectraError::Transform(e.to_string()))?;
+        // every sample is in every line, so that one line tells of a sample that is not a number
+        if self.spectrum.first().is_some_and(|line| !line.re.is_finite()) {
+            fill(&mut self.signal);
+            check_finite(&self.signal)?;
+            return Err(SpectraError::Transform("the sum of the samples is beyond an f64".into()));
+        }
+        Ok(())
     }
 }
 
@@ -72,7 +79,7 @@ impl SpectraAverage {
             fs_hz,
             samples,
             hits: 0,
-            force: Channel::new(&*fft),
+            forces: Vec::new(),
             s_ff: vec![0.0; lines],
             outputs: (0..outputs)
                 .map(|_| Output {
@@ -125,52 +132,86 @@ impl SpectraAverage {
     }
 
     /// Adds one hit whose windowed force and responses (by output) are written straight into the transforms' memory, which
-    /// holds other values before. Responses are filled, transformed and summed in parallel.
+    /// holds other values before. See [`SpectraAverage::add_hits`].
     ///
     /// # Errors
-    /// A value that is not a number. Some responses of the hit may be in the sums then, so that the average is spent: this
-    /// and [`SpectraAverage::finish`] give the same error from then on.
+    /// As of `add_hits`.
     pub fn add_with(
         &mut self,
-        force: impl FnOnce(&mut [f64]),
+        force: impl Fn(&mut [f64]) + Sync,
         response: impl Fn(usize, &mut [f64]) + Sync,
+    ) -> Result<(), SpectraError> {
+        self.add_hits(&[()], |(), out| force(out), |(), o, out| response(o, out))
+    }
+
+    /// Adds several hits at once, which keeps every core busy and costs the memory of their force spectra. The windowed force
+    /// and responses (by output) of a hit are written straight into the transforms' memory, which holds other values before.
+    ///
+    /// # Errors
+    /// A value that is not a number. Some responses of the hits may be in the sums then, so that the average is spent: this
+    /// and [`SpectraAverage::finish`] give the same error from then on.
+    pub fn add_hits<H: Sync>(
+        &mut self,
+        hits: &[H],
+        force: impl Fn(&H, &mut [f64]) + Sync,
+        response: impl Fn(&H, usize, &mut [f64]) + Sync,
     ) -> Result<(), SpectraError> {
         if let Some(error) = &self.failed {
             return Err(error.clone());
         }
+        let summed = self.sum(hits, force, response);
+        if let Err(error) = &summed {
+            self.failed = Some(error.clone());
+        }
+        summed
+    }
+
+    fn sum<H: Sync>(
+        &mut self,
+        hits: &[H],
+        force: impl Fn(&H, &mut [f64]) + Sync,
+        response: impl Fn(&H, usize, &mut [f64]) + Sync,
+    ) -> Result<(), SpectraError> {
         let fft = &*self.fft;
-        self.force.transform(fft, force)?;
-        let force = &self.force.spectrum;
+        self.forces.resize_with(hits.len(), || fft.make_output_vec());
+        let share = hits.len().div_ceil(self.workers.len()).max(1);
+        let parts = self.forces.par_chunks_mut(share).zip(hits.par_chunks(share)).zip(&mut self.workers);
+        parts.try_for_each(|((spectra, hits), worker)| {
+            for (spectrum, hit) in spectra.iter_mut().zip(hits) {
+                worker.transform(fft, |out| force(hit, out))?;
+                std::mem::swap(spectrum, &mut worker.spectrum);
+            }
+            Ok(())
+        })?;
+        let forces = &self.forces;
         let keep = self.keep_hits;
         let share = self.outputs.len().div_ceil(self.workers.len()).max(1);
-        let summed: Result<(), SpectraError> =
-            self.outputs.par_chunks_mut(share).zip(&mut self.workers).enumerate().try_for_each(
-                |(part, (outputs, worker))| {
-                    for (i, output) in outputs.iter_mut().enumerate() {
-                        worker.transform(fft, |out| response(part * share + i, out))?;
-                        let sums = output.s_xf.iter_mut().zip(&mut output.s_xx);
-                        for ((s_xf, s_xx), (x, f)) in sums.zip(worker.spectrum.iter().zip(force)) {
-                            *s_xf += x * f.conj();
-                            *s_xx += x.norm_sqr();
-                        }
-                        if keep {
-                            output.kept.push(worker.spectrum.clone());
-                        }
+        let parts = self.outputs.par_chunks_mut(share).zip(&mut self.workers).enumerate();
+        parts.try_for_each(|(part, (outputs, worker))| {
+            for (i, output) in outputs.iter_mut().enumerate() {
+                for (hit, force) in hits.iter().zip(forces) {
+                    worker.transform(fft, |out| response(hit, part * share + i, out))?;
+                    let sums = output.s_xf.iter_mut().zip(&mut output.s_xx);
+                    for ((s_xf, s_xx), (x, f)) in sums.zip(worker.spectrum.iter().zip(force)) {
+                        *s_xf += x * f.conj();
+                        *s_xx += x.norm_sqr();
                     }
-                    Ok(())
-                },
-            );
-        if let Err(error) = summed {
-            self.failed = Some(error.clone());
-            return Err(error);
-        }
-        for (sum, f) in self.s_ff.iter_mut().zip(force) {
-            *sum += f.norm_sqr();
+                    if keep {
+                        output.kept.push(worker.spectrum.clone());
+                    }
+                }
+            }
+            Ok(())
+        })?;
+        for force in &self.forces {
+            for (sum, f) in self.s_ff.iter_mut().zip(force) {
+                *sum += f.norm_sqr();
+            }
         }
         if keep {
-            self.kept_force.push(self.force.spectrum.clone());
+            self.kept_force.extend(self.forces.iter().cloned());
         }
-        self.hits += 1;
+        self.hits += hits.len();
         Ok(())
     }
 
@@ -232,7 +273,10 @@ impl SpectraAverage {
         let s_ff = self.s_ff[l];
         for (o, output) in self.outputs.iter().enumerate() {
             let (s_xf, s_xx) = (output.s_xf[l], output.s_xx[l]);
-            let advance = (s * delay_s.get(o).copied().unwrap_or(0.0)).exp();
+            let advance = match delay_s.get(o) {
+                None | Some(0.0) => Complex::new(1.0, 0.0),
+                Some(delay_s) => (s * delay_s).exp(),
+            };
             let first = h1(s_ff, s_xf) * advance;
             // A single hit is always coherent with itself: that says nothing about noise.
             let coherence = match (self.hits, s_ff * s_xx) {

@@ -51,6 +51,17 @@ impl Default for FrfSettings {
     }
 }
 
+/// Hits that are added together: enough that no core waits for another, few enough that their force spectra are small beside
+/// the records.
+const AT_ONCE: usize = 8;
+
+/// A hit that is used.
+struct Hit<'r> {
+    force: &'r [f64],
+    responses: &'r [Vec<f64>],
+    origin_s: f64,
+}
+
 /// H1, coherence and variance over those hits of `records` for which `used` is true.
 ///
 /// # Errors
@@ -74,8 +85,11 @@ pub fn estimate(
     if settings.jackknife {
         average = average.with_jackknife();
     }
-    let hits = records.force_n.iter().zip(&records.response).zip(used).enumerate();
-    for (hit, ((force, responses), _)) in hits.filter(|(_, (_, used))| **used) {
+    let mut hits = Vec::new();
+    for (hit, (force, responses)) in records.force_n.iter().zip(&records.response).enumerate() {
+        if !used.get(hit).copied().unwrap_or(false) {
+            continue;
+        }
         if responses.len() != outputs {
             return Err(SpectraError::Responses { found: responses.len(), expected: outputs });
         }
@@ -88,9 +102,13 @@ pub fn estimate(
                 Pulse::locate(force).ok_or(SpectraError::NoPulse { hit })?.start as f64 / records.fs_hz
             }
         };
-        average.add_with(
-            |out| window.force_into(force, &decay, origin_s, out),
-            |o, out| window.response_into(&responses[o], &decay, origin_s, out),
+        hits.push(Hit { force, responses, origin_s });
+    }
+    for hits in hits.chunks(AT_ONCE) {
+        average.add_hits(
+            hits,
+            |hit, out| window.force_into(hit.force, &decay, hit.origin_s, out),
+            |hit, o, out| window.response_into(&hit.responses[o], &decay, hit.origin_s, out),
         )?;
     }
     average.finish(settings.windowing.sigma_per_s, &settings.delay_s)

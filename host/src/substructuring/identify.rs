@@ -57,7 +57,7 @@ pub enum IdentifyError {
     },
     /// A band has no line.
     #[error(
-        "no line lies in the band {low_hz}–{high_hz} Hz: the files cover {from_hz}–{to_hz} Hz in {lines} lines above 0 Hz"
+        "no line lies in the band {low_hz}–{high_hz} Hz: the files cover {from_hz}–{to_hz} Hz in {lines} lines above 0 Hz; choose a band within"
     )]
     EmptyBand {
         /// Lowest frequency asked for, Hz.

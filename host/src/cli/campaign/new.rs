@@ -6,6 +6,7 @@ use clap::Args;
 
 use crate::campaign::plan;
 use crate::campaign::store::Store;
+use crate::cli::campaign::plan_file;
 use crate::cli::error::CliError;
 
 /// Create a campaign file from a plan.
@@ -26,14 +27,7 @@ impl New {
     pub fn run(self) -> Result<(), CliError> {
         let (text, name) = match &self.plan {
             None => (plan::PAPER.to_owned(), "paper.toml".to_owned()),
-            Some(path) => {
-                let text = std::fs::read_to_string(path).map_err(|source| CliError::File {
-                    path: path.clone(),
-                    doing: "reading the plan",
-                    source,
-                })?;
-                (text, path.display().to_string())
-            }
+            Some(path) => (plan_file::read(path)?, path.display().to_string()),
         };
         let store = Store::create(&self.file, &text, &name)?;
         let cells = store.cells()?;

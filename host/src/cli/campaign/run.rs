@@ -1,6 +1,6 @@
 //! `campaign run`: measures what is left.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -9,6 +9,7 @@ use crate::campaign::others::Others;
 use crate::campaign::plan::{Cell, Plan};
 use crate::campaign::stage::Stage;
 use crate::campaign::store::Store;
+use crate::cli::campaign::plan_file;
 use crate::cli::error::CliError;
 use crate::cli::{interrupt, measure};
 use crate::device::address::Address;
@@ -74,16 +75,12 @@ impl Run {
     /// Takes an edited plan over; without being told to, says that there is one.
     fn settle_plan(&self, store: &mut Store) -> Result<(), CliError> {
         if let Some(path) = &self.plan {
-            let text = std::fs::read_to_string(path).map_err(|source| CliError::File {
-                path: path.clone(),
-                doing: "reading the plan",
-                source,
-            })?;
+            let text = plan_file::read(path)?;
             return Ok(store.take_over(&text, &path.display().to_string())?);
         }
         let (text, source) = store.plan_text()?;
         // a plan that is gone, or was built in, was not edited
-        if std::fs::read_to_string(&source).is_ok_and(|now| now != text) {
+        if plan_file::read(Path::new(&source)).is_ok_and(|now| now != text) {
             eprintln!(
                 "{source} was edited since: going on with the plan in {}; `--plan {source}` takes the new one over",
                 self.file.display()

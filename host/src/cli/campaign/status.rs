@@ -12,7 +12,7 @@ use crate::campaign::tally::{Count, Tally};
 use crate::cli::error::CliError;
 use crate::cli::output;
 
-/// Show, per cell, what is wanted, kept and refused, and why.
+/// Show, per cell, what is wanted, kept and refused, and why; and the FRFs that came from elsewhere.
 #[derive(Debug, Args)]
 pub struct Status {
     /// The campaign file.
@@ -28,19 +28,30 @@ impl Status {
         let store = Store::open_read_only(&self.file)?;
         let (cells, records) = (store.cells()?, store.records()?);
         let tally = Tally::new(&cells, &records);
+        let frfs = store.frf_rows()?;
         if self.json {
+            let frfs: Vec<Value> = frfs
+                .iter()
+                .map(|row| json!({ "configuration": row.configuration, "file": row.source, "imported": row.utc }))
+                .collect();
             let cells: Vec<Value> = cells.iter().map(|row| cell_json(row, &tally.cell(row.id))).collect();
             return output::json(&json!({
                 "wanted": tally.wanted(),
                 "kept": tally.kept(),
                 "complete": tally.complete(),
                 "records": records.len(),
+                "imported_frf": frfs,
                 "cells": cells,
             }));
         }
         let (stored, raw) = store.sample_bytes()?;
         let size = std::fs::metadata(&self.file).map_or(0, |file| file.len());
         let started = cells.iter().filter(|row| tally.attempts(row.id) > 0);
+        output::lines(
+            frfs.iter().map(|row| {
+                format!("FRFs of {} from {}, imported {}", row.configuration, row.source, row.utc)
+            }),
+        )?;
         output::lines(started.map(|row| cell_line(row, &tally.cell(row.id))))?;
         output::lines([
             format!(

@@ -26,7 +26,11 @@ impl Verify {
             None => format!("file: {}", damage.what),
         }))?;
         if damage.is_empty() {
-            output::lines([format!("{path}: {} records, all whole", store.records()?.len())])
+            let frfs = match store.frf_rows()?.len() {
+                0 => String::new(),
+                count => format!(" and {count} FRF matrices from elsewhere"),
+            };
+            output::lines([format!("{path}: {} records{frfs}, all whole", store.records()?.len())])
         } else {
             Err(CliError::Bad(format!(
                 "{path}: {} damaged; analysis leaves damaged records out",

@@ -1,5 +1,6 @@
 //! What the analysis asks of a campaign: its geometry, its cells, and the kept hits of one cell in SI units.
 
+use crate::campaign::frfs::ImportedFrf;
 use crate::campaign::level::{Level, Moment};
 use crate::hysteresis::HysteresisRecord;
 use crate::spectra::MotionQuantity;
@@ -120,6 +121,14 @@ pub trait Measurements: Sync {
     /// What is known of contact and static arm beforehand.
     fn known_contact(&self) -> KnownContact {
         KnownContact::default()
+    }
+
+    /// FRFs of a configuration that were measured elsewhere.
+    ///
+    /// # Errors
+    /// They are damaged, or the file cannot be read.
+    fn imported(&self, _configuration: &str) -> Result<Option<ImportedFrf>, Self::Error> {
+        Ok(None)
     }
 
     /// The kept hits of a cell; none if it was not measured.

@@ -3,49 +3,85 @@
 use super::averages::CellAverage;
 use crate::results::{FrfCurve, Role, rounded};
 use crate::spectra::MotionQuantity;
+use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::{Configuration, Grouping, Point};
 use num_complex::Complex;
 use std::f64::consts::TAU;
 
-/// Driving point: the response along z nearest to an impact along z. Transfer: the same impact, across the joint in
-/// the assembly, at the far end otherwise.
-pub fn curves(
+/// The curves of a configuration that was measured here.
+pub fn of_cells(
     configuration: &str,
     points: &Configuration,
     cells: &[CellAverage],
     sigma_per_s: f64,
     quantity: MotionQuantity,
 ) -> Vec<FrfCurve> {
+    let find = |impact: &Point, channel: &Point| {
+        cells.iter().find(|c| c.name.impact == impact.name && c.name.response == channel.name)
+    };
+    let chosen = choose(points, &|impact, channel| find(impact, channel).is_some());
+    let curve = |(role, impact, channel): (Role, &Point, &Point)| {
+        let cell = find(impact, channel)?;
+        Some(of_cell(configuration, (role, impact, channel), cell, sigma_per_s, quantity))
+    };
+    chosen.into_iter().filter_map(curve).collect()
+}
+
+/// The curves of FRFs that were measured elsewhere; none where their lines are not evenly spaced.
+pub fn of_matrix(configuration: &str, points: &Configuration, frf: &FrfMatrix) -> Vec<FrfCurve> {
+    let place = |names: &[String], name: &str| names.iter().position(|n| n == name);
+    let (outputs, inputs) = (points.output_names(), points.input_names());
+    let find = |impact: &Point, channel: &Point| {
+        let output = points.channels.iter().position(|p| p == channel)?;
+        let input = points.impacts.iter().position(|p| p == impact)?;
+        Some((place(&frf.outputs, &outputs[output])?, place(&frf.inputs, &inputs[input])?))
+    };
+    let steps = || frf.frequency_hz.windows(2).map(|pair| pair[1] - pair[0]);
+    let first = steps().next().unwrap_or(0.0);
+    // files keep their axis to six digits or so
+    let even = steps().all(|step| (step - first).abs() <= 1e-3 * first);
+    let (true, Ok(y)) = (even, frf.to_receptance()) else { return Vec::new() };
+    let chosen = choose(points, &|impact, channel| find(impact, channel).is_some());
+    let curve = |(role, impact, channel): (Role, &Point, &Point)| {
+        let place = find(impact, channel)?;
+        // the channel counts along its own direction
+        let sign = channel.direction[2].signum();
+        let values = y.lines.iter().map(|y| y[place] * sign);
+        Some(curve(configuration, (role, impact, channel), &y.frequency_hz, values))
+    };
+    chosen.into_iter().filter_map(curve).collect()
+}
+
+/// Driving point: the response along z nearest to an impact along z. Transfer: the same impact, across the joint in
+/// the assembly, at the far end otherwise. `measured` tells which pairs of impact and channel there are.
+fn choose<'p>(
+    points: &'p Configuration,
+    measured: &dyn Fn(&Point, &Point) -> bool,
+) -> Vec<(Role, &'p Point, &'p Point)> {
     let along_z = |p: &&Point| p.direction[2].abs() > 0.9;
-    let mut pairs: Vec<(&Point, &Point, &CellAverage, f64)> = Vec::new();
+    let mut pairs: Vec<(&Point, &Point, f64)> = Vec::new();
     for impact in points.impacts.iter().filter(along_z) {
-        for channel in points.channels.iter().filter(along_z) {
-            let cell = cells.iter().find(|c| c.name.impact == impact.name && c.name.response == channel.name);
-            if let Some(cell) = cell {
-                pairs.push((impact, channel, cell, (impact.position() - channel.position()).norm()));
-            }
+        for channel in points.channels.iter().filter(along_z).filter(|c| measured(impact, c)) {
+            pairs.push((impact, channel, (impact.position() - channel.position()).norm()));
         }
     }
     let same_side = |a: &Point, b: &Point| on_a(a.grouping) == on_a(b.grouping);
     let driving = pairs
         .iter()
-        .filter(|(i, c, ..)| same_side(i, c))
+        .filter(|(i, c, _)| same_side(i, c))
         // in the assembly the joint is excited from A
         .min_by(|x, y| {
-            (!on_a(x.0.grouping), x.3)
-                .partial_cmp(&(!on_a(y.0.grouping), y.3))
+            (!on_a(x.0.grouping), x.2)
+                .partial_cmp(&(!on_a(y.0.grouping), y.2))
                 .unwrap_or(std::cmp::Ordering::Equal)
         });
     let Some(driving) = driving else { return Vec::new() };
-    let others = || pairs.iter().filter(|(i, c, ..)| i.name == driving.0.name && c.name != driving.1.name);
-    let across = others().filter(|(i, c, ..)| !same_side(i, c)).min_by(|x, y| x.3.total_cmp(&y.3));
-    let transfer = across.or_else(|| others().max_by(|x, y| x.3.total_cmp(&y.3)));
+    let others = || pairs.iter().filter(|(i, c, _)| i.name == driving.0.name && c.name != driving.1.name);
+    let across = others().filter(|(i, c, _)| !same_side(i, c)).min_by(|x, y| x.2.total_cmp(&y.2));
+    let transfer = across.or_else(|| others().max_by(|x, y| x.2.total_cmp(&y.2)));
     [(Role::DrivingPoint, Some(driving)), (Role::Transfer, transfer)]
         .into_iter()
-        .filter_map(|(role, pair)| {
-            let (impact, channel, cell, _) = pair?;
-            Some(curve(configuration, role, impact, channel, cell, sigma_per_s, quantity))
-        })
+        .filter_map(|(role, pair)| pair.map(|(impact, channel, _)| (role, *impact, *channel)))
         .collect()
 }
 
@@ -63,50 +99,60 @@ pub fn arms(
         points.channels.iter().filter(measured).find_map(|channel| {
             let own = |c: &&CellAverage| c.name.impact == impact && c.name.response == channel.name;
             let cell = cells.iter().filter(|c| c.name.configuration == "AJB").find(own)?;
-            Some(curve("AJB", role, hit, channel, cell, sigma_per_s, quantity))
+            Some(of_cell("AJB", (role, hit, channel), cell, sigma_per_s, quantity))
         })
     };
     let both = [arm(Role::ArmA, Grouping::InterfaceA), arm(Role::ArmB, Grouping::InterfaceB)];
     both.into_iter().flatten().collect()
 }
 
-fn on_a(grouping: Grouping) -> bool {
-    matches!(grouping, Grouping::InterfaceA | Grouping::InternalA)
-}
-
-fn curve(
+/// Of one averaged cell.
+fn of_cell(
     configuration: &str,
-    role: Role,
-    impact: &Point,
-    channel: &Point,
+    chosen: (Role, &Point, &Point),
     cell: &CellAverage,
     sigma_per_s: f64,
     quantity: MotionQuantity,
 ) -> FrfCurve {
     let order = quantity.frf().order_of_s();
-    // receptance along the two directions, hit and response both counted positive along z: a driving point starts at 0°
+    let s = |f: &f64| Complex::new(sigma_per_s, TAU * f);
+    let receptance = cell.h1[2].iter().zip(&cell.frequency_hz).map(|(h, f)| h * s(f).powi(-order));
+    let several = cell.records.len() > 1;
+    let coherence = cell.coherence[2].iter().filter(|_| several);
+    FrfCurve {
+        hits: cell.records.len(),
+        coherence: coherence.map(|c| rounded(if c.is_finite() { *c } else { 0.0 }, 5)).collect(),
+        ..curve(configuration, chosen, &cell.frequency_hz, receptance)
+    }
+}
+
+/// Receptance along the two directions, hit and response both counted positive along z: a driving point starts at 0°.
+fn curve(
+    configuration: &str,
+    (role, impact, channel): (Role, &Point, &Point),
+    frequency_hz: &[f64],
+    receptance: impl Iterator<Item = Complex<f64>>,
+) -> FrfCurve {
     let sign = impact.direction[2].signum();
-    let receptance = cell.h1[2]
-        .iter()
-        .zip(&cell.frequency_hz)
-        .map(|(h, f)| h * sign * Complex::new(sigma_per_s, TAU * f).powi(-order));
-    let (magnitude_m_per_n, phase_deg) =
-        receptance.map(|y| (rounded(y.norm(), 5), rounded(y.arg().to_degrees(), 5))).unzip();
-    let coherence = if cell.records.len() > 1 {
-        cell.coherence[2].iter().map(|c| rounded(if c.is_finite() { *c } else { 0.0 }, 5)).collect()
-    } else {
-        Vec::new()
-    };
+    let (magnitude_m_per_n, phase_deg) = receptance
+        .map(|y| y * sign)
+        .map(|y| (rounded(y.norm(), 5), rounded(y.arg().to_degrees(), 5)))
+        .unzip();
+    let first_hz = frequency_hz.first().copied().unwrap_or(0.0);
     FrfCurve {
         configuration: configuration.into(),
         role,
         output: channel.description.clone(),
         input: impact.name.clone(),
-        hits: cell.records.len(),
-        first_hz: cell.frequency_hz.first().copied().unwrap_or(0.0),
-        step_hz: cell.step_hz,
+        hits: 0,
+        first_hz,
+        step_hz: frequency_hz.get(1).map_or(0.0, |second| second - first_hz),
         magnitude_m_per_n,
         phase_deg,
-        coherence,
+        coherence: Vec::new(),
     }
+}
+
+fn on_a(grouping: Grouping) -> bool {
+    matches!(grouping, Grouping::InterfaceA | Grouping::InternalA)
 }

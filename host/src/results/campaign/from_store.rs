@@ -4,6 +4,7 @@ use super::cell::{
     Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel,
 };
 use super::{Progress, completeness};
+use crate::campaign::frfs::ImportedFrf;
 use crate::campaign::levels::LevelRow;
 use crate::campaign::plan::{Plan, configuration_name};
 use crate::campaign::rows::RecordRow;
@@ -306,6 +307,10 @@ impl Measurements for CampaignFile {
         });
         complaints.extend(read.err().map(|error| format!("The shaker's levels: {error}.")));
         (levels, complaints)
+    }
+
+    fn imported(&self, configuration: &str) -> Result<Option<ImportedFrf>, AnalyseError> {
+        self.with_reader(|store| Ok(store.frf(configuration)?))
     }
 
     fn read(&self, cell: &CellName) -> Result<Cell, AnalyseError> {

@@ -12,6 +12,7 @@ mod checks;
 mod chosen;
 mod contact;
 mod from_store;
+mod imported;
 mod joint;
 mod loops;
 mod shaker;
@@ -34,6 +35,7 @@ use crate::substructuring::identify::identify;
 use crate::substructuring::idm::IdmSet;
 use crate::substructuring::joint::Band;
 use crate::substructuring::method::Method;
+use crate::substructuring::noise::FrfNoise;
 use at_contact::at_the_contact;
 use averages::{CellAverage, HIGHEST_HZ, LOWEST_HZ, average};
 use loops::ImpactLoop;
@@ -92,26 +94,34 @@ pub fn analyse_measurements<M: Measurements>(
     note_given_up(&mut results, &cells, measurements.given_up());
     note_settings(&mut results, sigma);
     let mut frfs: [Option<FrfMatrix>; 3] = [None, None, None];
+    let mut noises: [Option<FrfNoise>; 3] = [None, None, None];
     for (place, (name, points)) in configurations(geometry).into_iter().enumerate() {
         let planned = cells.iter().filter(|c| c.configuration == name).count();
         let own: Vec<CellAverage> =
             averages.iter().filter(|a| a.name.configuration == name).cloned().collect();
+        if let Some(imported) = imported::of(measurements, &mut results, name, own.len()) {
+            results.frfs.extend(chosen::of_matrix(name, points, &imported.frf));
+            frfs[place] = Some(imported.frf);
+            noises[place] = imported.noise;
+            continue;
+        }
         note_missing(&mut results, name, planned, &own);
         let records = ranges(own.iter().flat_map(|c| c.records.iter().copied()));
         if !records.is_empty() {
             results.source.records.insert(name.into(), records);
         }
         results.usable_bands.extend(force_band(name, &own));
-        results.frfs.extend(chosen::curves(name, points, &own, sigma, measurements.quantity()));
+        results.frfs.extend(chosen::of_cells(name, points, &own, sigma, measurements.quantity()));
         let assembled = assemble::assemble(name, points, &own, sigma, measurements.quantity());
         if assembled.frf.is_some() {
             note_left_out(&mut results, name, "impacts", &assembled.impacts_left_out);
             note_left_out(&mut results, name, "response locations", &assembled.responses_left_out);
         }
+        noises[place] = assembled.frf.as_ref().map(|frf| assemble::noise(points, frf, &own));
         frfs[place] = assembled.frf;
     }
     substructure(&mut results, geometry, &frfs);
-    recommend(&mut results, geometry, &frfs, &averages);
+    recommend(&mut results, geometry, frfs[2].as_ref(), noises[2].as_ref());
     at_the_contact(&mut results, measurements, &averages, &impact_loops, sigma);
     results
 }
@@ -273,21 +283,13 @@ fn substructure(results: &mut Results, geometry: &Geometry, frfs: &[Option<FrfMa
 }
 
 /// The estimates to quote, with their intervals, from the assembly alone.
-fn recommend(
-    results: &mut Results,
-    geometry: &Geometry,
-    frfs: &[Option<FrfMatrix>; 3],
-    averages: &[CellAverage],
-) {
-    let Some(ajb) = &frfs[2] else { return };
-    let own: Vec<CellAverage> =
-        averages.iter().filter(|a| a.name.configuration == CONFIGURATIONS[2]).cloned().collect();
-    let noise = assemble::noise(&geometry.ajb, ajb, &own);
+fn recommend(results: &mut Results, geometry: &Geometry, ajb: Option<&FrfMatrix>, noise: Option<&FrfNoise>) {
+    let Some(ajb) = ajb else { return };
     let priors = Priors::default();
     results.source.settings.insert("priors".into(), serde_json::json!(priors));
     for [low_hz, high_hz] in BANDS_HZ {
         let band = Band { low_hz, high_hz };
-        match averaged(ajb, Some(&noise), geometry, IdmSet::Six, band, &priors) {
+        match averaged(ajb, noise, geometry, IdmSet::Six, band, &priors) {
             Ok(estimate) => results.recommended.push(estimate),
             Err(error) => {
                 results.missing.push(format!("No estimate with an interval by Eq. A.1: {error}."));

@@ -1,0 +1,33 @@
+//! What to do about an error of the file system: the half of a message that the operating system leaves out.
+
+use std::io::{Error, ErrorKind};
+
+/// For a file that is read.
+pub(crate) fn reading(error: &Error) -> &'static str {
+    match error.kind() {
+        ErrorKind::NotFound => "check the name and the folder",
+        ErrorKind::PermissionDenied => "ask for the right to read it",
+        ErrorKind::IsADirectory => "name a file in this folder",
+        ErrorKind::InvalidData | ErrorKind::UnexpectedEof => {
+            "it is damaged, cut off or of another kind: copy or export it again"
+        }
+        _ => "is the disk whole and connected?",
+    }
+}
+
+/// For a file or folder that is made.
+pub(crate) fn writing(error: &Error) -> &'static str {
+    match error.kind() {
+        ErrorKind::NotFound => "make the folder that it lies in first",
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+            "choose a folder that you may write to"
+        }
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
+            "free some space, then run the same command again"
+        }
+        ErrorKind::AlreadyExists | ErrorKind::NotADirectory | ErrorKind::IsADirectory => {
+            "something else has this name: choose another"
+        }
+        _ => "is the disk whole and connected?",
+    }
+}

@@ -1,0 +1,182 @@
+//! Impact records in universal files: time responses (function type 1), hit after hit.
+//!
+//! A function whose ordinate is a force begins a hit; the motions that follow it, up to the next force, are its responses. Responses
+//! along x, y and z (directions ±1, ±2, ±3) are put in this order, one along a negative axis is turned; others stay as they stand.
+
+use super::uff::{Abscissa, Contents, DataSet, Function, Values, kind, quantity, read};
+use super::{FrfUffError, NpzError, frf_file, read_impacts};
+use crate::spectra::{ImpactRecords, MotionQuantity};
+use std::path::Path;
+
+/// Sampling rates this close to a whole number are one: the format keeps the step's digits, not the rate's.
+const WHOLE_HZ: f64 = 1e-6;
+
+/// Why a file gives no impact records.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordFileError {
+    /// It cannot be read.
+    #[error(transparent)]
+    Open(#[from] frf_file::FrfFileError),
+    /// It is an npz file that holds no impact records.
+    #[error(transparent)]
+    Npz(#[from] NpzError),
+    /// It is not an npz file, and as a universal file it holds no impact records.
+    #[error(transparent)]
+    Uff(#[from] FrfUffError),
+}
+
+/// Reads impact records from an npz or a universal file; the second value says what was left out.
+///
+/// # Errors
+/// [`RecordFileError`] with the file and what is wrong in it.
+pub fn read_record_file(path: &Path) -> Result<(ImpactRecords, Vec<String>), RecordFileError> {
+    if frf_file::is_npz(path)? {
+        return Ok((read_impacts(path)?, Vec::new()));
+    }
+    let bytes = std::fs::read(path).map_err(|source| FrfUffError::Open { path: path.into(), source })?;
+    Ok(from_contents(&read(&bytes)).map_err(|reason| FrfUffError::Content { path: path.into(), reason })?)
+}
+
+/// The records among what was read of a file.
+///
+/// # Errors
+/// The reason in words.
+pub fn from_contents(contents: &Contents) -> Result<(ImpactRecords, Vec<String>), String> {
+    let warnings: Vec<String> = contents.faults.iter().map(|f| format!("{f}; left out")).collect();
+    let mut hits: Vec<Vec<(&Function, &[f64])>> = Vec::new();
+    for set in &contents.sets {
+        let DataSet::Function(function) = set else { continue };
+        let (kind::TIME, Values::Real(values)) = (function.kind, &function.values) else { continue };
+        match (function.axes[1].quantity, hits.last_mut()) {
+            (quantity::FORCE, _) => hits.push(vec![(&**function, values)]),
+            (_, Some(hit)) => hit.push((&**function, values)),
+            (_, None) => {
+                return Err(
+                    "a time response stands before the first force: every hit begins with its force".into()
+                );
+            }
+        }
+    }
+    let Some((first, samples)) = hits.first().and_then(|hit| hit.first()) else {
+        let why = warnings.first().map_or_else(String::new, |w| format!(" ({w})"));
+        return Err(format!(
+            "there is no force over time in it (data set 58 of function type 1 with an ordinate of type 13){why}: give an npz of impact records, or a universal file with time responses"
+        ));
+    };
+    let Abscissa::Even { step, .. } = first.abscissa else {
+        return Err("the force is not evenly sampled: resample it".into());
+    };
+    let rate_hz = 1.0 / step;
+    if !(rate_hz.is_finite() && rate_hz > 0.0) {
+        return Err(format!("the time step is {step} s"));
+    }
+    let whole = (rate_hz - rate_hz.round()).abs() <= WHOLE_HZ * rate_hz;
+    let fs_hz = if whole { rate_hz.round() } else { rate_hz };
+    let motion = motion(&hits)?;
+    let channels = hits[0].len() - 1;
+    let mut records = ImpactRecords { fs_hz, force_n: Vec::new(), response: Vec::new(), quantity: motion };
+    for (number, hit) in hits.iter().enumerate() {
+        if hit.len() - 1 != channels {
+            return Err(format!("hit {number} has {} responses, the first one {channels}", hit.len() - 1));
+        }
+        for (function, values) in hit {
+            let Abscissa::Even { step: own, .. } = function.abscissa else {
+                return Err(format!("hit {number} is not evenly sampled: resample it"));
+            };
+            if (own - step).abs() > WHOLE_HZ * step || values.len() != samples.len() {
+                return Err(format!("hit {number} has another sampling rate or length than the first one"));
+            }
+        }
+        records.force_n.push(hit[0].1.to_vec());
+        records.response.push(responses(&hit[1..]));
+    }
+    Ok((records, warnings))
+}
+
+/// The one quantity that all responses measure.
+fn motion(hits: &[Vec<(&Function, &[f64])>]) -> Result<MotionQuantity, String> {
+    let mut found: Vec<i64> = Vec::new();
+    for (function, _) in hits.iter().flat_map(|hit| &hit[1..]) {
+        let quantity = function.axes[1].quantity;
+        if !found.contains(&quantity) {
+            found.push(quantity);
+        }
+    }
+    match found[..] {
+        [quantity::DISPLACEMENT] => Ok(MotionQuantity::Displacement),
+        [quantity::VELOCITY] => Ok(MotionQuantity::Velocity),
+        [quantity::ACCELERATION] => Ok(MotionQuantity::Acceleration),
+        [] => Err("no response follows the force".into()),
+        _ => Err(format!(
+            "the responses' ordinates are of type {found:?}: all must be 8 (displacement), 11 (velocity) or 12 (acceleration)"
+        )),
+    }
+}
+
+fn responses(functions: &[(&Function, &[f64])]) -> Vec<Vec<f64>> {
+    let along = |axis: i64| functions.iter().find(|(f, _)| f.response.direction.abs() == axis);
+    match [along(1), along(2), along(3)] {
+        [Some(x), Some(y), Some(z)] if functions.len() == 3 => [x, y, z]
+            .map(|(function, values)| {
+                let sign = if function.response.direction < 0 { -1.0 } else { 1.0 };
+                values.iter().map(|v| sign * v).collect()
+            })
+            .to_vec(),
+        _ => functions.iter().map(|(_, values)| values.to_vec()).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::uff::write;
+    use super::super::uff_output::write_records;
+    use super::*;
+
+    fn records() -> ImpactRecords {
+        let signal = |seed: usize| (0..64).map(|i| ((i * 37 + seed * 11) % 101) as f64 * 1e-3).collect();
+        ImpactRecords {
+            fs_hz: 51_200.0,
+            force_n: (0..3).map(signal).collect(),
+            response: (0..3).map(|hit| (0..3).map(|axis| signal(10 * hit + axis + 3)).collect()).collect(),
+            quantity: MotionQuantity::Velocity,
+        }
+    }
+
+    #[test]
+    fn what_was_exported_comes_back() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("cell.uff");
+        write_records(&path, &records(), "A1", "AZ1").expect("written");
+        let (found, warnings) = read_record_file(&path).expect("read");
+        assert_eq!((found, warnings), (records(), Vec::new()));
+    }
+
+    #[test]
+    fn axes_are_put_in_order_and_turned_and_what_is_no_record_is_said() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("cell.uff");
+        write_records(&path, &records(), "A1", "AZ1").expect("written");
+        let mut contents = read(&std::fs::read(&path).expect("there"));
+        let change = |contents: &mut Contents, at: usize, change: &dyn Fn(&mut Function)| {
+            let functions = contents.sets.iter_mut().filter_map(|set| match set {
+                DataSet::Function(f) => Some(f),
+                _ => None,
+            });
+            functions.skip(at).take(1).for_each(|f| change(f));
+        };
+        // x and z of the first hit change places, one of them looks the other way
+        change(&mut contents, 1, &|f| f.response.direction = -3);
+        change(&mut contents, 3, &|f| f.response.direction = 1);
+        let (found, _) = from_contents(&contents).expect("read");
+        let turned: Vec<f64> = records().response[0][0].iter().map(|v| -v).collect();
+        assert_eq!((&found.response[0][0], &found.response[0][2]), (&records().response[0][2], &turned));
+        assert!(write(&contents.sets).is_ok());
+        change(&mut contents, 2, &|f| f.axes[1].quantity = quantity::ACCELERATION);
+        assert!(from_contents(&contents).expect_err("two quantities").contains("[11, 12]"));
+        change(&mut contents, 2, &|f| f.kind = kind::PSD);
+        assert!(from_contents(&contents).expect_err("one response less").contains("hit 1 has 3 responses"));
+        change(&mut contents, 0, &|f| f.axes[1].quantity = quantity::VELOCITY);
+        assert!(from_contents(&contents).expect_err("no force").contains("before the first force"));
+        assert!(from_contents(&Contents::default()).expect_err("nothing").contains("type 13"));
+    }
+}
