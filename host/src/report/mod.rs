@@ -5,6 +5,7 @@
 
 mod drawing;
 mod figures;
+mod interface_tables;
 mod page;
 mod panel;
 pub mod records;

@@ -1,7 +1,7 @@
 //! The page: headline, figures and tables in one html text without anything from outside.
 
 use super::drawing::escape;
-use super::{figures, tables};
+use super::{figures, interface_tables, tables};
 use crate::results::{Results, words};
 use std::fmt::Write;
 
@@ -40,14 +40,14 @@ pub fn page(results: &Results) -> String {
                 "Real part of the joint's dynamic stiffness along the sliding direction. The main band is shaded, with the mean of each set of interface \
                  deformation modes (IDMs); values beyond the frame are cut.",
             ),
-            tables::recommended(results),
+            interface_tables::recommended(results),
             tables::joint(results),
             refusals(results),
             figure(
                 figures::interface_modes(results),
                 "Singular values of Y(AJB) − Y(A) − Y(B) (CMIF, Eq. B.1): as many motions couple as curves stand clear of the rest.",
             ),
-            tables::virtual_points(results),
+            interface_tables::virtual_points(results),
         ],
     );
     section(

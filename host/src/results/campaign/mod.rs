@@ -18,6 +18,7 @@ mod interface;
 mod interface_checks;
 mod joint;
 mod loops;
+mod recommended;
 mod shaker;
 mod static_arm;
 #[cfg(test)]
@@ -30,9 +31,9 @@ pub use from_store::{AnalyseError, analyse, geometry};
 pub use interface::fill;
 pub use interface_checks::{BACK_COUPLING, INTERFACE_MODES, INTERNALS, SAME_IN_ALL};
 
-use super::{Bootstrap, Completeness, MAIN_BAND_HZ, Results, UsableBand, ranges};
+use super::{Completeness, MAIN_BAND_HZ, Results, UsableBand, ranges};
 use crate::spectra::{Windowing, usable_band};
-use crate::substructuring::averaged::{Averaged, AveragedError, CellHits, Prepared, Priors};
+use crate::substructuring::averaged::CellHits;
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping};
 use crate::substructuring::identify::identify;
@@ -60,9 +61,6 @@ pub struct Wanted {
     /// Contact and static arm.
     pub known: KnownContact,
 }
-
-/// The bootstrap's seed: the same file gives the same figures.
-const SEED: u64 = 1;
 
 const CONFIGURATIONS: [&str; 3] = ["A", "B", "AJB"];
 
@@ -141,7 +139,9 @@ pub fn analyse_measurements<M: Measurements>(
         frfs[place] = assembled.frf;
     }
     substructure(&mut results, geometry, &frfs);
-    recommend(&mut results, geometry, frfs[2].as_ref(), noises[2].as_ref(), &hits, wanted);
+    if let Some(ajb) = &frfs[2] {
+        recommended::fill(&mut results, geometry, ajb, noises[2].as_ref(), &hits, wanted);
+    }
     at_the_contact(&mut results, measurements, &averages, &impact_loops, sigma);
     results
 }
@@ -314,55 +314,6 @@ fn substructure(results: &mut Results, geometry: &Geometry, frfs: &[Option<FrfMa
         }
         Err(error) => results.missing.push(format!("Substructuring was not possible: {error}.")),
     }
-}
-
-/// The estimates to quote, with their intervals, from the assembly alone.
-fn recommend(
-    results: &mut Results,
-    geometry: &Geometry,
-    ajb: Option<&FrfMatrix>,
-    noise: Option<&FrfNoise>,
-    hits: &[CellHits],
-    wanted: Wanted,
-) {
-    let Some(ajb) = ajb else { return };
-    let priors = Priors::default();
-    results.source.settings.insert("priors".into(), serde_json::json!(priors));
-    for [low_hz, high_hz] in BANDS_HZ {
-        let band = Band { low_hz, high_hz };
-        match Prepared::of(ajb, noise, geometry, IdmSet::Six, band, &priors) {
-            Ok(prepared) => {
-                let estimate = prepared.estimate();
-                if wanted.replicates > 0 && [low_hz, high_hz] == MAIN_BAND_HZ {
-                    match draw(&prepared, &estimate, hits, wanted.replicates) {
-                        Ok(drawn) => results.bootstrap = Some(drawn),
-                        Err(error) => results.missing.push(format!("No bootstrap over hits: {error}.")),
-                    }
-                }
-                results.recommended.push(estimate);
-            }
-            Err(error) => {
-                results.missing.push(format!("No estimate with an interval by Eq. A.1: {error}."));
-                return;
-            }
-        }
-    }
-}
-
-/// The bootstrap, and the estimate with its scatter.
-fn draw(
-    prepared: &Prepared,
-    estimate: &Averaged,
-    hits: &[CellHits],
-    replicates: usize,
-) -> Result<Bootstrap, AveragedError> {
-    let drawn = prepared.bootstrap(hits, replicates, SEED)?;
-    let joint = estimate
-        .joint
-        .iter()
-        .filter_map(|(dof, whole)| Some((*dof, whole.with_hits(drawn.get(dof)?))))
-        .collect();
-    Ok(Bootstrap { band_hz: estimate.band_hz, replicates, seed: SEED, hits: drawn, joint })
 }
 
 /// Kept and refused hits of one configuration, from counts per cell: (wanted, kept, refused by verdict).
