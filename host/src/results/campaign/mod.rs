@@ -22,9 +22,10 @@ pub use contact::DIRECT;
 pub use from_store::{AnalyseError, analyse, geometry};
 pub use joint::shaped;
 
-use super::{Completeness, MAIN_BAND_HZ, Results, UsableBand, ranges, words};
+use super::{Completeness, MAIN_BAND_HZ, Refusal, Results, UsableBand, ranges, words};
 use crate::spectra::{Windowing, usable_band};
 use crate::substructuring::averaged::{Priors, averaged};
+use crate::substructuring::fit;
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping};
 use crate::substructuring::identify::identify;
@@ -109,6 +110,7 @@ pub fn analyse_measurements<M: Measurements>(
     }
     substructure(&mut results, geometry, &frfs);
     recommend(&mut results, geometry, &frfs, &averages);
+    fitted(&mut results, geometry, &frfs, &averages);
     at_the_contact(&mut results, measurements, &averages, &impact_loops, sigma);
     results
 }
@@ -284,6 +286,35 @@ fn recommend(
                 return;
             }
         }
+    }
+}
+
+/// The fit over the main band, from all three configurations and their noise.
+fn fitted(
+    results: &mut Results,
+    geometry: &Geometry,
+    frfs: &[Option<FrfMatrix>; 3],
+    averages: &[CellAverage],
+) {
+    // what is missing of the three is said already
+    let [Some(a), Some(b), Some(ajb)] = frfs else { return };
+    let noise = |frf: &FrfMatrix, place: usize| {
+        let (name, points) = configurations(geometry)[place];
+        let own: Vec<CellAverage> =
+            averages.iter().filter(|a| a.name.configuration == name).cloned().collect();
+        assemble::noise(points, frf, &own)
+    };
+    let noises = [noise(a, 0), noise(b, 1), noise(ajb, 2)];
+    let [a, b, ajb] = [(a, 0), (b, 1), (ajb, 2)].map(|(frf, i)| fit::Noisy { frf, noise: &noises[i] });
+    let [low_hz, high_hz] = MAIN_BAND_HZ;
+    let options = fit::Options::default();
+    match fit::fit(a, b, ajb, geometry, IdmSet::Six, Band { low_hz, high_hz }, &options) {
+        Ok(fitted) => results.joint.push((&fitted.row()).into()),
+        Err(error) => results.refused.push(Refusal {
+            method: fit::NAME.into(),
+            idms: IdmSet::Six.count(),
+            reason: error.to_string(),
+        }),
     }
 }
 
