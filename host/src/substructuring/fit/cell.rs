@@ -49,7 +49,7 @@ impl Block {
                 None => {
                     self.wrench(*direction, sensor.offset.cross(direction), sensor.side, rows, |at, v| {
                         seen[(axis, at)] += v;
-                    })
+                    });
                 }
             }
         }

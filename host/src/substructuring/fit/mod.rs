@@ -292,7 +292,7 @@ fn problem(
 /// The internal points of a side that the assembly and the substructure both have, where they are wanted.
 fn internals(side: Side, files: &[Measured<'_>; 3], points: Points) -> Internals {
     let (interface, internal) = side.groupings();
-    let (own, ajb) = (&files[if side == Side::A { 0 } else { 1 }], &files[2]);
+    let (own, ajb) = (&files[usize::from(side == Side::B)], &files[2]);
     let wanted = |lacking: bool| points == Points::All || lacking;
     let shared = |own: Vec<String>, ajb: Vec<String>| -> Vec<String> {
         ajb.into_iter().filter(|name| own.contains(name)).collect()

@@ -183,11 +183,11 @@ impl Point<'_> {
             for (mut column, slope) in out.slopes.column_iter_mut().zip(&predicted.slopes) {
                 column += DVector::from_column_slice(problem.measured(slope).as_slice()) * C::from(share);
             }
-            for side in 0..2 {
+            for (side, y) in y.iter().enumerate() {
                 let (left, right) = self.through(side, &predicted);
                 let way = Way { left: &left, right: &right, share: -share };
                 // Y^A and Y^B stand on the model's side of the residual: minus
-                self.aims(side, &y[side], &self.cells[side], &way, &mut out.effect);
+                self.aims(side, y, &self.cells[side], &way, &mut out.effect);
             }
         }
         out.model.copy_from_slice(problem.measured(&mean).as_slice());
