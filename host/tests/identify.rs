@@ -182,7 +182,7 @@ fn a_missing_file_and_a_wrong_command_line_differ_in_their_code() {
 
 #[test]
 fn the_fit_asks_for_the_noise_and_takes_it_stated() {
-    let mut files = Files::of("frf_rigid");
+    let files = Files::of("frf_rigid");
     files.refused(&["--method", "fit", "--idms", "6"], &["fit with 6 IDMs", "`variance`", "--noise"]);
     let out = files.identify(&[
         "--method",
