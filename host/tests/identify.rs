@@ -241,3 +241,34 @@ fn a_missing_file_and_a_wrong_command_line_differ_in_their_code() {
         assert_eq!(files.identify(wrong).status.code(), Some(2), "{wrong:?}");
     }
 }
+
+#[test]
+fn the_fit_asks_for_the_noise_and_takes_it_stated() {
+    let files = Files::of("frf_rigid");
+    files.refused(&["--method", "fit", "--idms", "6"], &["fit with 6 IDMs", "`variance`", "--noise"]);
+    let out = files.identify(&[
+        "--method",
+        "fit",
+        "--idms",
+        "6",
+        "--band",
+        "300:600",
+        "--noise",
+        "0.001",
+        "--json",
+        "--position-error",
+        "0",
+        "--aim-error",
+        "0",
+        "--angle-error",
+        "0",
+    ]);
+    assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
+    let found: Value = serde_json::from_slice(&out.stdout).expect("one JSON document");
+    let row = &found["joint"][0];
+    assert_eq!((&row["method"], &row["lines"]), (&Value::from("fit"), &Value::from(76)));
+    let z = &row["stiffness_n_per_m"]["z"];
+    let number = |v: &Value| v.as_f64().expect("a number");
+    assert!((number(&z["mean"]) / 180e6 - 1.0).abs() < 0.01, "{z}");
+    assert!(number(&z["ci95"][0]) < 180e6 && 180e6 < number(&z["ci95"][1]), "{z}");
+}

@@ -10,8 +10,9 @@ use super::error::CliError;
 use super::output;
 use crate::exchange::{FrfFile, PositionsError, read_frf_file, read_positions};
 use crate::results::campaign::{BANDS_HZ, fill};
-use crate::results::{Results, Source, words};
+use crate::results::{Joint, Refusal, Results, Source, words};
 use crate::substructuring::averaged::{Priors, averaged};
+use crate::substructuring::fit;
 use crate::substructuring::noise::FrfNoise;
 use crate::substructuring::{Band, Dof, FrfMatrix, Geometry, IdmSet, Method, identify};
 
@@ -32,9 +33,15 @@ pub struct Identify {
     /// Where sensors and impacts are: the pyFBS workbook (.xlsx), a folder of its tables as .csv, or .toml.
     #[arg(long, value_name = "FILE")]
     geometry: PathBuf,
-    /// Decoupling methods, by name [default: all].
+    /// Decoupling methods, by name [default: all that work line by line]; `fit`, which takes some ten seconds for each band, where asked for.
     #[arg(long = "method", value_name = "METHOD", value_delimiter = ',')]
-    methods: Vec<Method>,
+    methods: Vec<Asked>,
+    /// For `fit`: K and C full and symmetric instead of diagonal.
+    #[arg(long)]
+    full_joint: bool,
+    /// For `fit` of files without `variance`: noise of each value's real and of its imaginary part, as a fraction of the file's rms at the line.
+    #[arg(long, value_name = "FRACTION", value_parser = not_negative)]
+    noise: Option<f64>,
     /// Interface deformation modes of each virtual point: 2, 4 or 6 (several with commas), or one set by the names of its modes, for
     /// example x,z,ry; x…rz are rigid, ex…bzy flexible as in pyFBS. Repeats [default: 2,4,6].
     #[arg(long, value_name = "N|MODES")]
@@ -58,19 +65,34 @@ pub struct Identify {
 
 impl Identify {
     pub fn run(self) -> Result<(), CliError> {
-        let (a, b, ajb) = (read(&self.a)?.frf, read(&self.b)?.frf, read(&self.ajb)?);
+        let [a, b, ajb] = [read(&self.a)?, read(&self.b)?, read(&self.ajb)?];
+        let FrfFile { frf: a, noise: noise_a, .. } = a;
+        let FrfFile { frf: b, noise: noise_b, .. } = b;
         let (geometry, notes) = read_geometry(&self.geometry)?;
         let FrfFile { frf: ajb, noise, .. } = ajb;
         for note in notes {
             eprintln!("jointrig: {note}");
         }
-        let methods = if self.methods.is_empty() { Method::ALL.to_vec() } else { self.methods.clone() };
+        let methods: Vec<Method> = if self.methods.is_empty() {
+            Method::ALL.to_vec()
+        } else {
+            self.methods
+                .iter()
+                .filter_map(|m| if let Asked::ByLine(m) = m { Some(*m) } else { None })
+                .collect()
+        };
         let asked = self.idms.iter().flat_map(|sets| sets.0.iter().copied());
         let idms: Vec<IdmSet> = if self.idms.is_empty() { IdmSet::ALL.to_vec() } else { asked.collect() };
         let bands = if self.bands.is_empty() { default_bands(&ajb)? } else { self.bands.clone() };
         let mut results = Results::new(self.source());
-        let found = identify(&a, &b, &ajb, &geometry, &methods, &idms, &bands).map_err(bad)?;
-        fill(&mut results, [&a, &b, &ajb], &geometry, &found);
+        if !methods.is_empty() {
+            let found = identify(&a, &b, &ajb, &geometry, &methods, &idms, &bands).map_err(bad)?;
+            fill(&mut results, [&a, &b, &ajb], &geometry, &found);
+        }
+        if self.methods.contains(&Asked::Fit) {
+            let noises = [noise_a, noise_b, noise.clone()];
+            self.with_fit(&mut results, [&a, &b, &ajb], noises, &geometry, &idms, &bands);
+        }
         // the estimates with an interval need whole rigid motions
         if idms.contains(&IdmSet::Six) && methods.contains(&Method::Inverse) {
             self.with_intervals(&mut results, &ajb, noise.as_ref(), &geometry, &bands);
@@ -93,15 +115,59 @@ impl Identify {
         geometry: &Geometry,
         bands: &[Band],
     ) {
-        let priors = Priors {
-            position_m: self.position_error,
-            aim_m: self.aim_error,
-            hammer_angle_rad: self.angle_error,
-        };
+        let priors = self.priors();
         for band in bands {
             // where it cannot be had, the reason is among the refusals of `inverse` already
             if let Ok(estimate) = averaged(ajb, noise, geometry, IdmSet::Six, *band, &priors) {
                 results.recommended.push(estimate);
+            }
+        }
+    }
+
+    fn priors(&self) -> Priors {
+        Priors { position_m: self.position_error, aim_m: self.aim_error, hammer_angle_rad: self.angle_error }
+    }
+
+    /// The fit with each set of modes over each band.
+    fn with_fit(
+        &self,
+        results: &mut Results,
+        frfs: [&FrfMatrix; 3],
+        noises: [Option<FrfNoise>; 3],
+        geometry: &Geometry,
+        idms: &[IdmSet],
+        bands: &[Band],
+    ) {
+        let shape = if self.full_joint { fit::Shape::Full } else { fit::Shape::Diagonal };
+        let options = fit::Options { priors: self.priors(), shape, ..fit::Options::default() };
+        let mut known = Vec::new();
+        for ((name, frf), noise) in ["A", "B", "AJB"].into_iter().zip(frfs).zip(noises) {
+            match noise.or_else(|| self.noise.map(|fraction| FrfNoise::relative(frf, fraction))) {
+                Some(noise) => known.push(noise),
+                None => {
+                    let reason = format!(
+                        "{name} has no array `variance`, and `fit` weighs every cell with its noise: store it (`jointrig frf --out` does), or state --noise FRACTION"
+                    );
+                    results.refused.extend(idms.iter().map(|set| Refusal {
+                        method: fit::NAME.into(),
+                        idms: set.count(),
+                        reason: reason.clone(),
+                    }));
+                    return;
+                }
+            }
+        }
+        let [a, b, ajb] = [0, 1, 2].map(|i| fit::Noisy { frf: frfs[i], noise: &known[i] });
+        for set in idms {
+            for band in bands {
+                match fit::fit(a, b, ajb, geometry, *set, *band, &options) {
+                    Ok(fitted) => results.joint.push(Joint::from(&fitted.row())),
+                    Err(error) => results.refused.push(Refusal {
+                        method: fit::NAME.into(),
+                        idms: set.count(),
+                        reason: error.to_string(),
+                    }),
+                }
             }
         }
     }
@@ -117,6 +183,25 @@ impl Identify {
             source.settings.insert(name.into(), path.display().to_string().into());
         }
         source
+    }
+}
+
+/// A method as it may be asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Asked {
+    /// One that works line by line.
+    ByLine(Method),
+    /// Maximum likelihood over all lines.
+    Fit,
+}
+
+impl FromStr for Asked {
+    type Err = String;
+    fn from_str(name: &str) -> Result<Self, String> {
+        if name == fit::NAME {
+            return Ok(Asked::Fit);
+        }
+        name.parse().map(Asked::ByLine).map_err(|reason: String| format!("{reason}, {}", fit::NAME))
     }
 }
 

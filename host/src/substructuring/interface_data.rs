@@ -48,6 +48,7 @@ pub enum InterfaceError {
 }
 
 /// Points of the geometry that an FRF file really has, with their places in it.
+#[derive(Default)]
 pub(crate) struct Found {
     pub(crate) names: Vec<String>,
     pub(crate) points: Vec<Point>,

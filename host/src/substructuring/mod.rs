@@ -10,7 +10,8 @@
 //! 5. [`joint`]: K and C per line and over bands, with scatter, interval and warnings.
 //! 6. [`identify`](mod@identify): the front door that does all of it.
 //! 7. [`averaged`](mod@averaged): the estimate to quote, with its interval; the bootstrap over hits. [`noise`] is what they start from.
-//! 8. [`coupling`]: the other way round, from parts to the assembly; [`cmif`](mod@cmif): how many modes the interface needs;
+//! 8. [`fit`]: K and C by maximum likelihood over all measured blocks.
+//! 9. [`coupling`]: the other way round, from parts to the assembly; [`cmif`](mod@cmif): how many modes the interface needs;
 //!    [`back_coupling`]: whether the joint found gives the measured assembly; [`plausibility`]: passivity and reciprocity; [`semm`](mod@semm): a model corrected by a measurement.
 //!
 //! All FRFs of a campaign must share one exponential window: every method is algebraic in s, so it is exact on
@@ -22,6 +23,7 @@ pub mod cmif;
 pub mod consistency;
 pub mod coupling;
 pub mod decoupling;
+pub mod fit;
 pub mod frf;
 pub mod geometry;
 pub mod identify;

@@ -38,6 +38,19 @@ pub struct FrfNoise {
 }
 
 impl FrfNoise {
+    /// The same standard deviation of the real and of the imaginary part in all cells of a line: this fraction of their rms.
+    #[must_use]
+    pub fn relative(frf: &FrfMatrix, fraction: f64) -> FrfNoise {
+        let variance = (frf.lines.iter())
+            .map(|y| {
+                let (sum, count) = (y.iter().filter(|v| v.re.is_finite() && v.im.is_finite()))
+                    .fold((0.0, 0usize), |(sum, count), v| (sum + v.norm_sqr(), count + 1));
+                y.map(|_| fraction * fraction * sum / count as f64)
+            })
+            .collect();
+        FrfNoise { variance }
+    }
+
     /// Checks that the variance belongs to this FRF.
     ///
     /// # Errors

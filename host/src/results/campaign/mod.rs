@@ -11,6 +11,7 @@ mod cell;
 mod checks;
 mod chosen;
 mod contact;
+mod fitted;
 mod from_store;
 mod hit_spectra;
 mod imported;
@@ -142,6 +143,7 @@ pub fn analyse_measurements<M: Measurements>(
     if let Some(ajb) = &frfs[2] {
         recommended::fill(&mut results, geometry, ajb, noises[2].as_ref(), &hits, wanted);
     }
+    fitted::fill(&mut results, geometry, &frfs, &noises);
     at_the_contact(&mut results, measurements, &averages, &impact_loops, sigma);
     results
 }

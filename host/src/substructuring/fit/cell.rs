@@ -1,0 +1,115 @@
+//! One cell's geometry, right or wrong: what its sensor sees of the ports' motions, and how its blow acts on them.
+//!
+//! A sensor wrong by δ reads e·(θ × δ) more, where θ is the rotation of its virtual point; a blow wrong by δ adds the moment δ × e; one
+//! tilted pushes along another e.
+
+use super::block::{Block, Impact, Line, Ports, Sensor};
+use crate::substructuring::vpt::ROTATION_LENGTH_M;
+use nalgebra::{Complex, DMatrix, Unit, UnitQuaternion, Vector3};
+
+/// Errors of one cell's geometry: m, m, rad.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct CellError {
+    pub(super) sensor: Vector3<f64>,
+    pub(super) impact: [f64; 2],
+    pub(super) tilt: [f64; 2],
+}
+
+/// One cell at some geometry, as it acts on motions and forces of the ports.
+pub(super) struct CellGeometry {
+    /// The sensor's axes × output ports.
+    pub(super) seen: Line,
+    /// Its derivative by a shift along x, y and z.
+    pub(super) turned: [Line; 3],
+    /// Input ports × 1: the forces of a unit blow.
+    pub(super) pushed: Line,
+    /// Its derivatives by two shifts and two tilts: input ports × 4.
+    pub(super) slopes: Line,
+}
+
+impl Block {
+    /// The cell of these two with an error of its geometry.
+    pub(super) fn cell(&self, sensor: &Sensor, impact: &Impact, error: &CellError) -> CellGeometry {
+        let (pushed, slopes) = self.pushed(impact, error);
+        CellGeometry {
+            seen: self.seen(sensor, error.sensor).map(Complex::from),
+            turned: [0, 1, 2].map(|axis| self.turned(sensor, Vector3::ith(axis, 1.0)).map(Complex::from)),
+            pushed: pushed.map(Complex::from),
+            slopes: slopes.map(Complex::from),
+        }
+    }
+
+    /// What a unit of each output port shows on the sensor's axes when it sits `shift` away from where it should be: axes × ports.
+    fn seen(&self, sensor: &Sensor, shift: Vector3<f64>) -> DMatrix<f64> {
+        let rows = &self.rows;
+        let mut seen = self.turned(sensor, shift);
+        for (axis, direction) in sensor.directions.iter().enumerate() {
+            match sensor.port {
+                Some(port) => seen[(axis, port + axis)] += 1.0,
+                None => {
+                    self.wrench(*direction, sensor.offset.cross(direction), sensor.side, rows, |at, v| {
+                        seen[(axis, at)] += v;
+                    });
+                }
+            }
+        }
+        seen
+    }
+
+    /// What a shift adds to it: an internal sensor counts as sitting on its side's interface body.
+    fn turned(&self, sensor: &Sensor, shift: Vector3<f64>) -> DMatrix<f64> {
+        let rows = &self.rows;
+        let mut turned = DMatrix::zeros(sensor.directions.len(), rows.count);
+        for (axis, direction) in sensor.directions.iter().enumerate() {
+            self.wrench(Vector3::zeros(), shift.cross(direction), sensor.side, rows, |at, v| {
+                turned[(axis, at)] += v;
+            });
+        }
+        turned
+    }
+
+    /// The port forces of a unit blow with this error of geometry, and their derivatives by two shifts and two tilts.
+    fn pushed(&self, impact: &Impact, error: &CellError) -> (DMatrix<f64>, DMatrix<f64>) {
+        let columns = &self.columns;
+        let turn: Vector3<f64> = impact.across[0] * error.tilt[0] + impact.across[1] * error.tilt[1];
+        let direction = match Unit::try_new(turn, 0.0) {
+            Some(axis) => UnitQuaternion::from_axis_angle(&axis, turn.norm()) * impact.direction,
+            None => impact.direction,
+        };
+        let shift: Vector3<f64> = impact.across[0] * error.impact[0] + impact.across[1] * error.impact[1];
+        let mut force = DMatrix::zeros(columns.count, 1);
+        let put = |to: &mut DMatrix<f64>, column: usize, f: Vector3<f64>, m: Vector3<f64>| {
+            self.wrench(f, m, impact.side, columns, |at, v| to[(at, column)] += v);
+        };
+        match impact.port {
+            Some(port) => {
+                force[(port, 0)] = 1.0;
+                put(&mut force, 0, Vector3::zeros(), shift.cross(&direction));
+            }
+            None => put(&mut force, 0, direction, (impact.offset + shift).cross(&direction)),
+        }
+        let mut slopes = DMatrix::zeros(columns.count, 4);
+        for (k, across) in impact.across.iter().enumerate() {
+            put(&mut slopes, k, Vector3::zeros(), across.cross(&direction));
+            let swung = across.cross(&direction);
+            put(&mut slopes, 2 + k, swung, (impact.offset + shift).cross(&swung));
+        }
+        (force, slopes)
+    }
+
+    /// Puts a force and a moment (or an axis and its lever) into the places that the IDM set has.
+    fn wrench(
+        &self,
+        force: Vector3<f64>,
+        moment: Vector3<f64>,
+        side: usize,
+        ports: &Ports,
+        mut put: impl FnMut(usize, f64),
+    ) {
+        for (at, dof) in self.idms.dofs().iter().enumerate() {
+            let axis = *dof as usize % 3;
+            let value = if dof.is_rotation() { moment[axis] / ROTATION_LENGTH_M } else { force[axis] };
+            put(ports.first[side] + at, value);
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! The joint K + sC as parameters, in a chart that neither a soft nor a stiff joint leaves.
+//!
+//! Of one degree of freedom, Eq. (1) sees k through k W / (1 + k W) only, W being the admittance of A and B together: linear in
+//! k where the joint is soft against them, linear in 1/k where it is stiff. So the diagonal's parameter is
+//! κ = k u / (1 + k u) with u the size of W: 0 for no joint, 1 for a rigid one, nothing dividing by zero at either end. The damper's parameter is the loss factor λ at mid band, c = k λ / ω.
+//!
+//! The full matrices are K = S⁻¹ L Lᵀ S⁻¹, C = S⁻¹ M Mᵀ S⁻¹ / ω with lower triangles L and M and S = diag(√u): symmetric, not negative.
+
+use super::block::Line;
+use nalgebra::{Complex, DMatrix, DVector};
+
+type C = Complex<f64>;
+
+/// Which entries of K and C are free.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Shape {
+    /// Each degree of freedom by itself.
+    #[default]
+    Diagonal,
+    /// Symmetric, positive.
+    Full,
+}
+
+/// Bounds of κ: a joint does not push back with less than nothing, nor is it stiffer than rigid.
+const KAPPA: [f64; 2] = [0.0, 1.0];
+/// Bounds of the loss factor: a joint does not give energy.
+const LOSS: [f64; 2] = [0.0, 2.0];
+
+/// The parametrisation of one problem.
+#[derive(Debug, Clone)]
+pub(super) struct Chart {
+    pub(super) shape: Shape,
+    /// u per degree of freedom, m/N (rotations scaled).
+    pub(super) unit: Vec<f64>,
+    /// Middle of the band, rad/s.
+    pub(super) omega: f64,
+    /// Of the full form: the size of each row of L, from the diagonal's fit.
+    size: Vec<f64>,
+}
+
+/// The joint at one s as D and E with G⁻¹ = (D W + E)⁻¹ D, where G = W + (K + sC)⁻¹; and their derivatives by each parameter.
+pub(super) struct At {
+    pub(super) d: Line,
+    pub(super) e: Line,
+    pub(super) slopes: Vec<(Line, Line)>,
+}
+
+impl Chart {
+    pub(super) fn diagonal(unit: Vec<f64>, omega: f64) -> Chart {
+        Chart { shape: Shape::Diagonal, size: vec![1.0; unit.len()], unit, omega }
+    }
+
+    /// The full form around a fitted diagonal, and its start.
+    pub(super) fn full(&self, diagonal: &DVector<f64>) -> (Chart, DVector<f64>) {
+        let n = self.n();
+        let floor = 1e-4;
+        let stiffness = |d: usize| {
+            let kappa = diagonal[d].clamp(floor, 1.0 - floor);
+            kappa / (1.0 - kappa)
+        };
+        let size: Vec<f64> = (0..n).map(|d| stiffness(d).sqrt()).collect();
+        let chart = Chart { shape: Shape::Full, size, ..self.clone() };
+        let mut start = DVector::zeros(chart.count());
+        for (i, (r, c)) in triangle(n).enumerate() {
+            if r == c {
+                start[i] = chart.size[r];
+                start[i + n * (n + 1) / 2] = chart.size[r] * diagonal[n + r].clamp(0.01, 1.0).sqrt();
+            }
+        }
+        (chart, start)
+    }
+
+    pub(super) fn n(&self) -> usize {
+        self.unit.len()
+    }
+
+    /// Number of parameters.
+    pub(super) fn count(&self) -> usize {
+        match self.shape {
+            Shape::Diagonal => 2 * self.n(),
+            Shape::Full => self.n() * (self.n() + 1),
+        }
+    }
+
+    /// Inverse variances of the parameters' priors about zero. A loss factor is of the order of one at most; the
+    /// couplings of a positive matrix are at most as large as its diagonal. Stiffness has none.
+    pub(super) fn prior(&self) -> DVector<f64> {
+        let n = self.n();
+        match self.shape {
+            Shape::Diagonal => DVector::from_fn(2 * n, |i, _| if i < n { 0.0 } else { 1.0 }),
+            Shape::Full => {
+                let half = n * (n + 1) / 2;
+                let weights: Vec<f64> = triangle(n)
+                    .map(|(r, c)| if r == c { 0.0 } else { self.size[r].powi(-2) })
+                    .chain(triangle(n).map(|(r, _)| self.size[r].powi(-2)))
+                    .collect();
+                debug_assert_eq!(weights.len(), 2 * half);
+                DVector::from_vec(weights)
+            }
+        }
+    }
+
+    /// The nearest allowed parameters.
+    pub(super) fn bounded(&self, p: &DVector<f64>) -> DVector<f64> {
+        match self.shape {
+            Shape::Diagonal => DVector::from_fn(p.len(), |i, _| {
+                let [low, high] = if i < self.n() { KAPPA } else { LOSS };
+                p[i].clamp(low, high)
+            }),
+            Shape::Full => p.clone(),
+        }
+    }
+
+    /// Whether the parameter stands at a bound and `up` (the sign of the step asked for) points past it.
+    pub(super) fn held(&self, p: &DVector<f64>, i: usize, up: bool) -> bool {
+        let [low, high] = match self.shape {
+            Shape::Diagonal if i < self.n() => KAPPA,
+            Shape::Diagonal => LOSS,
+            Shape::Full => return false,
+        };
+        if up { p[i] >= high } else { p[i] <= low }
+    }
+
+    pub(super) fn at(&self, p: &DVector<f64>, s: C, slopes: bool) -> At {
+        match self.shape {
+            Shape::Diagonal => self.diagonal_at(p, s, slopes),
+            Shape::Full => self.full_at(p, s, slopes),
+        }
+    }
+
+    fn diagonal_at(&self, p: &DVector<f64>, s: C, slopes: bool) -> At {
+        let n = self.n();
+        let zero = || Line::zeros(n, n);
+        let mut at = At { d: zero(), e: zero(), slopes: vec![] };
+        let (mut by_kappa, mut by_loss) = (vec![], vec![]);
+        for d in 0..n {
+            let loss = 1.0 + s * (p[n + d] / self.omega);
+            at.d[(d, d)] = loss * (p[d] / self.unit[d]);
+            at.e[(d, d)] = C::from(1.0 - p[d]);
+            if slopes {
+                let (mut dd, mut de) = (zero(), zero());
+                dd[(d, d)] = loss / self.unit[d];
+                de[(d, d)] = C::from(-1.0);
+                by_kappa.push((dd, de));
+                let mut dd = zero();
+                dd[(d, d)] = s * (p[d] / self.unit[d] / self.omega);
+                by_loss.push((dd, zero()));
+            }
+        }
+        at.slopes.extend(by_kappa);
+        at.slopes.extend(by_loss);
+        at
+    }
+
+    fn full_at(&self, p: &DVector<f64>, s: C, slopes: bool) -> At {
+        let n = self.n();
+        let (l, m) = self.roots(p);
+        let scale = |z: Line| Line::from_fn(n, n, |r, c| z[(r, c)] / (self.unit[r] * self.unit[c]).sqrt());
+        let per = s / self.omega;
+        let d = (&l * l.transpose()).map(C::from) + (&m * m.transpose()).map(|v| per * v);
+        let mut at = At { d: scale(d), e: Line::identity(n, n), slopes: vec![] };
+        if slopes {
+            for (root, factor) in [(&l, C::from(1.0)), (&m, per)] {
+                for (r, c) in triangle(n) {
+                    // d(L Lᵀ) = e_r (column c of L)ᵀ + its transpose
+                    let mut dd = Line::zeros(n, n);
+                    for k in 0..n {
+                        dd[(r, k)] += factor * root[(k, c)];
+                        dd[(k, r)] += factor * root[(k, c)];
+                    }
+                    at.slopes.push((scale(dd), Line::zeros(n, n)));
+                }
+            }
+        }
+        at
+    }
+
+    fn roots(&self, p: &DVector<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+        let n = self.n();
+        let (mut l, mut m) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
+        for (i, (r, c)) in triangle(n).enumerate() {
+            l[(r, c)] = p[i];
+            m[(r, c)] = p[i + n * (n + 1) / 2];
+        }
+        (l, m)
+    }
+
+    /// K and ωC in units of 1/u (dimensionless, n × n), of the full form.
+    pub(super) fn matrices(&self, p: &DVector<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+        let (l, m) = self.roots(p);
+        (&l * l.transpose(), &m * m.transpose())
+    }
+}
+
+/// Places of a lower triangle, row by row.
+fn triangle(n: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..n).flat_map(|r| (0..=r).map(move |c| (r, c)))
+}

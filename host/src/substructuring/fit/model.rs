@@ -1,0 +1,107 @@
+//! Eq. (1) as the model of the assembly, with its derivatives by the joint and by what A and B were measured as.
+//!
+//! Y^AJB = Y − P G⁻¹ Q with P = Y Bᵀ, Q = B Y and G = B Y Bᵀ + Y^J. A change of Y alone gives L δY R with L = I − P G⁻¹ B and
+//! R = I − Bᵀ G⁻¹ Q; a change of the joint −P δ(G⁻¹) Q.
+
+use super::block::{Line, Ports};
+use super::joint::At;
+use nalgebra::Complex;
+
+type C = Complex<f64>;
+
+/// The assembly's ports: A's first, then B's.
+pub(super) struct Layout {
+    /// Interface degrees of freedom of one side.
+    pub(super) n: usize,
+    pub(super) rows: [Ports; 2],
+    pub(super) columns: [Ports; 2],
+}
+
+/// The model at one line.
+pub(super) struct Predicted {
+    /// All output ports × all input ports.
+    pub(super) y: Line,
+    /// L and R.
+    pub(super) left: Line,
+    pub(super) right: Line,
+    /// Derivative of `y` by each parameter of the joint.
+    pub(super) slopes: Vec<Line>,
+}
+
+impl Layout {
+    pub(super) fn shape(&self) -> (usize, usize) {
+        (self.rows[0].count + self.rows[1].count, self.columns[0].count + self.columns[1].count)
+    }
+
+    /// First row and column of a side's ports.
+    pub(super) fn corner(&self, side: usize) -> (usize, usize) {
+        if side == 0 { (0, 0) } else { (self.rows[0].count, self.columns[0].count) }
+    }
+
+    /// Y of both parts, block-diagonal.
+    fn apart(&self, parts: [&Line; 2]) -> Line {
+        let (rows, columns) = self.shape();
+        let mut y = Line::zeros(rows, columns);
+        for (side, part) in parts.into_iter().enumerate() {
+            y.view_mut(self.corner(side), part.shape()).copy_from(part);
+        }
+        y
+    }
+
+    /// P = Y Bᵀ and Q = B Y.
+    fn edges(&self, parts: [&Line; 2]) -> (Line, Line) {
+        let (rows, columns) = self.shape();
+        let (mut p, mut q) = (Line::zeros(rows, self.n), Line::zeros(self.n, columns));
+        for (side, part) in parts.into_iter().enumerate() {
+            let sign = C::from(if side == 0 { 1.0 } else { -1.0 });
+            let (row, column) = self.corner(side);
+            let pushed = part.columns(self.columns[side].first[0], self.n) * sign;
+            p.view_mut((row, 0), pushed.shape()).copy_from(&pushed);
+            let moved = part.rows(self.rows[side].first[0], self.n) * sign;
+            q.view_mut((0, column), moved.shape()).copy_from(&moved);
+        }
+        (p, q)
+    }
+
+    /// W = B Y Bᵀ of the interface.
+    pub(super) fn interface(&self, parts: [&Line; 2]) -> Line {
+        let mut w = Line::zeros(self.n, self.n);
+        for (side, part) in parts.into_iter().enumerate() {
+            let at = (self.rows[side].first[0], self.columns[side].first[0]);
+            w += part.view(at, (self.n, self.n));
+        }
+        w
+    }
+
+    /// Only the assembly's admittance; none where G is singular.
+    pub(super) fn assembly(&self, joint: &At, parts: [&Line; 2]) -> Option<Line> {
+        let flexibility = &joint.d * self.interface(parts) + &joint.e;
+        let g = flexibility.lu().solve(&joint.d)?;
+        let (p, q) = self.edges(parts);
+        Some(self.apart(parts) - p * (g * q))
+    }
+
+    /// The model with its derivatives; none where G is singular.
+    pub(super) fn predict(&self, joint: &At, parts: [&Line; 2]) -> Option<Predicted> {
+        let w = self.interface(parts);
+        let h = (&joint.d * &w + &joint.e).try_inverse()?;
+        let g = &h * &joint.d;
+        let (p, q) = self.edges(parts);
+        let (pg, gq) = (&p * &g, &g * &q);
+        let (rows, columns) = self.shape();
+        let (mut left, mut right) = (Line::identity(rows, rows), Line::identity(columns, columns));
+        for side in 0..2 {
+            let sign = C::from(if side == 0 { 1.0 } else { -1.0 });
+            let (row, column) = self.corner(side);
+            let mut at = left.columns_mut(row + self.rows[side].first[0], self.n);
+            at -= &pg * sign;
+            let mut at = right.rows_mut(column + self.columns[side].first[0], self.n);
+            at -= &gq * sign;
+        }
+        // δ(G⁻¹) = H (δD (I − W G⁻¹) − δE G⁻¹)
+        let ph = &p * &h;
+        let held = &q - &w * &gq;
+        let slopes = joint.slopes.iter().map(|(d, e)| -(&ph * (d * &held - e * &gq))).collect();
+        Some(Predicted { y: self.apart(parts) - &p * &gq, left, right, slopes })
+    }
+}

@@ -1,0 +1,83 @@
+//! The errors of geometry as nuisance parameters: which there are, and which of them a cell has.
+
+use super::block::Block;
+use super::cell::CellError;
+use crate::substructuring::averaged::Priors;
+use nalgebra::Vector3;
+
+/// Every error of geometry that is not known, with its prior: the nuisance parameters.
+///
+/// A sensor's position (three) and an impact's position and tilt (two each) are one error in all configurations; of each cell
+/// there are five more from the aim. An internal point's own error cancels between the substructure and the assembly.
+pub(super) struct Nuisances {
+    /// Standard deviations, m or rad.
+    pub(super) std: Vec<f64>,
+    sensors: Vec<(String, usize)>,
+    impacts: Vec<(String, usize)>,
+    /// First aim error of each block.
+    aims: Vec<usize>,
+}
+
+/// Places of one cell's nuisance parameters: own position (3), impact's position and tilt (4), aim (5).
+pub(super) struct CellNuisances {
+    pub(super) sensor: Option<usize>,
+    pub(super) impact: Option<usize>,
+    pub(super) aim: usize,
+}
+
+impl Nuisances {
+    pub(super) fn of(blocks: &[&Block], priors: &Priors) -> Nuisances {
+        let mut n = Nuisances { std: vec![], sensors: vec![], impacts: vec![], aims: vec![] };
+        for block in blocks {
+            for sensor in block.sensors.iter().filter(|s| !s.internal()) {
+                if !n.sensors.iter().any(|(name, _)| *name == sensor.name) {
+                    n.sensors.push((sensor.name.clone(), n.std.len()));
+                    n.std.extend([priors.position_m; 3]);
+                }
+            }
+            for impact in block.impacts.iter().filter(|i| !i.internal()) {
+                if !n.impacts.iter().any(|(name, _)| *name == impact.name) {
+                    n.impacts.push((impact.name.clone(), n.std.len()));
+                    n.std.extend([priors.position_m; 2]);
+                    n.std.extend([priors.hammer_angle_rad; 2]);
+                }
+            }
+        }
+        for block in blocks {
+            n.aims.push(n.std.len());
+            let cells = block.sensors.len() * block.impacts.len();
+            n.std.extend(std::iter::repeat_n(priors.aim_m, 5 * cells));
+        }
+        n
+    }
+
+    pub(super) fn of_cell(&self, block: usize, of: &Block, sensor: usize, impact: usize) -> CellNuisances {
+        let find =
+            |all: &[(String, usize)], name: &str| all.iter().find(|(n, _)| n == name).map(|(_, at)| *at);
+        CellNuisances {
+            sensor: find(&self.sensors, &of.sensors[sensor].name).filter(|_| !of.sensors[sensor].internal()),
+            impact: find(&self.impacts, &of.impacts[impact].name).filter(|_| !of.impacts[impact].internal()),
+            aim: self.aims[block] + 5 * (sensor * of.impacts.len() + impact),
+        }
+    }
+
+    /// The cell's error where every nuisance parameter has this many standard deviations.
+    pub(super) fn error(&self, at: &CellNuisances, eta: &[f64]) -> CellError {
+        let value = |i: usize| eta[i] * self.std[i];
+        let mut error = CellError {
+            sensor: Vector3::from_fn(|k, _| value(at.aim + k)),
+            impact: [value(at.aim + 3), value(at.aim + 4)],
+            tilt: [0.0; 2],
+        };
+        if let Some(sensor) = at.sensor {
+            error.sensor += Vector3::from_fn(|k, _| value(sensor + k));
+        }
+        if let Some(impact) = at.impact {
+            for k in 0..2 {
+                error.impact[k] += value(impact + k);
+                error.tilt[k] = value(impact + 2 + k);
+            }
+        }
+        error
+    }
+}

@@ -1,0 +1,251 @@
+//! Levenberg–Marquardt on the joint, with the errors of geometry integrated out and linearised anew where they are believed to be.
+
+use super::FitError;
+use super::joint::{Chart, Shape};
+use super::problem::{Corrected, Problem};
+use super::weight::{Point, Weight};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+/// How often geometry, weights and bias are evaluated anew. Tilts act in second order too, which the second pass takes out. Many
+/// passes would do harm: the derivatives hold the noise of the FRFs, and what it feigns adds up.
+const PASSES: usize = 4;
+/// Steps of one pass; a handful do from a fair start.
+const STEPS: usize = 40;
+/// A step that gains less than this in χ² is the last.
+const GAIN: f64 = 1e-4;
+/// χ² per degree of freedom above which geometry is far from linear at these weights: they are made milder for the pass.
+const STEEP: f64 = 1.5;
+const MILDER: usize = 4;
+/// χ² per degree of freedom after the second pass that no further one will mend.
+const HOPELESS: f64 = 100.0;
+/// A κ whose standard deviation is below this fraction of κ (1 − κ) tells its stiffness to some 60 %.
+const TOLD: f64 = 0.3;
+
+/// A direction of which noise feigns more than this fraction of the information is as good as not measured; its interval is
+/// widened tenfold.
+const FEIGNED_MOST: f64 = 0.9;
+
+/// Where a search ended.
+#[derive(Debug, Clone)]
+pub(super) struct Found {
+    pub(super) p: DVector<f64>,
+    pub(super) covariance: DMatrix<f64>,
+    /// χ² per degree of freedom.
+    pub(super) chi_square: f64,
+    /// Largest error of geometry found, in standard deviations of its prior.
+    pub(super) largest_error: f64,
+    /// Whether the last pass moved no parameter by more than half a standard deviation, and no weight was made milder.
+    pub(super) settled: bool,
+}
+
+/// The cost and its derivatives at one point.
+struct Score {
+    cost: f64,
+    chi: f64,
+    gradient: DVector<f64>,
+    hessian: DMatrix<f64>,
+    eta: DVector<f64>,
+}
+
+/// Everything that stays fixed while the joint moves.
+struct Pass<'a> {
+    problem: &'a Problem,
+    chart: &'a Chart,
+    data: &'a Corrected,
+    weight: &'a Weight,
+    /// G η₀ per band: the residual is that of η₀, while the prior is about zero.
+    believed: Vec<DMatrix<f64>>,
+    /// Variances are larger by this factor.
+    mild: f64,
+    /// Of I + Gᵀ N⁻¹ G / mild.
+    marginal: Cholesky<f64, Dyn>,
+    prior: DVector<f64>,
+}
+
+impl Pass<'_> {
+    fn score(&self, p: &DVector<f64>) -> Result<Score, FitError> {
+        let residuals = self.problem.residuals(self.chart, p, self.data)?;
+        let (count, nuisances) = (self.chart.count(), self.weight.information.nrows());
+        let mut square = 0.0;
+        let mut jr = DMatrix::zeros(count, 1);
+        let mut jj = DMatrix::zeros(count, count);
+        let mut gr = DMatrix::zeros(nuisances, 1);
+        let mut gj = DMatrix::zeros(nuisances, count);
+        for (b, weight) in self.weight.bands.iter().enumerate() {
+            let r = DMatrix::from_column_slice(residuals.r[b].len(), 1, residuals.r[b].as_slice());
+            let r = weight.whitened(&r) + &self.believed[b];
+            // r falls where the model rises
+            let j = weight.whitened(&residuals.slopes[b]);
+            square += r.norm_squared();
+            jr += crossed(&j, &r);
+            jj += crossed(&j, &j);
+            gr += crossed(&weight.g, &r);
+            gj += crossed(&weight.g, &j);
+        }
+        let mild = self.mild;
+        let held_r = self.marginal.solve(&gr);
+        let held_j = self.marginal.solve(&gj);
+        let chi = (square - gr.dot(&held_r) / mild) / mild;
+        let prior = DMatrix::from_diagonal(&self.prior);
+        Ok(Score {
+            cost: chi + p.dot(&self.prior.component_mul(p)),
+            chi,
+            gradient: ((jr - gj.tr_mul(&held_r) / mild) / mild).column(0) - self.prior.component_mul(p),
+            hessian: (jj - gj.tr_mul(&held_j) / mild) / mild + prior,
+            eta: held_r.column(0) / mild,
+        })
+    }
+
+    /// The minimum without what noise feigns in the derivatives (errors in variables), and its covariance; none where noise is
+    /// all there is.
+    fn corrected(&self, p: &DVector<f64>, at: &Score) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let (count, nuisances) = (p.len(), self.weight.information.nrows());
+        let mut jr = DMatrix::zeros(count, 1);
+        let mut jj = DMatrix::zeros(count, count);
+        let mut gr = DMatrix::zeros(nuisances, 1);
+        let mut gj = DMatrix::zeros(nuisances, count);
+        for weight in &self.weight.bands {
+            let f = &weight.feigned;
+            jr += crossed(&f.slopes, &f.residual);
+            jj += crossed(&f.slopes, &f.slopes);
+            gr += crossed(&weight.g, &f.residual);
+            gj += crossed(&weight.g, &f.slopes);
+        }
+        let mild = self.mild;
+        let held_j = self.marginal.solve(&gj);
+        let feigned = (jj - gj.tr_mul(&held_j) / mild) / mild;
+        let pull = (jr - held_j.tr_mul(&gr) / mild) / mild;
+        // in units in which the information is one, the feigned part of each direction is a fraction
+        let root = at.hessian.clone().cholesky()?.l();
+        let half = root.solve_lower_triangular(&feigned)?;
+        let fraction = root.solve_lower_triangular(&half.transpose())?.symmetric_eigen();
+        let left = fraction.eigenvalues.map(|f| 1.0 - f.clamp(0.0, FEIGNED_MOST));
+        let turn = root.transpose().solve_upper_triangular(&fraction.eigenvectors)?;
+        let inverse = &turn * DMatrix::from_diagonal(&left.map(|l| 1.0 / l)) * turn.transpose();
+        let mut rest = &at.gradient - pull.column(0);
+        for i in 0..count {
+            if self.chart.held(p, i, rest[i] > 0.0) {
+                rest[i] = 0.0;
+            }
+        }
+        let next = self.chart.bounded(&(p + &inverse * rest));
+        let mut covariance = &turn * DMatrix::from_diagonal(&left.map(|l| 1.0 / (l * l))) * turn.transpose();
+        // one draw and the first order: the correction is not known better than by its own size
+        for (i, step) in (&next - p).iter().enumerate() {
+            covariance[(i, i)] += step * step;
+        }
+        Some((next, covariance))
+    }
+
+    /// Goes downhill from `p` until nothing is gained.
+    fn descend(&self, p: &DVector<f64>) -> Result<(DVector<f64>, Score), FitError> {
+        let (mut p, mut here) = (p.clone(), self.score(p)?);
+        let mut damping = 1e-3;
+        for _ in 0..STEPS {
+            let mut damped = here.hessian.clone();
+            let mut downhill = here.gradient.clone();
+            for i in 0..p.len() {
+                damped[(i, i)] *= 1.0 + damping;
+                // what stands at its bound and would leave stays, and the others know
+                if self.chart.held(&p, i, here.gradient[i] > 0.0) {
+                    damped.row_mut(i).fill(0.0);
+                    damped.column_mut(i).fill(0.0);
+                    damped[(i, i)] = 1.0;
+                    downhill[i] = 0.0;
+                }
+            }
+            let step = damped.cholesky().map(|c| c.solve(&downhill));
+            let next = step.map(|step| self.chart.bounded(&(&p + step)));
+            match next.map(|next| (self.score(&next), next)) {
+                Some((Ok(score), next)) if score.cost <= here.cost => {
+                    let gain = here.cost - score.cost;
+                    (p, here) = (next, score);
+                    damping = (damping / 10.0f64).max(1e-9);
+                    if gain < GAIN {
+                        break;
+                    }
+                }
+                // uphill, or off the map: a shorter step
+                _ => damping *= 10.0,
+            }
+            if damping > 1e9 {
+                break;
+            }
+        }
+        Ok((p, here))
+    }
+}
+
+/// AᵀB by the product that is fast for wide A.
+fn crossed(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    (b.transpose() * a).transpose()
+}
+
+/// The most likely joint near `start`.
+pub(super) fn search(problem: &Problem, chart: &Chart, start: &DVector<f64>) -> Result<Found, FitError> {
+    let nuisances = problem.nuisances.std.len();
+    let freedom = (2 * problem.entries() * problem.bands.len()) as f64;
+    let freedom = (freedom - chart.count() as f64).max(1.0);
+    let mut p = start.clone();
+    let mut eta = DVector::zeros(nuisances);
+    let mut found: Option<Found> = None;
+    for pass in 0..PASSES {
+        let data = problem.corrected(chart, &p, eta.as_slice())?;
+        let cells = [0, 1, 2].map(|place| problem.cells(place, eta.as_slice()));
+        let weight = Weight::of(Point { problem, chart, p: &p, cells: &cells, data: &data })?;
+        let eta_column = DMatrix::from_column_slice(nuisances, 1, eta.as_slice());
+        let believed: Vec<DMatrix<f64>> = weight.bands.iter().map(|b| &b.g * &eta_column).collect();
+        let mut mild = 1.0;
+        let mut trial = 0;
+        let (score, (next, covariance)) = loop {
+            let marginal = DMatrix::identity(nuisances, nuisances) + &weight.information / mild;
+            let here = Pass {
+                problem,
+                chart,
+                data: &data,
+                weight: &weight,
+                believed: believed.clone(),
+                mild,
+                marginal: marginal.cholesky().ok_or(FitError::NoiseSingular)?,
+                prior: chart.prior(),
+            };
+            let (next, score) = here.descend(&p)?;
+            let corrected = here.corrected(&next, &score);
+            trial += 1;
+            if score.chi / freedom < STEEP || trial > MILDER {
+                break (score, corrected.ok_or(FitError::NoMinimum)?);
+            }
+            mild *= score.chi / freedom;
+        };
+        // what a pass still moves is not known better than that
+        let mut covariance = covariance;
+        if found.is_some() {
+            for i in 0..p.len() {
+                covariance[(i, i)] += (next[i] - p[i]).powi(2);
+            }
+        }
+        if (0..p.len()).any(|i| covariance[(i, i)].is_nan() || covariance[(i, i)] <= 0.0) {
+            return Err(FitError::NoMinimum);
+        }
+        // what the data do not tell may wander
+        let told = |i: usize| match chart.shape {
+            Shape::Diagonal => i < chart.n() && covariance[(i, i)].sqrt() < TOLD * next[i] * (1.0 - next[i]),
+            Shape::Full => true,
+        };
+        let moved = (0..p.len()).any(|i| told(i) && (next[i] - p[i]).abs() > 0.5 * covariance[(i, i)].sqrt());
+        eta = score.eta;
+        found = Some(Found {
+            p: next.clone(),
+            covariance,
+            chi_square: score.chi * mild / freedom,
+            largest_error: eta.amax(),
+            settled: !moved && mild == 1.0,
+        });
+        p = next;
+        if pass > 0 && found.as_ref().is_some_and(|f| f.chi_square > HOPELESS) {
+            // geometry had its chance
+            break;
+        }
+    }
+    found.ok_or(FitError::NoMinimum)
+}

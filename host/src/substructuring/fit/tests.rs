@@ -1,0 +1,166 @@
+use super::*;
+use crate::exchange::{read_frf, read_positions};
+use nalgebra::DMatrix;
+use std::path::{Path, PathBuf};
+
+fn data(file: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file)
+}
+
+const BAND: Band = Band { low_hz: 300.0, high_hz: 600.0 };
+const NOWHERE_WRONG: Priors = Priors { position_m: 0.0, aim_m: 0.0, hammer_angle_rad: 0.0 };
+
+struct Case {
+    frf: [FrfMatrix; 3],
+    noise: [FrfNoise; 3],
+    geometry: Geometry,
+}
+
+impl Case {
+    /// The rigid clamp's exact FRFs, said to have this noise, relative to each file's mean size.
+    fn rigid(relative: f64) -> Case {
+        let frf =
+            ["A", "B", "AJB"].map(|f| read_frf(&data(&format!("frf_rigid/{f}.npz"))).expect("test data"));
+        let noise = frf.each_ref().map(|frf| FrfNoise {
+            variance: frf
+                .lines
+                .iter()
+                .map(|y| {
+                    let mean = y.map(|v| v.norm_sqr()).mean();
+                    DMatrix::from_element(y.nrows(), y.ncols(), relative * relative * mean / 2.0)
+                })
+                .collect(),
+        });
+        let geometry = read_positions(&data("positions/positions.xlsx")).expect("test data").geometry;
+        Case { frf, noise, geometry }
+    }
+
+    fn fit(&self, idms: IdmSet, options: &Options) -> Result<Fitted, FitError> {
+        let [a, b, ajb] = [0, 1, 2].map(|i| Noisy { frf: &self.frf[i], noise: &self.noise[i] });
+        fit(a, b, ajb, &self.geometry, idms, BAND, options)
+    }
+}
+
+#[test]
+fn exact_data_give_the_contact_exactly() {
+    let options = Options { priors: NOWHERE_WRONG, ..Options::default() };
+    let found = Case::rigid(1e-6).fit(IdmSet::Six, &options).expect("exact data");
+    for (dof, stiffness) in
+        [(Dof::X, 180e6), (Dof::Y, 260e6), (Dof::Z, 180e6), (Dof::Rx, 22.0), (Dof::Ry, 10.0)]
+    {
+        let k = found.joint[&dof];
+        // the data are exact to 1e-12; what moves the estimate is the drawn bias of the noise that is only said to be there
+        let tolerance = if dof.is_rotation() { 1e-4 } else { 1e-6 };
+        assert!((k.stiffness / stiffness - 1.0).abs() < tolerance, "{dof}: {k:?}");
+    }
+    let z = found.joint[&Dof::Z];
+    assert!((z.damping / (180e6 * 1.5e-5) - 1.0).abs() < 1e-5, "{z:?}");
+    assert!(found.converged && z.identified && found.row().warnings.is_empty(), "{:?}", found.warnings());
+}
+
+#[test]
+fn full_matrices_of_exact_data_are_diagonal() {
+    let options = Options { priors: NOWHERE_WRONG, shape: Shape::Full, ..Options::default() };
+    let found = Case::rigid(1e-6).fit(IdmSet::Six, &options).expect("exact data");
+    let z = found.joint[&Dof::Z].stiffness;
+    assert!((z / 180e6 - 1.0).abs() < 1e-4, "{z}");
+    let [coupling, _] = found.coupling_si["y-z"];
+    assert!(coupling.abs() < 1e-3 * z, "{coupling}");
+}
+
+/// The paper's three internals on each side: too few for Eq. (3), enough for a model.
+#[test]
+fn three_internals_are_enough() {
+    let mut case = Case::rigid(1e-3);
+    let ajb = &case.frf[2];
+    let (outputs, inputs): (Vec<String>, Vec<String>) = (
+        ajb.outputs.iter().filter(|o| o.starts_with("B4")).cloned().collect(),
+        ajb.inputs.iter().filter(|i| i.starts_with("I_")).cloned().collect(),
+    );
+    assert_eq!((outputs.len(), inputs.len()), (3, 3));
+    let rows: Vec<usize> =
+        outputs.iter().map(|o| ajb.outputs.iter().position(|a| a == o).expect("there")).collect();
+    let columns: Vec<usize> =
+        inputs.iter().map(|i| ajb.inputs.iter().position(|a| a == i).expect("there")).collect();
+    case.noise[2] = FrfNoise {
+        variance: case.noise[2]
+            .variance
+            .iter()
+            .map(|v| DMatrix::from_fn(3, 3, |r, c| v[(rows[r], columns[c])]))
+            .collect(),
+    };
+    case.frf[2] = ajb.select(&outputs, &inputs).expect("they are there");
+    let options = Options { priors: NOWHERE_WRONG, ..Options::default() };
+    let found = case.fit(IdmSet::Six, &options).expect("a model needs no square matrix");
+    let z = found.joint[&Dof::Z];
+    assert!(z.ci95[0] < 180e6 && 180e6 < z.ci95[1], "{z:?}");
+    assert!((z.stiffness / 180e6 - 1.0).abs() < 0.01, "{z:?}");
+}
+
+#[test]
+fn what_the_model_cannot_describe_gives_no_bare_number() {
+    let mut case = Case::rigid(1e-4);
+    // an assembly of another scale: no K and C makes that of these parts
+    for y in &mut case.frf[2].lines {
+        *y *= nalgebra::Complex::from(1.5);
+    }
+    let options = Options { priors: NOWHERE_WRONG, ..Options::default() };
+    let error = case.fit(IdmSet::Six, &options).expect_err("refused").to_string();
+    assert!(error.contains("does not fit") || error.contains("not identified"), "{error}");
+}
+
+#[test]
+fn unknown_noise_is_refused_by_cell() {
+    let mut case = Case::rigid(1e-3);
+    let row = case.frf[1].outputs.iter().position(|o| o == "B2:y").expect("a channel of B");
+    for v in &mut case.noise[1].variance {
+        v[(row, 0)] = f64::NAN;
+    }
+    let error = case.fit(IdmSet::Six, &Options::default()).expect_err("refused").to_string();
+    assert!(error.contains("B2:y") && error.contains("`variance`"), "{error}");
+}
+
+/// Jacobian of Eq. (1) by the joint, in both charts, against difference quotients.
+#[test]
+fn the_analytic_derivatives_are_the_difference_quotients() {
+    let case = Case::rigid(1e-3);
+    let [a, b, ajb] = [0, 1, 2].map(|i| Noisy { frf: &case.frf[i], noise: &case.noise[i] });
+    let problem =
+        problem(a, b, ajb, &case.geometry, IdmSet::Six, BAND, &Options::default()).expect("exact data");
+    let diagonal = start::chart(&problem);
+    let p = nalgebra::DVector::from_fn(12, |i, _| {
+        [0.95, 0.9, 0.6, 0.05, 0.2, 0.1][i % 6] * if i < 6 { 1.0 } else { 0.3 }
+    });
+    let (full, mut q) = diagonal.full(&p);
+    // away from the diagonal
+    for i in 0..q.len() {
+        q[i] += 0.01 * (i as f64).sin();
+    }
+    let parts = [0, 1].map(|side: usize| problem.parts[side].reduce(&problem.parts[side].cells[10]));
+    for (chart, p) in [(&diagonal, &p), (&full, &q)] {
+        let at = |p: &nalgebra::DVector<f64>| {
+            problem.predict(chart, p, [&parts[0], &parts[1]], 10, true).expect("regular")
+        };
+        let here = at(p);
+        for (i, slope) in here.slopes.iter().enumerate() {
+            let step = 1e-5;
+            let (mut up, mut down) = (p.clone(), p.clone());
+            up[i] += step;
+            down[i] -= step;
+            let quotient = (at(&up).y - at(&down).y) / nalgebra::Complex::from(2.0 * step);
+            // third order of a step of 1e-5, and rounding over it
+            assert!(
+                (slope - &quotient).norm() < 1e-5 * quotient.norm() + 1e-9 * here.y.norm(),
+                "parameter {i}"
+            );
+        }
+        // L δY R is what a change of Y^A does
+        let change = &parts[0] * nalgebra::Complex::from(1e-6);
+        let moved =
+            problem.predict(chart, p, [&(&parts[0] + &change), &parts[1]], 10, false).expect("regular").y;
+        let left = here.left.columns(0, change.nrows());
+        let right = here.right.rows(0, change.ncols());
+        let linear = left * &change * right;
+        assert!((moved - &here.y - &linear).norm() < 1e-4 * linear.norm());
+    }
+}
