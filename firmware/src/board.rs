@@ -119,8 +119,8 @@ pub trait Inputs {
 
 /// Bytes from the host.
 pub trait ByteSource {
-    /// Waits for at least one byte and returns how many were written; 0 when the link was cut and came
-    /// back (what was gathered of a frame is then dropped).
+    /// Waits for at least one byte and returns how many were written; 0 when the link was cut: what was
+    /// gathered of a frame is dropped, and everything that moves comes to rest.
     fn read(&mut self, buffer: &mut [u8]) -> impl Future<Output = usize>;
 }
 

@@ -9,40 +9,74 @@ use crate::sine::sine;
 /// A quarter of a turn.
 const QUARTER: u32 = 1 << 30;
 
-/// Sums since the last whole cycles.
+/// What the signal times sine and cosine has come to, over so many scans.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct LockIn {
+struct Sums {
     in_phase: f32,
     quadrature: f32,
     scans: u32,
+}
+
+impl Sums {
+    const NOTHING: Self = Self { in_phase: 0.0, quadrature: 0.0, scans: 0 };
+
+    fn add(&mut self, other: &Self) {
+        self.in_phase += other.in_phase;
+        self.quadrature += other.quadrature;
+        self.scans += other.scans;
+    }
+
+    fn amplitude(&self) -> f32 {
+        let squares = self.in_phase * self.in_phase + self.quadrature * self.quadrature;
+        2.0 * square_root(squares) / self.scans as f32
+    }
+}
+
+/// What was seen at the end of some whole cycles, in the signal's unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seen {
+    /// Amplitude over the last few cycles: soon, and rough.
+    pub glance: f32,
+    /// Amplitude over the whole measurement, when that is complete.
+    pub whole: Option<f32>,
+}
+
+/// The sums of a measurement and of the glance that is under way.
+#[derive(Clone, Copy, Debug)]
+pub struct LockIn {
+    glance: Sums,
+    whole: Sums,
+    glance_scans: u32,
     least_scans: u32,
 }
 
 impl LockIn {
-    /// Measures over the fewest whole cycles that take `least_scans` or more.
-    pub const fn new(least_scans: u32) -> Self {
-        Self { in_phase: 0.0, quadrature: 0.0, scans: 0, least_scans }
+    /// Measures over the fewest whole cycles that take `least_scans` or more, and glances after the fewest that take
+    /// `glance_scans` or more.
+    pub const fn new(glance_scans: u32, least_scans: u32) -> Self {
+        Self { glance: Sums::NOTHING, whole: Sums::NOTHING, glance_scans, least_scans }
     }
 
     /// Forgets what was summed.
     pub fn restart(&mut self) {
-        *self = Self::new(self.least_scans);
+        *self = Self::new(self.glance_scans, self.least_scans);
     }
 
-    /// Takes the signal of one scan at this angle, from which the next scan's differs by `step`. The amplitude, in
-    /// the signal's unit, when a measurement is complete.
-    pub fn feed(&mut self, signal: f32, angle: u32, step: u32) -> Option<f32> {
-        self.in_phase += signal * sine(angle);
-        self.quadrature += signal * sine(angle.wrapping_add(QUARTER));
-        self.scans += 1;
+    /// Takes the signal of one scan at this angle, from which the next scan's differs by `step`. What is seen, when a
+    /// glance or a measurement is complete.
+    pub fn feed(&mut self, signal: f32, angle: u32, step: u32) -> Option<Seen> {
+        self.glance.in_phase += signal * sine(angle);
+        self.glance.quadrature += signal * sine(angle.wrapping_add(QUARTER));
+        self.glance.scans += 1;
         let (_, cycle_ends) = angle.overflowing_add(step);
-        if self.scans < self.least_scans || !cycle_ends {
+        let complete = self.whole.scans + self.glance.scans >= self.least_scans;
+        if !cycle_ends || !(complete || self.glance.scans >= self.glance_scans) {
             return None;
         }
-        let squares = self.in_phase * self.in_phase + self.quadrature * self.quadrature;
-        let amplitude = 2.0 * square_root(squares) / self.scans as f32;
-        self.restart();
-        Some(amplitude)
+        self.whole.add(&self.glance);
+        let glance = core::mem::take(&mut self.glance).amplitude();
+        let whole = complete.then(|| core::mem::take(&mut self.whole).amplitude());
+        Some(Seen { glance, whole })
     }
 }
 
@@ -68,10 +102,11 @@ mod tests {
 
     fn measured(frequency_hz: f64, signal: impl Fn(f64) -> f64) -> f32 {
         let step = jointrig_protocol::request::Shake::step_of(frequency_hz, 51_200);
-        let (mut lock_in, mut angle) = (LockIn::new(4_096), 0_u32);
+        let (mut lock_in, mut angle) = (LockIn::new(512, 4_096), 0_u32);
         for scan in 0..20_000 {
             let turns = f64::from(scan) * f64::from(step) / 4_294_967_296.0;
-            if let Some(amplitude) = lock_in.feed(signal(turns) as f32, angle, step) {
+            if let Some(Seen { whole: Some(amplitude), .. }) = lock_in.feed(signal(turns) as f32, angle, step)
+            {
                 return amplitude;
             }
             angle = angle.wrapping_add(step);
@@ -103,6 +138,24 @@ mod tests {
             3.0 + angle.sin() + 0.5 * (3.0 * angle).cos()
         });
         assert!((amplitude - 1.0).abs() < 1e-4, "{amplitude}");
+    }
+
+    #[test]
+    fn a_glance_sees_a_change_that_the_measurement_still_averages() {
+        // 256 scans a cycle: two cycles a glance, sixteen a measurement; the amplitude doubles after eight
+        let step = jointrig_protocol::request::Shake::step_of(200.0, 51_200);
+        let (mut lock_in, mut angle) = (LockIn::new(512, 4_096), 0_u32);
+        let mut seen = std::vec::Vec::new();
+        for scan in 0..4_096 {
+            let size = if scan < 2_048 { 1.0 } else { 2.0 };
+            seen.extend(lock_in.feed(size * sine(angle), angle, step));
+            angle = angle.wrapping_add(step);
+        }
+        let glances: std::vec::Vec<i32> =
+            seen.iter().map(|seen| (seen.glance * 1e4).round() as i32).collect();
+        assert_eq!(glances, [[10_000; 4], [20_000; 4]].as_flattened());
+        let whole: std::vec::Vec<f32> = seen.iter().filter_map(|seen| seen.whole).collect();
+        assert!(whole.len() == 1 && (whole[0] - 1.5).abs() < 1e-4, "{whole:?}");
     }
 
     #[test]

@@ -31,7 +31,7 @@ pub const BASE: usize = 0x8000_0000;
 /// Its size: QEMU insists on exactly this much.
 pub const BYTES: usize = 16 << 20;
 /// Changes with this layout, so that an image and a simulator of different sources refuse each other.
-pub const MAGIC: u32 = 0x4A52_4C03;
+pub const MAGIC: u32 = 0x4A52_4C04;
 /// Where [`MAGIC`] stands.
 pub const MAGIC_AT: usize = 0;
 /// Where the board's words stand.
@@ -199,6 +199,10 @@ pub struct Reply {
     pub log_tail: u32,
     /// Bytes of text.
     pub length: u32,
+    /// To [`Op::Play`]: the drive has run dry, and took nothing.
+    pub ran_dry: u32,
+    /// How often the link was cut since the start.
+    pub cuts: u32,
 }
 
 impl Reply {
@@ -214,8 +218,8 @@ impl Reply {
             self.to_host_tail,
             self.log_tail,
             self.length,
-            0,
-            0,
+            self.ran_dry,
+            self.cuts,
         ]
     }
 
@@ -230,6 +234,8 @@ impl Reply {
             to_host_tail: words[5],
             log_tail: words[6],
             length: words[7],
+            ran_dry: words[8],
+            cuts: words[9],
         }
     }
 }
@@ -344,6 +350,8 @@ mod tests {
             to_host_tail: 2,
             log_tail: 3,
             length: 4,
+            ran_dry: 1,
+            cuts: 6,
         };
         assert_eq!(Reply::from_words(&reply.to_words()), reply);
     }

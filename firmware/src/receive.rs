@@ -26,6 +26,9 @@ pub async fn receive<M: RawMutex, S: ByteSource, P: Stage>(
         let read = source.read(&mut bytes).await;
         if read == 0 {
             accumulator = Accumulator::new();
+            // whoever gave the orders cannot take them back any more
+            core.with(|state| state.bring_to_rest(Reason::LinkLost));
+            core.to_send.signal(());
             continue;
         }
         let mut rest = &bytes[..read];
@@ -73,7 +76,7 @@ impl<M: RawMutex> Core<'_, M> {
             if agreed && state.session == Some(theirs.session) {
                 return;
             }
-            state.disarm(Reason::StreamEnded);
+            state.bring_to_rest(Reason::StreamEnded);
             state.streaming = false;
             state.answers.clear();
             state.resends.clear();

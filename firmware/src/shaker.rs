@@ -187,10 +187,15 @@ impl<'a> Shaker<'a> {
 
     /// Is at rest at once: the drive was taken away. Nothing ramps.
     pub fn halt(&mut self, reason: Reason) -> Option<Event> {
-        let ran = matches!(self.state, State::Running { .. });
+        let told = match self.state {
+            State::Running { .. } => Some(Event::ShakerStops(reason)),
+            // why it stops was told when it began to
+            State::Stopping => Some(Event::ShakerRests),
+            State::Resting => None,
+        };
         self.state = State::Resting;
         self.amplitude_v = 0.0;
-        ran.then_some(Event::ShakerStops(reason))
+        told
     }
 
     /// Judges one block, and writes the codes of as many scans. Events tell what changed.

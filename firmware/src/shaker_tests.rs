@@ -183,6 +183,11 @@ fn an_emergency_leaves_nothing_to_ramp() {
     assert_eq!(shaker.halt(Reason::EmergencyStop), Some(Event::ShakerStops(Reason::EmergencyStop)));
     assert!(!shaker.moves());
     assert_eq!(shaker.halt(Reason::EmergencyStop), None);
+    // on its way down already, it only has to say that it rests
+    shaker.shake(now, &order(200.0, 5.0)).expect("an order within bounds");
+    run(&mut shaker, &mut now, 20, 0);
+    assert_eq!(shaker.stop(Reason::FrontEnd), Some(Event::ShakerStops(Reason::FrontEnd)));
+    assert_eq!(shaker.halt(Reason::RanDry), Some(Event::ShakerRests));
     // and the next order begins from nothing
     shaker.shake(now, &order(200.0, 5.0)).expect("an order within bounds");
     let (codes, _) = run(&mut shaker, &mut now, 1, 0);

@@ -28,6 +28,8 @@ struct Pipes {
     reader: Option<Waker>,
     writer: Option<Waker>,
     host_waits: bool,
+    /// The device has not heard yet that the link was cut.
+    cut: bool,
     closed: bool,
 }
 
@@ -131,6 +133,23 @@ impl HostEnd {
         self.0.device.notify_one();
         Ok(())
     }
+
+    /// Cuts the link, as when the cable is pulled or the host's program ends: what the device has not read is lost, and it hears of
+    /// the cut. This end goes on as the next host's.
+    pub fn cut(&mut self) {
+        let waker = {
+            let mut pipes = self.0.lock();
+            pipes.to_device.clear();
+            pipes.cut = true;
+            pipes.reader.take()
+        };
+        if let Some(waker) = waker {
+            waker.wake();
+        }
+        // the device checks its flag under this lock before it sleeps
+        drop(self.0.lock());
+        self.0.device.notify_one();
+    }
 }
 
 impl Drop for HostEnd {
@@ -166,6 +185,9 @@ impl ByteSource for DeviceEnd {
     fn read(&mut self, buffer: &mut [u8]) -> impl Future<Output = usize> {
         std::future::poll_fn(move |context| {
             let mut pipes = self.0.lock();
+            if std::mem::take(&mut pipes.cut) {
+                return Poll::Ready(0);
+            }
             if pipes.to_device.is_empty() {
                 pipes.reader = Some(context.waker().clone());
                 return Poll::Pending;

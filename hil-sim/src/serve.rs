@@ -67,6 +67,8 @@ fn bridge(board: &mut HostEnd, mut from_peer: impl Read + Send, mut to_peer: imp
             }
         };
         gone.store(true, Ordering::Release);
+        // whoever comes next begins anew
+        board.cut();
         outcome
     })
 }

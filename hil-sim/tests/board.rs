@@ -217,6 +217,13 @@ fn hammer_and_shaker_keep_every_promise() {
 }
 
 #[test]
+fn lost_scans_take_the_drive_away() {
+    let (board, mut host) = board(3);
+    let lose = |from, scans| board.controls().lose_scans(from, scans);
+    scenarios::lost_scans_take_the_drive_away(lose, board.controls(), &mut host);
+}
+
+#[test]
 fn a_host_that_is_gone_leaves_nothing_moving() {
     let (board, mut host) = with(&Options { seed: 1, free_running: true, ..Options::default() });
     scenarios::a_host_that_is_gone_leaves_nothing_moving(board.controls(), &mut host);

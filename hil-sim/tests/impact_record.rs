@@ -8,7 +8,7 @@ use jointrig_hil_sim::rig::config::BodyName;
 use jointrig_hil_sim::rig::force::ForceSegment;
 use jointrig_hil_sim::rig::modal::modes;
 use jointrig_hil_sim::rig::state_space::StateSpace;
-use jointrig_hil_sim::rig::stepper::{Aimed, ModalStepper, ScanForces};
+use jointrig_hil_sim::rig::stepper::{Aimed, ModalStepper, ScanForces, Span};
 use jointrig_hil_sim::rig::structure::Structure;
 use jointrig_hil_sim::rig::{Configuration, Probe, RigConfig};
 use nalgebra::DVector;
@@ -49,6 +49,7 @@ fn a_hit_on_az3_is_the_reference_record_but_for_its_noise() {
         shaker: none,
         // Finer than anything compared below.
         steps: [1e-9; 8],
+        joint: None,
     };
     let period_s = 1.0 / 51_200.0;
     let mut stepper = ModalStepper::new(&Arc::new(modes(&space).unwrap()), &aimed, period_s);
@@ -60,7 +61,7 @@ fn a_hit_on_az3_is_the_reference_record_but_for_its_noise() {
             error.push(row[channel] - stepper.signals()[3 + channel]);
         }
         let (from_s, to_s) = (n as f64 * period_s, (n + 1) as f64 * period_s);
-        stepper.advance(&ScanForces { from_s, to_s, hammer: &hit, shaker_n: 0.0 });
+        stepper.advance(Span::Scan, &ScanForces { from_s, to_s, hammer: &hit, shaker_n: 0.0 });
     }
     // The record's noise: 0.05 µm/s/√Hz up to 25.6 kHz, 0.02 N; whatever offset it has is taken out here.
     let noise = [8e-6, 8e-6, 0.02, 0.02, 0.02];

@@ -196,6 +196,16 @@ fn hammer_and_shaker_keep_every_promise() {
 }
 
 #[test]
+fn lost_scans_take_the_drive_away() {
+    for fault in [ConverterFault::Hung, ConverterFault::Noticed(Trouble::Silent(0, 0))] {
+        let Some((board, mut host)) = board(3) else { return };
+        let lose = |from, scans| board.faults().break_converters(fault, from, scans);
+        scenarios::lost_scans_take_the_drive_away(lose, board.controls(), &mut host);
+        assert_eq!(board.failure(), None);
+    }
+}
+
+#[test]
 fn a_host_that_is_gone_leaves_nothing_moving() {
     let Some(image) = image() else { return };
     let options = Options { seed: 1, free_running: true, ..Options::default() };

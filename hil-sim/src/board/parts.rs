@@ -41,6 +41,8 @@ pub struct Controls {
     /// A normal load that the rig has not heard of yet (N).
     normal_load_n: Mutex<Option<f64>>,
     watches_joint: AtomicBool,
+    /// Scans that the converters are to lose: the first, and how many.
+    lost: Mutex<(u64, u64)>,
     seen: Mutex<Seen>,
 }
 
@@ -86,6 +88,18 @@ impl Controls {
         config::normal_load(normal_load_n)?;
         *self.normal_load_n.lock().unwrap_or_else(PoisonError::into_inner) = Some(normal_load_n);
         Ok(())
+    }
+
+    /// Lets the native board's converters lose the blocks that hold these scans. They deliver nothing meanwhile; an emulated
+    /// board's have faults of their own.
+    pub fn lose_scans(&self, from_scan: u64, scans: u64) {
+        *self.lost.lock().unwrap_or_else(PoisonError::into_inner) = (from_scan, scans);
+    }
+
+    /// How many blocks are lost if the next one begins with `scan`.
+    fn lost_blocks(&self, scan: u64, per_block: u64) -> u64 {
+        let (from, scans) = *self.lost.lock().unwrap_or_else(PoisonError::into_inner);
+        if scan < from || scan >= from + scans { 0 } else { (from + scans - scan).div_ceil(per_block) }
     }
 
     /// Watches the joint from the next block on, which costs more than the block itself.
@@ -166,13 +180,24 @@ impl Scans for VirtualScans {
     }
 
     async fn next(&mut self, block: &mut [u8; BLOCK_SAMPLE_BYTES]) -> Delivered {
-        self.scans += self.per_block as u64;
+        let lost = self.controls.lost_blocks(self.scans, self.per_block as u64);
+        self.scans += (lost + 1) * self.per_block as u64;
         self.sampling.set(true);
         // the instant of the block's last scan, rounded up to the clock's microsecond
         Timer::at(Instant::from_micros((self.scans * 1_000_000).div_ceil(self.rate_hz))).await;
         self.sampling.set(false);
-        fill(&mut self.rig.borrow_mut(), &self.drive, &self.controls, self.channels, self.per_block, block);
-        Delivered { scans: self.per_block as u8, missed: 0 }
+        // what is lost has happened all the same
+        for _ in 0..=lost {
+            fill(
+                &mut self.rig.borrow_mut(),
+                &self.drive,
+                &self.controls,
+                self.channels,
+                self.per_block,
+                block,
+            );
+        }
+        Delivered { scans: self.per_block as u8, missed: (lost * self.per_block as u64) as u32 }
     }
 }
 

@@ -109,7 +109,7 @@ impl Plant {
         let stepper = match &self.way {
             Way::Modal(modes) => Stepper::Modal(Box::new(ModalStepper::new(modes, &aimed, self.period_s))),
             Way::Exponential { a, turn, .. } => {
-                Stepper::Exponential(ExponentialStepper::new(a, turn, &aimed, self.period_s))
+                Stepper::Exponential(Box::new(ExponentialStepper::new(a, turn, &aimed, self.period_s)))
             }
         };
         let Some(joint) = &aimed.joint else { return Ok((stepper, None)) };

@@ -76,6 +76,11 @@ impl SmallHost {
         self.link
     }
 
+    /// Pulls the link's plug, and puts it in again.
+    pub fn cut(&mut self) {
+        self.link.cut();
+    }
+
     pub fn send(&mut self, kind: Kind, payload: &[u8]) {
         let mut wire = [0; MAX_WIRE];
         self.link.write_all(encode(kind, payload, &mut wire).unwrap()).unwrap();

@@ -31,7 +31,7 @@ pub fn shake() -> Shake {
 pub type Scenario = fn(&Controls, &mut SmallHost);
 
 /// Those for a board whose time waits for its host.
-pub const ALL: [Scenario; 8] = [
+pub const ALL: [Scenario; 9] = [
     a_shot_without_arming_is_refused,
     one_arming_allows_one_shot,
     hammer_and_shaker_exclude_each_other,
@@ -40,6 +40,7 @@ pub const ALL: [Scenario; 8] = [
     a_stop_in_mid_pulse_takes_the_coil_away,
     a_stop_takes_the_shaker_away_without_a_ramp,
     an_open_guard_brings_the_shaker_to_rest,
+    a_pulled_link_brings_the_shaker_to_rest,
 ];
 
 /// Whatever was ordered, no pulse was longer than the cap.
@@ -84,10 +85,25 @@ fn hammer_and_shaker_exclude_each_other(controls: &Controls, host: &mut SmallHos
     assert_eq!(host.ask(order()), Err(Refusal::ShakerRuns));
     host.go_on(RATE.into());
     assert_eq!(host.status().shaker, Shaker::Steady);
+    assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Err(Refusal::ShakerRuns));
+    assert_eq!(host.ask(order()), Err(Refusal::ShakerRuns));
+    assert!(controls.seen().driven_until > 0, "the rig is driven");
+    // its time stands still while it is on its way down
+    halt(host);
     assert_eq!(host.ask(Request::Rest), Ok(Answer::Done));
+    assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Err(Refusal::ShakerRuns), "on its way down");
+    assert_eq!(host.ask(order()), Err(Refusal::ShakerRuns), "on its way down");
+    host.release();
     host.until("rest", |host| host.events.contains(&Event::ShakerRests));
     assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
     assert!(controls.coil_pulses_us().is_empty());
+}
+
+/// Holds the board, and waits until it stands: half a ring on.
+fn halt(host: &mut SmallHost) {
+    host.hold_at = host.next_scan;
+    let halt = host.hold_at + u64::from(host.hello.unwrap().ring_scans / 2);
+    host.until("the halt", |host| host.next_scan >= halt);
 }
 
 /// Peak code of the excitation channel in some last scans.
@@ -116,7 +132,16 @@ fn the_shaker_pushes_as_ordered_and_comes_to_rest(_: &Controls, host: &mut Small
     assert_eq!(host.status().shaker, Shaker::Resting);
 }
 
-fn a_limit_brings_the_shaker_to_rest(_: &Controls, host: &mut SmallHost) {
+/// From a tenth of a second after this scan on the rig feels no drive, for half a second and more.
+fn the_drive_rests_within_100_ms_of(scan: u64, controls: &Controls, host: &mut SmallHost) {
+    host.until("a second", |host| host.latest >= scan + u64::from(RATE));
+    let seen = controls.seen();
+    assert!(seen.driven_until > 0 && seen.driven_until <= scan + u64::from(RATE / 10), "{seen:?} for {scan}");
+    assert!(seen.drive_v == 0.0 && seen.scans > scan + u64::from(RATE / 2), "{seen:?} for {scan}");
+    assert_eq!(host.status().shaker, Shaker::Resting);
+}
+
+fn a_limit_brings_the_shaker_to_rest(controls: &Controls, host: &mut SmallHost) {
     host.start();
     let config = RigConfig::default();
     let mut order = shake();
@@ -124,11 +149,16 @@ fn a_limit_brings_the_shaker_to_rest(_: &Controls, host: &mut SmallHost) {
         order.limits.push(0.0).unwrap();
     }
     // half of the force that the order would come to
-    order.limits.push((f64::from(AMPLITUDE_V) * config.shaker.gain_n_per_v / 2.0) as f32).unwrap();
+    let limit_n = f64::from(AMPLITUDE_V) * config.shaker.gain_n_per_v / 2.0;
+    order.limits.push(limit_n as f32).unwrap();
     assert_eq!(host.ask(Request::Shake(order)), Ok(Answer::Done));
     host.until("rest", |host| host.events.contains(&Event::ShakerRests));
     let reason = Reason::Limit { channel: EXCITATION as u8 };
     assert!(host.events.contains(&Event::ShakerStops(reason)), "{:?}", host.events);
+    let bound = limit_n / config.sensors.excitation.units_per_volt / 10.0 * 32_768.0;
+    let mut forces = host.codes.iter().skip(EXCITATION).step_by(host.channels);
+    let tripped = forces.position(|code| f64::from(code.unsigned_abs()) > bound).unwrap() as u64;
+    the_drive_rests_within_100_ms_of(host.first_scan + tripped, controls, host);
 }
 
 fn a_stop_in_mid_pulse_takes_the_coil_away(controls: &Controls, host: &mut SmallHost) {
@@ -183,14 +213,55 @@ fn an_open_guard_brings_the_shaker_to_rest(controls: &Controls, host: &mut Small
     assert_eq!(host.ask(Request::Shake(shake())), Err(Refusal::Interlock));
 }
 
+fn a_pulled_link_brings_the_shaker_to_rest(controls: &Controls, host: &mut SmallHost) {
+    host.start();
+    assert_eq!(host.ask(Request::Shake(shake())), Ok(Answer::Done));
+    host.go_on(RATE.into());
+    // the link is cut while the board's time stands still, in mid-shake
+    halt(host);
+    let seen = controls.seen();
+    assert!(seen.scans < seen.driven_until + 24, "{seen:?}");
+    host.cut();
+    host.release();
+    the_drive_rests_within_100_ms_of(seen.scans, controls, host);
+    assert!(host.events.contains(&Event::ShakerStops(Reason::LinkLost)), "{:?}", host.events);
+}
+
+/// `lose` makes the converters lose so many scans from one on.
+pub fn lost_scans_take_the_drive_away(lose: impl Fn(u64, u64), controls: &Controls, host: &mut SmallHost) {
+    host.start();
+    assert_eq!(host.ask(Request::Shake(shake())), Ok(Answer::Done));
+    host.go_on(RATE.into());
+    assert_eq!(host.status().shaker, Shaker::Steady);
+    // further than the board can be ahead; blocks of 24 scans
+    let (from, scans) = ((host.next_scan + 2 * host.lead()) / 24 * 24, 240);
+    lose(from, scans);
+    host.until("the loss", |host| host.latest > from + scans);
+    the_drive_rests_within_100_ms_of(from, controls, host);
+    // what it had been given for one block was all that it played: it did not go on when scans came again
+    let seen = controls.seen();
+    assert!((from..=from + 48).contains(&seen.driven_until), "{seen:?} from {from}");
+    for event in [Event::ShakerStops(Reason::FrontEnd), Event::ShakerRests] {
+        assert!(host.events.contains(&event), "{:?}", host.events);
+    }
+    assert_eq!(host.ask(Request::Shake(shake())), Ok(Answer::Done));
+    host.go_on(RATE.into());
+    assert_eq!(host.status().shaker, Shaker::Steady, "it can be begun anew");
+}
+
 /// Needs a board whose time goes on without its host.
 pub fn a_host_that_is_gone_leaves_nothing_moving(controls: &Controls, host: &mut SmallHost) {
     host.start();
     assert_eq!(host.ask(Request::Shake(shake())), Ok(Answer::Done));
+    let last_word = controls.seen().scans;
     silence(host);
     let status = host.status();
     assert_eq!((status.shaker, status.drive_v), (Shaker::Resting, 0.0));
     assert!(host.events.contains(&Event::ShakerStops(Reason::LinkLost)), "{:?}", host.events);
+    // a second of silence, the tenth in which it is noticed, a tenth of a second to rest, and one until the word was heard
+    let seen = controls.seen();
+    let bound = u64::from(RATE / 10 * 13);
+    assert!(seen.driven_until > 0 && seen.driven_until < last_word + bound, "{seen:?} after {last_word}");
     assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
     silence(host);
     assert_eq!(host.status().hammer, Hammer::Disarmed);

@@ -154,6 +154,8 @@ static BENCH: Mutex<CriticalSectionRawMutex, RefCell<Bench>> = Mutex::new(RefCel
         to_host_tail: 0,
         log_tail: 0,
         length: 0,
+        ran_dry: 0,
+        cuts: 0,
     },
     noise: [[0; BLOCK_SAMPLE_BYTES]; NOISES],
     figures: Vec::new(),

@@ -58,7 +58,7 @@ async fn acquire(core: &'static Shared, mut scans: Scans) {
 
 #[embassy_executor::task]
 async fn receive(core: &'static Shared) {
-    jointrig_firmware::receive::receive(core, &mut Source, &mut Stage).await;
+    jointrig_firmware::receive::receive(core, &mut Source::default(), &mut Stage).await;
 }
 
 #[embassy_executor::task]

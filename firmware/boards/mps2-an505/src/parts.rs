@@ -119,9 +119,10 @@ impl board::Drive for Drive {
         for (place, code) in codes.iter().take(BLOCK_SAMPLE_BYTES / 2).enumerate() {
             memory::write(DRIVE_AT + 2 * place, &code.to_le_bytes());
         }
-        port::turn(Op::Play, codes.len() as u32);
-        // the simulator's clock stands still until it has them
-        Ok(())
+        match port::turn(Op::Play, codes.len() as u32).ran_dry {
+            0 => Ok(()),
+            _ => Err(RanDry),
+        }
     }
 
     fn rest(&mut self) {
@@ -157,7 +158,11 @@ impl board::Inputs for Inputs {
 }
 
 /// Bytes from the host.
-pub struct Source;
+#[derive(Default)]
+pub struct Source {
+    /// How often the link was cut, as far as the firmware was told.
+    cuts: u32,
+}
 
 impl board::ByteSource for Source {
     async fn read(&mut self, buffer: &mut [u8]) -> usize {
@@ -170,6 +175,10 @@ impl board::ByteSource for Source {
                         0 => Poll::Pending,
                         count => Poll::Ready(count),
                     };
+                }
+                if port.reply.cuts != self.cuts {
+                    self.cuts = port.reply.cuts;
+                    return Poll::Ready(0);
                 }
                 let tail = port.ask.to_device_tail;
                 let waiting = port.reply.to_device_head.wrapping_sub(tail);

@@ -39,6 +39,8 @@ static PORT: Mutex<CriticalSectionRawMutex, RefCell<Port>> = Mutex::new(RefCell:
         to_host_tail: 0,
         log_tail: 0,
         length: 0,
+        ran_dry: 0,
+        cuts: 0,
     },
     block: WakerRegistration::new(),
     bytes: WakerRegistration::new(),
@@ -79,7 +81,7 @@ pub fn idle(alarm_us: u64) {
         if reply.blocks != before.blocks {
             port.block.wake();
         }
-        if by_uart || reply.to_device_head != port.ask.to_device_tail {
+        if by_uart || reply.to_device_head != port.ask.to_device_tail || reply.cuts != before.cuts {
             port.bytes.wake();
         }
         if by_uart || reply.to_host_tail != before.to_host_tail {

@@ -142,7 +142,7 @@ impl Server {
         loop {
             let ask = self.wait()?;
             self.hear_log(&ask).map_err(|error| broken(&error))?;
-            self.reply.length = 0;
+            (self.reply.length, self.reply.ran_dry) = (0, 0);
             match Op::from_word(ask.op) {
                 Some(Op::Idle) => match self.idle(&ask).map_err(|error| broken(&error))? {
                     Next::Answer => {}
@@ -277,6 +277,10 @@ impl Server {
         let Poll::Ready(count) = once(self.link.read(&mut bytes[..room]), &self.waker) else {
             return Ok(false);
         };
+        if count == 0 {
+            self.reply.cuts += 1;
+            return Ok(true);
+        }
         self.ram.write_ring(TO_DEVICE_AT, head, &bytes[..count])?;
         self.reply.to_device_head = head.wrapping_add(count as u32);
         Ok(true)
@@ -289,8 +293,8 @@ impl Server {
         self.ram.read(DRIVE_AT, &mut bytes[..length])?;
         let codes: Vec<i16> =
             bytes[..length].as_chunks().0.iter().map(|pair| i16::from_le_bytes(*pair)).collect();
-        // a drive in virtual time does not run dry
-        self.drive.play(&codes).map_err(|_| io::Error::other("the simulated drive ran dry"))
+        self.reply.ran_dry = u32::from(self.drive.play(&codes).is_err());
+        Ok(())
     }
 
     /// Moves hammer and laser.

@@ -76,7 +76,7 @@ pub enum Stepper {
     /// By complex modes.
     Modal(Box<ModalStepper>),
     /// By matrix exponential.
-    Exponential(ExponentialStepper),
+    Exponential(Box<ExponentialStepper>),
 }
 
 /// Hands a call on to whichever it is.
