@@ -153,6 +153,26 @@ fn a_sweep_finds_the_hidden_resonance() {
     assert!((check.frequency_hz.unwrap() - 192.0).abs() < 3.0, "{check:?}");
 }
 
+/// Raw force, whole chain: k_T, μ and energy of a contact that slips as one.
+#[test]
+fn gross_slip_gives_back_the_rigs_friction() {
+    let bench = Bench::new();
+    let levels = vec![step(25.0, 3e-6), step(32.0, 10e-6)];
+    let options = Options { seconds: 1.0, ..options(levels) };
+    bench.run(&rig("jenkins"), &options).unwrap();
+    let results = bench.analysed();
+    let (k, limit) = (180e6, 180.0);
+    for row in rows(&results, Force::Raw) {
+        assert_eq!(row.shape, Shape::GrossSlip, "{row:?}");
+        let k_t = row.k_t_n_per_m.unwrap().mean;
+        assert!((k_t / k - 1.0).abs() < 0.03, "{k_t} at {:?}", row.amplitude_m);
+        assert!((row.friction_coefficient.unwrap() / 0.6 - 1.0).abs() < 0.03, "{row:?}");
+        let energy = 4.0 * limit * (row.amplitude_m.unwrap() - limit / k);
+        let found = row.energy_j.unwrap().mean;
+        assert!((found / energy - 1.0).abs() < 0.03, "{found} for {energy}");
+    }
+}
+
 /// k_eq that Iwan elements (20 of 180 N/µm and 180 N together, limits spread by 0.9) have under this closed cycle of Δx, m.
 fn iwan(displacement_m: &[f64]) -> f64 {
     let elements = 20;
