@@ -90,7 +90,7 @@ fn figures(found: &[LoopAnalysis; 2]) -> Vec<(&'static str, f64)> {
     vec![
         ("k_eq", raw.k_eq_n_per_m.mean),
         ("secant", raw.k_secant_n_per_m.unwrap_or(f64::NAN)),
-        ("fundamental", raw.k_fundamental_n_per_m.map_or(f64::NAN, |k| k.norm())),
+        ("fundamental", raw.k_fundamental_n_per_m.map_or(f64::NAN, num_complex::Complex::norm)),
         ("energy", raw.energy_j.map_or(f64::NAN, |e| e.mean)),
         ("amplitude", raw.amplitude_m),
         ("corrected_k_eq", corrected.k_eq_n_per_m.mean),

@@ -58,8 +58,11 @@ fn an_impact_beside_a_hidden_resonance_has_no_k_t() {
     assert!(one["decay_cycles"].as_array().unwrap().len() > 4);
 }
 
+/// Name, shape and values of each array.
+type Arrays = Vec<(&'static str, Vec<usize>, Vec<f64>)>;
+
 /// A shaker record of 20 cycles of 200 Hz at 20 kHz, changed before it is written.
-fn written(folder: &Path, change: impl FnOnce(&mut Vec<(&'static str, Vec<usize>, Vec<f64>)>)) -> PathBuf {
+fn written(folder: &Path, change: impl FnOnce(&mut Arrays)) -> PathBuf {
     let n = 2_000;
     let wave = |amplitude: f64| -> Vec<f64> {
         (0..n).map(|i| amplitude * (std::f64::consts::TAU * 200.0 * i as f64 / 20_000.0).cos()).collect()
@@ -68,7 +71,7 @@ fn written(folder: &Path, change: impl FnOnce(&mut Vec<(&'static str, Vec<usize>
         ("fs", vec![], vec![20_000.0]),
         ("velocity_a", vec![n], wave(3e-4)),
         ("velocity_b", vec![n], wave(1e-4)),
-        ("force", vec![n], (0..n).map(|i| 30.0 * (0.0628318530717958 * i as f64).sin()).collect()),
+        ("force", vec![n], (0..n).map(|i| 30.0 * (std::f64::consts::TAU * 0.01 * i as f64).sin()).collect()),
         ("excitation", vec![], vec![200.0]),
     ];
     change(&mut arrays);
@@ -98,7 +101,6 @@ fn other_rates_and_frequencies_do_as_well() {
 
 #[test]
 fn what_is_no_record_is_refused_by_name_place_and_remedy() {
-    type Arrays = Vec<(&'static str, Vec<usize>, Vec<f64>)>;
     let changes: [(&str, fn(&mut Arrays), &[&str]); 9] = [
         ("NaN", |a| a[2].2[700] = f64::NAN, &["sample 700", "cut"]),
         ("infinite", |a| a[3].2[3] = f64::INFINITY, &["sample 3", "cut"]),

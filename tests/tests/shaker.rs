@@ -19,7 +19,7 @@ fn levels(file: &Path) -> Vec<(f64, u32)> {
     rows.iter().map(|row| (row.level.frequency_hz, crc(row))).collect()
 }
 
-/// Four levels of a minute each: an undisturbed run takes seconds.
+/// Four levels of half a minute of the device's time each: there is time enough to be killed in.
 fn shaker(file: &Path, address: &str) -> Command {
     let mut command = jointrig();
     command.arg("shaker").arg(file).args(["--device", address, "--yes", "--seconds", "30"]);

@@ -57,7 +57,7 @@ pub struct Shaker {
     /// The drive's largest amplitude, V [default: its full scale].
     #[arg(long, value_name = "V", value_parser = positive)]
     max_drive: Option<f64>,
-    /// Magnitude of a channel (SI) that stops the shaker [default: 95 % of full scale at the contact]; may be given again.
+    /// Magnitude of a channel (SI) that stops the shaker [default: 95 % of full scale for load cells and excitation]; may be given again.
     #[arg(long = "limit", value_name = "CHANNEL=VALUE", value_parser = limit)]
     limits: Vec<(String, f64)>,
     /// Answer every prompt with yes.

@@ -63,11 +63,11 @@ impl ContactCompliance {
         let mut from = line(band_hz[0]).max(1);
         while from + group <= (line(band_hz[1]) + 1).min(x.len()) {
             let (mut cross, mut auto) = (Complex::default(), 0.0);
-            for l in from..from + group {
+            for (l, (moved, force)) in x.iter().zip(&t).enumerate().skip(from).take(group) {
                 let s = Complex::new(0.0, TAU * step_hz * l as f64);
-                let displacement = if per_velocity { x[l] / s } else { x[l] };
-                cross += displacement * t[l].conj();
-                auto += t[l].norm_sqr();
+                let displacement = if per_velocity { moved / s } else { *moved };
+                cross += displacement * force.conj();
+                auto += force.norm_sqr();
             }
             found.frequency_hz.push(step_hz * (from as f64 + 0.5 * (group - 1) as f64));
             found.compliance_m_per_n.push(cross / auto);
@@ -101,7 +101,9 @@ impl ContactCompliance {
 
 fn spectrum(mut x: Vec<f64>) -> Option<Vec<Complex<f64>>> {
     let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
-    x.iter_mut().for_each(|v| *v -= mean);
+    for v in &mut x {
+        *v -= mean;
+    }
     let fft = RealFftPlanner::new().plan_fft_forward(x.len());
     let mut out = fft.make_output_vec();
     fft.process(&mut x, &mut out).ok()?;

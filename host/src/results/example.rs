@@ -156,7 +156,7 @@ fn levels() -> Vec<Hysteresis> {
                     shape_evidence: None,
                     decay_cycles: Vec::new(),
                     decay: Vec::new(),
-                    level: Some(rows.len() as i64 + 1),
+                    level: i64::try_from(rows.len() + 1).ok(),
                     moment: Some(moment),
                     records: Vec::new(),
                     warnings: Vec::new(),

@@ -35,6 +35,14 @@ pub enum Shortfall {
         /// Largest of them.
         most: f64,
     },
+    /// A channel at the contact reached the end of its range while it was recorded.
+    #[error(
+        "channel `{channel}` reached the end of its range: set a wider one at the sensor, or order a smaller amplitude"
+    )]
+    Clipped {
+        /// Its name.
+        channel: String,
+    },
     /// It settled and left again while it was recorded.
     #[error("settled, but drifted to {:.1} % of the order while it was recorded; run the same command again", 100.0 * ratio)]
     Strayed {

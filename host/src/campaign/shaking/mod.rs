@@ -19,6 +19,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use jointrig_protocol::answer::Info;
+use jointrig_protocol::channel::Role;
 use jointrig_protocol::request::{Configuration, Stage as StageRequest};
 
 use super::level::{Level, Moment};
@@ -146,6 +147,18 @@ pub fn run(
     Ok(Summary { outcomes, interrupted: options.stop.load(Ordering::Relaxed) })
 }
 
+/// The first channel at the contact with a code at the end of its range.
+fn clipped(channels: &ChannelMap, codes: &[i16]) -> Option<String> {
+    let at_contact = |place: &usize| {
+        matches!(channels.channels[*place].role, Role::SpecimenA | Role::SpecimenB | Role::LoadCell)
+    };
+    let full = |code: &i16| matches!(*code, i16::MIN | i16::MAX);
+    (0..channels.len())
+        .filter(at_contact)
+        .find(|place| codes.iter().skip(*place).step_by(channels.len()).any(full))
+        .map(|place| channels.channels[place].name.to_string())
+}
+
 /// Puts the assembly on a virtual rig's table.
 fn assemble(session: &mut Session, plan: &Plan) -> Result<(), ShakeError> {
     let cells = plan.cells();
@@ -268,14 +281,18 @@ impl Bench<'_> {
         orders.go_on(self.session, at + scans)?;
         orders.still_runs(self.session)?;
         let (codes, _) = self.session.cut(at..at + scans)?;
-        let reached = meter.amplitude(&codes, self.channels.len());
+        if let Some(channel) = clipped(self.channels, &codes) {
+            return Err(ShakeError::Short(Shortfall::Clipped { channel }));
+        }
+        let moved = meter.amplitude(&codes, self.channels.len());
+        // the meter looks at what moves; an open loop reaches its drive by itself
+        let reached = if target.is_some() { moved } else { drive_v };
         if let Some(target) = target
             && (reached / target - 1.0).abs() > WITHIN
         {
             return Err(ShakeError::Short(Shortfall::Strayed { ratio: reached / target }));
         }
-        let ordered = if target.is_some() { level.amplitude } else { reached };
-        let settled = Settled { reached, overshoot: largest / ordered, after_s, drive_v };
+        let settled = Settled { reached, overshoot: largest / target.unwrap_or(moved), after_s, drive_v };
         Ok(Taken { first_scan: at, scans, settled })
     }
 

@@ -20,7 +20,8 @@ const VALID_MS: u32 = 10_000;
 /// After this much of the device's clock it is renewed, s. A virtual board may be half its ring further than its host knows.
 const RENEW_S: f64 = 3.0;
 
-/// The channels at the contact stop the shaker at this part of their full scale: beyond it there is nothing to be recorded.
+/// Load cells and excitation stop the shaker at this part of their full scale. The vibrometers do not: they go beyond theirs for a moment
+/// when a contact lets go, and what they measure is held by the device.
 const OF_FULL_SCALE: f64 = 0.95;
 
 /// The drive's amplitude changes at most by its full scale in half a second.
@@ -39,7 +40,7 @@ impl Limits {
                 let own = self.0.iter().find(|(name, _)| name == channel.name.as_str());
                 match channel.role {
                     _ if own.is_some() => own.map_or(0.0, |(_, limit)| *limit),
-                    Role::SpecimenA | Role::SpecimenB | Role::LoadCell | Role::Excitation => {
+                    Role::LoadCell | Role::Excitation => {
                         OF_FULL_SCALE * channels.full_scale(place).unwrap_or(0.0)
                     }
                     _ => 0.0,
@@ -163,7 +164,7 @@ mod tests {
     use jointrig_protocol::channel::{Channel, Quantity};
 
     #[test]
-    fn channels_at_the_contact_are_limited_and_a_users_limit_counts_more() {
+    fn forces_are_limited_and_a_users_limit_counts_more() {
         let channel = |name: &str, role| Channel {
             name: name.parse().expect("short"),
             role,
@@ -179,12 +180,12 @@ mod tests {
             channels: vec![
                 channel("hammer", Role::HammerForce),
                 channel("LDV_A", Role::SpecimenA),
-                channel("LDV_B", Role::SpecimenB),
+                channel("LC1", Role::LoadCell),
             ],
         };
         let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-8);
-        assert!(near(&Limits::default().of(&channels), &[0.0, 9.5e-3, 9.5e-3]));
-        let own = Limits(vec![("LDV_B".into(), 2e-3), ("hammer".into(), 1.0)]);
-        assert!(near(&own.of(&channels), &[1.0, 9.5e-3, 2e-3]));
+        assert!(near(&Limits::default().of(&channels), &[0.0, 0.0, 9.5e-3]));
+        let own = Limits(vec![("LDV_A".into(), 2e-3), ("hammer".into(), 1.0)]);
+        assert!(near(&own.of(&channels), &[1.0, 2e-3, 9.5e-3]));
     }
 }

@@ -75,6 +75,7 @@ pub fn levels(results: &Results) -> Option<String> {
 }
 
 /// How one panel is laid out.
+#[derive(Clone, Copy)]
 struct Axis<'a> {
     of: fn(&Dot) -> f64,
     colour: fn(&Dot) -> f64,

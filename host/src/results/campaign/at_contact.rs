@@ -47,7 +47,9 @@ pub fn at_the_contact<M: Measurements>(
     results.static_arm = arm;
 
     let mut of_impacts = loops::gathered(impact_loops, arm.as_ref());
-    of_impacts.iter_mut().for_each(|row| loops::judge(row, &hidden));
+    for row in &mut of_impacts {
+        loops::judge(row, &hidden);
+    }
     results.hysteresis.extend(of_impacts);
     let mut of_levels = shaker::rows(&steady, arm.as_ref());
     if let Some(resonance_hz) = resonance_hz {
