@@ -142,20 +142,19 @@ impl Identify {
         let options = fit::Options { priors: self.priors(), shape, ..fit::Options::default() };
         let mut known = Vec::new();
         for ((name, frf), noise) in ["A", "B", "AJB"].into_iter().zip(frfs).zip(noises) {
-            match noise.or_else(|| self.noise.map(|fraction| FrfNoise::relative(frf, fraction))) {
-                Some(noise) => known.push(noise),
-                None => {
-                    let reason = format!(
-                        "{name} has no array `variance`, and `fit` weighs every cell with its noise: store it (`jointrig frf --out` does), or state --noise FRACTION"
-                    );
-                    results.refused.extend(idms.iter().map(|set| Refusal {
-                        method: fit::NAME.into(),
-                        idms: set.count(),
-                        reason: reason.clone(),
-                    }));
-                    return;
-                }
-            }
+            let Some(noise) = noise.or_else(|| self.noise.map(|fraction| FrfNoise::relative(frf, fraction)))
+            else {
+                let reason = format!(
+                    "{name} has no array `variance`, and `fit` weighs every cell with its noise: store it (`jointrig frf --out` does), or state --noise FRACTION"
+                );
+                results.refused.extend(idms.iter().map(|set| Refusal {
+                    method: fit::NAME.into(),
+                    idms: set.count(),
+                    reason: reason.clone(),
+                }));
+                return;
+            };
+            known.push(noise);
         }
         let [a, b, ajb] = [0, 1, 2].map(|i| fit::Noisy { frf: frfs[i], noise: &known[i] });
         for set in idms {
