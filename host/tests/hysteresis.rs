@@ -61,6 +61,9 @@ fn an_impact_beside_a_hidden_resonance_has_no_k_t() {
 /// Name, shape and values of each array.
 type Arrays = Vec<(&'static str, Vec<usize>, Vec<f64>)>;
 
+/// What is wrong, how it is made so, and the words that say it.
+type Change = (&'static str, fn(&mut Arrays), &'static [&'static str]);
+
 /// A shaker record of 20 cycles of 200 Hz at 20 kHz, changed before it is written.
 fn written(folder: &Path, change: impl FnOnce(&mut Arrays)) -> PathBuf {
     let n = 2_000;
@@ -101,7 +104,7 @@ fn other_rates_and_frequencies_do_as_well() {
 
 #[test]
 fn what_is_no_record_is_refused_by_name_place_and_remedy() {
-    let changes: [(&str, fn(&mut Arrays), &[&str]); 9] = [
+    let changes: [Change; 9] = [
         ("NaN", |a| a[2].2[700] = f64::NAN, &["sample 700", "cut"]),
         ("infinite", |a| a[3].2[3] = f64::INFINITY, &["sample 3", "cut"]),
         (

@@ -226,17 +226,18 @@ fn told(store: &Store, outcome: &Outcome) -> (String, Value) {
                 Some(k) if found.shape == Shape::Stuck => ("k_T", k),
                 _ => ("k_eq", found.k_eq_n_per_m),
             };
-            line += &format!(
+            let said = format!(
                 "; raw {name} {} N/µm, {} ({} cycles)",
                 decimals(micro(k.mean), 1),
                 words::shape_name(found.shape),
                 k.cycles
             );
+            line += &said;
             value["shape"] = json!(found.shape);
             value["k_t_n_per_m"] = json!(found.k_t_n_per_m);
             value["k_eq_n_per_m"] = json!(found.k_eq_n_per_m);
         }
-        Some(Err(why)) => line += &format!("; no loop: {why}"),
+        Some(Err(why)) => line.extend(["; no loop: ", &why]),
         None => line += "; recorded from rest to rest",
     }
     (line, value)

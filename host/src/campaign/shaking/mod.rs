@@ -119,12 +119,11 @@ pub fn run(
             break;
         }
         let there = |row: &&LevelRow| row.moment == options.moment && row.level.same(level) && row.whole();
-        let outcome = match known.iter().find(there) {
-            Some(row) => Ok(Outcome::Known(row.clone())),
-            None => {
-                tell(store, level, None);
-                bench.measure(store, level)
-            }
+        let outcome = if let Some(row) = known.iter().find(there) {
+            Ok(Outcome::Known(row.clone()))
+        } else {
+            tell(store, level, None);
+            bench.measure(store, level)
         };
         match outcome {
             Ok(outcome) => {

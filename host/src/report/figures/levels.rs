@@ -134,7 +134,7 @@ fn panel(drawing: &mut Drawing, area: Area, dots: &[Dot], range: [f64; 2], axis:
         }
         entries.push((
             Stroke::new(colour, 1.6),
-            format!("{} {}", decimals(*centre, if *centre < 10.0 { 1 } else { 0 }), axis.unit),
+            format!("{} {}", decimals(*centre, usize::from(*centre < 10.0)), axis.unit),
         ));
     }
     legend(drawing, [area.left, 44.0], &entries);
