@@ -1,7 +1,7 @@
 //! The shaker's levels: each is brought to its amplitude by the device, recorded in steady state, stored, and left by a ramp to rest.
 //!
 //! Nothing moves without a host that wants it now: an order holds for ten seconds of the device's clock and is renewed every three
-//! ([`order`]); an interrupt, an error and the end of the session send the shaker to rest. Levels that are in the file already are
+//! (`order`); an interrupt, an error and the end of the session send the shaker to rest. Levels that are in the file already are
 //! skipped, so a run that was broken off is resumed by running it again.
 
 mod error;
