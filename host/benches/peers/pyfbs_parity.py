@@ -56,7 +56,8 @@ parent, overlay = read("frf_rigid", "A"), read("frf_default", "A")
 y_num = parent["frf"] / (2j * np.pi * parent["frequency"])[:, None, None]
 outputs = [list(parent["outputs"]).index(n) for n in job["semm_outputs"]]
 inputs = [list(parent["inputs"]).index(n) for n in job["semm_inputs"]]
-y_exp = overlay["frf"][:, outputs][:, :, inputs]
+# half as much again, so that the correction is as large as the parent
+y_exp = 1.5 * overlay["frf"][:, outputs][:, :, inputs]
 channels, impacts = sheets["Channels_A"], sheets["Impacts_A"]
 
 
