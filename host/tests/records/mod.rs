@@ -29,8 +29,11 @@ const SIGMA: f64 = 6.0;
 const PEAK_N: f64 = 50.0;
 const WIDTH_S: f64 = 0.41e-3;
 const START_S: f64 = 5e-3;
-/// The force is smoothed away between these, Hz: far above the analysis, so that nothing rings.
-const TAPER_HZ: [f64; 2] = [2000.0, 4000.0];
+/// The force's spectrum fades as exp(−(f / this)²), Hz: a bell in time, so that nothing rings before the pulse. (What does would
+/// wrap round to the record's end, where e^(σt) makes it 10⁵ times as large.)
+const FADE_HZ: f64 = 1000.0;
+/// Lines up to here, Hz: exp(−25) is left of the force.
+const HIGHEST_HZ: f64 = 5000.0;
 
 /// The assembly of a rig, hit at its interface and on its moving mass.
 pub struct Assembly {
@@ -48,7 +51,7 @@ impl Assembly {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/positions/positions.xlsx");
         let geometry = read_positions(&path).expect("test data").geometry;
         let structure = Structure::new(&config, Configuration::Ajb);
-        let lines = (TAPER_HZ[1] * RECORD_S) as usize;
+        let lines = (HIGHEST_HZ * RECORD_S) as usize;
         let scale = structure.mass.diagonal().map(|m| 1.0 / m.sqrt());
         let compliance = (0..lines)
             .map(|l| {
@@ -65,7 +68,7 @@ impl Assembly {
                 DMatrix::from_fn(scale.len(), scale.len(), |i, j| inverse[(i, j)] * scale[i] * scale[j])
             })
             .collect();
-        let force = (0..lines).map(|l| half_sine(variable(l)) * taper(l as f64 / RECORD_S)).collect();
+        let force = (0..lines).map(|l| half_sine(variable(l)) * fade(l as f64 / RECORD_S)).collect();
         Assembly { config, geometry, structure, compliance, force, seed }
     }
 
@@ -198,8 +201,6 @@ fn half_sine(s: C) -> C {
     (-s * START_S).exp() * PEAK_N * turn * end / (s * s + turn * turn)
 }
 
-fn taper(frequency_hz: f64) -> f64 {
-    let [from, to] = TAPER_HZ;
-    let part = ((frequency_hz - from) / (to - from)).clamp(0.0, 1.0);
-    0.5 * (1.0 + (PI * part).cos())
+fn fade(frequency_hz: f64) -> f64 {
+    (-(frequency_hz / FADE_HZ).powi(2)).exp()
 }
