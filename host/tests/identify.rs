@@ -236,7 +236,7 @@ fn names_that_do_not_meet_are_refused() {
 fn a_missing_file_and_a_wrong_command_line_differ_in_their_code() {
     let files = Files::of("frf_rigid");
     std::fs::remove_file(files.folder.path().join("B.npz")).expect("removed");
-    files.refused(&[], &["B.npz", "cannot be opened"]);
+    files.refused(&[], &["B.npz", "check the name"]);
     for wrong in [&["--idms", "3"][..], &["--idms", "x,q"], &["--band", "600:300"], &["--method", "none"]] {
         assert_eq!(files.identify(wrong).status.code(), Some(2), "{wrong:?}");
     }
