@@ -51,12 +51,12 @@ impl Table {
         let theirs = self.theirs.complex(array, "lines of matrices")?;
         let mine: Vec<Complex<f64>> =
             ours.iter().flat_map(|y| y.transpose().iter().copied().collect::<Vec<_>>()).collect();
-        Ok(difference(&mine, &theirs.values, |a, b| (a - b).norm(), |b| b.norm()))
+        Ok(difference(&mine, &theirs.values, |a, b| (a - b).norm(), Complex::norm))
     }
 
     fn real(&mut self, array: &str, ours: &[f64]) -> Result<f64, Box<dyn std::error::Error>> {
         let theirs = self.theirs.real(array, "numbers")?;
-        Ok(difference(ours, &theirs.values, |a, b| (a - b).abs(), |b| b.abs()))
+        Ok(difference(ours, &theirs.values, |a, b| (a - b).abs(), f64::abs))
     }
 }
 

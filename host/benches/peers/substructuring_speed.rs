@@ -216,15 +216,12 @@ fn for_numpy(file: &Path, a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix, geometr
             extras.push(vectors(format!("{kind}_{side}_direction"), points, |p| p.direction));
         }
         let places = |name: String, points: &[&Point], names: &[String]| {
-            let values: Vec<i64> = points
+            let values: Vec<f64> = points
                 .iter()
                 .filter_map(|p| names.iter().position(|n| *n == p.description))
-                .map(|i| i as i64)
+                .map(|i| i as f64)
                 .collect();
-            Extra::Real(
-                name,
-                Array { shape: vec![values.len()], values: values.iter().map(|i| *i as f64).collect() },
-            )
+            Extra::Real(name, Array { shape: vec![values.len()], values })
         };
         let with_inner = |points: &[Point]| -> Vec<Point> {
             let of = |g: Grouping| points.iter().filter(move |p| p.grouping == g).cloned();
