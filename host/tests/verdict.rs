@@ -102,9 +102,9 @@ fn hits_drawn_anew_scatter_as_the_noise_does() {
     let drawn = results.bootstrap.as_ref().expect("two hits in every cell");
     assert_eq!((drawn.replicates, <[f64; 2]>::from(drawn.band_hz)), (100, [300.0, 600.0]));
     let propagated = results.recommended[0].joint[&Dof::Z].std_noise;
-    // two hits drawn from themselves scatter by √(1/2) of what they should; 100 replicates know it to 7 %, the variance of two hits
-    // (averaged over cells and lines) well enough
+    // both know two hits only, and see √(1/2) of the scatter that many would show; 100 replicates know it to 7 %, two hits in each of
+    // 108 cells and 601 lines leave some tens of per cent
     let ratio = drawn.hits[&Dof::Z].std / propagated;
-    assert!((0.4..1.1).contains(&ratio), "{:?} against {propagated:e}", drawn.hits[&Dof::Z]);
+    assert!((0.6..1.6).contains(&ratio), "{:?} against {propagated:e}", drawn.hits[&Dof::Z]);
     assert!(words::summary(&results).join("\n").contains("Hits drawn anew 100 times"));
 }
