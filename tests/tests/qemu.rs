@@ -32,8 +32,12 @@ fn image() -> Option<PathBuf> {
     image
 }
 
+/// Held by each test: what a program logs is the whole program's.
+static ALONE: Mutex<()> = Mutex::new(());
+
 #[test]
 fn a_campaign_over_the_emulated_controller_gives_the_same_records() {
+    let _alone = ALONE.lock();
     if image().is_some() {
         assert_eq!(over("qemu:"), over("sim:"));
     }
@@ -90,6 +94,7 @@ fn disarm(transport: Box<dyn Transport>, tables: Tables, heard: impl Fn(&Session
 #[test]
 fn what_the_emulated_controller_logs_is_read_by_its_table_or_said_to_have_none() {
     let Some(image) = image() else { return };
+    let _alone = ALONE.lock();
     log::set_logger(&HEARD).unwrap();
     log::set_max_level(log::LevelFilter::Info);
     let open = || "qemu:".parse::<Address>().unwrap().open(7).unwrap();
