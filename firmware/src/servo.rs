@@ -8,7 +8,7 @@
 //!
 //! **A contact that slips** is no such plant. Up to its limit it is stiff; a per cent of drive beyond, it moves several
 //! times as far, and the amplitude's logarithm changes up to some hundred times as fast as the drive's. So every few cycles a glance tells
-//! whether the amplitude is beyond a [`CEILING`]. If it is, the last correction went too far: the drive goes back to where it was
+//! whether the amplitude is beyond a ceiling. If it is, the last correction went too far: the drive goes back to where it was
 //! measured last, the next corrections are a quarter as long, and from then on they are divided by the steepness that the last two
 //! measurements show.
 //!
