@@ -199,7 +199,8 @@ fn iwan(displacement_m: &[f64]) -> f64 {
 #[test]
 fn microslip_softens_the_loop_with_amplitude_as_its_law_says() {
     let bench = Bench::new();
-    let levels: Vec<Level> = [0.1e-6, 0.4e-6, 0.8e-6, 1.2e-6, 1.6e-6].map(|a| step(32.0, a)).to_vec();
+    // at a tenth of a micrometre the integrated noise, some nanometres at 32 Hz, takes 1 to 4 % of the slope
+    let levels: Vec<Level> = [0.4e-6, 0.8e-6, 1.2e-6, 1.6e-6].map(|a| step(32.0, a)).to_vec();
     bench.run(&rig("iwan"), &options(levels)).unwrap();
     let store = Store::open_read_only(path(&bench)).unwrap();
     let mut before = f64::INFINITY;
