@@ -1,7 +1,8 @@
 //! FBS and loops side by side (the paper's Tables 2 and 3): every kind of stiffness that was found, and what it is.
 
 use super::number::{band, count, decimals, short};
-use super::{Excitation, Force, Hysteresis, OverCycles, Results, words};
+use super::{Excitation, Force, Hysteresis, MAIN_BAND_HZ, OverCycles, Results, words};
+use crate::substructuring::{Dof, fit};
 
 /// One kind of stiffness.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,7 +22,7 @@ const LATER_CYCLE: usize = 4;
 
 /// Every kind that these results hold, FBS first.
 pub fn kinds(results: &Results) -> Vec<Kind> {
-    let mut kinds: Vec<Kind> = substructuring(results).into_iter().collect();
+    let mut kinds = substructuring(results);
     kinds.extend(direct(results));
     kinds.extend(shaker(results, Force::Raw));
     kinds.extend(impacts(results));
@@ -43,20 +44,51 @@ pub fn corrected(results: &Results) -> Vec<Kind> {
     kinds
 }
 
-fn substructuring(results: &Results) -> Option<Kind> {
-    let joint = results.headline_joint()?;
-    let k = joint.sliding_stiffness()?;
+/// The recommended estimate, the fit, and the paper's method, as far as they are there: each sees the same thing, and only the first two
+/// know how well.
+fn substructuring(results: &Results) -> Vec<Kind> {
     let series = results.check("series-compliance").and_then(|c| c.ok);
-    Some(Kind {
-        found: format!("FBS, {} with {} IDMs, {}", joint.method, joint.idms, band(joint.band_hz)),
-        mean_n_per_m: k.mean,
-        std_n_per_m: k.std,
-        meaning: match series {
-            Some(false) => "stiffness between the arms: contact and clamps in series. A property of this structure, not of the contact; for models that have no clamps".into(),
-            Some(true) => "stiffness between the arms; nothing soft lies between them and the contact, so it is k_T".into(),
-            None => "stiffness between the arms: k_T only if the clamps are much stiffer than the contact".into(),
-        },
-    })
+    let what = match series {
+        Some(false) => {
+            "stiffness between the arms: contact and clamps in series. A property of this structure, not of the contact; for models that have no clamps"
+        }
+        Some(true) => {
+            "stiffness between the arms; nothing soft lies between them and the contact, so it is k_T"
+        }
+        None => "stiffness between the arms: k_T only if the clamps are much stiffer than the contact",
+    };
+    let main = |band_hz: [f64; 2]| band_hz == MAIN_BAND_HZ;
+    let recommended = results.recommended.iter().find(|r| main(r.band_hz.into()));
+    let recommended = recommended.and_then(|r| Some((r, r.joint.get(&Dof::Z).filter(|z| z.identified)?)));
+    let mut kinds = Vec::new();
+    if let Some((estimate, z)) = recommended {
+        kinds.push(Kind {
+            found: format!("FBS, recommended, {} IDMs, {}", estimate.idms, band(MAIN_BAND_HZ)),
+            mean_n_per_m: z.stiffness,
+            std_n_per_m: z.std,
+            meaning: what.into(),
+        });
+    }
+    let fitted = results.joint.iter().find(|j| j.method == fit::NAME && main(j.band_hz));
+    for joint in [fitted, results.headline_joint()].into_iter().flatten() {
+        let Some(k) = joint.sliding_stiffness() else { continue };
+        let meaning = match (kinds.is_empty(), joint.method == fit::NAME) {
+            (true, _) => what,
+            (false, true) => {
+                "the same by maximum likelihood over all cells; needs A and B alone to be what they are in the assembly"
+            }
+            (false, false) => {
+                "the same line by line: ± is the scatter of the lines, no uncertainty of the joint"
+            }
+        };
+        kinds.push(Kind {
+            found: format!("FBS, {} with {} IDMs, {}", joint.method, joint.idms, band(joint.band_hz)),
+            mean_n_per_m: k.mean,
+            std_n_per_m: k.std,
+            meaning: meaning.into(),
+        });
+    }
+    kinds
 }
 
 fn direct(results: &Results) -> Option<Kind> {

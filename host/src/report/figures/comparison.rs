@@ -6,6 +6,7 @@ use super::super::scale::Scale;
 use super::WIDTH;
 use crate::results::number::{micro, stiffness};
 use crate::results::{MAIN_BAND_HZ, Results, side_by_side};
+use crate::substructuring::Dof;
 
 struct Row {
     label: String,
@@ -80,5 +81,18 @@ fn rows(results: &Results) -> Vec<Row> {
         median: None,
         colour: VERMILION,
     });
-    joint.chain(loops).collect()
+    quoted(results).into_iter().chain(joint).chain(loops).collect()
+}
+
+/// The estimate to quote, which is no method's row.
+fn quoted(results: &Results) -> Option<Row> {
+    let estimate = results.recommended.iter().find(|r| <[f64; 2]>::from(r.band_hz) == MAIN_BAND_HZ)?;
+    let z = estimate.joint.get(&Dof::Z).filter(|z| z.identified)?;
+    Some(Row {
+        label: format!("FBS recommended, {} IDMs", estimate.idms),
+        mean: micro(z.stiffness),
+        std: micro(z.std),
+        median: None,
+        colour: BLUE,
+    })
 }

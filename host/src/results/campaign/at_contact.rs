@@ -5,6 +5,7 @@ use super::cell::Measurements;
 use super::checks;
 use super::contact::{ContactCompliance, specimen_curves};
 use super::loops::{self, ImpactLoop};
+use super::phase_split::with_phases;
 use super::{chosen, shaker, static_arm};
 use crate::hysteresis::compliance::SEARCH_HZ;
 use crate::hysteresis::static_arm::{Identified, from_levels};
@@ -34,6 +35,7 @@ pub fn at_the_contact<M: Measurements>(
         results.frfs.extend(chosen::arms(impact, points, averages, sigma_per_s, quantity));
     }
     let hidden = hidden_resonance(compliance.as_ref(), &shaker::swept(&levels));
+    let hidden = with_phases(hidden, &results.frfs);
     let resonance_hz = hidden.frequency_hz.filter(|_| hidden.ok == Some(false));
 
     let arm = static_arm(measurements, averages, &steady, sigma_per_s);
