@@ -87,7 +87,8 @@ impl Identify {
         let mut results = Results::new(self.source());
         if !methods.is_empty() {
             let found = identify(&a, &b, &ajb, &geometry, &methods, &idms, &bands).map_err(bad)?;
-            fill(&mut results, [&a, &b, &ajb], &geometry, &found);
+            let noises = [noise_a.as_ref(), noise_b.as_ref(), noise.as_ref()];
+            fill(&mut results, [&a, &b, &ajb], noises, &geometry, &self.priors(), &found);
         }
         if self.methods.contains(&Asked::Fit) {
             let noises = [noise_a, noise_b, noise.clone()];
@@ -160,7 +161,7 @@ impl Identify {
         for set in idms {
             for band in bands {
                 match fit::fit(a, b, ajb, geometry, *set, *band, &options) {
-                    Ok(fitted) => results.joint.push(Joint::from(&fitted.row())),
+                    Ok(fitted) => results.joint.push(Joint::from(&fitted)),
                     Err(error) => results.refused.push(Refusal {
                         method: fit::NAME.into(),
                         idms: set.count(),

@@ -32,6 +32,7 @@ fn joint(method: &str, idms: usize, band_hz: [f64; 2], k: f64, std: f64, warning
         coupling_si: BTreeMap::new(),
         coupling_damping_si: BTreeMap::new(),
         lines: ((band_hz[1] - band_hz[0]) / 0.5) as usize + 1,
+        goodness: None,
         warnings: warnings.iter().map(|w| (*w).to_owned()).collect(),
     }
 }

@@ -37,6 +37,9 @@ pub struct Joint {
     pub coupling_damping_si: BTreeMap<String, Statistics>,
     /// Lines of the band that were used.
     pub lines: usize,
+    /// Of `fit`: how well the model describes the data.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub goodness: Option<Goodness>,
     /// What a reader must know before using these numbers.
     pub warnings: Vec<String>,
 }
@@ -46,6 +49,17 @@ impl Joint {
     pub fn sliding_stiffness(&self) -> Option<&Statistics> {
         self.stiffness_n_per_m.get("z")
     }
+}
+
+/// How well a model with K and C describes all cells.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Goodness {
+    /// χ² per degree of freedom; some 0.8 to 1 where model, noise and assumed errors of geometry describe the data.
+    pub chi_square_per_dof: f64,
+    /// The largest error of geometry that the fit believes in, in assumed standard deviations.
+    pub largest_error: f64,
+    /// Whether the search came to rest.
+    pub settled: bool,
 }
 
 /// A method that could not be applied, and why.

@@ -29,7 +29,7 @@ pub use completeness::Completeness;
 pub use curves::{FrfCurve, Role, UsableBand, rounded};
 pub use hysteresis::{DecayStep, Force, Hysteresis, ImpactSlope, LoopCurve, ShakerLoop};
 pub use interface::{Bootstrap, InterfaceModes, VirtualPoint};
-pub use joint::{Joint, JointSpectrum, Refusal, SpectrumCurve};
+pub use joint::{Goodness, Joint, JointSpectrum, Refusal, SpectrumCurve};
 pub use reconstruction::Reconstruction;
 pub use source::{Software, Source, ranges};
 

@@ -10,9 +10,6 @@ use serde::Serialize;
 
 type Line = DMatrix<Complex<f64>>;
 
-/// Lines within ± this many Hz are judged together by their median: a single antiresonance decides nothing.
-const AROUND_HZ: f64 = 25.0;
-
 /// How far the coupled assembly is from the measured one, line by line.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BackCoupling {
@@ -60,27 +57,6 @@ impl BackCoupling {
             .collect::<Option<Vec<f64>>>()?;
         (!inside.is_empty()).then(|| BackCoupling { frequency_hz: axis.frequency_hz.clone(), error })
     }
-
-    /// Median error of the lines within ± 25 Hz of each line.
-    pub fn smoothed(&self) -> Vec<f64> {
-        self.frequency_hz
-            .iter()
-            .map(|f| {
-                let from = self.frequency_hz.partition_point(|g| *g < f - AROUND_HZ);
-                let to = self.frequency_hz.partition_point(|g| *g <= f + AROUND_HZ);
-                super::joint::median(&self.error[from..to])
-            })
-            .collect()
-    }
-
-    /// The lowest frequency from which on, up to `high_hz`, the smoothed error stays below `allowed`; none if it does not at
-    /// `high_hz`.
-    pub fn agrees_from(&self, high_hz: f64, allowed: f64) -> Option<f64> {
-        let end = self.frequency_hz.partition_point(|f| *f <= high_hz);
-        let smooth = self.smoothed();
-        let start = smooth[..end].iter().rposition(|e| *e >= allowed || e.is_nan()).map_or(0, |at| at + 1);
-        (start < end).then(|| self.frequency_hz[start])
-    }
 }
 
 #[cfg(test)]
@@ -123,10 +99,6 @@ mod tests {
         let l = 300 - 20;
         // rounding of 2 × 2 inverses
         assert!(found.error[l] < 1e-10 && found.error[100 - 20] > 0.05, "{:?}", found.error);
-        let from = found.agrees_from(350.0, 1e-3).expect("agrees above");
-        // the median's window is 25 Hz wide on either side
-        assert!((from - 200.0).abs() <= 1.0, "{from}");
-        assert_eq!(found.agrees_from(150.0, 1e-6), None);
         let nowhere = Band { low_hz: 1e4, high_hz: 2e4 };
         assert_eq!(BackCoupling::of(&axis, &a, &b, &ajb, &z, nowhere), None);
     }

@@ -12,7 +12,7 @@
 //! 7. [`averaged`](mod@averaged): the estimate to quote, with its interval; the bootstrap over hits. [`noise`] is what they start from.
 //! 8. [`fit`]: K and C by maximum likelihood over all measured blocks.
 //! 9. [`coupling`]: the other way round, from parts to the assembly; [`cmif`](mod@cmif): how many modes the interface needs;
-//!    [`back_coupling`]: whether the joint found gives the measured assembly; [`plausibility`]: passivity and reciprocity; [`semm`](mod@semm): a model corrected by a measurement.
+//!    [`back_coupling`]: whether the joint found gives the measured assembly, and [`explained`] what may keep it from that; [`plausibility`]: passivity and reciprocity; [`semm`](mod@semm): a model corrected by a measurement.
 //!
 //! All FRFs of a campaign must share one exponential window: every method is algebraic in s, so it is exact on
 //! s = σ + iω, but only if A, B and AJB are on the same s. Degrees of freedom are ordered x, y, z, rx, ry, rz.
@@ -23,6 +23,7 @@ pub mod cmif;
 pub mod consistency;
 pub mod coupling;
 pub mod decoupling;
+pub mod explained;
 pub mod fit;
 pub mod frf;
 pub mod geometry;

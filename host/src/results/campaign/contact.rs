@@ -85,6 +85,7 @@ impl ContactCompliance {
             coupling_si: BTreeMap::new(),
             coupling_damping_si: BTreeMap::new(),
             lines: stiffness.len() * DIRECT_LINES,
+            goodness: None,
             warnings,
         })
     }

@@ -1,6 +1,6 @@
 //! The fit over the main band, from all three configurations and their noise.
 
-use crate::results::{MAIN_BAND_HZ, Refusal, Results};
+use crate::results::{Joint, MAIN_BAND_HZ, Refusal, Results};
 use crate::substructuring::fit;
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::Geometry;
@@ -34,7 +34,7 @@ pub fn fill(
         &fit::Options::default(),
     );
     match found {
-        Ok(fitted) => results.joint.push((&fitted.row()).into()),
+        Ok(fitted) => results.joint.push(Joint::from(&fitted)),
         Err(error) => refuse(error.to_string()),
     }
 }

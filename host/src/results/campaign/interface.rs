@@ -1,12 +1,16 @@
 //! From FRFs to what results say of joint and interface: shared by campaigns and by `identify`.
 
+use super::back_coupling;
 use super::interface_checks;
 use super::joint::shaped;
-use crate::results::{InterfaceModes, MAIN_BAND_HZ, Results, VirtualPoint, rounded};
+use crate::results::{Check, InterfaceModes, MAIN_BAND_HZ, Results, VirtualPoint, rounded};
+use crate::substructuring::averaged::Priors;
 use crate::substructuring::cmif::{Cmif, cmif};
+use crate::substructuring::explained::Explained;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping};
 use crate::substructuring::identify::{Identification, VirtualPointQuality};
-use crate::substructuring::{Band, FrfMatrix};
+use crate::substructuring::noise::FrfNoise;
+use crate::substructuring::{Band, FrfMatrix, IdmSet, Method};
 
 /// Curves of the CMIF that are kept: twelve interface motions at most, and the first beyond them.
 const CURVES: usize = 13;
@@ -14,10 +18,13 @@ const CURVES: usize = 13;
 /// Puts what was identified, and what the same FRFs say of the interface, into the results.
 pub fn fill(
     results: &mut Results,
-    [a, b, ajb]: [&FrfMatrix; 3],
+    frfs: [&FrfMatrix; 3],
+    noises: [Option<&FrfNoise>; 3],
     geometry: &Geometry,
+    priors: &Priors,
     found: &Identification,
 ) {
+    let [a, b, ajb] = frfs;
     let (joint, spectrum, refused) = shaped(found);
     results.joint = joint;
     results.joint_spectrum = spectrum;
@@ -34,7 +41,22 @@ pub fn fill(
     }
     results.checks.extend(interface_checks::internals(found));
     results.checks.extend(interface_checks::configuration(found));
-    results.checks.extend(interface_checks::back_coupling(found));
+    results.checks.extend(back_coupled(frfs, noises, geometry, priors, found));
+}
+
+/// The check of the assembly put together again, with the most modes that Eq. (A.1) was asked for with; none where it was not.
+fn back_coupled(
+    frfs: [&FrfMatrix; 3],
+    noises: [Option<&FrfNoise>; 3],
+    geometry: &Geometry,
+    priors: &Priors,
+    found: &Identification,
+) -> Option<Check> {
+    let by_inverse = found.spectra.iter().filter(|s| s.method == Method::Inverse.name());
+    let idms = IdmSet::of(&by_inverse.max_by_key(|s| s.idms)?.modes)?;
+    let main = Band { low_hz: MAIN_BAND_HZ[0], high_hz: MAIN_BAND_HZ[1] };
+    let judged = Explained::of(frfs, noises, geometry, idms, main, priors)?;
+    back_coupling::check(&judged)
 }
 
 /// The matrix without the spare responses of A, which may be anything.

@@ -1,5 +1,4 @@
-//! Whether the interface is described well enough: modes, internals, A and B the same in all configurations, and the assembly
-//! back from its parts.
+//! Whether the interface is described well enough: modes, internals, A and B the same in all configurations.
 
 use super::checks::UNIDENTIFIED;
 use crate::results::number::{micro, short};
@@ -14,15 +13,11 @@ pub const INTERFACE_MODES: &str = "interface-modes";
 pub const INTERNALS: &str = "internals";
 /// Name of the check on A and B being the same structures in all configurations.
 pub const SAME_IN_ALL: &str = "same-in-all-configurations";
-/// Name of the check on the assembly put together again.
-pub const BACK_COUPLING: &str = "back-coupling";
 
 /// Six rigid motions must explain this part of what coupling adds.
 const RIGID: f64 = 0.9;
 /// A difference of this part of the stiffness matters.
 const MATTERS: f64 = 0.1;
-/// The coupled assembly may be off by this part.
-const BACK: f64 = 0.3;
 
 fn main_band() -> Band {
     Band { low_hz: MAIN_BAND_HZ[0], high_hz: MAIN_BAND_HZ[1] }
@@ -159,44 +154,4 @@ pub fn configuration(found: &Identification) -> Option<Check> {
         check = check.with(&format!("primal_{}_minus_inverse_n_per_m", side.to_lowercase()), difference);
     }
     Some(check)
-}
-
-/// Whether A and B, coupled by the joint found, are the measured assembly, and above which frequency. None where it was not done.
-pub fn back_coupling(found: &Identification) -> Option<Check> {
-    let coupled = found.back_coupling.as_ref()?;
-    let inside: Vec<f64> = coupled
-        .frequency_hz
-        .iter()
-        .zip(&coupled.error)
-        .filter(|(f, _)| main_band().contains(**f))
-        .map(|(_, e)| *e)
-        .collect();
-    let median = BandStatistic::of(&inside)?.median;
-    let last = *coupled.frequency_hz.last()?;
-    let from = coupled.agrees_from(MAIN_BAND_HZ[1].min(last), BACK);
-    let percent = |part: f64| short(100.0 * part);
-    let check = match from {
-        Some(from) => Check::new(
-            BACK_COUPLING,
-            Some(from <= MAIN_BAND_HZ[0]),
-            format!(
-                "A and B coupled by the joint of Eq. A.1 (its mean over the main band) give the measured assembly from {} Hz on within {} % (median in the main band {} %). \
-                 Below, a single stiffness does not describe what was measured.",
-                short(from),
-                percent(BACK),
-                percent(median)
-            ),
-        )
-        .at(from),
-        None => Check::new(
-            BACK_COUPLING,
-            Some(false),
-            format!(
-                "A and B coupled by the joint of Eq. A.1 (its mean over the main band) do not give the measured assembly: the median error there is {} %. The joint is no spring \
-                 and damper, A or B changed, or noise prevails.",
-                percent(median)
-            ),
-        ),
-    };
-    Some(check.with("median_error", median))
 }

@@ -1,6 +1,7 @@
 //! The identified joint in the shape of the results.
 
-use crate::results::{Joint, JointSpectrum, Refusal, SpectrumCurve, rounded};
+use crate::results::{Goodness, Joint, JointSpectrum, Refusal, SpectrumCurve, rounded};
+use crate::substructuring::fit::Fitted;
 use crate::substructuring::identify::Identification;
 use crate::substructuring::idm::Dof;
 use crate::substructuring::joint::{BandStatistic, JointRow};
@@ -27,8 +28,20 @@ impl From<&JointRow> for Joint {
             coupling_si: finite(&row.coupling_si),
             coupling_damping_si: finite(&row.coupling_damping_si),
             lines: row.lines,
+            goodness: None,
             warnings: row.warnings.clone(),
         }
+    }
+}
+
+impl From<&Fitted> for Joint {
+    fn from(fitted: &Fitted) -> Self {
+        let goodness = Goodness {
+            chi_square_per_dof: fitted.chi_square_per_dof,
+            largest_error: fitted.largest_error,
+            settled: fitted.converged,
+        };
+        Joint { goodness: Some(goodness), ..Joint::from(&fitted.row()) }
     }
 }
 

@@ -7,6 +7,7 @@
 mod assemble;
 mod at_contact;
 mod averages;
+mod back_coupling;
 mod cell;
 mod checks;
 mod chosen;
@@ -19,22 +20,24 @@ mod interface;
 mod interface_checks;
 mod joint;
 mod loops;
+mod phase_split;
 mod recommended;
 mod shaker;
 mod static_arm;
 #[cfg(test)]
 mod synthetic;
 
+pub use back_coupling::BACK_COUPLING;
 pub use cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel};
 pub use checks::{HIDDEN_RESONANCE, SERIES_COMPLIANCE, UNIDENTIFIED};
 pub use contact::DIRECT;
 pub use from_store::{AnalyseError, analyse, geometry};
 pub use interface::fill;
-pub use interface_checks::{BACK_COUPLING, INTERFACE_MODES, INTERNALS, SAME_IN_ALL};
+pub use interface_checks::{INTERFACE_MODES, INTERNALS, SAME_IN_ALL};
 
 use super::{Completeness, MAIN_BAND_HZ, Results, UsableBand, ranges};
 use crate::spectra::{Windowing, usable_band};
-use crate::substructuring::averaged::CellHits;
+use crate::substructuring::averaged::{CellHits, Priors};
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping};
 use crate::substructuring::identify::identify;
@@ -139,7 +142,7 @@ pub fn analyse_measurements<M: Measurements>(
         noises[place] = assembled.frf.as_ref().map(|frf| assemble::noise(points, frf, &own));
         frfs[place] = assembled.frf;
     }
-    substructure(&mut results, geometry, &frfs);
+    substructure(&mut results, geometry, &frfs, &noises);
     if let Some(ajb) = &frfs[2] {
         recommended::fill(&mut results, geometry, ajb, noises[2].as_ref(), &hits, wanted);
     }
@@ -295,7 +298,12 @@ fn force_band(name: &str, own: &[CellAverage]) -> Option<UsableBand> {
     Some(UsableBand { configuration: name.into(), band_hz: [band.low_hz, band.high_hz] })
 }
 
-fn substructure(results: &mut Results, geometry: &Geometry, frfs: &[Option<FrfMatrix>; 3]) {
+fn substructure(
+    results: &mut Results,
+    geometry: &Geometry,
+    frfs: &[Option<FrfMatrix>; 3],
+    noises: &[Option<FrfNoise>; 3],
+) {
     let [Some(a), Some(b), Some(ajb)] = frfs else {
         let absent: Vec<&str> =
             CONFIGURATIONS.into_iter().zip(frfs).filter(|(_, f)| f.is_none()).map(|(name, _)| name).collect();
@@ -309,7 +317,8 @@ fn substructure(results: &mut Results, geometry: &Geometry, frfs: &[Option<FrfMa
         .collect();
     match identify(a, b, ajb, geometry, &Method::ALL, &IdmSet::ALL, &bands) {
         Ok(found) => {
-            interface::fill(results, [a, b, ajb], geometry, &found);
+            let noises = noises.each_ref().map(Option::as_ref);
+            interface::fill(results, [a, b, ajb], noises, geometry, &Priors::default(), &found);
             if let Some(spectrum) = &mut results.joint_spectrum {
                 spectrum.curves.retain(|c| SHOWN.iter().any(|m| m.name() == c.method));
             }

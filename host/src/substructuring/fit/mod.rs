@@ -42,6 +42,8 @@ use std::collections::BTreeMap;
 /// The method's name in command lines and results.
 pub const NAME: &str = "fit";
 
+/// χ² per degree of freedom at which no other start is tried: a wrong minimum is far above it.
+const ENOUGH: f64 = 2.0;
 /// χ² per degree of freedom above which no joint is given at all.
 const HOPELESS: f64 = 10.0;
 
@@ -209,7 +211,7 @@ pub fn fit(
         if better {
             best = Some(found);
         }
-        if best.as_ref().is_some_and(|best| best.chi_square < outcome::POOR) {
+        if best.as_ref().is_some_and(|best| best.chi_square < ENOUGH) {
             break;
         }
     }

@@ -21,8 +21,8 @@ const HOPELESS: f64 = 100.0;
 /// A κ whose standard deviation is below this fraction of κ (1 − κ) tells its stiffness to some 60 %.
 const TOLD: f64 = 0.3;
 
-/// A direction of which noise feigns more than this fraction of the information is as good as not measured; its interval is
-/// widened tenfold.
+/// A direction of which noise feigns more than this fraction of the information is as good as not measured: its interval is
+/// widened tenfold, and it is not corrected, because tenfold noise is no correction.
 const FEIGNED_MOST: f64 = 0.9;
 
 /// Where a search ended.
@@ -121,7 +121,9 @@ impl Pass<'_> {
         let fraction = root.solve_lower_triangular(&half.transpose())?.symmetric_eigen();
         let left = fraction.eigenvalues.map(|f| 1.0 - f.clamp(0.0, FEIGNED_MOST));
         let turn = root.transpose().solve_upper_triangular(&fraction.eigenvectors)?;
-        let inverse = &turn * DMatrix::from_diagonal(&left.map(|l| 1.0 / l)) * turn.transpose();
+        let told =
+            fraction.eigenvalues.map(|f| if f < FEIGNED_MOST { 1.0 / (1.0 - f.max(0.0)) } else { 0.0 });
+        let inverse = &turn * DMatrix::from_diagonal(&told) * turn.transpose();
         let mut rest = &at.gradient - pull.column(0);
         for i in 0..count {
             if self.chart.held(p, i, rest[i] > 0.0) {
