@@ -144,6 +144,23 @@ fn the_interval_covers_the_contact_of_a_loud_campaign() {
     keeps_its_promise(&recommended(180e6, LOUD), 180e6, LOUD);
 }
 
+/// The fit over six of its bands; the whole of it is in the table below.
+#[test]
+fn the_fit_covers_the_contact_and_describes_the_data() {
+    let (config, geometry) = (rigid_rig(180e6), geometry());
+    let band = Band { low_hz: 400.0, high_hz: 490.0 };
+    for seed in 1..=3 {
+        let c = campaign(&config, QUIET, seed, [band.low_hz, band.high_hz]);
+        let [a, b, ajb] = [&c.a, &c.b, &c.ajb].map(|m| Noisy { frf: &m.frf, noise: &m.noise });
+        let found =
+            fit::fit(a, b, ajb, &geometry, IdmSet::Six, band, &fit::Options::default()).expect("data");
+        let z = found.joint[&Dof::Z];
+        assert!(z.identified && z.ci95[0] < 180e6 && 180e6 < z.ci95[1], "seed {seed}: {z:?}");
+        assert!((z.ci95[1] - z.ci95[0]) / 2.0 < 0.1 * z.stiffness, "seed {seed}: {z:?}");
+        assert!((0.6..1.15).contains(&found.chi_square_per_dof), "seed {seed}: {}", found.chi_square_per_dof);
+    }
+}
+
 /// Hits drawn anew show the noise that was propagated, and the same figures every time.
 #[test]
 fn the_bootstrap_agrees_with_the_propagated_noise() {

@@ -36,6 +36,15 @@ fn the_default_rig_shows_clamp_and_contact_in_series() {
     let checks = results["checks"].as_array().unwrap();
     let series = checks.iter().find(|check| check["name"] == "series-compliance").unwrap();
     assert_eq!(series["ok"], false, "{series}");
+    let [low, high] =
+        ["low", "high"].map(|end| series[format!("series_stiffness_{end}_n_per_m")].as_f64().unwrap());
+    assert!(low < 31.2e6 && 31.2e6 < high, "{series}");
+    // A and B are coupled by nothing else, and errors of position are no finding
+    let coupled = checks.iter().find(|check| check["name"] == "back-coupling").unwrap();
+    assert_eq!(coupled["ok"], true, "{coupled}");
+    // the specimen that has a clamp is the one that leaves its arm
+    let hidden = checks.iter().find(|check| check["name"] == "hidden-resonance").unwrap();
+    assert!(hidden["meaning"].as_str().unwrap().contains("specimen A that moves in its clamp"), "{hidden}");
 }
 
 /// With a rigid clamp and no errors of position, substructuring sees the contact itself: 180 N/µm within 5 %.

@@ -18,7 +18,7 @@ pub fn check(found: &Explained) -> Option<Check> {
     let main = Band { low_hz: MAIN_BAND_HZ[0], high_hz: MAIN_BAND_HZ[1] };
     let [error, explained] = found.medians(main)?;
     let last = *found.frequency_hz.last()?;
-    let percent = |part: f64| short(100.0 * part);
+    let percent = |part: f64| if part < 1e-3 { "less than 0.1".into() } else { short(100.0 * part) };
     let sizes = format!(
         "in the main band they are {} % off, and noise and errors of position explain {} %",
         percent(error),

@@ -14,6 +14,9 @@ pub const UNIDENTIFIED: f64 = 1.5;
 /// A scatter of T/Δx over lines below this fraction of its mean is clear enough to compare with.
 const CLEAR: f64 = 0.3;
 
+/// 95 % of a normal distribution lie within this many standard deviations.
+const NORMAL_95: f64 = 1.96;
+
 /// Name of the check on what lies between the arms and the contact.
 pub const SERIES_COMPLIANCE: &str = "series-compliance";
 /// Name of the check on resonances of one specimen alone.
@@ -71,19 +74,29 @@ pub fn series_compliance(fbs: Option<&Statistics>, loops: Option<OverCycles>) ->
             .with("loop_stiffness_n_per_m", k_loops)
     };
     if ratio > SERIES_RATIO {
-        let series = 1.0 / (1.0 / k_fbs - 1.0 / k_loops);
+        let compliance = 1.0 / k_fbs - 1.0 / k_loops;
+        // independent measurements: the compliances' variances add
+        let std = (fbs.std / (k_fbs * k_fbs)).hypot(loops.std / (k_loops * k_loops));
+        let series = 1.0 / compliance;
+        let [low, high] = [compliance + NORMAL_95 * std, compliance - NORMAL_95 * std].map(|c| 1.0 / c);
         let meaning = format!(
             "The contact measured at the specimens is {} times stiffer than what FBS sees between the arms ({} against {} N/µm). Clamp and contact are in series, and the clamp gives way: \
-             the FBS value is not k_T. What lies between arms and contact has about {} N/µm by itself.",
+             the FBS value is not k_T. What lies between arms and contact has about {} N/µm by itself \
+             (95 % {}…{}).",
             short(ratio),
             short(micro(k_loops)),
             short(micro(k_fbs)),
-            short(micro(series))
+            short(micro(series)),
+            short(micro(low)),
+            if high > 0.0 { short(micro(high)) } else { "∞".into() }
         );
         return with(
             Check::new(name, Some(false), meaning)
                 .with("series_stiffness_n_per_m", series)
-                .with("series_compliance_m_per_n", 1.0 / series),
+                .with("series_stiffness_low_n_per_m", low)
+                .with("series_stiffness_high_n_per_m", if high > 0.0 { high } else { f64::INFINITY })
+                .with("series_compliance_m_per_n", compliance)
+                .with("series_compliance_std_m_per_n", std),
         );
     }
     if ratio < 1.0 / SERIES_RATIO {
@@ -168,6 +181,9 @@ mod tests {
         assert_eq!(check.ok, Some(false));
         assert!((check.values["series_stiffness_n_per_m"] / 31.2e6 - 1.0).abs() < 1e-9);
         assert!(check.meaning.contains("not k_T") && check.meaning.contains("in series"));
+        // σ of the two compliances: 1e6/26.59e6² and 4e6/180e6², in quadrature 1.42e-9 m/N of 32.05e-9
+        let [low, high] = ["low", "high"].map(|end| check.values[&format!("series_stiffness_{end}_n_per_m")]);
+        assert!((low / 28.7e6 - 1.0).abs() < 0.01 && (high / 34.2e6 - 1.0).abs() < 0.01, "{low:e} {high:e}");
     }
 
     #[test]
