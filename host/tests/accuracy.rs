@@ -157,6 +157,8 @@ fn the_fit_covers_the_contact_and_describes_the_data() {
         let z = found.joint[&Dof::Z];
         assert!(z.identified && z.ci95[0] < 180e6 && 180e6 < z.ci95[1], "seed {seed}: {z:?}");
         assert!((z.ci95[1] - z.ci95[0]) / 2.0 < 0.1 * z.stiffness, "seed {seed}: {z:?}");
+        // 10 N m/rad is a quarter of a thousandth of what the arms' inertia holds against it: no campaign can tell
+        assert!(!found.joint[&Dof::Ry].identified, "seed {seed}: {:?}", found.joint[&Dof::Ry]);
         assert!((0.6..1.15).contains(&found.chi_square_per_dof), "seed {seed}: {}", found.chi_square_per_dof);
     }
 }

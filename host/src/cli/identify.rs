@@ -58,6 +58,9 @@ pub struct Identify {
     /// The hammer's tilt, rad.
     #[arg(long, value_name = "RAD", default_value_t = Priors::default().hammer_angle_rad, value_parser = not_negative)]
     angle_error: f64,
+    /// For `fit`: how much A and B alone may differ from A and B in the assembly (standard deviation), as a fraction of their admittance.
+    #[arg(long, value_name = "FRACTION", default_value_t = fit::Options::default().mounting, value_parser = not_negative)]
+    mounting_error: f64,
     /// Print results.json on stdout instead of a summary.
     #[arg(long)]
     json: bool,
@@ -140,7 +143,12 @@ impl Identify {
         bands: &[Band],
     ) {
         let shape = if self.full_joint { fit::Shape::Full } else { fit::Shape::Diagonal };
-        let options = fit::Options { priors: self.priors(), shape, ..fit::Options::default() };
+        let options = fit::Options {
+            priors: self.priors(),
+            shape,
+            mounting: self.mounting_error,
+            ..fit::Options::default()
+        };
         let mut known = Vec::new();
         for ((name, frf), noise) in ["A", "B", "AJB"].into_iter().zip(frfs).zip(noises) {
             let Some(noise) = noise.or_else(|| self.noise.map(|fraction| FrfNoise::relative(frf, fraction)))

@@ -57,7 +57,7 @@ pub struct Noisy<'a> {
 }
 
 /// Choices of a fit.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
     /// What is assumed of positions and angles.
     pub priors: Priors,
@@ -65,6 +65,21 @@ pub struct Options {
     pub shape: Shape,
     /// Which points of the assembly are used.
     pub points: Points,
+    /// By how much A and B alone may differ from A and B in the assembly: a standard deviation, as a fraction of their admittance. Another
+    /// suspension, another mounting; a joint that is softer against the structures than this cannot be told from it.
+    pub mounting: f64,
+}
+
+impl Default for Options {
+    /// Diagonal, interface points, and 0.5 % between the configurations.
+    fn default() -> Self {
+        Options {
+            priors: Priors::default(),
+            shape: Shape::default(),
+            points: Points::default(),
+            mounting: 0.005,
+        }
+    }
 }
 
 /// Which points of the assembly a fit uses.
@@ -162,6 +177,8 @@ pub struct Fitted {
     pub idms: usize,
     /// What was assumed of positions and angles.
     pub priors: Priors,
+    /// What was assumed of A and B alone and in the assembly.
+    pub mounting: f64,
     /// Which entries were free.
     pub shape: Shape,
     /// The diagonal by degree of freedom.
@@ -227,7 +244,7 @@ pub fn fit(
     if found.chi_square.is_nan() || found.chi_square > HOPELESS {
         return Err(FitError::Misfit { chi_square: found.chi_square });
     }
-    Ok(outcome::fitted(&chart, &found, idms, band, problem.s.len(), options.priors))
+    Ok(outcome::fitted(&chart, &found, idms, band, problem.s.len(), options))
 }
 
 fn problem(

@@ -1,8 +1,8 @@
 //! From parameters to K and C with intervals, and to words where the data do not say enough.
 
-use super::Fitted;
 use super::joint::{Chart, Shape};
 use super::solver::Found;
+use super::{Fitted, Options};
 use crate::substructuring::idm::{Dof, IdmSet};
 use crate::substructuring::interface_data::balance;
 use crate::substructuring::joint::{Band, BandStatistic, JointRow};
@@ -64,12 +64,15 @@ pub(super) fn joint(
     chart: &Chart,
     found: &Found,
     idms: IdmSet,
+    mounting: f64,
 ) -> (BTreeMap<Dof, FittedDof>, BTreeMap<String, [f64; 2]>) {
     let n = chart.n();
     let d = balance(idms);
     // a fit worse than its noise is less certain than the noise says
     let widen = if found.chi_square > POOR { found.chi_square.sqrt() } else { 1.0 };
     let unit = |i: usize| chart.unit[i] / (d[i] * d[i]);
+    // what is held against W (1 + g) instead of W looks like another joint: κ + g (1 − κ)
+    let mounted = |kappa: f64, std: f64| std.hypot(mounting * (1.0 - kappa));
     match chart.shape {
         Shape::Diagonal => {
             let std = |i: usize| widen * found.covariance[(i, i)].sqrt();
@@ -79,7 +82,7 @@ pub(super) fn joint(
                 .enumerate()
                 .map(|(i, dof)| {
                     let loss = [found.p[n + i], std(n + i)];
-                    (*dof, FittedDof::of(found.p[i], std(i), loss, unit(i), chart.omega))
+                    (*dof, FittedDof::of(found.p[i], mounted(found.p[i], std(i)), loss, unit(i), chart.omega))
                 })
                 .collect();
             (dofs, BTreeMap::new())
@@ -107,6 +110,7 @@ pub(super) fn joint(
                 .map(|(i, dof)| {
                     let ([k, k_std], [c, c_std]) = (entry(0, i, i), entry(1, i, i));
                     let (kappa, kappa_std) = (k / (1.0 + k), k_std / ((1.0 + k) * (1.0 + k)));
+                    let kappa_std = mounted(kappa, kappa_std);
                     (*dof, FittedDof::of(kappa, kappa_std, [c / k, c_std / k], unit(i), chart.omega))
                 })
                 .collect();
@@ -197,14 +201,15 @@ pub(super) fn fitted(
     idms: IdmSet,
     band_hz: Band,
     lines: usize,
-    priors: crate::substructuring::averaged::Priors,
+    options: &Options,
 ) -> Fitted {
-    let (joint, coupling_si) = joint(chart, found, idms);
+    let (joint, coupling_si) = joint(chart, found, idms, options.mounting);
     Fitted {
         band_hz,
         lines,
         idms: idms.count(),
-        priors,
+        priors: options.priors,
+        mounting: options.mounting,
         shape: chart.shape,
         joint,
         coupling_si,

@@ -43,7 +43,7 @@ impl Case {
 
 #[test]
 fn exact_data_give_the_contact_exactly() {
-    let options = Options { priors: NOWHERE_WRONG, ..Options::default() };
+    let options = Options { priors: NOWHERE_WRONG, mounting: 0.0, ..Options::default() };
     let found = Case::rigid(1e-6).fit(IdmSet::Six, &options).expect("exact data");
     for (dof, stiffness) in
         [(Dof::X, 180e6), (Dof::Y, 260e6), (Dof::Z, 180e6), (Dof::Rx, 22.0), (Dof::Ry, 10.0)]
@@ -60,7 +60,7 @@ fn exact_data_give_the_contact_exactly() {
 
 #[test]
 fn full_matrices_of_exact_data_are_diagonal() {
-    let options = Options { priors: NOWHERE_WRONG, shape: Shape::Full, ..Options::default() };
+    let options = Options { priors: NOWHERE_WRONG, mounting: 0.0, shape: Shape::Full, ..Options::default() };
     let found = Case::rigid(1e-6).fit(IdmSet::Six, &options).expect("exact data");
     let z = found.joint[&Dof::Z].stiffness;
     assert!((z / 180e6 - 1.0).abs() < 1e-4, "{z}");
@@ -90,7 +90,7 @@ fn three_internals_are_enough() {
             .collect(),
     };
     case.frf[2] = ajb.select(&outputs, &inputs).expect("they are there");
-    let options = Options { priors: NOWHERE_WRONG, ..Options::default() };
+    let options = Options { priors: NOWHERE_WRONG, mounting: 0.0, ..Options::default() };
     let found = case.fit(IdmSet::Six, &options).expect("a model needs no square matrix");
     let z = found.joint[&Dof::Z];
     assert!(z.ci95[0] < 180e6 && 180e6 < z.ci95[1], "{z:?}");
@@ -104,7 +104,7 @@ fn what_the_model_cannot_describe_gives_no_bare_number() {
     for y in &mut case.frf[2].lines {
         *y *= nalgebra::Complex::from(1.5);
     }
-    let options = Options { priors: NOWHERE_WRONG, ..Options::default() };
+    let options = Options { priors: NOWHERE_WRONG, mounting: 0.0, ..Options::default() };
     let error = case.fit(IdmSet::Six, &options).expect_err("refused").to_string();
     assert!(error.contains("does not fit") || error.contains("not identified"), "{error}");
 }
