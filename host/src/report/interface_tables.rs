@@ -37,6 +37,8 @@ pub fn recommended(results: &Results) -> Option<String> {
                 if k.identified { shown(k.stiffness) } else { UNKNOWN.into() },
                 if k.identified {
                     format!("{} … {}", shown(k.ci95[0]), shown(k.ci95[1]))
+                } else if k.ci95[0] <= 0.0 {
+                    UNKNOWN.into()
                 } else {
                     format!("above {}", shown(k.ci95[0]))
                 },

@@ -1,5 +1,6 @@
 //! Whose resonance it is that hides: the phase of each specimen against its own arm, from the same impact (the paper's Fig. 8).
 
+use crate::results::number::{decimals, short};
 use crate::results::{Check, FrfCurve, Role};
 use num_complex::Complex;
 
@@ -34,11 +35,16 @@ pub fn with_phases(check: Check, curves: &[FrfCurve]) -> Check {
         () if other > CLEAR_DEG && other > 2.0 * mine => " So it is specimen B that moves in its clamp.",
         () => "",
     };
+    let degrees = |value: f64| decimals(value, 0);
     let mut check = check;
     check.meaning.push_str(&format!(
-        " At {:.1} Hz specimen A turns by {:.0}° against specimen B; against their own arms A turns by {:.0}° and B by {:.0}°, and the arms by {:.0}° \
+        " At {} Hz specimen A turns by {}° against specimen B; against their own arms A turns by {}° and B by {}°, and the arms by {}° \
          against each other.{whose}",
-        split.frequency_hz, split.specimens, split.a, split.b, split.arms
+        short(split.frequency_hz),
+        degrees(split.specimens),
+        degrees(split.a),
+        degrees(split.b),
+        degrees(split.arms)
     ));
     check
         .with("phase_specimen_a_to_b_deg", split.specimens)

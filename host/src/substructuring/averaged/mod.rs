@@ -4,7 +4,7 @@
 //! joint's compliance along one degree of freedom, 1/Z^J_dd, is taken: noise enters it almost linearly, while Z^J_dd =
 //! 1/(y + n) falls towards zero where |n| > |y|, so that a mean of stiffness over lines is pulled down by noise alone. The compliance of a
 //! spring and a damper hardly changes over a band; it is averaged with the weights that each line's noise deserves, and
-//! inverted once.
+//! inverted once. Whether noise leaves anything to average is asked at the band's typical compliance (`typical`).
 //!
 //! `sensitivity` holds the linear propagation: dy/dY of every cell, from which noise and errors of position, aim and angle
 //! follow alike. What noise does in second order (the bias) is drawn, in pairs ±n whose linear parts cancel.
@@ -13,6 +13,7 @@ mod assembly;
 mod bias;
 mod bootstrap;
 mod sensitivity;
+mod typical;
 
 pub use bootstrap::{CellHits, Replicates};
 
@@ -29,6 +30,7 @@ use rayon::prelude::*;
 use sensitivity::Sums;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use typical::Typical;
 
 type Line = DMatrix<Complex<f64>>;
 
@@ -36,6 +38,10 @@ type Line = DMatrix<Complex<f64>>;
 const NORMAL_95: f64 = 1.96;
 /// Above this relative half width the compliance cannot be told from zero well enough: the stiffness has no upper limit worth a name.
 const UNIDENTIFIED: f64 = 0.6;
+/// Above this the even mean of the lines tells nothing, so that weights have nothing to choose from either.
+const HIDDEN: f64 = 2.0;
+/// Of rotations, which may be far softer than the arms' inertia, the even mean itself must tell.
+const HIDDEN_ROTATION: f64 = 0.3;
 
 /// Standard deviations of what nobody at the rig knows. They belong to the experiment and are stated with the result.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -200,6 +206,8 @@ pub struct Prepared {
     sums: Vec<Vec<Sums>>,
     /// Normalised \[degree of freedom\]\[line\].
     weights: Vec<Vec<f64>>,
+    /// Relative standard deviation at the typical compliance \[degree of freedom\].
+    typical: Vec<f64>,
 }
 
 impl Prepared {
@@ -238,6 +246,9 @@ impl Prepared {
             .collect();
         let shared = shared_by_lines(ajb.sigma_per_s, assembly.step_hz());
         let weights = sums.iter().map(|lines| weights(lines, shared, priors)).collect();
+        let typical = (sums.iter().enumerate())
+            .map(|(d, lines)| Typical::of(&impedance, d).known(lines, &impedance, d, shared, priors))
+            .collect();
         Ok(Prepared {
             band_hz: band,
             priors: *priors,
@@ -249,6 +260,7 @@ impl Prepared {
             bias,
             sums,
             weights,
+            typical,
         })
     }
 
@@ -257,7 +269,11 @@ impl Prepared {
         let joint = (self.idms.dofs().iter().enumerate())
             .map(|(d, &dof)| {
                 // N/m for translations, N m/rad for rotations
-                (dof, self.estimate_of(d).scaled(balance(self.idms)[d].powi(2)))
+                let found = self.estimate_of(d).scaled(balance(self.idms)[d].powi(2));
+                // against the arms' inertia noise makes a soft rotation look stiff: a limit that it seems to give is none
+                let limited = found.identified || !dof.is_rotation();
+                let low = if limited { found.ci95[0] } else { 0.0 };
+                (dof, DofEstimate { ci95: [low, found.ci95[1]], ..found })
             })
             .collect();
         Averaged {
@@ -291,15 +307,17 @@ impl Prepared {
         let total = Sums::weighted(&self.sums[d], &self.weights[d]);
         // dK = −K² dy, to the loss factor's square
         let to_stiffness = stiffness * stiffness;
+        let enough = if self.idms.dofs()[d].is_rotation() { HIDDEN_ROTATION } else { HIDDEN };
         DofEstimate {
             stiffness,
             std: 0.0,
             std_noise: 0.0,
             std_geometry: to_stiffness * total.geometry_variance(&self.priors).sqrt(),
-            ci95: [stiffness; 2],
+            // of what noise hides, not even a limit is known
+            ci95: [0.0, f64::INFINITY],
             bias: stiffness_and_damping(y.inv(), s).0 - stiffness,
             damping,
-            identified: true,
+            identified: NORMAL_95 * self.typical[d] < enough,
         }
         .with_noise(to_stiffness * (total.noise_variance * self.shared()).sqrt())
     }
@@ -314,11 +332,15 @@ fn interval(stiffness: f64, std: f64) -> ([f64; 2], bool) {
 }
 
 impl DofEstimate {
-    /// The same with this standard deviation of the noise.
+    /// The same with this standard deviation of the noise; what is not identified stays so.
     fn with_noise(self, std_noise: f64) -> DofEstimate {
         let std = std_noise.hypot(self.std_geometry);
+        let same = DofEstimate { std, std_noise, ..self };
+        if !self.identified {
+            return same;
+        }
         let (ci95, identified) = interval(self.stiffness, std);
-        DofEstimate { std, std_noise, ci95, identified, ..self }
+        DofEstimate { ci95, identified, ..same }
     }
 
     /// The same with rotations in N m/rad: all but the verdict times `scale`.

@@ -120,6 +120,13 @@ impl Sums {
         total
     }
 
+    /// Sensitivities times `factor`.
+    pub(super) fn scaled(mut self, factor: f64) -> Sums {
+        self.noise_variance *= factor * factor;
+        self.parts().into_iter().flatten().for_each(|v| *v *= C::from(factor));
+        self
+    }
+
     fn parts(&mut self) -> [&mut Vec<Vector3<C>>; 5] {
         [
             &mut self.channel_position,

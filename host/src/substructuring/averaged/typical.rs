@@ -1,0 +1,106 @@
+//! Whether noise leaves anything of a joint to average: asked at the compliance that the band's lines scatter about.
+//!
+//! Of one degree of freedom the measurement sees κ = W / (W + y), W being the admittance of A and B together and y the
+//! joint's compliance: noise moves κ, and so moves y by (W + y)² / W as much. Where the joint is far softer than A and B, as the rotations
+//! of a small contact are, noise makes lines stiff by chance; at its own small y such a line looks well known, and a mean that weighs
+//! lines by that follows such lines alone: half a million N m/rad, "20 %", where 10 are true. At the typical y they are what they
+//! are: noise.
+
+use super::sensitivity::Sums;
+use super::{Line, Priors, compliance};
+use crate::substructuring::joint::median;
+use nalgebra::Complex;
+
+/// κ of a joint that is hardly there, and of one that hardly gives way.
+const ENDS: [f64; 2] = [1e-6, 1.0 - 1e-6];
+
+/// On fewer lines than this fraction the joint pushing back is chance: half of them do where there is noise only, and of hundreds that is
+/// known to some per cent.
+const PUSHING: f64 = 0.6;
+
+/// Sizes of one degree of freedom over the lines of a band.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Typical {
+    /// |W|, m/N (rotations scaled).
+    structures: f64,
+    /// |y|, the same.
+    joint: f64,
+    /// Fraction of lines on which the joint pushes back.
+    pushing: f64,
+}
+
+impl Typical {
+    /// Medians over lines of the inverse interface admittance (2n_c × 2n_c), along `d`: of |W|, and of κ, which no line can spoil.
+    pub(super) fn of(impedance: &[Line], d: usize) -> Typical {
+        let structures: Vec<f64> = impedance
+            .iter()
+            .map(|z| {
+                let n = z.nrows() / 2;
+                // the diagonal blocks hold A or B and the joint, the others minus the joint
+                let [a, b] = [z[(d, d)] + z[(d, n + d)], z[(n + d, n + d)] + z[(n + d, d)]];
+                (a.inv() + b.inv()).norm()
+            })
+            .collect();
+        let structures = median(&structures);
+        let kappa: Vec<f64> =
+            impedance.iter().map(|z| (structures / (structures + compliance(z, d))).re).collect();
+        let kappa = median(&kappa).clamp(ENDS[0], ENDS[1]);
+        let pushing = impedance.iter().filter(|z| compliance(z, d).re > 0.0).count();
+        Typical {
+            structures,
+            joint: structures * (1.0 / kappa - 1.0),
+            pushing: pushing as f64 / impedance.len() as f64,
+        }
+    }
+
+    /// The relative standard deviation of the lines' even mean at the typical compliance, given the sensitivities of each line at its own;
+    /// infinite where noise decides the sign.
+    pub(super) fn known(
+        &self,
+        lines: &[Sums],
+        impedance: &[Line],
+        d: usize,
+        shared: f64,
+        priors: &Priors,
+    ) -> f64 {
+        let there: Vec<Sums> = (lines.iter().zip(impedance))
+            .map(|(sums, z)| sums.clone().scaled(self.instead_of(compliance(z, d))))
+            .collect();
+        let total = Sums::weighted(&there, &vec![1.0 / lines.len() as f64; lines.len()]);
+        let variance = total.noise_variance * shared + total.geometry_variance(priors);
+        if self.pushing < PUSHING { f64::INFINITY } else { variance.sqrt() / self.joint }
+    }
+
+    /// The factor by which a sensitivity at the compliance `y` becomes that at the typical one.
+    fn instead_of(&self, y: Complex<f64>) -> f64 {
+        ((self.structures + self.joint) / (self.structures + y.norm())).powi(2)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A and B of 1 N/µm each and a joint between them.
+    fn line(joint: f64) -> Line {
+        let [own, joint] = [1e6, joint].map(Complex::from);
+        Line::from_row_slice(2, 2, &[own + joint, -joint, -joint, own + joint])
+    }
+
+    #[test]
+    fn a_line_off_the_others_is_judged_where_they_are() {
+        for joint in [1e3, 1e6, 1e8] {
+            let lines: Vec<Line> = [joint, joint, 50.0 * joint, joint, joint].map(line).into();
+            let typical = Typical::of(&lines, 0);
+            // W is 2 µm/N, and the odd one does not count
+            assert!((typical.structures / 2e-6 - 1.0).abs() < 1e-9, "{typical:?}");
+            assert!((typical.joint * joint - 1.0).abs() < 1e-9, "{typical:?}");
+            let [here, odd] = [1, 2].map(|l| typical.instead_of(compliance(&lines[l], 0)));
+            assert!((here - 1.0).abs() < 1e-9 && odd >= 1.0, "{here} {odd}");
+        }
+        // a soft joint fifty times too stiff by chance: its compliance's scatter is 50² times what it claims
+        let soft: Vec<Line> = [1e3, 1e3, 5e4].map(line).into();
+        let factor = Typical::of(&soft, 0).instead_of(compliance(&soft[2], 0));
+        assert!((factor / 2500.0 - 1.0).abs() < 0.25, "{factor}");
+    }
+}
