@@ -9,7 +9,9 @@ use super::interface_data::Measured;
 use super::joint::{Band, JointRow, JointSpectrum};
 use super::method::Method;
 use super::reduced::{Reduced, Rooms, Solution};
+use rayon::prelude::*;
 use serde::Serialize;
+use std::borrow::Cow;
 
 /// Why nothing at all can be identified from these files.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -177,12 +179,7 @@ pub fn identify(
         return Err(IdentifyError::NothingAsked);
     }
     check_alike(a, b, ajb)?;
-    let receptance = |file: &'static str, y: &FrfMatrix| {
-        y.band(f64::MIN_POSITIVE, f64::MAX)
-            .to_receptance()
-            .map_err(|source| IdentifyError::Frf { file, source })
-    };
-    let files = [receptance("A", a)?, receptance("B", b)?, receptance("AJB", ajb)?];
+    let files = [a, b, ajb].map(above_zero);
     for band in bands {
         if !files[0].frequency_hz.iter().any(|&f| band.contains(f)) {
             return Err(IdentifyError::EmptyBand {
@@ -214,42 +211,54 @@ pub fn identify(
         if let Ok(reduced) = &reduced {
             out.virtual_points.extend(reduced.quality(&rooms));
         }
+        let mut solved = Vec::new();
         for &method in methods {
-            let z = match &reduced {
+            let solution = match &reduced {
                 Ok(reduced) => reduced.solve(&rooms, method),
                 Err(error) => Err(error.clone().into()),
             };
-            match z {
-                Ok(Solution { z, notes, internals }) => {
-                    out.internals.extend(internals);
-                    if let (Ok(reduced), Method::Inverse, true) =
-                        (&reduced, method, set.count() > coupled_modes)
-                    {
-                        coupled_modes = set.count();
-                        out.back_coupling = reduced.back_coupling(&rooms, &z, bands[0]);
-                    }
-                    let spectrum = JointSpectrum::of(
-                        method.name(),
-                        set,
-                        &files[0].frequency_hz,
-                        files[0].sigma_per_s,
-                        &z,
-                    );
-                    for &band in bands {
-                        if let Some(mut row) = spectrum.over(band) {
-                            row.warnings.splice(0..0, notes.iter().cloned());
-                            out.joint.push(row);
-                        }
-                    }
-                    out.spectra.push(spectrum);
-                }
+            match solution {
+                Ok(solution) => solved.push((method, solution)),
                 Err(reason) => {
                     out.refused.push(Refused { method, idms: set.count(), reason: reason.to_string() });
                 }
             }
         }
+        let inverse = solved.iter().find(|(method, _)| *method == Method::Inverse);
+        if let (Ok(reduced), Some((_, Solution { z, .. })), true) =
+            (&reduced, inverse, set.count() > coupled_modes)
+        {
+            coupled_modes = set.count();
+            out.back_coupling = reduced.back_coupling(&rooms, z, bands[0]);
+        }
+        let axis = &files[0];
+        let results: Vec<(JointSpectrum, Vec<JointRow>)> = solved
+            .par_iter()
+            .map(|(method, Solution { z, notes, .. })| {
+                let spectrum = JointSpectrum::of(method.name(), set, &axis.frequency_hz, axis.sigma_per_s, z);
+                let mut rows: Vec<JointRow> = bands.iter().filter_map(|&band| spectrum.over(band)).collect();
+                rows.iter_mut().for_each(|row| {
+                    row.warnings.splice(0..0, notes.iter().cloned());
+                });
+                (spectrum, rows)
+            })
+            .collect();
+        for ((spectrum, rows), (_, solution)) in results.into_iter().zip(solved) {
+            out.internals.extend(solution.internals);
+            out.joint.extend(rows);
+            out.spectra.push(spectrum);
+        }
     }
     Ok(out)
+}
+
+/// The file without a line at 0 Hz, where no receptance can be told from a mobility.
+fn above_zero(file: &FrfMatrix) -> Cow<'_, FrfMatrix> {
+    if file.frequency_hz.first().is_some_and(|f| *f > 0.0) {
+        Cow::Borrowed(file)
+    } else {
+        Cow::Owned(file.band(f64::MIN_POSITIVE, f64::MAX))
+    }
 }
 
 fn check_alike(a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix) -> Result<(), IdentifyError> {

@@ -33,6 +33,7 @@ pub mod joint;
 pub mod method;
 pub mod noise;
 pub mod plausibility;
+mod product;
 pub mod pseudo_inverse;
 mod reduced;
 pub mod semm;
