@@ -32,7 +32,7 @@ pub fn consistency(
     let filter_u = &responses.r * &responses.t;
     let filter_f = &impacts.r * impacts.t.transpose();
     let ((overall_sensor, specific_sensor), (overall_impact, specific_impact)) = rayon::join(
-        || side(&filter_u, lines.iter().map(|y| y.column_sum())),
+        || side(&filter_u, lines.iter().map(DMatrix::column_sum)),
         || side(&filter_f, lines.iter().map(|y| y.row_sum().transpose())),
     );
     Consistency { overall_sensor, overall_impact, specific_sensor, specific_impact }

@@ -271,8 +271,8 @@ impl FrfMatrix {
 /// The sub-matrix of the given rows and columns, in the given order.
 pub(crate) fn block(y: &DMatrix<Complex<f64>>, rows: &[usize], columns: &[usize]) -> DMatrix<Complex<f64>> {
     let mut block = DMatrix::zeros(rows.len(), columns.len());
-    for (mut to, &c) in block.column_iter_mut().zip(columns) {
-        let from = y.column(c);
+    for (to, &c) in block.as_mut_slice().chunks_exact_mut(rows.len().max(1)).zip(columns) {
+        let from = &y.as_slice()[c * y.nrows()..][..y.nrows()];
         to.iter_mut().zip(rows).for_each(|(to, &r)| *to = from[r]);
     }
     block

@@ -5,10 +5,11 @@ use super::consistency::Consistency;
 use super::frf::{FrfError, FrfMatrix, Quantity};
 use super::geometry::Geometry;
 use super::idm::{Dof, IdmSet};
-use super::interface_data::Measured;
+use super::interface_data::{InterfaceError, Measured};
 use super::joint::{Band, JointRow, JointSpectrum};
 use super::method::Method;
 use super::reduced::{Reduced, Rooms, Solution};
+use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::borrow::Cow;
@@ -191,12 +192,7 @@ pub fn identify(
             });
         }
     }
-    let rooms = Rooms {
-        a: Measured { file: "A", frf: &files[0], points: &geometry.a },
-        b: Measured { file: "B", frf: &files[1], points: &geometry.b },
-        ajb: Measured { file: "AJB", frf: &files[2], points: &geometry.ajb },
-        geometry,
-    };
+    let rooms = rooms(&files, geometry);
     let mut out = Identification {
         joint: vec![],
         spectra: vec![],
@@ -213,15 +209,9 @@ pub fn identify(
         }
         let mut solved = Vec::new();
         for &method in methods {
-            let solution = match &reduced {
-                Ok(reduced) => reduced.solve(&rooms, method),
-                Err(error) => Err(error.clone().into()),
-            };
-            match solution {
+            match solve(&rooms, &reduced, set, method) {
                 Ok(solution) => solved.push((method, solution)),
-                Err(reason) => {
-                    out.refused.push(Refused { method, idms: set.count(), reason: reason.to_string() });
-                }
+                Err(refused) => out.refused.push(refused),
             }
         }
         let inverse = solved.iter().find(|(method, _)| *method == Method::Inverse);
@@ -237,9 +227,9 @@ pub fn identify(
             .map(|(method, Solution { z, notes, .. })| {
                 let spectrum = JointSpectrum::of(method.name(), set, &axis.frequency_hz, axis.sigma_per_s, z);
                 let mut rows: Vec<JointRow> = bands.iter().filter_map(|&band| spectrum.over(band)).collect();
-                rows.iter_mut().for_each(|row| {
+                for row in &mut rows {
                     row.warnings.splice(0..0, notes.iter().cloned());
-                });
+                }
                 (spectrum, rows)
             })
             .collect();
@@ -250,6 +240,53 @@ pub fn identify(
         }
     }
     Ok(out)
+}
+
+/// Z^J per line (n_c × n_c), or why there is none.
+pub type Decoupled = Result<Vec<DMatrix<Complex<f64>>>, Refused>;
+
+/// Z^J of every line above 0 Hz by every method asked for (n_c × n_c; N/m, N m/rad between rotations): what [`identify`] takes its
+/// statistics of, without them.
+///
+/// # Errors
+/// [`IdentifyError`] when the files do not fit together; [`Refused`] of a method that cannot work on them.
+pub fn decouple(
+    a: &FrfMatrix,
+    b: &FrfMatrix,
+    ajb: &FrfMatrix,
+    geometry: &Geometry,
+    methods: &[Method],
+    idms: IdmSet,
+) -> Result<Vec<(Method, Decoupled)>, IdentifyError> {
+    check_alike(a, b, ajb)?;
+    let files = [a, b, ajb].map(above_zero);
+    let rooms = rooms(&files, geometry);
+    let reduced = Reduced::of(&rooms, idms);
+    let z = |method| solve(&rooms, &reduced, idms, method).map(|solution| solution.z);
+    Ok(methods.iter().map(|&method| (method, z(method))).collect())
+}
+
+fn rooms<'a>(files: &'a [Cow<'_, FrfMatrix>; 3], geometry: &'a Geometry) -> Rooms<'a> {
+    let [a, b, ajb] = files;
+    Rooms {
+        a: Measured { file: "A", frf: a, points: &geometry.a },
+        b: Measured { file: "B", frf: b, points: &geometry.b },
+        ajb: Measured { file: "AJB", frf: ajb, points: &geometry.ajb },
+        geometry,
+    }
+}
+
+fn solve(
+    rooms: &Rooms<'_>,
+    reduced: &Result<Reduced, InterfaceError>,
+    idms: IdmSet,
+    method: Method,
+) -> Result<Solution, Refused> {
+    let solution = match reduced {
+        Ok(reduced) => reduced.solve(rooms, method),
+        Err(error) => Err(error.clone().into()),
+    };
+    solution.map_err(|reason| Refused { method, idms: idms.count(), reason: reason.to_string() })
 }
 
 /// The file without a line at 0 Hz, where no receptance can be told from a mobility.

@@ -188,8 +188,9 @@ pub(crate) fn balance(idms: IdmSet) -> Vec<f64> {
 
 /// factor diag(d) Z diag(d).
 pub(crate) fn scaled(mut z: Line, d: &[f64], factor: Complex<f64>) -> Line {
-    for (mut column, right) in z.column_iter_mut().zip(d) {
-        column.iter_mut().zip(d).for_each(|(z, left)| *z *= factor * (left * right));
+    for (column, right) in z.as_mut_slice().chunks_exact_mut(d.len().max(1)).zip(d) {
+        let factor = factor * right;
+        column.iter_mut().zip(d).for_each(|(z, left)| *z = *z * factor * left);
     }
     z
 }

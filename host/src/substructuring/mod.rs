@@ -42,7 +42,9 @@ pub mod vpt;
 
 pub use frf::{FrfError, FrfMatrix, Quantity};
 pub use geometry::{Configuration, Geometry, Grouping, Point};
-pub use identify::{Identification, IdentifyError, Refused, VirtualPointQuality, identify};
+pub use identify::{
+    Decoupled, Identification, IdentifyError, Refused, VirtualPointQuality, decouple, identify,
+};
 pub use idm::{Dof, IdmSet};
 pub use joint::{Band, BandStatistic, JointRow, JointSpectrum};
 pub use method::Method;

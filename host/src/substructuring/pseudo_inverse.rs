@@ -112,8 +112,8 @@ fn elimination(a: &Line) -> Option<Line> {
     Some(inverse)
 }
 
-/// A⁺ = R⁻¹Qᴴ of a tall matrix by Gram–Schmidt, twice over so that Q is orthogonal to rounding; none when a diagonal entry of R
-/// is not clearly above it.
+/// A⁺ = R⁻¹Qᴴ of a tall matrix by Gram–Schmidt, done again where much cancels, so that Q is orthogonal to rounding; none
+/// when a diagonal entry of R is not clearly above it.
 fn orthogonalisation(a: &Line) -> Option<Line> {
     let (m, n) = a.shape();
     let mut q = a.clone();
@@ -122,7 +122,9 @@ fn orthogonalisation(a: &Line) -> Option<Line> {
     for k in 0..n {
         let (done, rest) = q.as_mut_slice().split_at_mut(k * m);
         let (v, r) = (&mut rest[..m], &mut r.as_mut_slice()[k * n..=k * n + k]);
-        for _ in 0..2 {
+        let mut square = square_of(v);
+        loop {
+            let before = square;
             for (q, r) in done.chunks_exact(m).zip(r.iter_mut()) {
                 let along = q.iter().zip(v.iter()).fold(Complex::default(), |sum, (q, v)| sum + q.conj() * v);
                 *r += along;
@@ -130,8 +132,12 @@ fn orthogonalisation(a: &Line) -> Option<Line> {
                     *v -= q * along;
                 }
             }
+            square = square_of(v);
+            // where little was taken away, little of the rounding's direction along the others is left
+            if square > 0.1 * before || !clear(square, largest) {
+                break;
+            }
         }
-        let square: f64 = v.iter().map(Complex::norm_sqr).sum();
         largest = largest.max(square);
         if !clear(square, largest) {
             return None;
@@ -139,7 +145,9 @@ fn orthogonalisation(a: &Line) -> Option<Line> {
         // the diagonal holds 1/Rₖₖ: many products instead of quotients
         let inverse = 1.0 / square.sqrt();
         r[k] = Complex::from(inverse);
-        v.iter_mut().for_each(|v| *v *= inverse);
+        for v in v {
+            *v *= inverse;
+        }
     }
     let mut inverse = q.adjoint();
     for x in inverse.as_mut_slice().chunks_exact_mut(n.max(1)) {
@@ -152,6 +160,10 @@ fn orthogonalisation(a: &Line) -> Option<Line> {
         }
     }
     Some(inverse)
+}
+
+fn square_of(v: &[Complex<f64>]) -> f64 {
+    v.iter().map(Complex::norm_sqr).sum()
 }
 
 /// Whether a pivot leaves no doubt about the rank; both squared. NaN compares false.

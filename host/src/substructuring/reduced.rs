@@ -290,9 +290,13 @@ impl Balanced {
 }
 
 /// What `of` gives for each line, in parallel; the first line's refusal if there are some.
-fn every_line<E: Send>(lines: usize, of: impl Fn(usize) -> Result<Line, E> + Sync) -> Result<Vec<Line>, E> {
-    let all: Vec<Result<Line, E>> = (0..lines).into_par_iter().with_min_len(16).map(&of).collect();
-    all.into_iter().collect()
+fn every_line<E>(lines: usize, of: impl Fn(usize) -> Result<Line, E> + Sync) -> Result<Vec<Line>, E> {
+    let found: Vec<Option<Line>> = (0..lines).into_par_iter().with_min_len(16).map(|l| of(l).ok()).collect();
+    match found.into_iter().collect() {
+        Some(all) => Ok(all),
+        // which refusal is the first shows when they are asked in order
+        None => (0..lines).map(of).collect(),
+    }
 }
 
 /// A substructure.
