@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 const LINES: usize = 3600;
-const RUNS: usize = 5;
+const RUNS: usize = 9;
 /// How many times as fast as numpy it must be.
 const WANTED: f64 = 5.0;
 /// Both must find the same stiffness to this part.
