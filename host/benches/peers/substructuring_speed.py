@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-RUNS = 5
+RUNS = 9
 data = dict(np.load(sys.argv[1]))
 
 

@@ -1,8 +1,8 @@
 //! The proof of the pudding: A and B coupled by the identified joint must be the measured assembly.
 
-use super::coupling::{boolean_difference, couple};
 use super::frf::FrfMatrix;
-use super::joint::Band;
+use super::joint::{Band, stiffness_and_damping};
+use super::product::product;
 use super::pseudo_inverse::full_rank_inverse;
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
@@ -21,7 +21,7 @@ pub struct BackCoupling {
 
 impl BackCoupling {
     /// Couples Y^A and Y^B (n_c × n_c) by Eq. (1) with one spring and damper for all lines, K + sC: the mean of `z` over `band`.
-    /// None when no line lies in the band, or the mean joint has no inverse.
+    /// Admittances are of the quantity of `axis`. None when no line lies in the band, or the mean joint has no inverse.
     pub fn of(
         axis: &FrfMatrix,
         y_a: &[Line],
@@ -37,22 +37,35 @@ impl BackCoupling {
         let mut damping = DMatrix::<f64>::zeros(n, n);
         for &l in &inside {
             let s = axis.s(l);
-            let c = z[l].map(|z| z.im / s.im);
-            stiffness += (z[l].map(|z| z.re) - &c * s.re) / inside.len() as f64;
-            damping += c / inside.len() as f64;
+            for ((k, c), z) in stiffness.iter_mut().zip(damping.iter_mut()).zip(z[l].iter()) {
+                let (stiffness, damping) = stiffness_and_damping(*z, s);
+                *k += stiffness / inside.len() as f64;
+                *c += damping / inside.len() as f64;
+            }
         }
-        let b = boolean_difference(n);
         let error = (0..axis.frequency_hz.len())
             .into_par_iter()
             .map(|l| {
                 let s = axis.s(l);
                 let joint = DMatrix::from_fn(n, n, |r, c| s * damping[(r, c)] + stiffness[(r, c)]);
-                let joint = full_rank_inverse(&joint, "the mean joint").ok()?;
-                let mut y = Line::zeros(2 * n, 2 * n);
-                y.view_mut((0, 0), (n, n)).copy_from(&y_a[l]);
-                y.view_mut((n, n), (n, n)).copy_from(&y_b[l]);
-                let coupled = couple(&y, &b, &b, Some(&joint)).ok()?;
-                Some((coupled - &y_ajb[l]).norm() / y_ajb[l].norm())
+                let to_quantity = s.powi(axis.quantity.order_of_s());
+                let joint = full_rank_inverse(&joint, "the mean joint").ok()? * to_quantity;
+                let (y_a, y_b, y_ajb) = (&y_a[l], &y_b[l], &y_ajb[l]);
+                // Eq. (1) with B = [I, −I], block by block
+                let flexibility =
+                    full_rank_inverse(&(y_a + y_b + joint), "the interface flexibility").ok()?;
+                let mut square = 0.0;
+                for (column, y_column) in [y_a, y_b].into_iter().enumerate() {
+                    let held = product(&flexibility, y_column);
+                    for (row, y_row) in [y_a, y_b].into_iter().enumerate() {
+                        let through = product(y_row, &held);
+                        let measured = y_ajb.view((row * n, column * n), (n, n));
+                        let difference =
+                            if row == column { y_row - through - measured } else { through - measured };
+                        square += difference.norm_squared();
+                    }
+                }
+                Some(square.sqrt() / y_ajb.norm())
             })
             .collect::<Option<Vec<f64>>>()?;
         (!inside.is_empty()).then(|| BackCoupling { frequency_hz: axis.frequency_hz.clone(), error })

@@ -4,6 +4,7 @@
 //! u_f = R_u T_u u; impacts likewise with y = 1ᵀ Y, y_f = y T_f R_fᵀ. Overall consistency is |u_f| / |u| of a line,
 //! specific consistency of a channel the mean over lines of coh(u_f, u). This is pyFBS's definition.
 
+use super::product::product;
 use super::vpt::Transformation;
 use nalgebra::{Complex, DMatrix, DVector};
 use serde::Serialize;
@@ -28,20 +29,13 @@ pub fn consistency(
     responses: &Transformation,
     impacts: &Transformation,
 ) -> Consistency {
-    let filter_u = (&responses.r * &responses.t).map(Complex::from);
-    let filter_f = (&impacts.t * impacts.r.transpose()).transpose().map(Complex::from);
-    let mut sensors = Side::new(responses.r.nrows());
-    let mut hits = Side::new(impacts.r.nrows());
-    for y in lines {
-        sensors.add(&filter_u, &y.column_sum());
-        hits.add(&filter_f, &y.row_sum().transpose());
-    }
-    Consistency {
-        overall_sensor: sensors.overall,
-        overall_impact: hits.overall,
-        specific_sensor: sensors.sums.iter().map(|s| s / lines.len() as f64).collect(),
-        specific_impact: hits.sums.iter().map(|s| s / lines.len() as f64).collect(),
-    }
+    let filter_u = &responses.r * &responses.t;
+    let filter_f = &impacts.r * impacts.t.transpose();
+    let ((overall_sensor, specific_sensor), (overall_impact, specific_impact)) = rayon::join(
+        || side(&filter_u, lines.iter().map(DMatrix::column_sum)),
+        || side(&filter_f, lines.iter().map(|y| y.row_sum().transpose())),
+    );
+    Consistency { overall_sensor, overall_impact, specific_sensor, specific_impact }
 }
 
 /// coh(x, y) = (x+y)(x+y)* / (2 (xx* + yy*)): 1 when equal, 0 when opposite, ½ when one of them is zero.
@@ -50,24 +44,24 @@ pub fn coherence_of(x: Complex<f64>, y: Complex<f64>) -> f64 {
     if power == 0.0 { 1.0 } else { (x + y).norm_sqr() / power }
 }
 
-struct Side {
-    overall: Vec<f64>,
-    sums: Vec<f64>,
-}
-
-impl Side {
-    fn new(points: usize) -> Self {
-        Side { overall: Vec::new(), sums: vec![0.0; points] }
-    }
-
-    fn add(&mut self, filter: &DMatrix<Complex<f64>>, measured: &DVector<Complex<f64>>) {
-        let filtered = filter * measured;
+/// Overall consistency per line, and specific consistency per point, of the motions or forces `measured`.
+fn side(
+    filter: &DMatrix<f64>,
+    measured: impl Iterator<Item = DVector<Complex<f64>>>,
+) -> (Vec<f64>, Vec<f64>) {
+    let mut overall = Vec::new();
+    let mut specific = vec![0.0; filter.nrows()];
+    for measured in measured {
+        let measured = DMatrix::from_column_slice(measured.len(), 1, measured.as_slice());
+        let filtered = product(filter, &measured);
         let size = measured.norm();
-        self.overall.push(if size == 0.0 { 1.0 } else { filtered.norm() / size });
-        for (sum, (f, m)) in self.sums.iter_mut().zip(filtered.iter().zip(measured.iter())) {
+        overall.push(if size == 0.0 { 1.0 } else { filtered.norm() / size });
+        for (sum, (f, m)) in specific.iter_mut().zip(filtered.iter().zip(measured.iter())) {
             *sum += coherence_of(*f, *m);
         }
     }
+    let lines = overall.len() as f64;
+    (overall, specific.into_iter().map(|sum| sum / lines).collect())
 }
 
 #[cfg(test)]

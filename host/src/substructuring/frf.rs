@@ -270,7 +270,12 @@ impl FrfMatrix {
 
 /// The sub-matrix of the given rows and columns, in the given order.
 pub(crate) fn block(y: &DMatrix<Complex<f64>>, rows: &[usize], columns: &[usize]) -> DMatrix<Complex<f64>> {
-    DMatrix::from_fn(rows.len(), columns.len(), |r, c| y[(rows[r], columns[c])])
+    let mut block = DMatrix::zeros(rows.len(), columns.len());
+    for (to, &c) in block.as_mut_slice().chunks_exact_mut(rows.len().max(1)).zip(columns) {
+        let from = &y.as_slice()[c * y.nrows()..][..y.nrows()];
+        to.iter_mut().zip(rows).for_each(|(to, &r)| *to = from[r]);
+    }
+    block
 }
 
 fn places<'a>(names: &'a [String], side: &'static str) -> Result<HashMap<&'a str, usize>, FrfError> {

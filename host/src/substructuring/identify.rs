@@ -5,11 +5,14 @@ use super::consistency::Consistency;
 use super::frf::{FrfError, FrfMatrix, Quantity};
 use super::geometry::Geometry;
 use super::idm::{Dof, IdmSet};
-use super::interface_data::Measured;
+use super::interface_data::{InterfaceError, Measured};
 use super::joint::{Band, JointRow, JointSpectrum};
 use super::method::Method;
 use super::reduced::{Reduced, Rooms, Solution};
+use nalgebra::{Complex, DMatrix};
+use rayon::prelude::*;
 use serde::Serialize;
+use std::borrow::Cow;
 
 /// Why nothing at all can be identified from these files.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -177,12 +180,7 @@ pub fn identify(
         return Err(IdentifyError::NothingAsked);
     }
     check_alike(a, b, ajb)?;
-    let receptance = |file: &'static str, y: &FrfMatrix| {
-        y.band(f64::MIN_POSITIVE, f64::MAX)
-            .to_receptance()
-            .map_err(|source| IdentifyError::Frf { file, source })
-    };
-    let files = [receptance("A", a)?, receptance("B", b)?, receptance("AJB", ajb)?];
+    let files = [a, b, ajb].map(above_zero);
     for band in bands {
         if !files[0].frequency_hz.iter().any(|&f| band.contains(f)) {
             return Err(IdentifyError::EmptyBand {
@@ -194,12 +192,7 @@ pub fn identify(
             });
         }
     }
-    let rooms = Rooms {
-        a: Measured { file: "A", frf: &files[0], points: &geometry.a },
-        b: Measured { file: "B", frf: &files[1], points: &geometry.b },
-        ajb: Measured { file: "AJB", frf: &files[2], points: &geometry.ajb },
-        geometry,
-    };
+    let rooms = rooms(&files, geometry);
     let mut out = Identification {
         joint: vec![],
         spectra: vec![],
@@ -214,42 +207,95 @@ pub fn identify(
         if let Ok(reduced) = &reduced {
             out.virtual_points.extend(reduced.quality(&rooms));
         }
+        let mut solved = Vec::new();
         for &method in methods {
-            let z = match &reduced {
-                Ok(reduced) => reduced.solve(&rooms, method),
-                Err(error) => Err(error.clone().into()),
-            };
-            match z {
-                Ok(Solution { z, notes, internals }) => {
-                    out.internals.extend(internals);
-                    if let (Ok(reduced), Method::Inverse, true) =
-                        (&reduced, method, set.count() > coupled_modes)
-                    {
-                        coupled_modes = set.count();
-                        out.back_coupling = reduced.back_coupling(&rooms, &z, bands[0]);
-                    }
-                    let spectrum = JointSpectrum::of(
-                        method.name(),
-                        set,
-                        &files[0].frequency_hz,
-                        files[0].sigma_per_s,
-                        &z,
-                    );
-                    for &band in bands {
-                        if let Some(mut row) = spectrum.over(band) {
-                            row.warnings.splice(0..0, notes.iter().cloned());
-                            out.joint.push(row);
-                        }
-                    }
-                    out.spectra.push(spectrum);
-                }
-                Err(reason) => {
-                    out.refused.push(Refused { method, idms: set.count(), reason: reason.to_string() });
-                }
+            match solve(&rooms, &reduced, set, method) {
+                Ok(solution) => solved.push((method, solution)),
+                Err(refused) => out.refused.push(refused),
             }
+        }
+        let inverse = solved.iter().find(|(method, _)| *method == Method::Inverse);
+        if let (Ok(reduced), Some((_, Solution { z, .. })), true) =
+            (&reduced, inverse, set.count() > coupled_modes)
+        {
+            coupled_modes = set.count();
+            out.back_coupling = reduced.back_coupling(&rooms, z, bands[0]);
+        }
+        let axis = &files[0];
+        let results: Vec<(JointSpectrum, Vec<JointRow>)> = solved
+            .par_iter()
+            .map(|(method, Solution { z, notes, .. })| {
+                let spectrum = JointSpectrum::of(method.name(), set, &axis.frequency_hz, axis.sigma_per_s, z);
+                let mut rows: Vec<JointRow> = bands.iter().filter_map(|&band| spectrum.over(band)).collect();
+                for row in &mut rows {
+                    row.warnings.splice(0..0, notes.iter().cloned());
+                }
+                (spectrum, rows)
+            })
+            .collect();
+        for ((spectrum, rows), (_, solution)) in results.into_iter().zip(solved) {
+            out.internals.extend(solution.internals);
+            out.joint.extend(rows);
+            out.spectra.push(spectrum);
         }
     }
     Ok(out)
+}
+
+/// Z^J per line (n_c × n_c), or why there is none.
+pub type Decoupled = Result<Vec<DMatrix<Complex<f64>>>, Refused>;
+
+/// Z^J of every line above 0 Hz by every method asked for (n_c × n_c; N/m, N m/rad between rotations): what [`identify`] takes its
+/// statistics of, without them.
+///
+/// # Errors
+/// [`IdentifyError`] when the files do not fit together; [`Refused`] of a method that cannot work on them.
+pub fn decouple(
+    a: &FrfMatrix,
+    b: &FrfMatrix,
+    ajb: &FrfMatrix,
+    geometry: &Geometry,
+    methods: &[Method],
+    idms: IdmSet,
+) -> Result<Vec<(Method, Decoupled)>, IdentifyError> {
+    check_alike(a, b, ajb)?;
+    let files = [a, b, ajb].map(above_zero);
+    let rooms = rooms(&files, geometry);
+    let reduced = Reduced::of(&rooms, idms);
+    let z = |method| solve(&rooms, &reduced, idms, method).map(|solution| solution.z);
+    Ok(methods.iter().map(|&method| (method, z(method))).collect())
+}
+
+fn rooms<'a>(files: &'a [Cow<'_, FrfMatrix>; 3], geometry: &'a Geometry) -> Rooms<'a> {
+    let [a, b, ajb] = files;
+    Rooms {
+        a: Measured { file: "A", frf: a, points: &geometry.a },
+        b: Measured { file: "B", frf: b, points: &geometry.b },
+        ajb: Measured { file: "AJB", frf: ajb, points: &geometry.ajb },
+        geometry,
+    }
+}
+
+fn solve(
+    rooms: &Rooms<'_>,
+    reduced: &Result<Reduced, InterfaceError>,
+    idms: IdmSet,
+    method: Method,
+) -> Result<Solution, Refused> {
+    let solution = match reduced {
+        Ok(reduced) => reduced.solve(rooms, method),
+        Err(error) => Err(error.clone().into()),
+    };
+    solution.map_err(|reason| Refused { method, idms: idms.count(), reason: reason.to_string() })
+}
+
+/// The file without a line at 0 Hz, where no receptance can be told from a mobility.
+fn above_zero(file: &FrfMatrix) -> Cow<'_, FrfMatrix> {
+    if file.frequency_hz.first().is_some_and(|f| *f > 0.0) {
+        Cow::Borrowed(file)
+    } else {
+        Cow::Owned(file.band(f64::MIN_POSITIVE, f64::MAX))
+    }
 }
 
 fn check_alike(a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix) -> Result<(), IdentifyError> {

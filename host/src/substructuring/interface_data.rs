@@ -3,10 +3,11 @@
 use super::frf::{FrfError, FrfMatrix, block};
 use super::geometry::{Configuration, Geometry, Grouping, Point};
 use super::idm::IdmSet;
+use super::product::product_of_block;
 use super::vpt::{self, ROTATION_LENGTH_M, Transformation, VptError};
 use nalgebra::{Complex, DMatrix, Vector3};
 
-type Lines = Vec<DMatrix<Complex<f64>>>;
+type Line = DMatrix<Complex<f64>>;
 
 /// Why the data of an interface cannot be formed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -138,22 +139,46 @@ impl Measured<'_> {
     }
 
     /// The named block of every line, refusing values that are not numbers.
-    pub(crate) fn block(&self, rows: &Found, columns: &Found) -> Result<Lines, InterfaceError> {
-        let lines: Lines = self.frf.lines.iter().map(|y| block(y, &rows.at, &columns.at)).collect();
-        for (y, &frequency_hz) in lines.iter().zip(&self.frf.frequency_hz) {
-            if let Some(bad) = y.iter().position(|v| !(v.re.is_finite() && v.im.is_finite())) {
-                // storage is by columns
-                let (row, column) = (bad % y.nrows(), bad / y.nrows());
-                let source = FrfError::NotFinite {
-                    output: rows.names[row].clone(),
-                    input: columns.names[column].clone(),
-                    frequency_hz,
-                };
-                return Err(InterfaceError::Frf { file: self.file, source });
-            }
-        }
-        Ok(lines)
+    pub(crate) fn block(&self, rows: &Found, columns: &Found) -> Result<Vec<Line>, InterfaceError> {
+        (0..self.frf.lines.len()).map(|l| self.cells(l, rows, columns)).collect()
     }
+
+    /// The named block of one line, refusing values that are not numbers.
+    pub(crate) fn cells(&self, line: usize, rows: &Found, columns: &Found) -> Result<Line, InterfaceError> {
+        let y = block(&self.frf.lines[line], &rows.at, &columns.at);
+        if finite(&y) { Ok(y) } else { Err(self.not_finite(line, rows, columns)) }
+    }
+
+    /// T times the named block of one line, refusing values that are not numbers.
+    pub(crate) fn reduced_outputs(
+        &self,
+        line: usize,
+        t: &DMatrix<f64>,
+        rows: &Found,
+        columns: &Found,
+    ) -> Result<Line, InterfaceError> {
+        let reduced = product_of_block(t, &self.frf.lines[line], &rows.at, &columns.at);
+        // every value is in some sum, and even 0 times what is not a number is none
+        if finite(&reduced) { Ok(reduced) } else { Err(self.not_finite(line, rows, columns)) }
+    }
+
+    /// The refusal of the first cell of the block that is not a number.
+    fn not_finite(&self, line: usize, rows: &Found, columns: &Found) -> InterfaceError {
+        let y = block(&self.frf.lines[line], &rows.at, &columns.at);
+        // storage is by columns
+        let bad = y.iter().position(|v| !v.is_finite()).unwrap_or_default();
+        let source = FrfError::NotFinite {
+            output: rows.names[bad % y.nrows()].clone(),
+            input: columns.names[bad / y.nrows()].clone(),
+            frequency_hz: self.frf.frequency_hz[line],
+        };
+        InterfaceError::Frf { file: self.file, source }
+    }
+}
+
+/// Whether all are numbers; looking at all of them is faster than a way out in the middle.
+fn finite(y: &Line) -> bool {
+    y.as_slice().iter().fold(true, |all, v| all & v.is_finite())
 }
 
 /// 1 for translations, the scaling length for rotations (its square for modes that grow so): after D Y D all entries are m/N.
@@ -161,13 +186,11 @@ pub(crate) fn balance(idms: IdmSet) -> Vec<f64> {
     idms.dofs().iter().map(|d| ROTATION_LENGTH_M.powi(d.power_of_length())).collect()
 }
 
-/// diag(left) Y diag(right), with 1 where a side is not given.
-pub(crate) fn scaled(
-    y: &DMatrix<Complex<f64>>,
-    left: Option<&[f64]>,
-    right: Option<&[f64]>,
-) -> DMatrix<Complex<f64>> {
-    DMatrix::from_fn(y.nrows(), y.ncols(), |r, c| {
-        y[(r, c)] * left.map_or(1.0, |l| l[r]) * right.map_or(1.0, |s| s[c])
-    })
+/// factor diag(d) Z diag(d).
+pub(crate) fn scaled(mut z: Line, d: &[f64], factor: Complex<f64>) -> Line {
+    for (column, right) in z.as_mut_slice().chunks_exact_mut(d.len().max(1)).zip(d) {
+        let factor = factor * right;
+        column.iter_mut().zip(d).for_each(|(z, left)| *z = *z * factor * left);
+    }
+    z
 }

@@ -2,6 +2,7 @@
 
 use super::idm::{Dof, IdmSet};
 use nalgebra::{Complex, DMatrix};
+use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -84,13 +85,15 @@ fn block_jackknife(values: &[f64], mean: f64) -> Option<[f64; 2]> {
 
 /// The median; the mean of the two middle values of an even number.
 pub(crate) fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let n = sorted.len();
+    let mut values = values.to_vec();
+    let n = values.len();
     if n == 0 {
         return f64::NAN;
     }
-    0.5 * (sorted[(n - 1) / 2] + sorted[n / 2])
+    let (below, upper, _) = values.select_nth_unstable_by(n / 2, f64::total_cmp);
+    let lower =
+        if n % 2 == 1 { *upper } else { below.iter().copied().max_by(f64::total_cmp).unwrap_or(*upper) };
+    0.5 * (lower + *upper)
 }
 
 /// Stiffness and damping of one diagonal entry of Z^J on s = σ + iω: a spring–damper joint is Z = K + sC, so
@@ -131,41 +134,31 @@ impl JointSpectrum {
         sigma_per_s: f64,
         z: &[DMatrix<Complex<f64>>],
     ) -> JointSpectrum {
-        let mut stiffness_n_per_m = BTreeMap::new();
-        let mut damping_n_s_per_m = BTreeMap::new();
-        for (d, &dof) in idms.dofs().iter().enumerate() {
-            let (k, c) = z
-                .iter()
-                .zip(frequency_hz)
-                .map(|(z, f)| {
-                    let s = Complex::new(sigma_per_s, std::f64::consts::TAU * f);
-                    stiffness_and_damping(z[(d, d)], s)
-                })
-                .unzip();
-            stiffness_n_per_m.insert(dof, k);
-            damping_n_s_per_m.insert(dof, c);
-        }
-        let mut coupling_si = BTreeMap::new();
-        let mut coupling_damping_si = BTreeMap::new();
-        for (i, one) in idms.dofs().iter().enumerate() {
-            for (j, other) in idms.dofs().iter().enumerate().skip(i + 1) {
-                let pair = format!("{one}-{other}");
-                let (k, c): (Vec<f64>, Vec<f64>) = z
-                    .iter()
-                    .zip(frequency_hz)
-                    .map(|(z, f)| {
-                        let s = Complex::new(sigma_per_s, std::f64::consts::TAU * f);
-                        stiffness_and_damping(0.5 * (z[(i, j)] + z[(j, i)]), s)
-                    })
-                    .unzip();
-                coupling_damping_si.insert(pair.clone(), c);
-                coupling_si.insert(pair, k);
+        // mean of both places of an entry, along all lines
+        let entry = |i: usize, j: usize| -> (Vec<f64>, Vec<f64>) {
+            let parts = z.iter().zip(frequency_hz).map(|(z, f)| {
+                let s = Complex::new(sigma_per_s, std::f64::consts::TAU * f);
+                stiffness_and_damping(0.5 * (z[(i, j)] + z[(j, i)]), s)
+            });
+            parts.unzip()
+        };
+        let dofs = idms.dofs();
+        let (mut stiffness_n_per_m, mut damping_n_s_per_m) = (BTreeMap::new(), BTreeMap::new());
+        let (mut coupling_si, mut coupling_damping_si) = (BTreeMap::new(), BTreeMap::new());
+        for (i, one) in dofs.iter().enumerate() {
+            let (k, c) = entry(i, i);
+            stiffness_n_per_m.insert(*one, k);
+            damping_n_s_per_m.insert(*one, c);
+            for (j, other) in dofs.iter().enumerate().skip(i + 1) {
+                let (k, c) = entry(i, j);
+                coupling_si.insert(format!("{one}-{other}"), k);
+                coupling_damping_si.insert(format!("{one}-{other}"), c);
             }
         }
         JointSpectrum {
             method: method.into(),
             idms: idms.count(),
-            modes: idms.dofs(),
+            modes: dofs,
             frequency_hz: frequency_hz.to_vec(),
             stiffness_n_per_m,
             damping_n_s_per_m,
@@ -199,12 +192,12 @@ impl JointSpectrum {
 }
 
 /// Statistics of each spectrum over these lines.
-fn statistics<K: Ord + Clone>(
+fn statistics<K: Ord + Clone + Send + Sync>(
     spectra: &BTreeMap<K, Vec<f64>>,
     lines: &[usize],
 ) -> BTreeMap<K, BandStatistic> {
     spectra
-        .iter()
+        .par_iter()
         .filter_map(|(key, values)| {
             let band: Vec<f64> = lines.iter().map(|&l| values[l]).collect();
             BandStatistic::of(&band).map(|s| (key.clone(), s))

@@ -34,6 +34,7 @@ pub mod joint;
 pub mod method;
 pub mod noise;
 pub mod plausibility;
+mod product;
 pub mod pseudo_inverse;
 mod reduced;
 pub mod semm;
@@ -42,7 +43,9 @@ pub mod vpt;
 
 pub use frf::{FrfError, FrfMatrix, Quantity};
 pub use geometry::{Configuration, Geometry, Grouping, Point};
-pub use identify::{Identification, IdentifyError, Refused, VirtualPointQuality, identify};
+pub use identify::{
+    Decoupled, Identification, IdentifyError, Refused, VirtualPointQuality, decouple, identify,
+};
 pub use idm::{Dof, IdmSet};
 pub use joint::{Band, BandStatistic, JointRow, JointSpectrum};
 pub use method::Method;

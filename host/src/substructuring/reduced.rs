@@ -14,8 +14,8 @@ use super::joint::Band;
 use super::method::Method;
 use super::plausibility::{passivity, reciprocity};
 use super::pseudo_inverse::{condition, full_rank_inverse, rank};
-use super::vpt::{reduce_inputs, reduce_outputs};
-use nalgebra::{Complex, DMatrix};
+use super::vpt::reduce_inputs;
+use nalgebra::{Complex, DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
@@ -46,10 +46,13 @@ pub(super) struct Rooms<'a> {
 }
 
 /// Virtual points of A and B alone for one IDM set, with their admittances (rotations scaled to metres).
+///
+/// Admittances stay in the files' quantity, receptance times sᵏ: every method turns it into Z^J over sᵏ, and one factor at the
+/// end makes up for it.
 pub(super) struct Reduced {
     idms: IdmSet,
-    vp_a: VirtualPoint,
-    vp_b: VirtualPoint,
+    a: Balanced,
+    b: Balanced,
     y_a: Vec<Line>,
     y_b: Vec<Line>,
     /// Y^AJB_cc and its inverse: five methods share them.
@@ -68,38 +71,22 @@ type Solved = Result<Solution, RefusedReason>;
 
 impl Reduced {
     pub(super) fn of(rooms: &Rooms<'_>, idms: IdmSet) -> Result<Reduced, InterfaceError> {
-        let vp_a = rooms.a.virtual_point(Grouping::InterfaceA, rooms.geometry, idms)?;
-        let vp_b = rooms.b.virtual_point(Grouping::InterfaceB, rooms.geometry, idms)?;
-        let y_a = Self::admittance(rooms.a, &vp_a, &vp_a, idms)?;
-        let y_b = Self::admittance(rooms.b, &vp_b, &vp_b, idms)?;
+        let a = Balanced::of(rooms.a, Grouping::InterfaceA, rooms.geometry, idms)?;
+        let b = Balanced::of(rooms.b, Grouping::InterfaceB, rooms.geometry, idms)?;
+        let y_a = every_line(rooms.a.frf.lines.len(), |l| a.admittance(rooms.a, l, &a))?;
+        let y_b = every_line(rooms.b.frf.lines.len(), |l| b.admittance(rooms.b, l, &b))?;
         let (assembly, impedance) = (OnceLock::new(), OnceLock::new());
-        Ok(Reduced { idms, vp_a, vp_b, y_a, y_b, assembly, impedance })
-    }
-
-    /// T_u Y T_f between two virtual points of one file.
-    fn admittance(
-        file: Measured<'_>,
-        out: &VirtualPoint,
-        input: &VirtualPoint,
-        idms: IdmSet,
-    ) -> Result<Vec<Line>, InterfaceError> {
-        let d = balance(idms);
-        let lines = file.block(&out.rows, &input.columns)?;
-        Ok(lines
-            .par_iter()
-            .map(|y| {
-                let reduced = reduce_inputs(&reduce_outputs(&out.responses.t, y), &input.impacts.t);
-                scaled(&reduced, Some(&d), Some(&d))
-            })
-            .collect())
+        Ok(Reduced { idms, a, b, y_a, y_b, assembly, impedance })
     }
 
     pub(super) fn quality(&self, rooms: &Rooms<'_>) -> Vec<VirtualPointQuality> {
-        [("A", rooms.a, &self.vp_a, &self.y_a), ("B", rooms.b, &self.vp_b, &self.y_b)]
-            .into_iter()
+        [("A", rooms.a, &self.a.vp, &self.y_a), ("B", rooms.b, &self.b.vp, &self.y_b)]
+            .into_par_iter()
             .filter_map(|(substructure, file, vp, y)| {
-                let s: Vec<Complex<f64>> = (0..y.len()).map(|l| file.frf.s(l)).collect();
-                let lines = file.block(&vp.rows, &vp.columns).ok()?;
+                // what times a driving-point admittance is a mobility
+                let order = file.frf.quantity.order_of_s();
+                let s: Vec<Complex<f64>> = (0..y.len()).map(|l| file.frf.s(l).powi(1 - order)).collect();
+                let lines = every_line(y.len(), |l| file.cells(l, &vp.rows, &vp.columns)).ok()?;
                 Some(VirtualPointQuality {
                     substructure,
                     idms: self.idms.count(),
@@ -150,7 +137,7 @@ impl Reduced {
     /// How well A and B, coupled by this joint (mean over `band`), give the measured assembly; none where that cannot be said.
     pub(super) fn back_coupling(&self, rooms: &Rooms<'_>, z: &[Line], band: Band) -> Option<BackCoupling> {
         let d: Vec<f64> = balance(self.idms).iter().map(|d| 1.0 / d).collect();
-        let z: Vec<Line> = z.iter().map(|z| scaled(z, Some(&d), Some(&d))).collect();
+        let z: Vec<Line> = z.par_iter().map(|z| scaled(z.clone(), &d, Complex::from(1.0))).collect();
         let y = self.assembly(rooms).ok()?;
         BackCoupling::of(rooms.a.frf, &self.y_a, &self.y_b, y, &z, band)
     }
@@ -159,20 +146,18 @@ impl Reduced {
     fn assembly(&self, rooms: &Rooms<'_>) -> Result<&[Line], RefusedReason> {
         let found = self.assembly.get_or_init(|| {
             let n = self.idms.count();
-            let vp = [
-                rooms.ajb.virtual_point(Grouping::InterfaceA, rooms.geometry, self.idms)?,
-                rooms.ajb.virtual_point(Grouping::InterfaceB, rooms.geometry, self.idms)?,
-            ];
-            let mut lines = vec![Line::zeros(2 * n, 2 * n); rooms.ajb.frf.lines.len()];
-            for (r, out) in vp.iter().enumerate() {
-                for (c, input) in vp.iter().enumerate() {
-                    for (line, y) in lines.iter_mut().zip(Self::admittance(rooms.ajb, out, input, self.idms)?)
-                    {
+            let of = |grouping| Balanced::of(rooms.ajb, grouping, rooms.geometry, self.idms);
+            let vp = [of(Grouping::InterfaceA)?, of(Grouping::InterfaceB)?];
+            every_line(rooms.ajb.frf.lines.len(), |l| {
+                let mut line = Line::zeros(2 * n, 2 * n);
+                for (r, out) in vp.iter().enumerate() {
+                    for (c, input) in vp.iter().enumerate() {
+                        let y = out.admittance(rooms.ajb, l, input)?;
                         line.view_mut((r * n, c * n), (n, n)).copy_from(&y);
                     }
                 }
-            }
-            Ok(lines)
+                Ok(line)
+            })
         });
         found.as_deref().map_err(Clone::clone)
     }
@@ -181,13 +166,12 @@ impl Reduced {
     fn impedance(&self, rooms: &Rooms<'_>) -> Result<&[Line], RefusedReason> {
         let y = self.assembly(rooms)?;
         let found = self.impedance.get_or_init(|| {
-            y.par_iter()
-                .zip(&rooms.ajb.frf.frequency_hz)
-                .map(|(y, &frequency_hz)| {
-                    full_rank_inverse(y, ASSEMBLY)
-                        .map_err(|lost| RefusedReason::Decoupling { frequency_hz, source: lost.into() })
+            every_line(y.len(), |l| {
+                full_rank_inverse(&y[l], ASSEMBLY).map_err(|lost| RefusedReason::Decoupling {
+                    frequency_hz: rooms.ajb.frf.frequency_hz[l],
+                    source: lost.into(),
                 })
-                .collect()
+            })
         });
         found.as_deref().map_err(Clone::clone)
     }
@@ -198,43 +182,44 @@ impl Reduced {
         rooms: &Rooms<'_>,
         solve: impl Fn(usize) -> Result<Line, DecouplingError> + Sync,
     ) -> Solved {
-        Ok(Solution { z: self.per_line(rooms, solve)?, notes: Vec::new(), internals: None })
+        let z = self.per_line(rooms, |l| solve(l).map_err(|source| Self::refused(rooms, l, source)))?;
+        Ok(Solution { z, notes: Vec::new(), internals: None })
     }
 
     /// Both forms of Eq. (3) and its sisters: P, Q from the substructures, M from the assembly, at the internals that both have.
     fn internals(&self, rooms: &Rooms<'_>, name: Method, seen: Side, hit: Side, which: Internals) -> Solved {
         let printed = which == Internals::Printed;
-        let d = balance(self.idms);
         let alone = |side| match side {
-            Side::A => (rooms.a, &self.vp_a),
-            Side::B => (rooms.b, &self.vp_b),
+            Side::A => (rooms.a, &self.a),
+            Side::B => (rooms.b, &self.b),
         };
-        let ((seen_file, seen_vp), (hit_file, hit_vp)) = (alone(seen), alone(hit));
+        let ((seen_file, seen_at), (hit_file, hit_at)) = (alone(seen), alone(hit));
         let (seen_on, hit_on) = (seen.responses(which), hit.impacts(which));
         let (columns, columns_ajb) = shared(&hit_file.inputs(hit_on), &rooms.ajb.inputs(hit_on));
         let (rows, rows_ajb) = shared(&seen_file.outputs(seen_on), &rooms.ajb.outputs(seen_on));
-        let q_raw = hit_file.block(&hit_vp.rows, &columns)?;
-        let p_raw = seen_file.block(&rows, &seen_vp.columns)?;
-        let mut m = rooms.ajb.block(&rows_ajb, &columns_ajb)?;
-        if seen == hit {
-            // the substructure alone minus the assembly
-            for (m, own) in m.iter_mut().zip(seen_file.block(&rows, &columns)?) {
-                *m = own - &*m;
-            }
-        }
-        let q = |l: usize| scaled(&reduce_outputs(&hit_vp.responses.t, &q_raw[l]), Some(&d), None);
-        let p = |l: usize| scaled(&reduce_inputs(&p_raw[l], &seen_vp.impacts.t), None, Some(&d));
+        let q = |l: usize| hit_file.reduced_outputs(l, &hit_at.t_u, &hit_at.vp.rows, &columns);
+        let p = |l: usize| -> Result<Line, InterfaceError> {
+            Ok(reduce_inputs(&seen_file.cells(l, &rows, &seen_at.vp.columns)?, &seen_at.t_f))
+        };
+        let m = |l: usize| -> Result<Line, InterfaceError> {
+            let assembled = rooms.ajb.cells(l, &rows_ajb, &columns_ajb)?;
+            // of one substructure: alone minus in the assembly
+            if seen == hit { Ok(seen_file.cells(l, &rows, &columns)? - assembled) } else { Ok(assembled) }
+        };
         let mut notes = Vec::new();
-        let (n_b, n_a) = m.first().map_or((0, 0), DMatrix::shape);
+        let (n_b, n_a) = (rows.at.len(), columns.at.len());
         let n_c = self.idms.count();
-        if n_a.min(n_b) == 0 && !m.is_empty() {
+        let lines = self.y_a.len();
+        if n_a.min(n_b) == 0 && lines > 0 {
             let source = DecouplingError::TooFewInternals { impacts: n_a, responses: n_b, needed: n_c };
-            return Err(RefusedReason::Decoupling { frequency_hz: rooms.ajb.frf.frequency_hz[0], source });
+            return Err(Self::refused(rooms, 0, source));
         }
-        let middle = m.len() / 2;
-        let internals = (!m.is_empty()).then(|| {
-            let (p, q) = (p(middle), q(middle));
-            InternalsFound {
+        let internals = if lines == 0 {
+            None
+        } else {
+            let middle = lines / 2;
+            let (p, q) = (p(middle)?, q(middle)?);
+            Some(InternalsFound {
                 method: name,
                 idms: n_c,
                 impacts: n_a,
@@ -244,36 +229,73 @@ impl Reduced {
                 rank_q: rank(&q),
                 condition_p: condition(&p),
                 condition_q: condition(&q),
-            }
-        });
-        if printed && !m.is_empty() && (n_a != n_c || n_b != n_c) {
-            let rank = observed_rank(&p(0), &q(0));
+            })
+        };
+        if printed && lines > 0 && (n_a != n_c || n_b != n_c) {
+            let rank = observed_rank(&p(0)?, &q(0)?);
             notes.push(format!(
                 "Eq. 3 as printed with {n_a} internal impacts and {n_b} internal responses for {n_c} interface DoFs: Π has rank {rank} of {n_c}, \
                  so the result is right only for the interface forces that these internals generate, and biased otherwise; `internal` is the exact form"
             ));
         }
         let method = if printed { internal_printed } else { internal };
-        let z = self.per_line(rooms, |l| method(&self.y_a[l], &self.y_b[l], &p(l), &m[l], &q(l)))?;
+        let z = self.per_line(rooms, |l| {
+            method(&self.y_a[l], &self.y_b[l], &p(l)?, &m(l)?, &q(l)?)
+                .map_err(|source| Self::refused(rooms, l, source))
+        })?;
         Ok(Solution { z, notes, internals })
     }
 
-    /// Solves every line and takes the rotations' scale out again: Z = D Z' D.
+    fn refused(rooms: &Rooms<'_>, line: usize, source: DecouplingError) -> RefusedReason {
+        RefusedReason::Decoupling { frequency_hz: rooms.a.frf.frequency_hz[line], source }
+    }
+
+    /// Solves every line and takes the rotations' scale and the files' quantity out again: Z = D Z' D sᵏ.
     fn per_line(
         &self,
         rooms: &Rooms<'_>,
-        solve: impl Fn(usize) -> Result<Line, DecouplingError> + Sync,
+        solve: impl Fn(usize) -> Result<Line, RefusedReason> + Sync,
     ) -> Result<Vec<Line>, RefusedReason> {
         let d = balance(self.idms);
-        (0..self.y_a.len())
-            .into_par_iter()
-            .map(|l| {
-                solve(l).map(|z| scaled(&z, Some(&d), Some(&d))).map_err(|source| RefusedReason::Decoupling {
-                    frequency_hz: rooms.a.frf.frequency_hz[l],
-                    source,
-                })
-            })
-            .collect()
+        let order = rooms.a.frf.quantity.order_of_s();
+        every_line(self.y_a.len(), |l| Ok(scaled(solve(l)?, &d, rooms.a.frf.s(l).powi(order))))
+    }
+}
+
+/// A virtual point in one file with its rotations in metres: T_u and T_f between measured points and D u, D⁻¹ f.
+struct Balanced {
+    vp: VirtualPoint,
+    t_u: DMatrix<f64>,
+    t_f: DMatrix<f64>,
+}
+
+impl Balanced {
+    fn of(
+        file: Measured<'_>,
+        grouping: Grouping,
+        geometry: &Geometry,
+        idms: IdmSet,
+    ) -> Result<Balanced, InterfaceError> {
+        let vp = file.virtual_point(grouping, geometry, idms)?;
+        let d = DMatrix::from_diagonal(&DVector::from_vec(balance(idms)));
+        let (t_u, t_f) = (&d * &vp.responses.t, &vp.impacts.t * &d);
+        Ok(Balanced { vp, t_u, t_f })
+    }
+
+    /// T_u Y T_f of one line, responses at this virtual point and forces at the other.
+    fn admittance(&self, file: Measured<'_>, line: usize, input: &Balanced) -> Result<Line, InterfaceError> {
+        let motions = file.reduced_outputs(line, &self.t_u, &self.vp.rows, &input.vp.columns)?;
+        Ok(reduce_inputs(&motions, &input.t_f))
+    }
+}
+
+/// What `of` gives for each line, in parallel; the first line's refusal if there are some.
+fn every_line<E>(lines: usize, of: impl Fn(usize) -> Result<Line, E> + Sync) -> Result<Vec<Line>, E> {
+    let found: Vec<Option<Line>> = (0..lines).into_par_iter().with_min_len(16).map(|l| of(l).ok()).collect();
+    match found.into_iter().collect() {
+        Some(all) => Ok(all),
+        // which refusal is the first shows when they are asked in order
+        None => (0..lines).map(of).collect(),
     }
 }
 

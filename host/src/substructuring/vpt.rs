@@ -6,6 +6,7 @@
 
 use super::geometry::Point;
 use super::idm::IdmSet;
+use super::product::product;
 use nalgebra::{Complex, DMatrix, Vector3};
 
 /// Rotations are compared with translations through this length, m: about the distance of the rig's sensors
@@ -99,12 +100,12 @@ pub fn impacts(
 
 /// T_u Y: outputs onto the virtual point.
 pub fn reduce_outputs(t_u: &DMatrix<f64>, y: &DMatrix<Complex<f64>>) -> DMatrix<Complex<f64>> {
-    t_u.map(Complex::from) * y
+    product(t_u, y)
 }
 
 /// Y T_f: inputs onto the virtual point.
 pub fn reduce_inputs(y: &DMatrix<Complex<f64>>, t_f: &DMatrix<f64>) -> DMatrix<Complex<f64>> {
-    y * t_f.map(Complex::from)
+    product(y, t_f)
 }
 
 fn root_weights(kind: &'static str, points: usize, weights: Option<&[f64]>) -> Result<Vec<f64>, VptError> {

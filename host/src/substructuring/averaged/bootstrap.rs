@@ -41,9 +41,13 @@ pub struct Replicates {
     pub ci95: [f64; 2],
 }
 
-/// How many hits of each cell a replicate uses: \[replicate\]\[cell\]\[hit\].
+fn hits(cell: &CellHits) -> usize {
+    cell.auto.first().map_or(0, Vec::len)
+}
+
+/// How often a replicate uses each hit: \[replicate\]\[hit\], the cells' hits one after the other.
 struct Draws {
-    counts: Vec<Vec<Vec<f64>>>,
+    counts: Vec<Vec<f64>>,
 }
 
 impl Draws {
@@ -53,11 +57,10 @@ impl Draws {
                 let mut stream = Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_add(replicate as u64));
                 cells
                     .iter()
-                    .map(|cell| {
-                        let hits = cell.auto.first().map_or(0, Vec::len);
-                        let mut counts = vec![0.0; hits];
-                        for _ in 0..hits {
-                            counts[stream.random_range(0..hits)] += 1.0;
+                    .flat_map(|cell| {
+                        let mut counts = vec![0.0; hits(cell)];
+                        for _ in 0..counts.len() {
+                            counts[stream.random_range(0..hits(cell))] += 1.0;
                         }
                         counts
                     })
@@ -94,11 +97,15 @@ impl Prepared {
                 let mut y: Line = DMatrix::zeros(rows, columns);
                 let mut out = vec![Complex::default(); replicates * n];
                 for (replicate, counts) in draws.counts.iter().enumerate() {
-                    for (cell, (counts, place)) in cells.iter().zip(counts.iter().zip(&places)) {
-                        let auto: f64 = cell.auto[l].iter().zip(counts).map(|(a, w)| a * w).sum();
+                    let mut counts = counts.as_slice();
+                    for (cell, place) in cells.iter().zip(&places) {
+                        let own;
+                        (own, counts) = counts.split_at(hits(cell));
+                        let auto: f64 = cell.auto[l].iter().zip(own).map(|(a, w)| a * w).sum();
+                        let to_h1 = to_receptance / auto;
                         for (&(row, column), cross) in place.iter().zip(&cell.cross[l]) {
-                            let sum: Complex<f64> = cross.iter().zip(counts).map(|(x, w)| x * *w).sum();
-                            y[(row, column)] = sum / auto * to_receptance;
+                            let sum: Complex<f64> = cross.iter().zip(own).map(|(x, w)| x * *w).sum();
+                            y[(row, column)] = sum * to_h1;
                         }
                     }
                     let z = invert(&self.assembly.layout.reduce(&y));

@@ -10,6 +10,7 @@ use super::{Line, Priors, compliance};
 use crate::substructuring::geometry::{Geometry, Point};
 use crate::substructuring::idm::{Dof, IdmSet};
 use crate::substructuring::interface_data::{Found, VirtualPoint, balance};
+use crate::substructuring::vpt::{reduce_inputs, reduce_outputs};
 use nalgebra::{Complex, DMatrix, Vector3};
 
 type C = Complex<f64>;
@@ -84,7 +85,7 @@ impl Layout {
 
     /// T_u Y T_f: cells onto both virtual points, rotations scaled.
     pub(super) fn reduce(&self, cells: &Line) -> Line {
-        self.t_u.map(C::from) * cells * self.t_f.map(C::from)
+        reduce_inputs(&reduce_outputs(&self.t_u, cells), &self.t_f)
     }
 
     pub(super) fn cell_count(&self) -> (usize, usize) {

@@ -1,5 +1,6 @@
 //! Eq. (3) in its exact least-squares form, for any number of internal degrees of freedom ≥ n_c.
 
+use super::super::product::product;
 use super::super::pseudo_inverse::full_rank_inverse;
 use super::DecouplingError;
 use nalgebra::{Complex, DMatrix};
@@ -32,6 +33,6 @@ pub fn internal(
         full_rank_inverse(p, "P, the admittance between the virtual point and the internal responses,")?;
     let q_plus =
         full_rank_inverse(q, "Q, the admittance between the internal impacts and the virtual point,")?;
-    let g = full_rank_inverse(&(p_plus * m * q_plus), "P⁺ M Q⁺")?;
+    let g = full_rank_inverse(&product(&product(&p_plus, m), &q_plus), "P⁺ M Q⁺")?;
     Ok(full_rank_inverse(&(g - y_a - y_b), "the joint's admittance")?)
 }

@@ -1,5 +1,6 @@
 //! Eq. (3) as the paper prints it.
 
+use super::super::product::product;
 use super::super::pseudo_inverse::{full_rank_inverse, rank};
 use super::DecouplingError;
 use nalgebra::{Complex, DMatrix};
@@ -19,7 +20,7 @@ pub fn internal_printed(
     q: &DMatrix<Complex<f64>>,
 ) -> Result<DMatrix<Complex<f64>>, DecouplingError> {
     let m_inverse = full_rank_inverse(m, "M = Y^AJB between B's and A's internals")?;
-    Ok(full_rank_inverse(&(q * m_inverse * p - y_a - y_b), "the joint's admittance")?)
+    Ok(full_rank_inverse(&(product(&product(q, &m_inverse), p) - y_a - y_b), "the joint's admittance")?)
 }
 
 /// Rank of Π: how many directions of interface force these internals see, of n_c. It cannot exceed the rank

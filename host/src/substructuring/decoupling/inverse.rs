@@ -32,5 +32,5 @@ pub fn inverse_of(block: InverseBlock, z_ajb: &DMatrix<Complex<f64>>) -> DMatrix
         InverseBlock::Ab => (0, n),
         InverseBlock::Ba => (n, 0),
     };
-    -z_ajb.view(at, (n, n)).clone_owned()
+    z_ajb.view(at, (n, n)).map(|z| -z)
 }

@@ -1,0 +1,79 @@
+//! Products of the small complex matrices of one line, about twice as fast as the general ones: those are made for large
+//! matrices, and scale every term once more.
+
+use nalgebra::{Complex, DMatrix, Scalar};
+use std::ops::Mul;
+
+/// A B, where either may be real.
+pub(crate) fn product<A, B>(a: &DMatrix<A>, b: &DMatrix<B>) -> DMatrix<Complex<f64>>
+where
+    A: Scalar + Copy + Mul<B, Output = Complex<f64>>,
+    B: Scalar + Copy,
+{
+    assert_eq!(a.ncols(), b.nrows(), "A has as many columns as B has rows");
+    let mut out = DMatrix::zeros(a.nrows(), b.ncols());
+    let columns = b.as_slice().chunks_exact(b.nrows().max(1));
+    for (sum, factors) in out.as_mut_slice().chunks_exact_mut(a.nrows().max(1)).zip(columns) {
+        add_columns(sum, a.as_slice(), factors);
+    }
+    out
+}
+
+/// T Y of those rows and columns of Y that are named.
+pub(crate) fn product_of_block(
+    t: &DMatrix<f64>,
+    y: &DMatrix<Complex<f64>>,
+    rows: &[usize],
+    columns: &[usize],
+) -> DMatrix<Complex<f64>> {
+    assert_eq!(t.ncols(), rows.len(), "T has a column for each row named");
+    let mut out = DMatrix::zeros(t.nrows(), columns.len());
+    let mut factors = vec![Complex::default(); rows.len()];
+    for (sum, &c) in out.as_mut_slice().chunks_exact_mut(t.nrows().max(1)).zip(columns) {
+        let column = &y.as_slice()[c * y.nrows()..][..y.nrows()];
+        factors.iter_mut().zip(rows).for_each(|(f, &r)| *f = column[r]);
+        add_columns(sum, t.as_slice(), &factors);
+    }
+    out
+}
+
+/// sum += Σ fᵢ columnᵢ. Three at once spare two loads and stores of the sum in three.
+fn add_columns<A, B>(sum: &mut [Complex<f64>], columns: &[A], factors: &[B])
+where
+    A: Copy + Mul<B, Output = Complex<f64>>,
+    B: Copy,
+{
+    let rows = sum.len();
+    let (mut columns, mut factors) = (columns.chunks_exact(3 * rows), factors.chunks_exact(3));
+    for (columns, f) in columns.by_ref().zip(factors.by_ref()) {
+        let (x, rest) = columns.split_at(rows);
+        let (y, z) = rest.split_at(rows);
+        for (((sum, x), y), z) in sum.iter_mut().zip(x).zip(y).zip(z) {
+            *sum += *x * f[0] + *y * f[1] + *z * f[2];
+        }
+    }
+    for (column, f) in columns.remainder().chunks_exact(rows).zip(factors.remainder()) {
+        for (sum, x) in sum.iter_mut().zip(column) {
+            *sum += *x * *f;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn real_and_complex_factors_give_the_matrix_product() {
+        // every remainder of three, and nothing at all
+        for (rows, inner, columns) in [(1, 1, 1), (2, 3, 4), (5, 4, 2), (3, 5, 6), (2, 0, 3), (0, 2, 2)] {
+            let y = DMatrix::from_fn(rows, inner, |r, c| Complex::new(r as f64 - 1.0, c as f64 + 0.5));
+            let x = DMatrix::from_fn(inner, columns, |r, c| Complex::new(c as f64 - 0.3, r as f64 - 2.0));
+            let (t, u) = (y.map(|y| y.im), x.map(|x| x.re));
+            // rounding only
+            assert!((product(&y, &x) - &y * &x).norm() < 1e-13);
+            assert!((product(&t, &x) - t.map(Complex::from) * &x).norm() < 1e-13);
+            assert!((product(&y, &u) - &y * u.map(Complex::from)).norm() < 1e-13);
+        }
+    }
+}
