@@ -9,7 +9,7 @@ use super::loops::{
 };
 use super::record::{HysteresisRecord, Relative};
 use super::shape::{Shape, ShapeEvidence, shape};
-use super::stick::{friction_limit, slope_over, stick_part, strokes};
+use super::stick::{Part, first_part, flank_part, friction_limit, slope_over, strokes};
 use num_complex::Complex;
 use serde::Serialize;
 
@@ -40,6 +40,8 @@ pub struct LoopAnalysis {
     pub shape_evidence: Option<ShapeEvidence>,
     /// k_T: slope of the stick part, N/m. None for an ellipse.
     pub k_t_n_per_m: Option<OverCycles>,
+    /// The part of the force's swing after each reversal in which k_T was read; only where something slips.
+    pub stick_part: Option<[f64; 2]>,
     /// k_eq: least-squares slope over the whole loop, N/m.
     pub k_eq_n_per_m: OverCycles,
     /// Loop area per cycle, J. None for a decay, whose loops do not close.
@@ -118,17 +120,21 @@ fn shaker(
     let (shape, evidence) = shape(&mean, &cycles);
     let strokes = strokes(&mean);
     let mut warnings = Vec::new();
-    let k_t = match shape {
-        Shape::Stuck => over(&equivalent_stiffness),
-        Shape::Elliptical => {
+    let stick_part: Option<Part> = match shape {
+        Shape::Stuck | Shape::Elliptical => None,
+        Shape::Microslip => Some(first_part(&mean, &strokes)),
+        Shape::GrossSlip => Some(flank_part(&mean, &strokes)),
+    };
+    let k_t = match (shape, stick_part) {
+        (Shape::Stuck, _) => over(&equivalent_stiffness),
+        (_, None) => {
             warnings.push(
                 "an ellipse without slip: something between the measured spots resonates near this frequency; its slope is no contact stiffness"
                     .into(),
             );
             None
         }
-        Shape::Microslip | Shape::GrossSlip => {
-            let part = stick_part(&mean, &strokes);
+        (_, Some(part)) => {
             let values: Vec<f64> = cycles.iter().filter_map(|c| slope_over(c, &strokes, part)).collect();
             if values.len() < cycles.len() {
                 warnings.push(format!(
@@ -149,6 +155,7 @@ fn shaker(
         shape,
         shape_evidence: Some(evidence),
         k_t_n_per_m: k_t,
+        stick_part,
         k_eq_n_per_m: over(&equivalent_stiffness).expect("steady() gives at least one cycle"),
         energy_j: over(&energy),
         k_secant_n_per_m: Some(secant_stiffness(&mean)),
@@ -208,6 +215,7 @@ fn impact(record: &HysteresisRecord, motion: &Relative) -> Result<LoopAnalysis, 
         shape,
         shape_evidence: None,
         k_t_n_per_m: (shape == Shape::Stuck && hidden.is_none()).then_some(k),
+        stick_part: None,
         k_eq_n_per_m: k,
         energy_j: None,
         k_secant_n_per_m: None,

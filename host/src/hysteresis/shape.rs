@@ -7,7 +7,7 @@
 
 use super::cycles::Cycle;
 use super::loops::{fundamental_stiffness, harmonics};
-use super::stick::{final_tangent, slope_over, stick_part, strokes};
+use super::stick::{final_tangent, first_part, slope_over, strokes};
 use serde::Serialize;
 
 /// The shape of a loop.
@@ -70,7 +70,7 @@ pub(super) fn shape(mean: &Cycle, cycles: &[Cycle]) -> (Shape, ShapeEvidence) {
     let variance = scatter.sum::<f64>() / n;
     let nonlinearity_noise = (variance / (n - 1.0).max(1.0)).sqrt() / force;
     let strokes = strokes(mean);
-    let initial = slope_over(mean, &strokes, stick_part(mean, &strokes)).unwrap_or(k);
+    let initial = slope_over(mean, &strokes, first_part(mean, &strokes)).unwrap_or(k);
     let evidence = ShapeEvidence {
         nonlinearity: rms(&of_mean) / force,
         nonlinearity_noise,
