@@ -8,6 +8,8 @@ use jointrig::campaign::shaking::{self, Limits, Options, Outcome, ShakeError, Sh
 use jointrig::campaign::store::Store;
 use jointrig::device::address::Address;
 use jointrig::device::session::Session;
+use jointrig::exchange::read_hysteresis;
+use jointrig::exchange::uff::{self, DataSet, Values};
 use jointrig::results::{Excitation, Force, Hysteresis, Results, Shape, Wanted, analyse};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -280,6 +282,64 @@ fn microslip_softens_the_loop_with_amplitude_as_its_law_says() {
     }
     // at 1.6 µm most of it slips
     assert!(before < 0.65 * 180e6);
+}
+
+#[test]
+fn exported_levels_say_the_same_to_other_programs() {
+    let bench = Bench::new();
+    let sweep = Level { frequency_hz: 240.0, end_hz: Some(260.0), held: Held::Drive, amplitude: 0.1 };
+    bench.run("sim:", &options(vec![step(250.0, 1e-7), sweep])).unwrap();
+    let results = bench.analysed();
+    let folder = path(&bench).with_extension("exported");
+    let export = |format: &str, more: &[&str]| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_jointrig"));
+        command.arg("export").arg(path(&bench)).args(["--format", format, "--out"]).arg(&folder).args(more);
+        let out = command.output().unwrap();
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        String::from_utf8(out.stdout).unwrap()
+    };
+    assert!(export("npz", &[]).contains("2 levels of the shaker"));
+    let record = read_hysteresis(&folder.join("levels/level_1.npz")).unwrap();
+    let again = jointrig::hysteresis::analyse(&record).unwrap();
+    let raw = rows(&results, Force::Raw);
+    assert_eq!(raw.iter().map(|row| row.level).collect::<Vec<_>>(), [Some(1)], "a sweep has no loop");
+    assert_eq!(Some(again.k_eq_n_per_m), raw[0].k_eq_n_per_m);
+    assert_eq!(read_hysteresis(&folder.join("levels/level_2.npz")).unwrap().excitation_hz, None);
+
+    let table = |name: &str| -> Vec<Vec<String>> {
+        let mut reader =
+            csv::ReaderBuilder::new().has_headers(false).from_path(folder.join("levels").join(name)).unwrap();
+        reader.records().map(|row| row.unwrap().iter().map(String::from).collect()).collect()
+    };
+    let levels = table("levels.csv");
+    let column = |name: &str| levels[0].iter().position(|heading| heading == name).unwrap();
+    assert_eq!(levels.len(), 3);
+    assert_eq!([&levels[1][column("amplitude")], &levels[2][column("end_hz")]], ["0.0000001", "260"]);
+    assert_eq!(levels[2][column("file")], "level_2.npz");
+
+    export("csv", &[]);
+    let samples = table("level_1.csv");
+    assert_eq!(samples[0], ["time_s", "velocity_a_m_per_s", "velocity_b_m_per_s", "force_n"]);
+    assert_eq!(samples.len(), record.force_n.len() + 1);
+    assert_eq!(samples[100][3].parse(), Ok(record.force_n[99]));
+
+    export("uff58", &[]);
+    let contents = uff::read(&std::fs::read(folder.join("levels/level_1.uff")).unwrap());
+    let forces: Vec<_> = contents
+        .sets
+        .iter()
+        .filter_map(|set| match set {
+            DataSet::Function(function) if function.response.entity == "contact" => Some(function),
+            _ => None,
+        })
+        .collect();
+    assert!(matches!(&forces[..], [f] if f.values == Values::Real(record.force_n.clone())));
+
+    // without the records the table alone
+    std::fs::remove_dir_all(&folder).unwrap();
+    export("npz", &["--without-records"]);
+    assert_eq!(table("levels.csv")[1][column("file")], "");
+    assert!(!folder.join("levels/level_1.npz").exists());
 }
 
 #[test]
