@@ -27,7 +27,7 @@ impl Correction {
     #[must_use]
     pub fn applied(&self, record: &HysteresisRecord) -> HysteresisRecord {
         let mut force_n = Vec::with_capacity(record.force_n.len());
-        self.force(record, 0..record.force_n.len() as isize, &mut force_n);
+        self.force(record, 0..record.force_n.len().cast_signed(), &mut force_n);
         HysteresisRecord { force_n, ..record.clone() }
     }
 

@@ -152,7 +152,9 @@ impl<'a> Steady<'a> {
         }
         let n = self.cycles as f64;
         for x in mean.signals_mut() {
-            x.iter_mut().for_each(|value| *value /= n);
+            for value in x {
+                *value /= n;
+            }
         }
         let of_mean = products(&mean);
         let points = self.points as f64;

@@ -117,7 +117,8 @@ pub(super) fn within(
     to: &mut Vec<f64>,
     fill: impl FnOnce(Range<usize>, &mut Vec<f64>),
 ) {
-    let inside = range.start.clamp(0, len as isize - 1)..range.end.clamp(1, len as isize);
+    let len = len.cast_signed();
+    let inside = range.start.clamp(0, len - 1)..range.end.clamp(1, len);
     to.clear();
     fill(inside.start as usize..inside.end as usize, to);
     let (Some(first), Some(last)) = (to.first().copied(), to.last().copied()) else { return };
