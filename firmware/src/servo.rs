@@ -7,13 +7,15 @@
 //! roots of (z − 1)(z − 0.35) + 0.3 · 0.65 have the magnitude 0.74 and angles below 23°.
 //!
 //! **A contact that slips** is no such plant. Up to its limit it is stiff; a per cent of drive beyond, it moves several
-//! times as far, and the amplitude's logarithm changes up to some hundred times as fast as the drive's. So every few cycles a glance tells
-//! whether the amplitude is beyond a ceiling. If it is, the last correction went too far: the drive goes back to where it was
-//! measured last, the next corrections are a quarter as long, and from then on they are divided by the steepness that the last two
-//! measurements show.
+//! times as far, and the amplitude's logarithm changes up to some hundred times as fast as the drive's. Nothing tells beforehand at
+//! which drive that is. So the way up is a climb of small steps with a glance of a few cycles after each, the smaller the less is
+//! missing: r times the amplitude is missing, the next step is r/150. Stiff 500 times over, a contact that lets go at that
+//! step moves some three times as far as was ordered, however far it was from there. When less than a fiftieth
+//! is missing, measurements take over.
 //!
-//! The factor's bound makes the way up slow enough that the delay overshoots by no more than a few per cent: at 1.2 per
-//! measurement the amplitude lags by less than one more such step.
+//! A glance beyond a ceiling says that the last step went too far: the drive goes back to where it was before, which from then on
+//! is the edge. Up to the edge it is corrected as ever; beyond it by strides that begin at a quarter of the step, and
+//! divided by the steepness that the last two measurements show.
 
 use heapless::Vec;
 use jointrig_protocol::channel::{Channel, Role};
@@ -37,6 +39,8 @@ const CEILING: f32 = 1.25;
 const STEEP_PART: f32 = 0.35;
 /// The steepest plant that is believed.
 const STEEPEST: f32 = 200.0;
+/// Part of the difference by which a plant that proves less steep is believed to be so.
+const FORGETS: f32 = 0.25;
 /// Changes of the drive below this part of it tell nothing of the steepness.
 const TELLING: f32 = 2e-4;
 /// The longest logarithmic correction of a steep plant: ln 1.2.
@@ -47,13 +51,20 @@ const SHORTER: f32 = 0.25;
 const LONGER: f32 = 1.25;
 /// Largest factor of one correction, and its inverse the smallest.
 const FACTOR: f32 = 1.2;
-/// The factor while the amplitude is less than [`FAR`] of what was ordered: what the delay still hides is then harmless, and so is
-/// the jump of a contact that lets go.
-const FACTOR_FAR: f32 = 1.6;
-/// See [`FACTOR_FAR`].
-const FAR: f32 = 0.05;
+/// A step of the climb, for each time that the amplitude is missing.
+const STEP: f32 = 1.0 / 150.0;
+/// The longest step of the climb.
+const LONGEST: f32 = 0.15;
+/// A plant whose amplitude changes this much faster than the drive, in logarithms, has let go.
+const LETS_GO: f32 = 4.0;
+/// With so many times the amplitude missing a glance may still be noise.
+const NEAR: f32 = 10.0;
+/// The climb is over when no more than this times the amplitude is wanted.
+const CLIMBED: f32 = 1.02;
 /// The way up begins at this part of the drive's bound: even in a resonance that is far below a small order.
 const FIRST_PART: f32 = 0.001;
+/// A glance below this part of the one before says that the amplitude falls.
+const FALLS: f32 = 0.95;
 /// Glances in a row beyond the ceiling: the amplitude runs away, whatever the drive does.
 const GLANCES: u8 = 12;
 /// Measurements at the drive's bound without reaching the amplitude, until that is told.
@@ -83,7 +94,9 @@ pub struct Servo {
     in_vain: u8,
     /// Drive and amplitude of the last measurement.
     last: Option<(f32, f32)>,
-    /// Change of the amplitude's logarithm with the drive's, and the longest correction, since the ceiling was first met.
+    /// On the way up.
+    climbs: bool,
+    /// What is known since the ceiling was first met.
     steep: Option<Steep>,
     beyond: u8,
 }
@@ -91,8 +104,12 @@ pub struct Servo {
 /// What is known of a steep plant.
 #[derive(Clone, Copy)]
 struct Steep {
+    /// Change of the amplitude's logarithm with the drive's.
     ness: f32,
+    /// The longest logarithmic correction beyond the edge.
     stride: f32,
+    /// The drive below which the ceiling was not met, V.
+    edge_v: f32,
 }
 
 impl Servo {
@@ -121,7 +138,19 @@ impl Servo {
         let scans = |seconds: f32| (seconds * rate_hz as f32) as u32;
         let lock_in = LockIn::new(scans(GLANCE_S), scans(LEAST_S));
         let (last, steep) = (None, None);
-        Some(Self { terms, gain, target, most_v, lock_in, measured: 0.0, in_vain: 0, last, steep, beyond: 0 })
+        Some(Self {
+            terms,
+            gain,
+            target,
+            most_v,
+            lock_in,
+            measured: 0.0,
+            in_vain: 0,
+            last,
+            climbs: true,
+            steep,
+            beyond: 0,
+        })
     }
 
     /// The amplitude that was measured last, m or N.
@@ -138,6 +167,7 @@ impl Servo {
     pub fn continues(&mut self, before: &Self) {
         self.measured = before.measured;
         self.last = before.last;
+        self.climbs = before.climbs || self.target > before.target;
         self.steep = before.steep;
     }
 
@@ -164,35 +194,69 @@ impl Servo {
             return self.retreat(glance, drive_v).map(Some);
         }
         self.beyond = 0;
-        let Some(amplitude) = seen.whole else { return Ok(None) };
-        self.measured = amplitude * self.gain;
-        self.learn(drive_v);
-        self.last = Some((drive_v, self.measured));
-        let wanted = (drive_v * self.correction()).min(self.most_v);
-        self.in_vain = if wanted < self.most_v { 0 } else { self.in_vain + 1 };
+        let wanted = if self.climbs {
+            self.measured = glance;
+            let missing = self.target / glance.max(f32::MIN_POSITIVE);
+            if let Some(steep) = self.step(glance, drive_v)
+                && steep.ness > LETS_GO
+                && missing < NEAR
+            {
+                self.steep = Some(steep);
+            }
+            self.last = Some((drive_v, glance));
+            if missing < CLIMBED || self.steep.is_some() {
+                self.climbs = false;
+                self.lock_in.restart();
+                return Ok(None);
+            }
+            drive_v * (1.0 + (STEP * missing).min(LONGEST))
+        } else {
+            let Some(amplitude) = seen.whole else { return Ok(None) };
+            self.measured = amplitude * self.gain;
+            self.learn(drive_v);
+            self.last = Some((drive_v, self.measured));
+            drive_v * self.correction(drive_v)
+        };
+        let wanted = wanted.min(self.most_v);
+        self.in_vain = match seen.whole {
+            _ if wanted < self.most_v => 0,
+            Some(_) => self.in_vain + 1,
+            None => self.in_vain,
+        };
         if self.in_vain > PATIENCE { Err(Trouble::Weak) } else { Ok(Some(wanted)) }
+    }
+
+    /// What the step from the last measurement to this glance tells, if there was one upwards.
+    fn step(&self, glance: f32, drive_v: f32) -> Option<Steep> {
+        let (last_v, amplitude) = self.last.filter(|(last_v, _)| drive_v > last_v * (1.0 + TELLING))?;
+        let step = logarithm(drive_v / last_v);
+        let ness = (logarithm(glance / amplitude.max(f32::MIN_POSITIVE)) / step).clamp(1.0, STEEPEST);
+        Some(Steep { ness, stride: SHORTER * step, edge_v: last_v })
     }
 
     /// Back from beyond the ceiling: the drive that is wanted.
     fn retreat(&mut self, glance: f32, drive_v: f32) -> Result<f32, Trouble> {
+        let falls = self.beyond > 0 && glance < FALLS * self.measured;
+        self.climbs = false;
         self.measured = glance;
         self.lock_in.restart();
         self.beyond += 1;
         if self.beyond > GLANCES {
             return Err(Trouble::Runaway);
         }
-        if let Some((last_v, amplitude)) = self.last
-            && drive_v > last_v * (1.0 + TELLING)
-        {
-            let step = logarithm(drive_v / last_v);
-            let ness = (logarithm(glance / amplitude.max(f32::MIN_POSITIVE)) / step).clamp(1.0, STEEPEST);
-            self.steep = Some(Steep { ness, stride: SHORTER * step });
-            return Ok(last_v);
+        if let Some(steep) = self.step(glance, drive_v) {
+            self.steep = Some(steep);
+            return Ok(steep.edge_v);
+        }
+        if falls {
+            return Ok(drive_v);
         }
         // even where it was measured last it is too far now
-        let back_v = drive_v / FACTOR;
+        let Steep { ness, stride, .. } = self.steep.unwrap_or(Steep { ness: 1.0, stride: 0.0, edge_v: 0.0 });
+        let back = (logarithm(glance / self.target) / ness).max(stride).min(STRIDE);
+        let back_v = drive_v * exponential(-back);
         self.last = None;
-        self.steep.get_or_insert(Steep { ness: 1.0, stride: STRIDE });
+        self.steep = Some(Steep { ness, stride: back, edge_v: back_v });
         Ok(back_v)
     }
 
@@ -203,27 +267,25 @@ impl Servo {
         if step.abs() > TELLING {
             let seen =
                 (logarithm(self.measured / amplitude.max(f32::MIN_POSITIVE)) / step).clamp(1.0, STEEPEST);
-            steep.ness = 0.5 * (steep.ness + seen);
+            // at the limit itself the plant is stiff one time and steep the next: what is steep is believed at once
+            steep.ness = if seen > steep.ness { seen } else { steep.ness + FORGETS * (seen - steep.ness) };
         }
-        steep.stride = (LONGER * steep.stride).min(STRIDE);
+        if drive_v >= steep.edge_v {
+            steep.stride = (LONGER * steep.stride).min(STRIDE);
+        }
     }
 
-    fn correction(&self) -> f32 {
+    fn correction(&self, drive_v: f32) -> f32 {
         // noise alone may measure nothing at all
         let ratio = self.target / self.measured.max(f32::MIN_POSITIVE);
-        if let Some(Steep { ness, stride }) = self.steep {
-            let step = STEEP_PART * logarithm(ratio) / ness;
-            // not by clamp, whose panic for bounds that are no constants can print floats and with that costs 16 kB of flash
-            return exponential(step.max(-stride).min(stride));
-        }
-        if !(0.5..=2.0).contains(&ratio) {
-            return match ratio {
-                far if far > 1.0 / FAR => FACTOR_FAR,
-                below if below > 1.0 => FACTOR,
-                _ => 1.0 / FACTOR,
-            };
-        }
-        exponential(PART * logarithm(ratio)).clamp(1.0 / FACTOR, FACTOR)
+        let missing = logarithm(ratio);
+        let Some(Steep { ness, stride, edge_v }) = self.steep else {
+            return exponential(PART * missing).clamp(1.0 / FACTOR, FACTOR);
+        };
+        // not by clamp, whose panic for bounds that are no constants can print floats and with that costs 16 kB of flash
+        let bound =
+            if drive_v < edge_v { logarithm(edge_v / drive_v).max(stride).min(STRIDE) } else { stride };
+        exponential((STEEP_PART * missing / ness).max(-stride).min(bound))
     }
 }
 

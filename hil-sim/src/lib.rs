@@ -6,6 +6,7 @@
 //! imports the host, and the host cannot tell it from a rig except by its name.
 
 pub mod board;
+pub mod desk;
 pub mod executor;
 pub mod link;
 pub mod rig;

@@ -4,11 +4,12 @@
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
-use jointrig_hil_sim::board::VirtualBoard;
-use jointrig_hil_sim::serve;
+use jointrig_hil_sim::board::{Controls, VirtualBoard};
+use jointrig_hil_sim::{desk, serve};
 
 /// The simulated friction rig with its controller's firmware.
 #[derive(Parser)]
@@ -21,6 +22,9 @@ struct Command {
 #[derive(Subcommand)]
 enum Action {
     /// Serve one virtual board; its time stands still while no host listens.
+    ///
+    /// Lines on stdin are orders to whoever stands at the rig: `load NEWTONS` sets the normal load, `guard open|shut`,
+    /// `emergency press|release` and `reset` work the safety chain. Each is answered on stderr.
     Serve(Serve),
 }
 
@@ -65,7 +69,8 @@ fn run(options: &Serve) -> Result<(), Box<dyn std::error::Error>> {
     if let (Some(image), Some(address)) = (&options.image, &options.tcp) {
         return serve_image(image, address, rig.as_deref(), options.seed);
     }
-    let (_board, mut host) = VirtualBoard::start(rig.as_deref(), options.seed)?;
+    let (board, mut host) = VirtualBoard::start(rig.as_deref(), options.seed)?;
+    stand_at(board.controls());
     if let Some(address) = &options.tcp {
         let listener = TcpListener::bind(address).map_err(|error| {
             format!("cannot listen on {address}: {error}; is the address free and yours?")
@@ -76,6 +81,16 @@ fn run(options: &Serve) -> Result<(), Box<dyn std::error::Error>> {
         serve_terminal(&mut host)?;
     }
     Ok(())
+}
+
+/// Listens to stdin as long as it lasts; its end does not end the service.
+fn stand_at(controls: &Arc<Controls>) {
+    let controls = Arc::clone(controls);
+    std::thread::spawn(move || {
+        if let Err(error) = desk::listen(&controls, std::io::stdin().lock(), std::io::stderr()) {
+            eprintln!("stdin is not listened to any more: {error}");
+        }
+    });
 }
 
 /// Runs the image until it ends: QEMU itself listens at the address.
@@ -94,6 +109,7 @@ fn serve_image(
     let uart = Some(format!("tcp:{address},server=on,wait=off"));
     let options = Options { seed, uart, ..Options::default() };
     let (board, mut link) = QemuBoard::start_with(image, &config, &options)?;
+    stand_at(board.controls());
     println!("tcp:{address}");
     // nothing comes this way; it ends with the board
     while link.read(&mut [0; 64], Duration::from_secs(1)).is_ok() {}

@@ -194,6 +194,9 @@ fn a_contact_that_slips_moves_as_far_as_was_ordered_and_its_records_show_it() {
         let case = format!("{}, {frequency_hz} Hz, {amplitude_m} m", config.name);
         let settled = &amplitudes[60..];
         assert!(settled.iter().all(|ratio| (ratio - 1.0).abs() < 0.02), "{case}: {amplitudes:.3?}");
+        // a per cent of drive beyond the limit moves ten times as far
+        let most = amplitudes.iter().copied().fold(0.0, f64::max);
+        assert!(most < 2.0, "{case}: {amplitudes:.3?}");
         assert!(!host.events.iter().any(|event| matches!(event, Event::ShakerStops(_))), "{:?}", host.events);
         // the joint itself, over the cycles that come
         let from = board.controls().seen();

@@ -7,7 +7,7 @@ use jointrig::campaign::level::{Held, Level};
 use jointrig::campaign::rows::Samples;
 use jointrig::campaign::shaking::record;
 use jointrig::device::channels::ChannelMap;
-use jointrig::hysteresis::{Correction, LoopAnalysis, analyse};
+use jointrig::hysteresis::{Correction, LoopAnalysis, analyse, analyse_corrected};
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
@@ -80,8 +80,8 @@ fn run() -> Outcome<()> {
 /// Loops of the raw and of the corrected force.
 fn both(map: &ChannelMap, samples: &Samples, level: &Level) -> Outcome<[LoopAnalysis; 2]> {
     let raw = record(map, samples, level)?;
-    let corrected = Correction { effective_mass_kg: MASS_KG, parallel_path: PATH }.applied(&raw);
-    Ok([analyse(&raw)?, analyse(&corrected)?])
+    let correction = Correction { effective_mass_kg: MASS_KG, parallel_path: PATH };
+    Ok([analyse(&raw)?, analyse_corrected(&raw, &correction)?])
 }
 
 /// The figures that both sides must agree in.

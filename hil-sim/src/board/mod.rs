@@ -95,7 +95,7 @@ impl VirtualBoard {
     }
 
     /// Buttons and observations at the rig's side.
-    pub fn controls(&self) -> &Controls {
+    pub fn controls(&self) -> &Arc<Controls> {
         &self.controls
     }
 }

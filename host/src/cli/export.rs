@@ -1,5 +1,7 @@
 //! `export`: what a campaign file holds, in forms that other programs read.
 
+mod levels;
+
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -30,7 +32,9 @@ const LEAD_S: f64 = 1.25e-3;
 /// Write everything that a campaign file holds for other programs.
 ///
 /// DIR/geometry: csv tables in the form of the pyFBS workbook. DIR/frf: one file for each configuration, H1 of the good hits
-/// with coherence and variance, or what was imported. DIR/records: one file for each cell with all its hits. DIR/results.json and report.html.
+/// with coherence and variance, or what was imported. DIR/records: one file for each cell with all its hits. DIR/levels: one file for each
+/// level of the shaker (velocities of both specimens and the load cells' sum, in step; npz as `jointrig hysteresis` reads it) and
+/// levels.csv, which says what was ordered and reached. DIR/results.json and report.html.
 #[derive(Debug, Args)]
 pub struct Export {
     /// The campaign file.
@@ -145,6 +149,11 @@ impl Export {
         }
         if told.is_empty() {
             told.push("no good hit is in the file yet: there are no FRFs to export".into());
+        }
+        let folder = self.out.join("levels");
+        let levels = levels::write(&store, &folder, self.format, !self.without_records)?;
+        if levels > 0 {
+            told.push(format!("{}: {levels} levels of the shaker", folder.display()));
         }
         analyse_into(&store, Wanted::default(), &self.out)?;
         told.push(format!("geometry, results.json and report.html are in {}", self.out.display()));

@@ -1,5 +1,6 @@
 //! FRFs and records as text with commas: one row for each line or sample, one heading for each column.
 
+use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 use crate::spectra::ImpactRecords;
 use crate::substructuring::frf::FrfMatrix;
 use std::path::{Path, PathBuf};
@@ -54,6 +55,34 @@ pub fn write_records(path: &Path, records: &ImpactRecords) -> Result<(), TableEr
         }
         Ok(())
     })
+}
+
+/// `time_s`, `velocity_a_m_per_s` and `velocity_b_m_per_s` (or `displacement_a_m` and `…_b_m`), `force_n`.
+///
+/// # Errors
+/// [`TableError`].
+pub fn write_loop(path: &Path, record: &HysteresisRecord) -> Result<(), TableError> {
+    let (names, a, b) = match &record.motion {
+        RelativeMotion::Velocity { a_m_per_s, b_m_per_s } => {
+            (["velocity_a_m_per_s", "velocity_b_m_per_s"], a_m_per_s, b_m_per_s)
+        }
+        RelativeMotion::Displacement { a_m, b_m } => (["displacement_a_m", "displacement_b_m"], a_m, b_m),
+    };
+    write(path, |out| {
+        out.write_record(["time_s", names[0], names[1], "force_n"])?;
+        for (i, ((a, b), f)) in a.iter().zip(b).zip(&record.force_n).enumerate() {
+            out.write_record([i as f64 / record.fs_hz, *a, *b, *f].map(|value| value.to_string()))?;
+        }
+        Ok(())
+    })
+}
+
+/// Rows as they are, the heading first.
+///
+/// # Errors
+/// [`TableError`].
+pub fn write_rows(path: &Path, rows: &[Vec<String>]) -> Result<(), TableError> {
+    write(path, |out| rows.iter().try_for_each(|row| out.write_record(row)))
 }
 
 fn write(

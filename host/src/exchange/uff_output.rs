@@ -5,6 +5,7 @@ use super::uff::{
     Abscissa, Axis, ByteOrder, DataSet, Dof, Encoding, Function, Header, Node, Precision, Units, Values,
     count, kind, quantity,
 };
+use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 use crate::spectra::{ImpactRecords, MotionQuantity};
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::{Configuration, Point};
@@ -76,24 +77,11 @@ pub fn write_records(
     };
     let mut sets = start();
     for (hit, (force_n, responses)) in records.force_n.iter().zip(&records.response).enumerate() {
+        let reference = Dof { entity: impact.into(), node: 101, direction: 0 };
         let function = |dof: Dof, values: &[f64], quantity: i64, unit: &str| {
-            let axis = |quantity, unit: &str| Axis { quantity, unit: unit.into(), ..Axis::default() };
-            let places: Vec<f64> = (0..values.len()).map(|i| i as f64 / records.fs_hz).collect();
-            DataSet::Function(Box::new(Function {
-                id: [format!("hit {hit}"), String::new(), String::new(), String::new(), String::new()],
-                kind: kind::TIME,
-                number: 0,
-                version: count(hit) + 1,
-                load_case: 0,
-                response: dof,
-                reference: Dof { entity: impact.into(), node: 101, direction: 0 },
-                precision: Precision::Double,
-                abscissa: Abscissa::of(&places),
-                values: Values::Real(values.to_vec()),
-                z: 0.0,
-                axes: [axis(quantity::TIME, "s"), axis(quantity, unit), Axis::default(), Axis::default()],
-                encoding: ENCODING,
-            }))
+            let id = format!("hit {hit}");
+            let version = count(hit) + 1;
+            time_response((&id, version), [dof, reference.clone()], (values, records.fs_hz), (quantity, unit))
         };
         let at_impact = Dof { entity: impact.into(), node: 101, direction: 0 };
         sets.push(function(at_impact, force_n, quantity::FORCE, "N"));
@@ -104,6 +92,59 @@ pub fn write_records(
         }
     }
     write_uff(path, &sets)
+}
+
+/// Writes a level's record as time responses along z: specimen A (node 1), B (node 2), the tangential force (node 3); the version
+/// is the level's number.
+///
+/// # Errors
+/// What does not fit the format, or the disk's.
+pub fn write_loop(path: &Path, record: &HysteresisRecord, level: i64) -> Result<(), FrfUffError> {
+    let (a, b, motion) = match &record.motion {
+        RelativeMotion::Velocity { a_m_per_s, b_m_per_s } => {
+            (a_m_per_s, b_m_per_s, (quantity::VELOCITY, "m/s"))
+        }
+        RelativeMotion::Displacement { a_m, b_m } => (a_m, b_m, (quantity::DISPLACEMENT, "m")),
+    };
+    let excitation = record.excitation_hz.map_or("sweep".into(), |f| format!("{f} Hz"));
+    let id = format!("level {level}, {excitation}");
+    let signals = [
+        ("specimen_a", 1, a, motion),
+        ("specimen_b", 2, b, motion),
+        ("contact", 3, &record.force_n, (quantity::FORCE, "N")),
+    ];
+    let mut sets = start();
+    sets.extend(signals.into_iter().map(|(entity, node, values, unit)| {
+        let dof = Dof { entity: entity.into(), node, direction: 3 };
+        time_response((&id, level), [dof.clone(), dof], (values, record.fs_hz), unit)
+    }));
+    write_uff(path, &sets)
+}
+
+/// One signal over time: (its name, version), [response, reference], (values, sampling rate), (quantity, unit).
+fn time_response(
+    (id, version): (&str, i64),
+    [response, reference]: [Dof; 2],
+    (values, fs_hz): (&[f64], f64),
+    (quantity, unit): (i64, &str),
+) -> DataSet {
+    let axis = |quantity, unit: &str| Axis { quantity, unit: unit.into(), ..Axis::default() };
+    let places: Vec<f64> = (0..values.len()).map(|i| i as f64 / fs_hz).collect();
+    DataSet::Function(Box::new(Function {
+        id: [id.to_string(), String::new(), String::new(), String::new(), String::new()],
+        kind: kind::TIME,
+        number: 0,
+        version,
+        load_case: 0,
+        response,
+        reference,
+        precision: Precision::Double,
+        abscissa: Abscissa::of(&places),
+        values: Values::Real(values.to_vec()),
+        z: 0.0,
+        axes: [axis(quantity::TIME, "s"), axis(quantity, unit), Axis::default(), Axis::default()],
+        encoding: ENCODING,
+    }))
 }
 
 fn start() -> Vec<DataSet> {

@@ -2,14 +2,13 @@
 
 use super::HysteresisError;
 use super::compliance::{ContactCompliance, ImaginaryPeak, SEARCH_HZ};
-use super::cycles::{Cycle, steady, synchronous_average};
+use super::correction::Correction;
+use super::cycles::{Steady, Summed};
 use super::impact::{DecayCycle, FIRST_CYCLES, decay, dominant_frequency};
-use super::loops::{
-    OverCycles, energy, equivalent_stiffness, fundamental_stiffness, secant_stiffness, swing,
-};
+use super::loops::{OverCycles, fundamental_stiffness, secant_stiffness, swing};
 use super::record::{HysteresisRecord, Relative};
 use super::shape::{Shape, ShapeEvidence, shape};
-use super::stick::{friction_limit, slope_over, stick_part, strokes};
+use super::stick::{Part, first_part, flank_part, friction_limit, slope_over, strokes};
 use num_complex::Complex;
 use serde::Serialize;
 
@@ -40,6 +39,8 @@ pub struct LoopAnalysis {
     pub shape_evidence: Option<ShapeEvidence>,
     /// k_T: slope of the stick part, N/m. None for an ellipse.
     pub k_t_n_per_m: Option<OverCycles>,
+    /// The part of the force's swing after each reversal in which k_T was read; only where something slips.
+    pub stick_part: Option<[f64; 2]>,
     /// k_eq: least-squares slope over the whole loop, N/m.
     pub k_eq_n_per_m: OverCycles,
     /// Loop area per cycle, J. None for a decay, whose loops do not close.
@@ -79,8 +80,26 @@ const CLEAN_LINE: f64 = 0.95;
 /// # Errors
 /// [`HysteresisError`] when the signals do not fit together, nothing moves, or there is no whole cycle.
 pub fn analyse(record: &HysteresisRecord) -> Result<LoopAnalysis, HysteresisError> {
+    with(record, None)
+}
+
+/// As [`analyse`], with the force at the contact in place of the load cells' sum.
+///
+/// # Errors
+/// As [`analyse`].
+pub fn analyse_corrected(
+    record: &HysteresisRecord,
+    correction: &Correction,
+) -> Result<LoopAnalysis, HysteresisError> {
+    if record.excitation_hz.is_none() {
+        return with(&correction.applied(record), None);
+    }
+    // a shaker's record is long: no second one is made of it
+    with(record, Some(correction))
+}
+
+fn with(record: &HysteresisRecord, correction: Option<&Correction>) -> Result<LoopAnalysis, HysteresisError> {
     record.check()?;
-    let motion = record.relative();
     let frequency_hz = match record.excitation_hz {
         Some(f) if f > 0.0 && f.is_finite() => Some(f),
         Some(f) => return Err(HysteresisError::Excitation(f)),
@@ -90,8 +109,8 @@ pub fn analyse(record: &HysteresisRecord) -> Result<LoopAnalysis, HysteresisErro
         None => None,
     };
     match frequency_hz {
-        Some(frequency_hz) => shaker(record, &motion, frequency_hz),
-        None => impact(record, &motion),
+        Some(frequency_hz) => shaker(record, correction, frequency_hz),
+        None => impact(record, &record.relative()),
     }
 }
 
@@ -106,35 +125,40 @@ fn is_steady(force_n: &[f64]) -> bool {
 
 fn shaker(
     record: &HysteresisRecord,
-    motion: &Relative,
+    correction: Option<&Correction>,
     frequency_hz: f64,
 ) -> Result<LoopAnalysis, HysteresisError> {
-    let cycles = steady(motion, &record.force_n, record.fs_hz, frequency_hz)?;
-    let mean = synchronous_average(&cycles);
+    let cycles = Steady::new(record, correction, frequency_hz)?;
+    let Summed { mean, slopes, energies, scatter } = cycles.summed();
     if swing(&mean.displacement_m) == 0.0 || swing(&mean.force_n) == 0.0 {
         return Err(HysteresisError::NoMotion);
     }
-    let over = |f: &dyn Fn(&Cycle) -> f64| OverCycles::of(&cycles.iter().map(f).collect::<Vec<_>>());
-    let (shape, evidence) = shape(&mean, &cycles);
+    let k_eq = OverCycles::of(&slopes).expect("Steady::new() gives at least one cycle");
+    let (shape, evidence) = shape(&mean, &scatter);
     let strokes = strokes(&mean);
     let mut warnings = Vec::new();
-    let k_t = match shape {
-        Shape::Stuck => over(&equivalent_stiffness),
-        Shape::Elliptical => {
+    let stick_part: Option<Part> = match shape {
+        Shape::Stuck | Shape::Elliptical => None,
+        Shape::Microslip => Some(first_part(&mean, &strokes)),
+        Shape::GrossSlip => Some(flank_part(&mean, &strokes)),
+    };
+    let k_t = match (shape, stick_part) {
+        (Shape::Stuck, _) => Some(k_eq),
+        (_, None) => {
             warnings.push(
                 "an ellipse without slip: something between the measured spots resonates near this frequency; its slope is no contact stiffness"
                     .into(),
             );
             None
         }
-        Shape::Microslip | Shape::GrossSlip => {
-            let part = stick_part(&mean, &strokes);
-            let values: Vec<f64> = cycles.iter().filter_map(|c| slope_over(c, &strokes, part)).collect();
-            if values.len() < cycles.len() {
+        (_, Some(part)) => {
+            let values: Vec<f64> =
+                cycles.each(|cycle| slope_over(cycle, &strokes, part)).into_iter().flatten().collect();
+            if values.len() < slopes.len() {
                 warnings.push(format!(
                     "{} of {} cycles have too few samples on the stick part: sample faster, or excite more slowly",
-                    cycles.len() - values.len(),
-                    cycles.len()
+                    slopes.len() - values.len(),
+                    slopes.len()
                 ));
             }
             OverCycles::of(&values)
@@ -149,8 +173,9 @@ fn shaker(
         shape,
         shape_evidence: Some(evidence),
         k_t_n_per_m: k_t,
-        k_eq_n_per_m: over(&equivalent_stiffness).expect("steady() gives at least one cycle"),
-        energy_j: over(&energy),
+        stick_part,
+        k_eq_n_per_m: k_eq,
+        energy_j: OverCycles::of(&energies),
         k_secant_n_per_m: Some(secant_stiffness(&mean)),
         k_fundamental_n_per_m: Some(fundamental_stiffness(&mean)),
         friction_limit_n,
@@ -208,6 +233,7 @@ fn impact(record: &HysteresisRecord, motion: &Relative) -> Result<LoopAnalysis, 
         shape,
         shape_evidence: None,
         k_t_n_per_m: (shape == Shape::Stuck && hidden.is_none()).then_some(k),
+        stick_part: None,
         k_eq_n_per_m: k,
         energy_j: None,
         k_secant_n_per_m: None,

@@ -12,13 +12,16 @@ pub fn in_step<const N: usize>(signals: [Vec<f64>; N], delays_s: [f64; N], fs_hz
 
 /// The signal `samples` earlier (not negative), by straight lines between samples: loops live far below the
 /// sampling rate. The last value is held.
-fn advance(signal: Vec<f64>, samples: f64) -> Vec<f64> {
-    if samples <= 0.0 || signal.is_empty() {
-        return signal;
-    }
+fn advance(mut signal: Vec<f64>, samples: f64) -> Vec<f64> {
+    let Some(last) = signal.last().copied().filter(|_| samples > 0.0) else { return signal };
     let (whole, share) = (samples.floor() as usize, samples.fract());
-    let at = |i: usize| signal[i.min(signal.len() - 1)];
-    (0..signal.len()).map(|i| at(i + whole) * (1.0 - share) + at(i + whole + 1) * share).collect()
+    // only what lies ahead is read, so it can be done in place
+    let good = signal.len().saturating_sub(whole + 1);
+    for i in 0..good {
+        signal[i] = signal[i + whole] * (1.0 - share) + signal[i + whole + 1] * share;
+    }
+    signal[good..].fill(last);
+    signal
 }
 
 #[cfg(test)]

@@ -1,26 +1,29 @@
 //! Velocity to displacement.
 
-/// Displacement over one closed cycle from its velocities (m/s, `dt_s` apart): the mean velocity is removed first, so the
+use super::sums::mean;
+
+/// Displacement over one closed cycle from its velocities (m/s, `dt_s` apart), into `x`: the mean velocity is removed first, so the
 /// loop closes, then the trapezoid rule, then the mean displacement goes.
 ///
 /// One whole cycle of a steady vibration has no mean velocity of its own: what is removed is the vibrometer's offset and the noise's
 /// random walk. A straight line fitted to the displacement of a few cycles is *not* the same and biases the stiffness.
-pub fn closed_cycle(velocity: &[f64], dt_s: f64) -> Vec<f64> {
-    let n = velocity.len() as f64;
-    let mean = velocity.iter().sum::<f64>() / n;
-    let mut x = Vec::with_capacity(velocity.len());
-    let mut at = 0.0;
-    for (i, v) in velocity.iter().enumerate() {
+pub fn closed_cycle(velocity: &[f64], dt_s: f64, x: &mut Vec<f64>) {
+    let offset = mean(velocity);
+    x.clear();
+    let Some(first) = velocity.first() else { return };
+    let (mut at, mut before) = (0.0, first - offset);
+    x.extend(velocity.iter().enumerate().map(|(i, v)| {
+        let v = v - offset;
         if i > 0 {
-            at += 0.5 * dt_s * (velocity[i - 1] - mean + v - mean);
+            at += 0.5 * dt_s * (before + v);
         }
-        x.push(at);
-    }
-    let centre = x.iter().sum::<f64>() / n;
-    for value in &mut x {
+        before = v;
+        at
+    }));
+    let centre = mean(x);
+    for value in x {
         *value -= centre;
     }
-    x
 }
 
 /// Displacement of an open record (m) by the trapezoid rule from 0, after taking `offset` (m/s) off.
@@ -52,7 +55,8 @@ mod tests {
         fn a_cycle_comes_back_whatever_the_offset(phase in 0.0..TAU, offset in -1e-2..1e-2f64, n in 100usize..700) {
             let (w, dt) = (TAU * 80.0, 1.0 / (80.0 * n as f64));
             let v: Vec<f64> = (0..n).map(|i| 1e-6 * w * (w * dt * i as f64 + phase).cos() + offset).collect();
-            let x = closed_cycle(&v, dt);
+            let mut x = Vec::new();
+            closed_cycle(&v, dt, &mut x);
             for (i, x) in x.iter().enumerate() {
                 // the trapezoid loses (ω dt)² / 12
                 let exact = 1e-6 * (w * dt * i as f64 + phase).sin();

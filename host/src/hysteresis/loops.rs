@@ -2,6 +2,7 @@
 //! peak secant says 213 N/µm where the least-squares slope says 90.
 
 use super::cycles::Cycle;
+use super::sums::dot;
 use num_complex::Complex;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -73,14 +74,11 @@ pub fn equivalent_stiffness(cycle: &Cycle) -> f64 {
 /// Area of the closed loop, ∮ T dΔx, J. May come out slightly negative for a stuck contact: that is noise, not an error. The area of
 /// an ellipse beside a hidden resonance is no friction energy.
 pub fn energy(cycle: &Cycle) -> f64 {
-    let n = cycle.force_n.len();
-    (0..n)
-        .map(|i| {
-            let next = (i + 1) % n;
-            0.5 * (cycle.force_n[i] + cycle.force_n[next])
-                * (cycle.displacement_m[next] - cycle.displacement_m[i])
-        })
-        .sum()
+    let (x, t) = (&cycle.displacement_m, &cycle.force_n);
+    let ([x_first, .., x_last], [t_first, .., t_last]) = (&x[..], &t[..]) else { return 0.0 };
+    // the trapezoids' sum, once round
+    let around = dot(t, &x[1..]) - dot(&t[1..], x);
+    0.5 * (around + t_last * x_first - t_first * x_last)
 }
 
 /// Peak secant: the force's swing over the displacement's, N/m.

@@ -22,8 +22,9 @@ pub mod record;
 pub mod shape;
 pub mod static_arm;
 mod stick;
+mod sums;
 
-pub use analyse::{Kind, LoopAnalysis, analyse};
+pub use analyse::{Kind, LoopAnalysis, analyse, analyse_corrected};
 pub use correction::Correction;
 pub use loops::OverCycles;
 pub use record::{HysteresisRecord, RelativeMotion};

@@ -1,6 +1,8 @@
 //! What a hysteresis measurement gives: motion on both sides of the contact, and the tangential force.
 
 use super::HysteresisError;
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// A record shorter than this holds nothing that could be called a loop.
 const FEWEST_SAMPLES: usize = 32;
@@ -59,6 +61,20 @@ impl HysteresisRecord {
         }
     }
 
+    /// A − B over a range of samples, into `to`; beyond the record's ends their values go on.
+    pub(super) fn relative_motion(&self, range: Range<isize>, to: &mut Vec<f64>) {
+        let (RelativeMotion::Velocity { a_m_per_s: a, b_m_per_s: b }
+        | RelativeMotion::Displacement { a_m: a, b_m: b }) = &self.motion;
+        within(range, a.len(), to, |inside, to| {
+            to.extend(a[inside.clone()].iter().zip(&b[inside]).map(|(a, b)| a - b));
+        });
+    }
+
+    /// The force over a range of samples, as [`Self::relative_motion`].
+    pub(super) fn force(&self, range: Range<isize>, to: &mut Vec<f64>) {
+        within(range, self.force_n.len(), to, |inside, to| to.extend(&self.force_n[inside]));
+    }
+
     pub(super) fn check(&self) -> Result<(), HysteresisError> {
         let (a, b) = match &self.motion {
             RelativeMotion::Velocity { a_m_per_s, b_m_per_s } => (a_m_per_s, b_m_per_s),
@@ -73,9 +89,40 @@ impl HysteresisRecord {
         if self.fs_hz.is_nan() || self.fs_hz <= 0.0 {
             return Err(HysteresisError::SamplingRate(self.fs_hz));
         }
-        if let Some(sample) = (0..a.len()).find(|&i| !(a[i] + b[i] + self.force_n[i]).is_finite()) {
+        let bad = [a, b, &self.force_n].into_iter().filter_map(|x| not_finite(x)).min();
+        if let Some(sample) = bad {
             return Err(HysteresisError::NotFinite { sample });
         }
         Ok(())
     }
+}
+
+/// Samples that are looked through at once.
+const CHUNK: usize = 1 << 14;
+
+/// The first value that is no number.
+fn not_finite(x: &[f64]) -> Option<usize> {
+    let place = |(chunk, values): (usize, &[f64])| {
+        // without a way out of the loop it runs over several values at once
+        let all = values.iter().fold(true, |all, v| all & v.is_finite());
+        if all { None } else { values.iter().position(|v| !v.is_finite()).map(|i| chunk * CHUNK + i) }
+    };
+    x.par_chunks(CHUNK).enumerate().filter_map(place).min()
+}
+
+/// Fills `to` with a range of samples out of `len`: what lies inside by `fill`, what lies outside with its first and last value.
+pub(super) fn within(
+    range: Range<isize>,
+    len: usize,
+    to: &mut Vec<f64>,
+    fill: impl FnOnce(Range<usize>, &mut Vec<f64>),
+) {
+    let len = len.cast_signed();
+    let inside = range.start.clamp(0, len - 1)..range.end.clamp(1, len);
+    to.clear();
+    fill(inside.start as usize..inside.end as usize, to);
+    let (Some(first), Some(last)) = (to.first().copied(), to.last().copied()) else { return };
+    let before = (inside.start - range.start).max(0) as usize;
+    to.splice(0..0, std::iter::repeat_n(first, before));
+    to.resize(to.len() + (range.end - inside.end).max(0) as usize, last);
 }

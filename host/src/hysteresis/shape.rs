@@ -5,9 +5,9 @@
 //! slip from ellipse, against the noise seen from cycle to cycle; the phase tells ellipse from line; the final tangent
 //! tells gross slip from microslip.
 
-use super::cycles::Cycle;
+use super::cycles::{Cycle, Scatter};
 use super::loops::{fundamental_stiffness, harmonics};
-use super::stick::{final_tangent, slope_over, stick_part, strokes};
+use super::stick::{final_tangent, first_part, slope_over, strokes};
 use serde::Serialize;
 
 /// The shape of a loop.
@@ -51,28 +51,20 @@ const ELLIPSE_DEG: f64 = 10.0;
 /// On a plateau the tangent is nearly nothing of the initial one.
 const PLATEAU: f64 = 0.05;
 
-/// Tells the shape from the averaged loop and its cycles.
-pub(super) fn shape(mean: &Cycle, cycles: &[Cycle]) -> (Shape, ShapeEvidence) {
+/// Tells the shape from the averaged loop and how the cycles scatter about it.
+pub(super) fn shape(mean: &Cycle, scatter: &Scatter) -> (Shape, ShapeEvidence) {
     let (k, c) = linear_fit(mean);
-    let residual = |cycle: &Cycle| -> Vec<f64> {
-        (0..cycle.force_n.len())
-            .map(|i| cycle.force_n[i] - k * cycle.displacement_m[i] - c * cycle.velocity_m_per_s[i])
-            .collect()
-    };
-    let of_mean = residual(mean);
+    let residual: Vec<f64> = (0..mean.force_n.len())
+        .map(|i| mean.force_n[i] - k * mean.displacement_m[i] - c * mean.velocity_m_per_s[i])
+        .collect();
     let force = rms(&mean.force_n);
-    let scatter = cycles.iter().map(|cycle| {
-        let own = residual(cycle);
-        own.iter().zip(&of_mean).map(|(o, m)| (o - m).powi(2)).sum::<f64>() / own.len() as f64
-    });
     // the mean of n cycles holds 1/n of their variance; the scatter about that mean only (n − 1)/n of it
-    let n = cycles.len() as f64;
-    let variance = scatter.sum::<f64>() / n;
-    let nonlinearity_noise = (variance / (n - 1.0).max(1.0)).sqrt() / force;
+    let others = scatter.cycles.saturating_sub(1).max(1) as f64;
+    let nonlinearity_noise = (scatter.variance(k, c) / others).sqrt() / force;
     let strokes = strokes(mean);
-    let initial = slope_over(mean, &strokes, stick_part(mean, &strokes)).unwrap_or(k);
+    let initial = slope_over(mean, &strokes, first_part(mean, &strokes)).unwrap_or(k);
     let evidence = ShapeEvidence {
-        nonlinearity: rms(&of_mean) / force,
+        nonlinearity: rms(&residual) / force,
         nonlinearity_noise,
         phase_deg: fundamental_stiffness(mean).arg().to_degrees(),
         harmonics: harmonics(mean),

@@ -1,9 +1,14 @@
 //! The stick part of a slipping loop, and its plateau.
 //!
 //! After each reversal the whole contact sticks again. The part used for k_T is chosen by *force*, as a part of the swing from one
-//! reversal to the next. A contact of one slider is straight up to the plateau: there 20 to 40 % are taken, clear of the reversal, where
-//! Δx hardly moves and the load cells still ring. Where microslip has bent the tangent by then, the first 20 %: later parts
-//! read too little (half the swing gives 132 for 143.7 N/µm on an Iwan contact).
+//! reversal to the next. Which part depends on how the contact lets go:
+//!
+//! - Of a contact that slips as one the flank is straight up to the plateau, and 10 to 90 % of it are read. When such a contact sticks
+//!   again the structure goes on and rings, with 3 ms where the whole flank takes 4 to 8 ms, and the load cells feel the static
+//!   arm's inertia in that. A shorter part holds half a ring: 20 to 40 % reads anything from −6 to +4 % of the stiffness.
+//! - Where microslip bends the flank, the first 20 %: later parts read too little (half the swing gives 132 for 143.7 N/µm on an
+//!   Iwan contact).
+//! - Without a plateau nothing rings: 20 to 40 %, clear of the reversal where Δx hardly moves; or the first 20 % where it has bent by then.
 
 use super::cycles::Cycle;
 use super::loops::slope;
@@ -11,7 +16,17 @@ use super::loops::slope;
 /// A part of the force's swing after a reversal, from its first to its second fraction.
 pub(super) type Part = [f64; 2];
 
-/// Where a straight contact is read.
+/// Where a straight flank up to a plateau is read.
+const FLANK: Part = [0.10, 0.90];
+
+/// Its halves.
+const HALVES: [Part; 2] = [[0.10, 0.50], [0.50, 0.90]];
+
+/// A flank counts as straight with this much of the earlier half's slope in the later one: ringing alone leaves 0.95 and more, an Iwan
+/// contact's halves differ by a third.
+const STRAIGHT_FLANK: f64 = 0.9;
+
+/// Where a straight contact without a plateau is read.
 const LATE: Part = [0.20, 0.40];
 
 /// Where a bending one is read: the first samples after a reversal hardly move, and their displacement is noise of the integration.
@@ -53,12 +68,20 @@ fn progress(cycle: &Cycle, stroke: &Stroke) -> Vec<f64> {
     stroke.iter().map(|&i| (cycle.force_n[i] - from) / (to - from)).collect()
 }
 
-/// The part in which this contact is read, told from the averaged loop.
-pub(super) fn stick_part(guide: &Cycle, strokes: &[Stroke; 2]) -> Part {
+/// The part in which a contact without a plateau is read, told from the averaged loop.
+pub(super) fn first_part(guide: &Cycle, strokes: &[Stroke; 2]) -> Part {
     match (slope_over(guide, strokes, EARLY), slope_over(guide, strokes, LATE)) {
         (Some(early), Some(late)) if late < STRAIGHT * early => EARLY,
         (_, Some(_)) => LATE,
         _ => EARLY,
+    }
+}
+
+/// The part in which a contact with a plateau is read, told from the averaged loop.
+pub(super) fn flank_part(guide: &Cycle, strokes: &[Stroke; 2]) -> Part {
+    match HALVES.map(|half| slope_over(guide, strokes, half)) {
+        [Some(early), Some(late)] if late < STRAIGHT_FLANK * early => EARLY,
+        _ => FLANK,
     }
 }
 

@@ -89,6 +89,46 @@ fn microslip_lies_between_stuck_and_gross_slip() {
     }
 }
 
+/// When a contact sticks again the structure rings on, and load cells that carry an arm feel its inertia: T + m ẍ_B is the contact's, T
+/// is not. Over a part of the flank no longer than a ring that reads as stiffness; over the whole flank it does not.
+#[test]
+fn a_flank_that_rings_is_read_as_a_whole() {
+    let (k, limit, amplitude, frequency) = (180e6, 180.0, 5e-6, 28.0);
+    for ring_hz in [270.0, 310.0, 350.0] {
+        let (w, ring) = (TAU * frequency, TAU * ring_hz);
+        // since the last reversal, s
+        let since = |t: f64| (t - 0.25 / frequency).rem_euclid(0.5 / frequency);
+        let sign =
+            |t: f64| if ((t - 0.25 / frequency) * frequency).rem_euclid(1.0) < 0.5 { -1.0 } else { 1.0 };
+        let rung = |t: f64| -0.1e-6 * sign(t) * (-since(t) / 8e-3).exp() * (ring * since(t)).sin();
+        let n = (20.0 * FS / frequency) as usize;
+        let (mut slider, mut x_m, mut force_n) = (0.0, Vec::new(), Vec::new());
+        for i in 0..2 * n {
+            let t = i as f64 / FS;
+            let x = amplitude * (w * t).sin() + rung(t);
+            let contact = (k * (x - slider)).clamp(-limit, limit);
+            slider = x - contact / k;
+            if i >= n {
+                x_m.push(x);
+                // 1.5 kg that move with the ring as far as the contact yields
+                force_n.push(contact + 1.5 * ring * ring * rung(t));
+            }
+        }
+        let motion = RelativeMotion::Displacement { b_m: vec![0.0; n], a_m: x_m };
+        let record = HysteresisRecord {
+            fs_hz: FS,
+            motion,
+            force_n,
+            excitation_hz: Some(frequency),
+            normal_load_n: None,
+        };
+        let got = analyse(&record).expect("a loop");
+        assert_eq!((got.shape, got.stick_part), (Shape::GrossSlip, Some([0.1, 0.9])));
+        let k_t = got.k_t_n_per_m.expect("a flank").mean;
+        assert!((k_t / k - 1.0).abs() < 0.01, "{ring_hz}: {k_t}");
+    }
+}
+
 #[test]
 fn displacements_serve_as_well_as_velocities_and_a_steady_record_needs_no_frequency() {
     let mut one = record(&[(180e6, 150.0)], 4e-6, 80.0, 0.0);

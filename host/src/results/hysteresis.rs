@@ -30,6 +30,9 @@ pub struct Hysteresis {
     pub shape: Shape,
     /// Slope of T on Δx over the stick part, N/m; null where the loop has none.
     pub k_t_n_per_m: Option<OverCycles>,
+    /// The part of the force's swing after each reversal in which it was read; only where something slips.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stick_part: Option<[f64; 2]>,
     /// Slope of T on Δx over the whole loop, N/m.
     pub k_eq_n_per_m: Option<OverCycles>,
     /// Peak secant of the averaged loop, N/m: another quantity beside a hidden resonance, under its own name.
@@ -93,6 +96,7 @@ impl Hysteresis {
             amplitude_m: Some(found.amplitude_m),
             shape: found.shape,
             k_t_n_per_m: found.k_t_n_per_m,
+            stick_part: found.stick_part,
             k_eq_n_per_m: Some(found.k_eq_n_per_m),
             k_secant_n_per_m: found.k_secant_n_per_m,
             k_fundamental_n_per_m: found.k_fundamental_n_per_m.map(num_complex::Complex::norm),

@@ -133,7 +133,7 @@ impl QemuBoard {
     }
 
     /// Buttons and observations at the rig's side.
-    pub fn controls(&self) -> &Controls {
+    pub fn controls(&self) -> &Arc<Controls> {
         &self.controls
     }
 

@@ -1,6 +1,7 @@
 //! A stored level as a hysteresis record: scales, sums and delays applied, nothing else.
 
 use jointrig_protocol::channel::{Quantity, Role};
+use rayon::prelude::*;
 
 use crate::campaign::level::Level;
 use crate::campaign::rows::Samples;
@@ -28,16 +29,9 @@ pub fn record(channels: &ChannelMap, samples: &Samples, level: &Level) -> Result
     let b = velocity(Role::SpecimenB, "velocity of specimen B")?;
     let cells = channels.places(Role::LoadCell);
     let first = *cells.first().ok_or(Unusable("load cell"))?;
-    let mut force = vec![0.0; samples.channel(first).len()];
-    for place in cells {
-        force
-            .iter_mut()
-            .zip(channels.to_si(place, samples.channel(place)))
-            .for_each(|(sum, value)| *sum += value);
-    }
     let late = |place: usize| f64::from(channels.channels[place].delay_ns) * 1e-9;
     let fs_hz = f64::from(channels.rate_hz);
-    let signals = [channels.to_si(a, samples.channel(a)), channels.to_si(b, samples.channel(b)), force];
+    let signals = [&[a][..], &[b], &cells].map(|places| sum(channels, samples, places));
     // one amplifier: the cells are alike
     let [a_m_per_s, b_m_per_s, force_n] = in_step(signals, [late(a), late(b), late(first)], fs_hz);
     Ok(HysteresisRecord {
@@ -47,4 +41,22 @@ pub fn record(channels: &ChannelMap, samples: &Samples, level: &Level) -> Result
         excitation_hz: level.end_hz.is_none().then_some(level.frequency_hz),
         normal_load_n: None,
     })
+}
+
+/// Samples that are converted at once, so that a sum of channels stays in the core's cache.
+const CHUNK: usize = 1 << 14;
+
+/// The sum of these channels in SI units, on all cores.
+fn sum(channels: &ChannelMap, samples: &Samples, places: &[usize]) -> Vec<f64> {
+    let Some(first) = places.first() else { return Vec::new() };
+    let mut sum = vec![0.0; samples.channel(*first).len()];
+    sum.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, sum)| {
+        for place in places {
+            let Some(channel) = channels.channels.get(*place) else { continue };
+            let scale = channel.units_per_code();
+            let codes = &samples.channel(*place)[chunk * CHUNK..];
+            sum.iter_mut().zip(codes).for_each(|(sum, code)| *sum += f64::from(*code) * scale);
+        }
+    });
+    sum
 }

@@ -121,6 +121,7 @@ pub fn gathered(loops: &[ImpactLoop], arm: Option<&Identified>) -> Vec<Hysteresi
         amplitude_m: mean(|l| l.amplitude_m),
         shape,
         k_t_n_per_m: (shape == Shape::Stuck).then_some(slope),
+        stick_part: None,
         k_eq_n_per_m: Some(slope),
         k_secant_n_per_m: None,
         k_fundamental_n_per_m: None,

@@ -5,7 +5,9 @@ use crate::campaign::level::Moment;
 use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
 use crate::hysteresis::integration::open_record;
 use crate::hysteresis::static_arm::{Identified, Tones};
-use crate::hysteresis::{Correction, HysteresisRecord, LoopAnalysis, RelativeMotion, Shape, analyse};
+use crate::hysteresis::{
+    Correction, HysteresisRecord, LoopAnalysis, RelativeMotion, Shape, analyse, analyse_corrected,
+};
 use crate::results::number::short;
 use crate::results::{Check, Force, Hysteresis, ShakerLoop, rounded};
 
@@ -69,7 +71,7 @@ pub fn rows(levels: &[Analysed<'_>], arm: Option<&Identified>) -> Vec<Hysteresis
     let mut rows: Vec<Hysteresis> = levels.iter().map(|one| row(one.level, &one.raw, Force::Raw)).collect();
     if let Some(arm) = arm {
         rows.extend(levels.iter().filter_map(|one| {
-            let corrected = analyse(&arm.correction.applied(&one.level.record)).ok()?;
+            let corrected = analyse_corrected(&one.level.record, &arm.correction).ok()?;
             Some(row(one.level, &corrected, Force::Corrected))
         }));
     }
