@@ -48,13 +48,15 @@ pub struct LockIn {
     whole: Sums,
     glance_scans: u32,
     least_scans: u32,
+    /// A cycle has begun since it was asked for: a renewed order comes in the middle of one, and a part of a cycle has any amplitude.
+    begun: bool,
 }
 
 impl LockIn {
     /// Measures over the fewest whole cycles that take `least_scans` or more, and glances after the fewest that take
     /// `glance_scans` or more.
     pub const fn new(glance_scans: u32, least_scans: u32) -> Self {
-        Self { glance: Sums::NOTHING, whole: Sums::NOTHING, glance_scans, least_scans }
+        Self { glance: Sums::NOTHING, whole: Sums::NOTHING, glance_scans, least_scans, begun: false }
     }
 
     /// Forgets what was summed.
@@ -65,6 +67,10 @@ impl LockIn {
     /// Takes the signal of one scan at this angle, from which the next scan's differs by `step`. What is seen, when a
     /// glance or a measurement is complete.
     pub fn feed(&mut self, signal: f32, angle: u32, step: u32) -> Option<Seen> {
+        self.begun |= angle < step;
+        if !self.begun {
+            return None;
+        }
         self.glance.in_phase += signal * sine(angle);
         self.glance.quadrature += signal * sine(angle.wrapping_add(QUARTER));
         self.glance.scans += 1;
@@ -156,6 +162,23 @@ mod tests {
         assert_eq!(glances, [[10_000; 4], [20_000; 4]].as_flattened());
         let whole: std::vec::Vec<f32> = seen.iter().filter_map(|seen| seen.whole).collect();
         assert!(whole.len() == 1 && (whole[0] - 1.5).abs() < 1e-4, "{whole:?}");
+    }
+
+    #[test]
+    fn what_begins_within_a_cycle_waits_for_the_next_one() {
+        // 2048 scans a cycle, of which four fifths are left: as a glance they would read a seventh too much or too little
+        let step = jointrig_protocol::request::Shake::step_of(25.0, 51_200);
+        for phase in [0.0, 0.8, 1.6] {
+            let (mut lock_in, mut angle) = (LockIn::new(512, 4_096), step.wrapping_mul(410));
+            let mut seen = std::vec::Vec::new();
+            for _ in 0..8_192 {
+                let turns = f64::from(angle) / 4_294_967_296.0;
+                let signal = (turns * core::f64::consts::TAU + phase).sin() as f32;
+                seen.extend(lock_in.feed(signal, angle, step));
+                angle = angle.wrapping_add(step);
+            }
+            assert!(seen.len() >= 2 && seen.iter().all(|seen| (seen.glance - 1.0).abs() < 1e-3), "{seen:?}");
+        }
     }
 
     #[test]
