@@ -7,9 +7,10 @@
 //! Definitions are fixed here and nowhere else: k_T is the least-squares slope of the stick part; k_eq that of the whole loop; the peak
 //! secant and the ratio of fundamentals carry their own names. T is taken as given: the load cells' sum is not T at the
 //! contact (the static arm's inertia adds 2.4 % at 250 Hz). [`correction`] makes the contact's force of it, by what [`static_arm`]
-//! identified, and the corrected record is analysed beside the raw one. [`compliance`] looks at the same signals in frequency.
+//! identified, and the corrected record is analysed beside the raw one. [`compliance`] looks at the same signals in frequency, [`backbone`] at several levels.
 
 pub mod analyse;
+pub mod backbone;
 pub mod compliance;
 pub mod correction;
 pub mod cycles;

@@ -66,6 +66,11 @@ pub fn page(results: &Results) -> String {
                 "The shaker's levels. Round marks are k_T of straight loops, square ones k_eq of ellipses or of slip; full before the hammer's cells, hollow after them.",
             ),
             figure(
+                figures::backbone(results),
+                "The contact against amplitude where it slips. Left k_T of the stick part and k_eq of the whole loop, right the force at the loops' tips; the curves are \
+                 the law of parallel sliders that fits k_eq best.",
+            ),
+            figure(
                 figures::shaker_loops(results),
                 "Loops of the shaker, averaged over the record's cycles, and both specimens over one cycle. Beside a resonance of one specimen Δx leaves the phase of T, and the \
                  line opens to an ellipse.",

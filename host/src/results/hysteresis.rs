@@ -1,6 +1,7 @@
 //! The contact by hysteresis loops: numbers per kind of excitation, and one loop to look at.
 
 use super::{Excitation, OverCycles, Shape};
+use crate::hysteresis::backbone::Law;
 use crate::hysteresis::impact::DecayCycle;
 use crate::hysteresis::{LoopAnalysis, ShapeEvidence};
 use serde::Serialize;
@@ -71,6 +72,20 @@ pub struct Hysteresis {
     /// What a reader must know before using these numbers.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
+}
+
+/// How a slipping contact goes with amplitude: the law through the shaker's levels of one frequency, raw force.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Backbone {
+    /// Frequency of the levels, Hz.
+    pub frequency_hz: f64,
+    /// Before or after the hammer's cells.
+    pub moment: Option<&'static str>,
+    /// Ids of the levels, by amplitude.
+    pub levels: Vec<i64>,
+    /// The law.
+    #[serde(flatten)]
+    pub law: Law,
 }
 
 /// One cycle of the decay over all hits that count.

@@ -27,7 +27,7 @@ pub use campaign::{AnalyseError, KnownContact, Progress, Wanted, analyse};
 pub use check::Check;
 pub use completeness::Completeness;
 pub use curves::{FrfCurve, Role, UsableBand, rounded};
-pub use hysteresis::{DecayStep, Force, Hysteresis, ImpactSlope, LoopCurve, ShakerLoop};
+pub use hysteresis::{Backbone, DecayStep, Force, Hysteresis, ImpactSlope, LoopCurve, ShakerLoop};
 pub use interface::{Bootstrap, InterfaceModes, VirtualPoint};
 pub use joint::{Goodness, Joint, JointSpectrum, Refusal, SpectrumCurve};
 pub use reconstruction::Reconstruction;
@@ -94,6 +94,9 @@ pub struct Results {
     /// A loop of the shaker at each frequency.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub shaker_loops: Vec<ShakerLoop>,
+    /// Where the contact slips: how it goes with amplitude, at each frequency with enough levels.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub backbones: Vec<Backbone>,
     /// The specimens' decay put together from two sinusoids.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reconstruction: Option<Reconstruction>,
@@ -124,6 +127,7 @@ impl Results {
             example_loop: None,
             static_arm: None,
             shaker_loops: Vec::new(),
+            backbones: Vec::new(),
             reconstruction: None,
             impact_slopes: Vec::new(),
         }

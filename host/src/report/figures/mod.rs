@@ -1,5 +1,6 @@
 //! The figures, one file each: results in, an SVG text out, or nothing when the results lack the data.
 
+mod backbone;
 mod comparison;
 mod contact_loop;
 mod impacts;
@@ -11,6 +12,7 @@ mod receptances;
 mod shaker_loops;
 mod specimens;
 
+pub use backbone::backbone;
 pub use comparison::comparison;
 pub use contact_loop::contact_loop;
 pub use impacts::impacts;

@@ -59,6 +59,7 @@ pub fn at_the_contact<M: Measurements>(
     }
     results.hysteresis.extend(of_levels);
     results.shaker_loops = shaker::curves(&steady);
+    results.backbones = shaker::backbones(&steady);
     results.impact_slopes = loops::slopes(impact_loops);
     let shown = example(measurements, averages, impact_loops, resonance_hz);
     (results.example_loop, results.reconstruction) = shown.unwrap_or_default();

@@ -2,6 +2,7 @@
 
 use super::cell::ShakerLevel;
 use crate::campaign::level::Moment;
+use crate::hysteresis::backbone::Law;
 use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
 use crate::hysteresis::integration::open_record;
 use crate::hysteresis::static_arm::{Identified, Tones};
@@ -9,7 +10,7 @@ use crate::hysteresis::{
     Correction, HysteresisRecord, LoopAnalysis, RelativeMotion, Shape, analyse, analyse_corrected,
 };
 use crate::results::number::short;
-use crate::results::{Check, Force, Hysteresis, ShakerLoop, rounded};
+use crate::results::{Backbone, Check, Force, Hysteresis, ShakerLoop, rounded};
 
 /// Name of the check on wear.
 pub const UNCHANGED: &str = "contact-unchanged";
@@ -88,6 +89,31 @@ pub fn warn_of_resonance(rows: &mut [Hysteresis], resonance_hz: f64) {
             short(resonance_hz)
         ));
     }
+}
+
+/// The law through the levels of each frequency and moment at which something slips.
+pub fn backbones(levels: &[Analysed<'_>]) -> Vec<Backbone> {
+    let mut usable: Vec<&Analysed<'_>> =
+        levels.iter().filter(|one| one.raw.shape != Shape::Elliptical).collect();
+    let key = |one: &Analysed<'_>| (one.level.moment == Moment::After, one.level.level.frequency_hz);
+    usable.sort_by(|a, b| {
+        let ((after, f), (after_b, f_b)) = (key(a), key(b));
+        after.cmp(&after_b).then(f.total_cmp(&f_b)).then(a.raw.amplitude_m.total_cmp(&b.raw.amplitude_m))
+    });
+    let slips = |one: &&Analysed<'_>| one.raw.shape != Shape::Stuck;
+    let groups = usable.chunk_by(|a, b| key(a) == key(b)).filter(|own| own.iter().any(slips));
+    groups
+        .filter_map(|own| {
+            let points: Vec<(f64, f64)> =
+                own.iter().map(|one| (one.raw.amplitude_m, one.raw.k_eq_n_per_m.mean)).collect();
+            Some(Backbone {
+                frequency_hz: own[0].level.level.frequency_hz,
+                moment: Some(own[0].level.moment.name()),
+                levels: own.iter().map(|one| one.level.id).collect(),
+                law: Law::through(&points)?,
+            })
+        })
+        .collect()
 }
 
 /// Loops of the levels to look at: the middle amplitude of each frequency, one cycle averaged over the record.
