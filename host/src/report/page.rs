@@ -67,8 +67,8 @@ pub fn page(results: &Results) -> String {
             ),
             figure(
                 figures::backbone(results),
-                "The contact against amplitude where it slips. Left k_T of the stick part and k_eq of the whole loop, right the force at the loops' tips; the curves are \
-                 the law of parallel sliders that fits k_eq best.",
+                "The contact against amplitude where it slips. Left k_T of the stick part and the loop's peak secant, right the force at the loops' tips; the curves are \
+                 the law of parallel sliders that fits the tips best.",
             ),
             figure(
                 figures::shaker_loops(results),

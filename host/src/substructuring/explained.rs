@@ -134,8 +134,7 @@ struct Part {
 impl Part {
     fn of(frf: &FrfMatrix, noise: Option<&FrfNoise>) -> Part {
         let step = frf.lines.len().div_ceil(LINES).max(1);
-        let some = |l: &usize| l % step == 0;
-        let lines: Vec<usize> = (0..frf.lines.len()).filter(some).collect();
+        let lines: Vec<usize> = (0..frf.lines.len()).step_by(step).collect();
         let smooth = noise.map(|n| n.smoothed(&frf.frequency_hz, SMOOTH_HZ));
         Part {
             frf: FrfMatrix {

@@ -15,7 +15,7 @@ const COLOURS: [&str; MOST] = [BLUE, VERMILION, GREEN];
 /// Points of a law's curve.
 const POINTS: usize = 160;
 
-/// Left: k_T and k_eq of each level and the law's slope. Right: the force at the loops' tips and the law's backbone.
+/// Left: k_T and peak secant of each level and the law's secant. Right: the force at the loops' tips and the law's backbone.
 pub fn backbone(results: &Results) -> Option<String> {
     let shown = &results.backbones[..results.backbones.len().min(MOST)];
     let rows: Vec<Vec<&Hysteresis>> = shown.iter().map(|one| rows(results, one)).collect();
@@ -23,8 +23,8 @@ pub fn backbone(results: &Results) -> Option<String> {
     let amplitudes = all().filter_map(|row| row.amplitude_m).map(|x| (1e6 * x).log10());
     let [low, high] = middle_range(amplitudes, 1.0, 0.1)?;
     let (low, high) = (10f64.powf(low), 10f64.powf(high));
-    let stiffest = all().flat_map(|row| [row.k_t_n_per_m, row.k_eq_n_per_m]).flatten();
-    let stiffest = stiffest.map(|k| micro(k.mean + k.std)).fold(0.0, f64::max);
+    let k_t = all().filter_map(|row| row.k_t_n_per_m).map(|k| k.mean + k.std);
+    let stiffest = k_t.chain(all().filter_map(|row| row.k_secant_n_per_m)).map(micro).fold(0.0, f64::max);
     let strongest = all().filter_map(|row| tip(row)).fold(0.0, f64::max);
     let most_n = shown.iter().map(|one| one.law.tip(1e-6 * high)).fold(strongest, f64::max);
     let mut drawing = Drawing::new("backbone", WIDTH, 400.0);
@@ -45,7 +45,7 @@ pub fn backbone(results: &Results) -> Option<String> {
     for (((one, own), colour), line) in shown.iter().zip(&rows).zip(COLOURS).zip(0_i32..) {
         let stroke = Stroke::new(colour, 1.5);
         let law = &one.law;
-        panels[0].curve(&mut drawing, along.iter().map(|x| (*x, micro(law.slope(1e-6 * x)))), stroke);
+        panels[0].curve(&mut drawing, along.iter().map(|x| (*x, micro(law.secant(1e-6 * x)))), stroke);
         panels[1].curve(&mut drawing, along.iter().map(|x| (*x, law.tip(1e-6 * x))), stroke);
         for row in own {
             level(&mut drawing, &panels, row, colour);
@@ -62,7 +62,7 @@ pub fn backbone(results: &Results) -> Option<String> {
         [70.0, 16.0],
         Anchor::Start,
         "legend",
-        "○ k_T   ■ k_eq; force at the tip   (bars: ± σ over cycles; raw force)",
+        "○ k_T   ■ peak secant; force at the tip   (bars: ± σ over cycles; raw force)",
     );
     Some(drawing.finish("Stiffness and tip force of the shaker's loops against amplitude, with the law of sliders through them"))
 }
@@ -83,9 +83,8 @@ fn level(drawing: &mut Drawing, [left, right]: &[Panel; 2], row: &Hysteresis, co
         bar(drawing, k);
         drawing.dot(at(left, micro(k.mean)), 5.0, colour, true);
     }
-    if let Some(k) = &row.k_eq_n_per_m {
-        bar(drawing, k);
-        square(drawing, at(left, micro(k.mean)));
+    if let Some(k) = row.k_secant_n_per_m {
+        square(drawing, at(left, micro(k)));
     }
     if let Some(force) = tip(row) {
         square(drawing, at(right, force));

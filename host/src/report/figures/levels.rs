@@ -1,7 +1,7 @@
 //! The shaker's levels: stiffness against frequency and against amplitude, before and after the hammer's cells.
 
 use super::super::drawing::{Anchor, Area, Drawing, Stroke};
-use super::super::panel::{BLUE, GREEN, INK, Panel, VERMILION, legend};
+use super::super::panel::{BLUE, FAINT, GREEN, INK, Panel, VERMILION, legend};
 use super::super::scale::{Scale, middle_range};
 use super::WIDTH;
 use crate::results::number::{decimals, micro};
@@ -19,6 +19,9 @@ struct Dot {
 }
 
 const COLOURS: [&str; 6] = [BLUE, VERMILION, GREEN, "#cc79a7", "#8a6d00", INK];
+
+/// As many names as the legend of a panel has room for.
+const NAMED: usize = 5;
 
 /// Left: against frequency, a colour for each amplitude. Right: against amplitude, a colour for each frequency.
 pub fn levels(results: &Results) -> Option<String> {
@@ -136,6 +139,11 @@ fn panel(drawing: &mut Drawing, area: Area, dots: &[Dot], range: [f64; 2], axis:
             Stroke::new(colour, 1.6),
             format!("{} {}", decimals(*centre, usize::from(*centre < 10.0)), axis.unit),
         ));
+    }
+    if entries.len() > NAMED {
+        let more = entries.len() + 1 - NAMED;
+        entries.truncate(NAMED - 1);
+        entries.push((Stroke::new(FAINT, 1.6), format!("{more} more")));
     }
     legend(drawing, [area.left, 44.0], &entries);
     panel.axes(drawing, (&x_ticks, Some(axis.label)), (&y_ticks, Some("stiffness in N/µm")));

@@ -36,8 +36,7 @@ pub fn with_phases(check: Check, curves: &[FrfCurve]) -> Check {
         () => "",
     };
     let degrees = |value: f64| decimals(value, 0);
-    let mut check = check;
-    check.meaning.push_str(&format!(
+    let phases = format!(
         " At {} Hz specimen A turns by {}° against specimen B; against their own arms A turns by {}° and B by {}°, and the arms by {}° \
          against each other.{whose}",
         short(split.frequency_hz),
@@ -45,8 +44,8 @@ pub fn with_phases(check: Check, curves: &[FrfCurve]) -> Check {
         degrees(split.a),
         degrees(split.b),
         degrees(split.arms)
-    ));
-    check
+    );
+    Check { meaning: check.meaning + &phases, ..check }
         .with("phase_specimen_a_to_b_deg", split.specimens)
         .with("phase_specimen_a_to_arm_deg", split.a)
         .with("phase_specimen_b_to_arm_deg", split.b)

@@ -105,7 +105,7 @@ pub fn backbones(levels: &[Analysed<'_>]) -> Vec<Backbone> {
     groups
         .filter_map(|own| {
             let points: Vec<(f64, f64)> =
-                own.iter().map(|one| (one.raw.amplitude_m, one.raw.k_eq_n_per_m.mean)).collect();
+                own.iter().filter_map(|one| Some((one.raw.amplitude_m, one.raw.k_secant_n_per_m?))).collect();
             Some(Backbone {
                 frequency_hz: own[0].level.level.frequency_hz,
                 moment: Some(own[0].level.moment.name()),
