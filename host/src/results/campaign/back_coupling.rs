@@ -3,7 +3,7 @@
 use crate::results::number::short;
 use crate::results::{Check, MAIN_BAND_HZ};
 use crate::substructuring::Band;
-use crate::substructuring::explained::Explained;
+use crate::substructuring::explained::{BEYOND, Explained, USUAL};
 
 /// Name of the check.
 pub const BACK_COUPLING: &str = "back-coupling";
@@ -25,13 +25,25 @@ pub fn check(found: &Explained) -> Option<Check> {
         percent(explained)
     );
     let coupled = "A and B, coupled by the joint of Eq. A.1 (its mean over the main band)";
-    let check = match found.range(main) {
+    let whole = |range: Option<[f64; 2]>| {
+        range.is_some_and(|[from, to]| from <= main.low_hz && to >= USED_HZ.min(last))
+    };
+    let check = match found.range(main, BEYOND) {
         _ if explained > BLIND => Check::new(
             BACK_COUPLING,
             None,
             format!("Whether {coupled}, are the measured assembly cannot be told: {sizes}."),
         ),
-        Some([from, to]) if from <= main.low_hz && to >= USED_HZ.min(last) => Check::new(
+        range if whole(range) && !whole(found.range(main, USUAL)) => Check::new(
+            BACK_COUPLING,
+            None,
+            format!(
+                "{coupled}, give the measured assembly no worse than {} times what noise and errors of position explain ({sizes}): too little to call it another path, too \
+                 much to exclude one.",
+                short(BEYOND)
+            ),
+        ),
+        Some([from, to]) if whole(Some([from, to])) => Check::new(
             BACK_COUPLING,
             Some(true),
             format!(
@@ -77,21 +89,23 @@ pub fn check(found: &Explained) -> Option<Check> {
 mod tests {
     use super::*;
 
-    /// An error of 2 % below a frequency and of `above` from there on, where errors of position explain 10 %.
+    /// An error of 2 % below a frequency and of `above` from there on, where errors of position explain 6 %.
     fn found(edge_hz: f64, above: f64) -> Explained {
         let frequency_hz: Vec<f64> = (10..1000).map(f64::from).collect();
         Explained {
             error: frequency_hz.iter().map(|f| if *f < edge_hz { 0.02 } else { above }).collect(),
-            explained: vec![0.1; frequency_hz.len()],
+            explained: vec![0.06; frequency_hz.len()],
             frequency_hz,
         }
     }
 
     #[test]
     fn what_errors_of_position_explain_is_no_finding() {
-        let fine = check(&found(500.0, 0.15)).expect("lines");
+        let fine = check(&found(500.0, 0.1)).expect("lines");
         assert_eq!(fine.ok, Some(true), "{}", fine.meaning);
-        assert!((fine.values["median_explained"] - 0.1).abs() < 1e-12);
+        assert!((fine.values["median_explained"] - 0.06).abs() < 1e-12);
+        let between = check(&found(500.0, 0.2)).expect("lines");
+        assert_eq!(between.ok, None, "{}", between.meaning);
         let mut blind = found(500.0, 0.15);
         blind.explained.fill(1.5);
         assert_eq!(check(&blind).expect("lines").ok, None);
