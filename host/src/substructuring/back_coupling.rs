@@ -17,6 +17,9 @@ pub struct BackCoupling {
     pub frequency_hz: Vec<f64>,
     /// ‖coupled − measured‖ / ‖measured‖ over both virtual points, rotations in metres over 40 mm.
     pub error: Vec<f64>,
+    /// The same entry by entry, over ‖measured‖: its norm is the error.
+    #[serde(skip)]
+    pub difference: Vec<Vec<Complex<f64>>>,
 }
 
 impl BackCoupling {
@@ -43,7 +46,7 @@ impl BackCoupling {
                 *c += damping / inside.len() as f64;
             }
         }
-        let error = (0..axis.frequency_hz.len())
+        let difference: Vec<Vec<Complex<f64>>> = (0..axis.frequency_hz.len())
             .into_par_iter()
             .map(|l| {
                 let s = axis.s(l);
@@ -54,7 +57,8 @@ impl BackCoupling {
                 // Eq. (1) with B = [I, −I], block by block
                 let flexibility =
                     full_rank_inverse(&(y_a + y_b + joint), "the interface flexibility").ok()?;
-                let mut square = 0.0;
+                let scale = y_ajb.norm();
+                let mut all = Vec::with_capacity(4 * n * n);
                 for (column, y_column) in [y_a, y_b].into_iter().enumerate() {
                     let held = product(&flexibility, y_column);
                     for (row, y_row) in [y_a, y_b].into_iter().enumerate() {
@@ -62,13 +66,19 @@ impl BackCoupling {
                         let measured = y_ajb.view((row * n, column * n), (n, n));
                         let difference =
                             if row == column { y_row - through - measured } else { through - measured };
-                        square += difference.norm_squared();
+                        all.extend(difference.iter().map(|v| v / scale));
                     }
                 }
-                Some(square.sqrt() / y_ajb.norm())
+                Some(all)
             })
-            .collect::<Option<Vec<f64>>>()?;
-        (!inside.is_empty()).then(|| BackCoupling { frequency_hz: axis.frequency_hz.clone(), error })
+            .collect::<Option<_>>()?;
+        let norm = |all: &Vec<Complex<f64>>| all.iter().map(Complex::norm_sqr).sum::<f64>().sqrt();
+        let error = difference.iter().map(norm).collect();
+        (!inside.is_empty()).then(|| BackCoupling {
+            frequency_hz: axis.frequency_hz.clone(),
+            error,
+            difference,
+        })
     }
 }
 

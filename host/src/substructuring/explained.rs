@@ -3,9 +3,10 @@
 //! FBS takes A and B to be uncoupled but for the joint. Where another path couples them (springs to a common ground: the paper's
 //! rig above 800 Hz) or the joint is no spring and damper, back-coupling fails; but it also fails, by tens of per cent, when sensors and hits
 //! are half a millimetre off. So the same is done again with positions, aims, angles and noise drawn anew from what is assumed of
-//! them: the data then hold their own errors and the drawn ones, and what the square of the error grows by is what such errors do.
+//! them: by as much as the difference between coupled and measured assembly then moves, such errors may have made it.
 
 use super::averaged::Priors;
+use super::back_coupling::BackCoupling;
 use super::frf::FrfMatrix;
 use super::geometry::{Configuration, Geometry, Point};
 use super::identify::identify;
@@ -26,13 +27,13 @@ const LINES: usize = 400;
 const DRAWS: u64 = 12;
 /// Fixed, so that the same data give the same figures.
 const SEED: u64 = 0x6261_636b;
-/// Lines within ± this many Hz are judged together by their median: a single antiresonance decides nothing.
-const AROUND_HZ: f64 = 25.0;
+/// Lines within ± this many Hz are judged together by their median: a single resonance, which errors of position move, decides nothing.
+const AROUND_HZ: f64 = 75.0;
 /// Variances are smoothed over ± this many Hz.
 const SMOOTH_HZ: f64 = 10.0;
 /// An error up to this many times what is explained is nothing: a dozen draws and a handful of resonances know no better.
 pub const USUAL: f64 = 2.0;
-/// An error this many times what is explained is another thing. Sound campaigns have shown up to three times.
+/// An error this many times what is explained is another thing.
 pub const BEYOND: f64 = 6.0;
 /// An error below this part of the assembly's admittance matters to nobody.
 const SMALL: f64 = 0.05;
@@ -44,7 +45,7 @@ pub struct Explained {
     pub frequency_hz: Vec<f64>,
     /// ‖coupled − measured‖ / ‖measured‖ at both virtual points, the median around each line.
     pub error: Vec<f64>,
-    /// What drawn errors add to it, in quadrature.
+    /// What drawn errors change the difference by, root mean square, in the same unit.
     pub explained: Vec<f64>,
 }
 
@@ -61,31 +62,32 @@ impl Explained {
     ) -> Option<Explained> {
         let parts: Vec<Part> =
             frfs.into_iter().zip(noises).map(|(frf, noise)| Part::of(frf, noise)).collect();
-        let error = |frf: [&FrfMatrix; 3], geometry: &Geometry| -> Option<Vec<f64>> {
+        let coupled = |frf: [&FrfMatrix; 3], geometry: &Geometry| -> Option<BackCoupling> {
             let [a, b, ajb] = frf;
-            let found = identify(a, b, ajb, geometry, &[Method::Inverse], &[idms], &[band]).ok()?;
-            let coupled = found.back_coupling?;
-            Some(squares_around(&coupled.frequency_hz, &coupled.error))
+            identify(a, b, ajb, geometry, &[Method::Inverse], &[idms], &[band]).ok()?.back_coupling
         };
-        let nominal = error([&parts[0].frf, &parts[1].frf, &parts[2].frf], geometry)?;
-        let drawn: Vec<Vec<f64>> = (0..DRAWS)
+        let nominal = coupled([&parts[0].frf, &parts[1].frf, &parts[2].frf], geometry)?;
+        // per draw and line: the square of what the difference changes by
+        let changes: Vec<Vec<f64>> = (0..DRAWS)
             .into_par_iter()
             .map(|draw| {
                 let mut stream = Xoshiro256PlusPlus::seed_from_u64(SEED + draw);
                 let geometry =
                     Wrong { priors, common: HashMap::new(), stream: &mut stream }.geometry(geometry);
                 let noisy: Vec<FrfMatrix> = parts.iter().map(|p| p.drawn(&mut stream)).collect();
-                error([&noisy[0], &noisy[1], &noisy[2]], &geometry)
+                let drawn = coupled([&noisy[0], &noisy[1], &noisy[2]], &geometry)?;
+                let lines = drawn.difference.iter().zip(&nominal.difference);
+                Some(lines.map(|(d, n)| d.iter().zip(n).map(|(d, n)| (d - n).norm_sqr()).sum()).collect())
             })
             .collect::<Option<_>>()?;
-        let frequency_hz: Vec<f64> = parts[2].frf.frequency_hz.iter().copied().filter(|f| *f > 0.0).collect();
-        let explained = (0..nominal.len())
-            .map(|l| {
-                let mean = drawn.iter().map(|d| d[l]).sum::<f64>() / DRAWS as f64;
-                (mean - nominal[l]).max(0.0).sqrt()
-            })
+        let frequency_hz = nominal.frequency_hz.clone();
+        let squares: Vec<f64> = nominal.error.iter().map(|e| e * e).collect();
+        let mean: Vec<f64> = (0..squares.len())
+            .map(|l| changes.iter().map(|change| change[l]).sum::<f64>() / DRAWS as f64)
             .collect();
-        Some(Explained { frequency_hz, error: nominal.iter().map(|e| e.sqrt()).collect(), explained })
+        let [error, explained] = [squares, mean]
+            .map(|squares| medians_around(&frequency_hz, &squares).iter().map(|e| e.sqrt()).collect());
+        Some(Explained { frequency_hz, error, explained })
     }
 
     /// Whether the error at a line is no larger than `times` what is explained.
@@ -117,14 +119,13 @@ impl Explained {
     }
 }
 
-/// Medians of the squares within ± 25 Hz.
-fn squares_around(frequency_hz: &[f64], error: &[f64]) -> Vec<f64> {
-    let squares: Vec<f64> = error.iter().map(|e| e * e).collect();
+/// Medians within ± 75 Hz.
+fn medians_around(frequency_hz: &[f64], values: &[f64]) -> Vec<f64> {
     (frequency_hz.iter())
         .map(|f| {
             let from = frequency_hz.partition_point(|g| *g < f - AROUND_HZ);
             let to = frequency_hz.partition_point(|g| *g <= f + AROUND_HZ);
-            median(&squares[from..to])
+            median(&values[from..to])
         })
         .collect()
 }
@@ -307,8 +308,8 @@ mod tests {
         let priors = Priors::default();
         let found =
             Explained::of([a, b, ajb], [None; 3], &geometry, IdmSet::Six, below, &priors).expect("lines");
-        let [from, to] = found.range(below, BEYOND).expect("there the path is soft");
-        // the median's window is 25 Hz wide on either side
+        let [from, to] = found.range(below, USUAL).expect("there the path is soft");
+        // the median's window is 75 Hz wide on either side
         assert!(from <= 300.0 && (400.0..520.0).contains(&to), "{from} {to}");
     }
 }
