@@ -128,7 +128,7 @@ pub fn run(python: Option<&str>) -> Outcome {
         ajb.inputs.len()
     );
     println!(
-        "all of `identify`, with consistency, passivity, back-coupling and statistics of all 42 entries: {whole:.4} s"
+        "all of `identify`, with consistency, passivity and statistics of all 42 entries: {whole:.4} s"
     );
     let mut short = Vec::new();
     if let Some(python) = python {

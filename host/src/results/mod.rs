@@ -33,6 +33,7 @@ pub use joint::{Goodness, Joint, JointSpectrum, Refusal, SpectrumCurve};
 pub use reconstruction::Reconstruction;
 pub use source::{Software, Source, ranges};
 
+use crate::substructuring::joint::Band;
 use serde::Serialize;
 
 /// The shape's version: 1.
@@ -40,6 +41,8 @@ pub const VERSION: u32 = 1;
 
 /// The band the headline is read from, Hz (the paper's Table 2).
 pub const MAIN_BAND_HZ: [f64; 2] = [300.0, 600.0];
+/// The same as a band.
+pub const MAIN_BAND: Band = Band { low_hz: MAIN_BAND_HZ[0], high_hz: MAIN_BAND_HZ[1] };
 
 /// All that was found. The first six fields are the contract that scripts rely on; the others are there for
 /// the report and may grow.
@@ -140,6 +143,11 @@ impl Results {
             .iter()
             .filter(|j| j.band_hz == MAIN_BAND_HZ && j.sliding_stiffness().is_some())
             .max_by_key(|j| (j.method == "internal", j.method == "internal-printed", j.idms))
+    }
+
+    /// The estimate to quote over the main band, if it was made; whether it identified a degree of freedom is said there.
+    pub fn quoted(&self) -> Option<&Averaged> {
+        self.recommended.iter().find(|r| r.band_hz == MAIN_BAND)
     }
 
     /// The loops of the impacts, drawn with the raw force.

@@ -57,9 +57,8 @@ fn substructuring(results: &Results) -> Vec<Kind> {
         }
         None => "stiffness between the arms: k_T only if the clamps are much stiffer than the contact",
     };
-    let main = |band_hz: [f64; 2]| band_hz == MAIN_BAND_HZ;
-    let recommended = results.recommended.iter().find(|r| main(r.band_hz.into()));
-    let recommended = recommended.and_then(|r| Some((r, r.joint.get(&Dof::Z).filter(|z| z.identified)?)));
+    let recommended =
+        results.quoted().and_then(|r| Some((r, r.joint.get(&Dof::Z).filter(|z| z.identified)?)));
     let mut kinds = Vec::new();
     if let Some((estimate, z)) = recommended {
         kinds.push(Kind {
@@ -69,7 +68,7 @@ fn substructuring(results: &Results) -> Vec<Kind> {
             meaning: what.into(),
         });
     }
-    let fitted = results.joint.iter().find(|j| j.method == fit::NAME && main(j.band_hz));
+    let fitted = results.joint.iter().find(|j| j.method == fit::NAME && j.band_hz == MAIN_BAND_HZ);
     for joint in [fitted, results.headline_joint()].into_iter().flatten() {
         let Some(k) = joint.sliding_stiffness() else { continue };
         let meaning = match (kinds.is_empty(), joint.method == fit::NAME) {

@@ -15,7 +15,7 @@ pub fn substructuring(results: &Results) -> Option<String> {
 
 /// The recommended estimate over the main band.
 fn recommended(results: &Results) -> Option<String> {
-    let estimate = results.recommended.iter().find(|r| <[f64; 2]>::from(r.band_hz) == MAIN_BAND_HZ)?;
+    let estimate = results.quoted()?;
     Some(format!(
         "Substructuring (FBS, Eq. A.1 averaged as an admittance, {} IDMs, {}) sees between the arms, along the sliding direction: {}",
         estimate.idms,

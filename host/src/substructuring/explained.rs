@@ -6,13 +6,11 @@
 //! them: by as much as the difference between coupled and measured assembly then moves, such errors may have made it.
 
 use super::averaged::Priors;
-use super::back_coupling::BackCoupling;
 use super::frf::FrfMatrix;
 use super::geometry::{Configuration, Geometry, Point};
-use super::identify::identify;
+use super::identify::back_coupled;
 use super::idm::IdmSet;
 use super::joint::{Band, median};
-use super::method::Method;
 use super::noise::FrfNoise;
 use nalgebra::{Complex, Unit, UnitQuaternion, Vector3};
 use rand::SeedableRng;
@@ -62,11 +60,7 @@ impl Explained {
     ) -> Option<Explained> {
         let parts: Vec<Part> =
             frfs.into_iter().zip(noises).map(|(frf, noise)| Part::of(frf, noise)).collect();
-        let coupled = |frf: [&FrfMatrix; 3], geometry: &Geometry| -> Option<BackCoupling> {
-            let [a, b, ajb] = frf;
-            identify(a, b, ajb, geometry, &[Method::Inverse], &[idms], &[band]).ok()?.back_coupling
-        };
-        let nominal = coupled([&parts[0].frf, &parts[1].frf, &parts[2].frf], geometry)?;
+        let nominal = back_coupled([&parts[0].frf, &parts[1].frf, &parts[2].frf], geometry, idms, band)?;
         // per draw and line: the square of what the difference changes by
         let changes: Vec<Vec<f64>> = (0..DRAWS)
             .into_par_iter()
@@ -75,13 +69,13 @@ impl Explained {
                 let geometry =
                     Wrong { priors, common: HashMap::new(), stream: &mut stream }.geometry(geometry);
                 let noisy: Vec<FrfMatrix> = parts.iter().map(|p| p.drawn(&mut stream)).collect();
-                let drawn = coupled([&noisy[0], &noisy[1], &noisy[2]], &geometry)?;
+                let drawn = back_coupled([&noisy[0], &noisy[1], &noisy[2]], &geometry, idms, band)?;
                 let lines = drawn.difference.iter().zip(&nominal.difference);
-                Some(lines.map(|(d, n)| d.iter().zip(n).map(|(d, n)| (d - n).norm_sqr()).sum()).collect())
+                Some(lines.map(|(d, n)| (d - n).norm_squared()).collect())
             })
             .collect::<Option<_>>()?;
         let frequency_hz = nominal.frequency_hz.clone();
-        let squares: Vec<f64> = nominal.error.iter().map(|e| e * e).collect();
+        let squares: Vec<f64> = nominal.error().iter().map(|e| e * e).collect();
         let mean: Vec<f64> = (0..squares.len())
             .map(|l| changes.iter().map(|change| change[l]).sum::<f64>() / DRAWS as f64)
             .collect();

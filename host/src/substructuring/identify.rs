@@ -154,8 +154,6 @@ pub struct Identification {
     pub virtual_points: Vec<VirtualPointQuality>,
     /// n_i, n_c and ranks of the forms of Eq. (3) that were asked for.
     pub internals: Vec<Internals>,
-    /// A and B coupled by what `inverse` gave with the most modes over the first band, against the measured assembly.
-    pub back_coupling: Option<BackCoupling>,
 }
 
 /// Identifies the joint from FRFs of A, B and AJB (all three alike in lines, quantity and window).
@@ -199,9 +197,7 @@ pub fn identify(
         refused: vec![],
         virtual_points: vec![],
         internals: vec![],
-        back_coupling: None,
     };
-    let mut coupled_modes = 0;
     for &set in idms {
         let reduced = Reduced::of(&rooms, set);
         if let Ok(reduced) = &reduced {
@@ -213,13 +209,6 @@ pub fn identify(
                 Ok(solution) => solved.push((method, solution)),
                 Err(refused) => out.refused.push(refused),
             }
-        }
-        let inverse = solved.iter().find(|(method, _)| *method == Method::Inverse);
-        if let (Ok(reduced), Some((_, Solution { z, .. })), true) =
-            (&reduced, inverse, set.count() > coupled_modes)
-        {
-            coupled_modes = set.count();
-            out.back_coupling = reduced.back_coupling(&rooms, z, bands[0]);
         }
         let axis = &files[0];
         let results: Vec<(JointSpectrum, Vec<JointRow>)> = solved
@@ -264,6 +253,22 @@ pub fn decouple(
     let reduced = Reduced::of(&rooms, idms);
     let z = |method| solve(&rooms, &reduced, idms, method).map(|solution| solution.z);
     Ok(methods.iter().map(|&method| (method, z(method))).collect())
+}
+
+/// A and B coupled by the mean over `band` of what Eq. (A.1) gives, against the measured assembly. None where the files do not fit
+/// together, a virtual point cannot be formed, or no line lies in the band.
+pub fn back_coupled(
+    [a, b, ajb]: [&FrfMatrix; 3],
+    geometry: &Geometry,
+    idms: IdmSet,
+    band: Band,
+) -> Option<BackCoupling> {
+    check_alike(a, b, ajb).ok()?;
+    let files = [a, b, ajb].map(above_zero);
+    let rooms = rooms(&files, geometry);
+    let reduced = Reduced::of(&rooms, idms).ok()?;
+    let z = reduced.solve(&rooms, Method::Inverse).ok()?.z;
+    reduced.back_coupling(&rooms, &z, band)
 }
 
 fn rooms<'a>(files: &'a [Cow<'_, FrfMatrix>; 3], geometry: &'a Geometry) -> Rooms<'a> {

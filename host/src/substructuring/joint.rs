@@ -6,6 +6,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
+/// 95 % of a normal distribution lie within this many standard deviations.
+pub const NORMAL_95: f64 = 1.96;
+
 /// A frequency band, Hz; both ends belong to it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(into = "[f64; 2]")]

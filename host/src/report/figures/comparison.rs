@@ -86,7 +86,7 @@ fn rows(results: &Results) -> Vec<Row> {
 
 /// The estimate to quote, which is no method's row.
 fn quoted(results: &Results) -> Option<Row> {
-    let estimate = results.recommended.iter().find(|r| <[f64; 2]>::from(r.band_hz) == MAIN_BAND_HZ)?;
+    let estimate = results.quoted()?;
     let z = estimate.joint.get(&Dof::Z).filter(|z| z.identified)?;
     Some(Row {
         label: format!("FBS recommended, {} IDMs", estimate.idms),

@@ -1,8 +1,7 @@
 //! The check whether A and B, coupled by the joint found, are the measured assembly.
 
 use crate::results::number::short;
-use crate::results::{Check, MAIN_BAND_HZ};
-use crate::substructuring::Band;
+use crate::results::{Check, MAIN_BAND};
 use crate::substructuring::explained::{BEYOND, Explained, USUAL};
 
 /// Name of the check.
@@ -15,7 +14,7 @@ const BLIND: f64 = 1.0;
 
 /// From where to where the joint of the main band, with A and B, describes the assembly.
 pub fn check(found: &Explained) -> Option<Check> {
-    let main = Band { low_hz: MAIN_BAND_HZ[0], high_hz: MAIN_BAND_HZ[1] };
+    let main = MAIN_BAND;
     let [error, explained] = found.medians(main)?;
     let last = *found.frequency_hz.last()?;
     let percent = |part: f64| if part < 1e-3 { "less than 0.1".into() } else { short(100.0 * part) };

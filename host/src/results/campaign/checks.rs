@@ -2,8 +2,9 @@
 
 use super::contact::ContactCompliance;
 use crate::results::number::{micro, short};
-use crate::results::{Check, Joint, MAIN_BAND_HZ, OverCycles, Results, Statistics};
+use crate::results::{Check, Joint, OverCycles, Results, Statistics};
 use crate::substructuring::Dof;
+use crate::substructuring::joint::NORMAL_95;
 
 /// Loops stiffer than FBS by more than this: something between arm and specimen gives way.
 const SERIES_RATIO: f64 = 1.5;
@@ -14,9 +15,6 @@ pub const UNIDENTIFIED: f64 = 1.5;
 /// A scatter of T/Δx over lines below this fraction of its mean is clear enough to compare with.
 const CLEAR: f64 = 0.3;
 
-/// 95 % of a normal distribution lie within this many standard deviations.
-const NORMAL_95: f64 = 1.96;
-
 /// Name of the check on what lies between the arms and the contact.
 pub const SERIES_COMPLIANCE: &str = "series-compliance";
 /// Name of the check on resonances of one specimen alone.
@@ -25,12 +23,7 @@ pub const HIDDEN_RESONANCE: &str = "hidden-resonance";
 /// What FBS sees between the arms over the main band: the recommended estimate where it identified something, or the
 /// headline's method.
 pub fn between_the_arms(results: &Results) -> Option<Statistics> {
-    let z = results
-        .recommended
-        .iter()
-        .find(|r| <[f64; 2]>::from(r.band_hz) == MAIN_BAND_HZ)
-        .and_then(|r| r.joint.get(&Dof::Z))
-        .filter(|z| z.identified);
+    let z = results.quoted().and_then(|r| r.joint.get(&Dof::Z)).filter(|z| z.identified);
     z.map(|z| Statistics { mean: z.stiffness, std: z.std, median: z.stiffness, ci95: Some(z.ci95) })
         .or_else(|| results.headline_joint().and_then(|j| j.sliding_stiffness()).copied())
 }

@@ -1,11 +1,10 @@
 //! The fit over the main band, from all three configurations and their noise.
 
-use crate::results::{Joint, MAIN_BAND_HZ, Refusal, Results};
+use crate::results::{Joint, MAIN_BAND, Refusal, Results};
 use crate::substructuring::fit;
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::Geometry;
 use crate::substructuring::idm::IdmSet;
-use crate::substructuring::joint::Band;
 use crate::substructuring::noise::FrfNoise;
 
 /// Adds the fit to the joint's rows, or the reason why there is none to what was refused.
@@ -23,14 +22,13 @@ pub fn fill(
     let [Some(noise_a), Some(noise_b), Some(noise_ajb)] = noises else {
         return refuse("it needs the variance of A, B and AJB, and FRFs from elsewhere came without".into());
     };
-    let [low_hz, high_hz] = MAIN_BAND_HZ;
     let found = fit::fit(
         fit::Noisy { frf: a, noise: noise_a },
         fit::Noisy { frf: b, noise: noise_b },
         fit::Noisy { frf: ajb, noise: noise_ajb },
         geometry,
         IdmSet::Six,
-        Band { low_hz, high_hz },
+        MAIN_BAND,
         &fit::Options::default(),
     );
     match found {

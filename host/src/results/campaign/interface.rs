@@ -3,14 +3,14 @@
 use super::back_coupling;
 use super::interface_checks;
 use super::joint::shaped;
-use crate::results::{Check, InterfaceModes, MAIN_BAND_HZ, Results, VirtualPoint, rounded};
+use crate::results::{Check, InterfaceModes, MAIN_BAND, Results, VirtualPoint, rounded};
 use crate::substructuring::averaged::Priors;
 use crate::substructuring::cmif::{Cmif, cmif};
 use crate::substructuring::explained::Explained;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping};
 use crate::substructuring::identify::{Identification, VirtualPointQuality};
 use crate::substructuring::noise::FrfNoise;
-use crate::substructuring::{Band, FrfMatrix, IdmSet, Method};
+use crate::substructuring::{FrfMatrix, IdmSet, Method};
 
 /// Curves of the CMIF that are kept: twelve interface motions at most, and the first beyond them.
 const CURVES: usize = 13;
@@ -54,8 +54,7 @@ fn back_coupled(
 ) -> Option<Check> {
     let by_inverse = found.spectra.iter().filter(|s| s.method == Method::Inverse.name());
     let idms = IdmSet::of(&by_inverse.max_by_key(|s| s.idms)?.modes)?;
-    let main = Band { low_hz: MAIN_BAND_HZ[0], high_hz: MAIN_BAND_HZ[1] };
-    let judged = Explained::of(frfs, noises, geometry, idms, main, priors)?;
+    let judged = Explained::of(frfs, noises, geometry, idms, MAIN_BAND, priors)?;
     back_coupling::check(&judged)
 }
 
@@ -72,9 +71,8 @@ fn without_spares(frf: &FrfMatrix, points: &Configuration) -> FrfMatrix {
 
 /// Mean of the lines in the main band; of all lines where it has none.
 fn mean_in_band(frequency_hz: &[f64], values: &[f64]) -> f64 {
-    let band = Band { low_hz: MAIN_BAND_HZ[0], high_hz: MAIN_BAND_HZ[1] };
     let inside: Vec<f64> =
-        frequency_hz.iter().zip(values).filter(|(f, _)| band.contains(**f)).map(|(_, v)| *v).collect();
+        frequency_hz.iter().zip(values).filter(|(f, _)| MAIN_BAND.contains(**f)).map(|(_, v)| *v).collect();
     let used = if inside.is_empty() { values } else { &inside };
     used.iter().sum::<f64>() / used.len() as f64
 }

@@ -2,10 +2,10 @@
 
 use super::checks::UNIDENTIFIED;
 use crate::results::number::{micro, short};
-use crate::results::{Check, MAIN_BAND_HZ};
+use crate::results::{Check, MAIN_BAND};
 use crate::substructuring::cmif::Cmif;
 use crate::substructuring::identify::{Identification, Internals};
-use crate::substructuring::{Band, BandStatistic, Dof, JointSpectrum, Method};
+use crate::substructuring::{BandStatistic, Dof, JointSpectrum, Method};
 
 /// Name of the check on which rigid motions coupling adds.
 pub const INTERFACE_MODES: &str = "interface-modes";
@@ -18,10 +18,6 @@ pub const SAME_IN_ALL: &str = "same-in-all-configurations";
 const RIGID: f64 = 0.9;
 /// A difference of this part of the stiffness matters.
 const MATTERS: f64 = 0.1;
-
-fn main_band() -> Band {
-    Band { low_hz: MAIN_BAND_HZ[0], high_hz: MAIN_BAND_HZ[1] }
-}
 
 /// Which set of modes the CMIF suggests, and whether rigid motions are enough at all.
 pub fn modes(found: &Cmif) -> Check {
@@ -109,7 +105,7 @@ fn sliding(found: &Identification, method: Method) -> Option<(&JointSpectrum, &[
 pub fn configuration(found: &Identification) -> Option<Check> {
     let (reference, inverse) = sliding(found, Method::Inverse)?;
     let inside: Vec<usize> =
-        (0..inverse.len()).filter(|&l| main_band().contains(reference.frequency_hz[l])).collect();
+        (0..inverse.len()).filter(|&l| MAIN_BAND.contains(reference.frequency_hz[l])).collect();
     let of = |values: &dyn Fn(usize) -> f64| {
         BandStatistic::of(&inside.iter().map(|&l| values(l)).collect::<Vec<f64>>())
     };

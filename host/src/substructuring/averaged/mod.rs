@@ -21,7 +21,7 @@ use super::frf::FrfMatrix;
 use super::geometry::Geometry;
 use super::idm::{Dof, IdmSet};
 use super::interface_data::{InterfaceError, balance};
-use super::joint::{Band, stiffness_and_damping};
+use super::joint::{Band, NORMAL_95, stiffness_and_damping};
 use super::noise::{FrfNoise, NoiseError, shared_by_lines};
 use super::pseudo_inverse::{RankLost, full_rank_inverse};
 use assembly::Assembly;
@@ -34,8 +34,6 @@ use typical::Typical;
 
 type Line = DMatrix<Complex<f64>>;
 
-/// 95 % of a normal distribution lie within this many standard deviations.
-const NORMAL_95: f64 = 1.96;
 /// Above this relative half width the compliance cannot be told from zero well enough: the stiffness has no upper limit worth a name.
 const UNIDENTIFIED: f64 = 0.6;
 /// Above this the even mean of the lines tells nothing, so that weights have nothing to choose from either.

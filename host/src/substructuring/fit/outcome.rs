@@ -5,13 +5,11 @@ use super::solver::Found;
 use super::{Fitted, Options};
 use crate::substructuring::idm::{Dof, IdmSet};
 use crate::substructuring::interface_data::balance;
-use crate::substructuring::joint::{Band, BandStatistic, JointRow};
+use crate::substructuring::joint::{Band, BandStatistic, JointRow, NORMAL_95};
 use nalgebra::DVector;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// 95 % of a normal distribution lie within this many standard deviations.
-const NORMAL_95: f64 = 1.96;
 /// Half width over value above which a stiffness is a limit rather than a number.
 const UNIDENTIFIED: f64 = 0.6;
 /// A loss factor known no better than this is its prior's, not the data's.
