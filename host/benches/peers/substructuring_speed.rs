@@ -127,9 +127,7 @@ pub fn run(python: Option<&str>) -> Outcome {
         ajb.outputs.len(),
         ajb.inputs.len()
     );
-    println!(
-        "all of `identify`, with consistency, passivity and statistics of all 42 entries: {whole:.4} s"
-    );
+    println!("all of `identify`, with consistency, passivity and statistics of all 42 entries: {whole:.4} s");
     let mut short = Vec::new();
     if let Some(python) = python {
         let folder = tempfile::tempdir()?;
