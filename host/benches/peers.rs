@@ -50,3 +50,8 @@ fn script(python: &str, name: &str, argument: &str) -> Result<String, Box<dyn st
     }
     Ok(String::from_utf8(output.stdout)?)
 }
+
+/// The quickest of several runs, s: whatever else a machine does can only add to it, so that both sides are compared at their best.
+fn quickest(seconds: &[f64]) -> f64 {
+    seconds.iter().copied().reduce(f64::min).unwrap_or(f64::NAN)
+}

@@ -1,6 +1,6 @@
-//! Median of five runs of each job, ours and the peer's, on the same machine in one go.
+//! Quickest of five runs of each job, ours and the peer's, on the same machine in one go.
 
-use super::{Outcome, script};
+use super::{Outcome, quickest, script};
 use jointrig::exchange::uff::{
     Abscissa, ByteOrder, DataSet, Dof, Encoding, Function, Precision, Values, kind, read, write,
 };
@@ -39,30 +39,25 @@ pub fn run(python: Option<&str>) -> Outcome {
         })
         .transpose()?;
     println!("H1 and coherence of {HITS} hits x (1 + {RESPONSES}) x {SAMPLES} samples against pyFRF;");
-    println!("UFF58 of {FUNCTIONS} x {LINES} complex lines against pyuff; median of {RUNS}.");
+    println!("UFF58 of {FUNCTIONS} x {LINES} complex lines against pyuff; quickest of {RUNS}.");
     println!("| job | ours, s | peer, s | ratio | wanted |");
     println!("|---|---|---|---|---|");
     let mut short = Vec::new();
     for (job, wanted) in JOBS {
-        let mine = median(ours.iter().find(|(name, _)| *name == job).map_or(&[], |(_, t)| t));
+        let mine = quickest(ours.iter().find(|(name, _)| *name == job).map_or(&[], |(_, t)| t));
         let Some(theirs) = &theirs else {
             println!("| {job} | {mine:.4} | | | |");
             continue;
         };
         let times: Vec<f64> = serde_json::from_value(theirs[job].clone())?;
-        let (peer, ratio) = (median(&times), median(&times) / mine);
+        let peer = quickest(&times);
+        let ratio = peer / mine;
         println!("| {job} | {mine:.4} | {peer:.4} | {ratio:.1} | {wanted} |");
         if ratio < wanted {
             short.push(job);
         }
     }
     if short.is_empty() { Ok(()) } else { Err(format!("slower than wanted: {}", short.join(", ")).into()) }
-}
-
-fn median(times: &[f64]) -> f64 {
-    let mut times = times.to_vec();
-    times.sort_by(f64::total_cmp);
-    times.get(times.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 fn times(mut job: impl FnMut()) -> Vec<f64> {

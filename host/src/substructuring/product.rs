@@ -37,13 +37,26 @@ pub(crate) fn product_of_block(
     out
 }
 
-/// sum += Σ fᵢ columnᵢ. Three at once spare two loads and stores of the sum in three.
+/// sum += Σ fᵢ columnᵢ.
 fn add_columns<A, B>(sum: &mut [Complex<f64>], columns: &[A], factors: &[B])
 where
     A: Copy + Mul<B, Output = Complex<f64>>,
     B: Copy,
 {
-    let rows = sum.len();
+    match sum.len() {
+        6 => add_columns_of(6, &mut sum[..6], columns, factors),
+        n => add_columns_of(n, sum, columns, factors),
+    }
+}
+
+/// Three at once spare two loads and stores of the sum in three.
+#[expect(clippy::inline_always, reason = "only there the size is known")]
+#[inline(always)]
+fn add_columns_of<A, B>(rows: usize, sum: &mut [Complex<f64>], columns: &[A], factors: &[B])
+where
+    A: Copy + Mul<B, Output = Complex<f64>>,
+    B: Copy,
+{
     let (mut columns, mut factors) = (columns.chunks_exact(3 * rows), factors.chunks_exact(3));
     for (columns, f) in columns.by_ref().zip(factors.by_ref()) {
         let (x, rest) = columns.split_at(rows);

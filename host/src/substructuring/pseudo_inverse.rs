@@ -68,7 +68,17 @@ pub fn full_rank_inverse(a: &Line, name: &'static str) -> Result<Line, RankLost>
 
 /// A⁻¹ by Gauss–Jordan elimination with row pivoting; none when a pivot is not clearly above rounding.
 fn elimination(a: &Line) -> Option<Line> {
-    let n = a.nrows();
+    // sizes known beforehand are loops without counters: one virtual point's motions, and both of an assembly
+    match a.nrows() {
+        6 => elimination_of(a, 6),
+        12 => elimination_of(a, 12),
+        n => elimination_of(a, n),
+    }
+}
+
+#[expect(clippy::inline_always, reason = "only there the size is known")]
+#[inline(always)]
+fn elimination_of(a: &Line, n: usize) -> Option<Line> {
     let mut inverse = a.clone();
     let mut swaps = Vec::with_capacity(n);
     let mut scratch = vec![Complex::default(); 2 * n];
