@@ -6,7 +6,7 @@ use super::{
     Bootstrap, Excitation, Force, Hysteresis, Identified, Joint, MAIN_BAND_HZ, OverCycles, Results, Shape,
 };
 use crate::hysteresis::static_arm::Basis;
-use crate::substructuring::Dof;
+use crate::substructuring::{Dof, fit};
 
 /// What FBS found between the arms, in one sentence: the recommended estimate, or else the headline's method.
 pub fn substructuring(results: &Results) -> Option<String> {
@@ -201,14 +201,18 @@ fn joint_line(joint: &Joint) -> Option<String> {
     } else {
         ""
     };
+    // the fit takes all lines at once
+    let spread = if joint.method == fit::NAME {
+        format!("σ of the estimate from {} lines", joint.lines)
+    } else {
+        format!("σ over {} lines; median {}", joint.lines, short(micro(k.median)))
+    };
     Some(format!(
-        "  {:<17} {}  {:>11}  k_z {} (σ over {} lines; median {}{ci95}){verdict}",
+        "  {:<17} {}  {:>11}  k_z {} ({spread}{ci95}){verdict}",
         joint.method,
         if joint.idms == 0 { "      ".to_owned() } else { format!("{} IDMs", joint.idms) },
         band(joint.band_hz),
         stiffness(k.mean, k.std),
-        joint.lines,
-        short(micro(k.median)),
     ))
 }
 

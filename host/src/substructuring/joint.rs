@@ -244,8 +244,9 @@ fn scatter_warnings(k: &BandStatistic) -> Vec<String> {
     }
     if (k.mean - k.median).abs() > 0.2 * k.mean.abs().max(k.median.abs()) {
         warnings.push(format!(
-            "mean {:.4e} and median {:.4e} N/m of k_z disagree: single lines carry the mean",
-            k.mean, k.median
+            "mean {:.1} and median {:.1} N/µm of k_z disagree: single lines carry the mean",
+            k.mean * 1e-6,
+            k.median * 1e-6
         ));
     }
     if k.mean < 0.0 {

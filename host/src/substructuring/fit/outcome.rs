@@ -168,7 +168,7 @@ impl Fitted {
         }
         if !self.converged {
             warnings.push(
-                "the search had not settled when it was stopped: the estimate still moved by more than half its standard deviation".into(),
+                "the search had not settled when it was stopped: the estimate still moved by more than half its standard deviation, or the data had to be trusted less for it to move at all".into(),
             );
         }
         if self.largest_error > 5.0 {
