@@ -55,4 +55,22 @@ fn the_rigid_clamp_shows_the_contact() {
     let results = demo(folder.path(), &["--rig", rig.to_str().unwrap()]);
     let k = sliding_stiffness(&results, "internal");
     assert!((k / 180.0 - 1.0).abs() < 0.05, "{k} N/µm");
+    // nothing but noise moves these lines, and the noise told for each is what moves it: the median of a normal distribution's
+    // size is 0.674 σ; three hits know a variance to some tens of per cent
+    let spectrum = &results["joint_spectrum"];
+    let curves = spectrum["curves"].as_array().unwrap();
+    let internal = |c: &&Value| c["method"] == "internal" && c["idms"] == 6 && c["dof"] == "z";
+    let curve = curves.iter().find(internal).unwrap();
+    let numbers = |values: &Value| -> Vec<f64> {
+        values.as_array().unwrap().iter().map(|v| v.as_f64().unwrap_or(f64::NAN)).collect()
+    };
+    let lines = numbers(&spectrum["frequency_hz"]);
+    let (k, noise) = (numbers(&curve["stiffness_n_per_m"]), numbers(&curve["stiffness_noise_n_per_m"]));
+    let mut off: Vec<f64> = (0..lines.len())
+        .filter(|&l| (300.0..=600.0).contains(&lines[l]))
+        .map(|l| (k[l] - 180e6).abs() / noise[l])
+        .collect();
+    off.sort_by(f64::total_cmp);
+    let in_sigmas = off[off.len() / 2] / 0.674;
+    assert!((0.7..1.4).contains(&in_sigmas), "{in_sigmas}");
 }

@@ -32,6 +32,7 @@ fn joint(method: &str, idms: usize, band_hz: [f64; 2], k: f64, std: f64, warning
         coupling_si: BTreeMap::new(),
         coupling_damping_si: BTreeMap::new(),
         lines: ((band_hz[1] - band_hz[0]) / 0.5) as usize + 1,
+        noise_n_per_m: BTreeMap::from([("z".to_owned(), 0.8 * std)]),
         goodness: None,
         warnings: warnings.iter().map(|w| (*w).to_owned()).collect(),
     }
@@ -113,6 +114,7 @@ fn spectrum() -> JointSpectrum {
                     .then(|| rounded(k + size * scatter(l + idms) + peak + 2e6 * (f / 60.0 * PI).sin(), 6))
             })
             .collect(),
+        stiffness_noise_n_per_m: vec![Some(0.8 * size); frequency_hz.len()],
         damping_n_s_per_m: frequency_hz
             .iter()
             .enumerate()

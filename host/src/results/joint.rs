@@ -35,6 +35,10 @@ pub struct Joint {
     /// Damping between them, in the same units times seconds.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub coupling_damping_si: BTreeMap<String, Statistics>,
+    /// What the FRFs' noise alone moves the stiffness of one line by, N/m by direction: standard deviation by linear propagation through
+    /// virtual points and method, median over the band. None where a variance is not known.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub noise_n_per_m: BTreeMap<String, f64>,
     /// Lines of the band that were used.
     pub lines: usize,
     /// Of `fit`: how well the model describes the data.
@@ -93,6 +97,9 @@ pub struct SpectrumCurve {
     pub dof: String,
     /// Re Z, N/m; null where the line gave none.
     pub stiffness_n_per_m: Vec<Option<f64>>,
+    /// Standard deviation of the stiffness from the FRFs' noise alone, N/m; empty where their variance is not known.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stiffness_noise_n_per_m: Vec<Option<f64>>,
     /// Damping, N s/m; null where the line gave none.
     pub damping_n_s_per_m: Vec<Option<f64>>,
 }

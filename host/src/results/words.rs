@@ -195,8 +195,10 @@ fn joint_line(joint: &Joint) -> Option<String> {
     let ci95 = k
         .ci95
         .map_or(String::new(), |[low, high]| format!(", 95 % {}…{}", short(micro(low)), short(micro(high))));
-    // never a bare number where the lines scatter by more than the value
-    let verdict = if k.std > super::campaign::UNIDENTIFIED * k.mean.abs() || k.mean <= 0.0 {
+    // never a bare number where the lines scatter, or noise moves them, by more than the value
+    let noise = joint.noise_n_per_m.get("z");
+    let drowned = noise.is_some_and(|noise| *noise > k.mean.abs());
+    let verdict = if k.std > super::campaign::UNIDENTIFIED * k.mean.abs() || k.mean <= 0.0 || drowned {
         "; not identified"
     } else {
         ""
@@ -205,7 +207,8 @@ fn joint_line(joint: &Joint) -> Option<String> {
     let spread = if joint.method == fit::NAME {
         format!("σ of the estimate from {} lines", joint.lines)
     } else {
-        format!("σ over {} lines; median {}", joint.lines, short(micro(k.median)))
+        let noise = noise.map_or(String::new(), |noise| format!(", noise alone {}", short(micro(*noise))));
+        format!("σ over {} lines{noise}; median {}", joint.lines, short(micro(k.median)))
     };
     Some(format!(
         "  {:<17} {}  {:>11}  k_z {} ({spread}{ci95}){verdict}",

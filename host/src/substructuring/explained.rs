@@ -11,7 +11,7 @@ use super::geometry::{Configuration, Geometry, Point};
 use super::identify::back_coupled;
 use super::idm::IdmSet;
 use super::joint::{Band, median};
-use super::noise::FrfNoise;
+use super::noise::{FrfNoise, SMOOTH_HZ};
 use nalgebra::{Complex, Unit, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -27,8 +27,6 @@ const DRAWS: u64 = 12;
 const SEED: u64 = 0x6261_636b;
 /// Lines within ± this many Hz are judged together by their median: a single resonance, which errors of position move, decides nothing.
 const AROUND_HZ: f64 = 75.0;
-/// Variances are smoothed over ± this many Hz.
-const SMOOTH_HZ: f64 = 10.0;
 /// An error up to this many times what is explained is nothing: a dozen draws and a handful of resonances know no better.
 pub const USUAL: f64 = 2.0;
 /// An error this many times what is explained is another thing.

@@ -7,7 +7,9 @@ use super::geometry::Geometry;
 use super::idm::{Dof, IdmSet};
 use super::interface_data::{InterfaceError, Measured};
 use super::joint::{Band, JointRow, JointSpectrum};
+use super::line_noise::LineNoise;
 use super::method::Method;
+use super::noise::{FrfNoise, NoiseError, SMOOTH_HZ};
 use super::reduced::{Reduced, Rooms, Solution};
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
@@ -58,6 +60,14 @@ pub enum IdentifyError {
         found: f64,
         /// A's σ, 1/s.
         expected: f64,
+    },
+    /// A variance belongs to other FRFs.
+    #[error("{file}: {source}")]
+    Noise {
+        /// Which file.
+        file: &'static str,
+        /// What does not fit.
+        source: NoiseError,
     },
     /// A band has no line.
     #[error(
@@ -253,6 +263,41 @@ pub fn decouple(
     let reduced = Reduced::of(&rooms, idms);
     let z = |method| solve(&rooms, &reduced, idms, method).map(|solution| solution.z);
     Ok(methods.iter().map(|&method| (method, z(method))).collect())
+}
+
+/// The noise of a method's lines, or why there is none.
+pub type Propagated = Result<LineNoise, Refused>;
+
+/// What the FRFs' noise does to every line above 0 Hz by every method asked for: linear propagation of the variances, smoothed over
+/// ± 10 Hz, through virtual points and method.
+///
+/// # Errors
+/// [`IdentifyError`] when files or variances do not fit together; [`Refused`] of a method that cannot work on them.
+pub fn line_noise(
+    [a, b, ajb]: [&FrfMatrix; 3],
+    noises: [&FrfNoise; 3],
+    geometry: &Geometry,
+    methods: &[Method],
+    idms: IdmSet,
+) -> Result<Vec<(Method, Propagated)>, IdentifyError> {
+    check_alike(a, b, ajb)?;
+    for ((file, frf), noise) in [("A", a), ("B", b), ("AJB", ajb)].into_iter().zip(noises) {
+        noise.check(frf).map_err(|source| IdentifyError::Noise { file, source })?;
+    }
+    let files = [a, b, ajb].map(above_zero);
+    let [a, b, ajb] = [0, 1, 2].map(|i| {
+        let lines = &files[i].frequency_hz;
+        let skipped = noises[i].variance.len() - lines.len();
+        FrfNoise { variance: noises[i].variance[skipped..].to_vec() }.smoothed(lines, SMOOTH_HZ)
+    });
+    let rooms = rooms(&files, geometry);
+    let reduced = Reduced::of(&rooms, idms);
+    let noise = |method| {
+        let refused = |reason: String| Refused { method, idms: idms.count(), reason };
+        let reduced = reduced.as_ref().map_err(|error| refused(error.to_string()))?;
+        reduced.line_noise(&rooms, [&a, &b, &ajb], method).map_err(|error| refused(error.to_string()))
+    };
+    Ok(methods.iter().map(|&method| (method, noise(method))).collect())
 }
 
 /// A and B coupled by the mean over `band` of what Eq. (A.1) gives, against the measured assembly. None where the files do not fit

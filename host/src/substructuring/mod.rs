@@ -8,7 +8,7 @@
 //!    [`consistency`] says what is lost.
 //! 4. [`decoupling`]: one file per method, all returning Z^J per line; [`pseudo_inverse`] inverts without truncating.
 //! 5. [`joint`]: K and C per line and over bands, with scatter, interval and warnings.
-//! 6. [`identify`](mod@identify): the front door that does all of it.
+//! 6. [`identify`](mod@identify): the front door that does all of it; [`line_noise`](mod@line_noise): what the FRFs' noise does to each of its lines.
 //! 7. [`averaged`](mod@averaged): the estimate to quote, with its interval; the bootstrap over hits. [`noise`] is what they start from.
 //! 8. [`fit`]: K and C by maximum likelihood over all measured blocks.
 //! 9. [`coupling`]: the other way round, from parts to the assembly; [`cmif`](mod@cmif): how many modes the interface needs;
@@ -30,7 +30,9 @@ pub mod geometry;
 pub mod identify;
 pub mod idm;
 mod interface_data;
+mod internals;
 pub mod joint;
+pub mod line_noise;
 pub mod method;
 pub mod noise;
 pub mod plausibility;
@@ -44,7 +46,7 @@ pub mod vpt;
 pub use frf::{FrfError, FrfMatrix, Quantity};
 pub use geometry::{Configuration, Geometry, Grouping, Point};
 pub use identify::{
-    Decoupled, Identification, IdentifyError, Refused, VirtualPointQuality, decouple, identify,
+    Decoupled, Identification, IdentifyError, Refused, VirtualPointQuality, decouple, identify, line_noise,
 };
 pub use idm::{Dof, IdmSet};
 pub use joint::{Band, BandStatistic, JointRow, JointSpectrum};

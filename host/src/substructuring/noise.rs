@@ -3,6 +3,9 @@
 use super::frf::FrfMatrix;
 use nalgebra::DMatrix;
 
+/// Variances are averaged over this many Hz on either side: one from a handful of hits scatters by its own size.
+pub const SMOOTH_HZ: f64 = 10.0;
+
 /// Why a noise array cannot be used with an FRF matrix.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NoiseError {

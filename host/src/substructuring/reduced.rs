@@ -9,7 +9,8 @@ use super::decoupling::{
 use super::geometry::{Geometry, Grouping};
 use super::identify::{Internals as InternalsFound, VirtualPointQuality};
 use super::idm::IdmSet;
-use super::interface_data::{Found, InterfaceError, Measured, VirtualPoint, balance, scaled};
+use super::interface_data::{InterfaceError, Measured, VirtualPoint, balance, scaled};
+use super::internals::{Internals, Side, Which};
 use super::joint::Band;
 use super::method::Method;
 use super::plausibility::{passivity, reciprocity};
@@ -45,16 +46,52 @@ pub(super) struct Rooms<'a> {
     pub(super) geometry: &'a Geometry,
 }
 
+impl<'a> Rooms<'a> {
+    /// The file of one substructure alone.
+    pub(super) fn alone(&self, side: Side) -> Measured<'a> {
+        match side {
+            Side::A => self.a,
+            Side::B => self.b,
+        }
+    }
+}
+
+/// What a method is made of.
+pub(super) enum Kind {
+    /// Responses on the first, hits on the second.
+    Internal(Side, Side, Which),
+    Interface,
+    Primal(PrimalBlock),
+    Inverse(InverseBlock),
+}
+
+impl From<Method> for Kind {
+    fn from(method: Method) -> Kind {
+        match method {
+            Method::Internal => Kind::Internal(Side::B, Side::A, Which::All),
+            Method::InternalPrinted => Kind::Internal(Side::B, Side::A, Which::Printed),
+            Method::InternalAa => Kind::Internal(Side::A, Side::A, Which::All),
+            Method::InternalAb => Kind::Internal(Side::A, Side::B, Which::All),
+            Method::InternalBb => Kind::Internal(Side::B, Side::B, Which::All),
+            Method::Interface => Kind::Interface,
+            Method::PrimalA => Kind::Primal(PrimalBlock::A),
+            Method::PrimalB => Kind::Primal(PrimalBlock::B),
+            Method::Inverse => Kind::Inverse(InverseBlock::Ab),
+            Method::InverseBa => Kind::Inverse(InverseBlock::Ba),
+        }
+    }
+}
+
 /// Virtual points of A and B alone for one IDM set, with their admittances (rotations scaled to metres).
 ///
 /// Admittances stay in the files' quantity, receptance times sᵏ: every method turns it into Z^J over sᵏ, and one factor at the
 /// end makes up for it.
 pub(super) struct Reduced {
-    idms: IdmSet,
-    a: Balanced,
-    b: Balanced,
-    y_a: Vec<Line>,
-    y_b: Vec<Line>,
+    pub(super) idms: IdmSet,
+    pub(super) a: Balanced,
+    pub(super) b: Balanced,
+    pub(super) y_a: Vec<Line>,
+    pub(super) y_b: Vec<Line>,
     /// Y^AJB_cc and its inverse: five methods share them.
     assembly: OnceLock<Result<Vec<Line>, RefusedReason>>,
     impedance: OnceLock<Result<Vec<Line>, RefusedReason>>,
@@ -105,31 +142,26 @@ impl Reduced {
     }
 
     pub(super) fn solve(&self, rooms: &Rooms<'_>, method: Method) -> Solved {
-        match method {
-            Method::Internal => self.internals(rooms, method, Side::B, Side::A, Internals::All),
-            Method::InternalPrinted => self.internals(rooms, method, Side::B, Side::A, Internals::Printed),
-            Method::InternalAa => self.internals(rooms, method, Side::A, Side::A, Internals::All),
-            Method::InternalAb => self.internals(rooms, method, Side::A, Side::B, Internals::All),
-            Method::InternalBb => self.internals(rooms, method, Side::B, Side::B, Internals::All),
-            Method::Interface => {
+        match Kind::from(method) {
+            Kind::Internal(seen, hit, which) => {
+                let internals = Internals::of(seen, hit, which, rooms, [&self.a, &self.b]);
+                self.with_internals(rooms, method, &internals)
+            }
+            Kind::Interface => {
                 let y = self.assembly(rooms)?;
                 self.plain(rooms, |l| interface(&self.y_a[l], &self.y_b[l], &y[l]))
             }
-            Method::PrimalA => {
+            Kind::Primal(block) => {
                 let z = self.impedance(rooms)?;
-                self.plain(rooms, |l| primal_of(PrimalBlock::A, &self.y_a[l], &z[l]))
+                let y = match block {
+                    PrimalBlock::A => &self.y_a,
+                    PrimalBlock::B => &self.y_b,
+                };
+                self.plain(rooms, |l| primal_of(block, &y[l], &z[l]))
             }
-            Method::PrimalB => {
+            Kind::Inverse(block) => {
                 let z = self.impedance(rooms)?;
-                self.plain(rooms, |l| primal_of(PrimalBlock::B, &self.y_b[l], &z[l]))
-            }
-            Method::Inverse => {
-                let z = self.impedance(rooms)?;
-                self.plain(rooms, |l| Ok(inverse_of(InverseBlock::Ab, &z[l])))
-            }
-            Method::InverseBa => {
-                let z = self.impedance(rooms)?;
-                self.plain(rooms, |l| Ok(inverse_of(InverseBlock::Ba, &z[l])))
+                self.plain(rooms, |l| Ok(inverse_of(block, &z[l])))
             }
         }
     }
@@ -142,12 +174,17 @@ impl Reduced {
         BackCoupling::of(rooms.a.frf, &self.y_a, &self.y_b, y, &z, band)
     }
 
+    /// Both virtual points of the assembly, A's first.
+    pub(super) fn assembled(&self, rooms: &Rooms<'_>) -> Result<[Balanced; 2], InterfaceError> {
+        let of = |grouping| Balanced::of(rooms.ajb, grouping, rooms.geometry, self.idms);
+        Ok([of(Grouping::InterfaceA)?, of(Grouping::InterfaceB)?])
+    }
+
     /// Y^AJB_cc: both virtual points of the assembly, A's first.
-    fn assembly(&self, rooms: &Rooms<'_>) -> Result<&[Line], RefusedReason> {
+    pub(super) fn assembly(&self, rooms: &Rooms<'_>) -> Result<&[Line], RefusedReason> {
         let found = self.assembly.get_or_init(|| {
             let n = self.idms.count();
-            let of = |grouping| Balanced::of(rooms.ajb, grouping, rooms.geometry, self.idms);
-            let vp = [of(Grouping::InterfaceA)?, of(Grouping::InterfaceB)?];
+            let vp = self.assembled(rooms)?;
             every_line(rooms.ajb.frf.lines.len(), |l| {
                 let mut line = Line::zeros(2 * n, 2 * n);
                 for (r, out) in vp.iter().enumerate() {
@@ -163,7 +200,7 @@ impl Reduced {
     }
 
     /// (Y^AJB_cc)⁻¹.
-    fn impedance(&self, rooms: &Rooms<'_>) -> Result<&[Line], RefusedReason> {
+    pub(super) fn impedance(&self, rooms: &Rooms<'_>) -> Result<&[Line], RefusedReason> {
         let y = self.assembly(rooms)?;
         let found = self.impedance.get_or_init(|| {
             every_line(y.len(), |l| {
@@ -187,38 +224,21 @@ impl Reduced {
     }
 
     /// Both forms of Eq. (3) and its sisters: P, Q from the substructures, M from the assembly, at the internals that both have.
-    fn internals(&self, rooms: &Rooms<'_>, name: Method, seen: Side, hit: Side, which: Internals) -> Solved {
-        let printed = which == Internals::Printed;
-        let alone = |side| match side {
-            Side::A => (rooms.a, &self.a),
-            Side::B => (rooms.b, &self.b),
-        };
-        let ((seen_file, seen_at), (hit_file, hit_at)) = (alone(seen), alone(hit));
-        let (seen_on, hit_on) = (seen.responses(which), hit.impacts(which));
-        let (columns, columns_ajb) = shared(&hit_file.inputs(hit_on), &rooms.ajb.inputs(hit_on));
-        let (rows, rows_ajb) = shared(&seen_file.outputs(seen_on), &rooms.ajb.outputs(seen_on));
-        let q = |l: usize| hit_file.reduced_outputs(l, &hit_at.t_u, &hit_at.vp.rows, &columns);
-        let p = |l: usize| -> Result<Line, InterfaceError> {
-            Ok(reduce_inputs(&seen_file.cells(l, &rows, &seen_at.vp.columns)?, &seen_at.t_f))
-        };
-        let m = |l: usize| -> Result<Line, InterfaceError> {
-            let assembled = rooms.ajb.cells(l, &rows_ajb, &columns_ajb)?;
-            // of one substructure: alone minus in the assembly
-            if seen == hit { Ok(seen_file.cells(l, &rows, &columns)? - assembled) } else { Ok(assembled) }
-        };
+    fn with_internals(&self, rooms: &Rooms<'_>, name: Method, internals: &Internals<'_>) -> Solved {
+        let printed = internals.printed;
         let mut notes = Vec::new();
-        let (n_b, n_a) = (rows.at.len(), columns.at.len());
+        let (n_b, n_a) = (internals.rows.at.len(), internals.columns.at.len());
         let n_c = self.idms.count();
         let lines = self.y_a.len();
         if n_a.min(n_b) == 0 && lines > 0 {
             let source = DecouplingError::TooFewInternals { impacts: n_a, responses: n_b, needed: n_c };
             return Err(Self::refused(rooms, 0, source));
         }
-        let internals = if lines == 0 {
+        let found = if lines == 0 {
             None
         } else {
             let middle = lines / 2;
-            let (p, q) = (p(middle)?, q(middle)?);
+            let (p, q) = (internals.p(middle)?, internals.q(middle)?);
             Some(InternalsFound {
                 method: name,
                 idms: n_c,
@@ -232,7 +252,7 @@ impl Reduced {
             })
         };
         if printed && lines > 0 && (n_a != n_c || n_b != n_c) {
-            let rank = observed_rank(&p(0)?, &q(0)?);
+            let rank = observed_rank(&internals.p(0)?, &internals.q(0)?);
             notes.push(format!(
                 "Eq. 3 as printed with {n_a} internal impacts and {n_b} internal responses for {n_c} interface DoFs: Π has rank {rank} of {n_c}, \
                  so the result is right only for the interface forces that these internals generate, and biased otherwise; `internal` is the exact form"
@@ -240,13 +260,13 @@ impl Reduced {
         }
         let method = if printed { internal_printed } else { internal };
         let z = self.per_line(rooms, |l| {
-            method(&self.y_a[l], &self.y_b[l], &p(l)?, &m(l)?, &q(l)?)
+            method(&self.y_a[l], &self.y_b[l], &internals.p(l)?, &internals.m(l)?, &internals.q(l)?)
                 .map_err(|source| Self::refused(rooms, l, source))
         })?;
-        Ok(Solution { z, notes, internals })
+        Ok(Solution { z, notes, internals: found })
     }
 
-    fn refused(rooms: &Rooms<'_>, line: usize, source: DecouplingError) -> RefusedReason {
+    pub(super) fn refused(rooms: &Rooms<'_>, line: usize, source: DecouplingError) -> RefusedReason {
         RefusedReason::Decoupling { frequency_hz: rooms.a.frf.frequency_hz[line], source }
     }
 
@@ -263,14 +283,14 @@ impl Reduced {
 }
 
 /// A virtual point in one file with its rotations in metres: T_u and T_f between measured points and D u, D⁻¹ f.
-struct Balanced {
-    vp: VirtualPoint,
-    t_u: DMatrix<f64>,
-    t_f: DMatrix<f64>,
+pub(super) struct Balanced {
+    pub(super) vp: VirtualPoint,
+    pub(super) t_u: DMatrix<f64>,
+    pub(super) t_f: DMatrix<f64>,
 }
 
 impl Balanced {
-    fn of(
+    pub(super) fn of(
         file: Measured<'_>,
         grouping: Grouping,
         geometry: &Geometry,
@@ -290,62 +310,14 @@ impl Balanced {
 }
 
 /// What `of` gives for each line, in parallel; the first line's refusal if there are some.
-fn every_line<E>(lines: usize, of: impl Fn(usize) -> Result<Line, E> + Sync) -> Result<Vec<Line>, E> {
-    let found: Vec<Option<Line>> = (0..lines).into_par_iter().with_min_len(16).map(|l| of(l).ok()).collect();
+pub(super) fn every_line<T: Send, E>(
+    lines: usize,
+    of: impl Fn(usize) -> Result<T, E> + Sync,
+) -> Result<Vec<T>, E> {
+    let found: Vec<Option<T>> = (0..lines).into_par_iter().with_min_len(16).map(|l| of(l).ok()).collect();
     match found.into_iter().collect() {
         Some(all) => Ok(all),
         // which refusal is the first shows when they are asked in order
         None => (0..lines).map(of).collect(),
     }
-}
-
-/// A substructure.
-#[derive(Clone, Copy, PartialEq)]
-enum Side {
-    A,
-    B,
-}
-
-/// Which points count as internal.
-#[derive(Clone, Copy, PartialEq)]
-enum Internals {
-    /// All that was measured on the substructure, its interface points too; A's internal responses are spares and stay out.
-    All,
-    /// Grouping 3 and 4 only, as the paper has them.
-    Printed,
-}
-
-impl Side {
-    fn impacts(self, which: Internals) -> &'static [Grouping] {
-        match (self, which) {
-            (Side::A, Internals::All) => &[Grouping::InterfaceA, Grouping::InternalA],
-            (Side::A, Internals::Printed) => &[Grouping::InternalA],
-            (Side::B, Internals::All) => &[Grouping::InterfaceB, Grouping::InternalB],
-            (Side::B, Internals::Printed) => &[Grouping::InternalB],
-        }
-    }
-
-    fn responses(self, which: Internals) -> &'static [Grouping] {
-        match (self, which) {
-            (Side::A, Internals::All) => &[Grouping::InterfaceA],
-            _ => self.impacts(which),
-        }
-    }
-}
-
-/// Those rows (or columns) that both files have, in the order of the first.
-fn shared(first: &Found, second: &Found) -> (Found, Found) {
-    let mut one = Found { names: vec![], points: vec![], at: vec![] };
-    let mut two = Found { names: vec![], points: vec![], at: vec![] };
-    for (i, name) in first.names.iter().enumerate() {
-        if let Some(j) = second.names.iter().position(|n| n == name) {
-            one.names.push(name.clone());
-            one.points.push(first.points[i].clone());
-            one.at.push(first.at[i]);
-            two.names.push(name.clone());
-            two.points.push(second.points[j].clone());
-            two.at.push(second.at[j]);
-        }
-    }
-    (one, two)
 }

@@ -85,6 +85,7 @@ impl ContactCompliance {
             coupling_si: BTreeMap::new(),
             coupling_damping_si: BTreeMap::new(),
             lines: stiffness.len() * DIRECT_LINES,
+            noise_n_per_m: BTreeMap::new(),
             goodness: None,
             warnings,
         })

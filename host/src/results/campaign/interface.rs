@@ -3,6 +3,7 @@
 use super::back_coupling;
 use super::interface_checks;
 use super::joint::shaped;
+use super::line_noise;
 use crate::results::{Check, InterfaceModes, MAIN_BAND, Results, VirtualPoint, rounded};
 use crate::substructuring::averaged::Priors;
 use crate::substructuring::cmif::{Cmif, cmif};
@@ -29,6 +30,7 @@ pub fn fill(
     results.joint = joint;
     results.joint_spectrum = spectrum;
     results.refused = refused;
+    line_noise::fill(results, frfs, noises, geometry, found);
     results.virtual_points = found.virtual_points.iter().map(virtual_point).collect();
     let [a, b, ajb] = [(a, &geometry.a), (b, &geometry.b), (ajb, &geometry.ajb)]
         .map(|(frf, points)| without_spares(frf, points));

@@ -28,6 +28,7 @@ impl From<&JointRow> for Joint {
             coupling_si: finite(&row.coupling_si),
             coupling_damping_si: finite(&row.coupling_damping_si),
             lines: row.lines,
+            noise_n_per_m: BTreeMap::new(),
             goodness: None,
             warnings: row.warnings.clone(),
         }
@@ -72,6 +73,7 @@ pub(super) fn shaped(found: &Identification) -> (Vec<Joint>, Option<JointSpectru
                     idms: s.idms,
                     dof: dof.name().into(),
                     stiffness_n_per_m: column(s.stiffness_n_per_m.get(dof)),
+                    stiffness_noise_n_per_m: Vec::new(),
                     damping_n_s_per_m: column(s.damping_n_s_per_m.get(dof)),
                 };
                 let translations: Vec<&Dof> =

@@ -19,6 +19,7 @@ mod imported;
 mod interface;
 mod interface_checks;
 mod joint;
+mod line_noise;
 mod loops;
 mod phase_split;
 mod recommended;

@@ -7,11 +7,8 @@ use crate::substructuring::geometry::{Geometry, Grouping};
 use crate::substructuring::idm::IdmSet;
 use crate::substructuring::interface_data::{Found, Measured};
 use crate::substructuring::joint::Band;
-use crate::substructuring::noise::FrfNoise;
+use crate::substructuring::noise::{FrfNoise, SMOOTH_HZ};
 use nalgebra::{Complex, DMatrix};
-
-/// Noise variances are averaged over this many Hz on either side before lines are weighed with them.
-const SMOOTH_HZ: f64 = 10.0;
 
 /// The assembly's FRFs reduced to its two virtual points, with what is needed to trace an error back to its cell.
 pub(super) struct Assembly {

@@ -8,14 +8,11 @@ use crate::substructuring::geometry::{Geometry, Grouping};
 use crate::substructuring::idm::IdmSet;
 use crate::substructuring::interface_data::{Found, InterfaceError, Measured, balance};
 use crate::substructuring::joint::Band;
-use crate::substructuring::noise::FrfNoise;
+use crate::substructuring::noise::{FrfNoise, SMOOTH_HZ};
 use crate::substructuring::vpt;
 use nalgebra::{Complex, DMatrix, Vector3};
 
 pub(super) type Line = DMatrix<Complex<f64>>;
-
-/// Noise variances are averaged over this many Hz on either side: one from a handful of hits scatters by its own size.
-const SMOOTH_HZ: f64 = 10.0;
 
 /// The axes of one sensor.
 pub(super) struct Sensor {

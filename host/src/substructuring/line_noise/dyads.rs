@@ -1,0 +1,142 @@
+//! What moves Z_dd, as sums of dyads over the cells of measured blocks.
+
+use crate::substructuring::internals::Side;
+use crate::substructuring::product::product;
+use crate::substructuring::reduced::Balanced;
+use nalgebra::{Complex, DMatrix};
+
+type C = Complex<f64>;
+type Line = DMatrix<C>;
+
+/// A, B, AJB: places of their files.
+pub(super) const ASSEMBLED: usize = 2;
+
+/// A measured block with what carries it to a reduced one: T_l Y\[rows, columns\] T_r.
+pub(super) struct Source<'a> {
+    pub(super) file: usize,
+    pub(super) rows: &'a [usize],
+    pub(super) t_l: Option<&'a DMatrix<f64>>,
+    pub(super) columns: &'a [usize],
+    pub(super) t_r: Option<&'a DMatrix<f64>>,
+}
+
+/// leftᵈ of the rows times rightᵈ of the columns is what a cell does to Z_dd.
+struct Dyad<'a> {
+    source: &'a Source<'a>,
+    /// Whether it belongs to h* instead of g.
+    conjugate: bool,
+    /// Degree of freedom × row.
+    left: Line,
+    /// Column × degree of freedom.
+    right: Line,
+}
+
+/// All that moves one line.
+#[derive(Default)]
+pub(super) struct Dyads<'a>(Vec<Dyad<'a>>);
+
+impl<'a> Dyads<'a> {
+    /// L δA R.
+    pub(super) fn linear(&mut self, source: &'a Source<'a>, l: &Line, r: &Line) {
+        let left = source.t_l.map_or_else(|| l.clone(), |t| product(l, t));
+        let right = source.t_r.map_or_else(|| r.clone(), |t| product(t, r));
+        self.0.push(Dyad { source, conjugate: false, left, right });
+    }
+
+    /// X δAᴴ W.
+    fn adjoint(&mut self, source: &'a Source<'a>, x: &Line, w: &Line) {
+        let rows = source.t_l.map_or_else(|| w.clone(), |t| product(&t.transpose(), w));
+        let columns = source.t_r.map_or_else(|| x.clone(), |t| product(x, &t.transpose()));
+        self.0.push(Dyad { source, conjugate: true, left: rows.adjoint(), right: columns.adjoint() });
+    }
+
+    /// L δ(A⁺) R.
+    pub(super) fn inverse(&mut self, source: &'a Source<'a>, l: &Line, [a, plus]: [&Line; 2], r: &Line) {
+        let (rows, columns) = a.shape();
+        self.linear(source, &(-product(l, plus)), &product(plus, r));
+        let adjoint = plus.adjoint();
+        if rows > columns {
+            let beside = r - product(a, &product(plus, r));
+            self.adjoint(source, &product(&product(l, plus), &adjoint), &beside);
+        } else if columns > rows {
+            let beside = l - product(&product(l, plus), a);
+            self.adjoint(source, &beside, &product(&adjoint, &product(plus, r)));
+        }
+    }
+
+    /// Variances of K and of ωC for Z_dd `factor`, from those of the files' cells at this line.
+    pub(super) fn variances(&self, d: usize, factor: C, variance: [&DMatrix<f64>; 3], tau: f64) -> [f64; 2] {
+        let mut sums = [0.0; 2];
+        for (file, variance) in variance.into_iter().enumerate() {
+            let mut of_file = self.0.iter().filter(|dyad| dyad.source.file == file).peekable();
+            if of_file.peek().is_none() {
+                continue;
+            }
+            let mut g = [false, true].map(|_| Line::zeros(variance.nrows(), variance.ncols()));
+            for dyad in of_file {
+                let to = &mut g[usize::from(dyad.conjugate)];
+                for (j, &column) in dyad.source.columns.iter().enumerate() {
+                    for (i, &row) in dyad.source.rows.iter().enumerate() {
+                        to[(row, column)] += dyad.left[(d, i)] * dyad.right[(j, d)];
+                    }
+                }
+            }
+            let turn = C::new(1.0, tau);
+            let of_k = factor * turn;
+            for ((g, h), v) in g[0].iter().zip(g[1].iter()).zip(variance.iter()) {
+                // a cell that does not count may be unknown
+                if *g != C::default() || *h != C::default() {
+                    sums[0] += (of_k * g + of_k.conj() * h).norm_sqr() * v;
+                    sums[1] += (factor * g - factor.conj() * h).norm_sqr() * v;
+                }
+            }
+        }
+        sums
+    }
+}
+
+/// Both virtual points of the assembly as one.
+pub(super) struct Both {
+    rows: Vec<usize>,
+    columns: Vec<usize>,
+    t_u: DMatrix<f64>,
+    t_f: DMatrix<f64>,
+}
+
+impl Both {
+    pub(super) fn of([a, b]: &[Balanced; 2]) -> Both {
+        let stacked = |a: &DMatrix<f64>, b: &DMatrix<f64>| {
+            let (rows, columns) = a.shape();
+            let mut all = DMatrix::zeros(rows + b.nrows(), columns + b.ncols());
+            all.view_mut((0, 0), a.shape()).copy_from(a);
+            all.view_mut((rows, columns), b.shape()).copy_from(b);
+            all
+        };
+        Both {
+            rows: [&a.vp.rows.at[..], &b.vp.rows.at].concat(),
+            columns: [&a.vp.columns.at[..], &b.vp.columns.at].concat(),
+            t_u: stacked(&a.t_u, &b.t_u),
+            t_f: stacked(&a.t_f, &b.t_f),
+        }
+    }
+
+    pub(super) fn source(&self) -> Source<'_> {
+        Source {
+            file: ASSEMBLED,
+            rows: &self.rows,
+            t_l: Some(&self.t_u),
+            columns: &self.columns,
+            t_r: Some(&self.t_f),
+        }
+    }
+}
+
+pub(super) fn own(side: Side, at: &Balanced) -> Source<'_> {
+    Source {
+        file: side as usize,
+        rows: &at.vp.rows.at,
+        t_l: Some(&at.t_u),
+        columns: &at.vp.columns.at,
+        t_r: Some(&at.t_f),
+    }
+}

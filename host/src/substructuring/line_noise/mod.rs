@@ -1,0 +1,238 @@
+//! What the FRFs' noise does to every line of a method: linear propagation through virtual points and method.
+//!
+//! Each method is made of sums, products and inverses of the measured blocks, so a small δY moves Z_dd by Σ g δY + Σ h δY* over the
+//! cells. Both g and h are sums of dyads: δ(A⁻¹) = −A⁻¹ δA A⁻¹ takes a row and a column of A⁻¹, T_u and T_f carry
+//! them on to the cells. h is there where P or Q is inverted by least squares and the data do not fit (Golub and Pereyra's
+//! derivative of A⁺). Noise is independent between cells, and real and imaginary part have the variance v each:
+//! then var K = Σ |(1 + iτ) g + (1 − iτ) h*|² v with τ = σ/ω, and ω² var C = Σ |g − h*|² v.
+
+mod dyads;
+
+use super::decoupling::{InverseBlock, PrimalBlock};
+use super::idm::Dof;
+use super::interface_data::balance;
+use super::internals::{Internals, Side};
+use super::method::Method;
+use super::noise::FrfNoise;
+use super::product::product;
+use super::pseudo_inverse::full_rank_inverse;
+use super::reduced::{Kind, Reduced, RefusedReason, Rooms, every_line};
+use dyads::{ASSEMBLED, Both, Dyads, Source, own};
+use nalgebra::{Complex, DMatrix};
+use std::collections::BTreeMap;
+
+type Line = DMatrix<Complex<f64>>;
+
+/// Standard deviations of one line's stiffness and damping from the FRFs' noise alone, \[line\]; NaN where the variance of a cell
+/// that counts is not known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LineNoise {
+    /// Of K, N/m (N m/rad for rotations).
+    pub stiffness_n_per_m: BTreeMap<Dof, Vec<f64>>,
+    /// Of C, N s/m (N m s/rad for rotations).
+    pub damping_n_s_per_m: BTreeMap<Dof, Vec<f64>>,
+}
+
+impl Reduced {
+    /// The noise of every line by `method`; `noises` are of A, B and AJB and have the files' lines.
+    pub(super) fn line_noise(
+        &self,
+        rooms: &Rooms<'_>,
+        noises: [&FrfNoise; 3],
+        method: Method,
+    ) -> Result<LineNoise, RefusedReason> {
+        let own = [own(Side::A, &self.a), own(Side::B, &self.b)];
+        let lines = self.y_a.len();
+        let by_line: Result<Vec<Vec<[f64; 2]>>, RefusedReason> = match Kind::from(method) {
+            Kind::Internal(seen, hit, which) => {
+                let internals = Internals::of(seen, hit, which, rooms, [&self.a, &self.b]);
+                let sources = Sources::of(&internals);
+                every_line(lines, |l| {
+                    let dyads = self.by_internals(rooms, l, &internals, &sources, &own)?;
+                    Ok(self.deviations(rooms, noises, l, &dyads))
+                })
+            }
+            Kind::Interface => {
+                let both = Both::of(&self.assembled(rooms)?);
+                let (both, y) = (both.source(), self.assembly(rooms)?);
+                every_line(lines, |l| {
+                    let dyads = self.by_interface(rooms, l, &y[l], &both, &own)?;
+                    Ok(self.deviations(rooms, noises, l, &dyads))
+                })
+            }
+            Kind::Primal(block) => {
+                let both = Both::of(&self.assembled(rooms)?);
+                let (both, z) = (both.source(), self.impedance(rooms)?);
+                let (at, y, own) = match block {
+                    PrimalBlock::A => (0, &self.y_a, &own[0]),
+                    PrimalBlock::B => (self.idms.count(), &self.y_b, &own[1]),
+                };
+                every_line(lines, |l| {
+                    let alone = inverted(rooms, l, &y[l])?;
+                    let mut dyads = Dyads::default();
+                    let (row, column) = self.cross(&z[l], at, at);
+                    dyads.linear(&both, &-row, &column);
+                    dyads.linear(own, &alone, &alone);
+                    Ok(self.deviations(rooms, noises, l, &dyads))
+                })
+            }
+            Kind::Inverse(block) => {
+                let both = Both::of(&self.assembled(rooms)?);
+                let (both, z) = (both.source(), self.impedance(rooms)?);
+                let n = self.idms.count();
+                let (at, other) = match block {
+                    InverseBlock::Ab => (0, n),
+                    InverseBlock::Ba => (n, 0),
+                };
+                every_line(lines, |l| {
+                    let mut dyads = Dyads::default();
+                    let (row, column) = self.cross(&z[l], at, other);
+                    dyads.linear(&both, &row, &column);
+                    Ok(self.deviations(rooms, noises, l, &dyads))
+                })
+            }
+        };
+        let by_line = by_line?;
+        let column = |which: usize| {
+            (self.idms.dofs().into_iter().enumerate())
+                .map(|(d, dof)| (dof, by_line.iter().map(|line| line[d][which]).collect()))
+                .collect()
+        };
+        Ok(LineNoise { stiffness_n_per_m: column(0), damping_n_s_per_m: column(1) })
+    }
+
+    /// One virtual point's rows and another's columns of both points' impedance.
+    fn cross(&self, z: &Line, row: usize, column: usize) -> (Line, Line) {
+        let n = self.idms.count();
+        (z.rows(row, n).clone_owned(), z.columns(column, n).clone_owned())
+    }
+
+    /// Z = D⁻¹ − W⁻¹.
+    fn by_interface<'a>(
+        &self,
+        rooms: &Rooms<'_>,
+        l: usize,
+        y: &Line,
+        both: &'a Source<'a>,
+        own: &'a [Source<'a>; 2],
+    ) -> Result<Dyads<'a>, RefusedReason> {
+        let n = self.idms.count();
+        let relative = Line::from_fn(n, 2 * n, |r, c| {
+            Complex::from(f64::from(u8::from(c == r)) - f64::from(u8::from(c == n + r)))
+        });
+        let d = inverted(rooms, l, &product(&product(&relative, y), &relative.transpose()))?;
+        let w = inverted(rooms, l, &(&self.y_a[l] + &self.y_b[l]))?;
+        let mut dyads = Dyads::default();
+        dyads.linear(both, &-product(&d, &relative), &product(&relative.transpose(), &d));
+        for own in own {
+            dyads.linear(own, &w, &w);
+        }
+        Ok(dyads)
+    }
+
+    /// Z = (G − Y^A − Y^B)⁻¹ with G⁻¹ = P⁺ M Q⁺, or G = Q M⁻¹ P as printed.
+    fn by_internals<'a>(
+        &self,
+        rooms: &Rooms<'_>,
+        l: usize,
+        internals: &Internals<'_>,
+        sources: &'a Sources<'a>,
+        own: &'a [Source<'a>; 2],
+    ) -> Result<Dyads<'a>, RefusedReason> {
+        let (p, q, m) = (internals.p(l)?, internals.q(l)?, internals.m(l)?);
+        let mut dyads = Dyads::default();
+        let z = if internals.printed {
+            let m_plus = inverted(rooms, l, &m)?;
+            let g = product(&product(&q, &m_plus), &p);
+            let z = inverted(rooms, l, &(g - &self.y_a[l] - &self.y_b[l]))?;
+            dyads.linear(&sources.q, &-&z, &product(&m_plus, &product(&p, &z)));
+            for source in &sources.m {
+                dyads.inverse(source, &-product(&z, &q), [&m, &m_plus], &product(&p, &z));
+            }
+            dyads.linear(&sources.p, &-product(&product(&z, &q), &m_plus), &z);
+            z
+        } else {
+            let (p_plus, q_plus) = (inverted(rooms, l, &p)?, inverted(rooms, l, &q)?);
+            let g = inverted(rooms, l, &product(&product(&p_plus, &m), &q_plus))?;
+            let z = inverted(rooms, l, &(&g - &self.y_a[l] - &self.y_b[l]))?;
+            let (left, right) = (product(&z, &g), product(&g, &z));
+            let (to_m, from_m) = (product(&left, &p_plus), product(&q_plus, &right));
+            dyads.inverse(&sources.p, &left, [&p, &p_plus], &product(&m, &from_m));
+            dyads.inverse(&sources.q, &product(&to_m, &m), [&q, &q_plus], &right);
+            for (source, sign) in sources.m.iter().zip(sources.signs) {
+                dyads.linear(source, &(&to_m * Complex::from(sign)), &from_m);
+            }
+            z
+        };
+        for own in own {
+            dyads.linear(own, &z, &z);
+        }
+        Ok(dyads)
+    }
+
+    /// Standard deviations of K and C by degree of freedom, the rotations' scale and the files' quantity taken out.
+    fn deviations(
+        &self,
+        rooms: &Rooms<'_>,
+        noises: [&FrfNoise; 3],
+        l: usize,
+        dyads: &Dyads<'_>,
+    ) -> Vec<[f64; 2]> {
+        let frf = rooms.a.frf;
+        let s = frf.s(l);
+        let quantity = s.powi(frf.quantity.order_of_s());
+        let variance = noises.map(|n| &n.variance[l]);
+        (balance(self.idms).iter().enumerate())
+            .map(|(d, length)| {
+                let factor = quantity * length * length;
+                let [k, omega_c] = dyads.variances(d, factor, variance, s.re / s.im).map(f64::sqrt);
+                [k, omega_c / s.im]
+            })
+            .collect()
+    }
+}
+
+fn inverted(rooms: &Rooms<'_>, l: usize, y: &Line) -> Result<Line, RefusedReason> {
+    full_rank_inverse(y, "a block of it").map_err(|lost| Reduced::refused(rooms, l, lost.into()))
+}
+
+/// The blocks that P, Q and M are made of.
+struct Sources<'a> {
+    p: Source<'a>,
+    q: Source<'a>,
+    m: Vec<Source<'a>>,
+    /// Of M's blocks.
+    signs: [f64; 2],
+}
+
+impl<'a> Sources<'a> {
+    fn of(internals: &'a Internals<'a>) -> Sources<'a> {
+        let (seen, hit) = (internals.seen_at, internals.hit_at);
+        let block = |file: usize, rows: &'a [usize], columns: &'a [usize]| Source {
+            file,
+            rows,
+            t_l: None,
+            columns,
+            t_r: None,
+        };
+        let assembled = block(ASSEMBLED, &internals.rows_ajb.at, &internals.columns_ajb.at);
+        let (m, signs) = if internals.seen == internals.hit {
+            let alone = block(internals.seen as usize, &internals.rows.at, &internals.columns.at);
+            (vec![alone, assembled], [1.0, -1.0])
+        } else {
+            (vec![assembled], [1.0, 1.0])
+        };
+        Sources {
+            p: Source {
+                t_r: Some(&seen.t_f),
+                ..block(internals.seen as usize, &internals.rows.at, &seen.vp.columns.at)
+            },
+            q: Source {
+                t_l: Some(&hit.t_u),
+                ..block(internals.hit as usize, &hit.vp.rows.at, &internals.columns.at)
+            },
+            m,
+            signs,
+        }
+    }
+}
