@@ -94,8 +94,9 @@ impl Windowing {
     /// Writes the windowed response (SI) of the same hit into `out`.
     pub fn response_into(&self, response: &[f64], decay: &Decay, origin_s: f64, out: &mut [f64]) {
         let kept = response.len().min(out.len());
-        // samples up to the origin stay as they are where only the response is weighted
+        // samples stay as they are without a window, and up to the origin where only the response is weighted
         let plain = match self.force_weighting {
+            _ if self.sigma_per_s == 0.0 => kept,
             ForceWeighting::Exponential => 0,
             ForceWeighting::Rectangular => {
                 (0..kept).position(|i| i as f64 / decay.fs_hz > origin_s).unwrap_or(kept)

@@ -64,7 +64,7 @@ impl<'a> Dyads<'a> {
         }
     }
 
-    /// Variances of K and of ωC for Z_dd `factor`, from those of the files' cells at this line.
+    /// Variances of K and of ωC, where Z is `factor` times what the dyads move, from those of the files' cells at this line.
     pub(super) fn variances(&self, d: usize, factor: C, variance: [&DMatrix<f64>; 3], tau: f64) -> [f64; 2] {
         let mut sums = [0.0; 2];
         for (file, variance) in variance.into_iter().enumerate() {
