@@ -1,6 +1,7 @@
 //! `jointrig identify` as a script sees it: documents, exit codes, and the reason of every refusal.
 
-use jointrig::exchange::{read_frf, write_frf};
+use jointrig::exchange::npz::Array;
+use jointrig::exchange::{Extra, read_frf, write_frf};
 use jointrig::substructuring::FrfMatrix;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -91,6 +92,36 @@ fn every_method_finds_the_contact_of_a_rigid_clamp() {
     let best = &found["recommended"][0];
     assert!((best["joint"]["z"]["stiffness"].as_f64().expect("a number") / 180e6 - 1.0).abs() < 1e-3);
     assert_eq!(best["noise_known"], false);
+}
+
+/// Two sets of two modes have the same count: each one's noise must stand beside its own spectrum.
+#[test]
+fn the_noise_of_a_line_is_its_own_sets() {
+    let files = Files::of("frf_rigid");
+    for file in ["A.npz", "B.npz", "AJB.npz"] {
+        let path = files.folder.path().join(file);
+        let frf = read_frf(&path).expect("test data");
+        let shape = vec![frf.lines.len(), frf.outputs.len(), frf.inputs.len()];
+        let values = vec![1e-18; shape.iter().product()];
+        let variance = Extra::Real("variance".into(), Array { shape, values });
+        write_frf(&path, &frf, &[variance]).expect("written");
+    }
+    let noises = |sets: &[&str]| -> Vec<Value> {
+        let mut words = vec!["--method", "inverse", "--band", "300:600", "--json"];
+        words.extend(sets.iter().flat_map(|set| ["--idms", *set]));
+        let out = files.identify(&words);
+        assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
+        let found: Value = serde_json::from_slice(&out.stdout).expect("one JSON document");
+        for row in found["joint"].as_array().expect("rows") {
+            assert!(row["noise_n_per_m"]["z"].as_f64().expect("the variance is known") > 0.0, "{row}");
+        }
+        let curves = found["joint_spectrum"]["curves"].as_array().expect("curves").clone();
+        let along_z = curves.into_iter().filter(|c| c["dof"] == "z");
+        along_z.map(|c| c["stiffness_noise_n_per_m"].clone()).collect()
+    };
+    let (first, second, both) = (noises(&["y,z"]), noises(&["x,z"]), noises(&["y,z", "x,z"]));
+    assert_ne!(first, second);
+    assert_eq!(both, [first, second].concat());
 }
 
 /// Universal files of another program (58b), their names in the DOF labels, against an independent implementation's figures.

@@ -88,7 +88,7 @@ pub fn joint(results: &Results) -> Option<String> {
                 joint.method.clone(),
                 joint.idms.to_string(),
                 band(joint.band_hz),
-                stiffness("z"),
+                stiffness("z") + if k.is_none() || joint.identified() { "" } else { ", not identified" },
                 joint.noise_n_per_m.get("z").map_or(UNKNOWN.into(), |noise| short(micro(*noise))),
                 k.map_or(UNKNOWN.into(), |k| short(micro(k.median))),
                 interval,

@@ -1,6 +1,7 @@
 //! The joint by substructuring: numbers over bands, and the spectra they come from.
 
 use super::Statistics;
+use super::campaign::UNIDENTIFIED;
 use crate::substructuring::Dof;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -52,6 +53,14 @@ impl Joint {
     /// Stiffness along the sliding direction z, N/m.
     pub fn sliding_stiffness(&self) -> Option<&Statistics> {
         self.stiffness_n_per_m.get("z")
+    }
+
+    /// Whether the sliding stiffness is a number worth showing alone: the lines neither scatter nor are moved by noise by more than
+    /// the value, and it is positive.
+    pub fn identified(&self) -> bool {
+        let noise = self.noise_n_per_m.get("z").copied().unwrap_or(0.0);
+        self.sliding_stiffness()
+            .is_some_and(|k| k.mean > 0.0 && k.std <= UNIDENTIFIED * k.mean && noise <= k.mean)
     }
 }
 

@@ -28,8 +28,10 @@ fn by_one_method(results: &Results) -> Option<String> {
     let joint = results.headline_joint()?;
     let k = joint.sliding_stiffness()?;
     let median = short(micro(k.median));
-    let rest = if k.std > super::campaign::UNIDENTIFIED * k.mean.abs() || k.mean <= 0.0 {
-        format!(": the scatter is larger than the value (median {median}), so the joint is not identified")
+    let rest = if !joint.identified() {
+        format!(
+            ": scatter or noise is larger than the value (median {median}), so the joint is not identified"
+        )
     } else if k.std > 0.3 * k.mean.abs() {
         format!("; single lines scatter widely, their median is {median}")
     } else {
@@ -195,14 +197,8 @@ fn joint_line(joint: &Joint) -> Option<String> {
     let ci95 = k
         .ci95
         .map_or(String::new(), |[low, high]| format!(", 95 % {}…{}", short(micro(low)), short(micro(high))));
-    // never a bare number where the lines scatter, or noise moves them, by more than the value
     let noise = joint.noise_n_per_m.get("z");
-    let drowned = noise.is_some_and(|noise| *noise > k.mean.abs());
-    let verdict = if k.std > super::campaign::UNIDENTIFIED * k.mean.abs() || k.mean <= 0.0 || drowned {
-        "; not identified"
-    } else {
-        ""
-    };
+    let verdict = if joint.identified() { "" } else { "; not identified" };
     // the fit takes all lines at once
     let spread = if joint.method == fit::NAME {
         format!("σ of the estimate from {} lines", joint.lines)

@@ -43,7 +43,7 @@ impl Side {
 }
 
 /// One rearrangement of Eq. (1): responses on `seen`, hits on `hit`, at the points that are in the assembly's file too.
-pub(super) struct Internals<'a> {
+pub(super) struct Rearrangement<'a> {
     pub(super) seen: Side,
     pub(super) hit: Side,
     /// Whether M is inverted (Eq. 3 as printed) instead of P and Q.
@@ -59,7 +59,7 @@ pub(super) struct Internals<'a> {
     pub(super) hit_at: &'a Balanced,
 }
 
-impl<'a> Internals<'a> {
+impl<'a> Rearrangement<'a> {
     /// Responses on `seen` and hits on `hit`; `at` are the virtual points of A and B alone.
     pub(super) fn of(
         seen: Side,
@@ -73,7 +73,7 @@ impl<'a> Internals<'a> {
         let (rows, rows_ajb) = shared(&rooms.alone(seen).outputs(seen_on), &rooms.ajb.outputs(seen_on));
         let printed = which == Which::Printed;
         let [seen_at, hit_at] = [seen, hit].map(|side| at[side as usize]);
-        Internals { seen, hit, printed, rows, rows_ajb, columns, columns_ajb, rooms, seen_at, hit_at }
+        Rearrangement { seen, hit, printed, rows, rows_ajb, columns, columns_ajb, rooms, seen_at, hit_at }
     }
 
     /// P: from the virtual point to the internal responses (n_i × n_c).

@@ -7,10 +7,10 @@ use super::decoupling::{
     observed_rank, primal_of,
 };
 use super::geometry::{Geometry, Grouping};
-use super::identify::{Internals as InternalsFound, VirtualPointQuality};
+use super::identify::{Internals, VirtualPointQuality};
 use super::idm::IdmSet;
 use super::interface_data::{InterfaceError, Measured, VirtualPoint, balance, scaled};
-use super::internals::{Internals, Side, Which};
+use super::internals::{Rearrangement, Side, Which};
 use super::joint::Band;
 use super::method::Method;
 use super::plausibility::{passivity, reciprocity};
@@ -101,7 +101,7 @@ pub(super) struct Reduced {
 pub(super) struct Solution {
     pub(super) z: Vec<Line>,
     pub(super) notes: Vec<String>,
-    pub(super) internals: Option<InternalsFound>,
+    pub(super) internals: Option<Internals>,
 }
 
 type Solved = Result<Solution, RefusedReason>;
@@ -144,7 +144,7 @@ impl Reduced {
     pub(super) fn solve(&self, rooms: &Rooms<'_>, method: Method) -> Solved {
         match Kind::from(method) {
             Kind::Internal(seen, hit, which) => {
-                let internals = Internals::of(seen, hit, which, rooms, [&self.a, &self.b]);
+                let internals = Rearrangement::of(seen, hit, which, rooms, [&self.a, &self.b]);
                 self.with_internals(rooms, method, &internals)
             }
             Kind::Interface => {
@@ -224,7 +224,7 @@ impl Reduced {
     }
 
     /// Both forms of Eq. (3) and its sisters: P, Q from the substructures, M from the assembly, at the internals that both have.
-    fn with_internals(&self, rooms: &Rooms<'_>, name: Method, internals: &Internals<'_>) -> Solved {
+    fn with_internals(&self, rooms: &Rooms<'_>, name: Method, internals: &Rearrangement<'_>) -> Solved {
         let printed = internals.printed;
         let mut notes = Vec::new();
         let (n_b, n_a) = (internals.rows.at.len(), internals.columns.at.len());
@@ -239,7 +239,7 @@ impl Reduced {
         } else {
             let middle = lines / 2;
             let (p, q) = (internals.p(middle)?, internals.q(middle)?);
-            Some(InternalsFound {
+            Some(Internals {
                 method: name,
                 idms: n_c,
                 impacts: n_a,

@@ -14,8 +14,7 @@ const BLIND: f64 = 1.0;
 
 /// From where to where the joint of the main band, with A and B, describes the assembly.
 pub fn check(found: &Explained) -> Option<Check> {
-    let main = MAIN_BAND;
-    let [error, explained] = found.medians(main)?;
+    let [error, explained] = found.medians(MAIN_BAND)?;
     let last = *found.frequency_hz.last()?;
     let percent = |part: f64| if part < 1e-3 { "less than 0.1".into() } else { short(100.0 * part) };
     let sizes = format!(
@@ -25,15 +24,15 @@ pub fn check(found: &Explained) -> Option<Check> {
     );
     let coupled = "A and B, coupled by the joint of Eq. A.1 (its mean over the main band)";
     let whole = |range: Option<[f64; 2]>| {
-        range.is_some_and(|[from, to]| from <= main.low_hz && to >= USED_HZ.min(last))
+        range.is_some_and(|[from, to]| from <= MAIN_BAND.low_hz && to >= USED_HZ.min(last))
     };
-    let check = match found.range(main, BEYOND) {
+    let check = match found.range(MAIN_BAND, BEYOND) {
         _ if explained > BLIND => Check::new(
             BACK_COUPLING,
             None,
             format!("Whether {coupled}, are the measured assembly cannot be told: {sizes}."),
         ),
-        range if whole(range) && !whole(found.range(main, USUAL)) => Check::new(
+        range if whole(range) && !whole(found.range(MAIN_BAND, USUAL)) => Check::new(
             BACK_COUPLING,
             None,
             format!(
@@ -51,7 +50,7 @@ pub fn check(found: &Explained) -> Option<Check> {
                 short(to)
             ),
         ),
-        Some([from, to]) if from <= main.low_hz && to >= main.high_hz => Check::new(
+        Some([from, to]) if from <= MAIN_BAND.low_hz && to >= MAIN_BAND.high_hz => Check::new(
             BACK_COUPLING,
             Some(false),
             format!(
@@ -71,7 +70,7 @@ pub fn check(found: &Explained) -> Option<Check> {
                 short(to)
             ),
         )
-        .at(if to < main.high_hz { to } else { from }),
+        .at(if to < MAIN_BAND.high_hz { to } else { from }),
         None => Check::new(
             BACK_COUPLING,
             Some(false),

@@ -26,11 +26,11 @@ pub fn fill(
     found: &Identification,
 ) {
     let [a, b, ajb] = frfs;
-    let (joint, spectrum, refused) = shaped(found);
+    let noise = line_noise::of(frfs, noises, geometry, found);
+    let (joint, spectrum, refused) = shaped(found, &noise);
     results.joint = joint;
     results.joint_spectrum = spectrum;
     results.refused = refused;
-    line_noise::fill(results, frfs, noises, geometry, found);
     results.virtual_points = found.virtual_points.iter().map(virtual_point).collect();
     let [a, b, ajb] = [(a, &geometry.a), (b, &geometry.b), (ajb, &geometry.ajb)]
         .map(|(frf, points)| without_spares(frf, points));

@@ -1,10 +1,12 @@
 //! The identified joint in the shape of the results.
 
+use super::line_noise;
 use crate::results::{Goodness, Joint, JointSpectrum, Refusal, SpectrumCurve, rounded};
 use crate::substructuring::fit::Fitted;
 use crate::substructuring::identify::Identification;
 use crate::substructuring::idm::Dof;
 use crate::substructuring::joint::{BandStatistic, JointRow};
+use crate::substructuring::line_noise::LineNoise;
 use std::collections::BTreeMap;
 
 impl From<&JointRow> for Joint {
@@ -55,8 +57,23 @@ fn finite(all: &BTreeMap<String, BandStatistic>) -> BTreeMap<String, BandStatist
 }
 
 /// Rows, spectra (translations only: they are what the figures show) and refusals.
-pub(super) fn shaped(found: &Identification) -> (Vec<Joint>, Option<JointSpectrum>, Vec<Refusal>) {
-    let joint = found.joint.iter().map(Joint::from).collect();
+///
+/// `noise` belongs to the spectra, in their order.
+pub(super) fn shaped(
+    found: &Identification,
+    noise: &[Option<LineNoise>],
+) -> (Vec<Joint>, Option<JointSpectrum>, Vec<Refusal>) {
+    let spectra = || found.spectra.iter().zip(noise);
+    let joint = (found.joint.iter())
+        .map(|row| {
+            let mut joint = Joint::from(row);
+            let own = spectra().find(|(s, _)| s.method == row.method && s.modes == row.modes);
+            if let Some((spectrum, Some(noise))) = own {
+                line_noise::in_row(&mut joint, &spectrum.frequency_hz, noise);
+            }
+            joint
+        })
+        .collect();
     let refused = found
         .refused
         .iter()
@@ -64,16 +81,15 @@ pub(super) fn shaped(found: &Identification) -> (Vec<Joint>, Option<JointSpectru
         .collect();
     let spectrum = found.spectra.first().map(|first| JointSpectrum {
         frequency_hz: first.frequency_hz.clone(),
-        curves: found
-            .spectra
-            .iter()
-            .flat_map(|s| {
+        curves: spectra()
+            .flat_map(|(s, noise)| {
+                let of_k = |dof: &Dof| noise.as_ref().and_then(|noise| noise.stiffness_n_per_m.get(dof));
                 let curve = |dof: &Dof| SpectrumCurve {
                     method: s.method.clone(),
                     idms: s.idms,
                     dof: dof.name().into(),
                     stiffness_n_per_m: column(s.stiffness_n_per_m.get(dof)),
-                    stiffness_noise_n_per_m: Vec::new(),
+                    stiffness_noise_n_per_m: column(of_k(dof)),
                     damping_n_s_per_m: column(s.damping_n_s_per_m.get(dof)),
                 };
                 let translations: Vec<&Dof> =

@@ -17,11 +17,21 @@ pub fn interface(
     y_b: &DMatrix<Complex<f64>>,
     y_ajb: &DMatrix<Complex<f64>>,
 ) -> Result<DMatrix<Complex<f64>>, DecouplingError> {
+    let [d_inverse, w_inverse] = stiffnesses(y_a, y_b, y_ajb)?;
+    Ok(d_inverse - w_inverse)
+}
+
+/// D⁻¹ and W⁻¹.
+pub(crate) fn stiffnesses(
+    y_a: &DMatrix<Complex<f64>>,
+    y_b: &DMatrix<Complex<f64>>,
+    y_ajb: &DMatrix<Complex<f64>>,
+) -> Result<[DMatrix<Complex<f64>>; 2], DecouplingError> {
     let n = y_a.nrows();
     let block = |r: usize, c: usize| y_ajb.view((r * n, c * n), (n, n));
     let d = block(0, 0) - block(0, 1) - block(1, 0) + block(1, 1);
     let d_inverse = full_rank_inverse(&d, "the assembly's relative admittance")?;
-    Ok(d_inverse - full_rank_inverse(&(y_a + y_b), "Y^A + Y^B")?)
+    Ok([d_inverse, full_rank_inverse(&(y_a + y_b), "Y^A + Y^B")?])
 }
 
 #[cfg(test)]

@@ -24,6 +24,25 @@ pub fn internal(
     m: &DMatrix<Complex<f64>>,
     q: &DMatrix<Complex<f64>>,
 ) -> Result<DMatrix<Complex<f64>>, DecouplingError> {
+    Ok(factors(y_a, y_b, p, m, q)?.z)
+}
+
+/// Z^J and what it is made of.
+pub(crate) struct Factors {
+    pub(crate) p_plus: DMatrix<Complex<f64>>,
+    pub(crate) q_plus: DMatrix<Complex<f64>>,
+    pub(crate) g: DMatrix<Complex<f64>>,
+    pub(crate) z: DMatrix<Complex<f64>>,
+}
+
+/// As [`internal`], with the factors.
+pub(crate) fn factors(
+    y_a: &DMatrix<Complex<f64>>,
+    y_b: &DMatrix<Complex<f64>>,
+    p: &DMatrix<Complex<f64>>,
+    m: &DMatrix<Complex<f64>>,
+    q: &DMatrix<Complex<f64>>,
+) -> Result<Factors, DecouplingError> {
     let needed = y_a.nrows();
     let (responses, impacts) = m.shape();
     if responses.min(impacts) < needed {
@@ -34,5 +53,6 @@ pub fn internal(
     let q_plus =
         full_rank_inverse(q, "Q, the admittance between the internal impacts and the virtual point,")?;
     let g = full_rank_inverse(&product(&product(&p_plus, m), &q_plus), "P⁺ M Q⁺")?;
-    Ok(full_rank_inverse(&(g - y_a - y_b), "the joint's admittance")?)
+    let z = full_rank_inverse(&(&g - y_a - y_b), "the joint's admittance")?;
+    Ok(Factors { p_plus, q_plus, g, z })
 }

@@ -19,8 +19,21 @@ pub fn internal_printed(
     m: &DMatrix<Complex<f64>>,
     q: &DMatrix<Complex<f64>>,
 ) -> Result<DMatrix<Complex<f64>>, DecouplingError> {
+    let [z, _] = with_m_inverse(y_a, y_b, p, m, q)?;
+    Ok(z)
+}
+
+/// Z^J as [`internal_printed`] gives it, and M⁻¹.
+pub(crate) fn with_m_inverse(
+    y_a: &DMatrix<Complex<f64>>,
+    y_b: &DMatrix<Complex<f64>>,
+    p: &DMatrix<Complex<f64>>,
+    m: &DMatrix<Complex<f64>>,
+    q: &DMatrix<Complex<f64>>,
+) -> Result<[DMatrix<Complex<f64>>; 2], DecouplingError> {
     let m_inverse = full_rank_inverse(m, "M = Y^AJB between B's and A's internals")?;
-    Ok(full_rank_inverse(&(product(&product(q, &m_inverse), p) - y_a - y_b), "the joint's admittance")?)
+    let admittance = product(&product(q, &m_inverse), p) - y_a - y_b;
+    Ok([full_rank_inverse(&admittance, "the joint's admittance")?, m_inverse])
 }
 
 /// Rank of Π: how many directions of interface force these internals see, of n_c. It cannot exceed the rank

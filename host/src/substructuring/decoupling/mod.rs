@@ -14,7 +14,10 @@ mod primal;
 
 pub use fixture::{Weakening, remove_fixture};
 pub use interface::interface;
+pub(super) use interface::stiffnesses;
 pub use internal::internal;
+pub(super) use internal::{Factors, factors};
+pub(super) use internal_printed::with_m_inverse;
 pub use internal_printed::{internal_printed, observed_rank};
 pub use inverse::{InverseBlock, inverse, inverse_of};
 pub use primal::{PrimalBlock, primal, primal_of};
@@ -23,6 +26,9 @@ use super::pseudo_inverse::RankLost;
 
 /// What a singular Y^AJB_cc is called.
 pub(super) const ASSEMBLY: &str = "the assembly's interface admittance";
+
+/// What a singular Y^A_cc or Y^B_cc is called.
+pub(super) const SUBSTRUCTURE: &str = "the substructure's interface admittance";
 
 /// Why a method cannot be applied to this data.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -1,7 +1,7 @@
 //! Eq. (A.2): primal decoupling.
 
 use super::super::pseudo_inverse::full_rank_inverse;
-use super::{ASSEMBLY, DecouplingError};
+use super::{ASSEMBLY, DecouplingError, SUBSTRUCTURE};
 use nalgebra::{Complex, DMatrix};
 
 /// Which diagonal block of Eq. (A.2) is read. (The off-diagonal ones are Eq. (A.1) again.)
@@ -41,5 +41,5 @@ pub fn primal_of(
         PrimalBlock::A => 0,
         PrimalBlock::B => n,
     };
-    Ok(z_ajb.view((at, at), (n, n)) - full_rank_inverse(y_s, "the substructure's interface admittance")?)
+    Ok(z_ajb.view((at, at), (n, n)) - full_rank_inverse(y_s, SUBSTRUCTURE)?)
 }

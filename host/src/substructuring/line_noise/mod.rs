@@ -8,10 +8,13 @@
 
 mod dyads;
 
-use super::decoupling::{InverseBlock, PrimalBlock};
+use super::coupling::boolean_difference;
+use super::decoupling::{
+    DecouplingError, Factors, InverseBlock, PrimalBlock, SUBSTRUCTURE, factors, stiffnesses, with_m_inverse,
+};
 use super::idm::Dof;
 use super::interface_data::balance;
-use super::internals::{Internals, Side};
+use super::internals::{Rearrangement, Side};
 use super::method::Method;
 use super::noise::FrfNoise;
 use super::product::product;
@@ -45,7 +48,7 @@ impl Reduced {
         let lines = self.y_a.len();
         let by_line: Result<Vec<Vec<[f64; 2]>>, RefusedReason> = match Kind::from(method) {
             Kind::Internal(seen, hit, which) => {
-                let internals = Internals::of(seen, hit, which, rooms, [&self.a, &self.b]);
+                let internals = Rearrangement::of(seen, hit, which, rooms, [&self.a, &self.b]);
                 let sources = Sources::of(&internals);
                 every_line(lines, |l| {
                     let dyads = self.by_internals(rooms, l, &internals, &sources, &own)?;
@@ -68,7 +71,8 @@ impl Reduced {
                     PrimalBlock::B => (self.idms.count(), &self.y_b, &own[1]),
                 };
                 every_line(lines, |l| {
-                    let alone = inverted(rooms, l, &y[l])?;
+                    let alone = full_rank_inverse(&y[l], SUBSTRUCTURE)
+                        .map_err(|lost| Reduced::refused(rooms, l, lost.into()))?;
                     let mut dyads = Dyads::default();
                     let (row, column) = self.cross(&z[l], at, at);
                     dyads.linear(&both, &-row, &column);
@@ -107,7 +111,7 @@ impl Reduced {
         (z.rows(row, n).clone_owned(), z.columns(column, n).clone_owned())
     }
 
-    /// Z = D⁻¹ − W⁻¹.
+    /// Z = D⁻¹ − W⁻¹, where D = B Y^AJB Bᵀ.
     fn by_interface<'a>(
         &self,
         rooms: &Rooms<'_>,
@@ -116,12 +120,8 @@ impl Reduced {
         both: &'a Source<'a>,
         own: &'a [Source<'a>; 2],
     ) -> Result<Dyads<'a>, RefusedReason> {
-        let n = self.idms.count();
-        let relative = Line::from_fn(n, 2 * n, |r, c| {
-            Complex::from(f64::from(u8::from(c == r)) - f64::from(u8::from(c == n + r)))
-        });
-        let d = inverted(rooms, l, &product(&product(&relative, y), &relative.transpose()))?;
-        let w = inverted(rooms, l, &(&self.y_a[l] + &self.y_b[l]))?;
+        let [d, w] = stiffnesses(&self.y_a[l], &self.y_b[l], y).map_err(refused(rooms, l))?;
+        let relative = boolean_difference(self.idms.count());
         let mut dyads = Dyads::default();
         dyads.linear(both, &-product(&d, &relative), &product(&relative.transpose(), &d));
         for own in own {
@@ -135,16 +135,15 @@ impl Reduced {
         &self,
         rooms: &Rooms<'_>,
         l: usize,
-        internals: &Internals<'_>,
+        internals: &Rearrangement<'_>,
         sources: &'a Sources<'a>,
         own: &'a [Source<'a>; 2],
     ) -> Result<Dyads<'a>, RefusedReason> {
         let (p, q, m) = (internals.p(l)?, internals.q(l)?, internals.m(l)?);
         let mut dyads = Dyads::default();
         let z = if internals.printed {
-            let m_plus = inverted(rooms, l, &m)?;
-            let g = product(&product(&q, &m_plus), &p);
-            let z = inverted(rooms, l, &(g - &self.y_a[l] - &self.y_b[l]))?;
+            let [z, m_plus] =
+                with_m_inverse(&self.y_a[l], &self.y_b[l], &p, &m, &q).map_err(refused(rooms, l))?;
             dyads.linear(&sources.q, &-&z, &product(&m_plus, &product(&p, &z)));
             for source in &sources.m {
                 dyads.inverse(source, &-product(&z, &q), [&m, &m_plus], &product(&p, &z));
@@ -152,9 +151,8 @@ impl Reduced {
             dyads.linear(&sources.p, &-product(&product(&z, &q), &m_plus), &z);
             z
         } else {
-            let (p_plus, q_plus) = (inverted(rooms, l, &p)?, inverted(rooms, l, &q)?);
-            let g = inverted(rooms, l, &product(&product(&p_plus, &m), &q_plus))?;
-            let z = inverted(rooms, l, &(&g - &self.y_a[l] - &self.y_b[l]))?;
+            let Factors { p_plus, q_plus, g, z } =
+                factors(&self.y_a[l], &self.y_b[l], &p, &m, &q).map_err(refused(rooms, l))?;
             let (left, right) = (product(&z, &g), product(&g, &z));
             let (to_m, from_m) = (product(&left, &p_plus), product(&q_plus, &right));
             dyads.inverse(&sources.p, &left, [&p, &p_plus], &product(&m, &from_m));
@@ -192,8 +190,8 @@ impl Reduced {
     }
 }
 
-fn inverted(rooms: &Rooms<'_>, l: usize, y: &Line) -> Result<Line, RefusedReason> {
-    full_rank_inverse(y, "a block of it").map_err(|lost| Reduced::refused(rooms, l, lost.into()))
+fn refused<'a>(rooms: &'a Rooms<'_>, l: usize) -> impl Fn(DecouplingError) -> RefusedReason + 'a {
+    move |source| Reduced::refused(rooms, l, source)
 }
 
 /// The blocks that P, Q and M are made of.
@@ -206,7 +204,7 @@ struct Sources<'a> {
 }
 
 impl<'a> Sources<'a> {
-    fn of(internals: &'a Internals<'a>) -> Sources<'a> {
+    fn of(internals: &'a Rearrangement<'a>) -> Sources<'a> {
         let (seen, hit) = (internals.seen_at, internals.hit_at);
         let block = |file: usize, rows: &'a [usize], columns: &'a [usize]| Source {
             file,
