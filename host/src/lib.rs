@@ -6,13 +6,12 @@
 //! files or screens: arrays and geometry in, numbers out.
 #![forbid(unsafe_code)]
 
+pub use jointrig_analysis::{hysteresis, spectra, substructuring};
+
 mod advice;
 pub mod campaign;
 pub mod cli;
 pub mod device;
 pub mod exchange;
-pub mod hysteresis;
 pub mod report;
 pub mod results;
-pub mod spectra;
-pub mod substructuring;

@@ -3,10 +3,11 @@
 use super::averages::{CellAverage, ContactAverage};
 use super::cell::Measurements;
 use super::checks;
-use super::contact::{ContactCompliance, specimen_curves};
+use super::contact::{self, specimen_curves};
 use super::loops::{self, ImpactLoop};
 use super::phase_split::with_phases;
 use super::{chosen, shaker, static_arm};
+use crate::hysteresis::compliance::ContactCompliance;
 use crate::hysteresis::compliance::SEARCH_HZ;
 use crate::hysteresis::static_arm::{Identified, from_levels};
 use crate::results::{Check, LoopCurve, Reconstruction, Results, words};
@@ -29,7 +30,7 @@ pub fn at_the_contact<M: Measurements>(
     let (frequency_hz, by_impact) = summed(averages);
     let sums: Vec<&ContactAverage> =
         by_impact.iter().map(|(_, c)| c).filter(|c| c.force.len() == frequency_hz.len()).collect();
-    let compliance = ContactCompliance::of(frequency_hz, sigma_per_s, &sums);
+    let compliance = contact::compliance(frequency_hz, sigma_per_s, &sums);
     if let Some(impact) = show_specimens(results, geometry, frequency_hz, &by_impact, sigma_per_s) {
         let (points, quantity) = (&geometry.ajb, measurements.quantity());
         results.frfs.extend(chosen::arms(impact, points, averages, sigma_per_s, quantity));
@@ -64,7 +65,7 @@ pub fn at_the_contact<M: Measurements>(
     let shown = example(measurements, averages, impact_loops, resonance_hz);
     (results.example_loop, results.reconstruction) = shown.unwrap_or_default();
 
-    let direct = compliance.as_ref().and_then(|c| c.direct(sigma_per_s));
+    let direct = compliance.as_ref().and_then(|c| contact::direct(c, sigma_per_s));
     let loops = results.impact_loops().and_then(words::slope).map(|(_, k)| k);
     let series = checks::series_compliance(
         checks::between_the_arms(results).as_ref(),

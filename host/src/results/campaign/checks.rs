@@ -1,6 +1,6 @@
 //! Whether the numbers may be believed: clamp in series, hidden resonance.
 
-use super::contact::ContactCompliance;
+use crate::hysteresis::compliance::ContactCompliance;
 use crate::results::number::{micro, short};
 use crate::results::{Check, Joint, OverCycles, Results, Statistics};
 use crate::substructuring::Dof;

@@ -87,7 +87,7 @@ fn block_jackknife(values: &[f64], mean: f64) -> Option<[f64; 2]> {
 }
 
 /// The median; the mean of the two middle values of an even number.
-pub(crate) fn median(values: &[f64]) -> f64 {
+pub fn median(values: &[f64]) -> f64 {
     let mut values = values.to_vec();
     let n = values.len();
     if n == 0 {

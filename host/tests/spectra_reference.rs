@@ -1,7 +1,7 @@
 //! H1 and coherence of three good hits of the simulated rig, against an independent implementation with the same windows.
 
-use super::*;
-use crate::exchange::read_impacts;
+use jointrig::exchange::read_impacts;
+use jointrig::spectra::{ForceWeighting, FrfSettings, Origin, Windowing, estimate, usable_band};
 use num_complex::Complex;
 use serde_json::Value;
 use std::path::Path;

@@ -372,6 +372,3 @@ fn weights(lines: &[Sums], shared: f64, priors: &Priors) -> Vec<f64> {
         vec![1.0 / lines.len() as f64; lines.len()]
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -51,6 +51,3 @@ pub use identify::{
 pub use idm::{Dof, IdmSet};
 pub use joint::{Band, BandStatistic, JointRow, JointSpectrum};
 pub use method::Method;
-
-#[cfg(test)]
-mod reference;

@@ -78,8 +78,5 @@ pub enum HysteresisError {
     #[error("force or relative motion is constant: there is no loop; check the channels")]
     NoMotion,
 }
-
-#[cfg(test)]
-mod reference;
 #[cfg(test)]
 mod synthetic;

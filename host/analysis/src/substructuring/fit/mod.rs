@@ -325,6 +325,3 @@ fn internals(side: Side, files: &[Measured<'_>; 3], points: Points) -> Internals
     }
     found
 }
-
-#[cfg(test)]
-mod tests;

@@ -74,5 +74,3 @@ pub enum SpectraError {
 
 #[cfg(test)]
 mod exactness;
-#[cfg(test)]
-mod reference;

@@ -1,7 +1,7 @@
 //! Five records of known truth, checked quantity by quantity with the tolerance and reason that stand beside each in the data.
 
-use super::*;
-use crate::exchange::read_hysteresis;
+use jointrig::exchange::read_hysteresis;
+use jointrig::hysteresis::{LoopAnalysis, analyse};
 use serde_json::{Value, json};
 use std::path::Path;
 

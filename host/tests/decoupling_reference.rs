@@ -4,8 +4,8 @@
 //! and the contact, so no arm-based method may return the contact stiffness. Lines 300…600 Hz, step 4 Hz. `frf_specimen`: the same
 //! clamp, but the points sit on the specimens, so that the contact is visible again; step 20 Hz.
 
-use super::*;
-use crate::exchange::{read_frf, read_positions};
+use jointrig::exchange::{read_frf, read_positions};
+use jointrig::substructuring::*;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
