@@ -12,8 +12,14 @@ const OWN_PACKAGE: [&str; 5] =
 
 /// The cargo that started xtask, working in `directory`.
 pub fn cargo(directory: &Path) -> Command {
-    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    let mut command = without_own_package(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(directory);
+    command
+}
+
+/// A program that does not hear about xtask's own package.
+pub fn without_own_package(program: impl AsRef<OsStr>) -> Command {
+    let mut command = Command::new(program);
     for (name, _) in std::env::vars_os() {
         if name.to_str().is_some_and(|name| OWN_PACKAGE.iter().any(|prefix| name.starts_with(prefix))) {
             command.env_remove(name);

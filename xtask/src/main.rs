@@ -11,6 +11,8 @@ mod consent;
 mod emulator;
 mod firmware;
 mod flash;
+mod house;
+mod jobs;
 mod lint;
 mod locks;
 mod packages;
@@ -20,6 +22,7 @@ mod setup;
 mod size;
 mod suite;
 mod sysroot;
+mod test_programs;
 mod tests_run;
 mod toolchain;
 
@@ -55,6 +58,8 @@ enum Task {
     FmtCheck,
     /// Run clippy on both workspaces with warnings as errors, and compare their locks.
     Lint,
+    /// Check the laws of the house: which crate uses which, circles of files.
+    House,
     /// Run all that must pass before a change is merged.
     #[command(after_help = setup::ENVIRONMENT_HELP)]
     Test(suite::Options),
@@ -96,6 +101,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Firmware { board } => firmware::command(&project, board.as_deref()),
         Task::FmtCheck => lint::formatting(&project),
         Task::Lint => lint::all(&project),
+        Task::House => house::check(&project),
         Task::Test(options) => suite::run(&project, &options),
         Task::Qemu(options) => emulator::run(&project, &options),
         Task::Budgets => budgets::command(&project),

@@ -19,16 +19,31 @@ pub struct Project {
 }
 
 /// What cargo says about one package.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug, Default, PartialEq, Eq)]
 pub struct Package {
     /// The name `-p` takes.
     pub name: String,
+    /// The files that its library and its binaries begin with.
+    pub roots: Vec<PathBuf>,
+    /// What it is built from; what only its tests need is not here.
+    pub dependencies: Vec<Dependency>,
     /// Its features, the implicit ones of optional dependencies included.
     pub features: Vec<String>,
     /// The names of its binaries.
     pub binaries: Vec<String>,
+    /// The names of its examples.
+    pub examples: Vec<String>,
     /// The names of its benchmarks.
     pub benches: Vec<String>,
+}
+
+/// What a package says that it needs.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Dependency {
+    /// The package's name.
+    pub name: String,
+    /// Whether only a feature turns it on.
+    pub optional: bool,
 }
 
 impl Project {
@@ -91,20 +106,32 @@ fn packages(metadata: &Value) -> Vec<Package> {
         .iter()
         .map(|package| {
             let targets = list(&package["targets"]);
-            let of_kind = |kind: &str| {
+            let texts = |kind: &str, field: &str| -> Vec<String> {
                 targets
                     .iter()
                     .filter(|target| list(&target["kind"]).iter().any(|k| k == kind))
-                    .filter_map(|target| target["name"].as_str().map(String::from))
+                    .filter_map(|target| target[field].as_str().map(String::from))
                     .collect()
             };
+            let of_kind = |kind| texts(kind, "name");
+            let roots = ["lib", "bin"].iter().flat_map(|kind| texts(kind, "src_path"));
             Package {
                 name: package["name"].as_str().unwrap_or_default().to_owned(),
+                roots: roots.map(PathBuf::from).collect(),
+                dependencies: list(&package["dependencies"])
+                    .iter()
+                    .filter(|dependency| dependency["kind"] != "dev")
+                    .map(|dependency| Dependency {
+                        name: dependency["name"].as_str().unwrap_or_default().to_owned(),
+                        optional: dependency["optional"] == true,
+                    })
+                    .collect(),
                 features: package["features"]
                     .as_object()
                     .map(|map| map.keys().cloned().collect())
                     .unwrap_or_default(),
                 binaries: of_kind("bin"),
+                examples: of_kind("example"),
                 benches: of_kind("bench"),
             }
         })
@@ -117,20 +144,28 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn a_package_is_read_with_its_features_binaries_and_benches() {
+    fn a_package_is_read_with_its_features_targets_and_dependencies() {
         let metadata = json!({"packages": [{
             "name": "nucleo-u5a5",
             "features": {"default": [], "defmt": ["dep:defmt"]},
+            "dependencies": [
+                {"name": "defmt", "kind": null, "optional": true},
+                {"name": "proptest", "kind": "dev", "optional": false},
+            ],
             "targets": [
-                {"name": "wiring", "kind": ["lib"]},
-                {"name": "nucleo-u5a5", "kind": ["bin"]},
+                {"name": "wiring", "kind": ["lib"], "src_path": "/src/lib.rs"},
+                {"name": "nucleo-u5a5", "kind": ["bin"], "src_path": "/src/main.rs"},
+                {"name": "blink", "kind": ["example"], "src_path": "/examples/blink.rs"},
                 {"name": "scan", "kind": ["bench"]},
             ],
         }]});
         let expected = Package {
             name: "nucleo-u5a5".into(),
+            roots: vec!["/src/lib.rs".into(), "/src/main.rs".into()],
+            dependencies: vec![Dependency { name: "defmt".into(), optional: true }],
             features: vec!["default".into(), "defmt".into()],
             binaries: vec!["nucleo-u5a5".into()],
+            examples: vec!["blink".into()],
             benches: vec!["scan".into()],
         };
         assert_eq!(packages(&metadata), [expected]);

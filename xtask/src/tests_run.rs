@@ -1,11 +1,12 @@
-//! Building and running the tests of the root workspace.
+//! Building and running the tests and examples of the root workspace.
 //!
 //! One profile serves everything: release. The whole-system scenarios simulate minutes of sixteen channels and need its
 //! speed, and a second profile would compile every dependency twice. Binaries and tests are built by one command,
 //! because only then do their dependencies have the same features and are compiled once.
 
-use crate::command;
+use crate::jobs::{self, Ended};
 use crate::project::Project;
+use crate::{command, test_programs};
 use anyhow::{Context, Result, bail};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -51,24 +52,61 @@ pub fn build(project: &Project, scope: Scope) -> Result<()> {
     command::run(&mut cargo).context("the binaries and tests do not compile")
 }
 
-/// Runs the tests with the paths of the binaries in their environment; `extra` goes to `cargo test`.
+/// Runs the tests with the paths of the binaries in their environment. All of them run side by side, with the examples;
+/// where `extra` narrows them down, or speaks to the test programs, plain `cargo test` gets it and runs one after another.
 pub fn run(project: &Project, scope: Scope, extra: &[String]) -> Result<Counts> {
-    let mut cargo = command::cargo(&project.root);
-    for (package, binary, variable) in PROGRAMS {
-        if let Some(path) = program(project, package, binary)? {
-            cargo.env(variable, path);
-        } else {
-            println!("  the package {package} has no binary {binary} yet, so {variable} is not set");
+    if !extra.is_empty() {
+        let mut cargo = command::cargo(&project.root);
+        cargo.envs(programs(project)?);
+        cargo.args(["test", "--release", "--workspace"]).args(left_out(scope)).args(extra);
+        let (counts, success) = watched(&mut cargo, &mut std::io::stdout())?;
+        if !success {
+            bail!("the tests failed ({counts}): the lines above name them");
         }
+        return Ok(counts);
     }
-    cargo.args(["test", "--release", "--workspace"]).args(left_out(scope)).args(extra);
-    let (counts, success) = watched(&mut cargo, &mut std::io::stdout())?;
-    if !success {
-        bail!(
-            "the tests failed ({counts}): the lines above name them; `cargo xtask test -- <part of a name>` runs fewer"
-        );
+    let mut jobs = test_programs::tests(project, left_out(scope))?;
+    jobs.extend(test_programs::examples(project)?);
+    for job in &mut jobs {
+        job.command.envs(programs(project)?);
     }
-    Ok(counts)
+    concluded(&jobs::run(jobs, jobs::at_once(), &mut std::io::stdout())?)
+}
+
+/// Adds up what the programs report, or fails with the names of what failed.
+fn concluded(ended: &[Ended]) -> Result<Counts> {
+    let (mut counts, mut failures) = (Counts::default(), Vec::new());
+    for ended in ended {
+        let output = String::from_utf8_lossy(&ended.output);
+        output.lines().for_each(|line| count(line, &mut counts));
+        if ended.status.success() {
+            continue;
+        }
+        let tests: Vec<&str> = output
+            .lines()
+            .filter_map(|line| line.strip_prefix("test ")?.split_once(" ... FAILED"))
+            .map(|(test, _)| test)
+            .collect();
+        // A program may also end before it can say which test it was at.
+        let what = if tests.is_empty() { ended.status.to_string() } else { tests.join(", ") };
+        failures.push(format!("{}: {what}", ended.name));
+    }
+    if failures.is_empty() {
+        return Ok(counts);
+    }
+    bail!(
+        "the tests failed ({counts}):\n  {}\n  `cargo xtask test -- <part of a name>` runs fewer",
+        failures.join("\n  ")
+    )
+}
+
+/// The variables that carry the paths of the programs that scenarios start.
+fn programs(project: &Project) -> Result<Vec<(&'static str, PathBuf)>> {
+    let mut variables = Vec::new();
+    for (package, binary, variable) in PROGRAMS {
+        variables.extend(program(project, package, binary)?.map(|path| (variable, path)));
+    }
+    Ok(variables)
 }
 
 /// The variable that carries the path of the emulated board's image.
@@ -146,6 +184,7 @@ fn count(line: &str, counts: &mut Counts) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::jobs::Job;
 
     #[test]
     fn closing_lines_are_added_up_and_others_ignored() {
@@ -160,6 +199,27 @@ mod tests {
         }
         assert_eq!(counts, Counts { passed: 15, failed: 2, ignored: 1 });
         assert_eq!(counts.to_string(), "15 passed, 2 failed, 1 ignored");
+    }
+
+    #[test]
+    fn what_failed_is_named_with_its_program() {
+        let ended = |script: &str| {
+            let mut command = Command::new("sh");
+            command.args(["-c", script]);
+            jobs::run(vec![Job { name: "host demo".into(), command }], 1, &mut Vec::new())
+                .expect("sh is there")
+        };
+        let passed = ended("echo 'test a::b ... ok'; echo 'test result: ok. 1 passed; 0 failed; 0 ignored'");
+        assert_eq!(concluded(&passed).expect("it passed").to_string(), "1 passed, 0 failed, 0 ignored");
+        let failed =
+            ended("echo 'test a::b ... FAILED'; echo 'test result: FAILED. 0 passed; 1 failed'; exit 101");
+        let message = concluded(&failed).expect_err("it failed").to_string();
+        assert!(
+            message.starts_with("the tests failed (0 passed, 1 failed, 0 ignored):\n  host demo: a::b\n"),
+            "{message}"
+        );
+        let message = concluded(&ended("kill -9 $$")).expect_err("it was killed").to_string();
+        assert!(message.contains("host demo: signal: 9"), "{message}");
     }
 
     #[test]

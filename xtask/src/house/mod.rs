@@ -1,0 +1,34 @@
+//! `cargo xtask house`: the laws of the house that a program can check, in seconds and without compiling anything.
+
+mod circles;
+mod equations;
+mod graph;
+mod modules;
+mod tokens;
+
+use crate::project::Project;
+use anyhow::{Result, bail};
+
+/// One law: its name, and its check, which returns a remark.
+type Law = (&'static str, fn(&Project) -> Result<String>);
+
+const LAWS: [Law; 3] = [
+    ("which crate uses which", graph::check),
+    ("files in circles", circles::check),
+    ("equations", equations::check),
+];
+
+/// Checks all of them, and fails with everything that was found.
+pub fn check(project: &Project) -> Result<()> {
+    let mut faults = Vec::new();
+    for (name, law) in LAWS {
+        match law(project) {
+            Ok(remark) => println!("  {name}: {remark}"),
+            Err(error) => faults.push(format!("{name}: {error:#}")),
+        }
+    }
+    if faults.is_empty() {
+        return Ok(());
+    }
+    bail!("the house is not in order:\n  {}", faults.join("\n  "))
+}
