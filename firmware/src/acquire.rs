@@ -12,9 +12,8 @@ use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
 
 use crate::Core;
 use crate::board::{Coil, Delivered, Drive, Inputs, Scans};
-use crate::hammer::CoilOrder;
+use crate::hammer::{CoilOrder, Scanned};
 use crate::ring::Range;
-use crate::scanned::Scanned;
 
 /// Runs for ever.
 pub async fn acquire<M: RawMutex, S: Scans, C: Coil, D: Drive, I: Inputs>(

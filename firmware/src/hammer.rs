@@ -22,8 +22,6 @@ use jointrig_protocol::shot::{Phase, Shot};
 use crate::friction::Friction;
 use crate::pulse::Pulse;
 use crate::quiet::Quiet;
-use crate::refusal::out_of_bounds;
-use crate::scanned::Scanned;
 
 /// What the coil must do now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +43,16 @@ pub struct Outcome {
     pub disarmed: Option<Reason>,
     /// Whether the trigger lies in this block.
     pub trigger: bool,
+}
+
+/// One block of codes, as the machine reads it.
+pub trait Scanned {
+    /// Index of the first scan.
+    fn first_scan(&self) -> u64;
+    /// How many scans.
+    fn scans(&self) -> usize;
+    /// The code of a channel in the `scan`-th scan.
+    fn code(&self, scan: usize, channel: usize) -> i16;
 }
 
 enum State {
@@ -140,7 +148,7 @@ impl Hammer {
             || longest > minute
             || trigger.listen_scans == 0
         {
-            return Err(out_of_bounds(
+            return Err(crate::requests::out_of_bounds(
                 "trigger: the level must be a force above 0 N, and no time longer than a minute",
             ));
         }
@@ -158,7 +166,7 @@ impl Hammer {
             return Err(Refusal::Unsupported);
         }
         if valid_ms == 0 || valid_ms > ARM_VALID_CAP_MS {
-            return Err(out_of_bounds("arming must be valid for 1 to 60000 ms"));
+            return Err(crate::requests::out_of_bounds("arming must be valid for 1 to 60000 ms"));
         }
         match self.state {
             // the rest after a shot does not forbid arming: the next shot waits for its end
@@ -191,7 +199,7 @@ impl Hammer {
         if order.quiet_limits.iter().any(|limit| !limit.is_finite() || *limit < 0.0)
             || order.quiet_limits.len() > self.units_per_code.len()
         {
-            return Err(out_of_bounds(
+            return Err(crate::requests::out_of_bounds(
                 "quiet limits must be finite, not negative, and no more than there are channels",
             ));
         }

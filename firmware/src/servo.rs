@@ -24,8 +24,8 @@ use jointrig_protocol::request::Control;
 #[allow(unused_imports, reason = "core has no powf; where std is linked its own is taken")]
 use micromath::F32Ext;
 
+use crate::hammer::Scanned;
 use crate::lock_in::LockIn;
-use crate::scanned::Scanned;
 
 /// Shortest measurement.
 const LEAST_S: f32 = 0.08;

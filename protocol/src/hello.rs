@@ -16,11 +16,13 @@
 //! Later versions may append; a reader takes the first 32 bytes. A session starts with a host's Hello
 //! carrying a new session number; the device forgets answers to earlier sessions' requests.
 
-use crate::limits::HELLO_BYTES;
 use crate::{limits, schema};
 
 /// Magic bytes that start every Hello.
 pub const MAGIC: [u8; 4] = *b"JRIG";
+
+/// Length of the frozen part.
+pub const BYTES: usize = 32;
 
 /// Who speaks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,8 +116,8 @@ impl Hello {
 
     /// The 32 frozen bytes.
     #[must_use]
-    pub fn to_bytes(&self) -> [u8; HELLO_BYTES] {
-        let mut out = [0; HELLO_BYTES];
+    pub fn to_bytes(&self) -> [u8; BYTES] {
+        let mut out = [0; BYTES];
         out[0..4].copy_from_slice(&MAGIC);
         out[4..6].copy_from_slice(&self.major.to_le_bytes());
         out[6..8].copy_from_slice(&self.minor.to_le_bytes());
@@ -134,7 +136,7 @@ impl Hello {
     /// # Errors
     /// [`Mismatch::NotHello`] when it is too short, has another magic, or an unknown role.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Mismatch> {
-        let b = bytes.first_chunk::<HELLO_BYTES>().ok_or(Mismatch::NotHello)?;
+        let b = bytes.first_chunk::<BYTES>().ok_or(Mismatch::NotHello)?;
         if b[0..4] != MAGIC {
             return Err(Mismatch::NotHello);
         }
@@ -195,9 +197,9 @@ mod tests {
     #[test]
     fn appended_bytes_of_later_versions_are_ignored() {
         let device = Hello::device(1, 2, 3);
-        let mut long = [0xAA; HELLO_BYTES + 9];
-        long[..HELLO_BYTES].copy_from_slice(&device.to_bytes());
+        let mut long = [0xAA; BYTES + 9];
+        long[..BYTES].copy_from_slice(&device.to_bytes());
         assert_eq!(Hello::from_bytes(&long), Ok(device));
-        assert_eq!(Hello::from_bytes(&long[..HELLO_BYTES - 1]), Err(Mismatch::NotHello));
+        assert_eq!(Hello::from_bytes(&long[..BYTES - 1]), Err(Mismatch::NotHello));
     }
 }

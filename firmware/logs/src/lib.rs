@@ -9,7 +9,6 @@
 
 #[cfg(feature = "example")]
 pub mod example;
-mod line;
 #[cfg(not(feature = "decode"))]
 #[path = "no_strings.rs"]
 mod strings;
@@ -19,8 +18,7 @@ mod table;
 
 use object::Object;
 
-pub use line::Line;
-pub use table::{Table, TableError};
+pub use table::{Line, Table, TableError};
 
 /// The folder of tables that `cargo xtask firmware` fills, inside cargo's target directory.
 pub const FOLDER: &str = "log-tables";

@@ -1,6 +1,6 @@
 //! In place of the decoder, where it was left out.
 
-use crate::line::Line;
+use crate::table::Line;
 
 /// There are none.
 pub enum Strings {}

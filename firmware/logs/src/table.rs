@@ -2,8 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::line::Line;
+use log::Level;
+
 use crate::strings::Strings;
+
+/// One line of a controller's log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Line {
+    /// How important it is; a line without a level counts as information.
+    pub level: Level,
+    /// The device's time in seconds, where the image tells it, and the text.
+    pub text: String,
+}
 
 /// Why there is no table.
 #[derive(Debug, thiserror::Error)]

@@ -15,7 +15,6 @@
 //! | [`part`] | what differs between the parts |
 //! | [`range`] | input ranges, codes to volts and back |
 //! | [`registers`] | addresses and bits |
-//! | [`lines`] | how many DOUT lines carry data |
 //! | [`frames`] | what comes out of the DOUT lines, and its CRC |
 //! | [`converter`] | one chip: reset, identity, settings, diagnostics, single conversions |
 //! | [`pair`] | two chips: sixteen channels per scan, and scans that went missing |
@@ -23,7 +22,6 @@
 pub mod converter;
 pub mod error;
 pub mod frames;
-pub mod lines;
 pub mod pair;
 pub mod part;
 pub mod range;
@@ -32,7 +30,6 @@ pub mod trouble;
 
 pub use converter::{Converter, Settings};
 pub use error::Error;
-pub use lines::Lines;
 pub use part::{Oversampling, Part};
 pub use range::Range;
 

@@ -1,6 +1,6 @@
 //! What differs between the parts that fit one footprint.
 
-use super::lines::Lines;
+use super::frames::Lines;
 use super::range::Range;
 
 /// How many conversions the chip averages into one sample.
