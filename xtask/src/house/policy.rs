@@ -17,6 +17,8 @@ const FILE: &str = "deny.toml";
 /// What `deny.toml` says.
 #[derive(Debug, Default)]
 struct Policy {
+    /// The systems that the crates are looked at for.
+    targets: Vec<String>,
     licences: Vec<Licensee>,
     /// Licences for one crate only.
     exceptions: Vec<(String, Vec<Licensee>)>,
@@ -43,11 +45,11 @@ pub fn check(project: &Project) -> Result<String> {
     let text =
         std::fs::read_to_string(&path).with_context(|| format!("could not read {}", path.display()))?;
     let policy = Policy::read(&text).with_context(|| format!("{FILE} is not understood"))?;
-    let crates = crates(&project.root)?;
+    let crates = policy.crates(&project.root)?;
     let mut faults = policy.faults(&crates);
     faults.extend(policy.duplicates(&crates));
     if let Some(folder) = project.boards_root() {
-        faults.extend(policy.faults(&self::crates(&folder)?));
+        faults.extend(policy.faults(&policy.crates(&folder)?));
     }
     faults.sort();
     faults.dedup();
@@ -55,17 +57,6 @@ pub fn check(project: &Project) -> Result<String> {
         return Ok(format!("{} crates of others keep to {FILE}", crates.len()));
     }
     bail!("{FILE} does not allow this: {}", faults.join("; "))
-}
-
-/// All crates of others in a workspace's lock, for every system that it can be built on.
-fn crates(folder: &Path) -> Result<Vec<Crate>> {
-    let mut cargo = command::cargo(folder);
-    let metadata =
-        command::output(cargo.args(["metadata", "--locked", "--all-features", "--format-version", "1"]))?;
-    let metadata: Value =
-        serde_json::from_str(&metadata).context("`cargo metadata` did not answer in JSON")?;
-    let packages = metadata["packages"].as_array().context("`cargo metadata` names no packages")?;
-    Ok(packages.iter().filter_map(of_others).collect())
 }
 
 /// A package that has a source; ours have none.
@@ -96,6 +87,7 @@ impl Policy {
         strict("sources", "unknown-registry")?;
         strict("sources", "unknown-git")?;
         Ok(Self {
+            targets: part("graph", "targets")?.iter().map(string).collect::<Result<_>>()?,
             licences: licensees(&part("licenses", "allow")?)?,
             exceptions: part("licenses", "exceptions")?
                 .iter()
@@ -114,6 +106,19 @@ impl Policy {
                 .map(|source| Ok(format!("registry+{}", string(source)?)))
                 .collect::<Result<_>>()?,
         })
+    }
+
+    /// All crates of others that a workspace is built from.
+    fn crates(&self, folder: &Path) -> Result<Vec<Crate>> {
+        let mut cargo = command::cargo(folder);
+        cargo.args(["metadata", "--locked", "--all-features", "--format-version", "1"]);
+        for target in &self.targets {
+            cargo.args(["--filter-platform", target]);
+        }
+        let metadata: Value = serde_json::from_str(&command::output(&mut cargo)?)
+            .context("`cargo metadata` did not answer in JSON")?;
+        let packages = metadata["packages"].as_array().context("`cargo metadata` names no packages")?;
+        Ok(packages.iter().filter_map(of_others).collect())
     }
 
     fn faults(&self, crates: &[Crate]) -> Vec<String> {
@@ -189,7 +194,7 @@ mod tests {
 
     fn policy() -> Policy {
         Policy::read(
-            "[licenses]\nallow = ['MIT', 'Apache-2.0 WITH LLVM-exception']\nexceptions = [{ crate = 'port', allow = ['MPL-2.0'] }]\n\
+            "[graph]\ntargets = ['here']\n[licenses]\nallow = ['MIT', 'Apache-2.0 WITH LLVM-exception']\nexceptions = [{ crate = 'port', allow = ['MPL-2.0'] }]\n\
              [bans]\nmultiple-versions = 'deny'\ndeny = [{ crate = 'tokio', reason = 'threads' }]\nskip = [{ crate = 'syn@1.0.0' }]\n\
              [sources]\nunknown-registry = 'deny'\nunknown-git = 'deny'\nallow-registry = ['https://here']",
         )
