@@ -30,6 +30,7 @@ pub mod memory;
 pub mod pulse;
 pub mod quiet;
 pub mod receive;
+mod refusal;
 pub mod report;
 mod requests;
 pub mod ring;

@@ -1,7 +1,6 @@
 //! What each request does.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
-use heapless::String;
 use jointrig_protocol::answer::{Answer, Refusal, Status};
 use jointrig_protocol::event::{Event, Reason};
 use jointrig_protocol::request::{Request, Stage as Place};
@@ -9,15 +8,8 @@ use nalgebra::Matrix3;
 
 use crate::Core;
 use crate::board::Stage;
+use crate::refusal::out_of_bounds;
 use crate::ring::{CHANNEL_MAP, Range};
-
-/// A refusal with a sentence.
-pub(crate) fn out_of_bounds(sentence: &str) -> Refusal {
-    let mut text = String::new();
-    // what does not fit 120 bytes is left out
-    let _ = text.push_str(sentence);
-    Refusal::OutOfBounds(text)
-}
 
 impl<M: RawMutex> Core<'_, M> {
     /// Carries out a request that was not seen before.

@@ -111,7 +111,7 @@ impl<'a> Shaker<'a> {
         if self.full_scale_v <= 0.0 {
             return Err(Refusal::Unsupported);
         }
-        let refuse = |sentence| Err(crate::requests::out_of_bounds(sentence));
+        let refuse = |sentence| Err(crate::refusal::out_of_bounds(sentence));
         if order.step == 0 || order.step > u32::MAX / SHAKE_SCANS_PER_CYCLE {
             return refuse("the shaker's frequency must be above 0 and at most a tenth of the scan rate");
         }

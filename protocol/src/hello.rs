@@ -22,7 +22,7 @@ use crate::{limits, schema};
 pub const MAGIC: [u8; 4] = *b"JRIG";
 
 /// Length of the frozen part.
-pub const BYTES: usize = 32;
+pub const BYTES: usize = limits::HELLO_BYTES;
 
 /// Who speaks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

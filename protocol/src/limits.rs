@@ -9,6 +9,9 @@ pub const BLOCK_SAMPLE_BYTES: usize = 480;
 /// Bytes of a block's fixed header, its kind byte included.
 pub const BLOCK_HEADER_BYTES: usize = 16;
 
+/// Bytes of the frozen part of a Hello.
+pub const HELLO_BYTES: usize = 32;
+
 /// Bytes of the CRC-32 that ends every frame.
 pub const CRC_BYTES: usize = 4;
 

@@ -5,7 +5,7 @@
 
 use postcard_schema::key::Key;
 
-use crate::{acknowledge, answer, block, event, hello, limits, request};
+use crate::{acknowledge, answer, block, event, limits, request};
 
 /// Another major is another protocol.
 pub const MAJOR: u16 = 1;
@@ -28,7 +28,7 @@ pub const LAYOUT: &[u64] = &[
     limits::SHAKE_VALID_CAP_MS as u64,
     limits::SHAKE_RAMP_MS as u64,
     limits::SHAKE_SCANS_PER_CYCLE as u64,
-    hello::BYTES as u64,
+    limits::HELLO_BYTES as u64,
     acknowledge::BYTES as u64,
     block::HEADER_PAYLOAD as u64,
     // revision of the hand-written layouts in `block`, `acknowledge` and `frame`

@@ -109,8 +109,12 @@ pub fn check(project: &Project, toolchain: &Toolchain) -> Result<String> {
 
 fn measure(project: &Project, toolchain: &Toolchain) -> Result<Figures> {
     let image = firmware::build_board(project, toolchain, emulator::BOARD)?;
-    let first = emulator::listen(&image, "bench", true)?;
-    let second = emulator::listen(&image, "bench", true)?;
+    let listen = || emulator::listen(&image, "bench", true);
+    let (first, second) = std::thread::scope(|scope| {
+        let other = scope.spawn(listen);
+        (listen(), other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+    });
+    let (first, second) = (first?, second?);
     if first != second {
         bail!("two runs of the benchmark differ, which must not be:\n{first}\n{second}");
     }

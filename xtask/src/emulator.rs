@@ -2,14 +2,13 @@
 
 use crate::consent::Consent;
 use crate::project::Project;
-use crate::{command, firmware, packages, setup};
+use crate::qemu::PROGRAM;
+use crate::{command, firmware, setup};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::path::Path;
 use std::process::Command;
 
-/// The emulator of 32-bit Arm machines.
-const PROGRAM: &str = "qemu-system-arm";
 /// The emulated board: QEMU's machine `mps2-an505` (Cortex-M33) and our package are named alike.
 pub const BOARD: &str = "mps2-an505";
 
@@ -25,23 +24,6 @@ pub struct Options {
     /// Passed on to qemu-system-arm, for example `-- -serial pty`.
     #[arg(last = true)]
     extra: Vec<String>,
-}
-
-/// Makes QEMU available.
-pub fn ensure(consent: Consent) -> Result<()> {
-    if let Some(program) = command::find_program(PROGRAM) {
-        println!("  {PROGRAM}: {}", program.display());
-        return Ok(());
-    }
-    if !packages::available() {
-        bail!("{PROGRAM} is not installed: {}", how_to_install(std::env::consts::OS));
-    }
-    println!("  {PROGRAM}: not installed; the firmware's own binary runs in it, so apt-get installs it");
-    packages::install(&[PROGRAM], consent)?;
-    if command::find_program(PROGRAM).is_none() {
-        bail!("the package {PROGRAM} is installed, but no such program is on PATH: check PATH");
-    }
-    Ok(())
 }
 
 /// Builds the emulated board's image and runs it; QEMU's exit code, which is the image's, decides.
@@ -89,17 +71,6 @@ fn arguments(image: &Path, options: &Options) -> Result<Vec<String>> {
     Ok(arguments)
 }
 
-fn how_to_install(system: &str) -> &'static str {
-    match system {
-        "macos" => "run `brew install qemu`",
-        "windows" => "run `winget install SoftwareFreedomConservancy.QEMU`, and add its folder to PATH",
-        _ => {
-            "install your distribution's package (Fedora: `dnf install qemu-system-arm-core`, Arch: \
-             `pacman -S qemu-system-arm`, Alpine: `apk add qemu-system-arm`)"
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -127,11 +98,5 @@ mod tests {
             "{line}"
         );
         assert!(line.ends_with("-kernel i -serial pty") && !line.contains("null"), "{line}");
-    }
-
-    #[test]
-    fn every_system_is_told_what_to_install() {
-        assert!(how_to_install("macos").contains("brew"));
-        assert!(how_to_install("linux").contains("dnf"));
     }
 }

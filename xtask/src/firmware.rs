@@ -4,8 +4,8 @@
 //! boards' chip features exclude each other.
 
 use crate::consent::Consent;
-use crate::project::{Package, Project};
-use crate::toolchain::{TARGET, Toolchain};
+use crate::project::{Package, Project, TARGET};
+use crate::toolchain::Toolchain;
 use crate::{command, setup, size};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
@@ -30,14 +30,15 @@ pub fn command(project: &Project, only: Option<&str>) -> Result<()> {
 }
 
 /// Compiles the two libraries for the microcontroller, which shows that they need neither `std` nor anything the
-/// microcontroller lacks. The log goes to `defmt` there, so that feature is checked, where there is one.
+/// microcontroller lacks. The log goes to `defmt` there, so that feature is checked, where there is one. Machine code is
+/// made for the boards only, whose profile is another.
 pub fn check(project: &Project, toolchain: &Toolchain) -> Result<()> {
     for name in LIBRARIES {
         let package =
             project.package(name).with_context(|| format!("the workspace has no package {name}"))?;
         let mut cargo = command::cargo(&project.root);
         toolchain.apply(&mut cargo, project);
-        cargo.args(["build", "--release", "--target", TARGET, "--package", name, "--no-default-features"]);
+        cargo.args(["check", "--release", "--target", TARGET, "--package", name, "--no-default-features"]);
         if package.features.iter().any(|feature| feature == "defmt") {
             cargo.args(["--features", "defmt"]);
         }

@@ -1,8 +1,7 @@
 //! Formatting and lints, in both workspaces.
 
 use crate::consent::Consent;
-use crate::project::Project;
-use crate::toolchain::TARGET;
+use crate::project::{Project, TARGET};
 use crate::{command, locks, setup};
 use anyhow::{Context, Result};
 use std::path::Path;

@@ -18,6 +18,7 @@ mod locks;
 mod packages;
 mod parity;
 mod project;
+mod qemu;
 mod setup;
 mod size;
 mod suite;
@@ -58,7 +59,7 @@ enum Task {
     FmtCheck,
     /// Run clippy on both workspaces with warnings as errors, and compare their locks.
     Lint,
-    /// Check the laws of the house: which crate uses which, circles of files.
+    /// Check the laws of the house: crate graph, circles of files, equations, licences.
     House,
     /// Run all that must pass before a change is merged.
     #[command(after_help = setup::ENVIRONMENT_HELP)]

@@ -8,6 +8,9 @@ use anyhow::{Context, Result};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
+/// The Cortex-M33 with its floating-point unit: the rig's controller and the emulated board.
+pub const TARGET: &str = "thumbv8m.main-none-eabihf";
+
 /// The repository as xtask sees it.
 pub struct Project {
     /// The folder of the root `Cargo.toml`.
@@ -169,6 +172,19 @@ mod tests {
             benches: vec!["scan".into()],
         };
         assert_eq!(packages(&metadata), [expected]);
+    }
+
+    #[test]
+    fn the_public_ci_runs_on_the_oldest_compiler_that_is_promised() {
+        let root = Project::locate().expect("the tests run inside the repository").root;
+        let read =
+            |file: &str| std::fs::read_to_string(root.join(file)).expect("it is part of the repository");
+        let manifest: toml::Table = read("Cargo.toml").parse().expect("a manifest");
+        let oldest =
+            manifest["workspace"]["package"]["rust-version"].as_str().expect("it is stated").to_owned();
+        let workflow = read(".github/workflows/ci.yml");
+        assert!(workflow.contains(&format!("toolchain: [stable, \"{oldest}\"]")), "{oldest}");
+        assert!(workflow.contains("\n      - run: cargo xtask test\n"));
     }
 
     #[test]

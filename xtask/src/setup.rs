@@ -1,8 +1,8 @@
 //! `cargo xtask setup`: what the machine needs beyond a Rust compiler, made available once.
 
 use crate::consent::Consent;
-use crate::emulator;
 use crate::project::Project;
+use crate::qemu;
 use crate::toolchain::{self, Mode, Toolchain};
 use anyhow::Result;
 
@@ -16,7 +16,7 @@ JOINTRIG_FIRMWARE_TOOLCHAIN chooses the compiler for the microcontroller:
 /// Makes the target and the emulator available, and returns the compiler for the target.
 pub fn everything(project: &Project, consent: Consent) -> Result<Toolchain> {
     let toolchain = target(project, consent)?;
-    emulator::ensure(consent)?;
+    qemu::ensure(consent)?;
     Ok(toolchain)
 }
 

@@ -12,8 +12,7 @@
 use crate::command;
 use crate::consent::Consent;
 use crate::packages;
-use crate::project::Project;
-use crate::toolchain::TARGET;
+use crate::project::{Project, TARGET};
 use anyhow::{Context, Result, bail};
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};

@@ -45,11 +45,11 @@ pub fn tests(project: &Project, selection: &[&str]) -> Result<Vec<Job>> {
     Ok(jobs)
 }
 
-/// The examples that the documentation's text consists of, which only cargo can compile and run.
+/// The examples within the documentation's text, which only cargo can compile and run.
 fn documentation(project: &Project, selection: &[&str]) -> Job {
     let mut command = command::cargo(&project.root);
     command.args(["test", "--doc", "--release", "--workspace"]).args(selection);
-    Job { name: "the documentation's examples".into(), command }
+    Job { name: "documentation tests".into(), command }
 }
 
 /// Every example of the workspace, started without arguments in the repository's root: what a stranger does.

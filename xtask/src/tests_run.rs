@@ -47,7 +47,9 @@ impl std::fmt::Display for Counts {
 /// Builds the binaries and the tests.
 pub fn build(project: &Project, scope: Scope) -> Result<()> {
     let mut cargo = command::cargo(&project.root);
-    cargo.args(["build", "--release", "--workspace", "--bins", "--tests", "--examples"]);
+    cargo.args(["build", "--release", "--workspace", "--tests", "--examples"]);
+    // Not all binaries: xtask's own is in use, and some systems do not let go of a running program's file.
+    cargo.args(PROGRAMS.iter().flat_map(|(_, binary, _)| ["--bin", binary]));
     cargo.args(left_out(scope));
     command::run(&mut cargo).context("the binaries and tests do not compile")
 }

@@ -5,7 +5,7 @@
 //! once; see [`crate::sysroot`]. The variable [`MODE_VARIABLE`] chooses.
 
 use crate::consent::Consent;
-use crate::project::Project;
+use crate::project::{Project, TARGET};
 use crate::{command, packages, sysroot};
 use anyhow::{Context, Result, bail};
 use std::ffi::OsString;
@@ -13,8 +13,6 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::str::FromStr;
 
-/// The Cortex-M33 with its floating-point unit: the rig's controller and the emulated board.
-pub const TARGET: &str = "thumbv8m.main-none-eabihf";
 /// The environment variable that chooses the [`Mode`].
 pub const MODE_VARIABLE: &str = "JOINTRIG_FIRMWARE_TOOLCHAIN";
 

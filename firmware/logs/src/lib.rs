@@ -9,6 +9,7 @@
 
 #[cfg(feature = "example")]
 pub mod example;
+mod line;
 #[cfg(not(feature = "decode"))]
 #[path = "no_strings.rs"]
 mod strings;
@@ -18,7 +19,8 @@ mod table;
 
 use object::Object;
 
-pub use table::{Line, Table, TableError};
+pub use line::Line;
+pub use table::{Table, TableError};
 
 /// The folder of tables that `cargo xtask firmware` fills, inside cargo's target directory.
 pub const FOLDER: &str = "log-tables";

@@ -1,6 +1,6 @@
 //! In place of the decoder, where it was left out.
 
-use crate::table::Line;
+use crate::line::Line;
 
 /// There are none.
 pub enum Strings {}

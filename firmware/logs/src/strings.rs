@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use log::Level;
 
-use crate::table::Line;
+use crate::line::Line;
 
 /// The strings of one image.
 pub struct Strings(defmt_decoder::Table);

@@ -2,18 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use log::Level;
-
+use crate::line::Line;
 use crate::strings::Strings;
-
-/// One line of a controller's log.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Line {
-    /// How important it is; a line without a level counts as information.
-    pub level: Level,
-    /// The device's time in seconds, where the image tells it, and the text.
-    pub text: String,
-}
 
 /// Why there is no table.
 #[derive(Debug, thiserror::Error)]

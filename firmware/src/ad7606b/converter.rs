@@ -10,8 +10,8 @@ use embedded_hal::spi::SpiDevice;
 use embedded_hal_async::delay::DelayNs as WaitNs;
 use embedded_hal_async::digital::Wait;
 
-use super::frames::{INTERFACE_PATTERN, LINE_BYTES_MAX, Layout, Lines};
-use super::part::{Oversampling, Part};
+use super::frames::{INTERFACE_PATTERN, LINE_BYTES_MAX, Layout};
+use super::part::{Lines, Oversampling, Part};
 use super::range::Range;
 use super::{CHANNELS, Error, registers as reg};
 

@@ -7,35 +7,7 @@
 use crc::{Algorithm, Crc, Table};
 
 use super::CHANNELS;
-use super::part::Part;
-
-/// Lines on which data comes out at once.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Lines {
-    /// DOUTA.
-    One,
-    /// DOUTA and DOUTB.
-    Two,
-    /// DOUTA to DOUTD.
-    Four,
-    /// DOUTA to DOUTH (AD7606C only).
-    Eight,
-}
-
-impl Lines {
-    /// Its code in the CONFIG register.
-    #[must_use]
-    pub const fn code(self) -> u8 {
-        self as u8
-    }
-
-    /// How many there are.
-    #[must_use]
-    pub const fn count(self) -> usize {
-        1 << self as u8
-    }
-}
+use super::part::{Lines, Part};
 
 /// Bytes of the CRC at the end of a line's data.
 pub const CRC_BYTES: usize = 2;

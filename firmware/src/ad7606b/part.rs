@@ -1,6 +1,5 @@
 //! What differs between the parts that fit one footprint.
 
-use super::frames::Lines;
 use super::range::Range;
 
 /// How many conversions the chip averages into one sample.
@@ -37,6 +36,34 @@ impl Oversampling {
     /// Conversions per sample.
     #[must_use]
     pub const fn ratio(self) -> u16 {
+        1 << self as u8
+    }
+}
+
+/// Lines on which data comes out at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Lines {
+    /// DOUTA.
+    One,
+    /// DOUTA and DOUTB.
+    Two,
+    /// DOUTA to DOUTD.
+    Four,
+    /// DOUTA to DOUTH (AD7606C only).
+    Eight,
+}
+
+impl Lines {
+    /// Its code in the CONFIG register.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub const fn count(self) -> usize {
         1 << self as u8
     }
 }

@@ -4,8 +4,8 @@
 mod model;
 
 use embassy_futures::block_on;
-use jointrig_firmware::ad7606b::frames::{CHIP_WORDS, Lines, check_words, data_crc};
-use jointrig_firmware::ad7606b::part::{AD7606B, AD7606C_16, Oversampling};
+use jointrig_firmware::ad7606b::frames::{CHIP_WORDS, check_words, data_crc};
+use jointrig_firmware::ad7606b::part::{AD7606B, AD7606C_16, Lines, Oversampling};
 use jointrig_firmware::ad7606b::{Converter, Error, Range, Settings, registers};
 use model::{Faults, Model, Port, ResetPin};
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::config::BodyName;
+use super::body::BodyName;
 
 /// A configuration of the rig.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -13,6 +13,7 @@
 //! **Budget.** A scan of the assembly at 51.2 kHz costs about 0.1 µs; `benches/rig.rs` measures it.
 
 mod aim;
+mod body;
 pub mod config;
 mod configuration;
 mod error;

@@ -131,7 +131,7 @@ fn judge(places: &Places) -> Result<String> {
     if twice.is_empty() {
         return Ok(format!("{} equations, each in one function", places.len()));
     }
-    bail!("{}. Let one of them call the other, or say which form of the equation each is", twice.join("; "))
+    bail!("{}. Let one call the other, or say which form of the equation each one is", twice.join("; "))
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ mod circles;
 mod equations;
 mod graph;
 mod modules;
+mod policy;
 mod tokens;
 
 use crate::project::Project;
@@ -12,10 +13,11 @@ use anyhow::{Result, bail};
 /// One law: its name, and its check, which returns a remark.
 type Law = (&'static str, fn(&Project) -> Result<String>);
 
-const LAWS: [Law; 3] = [
+const LAWS: [Law; 4] = [
     ("which crate uses which", graph::check),
     ("files in circles", circles::check),
     ("equations", equations::check),
+    ("licences, bans, sources", policy::check),
 ];
 
 /// Checks all of them, and fails with everything that was found.

@@ -59,12 +59,12 @@ impl Tree {
     pub fn read(root: &Path) -> Result<Self> {
         let mut tree = Self::default();
         let folder = root.parent().context("a source file stands in a folder")?;
-        tree.read_file(root, folder, Vec::new())?;
+        tree.read_file(root, folder, &[])?;
         Ok(tree)
     }
 
     /// Reads a file; `folder` is where the files of its modules are.
-    fn read_file(&mut self, file: &Path, folder: &Path, path: Vec<String>) -> Result<()> {
+    fn read_file(&mut self, file: &Path, folder: &Path, path: &[String]) -> Result<()> {
         let source =
             std::fs::read_to_string(file).with_context(|| format!("could not read {}", file.display()))?;
         let tokens = tokens::of(&source);
@@ -75,7 +75,7 @@ impl Tree {
             if let Some(named) = child.file {
                 // As cargo does: beside the file that says so, and its own modules beside it.
                 let beside = file.with_file_name(named.trim_matches('"'));
-                self.read_file(&beside, beside.parent().unwrap_or(folder), child.path)?;
+                self.read_file(&beside, beside.parent().unwrap_or(folder), &child.path)?;
                 continue;
             }
             // Below a module written inside a file, its files have a folder of their own.
@@ -83,7 +83,7 @@ impl Tree {
             let beside = inner.join(format!("{name}.rs"));
             let below = inner.join(&name).join("mod.rs");
             let file = if beside.is_file() { beside } else { below };
-            self.read_file(&file, &inner.join(&name), child.path)?;
+            self.read_file(&file, &inner.join(&name), &child.path)?;
         }
         Ok(())
     }
@@ -183,9 +183,9 @@ impl<'a> Parser<'a> {
     }
 
     /// Reads a module's body: the file, or up to the brace that closes it.
-    fn module(&mut self, path: Vec<String>) {
-        let outermost = self.file_path_length(&path);
-        let (number, mut depth, mut file) = (self.tree.add(path.clone(), self.file), 0_usize, None);
+    fn module(&mut self, path: &[String]) {
+        let outermost = self.file_path_length(path);
+        let (number, mut depth, mut file) = (self.tree.add(path.to_vec(), self.file), 0_usize, None);
         while self.at < self.tokens.len() {
             match self.text(0) {
                 "}" if depth == 0 => break,
@@ -201,12 +201,12 @@ impl<'a> Parser<'a> {
                     continue;
                 }
                 "mod" if self.word(1).is_some() => {
-                    let mut path = path.clone();
+                    let mut path = path.to_vec();
                     path.extend(self.word(1).map(String::from));
                     self.at += 2;
                     if self.text(0) == "{" {
                         self.at += 1;
-                        self.module(path);
+                        self.module(&path);
                     } else {
                         let inside = path[outermost..path.len() - 1].to_vec();
                         self.children.push(Child { path, inside, file: file.take() });

@@ -7,6 +7,7 @@ mod check;
 mod document;
 mod sensors;
 
+pub use super::body::BodyName;
 pub(crate) use check::normal_load;
 pub use sensors::{Excitation, ForceSensor, LoadCells, Sensors, SpeckleNoise, SpotVibrometer, Vibrometer};
 
@@ -90,20 +91,6 @@ impl Default for RigConfig {
     fn default() -> Self {
         document::read(DEFAULT_TOML).expect("rigs/default.toml is a complete, valid rig: a test reads it")
     }
-}
-
-/// Which body a point sits on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum BodyName {
-    /// The moving mass (substructure A).
-    Mass,
-    /// Arm A (substructure A).
-    ArmA,
-    /// Specimen A (substructure A); arm A itself when the clamp is rigid.
-    SpecimenA,
-    /// Arm B with its specimen (substructure B).
-    ArmB,
 }
 
 /// The four rigid bodies.
@@ -365,16 +352,4 @@ pub struct Errors {
     pub aim_m: f64,
     /// Hammer's tilt about each of the two axes across the impact (rad), the same in every cell.
     pub hammer_angle_rad: f64,
-}
-
-impl BodyName {
-    /// As rig files write it.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Mass => "mass",
-            Self::ArmA => "arm_a",
-            Self::SpecimenA => "specimen_a",
-            Self::ArmB => "arm_b",
-        }
-    }
 }

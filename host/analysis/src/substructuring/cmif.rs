@@ -42,6 +42,8 @@ const VECTORS: usize = 12;
 /// The CMIF of the assembly against its parts; rows and columns are matched by name, and the substructures' internals count too.
 /// Responses that only the assembly has are left out, and so are spare ones (Grouping 3), which no virtual point uses.
 ///
+/// Implements Eq. (B.1).
+///
 /// # Errors
 /// A value that is not a number, a name that stands twice, or lines that differ in number.
 pub fn cmif(a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix, geometry: &Geometry) -> Result<Cmif, FrfError> {

@@ -39,7 +39,9 @@ pub enum CouplingError {
     Singular(#[from] RankLost),
 }
 
-/// The paper's Eq. (1): Ỹ = Y − Y B_fᵀ (B_u Y B_fᵀ + Y^J)⁻¹ B_u Y.
+/// Ỹ = Y − Y B_fᵀ (B_u Y B_fᵀ + Y^J)⁻¹ B_u Y.
+///
+/// Implements Eq. (1).
 ///
 /// `y` (outputs × inputs) holds the uncoupled parts, `b_u` (m × outputs) and `b_f` (m × inputs) the signed Boolean
 /// matrices of the m couplings. With `joint` = Y^J (m × m) the interface gives way; without it this is the rigid coupling

@@ -5,7 +5,9 @@ use super::super::pseudo_inverse::full_rank_inverse;
 use super::DecouplingError;
 use nalgebra::{Complex, DMatrix};
 
-/// Z^J from G = (P⁺ M Q⁺)⁻¹, Y^J = G − Y^A_cc − Y^B_cc (the paper's Eq. (3), solved for G by least squares).
+/// Z^J from G = (P⁺ M Q⁺)⁻¹, Y^J = G − Y^A_cc − Y^B_cc.
+///
+/// Implements Eq. (3), solved for G by least squares.
 ///
 /// `p` = Y^B_{i,c} (responses on B × n_c), `q` = Y^A_{c,i} (n_c × impacts on A), `m` = Y^AJB_{i(B),i(A)}; because
 /// M = P G⁻¹ Q exactly, P and Q are inverted whole and M, which is singular for n_i > n_c, never is.

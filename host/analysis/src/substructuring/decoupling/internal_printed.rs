@@ -5,7 +5,9 @@ use super::super::pseudo_inverse::{full_rank_inverse, rank};
 use super::DecouplingError;
 use nalgebra::{Complex, DMatrix};
 
-/// Z^J from Y^J = Q M⁻¹ P − Y^A_cc − Y^B_cc: the paper's Eq. (3) as printed.
+/// Z^J from Y^J = Q M⁻¹ P − Y^A_cc − Y^B_cc.
+///
+/// Implements Eq. (3), as printed.
 ///
 /// `p` = Y^B_{i,c}, `q` = Y^A_{c,i}, `m` = Y^AJB_{i(B),i(A)}. Exact only for n_i = n_c. With n_i < n_c what comes back is
 /// Y^J − G (I − Π) with Π of rank n_i ([`observed_rank`]): right for the forces that the internals generate, −(Y^A + Y^B) elsewhere.

@@ -13,8 +13,10 @@ pub enum InverseBlock {
     Ba,
 }
 
-/// Z^J = minus an off-diagonal block of (Y^AJB_cc)⁻¹: the paper's Eq. (A.1). Needs neither Y^A nor Y^B, so it does not
+/// Z^J = minus an off-diagonal block of (Y^AJB_cc)⁻¹. Needs neither Y^A nor Y^B, so it does not
 /// care whether A changes between configurations. `y_ajb` is 2n_c × 2n_c, A's virtual point first.
+///
+/// Implements Eq. (A.1).
 ///
 /// # Errors
 /// Y^AJB_cc is singular.

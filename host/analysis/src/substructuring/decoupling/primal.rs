@@ -13,7 +13,9 @@ pub enum PrimalBlock {
     B,
 }
 
-/// Z^J = Z^AJB_SS − Z^S: a diagonal block of the paper's Eq. (A.2), whose printed lower-right subscript is a misprint.
+/// Z^J = Z^AJB_SS − Z^S.
+///
+/// Implements Eq. (A.2), one diagonal block; the printed lower-right subscript is a misprint.
 ///
 /// `y_s` is the admittance of the substructure of that block (n_c × n_c), `y_ajb` 2n_c × 2n_c, A's virtual point first.
 ///

@@ -1,0 +1,29 @@
+//! The names of the rigid bodies.
+
+use serde::{Deserialize, Serialize};
+
+/// Which body a point sits on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BodyName {
+    /// The moving mass (substructure A).
+    Mass,
+    /// Arm A (substructure A).
+    ArmA,
+    /// Specimen A (substructure A); arm A itself when the clamp is rigid.
+    SpecimenA,
+    /// Arm B with its specimen (substructure B).
+    ArmB,
+}
+
+impl BodyName {
+    /// As rig files write it.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Mass => "mass",
+            Self::ArmA => "arm_a",
+            Self::SpecimenA => "specimen_a",
+            Self::ArmB => "arm_b",
+        }
+    }
+}
