@@ -6,7 +6,7 @@
 //! format has no field for, is in text 4 as `sigma 2.3 1/s`.
 
 use super::uff::{
-    Abscissa, Axis, Contents, DataSet, Dof, Encoding, Function, Precision, Values, WriteError, count, kind,
+    Abscissa, Axis, Contents, DataSet, Dof, Encoding, Function, Precision, Values, WriteError, kind,
     quantity, read,
 };
 use crate::advice;
@@ -213,10 +213,10 @@ pub fn to_functions(
         }
     }
     let mut sets = Vec::with_capacity(frf.outputs.len() * frf.inputs.len());
-    for (column, input) in frf.inputs.iter().enumerate() {
+    for ((column, input), node) in frf.inputs.iter().enumerate().zip(101..) {
         for (row, output) in frf.outputs.iter().enumerate() {
             let (sensor, direction) = split(output);
-            let node = sensors.iter().position(|name| *name == sensor).map_or(0, |at| count(at) + 1);
+            let number = (1..).zip(&sensors).find(|(_, name)| **name == sensor).map_or(0, |(at, _)| at);
             sets.push(DataSet::Function(Box::new(Function {
                 id: [
                     format!("{output} / {input}"),
@@ -229,10 +229,10 @@ pub fn to_functions(
                 number: 0,
                 version: 0,
                 load_case: 0,
-                response: Dof { entity: sensor.into(), node, direction },
+                response: Dof { entity: sensor.into(), node: number, direction },
                 reference: Dof {
                     entity: input.clone(),
-                    node: 101 + count(column),
+                    node,
                     direction: input_directions.get(column).copied().unwrap_or(0),
                 },
                 precision: Precision::Double,
@@ -249,9 +249,8 @@ pub fn to_functions(
 
 /// Sensor and direction of an output's name.
 fn split(name: &str) -> (&str, i64) {
-    let axis =
-        |axis: &str| ["x", "y", "z", "rx", "ry", "rz"].iter().position(|a| *a == axis).map(|i| count(i) + 1);
-    name.rsplit_once(':').and_then(|(sensor, a)| Some((sensor, axis(a)?))).unwrap_or((name, 0))
+    let axis = |axis: &str| (1..).zip(["x", "y", "z", "rx", "ry", "rz"]).find(|(_, a)| *a == axis);
+    name.rsplit_once(':').and_then(|(sensor, a)| Some((sensor, axis(a)?.0))).unwrap_or((name, 0))
 }
 
 /// Writes data sets to a file.

@@ -3,7 +3,7 @@
 use super::frf_uff::{FrfUffError, to_functions, write_uff};
 use super::uff::{
     Abscissa, Axis, ByteOrder, DataSet, Dof, Encoding, Function, Header, Node, Precision, Units, Values,
-    count, kind, quantity,
+    kind, quantity,
 };
 use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 use crate::spectra::{ImpactRecords, MotionQuantity};
@@ -76,18 +76,17 @@ pub fn write_records(
         MotionQuantity::Acceleration => (quantity::ACCELERATION, "m/s^2"),
     };
     let mut sets = start();
-    for (hit, (force_n, responses)) in records.force_n.iter().zip(&records.response).enumerate() {
+    for (version, (force_n, responses)) in (1..).zip(records.force_n.iter().zip(&records.response)) {
         let reference = Dof { entity: impact.into(), node: 101, direction: 0 };
         let function = |dof: Dof, values: &[f64], quantity: i64, unit: &str| {
-            let id = format!("hit {hit}");
-            let version = count(hit) + 1;
+            let id = format!("hit {}", version - 1);
             time_response((&id, version), [dof, reference.clone()], (values, records.fs_hz), (quantity, unit))
         };
         let at_impact = Dof { entity: impact.into(), node: 101, direction: 0 };
         sets.push(function(at_impact, force_n, quantity::FORCE, "N"));
         let three = responses.len() == 3;
-        for (i, x) in responses.iter().enumerate() {
-            let direction = if three { count(i) + 1 } else { 0 };
+        for (axis, x) in (1..).zip(responses) {
+            let direction = if three { axis } else { 0 };
             sets.push(function(Dof { entity: response.into(), node: 1, direction }, x, motion, unit));
         }
     }
@@ -177,8 +176,8 @@ fn nodes(points: &Configuration) -> Vec<Node> {
 
 /// ±1, 2, 3 where the direction is an axis's, 0 where it is oblique.
 fn direction(point: &Point) -> i64 {
-    (0..3).find(|axis| point.direction[*axis].abs() == 1.0).map_or(0, |axis| {
-        let number = count(axis) + 1;
-        if point.direction[axis] < 0.0 { -number } else { number }
-    })
+    (1..)
+        .zip(point.direction)
+        .find(|(_, along)| along.abs() == 1.0)
+        .map_or(0, |(number, along)| if along < 0.0 { -number } else { number })
 }

@@ -2,22 +2,23 @@
 //!
 //! A universal file is a row of data sets between lines of `    -1`. Known here: 58 and 58b (functions: FRFs, time signals,
 //! spectra, coherence), 15 and 2411 (nodes), 82 (trace lines), 2412 (elements), 151 (header), 164 (units); others are kept as their number and
-//! place. Each set has a file of its own; this module uses nothing else of jointrig.
+//! place. Each set has a file of its own.
 //!
 //! Reading is tolerant where the world is not: line ends of any kind (also a false one between binary data and the closing `-1`), Latin-1 and
 //! UTF-8 texts, trailing blanks or none, `e`, `E`, `d` and `D` exponents, columns that do not stand where they should, 4- and 8-byte
 //! floats of either byte order, byte counts in 58b headers that are wrong. What cannot be read is a [`Fault`] with the data set, its byte
 //! offset and the reason; all else is still read. No input makes it panic, and memory stays within a small multiple of the input.
+#![forbid(unsafe_code)]
 
 #[cfg(test)]
-mod any_bytes;
+mod any_bytes_tests;
 mod blocks;
 #[cfg(test)]
-mod foreign;
+mod foreign_tests;
 mod function;
 mod number;
 #[cfg(test)]
-mod round_trip;
+mod round_trip_tests;
 mod set15;
 mod set151;
 mod set164;
@@ -35,6 +36,7 @@ pub use set151::Header;
 pub use set164::Units;
 pub use set2412::{Beam, Element};
 
+#[cfg(feature = "parallel")]
 use rayon::prelude::*;
 use std::fmt;
 
@@ -119,40 +121,30 @@ pub fn read(bytes: &[u8]) -> Contents {
         Fault(Fault),
         Skipped(Skipped),
     }
-    let blocks = blocks::split(bytes);
-    let read: Vec<Read> = blocks
-        .into_par_iter()
-        .enumerate()
-        .map(|(place, block)| {
-            let fault = |number, at: text::Wrong| {
-                Read::Fault(Fault {
-                    data_set: number,
-                    place: place + 1,
-                    offset: at.offset,
-                    reason: at.reason,
-                })
-            };
-            let block = match block {
-                Ok(block) => block,
-                Err(unusable) => return fault(unusable.number, unusable.wrong),
-            };
-            let body = text::Lines::new(block.body, block.body_offset);
-            let set = match block.number {
-                58 => set58::read(&block).map(|f| DataSet::Function(Box::new(f))),
-                15 => set15::read(body).map(DataSet::Nodes),
-                2411 => set2411::read(body).map(DataSet::NodesDouble),
-                82 => set82::read(body).map(DataSet::TraceLine),
-                2412 => set2412::read(body).map(DataSet::Elements),
-                151 => set151::read(body).map(DataSet::Header),
-                164 => set164::read(body).map(DataSet::Units),
-                data_set => return Read::Skipped(Skipped { data_set, offset: block.offset }),
-            };
-            match set {
-                Ok(set) => Read::Set(Box::new(set)),
-                Err(wrong) => fault(block.number, wrong),
-            }
-        })
-        .collect();
+    let read = of_each(blocks::split(bytes), |(place, block)| {
+        let fault = |number, at: text::Wrong| {
+            Read::Fault(Fault { data_set: number, place: place + 1, offset: at.offset, reason: at.reason })
+        };
+        let block = match block {
+            Ok(block) => block,
+            Err(unusable) => return fault(unusable.number, unusable.wrong),
+        };
+        let body = text::Lines::new(block.body, block.body_offset);
+        let set = match block.number {
+            58 => set58::read(&block).map(|f| DataSet::Function(Box::new(f))),
+            15 => set15::read(body).map(DataSet::Nodes),
+            2411 => set2411::read(body).map(DataSet::NodesDouble),
+            82 => set82::read(body).map(DataSet::TraceLine),
+            2412 => set2412::read(body).map(DataSet::Elements),
+            151 => set151::read(body).map(DataSet::Header),
+            164 => set164::read(body).map(DataSet::Units),
+            data_set => return Read::Skipped(Skipped { data_set, offset: block.offset }),
+        };
+        match set {
+            Ok(set) => Read::Set(Box::new(set)),
+            Err(wrong) => fault(block.number, wrong),
+        }
+    });
     let mut contents = Contents::default();
     for item in read {
         match item {
@@ -164,8 +156,16 @@ pub fn read(bytes: &[u8]) -> Contents {
     contents
 }
 
+/// `f` of each item and its place, in their order; on all processors with the feature `parallel`.
+fn of_each<T: Send, R: Send>(items: Vec<T>, f: impl Fn((usize, T)) -> R + Send + Sync) -> Vec<R> {
+    #[cfg(feature = "parallel")]
+    return items.into_par_iter().enumerate().map(f).collect();
+    #[cfg(not(feature = "parallel"))]
+    return items.into_iter().enumerate().map(f).collect();
+}
+
 /// A count as the format's whole numbers are.
-pub(super) fn count(n: usize) -> i64 {
+pub(crate) fn count(n: usize) -> i64 {
     i64::try_from(n).unwrap_or(i64::MAX)
 }
 
@@ -187,25 +187,21 @@ pub struct WriteError {
 /// [`WriteError`] for a text that is too long or has line ends, a number that its column cannot hold, values that do not
 /// fit their abscissa.
 pub fn write(sets: &[DataSet]) -> Result<Vec<u8>, WriteError> {
-    let parts: Vec<Vec<u8>> = sets
-        .par_iter()
-        .enumerate()
-        .map(|(place, set)| {
-            let mut out = text::Output::default();
-            let written = match set {
-                DataSet::Function(function) => set58::write(function, &mut out),
-                DataSet::Nodes(nodes) => set15::write(nodes, &mut out),
-                DataSet::NodesDouble(nodes) => set2411::write(nodes, &mut out),
-                DataSet::TraceLine(line) => set82::write(line, &mut out),
-                DataSet::Elements(elements) => set2412::write(elements, &mut out),
-                DataSet::Header(header) => set151::write(header, &mut out),
-                DataSet::Units(units) => set164::write(units, &mut out),
-            };
-            match written {
-                Ok(()) => Ok(out.into_bytes()),
-                Err(reason) => Err(WriteError { data_set: set.number(), place: place + 1, reason }),
-            }
-        })
-        .collect::<Result<_, _>>()?;
-    Ok(parts.concat())
+    let parts = of_each(sets.iter().collect(), |(place, set)| {
+        let mut out = text::Output::default();
+        let written = match set {
+            DataSet::Function(function) => set58::write(function, &mut out),
+            DataSet::Nodes(nodes) => set15::write(nodes, &mut out),
+            DataSet::NodesDouble(nodes) => set2411::write(nodes, &mut out),
+            DataSet::TraceLine(line) => set82::write(line, &mut out),
+            DataSet::Elements(elements) => set2412::write(elements, &mut out),
+            DataSet::Header(header) => set151::write(header, &mut out),
+            DataSet::Units(units) => set164::write(units, &mut out),
+        };
+        match written {
+            Ok(()) => Ok(out.into_bytes()),
+            Err(reason) => Err(WriteError { data_set: set.number(), place: place + 1, reason }),
+        }
+    });
+    Ok(parts.into_iter().collect::<Result<Vec<_>, _>>()?.concat())
 }
