@@ -2,8 +2,7 @@
 
 use super::frf_uff::{FrfUffError, to_functions, write_uff};
 use super::uff::{
-    Abscissa, Axis, ByteOrder, DataSet, Dof, Encoding, Function, Header, Node, Precision, Units, Values,
-    kind, quantity,
+    Abscissa, Axis, ByteOrder, DataSet, Dof, Encoding, Function, Header, Node, Units, Values, kind, quantity,
 };
 use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 use crate::spectra::{ImpactRecords, MotionQuantity};
@@ -47,12 +46,13 @@ pub fn write_frf(
             .filter_map(|line| coherence.get((line * frf.outputs.len() + output) * inputs + input).copied())
             .collect();
         if of_pair.len() == frf.lines.len() && of_pair.iter().all(|v| v.is_finite()) {
-            sets.push(DataSet::Function(Box::new(Function {
+            let coherence = Function {
                 kind: kind::COHERENCE,
                 values: Values::Real(of_pair),
                 axes: [function.axes[0].clone(), Axis::default(), Axis::default(), Axis::default()],
                 ..(*function).clone()
-            })));
+            };
+            sets.push(coherence.into());
         }
         sets.push(DataSet::Function(function));
     }
@@ -129,21 +129,13 @@ fn time_response(
 ) -> DataSet {
     let axis = |quantity, unit: &str| Axis { quantity, unit: unit.into(), ..Axis::default() };
     let places: Vec<f64> = (0..values.len()).map(|i| i as f64 / fs_hz).collect();
-    DataSet::Function(Box::new(Function {
-        id: [id.to_string(), String::new(), String::new(), String::new(), String::new()],
-        kind: kind::TIME,
-        number: 0,
-        version,
-        load_case: 0,
-        response,
-        reference,
-        precision: Precision::Double,
-        abscissa: Abscissa::of(&places),
-        values: Values::Real(values.to_vec()),
-        z: 0.0,
-        axes: [axis(quantity::TIME, "s"), axis(quantity, unit), Axis::default(), Axis::default()],
-        encoding: ENCODING,
-    }))
+    let mut function = Function::new(kind::TIME, Abscissa::of(&places), Values::Real(values.to_vec()));
+    function.id[0] = id.into();
+    function.version = version;
+    (function.response, function.reference) = (response, reference);
+    function.axes = [axis(quantity::TIME, "s"), axis(quantity, unit), Axis::default(), Axis::default()];
+    function.encoding = ENCODING;
+    function.into()
 }
 
 fn start() -> Vec<DataSet> {

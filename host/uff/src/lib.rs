@@ -1,13 +1,50 @@
 //! Universal files (UFF): the exchange format of modal analysis, read and written.
 //!
-//! A universal file is a row of data sets between lines of `    -1`. Known here: 58 and 58b (functions: FRFs, time signals,
-//! spectra, coherence), 15 and 2411 (nodes), 82 (trace lines), 2412 (elements), 151 (header), 164 (units); others are kept as their number and
-//! place. Each set has a file of its own.
+//! A universal file is a row of data sets between lines of `    -1`. Known here: 58 and 58b ([`Function`]: FRFs, time signals, spectra,
+//! coherence), 15 and 2411 ([`Node`]), 82 ([`TraceLine`]), 2412 ([`Element`]), 151 ([`Header`]), 164 ([`Units`]). Others are counted with
+//! their number and place.
 //!
-//! Reading is tolerant where the world is not: line ends of any kind (also a false one between binary data and the closing `-1`), Latin-1 and
+//! An accelerance of three lines, written and read again:
+//!
+//! ```
+//! use jointrig_uff::{Abscissa, Axis, Dof, Function, Values, kind, quantity, read, write};
+//! use num_complex::Complex;
+//!
+//! let axis = |quantity, unit: &str| Axis { quantity, unit: unit.into(), ..Axis::default() };
+//! let frf = Function {
+//!     response: Dof { entity: "plate".into(), node: 4, direction: 3 },
+//!     reference: Dof { entity: "plate".into(), node: 1, direction: -3 },
+//!     axes: [
+//!         axis(quantity::FREQUENCY, "Hz"),
+//!         axis(quantity::ACCELERATION, "m/s^2"),
+//!         axis(quantity::FORCE, "N"),
+//!         Axis::default(),
+//!     ],
+//!     ..Function::new(
+//!         kind::FRF,
+//!         Abscissa::Even { start: 100.0, step: 50.0 },
+//!         Values::Complex(vec![Complex::new(0.5, -0.25), Complex::new(-2.0, 8.0), Complex::new(1.0, 0.125)]),
+//!     )
+//! };
+//! let file = write(&[frf.clone().into()])?; // bytes, for std::fs::write
+//!
+//! let contents = read(&file); // of std::fs::read
+//! let back = contents.functions().next().expect("one FRF");
+//! assert_eq!(*back, frf);
+//! let Values::Complex(values) = &back.values else { panic!("an FRF is complex") };
+//! for (line, value) in values.iter().enumerate() {
+//!     println!("{} Hz: {} m/s² per N", back.abscissa.at(line), value.norm());
+//! }
+//! # Ok::<(), jointrig_uff::WriteError>(())
+//! ```
+//!
+//! Reading forgives what other programs do: line ends of any kind (also a false one between binary data and the closing `-1`), Latin-1 and
 //! UTF-8 texts, trailing blanks or none, `e`, `E`, `d` and `D` exponents, columns that do not stand where they should, 4- and 8-byte
 //! floats of either byte order, byte counts in 58b headers that are wrong. What cannot be read is a [`Fault`] with the data set, its byte
 //! offset and the reason; all else is still read. No input makes it panic, and memory stays within a small multiple of the input.
+//!
+//! The structs of the data sets mirror a format that has been fixed for decades, so all their fields are public. The feature `parallel`
+//! (off by default) reads and writes large files on all processors.
 #![forbid(unsafe_code)]
 
 #[cfg(test)]
@@ -16,7 +53,9 @@ mod blocks;
 #[cfg(test)]
 mod foreign_tests;
 mod function;
+mod lines;
 mod number;
+mod output;
 #[cfg(test)]
 mod round_trip_tests;
 mod set15;
@@ -25,9 +64,9 @@ mod set164;
 mod set2411;
 mod set2412;
 mod set58;
+mod set58_header;
 mod set58_values;
 mod set82;
-mod text;
 
 pub use function::{Abscissa, Axis, ByteOrder, Dof, Encoding, Function, Precision, Values, kind, quantity};
 pub use set15::Node;
@@ -42,6 +81,7 @@ use std::fmt;
 
 /// One data set.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum DataSet {
     /// 58 or 58b: a function at a degree of freedom.
     Function(Box<Function>),
@@ -74,8 +114,15 @@ impl DataSet {
     }
 }
 
+impl From<Function> for DataSet {
+    fn from(function: Function) -> Self {
+        DataSet::Function(Box::new(function))
+    }
+}
+
 /// A data set that could not be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Fault {
     /// Its number; 0 where not even that can be read.
     pub data_set: u32,
@@ -96,6 +143,7 @@ impl fmt::Display for Fault {
 
 /// A data set of a type that is not read here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Skipped {
     /// Its number.
     pub data_set: u32,
@@ -105,6 +153,7 @@ pub struct Skipped {
 
 /// What a universal file holds.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Contents {
     /// Every data set that could be read, in the order of the file.
     pub sets: Vec<DataSet>,
@@ -112,6 +161,16 @@ pub struct Contents {
     pub faults: Vec<Fault>,
     /// Every one of a type that is not known here.
     pub skipped: Vec<Skipped>,
+}
+
+impl Contents {
+    /// The functions (58 and 58b) among the data sets, in the order of the file.
+    pub fn functions(&self) -> impl Iterator<Item = &Function> {
+        self.sets.iter().filter_map(|set| match set {
+            DataSet::Function(function) => Some(&**function),
+            _ => None,
+        })
+    }
 }
 
 /// Reads all data sets of a file's bytes; large ones in parallel.
@@ -122,16 +181,16 @@ pub fn read(bytes: &[u8]) -> Contents {
         Skipped(Skipped),
     }
     let read = of_each(blocks::split(bytes), |(place, block)| {
-        let fault = |number, at: text::Wrong| {
+        let fault = |number, at: lines::Wrong| {
             Read::Fault(Fault { data_set: number, place: place + 1, offset: at.offset, reason: at.reason })
         };
         let block = match block {
             Ok(block) => block,
             Err(unusable) => return fault(unusable.number, unusable.wrong),
         };
-        let body = text::Lines::new(block.body, block.body_offset);
+        let body = lines::Lines::of(block.body);
         let set = match block.number {
-            58 => set58::read(&block).map(|f| DataSet::Function(Box::new(f))),
+            58 => set58::read(&block).map(DataSet::from),
             15 => set15::read(body).map(DataSet::Nodes),
             2411 => set2411::read(body).map(DataSet::NodesDouble),
             82 => set82::read(body).map(DataSet::TraceLine),
@@ -164,13 +223,9 @@ fn of_each<T: Send, R: Send>(items: Vec<T>, f: impl Fn((usize, T)) -> R + Send +
     return items.into_iter().enumerate().map(f).collect();
 }
 
-/// A count as the format's whole numbers are.
-pub(crate) fn count(n: usize) -> i64 {
-    i64::try_from(n).unwrap_or(i64::MAX)
-}
-
 /// Why a data set cannot be written.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 #[error("data set {place} (type {data_set}) cannot be written: {reason}")]
 pub struct WriteError {
     /// Its number.
@@ -188,7 +243,7 @@ pub struct WriteError {
 /// fit their abscissa.
 pub fn write(sets: &[DataSet]) -> Result<Vec<u8>, WriteError> {
     let parts = of_each(sets.iter().collect(), |(place, set)| {
-        let mut out = text::Output::default();
+        let mut out = output::Output::default();
         let written = match set {
             DataSet::Function(function) => set58::write(function, &mut out),
             DataSet::Nodes(nodes) => set15::write(nodes, &mut out),
