@@ -312,5 +312,6 @@ fn figures(set: &DataSet) -> Vec<Figures> {
             (("force", ""), vec![u.force], 1e-15),
             (("temp_offset", ""), vec![u.temperature_offset], 1e-15),
         ],
+        other => panic!("data set {} is not written here", other.number()),
     }
 }

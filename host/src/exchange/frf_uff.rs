@@ -6,8 +6,7 @@
 //! format has no field for, is in text 4 as `sigma 2.3 1/s`.
 
 use super::uff::{
-    Abscissa, Axis, Contents, DataSet, Dof, Encoding, Function, Precision, Values, WriteError, count, kind,
-    quantity, read,
+    Abscissa, Axis, Contents, DataSet, Dof, Encoding, Function, Values, WriteError, kind, quantity, read,
 };
 use crate::advice;
 use crate::substructuring::frf::{FrfMatrix, Quantity};
@@ -61,14 +60,11 @@ pub fn read_frf_uff(path: &Path) -> Result<(FrfMatrix, Vec<String>), FrfUffError
 pub fn from_contents(contents: &Contents) -> Result<(FrfMatrix, Vec<String>), String> {
     let mut warnings: Vec<String> = contents.faults.iter().map(|f| format!("{f}; left out")).collect();
     let functions: Vec<(&Function, &[Complex<f64>])> = contents
-        .sets
-        .iter()
-        .filter_map(|set| match set {
-            DataSet::Function(f) if f.kind == kind::FRF => match &f.values {
-                Values::Complex(values) => Some((&**f, values.as_slice())),
-                Values::Real(_) => None,
-            },
-            _ => None,
+        .functions()
+        .filter(|f| f.kind == kind::FRF)
+        .filter_map(|f| match &f.values {
+            Values::Complex(values) => Some((f, values.as_slice())),
+            Values::Real(_) => None,
         })
         .collect();
     let Some((first, values)) = functions.first() else {
@@ -212,36 +208,22 @@ pub fn to_functions(
             sensors.push(sensor);
         }
     }
+    let abscissa = Abscissa::of(&frf.frequency_hz);
     let mut sets = Vec::with_capacity(frf.outputs.len() * frf.inputs.len());
-    for (column, input) in frf.inputs.iter().enumerate() {
+    for ((column, input), node) in frf.inputs.iter().enumerate().zip(101..) {
         for (row, output) in frf.outputs.iter().enumerate() {
             let (sensor, direction) = split(output);
-            let node = sensors.iter().position(|name| *name == sensor).map_or(0, |at| count(at) + 1);
-            sets.push(DataSet::Function(Box::new(Function {
-                id: [
-                    format!("{output} / {input}"),
-                    String::new(),
-                    String::new(),
-                    damping.clone(),
-                    String::new(),
-                ],
-                kind: kind::FRF,
-                number: 0,
-                version: 0,
-                load_case: 0,
-                response: Dof { entity: sensor.into(), node, direction },
-                reference: Dof {
-                    entity: input.clone(),
-                    node: 101 + count(column),
-                    direction: input_directions.get(column).copied().unwrap_or(0),
-                },
-                precision: Precision::Double,
-                abscissa: Abscissa::of(&frf.frequency_hz),
-                values: Values::Complex(frf.lines.iter().map(|y| y[(row, column)]).collect()),
-                z: 0.0,
-                axes: axes.clone(),
-                encoding,
-            })));
+            let number = (1..).zip(&sensors).find(|(_, name)| **name == sensor).map_or(0, |(at, _)| at);
+            let values = Values::Complex(frf.lines.iter().map(|y| y[(row, column)]).collect());
+            let mut function = Function::new(kind::FRF, abscissa.clone(), values);
+            function.id[0] = format!("{output} / {input}");
+            function.id[3].clone_from(&damping);
+            function.response = Dof { entity: sensor.into(), node: number, direction };
+            let direction = input_directions.get(column).copied().unwrap_or(0);
+            function.reference = Dof { entity: input.clone(), node, direction };
+            function.axes.clone_from(&axes);
+            function.encoding = encoding;
+            sets.push(function.into());
         }
     }
     Ok(sets)
@@ -249,9 +231,8 @@ pub fn to_functions(
 
 /// Sensor and direction of an output's name.
 fn split(name: &str) -> (&str, i64) {
-    let axis =
-        |axis: &str| ["x", "y", "z", "rx", "ry", "rz"].iter().position(|a| *a == axis).map(|i| count(i) + 1);
-    name.rsplit_once(':').and_then(|(sensor, a)| Some((sensor, axis(a)?))).unwrap_or((name, 0))
+    let axis = |axis: &str| (1..).zip(["x", "y", "z", "rx", "ry", "rz"]).find(|(_, a)| *a == axis);
+    name.rsplit_once(':').and_then(|(sensor, a)| Some((sensor, axis(a)?.0))).unwrap_or((name, 0))
 }
 
 /// Writes data sets to a file.

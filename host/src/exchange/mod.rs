@@ -5,7 +5,7 @@
 //! [`frf_uff`] says which of its functions make an FRF matrix, [`frf_file`] takes either form.
 
 #[cfg(test)]
-mod any_bytes;
+mod any_bytes_tests;
 pub mod frf_file;
 pub mod frf_npz;
 pub mod frf_uff;
@@ -16,11 +16,12 @@ pub mod positions_output;
 pub mod record_npz;
 pub mod record_uff;
 #[cfg(test)]
-mod round_trips;
+mod round_trip_tests;
 mod tables;
 pub mod tables_output;
-pub mod uff;
 pub mod uff_output;
+
+pub use jointrig_uff as uff;
 
 pub use frf_file::{FrfFile, FrfFileError, read_frf_file};
 pub use frf_npz::{Extra, read_frf, read_frf_noise, write_frf};

@@ -4,12 +4,13 @@
 //! gives C order and the widest type. Every error names the file, the array and what was expected of it.
 
 use crate::advice;
-use npyz::npz::NpzArchive;
+use npyz::npz::{array_name_from_file_name, file_name_from_array_name};
 use npyz::{DType, NpyFile, Order, TypeChar};
 use num_complex::Complex;
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
+use zip::ZipArchive;
 
 /// Why an npz file cannot be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -76,7 +77,7 @@ pub struct Array<T> {
 /// An npz file open for reading.
 pub struct NpzFile {
     path: PathBuf,
-    archive: NpzArchive<BufReader<File>>,
+    archive: ZipArchive<BufReader<File>>,
 }
 
 impl NpzFile {
@@ -85,14 +86,15 @@ impl NpzFile {
     /// # Errors
     /// [`NpzError::Open`].
     pub fn open(path: &Path) -> Result<Self, NpzError> {
-        let archive =
-            NpzArchive::open(path).map_err(|source| NpzError::Open { path: path.into(), source })?;
+        let archive = File::open(path)
+            .and_then(|file| Ok(ZipArchive::new(BufReader::new(file))?))
+            .map_err(|source| NpzError::Open { path: path.into(), source })?;
         Ok(NpzFile { path: path.into(), archive })
     }
 
     /// Whether there is an array of this name.
     pub fn has(&self, array: &str) -> bool {
-        self.archive.array_names().any(|name| name == array)
+        self.archive.index_for_name(&file_name_from_array_name(array)).is_some()
     }
 
     /// The file's path, for messages.
@@ -218,7 +220,12 @@ impl NpzFile {
         expected: &str,
     ) -> Result<(TypeChar, u64, Vec<usize>, Order, NpyFile<impl Read + '_>), NpzError> {
         if !self.has(array) {
-            let mut available: Vec<&str> = self.archive.array_names().collect();
+            let mut available: Vec<String> = self
+                .archive
+                .file_names()
+                .flatten()
+                .filter_map(|name| array_name_from_file_name(&name).map(String::from))
+                .collect();
             available.sort_unstable();
             return Err(NpzError::Missing {
                 path: self.path.clone(),
@@ -234,18 +241,12 @@ impl NpzFile {
             found,
             expected: expected.into(),
         };
-        let entry_name = npyz::npz::file_name_from_array_name(array);
-        let stored = self
+        let member = self
             .archive
-            .zip_archive()
-            .by_name(&entry_name)
-            .map_err(|e| damaged(format!("is damaged ({e})")))?
-            .size();
-        let file = match self.archive.by_name(array) {
-            Ok(Some(file)) => file,
-            Ok(None) => return Err(damaged("vanished from the archive".into())),
-            Err(e) => return Err(damaged(format!("is damaged ({e})"))),
-        };
+            .by_name(&file_name_from_array_name(array))
+            .map_err(|e| damaged(format!("is damaged ({e})")))?;
+        let stored = member.size();
+        let file = NpyFile::new(member).map_err(|e| damaged(format!("is damaged ({e})")))?;
         let DType::Plain(kind) = file.dtype() else {
             return Err(damaged("is a structured array".into()));
         };
@@ -294,7 +295,7 @@ fn in_c_order<T: Clone>(values: Vec<T>, shape: &[usize], order: Order) -> Vec<T>
 mod tests {
     use super::super::npz_output::NpzOutput;
     use super::*;
-    use npyz::zip;
+    use zip::write::SimpleFileOptions;
 
     #[test]
     fn arrays_come_back() {
@@ -332,7 +333,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("a temporary folder");
         let path = dir.path().join("bomb.npz");
         let mut zip = zip::ZipWriter::new(File::create(&path).expect("writable"));
-        zip.start_file("force.npy", zip::write::FileOptions::default()).expect("entry");
+        zip.start_file("force.npy", SimpleFileOptions::default()).expect("entry");
         let mut npy = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
         let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (4000000000, 1000000), }".to_string();
         npy.extend(format!("{header:<117}\n").bytes());

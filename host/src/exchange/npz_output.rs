@@ -1,18 +1,19 @@
 //! Arrays into an npz archive: float64, complex128 and unicode, in C order.
 
 use super::npz::NpzError;
-use npyz::npz::NpzWriter;
-use npyz::zip;
-use npyz::{DType, WriterBuilder};
+use npyz::npz::file_name_from_array_name;
+use npyz::{DType, WriteOptions, WriterBuilder};
 use num_complex::Complex;
 use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use zip::ZipWriter;
+use zip::write::SimpleFileOptions;
 
 /// An npz file being written.
 pub struct NpzOutput {
     path: PathBuf,
-    writer: NpzWriter<BufWriter<File>>,
+    archive: ZipWriter<BufWriter<File>>,
 }
 
 impl NpzOutput {
@@ -21,9 +22,8 @@ impl NpzOutput {
     /// # Errors
     /// [`NpzError::Write`].
     pub fn create(path: &Path) -> Result<Self, NpzError> {
-        let writer =
-            NpzWriter::create(path).map_err(|source| NpzError::Write { path: path.into(), source })?;
-        Ok(NpzOutput { path: path.into(), writer })
+        let file = File::create(path).map_err(|source| NpzError::Write { path: path.into(), source })?;
+        Ok(NpzOutput { path: path.into(), archive: ZipWriter::new(BufWriter::new(file)) })
     }
 
     /// Adds a float64 array in C order.
@@ -61,18 +61,18 @@ impl NpzOutput {
     ) -> Result<(), NpzError> {
         let shape: Vec<u64> = shape.iter().map(|&n| n as u64).collect();
         // A fixed date keeps files of the same content identical.
-        let options = zip::write::FileOptions::default()
+        let options = SimpleFileOptions::default()
             .last_modified_time(zip::DateTime::default())
             .large_file(shape.iter().product::<u64>() > 100_000_000);
         let dtype = DType::new_scalar(kind.parse().expect("type strings above are numpy's own"));
-        let written = self
-            .writer
-            .array::<T>(name, options)
-            .and_then(|array| array.dtype(dtype).shape(&shape).begin_nd())
-            .and_then(|mut array| {
-                array.extend(values)?;
-                array.finish()
-            });
+        let archive = &mut self.archive;
+        let written = archive.start_file(file_name_from_array_name(name), options).map_err(io::Error::from);
+        let written = written.and_then(|()| {
+            let array = WriteOptions::<T>::new().dtype(dtype).shape(&shape);
+            let mut array = array.writer(archive).begin_nd()?;
+            array.extend(values)?;
+            array.finish()
+        });
         written.map_err(|source| NpzError::Write { path: self.path.clone(), source })
     }
 
@@ -80,9 +80,9 @@ impl NpzOutput {
     ///
     /// # Errors
     /// [`NpzError::Write`].
-    pub fn finish(mut self) -> Result<(), NpzError> {
-        let closed = self.writer.zip_writer().finish().map_err(io::Error::from);
-        let flushed = closed.and_then(|mut file| io::Write::flush(&mut file));
-        flushed.map_err(|source| NpzError::Write { path: self.path.clone(), source })
+    pub fn finish(self) -> Result<(), NpzError> {
+        let closed = self.archive.finish().map_err(io::Error::from);
+        let flushed = closed.and_then(|mut file| file.flush());
+        flushed.map_err(|source| NpzError::Write { path: self.path, source })
     }
 }

@@ -77,7 +77,8 @@ pub struct Positions {
 /// # Errors
 /// [`PositionsError`] naming sheet, row and column.
 pub fn read_positions(path: &Path) -> Result<Positions, PositionsError> {
-    let tables = if path.is_dir() { csv_tables(path)? } else { workbook_tables(path)? };
+    let tables = if path.is_dir() { csv_tables(path) } else { workbook_tables(path) };
+    let tables = tables.map_err(|reason| PositionsError::Open { path: path.into(), reason })?;
     let mut reading = Reading { path, tables, warnings: Vec::new() };
     let a = reading.configuration("A")?;
     let b = reading.configuration("B")?;

@@ -3,7 +3,7 @@
 //! A function whose ordinate is a force begins a hit; the motions that follow it, up to the next force, are its responses. Responses
 //! along x, y and z (directions ±1, ±2, ±3) are put in this order, one along a negative axis is turned; others stay as they stand.
 
-use super::uff::{Abscissa, Contents, DataSet, Function, Values, kind, quantity, read};
+use super::uff::{Abscissa, Contents, Function, Values, kind, quantity, read};
 use super::{FrfUffError, NpzError, frf_file, read_impacts};
 use crate::spectra::{ImpactRecords, MotionQuantity};
 use std::path::Path;
@@ -44,12 +44,11 @@ pub fn read_record_file(path: &Path) -> Result<(ImpactRecords, Vec<String>), Rec
 pub fn from_contents(contents: &Contents) -> Result<(ImpactRecords, Vec<String>), String> {
     let warnings: Vec<String> = contents.faults.iter().map(|f| format!("{f}; left out")).collect();
     let mut hits: Vec<Vec<(&Function, &[f64])>> = Vec::new();
-    for set in &contents.sets {
-        let DataSet::Function(function) = set else { continue };
+    for function in contents.functions() {
         let (kind::TIME, Values::Real(values)) = (function.kind, &function.values) else { continue };
         match (function.axes[1].quantity, hits.last_mut()) {
-            (quantity::FORCE, _) => hits.push(vec![(&**function, values)]),
-            (_, Some(hit)) => hit.push((&**function, values)),
+            (quantity::FORCE, _) => hits.push(vec![(function, values)]),
+            (_, Some(hit)) => hit.push((function, values)),
             (_, None) => {
                 return Err(
                     "a time response stands before the first force: every hit begins with its force".into()
@@ -128,7 +127,7 @@ fn responses(functions: &[(&Function, &[f64])]) -> Vec<Vec<f64>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::uff::write;
+    use super::super::uff::{DataSet, write};
     use super::super::uff_output::write_records;
     use super::*;
 

@@ -1,6 +1,5 @@
 //! Sheets of a workbook, or csv files of a folder, as plain rows of cells.
 
-use super::positions::PositionsError;
 use calamine::{Data, Reader, Xlsx, open_workbook};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,13 +15,12 @@ pub(super) enum Cell {
 /// Rows of one sheet with the spreadsheet's row number of each.
 pub(super) type Table = Vec<(usize, Vec<Cell>)>;
 
-/// All sheets of a workbook.
-pub(super) fn workbook_tables(path: &Path) -> Result<BTreeMap<String, Table>, PositionsError> {
-    let fail = |reason: String| PositionsError::Open { path: path.into(), reason };
-    let mut workbook: Xlsx<_> = open_workbook(path).map_err(|e: calamine::XlsxError| fail(e.to_string()))?;
+/// All sheets of a workbook, or why it cannot be read.
+pub(super) fn workbook_tables(path: &Path) -> Result<BTreeMap<String, Table>, String> {
+    let mut workbook: Xlsx<_> = open_workbook(path).map_err(|e: calamine::XlsxError| e.to_string())?;
     let mut tables = BTreeMap::new();
     for sheet in workbook.sheet_names() {
-        let range = workbook.worksheet_range(&sheet).map_err(|e| fail(format!("sheet `{sheet}`: {e}")))?;
+        let range = workbook.worksheet_range(&sheet).map_err(|e| format!("sheet `{sheet}`: {e}"))?;
         let first = range.start().map_or(0, |(row, _)| row as usize);
         let rows = range
             .rows()
@@ -45,22 +43,21 @@ fn cell(data: &Data) -> Cell {
     }
 }
 
-/// All csv files of a folder, named by their stems.
-pub(super) fn csv_tables(path: &Path) -> Result<BTreeMap<String, Table>, PositionsError> {
-    let fail = |reason: String| PositionsError::Open { path: path.into(), reason };
+/// All csv files of a folder, named by their stems, or why they cannot be read.
+pub(super) fn csv_tables(path: &Path) -> Result<BTreeMap<String, Table>, String> {
     let mut tables = BTreeMap::new();
-    for entry in std::fs::read_dir(path).map_err(|e| fail(e.to_string()))? {
-        let file = entry.map_err(|e| fail(e.to_string()))?.path();
+    for entry in std::fs::read_dir(path).map_err(|e| e.to_string())? {
+        let file = entry.map_err(|e| e.to_string())?.path();
         if file.extension().is_none_or(|e| !e.eq_ignore_ascii_case("csv")) {
             continue;
         }
         let Some(sheet) = file.file_stem().and_then(|s| s.to_str()) else { continue };
-        let text = std::fs::read_to_string(&file).map_err(|e| fail(format!("{}: {e}", file.display())))?;
+        let text = std::fs::read_to_string(&file).map_err(|e| format!("{}: {e}", file.display()))?;
         let mut reader =
             csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
         let mut table: Table = Vec::new();
         for record in reader.records() {
-            let record = record.map_err(|e| fail(format!("{}: {e}", file.display())))?;
+            let record = record.map_err(|e| format!("{}: {e}", file.display()))?;
             // The reader's own line number lags by one in files with CR LF; its byte position may stand on
             // the previous line's LF, which is counted then.
             let byte = record.position().map_or(0, |p| p.byte() as usize);
@@ -77,9 +74,9 @@ pub(super) fn csv_tables(path: &Path) -> Result<BTreeMap<String, Table>, Positio
         tables.insert(sheet.to_string(), table);
     }
     if tables.is_empty() {
-        return Err(fail(
-            "the folder has no .csv tables; they are named Channels_A.csv, Impacts_A.csv and so on".into(),
-        ));
+        return Err(
+            "the folder has no .csv tables; they are named Channels_A.csv, Impacts_A.csv and so on".into()
+        );
     }
     Ok(tables)
 }

@@ -2,8 +2,7 @@
 
 use super::frf_uff::{FrfUffError, to_functions, write_uff};
 use super::uff::{
-    Abscissa, Axis, ByteOrder, DataSet, Dof, Encoding, Function, Header, Node, Precision, Units, Values,
-    count, kind, quantity,
+    Abscissa, Axis, ByteOrder, DataSet, Dof, Encoding, Function, Header, Node, Units, Values, kind, quantity,
 };
 use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 use crate::spectra::{ImpactRecords, MotionQuantity};
@@ -47,12 +46,13 @@ pub fn write_frf(
             .filter_map(|line| coherence.get((line * frf.outputs.len() + output) * inputs + input).copied())
             .collect();
         if of_pair.len() == frf.lines.len() && of_pair.iter().all(|v| v.is_finite()) {
-            sets.push(DataSet::Function(Box::new(Function {
+            let coherence = Function {
                 kind: kind::COHERENCE,
                 values: Values::Real(of_pair),
                 axes: [function.axes[0].clone(), Axis::default(), Axis::default(), Axis::default()],
                 ..(*function).clone()
-            })));
+            };
+            sets.push(coherence.into());
         }
         sets.push(DataSet::Function(function));
     }
@@ -76,18 +76,17 @@ pub fn write_records(
         MotionQuantity::Acceleration => (quantity::ACCELERATION, "m/s^2"),
     };
     let mut sets = start();
-    for (hit, (force_n, responses)) in records.force_n.iter().zip(&records.response).enumerate() {
+    for (version, (force_n, responses)) in (1..).zip(records.force_n.iter().zip(&records.response)) {
         let reference = Dof { entity: impact.into(), node: 101, direction: 0 };
         let function = |dof: Dof, values: &[f64], quantity: i64, unit: &str| {
-            let id = format!("hit {hit}");
-            let version = count(hit) + 1;
+            let id = format!("hit {}", version - 1);
             time_response((&id, version), [dof, reference.clone()], (values, records.fs_hz), (quantity, unit))
         };
         let at_impact = Dof { entity: impact.into(), node: 101, direction: 0 };
         sets.push(function(at_impact, force_n, quantity::FORCE, "N"));
         let three = responses.len() == 3;
-        for (i, x) in responses.iter().enumerate() {
-            let direction = if three { count(i) + 1 } else { 0 };
+        for (axis, x) in (1..).zip(responses) {
+            let direction = if three { axis } else { 0 };
             sets.push(function(Dof { entity: response.into(), node: 1, direction }, x, motion, unit));
         }
     }
@@ -130,21 +129,13 @@ fn time_response(
 ) -> DataSet {
     let axis = |quantity, unit: &str| Axis { quantity, unit: unit.into(), ..Axis::default() };
     let places: Vec<f64> = (0..values.len()).map(|i| i as f64 / fs_hz).collect();
-    DataSet::Function(Box::new(Function {
-        id: [id.to_string(), String::new(), String::new(), String::new(), String::new()],
-        kind: kind::TIME,
-        number: 0,
-        version,
-        load_case: 0,
-        response,
-        reference,
-        precision: Precision::Double,
-        abscissa: Abscissa::of(&places),
-        values: Values::Real(values.to_vec()),
-        z: 0.0,
-        axes: [axis(quantity::TIME, "s"), axis(quantity, unit), Axis::default(), Axis::default()],
-        encoding: ENCODING,
-    }))
+    let mut function = Function::new(kind::TIME, Abscissa::of(&places), Values::Real(values.to_vec()));
+    function.id[0] = id.into();
+    function.version = version;
+    (function.response, function.reference) = (response, reference);
+    function.axes = [axis(quantity::TIME, "s"), axis(quantity, unit), Axis::default(), Axis::default()];
+    function.encoding = ENCODING;
+    function.into()
 }
 
 fn start() -> Vec<DataSet> {
@@ -177,8 +168,8 @@ fn nodes(points: &Configuration) -> Vec<Node> {
 
 /// ±1, 2, 3 where the direction is an axis's, 0 where it is oblique.
 fn direction(point: &Point) -> i64 {
-    (0..3).find(|axis| point.direction[*axis].abs() == 1.0).map_or(0, |axis| {
-        let number = count(axis) + 1;
-        if point.direction[axis] < 0.0 { -number } else { number }
-    })
+    (1..)
+        .zip(point.direction)
+        .find(|(_, along)| along.abs() == 1.0)
+        .map_or(0, |(number, along)| if along < 0.0 { -number } else { number })
 }

@@ -1,8 +1,9 @@
 //! Data set 2411: nodes, double precision. Format 4I10 and, on the next line, 3D25.16.
 
+use super::lines::{Lines, Wrong};
 use super::number;
+use super::output::Output;
 use super::set15::{self, Node};
-use super::text::{Lines, Output, Wrong};
 
 /// As a row of numbers it is the same as set 15.
 pub(super) fn read(lines: Lines<'_>) -> Result<Vec<Node>, Wrong> {

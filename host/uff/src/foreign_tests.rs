@@ -5,20 +5,13 @@ use num_complex::Complex;
 
 /// An FRF of two lines.
 pub(super) fn small() -> Function {
+    let abscissa = Abscissa::Even { start: 300.0, step: 20.0 };
+    let values = Values::Complex(vec![Complex::new(1.5, -2.25), Complex::new(0.0, 1e-9)]);
     Function {
         id: [String::from("first"), String::new(), String::new(), String::new(), String::new()],
-        kind: kind::FRF,
-        number: 0,
-        version: 0,
-        load_case: 0,
         response: Dof { entity: "A1".into(), node: 1, direction: 1 },
         reference: Dof { entity: "AZ1".into(), node: 101, direction: -3 },
-        precision: Precision::Double,
-        abscissa: Abscissa::Even { start: 300.0, step: 20.0 },
-        values: Values::Complex(vec![Complex::new(1.5, -2.25), Complex::new(0.0, 1e-9)]),
-        z: 0.0,
-        axes: Default::default(),
-        encoding: Encoding::Ascii,
+        ..Function::new(kind::FRF, abscissa, values)
     }
 }
 

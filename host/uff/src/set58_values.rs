@@ -4,11 +4,11 @@
 //! Binary: the same row of numbers as IEEE floats. Places beside double values are double here, as the common programs write them; read
 //! are also places of 4 bytes beside values of 8, as the standard has it.
 
-use super::blocks::Block;
 use super::function::{Abscissa, ByteOrder, Encoding, Function, Precision, Values};
+use super::lines::{Lines, Span, Words, Wrong};
 use super::number;
-use super::set58::{self, Shape};
-use super::text::{Lines, Output, Words, Wrong};
+use super::output::Output;
+use super::set58_header::{Shape, shape_of};
 use num_complex::Complex;
 
 impl Shape {
@@ -33,11 +33,11 @@ fn bytes_for(shape: &Shape, (place, part): (usize, usize)) -> Option<usize> {
 }
 
 /// How many bytes the data of a 58b may have: what its header announces, and what its form of data needs. Writers disagree.
-pub(super) fn byte_counts(block: &Block<'_>) -> Vec<usize> {
-    let identifier = String::from_utf8_lossy(block.identifier);
+pub(super) fn byte_counts(identifier: Span<'_>, header: Span<'_>) -> Vec<usize> {
+    let identifier = String::from_utf8_lossy(identifier.bytes);
     let announced: Option<usize> = identifier.split_whitespace().nth(4).and_then(|word| word.parse().ok());
     let mut counts: Vec<usize> = Vec::new();
-    if let Some(shape) = set58::shape_of(block) {
+    if let Some(shape) = shape_of(header) {
         counts.extend(widths(&shape).into_iter().filter_map(|w| bytes_for(&shape, w)));
     }
     counts.extend(announced);
@@ -46,13 +46,13 @@ pub(super) fn byte_counts(block: &Block<'_>) -> Vec<usize> {
 
 /// Values in binary.
 pub(super) fn read_binary(
-    data: &[u8],
+    data: Span<'_>,
     shape: &Shape,
-    block: &Block<'_>,
+    identifier: Span<'_>,
 ) -> Result<(Abscissa, Values, Encoding), Wrong> {
-    let identifier = String::from_utf8_lossy(block.identifier);
+    let wrong = |reason: String| Wrong { offset: identifier.offset, reason };
+    let identifier = String::from_utf8_lossy(identifier.bytes);
     let mut words = identifier.split_whitespace().skip(1);
-    let wrong = |reason: String| Wrong { offset: block.identifier_offset, reason };
     let order = match words.next() {
         Some("1") => ByteOrder::Little,
         Some("2") => ByteOrder::Big,
@@ -68,11 +68,10 @@ pub(super) fn read_binary(
             "the floats are of format `{format}`: 2 (IEEE 754) is known, write the file so"
         )));
     }
-    let fitting = widths(shape).into_iter().find(|w| bytes_for(shape, *w) == Some(data.len()));
+    let fitting = widths(shape).into_iter().find(|w| bytes_for(shape, *w) == Some(data.bytes.len()));
     let Some((place, part)) = fitting else {
-        let offset = block.body_offset + block.body.len();
-        let reason = format!("{} bytes of binary data do not make {} values", data.len(), shape.points);
-        return Err(Wrong { offset, reason });
+        let reason = format!("{} bytes of binary data do not make {} values", data.bytes.len(), shape.points);
+        return Err(Wrong { offset: data.offset, reason });
     };
     let float = |bytes: &[u8]| match (bytes, order) {
         (&[a, b, c, d], ByteOrder::Little) => f32::from_le_bytes([a, b, c, d]).into(),
@@ -83,7 +82,7 @@ pub(super) fn read_binary(
         _ => f64::NAN,
     };
     let place = if shape.even { 0 } else { place };
-    let all = data.chunks_exact((place + part * (1 + usize::from(shape.complex))).max(1));
+    let all = data.bytes.chunks_exact((place + part * (1 + usize::from(shape.complex))).max(1));
     let places = if shape.even { Vec::new() } else { all.clone().map(|v| float(&v[..place])).collect() };
     let values = if shape.complex {
         Values::Complex(

@@ -186,3 +186,24 @@ pub struct Function {
     /// How the values are stored.
     pub encoding: Encoding,
 }
+
+impl Function {
+    /// Values as double-precision text, without names, places and units: fill in what is known with `..Function::new(…)`.
+    pub fn new(kind: i64, abscissa: Abscissa, values: Values) -> Self {
+        Function {
+            id: Default::default(),
+            kind,
+            number: 0,
+            version: 0,
+            load_case: 0,
+            response: Dof::default(),
+            reference: Dof::default(),
+            precision: Precision::Double,
+            abscissa,
+            values,
+            z: 0.0,
+            axes: Default::default(),
+            encoding: Encoding::Ascii,
+        }
+    }
+}

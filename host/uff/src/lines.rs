@@ -1,7 +1,14 @@
-//! Lines, columns and words of a universal file, and the same on the way out.
+//! Lines, columns and words of a universal file, each with its place.
 
 use super::number;
 use std::borrow::Cow;
+
+/// Bytes of a file, and where in it they begin.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Span<'a> {
+    pub bytes: &'a [u8],
+    pub offset: usize,
+}
 
 /// What is wrong at which byte of the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,9 +27,9 @@ pub(super) struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    /// The lines of `bytes`, which begin at `base` of the file.
-    pub fn new(bytes: &'a [u8], base: usize) -> Self {
-        Lines { bytes, at: 0, base, ended: true }
+    /// The lines of a part of the file.
+    pub fn of(Span { bytes, offset }: Span<'a>) -> Self {
+        Lines { bytes, at: 0, base: offset, ended: true }
     }
 
     /// Offset in the file of what has not been read.
@@ -81,6 +88,12 @@ impl<'a> Iterator for Lines<'a> {
         self.ended = width > 0;
         Some((offset, &rest[..end]))
     }
+}
+
+/// Whether a line is `-1` in the first six columns; writers that forget the blanks before it are forgiven.
+pub(super) fn is_delimiter(line: &[u8]) -> bool {
+    let end = line.iter().rposition(|b| !b.is_ascii_whitespace()).map_or(0, |at| at + 1);
+    end <= 6 && line[..end].ends_with(b"-1") && line[..end - 2].iter().all(|b| *b == b' ')
 }
 
 /// UTF-8 where it is valid, else Latin-1.
@@ -197,68 +210,4 @@ impl<'a> Words<'a> {
         (self.lines, self.line, self.at) = (lines, line, at);
         empty
     }
-}
-
-/// Lines on their way out.
-#[derive(Default)]
-pub(super) struct Output {
-    pub bytes: Vec<u8>,
-}
-
-impl Output {
-    pub fn into_bytes(self) -> Vec<u8> {
-        self.bytes
-    }
-
-    /// Opens a data set; `after` follows the number.
-    pub fn open(&mut self, number: u32, after: &str) {
-        self.line(&format!("{:>6}", -1));
-        self.line(&format!("{number:>6}{after}"));
-    }
-
-    pub fn close(&mut self) {
-        self.line(&format!("{:>6}", -1));
-    }
-
-    pub fn line(&mut self, text: &str) {
-        self.bytes.extend_from_slice(text.as_bytes());
-        self.bytes.push(b'\n');
-    }
-
-    /// A line of text, `NONE` for nothing.
-    pub fn label(&mut self, what: &str, text: &str) -> Result<(), String> {
-        let line = label(what, text, 80)?;
-        if super::blocks::is_delimiter(line.as_bytes()) {
-            return Err(format!("{what} is `{text}`, which would end the data set: say it in words"));
-        }
-        self.line(&line);
-        Ok(())
-    }
-}
-
-/// A text that fits `width` characters, `NONE` for nothing, padded with blanks.
-pub(super) fn label(what: &str, text: &str, width: usize) -> Result<String, String> {
-    let text = if text.is_empty() { "NONE" } else { text };
-    if text.chars().count() > width {
-        return Err(format!("{what} `{text}` is longer than {width} characters: shorten it"));
-    }
-    if text.chars().any(char::is_control) {
-        return Err(format!("{what} {text:?} has a control character: take it out"));
-    }
-    Ok(format!("{text:<width$}"))
-}
-
-/// Whole numbers right-justified in columns of one width.
-pub(super) fn integers(what: &str, values: &[i64], width: usize) -> Result<String, String> {
-    let mut line = String::new();
-    for value in values {
-        let text = value.to_string();
-        // a full column would run into its neighbour
-        if text.len() >= width {
-            return Err(format!("{what} is {value}: at most {} characters are possible", width - 1));
-        }
-        line.extend(std::iter::repeat_n(' ', width - text.len()));
-        line.push_str(&text);
-    }
-    Ok(line)
 }

@@ -1,7 +1,8 @@
 //! Data set 15: nodes, single precision. Format 4I10, 3E13.5.
 
+use super::lines::{Lines, Words, Wrong};
 use super::number;
-use super::text::{Lines, Output, Words, Wrong, integers};
+use super::output::{Output, integers};
 
 /// A node.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,7 +1,8 @@
 //! Data set 164: units. Format I10, 20A1, I10; 3D25.17; D25.17.
 
+use super::lines::{Lines, Words, Wrong, integer, unless_none};
 use super::number;
-use super::text::{Lines, Output, Words, Wrong, integer, integers, label, unless_none};
+use super::output::{Output, integers, label};
 
 /// Units of the file. A value in the file divided by its factor is SI.
 #[derive(Debug, Clone, PartialEq)]

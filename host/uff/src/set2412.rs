@@ -1,7 +1,8 @@
 //! Data set 2412: elements. Format 6I10; for beams 3I10 more; 8I10.
 
-use super::count;
-use super::text::{Lines, Output, Words, Wrong, integers};
+use super::lines::{Lines, Words, Wrong};
+use super::number::count;
+use super::output::{Output, integers};
 
 /// Descriptors of beams, which have a line more: rod, linear, tapered, curved and parabolic beam.
 const BEAMS: [i64; 5] = [11, 21, 22, 23, 24];

@@ -1,5 +1,5 @@
 //! read(write(x)) = x for every format that is both written and read. Universal data sets of every kind are in `uff/round_trip.rs`,
-//! arrays of any type in `any_bytes.rs`.
+//! arrays of any type in `any_bytes_tests.rs`.
 
 use super::frf_uff::{read_frf_uff, to_functions, write_uff};
 use super::positions_output::write_positions;

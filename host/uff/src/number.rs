@@ -73,6 +73,11 @@ fn thorough(word: &[u8]) -> Option<f64> {
     text.parse().ok()
 }
 
+/// A count as the format's whole numbers are.
+pub(super) fn count(n: usize) -> i64 {
+    i64::try_from(n).unwrap_or(i64::MAX)
+}
+
 /// `value` as C's `%{width}.{digits}e` prints it, with as many digits as asked for and the column has room for beside one blank.
 pub(super) fn print(out: &mut Vec<u8>, value: f64, width: usize, digits: usize) {
     use std::io::Write;

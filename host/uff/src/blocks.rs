@@ -1,7 +1,7 @@
 //! Where each data set begins and ends: by its lines of `-1`, and by byte counts where the data are binary.
 
-use super::text::{Lines, Wrong};
-use super::{set58, set58_values};
+use super::lines::{Lines, Span, Wrong, is_delimiter};
+use super::{set58_header, set58_values};
 
 /// One data set's bytes.
 pub(super) struct Block<'a> {
@@ -9,14 +9,12 @@ pub(super) struct Block<'a> {
     pub number: u32,
     /// Byte offset of its opening `-1`.
     pub offset: usize,
-    /// What follows the number on its line, and where.
-    pub identifier: &'a [u8],
-    pub identifier_offset: usize,
+    /// What follows the number on its line.
+    pub identifier: Span<'a>,
     /// All lines after that, without the closing one; for 58b without the binary data.
-    pub body: &'a [u8],
-    pub body_offset: usize,
+    pub body: Span<'a>,
     /// The binary data of 58b.
-    pub binary: Option<&'a [u8]>,
+    pub binary: Option<Span<'a>>,
 }
 
 /// A place that should be a data set and is none.
@@ -28,7 +26,7 @@ pub(super) struct Unusable {
 /// Splits a file into its data sets.
 pub(super) fn split(bytes: &[u8]) -> Vec<Result<Block<'_>, Unusable>> {
     let mut blocks = Vec::new();
-    let mut lines = Lines::new(bytes, 0);
+    let mut lines = Lines::of(Span { bytes, offset: 0 });
     while let Some((offset, line)) = lines.next() {
         if !is_delimiter(line) {
             continue;
@@ -45,13 +43,13 @@ pub(super) fn split(bytes: &[u8]) -> Vec<Result<Block<'_>, Unusable>> {
             skip_to_end(&mut lines);
             continue;
         };
-        let identifier = &identifier[blanks + digits..];
-        let body_offset = lines.offset();
-        let mut block =
-            Block { number, offset, identifier, identifier_offset, body: &[], body_offset, binary: None };
-        let closed = if number == 58 && set58::is_binary(identifier) {
-            let header_end = (0..set58::HEADER_LINES).all(|_| lines.next_unless(is_delimiter).is_some());
-            block.body = &bytes[body_offset..lines.offset()];
+        let identifier = Span { bytes: &identifier[blanks + digits..], offset: identifier_offset };
+        let start = lines.offset();
+        let body = |end: usize| Span { bytes: &bytes[start..end], offset: start };
+        let mut block = Block { number, offset, identifier, body: body(start), binary: None };
+        let closed = if number == 58 && set58_header::is_binary(identifier.bytes) {
+            let header_end = (0..set58_header::LINES).all(|_| lines.next_unless(is_delimiter).is_some());
+            block.body = body(lines.offset());
             if header_end {
                 close_binary(bytes, &mut lines, &mut block)
             } else {
@@ -59,7 +57,7 @@ pub(super) fn split(bytes: &[u8]) -> Vec<Result<Block<'_>, Unusable>> {
             }
         } else {
             let end = skip_to_end(&mut lines);
-            block.body = &bytes[body_offset..end.unwrap_or(bytes.len())];
+            block.body = body(end.unwrap_or(bytes.len()));
             end.is_some()
         };
         blocks.push(if closed {
@@ -70,12 +68,6 @@ pub(super) fn split(bytes: &[u8]) -> Vec<Result<Block<'_>, Unusable>> {
         });
     }
     blocks
-}
-
-/// A line of `-1` in the first six columns; writers that forget the blanks before it are forgiven.
-pub(super) fn is_delimiter(line: &[u8]) -> bool {
-    let end = line.iter().rposition(|b| !b.is_ascii_whitespace()).map_or(0, |at| at + 1);
-    end <= 6 && line[..end].ends_with(b"-1") && line[..end - 2].iter().all(|b| *b == b' ')
 }
 
 /// Moves behind the next line of `-1` and gives the offset where that line begins. At the very end of a file, without an end of
@@ -93,10 +85,10 @@ fn skip_to_end(lines: &mut Lines<'_>) -> Option<usize> {
 fn close_binary<'a>(bytes: &'a [u8], lines: &mut Lines<'a>, block: &mut Block<'a>) -> bool {
     let start = lines.offset();
     // counts that the header allows, each tried against what stands behind it
-    for count in set58_values::byte_counts(block) {
+    for count in set58_values::byte_counts(block.identifier, block.body) {
         let Some(end) = start.checked_add(count).filter(|end| *end <= bytes.len()) else { continue };
         if let Some(after) = delimiter_at(bytes, end) {
-            block.binary = Some(&bytes[start..end]);
+            block.binary = Some(Span { bytes: &bytes[start..end], offset: start });
             lines.jump(after);
             return true;
         }
@@ -105,9 +97,9 @@ fn close_binary<'a>(bytes: &'a [u8], lines: &mut Lines<'a>, block: &mut Block<'a
     let mut from = start;
     while let Some(at) = memchr::memmem::find(&bytes[from..], b"    -1").map(|at| from + at) {
         if let Some(after) = delimiter_at(bytes, at) {
-            let next = Lines::new(&bytes[after..], after).next();
+            let next = Lines::of(Span { bytes: &bytes[after..], offset: after }).next();
             if next.is_none_or(|(_, line)| is_delimiter(line)) {
-                block.binary = Some(&bytes[start..at]);
+                block.binary = Some(Span { bytes: &bytes[start..at], offset: start });
                 lines.jump(after);
                 return true;
             }
@@ -124,7 +116,7 @@ fn delimiter_at(bytes: &[u8], at: usize) -> Option<usize> {
     let blank =
         [&b"\r\n"[..], b"\n", b"\r"].iter().find(|end| rest.starts_with(end)).map_or(0, |end| end.len());
     [0, blank].into_iter().find_map(|skipped| {
-        let mut lines = Lines::new(&rest[skipped..], at + skipped);
+        let mut lines = Lines::of(Span { bytes: &rest[skipped..], offset: at + skipped });
         let (_, line) = lines.next()?;
         is_delimiter(line).then(|| lines.offset())
     })

@@ -1,6 +1,8 @@
 //! Data set 82: a trace line. Format 3I10; 80A1; 8I10.
 
-use super::text::{Lines, Output, Words, Wrong, integer, integers};
+use super::lines::{Lines, Words, Wrong, integer};
+use super::number;
+use super::output::{Output, integers};
 
 /// A line through nodes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -29,7 +31,7 @@ pub(super) fn read(mut lines: Lines<'_>) -> Result<TraceLine, Wrong> {
         nodes.push(words.integer("a node's number")?);
     }
     // more than announced is common (one writer counts each node once); fewer means that some are lost
-    if super::count(nodes.len()) < count {
+    if number::count(nodes.len()) < count {
         return Err(first.wrong(format!("{count} nodes are announced and {} are there", nodes.len())));
     }
     Ok(TraceLine { number: line, color, name, nodes })
@@ -37,7 +39,7 @@ pub(super) fn read(mut lines: Lines<'_>) -> Result<TraceLine, Wrong> {
 
 pub(super) fn write(line: &TraceLine, out: &mut Output) -> Result<(), String> {
     out.open(82, "");
-    let count = super::count(line.nodes.len());
+    let count = number::count(line.nodes.len());
     out.line(&integers("a number of the trace line", &[line.number, count, line.color], 10)?);
     out.label("the trace line's name", &line.name)?;
     for nodes in line.nodes.chunks(8) {

@@ -1,6 +1,6 @@
 //! Whatever the bytes: no panic, no hang, and every good data set before the damage is still read.
 
-use super::round_trip::set;
+use super::round_trip_tests::set;
 use super::*;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -41,7 +41,7 @@ proptest! {
 
 #[test]
 fn a_count_that_promises_too_much_reserves_nothing() {
-    let good = write(&[DataSet::Function(Box::new(super::foreign::small()))]).expect("writable");
+    let good = write(&[DataSet::Function(Box::new(super::foreign_tests::small()))]).expect("writable");
     let text = String::from_utf8(good).expect("ASCII");
     let huge = text.replacen("         6         2         1", "         6 999999999         1", 1);
     assert_ne!(text, huge);

@@ -1,6 +1,7 @@
 //! Data set 151: the file's header. Seven lines of texts, dates and versions.
 
-use super::text::{Lines, Output, Wrong, integer, integers, label, unless_none};
+use super::lines::{Lines, Wrong, integer, unless_none};
+use super::output::{Output, integers, label};
 
 /// Who wrote the file, and when. Dates and times are as they stand: `21-Nov-26`, `14:30:00`.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

@@ -1,0 +1,262 @@
+//! Universal files (UFF): the exchange format of modal analysis, read and written.
+//!
+//! A universal file is a row of data sets between lines of `    -1`. Known here: 58 and 58b ([`Function`]: FRFs, time signals, spectra,
+//! coherence), 15 and 2411 ([`Node`]), 82 ([`TraceLine`]), 2412 ([`Element`]), 151 ([`Header`]), 164 ([`Units`]). Others are counted with
+//! their number and place.
+//!
+//! An accelerance of three lines, written and read again:
+//!
+//! ```
+//! use jointrig_uff::{Abscissa, Axis, Dof, Function, Values, kind, quantity, read, write};
+//! use num_complex::Complex;
+//!
+//! let axis = |quantity, unit: &str| Axis { quantity, unit: unit.into(), ..Axis::default() };
+//! let frf = Function {
+//!     response: Dof { entity: "plate".into(), node: 4, direction: 3 },
+//!     reference: Dof { entity: "plate".into(), node: 1, direction: -3 },
+//!     axes: [
+//!         axis(quantity::FREQUENCY, "Hz"),
+//!         axis(quantity::ACCELERATION, "m/s^2"),
+//!         axis(quantity::FORCE, "N"),
+//!         Axis::default(),
+//!     ],
+//!     ..Function::new(
+//!         kind::FRF,
+//!         Abscissa::Even { start: 100.0, step: 50.0 },
+//!         Values::Complex(vec![Complex::new(0.5, -0.25), Complex::new(-2.0, 8.0), Complex::new(1.0, 0.125)]),
+//!     )
+//! };
+//! let file = write(&[frf.clone().into()])?; // bytes, for std::fs::write
+//!
+//! let contents = read(&file); // of std::fs::read
+//! let back = contents.functions().next().expect("one FRF");
+//! assert_eq!(*back, frf);
+//! let Values::Complex(values) = &back.values else { panic!("an FRF is complex") };
+//! for (line, value) in values.iter().enumerate() {
+//!     println!("{} Hz: {} m/s² per N", back.abscissa.at(line), value.norm());
+//! }
+//! # Ok::<(), jointrig_uff::WriteError>(())
+//! ```
+//!
+//! Reading forgives what other programs do: line ends of any kind (also a false one between binary data and the closing `-1`), Latin-1 and
+//! UTF-8 texts, trailing blanks or none, `e`, `E`, `d` and `D` exponents, columns that do not stand where they should, 4- and 8-byte
+//! floats of either byte order, byte counts in 58b headers that are wrong. What cannot be read is a [`Fault`] with the data set, its byte
+//! offset and the reason; all else is still read. No input makes it panic, and memory stays within a small multiple of the input.
+//!
+//! The structs of the data sets mirror a format that has been fixed for decades, so all their fields are public. The feature `parallel`
+//! (off by default) reads and writes large files on all processors.
+#![forbid(unsafe_code)]
+
+#[cfg(test)]
+mod any_bytes_tests;
+mod blocks;
+#[cfg(test)]
+mod foreign_tests;
+mod function;
+mod lines;
+mod number;
+mod output;
+#[cfg(test)]
+mod round_trip_tests;
+mod set15;
+mod set151;
+mod set164;
+mod set2411;
+mod set2412;
+mod set58;
+mod set58_header;
+mod set58_values;
+mod set82;
+
+pub use function::{Abscissa, Axis, ByteOrder, Dof, Encoding, Function, Precision, Values, kind, quantity};
+pub use set15::Node;
+pub use set82::TraceLine;
+pub use set151::Header;
+pub use set164::Units;
+pub use set2412::{Beam, Element};
+
+#[cfg(feature = "parallel")]
+use rayon::prelude::*;
+use std::fmt;
+
+/// One data set.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum DataSet {
+    /// 58 or 58b: a function at a degree of freedom.
+    Function(Box<Function>),
+    /// 15: nodes, single precision.
+    Nodes(Vec<Node>),
+    /// 2411: nodes, double precision.
+    NodesDouble(Vec<Node>),
+    /// 82: a trace line.
+    TraceLine(TraceLine),
+    /// 2412: elements.
+    Elements(Vec<Element>),
+    /// 151: the file's header.
+    Header(Header),
+    /// 164: units.
+    Units(Units),
+}
+
+impl DataSet {
+    /// Its number in the file.
+    pub fn number(&self) -> u32 {
+        match self {
+            DataSet::Function(_) => 58,
+            DataSet::Nodes(_) => 15,
+            DataSet::NodesDouble(_) => 2411,
+            DataSet::TraceLine(_) => 82,
+            DataSet::Elements(_) => 2412,
+            DataSet::Header(_) => 151,
+            DataSet::Units(_) => 164,
+        }
+    }
+}
+
+impl From<Function> for DataSet {
+    fn from(function: Function) -> Self {
+        DataSet::Function(Box::new(function))
+    }
+}
+
+/// A data set that could not be read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Fault {
+    /// Its number; 0 where not even that can be read.
+    pub data_set: u32,
+    /// Its place among the data sets of the file, from 1.
+    pub place: usize,
+    /// Where the trouble is, in bytes from the start of the file.
+    pub offset: usize,
+    /// What is wrong.
+    pub reason: String,
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Fault { data_set, place, offset, reason } = self;
+        write!(f, "data set {place} (type {data_set}), byte {offset}: {reason}")
+    }
+}
+
+/// A data set of a type that is not read here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Skipped {
+    /// Its number.
+    pub data_set: u32,
+    /// Byte offset of its opening `-1`.
+    pub offset: usize,
+}
+
+/// What a universal file holds.
+#[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
+pub struct Contents {
+    /// Every data set that could be read, in the order of the file.
+    pub sets: Vec<DataSet>,
+    /// Every one that could not.
+    pub faults: Vec<Fault>,
+    /// Every one of a type that is not known here.
+    pub skipped: Vec<Skipped>,
+}
+
+impl Contents {
+    /// The functions (58 and 58b) among the data sets, in the order of the file.
+    pub fn functions(&self) -> impl Iterator<Item = &Function> {
+        self.sets.iter().filter_map(|set| match set {
+            DataSet::Function(function) => Some(&**function),
+            _ => None,
+        })
+    }
+}
+
+/// Reads all data sets of a file's bytes; large ones in parallel.
+pub fn read(bytes: &[u8]) -> Contents {
+    enum Read {
+        Set(Box<DataSet>),
+        Fault(Fault),
+        Skipped(Skipped),
+    }
+    let read = of_each(blocks::split(bytes), |(place, block)| {
+        let fault = |number, at: lines::Wrong| {
+            Read::Fault(Fault { data_set: number, place: place + 1, offset: at.offset, reason: at.reason })
+        };
+        let block = match block {
+            Ok(block) => block,
+            Err(unusable) => return fault(unusable.number, unusable.wrong),
+        };
+        let body = lines::Lines::of(block.body);
+        let set = match block.number {
+            58 => set58::read(&block).map(DataSet::from),
+            15 => set15::read(body).map(DataSet::Nodes),
+            2411 => set2411::read(body).map(DataSet::NodesDouble),
+            82 => set82::read(body).map(DataSet::TraceLine),
+            2412 => set2412::read(body).map(DataSet::Elements),
+            151 => set151::read(body).map(DataSet::Header),
+            164 => set164::read(body).map(DataSet::Units),
+            data_set => return Read::Skipped(Skipped { data_set, offset: block.offset }),
+        };
+        match set {
+            Ok(set) => Read::Set(Box::new(set)),
+            Err(wrong) => fault(block.number, wrong),
+        }
+    });
+    let mut contents = Contents::default();
+    for item in read {
+        match item {
+            Read::Set(set) => contents.sets.push(*set),
+            Read::Fault(fault) => contents.faults.push(fault),
+            Read::Skipped(skipped) => contents.skipped.push(skipped),
+        }
+    }
+    contents
+}
+
+/// `f` of each item and its place, in their order; on all processors with the feature `parallel`.
+fn of_each<T: Send, R: Send>(items: Vec<T>, f: impl Fn((usize, T)) -> R + Send + Sync) -> Vec<R> {
+    #[cfg(feature = "parallel")]
+    return items.into_par_iter().enumerate().map(f).collect();
+    #[cfg(not(feature = "parallel"))]
+    return items.into_iter().enumerate().map(f).collect();
+}
+
+/// Why a data set cannot be written.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+#[error("data set {place} (type {data_set}) cannot be written: {reason}")]
+pub struct WriteError {
+    /// Its number.
+    pub data_set: u32,
+    /// Its place, from 1.
+    pub place: usize,
+    /// What does not fit the format, and what would.
+    pub reason: String,
+}
+
+/// The bytes of a universal file with these data sets; large ones are formatted in parallel.
+///
+/// # Errors
+/// [`WriteError`] for a text that is too long or has line ends, a number that its column cannot hold, values that do not
+/// fit their abscissa.
+pub fn write(sets: &[DataSet]) -> Result<Vec<u8>, WriteError> {
+    let parts = of_each(sets.iter().collect(), |(place, set)| {
+        let mut out = output::Output::default();
+        let written = match set {
+            DataSet::Function(function) => set58::write(function, &mut out),
+            DataSet::Nodes(nodes) => set15::write(nodes, &mut out),
+            DataSet::NodesDouble(nodes) => set2411::write(nodes, &mut out),
+            DataSet::TraceLine(line) => set82::write(line, &mut out),
+            DataSet::Elements(elements) => set2412::write(elements, &mut out),
+            DataSet::Header(header) => set151::write(header, &mut out),
+            DataSet::Units(units) => set164::write(units, &mut out),
+        };
+        match written {
+            Ok(()) => Ok(out.into_bytes()),
+            Err(reason) => Err(WriteError { data_set: set.number(), place: place + 1, reason }),
+        }
+    });
+    Ok(parts.into_iter().collect::<Result<Vec<_>, _>>()?.concat())
+}
