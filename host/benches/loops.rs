@@ -4,7 +4,7 @@
 //! both must find the same numbers.
 
 use jointrig::campaign::level::{Held, Level};
-use jointrig::campaign::rows::Samples;
+use jointrig::campaign::record_row::Samples;
 use jointrig::campaign::shaking::record;
 use jointrig::device::channels::ChannelMap;
 use jointrig::hysteresis::{Correction, LoopAnalysis, analyse, analyse_corrected};
@@ -39,7 +39,7 @@ fn main() -> ExitCode {
 
 fn run() -> Outcome<()> {
     let map = channels()?;
-    let samples = Samples { codes: codes(&map), channels: map.len(), trigger_index: 0 };
+    let samples = Samples { codes: codes(&map), channels: map.len() };
     let level =
         Level { frequency_hz: FREQUENCY_HZ, end_hz: None, held: Held::Displacement, amplitude: 1.5e-7 };
     let mut found = both(&map, &samples, &level)?;

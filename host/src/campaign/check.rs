@@ -13,9 +13,8 @@
 
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
 
-use super::judge::Kind;
 use super::plan::{Plan, configuration_name};
-use super::rows::RecordRow;
+use super::record_row::RecordRow;
 use super::store::Store;
 use super::store_error::StoreError;
 use crate::device::channels::ChannelMap;
@@ -138,8 +137,7 @@ pub fn ratio(store: &Store, cell: i64, mass_kg: f64) -> Result<Option<Ratio>, St
 }
 
 fn kept(store: &Store, wanted: impl Fn(&RecordRow) -> bool) -> Result<Vec<RecordRow>, StoreError> {
-    let rows = store.records()?;
-    Ok(rows.into_iter().filter(|row| row.kept() && row.standing() == Kind::Good && wanted(row)).collect())
+    Ok(store.records()?.into_iter().flatten().filter(|row| row.kept() && wanted(row)).collect())
 }
 
 /// Records whose hits go along the channel's axis, the nearest to its place first.

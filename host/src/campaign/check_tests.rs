@@ -1,8 +1,10 @@
 use super::*;
-use crate::campaign::judge::Judgement;
+use crate::campaign::notes::utc_now;
 use crate::campaign::plan::SMALL;
-use crate::campaign::rows::{Counters, NewRecord, SessionInfo};
-use crate::campaign::store::utc_now;
+use crate::campaign::record_row::NewRecord;
+use crate::campaign::session_table::{Counters, SessionInfo};
+use crate::campaign::stored::Hex;
+use crate::campaign::verdict::{Kind, Verdict};
 use crate::device::recording::Recording;
 use jointrig_protocol::shot::{Phase, Shot};
 use std::f64::consts::PI;
@@ -76,18 +78,13 @@ fn campaign(folder: &tempfile::TempDir, map: &ChannelMap) -> Store {
         serial: "x".into(),
         firmware_version: "0".into(),
         target: "x".into(),
-        build: 0,
-        schema_hash: 0,
+        build: Hex(0),
+        schema_hash: Hex(0),
     };
     let session = store.begin_session(&info, map).expect("session");
     for (attempt, peak) in [45.0, 50.0, 55.0].into_iter().enumerate() {
-        let judgement = Judgement {
-            kind: Kind::Good,
-            measure: 0.0,
-            limit: 0.0,
-            sentence: "made up".into(),
-            peak_n: peak,
-        };
+        let verdict =
+            Verdict { peak_n: peak, ..Verdict::without_pulse(Kind::Good, 0.0, 0.0, "made up".into()) };
         let record = NewRecord {
             cell: 1,
             attempt: attempt as u32,
@@ -95,7 +92,7 @@ fn campaign(folder: &tempfile::TempDir, map: &ChannelMap) -> Store {
             utc: utc_now(),
             utc_error_s: None,
             recording: recording(peak),
-            judgement,
+            verdict,
         };
         store.insert(&record, &Counters::new()).expect("stored");
     }

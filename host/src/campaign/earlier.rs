@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::others::Others;
 use super::plan::Plan;
-use super::rows::RecordRow;
+use super::record_row::{Damaged, RecordRow};
 use super::store::Store;
 use super::store_error::StoreError;
 use crate::device::channels::ChannelMap;
@@ -13,15 +13,16 @@ use crate::device::channels::ChannelMap;
 /// The records of earlier runs, by cell.
 pub(super) struct Earlier {
     path: PathBuf,
-    records: HashMap<i64, Vec<RecordRow>>,
+    records: HashMap<i64, Vec<Result<RecordRow, Damaged>>>,
 }
 
 impl Earlier {
     /// Those of the file at `path`.
-    pub(super) fn new(path: &Path, rows: Vec<RecordRow>) -> Self {
-        let mut records: HashMap<i64, Vec<RecordRow>> = HashMap::new();
+    pub(super) fn new(path: &Path, rows: Vec<Result<RecordRow, Damaged>>) -> Self {
+        let mut records: HashMap<i64, Vec<Result<RecordRow, Damaged>>> = HashMap::new();
         for row in rows {
-            records.entry(row.cell).or_default().push(row);
+            let cell = row.as_ref().map_or_else(|damaged| damaged.place.cell, |row| row.cell);
+            records.entry(cell).or_default().push(row);
         }
         Self { path: path.into(), records }
     }
@@ -43,16 +44,18 @@ impl Earlier {
         let Some(records) = self.records.get(&cell) else { return Ok((others, VecDeque::new())) };
         // the writer is on a thread of its own; a cell's earlier records are in the file since before it began
         let store = Store::open_read_only(&self.path)?;
-        for record in records.iter().filter(|record| record.kept() && record.channels == channels.len()) {
+        let kept = |record: &&RecordRow| record.kept() && record.channels == channels.len();
+        for record in records.iter().flatten().filter(kept) {
             match store.samples(record) {
-                Ok(samples) => others.learn(plan, channels, &samples),
+                Ok(samples) => others.learn(plan, channels, samples.view()),
                 Err(error @ StoreError::Damaged { .. }) => log::warn!("{error}"),
                 Err(error) => return Err(error),
             }
         }
-        let mut again: Vec<RecordRow> = records.clone();
+        let mut again: Vec<RecordRow> = records.iter().flatten().cloned().collect();
         again.sort_by_key(|record| record.attempt);
-        let whole = again.iter().zip(0..).all(|(record, n)| record.attempt == n && record.damage.is_none());
+        let whole =
+            again.len() == records.len() && again.iter().zip(0..).all(|(record, n)| record.attempt == n);
         Ok((others, if whole { again.into() } else { VecDeque::new() }))
     }
 }

@@ -2,27 +2,10 @@
 
 use super::others::{self, Others};
 use super::plan::{Cell, Plan};
-use super::rows::Samples;
-pub use super::verdict::VerdictKind as Kind;
-use super::verdict::{self, RawHit};
+use super::verdict::{self, Kind, RawHit, Verdict};
 use crate::device::channels::ChannelMap;
 use crate::device::recording::Recording;
 use jointrig_protocol::channel::{Channel, Quantity, Role};
-
-/// A verdict with what it rests on.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Judgement {
-    /// What the record is.
-    pub kind: Kind,
-    /// What was measured for it, in the unit that the sentence names.
-    pub measure: f64,
-    /// The limit that it was held against, same unit.
-    pub limit: f64,
-    /// Both in words.
-    pub sentence: String,
-    /// Peak of the band-limited force, N; 0 where there is no pulse.
-    pub peak_n: f64,
-}
 
 /// Whoever judges records. It works on the raw record, before anything is derived from it.
 pub trait Judge {
@@ -35,7 +18,7 @@ pub trait Judge {
         channels: &ChannelMap,
         recording: &Recording,
         others: &Others,
-    ) -> Judgement;
+    ) -> Verdict;
 }
 
 /// Judges by the raw record itself ([`verdict::judge`]): hammer force and every velocity of the record, in SI.
@@ -50,7 +33,7 @@ impl Judge for ByRecord {
         channels: &ChannelMap,
         recording: &Recording,
         others: &Others,
-    ) -> Judgement {
+    ) -> Verdict {
         let si = |place: usize| -> Vec<f64> {
             let unit = channels.channels.get(place).map_or(f64::NAN, Channel::units_per_code);
             recording.channel(place).iter().map(|code| f64::from(*code) * unit).collect()
@@ -83,13 +66,8 @@ impl Judge for ByRecord {
             missing_samples: missing,
         };
         let found = verdict::judge(hit, &limits, Some(wanted.target_n));
-        let judged = |kind, measure, limit, sentence| Judgement {
-            kind,
-            measure,
-            limit,
-            sentence,
-            peak_n: found.peak_n,
-        };
+        let judged =
+            |kind, measure, limit, sentence| Verdict { kind, measure, limit, sentence, ..found.clone() };
         // a channel that runs into its converter's end spoils the record whatever the hammer did; channels
         // differ in range, so that each is looked at in its own codes
         if missing == 0
@@ -98,7 +76,7 @@ impl Judge for ByRecord {
             let sentence = format!("channel {name} stands at the end of its range for {touched} samples");
             return judged(Kind::Overload, touched as f64, 1.0, sentence);
         }
-        if found.verdict == Kind::Good
+        if found.kind == Kind::Good
             && let Some((name, ratio)) = noisier(channels, recording, others, given.noise_ratio)
         {
             let limit = given.noise_ratio;
@@ -107,11 +85,12 @@ impl Judge for ByRecord {
             );
             return judged(Kind::Noisy, ratio, limit, sentence);
         }
-        let sentence = match found.verdict {
-            Kind::Noisy | Kind::Overload => name_responses(&found.sentence, &names),
-            _ => found.sentence.clone(),
-        };
-        judged(found.verdict, found.measure, found.limit, sentence)
+        match found.kind {
+            Kind::Noisy | Kind::Overload => {
+                Verdict { sentence: name_responses(&found.sentence, &names), ..found }
+            }
+            _ => found,
+        }
     }
 }
 
@@ -122,7 +101,7 @@ fn noisier<'a>(
     others: &Others,
     limit: f64,
 ) -> Option<(&'a str, f64)> {
-    let noise = others::channel_noise(channels, &Samples::of(recording));
+    let noise = others::channel_noise(channels, recording.view());
     let ratios = channels.channels.iter().zip(noise).enumerate().filter_map(|(place, (channel, noise))| {
         let usual = others.usual_noise(place).filter(|usual| *usual > 0.0)?;
         Some((channel.name.as_str(), noise / usual))
@@ -150,7 +129,3 @@ fn name_responses(sentence: &str, names: &[&str]) -> String {
         text.replace(&format!("response {place}"), &format!("response {name}"))
     })
 }
-
-#[cfg(test)]
-#[path = "judge_by_summary.rs"]
-pub(crate) mod by_summary;

@@ -6,7 +6,8 @@
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
-use super::rows::{Counters, NewRecord};
+use super::record_row::NewRecord;
+use super::session_table::Counters;
 use super::store::Store;
 use super::store_error::StoreError;
 

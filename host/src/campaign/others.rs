@@ -4,8 +4,8 @@
 use jointrig_protocol::channel::{Quantity, Role};
 
 use super::plan::{Enough, Plan};
-use super::rows::Samples;
 use crate::device::channels::ChannelMap;
+use crate::device::recording::Codes;
 use crate::spectra::{Pulse, SpectraAverage, Windowing};
 
 /// Good records from which on there is something usual.
@@ -26,10 +26,10 @@ pub struct Others {
 
 impl Others {
     /// Learns from a good record. The FRFs are followed only where the plan asks when they are good enough.
-    pub fn learn(&mut self, plan: &Plan, channels: &ChannelMap, samples: &Samples) {
-        self.noise.push(channel_noise(channels, samples));
+    pub fn learn(&mut self, plan: &Plan, channels: &ChannelMap, codes: Codes<'_>) {
+        self.noise.push(channel_noise(channels, codes));
         if plan.enough.is_some() {
-            self.add_to_average(plan, channels, samples);
+            self.add_to_average(plan, channels, codes);
         }
     }
 
@@ -56,12 +56,12 @@ impl Others {
         (power > 0.0).then(|| (variance / power).sqrt())
     }
 
-    fn add_to_average(&mut self, plan: &Plan, channels: &ChannelMap, samples: &Samples) {
+    fn add_to_average(&mut self, plan: &Plan, channels: &ChannelMap, codes: Codes<'_>) {
         let (Some(force), Some(responses)) = (channels.place(Role::HammerForce), channels.responses()) else {
             return;
         };
         let fs_hz = f64::from(channels.rate_hz);
-        let si = |place: usize| channels.to_si(place, samples.channel(place));
+        let si = |place: usize| channels.to_si(place, codes.channel(place));
         let force_n = si(force);
         let Some(pulse) = Pulse::locate(&force_n) else { return };
         let window = Windowing { sigma_per_s: plan.window.exponential_per_s, ..Windowing::default() };
@@ -81,10 +81,10 @@ impl Others {
 }
 
 /// Noise of every channel in its unit; 0 for those that measure no velocity.
-pub fn channel_noise(channels: &ChannelMap, samples: &Samples) -> Vec<f64> {
+pub fn channel_noise(channels: &ChannelMap, codes: Codes<'_>) -> Vec<f64> {
     let of = |(place, channel): (usize, &jointrig_protocol::channel::Channel)| {
         if channel.quantity == Quantity::Velocity {
-            noise_codes(samples.channel(place)) * channel.units_per_code().abs()
+            noise_codes(codes.channel(place)) * channel.units_per_code().abs()
         } else {
             0.0
         }

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::judge::Judgement;
 use super::plan::{Cell as PlanCell, configuration_name};
+use super::verdict::Verdict;
 
 /// Good hits that are still wanted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -47,10 +47,10 @@ impl Progress {
     }
 
     /// A record was judged; `kept` good ones are there in all.
-    pub fn judged(&self, cell: &PlanCell, judgement: &Judgement, kept: u64, left: Left) {
+    pub fn judged(&self, cell: &PlanCell, verdict: &Verdict, kept: u64, left: Left) {
         self.bar.set_position(kept);
         let (time, label) = (self.time_left(cell, left), label(cell));
-        self.bar.set_message(format!("{label}  {time}  {}: {}", judgement.kind, judgement.sentence));
+        self.bar.set_message(format!("{label}  {time}  {}: {}", verdict.kind, verdict.sentence));
     }
 
     /// `left: cell 9 s, AJB 4 min, all 1 h 10 min`, from the time that a good hit took so far.

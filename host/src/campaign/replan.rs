@@ -2,10 +2,10 @@
 
 use std::collections::HashSet;
 
-use rusqlite::params;
-
+use super::cell_table::write_cell;
+use super::notes::{write_log, write_plan};
 use super::plan::{Cell, Plan, configuration_name};
-use super::store::{Store, utc_now};
+use super::store::Store;
 use super::store_error::{StoreError, sqlite};
 
 impl Store {
@@ -21,7 +21,7 @@ impl Store {
             Err(StoreError::PlanChange { path: self.path.clone(), source_name: source.into(), what })
         };
         let rows = self.cells()?;
-        let measured: HashSet<i64> = self.records()?.iter().map(|record| record.cell).collect();
+        let measured: HashSet<i64> = self.places()?.iter().map(|place| place.cell).collect();
         if !measured.is_empty() && new.record.get_ref() != old.record.get_ref() {
             return refuse(
                 "[record] must stay as it is, because records were measured with it; create a new campaign"
@@ -52,21 +52,10 @@ impl Store {
                 }
             }
             for cell in &cells {
-                transaction.execute(
-                    "INSERT INTO cells (configuration, impact, response, wanted) VALUES (?1, ?2, ?3, ?4) \
-                     ON CONFLICT (configuration, impact, response) \
-                     DO UPDATE SET wanted = excluded.wanted, given_up = NULL, settled = NULL",
-                    params![configuration_name(cell.configuration), cell.impact, cell.response, cell.wanted],
-                )?;
+                write_cell(&transaction, cell)?;
             }
-            transaction.execute(
-                "INSERT INTO plan (utc, source, text) VALUES (?1, ?2, ?3)",
-                params![utc_now(), source, text],
-            )?;
-            transaction.execute(
-                "INSERT INTO log (utc, text) VALUES (?1, ?2)",
-                params![utc_now(), format!("the plan {source} took over")],
-            )?;
+            write_plan(&transaction, text, source)?;
+            write_log(&transaction, &format!("the plan {source} took over"))?;
             transaction.commit()
         };
         write().map_err(|error| sqlite(&path, "taking over the plan", error))

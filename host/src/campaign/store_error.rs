@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use rusqlite::ErrorCode;
 
-use super::codec::CodecError;
 use super::plan::PlanError;
 
 /// What can go wrong with a campaign file.
@@ -29,8 +28,20 @@ pub enum StoreError {
         path: PathBuf,
     },
     /// Written by a newer program.
-    #[error("{path} has schema version {found}, this program reads up to {known}: use a newer jointrig")]
+    #[error("{path} has schema version {found}, this program reads version {known}: use a newer jointrig")]
     Newer {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        found: i32,
+        /// Ours.
+        known: i32,
+    },
+    /// Written by an older program.
+    #[error(
+        "{path} has schema version {found}, this program reads version {known}: use the jointrig that wrote it"
+    )]
+    Older {
         /// The file.
         path: PathBuf,
         /// Its version.
@@ -77,14 +88,14 @@ pub enum StoreError {
         path: PathBuf,
     },
     /// A record cannot be read.
-    #[error("{path}: record {record} is damaged ({source}); `jointrig campaign verify` lists all damage")]
+    #[error("{path}: record {record} is damaged ({what}); `jointrig campaign verify` lists all damage")]
     Damaged {
         /// The file.
         path: PathBuf,
         /// The record's id.
         record: i64,
         /// What is wrong with it.
-        source: CodecError,
+        what: String,
     },
     /// Something in the file makes no sense.
     #[error("{path}: {what}")]

@@ -1,12 +1,15 @@
-use super::super::rows::SessionInfo;
 use super::*;
-use crate::campaign::judge::Judgement;
+use crate::campaign::notes::utc_now;
 use crate::campaign::plan::{PAPER, SMALL};
+use crate::campaign::session_table::SessionInfo;
+use crate::campaign::store::VERSION;
+use crate::campaign::stored::Hex;
+use crate::campaign::verdict::Verdict;
 use crate::device::channels::ChannelMap;
+use crate::device::recording::Recording;
 use jointrig_protocol::channel::Channel;
 use jointrig_protocol::channel::{Quantity, Role};
 use jointrig_protocol::shot::{Phase, Shot};
-use std::path::Path;
 
 fn map() -> ChannelMap {
     let channel = |name: &str, role, scale| Channel {
@@ -35,8 +38,8 @@ fn info() -> SessionInfo {
         serial: "1".into(),
         firmware_version: "0.1.0".into(),
         target: "x".into(),
-        build: 1 << 63,
-        schema_hash: u64::MAX,
+        build: Hex(1 << 63),
+        schema_hash: Hex(u64::MAX),
     }
 }
 
@@ -64,8 +67,13 @@ fn record(cell: i64, attempt: u32, session: i64, kind: Kind) -> NewRecord {
         gaps: vec![3..7, 9..10],
         shot,
     };
-    let judgement = Judgement { kind, measure: 0.1, limit: 0.02, sentence: "because".into(), peak_n: 49.5 };
-    NewRecord { cell, attempt, session, utc: utc_now(), utc_error_s: Some(0.003), recording, judgement }
+    let verdict = Verdict { peak_n: 49.5, ..Verdict::without_pulse(kind, 0.1, 0.02, "because".into()) };
+    NewRecord { cell, attempt, session, utc: utc_now(), utc_error_s: Some(0.003), recording, verdict }
+}
+
+/// The rows of all records, every one whole.
+fn rows(store: &Store) -> Vec<RecordRow> {
+    store.records().expect("rows").into_iter().collect::<Result<_, _>>().expect("whole")
 }
 
 #[test]
@@ -81,17 +89,17 @@ fn records_come_back_bit_for_bit_and_can_be_read_while_another_writes() {
         let kind = if attempt == 1 { Kind::DoubleHit } else { Kind::Good };
         store.insert(&record(cells[0].id, attempt, session, kind), &Counters::new()).expect("stored");
     }
-    let rows = reader.records().expect("rows");
-    assert_eq!(rows.iter().map(RecordRow::kept).collect::<Vec<_>>(), [true, false, true]);
+    let stored = rows(&reader);
+    assert_eq!(stored.iter().map(RecordRow::kept).collect::<Vec<_>>(), [true, false, true]);
     assert_eq!(reader.channels(session).expect("channels"), map());
     assert_eq!(reader.sessions().expect("sessions"), [(session, info())]);
-    for (row, attempt) in rows.iter().zip(0..) {
-        let stored = record(cells[0].id, attempt, session, row.verdict).recording;
-        assert_eq!(reader.samples(row).expect("samples").codes, stored.codes);
-        assert_eq!((row.shot, &row.gaps, row.first_scan), (stored.shot, &stored.gaps, 144));
+    for (row, attempt) in stored.iter().zip(0..) {
+        let new = record(cells[0].id, attempt, session, row.verdict).recording;
+        assert_eq!(reader.samples(row).expect("samples").codes, new.codes);
+        assert_eq!((row.shot, &row.gaps, row.first_scan), (new.shot, &new.gaps, 144));
     }
-    store.overrule(rows[1].id, Kind::Good, "looked at it").expect("overruled");
-    assert!(reader.records().expect("rows")[1].kept());
+    store.overrule(stored[1].id, Kind::Good, "looked at it").expect("overruled");
+    assert!(rows(&reader)[1].kept());
     assert_eq!(reader.verify().expect("checked"), []);
     assert!(
         store.insert(&record(cells[0].id, 0, session, Kind::Good), &Counters::new()).is_err(),
@@ -147,92 +155,60 @@ fn wrong_files_are_refused_in_words() {
     assert!(!at("a.jrig-wal").exists(), "one file only");
 }
 
-/// A file of version 1 with two records, the second one's verdict changed behind its seal's back.
-fn first_version(path: &Path) {
-    let connection = rusqlite::Connection::open(path).expect("opens");
-    connection.execute_batch(super::super::schema::STEPS[0]).expect("tables");
-    connection.pragma_update(None, "application_id", super::super::schema::APPLICATION_ID).expect("set");
-    connection.pragma_update(None, "user_version", 1).expect("set");
-    let row = |attempt: u32| {
-        let NewRecord { recording, judgement, utc, .. } = record(1, attempt, 1, Kind::Good);
-        let bytes = codec::encode(&recording.codes, 2).expect("compressed");
-        let shot = serde_json::to_string(&recording.shot).expect("json");
-        let gaps = serde_json::to_string(&recording.gaps).expect("json");
-        let described = RecordRow {
-            session: 1,
-            utc: utc.clone(),
-            epoch: recording.epoch,
-            first_scan: recording.first_scan,
-            trigger_index: recording.trigger_index,
-            scans: recording.scans(),
-            channels: 2,
-            shot: recording.shot,
-            gaps: recording.gaps.clone(),
-            verdict: Kind::Good,
-            measure: judgement.measure,
-            limit: judgement.limit,
-            sentence: judgement.sentence.clone(),
-            crc: codec::checksum(&recording.codes),
-            ..RecordRow::unreadable(0, 1, attempt, String::new())
-        };
-        let seal = super::super::rows::first_seal(&described);
-        connection
-            .execute(
-                "INSERT INTO records (cell, attempt, session, utc, epoch, first_scan, trigger_index, scans, channels, \
-                 pulse_us, peak_n, shot, gaps, verdict, measure, limit_value, sentence, crc32, seal, samples) \
-                 VALUES (1, ?1, 1, ?2, 3, 144, 256, 2000, 2, 3000, 49.3, ?3, ?4, ?5, 0.1, 0.02, 'because', ?6, ?7, ?8)",
-                params![
-                    attempt,
-                    utc,
-                    shot,
-                    gaps,
-                    if attempt == 1 { "weak" } else { "good" },
-                    described.crc,
-                    seal,
-                    bytes
-                ],
-            )
-            .expect("stored");
-    };
-    let plan = params![utc_now(), SMALL];
-    connection
-        .execute("INSERT INTO plan (utc, source, text) VALUES (?1, 'small.toml', ?2)", plan)
-        .expect("plan");
-    connection
-        .execute_batch(
-            "INSERT INTO sessions VALUES (1, '', 'sim:', 'b', 's', '0', 't', '0', '0', '0', 51200); \
-             INSERT INTO cells (configuration, impact, response, wanted) VALUES ('A', 'AZ1', 'A1', 2);",
-        )
-        .expect("rows");
-    row(0);
-    row(1);
+#[test]
+fn files_of_another_version_are_refused_in_words_and_stay_as_they_are() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.jrig");
+    for (version, advice) in [(VERSION + 1, "use a newer jointrig"), (0, "use the jointrig that wrote it")] {
+        let store = Store::create(&path, SMALL, "small.toml").expect("created");
+        store.connection.pragma_update(None, "user_version", version).expect("changed");
+        store.close().expect("closed");
+        let before = std::fs::read(&path).expect("read");
+        for opened in [Store::open(&path), Store::open_read_only(&path)] {
+            let said = opened.expect_err("another version").to_string();
+            assert!(
+                said.contains(&format!("schema version {version}, this program reads version {VERSION}")),
+                "{said}"
+            );
+            assert!(said.contains(advice), "{said}");
+        }
+        assert!(std::fs::read(&path).expect("read") == before);
+        std::fs::remove_file(&path).expect("removed");
+    }
+    let store = Store::create(&path, SMALL, "small.toml").expect("created");
+    store.connection.pragma_update(None, "application_id", 1).expect("changed");
+    store.close().expect("closed");
+    assert!(matches!(Store::open_read_only(&path), Err(StoreError::Foreign { .. })), "of another program");
 }
 
 #[test]
-fn a_file_of_the_first_version_is_read_as_it_is_and_brought_up_when_written() {
+fn every_column_of_a_record_is_under_its_seal() {
     let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("old.jrig");
-    first_version(&path);
-    let before = std::fs::read(&path).expect("read");
-    let damaged = |store: &Store| {
+    let mut store = Store::create(&folder.path().join("a.jrig"), SMALL, "small.toml").expect("created");
+    let session = store.begin_session(&info(), &map()).expect("session");
+    let id = store.insert(&record(1, 0, session, Kind::Good), &Counters::new()).expect("stored");
+    let before = store.record(id).expect("whole");
+    let vandals = "DROP TRIGGER records_stay; DROP TRIGGER seals_stay; PRAGMA foreign_keys = OFF";
+    store.connection.execute_batch(vandals).expect("changed");
+    let columns: Vec<_> = RecordRow::columns().filter(|column| column.name() != "id").collect();
+    assert_eq!(columns.len(), 22);
+    for column in columns {
+        let (table, name) = (column.table, column.name());
+        store
+            .connection
+            .execute_batch(&format!(
+                "CREATE TABLE kept AS SELECT {name} AS value FROM {table}; UPDATE {table} SET {name} = \
+             CASE typeof({name}) WHEN 'text' THEN {name} || ' ' WHEN 'null' THEN 1.0 ELSE {name} + 1 END"
+            ))
+            .expect("changed behind its back");
         let damage = store.verify().expect("checked");
-        damage.iter().filter_map(|damage| damage.record).collect::<Vec<_>>()
-    };
-    let old = Store::open_read_only(&path).expect("readable");
-    assert_eq!(damaged(&old), [2]);
-    let samples = old.samples(&old.record(1).expect("there")).expect("whole");
-    assert!(old.link_counters().expect("none yet").is_empty() && old.cells().expect("cells").len() == 1);
-    drop(old);
-    assert!(std::fs::read(&path).expect("read") == before, "reading changes nothing");
-
-    let store = Store::open(&path).expect("brought up");
-    assert_eq!(damaged(&store), [2], "what was damaged is not made good");
-    assert_eq!(store.samples(&store.record(1).expect("there")).expect("whole"), samples);
-    store.insert(&record(1, 2, 1, Kind::Good), &Counters::new()).expect("goes on");
-    store.close().expect("closed");
-    let again = Store::open_read_only(&path).expect("readable");
-    assert_eq!(damaged(&again), [2]);
-    assert_eq!(again.records().expect("rows").iter().filter(|row| row.kept()).count(), 2);
+        assert!(damage.len() == 1 && damage[0].record == Some(id), "{table}.{name}: {damage:?}");
+        let back = format!("UPDATE {table} SET {name} = (SELECT value FROM kept); DROP TABLE kept");
+        store.connection.execute_batch(&back).expect("changed back");
+        assert_eq!(store.record(id).expect("whole again"), before, "{table}.{name}");
+    }
+    store.connection.execute_batch("DROP TRIGGER seals_remain; DELETE FROM seals").expect("changed");
+    assert_eq!(store.verify().expect("checked")[0].what, "its seal is missing");
 }
 
 #[test]

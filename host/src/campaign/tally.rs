@@ -2,8 +2,9 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::judge::Kind;
-use super::rows::{CellRow, RecordRow};
+use super::cell_table::CellRow;
+use super::record_row::{Damaged, RecordRow};
+use super::verdict::Kind;
 
 /// How far one cell is.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -39,7 +40,7 @@ pub struct Tally {
 
 impl Tally {
     /// Counts what a file holds.
-    pub fn new(cells: &[CellRow], records: &[RecordRow]) -> Self {
+    pub fn new(cells: &[CellRow], records: &[Result<RecordRow, Damaged>]) -> Self {
         let mut counts: HashMap<i64, Count> = cells
             .iter()
             .map(|row| {
@@ -48,14 +49,13 @@ impl Tally {
             })
             .collect();
         for record in records {
-            let count = counts.entry(record.cell).or_default();
-            count.attempts = count.attempts.max(record.attempt + 1);
-            if record.damage.is_some() {
-                count.damaged += 1;
-            } else if record.kept() {
-                count.kept += 1;
-            } else {
-                *count.refused.entry(record.standing()).or_default() += 1;
+            let place = record.as_ref().map_or_else(|damaged| damaged.place, RecordRow::place);
+            let count = counts.entry(place.cell).or_default();
+            count.attempts = count.attempts.max(place.attempt + 1);
+            match record {
+                Err(_) => count.damaged += 1,
+                Ok(record) if record.kept() => count.kept += 1,
+                Ok(record) => *count.refused.entry(record.standing()).or_default() += 1,
             }
         }
         Self { cells: counts }

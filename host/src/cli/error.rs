@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use crate::advice;
 use crate::campaign::plan::PlanError;
-use crate::campaign::runner::RunError;
+use crate::campaign::run_error::RunError;
 use crate::campaign::shaking::ShakeError;
 use crate::campaign::store_error::StoreError;
 use crate::device::error::DeviceError;

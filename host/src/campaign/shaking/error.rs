@@ -5,7 +5,7 @@ use jointrig_protocol::channel::Role;
 use jointrig_protocol::event::Reason;
 use jointrig_protocol::limits::SHAKE_SCANS_PER_CYCLE;
 
-use super::Options;
+use super::options::Options;
 use crate::campaign::level::Held;
 use crate::campaign::store_error::StoreError;
 use crate::device::channels::ChannelMap;

@@ -6,27 +6,28 @@
 
 mod error;
 mod meter;
+mod options;
 mod order;
 mod signals;
 mod sweep;
 
 pub use error::{ShakeError, Shortfall};
 pub use meter::CRITERION;
-pub use order::Limits;
+pub use options::{Limits, Options};
 pub use signals::{Unusable, record};
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 use jointrig_protocol::answer::Info;
 use jointrig_protocol::channel::Role;
 use jointrig_protocol::request::{Configuration, Stage as StageRequest};
 
-use super::level::{Level, Moment};
-use super::levels::{LevelRow, NewLevel, Settled};
+use super::level::Level;
+use super::level_table::{LevelRow, NewLevel, Settled};
 use super::plan::Plan;
-use super::rows::SessionInfo;
+use super::session_table::SessionInfo;
 use super::store::Store;
+use super::stored::Hex;
 use crate::device::channels::ChannelMap;
 use crate::device::recording::by_channel;
 use crate::device::session::Session;
@@ -41,25 +42,6 @@ const PAUSE_S: f64 = 0.3;
 
 /// Fewest cycles of a record.
 const FEWEST_CYCLES: f64 = 20.0;
-
-/// How levels are measured.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// Which levels, in their order.
-    pub levels: Vec<Level>,
-    /// Before or after the hammer's cells.
-    pub moment: Moment,
-    /// Shortest record, s; it is lengthened to whole cycles, twenty at least.
-    pub seconds: f64,
-    /// How fast a sweep goes, Hz/s.
-    pub sweep_hz_per_s: f64,
-    /// The drive's largest amplitude, V; its full scale without it.
-    pub most_drive_v: Option<f64>,
-    /// What stops the shaker.
-    pub limits: Limits,
-    /// Set to come to rest and end.
-    pub stop: Arc<AtomicBool>,
-}
 
 /// What came of one level.
 #[derive(Clone, Debug)]
@@ -102,8 +84,8 @@ pub fn run(
         serial: info.serial.as_str().into(),
         firmware_version: info.version.as_str().into(),
         target: info.target.as_str().into(),
-        build: info.build,
-        schema_hash: session.hello().schema,
+        build: Hex(info.build),
+        schema_hash: Hex(session.hello().schema),
     };
     let known = store.levels()?;
     let id = store.begin_session(&noted, &channels)?;
@@ -118,8 +100,8 @@ pub fn run(
         if options.stop.load(Ordering::Relaxed) {
             break;
         }
-        let there = |row: &&LevelRow| row.moment == options.moment && row.level.same(level) && row.whole();
-        let outcome = if let Some(row) = known.iter().find(there) {
+        let there = |row: &&LevelRow| row.moment == options.moment && row.level().same(level) && row.whole();
+        let outcome = if let Some(row) = known.iter().flatten().find(there) {
             Ok(Outcome::Known(row.clone()))
         } else {
             tell(store, level, None);
@@ -232,7 +214,7 @@ impl Bench<'_> {
             gaps,
         };
         let id = store.insert_level(&new)?;
-        let stored = store.levels()?.into_iter().find(|row| row.id == id);
+        let stored = store.levels()?.into_iter().flatten().find(|row| row.id == id);
         Ok(Outcome::Stored(stored.ok_or(ShakeError::Lost(id))?))
     }
 

@@ -4,11 +4,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use jointrig_protocol::answer::{Info, Shaker};
-use jointrig_protocol::channel::Role;
 use jointrig_protocol::request::Shake;
 
-use super::Options;
 use super::error::{ShakeError, Shortfall};
+use super::options::Options;
 use crate::campaign::level::{Held, Level};
 use crate::device::channels::ChannelMap;
 use crate::device::session::Session;
@@ -20,35 +19,8 @@ const VALID_MS: u32 = 10_000;
 /// After this much of the device's clock it is renewed, s. A virtual board may be half its ring further than its host knows.
 const RENEW_S: f64 = 3.0;
 
-/// Load cells and excitation stop the shaker at this part of their full scale. The vibrometers do not: they go beyond theirs for a moment
-/// when a contact lets go, and what they measure is held by the device.
-const OF_FULL_SCALE: f64 = 0.95;
-
 /// The drive's amplitude changes at most by its full scale in half a second.
 const SLEW_PER_S: f64 = 2.0;
-
-/// Limits by channel name, SI units; those of a whole level.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Limits(pub Vec<(String, f64)>);
-
-impl Limits {
-    /// The limit of each channel, in the order of the scan; 0 where there is none.
-    pub fn of(&self, channels: &ChannelMap) -> Vec<f64> {
-        (0..channels.len())
-            .map(|place| {
-                let channel = &channels.channels[place];
-                let own = self.0.iter().find(|(name, _)| name == channel.name.as_str());
-                match channel.role {
-                    _ if own.is_some() => own.map_or(0.0, |(_, limit)| *limit),
-                    Role::LoadCell | Role::Excitation => {
-                        OF_FULL_SCALE * channels.full_scale(place).unwrap_or(0.0)
-                    }
-                    _ => 0.0,
-                }
-            })
-            .collect()
-    }
-}
 
 /// The order that holds, and when it is renewed.
 pub struct Orders {
@@ -155,37 +127,5 @@ impl Orders {
             level: self.level.to_string(),
             why: super::error::in_words(reason, &self.channels, limit),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use jointrig_protocol::channel::{Channel, Quantity};
-
-    #[test]
-    fn forces_are_limited_and_a_users_limit_counts_more() {
-        let channel = |name: &str, role| Channel {
-            name: name.parse().expect("short"),
-            role,
-            quantity: Quantity::Velocity,
-            units_per_volt: -1e-3,
-            range_v: 10.0,
-            delay_ns: 0,
-            bits: 16,
-        };
-        let channels = ChannelMap {
-            id: 0,
-            rate_hz: 51_200,
-            channels: vec![
-                channel("hammer", Role::HammerForce),
-                channel("LDV_A", Role::SpecimenA),
-                channel("LC1", Role::LoadCell),
-            ],
-        };
-        let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-8);
-        assert!(near(&Limits::default().of(&channels), &[0.0, 0.0, 9.5e-3]));
-        let own = Limits(vec![("LDV_A".into(), 2e-3), ("hammer".into(), 1.0)]);
-        assert!(near(&own.of(&channels), &[1.0, 2e-3, 9.5e-3]));
     }
 }

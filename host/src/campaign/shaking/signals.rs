@@ -4,7 +4,7 @@ use jointrig_protocol::channel::{Quantity, Role};
 use rayon::prelude::*;
 
 use crate::campaign::level::Level;
-use crate::campaign::rows::Samples;
+use crate::campaign::record_row::Samples;
 use crate::device::channels::ChannelMap;
 use crate::hysteresis::delays::in_step;
 use crate::hysteresis::{HysteresisRecord, RelativeMotion};

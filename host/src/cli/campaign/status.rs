@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Map, Value, json};
 
+use crate::campaign::cell_table::CellRow;
 use crate::campaign::plan::configuration_name;
-use crate::campaign::rows::CellRow;
 use crate::campaign::store::Store;
 use crate::campaign::tally::{Count, Tally};
 use crate::cli::error::CliError;

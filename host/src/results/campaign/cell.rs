@@ -1,6 +1,6 @@
 //! What the analysis asks of a campaign: its geometry, its cells, and the kept hits of one cell in SI units.
 
-use crate::campaign::frfs::ImportedFrf;
+use crate::campaign::frf_table::ImportedFrf;
 use crate::campaign::level::{Level, Moment};
 use crate::hysteresis::HysteresisRecord;
 use crate::spectra::MotionQuantity;

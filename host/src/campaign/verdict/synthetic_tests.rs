@@ -78,7 +78,7 @@ fn every_rebound_from_two_per_cent_on_is_found() {
             let second = (start + after_ms * 1e-3, fraction * peak, width * dice.uniform(0.9, 1.2));
             let force = force(&[(start, peak, width), second], 8192, &mut dice);
             let v = verdict(&force, &[], &Limits::default());
-            assert_eq!(v.verdict, VerdictKind::DoubleHit, "{fraction} after {after_ms} ms: {v:?}");
+            assert_eq!(v.kind, Kind::DoubleHit, "{fraction} after {after_ms} ms: {v:?}");
             smallest = smallest.min(v.measure / fraction);
         }
     }
@@ -94,7 +94,7 @@ fn ringing_and_noise_raise_no_alarm() {
         let force = force(&[pulse], 12_800, &mut dice);
         let responses = [response(pulse.0, 12_800, &mut dice)];
         let v = verdict(&force, &responses, &Limits::default());
-        assert_eq!(v.verdict, VerdictKind::Good, "{v:?}");
+        assert_eq!(v.kind, Kind::Good, "{v:?}");
         // 1 % of ringing under the peak and half a per cent of interpolation
         assert!((v.peak_n / pulse.1 - 1.0).abs() < 0.04, "{} for {}", v.peak_n, pulse.1);
     }
@@ -109,14 +109,14 @@ fn a_flat_top_is_an_overload_wherever_the_range_is() {
         for f in &mut force {
             *f = f.min(range);
         }
-        assert_eq!(verdict(&force, &[], &Limits::default()).verdict, VerdictKind::Overload, "{range} N");
+        assert_eq!(verdict(&force, &[], &Limits::default()).kind, Kind::Overload, "{range} N");
         let limits = Limits { force_range_n: Some(range), ..Limits::default() };
-        assert_eq!(verdict(&force, &[], &limits).verdict, VerdictKind::Overload);
+        assert_eq!(verdict(&force, &[], &limits).kind, Kind::Overload);
     }
     let limits = Limits { response_range: Some(1e-3), ..Limits::default() };
     let pulse = clean(&mut dice);
     let (force, responses) = (force(&[pulse], 4096, &mut dice), [response(pulse.0, 4096, &mut dice)]);
-    assert_eq!(verdict(&force, &responses, &limits).verdict, VerdictKind::Overload);
+    assert_eq!(verdict(&force, &responses, &limits).kind, Kind::Overload);
 }
 
 #[test]
@@ -134,9 +134,9 @@ fn dropouts_and_spikes_are_noisy_but_plain_noise_is_not() {
             2 => x[at..(at + 150).min(12_800)].iter_mut().for_each(|v| *v += 1e-3),
             _ => x.iter_mut().for_each(|v| *v += 3e-4 * dice.gauss()),
         }
-        let wanted = if case % 4 == 3 { VerdictKind::Good } else { VerdictKind::Noisy };
+        let wanted = if case % 4 == 3 { Kind::Good } else { Kind::Noisy };
         let v = verdict(&force, &[x], &Limits::default());
-        assert_eq!(v.verdict, wanted, "case {case}: {v:?}");
+        assert_eq!(v.kind, wanted, "case {case}: {v:?}");
     }
 }
 
@@ -144,17 +144,17 @@ fn dropouts_and_spikes_are_noisy_but_plain_noise_is_not() {
 fn the_other_kinds() {
     let mut dice = Dice::new();
     let plain = |peak: f64, dice: &mut Dice| force(&[(5e-3, peak, 0.41e-3)], 4096, dice);
-    assert_eq!(verdict(&plain(15.0, &mut dice), &[], &Limits::default()).verdict, VerdictKind::Weak);
-    assert_eq!(verdict(&plain(0.0, &mut dice), &[], &Limits::default()).verdict, VerdictKind::Weak);
-    assert_eq!(verdict(&[0.0; 1024], &[], &Limits::default()).verdict, VerdictKind::Weak);
-    assert_eq!(verdict(&plain(120.0, &mut dice), &[], &Limits::default()).verdict, VerdictKind::Strong);
+    assert_eq!(verdict(&plain(15.0, &mut dice), &[], &Limits::default()).kind, Kind::Weak);
+    assert_eq!(verdict(&plain(0.0, &mut dice), &[], &Limits::default()).kind, Kind::Weak);
+    assert_eq!(verdict(&[0.0; 1024], &[], &Limits::default()).kind, Kind::Weak);
+    assert_eq!(verdict(&plain(120.0, &mut dice), &[], &Limits::default()).kind, Kind::Strong);
     let timed = Limits { expected_start_s: Some(8e-3), ..Limits::default() };
     let v = verdict(&plain(50.0, &mut dice), &[], &timed);
-    assert_eq!(v.verdict, VerdictKind::Mistimed);
+    assert_eq!(v.kind, Kind::Mistimed);
     assert!((v.measure - 3e-3).abs() < 1e-4 && v.limit == 2e-3);
     let force = plain(50.0, &mut dice);
     let hit = RawHit { fs_hz: FS, force_n: &force, responses: &[], missing_samples: 3 };
-    assert_eq!(judge(hit, &Limits::default(), None).verdict, VerdictKind::Gap);
+    assert_eq!(judge(hit, &Limits::default(), None).kind, Kind::Gap);
     // two humps of one long contact
     let merged: Vec<f64> = (0..4096)
         .map(|i| {
@@ -166,7 +166,7 @@ fn the_other_kinds() {
             }
         })
         .collect();
-    assert_eq!(verdict(&merged, &[], &Limits::default()).verdict, VerdictKind::DoubleHit);
+    assert_eq!(verdict(&merged, &[], &Limits::default()).kind, Kind::DoubleHit);
 }
 
 #[test]
@@ -189,11 +189,11 @@ fn a_saturated_amplifier_below_full_scale_is_an_overload_and_a_round_top_is_not(
         let round: Vec<f64> = motion.iter().copied().map(rounded).collect();
         let v = verdict(&force, &[round], &Limits::default());
         // without noise even the corner at the hit counts as a jump
-        assert_ne!(v.verdict, VerdictKind::Overload, "case {case}, {hz} Hz: {v:?}");
+        assert_ne!(v.kind, Kind::Overload, "case {case}, {hz} Hz: {v:?}");
         let top = motion.iter().fold(0.0f64, |most, x| most.max(x.abs()));
         let flat = motion.iter().map(|x| rounded(x.clamp(-0.85 * top, 0.85 * top))).collect();
         let v = verdict(&force, &[flat], &Limits::default());
-        assert_eq!(v.verdict, VerdictKind::Overload, "case {case}, {hz} Hz: {v:?}");
+        assert_eq!(v.kind, Kind::Overload, "case {case}, {hz} Hz: {v:?}");
         assert!((v.measure.abs() / (0.85 * top) - 1.0).abs() < 0.01, "{v:?}");
     }
 }

@@ -1,7 +1,9 @@
 use super::*;
 use crate::campaign::level::Held;
 use crate::campaign::plan::SMALL;
-use crate::campaign::rows::SessionInfo;
+use crate::campaign::session_table::SessionInfo;
+use crate::campaign::stored::Hex;
+use crate::campaign::table::Column;
 use crate::device::channels::ChannelMap;
 
 fn session(store: &mut Store) -> i64 {
@@ -12,8 +14,8 @@ fn session(store: &mut Store) -> i64 {
         serial: text(),
         firmware_version: text(),
         target: text(),
-        build: 1,
-        schema_hash: 2,
+        build: Hex(1),
+        schema_hash: Hex(2),
     };
     let map = ChannelMap { id: 0, rate_hz: 51_200, channels: vec![] };
     store.begin_session(&info, &map).expect("noted")
@@ -48,8 +50,9 @@ fn a_level_comes_back_as_it_was_stored() {
     let rows = store.levels().expect("read");
     assert_eq!(rows.len(), 2);
     for (row, new) in rows.iter().zip(&new) {
+        let row = row.as_ref().expect("whole");
         assert!(row.whole(), "{row:?}");
-        assert_eq!((row.level, row.settled, row.moment), (new.level, new.settled, new.moment));
+        assert_eq!((row.level(), row.settled(), row.moment), (new.level, new.settled, new.moment));
         assert_eq!(store.level_samples(row).expect("whole").codes, new.codes);
     }
     assert!(store.verify().expect("verified").is_empty());
@@ -78,19 +81,30 @@ fn nothing_of_a_level_can_be_changed_unseen() {
     }
 }
 
-/// Files from before there were levels are read without any, and get room for them when they are written.
 #[test]
-fn a_file_of_version_3_has_no_levels_until_it_is_brought_up() {
+fn every_column_of_a_level_is_under_its_seal() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let path = folder.path().join("old.jrig");
-    let store = Store::create(&path, SMALL, "small").expect("created");
-    store.connection.execute_batch("DROP TABLE levels; PRAGMA user_version = 3;").expect("made older");
-    store.close().expect("closed");
-    let store = Store::open_read_only(&path).expect("read as it is");
-    assert!(store.levels().expect("none").is_empty() && store.verify().expect("whole").is_empty());
-    store.close().expect("closed");
-    let mut store = Store::open(&path).expect("brought up");
+    let mut store = Store::create(&folder.path().join("a.jrig"), SMALL, "small").expect("created");
     let id = session(&mut store);
     store.insert_level(&level(id, Moment::Before, None)).expect("stored");
-    assert_eq!(store.levels().expect("read").len(), 1);
+    let before = store.levels().expect("read");
+    store.connection.execute_batch("DROP TRIGGER levels_stay; PRAGMA foreign_keys = OFF").expect("changed");
+    assert_eq!(LevelRow::columns().count(), 19);
+    for name in LevelRow::columns().map(Column::name) {
+        store
+            .connection
+            .execute_batch(&format!(
+                "CREATE TABLE kept AS SELECT {name} AS value FROM levels; UPDATE levels SET {name} = \
+                 CASE typeof({name}) WHEN 'text' THEN {name} || ' ' WHEN 'null' THEN 1.0 ELSE {name} + 1 END"
+            ))
+            .expect("changed behind its back");
+        let damage = store.verify().expect("verified");
+        assert!(
+            damage.len() == 1 && damage[0].what.contains("description was changed"),
+            "{name}: {damage:?}"
+        );
+        let back = format!("UPDATE levels SET {name} = (SELECT value FROM kept); DROP TABLE kept");
+        store.connection.execute_batch(&back).expect("changed back");
+        assert_eq!(store.levels().expect("read"), before, "{name}");
+    }
 }

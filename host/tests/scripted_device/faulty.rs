@@ -1,4 +1,4 @@
-//! A link that loses, damages, doubles and cuts off frames: a public test fixture, never used in a measurement.
+//! A link that loses, damages, doubles and cuts off frames.
 //!
 //! It wraps any [`Transport`] and spoils a seeded share of the *frames* of both directions, so that tests
 //! can show that a session delivers the same samples whatever the link does.
@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use std::io;
 use std::time::Duration;
 
-use super::transport::Transport;
+use jointrig::device::transport::Transport;
 
 /// Share of the frames to which each fault happens, 0 to 1, in each direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -22,15 +22,6 @@ pub struct Faults {
     pub truncate: f64,
 }
 
-/// How many frames were let through and spoilt, both directions together.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Spoilt {
-    /// Frames seen.
-    pub frames: u64,
-    /// Frames dropped, corrupted, doubled or truncated.
-    pub spoilt: u64,
-}
-
 /// A transport that spoils a share of the frames.
 pub struct Faulty<T> {
     inner: T,
@@ -38,7 +29,6 @@ pub struct Faulty<T> {
     random: u64,
     to_host: Line,
     to_device: Line,
-    count: Spoilt,
 }
 
 #[derive(Default)]
@@ -50,19 +40,7 @@ struct Line {
 impl<T: Transport> Faulty<T> {
     /// Spoils what goes over `inner`; the same seed spoils the same frames of the same traffic.
     pub fn new(inner: T, faults: Faults, seed: u64) -> Self {
-        Self {
-            inner,
-            faults,
-            random: seed,
-            to_host: Line::default(),
-            to_device: Line::default(),
-            count: Spoilt::default(),
-        }
-    }
-
-    /// What has been spoilt so far.
-    pub fn spoilt(&self) -> Spoilt {
-        self.count
+        Self { inner, faults, random: seed, to_host: Line::default(), to_device: Line::default() }
     }
 
     /// splitmix64, as a number from 0 to 1.
@@ -95,8 +73,6 @@ impl<T: Transport> Faulty<T> {
                 edge += share;
                 hit
             });
-        self.count.frames += 1;
-        self.count.spoilt += u64::from(drop || corrupt || duplicate || truncate);
         if drop {
             return;
         }

@@ -7,12 +7,12 @@
 use jointrig_protocol::request::Configuration;
 use nalgebra::DMatrix;
 use num_complex::Complex;
-use rusqlite::params;
 
+use super::notes::utc_now;
 use super::plan::configuration_name;
-use super::schema::WITH_FRFS;
-use super::store::{Store, utc_now};
+use super::store::Store;
 use super::store_error::StoreError;
+use super::table::{Row, table};
 use crate::substructuring::frf::{FrfMatrix, Quantity};
 use crate::substructuring::noise::FrfNoise;
 
@@ -42,21 +42,37 @@ pub struct FrfRow {
     pub utc: String,
 }
 
-/// One row as it stands in the file.
-struct Row {
-    configuration: String,
-    utc: String,
-    source: String,
-    quantity: String,
-    sigma_per_s: f64,
-    outputs: String,
-    inputs: String,
-    frequency: Vec<u8>,
-    frf: Vec<u8>,
-    variance: Option<Vec<u8>>,
+table! {
+    /// FRFs as they stand in the file; the latest row of a configuration counts.
+    pub struct FrfColumns {
+        "frfs" {
+            "id INTEGER PRIMARY KEY",
+            /// `A`, `B` or `AJB`.
+            configuration: String = "configuration TEXT NOT NULL",
+            /// When they were imported, RFC 3339.
+            utc: String = "utc TEXT NOT NULL",
+            /// The file that they came from, without its folder.
+            source: String = "source TEXT NOT NULL",
+            /// Which kind of FRF.
+            quantity: String = "quantity TEXT NOT NULL",
+            /// Their shift from the imaginary axis, 1/s.
+            sigma_per_s: f64 = "sigma_per_s REAL NOT NULL",
+            /// Names of the outputs, as a JSON list.
+            outputs: String = "outputs TEXT NOT NULL",
+            /// Names of the inputs, as a JSON list.
+            inputs: String = "inputs TEXT NOT NULL",
+            /// The lines, Hz.
+            frequency: Vec<u8> = "frequency BLOB NOT NULL",
+            /// (line, output, input), real and imaginary part in turn.
+            frf: Vec<u8> = "frf BLOB NOT NULL",
+            /// (line, output, input) of the real part.
+            variance: Option<Vec<u8>> = "variance BLOB",
+            "crc32 INTEGER NOT NULL",
+        }
+    }
 }
 
-impl Row {
+impl FrfColumns {
     fn crc(&self) -> u32 {
         let mut hasher = crc32fast::Hasher::new();
         let texts =
@@ -72,7 +88,7 @@ impl Row {
     }
 
     /// The FRFs of this row; the reason where it contradicts itself.
-    fn read(self) -> Result<ImportedFrf, String> {
+    fn decoded(self) -> Result<ImportedFrf, String> {
         let names = |text: &str| serde_json::from_str::<Vec<String>>(text).map_err(|e| e.to_string());
         let (outputs, inputs) = (names(&self.outputs)?, names(&self.inputs)?);
         let frequency_hz = numbers(&self.frequency);
@@ -126,7 +142,7 @@ impl Store {
         let variances = |noise: &FrfNoise| {
             bytes(noise.variance.iter().flat_map(|v| v.transpose().iter().copied().collect::<Vec<_>>()))
         };
-        let row = Row {
+        let row = FrfColumns {
             configuration: configuration_name(configuration).into(),
             utc: utc_now(),
             source: source.into(),
@@ -139,33 +155,11 @@ impl Store {
             variance: noise.map(variances),
         };
         let crc = row.crc();
-        self.connection
-            .execute(
-                "INSERT INTO frfs (configuration, utc, source, quantity, sigma_per_s, outputs, inputs, frequency, frf, \
-                 variance, crc32) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
-                params![
-                    row.configuration,
-                    row.utc,
-                    row.source,
-                    row.quantity,
-                    row.sigma_per_s,
-                    row.outputs,
-                    row.inputs,
-                    row.frequency,
-                    row.frf,
-                    row.variance,
-                    crc
-                ],
-            )
-            .map(|_| ())
-            .map_err(self.failed("storing FRFs"))
+        row.insert(&self.connection, &[("crc32", &crc)]).map_err(self.failed("storing FRFs"))
     }
 
     /// The FRFs that count, without their values: the latest of each configuration.
     pub fn frf_rows(&self) -> Result<Vec<FrfRow>, StoreError> {
-        if self.version < WITH_FRFS {
-            return Ok(Vec::new());
-        }
         let sql = "SELECT max(id), configuration, source, utc FROM frfs GROUP BY configuration ORDER BY 1";
         let read = |row: &rusqlite::Row<'_>| {
             Ok(FrfRow { id: row.get(0)?, configuration: row.get(1)?, source: row.get(2)?, utc: row.get(3)? })
@@ -187,26 +181,11 @@ impl Store {
     /// # Errors
     /// As [`Store::frf`].
     pub(super) fn frf_of(&self, id: i64) -> Result<ImportedFrf, StoreError> {
-        let sql = "SELECT configuration, utc, source, quantity, sigma_per_s, outputs, inputs, frequency, frf, \
-                   variance, crc32 FROM frfs WHERE id = ?1";
-        let read = |row: &rusqlite::Row<'_>| {
-            let read = Row {
-                configuration: row.get(0)?,
-                utc: row.get(1)?,
-                source: row.get(2)?,
-                quantity: row.get(3)?,
-                sigma_per_s: row.get(4)?,
-                outputs: row.get(5)?,
-                inputs: row.get(6)?,
-                frequency: row.get(7)?,
-                frf: row.get(8)?,
-                variance: row.get(9)?,
-            };
-            Ok((read, row.get::<_, u32>(10)?))
-        };
-        let (row, crc) = self.connection.query_row(sql, [id], read).map_err(self.failed("reading FRFs"))?;
+        let sql = format!("SELECT {}, crc32 FROM frfs WHERE id = ?1", FrfColumns::list());
+        let read = |row: &rusqlite::Row<'_>| Ok((FrfColumns::read(row)?, row.get::<_, u32>("crc32")?));
+        let (row, crc) = self.connection.query_row(&sql, [id], read).map_err(self.failed("reading FRFs"))?;
         let name = format!("the FRFs of {} from {}", row.configuration, row.source);
-        let read = if row.crc() == crc { row.read() } else { Err("their checksum is another".into()) };
+        let read = if row.crc() == crc { row.decoded() } else { Err("their checksum is another".into()) };
         read.map_err(|what| self.content(format!("{name} are damaged ({what}): import them again")))
     }
 }
@@ -220,5 +199,5 @@ fn numbers(bytes: &[u8]) -> Vec<f64> {
 }
 
 #[cfg(test)]
-#[path = "frfs_tests.rs"]
+#[path = "frf_table_tests.rs"]
 mod tests;

@@ -19,7 +19,7 @@ use jointrig_protocol::hello::Hello;
 use jointrig_protocol::request::{Fire, Numbered, Request, Stage};
 use jointrig_protocol::shot::{Phase, Shot};
 
-use crate::device::transport::Transport;
+use jointrig::device::transport::Transport;
 
 pub const RING: u32 = 8_192;
 pub const RATE: u32 = 51_200;

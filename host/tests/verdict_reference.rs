@@ -1,7 +1,7 @@
 //! Verdicts on seven simulated hits of known kind (a quarter of a second of each, one response).
 
-use super::*;
-use crate::exchange::read_impacts;
+use jointrig::campaign::verdict::{Kind, Limits, judge_all};
+use jointrig::exchange::read_impacts;
 use serde_json::Value;
 use std::path::Path;
 
@@ -12,12 +12,12 @@ fn all_seven_kinds_are_told_apart() {
     let text = std::fs::read_to_string(data.join("expected.json")).expect("test data");
     let expected: Value = serde_json::from_str(&text).expect("test data");
     let verdicts = judge_all(&records, &Limits::default(), None);
-    let names: Vec<String> = verdicts.iter().map(|v| v.verdict.name().replace(' ', "_")).collect();
+    let names: Vec<String> = verdicts.iter().map(|v| v.kind.name().replace(' ', "_")).collect();
     let wanted: Vec<&str> =
         expected["verdicts"].as_array().expect("a list").iter().filter_map(Value::as_str).collect();
     assert_eq!(names, wanted, "{verdicts:#?}");
     for (verdict, peak) in verdicts.iter().zip(expected["peaks_n"].as_array().expect("a list")) {
-        if verdict.verdict == VerdictKind::Good {
+        if verdict.kind == Kind::Good {
             // half sines are not band-limited, and the noise is 0.01 N
             assert!((verdict.peak_n / peak.as_f64().expect("a number") - 1.0).abs() < 5e-3, "{verdict:?}");
         }

@@ -1,8 +1,16 @@
-use super::*;
-use crate::device::fake::{Fake, RING};
-use crate::device::faulty::{Faults, Faulty};
+//! A session puts the same samples together whatever the link does, and says what is wrong with a device.
+
+use std::time::Duration;
+
+use crate::fake::{Fake, RING};
+use crate::faulty::{Faults, Faulty};
+use jointrig::device::logs::Tables;
+use jointrig::device::session::Session;
+use jointrig::device::stream::Accounts;
+use jointrig::device::transport::Transport;
 use jointrig_logs::example::{WARNING, image, line};
 use jointrig_logs::file_name;
+use jointrig_protocol::hello::Hello;
 use jointrig_protocol::request::Fire;
 
 fn open(transport: impl Transport + 'static) -> Session {

@@ -2,15 +2,16 @@
 
 use jointrig_protocol::channel::Role;
 
-use super::{Judge, Judgement, Kind};
-use crate::campaign::others::Others;
-use crate::campaign::plan::{Cell, Plan};
-use crate::device::channels::ChannelMap;
-use crate::device::recording::Recording;
+use jointrig::campaign::judge::Judge;
+use jointrig::campaign::others::Others;
+use jointrig::campaign::plan::{Cell, Plan};
+use jointrig::campaign::verdict::{Kind, Verdict};
+use jointrig::device::channels::ChannelMap;
+use jointrig::device::recording::Recording;
 
 /// Judges by the device's own summary of the shot and by the codes' range; needs no signal processing.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct ByShotSummary;
+pub struct ByShotSummary;
 
 impl Judge for ByShotSummary {
     fn judge(
@@ -20,11 +21,14 @@ impl Judge for ByShotSummary {
         channels: &ChannelMap,
         recording: &Recording,
         _: &Others,
-    ) -> Judgement {
+    ) -> Verdict {
         let (shot, limits) = (&recording.shot, plan.limits.get_ref());
         let peak_n = f64::from(shot.peak_n);
         let missing: usize = recording.gaps.iter().map(ExactSizeIterator::len).sum();
-        let judged = |kind, measure, limit, sentence| Judgement { kind, measure, limit, sentence, peak_n };
+        let judged = |kind, measure, limit, sentence| Verdict {
+            peak_n,
+            ..Verdict::without_pulse(kind, measure, limit, sentence)
+        };
         if missing > 0 {
             return judged(Kind::Gap, missing as f64, 0.0, format!("{missing} samples are missing"));
         }

@@ -9,16 +9,14 @@ mod clipping;
 mod double_hit;
 mod dropout;
 #[cfg(test)]
-mod reference;
-#[cfg(test)]
-mod synthetic;
+mod synthetic_tests;
 
 use crate::spectra::{ImpactRecords, Pulse};
 use serde::{Deserialize, Serialize};
 
-/// The kinds of verdict. Only [`VerdictKind::Good`] hits enter an average.
+/// The kinds of verdict. Only [`Kind::Good`] hits enter an average.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum VerdictKind {
+pub enum Kind {
     /// Usable.
     #[serde(rename = "good")]
     Good,
@@ -48,7 +46,7 @@ pub enum VerdictKind {
     Dropped,
 }
 
-impl VerdictKind {
+impl Kind {
     /// Every kind, good first.
     pub const ALL: [Self; 9] = [
         Self::Good,
@@ -70,40 +68,47 @@ impl VerdictKind {
     /// The words used in results.
     pub fn name(self) -> &'static str {
         match self {
-            VerdictKind::Good => "good",
-            VerdictKind::DoubleHit => "double hit",
-            VerdictKind::Overload => "overload",
-            VerdictKind::Noisy => "noisy",
-            VerdictKind::Weak => "weak",
-            VerdictKind::Strong => "strong",
-            VerdictKind::Mistimed => "mistimed",
-            VerdictKind::Gap => "gap",
-            VerdictKind::Dropped => "dropped",
+            Kind::Good => "good",
+            Kind::DoubleHit => "double hit",
+            Kind::Overload => "overload",
+            Kind::Noisy => "noisy",
+            Kind::Weak => "weak",
+            Kind::Strong => "strong",
+            Kind::Mistimed => "mistimed",
+            Kind::Gap => "gap",
+            Kind::Dropped => "dropped",
         }
     }
 }
 
-impl std::fmt::Display for VerdictKind {
+impl std::fmt::Display for Kind {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(self.name())
     }
 }
 
-/// A verdict with its evidence.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// A verdict with what it rests on.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
-    /// The kind.
-    pub verdict: VerdictKind,
-    /// What was measured, in the unit that `sentence` says.
+    /// What the record is.
+    pub kind: Kind,
+    /// What was measured for it, in the unit that `sentence` says.
     pub measure: f64,
-    /// What it was compared with, in the same unit.
+    /// The limit that it was held against, in the same unit.
     pub limit: f64,
-    /// The verdict in words.
+    /// Both in words.
     pub sentence: String,
     /// Peak of the band-limited force, N; 0 without a pulse.
     pub peak_n: f64,
     /// Start of the pulse from the record's start, s; 0 without a pulse.
     pub start_s: f64,
+}
+
+impl Verdict {
+    /// A verdict on a record without a pulse.
+    pub fn without_pulse(kind: Kind, measure: f64, limit: f64, sentence: String) -> Self {
+        Self { kind, measure, limit, sentence, peak_n: 0.0, start_s: 0.0 }
+    }
 }
 
 /// Limits of all checks.
@@ -164,13 +169,10 @@ pub struct RawHit<'a> {
 /// Judges one hit. `reference_peak_n` is the wanted peak (or the median of the set); without it, weak means no pulse above noise.
 pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) -> Verdict {
     let pulse = Pulse::locate(hit.force_n);
-    let verdict = |verdict, measure, limit, sentence: String| Verdict {
-        verdict,
-        measure,
-        limit,
-        sentence,
+    let verdict = |kind, measure, limit, sentence: String| Verdict {
         peak_n: pulse.map_or(0.0, |p| p.peak_n),
         start_s: pulse.map_or(0.0, |p| p.start as f64 / hit.fs_hz),
+        ..Verdict::without_pulse(kind, measure, limit, sentence)
     };
     let broken = std::iter::once(hit.force_n)
         .chain(hit.responses.iter().map(Vec::as_slice))
@@ -179,43 +181,33 @@ pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) ->
         .unwrap_or(0);
     let missing = hit.missing_samples as f64 + broken as f64;
     if missing > 0.0 {
-        return verdict(
-            VerdictKind::Gap,
-            missing,
-            0.0,
-            format!("{missing} samples are missing from the record"),
-        );
+        return verdict(Kind::Gap, missing, 0.0, format!("{missing} samples are missing from the record"));
     }
     let Some(pulse) = pulse else {
-        return verdict(VerdictKind::Weak, 0.0, 0.0, "there is no force pulse at all".into());
+        return verdict(Kind::Weak, 0.0, 0.0, "there is no force pulse at all".into());
     };
     // Of some 10⁵ samples of noise the largest reaches 4.5 times its rms.
     let floor = 10.0 * pulse.noise_n;
     if pulse.peak_n < floor {
         let sentence =
             format!("the highest force of {:.3} N is not above noise ({floor:.3} N)", pulse.peak_n);
-        return verdict(VerdictKind::Weak, pulse.peak_n, floor, sentence);
+        return verdict(Kind::Weak, pulse.peak_n, floor, sentence);
     }
     if let Some(found) = clipping::force(hit.force_n, &pulse, limits.force_range_n) {
-        return verdict(VerdictKind::Overload, found.level, found.limit, found.sentence("force", "N"));
+        return verdict(Kind::Overload, found.level, found.limit, found.sentence("force", "N"));
     }
     if let Some(range) = limits.response_range {
         for (channel, x) in hit.responses.iter().enumerate() {
             if let Some(found) = clipping::response(x, range) {
                 let name = format!("response {channel}");
-                return verdict(
-                    VerdictKind::Overload,
-                    found.level,
-                    found.limit,
-                    found.sentence(&name, "in SI"),
-                );
+                return verdict(Kind::Overload, found.level, found.limit, found.sentence(&name, "in SI"));
             }
         }
     }
     for (channel, x) in hit.responses.iter().enumerate() {
         if let Some(found) = clipping::plateau(x, dropout::quantum(x)) {
             let name = format!("response {channel}");
-            return verdict(VerdictKind::Overload, found.level, found.limit, found.sentence(&name, "in SI"));
+            return verdict(Kind::Overload, found.level, found.limit, found.sentence(&name, "in SI"));
         }
     }
     let from = (limits.rebound_after_s * hit.fs_hz) as usize;
@@ -226,17 +218,17 @@ pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) ->
             second.fraction * pulse.peak_n,
             100.0 * second.fraction
         );
-        return verdict(VerdictKind::DoubleHit, second.fraction, second.limit, sentence);
+        return verdict(Kind::DoubleHit, second.fraction, second.limit, sentence);
     }
     if let Some(reference) = reference_peak_n {
         let (low, high) = (limits.weak_fraction * reference, limits.strong_fraction * reference);
         if pulse.peak_n < low {
             let sentence = format!("a peak of {:.2} N is below {low:.2} N", pulse.peak_n);
-            return verdict(VerdictKind::Weak, pulse.peak_n, low, sentence);
+            return verdict(Kind::Weak, pulse.peak_n, low, sentence);
         }
         if pulse.peak_n > high {
             let sentence = format!("a peak of {:.2} N is above {high:.2} N", pulse.peak_n);
-            return verdict(VerdictKind::Strong, pulse.peak_n, high, sentence);
+            return verdict(Kind::Strong, pulse.peak_n, high, sentence);
         }
     }
     for (channel, x) in hit.responses.iter().enumerate() {
@@ -246,18 +238,18 @@ pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) ->
                 1e3 * burst.sample as f64 / hit.fs_hz,
                 burst.ratio
             );
-            return verdict(VerdictKind::Noisy, burst.ratio, limits.dropout_ratio, sentence);
+            return verdict(Kind::Noisy, burst.ratio, limits.dropout_ratio, sentence);
         }
     }
     if let Some(expected) = limits.expected_start_s {
         let late = pulse.start as f64 / hit.fs_hz - expected;
         if late.abs() > limits.start_tolerance_s {
             let sentence = format!("the pulse starts {:.2} ms from where it should", 1e3 * late);
-            return verdict(VerdictKind::Mistimed, late.abs(), limits.start_tolerance_s, sentence);
+            return verdict(Kind::Mistimed, late.abs(), limits.start_tolerance_s, sentence);
         }
     }
     let limit = reference_peak_n.map_or(floor, |r| limits.weak_fraction * r);
-    verdict(VerdictKind::Good, pulse.peak_n, limit, format!("one clean pulse of {:.2} N", pulse.peak_n))
+    verdict(Kind::Good, pulse.peak_n, limit, format!("one clean pulse of {:.2} N", pulse.peak_n))
 }
 
 /// Judges every hit of a set. The reference peak is `target_n`, or the median of the set's peaks.

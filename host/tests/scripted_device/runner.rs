@@ -1,10 +1,27 @@
-use super::*;
-use crate::campaign::judge::by_summary::ByShotSummary;
-use crate::campaign::plan::SMALL;
-use crate::device::fake::Fake;
-use crate::device::faulty::{Faults, Faulty};
-use crate::device::logs::Tables;
-use crate::device::transport::Transport;
+//! Campaigns on a scripted device: complete, interrupted, over a bad link, with a device that dies or starts anew.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::by_summary::ByShotSummary;
+use crate::fake::Fake;
+use crate::faulty::{Faults, Faulty};
+use jointrig::campaign::judge::Judge;
+use jointrig::campaign::others::Others;
+use jointrig::campaign::plan::SMALL;
+use jointrig::campaign::plan::{Cell, Plan};
+use jointrig::campaign::record_row::RecordRow;
+use jointrig::campaign::run_error::RunError;
+use jointrig::campaign::runner::{Options, Summary, run};
+use jointrig::campaign::stage::Stage;
+use jointrig::campaign::store::Store;
+use jointrig::campaign::tally::Tally;
+use jointrig::campaign::verdict::{Kind, Verdict};
+use jointrig::device::channels::ChannelMap;
+use jointrig::device::logs::Tables;
+use jointrig::device::recording::Recording;
+use jointrig::device::session::Session;
+use jointrig::device::transport::Transport;
 use jointrig_logs::example::{WARNING, image, line};
 use jointrig_logs::file_name;
 use std::path::Path;
@@ -39,11 +56,16 @@ fn create(folder: &tempfile::TempDir, name: &str, text: &str) -> std::path::Path
     path
 }
 
+/// The rows of all records, every one whole.
+fn rows(store: &Store) -> Vec<RecordRow> {
+    store.records().expect("rows").into_iter().collect::<Result<_, _>>().expect("whole")
+}
+
 /// What two equal runs have in common: everything but absolute scans and times.
 fn content(path: &Path) -> Vec<(i64, u32, Kind, usize, u32, Vec<i16>)> {
     let store = Store::open_read_only(path).expect("opens");
     assert_eq!(store.verify().expect("checked"), []);
-    let rows = store.records().expect("rows");
+    let rows = self::rows(&store);
     rows.iter()
         .map(|row| {
             let codes = store.samples(row).expect("samples").codes;
@@ -53,7 +75,7 @@ fn content(path: &Path) -> Vec<(i64, u32, Kind, usize, u32, Vec<i16>)> {
 }
 
 fn distances(path: &Path) -> Vec<(i64, u64)> {
-    let rows = Store::open_read_only(path).expect("opens").records().expect("rows");
+    let rows = self::rows(&Store::open_read_only(path).expect("opens"));
     rows.windows(2)
         .filter(|pair| pair[0].cell == pair[1].cell)
         .map(|pair| (pair[0].cell, pair[1].first_scan - pair[0].first_scan))
@@ -108,7 +130,7 @@ impl Judge for StopAfter {
         channels: &ChannelMap,
         recording: &Recording,
         others: &Others,
-    ) -> Judgement {
+    ) -> Verdict {
         self.0 = self.0.saturating_sub(1);
         if self.0 == 0 {
             self.1.store(true, Ordering::Relaxed);
