@@ -3,9 +3,9 @@
 //! `cargo bench -p jointrig --bench loops`; with `JOINTRIG_PYTHON` naming an interpreter that has numpy its side is run too, and
 //! both must find the same numbers.
 
-use jointrig::campaign::level::{Held, Level};
-use jointrig::campaign::record_row::Samples;
-use jointrig::campaign::shaking::record;
+use jointrig::campaign::plan::level::{Held, Level};
+use jointrig::campaign::run::shaking::record;
+use jointrig::campaign::store::record_row::Samples;
 use jointrig::device::channels::ChannelMap;
 use jointrig::hysteresis::{Correction, LoopAnalysis, analyse, analyse_corrected};
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};

@@ -2,11 +2,11 @@
 #![cfg(feature = "sim")]
 #![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
 
-use jointrig::campaign::level::{Held, Level, Moment};
-use jointrig::campaign::level_table::LevelRow;
 use jointrig::campaign::plan::PAPER;
-use jointrig::campaign::shaking::{self, Limits, Options, Outcome, ShakeError, Shortfall, Summary};
+use jointrig::campaign::plan::level::{Held, Level, Moment};
+use jointrig::campaign::run::shaking::{self, Limits, Options, Outcome, ShakeError, Shortfall, Summary};
 use jointrig::campaign::store::Store;
+use jointrig::campaign::store::level_table::LevelRow;
 use jointrig::device::address::Address;
 use jointrig::device::session::Session;
 use jointrig::exchange::read_hysteresis;

@@ -5,11 +5,11 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use jointrig::campaign::judge::ByRecord;
-use jointrig::campaign::record_row::RecordRow;
-use jointrig::campaign::runner::{self, Options, Summary};
-use jointrig::campaign::stage::Stage;
+use jointrig::campaign::run::runner::{self, Options, Summary};
+use jointrig::campaign::run::stage::Stage;
 use jointrig::campaign::store::Store;
+use jointrig::campaign::store::record_row::RecordRow;
+use jointrig::campaign::verdict::judge::ByRecord;
 use jointrig::device::session::Session;
 use jointrig::device::transport::Transport;
 

@@ -9,8 +9,8 @@ use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
 
-use jointrig::campaign::codec;
 use jointrig::campaign::store::Store;
+use jointrig::campaign::store::codec;
 use jointrig_tests::campaign::rows;
 use jointrig_tests::command::jointrig;
 
@@ -19,7 +19,7 @@ type Content = BTreeMap<(i64, u32), (String, String, u32)>;
 
 fn content(file: &Path) -> Content {
     let store = Store::open_read_only(file).unwrap();
-    let row = |row: &jointrig::campaign::record_row::RecordRow| {
+    let row = |row: &jointrig::campaign::store::record_row::RecordRow| {
         let crc = codec::checksum(&store.samples(row).unwrap().codes);
         ((row.cell, row.attempt), (row.verdict.name().to_owned(), format!("{:?}", row.measure), crc))
     };

@@ -5,8 +5,8 @@ use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
 
-use jointrig::campaign::codec;
 use jointrig::campaign::store::Store;
+use jointrig::campaign::store::codec;
 use jointrig_tests::campaign::{plan, rows, run};
 
 #[test]

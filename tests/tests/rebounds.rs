@@ -3,9 +3,9 @@
 
 use std::fmt::Write;
 
-use jointrig::campaign::judge::{ByRecord, Judge};
-use jointrig::campaign::others::Others;
 use jointrig::campaign::plan::{Cell, DEMO, Plan};
+use jointrig::campaign::verdict::judge::{ByRecord, Judge};
+use jointrig::campaign::verdict::others::Others;
 use jointrig::campaign::verdict::{Kind, Verdict};
 use jointrig::device::channels::ChannelMap;
 use jointrig::device::recording::Recording;

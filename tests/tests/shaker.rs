@@ -6,9 +6,9 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use jointrig::campaign::codec;
-use jointrig::campaign::level_table::LevelRow;
 use jointrig::campaign::store::Store;
+use jointrig::campaign::store::codec;
+use jointrig::campaign::store::level_table::LevelRow;
 use jointrig_tests::command::{Served, jointrig};
 
 /// Frequency and checksum of every level in the file.

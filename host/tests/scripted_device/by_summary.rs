@@ -2,9 +2,9 @@
 
 use jointrig_protocol::channel::Role;
 
-use jointrig::campaign::judge::Judge;
-use jointrig::campaign::others::Others;
 use jointrig::campaign::plan::{Cell, Plan};
+use jointrig::campaign::verdict::judge::Judge;
+use jointrig::campaign::verdict::others::Others;
 use jointrig::campaign::verdict::{Kind, Verdict};
 use jointrig::device::channels::ChannelMap;
 use jointrig::device::recording::Recording;

@@ -4,10 +4,15 @@
 //! averaging bad hits in cost a median FRF error of 25 % against 0.6 %. Each check stands in its own file and needs this one
 //! record only; the first that fails gives the verdict, in the order gap, overload, double hit, weak, strong, noisy, mistimed.
 //! (A refused hit needs one reason; the earlier checks would spoil the figures of the later ones.)
+//!
+//! A new verdict is a new [`Kind`], a file with its check here, and its place in [`judge`](fn@judge). The limits are [`Limits`]: the double-hit
+//! threshold is `rebound_fraction`, which a plan sets (`limits.rebound_ratio`) and [`judge::ByRecord`] hands over.
 
 mod clipping;
 mod double_hit;
 mod dropout;
+pub mod judge;
+pub mod others;
 #[cfg(test)]
 mod synthetic_tests;
 

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::campaign::judge::{ByRecord, Judge};
-use crate::campaign::others::Others;
 use crate::campaign::plan::{Cell, Plan};
-use crate::campaign::stage::Stage;
+use crate::campaign::run::stage::Stage;
 use crate::campaign::store::Store;
+use crate::campaign::verdict::judge::{ByRecord, Judge};
+use crate::campaign::verdict::others::Others;
 use crate::campaign::verdict::{Kind, Verdict};
 use crate::cli::campaign::plan_file;
 use crate::cli::error::CliError;

@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Value, json};
 
-use crate::campaign::cell_table::CellRow;
-use crate::campaign::overrules::Overrule;
 use crate::campaign::plan::configuration_name;
-use crate::campaign::record_row::{Damaged, RecordRow};
 use crate::campaign::store::Store;
-use crate::campaign::store_error::StoreError;
+use crate::campaign::store::cell_table::CellRow;
+use crate::campaign::store::error::StoreError;
+use crate::campaign::store::overrules::Overrule;
+use crate::campaign::store::record_row::{Damaged, RecordRow};
 use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::report::records::{Shown, records};

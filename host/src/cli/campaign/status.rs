@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Map, Value, json};
 
-use crate::campaign::cell_table::CellRow;
 use crate::campaign::plan::configuration_name;
+use crate::campaign::run::tally::{Count, Tally};
 use crate::campaign::store::Store;
-use crate::campaign::tally::{Count, Tally};
+use crate::campaign::store::cell_table::CellRow;
 use crate::cli::error::CliError;
 use crate::cli::output;
 

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use super::{Format, bad};
-use crate::campaign::level_table::{DamagedLevel, LevelRow};
-use crate::campaign::shaking;
+use crate::campaign::run::shaking;
 use crate::campaign::store::Store;
+use crate::campaign::store::level_table::{DamagedLevel, LevelRow};
 use crate::cli::error::CliError;
 use crate::exchange::{tables_output, uff_output, write_hysteresis};
 use crate::hysteresis::HysteresisRecord;

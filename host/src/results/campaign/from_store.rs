@@ -4,14 +4,14 @@ use super::cell::{
     Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel,
 };
 use super::{Progress, Wanted, completeness};
-use crate::campaign::frf_table::ImportedFrf;
-use crate::campaign::level_table::LevelRow;
 use crate::campaign::plan::{Plan, configuration_name};
-use crate::campaign::record_row::{Damaged, RecordRow};
-use crate::campaign::shaking;
+use crate::campaign::run::shaking;
+use crate::campaign::run::tally::Tally;
 use crate::campaign::store::Store;
-use crate::campaign::store_error::StoreError;
-use crate::campaign::tally::Tally;
+use crate::campaign::store::error::StoreError;
+use crate::campaign::store::frf_table::ImportedFrf;
+use crate::campaign::store::level_table::LevelRow;
+use crate::campaign::store::record_row::{Damaged, RecordRow};
 use crate::device::channels::ChannelMap;
 use crate::hysteresis::HysteresisRecord;
 use crate::results::{Completeness, Results, Source};

@@ -1,9 +1,9 @@
 use super::*;
-use crate::campaign::notes::utc_now;
 use crate::campaign::plan::SMALL;
-use crate::campaign::record_row::NewRecord;
-use crate::campaign::session_table::{Counters, SessionInfo};
-use crate::campaign::stored::Hex;
+use crate::campaign::store::notes::utc_now;
+use crate::campaign::store::record_row::NewRecord;
+use crate::campaign::store::session_table::{Counters, SessionInfo};
+use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::{Kind, Verdict};
 use crate::device::recording::Recording;
 use jointrig_protocol::channel::{Axis, Channel};
