@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """pco against zstd on a campaign's records: ratio and speed. Needs numpy, pcodec and zstandard.
-`python3 docs/compare_codecs.py FILE.jrig [RECORDS]`; the figures in host/src/campaign/codec.rs are its output."""
+`python3 docs/compare_codecs.py FILE.jrig [RECORDS]`; the figures in host/src/campaign/store/codec.rs are its output."""
 import sqlite3, sys, time
 import numpy as np
 import zstandard

@@ -3,9 +3,9 @@
 //! `cargo bench -p jointrig --bench loops`; with `JOINTRIG_PYTHON` naming an interpreter that has numpy its side is run too, and
 //! both must find the same numbers.
 
-use jointrig::campaign::level::{Held, Level};
-use jointrig::campaign::rows::Samples;
-use jointrig::campaign::shaking::record;
+use jointrig::campaign::plan::level::{Held, Level};
+use jointrig::campaign::run::shaking::record;
+use jointrig::campaign::store::record_row::Samples;
 use jointrig::device::channels::ChannelMap;
 use jointrig::hysteresis::{Correction, LoopAnalysis, analyse, analyse_corrected};
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
@@ -39,7 +39,7 @@ fn main() -> ExitCode {
 
 fn run() -> Outcome<()> {
     let map = channels()?;
-    let samples = Samples { codes: codes(&map), channels: map.len(), trigger_index: 0 };
+    let samples = Samples { codes: codes(&map), channels: map.len() };
     let level =
         Level { frequency_hz: FREQUENCY_HZ, end_hz: None, held: Held::Displacement, amplitude: 1.5e-7 };
     let mut found = both(&map, &samples, &level)?;

@@ -2,10 +2,11 @@
 #![cfg(feature = "sim")]
 #![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
 
-use jointrig::campaign::level::{Held, Level, Moment};
 use jointrig::campaign::plan::PAPER;
-use jointrig::campaign::shaking::{self, Limits, Options, Outcome, ShakeError, Shortfall, Summary};
+use jointrig::campaign::plan::level::{Held, Level, Moment};
+use jointrig::campaign::run::shaking::{self, Limits, Options, Outcome, ShakeError, Shortfall, Summary};
 use jointrig::campaign::store::Store;
+use jointrig::campaign::store::level_table::LevelRow;
 use jointrig::device::address::Address;
 use jointrig::device::session::Session;
 use jointrig::exchange::read_hysteresis;
@@ -83,6 +84,12 @@ fn stored(summary: &Summary) -> usize {
     summary.outcomes.iter().filter(|outcome| matches!(outcome, Outcome::Stored(_))).count()
 }
 
+/// The levels of the file; every one must be whole.
+fn rows_of(bench: &Bench) -> Vec<LevelRow> {
+    let store = Store::open_read_only(path(bench)).unwrap();
+    store.levels().unwrap().into_iter().collect::<Result<_, _>>().unwrap()
+}
+
 fn path(bench: &Bench) -> &Path {
     &bench.file
 }
@@ -96,9 +103,9 @@ fn the_papers_fifteen_levels_on_the_default_rig() {
         .collect();
     let summary = bench.run("sim:", &options(levels)).unwrap();
     assert_eq!(stored(&summary), 15);
-    for row in Store::open_read_only(path(&bench)).unwrap().levels().unwrap() {
-        let settled = row.settled;
-        assert!((settled.reached / row.level.amplitude - 1.0).abs() < 0.02, "{row:?}");
+    for row in rows_of(&bench) {
+        let settled = row.settled();
+        assert!((settled.reached / row.level().amplitude - 1.0).abs() < 0.02, "{row:?}");
         assert!(settled.overshoot < 1.2, "{row:?}");
     }
     let results = bench.analysed();
@@ -184,7 +191,7 @@ fn slipped(slider: &Slider, levels: Vec<Level>) -> Vec<(Level, [f64; 3])> {
     bench.run(&slider.rig(&bench), &Options { seconds: 1.0, ..options(levels) }).unwrap();
     let results = bench.analysed();
     let rows = rows(&results, Force::Raw);
-    let levels = Store::open_read_only(path(&bench)).unwrap().levels().unwrap();
+    let levels = rows_of(&bench);
     assert_eq!(rows.len(), levels.len());
     let errors = rows.into_iter().map(|row| {
         assert_eq!(row.shape, Shape::GrossSlip, "{row:?}");
@@ -197,7 +204,7 @@ fn slipped(slider: &Slider, levels: Vec<Level>) -> Vec<(Level, [f64; 3])> {
         ];
         pairs.map(|(found, truth)| 100.0 * (found / truth - 1.0))
     });
-    levels.iter().map(|row| row.level).zip(errors).collect()
+    levels.iter().map(LevelRow::level).zip(errors).collect()
 }
 
 /// Raw force, whole chain: k_T, μ and energy of a contact that slips as one.
@@ -272,14 +279,14 @@ fn microslip_softens_the_loop_with_amplitude_as_its_law_says() {
     bench.run(&rig("iwan"), &options(levels)).unwrap();
     let store = Store::open_read_only(path(&bench)).unwrap();
     let mut before = f64::INFINITY;
-    for row in store.levels().unwrap() {
+    for row in rows_of(&bench) {
         let channels = store.channels(row.session).unwrap();
-        let record = shaking::record(&channels, &store.level_samples(&row).unwrap(), &row.level).unwrap();
+        let record = shaking::record(&channels, &store.level_samples(&row).unwrap(), &row.level()).unwrap();
         let found = jointrig::hysteresis::analyse(&record).unwrap();
         let (k, law) = (found.k_eq_n_per_m.mean, iwan(&found.loop_displacement_m));
-        println!("{} {:?}: {k:.4e} for {law:.4e}", row.level, found.shape);
-        assert!((k / law - 1.0).abs() < 0.03, "{}: {k} for {law}", row.level);
-        assert!(k < before, "{}", row.level);
+        println!("{} {:?}: {k:.4e} for {law:.4e}", row.level(), found.shape);
+        assert!((k / law - 1.0).abs() < 0.03, "{}: {k} for {law}", row.level());
+        assert!(k < before, "{}", row.level());
         before = k;
     }
     // at 1.6 µm most of it slips

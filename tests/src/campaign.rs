@@ -5,10 +5,11 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use jointrig::campaign::judge::ByRecord;
-use jointrig::campaign::runner::{self, Options, Summary};
-use jointrig::campaign::stage::Stage;
+use jointrig::campaign::run::runner::{self, Options, Summary};
+use jointrig::campaign::run::stage::Stage;
 use jointrig::campaign::store::Store;
+use jointrig::campaign::store::record_row::RecordRow;
+use jointrig::campaign::verdict::judge::ByRecord;
 use jointrig::device::session::Session;
 use jointrig::device::transport::Transport;
 
@@ -52,11 +53,16 @@ pub fn run(file: &Path, plan: &str, transport: Box<dyn Transport>) -> (Summary, 
     (summary, records(file))
 }
 
+/// The rows of all records, in order; every one must be whole.
+pub fn rows(store: &Store) -> Vec<RecordRow> {
+    store.records().unwrap().into_iter().collect::<Result<_, _>>().unwrap()
+}
+
 /// All records of a campaign file, in order.
 pub fn records(file: &Path) -> Vec<Kept> {
     let store = Store::open_read_only(file).unwrap();
-    let rows = store.records().unwrap();
-    rows.iter()
+    rows(&store)
+        .iter()
         .map(|row| Kept {
             place: (row.cell, row.attempt),
             verdict: row.standing().name(),

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Output;
 
 use jointrig::campaign::store::Store;
-use jointrig_tests::campaign::{plan, run};
+use jointrig_tests::campaign::{plan, rows, run};
 use jointrig_tests::command::jointrig;
 
 fn verify(file: &Path) -> Output {
@@ -35,7 +35,7 @@ fn a_flipped_bit_in_the_samples_names_the_record_and_is_left_out() {
     let file = folder.path().join("a.jrig");
     campaign(&file);
     assert!(verify(&file).status.success());
-    let rows = Store::open_read_only(&file).unwrap().records().unwrap();
+    let rows = rows(&Store::open_read_only(&file).unwrap());
     let good: Vec<_> = rows.iter().filter(|row| row.kept()).collect();
     let whole = std::fs::read(&file).unwrap();
 
@@ -79,8 +79,7 @@ fn whatever_bit_flips_either_it_is_found_or_every_record_is_as_it_was() {
     let whole = std::fs::read(&file).unwrap();
     let content = |file: &Path| {
         let store = Store::open_read_only(file).unwrap();
-        let rows = store.records().unwrap();
-        rows.iter().map(|row| (row.clone(), store.samples(row).unwrap())).collect::<Vec<_>>()
+        rows(&store).iter().map(|row| (row.clone(), store.samples(row).unwrap())).collect::<Vec<_>>()
     };
     let before = content(&file);
     let copy = folder.path().join("spoilt.jrig");

@@ -9,8 +9,9 @@ use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
 
-use jointrig::campaign::codec;
 use jointrig::campaign::store::Store;
+use jointrig::campaign::store::codec;
+use jointrig_tests::campaign::rows;
 use jointrig_tests::command::jointrig;
 
 /// By cell and attempt: verdict, measure, and the checksum of every code.
@@ -18,12 +19,11 @@ type Content = BTreeMap<(i64, u32), (String, String, u32)>;
 
 fn content(file: &Path) -> Content {
     let store = Store::open_read_only(file).unwrap();
-    let row = |row: &jointrig::campaign::rows::RecordRow| {
-        assert_eq!(row.damage, None);
+    let row = |row: &jointrig::campaign::store::record_row::RecordRow| {
         let crc = codec::checksum(&store.samples(row).unwrap().codes);
         ((row.cell, row.attempt), (row.verdict.name().to_owned(), format!("{:?}", row.measure), crc))
     };
-    store.records().unwrap().iter().map(row).collect()
+    rows(&store).iter().map(row).collect()
 }
 
 fn command(file: &Path) -> std::process::Command {

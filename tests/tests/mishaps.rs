@@ -8,6 +8,7 @@ use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
 use jointrig::campaign::store::Store;
+use jointrig_tests::campaign::rows;
 use jointrig_tests::command::{Served, binary, jointrig};
 use serde_json::Value;
 
@@ -244,9 +245,9 @@ fn a_second_writer_is_refused_while_others_read_and_back_up() {
     assert!(copied.status.success(), "{}", said(&copied));
     assert!(first.try_wait().unwrap().is_none(), "it still runs: all of this happened meanwhile");
     verified(&copy);
-    let in_copy = Store::open_read_only(&copy).unwrap().records().unwrap();
+    let in_copy = rows(&Store::open_read_only(&copy).unwrap());
     assert!(first.wait().unwrap().success());
-    let in_all = Store::open_read_only(&file).unwrap().records().unwrap();
+    let in_all = rows(&Store::open_read_only(&file).unwrap());
     assert!(!in_copy.is_empty() && in_all.len() > in_copy.len());
     assert!(in_copy[..] == in_all[..in_copy.len()]);
 }

@@ -4,7 +4,7 @@
 use jointrig::campaign::store::Store;
 use jointrig::device::address::Address;
 use jointrig_hil_sim::rig::{Configuration, Quantity, RigConfig, exact_frf};
-use jointrig_tests::campaign::{plan, run};
+use jointrig_tests::campaign::{plan, rows, run};
 use num_complex::Complex;
 
 /// Window's decay, 1/s, as in the plan.
@@ -28,7 +28,7 @@ fn the_second_hit_on_a_is_not_spoilt_by_the_first() {
     assert_eq!(summary.kept, 2);
 
     let store = Store::open_read_only(&file).unwrap();
-    let rows = store.records().unwrap();
+    let rows = rows(&store);
     let channels = store.channels(rows[1].session).unwrap();
     let samples = store.samples(&rows[1]).unwrap();
     let si = |name: &str| -> Vec<f64> {

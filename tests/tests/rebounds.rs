@@ -3,9 +3,10 @@
 
 use std::fmt::Write;
 
-use jointrig::campaign::judge::{ByRecord, Judge, Kind};
-use jointrig::campaign::others::Others;
 use jointrig::campaign::plan::{Cell, DEMO, Plan};
+use jointrig::campaign::verdict::judge::{ByRecord, Judge};
+use jointrig::campaign::verdict::others::Others;
+use jointrig::campaign::verdict::{Kind, Verdict};
 use jointrig::device::channels::ChannelMap;
 use jointrig::device::recording::Recording;
 use jointrig_hil_sim::rig::{self, Measured, Rig, RigConfig};
@@ -77,7 +78,7 @@ fn hit(rig: &mut Rig, map: &ChannelMap, pulse_s: f64) -> Vec<Vec<i16>> {
     channels.iter().map(|channel| channel[from..].to_vec()).collect()
 }
 
-fn judge(plan: &Plan, map: &ChannelMap, channels: &[Vec<i16>]) -> jointrig::campaign::judge::Judgement {
+fn judge(plan: &Plan, map: &ChannelMap, channels: &[Vec<i16>]) -> Verdict {
     let recording = Recording {
         epoch: 0,
         first_scan: 0,

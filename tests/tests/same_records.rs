@@ -2,10 +2,13 @@
 #![allow(clippy::unwrap_used)]
 
 use jointrig::device::address::Address;
-use jointrig::device::faulty::{Faults, Faulty};
 use jointrig::device::transport::Transport;
 use jointrig_tests::campaign::{Kept, plan, run};
 use jointrig_tests::command::Served;
+
+#[path = "../../host/tests/scripted_device/faulty.rs"]
+mod faulty;
+use faulty::{Faults, Faulty};
 
 /// Four cells of all three configurations, two good hits each; A must wait until it is quiet.
 fn few_cells() -> String {

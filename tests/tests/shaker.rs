@@ -6,17 +6,18 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use jointrig::campaign::codec;
 use jointrig::campaign::store::Store;
+use jointrig::campaign::store::codec;
+use jointrig::campaign::store::level_table::LevelRow;
 use jointrig_tests::command::{Served, jointrig};
 
 /// Frequency and checksum of every level in the file.
 fn levels(file: &Path) -> Vec<(f64, u32)> {
     let store = Store::open_read_only(file).unwrap();
-    let rows = store.levels().unwrap();
-    assert!(rows.iter().all(jointrig::campaign::levels::LevelRow::whole));
+    let rows: Vec<LevelRow> = store.levels().unwrap().into_iter().collect::<Result<_, _>>().unwrap();
+    assert!(rows.iter().all(LevelRow::whole));
     let crc = |row| codec::checksum(&store.level_samples(row).unwrap().codes);
-    rows.iter().map(|row| (row.level.frequency_hz, crc(row))).collect()
+    rows.iter().map(|row| (row.level().frequency_hz, crc(row))).collect()
 }
 
 /// Four levels of half a minute of the device's time each: there is time enough to be killed in.

@@ -1,39 +1,19 @@
-//! Campaigns: the plan, the file that keeps every record, and the runner that fills it.
+//! Campaigns: the plan, the file that keeps every record, why a record is kept or refused, and the runner that fills the file.
 //!
-//! [`runner::run`] walks the cells of the plan: hammer and laser are brought there ([`stage`]), shots are fired at
-//! repeatable scans ([`shot`]) with a pulse that finds the target force ([`pulse`]), each record is judged
-//! ([`judge`]) and stored on a thread of its own (`keeper`, [`store`]).
+//! | to add or change | where |
+//! |---|---|
+//! | a field of the plan | [`plan`], its rule in `plan/check.rs` |
+//! | a column, a table | [`store`]: beside the row's type in its `*_table.rs` or `record_row.rs` |
+//! | a verdict, the double-hit threshold | [`verdict`] |
+//! | what happens between two hits | [`run`]: `cell.rs` |
+//! | a level of the shaker | [`run::shaking`] |
+//!
+//! [`run::runner::run`] walks the cells of the plan: hammer and laser are brought there ([`run::stage`]), shots are fired at repeatable
+//! scans ([`run::shot`]) with a pulse that finds the target force ([`run::pulse`]), each record is judged ([`verdict::judge`]) and stored on
+//! a thread of its own (`run/keeper.rs`).
 
-mod backup;
-pub mod check;
-mod clock;
-pub mod codec;
-mod earlier;
-pub mod frfs;
-pub mod judge;
-mod keeper;
-pub mod level;
-pub mod levels;
-mod lock;
-pub mod others;
 pub mod plan;
-mod plan_check;
-mod progress;
-pub mod pulse;
-pub mod quiet;
-mod records;
-mod replan;
-pub mod rows;
-pub mod runner;
-mod schema;
-mod seal;
-mod sessions;
-pub mod shaking;
-mod share;
-pub mod shot;
-pub mod stage;
+pub mod run;
+pub mod sensor_check;
 pub mod store;
-pub mod store_error;
-pub mod tally;
-mod upgrade;
 pub mod verdict;

@@ -6,9 +6,9 @@ use std::path::PathBuf;
 
 use crate::advice;
 use crate::campaign::plan::PlanError;
-use crate::campaign::runner::RunError;
-use crate::campaign::shaking::ShakeError;
-use crate::campaign::store_error::StoreError;
+use crate::campaign::run::error::RunError;
+use crate::campaign::run::shaking::ShakeError;
+use crate::campaign::store::error::StoreError;
 use crate::device::error::DeviceError;
 use crate::results::AnalyseError;
 

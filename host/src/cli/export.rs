@@ -12,10 +12,10 @@ use num_complex::Complex;
 use super::analyse::analyse_into;
 use super::error::CliError;
 use super::{frf, output};
-use crate::campaign::frfs::ImportedFrf;
 use crate::campaign::plan::configuration_name;
-use crate::campaign::rows::RecordRow;
 use crate::campaign::store::Store;
+use crate::campaign::store::frf_table::ImportedFrf;
+use crate::campaign::store::record_row::RecordRow;
 use crate::device::channels::ChannelMap;
 use crate::exchange::npz::Array;
 use crate::exchange::positions_output::write_positions;
@@ -107,7 +107,7 @@ impl Export {
             let mut matrix: Option<Matrix> = None;
             for cell in store.cells()?.iter().filter(|c| configuration_name(c.cell.configuration) == name) {
                 let of_cell: Vec<&RecordRow> =
-                    rows.iter().filter(|r| r.cell == cell.id && r.scans > 0).collect();
+                    rows.iter().flatten().filter(|r| r.cell == cell.id && r.scans > 0).collect();
                 let Some(records) = self.cell(&store, &of_cell)? else { continue };
                 if !self.without_records {
                     let stem = format!("{name}_{}_{}", cell.cell.impact, cell.cell.response);

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::error::CliError;
 use super::output;
-use crate::campaign::verdict::{Limits, Verdict, VerdictKind, judge_all};
+use crate::campaign::verdict::{Kind, Limits, Verdict, judge_all};
 use crate::exchange::npz::Array;
 use crate::exchange::record_uff::read_record_file;
 use crate::exchange::{Extra, write_frf};
@@ -115,7 +115,7 @@ impl Frf {
         }
         let names = self.names(records.response.first().map_or(0, Vec::len))?;
         let verdicts = judge_all(&records, &Limits::default(), None);
-        let used: Vec<bool> = verdicts.iter().map(|v| v.verdict == VerdictKind::Good).collect();
+        let used: Vec<bool> = verdicts.iter().map(|v| v.kind == Kind::Good).collect();
         if !used.contains(&true) {
             if self.json {
                 output::json(&self.document(&records, &verdicts, None))?;
@@ -123,7 +123,7 @@ impl Frf {
             let why: Vec<String> = verdicts
                 .iter()
                 .enumerate()
-                .map(|(i, v)| format!("hit {i}: {}, {}", v.verdict, v.sentence))
+                .map(|(i, v)| format!("hit {i}: {}, {}", v.kind, v.sentence))
                 .collect();
             return Err(CliError::Bad(format!(
                 "{}: no hit is good, so there is nothing to average; measure again\n  {}",
@@ -231,7 +231,7 @@ impl Frf {
             .enumerate()
             .map(|(index, v)| {
                 json!({
-                    "index": index, "verdict": v.verdict, "measure": v.measure, "limit": v.limit,
+                    "index": index, "verdict": v.kind, "measure": v.measure, "limit": v.limit,
                     "sentence": v.sentence, "peak_n": v.peak_n, "start_s": v.start_s,
                 })
             })
@@ -258,7 +258,7 @@ impl Frf {
         let mut lines: Vec<String> = verdicts
             .iter()
             .enumerate()
-            .map(|(i, v)| format!("hit {i}: {} ({})", v.verdict, v.sentence))
+            .map(|(i, v)| format!("hit {i}: {} ({})", v.kind, v.sentence))
             .collect();
         lines.push(format!("{} of {} hits averaged", found.hits, verdicts.len()));
         if let Some(band) = excited {

@@ -9,9 +9,9 @@ use clap::Args;
 
 use super::error::CliError;
 use super::output;
-use crate::campaign::judge::Kind;
 use crate::campaign::plan::{configuration_name, configuration_named};
 use crate::campaign::store::Store;
+use crate::campaign::verdict::Kind;
 use crate::exchange::npz::Array;
 use crate::exchange::{Extra, FrfFile, read_frf_file, write_frf};
 use crate::results;
@@ -103,7 +103,8 @@ impl Import {
         let own = |id: i64| {
             cells.iter().any(|row| row.id == id && configuration_name(row.cell.configuration) == name)
         };
-        let kept = store.records()?.iter().filter(|r| own(r.cell) && r.verdict == Kind::Good).count();
+        let kept =
+            store.records()?.iter().flatten().filter(|r| own(r.cell) && r.verdict == Kind::Good).count();
         if kept > 0 {
             return Err(CliError::Bad(format!(
                 "{}: {name} has {kept} good hits of its own, which FRFs would stand beside: import into a campaign that has \

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use super::error::CliError;
-use crate::campaign::judge::Judge;
-use crate::campaign::runner::{self, Options, Summary};
-use crate::campaign::stage::Stage;
+use crate::campaign::run::runner::{self, Options, Summary};
+use crate::campaign::run::stage::Stage;
 use crate::campaign::store::Store;
+use crate::campaign::verdict::judge::Judge;
 use crate::device::address::Address;
 use crate::device::logs::Tables;
 use crate::device::session::Session;

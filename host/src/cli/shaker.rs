@@ -9,11 +9,11 @@ use serde_json::{Value, json};
 use super::error::CliError;
 use super::number::positive;
 use super::{interrupt, output};
-use crate::campaign::level::{Held, Level, Moment};
-use crate::campaign::levels::LevelRow;
 use crate::campaign::plan::Plan;
-use crate::campaign::shaking::{self, CRITERION, Limits, Options, Outcome, Summary};
+use crate::campaign::plan::level::{Held, Level, Moment};
+use crate::campaign::run::shaking::{self, CRITERION, Limits, Options, Outcome, Summary};
 use crate::campaign::store::Store;
+use crate::campaign::store::level_table::LevelRow;
 use crate::device::address::Address;
 use crate::device::logs::Tables;
 use crate::device::session::Session;
@@ -194,13 +194,13 @@ fn told(store: &Store, outcome: &Outcome) -> (String, Value) {
         }
     };
     let found = look(store, row);
-    let settled = row.settled;
+    let settled = row.settled();
     let mut value = json!({
         "id": row.id,
-        "frequency_hz": row.level.frequency_hz,
-        "end_hz": row.level.end_hz,
-        "control": row.level.held.name(),
-        "amplitude": row.level.amplitude,
+        "frequency_hz": row.level().frequency_hz,
+        "end_hz": row.level().end_hz,
+        "control": row.level().held.name(),
+        "amplitude": row.level().amplitude,
         "recorded": true,
         "new": is_new,
         "reached": settled.reached,
@@ -212,13 +212,13 @@ fn told(store: &Store, outcome: &Outcome) -> (String, Value) {
     let mut line = if is_new {
         format!(
             "{} after {} s, at most {} % on the way, {} V",
-            row.level.held.show(settled.reached),
+            row.level().held.show(settled.reached),
             decimals(settled.after_s, 1),
             decimals(100.0 * settled.overshoot, 0),
             decimals(settled.drive_v, 3)
         )
     } else {
-        format!("{}: in the file already", row.level)
+        format!("{}: in the file already", row.level())
     };
     match found {
         Some(Ok(found)) => {
@@ -245,13 +245,13 @@ fn told(store: &Store, outcome: &Outcome) -> (String, Value) {
 
 /// A first look at the loop, with the raw force; none for a sweep, which has none.
 fn look(store: &Store, row: &LevelRow) -> Option<Result<LoopAnalysis, String>> {
-    if row.level.end_hz.is_some() {
+    if row.level().end_hz.is_some() {
         return None;
     }
     let read = || {
         let channels = store.channels(row.session).map_err(|error| error.to_string())?;
         let samples = store.level_samples(row).map_err(|error| error.to_string())?;
-        let record = shaking::record(&channels, &samples, &row.level).map_err(|error| error.to_string())?;
+        let record = shaking::record(&channels, &samples, &row.level()).map_err(|error| error.to_string())?;
         analyse(&record).map_err(|error| error.to_string())
     };
     Some(read())

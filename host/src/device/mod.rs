@@ -7,9 +7,6 @@
 pub mod address;
 pub mod channels;
 pub mod error;
-#[cfg(test)]
-pub(crate) mod fake;
-pub mod faulty;
 mod inbox;
 pub mod link;
 pub mod logs;

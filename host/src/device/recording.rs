@@ -29,9 +29,30 @@ impl Recording {
         self.codes.len().checked_div(self.channels).unwrap_or(0)
     }
 
+    /// Its samples, to look at.
+    pub fn view(&self) -> Codes<'_> {
+        Codes { codes: &self.codes, channels: self.channels }
+    }
+
     /// The raw codes of one channel; empty outside the map.
     pub fn channel(&self, place: usize) -> &[i16] {
-        let scans = self.scans();
+        self.view().channel(place)
+    }
+}
+
+/// A look at the samples of a record, wherever they are kept.
+#[derive(Clone, Copy, Debug)]
+pub struct Codes<'a> {
+    /// Raw codes, channel after channel.
+    pub codes: &'a [i16],
+    /// Channels.
+    pub channels: usize,
+}
+
+impl<'a> Codes<'a> {
+    /// The raw codes of one channel; empty outside the map.
+    pub fn channel(self, place: usize) -> &'a [i16] {
+        let scans = self.codes.len().checked_div(self.channels).unwrap_or(0);
         self.codes.get(place * scans..(place + 1) * scans).unwrap_or(&[])
     }
 }

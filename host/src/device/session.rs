@@ -405,7 +405,3 @@ fn nonce() -> u32 {
     hasher.write_u32(std::process::id());
     hasher.finish() as u32
 }
-
-#[cfg(test)]
-#[path = "session_tests.rs"]
-mod tests;

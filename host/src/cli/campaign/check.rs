@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Value, json};
 
-use crate::campaign::check::{Polarity, Ratio, polarity, ratio};
+use crate::campaign::sensor_check::{Polarity, Ratio, polarity, ratio};
 use crate::campaign::store::Store;
 use crate::cli::campaign::show::find;
 use crate::cli::error::CliError;

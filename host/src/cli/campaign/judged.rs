@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::campaign::judge::Kind;
 use crate::campaign::store::Store;
+use crate::campaign::verdict::Kind;
 use crate::cli::error::CliError;
 use crate::cli::output;
 
@@ -41,9 +41,6 @@ impl Overrule {
         // all or none: a wrong number must not leave half of it done
         for id in &self.records {
             let record = store.record(*id)?;
-            if let Some(damage) = &record.damage {
-                return Err(CliError::Bad(format!("record {id} is damaged ({damage}): it cannot be used")));
-            }
             if verdict == Kind::Good && record.scans == 0 {
                 return Err(CliError::Bad(format!("record {id} has no samples: the bolt did not arrive")));
             }

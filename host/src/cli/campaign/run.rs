@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::campaign::judge::{ByRecord, Judge, Judgement, Kind};
-use crate::campaign::others::Others;
 use crate::campaign::plan::{Cell, Plan};
-use crate::campaign::stage::Stage;
+use crate::campaign::run::stage::Stage;
 use crate::campaign::store::Store;
+use crate::campaign::verdict::judge::{ByRecord, Judge};
+use crate::campaign::verdict::others::Others;
+use crate::campaign::verdict::{Kind, Verdict};
 use crate::cli::campaign::plan_file;
 use crate::cli::error::CliError;
 use crate::cli::{interrupt, measure};
@@ -103,11 +104,11 @@ impl Judge for Ringing {
         channels: &ChannelMap,
         recording: &Recording,
         others: &Others,
-    ) -> Judgement {
-        let judgement = ByRecord.judge(cell, plan, channels, recording, others);
+    ) -> Verdict {
+        let verdict = ByRecord.judge(cell, plan, channels, recording, others);
         if self.rings {
-            eprint!("{}", if judgement.kind == Kind::Good { "\x07" } else { "\x07\x07" });
+            eprint!("{}", if verdict.kind == Kind::Good { "\x07" } else { "\x07\x07" });
         }
-        judgement
+        verdict
     }
 }

@@ -6,9 +6,11 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use crate::campaign::plan::configuration_name;
-use crate::campaign::rows::{CellRow, Overrule, RecordRow};
 use crate::campaign::store::Store;
-use crate::campaign::store_error::StoreError;
+use crate::campaign::store::cell_table::CellRow;
+use crate::campaign::store::error::StoreError;
+use crate::campaign::store::overrules::Overrule;
+use crate::campaign::store::record_row::{Damaged, RecordRow};
 use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::report::records::{Shown, records};
@@ -39,13 +41,23 @@ impl Show {
         let store = Store::open_read_only(&self.file)?;
         let cells = store.cells()?;
         let row = find(&cells, &self.cell)?;
-        let records: Vec<RecordRow> =
-            store.records()?.into_iter().filter(|record| record.cell == row.id).collect();
+        let records = store.records_of(row.id)?;
         let overrules = if records.is_empty() { Vec::new() } else { store.overrules()? };
-        let figure =
-            if self.no_figure || records.is_empty() { None } else { self.draw(&store, row, &records)? };
+        let figure = if self.no_figure || records.is_empty() {
+            None
+        } else {
+            self.draw(&store, row, records.iter().flatten())?
+        };
         if self.json {
-            let records: Vec<Value> = records.iter().map(|record| as_json(record, &overrules)).collect();
+            let records: Vec<Value> = records
+                .iter()
+                .map(|record| match record {
+                    Ok(record) => as_json(record, &overrules),
+                    Err(Damaged { place, what }) => {
+                        json!({ "record": place.id, "attempt": place.attempt, "kept": false, "damage": what })
+                    }
+                })
+                .collect();
             return output::json(&json!({
                 "configuration": configuration_name(row.cell.configuration),
                 "impact": row.cell.impact,
@@ -62,9 +74,12 @@ impl Show {
         lines.extend(row.given_up.iter().map(|reason| format!("given up: {reason}")));
         lines.extend(row.settled.iter().map(|reason| format!("settled: {reason}")));
         for record in &records {
-            lines.push(line(record));
-            let own = overrules.iter().filter(|overrule| overrule.record == record.id);
-            lines.extend(own.map(|overrule| {
+            let (id, line) = match record {
+                Ok(record) => (record.id, line(record)),
+                Err(Damaged { place, what }) => (place.id, format!("{:>6}  damaged: {what}", place.id)),
+            };
+            lines.push(line);
+            lines.extend(overrules.iter().filter(|overrule| overrule.record == id).map(|overrule| {
                 format!("        a person, {}: {} ({})", overrule.utc, overrule.verdict, overrule.reason)
             }));
         }
@@ -73,9 +88,14 @@ impl Show {
     }
 
     /// Draws what can be read; a damaged record is in the list only.
-    fn draw(&self, store: &Store, row: &CellRow, rows: &[RecordRow]) -> Result<Option<PathBuf>, CliError> {
+    fn draw<'r>(
+        &self,
+        store: &Store,
+        row: &CellRow,
+        rows: impl Iterator<Item = &'r RecordRow>,
+    ) -> Result<Option<PathBuf>, CliError> {
         let mut shown = Vec::new();
-        for record in rows.iter().filter(|record| record.damage.is_none() && record.scans > 0) {
+        for record in rows.filter(|record| record.scans > 0) {
             let samples = match store.samples(record) {
                 Ok(samples) => samples,
                 Err(error @ StoreError::Damaged { .. }) => {
@@ -131,9 +151,6 @@ pub(super) fn find<'a>(cells: &'a [CellRow], name: &str) -> Result<&'a CellRow, 
 }
 
 fn line(record: &RecordRow) -> String {
-    if let Some(damage) = &record.damage {
-        return format!("{:>6}  damaged: {damage}", record.id);
-    }
     let error = record.utc_error_s.map_or("unknown error".into(), |error| format!("± {error:.3} s"));
     format!(
         "{:>6}  {:<10} {:6.2} N  {:5} us  {}  ({} {error})",
@@ -166,7 +183,7 @@ fn as_json(record: &RecordRow, overrules: &[Overrule]) -> Value {
         "sentence": record.sentence,
         "kept": record.kept(),
         "overruled": overruled,
-        "damage": record.damage,
+        "damage": null,
         "peak_n": record.peak_n,
         "pulse_us": record.shot.pulse_us,
         "scans": record.scans,

@@ -6,9 +6,9 @@ use clap::Args;
 use serde_json::{Map, Value, json};
 
 use crate::campaign::plan::configuration_name;
-use crate::campaign::rows::CellRow;
+use crate::campaign::run::tally::{Count, Tally};
 use crate::campaign::store::Store;
-use crate::campaign::tally::{Count, Tally};
+use crate::campaign::store::cell_table::CellRow;
 use crate::cli::error::CliError;
 use crate::cli::output;
 

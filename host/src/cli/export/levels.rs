@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use super::{Format, bad};
-use crate::campaign::levels::LevelRow;
-use crate::campaign::shaking;
+use crate::campaign::run::shaking;
 use crate::campaign::store::Store;
+use crate::campaign::store::level_table::{DamagedLevel, LevelRow};
 use crate::cli::error::CliError;
 use crate::exchange::{tables_output, uff_output, write_hysteresis};
 use crate::hysteresis::HysteresisRecord;
@@ -49,7 +49,14 @@ pub(super) fn write(
     let plan = store.plan()?;
     let load = plan.contact.as_ref().and_then(|contact| contact.get_ref().normal_load_n);
     let mut table = vec![COLUMNS.map(String::from).to_vec()];
-    for row in &levels {
+    for level in &levels {
+        let row = match level {
+            Ok(row) => row,
+            Err(damaged) => {
+                table.push(damaged_line(damaged));
+                continue;
+            }
+        };
         let file = if with_records && row.whole() {
             let name = format!("level_{}.{}", row.id, format.extension());
             let record = HysteresisRecord { normal_load_n: load, ..record(store, row)? };
@@ -67,8 +74,8 @@ pub(super) fn write(
 fn record(store: &Store, row: &LevelRow) -> Result<HysteresisRecord, CliError> {
     let channels = store.channels(row.session)?;
     let samples = store.level_samples(row)?;
-    shaking::record(&channels, &samples, &row.level)
-        .map_err(|what| CliError::Bad(format!("the shaker's level {} ({}): {what}", row.id, row.level)))
+    shaking::record(&channels, &samples, &row.level())
+        .map_err(|what| CliError::Bad(format!("the shaker's level {} ({}): {what}", row.id, row.level())))
 }
 
 fn one(path: &Path, format: Format, record: &HysteresisRecord, level: i64) -> Result<(), CliError> {
@@ -79,8 +86,16 @@ fn one(path: &Path, format: Format, record: &HysteresisRecord, level: i64) -> Re
     }
 }
 
+/// Of a damaged level only its number and what is wrong can be told.
+fn damaged_line(damaged: &DamagedLevel) -> Vec<String> {
+    let mut line = vec![String::new(); COLUMNS.len()];
+    line[0] = damaged.id.to_string();
+    line[COLUMNS.len() - 2].clone_from(&damaged.what);
+    line
+}
+
 fn line(row: &LevelRow, rate_hz: f64, file: String) -> Vec<String> {
-    let (level, settled) = (&row.level, &row.settled);
+    let (level, settled) = (row.level(), row.settled());
     let lost: usize = row.gaps.iter().map(std::ops::Range::len).sum();
     vec![
         row.id.to_string(),
@@ -96,7 +111,7 @@ fn line(row: &LevelRow, rate_hz: f64, file: String) -> Vec<String> {
         settled.drive_v.to_string(),
         (row.scans as f64 / rate_hz).to_string(),
         lost.to_string(),
-        row.damage.clone().unwrap_or_default(),
+        String::new(),
         file,
     ]
 }

@@ -6,11 +6,15 @@ use jointrig_protocol::shot::{Phase, Shot};
 
 use super::bad;
 use super::quantised::quantised;
-use crate::campaign::judge::{ByRecord, Judge, Kind};
-use crate::campaign::others::Others;
 use crate::campaign::plan::{Cell, configuration_name};
-use crate::campaign::rows::{Counters, NewRecord, Samples, SessionInfo};
-use crate::campaign::store::{Store, utc_now};
+use crate::campaign::store::Store;
+use crate::campaign::store::notes::utc_now;
+use crate::campaign::store::record_row::NewRecord;
+use crate::campaign::store::session_table::{Counters, SessionInfo};
+use crate::campaign::store::stored::Hex;
+use crate::campaign::verdict::Kind;
+use crate::campaign::verdict::judge::{ByRecord, Judge};
+use crate::campaign::verdict::others::Others;
 use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::device::recording::Recording;
@@ -46,12 +50,12 @@ pub(super) fn import(file: &Path, into: &Path, name: &CellName<'_>) -> Result<()
     let (mut kept, mut others) = (0, Others::default());
     let hits = recordings.len();
     for (hit, recording) in recordings.into_iter().enumerate() {
-        let judgement = ByRecord.judge(&cell, &plan, &map, &recording, &others);
-        if judgement.kind == Kind::Good {
-            others.learn(&plan, &map, &Samples::of(&recording));
+        let verdict = ByRecord.judge(&cell, &plan, &map, &recording, &others);
+        if verdict.kind == Kind::Good {
+            others.learn(&plan, &map, recording.view());
             kept += 1;
         }
-        eprintln!("hit {hit}: {} ({})", judgement.kind, judgement.sentence);
+        eprintln!("hit {hit}: {} ({})", verdict.kind, verdict.sentence);
         let record = NewRecord {
             cell: id,
             attempt: attempt + hit as u32,
@@ -60,7 +64,7 @@ pub(super) fn import(file: &Path, into: &Path, name: &CellName<'_>) -> Result<()
             // when it was measured is not known here
             utc_error_s: None,
             recording,
-            judgement,
+            verdict,
         };
         store.insert(&record, &Counters::default())?;
     }
@@ -93,7 +97,7 @@ fn find(store: &Store, name: &CellName<'_>) -> Result<(i64, Cell, u32), CliError
             wanted[2]
         )));
     };
-    let attempts = store.records()?.iter().filter(|r| r.cell == row.id).map(|r| r.attempt + 1).max();
+    let attempts = store.places()?.iter().filter(|r| r.cell == row.id).map(|r| r.attempt + 1).max();
     Ok((row.id, row.cell, attempts.unwrap_or(0)))
 }
 
@@ -105,8 +109,8 @@ fn session(file: &Path) -> SessionInfo {
         serial: String::new(),
         firmware_version: String::new(),
         target: String::new(),
-        build: 0,
-        schema_hash: 0,
+        build: Hex(0),
+        schema_hash: Hex(0),
     }
 }
 

@@ -1,7 +1,7 @@
 //! What the analysis asks of a campaign: its geometry, its cells, and the kept hits of one cell in SI units.
 
-use crate::campaign::frfs::ImportedFrf;
-use crate::campaign::level::{Level, Moment};
+use crate::campaign::plan::level::{Level, Moment};
+use crate::campaign::store::frf_table::ImportedFrf;
 use crate::hysteresis::HysteresisRecord;
 use crate::spectra::MotionQuantity;
 use crate::substructuring::geometry::Geometry;

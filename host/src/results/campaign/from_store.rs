@@ -4,14 +4,14 @@ use super::cell::{
     Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel,
 };
 use super::{Progress, Wanted, completeness};
-use crate::campaign::frfs::ImportedFrf;
-use crate::campaign::levels::LevelRow;
 use crate::campaign::plan::{Plan, configuration_name};
-use crate::campaign::rows::RecordRow;
-use crate::campaign::shaking;
+use crate::campaign::run::shaking;
+use crate::campaign::run::tally::Tally;
 use crate::campaign::store::Store;
-use crate::campaign::store_error::StoreError;
-use crate::campaign::tally::Tally;
+use crate::campaign::store::error::StoreError;
+use crate::campaign::store::frf_table::ImportedFrf;
+use crate::campaign::store::level_table::LevelRow;
+use crate::campaign::store::record_row::{Damaged, RecordRow};
 use crate::device::channels::ChannelMap;
 use crate::hysteresis::HysteresisRecord;
 use crate::results::{Completeness, Results, Source};
@@ -75,7 +75,7 @@ struct CampaignFile {
     quantity: MotionQuantity,
     cells: Vec<PlannedCell>,
     tally: Tally,
-    records: HashMap<i64, Vec<RecordRow>>,
+    records: HashMap<i64, Vec<Result<RecordRow, Damaged>>>,
     channels: HashMap<i64, ChannelMap>,
     /// Open connections that no thread uses at the moment: SQLite's cannot be shared, only handed on.
     idle: Mutex<Vec<Store>>,
@@ -104,9 +104,10 @@ impl CampaignFile {
                 given_up: row.given_up,
             })
             .collect();
-        let mut records: HashMap<i64, Vec<RecordRow>> = HashMap::new();
+        let mut records: HashMap<i64, Vec<Result<RecordRow, Damaged>>> = HashMap::new();
         for record in all {
-            records.entry(record.cell).or_default().push(record);
+            let cell = record.as_ref().map_or_else(|damaged| damaged.place.cell, |row| row.cell);
+            records.entry(cell).or_default().push(record);
         }
         let mut channels = HashMap::new();
         for (session, _) in store.sessions()? {
@@ -129,7 +130,7 @@ impl CampaignFile {
     fn source(&self, store: &Store) -> Result<Source, AnalyseError> {
         let file = self.path.file_name().unwrap_or(self.path.as_os_str()).to_string_lossy().into_owned();
         let mut source = Source { file, kind: "campaign".into(), ..Source::default() };
-        source.started = self.records.values().flatten().map(|r| r.utc.clone()).min();
+        source.started = self.records.values().flatten().flatten().map(|r| r.utc.clone()).min();
         let sessions = store.sessions()?;
         if let Some((_, info)) = sessions.last() {
             for (key, value) in [
@@ -138,8 +139,8 @@ impl CampaignFile {
                 ("serial", info.serial.clone()),
                 ("firmware_version", info.firmware_version.clone()),
                 ("target", info.target.clone()),
-                ("build", format!("{:016x}", info.build)),
-                ("schema_hash", format!("{:016x}", info.schema_hash)),
+                ("build", info.build.to_string()),
+                ("schema_hash", info.schema_hash.to_string()),
                 ("sessions", sessions.len().to_string()),
             ] {
                 source.device.insert(key.into(), value);
@@ -182,7 +183,7 @@ impl CampaignFile {
             .collect()
     }
 
-    fn records_of(&self, cell: i64) -> &[RecordRow] {
+    fn records_of(&self, cell: i64) -> &[Result<RecordRow, Damaged>] {
         self.records.get(&cell).map_or(&[], Vec::as_slice)
     }
 
@@ -251,17 +252,14 @@ impl CampaignFile {
 
 impl CampaignFile {
     fn level(&self, store: &Store, row: &LevelRow) -> Result<ShakerLevel, String> {
-        if let Some(what) = &row.damage {
-            return Err(format!("it is damaged ({what}) and was left out"));
-        }
         if !row.gaps.is_empty() {
             return Err("samples of it were lost on the way: measure it again".into());
         }
         let channels = self.channels.get(&row.session).ok_or("its session is missing")?;
         let samples = store.level_samples(row).map_err(|error| error.to_string())?;
-        let record = shaking::record(channels, &samples, &row.level).map_err(|error| error.to_string())?;
+        let record = shaking::record(channels, &samples, &row.level()).map_err(|error| error.to_string())?;
         let record = HysteresisRecord { normal_load_n: self.known.normal_load_n, ..record };
-        Ok(ShakerLevel { id: row.id, moment: row.moment, level: row.level, record })
+        Ok(ShakerLevel { id: row.id, moment: row.moment, level: row.level(), record })
     }
 }
 
@@ -300,10 +298,20 @@ impl Measurements for CampaignFile {
         let (mut levels, mut complaints) = (Vec::new(), Vec::new());
         let read = self.with_reader(|store| {
             for row in store.levels()? {
+                let row = match row {
+                    Ok(row) => row,
+                    Err(damaged) => {
+                        complaints.push(format!(
+                            "Shaker, level {} is damaged ({}) and was left out.",
+                            damaged.id, damaged.what
+                        ));
+                        continue;
+                    }
+                };
                 match self.level(store, &row) {
                     Ok(level) => levels.push(level),
                     Err(why) => {
-                        complaints.push(format!("Shaker, {} ({}): {why}.", row.level, row.moment.name()));
+                        complaints.push(format!("Shaker, {} ({}): {why}.", row.level(), row.moment.name()));
                     }
                 }
             }
@@ -319,20 +327,22 @@ impl Measurements for CampaignFile {
             let mut whole = Cell::default();
             let mut left_out = Vec::new();
             for record in self.records_of(planned.id) {
-                if let Some(what) = &record.damage {
-                    left_out.push(format!("record {} is damaged ({what}) and was left out", record.id));
-                }
-                if !record.kept() {
-                    continue;
-                }
+                let record = match record {
+                    Ok(record) if record.kept() => record,
+                    Ok(_) => continue,
+                    Err(Damaged { place, what }) => {
+                        left_out.push(format!("record {} is damaged ({what}) and was left out", place.id));
+                        continue;
+                    }
+                };
                 match self.hit(store, record) {
                     Ok((hit, about)) => {
                         let mut hits = std::mem::take(&mut whole.hits);
                         hits.push(hit);
                         whole = Cell { hits, ..about };
                     }
-                    Err(AnalyseError::Store(StoreError::Damaged { record, source, .. })) => {
-                        left_out.push(format!("record {record} is damaged ({source}) and was left out"));
+                    Err(AnalyseError::Store(StoreError::Damaged { record, what, .. })) => {
+                        left_out.push(format!("record {record} is damaged ({what}) and was left out"));
                     }
                     Err(other) => return Err(other),
                 }

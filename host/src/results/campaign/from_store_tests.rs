@@ -1,8 +1,10 @@
 use super::*;
-use crate::campaign::judge::{Judgement, Kind};
 use crate::campaign::plan::SMALL;
-use crate::campaign::rows::{Counters, NewRecord, SessionInfo};
-use crate::campaign::store::utc_now;
+use crate::campaign::store::notes::utc_now;
+use crate::campaign::store::record_row::NewRecord;
+use crate::campaign::store::session_table::{Counters, SessionInfo};
+use crate::campaign::store::stored::Hex;
+use crate::campaign::verdict::{Kind, Verdict};
 use crate::device::recording::Recording;
 use jointrig_protocol::channel::{Axis, Channel};
 use jointrig_protocol::shot::{Phase, Shot};
@@ -99,8 +101,8 @@ fn campaign(path: &Path) -> Store {
         serial: "7".into(),
         firmware_version: "0.1.0".into(),
         target: "x".into(),
-        build: 1,
-        schema_hash: 2,
+        build: Hex(1),
+        schema_hash: Hex(2),
     };
     let map = map();
     let session = store.begin_session(&info, &map).expect("session");
@@ -110,8 +112,8 @@ fn campaign(path: &Path) -> Store {
         for (attempt, (peak, kind)) in
             [(50.0, Kind::Good), (48.0, Kind::DoubleHit), (46.0, Kind::Good)].into_iter().enumerate()
         {
-            let judgement =
-                Judgement { kind, measure: 0.0, limit: 0.0, sentence: "made up".into(), peak_n: peak };
+            let verdict =
+                Verdict { peak_n: peak, ..Verdict::without_pulse(kind, 0.0, 0.0, "made up".into()) };
             let record = NewRecord {
                 cell: cell.id,
                 attempt: attempt as u32,
@@ -119,7 +121,7 @@ fn campaign(path: &Path) -> Store {
                 utc: utc_now(),
                 utc_error_s: None,
                 recording: recording(&map, peak),
-                judgement,
+                verdict,
             };
             store.insert(&record, &Counters::new()).expect("stored");
         }

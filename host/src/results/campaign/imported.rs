@@ -1,7 +1,7 @@
 //! FRFs that were measured elsewhere stand in for a configuration that was not measured here.
 
 use super::cell::Measurements;
-use crate::campaign::frfs::ImportedFrf;
+use crate::campaign::store::frf_table::ImportedFrf;
 use crate::results::Results;
 use serde_json::{Map, json};
 

@@ -1,7 +1,7 @@
 //! The shaker's levels: each level's loop with the raw and the corrected force, a loop to look at, before against after.
 
 use super::cell::ShakerLevel;
-use crate::campaign::level::Moment;
+use crate::campaign::plan::level::Moment;
 use crate::hysteresis::backbone::Law;
 use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
 use crate::hysteresis::integration::open_record;
@@ -210,7 +210,7 @@ pub fn unchanged(levels: &[Analysed<'_>]) -> Option<Check> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::level::{Held, Level};
+    use crate::campaign::plan::level::{Held, Level};
     use std::f64::consts::TAU;
 
     fn level(id: i64, moment: Moment, frequency_hz: f64, stiffness: f64) -> ShakerLevel {

@@ -1,0 +1,388 @@
+//! The plan of a campaign: what is hit and measured, how often, and what counts as a good hit.
+//!
+//! A plan is a TOML file (`docs/plans/paper.toml` is the example). Unknown fields are refused, and every
+//! error names file, line and field. Lengths are in m, forces in N, times in s unless a name says otherwise.
+
+mod check;
+pub mod level;
+
+use jointrig_protocol::request::Configuration;
+use serde::Deserialize;
+use toml::Spanned;
+
+/// The paper's campaign: 252 cells of 8 hits.
+pub const PAPER: &str = include_str!("../../../../docs/plans/paper.toml");
+/// All cells of the paper's campaign, three good hits in each.
+pub const DEMO: &str = include_str!("../../../../docs/plans/demo.toml");
+/// A few cells.
+pub const SMALL: &str = include_str!("../../../../docs/plans/small.toml");
+
+/// What is wrong with a plan, and where.
+#[derive(Debug, thiserror::Error)]
+#[error("{source_name}:{line}: {what} (docs/campaigns.md explains every field)")]
+pub struct PlanError {
+    /// The file.
+    pub source_name: String,
+    /// Line in it, from 1.
+    pub line: usize,
+    /// What is wrong, with the field's name.
+    pub what: String,
+}
+
+/// A checked plan.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// Version of the plan's format: 1.
+    pub version: Spanned<u32>,
+    /// Name of the plan.
+    pub name: String,
+    /// How a record is cut.
+    pub record: Spanned<RecordPlan>,
+    /// How many hits.
+    pub hits: Spanned<Hits>,
+    /// How hard.
+    pub force: Spanned<Force>,
+    /// How the device recognises a hit.
+    pub trigger: Spanned<TriggerPlan>,
+    /// Why a record is refused.
+    pub limits: Spanned<Limits>,
+    /// How long the hammer waits between hits.
+    pub settle: Spanned<Settle>,
+    /// How the FRFs are to be windowed.
+    pub window: Window,
+    /// When a cell's FRFs are good enough to stop before all wanted hits; never, without it.
+    pub enough: Option<Spanned<Enough>>,
+    /// The shaker's levels before and after the campaign; none, without it.
+    pub shaker: Option<Spanned<ShakerPlan>>,
+    /// What is known of contact and static arm; without it, only what the records say.
+    pub contact: Option<Spanned<ContactPlan>>,
+    /// What is behind the device's channels; those that are not named are taken as the device describes them.
+    #[serde(default)]
+    pub channel: Vec<Spanned<SensorPlan>>,
+    /// The structures, in the order in which they are measured.
+    pub configuration: Vec<ConfigurationPlan>,
+    /// Where everything is.
+    pub geometry: GeometryPlan,
+}
+
+/// How a record is cut from the stream.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecordPlan {
+    /// Scans per second, Hz.
+    pub rate_hz: u32,
+    /// Length from the trigger on, s.
+    pub length_s: f64,
+    /// Scans before the trigger.
+    pub pre_trigger_scans: u32,
+}
+
+/// How many hits a cell gets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hits {
+    /// Good ones wanted.
+    pub wanted: u32,
+    /// Good ones that are enough, if the attempts run out or the FRFs are good enough; below it a cell cannot be used.
+    pub minimum: u32,
+    /// Attempts after which a cell ends: settled with the minimum or more, given up with less.
+    pub most: u32,
+}
+
+/// How hard the hammer hits.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Force {
+    /// Peak force wanted, N.
+    pub target_n: f64,
+    /// Part of the target within which the pulse is left alone.
+    pub tolerance: f64,
+    /// First coil pulse, µs.
+    pub pulse_us: u32,
+    /// Shortest and longest coil pulse to try, µs.
+    pub pulse_bounds_us: [u32; 2],
+}
+
+/// How the device recognises a hit.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TriggerPlan {
+    /// Force that counts as contact, N.
+    pub level_n: f32,
+    /// How long the bolt may fly, s.
+    pub flight_s: f64,
+    /// How long rebounds are looked for, s.
+    pub listen_s: f64,
+    /// How long the hammer rests afterwards, s.
+    pub hold_off_s: f64,
+}
+
+/// Why a record is refused.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Limits {
+    /// A weaker peak is refused, N.
+    pub weak_n: f64,
+    /// A stronger peak is refused, N.
+    pub strong_n: f64,
+    /// A later contact of this part of the peak is a double hit.
+    pub rebound_ratio: f64,
+    /// A later contact counts from this long after the first one on (start to start), s.
+    pub rebound_after_s: f64,
+    /// A record this many times noisier than the cell's others is refused.
+    pub noise_ratio: f64,
+}
+
+/// How long the hammer waits between hits.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settle {
+    /// Residual motion allowed, as a part of the motion right after the last hit.
+    pub quiet_relative: f64,
+    /// Residual velocity that is always allowed, m/s rms.
+    pub quiet_floor_m_per_s: f64,
+    /// Length of the windows in which the device judges residual motion, in its decimated samples.
+    pub window_samples: u16,
+    /// Longest wait, s.
+    pub bound_s: f64,
+}
+
+/// How the FRFs are to be windowed; the analysis reads it.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Window {
+    /// Decay of the exponential window on force and response, 1/s.
+    pub exponential_per_s: f64,
+}
+
+/// The shaker's levels: every frequency at every amplitude, measured before and after the hammer's cells so that wear shows.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ShakerPlan {
+    /// Frequencies, Hz.
+    pub frequencies_hz: Vec<f64>,
+    /// Amplitudes of the specimens' relative displacement, m.
+    pub amplitudes_m: Vec<f64>,
+}
+
+impl ShakerPlan {
+    /// How many levels there are, each time.
+    pub fn levels(&self) -> usize {
+        self.frequencies_hz.len() * self.amplitudes_m.len()
+    }
+
+    /// What is to be done about them, for whoever counts on them.
+    pub fn remark(&self, file: &std::path::Path) -> String {
+        format!(
+            "the plan's {} levels of the shaker, before and after the cells: `jointrig shaker {} --device ADDR` measures them",
+            self.levels(),
+            file.display()
+        )
+    }
+}
+
+/// What is known of contact and static arm beforehand, from drawings or a balance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ContactPlan {
+    /// The normal load, N.
+    pub normal_load_n: Option<f64>,
+    /// Stiffness to ground beside the load cells, over theirs.
+    pub parallel_path: Option<f64>,
+    /// Effective mass of the static arm at the contact, kg; identified where it is not given.
+    pub effective_mass_kg: Option<f64>,
+}
+
+/// When a cell's FRFs are good enough.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Enough {
+    /// Random error of the averaged FRFs as a part of them; with `hits.minimum` good hits or more, less than this ends a cell.
+    pub random_error: f64,
+    /// The band that counts, Hz.
+    pub band_hz: [f64; 2],
+}
+
+/// What is behind a channel of the device. What is given is held against what the device says.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorPlan {
+    /// The channel's name on the device.
+    pub name: String,
+    /// The sensor's model.
+    pub model: Option<String>,
+    /// Its serial number.
+    pub serial: Option<String>,
+    /// When it was calibrated, YYYY-MM-DD.
+    pub calibrated: Option<String>,
+    /// V per SI unit, without sign.
+    pub sensitivity_v: Option<f64>,
+    /// 1, or -1 where a positive quantity gives a negative voltage.
+    pub polarity: Option<i8>,
+    /// Full scale in SI units.
+    pub range: Option<f64>,
+}
+
+/// One structure: every impact is combined with every response.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConfigurationPlan {
+    /// `A`, `B` or `AJB`.
+    pub name: Spanned<String>,
+    /// Names of impact points.
+    pub impacts: Vec<Spanned<String>>,
+    /// Names of response points.
+    pub responses: Vec<Spanned<String>>,
+}
+
+/// Where everything is: x lateral, y vertical, z sliding; origin at the contact centre.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GeometryPlan {
+    /// Both virtual points, m.
+    pub virtual_point_m: [f64; 3],
+    /// Response points, each measured along x, y and z.
+    pub response: Vec<Spanned<ResponsePoint>>,
+    /// Impact points.
+    pub impact: Vec<Spanned<ImpactPoint>>,
+    /// Sensors that stay where they are.
+    #[serde(default)]
+    pub sensor: Vec<SensorPoint>,
+}
+
+/// A response point.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ResponsePoint {
+    /// Its name.
+    pub name: String,
+    /// 1 interface of A, 2 interface of B, 3 internal of A, 4 internal of B.
+    pub grouping: u8,
+    /// Where it is, m.
+    pub position_m: [f64; 3],
+}
+
+/// An impact point.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImpactPoint {
+    /// Its name.
+    pub name: String,
+    /// 1 interface of A, 2 interface of B, 3 internal of A, 4 internal of B.
+    pub grouping: u8,
+    /// Where it is, m.
+    pub position_m: [f64; 3],
+    /// Where the hammer pushes, a unit vector.
+    pub direction: [f64; 3],
+}
+
+/// A sensor that stays where it is.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorPoint {
+    /// Its name.
+    pub name: String,
+    /// Where it is, m.
+    pub position_m: [f64; 3],
+    /// What it feels, a unit vector.
+    pub direction: [f64; 3],
+}
+
+/// One impact position with one response location, in one structure.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Cell {
+    /// The structure.
+    pub configuration: Configuration,
+    /// Name of the impact point.
+    pub impact: String,
+    /// Name of the response point.
+    pub response: String,
+    /// Good hits wanted.
+    pub wanted: u32,
+}
+
+/// The name of a configuration in plans, files and reports.
+pub fn configuration_name(configuration: Configuration) -> &'static str {
+    match configuration {
+        Configuration::A => "A",
+        Configuration::B => "B",
+        Configuration::Ajb => "AJB",
+    }
+}
+
+/// The configuration of that name.
+pub fn configuration_named(name: &str) -> Option<Configuration> {
+    match name {
+        "A" => Some(Configuration::A),
+        "B" => Some(Configuration::B),
+        "AJB" => Some(Configuration::Ajb),
+        _ => None,
+    }
+}
+
+impl Plan {
+    /// Reads and checks a plan; `source_name` is what errors call it.
+    ///
+    /// # Errors
+    /// The first thing that is wrong, with line and field.
+    pub fn parse(text: &str, source_name: &str) -> Result<Self, PlanError> {
+        let error = |at: usize, what: String| PlanError {
+            source_name: source_name.into(),
+            line: 1 + text.get(..at).unwrap_or(text).matches('\n').count(),
+            what,
+        };
+        let plan: Self = toml::from_str(text)
+            .map_err(|wrong| error(wrong.span().map_or(0, |span| span.start), field(text, &wrong)))?;
+        plan.check().map_err(|(at, what)| error(at, what))?;
+        Ok(plan)
+    }
+
+    /// Samples of a record from the trigger on.
+    pub fn post_trigger_scans(&self) -> u64 {
+        let record = self.record.get_ref();
+        (record.length_s * f64::from(record.rate_hz)).round() as u64
+    }
+
+    /// The cells in the order that moves hammer and laser least: the hammer goes to each impact once, and
+    /// the laser goes through the responses there and back (boustrophedon).
+    pub fn cells(&self) -> Vec<Cell> {
+        let mut cells = Vec::new();
+        for structure in &self.configuration {
+            let Some(configuration) = configuration_named(structure.name.get_ref()) else { continue };
+            for (place, impact) in structure.impacts.iter().enumerate() {
+                let mut here: Vec<Cell> = structure
+                    .responses
+                    .iter()
+                    .map(|response| Cell {
+                        configuration,
+                        impact: impact.get_ref().clone(),
+                        response: response.get_ref().clone(),
+                        wanted: self.hits.get_ref().wanted,
+                    })
+                    .collect();
+                if place % 2 == 1 {
+                    here.reverse();
+                }
+                cells.extend(here);
+            }
+        }
+        cells
+    }
+}
+
+/// What toml says, with the line that it points at.
+fn field(text: &str, wrong: &toml::de::Error) -> String {
+    let said = wrong.message().to_owned();
+    let line = wrong.span().and_then(|span| {
+        let from = text.get(..span.start)?.rfind('\n').map_or(0, |end| end + 1);
+        Some(text.get(from..)?.lines().next()?.trim())
+    });
+    match line {
+        Some(line) if !line.is_empty() && !said.contains(line) => format!("{said} (at `{line}`)"),
+        _ => said,
+    }
+}
+
+#[cfg(test)]
+mod tests;

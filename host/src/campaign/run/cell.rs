@@ -1,0 +1,205 @@
+//! One cell: from the hammer in place to enough good hits, or a reason why not.
+
+use jointrig_protocol::shot::Shot;
+
+use super::directions::name;
+use super::error::RunError;
+use super::quiet;
+use super::runner::{Next, Runner, still};
+use super::shot::{Outcome, QuietLimits};
+use super::stage::{Moved, Stage};
+use crate::campaign::store::cell_table::CellRow;
+use crate::campaign::store::codec;
+use crate::campaign::verdict::others::Others;
+use crate::campaign::verdict::{Kind, Verdict};
+use crate::device::recording::Recording;
+
+/// Shots of one cell that may be cancelled or find no quiet, before the cell is given up.
+const SETBACKS: u32 = 4;
+
+impl Runner<'_> {
+    /// Brings one cell to its end: enough good hits, or a reason why not.
+    pub(super) fn cell(&mut self, row: &CellRow) -> Result<Next, RunError> {
+        let (mut others, mut again) = self.earlier.of(row.id, self.plan, self.channels)?;
+        if self.stage != Stage::Device {
+            again.clear();
+        }
+        let attempt = if again.is_empty() { self.tally.attempts(row.id) } else { 0 };
+        match self.go(row, attempt)? {
+            Moved::InPlace(_) => {}
+            Moved::Skip => return Ok(Next::On),
+            Moved::Back => return Ok(Next::Back),
+            Moved::Redo => {
+                self.tally.redo(row.id);
+                self.earlier.forget(row.id);
+                still(self.keeper.redo(row.id, "struck anew, as a person asked at the prompt"))?;
+                return self.cell(row);
+            }
+        }
+        let mut quiet = quiet::unknown(self.channels);
+        let mut setbacks = 0;
+        while (self.tally.open(row.id) || !again.is_empty()) && !self.stopped() {
+            if again.is_empty() && self.ended(row, &others)? {
+                break;
+            }
+            let known = again.front().map(|known| (known.id, known.crc, known.shot.pulse_us));
+            let pulse_us = known.map_or(self.pulse.pulse_us(), |(_, _, pulse_us)| pulse_us);
+            self.mark()?;
+            let outcome = self.shooter.shoot(self.session, pulse_us, &quiet, &self.options.stop)?;
+            if let (Some((record, stored, _)), Some(crc)) = (known, crc_of(&outcome)) {
+                again.pop_front();
+                if crc == stored {
+                    setbacks = 0;
+                    if let Outcome::Recorded(recording) = &outcome {
+                        quiet = quiet::after(recording, self.channels, self.plan.settle.get_ref(), 1.0);
+                    }
+                } else {
+                    self.differs(row, record)?;
+                    again.clear();
+                    quiet = quiet::unknown(self.channels);
+                    let attempt = self.tally.attempts(row.id);
+                    self.go(row, attempt)?;
+                }
+                continue;
+            }
+            match outcome {
+                Outcome::Recorded(recording) => {
+                    setbacks = 0;
+                    quiet = quiet::after(&recording, self.channels, self.plan.settle.get_ref(), 1.0);
+                    let verdict = self.judge.judge(&row.cell, self.plan, self.channels, &recording, &others);
+                    if verdict.kind == Kind::Good {
+                        others.learn(self.plan, self.channels, recording.view());
+                    }
+                    self.keep(row, *recording, verdict)?;
+                }
+                Outcome::Missed(shot) => {
+                    let limit = self.plan.limits.get_ref().weak_n;
+                    let sentence = format!("the bolt did not arrive with a pulse of {pulse_us} us");
+                    let verdict = Verdict::without_pulse(Kind::Weak, 0.0, limit, sentence);
+                    let recording = Recording {
+                        epoch: 0,
+                        first_scan: shot.fired_at,
+                        trigger_index: 0,
+                        channels: self.channels.len(),
+                        codes: Vec::new(),
+                        gaps: Vec::new(),
+                        shot: Shot { peak_n: 0.0, ..shot },
+                    };
+                    self.keep(row, recording, verdict)?;
+                }
+                Outcome::NotQuiet(shot) => {
+                    setbacks += 1;
+                    let reason = format!("not quiet within {} s", self.plan.settle.get_ref().bound_s);
+                    if !self.set_back(row, setbacks, &format!("{reason} (ratio {:.1})", shot.quiet_ratio))? {
+                        self.give_up(row, &reason)?;
+                        break;
+                    }
+                    loosen(&mut quiet);
+                }
+                Outcome::Cancelled(_) => {
+                    setbacks += 1;
+                    let why = "the device took the shot back";
+                    self.check_safe()?;
+                    if !self.set_back(row, setbacks, why)? {
+                        self.give_up(row, why)?;
+                        break;
+                    }
+                }
+                Outcome::Interrupted => {}
+            }
+        }
+        Ok(Next::On)
+    }
+
+    /// Ends a cell whose attempts run out, or whose FRFs are good enough; returns whether it did.
+    fn ended(&mut self, row: &CellRow, others: &Others) -> Result<bool, RunError> {
+        let hits = self.plan.hits.get_ref();
+        let (kept, attempts) = (self.tally.kept_in(row.id), self.tally.attempts(row.id));
+        let enough = self.plan.enough.as_ref().map(toml::Spanned::get_ref).filter(|_| kept >= hits.minimum);
+        let reason = if attempts >= hits.most {
+            format!("{kept} of {} good after {attempts} hits", row.cell.wanted)
+        } else if let Some(enough) = enough
+            && let Some(error) = others.random_error(enough).filter(|error| *error <= enough.random_error)
+        {
+            format!(
+                "{kept} good hits give the FRFs to {:.2} % (enough: {:.2} %)",
+                100.0 * error,
+                100.0 * enough.random_error
+            )
+        } else {
+            return Ok(false);
+        };
+        if kept >= hits.minimum && kept > 0 {
+            self.tally.settle(row.id);
+            self.progress.say(&format!("{}: settled: {reason}", name(&row.cell)));
+            still(self.keeper.settle(row.id, &reason))?;
+        } else {
+            self.give_up(row, &format!("{reason}, at least {} needed", hits.minimum))?;
+        }
+        Ok(true)
+    }
+
+    /// Brings hammer and laser to a cell. The acknowledgement is held meanwhile, so that the first shot is at a
+    /// fixed distance from the scan at which they are in place.
+    fn go(&mut self, row: &CellRow, attempt: u32) -> Result<Moved, RunError> {
+        self.progress.cell(&row.cell, self.left(row));
+        let what = self.directions(row);
+        let (stage, session, yes) = (&self.stage, &mut *self.session, self.options.yes);
+        let moved = self.progress.aside(|| stage.go(session, &row.cell, attempt, &what, yes))?;
+        if let Moved::InPlace(at_scan) = moved {
+            self.shooter.staged(at_scan);
+        }
+        Ok(moved)
+    }
+
+    /// The device did not repeat a stored record: it is another rig, or another seed.
+    fn differs(&mut self, row: &CellRow, record: i64) -> Result<(), RunError> {
+        let text = format!(
+            "{}: struck once more, record {record} came out otherwise: another rig, or another seed, than it was measured with; \
+             going on with this one",
+            name(&row.cell)
+        );
+        self.progress.say(&text);
+        still(self.keeper.log(text))
+    }
+
+    fn give_up(&mut self, row: &CellRow, reason: &str) -> Result<(), RunError> {
+        self.tally.give_up(row.id);
+        self.progress.say(&format!("{}: given up: {reason}", name(&row.cell)));
+        still(self.keeper.give_up(row.id, reason))
+    }
+
+    /// Notes a setback; returns whether it is worth trying again.
+    fn set_back(&self, row: &CellRow, setbacks: u32, why: &str) -> Result<bool, RunError> {
+        self.progress.say(&format!("{}: {why}", name(&row.cell)));
+        still(self.keeper.log(format!("{}: {why}", name(&row.cell))))?;
+        Ok(setbacks < SETBACKS)
+    }
+
+    /// Ends the run where the rig must not be struck: giving cells up one by one would help nobody.
+    fn check_safe(&mut self) -> Result<(), RunError> {
+        let status = self.session.status()?;
+        if status.emergency_stop {
+            Err(RunError::Unsafe("the emergency stop is latched: release and reset it at the rig"))
+        } else if !status.interlock_closed {
+            Err(RunError::Unsafe("the interlock is open: close the guard"))
+        } else {
+            Ok(())
+        }
+    }
+}
+
+/// The checksum of what a shot left behind, if it was fired: a missed one has no samples.
+fn crc_of(outcome: &Outcome) -> Option<u32> {
+    match outcome {
+        Outcome::Recorded(recording) => Some(codec::checksum(&recording.codes)),
+        Outcome::Missed(_) => Some(codec::checksum(&[])),
+        _ => None,
+    }
+}
+
+fn loosen(quiet: &mut QuietLimits) {
+    for limit in quiet {
+        *limit *= 2.0;
+    }
+}

@@ -1,0 +1,33 @@
+//! Why a run ends with an error.
+
+use super::stage::StageError;
+use crate::campaign::store::error::StoreError;
+use crate::device::error::DeviceError;
+
+/// Why a run ended with an error.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The campaign file.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The device.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+    /// Hammer and laser.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+    /// The device does not fit the plan.
+    #[error("{address} does not fit the plan: {what}")]
+    Unfit {
+        /// The device.
+        address: String,
+        /// What does not fit, and what to do.
+        what: String,
+    },
+    /// The thread that stores records ended without saying why.
+    #[error("records can no longer be stored; run the same command again")]
+    KeeperGone,
+    /// The rig is not safe to strike.
+    #[error("{0}; nothing accepted is lost: run the same command again")]
+    Unsafe(&'static str),
+}

@@ -1,0 +1,128 @@
+//! Storing goes on while the next hit is measured: compression, insertion and sync on a thread of their own.
+//!
+//! The queue is short, so that a slow disk slows the campaign instead of filling the memory, and the first
+//! error ends it: nothing is measured that cannot be kept.
+
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::JoinHandle;
+
+use crate::campaign::store::Store;
+use crate::campaign::store::error::StoreError;
+use crate::campaign::store::record_row::NewRecord;
+use crate::campaign::store::session_table::Counters;
+
+/// Records under way to the disk.
+const QUEUE: usize = 2;
+
+/// What is to be stored.
+enum Entry {
+    Record(Box<NewRecord>, Counters),
+    GivenUp { cell: i64, reason: String },
+    Settled { cell: i64, reason: String },
+    Redo { cell: i64, reason: String },
+    Link { session: i64, counters: Counters },
+    Log(String),
+}
+
+/// The thread that stores.
+pub struct Keeper {
+    queue: Option<SyncSender<Entry>>,
+    thread: Option<JoinHandle<(Store, Result<(), StoreError>)>>,
+}
+
+impl Keeper {
+    /// Takes the store over until [`Keeper::finish`].
+    pub fn start(store: Store) -> Self {
+        let (queue, entries) = sync_channel(QUEUE);
+        let thread = std::thread::spawn(move || {
+            let kept = keep(&store, &entries);
+            (store, kept)
+        });
+        Self { queue: Some(queue), thread: Some(thread) }
+    }
+
+    /// Stores a record, with the link's counters so far; waits only when the disk is two records behind. Returns whether the
+    /// keeper still works: if not, [`Keeper::finish`] says why.
+    #[must_use]
+    pub fn record(&self, record: NewRecord, counters: Counters) -> bool {
+        self.send(Entry::Record(Box::new(record), counters))
+    }
+
+    /// A cell is done with what it has. Returns as [`Keeper::record`] does.
+    #[must_use]
+    pub fn settle(&self, cell: i64, reason: &str) -> bool {
+        self.send(Entry::Settled { cell, reason: reason.into() })
+    }
+
+    /// A person wants a cell struck anew: its good records are overruled. Returns as [`Keeper::record`] does.
+    #[must_use]
+    pub fn redo(&self, cell: i64, reason: &str) -> bool {
+        self.send(Entry::Redo { cell, reason: reason.into() })
+    }
+
+    /// The link's counters at the end of a session. Returns as [`Keeper::record`] does.
+    #[must_use]
+    pub fn link(&self, session: i64, counters: Counters) -> bool {
+        self.send(Entry::Link { session, counters })
+    }
+
+    /// Gives a cell up. Returns as [`Keeper::record`] does.
+    #[must_use]
+    pub fn give_up(&self, cell: i64, reason: &str) -> bool {
+        self.send(Entry::GivenUp { cell, reason: reason.into() })
+    }
+
+    /// Adds a line to the campaign's log. Returns as [`Keeper::record`] does.
+    #[must_use]
+    pub fn log(&self, text: String) -> bool {
+        self.send(Entry::Log(text))
+    }
+
+    fn send(&self, entry: Entry) -> bool {
+        self.queue.as_ref().is_some_and(|queue| queue.send(entry).is_ok())
+    }
+
+    /// Stores what is left, closes the file, and tells how it went.
+    pub fn finish(mut self) -> Result<(), StoreError> {
+        self.end().unwrap_or(Ok(()))
+    }
+
+    fn end(&mut self) -> Option<Result<(), StoreError>> {
+        self.queue = None;
+        let (store, kept) = match self.thread.take()?.join() {
+            Ok(ended) => ended,
+            Err(panic) => std::panic::resume_unwind(panic),
+        };
+        Some(kept.and(store.close()))
+    }
+}
+
+impl Drop for Keeper {
+    /// What was handed over is stored even when the runner ends early.
+    fn drop(&mut self) {
+        if self.thread.is_some()
+            && !std::thread::panicking()
+            && let Some(Err(error)) = self.end()
+        {
+            log::error!("{error}");
+        }
+    }
+}
+
+fn keep(store: &Store, entries: &Receiver<Entry>) -> Result<(), StoreError> {
+    for entry in entries {
+        match entry {
+            Entry::Record(record, counters) => {
+                store.insert(&record, &counters)?;
+            }
+            Entry::Settled { cell, reason } => store.settle(cell, &reason)?,
+            Entry::Redo { cell, reason } => {
+                store.redo(cell, &reason)?;
+            }
+            Entry::Link { session, counters } => store.note_link(session, &counters)?,
+            Entry::GivenUp { cell, reason } => store.give_up(cell, &reason)?,
+            Entry::Log(text) => store.log(&text)?,
+        }
+    }
+    Ok(())
+}

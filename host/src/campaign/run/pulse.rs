@@ -1,0 +1,217 @@
+//! The hammer's closed loop: which coil pulse gives the force that is wanted.
+//!
+//! Peak force grows with pulse length, with scatter of a few per cent and a slow drift as the coil warms. The
+//! next pulse follows from the hits so far and from nothing else, so that a resumed campaign goes on as if it
+//! had never stopped.
+
+use crate::campaign::plan::Force;
+
+/// Hits that count: older ones belong to a colder coil.
+const MEMORY: usize = 6;
+
+/// Part of the correction that one hit may cause: scatter must not be chased.
+const DAMPING: f64 = 0.7;
+
+/// Largest change of the pulse in one step, as a part of it.
+const STEP: f64 = 0.15;
+
+/// How much longer the pulse gets when the bolt did not arrive.
+const REACH: f64 = 0.12;
+
+/// Bounds of d ln(peak) / d ln(pulse): near the shortest pulse that arrives the peak is very sensitive.
+const SLOPES: (f64, f64) = (0.5, 8.0);
+
+/// The slope assumed before there is one to measure.
+const FIRST_SLOPE: f64 = 3.0;
+
+/// A peak this far (ln) from what the same pulse gave before is an accident of the bolt and no news of the coil, unless the next
+/// one is as far off.
+const ODD: f64 = 0.2;
+
+/// One hit as the loop sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Coil pulse, µs.
+    pub pulse_us: u32,
+    /// Peak force, N; 0 when the bolt did not arrive.
+    pub peak_n: f64,
+}
+
+/// The closed loop.
+#[derive(Clone, Debug)]
+pub struct PulseLoop {
+    force: Force,
+    cap_us: u32,
+    hits: Vec<Hit>,
+    pulse_us: f64,
+    /// Whether the last hit was an odd one.
+    odd: bool,
+}
+
+impl PulseLoop {
+    /// A loop that starts at the plan's pulse and never passes `cap_us`, the device's own bound.
+    pub fn new(force: &Force, cap_us: u32) -> Self {
+        let pulse_us = f64::from(force.pulse_us.min(cap_us));
+        Self { force: *force, cap_us, hits: Vec::new(), pulse_us, odd: false }
+    }
+
+    /// The pulse for the next shot, µs.
+    pub fn pulse_us(&self) -> u32 {
+        self.pulse_us.round() as u32
+    }
+
+    /// Learns from a hit.
+    pub fn learn(&mut self, hit: Hit) {
+        let [shortest, longest] = self.force.pulse_bounds_us;
+        let pulse = f64::from(hit.pulse_us);
+        let is_odd = self.is_odd(hit);
+        let was_odd = std::mem::replace(&mut self.odd, is_odd);
+        if self.odd && !was_odd {
+            return;
+        }
+        if self.odd {
+            // twice in a row: it is the coil after all, and what was known of it is out of date
+            self.hits.clear();
+        }
+        let next = if hit.peak_n <= 0.0 {
+            // from the failed pulse, not from ours: several failures in hand must not add up
+            self.pulse_us.max(pulse * (1.0 + REACH))
+        } else {
+            if self.hits.len() == MEMORY {
+                self.hits.remove(0);
+            }
+            self.hits.push(hit);
+            self.corrected(pulse, hit.peak_n)
+        };
+        self.pulse_us = next.clamp(f64::from(shortest), f64::from(longest.min(self.cap_us)));
+    }
+
+    /// The mean peak over hits with (nearly) this pulse, so that scatter averages out, and how many there are.
+    fn usual(&self, pulse: f64) -> (f64, f64) {
+        let near = |hit: &&Hit| (f64::from(hit.pulse_us) / pulse - 1.0).abs() < 0.01;
+        let (sum, count) =
+            self.hits.iter().filter(near).fold((0.0, 0.0), |(sum, n), hit| (sum + hit.peak_n, n + 1.0));
+        (sum / count, count)
+    }
+
+    fn is_odd(&self, hit: Hit) -> bool {
+        let (usual, count) = self.usual(f64::from(hit.pulse_us));
+        count >= 2.0 && hit.peak_n > 0.0 && (hit.peak_n / usual).ln().abs() > ODD
+    }
+
+    fn corrected(&self, pulse: f64, peak: f64) -> f64 {
+        let (usual, count) = self.usual(pulse);
+        let mean = if count > 0.0 { usual } else { peak };
+        let error = (self.force.target_n / mean).ln();
+        // a mean over n hits scatters less by √n: it may be held closer to the target
+        if error.abs() <= (1.0 + self.force.tolerance).ln() / count.max(1.0).sqrt() {
+            return pulse;
+        }
+        let step = (DAMPING * error / self.slope()).exp();
+        pulse * step.clamp(1.0 - STEP, 1.0 + STEP)
+    }
+
+    /// d ln(peak) / d ln(pulse) over the hits in memory (least squares), within bounds.
+    fn slope(&self) -> f64 {
+        let points = || self.hits.iter().map(|hit| (f64::from(hit.pulse_us).ln(), hit.peak_n.ln()));
+        let n = self.hits.len().max(1) as f64;
+        let (mx, my) = points().fold((0.0, 0.0), |(x, y), (px, py)| (x + px / n, y + py / n));
+        let (sxx, sxy) = points()
+            .fold((0.0, 0.0), |(xx, xy), (px, py)| (xx + (px - mx).powi(2), xy + (px - mx) * (py - my)));
+        // pulses that hardly differ tell only of scatter
+        if sxx < n * 1e-4 { FIRST_SLOPE } else { (sxy / sxx).clamp(SLOPES.0, SLOPES.1) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FORCE: Force =
+        Force { target_n: 50.0, tolerance: 0.05, pulse_us: 3_000, pulse_bounds_us: [500, 8_000] };
+
+    fn settle(peak: impl Fn(u32, usize) -> f64) -> Vec<Hit> {
+        let mut pulse = PulseLoop::new(&FORCE, 8_000);
+        (0..24)
+            .map(|shot| {
+                let hit = Hit { pulse_us: pulse.pulse_us(), peak_n: peak(pulse.pulse_us(), shot) };
+                pulse.learn(hit);
+                hit
+            })
+            .collect()
+    }
+
+    #[test]
+    fn finds_the_target_from_far_away_and_follows_a_drift() {
+        let scatter = |shot: usize| 1.0 + 0.03 * (shot as f64 * 2.4).sin();
+        let laws: [fn(f64) -> f64; 4] = [
+            |us| 0.012 * us,
+            |us| (us - 2_000.0).max(0.0) * 0.02,
+            |us| (us - 4_000.0).max(0.0) * 0.05,
+            |us| 1e-5 * us * us,
+        ];
+        for (which, law) in laws.iter().enumerate() {
+            let hits = settle(|us, shot| law(f64::from(us)) * scatter(shot) * (1.0 + 0.002 * shot as f64));
+            for hit in &hits[16..] {
+                assert!((hit.peak_n / 50.0 - 1.0).abs() < 0.12, "law {which}: {hits:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_accident_is_not_chased_and_a_change_is() {
+        let mut pulse = PulseLoop::new(&FORCE, 8_000);
+        let mut strike = |peak_n: f64| {
+            let pulse_us = pulse.pulse_us();
+            pulse.learn(Hit { pulse_us, peak_n });
+            pulse.pulse_us()
+        };
+        for peak in [50.5, 49.0, 50.0] {
+            assert_eq!(strike(peak), 3_000);
+        }
+        // the bolt slipped; the next one is as ever
+        assert_eq!((strike(15.0), strike(50.2)), (3_000, 3_000));
+        // the supply sagged: twice is no accident
+        assert_eq!(strike(35.0), 3_000);
+        assert!(strike(35.5) > 3_100);
+    }
+
+    #[test]
+    fn the_mean_comes_closer_to_the_target_than_one_hit_must() {
+        let mut state = 7_u64;
+        let mut dice = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
+        };
+        // scatter of 2 % rms, every tenth hit an accident
+        let mut pulse = PulseLoop::new(&FORCE, 8_000);
+        let mut peaks = Vec::new();
+        for shot in 0..400 {
+            let us = f64::from(pulse.pulse_us());
+            let accident = if shot % 10 == 7 { 0.35 } else { 1.0 };
+            let peak_n = (us - 1_000.0) * 0.022 * (1.0 + 0.07 * dice()) * accident;
+            pulse.learn(Hit { pulse_us: pulse.pulse_us(), peak_n });
+            if shot > 20 && accident == 1.0 {
+                peaks.push(peak_n);
+            }
+        }
+        let within = peaks.iter().filter(|peak| (*peak / 50.0 - 1.0).abs() <= 0.05).count();
+        assert!(within * 10 > peaks.len() * 9, "{within} of {}", peaks.len());
+    }
+
+    #[test]
+    fn never_leaves_its_bounds() {
+        assert!(settle(|_, _| 0.0).iter().all(|hit| hit.pulse_us <= 8_000));
+        assert!(settle(|_, _| 1e6).iter().all(|hit| hit.pulse_us >= 500));
+        let mut capped = PulseLoop::new(&FORCE, 2_500);
+        capped.learn(Hit { pulse_us: 2_500, peak_n: 0.0 });
+        assert_eq!(capped.pulse_us(), 2_500);
+    }
+
+    #[test]
+    fn a_good_hit_leaves_the_pulse_alone() {
+        let mut pulse = PulseLoop::new(&FORCE, 8_000);
+        pulse.learn(Hit { pulse_us: 3_000, peak_n: 51.5 });
+        assert_eq!(pulse.pulse_us(), 3_000);
+    }
+}

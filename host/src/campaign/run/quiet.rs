@@ -1,0 +1,41 @@
+//! How quiet the structure must be before the next hit, from how it moved after the last one.
+
+use jointrig_protocol::channel::Quantity;
+
+use super::shot::QuietLimits;
+use crate::campaign::plan::Settle;
+use crate::device::channels::ChannelMap;
+use crate::device::recording::Recording;
+
+/// The motion right after a hit is judged from here on (s after the trigger), when the pulse is over …
+const FROM_S: f64 = 0.002;
+/// … for this long, s: two periods of the slowest mode that matters.
+const FOR_S: f64 = 0.075;
+
+/// Limits for the first hit of a cell: nothing is known, everything is allowed.
+pub fn unknown(channels: &ChannelMap) -> QuietLimits {
+    vec![0.0; channels.len()]
+}
+
+/// Limits after `recording`: for each velocity channel a part of its rms right after the hit, at least the floor;
+/// `allowance` (1 or more) loosens them. Other channels are left out.
+pub fn after(recording: &Recording, channels: &ChannelMap, settle: &Settle, allowance: f64) -> QuietLimits {
+    let rate = f64::from(channels.rate_hz);
+    let from = recording.trigger_index + (FROM_S * rate) as usize;
+    let to = from + (FOR_S * rate) as usize;
+    channels
+        .channels
+        .iter()
+        .enumerate()
+        .map(|(place, channel)| {
+            if channel.quantity != Quantity::Velocity {
+                return 0.0;
+            }
+            let codes = recording.channel(place);
+            let window = codes.get(from.min(codes.len())..to.min(codes.len())).unwrap_or(&[]);
+            let power: f64 = window.iter().map(|code| f64::from(*code).powi(2)).sum();
+            let rms = (power / window.len().max(1) as f64).sqrt() * channel.units_per_code().abs();
+            (allowance * (settle.quiet_relative * rms).max(settle.quiet_floor_m_per_s)) as f32
+        })
+        .collect()
+}

@@ -1,0 +1,280 @@
+//! The runner: brings every cell to its wanted number of good hits, keeps each record, resumes where it stopped.
+//!
+//! A cell begins with the structure at rest, and each later hit finds what the ones before left behind (within the plan's limit).
+//! So a cell that was broken off is resumed, on a device that moves hammer and laser by itself (a virtual rig), by striking its
+//! attempts once more at the same scans with the same pulses: nothing of that is stored, each is held against its stored record, and
+//! the next hit is the one that an undisturbed run would have made, to the last bit. A real structure is not struck in vain: it
+//! settles, and goes on.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use super::clock::ScanClock;
+use super::earlier::Earlier;
+use super::error::RunError;
+use super::fit::check_fit;
+use super::keeper::Keeper;
+use super::progress::Progress;
+use super::pulse::{Hit, PulseLoop};
+use super::shot::Shooter;
+use super::stage::Stage;
+use super::tally::Tally;
+use crate::campaign::plan::Plan;
+use crate::campaign::store::Store;
+use crate::campaign::store::cell_table::CellRow;
+use crate::campaign::store::record_row::NewRecord;
+use crate::campaign::store::session_table::{Counters, SessionInfo};
+use crate::campaign::store::stored::Hex;
+use crate::campaign::verdict::judge::Judge;
+use crate::campaign::verdict::{Kind, Verdict};
+use crate::device::channels::ChannelMap;
+use crate::device::recording::Recording;
+use crate::device::session::Session;
+use crate::device::stream::Accounts;
+
+/// How a campaign is run.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Who moves hammer and laser.
+    pub stage: Stage,
+    /// Answer every prompt with yes.
+    pub yes: bool,
+    /// Show a progress bar on stderr.
+    pub progress: bool,
+    /// Set to end the run after the shot in hand.
+    pub stop: Arc<AtomicBool>,
+}
+
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Summary {
+    /// Whether the user ended it early.
+    pub interrupted: bool,
+    /// Good records in the file.
+    pub kept: u64,
+    /// Good records wanted in all.
+    pub wanted: u64,
+    /// Cells given up in all.
+    pub given_up: u64,
+    /// Hits of this run.
+    pub hits: u64,
+    /// Where every scan of the stream went.
+    pub accounts: Accounts,
+}
+
+/// Runs the campaign in `store` on the device behind `session` until it is complete, given up or stopped.
+///
+/// # Errors
+/// File, device or stage failed; everything accepted so far is in the file, and a later run goes on from there.
+pub fn run(
+    mut store: Store,
+    session: &mut Session,
+    judge: &mut dyn Judge,
+    options: &Options,
+) -> Result<Summary, RunError> {
+    let plan = store.plan()?;
+    let info = session.info()?;
+    let channels = session.channels(&info)?;
+    check_fit(session.address(), &plan, &channels)?;
+    let noted = SessionInfo {
+        address: session.address().into(),
+        board: info.board.as_str().into(),
+        serial: info.serial.as_str().into(),
+        firmware_version: info.version.as_str().into(),
+        target: info.target.as_str().into(),
+        build: Hex(info.build),
+        schema_hash: Hex(session.hello().schema),
+    };
+    let id = store.begin_session(&noted, &channels)?;
+    let (cells, records) = (store.cells()?, store.records()?);
+    let tally = Tally::new(&cells, &records);
+    let mut pulse = PulseLoop::new(plan.force.get_ref(), info.coil_cap_us);
+    for record in records.iter().flatten() {
+        pulse.learn(Hit { pulse_us: record.shot.pulse_us, peak_n: record.peak_n });
+    }
+    session.set_load_cells([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])?;
+    let (epoch, _) = session.start(channels.len())?;
+    let shooter = Shooter::new(session, &plan, epoch, channels.len())?;
+    let progress = Progress::new(tally.wanted(), tally.kept(), options.progress);
+    let block = jointrig_protocol::limits::scans_per_block(channels.len()).unwrap_or(1);
+    let mut runner = Runner {
+        plan: &plan,
+        channels: &channels,
+        cells: &cells,
+        earlier: Earlier::new(store.path(), records),
+        stage: options.stage.clone().decided(info.stage),
+        options,
+        session,
+        judge,
+        shooter,
+        pulse,
+        clock: ScanClock::new(f64::from(channels.rate_hz), block),
+        keeper: Keeper::start(store),
+        session_id: id,
+        tally,
+        progress,
+        hits: 0,
+    };
+    let walked = runner.walk();
+    runner.end(walked)
+}
+
+/// A run under way.
+pub(super) struct Runner<'a> {
+    pub(super) plan: &'a Plan,
+    pub(super) channels: &'a ChannelMap,
+    pub(super) cells: &'a [CellRow],
+    pub(super) earlier: Earlier,
+    pub(super) stage: Stage,
+    pub(super) options: &'a Options,
+    pub(super) session: &'a mut Session,
+    pub(super) judge: &'a mut dyn Judge,
+    pub(super) shooter: Shooter,
+    pub(super) pulse: PulseLoop,
+    pub(super) clock: ScanClock,
+    pub(super) keeper: Keeper,
+    pub(super) session_id: i64,
+    pub(super) tally: Tally,
+    pub(super) progress: Progress,
+    pub(super) hits: u64,
+}
+
+/// Where to go after a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Next {
+    On,
+    Back,
+}
+
+impl Runner<'_> {
+    pub(super) fn stopped(&self) -> bool {
+        self.options.stop.load(Ordering::Relaxed)
+    }
+
+    fn walk(&mut self) -> Result<(), RunError> {
+        let cells = self.cells;
+        let (mut at, mut back) = (0, false);
+        while let Some(row) = cells.get(at)
+            && !self.stopped()
+        {
+            // a cell that somebody went back to is shown whatever its state
+            if !self.tally.open(row.id) && !back {
+                at += 1;
+                continue;
+            }
+            back = match self.cell(row)? {
+                Next::On => {
+                    at += 1;
+                    false
+                }
+                Next::Back => {
+                    at = at.saturating_sub(1);
+                    true
+                }
+            };
+        }
+        Ok(())
+    }
+
+    /// Notes where the scan clock is.
+    pub(super) fn mark(&mut self) -> Result<(), RunError> {
+        let asked = Instant::now();
+        let next_scan = self.session.status()?.next_scan;
+        self.clock.mark(next_scan, asked, Instant::now());
+        Ok(())
+    }
+
+    pub(super) fn keep(
+        &mut self,
+        row: &CellRow,
+        recording: Recording,
+        verdict: Verdict,
+    ) -> Result<(), RunError> {
+        self.mark()?;
+        self.hits += 1;
+        let shot = recording.shot;
+        self.pulse.learn(Hit { pulse_us: shot.pulse_us, peak_n: verdict.peak_n });
+        let attempt = self.tally.add(row.id, verdict.kind == Kind::Good);
+        self.progress.judged(&row.cell, &verdict, self.tally.kept(), self.left(row));
+        log::debug!("{:?} attempt {attempt}: {} ({})", row.cell, verdict.kind, verdict.sentence);
+        self.keep_log()?;
+        let (utc, utc_error_s) = self.clock.utc(recording.first_scan + recording.trigger_index as u64);
+        let record = NewRecord {
+            cell: row.id,
+            attempt,
+            session: self.session_id,
+            utc: utc.to_string(),
+            utc_error_s,
+            recording,
+            verdict,
+        };
+        still(self.keeper.record(record, counters(self.session)))
+    }
+
+    /// Keeps what the controller has logged.
+    pub(super) fn keep_log(&mut self) -> Result<(), RunError> {
+        let lines = self.session.log_lines();
+        lines.into_iter().try_for_each(|line| still(self.keeper.log(format!("controller: {line}"))))
+    }
+
+    /// Ends stream and file; of two errors the first one counts.
+    fn end(mut self, walked: Result<(), RunError>) -> Result<Summary, RunError> {
+        self.progress.finish();
+        let accounts = if walked.is_ok() {
+            self.session.disarm().and_then(|()| self.session.finish())
+        } else {
+            // the device may be gone; its arming expires by itself
+            drop(self.session.disarm());
+            Ok(self.session.accounts())
+        };
+        if let Ok(accounts) = &accounts
+            && walked.is_ok()
+        {
+            let text = format!("{accounts:?}, {} unexplained", accounts.unexplained());
+            log::info!("{text}");
+            if accounts.unexplained() > 0 {
+                log::error!("scans are missing without a reason: {text}");
+            }
+            // a keeper that is gone says so below
+            let _ = self.keeper.log(text);
+            let _ = self.keeper.link(self.session_id, counters(self.session));
+        }
+        // here too a keeper that is gone says so below
+        let _ = self.keep_log();
+        let closed = self.keeper.finish();
+        match &walked {
+            Err(RunError::KeeperGone) | Ok(()) => closed?,
+            Err(_) => {}
+        }
+        walked?;
+        Ok(Summary {
+            interrupted: self.options.stop.load(Ordering::Relaxed),
+            kept: self.tally.kept(),
+            wanted: self.tally.wanted(),
+            given_up: self.tally.given_up(),
+            hits: self.hits,
+            accounts: accounts?,
+        })
+    }
+}
+
+/// The link's counters of this session so far.
+fn counters(session: &Session) -> Counters {
+    let (accounts, (good, damaged)) = (session.accounts(), session.frames());
+    [
+        ("frames_received", good),
+        ("frames_damaged", damaged),
+        ("scans_received", accounts.received),
+        ("scans_recovered", accounts.recovered),
+        ("scans_lost", accounts.lost),
+        ("scans_duplicate", accounts.duplicates),
+    ]
+    .map(|(name, count)| (name.to_owned(), count))
+    .into()
+}
+
+/// Whether the keeper still works; why it does not is told when it is joined.
+pub(super) fn still(works: bool) -> Result<(), RunError> {
+    if works { Ok(()) } else { Err(RunError::KeeperGone) }
+}

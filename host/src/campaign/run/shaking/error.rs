@@ -1,0 +1,179 @@
+//! Why levels cannot be measured, in the words of whoever stands at the shaker.
+
+use jointrig_protocol::answer::Info;
+use jointrig_protocol::channel::Role;
+use jointrig_protocol::event::Reason;
+use jointrig_protocol::limits::SHAKE_SCANS_PER_CYCLE;
+
+use super::options::Options;
+use crate::campaign::plan::level::Held;
+use crate::campaign::store::error::StoreError;
+use crate::device::channels::ChannelMap;
+use crate::device::error::DeviceError;
+
+/// Why one level was not brought about; the others may be all the same.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Shortfall {
+    /// The largest drive does not reach it.
+    #[error(
+        "out of reach: the largest drive of {drive_v} V gives less; allow more (--max-drive), or order less"
+    )]
+    Weak {
+        /// The largest drive, V.
+        drive_v: f64,
+    },
+    /// It does not come to rest at what was ordered.
+    #[error(
+        "never settled: after {seconds} s its amplitude still goes between {:.1} and {:.1} % of the order; go further from the \
+         resonance, or look for what is loose", 100.0 * least, 100.0 * most
+    )]
+    NeverSettled {
+        /// How long it had, s.
+        seconds: f64,
+        /// Smallest of the last windows, over the order.
+        least: f64,
+        /// Largest of them.
+        most: f64,
+    },
+    /// A channel at the contact reached the end of its range while it was recorded.
+    #[error(
+        "channel `{channel}` reached the end of its range: set a wider one at the sensor, or order a smaller amplitude"
+    )]
+    Clipped {
+        /// Its name.
+        channel: String,
+    },
+    /// It settled and left again while it was recorded.
+    #[error("settled, but drifted to {:.1} % of the order while it was recorded; run the same command again", 100.0 * ratio)]
+    Strayed {
+        /// Amplitude over the record, over the order.
+        ratio: f64,
+    },
+}
+
+/// Why the run ended.
+#[derive(Debug, thiserror::Error)]
+pub enum ShakeError {
+    /// The campaign file.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The device.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+    /// The device does not fit.
+    #[error("{address} cannot do that: {what}")]
+    Unfit {
+        /// The device.
+        address: String,
+        /// What is missing, and what to do.
+        what: String,
+    },
+    /// There is nothing to shake.
+    #[error("the plan has no assembly (a configuration AJB): the shaker's levels are measured in it")]
+    NoAssembly,
+    /// The shaker stopped by itself.
+    #[error(
+        "the shaker stopped at {level}: {why}\nthe levels before it are in the file; run the same command again to go on"
+    )]
+    Stopped {
+        /// At which level.
+        level: String,
+        /// Why, and what to do.
+        why: String,
+    },
+    /// It was told to rest and does not.
+    #[error("{address}: the shaker does not come to rest; press the emergency stop")]
+    DoesNotRest {
+        /// The device.
+        address: String,
+    },
+    /// A level that was stored cannot be found.
+    #[error("level {0} was stored and cannot be read back: check the file with `jointrig campaign verify`")]
+    Lost(i64),
+    /// This level only; the run goes on.
+    #[error(transparent)]
+    Short(Shortfall),
+    /// The user wants to end.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// Whether the device has what the levels need.
+pub fn check_fit(
+    address: &str,
+    info: &Info,
+    channels: &ChannelMap,
+    options: &Options,
+) -> Result<(), ShakeError> {
+    let unfit = |what: String| Err(ShakeError::Unfit { address: address.into(), what });
+    if info.drive_v <= 0.0 {
+        return unfit("it has no drive for a shaker (`jointrig info` says `shaker: none`)".into());
+    }
+    let needed = [
+        (Role::SpecimenA, "the vibrometer on specimen A"),
+        (Role::SpecimenB, "the vibrometer on specimen B"),
+        (Role::LoadCell, "a load cell"),
+        (Role::Excitation, "the excitation's force"),
+    ];
+    let force_held = options.levels.iter().any(|level| level.held == Held::Force);
+    for (role, name) in needed {
+        if channels.place(role).is_none() && (role != Role::Excitation || force_held) {
+            return unfit(format!("it has no channel for {name}"));
+        }
+    }
+    let known = |name: &String| channels.channels.iter().any(|channel| channel.name == name.as_str());
+    if let Some((name, _)) = options.limits.0.iter().find(|(name, _)| !known(name)) {
+        let names: Vec<&str> = channels.channels.iter().map(|channel| channel.name.as_str()).collect();
+        return unfit(format!("it has no channel `{name}` to limit; its channels are {}", names.join(", ")));
+    }
+    let full_v = f64::from(info.drive_v);
+    let highest_hz = f64::from(channels.rate_hz / SHAKE_SCANS_PER_CYCLE);
+    for level in &options.levels {
+        let drive_v = match level.held {
+            Held::Drive => level.amplitude,
+            _ => options.most_drive_v.unwrap_or(full_v),
+        };
+        if drive_v > full_v * (1.0 + 1e-6) {
+            return unfit(format!("{level}: its drive goes to {full_v} V, not to {drive_v} V"));
+        }
+        if level.frequency_hz.max(level.end_hz.unwrap_or(0.0)) > highest_hz {
+            return unfit(format!("{level}: its shaker goes up to {highest_hz} Hz"));
+        }
+    }
+    Ok(())
+}
+
+/// Why the shaker stopped, and what to do.
+pub fn in_words(reason: Option<Reason>, channels: &ChannelMap, limit: impl Fn(u8) -> f32) -> String {
+    match reason {
+        Some(Reason::Limit { channel }) => {
+            let (name, unit) = channels
+                .channels
+                .get(usize::from(channel))
+                .map_or(("?", ""), |channel| (channel.name.as_str(), channel.quantity.unit()));
+            format!(
+                "channel `{name}` went beyond its limit of {:.4} {unit}; order a smaller amplitude or another frequency, or raise \
+                 the limit (--limit {name}=VALUE) if the rig may take it",
+                limit(channel)
+            )
+        }
+        Some(Reason::Runaway) => {
+            "its amplitude rose to half as much again as was ordered: a resonance is too close, or a sensor \
+             was lost; check the vibrometers' signal, then try another frequency"
+                .into()
+        }
+        Some(Reason::Interlock) => "the guard was opened: close it".into(),
+        Some(Reason::EmergencyStop) => "the emergency stop: release and reset it at the rig".into(),
+        Some(Reason::LinkLost) => {
+            "the device did not hear this program for a second: is the machine overloaded?".into()
+        }
+        Some(Reason::Expired) => "its order expired before it was renewed: is the machine overloaded?".into(),
+        Some(Reason::FrontEnd) => "the converters lost scans; see the controller's log".into(),
+        Some(Reason::RanDry) => "its drive was not fed in time; see the controller's log".into(),
+        Some(Reason::StreamEnded) => "the stream ended".into(),
+        Some(Reason::Asked) => "another program asked for it".into(),
+        Some(Reason::Fired | Reason::Weak) | None => {
+            "the reason was lost on the way; see the controller's log".into()
+        }
+    }
+}

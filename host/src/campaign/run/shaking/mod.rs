@@ -1,0 +1,300 @@
+//! The shaker's levels: each is brought to its amplitude by the device, recorded in steady state, stored, and left by a ramp to rest.
+//!
+//! Nothing moves without a host that wants it now: an order holds for ten seconds of the device's clock and is renewed every three
+//! (`order`); an interrupt, an error and the end of the session send the shaker to rest. Levels that are in the file already are
+//! skipped, so a run that was broken off is resumed by running it again.
+
+mod error;
+mod meter;
+mod options;
+mod order;
+mod signals;
+mod sweep;
+
+pub use error::{ShakeError, Shortfall};
+pub use meter::CRITERION;
+pub use options::{Limits, Options};
+pub use signals::{Unusable, record};
+
+use std::sync::atomic::Ordering;
+
+use jointrig_protocol::answer::Info;
+use jointrig_protocol::channel::Role;
+use jointrig_protocol::request::{Configuration, Stage as StageRequest};
+
+use crate::campaign::plan::Plan;
+use crate::campaign::plan::level::Level;
+use crate::campaign::store::Store;
+use crate::campaign::store::level_table::{LevelRow, NewLevel, Settled};
+use crate::campaign::store::session_table::SessionInfo;
+use crate::campaign::store::stored::Hex;
+use crate::device::channels::ChannelMap;
+use crate::device::recording::by_channel;
+use crate::device::session::Session;
+use meter::{Meter, SETTLED_WINDOWS, WITHIN, is_settled};
+use order::Orders;
+
+/// A level that is not settled by then never will be, s of the device.
+const SETTLE_BOUND_S: f64 = 40.0;
+
+/// Between two levels the structure rests, s.
+const PAUSE_S: f64 = 0.3;
+
+/// Fewest cycles of a record.
+const FEWEST_CYCLES: f64 = 20.0;
+
+/// What came of one level.
+#[derive(Clone, Debug)]
+pub enum Outcome {
+    /// It was in the file already.
+    Known(LevelRow),
+    /// It was measured and stored.
+    Stored(LevelRow),
+    /// The shaker does not bring it about; the others may be measured all the same.
+    Short(Level, Shortfall),
+}
+
+/// How a run ended.
+#[derive(Clone, Debug)]
+pub struct Summary {
+    /// What came of each level that was come to, in order.
+    pub outcomes: Vec<Outcome>,
+    /// Whether the user ended it early.
+    pub interrupted: bool,
+}
+
+/// Measures what is missing of the levels. `tell` hears of each level when it begins (`None`) and when it is over.
+///
+/// # Errors
+/// File or device failed, the device does not fit, or the shaker was stopped; the levels before that are in the file.
+pub fn run(
+    store: &mut Store,
+    session: &mut Session,
+    options: &Options,
+    tell: &mut dyn FnMut(&Store, &Level, Option<&Outcome>),
+) -> Result<Summary, ShakeError> {
+    let plan = store.plan()?;
+    let info = session.info()?;
+    let channels = session.channels(&info)?;
+    let address = session.address().to_owned();
+    error::check_fit(&address, &info, &channels, options)?;
+    let noted = SessionInfo {
+        address,
+        board: info.board.as_str().into(),
+        serial: info.serial.as_str().into(),
+        firmware_version: info.version.as_str().into(),
+        target: info.target.as_str().into(),
+        build: Hex(info.build),
+        schema_hash: Hex(session.hello().schema),
+    };
+    let known = store.levels()?;
+    let id = store.begin_session(&noted, &channels)?;
+    let (epoch, _) = session.start(channels.len())?;
+    if info.stage {
+        assemble(session, &plan)?;
+    }
+    let mut bench = Bench { session, channels: &channels, info: &info, options, session_id: id, epoch };
+    let mut outcomes = Vec::new();
+    let mut walked = Ok(());
+    for level in &options.levels {
+        if options.stop.load(Ordering::Relaxed) {
+            break;
+        }
+        let there = |row: &&LevelRow| row.moment == options.moment && row.level().same(level) && row.whole();
+        let outcome = if let Some(row) = known.iter().flatten().find(there) {
+            Ok(Outcome::Known(row.clone()))
+        } else {
+            tell(store, level, None);
+            bench.measure(store, level)
+        };
+        match outcome {
+            Ok(outcome) => {
+                tell(store, level, Some(&outcome));
+                outcomes.push(outcome);
+            }
+            Err(ShakeError::Interrupted) => break,
+            Err(error) => {
+                walked = Err(error);
+                break;
+            }
+        }
+    }
+    // of two errors the first one counts; a device that is gone rests by itself
+    let rested = bench.come_to_rest();
+    let ended = bench.session.finish();
+    walked?;
+    rested?;
+    ended?;
+    Ok(Summary { outcomes, interrupted: options.stop.load(Ordering::Relaxed) })
+}
+
+/// The first channel at the contact with a code at the end of its range.
+fn clipped(channels: &ChannelMap, codes: &[i16]) -> Option<String> {
+    let at_contact = |place: &usize| {
+        matches!(channels.channels[*place].role, Role::SpecimenA | Role::SpecimenB | Role::LoadCell)
+    };
+    let full = |code: &i16| matches!(*code, i16::MIN | i16::MAX);
+    (0..channels.len())
+        .filter(at_contact)
+        .find(|place| codes.iter().skip(*place).step_by(channels.len()).any(full))
+        .map(|place| channels.channels[place].name.to_string())
+}
+
+/// Puts the assembly on a virtual rig's table.
+fn assemble(session: &mut Session, plan: &Plan) -> Result<(), ShakeError> {
+    let cells = plan.cells();
+    let Some(cell) = cells.iter().find(|cell| cell.configuration == Configuration::Ajb) else {
+        return Err(ShakeError::NoAssembly);
+    };
+    let name = |text: &String| {
+        text.as_str().try_into().map_err(|_| ShakeError::Unfit {
+            address: "the device".into(),
+            what: format!("the point's name `{text}` is too long for it"),
+        })
+    };
+    let (impact, response) = (name(&cell.impact)?, name(&cell.response)?);
+    let stage = StageRequest { configuration: Configuration::Ajb, impact, response, attempt: 0 };
+    session.stage(stage)?;
+    session.hold_acknowledgement(None);
+    Ok(())
+}
+
+/// Everything at hand for one level after the other.
+struct Bench<'a> {
+    session: &'a mut Session,
+    channels: &'a ChannelMap,
+    info: &'a Info,
+    options: &'a Options,
+    session_id: i64,
+    epoch: u32,
+}
+
+/// What was cut, and how the level came to its amplitude.
+struct Taken {
+    first_scan: u64,
+    scans: u64,
+    settled: Settled,
+}
+
+impl Bench<'_> {
+    fn rate_hz(&self) -> f64 {
+        f64::from(self.channels.rate_hz)
+    }
+
+    /// Brings the level about, records and stores it, and comes to rest.
+    fn measure(&mut self, store: &mut Store, level: &Level) -> Result<Outcome, ShakeError> {
+        let taken = match self.take(level) {
+            Ok(taken) => taken,
+            Err(ShakeError::Short(shortfall)) => {
+                self.come_to_rest()?;
+                store.log(&format!("shaker, {}, {level}: {shortfall}", self.options.moment.name()))?;
+                return Ok(Outcome::Short(*level, shortfall));
+            }
+            Err(error) => {
+                // the first error is the one to report
+                drop(self.come_to_rest());
+                return Err(error);
+            }
+        };
+        self.come_to_rest()?;
+        let first_scan = taken.first_scan;
+        // the ramp to rest belongs to a sweep's record
+        let end = if level.end_hz.is_some() { self.session.expected()? } else { first_scan + taken.scans };
+        let (codes, gaps) = self.session.cut(first_scan..end)?;
+        let channels = self.channels.len();
+        let new = NewLevel {
+            session: self.session_id,
+            moment: self.options.moment,
+            level: *level,
+            settled: taken.settled,
+            epoch: self.epoch,
+            first_scan,
+            channels,
+            codes: by_channel(&codes, channels),
+            gaps,
+        };
+        let id = store.insert_level(&new)?;
+        let stored = store.levels()?.into_iter().flatten().find(|row| row.id == id);
+        Ok(Outcome::Stored(stored.ok_or(ShakeError::Lost(id))?))
+    }
+
+    fn take(&mut self, level: &Level) -> Result<Taken, ShakeError> {
+        let options = self.options;
+        let mut orders = Orders::new(self.channels, self.info, level, options);
+        let before = self.session.expected()?;
+        let begun = orders.begin(self.session)?;
+        let meter = Meter::new(self.channels, level.held, level.frequency_hz);
+        let window = meter.window_scans();
+        let mut amplitudes: Vec<f64> = Vec::new();
+        let mut at = begun;
+        let target = (level.held != crate::campaign::plan::level::Held::Drive).then_some(level.amplitude);
+        while !is_settled(&amplitudes, target) {
+            if (at - begun) as f64 > SETTLE_BOUND_S * self.rate_hz() {
+                let last = &amplitudes[amplitudes.len().saturating_sub(SETTLED_WINDOWS)..];
+                return Err(ShakeError::Short(Shortfall::NeverSettled {
+                    seconds: SETTLE_BOUND_S,
+                    least: last.iter().copied().fold(f64::INFINITY, f64::min) / level.amplitude,
+                    most: last.iter().copied().fold(0.0, f64::max) / level.amplitude,
+                }));
+            }
+            orders.go_on(self.session, at + window)?;
+            let (codes, gaps) = self.session.cut(at..at + window)?;
+            if gaps.is_empty() {
+                amplitudes.push(meter.amplitude(&codes, self.channels.len()));
+            }
+            at += window;
+            if level.end_hz.is_none() {
+                self.session.forget_before(at);
+            }
+        }
+        let largest = amplitudes.iter().copied().fold(0.0, f64::max);
+        let after_s = (at - begun) as f64 / self.rate_hz();
+        let drive_v = f64::from(self.session.status()?.drive_v);
+        if let Some(end_hz) = level.end_hz {
+            let last = amplitudes.last().copied().unwrap_or(0.0);
+            let settled = Settled { reached: last, overshoot: largest / level.amplitude, after_s, drive_v };
+            sweep::go(self.session, &mut orders, [level.frequency_hz, end_hz], options.sweep_hz_per_s)?;
+            return Ok(Taken { first_scan: before, scans: 0, settled });
+        }
+        let cycles = (options.seconds * level.frequency_hz).ceil().max(FEWEST_CYCLES);
+        // one more than the cycles last, so that cutting finds them all
+        let scans = (cycles * self.rate_hz() / level.frequency_hz).ceil() as u64 + 1;
+        orders.go_on(self.session, at + scans)?;
+        orders.still_runs(self.session)?;
+        let (codes, _) = self.session.cut(at..at + scans)?;
+        if let Some(channel) = clipped(self.channels, &codes) {
+            return Err(ShakeError::Short(Shortfall::Clipped { channel }));
+        }
+        let moved = meter.amplitude(&codes, self.channels.len());
+        // the meter looks at what moves; an open loop reaches its drive by itself
+        let reached = if target.is_some() { moved } else { drive_v };
+        if let Some(target) = target
+            && (reached / target - 1.0).abs() > WITHIN
+        {
+            return Err(ShakeError::Short(Shortfall::Strayed { ratio: reached / target }));
+        }
+        let settled = Settled { reached, overshoot: largest / target.unwrap_or(moved), after_s, drive_v };
+        Ok(Taken { first_scan: at, scans, settled })
+    }
+
+    /// Comes to rest, and waits until the structure does so too.
+    fn come_to_rest(&mut self) -> Result<(), ShakeError> {
+        self.session.rest()?;
+        let pause = (PAUSE_S * self.rate_hz()) as u64;
+        let until = self.session.status()?.next_scan + 20 * pause;
+        loop {
+            let next = self.session.expected()? + pause;
+            self.session.wait_for(next)?;
+            if self.session.shaker_rests()? {
+                break;
+            }
+            if next > until {
+                return Err(ShakeError::DoesNotRest { address: self.session.address().into() });
+            }
+        }
+        // that it stopped is no news here
+        let _ = self.session.shaker_stopped();
+        let next = self.session.status()?.next_scan + pause;
+        Ok(self.session.wait_for(next)?)
+    }
+}

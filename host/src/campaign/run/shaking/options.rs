@@ -1,0 +1,87 @@
+//! How levels are measured, and what stops the shaker.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use jointrig_protocol::channel::Role;
+
+use crate::campaign::plan::level::{Level, Moment};
+use crate::device::channels::ChannelMap;
+
+/// Load cells and excitation stop the shaker at this part of their full scale. The vibrometers do not: they go beyond theirs for a moment
+/// when a contact lets go, and what they measure is held by the device.
+const OF_FULL_SCALE: f64 = 0.95;
+
+/// How levels are measured.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Which levels, in their order.
+    pub levels: Vec<Level>,
+    /// Before or after the hammer's cells.
+    pub moment: Moment,
+    /// Shortest record, s; it is lengthened to whole cycles, twenty at least.
+    pub seconds: f64,
+    /// How fast a sweep goes, Hz/s.
+    pub sweep_hz_per_s: f64,
+    /// The drive's largest amplitude, V; its full scale without it.
+    pub most_drive_v: Option<f64>,
+    /// What stops the shaker.
+    pub limits: Limits,
+    /// Set to come to rest and end.
+    pub stop: Arc<AtomicBool>,
+}
+
+/// Limits by channel name, SI units; those of a whole level.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Limits(pub Vec<(String, f64)>);
+
+impl Limits {
+    /// The limit of each channel, in the order of the scan; 0 where there is none.
+    pub fn of(&self, channels: &ChannelMap) -> Vec<f64> {
+        (0..channels.len())
+            .map(|place| {
+                let channel = &channels.channels[place];
+                let own = self.0.iter().find(|(name, _)| name == channel.name.as_str());
+                match channel.role {
+                    _ if own.is_some() => own.map_or(0.0, |(_, limit)| *limit),
+                    Role::LoadCell | Role::Excitation => {
+                        OF_FULL_SCALE * channels.full_scale(place).unwrap_or(0.0)
+                    }
+                    _ => 0.0,
+                }
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jointrig_protocol::channel::{Channel, Quantity};
+
+    #[test]
+    fn forces_are_limited_and_a_users_limit_counts_more() {
+        let channel = |name: &str, role| Channel {
+            name: name.parse().expect("short"),
+            role,
+            quantity: Quantity::Velocity,
+            units_per_volt: -1e-3,
+            range_v: 10.0,
+            delay_ns: 0,
+            bits: 16,
+        };
+        let channels = ChannelMap {
+            id: 0,
+            rate_hz: 51_200,
+            channels: vec![
+                channel("hammer", Role::HammerForce),
+                channel("LDV_A", Role::SpecimenA),
+                channel("LC1", Role::LoadCell),
+            ],
+        };
+        let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-8);
+        assert!(near(&Limits::default().of(&channels), &[0.0, 0.0, 9.5e-3]));
+        let own = Limits(vec![("LDV_A".into(), 2e-3), ("hammer".into(), 1.0)]);
+        assert!(near(&own.of(&channels), &[1.0, 2e-3, 9.5e-3]));
+    }
+}

@@ -1,0 +1,131 @@
+//! The orders of one level: what the device is told, renewed as long as the level lasts.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use jointrig_protocol::answer::{Info, Shaker};
+use jointrig_protocol::request::Shake;
+
+use super::error::{ShakeError, Shortfall};
+use super::options::Options;
+use crate::campaign::plan::level::{Held, Level};
+use crate::device::channels::ChannelMap;
+use crate::device::session::Session;
+use jointrig_protocol::event::Reason;
+
+/// How long an order holds, ms of the device.
+const VALID_MS: u32 = 10_000;
+
+/// After this much of the device's clock it is renewed, s. A virtual board may be half its ring further than its host knows.
+const RENEW_S: f64 = 3.0;
+
+/// The drive's amplitude changes at most by its full scale in half a second.
+const SLEW_PER_S: f64 = 2.0;
+
+/// The order that holds, and when it is renewed.
+pub struct Orders {
+    order: Shake,
+    level: Level,
+    rate_hz: u32,
+    renew_at: u64,
+    channels: ChannelMap,
+    stop: Arc<AtomicBool>,
+}
+
+impl Orders {
+    pub fn new(channels: &ChannelMap, info: &Info, level: &Level, options: &Options) -> Self {
+        let full_v = f64::from(info.drive_v);
+        let (amplitude_v, slew) = match level.held {
+            Held::Drive => (level.amplitude, level.amplitude),
+            _ => (options.most_drive_v.unwrap_or(full_v), full_v),
+        };
+        let limits = options.limits.of(channels).into_iter().map(|limit| limit as f32).collect();
+        let order = Shake {
+            step: Shake::step_of(level.frequency_hz, channels.rate_hz),
+            control: level.held.control(level.amplitude),
+            amplitude_v: amplitude_v as f32,
+            slew_v_per_s: (SLEW_PER_S * slew) as f32,
+            valid_ms: VALID_MS,
+            limits,
+        };
+        Self {
+            order,
+            level: *level,
+            rate_hz: channels.rate_hz,
+            renew_at: 0,
+            channels: channels.clone(),
+            stop: options.stop.clone(),
+        }
+    }
+
+    /// Gives the first order; returns a scan from which on it holds.
+    pub fn begin(&mut self, session: &mut Session) -> Result<u64, ShakeError> {
+        let _ = session.shaker_stopped();
+        session.shake(self.order.clone())?;
+        let now = session.status()?.next_scan;
+        self.renew_at = now + (RENEW_S * f64::from(self.rate_hz)) as u64;
+        Ok(now)
+    }
+
+    /// Scans per second.
+    pub fn rate_hz(&self) -> f64 {
+        f64::from(self.rate_hz)
+    }
+
+    /// Another frequency, with the phase going on.
+    pub fn tune(&mut self, session: &mut Session, frequency_hz: f64) -> Result<(), ShakeError> {
+        self.order.step = Shake::step_of(frequency_hz, self.rate_hz);
+        self.renew(session)
+    }
+
+    /// Waits for `scan`, and keeps the order alive meanwhile.
+    ///
+    /// # Errors
+    /// The user interrupts, the shaker stopped, or the device is gone.
+    pub fn go_on(&mut self, session: &mut Session, scan: u64) -> Result<(), ShakeError> {
+        loop {
+            let next = scan.min(self.renew_at);
+            let stop = &self.stop;
+            if session.wait_until(next, |_| stop.load(Ordering::Relaxed))? {
+                return Err(ShakeError::Interrupted);
+            }
+            if let Some(reason) = session.shaker_stopped() {
+                return Err(self.stopped(Some(reason)));
+            }
+            if next == scan {
+                return Ok(());
+            }
+            self.renew(session)?;
+        }
+    }
+
+    /// A shaker that stopped unheard must not be started again by a renewal.
+    fn renew(&mut self, session: &mut Session) -> Result<(), ShakeError> {
+        self.still_runs(session)?;
+        session.shake(self.order.clone())?;
+        self.renew_at = session.expected()? + (RENEW_S * f64::from(self.rate_hz)) as u64;
+        Ok(())
+    }
+
+    /// Whether the shaker runs as ordered.
+    pub fn still_runs(&self, session: &mut Session) -> Result<(), ShakeError> {
+        match session.status()?.shaker {
+            Shaker::Slewing | Shaker::Steady => Ok(()),
+            Shaker::Resting | Shaker::Stopping => {
+                let reason = session.shaker_stopped();
+                Err(self.stopped(reason))
+            }
+        }
+    }
+
+    fn stopped(&self, reason: Option<Reason>) -> ShakeError {
+        if reason == Some(Reason::Weak) {
+            return ShakeError::Short(Shortfall::Weak { drive_v: f64::from(self.order.amplitude_v) });
+        }
+        let limit = |channel: u8| self.order.limits.get(usize::from(channel)).copied().unwrap_or(0.0);
+        ShakeError::Stopped {
+            level: self.level.to_string(),
+            why: super::error::in_words(reason, &self.channels, limit),
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! A stored level as a hysteresis record: scales, sums and delays applied, nothing else.
+
+use jointrig_protocol::channel::{Quantity, Role};
+use rayon::prelude::*;
+
+use crate::campaign::plan::level::Level;
+use crate::campaign::store::record_row::Samples;
+use crate::device::channels::ChannelMap;
+use crate::hysteresis::delays::in_step;
+use crate::hysteresis::{HysteresisRecord, RelativeMotion};
+
+/// Why a level's channels make no hysteresis record.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("its session has no {0}")]
+pub struct Unusable(&'static str);
+
+/// v_A, v_B and the load cells' sum, in step with one another.
+///
+/// # Errors
+/// A channel is missing.
+pub fn record(channels: &ChannelMap, samples: &Samples, level: &Level) -> Result<HysteresisRecord, Unusable> {
+    let velocity = |role: Role, name: &'static str| {
+        channels
+            .place(role)
+            .filter(|place| channels.channels[*place].quantity == Quantity::Velocity)
+            .ok_or(Unusable(name))
+    };
+    let a = velocity(Role::SpecimenA, "velocity of specimen A")?;
+    let b = velocity(Role::SpecimenB, "velocity of specimen B")?;
+    let cells = channels.places(Role::LoadCell);
+    let first = *cells.first().ok_or(Unusable("load cell"))?;
+    let late = |place: usize| f64::from(channels.channels[place].delay_ns) * 1e-9;
+    let fs_hz = f64::from(channels.rate_hz);
+    let signals = [&[a][..], &[b], &cells].map(|places| sum(channels, samples, places));
+    // one amplifier: the cells are alike
+    let [a_m_per_s, b_m_per_s, force_n] = in_step(signals, [late(a), late(b), late(first)], fs_hz);
+    Ok(HysteresisRecord {
+        fs_hz,
+        motion: RelativeMotion::Velocity { a_m_per_s, b_m_per_s },
+        force_n,
+        excitation_hz: level.end_hz.is_none().then_some(level.frequency_hz),
+        normal_load_n: None,
+    })
+}
+
+/// Samples that are converted at once, so that a sum of channels stays in the core's cache.
+const CHUNK: usize = 1 << 14;
+
+/// The sum of these channels in SI units, on all cores.
+fn sum(channels: &ChannelMap, samples: &Samples, places: &[usize]) -> Vec<f64> {
+    let Some(first) = places.first() else { return Vec::new() };
+    let mut sum = vec![0.0; samples.channel(*first).len()];
+    sum.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, sum)| {
+        for place in places {
+            let Some(channel) = channels.channels.get(*place) else { continue };
+            let scale = channel.units_per_code();
+            let codes = &samples.channel(*place)[chunk * CHUNK..];
+            sum.iter_mut().zip(codes).for_each(|(sum, code)| *sum += f64::from(*code) * scale);
+        }
+    });
+    sum
+}

@@ -1,0 +1,226 @@
+//! One shot: armed, fired, waited for, cut from the stream — at scans that depend on the shots before and on
+//! nothing else.
+//!
+//! A virtual board's time stands still half a ring beyond the held acknowledgement, so whatever is asked while it
+//! is held at scan `D` reaches the device before scan `D + ring/2`. Every shot ends at such a decision scan `D`,
+//! which is a fixed distance from the shot's own events, and the next one may begin at
+//! `D + ring/2 + MARGIN`: however long host, link or disk took, two runs fire at the same scans.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use jointrig_protocol::limits::ARM_VALID_CAP_MS;
+use jointrig_protocol::request::{Fire, Trigger};
+use jointrig_protocol::shot::{Phase, Shot};
+
+use crate::campaign::plan::Plan;
+use crate::device::error::DeviceError;
+use crate::device::recording::{Recording, by_channel};
+use crate::device::session::Session;
+
+/// Scans between what the device can have reached and what it is asked for.
+const MARGIN: u64 = 1_024;
+
+/// Steps in which the acknowledgement follows a shot that is not decided yet, per ring.
+const STEPS_PER_RING: u64 = 8;
+
+/// A shot's end is known at the latest this many steps after it.
+const STEPS_TO_KNOW: u64 = 3;
+
+/// What came of a shot.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// The hammer hit, and this is the record.
+    Recorded(Box<Recording>),
+    /// The bolt did not arrive.
+    Missed(Shot),
+    /// The structure did not become quiet in time; the coil stayed off.
+    NotQuiet(Shot),
+    /// The device took the shot back (arming expired, link lost, interlock, emergency stop).
+    Cancelled(Shot),
+    /// The user asked to stop; the shot was taken back.
+    Interrupted,
+}
+
+/// Residual motion that a shot waits for, per channel in its unit (rms); 0 leaves a channel out.
+pub type QuietLimits = Vec<f32>;
+
+/// Fires one shot after the other on a running stream.
+pub struct Shooter {
+    ring: u64,
+    channels: usize,
+    epoch: u32,
+    pre: u64,
+    post: u64,
+    rate_hz: f64,
+    trigger: Trigger,
+    window: u16,
+    patience: u64,
+    number: u32,
+    ready_at: u64,
+}
+
+impl Shooter {
+    /// Sets the device up for the plan's hits. `epoch` is the running stream's, of `channels` channels.
+    ///
+    /// # Errors
+    /// The device refuses or is gone.
+    pub fn new(session: &mut Session, plan: &Plan, epoch: u32, channels: usize) -> Result<Self, DeviceError> {
+        let (record, settle, times) = (plan.record.get_ref(), plan.settle.get_ref(), plan.trigger.get_ref());
+        let rate_hz = f64::from(record.rate_hz);
+        let scans = |seconds: f64| (seconds * rate_hz).round() as u32;
+        let trigger = Trigger {
+            level_n: times.level_n,
+            flight_scans: scans(times.flight_s),
+            listen_scans: scans(times.listen_s),
+            hold_off_scans: scans(times.hold_off_s),
+        };
+        session.set_trigger(trigger)?;
+        session.hold_acknowledgement(Some(session.expected()?));
+        Ok(Self {
+            ring: session.ring_scans(),
+            channels,
+            epoch,
+            pre: u64::from(record.pre_trigger_scans),
+            post: plan.post_trigger_scans(),
+            rate_hz,
+            trigger,
+            window: settle.window_samples,
+            patience: u64::from(scans(settle.bound_s)),
+            number: 0,
+            ready_at: 0,
+        })
+    }
+
+    /// Hammer and laser are in place from `at_scan` on, and the acknowledgement was held at or before it when
+    /// that was asked: the next shot may begin at a fixed distance from it.
+    pub fn staged(&mut self, at_scan: u64) {
+        self.ready_at = at_scan + self.ring / 2 + MARGIN;
+    }
+
+    /// Fires once and waits for what comes of it. The acknowledgement is held when this returns.
+    ///
+    /// # Errors
+    /// The device refuses or is gone.
+    pub fn shoot(
+        &mut self,
+        session: &mut Session,
+        pulse_us: u32,
+        quiet: &QuietLimits,
+        stop: &AtomicBool,
+    ) -> Result<Outcome, DeviceError> {
+        self.number += 1;
+        let not_before = self.ready_at;
+        let last = not_before + self.patience + self.flight(pulse_us);
+        // arming outlives everything that the shot may wait for, and not more
+        let wait = last + self.ring - session.expected()?;
+        let valid_ms = (wait as f64 / self.rate_hz * 1000.0) as u32 + 1_000;
+        session.arm(valid_ms.min(ARM_VALID_CAP_MS))?;
+        session.fire(Fire {
+            number: self.number,
+            pulse_us,
+            not_before,
+            quiet_limits: quiet.iter().copied().take(jointrig_protocol::limits::MAX_CHANNELS).collect(),
+            quiet_window: if quiet.iter().any(|limit| *limit > 0.0) { self.window } else { 0 },
+            quiet_patience: self.patience as u32,
+        })?;
+        let step = (self.ring / STEPS_PER_RING).max(1);
+        let rest = STEPS_TO_KNOW * step + u64::from(self.trigger.hold_off_scans) + MARGIN;
+        let mut reach = not_before + step;
+        let shot = loop {
+            session.hold_acknowledgement(Some(reach));
+            let number = self.number;
+            let decided =
+                |session: &Session| session.shot().filter(|shot| shot.number == number && is_decided(shot));
+            session
+                .wait_until(reach, |session| stop.load(Ordering::Relaxed) || decided(session).is_some())?;
+            // an event may be lost: what counts can be asked for
+            let known = match decided(session) {
+                Some(shot) => Some(shot),
+                None => session.status()?.shot.filter(|shot| shot.number == number),
+            };
+            match known {
+                Some(shot) if is_decided(&shot) => break shot,
+                Some(shot) if stop.load(Ordering::Relaxed) && shot.phase == Phase::Waiting => {
+                    session.disarm()?;
+                    return Ok(Outcome::Interrupted);
+                }
+                // long after its time: the device forgot it
+                _ if reach > last + self.ring => {
+                    break Shot { phase: Phase::Cancelled, ..no_shot(number, pulse_us) };
+                }
+                _ => {}
+            }
+            if session.expected()? >= reach {
+                reach += step;
+            }
+            session.forget_before(reach.saturating_sub(self.pre + 5 * step));
+        };
+        let decision = match shot.phase {
+            Phase::Missed => shot.fired_at + self.flight(pulse_us) + rest,
+            Phase::NotQuiet => not_before + self.patience + rest,
+            Phase::Cancelled => reach + rest,
+            _ => shot.trigger + self.post.max(u64::from(self.trigger.listen_scans) + rest),
+        };
+        session.hold_acknowledgement(Some(decision));
+        session.wait_for(decision)?;
+        self.ready_at = decision + self.ring / 2 + MARGIN;
+        let outcome = match shot.phase {
+            Phase::Missed => Outcome::Missed(shot),
+            Phase::NotQuiet => Outcome::NotQuiet(shot),
+            Phase::Cancelled => Outcome::Cancelled(shot),
+            _ => Outcome::Recorded(Box::new(self.collect(session, &shot)?)),
+        };
+        session.forget_before(decision.saturating_sub(self.pre));
+        Ok(outcome)
+    }
+
+    /// Cuts the record of `shot`, whose last scan has arrived, and gets its final summary.
+    fn collect(&self, session: &mut Session, shot: &Shot) -> Result<Recording, DeviceError> {
+        let is_final = |known: &Shot| known.number == shot.number && known.phase == Phase::Done;
+        let summary = match session.shot().filter(is_final) {
+            Some(known) => known,
+            None => session.status()?.shot.filter(is_final).unwrap_or(*shot),
+        };
+        let first_scan = shot.trigger.saturating_sub(self.pre);
+        let (codes, gaps) = session.cut(first_scan..shot.trigger + self.post)?;
+        Ok(Recording {
+            epoch: self.epoch,
+            first_scan,
+            trigger_index: (shot.trigger - first_scan) as usize,
+            channels: self.channels,
+            codes: by_channel(&codes, self.channels),
+            gaps,
+            shot: summary,
+        })
+    }
+
+    /// Scans from the coil's beginning until the bolt counts as lost.
+    fn flight(&self, pulse_us: u32) -> u64 {
+        (f64::from(pulse_us) * 1e-6 * self.rate_hz).ceil() as u64 + u64::from(self.trigger.flight_scans)
+    }
+}
+
+/// Whether it is settled what becomes of the shot.
+fn is_decided(shot: &Shot) -> bool {
+    match shot.phase {
+        Phase::Waiting | Phase::Firing => false,
+        Phase::Listening | Phase::Done => shot.trigger > 0,
+        Phase::Missed | Phase::NotQuiet | Phase::Cancelled => true,
+    }
+}
+
+fn no_shot(number: u32, pulse_us: u32) -> Shot {
+    Shot {
+        number,
+        phase: Phase::Waiting,
+        fired_at: 0,
+        trigger: 0,
+        pulse_us,
+        peak_n: 0.0,
+        width_us: 0.0,
+        rebound_ratio: 0.0,
+        rebound_after: 0,
+        friction_peak_n: 0.0,
+        quiet_ratio: 0.0,
+    }
+}

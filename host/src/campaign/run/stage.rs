@@ -1,0 +1,257 @@
+//! Who moves hammer and laser: the device itself (virtual rigs), a person, or a command of the user's.
+
+use std::io::{BufRead, Write};
+use std::process::Command;
+use std::str::FromStr;
+use std::time::Duration;
+
+use jointrig_protocol::request::Stage as StageRequest;
+
+use crate::campaign::plan::{Cell, configuration_name};
+use crate::device::error::DeviceError;
+use crate::device::session::Session;
+
+/// Who moves hammer and laser.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// The device when it can, else a person.
+    Auto,
+    /// The device.
+    Device,
+    /// A person, asked on the terminal.
+    Manual,
+    /// A command, run by the shell with the cell in its environment.
+    Exec(String),
+}
+
+/// What came of moving hammer and laser.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moved {
+    /// They are in place from this scan on.
+    InPlace(u64),
+    /// A person wants the good hits of this cell struck anew, and will be asked again.
+    Redo,
+    /// A person leaves this cell for a later run.
+    Skip,
+    /// A person wants to go back to the cell before.
+    Back,
+}
+
+/// Why hammer and laser are not in place.
+#[derive(Debug, thiserror::Error)]
+pub enum StageError {
+    /// The device refused, or is gone.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+    /// The command failed.
+    #[error("the stage command `{command}` failed ({why}); hammer and laser are not in place")]
+    Command {
+        /// The command.
+        command: String,
+        /// How it ended.
+        why: String,
+    },
+    /// Nobody answered.
+    #[error(
+        "nobody is there to move hammer and laser (no terminal): use --yes, --stage exec:COMMAND or --stage device"
+    )]
+    NobodyThere,
+    /// A person stopped the campaign.
+    #[error("stopped at the prompt; run the same command again to go on")]
+    Stopped,
+    /// A point's name does not fit the protocol.
+    #[error("the name `{0}` is too long for the device")]
+    Name(String),
+}
+
+impl FromStr for Stage {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "device" => Ok(Self::Device),
+            "manual" => Ok(Self::Manual),
+            _ => match text.strip_prefix("exec:") {
+                Some(command) if !command.trim().is_empty() => Ok(Self::Exec(command.into())),
+                _ => Err("write auto, manual, device or exec:COMMAND".into()),
+            },
+        }
+    }
+}
+
+impl Stage {
+    /// Who it is for a device that can (or cannot) be told where hammer and laser are.
+    #[must_use]
+    pub fn decided(self, device_can: bool) -> Self {
+        match self {
+            Self::Auto if device_can => Self::Device,
+            Self::Auto => Self::Manual,
+            other => other,
+        }
+    }
+
+    /// Brings hammer and laser to `cell`, whose next attempt is `attempt`; `what` tells a person where they belong and how
+    /// far the cell is. In place, the acknowledgement is held at or before the scan that is returned. `yes` answers a prompt.
+    ///
+    /// # Errors
+    /// They are not in place, and why.
+    pub fn go(
+        &self,
+        session: &mut Session,
+        cell: &Cell,
+        attempt: u32,
+        what: &str,
+        yes: bool,
+    ) -> Result<Moved, StageError> {
+        match self {
+            Self::Device | Self::Auto => {
+                let name = |text: &str| text.try_into().map_err(|_| StageError::Name(text.into()));
+                let (impact, response) = (name(&cell.impact)?, name(&cell.response)?);
+                let configuration = cell.configuration;
+                let request = StageRequest { configuration, impact, response, attempt };
+                return Ok(Moved::InPlace(session.stage(request)?));
+            }
+            Self::Manual => match meanwhile(session, || ask(what, yes))? {
+                Key::Accept => {}
+                Key::Redo => return Ok(Moved::Redo),
+                Key::Skip => return Ok(Moved::Skip),
+                Key::Back => return Ok(Moved::Back),
+            },
+            Self::Exec(command) => meanwhile(session, || execute(command, cell, attempt))?,
+        }
+        session.hold_acknowledgement(Some(session.expected()?));
+        Ok(Moved::InPlace(session.status()?.next_scan))
+    }
+}
+
+/// Keeps the stream going while somebody moves things; what is measured meanwhile is of no use.
+fn meanwhile<T: Send>(
+    session: &mut Session,
+    work: impl FnOnce() -> Result<T, StageError> + Send,
+) -> Result<T, StageError> {
+    session.hold_acknowledgement(None);
+    std::thread::scope(|scope| {
+        let worker = scope.spawn(work);
+        let mut link = Ok(0);
+        while !worker.is_finished() && link.is_ok() {
+            link = session.pump(Duration::from_millis(5)).and_then(|()| session.expected());
+            if let Ok(expected) = link {
+                session.forget_before(expected);
+            }
+        }
+        let moved = worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        link?;
+        moved
+    })
+}
+
+/// What a person may answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Key {
+    Accept,
+    Redo,
+    Skip,
+    Back,
+}
+
+fn ask(what: &str, yes: bool) -> Result<Key, StageError> {
+    prompt(what, yes, &mut std::io::stdin().lock(), &mut std::io::stderr())
+}
+
+/// Asks until there is an answer that can be understood.
+fn prompt(
+    what: &str,
+    yes: bool,
+    keys: &mut impl BufRead,
+    screen: &mut impl Write,
+) -> Result<Key, StageError> {
+    // a closed screen is no reason to stop: without answers there is an error below
+    let _ = write!(screen, "\n{what}\n");
+    if yes {
+        let _ = writeln!(screen, "in place? yes (--yes)");
+        return Ok(Key::Accept);
+    }
+    loop {
+        let _ = write!(screen, "Enter when in place; r redo this cell, s skip it, b back one cell, q quit: ")
+            .and_then(|()| screen.flush());
+        let mut line = String::new();
+        if !matches!(keys.read_line(&mut line), Ok(length) if length > 0) {
+            return Err(StageError::NobodyThere);
+        }
+        match line.trim().to_ascii_lowercase().as_str() {
+            "" | "a" | "y" => return Ok(Key::Accept),
+            "r" => return Ok(Key::Redo),
+            "s" => return Ok(Key::Skip),
+            "b" => return Ok(Key::Back),
+            "q" => return Err(StageError::Stopped),
+            other => {
+                let _ = writeln!(screen, "`{other}` is none of these");
+            }
+        }
+    }
+}
+
+fn execute(command: &str, cell: &Cell, attempt: u32) -> Result<(), StageError> {
+    let failed = |why: String| StageError::Command { command: command.into(), why };
+    let (shell, flag) = if cfg!(windows) { ("cmd", "/C") } else { ("sh", "-c") };
+    let status = Command::new(shell)
+        .args([flag, command])
+        .env("JOINTRIG_CONFIGURATION", configuration_name(cell.configuration))
+        .env("JOINTRIG_IMPACT", &cell.impact)
+        .env("JOINTRIG_RESPONSE", &cell.response)
+        .env("JOINTRIG_ATTEMPT", attempt.to_string())
+        .stdout(std::io::stderr())
+        .status()
+        .map_err(|error| failed(error.to_string()))?;
+    if status.success() { Ok(()) } else { Err(failed(status.to_string())) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jointrig_protocol::request::Configuration;
+
+    #[test]
+    fn stages_are_named_as_on_the_command_line() {
+        assert_eq!("manual".parse(), Ok(Stage::Manual));
+        assert_eq!("exec:move.sh x".parse(), Ok(Stage::Exec("move.sh x".into())));
+        assert!("exec:".parse::<Stage>().is_err());
+        assert!("robot".parse::<Stage>().is_err());
+        assert_eq!(Stage::Auto.decided(false), Stage::Manual);
+        assert_eq!(Stage::Auto.decided(true), Stage::Device);
+    }
+
+    #[test]
+    fn a_person_may_accept_redo_skip_go_back_and_quit() {
+        let answered = |keys: &str| {
+            let mut screen = Vec::new();
+            let key = prompt("hammer to AZ1", false, &mut keys.as_bytes(), &mut screen);
+            (key, String::from_utf8(screen).expect("text"))
+        };
+        for (keys, wanted) in
+            [("\n", Key::Accept), ("r\n", Key::Redo), ("S\n", Key::Skip), ("x\nb\n", Key::Back)]
+        {
+            let (key, screen) = answered(keys);
+            assert_eq!(key.expect(keys), wanted);
+            assert!(screen.contains("hammer to AZ1") && screen.contains("q quit"), "{screen}");
+            assert_eq!(screen.contains("`x` is none of these"), keys.starts_with('x'));
+        }
+        assert!(matches!(answered("q\n").0, Err(StageError::Stopped)));
+        assert!(matches!(answered("").0, Err(StageError::NobodyThere)));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_command_is_told_the_cell_and_its_failure_counts() {
+        let cell = Cell {
+            configuration: Configuration::Ajb,
+            impact: "AZ1".into(),
+            response: "B2".into(),
+            wanted: 1,
+        };
+        let test = "test $JOINTRIG_CONFIGURATION/$JOINTRIG_IMPACT/$JOINTRIG_RESPONSE/$JOINTRIG_ATTEMPT = AJB/AZ1/B2/3";
+        execute(test, &cell, 3).expect("told");
+        assert!(execute(test, &cell, 4).expect_err("another").to_string().contains("failed"));
+    }
+}

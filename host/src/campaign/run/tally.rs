@@ -1,0 +1,128 @@
+//! How far a campaign is: per cell wanted, kept, tried.
+
+use std::collections::{BTreeMap, HashMap};
+
+use crate::campaign::store::cell_table::CellRow;
+use crate::campaign::store::record_row::{Damaged, RecordRow};
+use crate::campaign::verdict::Kind;
+
+/// How far one cell is.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Count {
+    /// Good hits wanted.
+    pub wanted: u32,
+    /// Good hits there.
+    pub kept: u32,
+    /// Hits tried.
+    pub attempts: u32,
+    /// Whether it was given up.
+    pub given_up: bool,
+    /// Whether it is done with fewer good hits than wanted, but enough.
+    pub settled: bool,
+    /// Records whose description is damaged.
+    pub damaged: u32,
+    /// Refused records by verdict.
+    pub refused: BTreeMap<Kind, u32>,
+}
+
+impl Count {
+    /// Whether it has all that it needs.
+    pub fn done(&self) -> bool {
+        self.kept >= self.wanted || self.settled
+    }
+}
+
+/// How far a campaign is.
+#[derive(Clone, Debug, Default)]
+pub struct Tally {
+    cells: HashMap<i64, Count>,
+}
+
+impl Tally {
+    /// Counts what a file holds.
+    pub fn new(cells: &[CellRow], records: &[Result<RecordRow, Damaged>]) -> Self {
+        let mut counts: HashMap<i64, Count> = cells
+            .iter()
+            .map(|row| {
+                let (given_up, settled) = (row.given_up.is_some(), row.settled.is_some());
+                (row.id, Count { wanted: row.cell.wanted, given_up, settled, ..Count::default() })
+            })
+            .collect();
+        for record in records {
+            let place = record.as_ref().map_or_else(|damaged| damaged.place, RecordRow::place);
+            let count = counts.entry(place.cell).or_default();
+            count.attempts = count.attempts.max(place.attempt + 1);
+            match record {
+                Err(_) => count.damaged += 1,
+                Ok(record) if record.kept() => count.kept += 1,
+                Ok(record) => *count.refused.entry(record.standing()).or_default() += 1,
+            }
+        }
+        Self { cells: counts }
+    }
+
+    /// One cell's count.
+    pub fn cell(&self, id: i64) -> Count {
+        self.cells.get(&id).cloned().unwrap_or_default()
+    }
+
+    /// Whether the cell needs more hits.
+    pub fn open(&self, id: i64) -> bool {
+        self.cells.get(&id).is_some_and(|count| !count.given_up && !count.done())
+    }
+
+    /// Hits tried in the cell: the number of its next attempt.
+    pub fn attempts(&self, id: i64) -> u32 {
+        self.cells.get(&id).map_or(0, |count| count.attempts)
+    }
+
+    /// Good hits in the cell.
+    pub fn kept_in(&self, id: i64) -> u32 {
+        self.cells.get(&id).map_or(0, |count| count.kept)
+    }
+
+    /// Counts one more hit; returns its attempt number.
+    pub fn add(&mut self, id: i64, good: bool) -> u32 {
+        let count = self.cells.entry(id).or_default();
+        count.attempts += 1;
+        count.kept += u32::from(good);
+        count.attempts - 1
+    }
+
+    /// A cell is done with what it has.
+    pub fn settle(&mut self, id: i64) {
+        self.cells.entry(id).or_default().settled = true;
+    }
+
+    /// A cell is struck anew: its good records count no more.
+    pub fn redo(&mut self, id: i64) {
+        let count = self.cells.entry(id).or_default();
+        *count.refused.entry(Kind::Dropped).or_default() += count.kept;
+        (count.kept, count.settled, count.given_up) = (0, false, false);
+    }
+
+    /// Gives a cell up.
+    pub fn give_up(&mut self, id: i64) {
+        self.cells.entry(id).or_default().given_up = true;
+    }
+
+    /// Good hits wanted in all.
+    pub fn wanted(&self) -> u64 {
+        self.cells.values().map(|count| u64::from(count.wanted)).sum()
+    }
+
+    /// Good hits there in all, those beyond a cell's wish not counted.
+    pub fn kept(&self) -> u64 {
+        self.cells.values().map(|count| u64::from(count.kept.min(count.wanted))).sum()
+    }
+
+    /// Cells given up.
+    pub fn given_up(&self) -> u64 {
+        self.cells.values().filter(|count| count.given_up).count() as u64
+    }
+
+    /// Whether every cell has what it wants, or enough.
+    pub fn complete(&self) -> bool {
+        self.cells.values().all(Count::done)
+    }
+}

@@ -1,0 +1,276 @@
+//! Checks on stored records: does every channel have the sign that its role promises, and do hammer and vibrometer agree on a
+//! mass that is known?
+//!
+//! **Polarity.** A hit gives energy to the place that it strikes: over the pulse, force times velocity along it is positive, whatever
+//! the structure. So a response's sign is Σ F v / √(Σ F² Σ v²), in −1 … 1, over the kept hits along its axis, nearest first (on the
+//! paper's campaign, simulated, 0.6 to 0.96 within 31 mm); a wrong plug or a turned head gives a clear negative. Vibrometers on the specimens
+//! and load cells are further off, and follow hits along z on A within the first millisecond: their sign is its mean over its
+//! rms; a load cell is positive when arm B moves along +z. So is the force's own: it pushes.
+//!
+//! **Ratio calibration.** On a free, rigid mass m the hammer's impulse is the change of momentum: ∫F dt = m Δv, whatever the shape of
+//! the pulse. The ratio ∫F dt / (m Δv) is 1 when the sensitivities of hammer and vibrometer fit each other; else one of them is wrong by
+//! that factor. (Handbook practice: ISO 7626-5, ratio calibration.)
+
+use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
+
+use super::plan::{Plan, configuration_name};
+use super::store::Store;
+use super::store::error::StoreError;
+use super::store::record_row::RecordRow;
+use crate::device::channels::ChannelMap;
+use crate::spectra::Pulse;
+
+/// The structure follows the force for about this long, s.
+const EARLY_S: f64 = 1e-3;
+/// A sign is clear from this mean over rms on.
+const CLEAR: f64 = 0.2;
+/// Hits that are looked at per channel.
+const HITS: usize = 12;
+/// A free mass moves evenly in this time after the pulse's end, s.
+const EVEN_S: [f64; 2] = [0.5e-3, 5e-3];
+/// Rest before the pulse, s.
+const REST_S: f64 = 2e-3;
+/// Impact and hit direction count as along an axis from this cosine on.
+const ALONG: f64 = 0.9;
+
+/// The sign of one channel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Polarity {
+    /// The channel.
+    pub channel: String,
+    /// Early mean over rms along the hits, −1 … 1: the mean over hits. None where no kept hit tells.
+    pub sign: Option<f64>,
+    /// Records that it rests on.
+    pub records: Vec<i64>,
+}
+
+impl Polarity {
+    /// Right, wrong, or not told by these records.
+    pub fn right(&self) -> Option<bool> {
+        self.sign.filter(|sign| sign.abs() >= CLEAR).map(|sign| sign > 0.0)
+    }
+}
+
+/// Hammer against vibrometer on a known mass.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ratio {
+    /// Mean of ∫F dt / (m Δv) over the hits.
+    pub mean: f64,
+    /// Its standard deviation from hit to hit; 0 for one hit.
+    pub deviation: f64,
+    /// Records that it rests on.
+    pub records: Vec<i64>,
+}
+
+/// A kept record in SI units with where it was struck.
+struct Hit {
+    record: i64,
+    direction: [f64; 3],
+    map: ChannelMap,
+    signals: Vec<Vec<f64>>,
+    pulse: Pulse,
+}
+
+/// The sign of every channel that the kept records tell of.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn polarity(store: &Store) -> Result<Vec<Polarity>, StoreError> {
+    let plan = store.plan()?;
+    let rows = kept(store, |_| true)?;
+    let Some(last) = rows.last() else { return Ok(Vec::new()) };
+    let map = store.channels(last.session)?;
+    let mut found = Vec::new();
+    for (place, channel) in map.channels.iter().enumerate() {
+        let axis = match channel.role {
+            Role::HammerForce => None,
+            Role::Response(axis) => Some(index(axis)),
+            Role::SpecimenA | Role::SpecimenB | Role::LoadCell => Some(2),
+            _ => continue,
+        };
+        let mut candidates = candidates(store, &plan, &rows, channel, axis)?;
+        candidates.truncate(HITS);
+        let (mut signs, mut records) = (Vec::new(), Vec::new());
+        for row in candidates {
+            let Some(hit) = hit(store, &plan, row)? else { continue };
+            let own = hit.map.channels.iter().position(|other| other.name == channel.name);
+            let sign = match (channel.role, axis) {
+                (Role::Response(_), Some(axis)) => own.and_then(|own| power_sign(&hit, own, axis)),
+                _ => own.and_then(|own| early_sign(&hit, own, axis)),
+            };
+            if let Some(sign) = sign {
+                signs.push(sign);
+                records.push(hit.record);
+            }
+        }
+        let mean = signs.iter().sum::<f64>() / signs.len().max(1) as f64;
+        let sign = (!signs.is_empty()).then_some(mean);
+        log::debug!("{} (place {place}): {sign:?}", channel.name);
+        found.push(Polarity { channel: channel.name.as_str().into(), sign, records });
+    }
+    Ok(found)
+}
+
+/// Hammer against vibrometer in the cell of that id, struck on a free mass of `mass_kg`; none without a kept hit.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn ratio(store: &Store, cell: i64, mass_kg: f64) -> Result<Option<Ratio>, StoreError> {
+    let plan = store.plan()?;
+    let (mut ratios, mut records) = (Vec::new(), Vec::new());
+    for row in kept(store, |row| row.cell == cell)? {
+        if let Some(hit) = hit(store, &plan, &row)?
+            && let Some(ratio) = momentum_ratio(&hit, mass_kg)
+        {
+            ratios.push(ratio);
+            records.push(hit.record);
+        }
+    }
+    let n = ratios.len() as f64;
+    if ratios.is_empty() {
+        return Ok(None);
+    }
+    let mean = ratios.iter().sum::<f64>() / n;
+    let spread = ratios.iter().map(|ratio| (ratio - mean).powi(2)).sum::<f64>();
+    let deviation = if ratios.len() > 1 { (spread / (n - 1.0)).sqrt() } else { 0.0 };
+    Ok(Some(Ratio { mean, deviation, records }))
+}
+
+fn kept(store: &Store, wanted: impl Fn(&RecordRow) -> bool) -> Result<Vec<RecordRow>, StoreError> {
+    Ok(store.records()?.into_iter().flatten().filter(|row| row.kept() && wanted(row)).collect())
+}
+
+/// Records whose hits go along the channel's axis, the nearest to its place first.
+fn candidates<'a>(
+    store: &Store,
+    plan: &Plan,
+    rows: &'a [RecordRow],
+    channel: &Channel,
+    axis: Option<usize>,
+) -> Result<Vec<&'a RecordRow>, StoreError> {
+    let cells = store.cells()?;
+    let mut near: Vec<(f64, &RecordRow)> = rows
+        .iter()
+        .filter_map(|row| {
+            let cell = &cells.iter().find(|cell| cell.id == row.cell)?.cell;
+            let (direction, distance) = geometry(plan, &cell.impact, &cell.response)?;
+            let along = axis.is_none_or(|axis| direction[axis].abs() >= ALONG);
+            let assembly = configuration_name(cell.configuration) == "AJB";
+            // the contact's channels see anything in the assembly only, and the force path goes from A's side to B
+            let seen = matches!(channel.role, Role::Response(_) | Role::HammerForce)
+                || (assembly && grouping(plan, &cell.impact) % 2 == 1);
+            (along && seen).then_some((distance, row))
+        })
+        .collect();
+    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.id.cmp(&b.1.id)));
+    Ok(near.into_iter().map(|(_, row)| row).collect())
+}
+
+fn grouping(plan: &Plan, impact: &str) -> u8 {
+    let mut points = plan.geometry.impact.iter().map(toml::Spanned::get_ref);
+    points.find(|point| point.name == impact).map_or(0, |point| point.grouping)
+}
+
+/// Direction of an impact, and its distance from a response point.
+fn geometry(plan: &Plan, impact: &str, response: &str) -> Option<([f64; 3], f64)> {
+    let impact =
+        plan.geometry.impact.iter().map(toml::Spanned::get_ref).find(|point| point.name == impact)?;
+    let response =
+        plan.geometry.response.iter().map(toml::Spanned::get_ref).find(|point| point.name == response)?;
+    let apart = (0..3).map(|i| (impact.position_m[i] - response.position_m[i]).powi(2)).sum::<f64>().sqrt();
+    Some((impact.direction, apart))
+}
+
+/// A record in SI units; none where a damaged one or one without pulse tells nothing.
+fn hit(store: &Store, plan: &Plan, row: &RecordRow) -> Result<Option<Hit>, StoreError> {
+    let Some(cell) = store.cells()?.into_iter().find(|cell| cell.id == row.cell) else { return Ok(None) };
+    let samples = match store.samples(row) {
+        Ok(samples) => samples,
+        Err(error @ StoreError::Damaged { .. }) => {
+            log::warn!("{error}");
+            return Ok(None);
+        }
+        Err(error) => return Err(error),
+    };
+    let map = store.channels(row.session)?;
+    let signals: Vec<Vec<f64>> =
+        (0..map.len()).map(|place| map.to_si(place, samples.channel(place))).collect();
+    let pulse = map.place(Role::HammerForce).and_then(|place| Pulse::locate(&signals[place]));
+    let found = pulse.zip(geometry(plan, &cell.cell.impact, &cell.cell.response));
+    Ok(found.map(|(pulse, (direction, _))| Hit { record: row.id, direction, map, signals, pulse }))
+}
+
+/// Force times velocity along the hit, summed over the pulse, as a part of what it could be at most.
+fn power_sign(hit: &Hit, place: usize, axis: usize) -> Option<f64> {
+    let rate = f64::from(hit.map.rate_hz);
+    let late = (f64::from(hit.map.channels[place].delay_ns) * 1e-9 * rate) as usize;
+    let (force, signal) = (hit.signals.get(hit.map.place(Role::HammerForce)?)?, hit.signals.get(place)?);
+    let Pulse { start, end, offset_n, .. } = hit.pulse;
+    let before = signal.get((start + late).checked_sub((REST_S * rate) as usize)?..start + late)?;
+    let rest = before.iter().sum::<f64>() / before.len().max(1) as f64;
+    let pairs = force.get(start..end)?.iter().zip(signal.get(start + late..end + late)?);
+    let (mut both, mut forces, mut motions) = (0.0, 0.0, 0.0);
+    for (f, v) in pairs.map(|(f, v)| (f - offset_n, v - rest)) {
+        both += f * v;
+        forces += f * f;
+        motions += v * v;
+    }
+    let most = (forces * motions).sqrt();
+    (most > 0.0).then_some(hit.direction[axis].signum() * both / most)
+}
+
+/// The mean over the rms of a channel in the first millisecond, positive along the hit (the force itself: positive at all).
+fn early_sign(hit: &Hit, place: usize, axis: Option<usize>) -> Option<f64> {
+    let rate = f64::from(hit.map.rate_hz);
+    let channel = &hit.map.channels[place];
+    let late = (f64::from(channel.delay_ns) * 1e-9 * rate) as usize;
+    let (signal, from) = (hit.signals.get(place)?, hit.pulse.start + late);
+    let before = signal.get(from.checked_sub((REST_S * rate) as usize)?..from)?;
+    let rest = before.iter().sum::<f64>() / before.len().max(1) as f64;
+    let early = signal.get(from..from + (EARLY_S * rate) as usize)?;
+    let mean = early.iter().map(|value| value - rest).sum::<f64>() / early.len() as f64;
+    let rms = (early.iter().map(|value| (value - rest).powi(2)).sum::<f64>() / early.len() as f64).sqrt();
+    let along = axis.map_or(1.0, |axis| hit.direction[axis].signum());
+    (rms > 0.0).then_some(along * mean / rms)
+}
+
+/// ∫F dt / (m Δv) along the hit.
+fn momentum_ratio(hit: &Hit, mass_kg: f64) -> Option<f64> {
+    let rate = f64::from(hit.map.rate_hz);
+    let samples = |seconds: f64| (seconds * rate) as usize;
+    let force = &hit.signals[hit.map.place(Role::HammerForce)?];
+    let Pulse { start, end, offset_n, .. } = hit.pulse;
+    // the foot below 2 % of the peak belongs to the impulse too
+    let margin = (end - start) / 4;
+    let impulse: f64 =
+        force.get(start.saturating_sub(margin)..end + margin)?.iter().map(|f| f - offset_n).sum::<f64>()
+            / rate;
+    let mut change = 0.0;
+    for (axis, place) in hit.map.responses()?.into_iter().enumerate() {
+        let (signal, channel) = (&hit.signals[place], &hit.map.channels[place]);
+        if channel.quantity != Quantity::Velocity {
+            return None;
+        }
+        let late = (f64::from(channel.delay_ns) * 1e-9 * rate) as usize;
+        let mean = |range: std::ops::Range<usize>| {
+            let part = signal.get(range)?;
+            Some(part.iter().sum::<f64>() / part.len().max(1) as f64)
+        };
+        let before = mean((start + late).checked_sub(samples(REST_S) + margin)?..start + late - margin)?;
+        let after = mean(end + late + samples(EVEN_S[0])..end + late + samples(EVEN_S[1]))?;
+        change += hit.direction[axis] * (after - before);
+    }
+    (change != 0.0).then(|| impulse / (mass_kg * change))
+}
+
+fn index(axis: Axis) -> usize {
+    match axis {
+        Axis::X => 0,
+        Axis::Y => 1,
+        Axis::Z => 2,
+    }
+}
+
+#[cfg(test)]
+#[path = "sensor_check_tests.rs"]
+mod tests;

@@ -1,0 +1,88 @@
+//! The cells of the plan in the campaign file, and what became of them.
+
+use jointrig_protocol::request::Configuration;
+use rusqlite::{Connection, params};
+
+use super::Store;
+use super::error::StoreError;
+use super::table::{Row, table};
+use crate::campaign::plan::{Cell, configuration_name};
+
+table! {
+    /// The columns of a cell.
+    pub struct CellColumns {
+        "cells" {
+            /// Its id in this file.
+            id: i64 = "id INTEGER PRIMARY KEY",
+            /// The structure.
+            configuration: Configuration = "configuration TEXT NOT NULL",
+            /// Where the hammer strikes.
+            impact: String = "impact TEXT NOT NULL",
+            /// Where the laser measures.
+            response: String = "response TEXT NOT NULL",
+            /// Good hits wanted.
+            wanted: u32 = "wanted INTEGER NOT NULL",
+            /// Why it was given up, if it was.
+            given_up: Option<String> = "given_up TEXT",
+            /// Why it is done with fewer good hits than wanted, but enough, if it is.
+            settled: Option<String> = "settled TEXT",
+            "UNIQUE (configuration, impact, response)",
+        }
+    }
+}
+
+/// A cell of the plan.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CellRow {
+    /// Its id in this file.
+    pub id: i64,
+    /// What it is.
+    pub cell: Cell,
+    /// Why it was given up, if it was.
+    pub given_up: Option<String>,
+    /// Why it is done with fewer good hits than wanted, but enough, if it is.
+    pub settled: Option<String>,
+}
+
+impl From<CellColumns> for CellRow {
+    fn from(columns: CellColumns) -> Self {
+        let CellColumns { id, configuration, impact, response, wanted, given_up, settled } = columns;
+        Self { id, cell: Cell { configuration, impact, response, wanted }, given_up, settled }
+    }
+}
+
+/// Adds a cell; one that is there already gets another chance, with as many hits as are wanted now.
+pub(super) fn write_cell(connection: &Connection, cell: &Cell) -> rusqlite::Result<()> {
+    connection
+        .prepare_cached(
+            "INSERT INTO cells (configuration, impact, response, wanted) VALUES (?1, ?2, ?3, ?4) \
+             ON CONFLICT (configuration, impact, response) \
+             DO UPDATE SET wanted = excluded.wanted, given_up = NULL, settled = NULL",
+        )?
+        .execute(params![configuration_name(cell.configuration), cell.impact, cell.response, cell.wanted])
+        .map(|_| ())
+}
+
+impl Store {
+    /// Every cell, in the order of the plan.
+    pub fn cells(&self) -> Result<Vec<CellRow>, StoreError> {
+        let sql = format!("SELECT {} FROM cells ORDER BY id", CellColumns::list());
+        self.all(&sql, [], |row| CellColumns::read(row).map(CellRow::from), "reading cells")
+    }
+
+    /// Gives a cell up, with the reason.
+    pub fn give_up(&self, cell: i64, reason: &str) -> Result<(), StoreError> {
+        self.connection
+            .execute("UPDATE cells SET given_up = ?2 WHERE id = ?1", params![cell, reason])
+            .map(|_| ())
+            .map_err(self.failed("giving a cell up"))
+    }
+
+    /// Notes that a cell is done with fewer good hits than wanted, and why.
+    pub fn settle(&self, cell: i64, reason: &str) -> Result<(), StoreError> {
+        self.connection
+            .execute("UPDATE cells SET settled = ?2 WHERE id = ?1", params![cell, reason])
+            .map(|_| ())
+            .map_err(self.failed("closing a cell"))
+    }
+}

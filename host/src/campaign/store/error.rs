@@ -1,0 +1,155 @@
+//! What can go wrong with a campaign file, and what to do.
+
+use std::path::{Path, PathBuf};
+
+use rusqlite::ErrorCode;
+
+use crate::campaign::plan::PlanError;
+
+/// What can go wrong with a campaign file.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// A new file was asked for and something is there.
+    #[error("{path} exists already: choose another name, or continue it with `jointrig campaign run`")]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// There is no such file.
+    #[error("there is no campaign file {path}: create one with `jointrig campaign new`")]
+    Missing {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Some other file.
+    #[error("{path} is not a campaign file: give the .jrig file that `jointrig campaign new` made")]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Written by a newer program.
+    #[error("{path} has schema version {found}, this program reads version {known}: use a newer jointrig")]
+    Newer {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        found: i32,
+        /// Ours.
+        known: i32,
+    },
+    /// Written by an older program.
+    #[error(
+        "{path} has schema version {found}, this program reads version {known}: use the jointrig that wrote it"
+    )]
+    Older {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        found: i32,
+        /// Ours.
+        known: i32,
+    },
+    /// Another process writes it.
+    #[error(
+        "{path} is being written by another jointrig ({holder}): end that one first; reading it is always possible"
+    )]
+    Busy {
+        /// The file.
+        path: PathBuf,
+        /// Who writes it.
+        holder: String,
+    },
+    /// It cannot be locked for writing.
+    #[error("{path} cannot be opened for writing: {source}; the folder must exist and be writable")]
+    Lock {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// It lies on a network share.
+    #[error(
+        "{path} lies on a network share ({kind}), where a record that was accepted could be lost: run the campaign on a \
+         local disk and copy it with `jointrig campaign backup`"
+    )]
+    Share {
+        /// The file.
+        path: PathBuf,
+        /// The kind of file system.
+        kind: String,
+    },
+    /// Records wait beside a file that cannot be written.
+    #[error(
+        "{path} was not closed in order and lies where nothing can be written: copy it to a local disk together with \
+         {path}-wal, which holds its last records"
+    )]
+    Unfinished {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A record cannot be read.
+    #[error("{path}: record {record} is damaged ({what}); `jointrig campaign verify` lists all damage")]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// The record's id.
+        record: i64,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// Something in the file makes no sense.
+    #[error("{path}: {what}")]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What makes no sense.
+        what: String,
+    },
+    /// The plan cannot be read.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// A plan does not go on from what was measured.
+    #[error("{source_name} cannot take over from the plan in {path}: {what}")]
+    PlanChange {
+        /// The file.
+        path: PathBuf,
+        /// The new plan.
+        source_name: String,
+        /// What does not fit, and what to do.
+        what: String,
+    },
+    /// SQLite failed.
+    #[error("{path}: {doing}: {source}{hint}")]
+    Sqlite {
+        /// The file.
+        path: PathBuf,
+        /// What was being done.
+        doing: &'static str,
+        /// What SQLite said.
+        source: rusqlite::Error,
+        /// What to do, if it is known.
+        hint: &'static str,
+    },
+}
+
+/// SQLite's error with what was being done and, where it is known, what to do.
+pub(super) fn sqlite(path: &Path, doing: &'static str, source: rusqlite::Error) -> StoreError {
+    let hint = match source.sqlite_error_code() {
+        Some(ErrorCode::DiskFull) => {
+            "; free some space, then run the same command again: nothing accepted is lost"
+        }
+        Some(ErrorCode::SystemIoFailure) => {
+            "; is the disk whole, and is there space on it? nothing accepted is lost: run the same command again"
+        }
+        Some(ErrorCode::DatabaseCorrupt) => {
+            "; the file was cut off or damaged: go on from a copy that `jointrig campaign backup` made"
+        }
+        Some(ErrorCode::ReadOnly) => "; the file or its folder is read-only",
+        Some(ErrorCode::CannotOpen) => "; does the folder exist, and may you write there?",
+        Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => {
+            "; another program writes this file: end it first"
+        }
+        _ => "",
+    };
+    StoreError::Sqlite { path: path.into(), doing, source, hint }
+}

@@ -1,0 +1,203 @@
+//! FRFs that were measured elsewhere: one matrix for a configuration, kept in the campaign file as it came.
+//!
+//! Append-only like the records; the latest of a configuration counts. The values are f64, little-endian: `frf` holds (line,
+//! output, input) with real and imaginary part in turn, `variance` the same without parts. The checksum runs over every column
+//! that describes them.
+
+use jointrig_protocol::request::Configuration;
+use nalgebra::DMatrix;
+use num_complex::Complex;
+
+use super::Store;
+use super::error::StoreError;
+use super::notes::utc_now;
+use super::table::{Row, table};
+use crate::campaign::plan::configuration_name;
+use crate::substructuring::frf::{FrfMatrix, Quantity};
+use crate::substructuring::noise::FrfNoise;
+
+/// FRFs from elsewhere, with the noise where their file told it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImportedFrf {
+    /// The file that they came from, without its folder.
+    pub source: String,
+    /// When they were imported, RFC 3339.
+    pub utc: String,
+    /// The FRFs.
+    pub frf: FrfMatrix,
+    /// Variance of the real part of each value.
+    pub noise: Option<FrfNoise>,
+}
+
+/// Which FRFs there are.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FrfRow {
+    /// The row.
+    pub id: i64,
+    /// `A`, `B` or `AJB`.
+    pub configuration: String,
+    /// The file that they came from, without its folder.
+    pub source: String,
+    /// When they were imported, RFC 3339.
+    pub utc: String,
+}
+
+table! {
+    /// FRFs as they stand in the file; the latest row of a configuration counts.
+    pub struct FrfColumns {
+        "frfs" {
+            "id INTEGER PRIMARY KEY",
+            /// `A`, `B` or `AJB`.
+            configuration: String = "configuration TEXT NOT NULL",
+            /// When they were imported, RFC 3339.
+            utc: String = "utc TEXT NOT NULL",
+            /// The file that they came from, without its folder.
+            source: String = "source TEXT NOT NULL",
+            /// Which kind of FRF.
+            quantity: String = "quantity TEXT NOT NULL",
+            /// Their shift from the imaginary axis, 1/s.
+            sigma_per_s: f64 = "sigma_per_s REAL NOT NULL",
+            /// Names of the outputs, as a JSON list.
+            outputs: String = "outputs TEXT NOT NULL",
+            /// Names of the inputs, as a JSON list.
+            inputs: String = "inputs TEXT NOT NULL",
+            /// The lines, Hz.
+            frequency: Vec<u8> = "frequency BLOB NOT NULL",
+            /// (line, output, input), real and imaginary part in turn.
+            frf: Vec<u8> = "frf BLOB NOT NULL",
+            /// (line, output, input) of the real part.
+            variance: Option<Vec<u8>> = "variance BLOB",
+            "crc32 INTEGER NOT NULL",
+        }
+    }
+}
+
+impl FrfColumns {
+    fn crc(&self) -> u32 {
+        let mut hasher = crc32fast::Hasher::new();
+        let texts =
+            [&self.configuration, &self.utc, &self.source, &self.quantity, &self.outputs, &self.inputs];
+        let texts = texts.map(String::as_bytes);
+        let sigma = self.sigma_per_s.to_le_bytes();
+        let blobs = [&self.frequency, &self.frf, self.variance.as_ref().unwrap_or(const { &Vec::new() })];
+        for part in texts.into_iter().chain([&sigma[..]]).chain(blobs.map(Vec::as_slice)) {
+            hasher.update(&(part.len() as u64).to_le_bytes());
+            hasher.update(part);
+        }
+        hasher.finalize()
+    }
+
+    /// The FRFs of this row; the reason where it contradicts itself.
+    fn decoded(self) -> Result<ImportedFrf, String> {
+        let names = |text: &str| serde_json::from_str::<Vec<String>>(text).map_err(|e| e.to_string());
+        let (outputs, inputs) = (names(&self.outputs)?, names(&self.inputs)?);
+        let frequency_hz = numbers(&self.frequency);
+        let (rows, columns) = (outputs.len(), inputs.len());
+        let entries = frequency_hz.len() * rows * columns;
+        let values = numbers(&self.frf);
+        if values.len() != 2 * entries || self.variance.as_ref().is_some_and(|v| v.len() != 8 * entries) {
+            return Err(format!("it has not {} × {rows} × {columns} values", frequency_hz.len()));
+        }
+        let place = |line: usize, row: usize, column: usize| (line * rows + row) * columns + column;
+        let lines = 0..frequency_hz.len();
+        let matrix = |line| {
+            DMatrix::from_fn(rows, columns, |row, column| {
+                let at = 2 * place(line, row, column);
+                Complex::new(values[at], values[at + 1])
+            })
+        };
+        let noise = self.variance.as_deref().map(numbers).map(|variance| FrfNoise {
+            variance: lines
+                .clone()
+                .map(|line| DMatrix::from_fn(rows, columns, |r, c| variance[place(line, r, c)]))
+                .collect(),
+        });
+        let quantity = Quantity::from_name(&self.quantity)
+            .ok_or_else(|| format!("`{}` is no kind of FRF", self.quantity))?;
+        let lines = lines.map(matrix).collect();
+        let frf = FrfMatrix { frequency_hz, sigma_per_s: self.sigma_per_s, quantity, outputs, inputs, lines };
+        frf.check().map_err(|e| e.to_string())?;
+        Ok(ImportedFrf { source: self.source, utc: self.utc, frf, noise })
+    }
+}
+
+impl Store {
+    /// Stores FRFs of a configuration; they count instead of earlier ones.
+    ///
+    /// # Errors
+    /// They contradict themselves, or the file cannot be written.
+    pub fn insert_frf(
+        &self,
+        configuration: Configuration,
+        source: &str,
+        frf: &FrfMatrix,
+        noise: Option<&FrfNoise>,
+    ) -> Result<(), StoreError> {
+        frf.check().map_err(|e| self.content(e.to_string()))?;
+        if let Some(noise) = noise {
+            noise.check(frf).map_err(|e| self.content(e.to_string()))?;
+        }
+        // rows of C order, which nalgebra's columns of the transpose are
+        let values = frf.lines.iter().flat_map(|y| y.transpose().iter().copied().collect::<Vec<_>>());
+        let variances = |noise: &FrfNoise| {
+            bytes(noise.variance.iter().flat_map(|v| v.transpose().iter().copied().collect::<Vec<_>>()))
+        };
+        let row = FrfColumns {
+            configuration: configuration_name(configuration).into(),
+            utc: utc_now(),
+            source: source.into(),
+            quantity: frf.quantity.name().into(),
+            sigma_per_s: frf.sigma_per_s,
+            outputs: serde_json::json!(frf.outputs).to_string(),
+            inputs: serde_json::json!(frf.inputs).to_string(),
+            frequency: bytes(frf.frequency_hz.iter().copied()),
+            frf: bytes(values.flat_map(|v| [v.re, v.im])),
+            variance: noise.map(variances),
+        };
+        let crc = row.crc();
+        row.insert(&self.connection, &[("crc32", &crc)]).map_err(self.failed("storing FRFs"))
+    }
+
+    /// The FRFs that count, without their values: the latest of each configuration.
+    pub fn frf_rows(&self) -> Result<Vec<FrfRow>, StoreError> {
+        let sql = "SELECT max(id), configuration, source, utc FROM frfs GROUP BY configuration ORDER BY 1";
+        let read = |row: &rusqlite::Row<'_>| {
+            Ok(FrfRow { id: row.get(0)?, configuration: row.get(1)?, source: row.get(2)?, utc: row.get(3)? })
+        };
+        self.all(sql, [], read, "reading FRFs")
+    }
+
+    /// The FRFs of a configuration that came from elsewhere, if there are any.
+    ///
+    /// # Errors
+    /// They are damaged, or the file cannot be read.
+    pub fn frf(&self, configuration: &str) -> Result<Option<ImportedFrf>, StoreError> {
+        let found = self.frf_rows()?.into_iter().find(|row| row.configuration == configuration);
+        found.map(|row| self.frf_of(row.id)).transpose()
+    }
+
+    /// The FRFs of that row.
+    ///
+    /// # Errors
+    /// As [`Store::frf`].
+    pub(super) fn frf_of(&self, id: i64) -> Result<ImportedFrf, StoreError> {
+        let sql = format!("SELECT {}, crc32 FROM frfs WHERE id = ?1", FrfColumns::list());
+        let read = |row: &rusqlite::Row<'_>| Ok((FrfColumns::read(row)?, row.get::<_, u32>("crc32")?));
+        let (row, crc) = self.connection.query_row(&sql, [id], read).map_err(self.failed("reading FRFs"))?;
+        let name = format!("the FRFs of {} from {}", row.configuration, row.source);
+        let read = if row.crc() == crc { row.decoded() } else { Err("their checksum is another".into()) };
+        read.map_err(|what| self.content(format!("{name} are damaged ({what}): import them again")))
+    }
+}
+
+fn bytes(numbers: impl Iterator<Item = f64>) -> Vec<u8> {
+    numbers.flat_map(f64::to_le_bytes).collect()
+}
+
+fn numbers(bytes: &[u8]) -> Vec<f64> {
+    bytes.as_chunks::<8>().0.iter().map(|chunk| f64::from_le_bytes(*chunk)).collect()
+}
+
+#[cfg(test)]
+#[path = "frf_table_tests.rs"]
+mod tests;

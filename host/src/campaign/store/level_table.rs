@@ -1,0 +1,214 @@
+//! Levels of the shaker in the campaign file: stored once, read back checked, never changed.
+
+use std::fmt;
+use std::ops::Range;
+
+use super::Store;
+use super::codec::{self, CodecError};
+use super::error::StoreError;
+use super::notes::utc_now;
+use super::record_row::Samples;
+use super::row_seal;
+use super::table::{Row, insert, table};
+use crate::campaign::plan::level::{Held, Level, Moment};
+
+table! {
+    /// A stored level without its samples: what the seal runs over. One row per level that was recorded: a sine held in steady state,
+    /// or a sweep from rest to rest.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct LevelRow {
+        "levels" {
+            /// Its id, counted apart from the hammer's records.
+            id: i64 = "id INTEGER PRIMARY KEY",
+            /// Which session: its channels give the scales.
+            session: i64 = "session INTEGER NOT NULL REFERENCES sessions(id)",
+            /// When it was stored, RFC 3339.
+            utc: String = "utc TEXT NOT NULL",
+            /// Before or after the hammer's cells.
+            moment: Moment = "moment TEXT NOT NULL",
+            /// Its frequency, or the first one of a sweep, Hz.
+            frequency_hz: f64 = "frequency_hz REAL NOT NULL",
+            /// The last frequency of a sweep, Hz; none for a step.
+            end_hz: Option<f64> = "end_hz REAL",
+            /// What is held.
+            held: Held = "control TEXT NOT NULL",
+            /// At which amplitude, m, N or V.
+            amplitude: f64 = "amplitude REAL NOT NULL",
+            /// The amplitude over the record, m, N or V.
+            reached: f64 = "reached REAL NOT NULL",
+            /// Largest amplitude on the way, over the ordered one.
+            overshoot: f64 = "overshoot REAL NOT NULL",
+            /// Time from the order to the record, s of the device.
+            after_s: f64 = "settle_s REAL NOT NULL",
+            /// The drive's amplitude then, V.
+            drive_v: f64 = "drive_v REAL NOT NULL",
+            /// The stream that it was cut from.
+            epoch: u32 = "epoch INTEGER NOT NULL",
+            /// Scan index of its first sample.
+            first_scan: u64 = "first_scan INTEGER NOT NULL",
+            /// Samples per channel.
+            scans: usize = "scans INTEGER NOT NULL",
+            /// Channels.
+            channels: usize = "channels INTEGER NOT NULL",
+            /// Missing samples, as index ranges.
+            gaps: Vec<Range<usize>> = "gaps TEXT NOT NULL",
+            /// CRC-32 of the raw codes.
+            crc: u32 = "crc32 INTEGER NOT NULL",
+            /// CRC-32 of the bytes that hold the codes in the file.
+            bytes_crc: u32 = "bytes_crc32 INTEGER NOT NULL",
+            "seal INTEGER NOT NULL",
+            "samples BLOB NOT NULL",
+        }
+    }
+}
+
+/// How a level came to its amplitude.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settled {
+    /// Amplitude of what is held over the record, m, N or V.
+    pub reached: f64,
+    /// Largest amplitude on the way, over the ordered one.
+    pub overshoot: f64,
+    /// Time from the order to the record, s of the device.
+    pub after_s: f64,
+    /// The drive's amplitude then, V.
+    pub drive_v: f64,
+}
+
+/// A level to be stored.
+#[derive(Clone, Debug)]
+pub struct NewLevel {
+    /// Which session.
+    pub session: i64,
+    /// Before or after the hammer's cells.
+    pub moment: Moment,
+    /// What was ordered.
+    pub level: Level,
+    /// What came of it.
+    pub settled: Settled,
+    /// The stream that it was cut from.
+    pub epoch: u32,
+    /// Scan index of its first sample.
+    pub first_scan: u64,
+    /// Channels.
+    pub channels: usize,
+    /// Raw codes, channel after channel.
+    pub codes: Vec<i16>,
+    /// Missing samples, as index ranges.
+    pub gaps: Vec<Range<usize>>,
+}
+
+/// A level whose description is damaged.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DamagedLevel {
+    /// Its id.
+    pub id: i64,
+    /// What is wrong.
+    pub what: String,
+}
+
+impl fmt::Display for DamagedLevel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "the shaker's level {}: {}", self.id, self.what)
+    }
+}
+
+impl LevelRow {
+    /// What was ordered.
+    pub fn level(&self) -> Level {
+        let Self { frequency_hz, end_hz, held, amplitude, .. } = *self;
+        Level { frequency_hz, end_hz, held, amplitude }
+    }
+
+    /// What came of it.
+    pub fn settled(&self) -> Settled {
+        let Self { reached, overshoot, after_s, drive_v, .. } = *self;
+        Settled { reached, overshoot, after_s, drive_v }
+    }
+
+    /// Whether no sample of it is missing.
+    pub fn whole(&self) -> bool {
+        self.gaps.is_empty()
+    }
+}
+
+impl NewLevel {
+    fn row(&self, id: i64, crc: u32, bytes_crc: u32) -> LevelRow {
+        let (Level { frequency_hz, end_hz, held, amplitude }, settled) = (self.level, self.settled);
+        let Settled { reached, overshoot, after_s, drive_v } = settled;
+        LevelRow {
+            id,
+            session: self.session,
+            utc: utc_now(),
+            moment: self.moment,
+            frequency_hz,
+            end_hz,
+            held,
+            amplitude,
+            reached,
+            overshoot,
+            after_s,
+            drive_v,
+            epoch: self.epoch,
+            first_scan: self.first_scan,
+            scans: self.codes.len().checked_div(self.channels).unwrap_or(0),
+            channels: self.channels,
+            gaps: self.gaps.clone(),
+            crc,
+            bytes_crc,
+        }
+    }
+}
+
+impl Store {
+    /// Stores one level for good; returns its id.
+    pub fn insert_level(&self, new: &NewLevel) -> Result<i64, StoreError> {
+        let bytes = codec::encode(&new.codes, new.channels)
+            .map_err(|error| self.content(format!("a level could not be compressed: {error}")))?;
+        let (crc, bytes_crc) = (codec::checksum(&new.codes), crc32fast::hash(&bytes));
+        let store = || {
+            let transaction = self.connection.unchecked_transaction()?;
+            let id: i64 =
+                transaction.query_row("SELECT coalesce(max(id), 0) + 1 FROM levels", [], |row| row.get(0))?;
+            let values = new.row(id, crc, bytes_crc).into_values()?;
+            let seal = row_seal::of(&values);
+            insert::<LevelRow>(&transaction, "levels", &values, &[("seal", &seal), ("samples", &bytes)])?;
+            transaction.commit()?;
+            Ok(id)
+        };
+        store().map_err(self.failed("storing a level"))
+    }
+
+    /// Every level without its samples, in order of measurement.
+    pub fn levels(&self) -> Result<Vec<Result<LevelRow, DamagedLevel>>, StoreError> {
+        let sql = format!("SELECT {}, seal FROM levels ORDER BY id", LevelRow::list());
+        let read = |row: &rusqlite::Row<'_>| {
+            let id = row.get(0)?;
+            Ok(row_seal::read(row)?.map_err(|what| DamagedLevel { id, what }))
+        };
+        self.all(&sql, [], read, "reading the shaker's levels")
+    }
+
+    /// The samples of one level, checked against their checksums.
+    ///
+    /// # Errors
+    /// They are damaged; the level is named.
+    pub fn level_samples(&self, row: &LevelRow) -> Result<Samples, StoreError> {
+        let damaged =
+            |what: CodecError| self.content(format!("the shaker's level {} is damaged: {what}", row.id));
+        let read = self
+            .connection
+            .query_row("SELECT samples FROM levels WHERE id = ?1", [row.id], |row| row.get::<_, Vec<u8>>(0));
+        let bytes = read.map_err(|error| damaged(CodecError::Unreadable(error.to_string())))?;
+        let found = crc32fast::hash(&bytes);
+        if found != row.bytes_crc {
+            return Err(damaged(CodecError::Bytes { found, stored: row.bytes_crc }));
+        }
+        let codes = codec::decode(&bytes, row.channels, row.scans, row.crc).map_err(damaged)?;
+        Ok(Samples { codes, channels: row.channels })
+    }
+}
+
+#[cfg(test)]
+#[path = "level_table_tests.rs"]
+mod tests;

@@ -1,0 +1,112 @@
+//! One writer at a time: a lock beside the campaign file, held as long as it is open for writing.
+//!
+//! SQLite would let two writers take turns; two campaigns in one file would then strike the same cells. The operating system
+//! drops the lock with the process that holds it, however that ends, so that a file left behind locks nobody out.
+
+use std::ffi::OsString;
+use std::fs::{File, TryLockError};
+use std::io::{Read, Seek, Write};
+use std::path::{Path, PathBuf};
+
+use super::error::StoreError;
+
+/// How often a lock file that vanished in between is taken anew.
+const TRIES: usize = 10;
+
+/// The lock; dropping it lets go.
+#[derive(Debug)]
+pub(super) struct WriteLock {
+    file: File,
+    path: PathBuf,
+}
+
+impl WriteLock {
+    /// Locks `campaign` for writing.
+    ///
+    /// # Errors
+    /// Another process holds it ([`StoreError::Busy`] says which), or nothing can be written there.
+    pub(super) fn take(campaign: &Path) -> Result<Self, StoreError> {
+        let path = beside(campaign);
+        let failed = |source| StoreError::Lock { path: campaign.into(), source };
+        for _ in 0..TRIES {
+            let mut file = File::options()
+                .read(true)
+                .write(true)
+                .create(true)
+                .truncate(false)
+                .open(&path)
+                .map_err(failed)?;
+            match file.try_lock() {
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) => {
+                    let mut holder = String::new();
+                    // who it is only makes the message better
+                    let _ = file.read_to_string(&mut holder);
+                    return Err(StoreError::Busy { path: campaign.into(), holder: holder.trim().into() });
+                }
+                Err(TryLockError::Error(source)) => return Err(failed(source)),
+            }
+            // its last holder may have removed it between our opening and locking
+            if !still_there(&file, &path) {
+                continue;
+            }
+            let noted = file
+                .set_len(0)
+                .and_then(|()| file.rewind())
+                .and_then(|()| write!(file, "process {}", std::process::id()));
+            if let Err(error) = noted {
+                log::debug!("{}: {error}", path.display());
+            }
+            return Ok(Self { file, path });
+        }
+        Err(StoreError::Busy { path: campaign.into(), holder: String::new() })
+    }
+}
+
+impl Drop for WriteLock {
+    fn drop(&mut self) {
+        // removed while it is held: whoever opened it before notices
+        let _ = std::fs::remove_file(&self.path);
+        let _ = self.file.unlock();
+    }
+}
+
+fn beside(campaign: &Path) -> PathBuf {
+    let mut name = campaign.file_name().map(OsString::from).unwrap_or_default();
+    name.push("-lock");
+    campaign.with_file_name(name)
+}
+
+#[cfg(unix)]
+fn still_there(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    match (file.metadata(), std::fs::metadata(path)) {
+        (Ok(ours), Ok(there)) => (ours.dev(), ours.ino()) == (there.dev(), there.ino()),
+        _ => false,
+    }
+}
+
+/// Elsewhere an open file cannot be removed.
+#[cfg(not(unix))]
+fn still_there(_: &File, _: &Path) -> bool {
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_writer_is_refused_by_name_and_nothing_is_left_behind() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let campaign = folder.path().join("a.jrig");
+        let lock = WriteLock::take(&campaign).expect("free");
+        let said = WriteLock::take(&campaign).expect_err("held").to_string();
+        assert!(said.contains(&format!("process {}", std::process::id())), "{said}");
+        drop(lock);
+        assert!(!beside(&campaign).exists());
+        // left behind by a process that was killed
+        std::fs::write(beside(&campaign), "process 1").expect("written");
+        drop(WriteLock::take(&campaign).expect("nobody holds it"));
+    }
+}

@@ -1,0 +1,87 @@
+//! What stands in the file about the whole campaign: its plans, its notes, its log.
+
+use rusqlite::{Connection, OptionalExtension};
+
+use super::Store;
+use super::error::StoreError;
+use super::table::{Row, table};
+use crate::campaign::plan::Plan;
+
+table! {
+    /// A plan; the last one counts.
+    pub struct PlanText {
+        "plan" {
+            "id INTEGER PRIMARY KEY",
+            /// Since when, RFC 3339.
+            utc: String = "utc TEXT NOT NULL",
+            /// The name of the file that it came from.
+            source: String = "source TEXT NOT NULL",
+            /// All of it.
+            text: String = "text TEXT NOT NULL",
+        }
+    }
+}
+
+table! {
+    /// A line of the log.
+    pub struct LogLine {
+        "log" {
+            "id INTEGER PRIMARY KEY",
+            /// When, RFC 3339.
+            utc: String = "utc TEXT NOT NULL",
+            /// What happened.
+            text: String = "text TEXT NOT NULL",
+        }
+    }
+}
+
+/// Now, as it stands in the file: RFC 3339, UTC.
+pub fn utc_now() -> String {
+    jiff::Timestamp::now().to_string()
+}
+
+/// Notes that the plan in `text` counts from now on.
+pub(super) fn write_plan(connection: &Connection, text: &str, source: &str) -> rusqlite::Result<()> {
+    PlanText { utc: utc_now(), source: source.into(), text: text.into() }.insert(connection, &[])
+}
+
+/// Adds a line to the log.
+pub(super) fn write_log(connection: &Connection, text: &str) -> rusqlite::Result<()> {
+    LogLine { utc: utc_now(), text: text.into() }.insert(connection, &[])
+}
+
+impl Store {
+    /// The plan.
+    pub fn plan(&self) -> Result<Plan, StoreError> {
+        let (text, source) = self.plan_text()?;
+        Ok(Plan::parse(&text, &source)?)
+    }
+
+    /// The plan's text and the name of the file that it came from.
+    pub fn plan_text(&self) -> Result<(String, String), StoreError> {
+        let sql = format!("SELECT {} FROM plan ORDER BY id DESC LIMIT 1", PlanText::list());
+        let plan = self.connection.query_row(&sql, [], PlanText::read);
+        plan.map(|plan| (plan.text, plan.source)).map_err(self.failed("reading the plan"))
+    }
+
+    /// A note on the whole campaign.
+    pub fn meta(&self, key: &str) -> Result<Option<String>, StoreError> {
+        self.connection
+            .query_row("SELECT value FROM meta WHERE key = ?1", [key], |row| row.get(0))
+            .optional()
+            .map_err(self.failed("reading notes"))
+    }
+
+    /// Writes a note on the whole campaign.
+    pub fn set_meta(&self, key: &str, value: &str) -> Result<(), StoreError> {
+        self.connection
+            .execute("INSERT OR REPLACE INTO meta VALUES (?1, ?2)", [key, value])
+            .map(|_| ())
+            .map_err(self.failed("writing notes"))
+    }
+
+    /// Adds a line to the campaign's log.
+    pub fn log(&self, text: &str) -> Result<(), StoreError> {
+        write_log(&self.connection, text).map_err(self.failed("writing the log"))
+    }
+}

@@ -1,0 +1,75 @@
+//! What a person made of a verdict: kept beside it, and the last one counts.
+
+use rusqlite::Connection;
+
+use super::Store;
+use super::error::StoreError;
+use super::notes::utc_now;
+use super::table::{Row, table};
+use crate::campaign::verdict::Kind;
+
+table! {
+    /// A verdict that a person overruled.
+    #[derive(Clone, Debug, PartialEq, Eq)]
+    pub struct Overrule {
+        "overrules" {
+            "id INTEGER PRIMARY KEY",
+            /// Which record.
+            record: i64 = "record INTEGER NOT NULL REFERENCES records(id)",
+            /// When, RFC 3339.
+            utc: String = "utc TEXT NOT NULL",
+            /// What it counts as since then.
+            verdict: String = "verdict TEXT NOT NULL",
+            /// Why.
+            reason: String = "reason TEXT NOT NULL",
+        }
+    }
+}
+
+impl Store {
+    /// Overrules a record's verdict; the first one stays in the file too. A cell that a refusal leaves with less than it
+    /// was settled with is open again.
+    pub fn overrule(&self, record: i64, verdict: Kind, reason: &str) -> Result<(), StoreError> {
+        let write = || {
+            let transaction = self.connection.unchecked_transaction()?;
+            write_overrule(&transaction, record, verdict, reason)?;
+            transaction.commit()
+        };
+        write().map_err(self.failed("overruling a verdict"))
+    }
+
+    /// Has a cell struck anew: its good records are dropped, and it is open again. Returns how many were dropped.
+    pub fn redo(&self, cell: i64, reason: &str) -> Result<usize, StoreError> {
+        let records = self.records_of(cell)?;
+        let good = records.iter().flatten().filter(|record| record.standing() == Kind::Good);
+        let good: Vec<i64> = good.map(|record| record.id).collect();
+        let write = || {
+            let transaction = self.connection.unchecked_transaction()?;
+            for record in &good {
+                write_overrule(&transaction, *record, Kind::Dropped, reason)?;
+            }
+            transaction.execute("UPDATE cells SET settled = NULL, given_up = NULL WHERE id = ?1", [cell])?;
+            transaction.commit()
+        };
+        write().map_err(self.failed("opening a cell again"))?;
+        Ok(good.len())
+    }
+
+    /// Every time that a person overruled a verdict.
+    pub fn overrules(&self) -> Result<Vec<Overrule>, StoreError> {
+        let sql = format!("SELECT {} FROM overrules ORDER BY id", Overrule::list());
+        self.all(&sql, [], Overrule::read, "reading overrules")
+    }
+}
+
+fn write_overrule(connection: &Connection, record: i64, verdict: Kind, reason: &str) -> rusqlite::Result<()> {
+    let overrule = Overrule { record, utc: utc_now(), verdict: verdict.name().into(), reason: reason.into() };
+    overrule.insert(connection, &[])?;
+    if verdict != Kind::Good {
+        connection.execute(
+            "UPDATE cells SET settled = NULL WHERE id = (SELECT cell FROM records WHERE id = ?1)",
+            [record],
+        )?;
+    }
+    Ok(())
+}

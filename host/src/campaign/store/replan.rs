@@ -1,0 +1,89 @@
+//! Going on with an edited plan: what was measured stays valid, or the plan is refused.
+
+use std::collections::HashSet;
+
+use super::Store;
+use super::cell_table::write_cell;
+use super::error::{StoreError, sqlite};
+use super::notes::{write_log, write_plan};
+use crate::campaign::plan::{Cell, Plan, configuration_name};
+
+impl Store {
+    /// Takes over the plan in `text`, which errors call `source`. Hits, force, limits and settling may change, and cells may be
+    /// added; cells without records may go. Cells that were given up or settled get another chance. The plans before stay in
+    /// the file.
+    ///
+    /// # Errors
+    /// The plan is wrong, or what was measured already would not fit it.
+    pub fn take_over(&mut self, text: &str, source: &str) -> Result<(), StoreError> {
+        let (new, old) = (Plan::parse(text, source)?, self.plan()?);
+        let refuse = |what: String| {
+            Err(StoreError::PlanChange { path: self.path.clone(), source_name: source.into(), what })
+        };
+        let rows = self.cells()?;
+        let measured: HashSet<i64> = self.places()?.iter().map(|place| place.cell).collect();
+        if !measured.is_empty() && new.record.get_ref() != old.record.get_ref() {
+            return refuse(
+                "[record] must stay as it is, because records were measured with it; create a new campaign"
+                    .into(),
+            );
+        }
+        let cells = new.cells();
+        for row in rows.iter().filter(|row| measured.contains(&row.id)) {
+            let Cell { configuration, impact, response, .. } = &row.cell;
+            if !cells.iter().any(|cell| same(cell, &row.cell)) {
+                let name = configuration_name(*configuration);
+                return refuse(format!(
+                    "the cell {name}/{impact}/{response} has records and must stay in it"
+                ));
+            }
+            if let Some(point) = moved(&old, &new, impact, response) {
+                return refuse(format!(
+                    "`{point}` has records and must stay where it is; give the other place another name"
+                ));
+            }
+        }
+        let path = self.path.clone();
+        let mut write = || {
+            let transaction = self.connection.transaction()?;
+            for row in rows.iter().filter(|row| !measured.contains(&row.id)) {
+                if !cells.iter().any(|cell| same(cell, &row.cell)) {
+                    transaction.execute("DELETE FROM cells WHERE id = ?1", [row.id])?;
+                }
+            }
+            for cell in &cells {
+                write_cell(&transaction, cell)?;
+            }
+            write_plan(&transaction, text, source)?;
+            write_log(&transaction, &format!("the plan {source} took over"))?;
+            transaction.commit()
+        };
+        write().map_err(|error| sqlite(&path, "taking over the plan", error))
+    }
+}
+
+fn same(one: &Cell, other: &Cell) -> bool {
+    (one.configuration, &one.impact, &one.response) == (other.configuration, &other.impact, &other.response)
+}
+
+/// The first of the two points that the new plan puts elsewhere.
+fn moved<'a>(old: &Plan, new: &Plan, impact: &'a str, response: &'a str) -> Option<&'a str> {
+    let impact_of = |plan: &Plan| {
+        plan.geometry.impact.iter().map(toml::Spanned::get_ref).find(|point| point.name == impact).cloned()
+    };
+    let response_of = |plan: &Plan| {
+        plan.geometry
+            .response
+            .iter()
+            .map(toml::Spanned::get_ref)
+            .find(|point| point.name == response)
+            .cloned()
+    };
+    if impact_of(old) != impact_of(new) {
+        Some(impact)
+    } else if response_of(old) != response_of(new) {
+        Some(response)
+    } else {
+        None
+    }
+}

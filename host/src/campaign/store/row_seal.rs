@@ -1,0 +1,46 @@
+//! The seal of a row: a CRC-32 over every column that its type holds, so that no flipped bit goes unseen.
+//!
+//! It runs over the columns in the order of the table ([`super::table`]); for a record over those of `records` and then of `seals`. For each
+//! value its kind (0 nothing, 1 whole number, 2 real, 3 text, 4 bytes), then eight bytes little-endian (the number, the real's bits, or
+//! the length), then the text or bytes themselves. The samples have checksums of their own among these columns: one over the codes, one over
+//! the bytes as they are stored.
+
+use rusqlite::types::{Value, ValueRef};
+
+use super::table::Row;
+
+/// The seal of values that are to be stored.
+pub(super) fn of(values: &[Value]) -> u32 {
+    over(values.iter().map(ValueRef::from))
+}
+
+/// Reads a row that is followed by its seal; what is wrong with it where that does not fit.
+pub(super) fn read<R: Row>(row: &rusqlite::Row<'_>) -> rusqlite::Result<Result<R, String>> {
+    let columns = R::columns().count();
+    let Some(stored) = row.get::<_, Option<u32>>(columns)? else {
+        return Ok(Err("its seal is missing".into()));
+    };
+    let values = (0..columns).map(|place| row.get_ref(place)).collect::<rusqlite::Result<Vec<_>>>()?;
+    if over(values.into_iter()) == stored {
+        R::read(row).map(Ok)
+    } else {
+        Ok(Err("its description was changed".into()))
+    }
+}
+
+fn over<'v>(values: impl Iterator<Item = ValueRef<'v>>) -> u32 {
+    let mut hasher = crc32fast::Hasher::new();
+    for value in values {
+        let (kind, number, bytes): (u8, [u8; 8], &[u8]) = match value {
+            ValueRef::Null => (0, [0; 8], &[]),
+            ValueRef::Integer(number) => (1, number.to_le_bytes(), &[]),
+            ValueRef::Real(real) => (2, real.to_bits().to_le_bytes(), &[]),
+            ValueRef::Text(text) => (3, (text.len() as u64).to_le_bytes(), text),
+            ValueRef::Blob(blob) => (4, (blob.len() as u64).to_le_bytes(), blob),
+        };
+        hasher.update(&[kind]);
+        hasher.update(&number);
+        hasher.update(bytes);
+    }
+    hasher.finalize()
+}

@@ -1,0 +1,88 @@
+//! A new campaign file: its tables, and what may never change in them.
+//!
+//! The columns stand beside the type of their row; the tables of a key and a value stand here.
+//!
+//! A file of another version is refused in words. Once a version is released, a change of any column makes a new one; what brings
+//! older files up is then to be written here, and applied by [`super::Store::open`].
+
+use std::path::Path;
+
+use super::cell_table::{CellColumns, write_cell};
+use super::error::{StoreError, sqlite};
+use super::frf_table::FrfColumns;
+use super::level_table::LevelRow;
+use super::notes::{LogLine, PlanText, write_plan};
+use super::overrules::Overrule;
+use super::record_row::RecordRow;
+use super::session_table::{ChannelColumns, Sensor, SessionInfo};
+use super::table::create;
+use super::{APPLICATION_ID, Store, VERSION};
+use crate::campaign::plan::Plan;
+
+/// Notes on the whole campaign, and the counters of each session's link so far (a JSON object of numbers).
+const PAIRS: &str = "
+CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
+CREATE TABLE links (session INTEGER PRIMARY KEY REFERENCES sessions(id), counters TEXT NOT NULL) STRICT;
+";
+
+/// Tables whose rows stay as they were stored, and what their triggers call a row.
+const APPEND_ONLY: [(&str, &str); 4] = [
+    ("records", "a raw record is"),
+    ("seals", "a record''s seal is"),
+    ("frfs", "imported FRFs are"),
+    ("levels", "a raw record is"),
+];
+
+impl Store {
+    /// Creates a campaign file for the plan in `text`, which errors call `source`.
+    ///
+    /// # Errors
+    /// The file exists, cannot be written, or the plan is wrong.
+    pub fn create(path: &Path, text: &str, source: &str) -> Result<Self, StoreError> {
+        let plan = Plan::parse(text, source)?;
+        let mut store = Self::empty(path)?;
+        store.fill(&plan, text, source).map_err(|error| sqlite(path, "creating", error))?;
+        Ok(store)
+    }
+
+    fn fill(&mut self, plan: &Plan, text: &str, source: &str) -> rusqlite::Result<()> {
+        let transaction = self.connection.transaction()?;
+        transaction.pragma_update(None, "application_id", APPLICATION_ID)?;
+        transaction.execute_batch(&tables())?;
+        transaction.pragma_update(None, "user_version", VERSION)?;
+        write_plan(&transaction, text, source)?;
+        transaction
+            .execute("INSERT INTO meta VALUES ('software_version', ?1)", [env!("CARGO_PKG_VERSION")])?;
+        for cell in &plan.cells() {
+            write_cell(&transaction, cell)?;
+        }
+        transaction.commit()
+    }
+}
+
+/// The SQL that makes an empty file.
+fn tables() -> String {
+    let mut sql = [
+        PAIRS.to_owned(),
+        create::<PlanText>(),
+        create::<SessionInfo>(),
+        create::<ChannelColumns>(),
+        create::<Sensor>(),
+        create::<CellColumns>(),
+        create::<RecordRow>(),
+        create::<Overrule>(),
+        create::<LogLine>(),
+        create::<FrfColumns>(),
+        create::<LevelRow>(),
+    ]
+    .concat();
+    for (table, row) in APPEND_ONLY {
+        for (name, event, done) in [("stay", "UPDATE", "changed"), ("remain", "DELETE", "deleted")] {
+            sql += &format!(
+                "CREATE TRIGGER {table}_{name} BEFORE {event} ON {table}\n\
+                 BEGIN SELECT RAISE(ABORT, '{row} never {done}'); END;\n"
+            );
+        }
+    }
+    sql
+}

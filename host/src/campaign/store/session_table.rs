@@ -1,0 +1,193 @@
+//! Sessions in the campaign file: what was connected, the channels that it had, and the sensors behind them.
+
+use std::collections::BTreeMap;
+
+use jointrig_protocol::channel::{Channel, Quantity, Role};
+use rusqlite::{Connection, ToSql, params};
+use toml::Spanned;
+
+use super::Store;
+use super::error::{StoreError, sqlite};
+use super::notes::utc_now;
+use super::stored::Hex;
+use super::table::{Row, table};
+use crate::campaign::plan::Plan;
+use crate::device::channels::ChannelMap;
+
+table! {
+    /// What was connected. One row per connection to a device.
+    #[derive(Clone, Debug, PartialEq, Eq)]
+    pub struct SessionInfo {
+        "sessions" {
+            "id INTEGER PRIMARY KEY",
+            "utc TEXT NOT NULL",
+            /// The device's address.
+            address: String = "address TEXT NOT NULL",
+            /// The board's name.
+            board: String = "board TEXT NOT NULL",
+            /// Its serial number.
+            serial: String = "serial TEXT NOT NULL",
+            /// Its firmware's version.
+            firmware_version: String = "firmware_version TEXT NOT NULL",
+            /// The target triple that it was built for.
+            target: String = "target TEXT NOT NULL",
+            /// The build's number.
+            build: Hex = "build TEXT NOT NULL",
+            /// The protocol's schema hash.
+            schema_hash: Hex = "schema_hash TEXT NOT NULL",
+            "software_version TEXT NOT NULL",
+            "rate_hz INTEGER NOT NULL",
+        }
+    }
+}
+
+table! {
+    /// A channel: SI value = code · units_per_volt · range_v / 32768.
+    pub struct ChannelColumns {
+        "channels" {
+            "session INTEGER NOT NULL REFERENCES sessions(id)",
+            "place INTEGER NOT NULL",
+            /// Its name.
+            name: String = "name TEXT NOT NULL",
+            /// What it serves as.
+            role: Role = "role TEXT NOT NULL",
+            /// What it measures.
+            quantity: Quantity = "quantity TEXT NOT NULL",
+            "unit TEXT NOT NULL",
+            /// Units of the quantity per volt, with the sensor's polarity.
+            units_per_volt: f32 = "units_per_volt REAL NOT NULL",
+            /// Range of the converter, V.
+            range_v: f32 = "range_v REAL NOT NULL",
+            /// How late it is, ns.
+            delay_ns: u32 = "delay_ns INTEGER NOT NULL",
+            /// Resolution of the converter.
+            bits: u8 = "bits INTEGER NOT NULL",
+            "PRIMARY KEY (session, place)",
+        }
+    }
+}
+
+table! {
+    /// What a plan says about the sensor behind a channel; sensitivity and polarity are in the channel's scale.
+    #[derive(Clone, Debug, Default, PartialEq, Eq)]
+    pub struct Sensor {
+        "sensors" {
+            "session INTEGER NOT NULL REFERENCES sessions(id)",
+            "place INTEGER NOT NULL",
+            /// Its model.
+            model: Option<String> = "model TEXT",
+            /// Its serial number.
+            serial: Option<String> = "serial TEXT",
+            /// When it was calibrated, YYYY-MM-DD.
+            calibrated: Option<String> = "calibrated TEXT",
+            "PRIMARY KEY (session, place)",
+        }
+    }
+}
+
+/// Counters of a link by name.
+pub type Counters = BTreeMap<String, u64>;
+
+/// Notes the counters of a session's link so far.
+pub(super) fn write_link(connection: &Connection, session: i64, counters: &Counters) -> rusqlite::Result<()> {
+    let failed = |error| rusqlite::Error::ToSqlConversionFailure(Box::new(error));
+    let text = serde_json::to_string(counters).map_err(failed)?;
+    connection
+        .prepare_cached("INSERT OR REPLACE INTO links VALUES (?1, ?2)")?
+        .execute(params![session, text])
+        .map(|_| ())
+}
+
+impl Store {
+    /// Notes a connection to a device, its channels, and the sensors that the plan names behind them; returns its id.
+    pub fn begin_session(&mut self, info: &SessionInfo, channels: &ChannelMap) -> Result<i64, StoreError> {
+        let (path, plan) = (self.path.clone(), self.plan()?);
+        self.write_session(info, channels, &plan).map_err(|error| sqlite(&path, "noting the session", error))
+    }
+
+    fn write_session(&mut self, info: &SessionInfo, map: &ChannelMap, plan: &Plan) -> rusqlite::Result<i64> {
+        let transaction = self.connection.transaction()?;
+        let software = env!("CARGO_PKG_VERSION");
+        let beside: [(&str, &dyn ToSql); 3] =
+            [("utc", &utc_now()), ("software_version", &software), ("rate_hz", &map.rate_hz)];
+        info.clone().insert(&transaction, &beside)?;
+        let session = transaction.last_insert_rowid();
+        for (place, channel) in map.channels.iter().enumerate() {
+            let columns = ChannelColumns {
+                name: channel.name.as_str().into(),
+                role: channel.role,
+                quantity: channel.quantity,
+                units_per_volt: channel.units_per_volt,
+                range_v: channel.range_v,
+                delay_ns: channel.delay_ns,
+                bits: channel.bits,
+            };
+            let at: [(&str, &dyn ToSql); 2] = [("session", &session), ("place", &place)];
+            columns.insert(&transaction, &[at[0], at[1], ("unit", &channel.quantity.unit())])?;
+            let named =
+                plan.channel.iter().map(Spanned::get_ref).find(|sensor| sensor.name == channel.name.as_str());
+            if let Some(sensor) = named {
+                let (model, serial) = (sensor.model.clone(), sensor.serial.clone());
+                Sensor { model, serial, calibrated: sensor.calibrated.clone() }.insert(&transaction, &at)?;
+            }
+        }
+        transaction.commit()?;
+        Ok(session)
+    }
+
+    /// The channels of one session.
+    pub fn channels(&self, session: i64) -> Result<ChannelMap, StoreError> {
+        let rate_hz = self
+            .connection
+            .query_row("SELECT rate_hz FROM sessions WHERE id = ?1", [session], |row| row.get(0))
+            .map_err(self.failed("reading a session"))?;
+        let sql =
+            format!("SELECT {} FROM channels WHERE session = ?1 ORDER BY place", ChannelColumns::list());
+        let rows = self.all(&sql, [session], ChannelColumns::read, "reading channels")?;
+        let channel = |row: ChannelColumns| {
+            let ChannelColumns { name, role, quantity, units_per_volt, range_v, delay_ns, bits } = row;
+            let wrong =
+                |_| self.content(format!("session {session}: the name `{name}` of a channel is too long"));
+            let name = name.as_str().try_into().map_err(wrong)?;
+            Ok(Channel { name, role, quantity, units_per_volt, range_v, delay_ns, bits })
+        };
+        let channels = rows.into_iter().map(channel).collect::<Result<_, StoreError>>()?;
+        Ok(ChannelMap { id: 0, rate_hz, channels })
+    }
+
+    /// What is known of the sensors of one session's channels, in their order.
+    pub fn sensors(&self, session: i64) -> Result<Vec<Sensor>, StoreError> {
+        let sql = format!(
+            "SELECT {} FROM channels LEFT JOIN sensors USING (session, place) WHERE session = ?1 ORDER BY place",
+            Sensor::list()
+        );
+        self.all(&sql, [session], Sensor::read, "reading sensors")
+    }
+
+    /// Notes the counters of a session's link.
+    pub fn note_link(&self, session: i64, counters: &Counters) -> Result<(), StoreError> {
+        write_link(&self.connection, session, counters).map_err(self.failed("noting the link's counters"))
+    }
+
+    /// The counters of the link, summed over all sessions that noted them.
+    pub fn link_counters(&self) -> Result<Counters, StoreError> {
+        let mut sum = Counters::new();
+        let texts: Vec<String> =
+            self.all("SELECT counters FROM links", [], |row| row.get(0), "reading the link's counters")?;
+        for text in texts {
+            let counters: Counters = serde_json::from_str(&text)
+                .map_err(|error| self.content(format!("the link's counters cannot be read: {error}")))?;
+            for (name, count) in counters {
+                *sum.entry(name).or_default() += count;
+            }
+        }
+        Ok(sum)
+    }
+
+    /// The sessions of this file: id, and what was connected.
+    pub fn sessions(&self) -> Result<Vec<(i64, SessionInfo)>, StoreError> {
+        let sql = format!("SELECT {}, id FROM sessions ORDER BY id", SessionInfo::list());
+        let read = |row: &rusqlite::Row<'_>| Ok((row.get("id")?, SessionInfo::read(row)?));
+        self.all(&sql, [], read, "reading sessions")
+    }
+}

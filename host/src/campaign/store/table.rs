@@ -1,0 +1,175 @@
+//! A table of the campaign file, written down once.
+//!
+//! [`table!`] takes the columns in the order of the table. Of a column with a field before it, the row's type gets that field; a bare
+//! one (a constraint, or what the type leaves out) is only created. CREATE, INSERT, SELECT and the order of the row's seal
+//! (`row_seal.rs`) all come from this list: a new column is one new line.
+
+use rusqlite::types::{FromSql, ToSql, Value, ValueRef};
+use rusqlite::{Connection, params_from_iter};
+
+/// A column of a table, or a constraint.
+#[derive(Clone, Copy, Debug)]
+pub struct Column {
+    /// Its table.
+    pub table: &'static str,
+    /// Its SQL, which begins with its name.
+    pub declaration: &'static str,
+    /// Whether the row's type has it.
+    pub in_row: bool,
+}
+
+impl Column {
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        self.declaration.split(' ').next().unwrap_or_default()
+    }
+}
+
+/// A type that holds one row, made by [`table!`].
+pub trait Row: Sized {
+    /// All columns of all its tables.
+    const ALL: &'static [Column];
+
+    /// Reads it from a row that begins with [`Row::columns`].
+    fn read(row: &rusqlite::Row<'_>) -> rusqlite::Result<Self>;
+
+    /// Its values, in the order of [`Row::columns`].
+    fn into_values(self) -> rusqlite::Result<Vec<Value>>;
+
+    /// The columns that it holds.
+    fn columns() -> impl Iterator<Item = &'static Column> {
+        Self::ALL.iter().filter(|column| column.in_row)
+    }
+
+    /// The columns that it holds, as SELECT wants them.
+    fn list() -> String {
+        let names: Vec<String> =
+            Self::columns().map(|column| format!("{}.{}", column.table, column.name())).collect();
+        names.join(", ")
+    }
+
+    /// Stores it in its only table, with the columns `beside` that it does not hold.
+    fn insert(self, connection: &Connection, beside: &[(&str, &dyn ToSql)]) -> rusqlite::Result<()> {
+        insert::<Self>(connection, Self::ALL[0].table, &self.into_values()?, beside)
+    }
+}
+
+/// Stores those of a row's `values` that belong to `table`, with the columns `beside` that the row does not hold.
+pub(super) fn insert<R: Row>(
+    connection: &Connection,
+    table: &str,
+    values: &[Value],
+    beside: &[(&str, &dyn ToSql)],
+) -> rusqlite::Result<()> {
+    let own = R::columns().zip(values).filter(|(column, _)| column.table == table);
+    let own = own.map(|(column, value)| (column.name(), value as &dyn ToSql));
+    let (names, values): (Vec<&str>, Vec<&dyn ToSql>) = own.chain(beside.iter().copied()).unzip();
+    let (names, places) = (names.join(", "), vec!["?"; names.len()].join(", "));
+    let sql = format!("INSERT INTO {table} ({names}) VALUES ({places})");
+    connection.prepare_cached(&sql)?.execute(params_from_iter(values)).map(|_| ())
+}
+
+/// The SQL that creates the tables of a row.
+pub(super) fn create<R: Row>() -> String {
+    let tables = R::ALL.chunk_by(|one, other| one.table == other.table);
+    let one = |columns: &[Column]| {
+        let lines: Vec<&str> = columns.iter().map(|column| column.declaration).collect();
+        format!("CREATE TABLE {} (\n    {}\n) STRICT;\n", columns[0].table, lines.join(",\n    "))
+    };
+    tables.map(one).collect()
+}
+
+/// A value as a column holds it.
+pub trait Stored: Sized {
+    /// As it is stored.
+    fn store(self) -> rusqlite::Result<Value>;
+
+    /// As it was; none where the column holds no such thing.
+    fn load(value: ValueRef<'_>) -> Option<Self>;
+}
+
+/// Those that SQLite knows.
+macro_rules! plain {
+    ($($type:ty),+) => {
+        $(impl Stored for $type {
+            fn store(self) -> rusqlite::Result<Value> {
+                Ok(Value::from(self))
+            }
+
+            fn load(value: ValueRef<'_>) -> Option<Self> {
+                FromSql::column_result(value).ok()
+            }
+        })+
+    };
+}
+plain!(i64, u32, u8, f64, f32, String, Vec<u8>, Option<f64>, Option<String>, Option<Vec<u8>>);
+
+/// Numbers that SQLite would have to sign.
+macro_rules! unsigned {
+    ($($type:ty),+) => {
+        $(impl Stored for $type {
+            fn store(self) -> rusqlite::Result<Value> {
+                let failed = |error| rusqlite::Error::ToSqlConversionFailure(Box::new(error));
+                i64::try_from(self).map(Value::Integer).map_err(failed)
+            }
+
+            fn load(value: ValueRef<'_>) -> Option<Self> {
+                FromSql::column_result(value).ok()
+            }
+        })+
+    };
+}
+unsigned!(u64, usize);
+
+/// The value at `place`, which moves on.
+pub(super) fn next<T: Stored>(row: &rusqlite::Row<'_>, place: &mut usize, name: &str) -> rusqlite::Result<T> {
+    let (at, value) = (*place, row.get_ref(*place)?);
+    *place += 1;
+    T::load(value).ok_or_else(|| rusqlite::Error::InvalidColumnType(at, name.into(), value.data_type()))
+}
+
+/// A row's type and its tables. Fields in `beside` stand in no column of theirs: they are read with their default.
+macro_rules! table {
+    (
+        $(#[$meta:meta])*
+        $vis:vis struct $name:ident {
+            $($table:literal {
+                $( $( $(#[$about:meta])* $field:ident: $type:ty = )? $declaration:literal, )+
+            })+
+        }
+        $(beside { $( $(#[$beside_about:meta])* $beside:ident: $beside_type:ty, )+ })?
+    ) => {
+        $(#[$meta])*
+        $vis struct $name {
+            $( $( $( $(#[$about])* pub $field: $type, )? )+ )+
+            $( $( $(#[$beside_about])* pub $beside: $beside_type, )+ )?
+        }
+
+        impl $crate::campaign::store::table::Row for $name {
+            const ALL: &'static [$crate::campaign::store::table::Column] = &[
+                $( $( $crate::campaign::store::table::Column {
+                    table: $table,
+                    declaration: $declaration,
+                    in_row: {
+                        let fields: &[&str] = &[$(stringify!($field))?];
+                        !fields.is_empty()
+                    },
+                }, )+ )+
+            ];
+
+            fn read(row: &rusqlite::Row<'_>) -> rusqlite::Result<Self> {
+                let mut place = 0;
+                let read = Self {
+                    $( $( $( $field: $crate::campaign::store::table::next(row, &mut place, stringify!($field))?, )? )+ )+
+                    $( $( $beside: Default::default(), )+ )?
+                };
+                Ok(read)
+            }
+
+            fn into_values(self) -> rusqlite::Result<Vec<rusqlite::types::Value>> {
+                Ok(vec![ $( $( $( $crate::campaign::store::table::Stored::store(self.$field)?, )? )+ )+ ])
+            }
+        }
+    };
+}
+pub(super) use table;

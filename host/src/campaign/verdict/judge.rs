@@ -1,0 +1,131 @@
+//! Why a record is kept or refused, and by whom it is judged.
+
+use super::others::{self, Others};
+use super::{Kind, Limits, RawHit, Verdict};
+use crate::campaign::plan::{Cell, Plan};
+use crate::device::channels::ChannelMap;
+use crate::device::recording::Recording;
+use jointrig_protocol::channel::{Channel, Quantity, Role};
+
+/// Whoever judges records. It works on the raw record, before anything is derived from it.
+pub trait Judge {
+    /// Judges one record of `cell`, of which `others` are the good records so far; called once per record, in order of
+    /// measurement.
+    fn judge(
+        &mut self,
+        cell: &Cell,
+        plan: &Plan,
+        channels: &ChannelMap,
+        recording: &Recording,
+        others: &Others,
+    ) -> Verdict;
+}
+
+/// Judges by the raw record itself ([`super::judge`](fn@super::judge)): hammer force and every velocity of the record, in SI.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ByRecord;
+
+impl Judge for ByRecord {
+    fn judge(
+        &mut self,
+        _: &Cell,
+        plan: &Plan,
+        channels: &ChannelMap,
+        recording: &Recording,
+        others: &Others,
+    ) -> Verdict {
+        let si = |place: usize| -> Vec<f64> {
+            let unit = channels.channels.get(place).map_or(f64::NAN, Channel::units_per_code);
+            recording.channel(place).iter().map(|code| f64::from(*code) * unit).collect()
+        };
+        let force_n = channels.place(Role::HammerForce).map(si).unwrap_or_default();
+        let places = channels
+            .channels
+            .iter()
+            .enumerate()
+            .filter(|(_, channel)| channel.quantity == Quantity::Velocity);
+        let (names, responses): (Vec<&str>, Vec<Vec<f64>>) =
+            places.map(|(place, channel)| (channel.name.as_str(), si(place))).unzip();
+        let (wanted, given) = (plan.force.get_ref(), plan.limits.get_ref());
+        let limits = Limits {
+            // so that noise does not hide a rebound of just the limit
+            rebound_fraction: 0.6 * given.rebound_ratio,
+            rebound_after_s: given.rebound_after_s,
+            weak_fraction: given.weak_n / wanted.target_n,
+            strong_fraction: given.strong_n / wanted.target_n,
+            force_range_n: channels.place(Role::HammerForce).map(|place| range(&channels.channels[place])),
+            response_range: None,
+            expected_start_s: Some(recording.trigger_index as f64 / f64::from(channels.rate_hz)),
+            ..Limits::default()
+        };
+        let missing = recording.gaps.iter().map(ExactSizeIterator::len).sum::<usize>() as u64;
+        let hit = RawHit {
+            fs_hz: f64::from(channels.rate_hz),
+            force_n: &force_n,
+            responses: &responses,
+            missing_samples: missing,
+        };
+        let found = super::judge(hit, &limits, Some(wanted.target_n));
+        let judged =
+            |kind, measure, limit, sentence| Verdict { kind, measure, limit, sentence, ..found.clone() };
+        // a channel that runs into its converter's end spoils the record whatever the hammer did; channels
+        // differ in range, so that each is looked at in its own codes
+        if missing == 0
+            && let Some((name, touched)) = over_range(channels, recording)
+        {
+            let sentence = format!("channel {name} stands at the end of its range for {touched} samples");
+            return judged(Kind::Overload, touched as f64, 1.0, sentence);
+        }
+        if found.kind == Kind::Good
+            && let Some((name, ratio)) = noisier(channels, recording, others, given.noise_ratio)
+        {
+            let limit = given.noise_ratio;
+            let sentence = format!(
+                "channel {name} is {ratio:.1} times as noisy as in the cell's other records (at most {limit:.1})"
+            );
+            return judged(Kind::Noisy, ratio, limit, sentence);
+        }
+        match found.kind {
+            Kind::Noisy | Kind::Overload => {
+                Verdict { sentence: name_responses(&found.sentence, &names), ..found }
+            }
+            _ => found,
+        }
+    }
+}
+
+/// The channel that is noisier than `limit` times its usual noise, and by what ratio; the worst of several.
+fn noisier<'a>(
+    channels: &'a ChannelMap,
+    recording: &Recording,
+    others: &Others,
+    limit: f64,
+) -> Option<(&'a str, f64)> {
+    let noise = others::channel_noise(channels, recording.view());
+    let ratios = channels.channels.iter().zip(noise).enumerate().filter_map(|(place, (channel, noise))| {
+        let usual = others.usual_noise(place).filter(|usual| *usual > 0.0)?;
+        Some((channel.name.as_str(), noise / usual))
+    });
+    ratios.filter(|(_, ratio)| *ratio > limit).max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Full scale of a channel in its unit.
+fn range(channel: &Channel) -> f64 {
+    f64::from(channel.range_v) * f64::from(channel.units_per_volt).abs()
+}
+
+/// The first channel with more than one code at an end of its range, and how many. One may be chance.
+fn over_range<'a>(channels: &'a ChannelMap, recording: &Recording) -> Option<(&'a str, usize)> {
+    channels.channels.iter().enumerate().find_map(|(place, channel)| {
+        let extreme = |code: &&i16| **code == i16::MAX || **code == i16::MIN;
+        let touched = recording.channel(place).iter().filter(extreme).count();
+        (touched > 1).then_some((channel.name.as_str(), touched))
+    })
+}
+
+/// Puts the channels' names where the analysis, which knows places only, says `response N`.
+fn name_responses(sentence: &str, names: &[&str]) -> String {
+    names.iter().enumerate().rev().fold(sentence.to_owned(), |text, (place, name)| {
+        text.replace(&format!("response {place}"), &format!("response {name}"))
+    })
+}

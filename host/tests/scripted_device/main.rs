@@ -1,0 +1,8 @@
+//! Sessions and campaigns on a scripted device, over a link that loses and damages what it likes.
+#![allow(clippy::unwrap_used)]
+
+mod by_summary;
+mod fake;
+mod faulty;
+mod runner;
+mod session;
