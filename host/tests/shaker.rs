@@ -2,6 +2,7 @@
 #![cfg(feature = "sim")]
 #![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
 
+use jointrig::analyse::{Wanted, analyse};
 use jointrig::campaign::level::{Held, Level, Moment};
 use jointrig::campaign::plan::PAPER;
 use jointrig::campaign::shaking::{self, Limits, Options, Outcome, ShakeError, Shortfall, Summary};
@@ -10,7 +11,7 @@ use jointrig::device::address::Address;
 use jointrig::device::session::Session;
 use jointrig::exchange::read_hysteresis;
 use jointrig::exchange::uff::{self, DataSet, Values};
-use jointrig::results::{Excitation, Force, Hysteresis, Results, Shape, Wanted, analyse};
+use jointrig::results::{Excitation, Force, Hysteresis, Results, Shape};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

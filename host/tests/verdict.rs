@@ -4,9 +4,7 @@
 
 mod records;
 
-use jointrig::results::campaign::{
-    DIRECT, HIDDEN_RESONANCE, SERIES_COMPLIANCE, Wanted, analyse_measurements,
-};
+use jointrig::analyse::{DIRECT, HIDDEN_RESONANCE, SERIES_COMPLIANCE, Wanted, analyse_measurements};
 use jointrig::results::{Results, Source, words};
 use jointrig::substructuring::Dof;
 use jointrig_hil_sim::rig::RigConfig;

@@ -7,13 +7,13 @@ use clap::Args;
 use super::analyse::analyse_into;
 use super::error::CliError;
 use super::{interrupt, measure, output};
+use crate::analyse::Wanted;
 use crate::campaign::judge::ByRecord;
 use crate::campaign::plan;
 use crate::campaign::stage::Stage;
 use crate::campaign::store::Store;
 use crate::device::address::Address;
 use crate::results;
-use crate::results::Wanted;
 
 /// The whole job on the built-in simulator: campaign, analysis, report.
 #[derive(Debug, Args)]

@@ -5,12 +5,12 @@ use std::io;
 use std::path::PathBuf;
 
 use crate::advice;
+use crate::analyse::AnalyseError;
 use crate::campaign::plan::PlanError;
 use crate::campaign::runner::RunError;
 use crate::campaign::shaking::ShakeError;
 use crate::campaign::store_error::StoreError;
 use crate::device::error::DeviceError;
-use crate::results::AnalyseError;
 
 /// Why a command could not do its work.
 #[derive(Debug, thiserror::Error)]

@@ -8,8 +8,8 @@ use clap::Args;
 
 use super::error::CliError;
 use super::output;
+use crate::analyse::{BANDS_HZ, fill};
 use crate::exchange::{FrfFile, PositionsError, read_frf_file, read_positions};
-use crate::results::campaign::{BANDS_HZ, fill};
 use crate::results::{Joint, Refusal, Results, Source, words};
 use crate::substructuring::averaged::{Priors, averaged};
 use crate::substructuring::fit;

@@ -1,7 +1,7 @@
 //! The joint by substructuring: numbers over bands, and the spectra they come from.
 
 use super::Statistics;
-use super::campaign::UNIDENTIFIED;
+use crate::analyse::UNIDENTIFIED;
 use crate::substructuring::Dof;
 use serde::Serialize;
 use std::collections::BTreeMap;

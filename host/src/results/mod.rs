@@ -4,7 +4,6 @@
 //! ([`crate::report`]) and the terminal summary ([`words`]) show it and add nothing. A value that is not
 //! known is null, never NaN. Every document carries its [`Source`]: file, record ids, settings, version.
 
-pub mod campaign;
 mod check;
 mod completeness;
 mod curves;
@@ -23,7 +22,6 @@ pub use crate::hysteresis::static_arm::Identified;
 pub use crate::hysteresis::{Kind as Excitation, OverCycles, Shape};
 pub use crate::substructuring::averaged::Averaged;
 pub use crate::substructuring::joint::BandStatistic as Statistics;
-pub use campaign::{AnalyseError, KnownContact, Progress, Wanted, analyse};
 pub use check::Check;
 pub use completeness::Completeness;
 pub use curves::{FrfCurve, Role, UsableBand, rounded};

@@ -223,7 +223,7 @@ impl Measurements for Rig {
 fn quiet(_: Progress) {}
 
 fn run(rig: &Rig) -> Results {
-    analyse_measurements(rig, Results::new(super::super::Source::default()), Wanted::default(), &quiet)
+    analyse_measurements(rig, Results::new(crate::results::Source::default()), Wanted::default(), &quiet)
 }
 
 #[test]
@@ -289,7 +289,7 @@ fn cells_given_up_are_told_together() {
         response: response.into(),
     };
     let planned = [cell("AZ1", "A1"), cell("AZ2", "A1"), cell("AZ1", "A4"), cell("AZ2", "A4")];
-    let mut results = Results::new(super::super::Source::default());
+    let mut results = Results::new(crate::results::Source::default());
     let reason = || "0 of 3 good after 12 hits".to_owned();
     let given_up = [&planned[2], &planned[3], &planned[0]].map(|c| (c.clone(), reason())).to_vec();
     note_given_up(&mut results, &planned, given_up);

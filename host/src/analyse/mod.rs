@@ -36,7 +36,7 @@ pub use from_store::{AnalyseError, analyse, geometry};
 pub use interface::fill;
 pub use interface_checks::{INTERFACE_MODES, INTERNALS, SAME_IN_ALL};
 
-use super::{Completeness, MAIN_BAND_HZ, Results, UsableBand, ranges};
+use crate::results::{Completeness, MAIN_BAND_HZ, Results, UsableBand, ranges};
 use crate::spectra::{Windowing, usable_band};
 use crate::substructuring::averaged::{CellHits, Priors};
 use crate::substructuring::frf::FrfMatrix;
