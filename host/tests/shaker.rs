@@ -11,6 +11,7 @@ use jointrig::device::address::Address;
 use jointrig::device::session::Session;
 use jointrig::exchange::read_hysteresis;
 use jointrig::exchange::uff::{self, DataSet, Values};
+use jointrig::report::document;
 use jointrig::results::{Excitation, Force, Hysteresis, Results, Shape};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -72,7 +73,7 @@ impl Bench {
     fn analysed(&self) -> Results {
         let store = Store::open_read_only(&self.file).unwrap();
         assert_eq!(store.verify().unwrap(), []);
-        analyse(&store, Wanted::default(), &|_| {}).unwrap()
+        document(analyse(&store, Wanted::default(), &|_| {}).unwrap())
     }
 }
 

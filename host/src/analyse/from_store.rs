@@ -1,9 +1,12 @@
 //! The campaign file as measurements: records decoded, in SI units, one cell at a time, from any thread.
 
+use super::campaign::analyse_measurements;
 use super::cell::{
     Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel,
 };
-use super::{Progress, Wanted, completeness};
+use super::findings::Findings;
+use super::hit_counts::completeness;
+use super::wanted::{Progress, Wanted};
 use crate::campaign::frfs::ImportedFrf;
 use crate::campaign::levels::LevelRow;
 use crate::campaign::plan::{Plan, configuration_name};
@@ -14,7 +17,7 @@ use crate::campaign::store_error::StoreError;
 use crate::campaign::tally::Tally;
 use crate::device::channels::ChannelMap;
 use crate::hysteresis::HysteresisRecord;
-use crate::results::{Completeness, Results, Source};
+use crate::results::{Completeness, Source};
 use crate::spectra::MotionQuantity;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
 use jointrig_protocol::channel::{Quantity, Role};
@@ -49,16 +52,15 @@ pub enum AnalyseError {
 /// Everything that a campaign file says about the joint. What is `known` beforehand counts more than what the plan says.
 ///
 /// # Errors
-/// The file itself cannot be read. What is missing or damaged in it is told in the results instead.
+/// The file itself cannot be read. What is missing or damaged in it is told in the findings instead.
 pub fn analyse(
     store: &Store,
     wanted: Wanted,
     progress: &(dyn Fn(Progress) + Sync),
-) -> Result<Results, AnalyseError> {
+) -> Result<Findings, AnalyseError> {
     let file = CampaignFile::open(store, wanted.known)?;
-    let mut results = Results::new(file.source(store)?);
-    results.completeness = file.completeness();
-    Ok(super::analyse_measurements(&file, results, wanted, progress))
+    let (source, completeness) = (file.source(store)?, file.completeness());
+    Ok(Findings { source, completeness, ..analyse_measurements(&file, wanted, progress) })
 }
 
 struct PlannedCell {

@@ -1,4 +1,5 @@
 use super::*;
+use crate::analyse::missing::Missing;
 use crate::campaign::judge::{Judgement, Kind};
 use crate::campaign::plan::SMALL;
 use crate::campaign::rows::{Counters, NewRecord, SessionInfo};
@@ -132,23 +133,24 @@ fn a_campaign_that_stopped_half_way_gives_what_it_can() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = campaign(&folder.path().join("half.jrig"));
     store.note_link(1, &[("frames_received".to_owned(), 17)].into()).expect("noted");
-    let results = analyse(&store, Wanted::default(), &|_| {}).expect("readable");
-    let loops = results.impact_loops().expect("hits along z on A");
-    let slope = loops.k_eq_n_per_m.expect("a straight line");
+    let found = analyse(&store, Wanted::default(), &|_| {}).expect("readable");
+    let contact = found.contact.as_ref().expect("looked for");
+    let loops = contact.impacts.as_ref().expect("hits along z on A");
+    let slope = loops.slope_n_per_m;
     // 16-bit steps: 0.3 µm/s in 2 mm/s
     assert!((slope.mean / SLOPE - 1.0).abs() < 0.01, "{slope:?}");
     // AZ1 counts, AY1 does not: two locations with two good hits
-    assert_eq!((slope.cycles, results.impact_slopes.len()), (4, 4));
-    assert_eq!(loops.records.iter().map(|r| r[1] - r[0] + 1).sum::<i64>(), 4);
-    let ajb = results.completeness.iter().find(|c| c.configuration == "AJB").expect("counted");
+    assert_eq!((slope.cycles, loops.slopes.len(), loops.records.len()), (4, 4, 4));
+    let ajb = found.completeness.iter().find(|c| c.configuration == "AJB").expect("counted");
     assert_eq!((ajb.kept, ajb.refused["double hit"]), (8, 4));
-    assert_eq!(results.source.device["board"], "virtual");
-    assert_eq!(results.source.link["frames_received"], 17);
-    assert_eq!(results.source.file, "half.jrig");
-    assert!(results.missing.iter().any(|m| m.contains("A has not been measured")), "{:?}", results.missing);
-    assert!(results.joint.iter().all(|j| j.method == "direct"));
-    assert!(results.frfs.iter().all(|c| c.step_hz == 0.5), "two seconds give half-hertz lines");
-    crate::report::write(&results, &folder.path().join("out")).expect("written");
+    assert_eq!(found.source.device["board"], "virtual");
+    assert_eq!(found.source.link["frames_received"], 17);
+    assert_eq!(found.source.file, "half.jrig");
+    let unmeasured = |m: &Missing| matches!(m, Missing::NotMeasured { configuration: "A", .. });
+    assert!(found.missing.iter().any(unmeasured), "{:?}", found.missing);
+    assert!(found.substructured.is_none() && found.fits.is_empty());
+    let frfs = || found.configurations.iter().flat_map(|c| &c.frfs).chain(&contact.frfs);
+    assert!(frfs().count() > 0 && frfs().all(|c| c.step_hz == 0.5), "two seconds give half-hertz lines");
 }
 
 #[test]
@@ -156,12 +158,13 @@ fn a_new_campaign_is_no_error() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = Store::create(&folder.path().join("new.jrig"), SMALL, "small.toml").expect("created");
     let seen = std::sync::atomic::AtomicUsize::new(0);
-    let results = analyse(&store, Wanted::default(), &|p| {
+    let found = analyse(&store, Wanted::default(), &|p| {
         seen.fetch_max(p.done, std::sync::atomic::Ordering::Relaxed);
     })
     .expect("readable");
     assert_eq!(seen.into_inner(), store.cells().expect("cells").len());
-    assert!(results.hysteresis.is_empty() && !results.missing.is_empty());
+    let contact = found.contact.expect("looked for");
+    assert!(contact.impacts.is_none() && contact.levels.is_empty() && !found.missing.is_empty());
 }
 
 #[test]

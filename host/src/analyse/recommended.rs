@@ -1,47 +1,56 @@
 //! The estimates to quote, and the bootstrap over hits where it was asked for.
 
-use super::{BANDS_HZ, Wanted};
-use crate::results::{Bootstrap, MAIN_BAND_HZ, Results};
+use super::missing::Missing;
+use super::wanted::BANDS_HZ;
+use crate::results::{Bootstrap, MAIN_BAND};
 use crate::substructuring::averaged::{Averaged, AveragedError, CellHits, Prepared, Priors};
-use crate::substructuring::frf::FrfMatrix;
-use crate::substructuring::geometry::Geometry;
-use crate::substructuring::idm::IdmSet;
-use crate::substructuring::joint::Band;
 use crate::substructuring::noise::FrfNoise;
+use crate::substructuring::{Band, FrfMatrix, Geometry, IdmSet};
 
 /// The bootstrap's seed: the same file gives the same figures.
 const SEED: u64 = 1;
 
-/// The estimates to quote, with their intervals, from the assembly alone.
-pub fn fill(
-    results: &mut Results,
+/// The estimates to quote.
+#[derive(Debug, Default)]
+pub struct Recommended {
+    /// One for each band.
+    pub estimates: Vec<Averaged>,
+    /// Hits drawn anew, over the main band.
+    pub bootstrap: Option<Bootstrap>,
+    /// What there is not.
+    pub missing: Vec<Missing>,
+}
+
+/// The estimates to quote, with their intervals, from the assembly alone; `replicates` of the bootstrap.
+pub fn recommended(
     geometry: &Geometry,
     ajb: &FrfMatrix,
     noise: Option<&FrfNoise>,
+    priors: &Priors,
     hits: &[CellHits],
-    wanted: Wanted,
-) {
-    let priors = Priors::default();
-    results.source.settings.insert("priors".into(), serde_json::json!(priors));
+    replicates: usize,
+) -> Recommended {
+    let mut found = Recommended::default();
     for [low_hz, high_hz] in BANDS_HZ {
         let band = Band { low_hz, high_hz };
-        match Prepared::of(ajb, noise, geometry, IdmSet::Six, band, &priors) {
+        match Prepared::of(ajb, noise, geometry, IdmSet::Six, band, priors) {
             Ok(prepared) => {
                 let estimate = prepared.estimate();
-                if wanted.replicates > 0 && [low_hz, high_hz] == MAIN_BAND_HZ {
-                    match draw(&prepared, &estimate, hits, wanted.replicates) {
-                        Ok(drawn) => results.bootstrap = Some(drawn),
-                        Err(error) => results.missing.push(format!("No bootstrap over hits: {error}.")),
+                if replicates > 0 && band == MAIN_BAND {
+                    match draw(&prepared, &estimate, hits, replicates) {
+                        Ok(drawn) => found.bootstrap = Some(drawn),
+                        Err(error) => found.missing.push(Missing::Bootstrap(error)),
                     }
                 }
-                results.recommended.push(estimate);
+                found.estimates.push(estimate);
             }
             Err(error) => {
-                results.missing.push(format!("No estimate with an interval by Eq. A.1: {error}."));
-                return;
+                found.missing.push(Missing::Estimate(error));
+                break;
             }
         }
     }
+    found
 }
 
 /// The bootstrap, and the estimate with its scatter.

@@ -11,7 +11,8 @@ use super::number::{not_negative, positive};
 use super::output;
 use crate::analyse::{self, KnownContact, Wanted};
 use crate::campaign::store::Store;
-use crate::results::{Results, words};
+use crate::report::{self, words};
+use crate::results::Results;
 
 /// Analyse a campaign file: results.json and report.html.
 #[derive(Debug, Args)]
@@ -64,10 +65,11 @@ pub fn analyse_into(store: &Store, wanted: Wanted, folder: &Path) -> Result<Resu
         bar.set_position(progress.done as u64);
     })?;
     bar.finish_and_clear();
-    crate::report::write(&found, folder).map_err(|source| CliError::File {
+    let results = report::document(found);
+    report::write(&results, folder).map_err(|source| CliError::File {
         path: folder.into(),
         doing: "writing results and report",
         source,
     })?;
-    Ok(found)
+    Ok(results)
 }

@@ -4,7 +4,7 @@ use super::*;
 use serde_json::Value;
 
 fn document() -> Value {
-    serde_json::from_str(&example::results().to_json().expect("serialises")).expect("json")
+    serde_json::from_str(&example_tests::results().to_json().expect("serialises")).expect("json")
 }
 
 fn numbers(value: &Value, names: &[&str]) {
@@ -88,7 +88,7 @@ fn a_check_has_its_fields() {
 
 #[test]
 fn no_value_is_other_than_a_number_and_the_file_stays_small() {
-    let text = example::results().to_json().expect("serialises");
+    let text = example_tests::results().to_json().expect("serialises");
     assert!(!text.contains("NaN") && !text.contains("Infinity"));
     assert!(text.len() < 5_000_000, "{} bytes", text.len());
     let check = Check::new("x", None, "y").with("a", f64::NAN).with("b", 1.0);

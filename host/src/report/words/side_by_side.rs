@@ -1,7 +1,11 @@
 //! FBS and loops side by side (the paper's Tables 2 and 3): every kind of stiffness that was found, and what it is.
 
+use super::names::slope;
 use super::number::{band, count, decimals, short};
-use super::{Excitation, Force, Hysteresis, MAIN_BAND_HZ, OverCycles, Results, words};
+use crate::results::{
+    DIRECT, Excitation, Force, HIDDEN_RESONANCE, Hysteresis, MAIN_BAND_HZ, OverCycles, Results,
+    SERIES_COMPLIANCE, Shape,
+};
 use crate::substructuring::{Dof, fit};
 
 /// One kind of stiffness.
@@ -33,7 +37,7 @@ pub fn kinds(results: &Results) -> Vec<Kind> {
 pub fn corrected(results: &Results) -> Vec<Kind> {
     let mut kinds = shaker(results, Force::Corrected);
     let of_impacts = |h: &&Hysteresis| h.kind == Excitation::Impact && h.force == Force::Corrected;
-    if let Some((name, k)) = results.hysteresis.iter().find(of_impacts).and_then(words::slope) {
+    if let Some((name, k)) = results.hysteresis.iter().find(of_impacts).and_then(slope) {
         kinds.push(Kind {
             found: format!("{name}, impacts, first cycle of {} hits", count(k.cycles as u64)),
             mean_n_per_m: k.mean,
@@ -47,7 +51,7 @@ pub fn corrected(results: &Results) -> Vec<Kind> {
 /// The recommended estimate, the fit, and the paper's method, as far as they are there: each sees the same thing, and only the first two
 /// know how well.
 fn substructuring(results: &Results) -> Vec<Kind> {
-    let series = results.check("series-compliance").and_then(|c| c.ok);
+    let series = results.check(SERIES_COMPLIANCE).and_then(|c| c.ok);
     let what = match series {
         Some(false) => {
             "stiffness between the arms: contact and clamps in series. A property of this structure, not of the contact; for models that have no clamps"
@@ -91,7 +95,7 @@ fn substructuring(results: &Results) -> Vec<Kind> {
 }
 
 fn direct(results: &Results) -> Option<Kind> {
-    let joint = results.joint.iter().find(|j| j.method == "direct")?;
+    let joint = results.joint.iter().find(|j| j.method == DIRECT)?;
     let k = joint.sliding_stiffness()?;
     Some(Kind {
         found: format!("T/Δx of the impacts, {}", band(joint.band_hz)),
@@ -131,9 +135,7 @@ fn shaker(results: &Results, force: Force) -> Vec<Kind> {
 }
 
 fn meaning(row: &Hysteresis, results: &Results) -> String {
-    use super::Shape;
-    let hidden =
-        results.check("hidden-resonance").filter(|c| c.ok == Some(false)).and_then(|c| c.frequency_hz);
+    let hidden = results.check(HIDDEN_RESONANCE).filter(|c| c.ok == Some(false)).and_then(|c| c.frequency_hz);
     match (row.shape, hidden) {
         (Shape::Stuck, Some(f)) => format!(
             "a straight loop: the contact between the laser spots, with some per cent of the {} Hz resonance in Δx",
@@ -203,8 +205,8 @@ fn pooled(slopes: &[OverCycles]) -> Option<(f64, f64)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::example;
     use super::*;
+    use crate::results::example_tests as example;
 
     #[test]
     fn every_number_has_a_sentence_that_says_what_it_is() {

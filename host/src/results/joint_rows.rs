@@ -1,13 +1,22 @@
 //! The joint by substructuring: numbers over bands, and the spectra they come from.
 
-use super::Statistics;
-use crate::analyse::UNIDENTIFIED;
-use crate::substructuring::Dof;
+use crate::substructuring::{BandStatistic as Statistics, Dof};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
+/// Name of T/Δx at the specimens among the methods.
+pub const DIRECT: &str = "direct";
+
+/// A scatter over lines of more than this times the mean is no identification.
+pub const UNIDENTIFIED: f64 = 1.5;
+
+/// The headline quotes the row of the main band for which this is largest.
+pub fn headline_rank(method: &str, idms: usize) -> (bool, bool, usize) {
+    (method == "internal", method == "internal-printed", idms)
+}
+
 /// One method, one set of interface deformation modes, one band.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Joint {
     /// The method's name, as on the command line.
     pub method: String,

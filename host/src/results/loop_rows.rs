@@ -1,9 +1,8 @@
 //! The contact by hysteresis loops: numbers per kind of excitation, and one loop to look at.
 
-use super::{Excitation, OverCycles, Shape};
 use crate::hysteresis::backbone::Law;
 use crate::hysteresis::impact::DecayCycle;
-use crate::hysteresis::{LoopAnalysis, ShapeEvidence};
+use crate::hysteresis::{Kind as Excitation, OverCycles, Shape, ShapeEvidence};
 use serde::Serialize;
 
 /// Which force the loop was drawn with.
@@ -99,35 +98,6 @@ pub struct DecayStep {
     pub phase_deg: f64,
     /// Half the swing of Δx, m (mean over hits).
     pub amplitude_m: f64,
-}
-
-impl Hysteresis {
-    /// One record's loops, drawn with this force.
-    pub fn of(found: &LoopAnalysis, force: Force) -> Self {
-        Self {
-            force,
-            kind: found.kind,
-            frequency_hz: Some(found.frequency_hz),
-            amplitude_m: Some(found.amplitude_m),
-            shape: found.shape,
-            k_t_n_per_m: found.k_t_n_per_m,
-            stick_part: found.stick_part,
-            k_eq_n_per_m: Some(found.k_eq_n_per_m),
-            k_secant_n_per_m: found.k_secant_n_per_m,
-            k_fundamental_n_per_m: found.k_fundamental_n_per_m.map(num_complex::Complex::norm),
-            energy_j: found.energy_j,
-            friction_limit_n: found.friction_limit_n,
-            friction_coefficient: found.friction_coefficient,
-            phase_deg: Some(found.phase_deg),
-            shape_evidence: found.shape_evidence,
-            decay_cycles: found.decay_cycles.clone(),
-            decay: Vec::new(),
-            level: None,
-            moment: None,
-            records: Vec::new(),
-            warnings: found.warnings.clone(),
-        }
-    }
 }
 
 /// One cycle, sample by sample: what the loop figure shows.
