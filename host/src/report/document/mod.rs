@@ -1,21 +1,21 @@
 //! The document made of the findings: every number and sentence of `results.json` in its place.
 
-mod joint_rows;
-mod loop_rows;
-mod provenance;
-mod virtual_points;
+mod interface_from_findings;
+mod joint_from_findings;
+mod loops_from_findings;
+mod source_from_findings;
 
-use super::words::{checks, missing};
+use super::words::{check_sentences, missing_sentences};
 use crate::analyse::Findings;
 use crate::results::{Results, VERSION};
 
 /// `results.json`, from all that was found.
 pub fn document(found: Findings) -> Results {
-    let source = provenance::source(&found);
-    let checks = checks::all(&found);
-    let missing = found.missing.iter().map(missing::sentence).collect();
-    let (joint, refused) = joint_rows::rows(&found);
-    let hysteresis = loop_rows::rows(&found);
+    let source = source_from_findings::source(&found);
+    let checks = check_sentences::all(&found);
+    let missing = found.missing.iter().map(missing_sentences::sentence).collect();
+    let (joint, refused) = joint_from_findings::rows(&found);
+    let hysteresis = loops_from_findings::rows(&found);
     let mut results = Results {
         version: VERSION,
         source,
@@ -30,9 +30,10 @@ pub fn document(found: Findings) -> Results {
         ..Results::default()
     };
     if let Some(of_frfs) = &found.substructured {
-        results.virtual_points = of_frfs.virtual_points.iter().map(virtual_points::quality).collect();
-        results.interface_modes = of_frfs.cmif.as_ref().ok().map(virtual_points::interface_modes);
-        results.joint_spectrum = joint_rows::spectrum(of_frfs);
+        results.virtual_points =
+            of_frfs.virtual_points.iter().map(interface_from_findings::quality).collect();
+        results.interface_modes = of_frfs.cmif.as_ref().ok().map(interface_from_findings::interface_modes);
+        results.joint_spectrum = joint_from_findings::spectrum(of_frfs);
     }
     for measured in found.configurations {
         results.usable_bands.extend(measured.usable_band);

@@ -2,7 +2,7 @@
 
 use crate::analyse::{Contact, Findings, ImpactLoops, RecordLoops, SlopeIs};
 use crate::hysteresis::{Kind, LoopAnalysis, OverCycles, Shape};
-use crate::report::words::warnings;
+use crate::report::words::warning_sentences;
 use crate::results::{DecayStep, Force, Hysteresis, ranges};
 
 /// The impacts together, the shaker's levels, and a record of its own: each with the raw force, then with the corrected one.
@@ -17,7 +17,7 @@ pub fn rows(found: &Findings) -> Vec<Hysteresis> {
 }
 
 fn of_impacts(impacts: &ImpactLoops) -> Vec<Hysteresis> {
-    let warnings = warnings::impact_loops(impacts);
+    let warnings = warning_sentences::impact_loops(impacts);
     let row = |force, slope: OverCycles, decay: &[DecayStep]| Hysteresis {
         force,
         kind: Kind::Impact,
@@ -53,7 +53,7 @@ fn of_records(records: &[RecordLoops], resonance_hz: Option<f64>) -> Vec<Hystere
         let mut row = of_record(found, force);
         (row.level, row.moment) = (one.level.map(|(id, _)| id), one.level.map(|(_, moment)| moment.name()));
         if let (Shape::Stuck, Some(resonance_hz)) = (found.shape, resonance_hz) {
-            row.warnings.push(warnings::beside_resonance(found.frequency_hz, resonance_hz));
+            row.warnings.push(warning_sentences::beside_resonance(found.frequency_hz, resonance_hz));
         }
         row
     };

@@ -1,7 +1,7 @@
 //! The joint in the shape of the results.
 
 use crate::analyse::{Findings, Row, Substructured};
-use crate::report::words::warnings;
+use crate::report::words::warning_sentences;
 use crate::results::{DIRECT, Goodness, Joint, JointSpectrum, Refusal, SpectrumCurve, rounded};
 use crate::substructuring::direct::{self, Direct};
 use crate::substructuring::fit::{self, Fitted};
@@ -19,7 +19,7 @@ pub fn rows(found: &Findings) -> (Vec<Joint>, Vec<Refusal>) {
     for one in &found.fits {
         match &one.outcome {
             Ok(fitted) => joint.push(by_fit(fitted)),
-            Err(why) => refused.push(refusal(fit::NAME, one.idms.count(), warnings::no_fit(why))),
+            Err(why) => refused.push(refusal(fit::NAME, one.idms.count(), warning_sentences::no_fit(why))),
         }
     }
     joint.extend(found.contact.as_ref().and_then(|contact| contact.direct.as_ref()).map(at_the_specimens));
@@ -30,7 +30,7 @@ fn by_line(row: &Row) -> Joint {
     let mut joint = of_row(&row.joint);
     joint.noise_n_per_m = row.noise_n_per_m.iter().map(|(dof, noise)| (dof.name().into(), *noise)).collect();
     if let Some((k, noise)) = joint.sliding_stiffness().zip(joint.noise_n_per_m.get("z")) {
-        joint.warnings.extend(warnings::loud_noise(k.median, *noise));
+        joint.warnings.extend(warning_sentences::loud_noise(k.median, *noise));
     }
     joint
 }
@@ -52,7 +52,7 @@ fn at_the_specimens(found: &Direct) -> Joint {
         stiffness_n_per_m: along_z(found.stiffness_n_per_m),
         damping_n_s_per_m: along_z(found.damping_n_s_per_m),
         lines: found.lines,
-        warnings: warnings::direct(found),
+        warnings: warning_sentences::direct(found),
         ..Joint::default()
     }
 }
