@@ -9,6 +9,7 @@
 pub use jointrig_analysis::{hysteresis, spectra, substructuring};
 
 mod advice;
+pub mod analyse;
 pub mod campaign;
 pub mod cli;
 pub mod device;

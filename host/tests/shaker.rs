@@ -2,6 +2,7 @@
 #![cfg(feature = "sim")]
 #![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
 
+use jointrig::analyse::{Wanted, analyse};
 use jointrig::campaign::plan::PAPER;
 use jointrig::campaign::plan::level::{Held, Level, Moment};
 use jointrig::campaign::run::shaking::{self, Limits, Options, Outcome, ShakeError, Shortfall, Summary};
@@ -11,7 +12,8 @@ use jointrig::device::address::Address;
 use jointrig::device::session::Session;
 use jointrig::exchange::read_hysteresis;
 use jointrig::exchange::uff::{self, DataSet, Values};
-use jointrig::results::{Excitation, Force, Hysteresis, Results, Shape, Wanted, analyse};
+use jointrig::report::document;
+use jointrig::results::{Excitation, Force, Hysteresis, Results, Shape};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -72,7 +74,7 @@ impl Bench {
     fn analysed(&self) -> Results {
         let store = Store::open_read_only(&self.file).unwrap();
         assert_eq!(store.verify().unwrap(), []);
-        analyse(&store, Wanted::default(), &|_| {}).unwrap()
+        document(analyse(&store, Wanted::default(), &|_| {}).unwrap())
     }
 }
 

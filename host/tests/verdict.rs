@@ -4,10 +4,9 @@
 
 mod records;
 
-use jointrig::results::campaign::{
-    DIRECT, HIDDEN_RESONANCE, SERIES_COMPLIANCE, Wanted, analyse_measurements,
-};
-use jointrig::results::{Results, Source, words};
+use jointrig::analyse::{Wanted, analyse_measurements};
+use jointrig::report::{document, words};
+use jointrig::results::{DIRECT, HIDDEN_RESONANCE, Results, SERIES_COMPLIANCE};
 use jointrig::substructuring::Dof;
 use jointrig_hil_sim::rig::RigConfig;
 use records::Assembly;
@@ -25,9 +24,8 @@ impl Verdict {
     fn on(name: &str) -> Verdict {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../hil-sim/rigs").join(format!("{name}.toml"));
         let config = RigConfig::from_toml(&std::fs::read_to_string(path).expect("a rig")).expect("readable");
-        let results = Results::new(Source::default());
-        let results = analyse_measurements(&Assembly::of(config, 5), results, Wanted::default(), &|_| {});
-        Verdict { results }
+        let found = analyse_measurements(&Assembly::of(config, 5), Wanted::default(), &|_| {});
+        Verdict { results: document(found) }
     }
 
     fn series(&self) -> f64 {
@@ -56,6 +54,7 @@ fn on_the_default_rig_fbs_is_not_k_t() {
     let said = words::summary(&verdict.results).join("\n");
     assert!(said.contains("not k_T"), "{said}");
     assert!(jointrig::report::page(&verdict.results).contains("not k_T"));
+    assert!(!verdict.results.to_json().expect("serialises").contains("NaN"));
     near("series", verdict.series(), SERIES, 0.15);
     near("direct", verdict.direct(), 180e6, 0.10);
     let hidden = verdict.results.check(HIDDEN_RESONANCE).expect("the check");
@@ -97,8 +96,7 @@ fn hits_drawn_anew_scatter_as_the_noise_does() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../hil-sim/rigs/noisy.toml");
     let config = RigConfig::from_toml(&std::fs::read_to_string(path).expect("a rig")).expect("readable");
     let wanted = Wanted { replicates: 100, ..Wanted::default() };
-    let results =
-        analyse_measurements(&Assembly::of(config, 5), Results::new(Source::default()), wanted, &|_| {});
+    let results = document(analyse_measurements(&Assembly::of(config, 5), wanted, &|_| {}));
     let drawn = results.bootstrap.as_ref().expect("two hits in every cell");
     assert_eq!((drawn.replicates, <[f64; 2]>::from(drawn.band_hz)), (100, [300.0, 600.0]));
     let propagated = results.recommended[0].joint[&Dof::Z].std_noise;

@@ -9,8 +9,10 @@ use indicatif::{ProgressBar, ProgressDrawTarget};
 use super::error::CliError;
 use super::number::{not_negative, positive};
 use super::output;
+use crate::analyse::{self, KnownContact, Wanted};
 use crate::campaign::store::Store;
-use crate::results::{self, KnownContact, Results, Wanted};
+use crate::report::{self, words};
+use crate::results::Results;
 
 /// Analyse a campaign file: results.json and report.html.
 #[derive(Debug, Args)]
@@ -47,7 +49,7 @@ impl Analyse {
             effective_mass_kg: self.effective_mass,
         };
         let found = analyse_into(&store, Wanted { replicates: self.bootstrap, known }, &self.out)?;
-        if self.json { output::json(&found) } else { output::lines(results::words::summary(&found)) }
+        if self.json { output::json(&found) } else { output::lines(words::summary(&found)) }
     }
 }
 
@@ -58,15 +60,16 @@ pub fn analyse_into(store: &Store, wanted: Wanted, folder: &Path) -> Result<Resu
     } else {
         ProgressBar::hidden()
     };
-    let found = results::analyse(store, wanted, &|progress| {
+    let found = analyse::analyse(store, wanted, &|progress| {
         bar.set_length(progress.total as u64);
         bar.set_position(progress.done as u64);
     })?;
     bar.finish_and_clear();
-    crate::report::write(&found, folder).map_err(|source| CliError::File {
+    let results = report::document(found);
+    report::write(&results, folder).map_err(|source| CliError::File {
         path: folder.into(),
         doing: "writing results and report",
         source,
     })?;
-    Ok(found)
+    Ok(results)
 }

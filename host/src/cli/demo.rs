@@ -7,13 +7,13 @@ use clap::Args;
 use super::analyse::analyse_into;
 use super::error::CliError;
 use super::{interrupt, measure, output};
+use crate::analyse::Wanted;
 use crate::campaign::plan;
 use crate::campaign::run::stage::Stage;
 use crate::campaign::store::Store;
 use crate::campaign::verdict::judge::ByRecord;
 use crate::device::address::Address;
-use crate::results;
-use crate::results::Wanted;
+use crate::report::words;
 
 /// The whole job on the built-in simulator: campaign, analysis, report.
 #[derive(Debug, Args)]
@@ -57,7 +57,7 @@ impl Demo {
         }
         let store = Store::open_read_only(&file)?;
         let found = analyse_into(&store, Wanted::default(), folder)?;
-        output::lines(results::words::summary(&found))?;
+        output::lines(words::summary(&found))?;
         let (stored, raw) = store.sample_bytes()?;
         output::lines([
             format!(

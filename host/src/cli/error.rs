@@ -5,12 +5,12 @@ use std::io;
 use std::path::PathBuf;
 
 use crate::advice;
+use crate::analyse::AnalyseError;
 use crate::campaign::plan::PlanError;
 use crate::campaign::run::error::RunError;
 use crate::campaign::run::shaking::ShakeError;
 use crate::campaign::store::error::StoreError;
 use crate::device::error::DeviceError;
-use crate::results::AnalyseError;
 
 /// Why a command could not do its work.
 #[derive(Debug, thiserror::Error)]

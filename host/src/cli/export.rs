@@ -12,6 +12,7 @@ use num_complex::Complex;
 use super::analyse::analyse_into;
 use super::error::CliError;
 use super::{frf, output};
+use crate::analyse::{self, Wanted};
 use crate::campaign::plan::configuration_name;
 use crate::campaign::store::Store;
 use crate::campaign::store::frf_table::ImportedFrf;
@@ -20,8 +21,6 @@ use crate::device::channels::ChannelMap;
 use crate::exchange::npz::Array;
 use crate::exchange::positions_output::write_positions;
 use crate::exchange::{Extra, tables_output, uff_output, write_frf, write_impacts};
-use crate::results;
-use crate::results::Wanted;
 use crate::spectra::{AveragedFrf, FrfSettings, ImpactRecords, MotionQuantity, Windowing, estimate};
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::Configuration;
@@ -99,7 +98,7 @@ impl Export {
             })?;
         }
         let plan = store.plan()?;
-        let geometry = results::campaign::geometry(&plan);
+        let geometry = analyse::geometry(&plan);
         write_positions(&folders[0], &geometry, "Velocity").map_err(bad)?;
         let mut told = Vec::new();
         let rows = store.records()?;

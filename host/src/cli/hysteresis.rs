@@ -7,9 +7,11 @@ use clap::Args;
 use super::error::CliError;
 use super::number::{not_negative, positive};
 use super::output;
+use crate::analyse::{Findings, RecordLoops};
 use crate::exchange::read_hysteresis;
-use crate::hysteresis::{Correction, HysteresisError, HysteresisRecord, analyse};
-use crate::results::{Force, Hysteresis, Results, Source, words};
+use crate::hysteresis::{Correction, HysteresisRecord, analyse};
+use crate::report::{document, words};
+use crate::results::Source;
 
 /// Loops of a time record measured anywhere: stiffness, energy, shape, friction.
 ///
@@ -39,21 +41,19 @@ impl Loops {
         let bad = |what: String| CliError::Bad(format!("{}: {what}", self.record.display()));
         let mut record = read_hysteresis(&self.record).map_err(|error| CliError::Bad(error.to_string()))?;
         record.normal_load_n = self.normal_load.or(record.normal_load_n);
-        let mut results = Results::new(self.source(&record));
-        let found = |record: &HysteresisRecord, force| -> Result<Hysteresis, HysteresisError> {
-            Ok(Hysteresis::of(&analyse(record)?, force))
+        let found = |record: &HysteresisRecord| analyse(record).map_err(|error| bad(error.to_string()));
+        let stated = self.effective_mass.is_some() || self.parallel_path.is_some();
+        let correction = stated.then(|| Correction {
+            effective_mass_kg: self.effective_mass.unwrap_or(0.0),
+            parallel_path: self.parallel_path.unwrap_or(0.0),
+        });
+        let loops = RecordLoops {
+            level: None,
+            raw: found(&record)?,
+            corrected: correction.map(|correction| found(&correction.applied(&record))).transpose()?,
         };
-        results.hysteresis.push(found(&record, Force::Raw).map_err(|error| bad(error.to_string()))?);
-        if self.effective_mass.is_some() || self.parallel_path.is_some() {
-            let correction = Correction {
-                effective_mass_kg: self.effective_mass.unwrap_or(0.0),
-                parallel_path: self.parallel_path.unwrap_or(0.0),
-            };
-            let corrected = correction.applied(&record);
-            results
-                .hysteresis
-                .push(found(&corrected, Force::Corrected).map_err(|error| bad(error.to_string()))?);
-        }
+        let results =
+            document(Findings { source: self.source(&record), record: Some(loops), ..Findings::default() });
         if self.json { output::json(&results) } else { output::lines(words::summary(&results)) }
     }
 

@@ -8,9 +8,10 @@ use clap::Args;
 
 use super::error::CliError;
 use super::output;
+use crate::analyse::{BANDS_HZ, Findings, Fit, Missing, NoFit, Substructured, fits};
 use crate::exchange::{FrfFile, PositionsError, read_frf_file, read_positions};
-use crate::results::campaign::{BANDS_HZ, fill};
-use crate::results::{Joint, Refusal, Results, Source, words};
+use crate::report::{document, words};
+use crate::results::{Results, Source};
 use crate::substructuring::averaged::{Priors, averaged};
 use crate::substructuring::fit;
 use crate::substructuring::noise::FrfNoise;
@@ -87,20 +88,24 @@ impl Identify {
         let asked = self.idms.iter().flat_map(|sets| sets.0.iter().copied());
         let idms: Vec<IdmSet> = if self.idms.is_empty() { IdmSet::ALL.to_vec() } else { asked.collect() };
         let bands = if self.bands.is_empty() { default_bands(&ajb)? } else { self.bands.clone() };
-        let mut results = Results::new(self.source());
+        let mut found = Findings { source: self.source(), ..Findings::default() };
         if !methods.is_empty() {
-            let found = identify(&a, &b, &ajb, &geometry, &methods, &idms, &bands).map_err(bad)?;
+            let identified = identify(&a, &b, &ajb, &geometry, &methods, &idms, &bands).map_err(bad)?;
             let noises = [noise_a.as_ref(), noise_b.as_ref(), noise.as_ref()];
-            fill(&mut results, [&a, &b, &ajb], noises, &geometry, &self.priors(), &found);
-        }
-        if self.methods.contains(&Asked::Fit) {
-            let noises = [noise_a, noise_b, noise.clone()];
-            self.with_fit(&mut results, [&a, &b, &ajb], noises, &geometry, &idms, &bands);
+            let of_frfs = Substructured::of([&a, &b, &ajb], noises, &geometry, &self.priors(), identified);
+            found.missing.extend(of_frfs.cmif.as_ref().err().cloned().map(Missing::Cmif));
+            found.substructured = Some(of_frfs);
         }
         // the estimates with an interval need whole rigid motions
         if idms.contains(&IdmSet::Six) && methods.contains(&Method::Inverse) {
-            self.with_intervals(&mut results, &ajb, noise.as_ref(), &geometry, &bands);
+            let of = |band| averaged(&ajb, noise.as_ref(), &geometry, IdmSet::Six, band, &self.priors());
+            // where it cannot be had, the reason is among the refusals of `inverse` already
+            found.recommended = bands.iter().filter_map(|band| of(*band).ok()).collect();
         }
+        if self.methods.contains(&Asked::Fit) {
+            found.fits = self.fits([&a, &b, &ajb], [noise_a, noise_b, noise], &geometry, &idms, &bands);
+        }
+        let results = document(found);
         let printed =
             if self.json { output::json(&results) } else { output::lines(words::summary(&results)) };
         printed?;
@@ -110,38 +115,19 @@ impl Identify {
         }
     }
 
-    /// The recommended estimate over each band.
-    fn with_intervals(
-        &self,
-        results: &mut Results,
-        ajb: &FrfMatrix,
-        noise: Option<&FrfNoise>,
-        geometry: &Geometry,
-        bands: &[Band],
-    ) {
-        let priors = self.priors();
-        for band in bands {
-            // where it cannot be had, the reason is among the refusals of `inverse` already
-            if let Ok(estimate) = averaged(ajb, noise, geometry, IdmSet::Six, *band, &priors) {
-                results.recommended.push(estimate);
-            }
-        }
-    }
-
     fn priors(&self) -> Priors {
         Priors { position_m: self.position_error, aim_m: self.aim_error, hammer_angle_rad: self.angle_error }
     }
 
     /// The fit with each set of modes over each band.
-    fn with_fit(
+    fn fits(
         &self,
-        results: &mut Results,
         frfs: [&FrfMatrix; 3],
         noises: [Option<FrfNoise>; 3],
         geometry: &Geometry,
         idms: &[IdmSet],
         bands: &[Band],
-    ) {
+    ) -> Vec<Fit> {
         let shape = if self.full_joint { fit::Shape::Full } else { fit::Shape::Diagonal };
         let options = fit::Options {
             priors: self.priors(),
@@ -153,31 +139,13 @@ impl Identify {
         for ((name, frf), noise) in ["A", "B", "AJB"].into_iter().zip(frfs).zip(noises) {
             let Some(noise) = noise.or_else(|| self.noise.map(|fraction| FrfNoise::relative(frf, fraction)))
             else {
-                let reason = format!(
-                    "{name} has no array `variance`, and `fit` weighs every cell with its noise: store it (`jointrig frf --out` does), or state --noise FRACTION"
-                );
-                results.refused.extend(idms.iter().map(|set| Refusal {
-                    method: fit::NAME.into(),
-                    idms: set.count(),
-                    reason: reason.clone(),
-                }));
-                return;
+                let refused =
+                    |set: &IdmSet| Fit { idms: *set, outcome: Err(NoFit::FileWithoutVariance(name)) };
+                return idms.iter().map(refused).collect();
             };
             known.push(noise);
         }
-        let [a, b, ajb] = [0, 1, 2].map(|i| fit::Noisy { frf: frfs[i], noise: &known[i] });
-        for set in idms {
-            for band in bands {
-                match fit::fit(a, b, ajb, geometry, *set, *band, &options) {
-                    Ok(fitted) => results.joint.push(Joint::from(&fitted)),
-                    Err(error) => results.refused.push(Refusal {
-                        method: fit::NAME.into(),
-                        idms: set.count(),
-                        reason: error.to_string(),
-                    }),
-                }
-            }
-        }
+        fits(frfs, [&known[0], &known[1], &known[2]], geometry, idms, bands, &options)
     }
 
     fn source(&self) -> Source {

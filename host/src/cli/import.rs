@@ -9,12 +9,12 @@ use clap::Args;
 
 use super::error::CliError;
 use super::output;
+use crate::analyse;
 use crate::campaign::plan::{configuration_name, configuration_named};
 use crate::campaign::store::Store;
 use crate::campaign::verdict::Kind;
 use crate::exchange::npz::Array;
 use crate::exchange::{Extra, FrfFile, read_frf_file, write_frf};
-use crate::results;
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::Configuration as Points;
 use crate::substructuring::noise::FrfNoise;
@@ -92,7 +92,7 @@ impl Import {
         })?;
         let FrfFile { frf, noise, .. } = self.read()?;
         let store = Store::open(into)?;
-        let geometry = results::campaign::geometry(&store.plan()?);
+        let geometry = analyse::geometry(&store.plan()?);
         let points = match name {
             "A" => &geometry.a,
             "B" => &geometry.b,

@@ -18,8 +18,8 @@ use crate::device::address::Address;
 use crate::device::logs::Tables;
 use crate::device::session::Session;
 use crate::hysteresis::{LoopAnalysis, Shape, analyse};
-use crate::results::number::{decimals, micro};
-use crate::results::words;
+use crate::report::words;
+use crate::report::words::number::{decimals, micro};
 
 /// Measure levels of the shaker: each is brought to its amplitude, recorded in steady state and stored.
 ///

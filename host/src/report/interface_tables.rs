@@ -2,8 +2,9 @@
 
 use super::drawing::escape;
 use super::tables::{Table, UNKNOWN};
-use crate::results::number::{band, decimals, short};
-use crate::results::{Results, words};
+use crate::report::words;
+use crate::report::words::number::{band, decimals, short};
+use crate::results::Results;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 

@@ -3,6 +3,7 @@
 //! The page is one self-contained html text: figures are inline SVG, nothing is fetched, it prints. Everything
 //! shown stands in [`Results`]; this room computes no result.
 
+mod document;
 mod drawing;
 mod figures;
 mod interface_tables;
@@ -11,7 +12,9 @@ mod panel;
 pub mod records;
 mod scale;
 mod tables;
+pub mod words;
 
+pub use document::document;
 pub use page::page;
 
 use crate::results::Results;
@@ -51,7 +54,7 @@ fn replace(place: &Path, content: &[u8]) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::results::{Source, example};
+    use crate::results::{Source, example_tests as example};
 
     #[test]
     fn the_page_shows_the_numbers_of_the_results() {

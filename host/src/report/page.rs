@@ -2,7 +2,8 @@
 
 use super::drawing::escape;
 use super::{figures, interface_tables, tables};
-use crate::results::{Results, words};
+use crate::report::words;
+use crate::results::Results;
 use std::fmt::Write;
 
 const STYLE: &str = include_str!("style.css");

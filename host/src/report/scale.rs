@@ -1,6 +1,6 @@
 //! Axes: from values to pixels, with ticks at 1, 2 and 5.
 
-use crate::results::number::decimals;
+use crate::report::words::number::decimals;
 
 /// How values are spread over an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

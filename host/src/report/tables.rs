@@ -1,8 +1,10 @@
 //! The tables: html text from results.
 
 use super::drawing::escape;
-use crate::results::number::{band, count, decimals, micro, short, with_scatter};
-use crate::results::{MAIN_BAND_HZ, OverCycles, Results, side_by_side, words};
+use crate::report::words;
+use crate::report::words::number::{band, count, decimals, micro, short, with_scatter};
+use crate::report::words::side_by_side;
+use crate::results::{MAIN_BAND_HZ, OverCycles, Results};
 use std::fmt::Write;
 
 /// Builds one table; cells are escaped, columns after the first `text_columns` are set to the right.

@@ -3,6 +3,21 @@
 use serde::Serialize;
 use std::collections::BTreeMap;
 
+/// Name of the check on what lies between the arms and the contact.
+pub const SERIES_COMPLIANCE: &str = "series-compliance";
+/// Name of the check on resonances of one specimen alone.
+pub const HIDDEN_RESONANCE: &str = "hidden-resonance";
+/// Name of the check on wear.
+pub const UNCHANGED: &str = "contact-unchanged";
+/// Name of the check on which rigid motions coupling adds.
+pub const INTERFACE_MODES: &str = "interface-modes";
+/// Name of the check on n_i against n_c.
+pub const INTERNALS: &str = "internals";
+/// Name of the check on A and B being the same structures in all configurations.
+pub const SAME_IN_ALL: &str = "same-in-all-configurations";
+/// Name of the check whether A and B, coupled by the joint found, are the measured assembly.
+pub const BACK_COUPLING: &str = "back-coupling";
+
 /// One question that was put to the data.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Check {

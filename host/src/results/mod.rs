@@ -1,35 +1,35 @@
 //! Results: one document with everything that was found, and what it was found from.
 //!
-//! [`Results`] is `results.json`, field for field, with SI units in the names; the report
-//! ([`crate::report`]) and the terminal summary ([`words`]) show it and add nothing. A value that is not
-//! known is null, never NaN. Every document carries its [`Source`]: file, record ids, settings, version.
+//! [`Results`] is `results.json`, field for field, with SI units in the names: data, and nothing that computes.
+//! [`crate::report::document`] makes it of what an analysis found; the report and the terminal show it and add
+//! nothing. A value that is not known is null, never NaN. Every document carries its [`Source`]: file, record ids, settings, version.
 
-pub mod campaign;
 mod check;
 mod completeness;
 mod curves;
 #[cfg(test)]
-pub(crate) mod example;
-mod hysteresis;
-mod interface;
-mod joint;
-pub mod number;
+pub(crate) mod example_tests;
+mod interface_quality;
+mod joint_rows;
+mod loop_rows;
 mod reconstruction;
-pub mod side_by_side;
 mod source;
-pub mod words;
 
 pub use crate::hysteresis::static_arm::Identified;
 pub use crate::hysteresis::{Kind as Excitation, OverCycles, Shape};
 pub use crate::substructuring::averaged::Averaged;
 pub use crate::substructuring::joint::BandStatistic as Statistics;
-pub use campaign::{AnalyseError, KnownContact, Progress, Wanted, analyse};
-pub use check::Check;
+pub use check::{
+    BACK_COUPLING, Check, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, SAME_IN_ALL, SERIES_COMPLIANCE,
+    UNCHANGED,
+};
 pub use completeness::Completeness;
 pub use curves::{FrfCurve, Role, UsableBand, rounded};
-pub use hysteresis::{Backbone, DecayStep, Force, Hysteresis, ImpactSlope, LoopCurve, ShakerLoop};
-pub use interface::{Bootstrap, InterfaceModes, VirtualPoint};
-pub use joint::{Goodness, Joint, JointSpectrum, Refusal, SpectrumCurve};
+pub use interface_quality::{Bootstrap, InterfaceModes, VirtualPoint};
+pub use joint_rows::{
+    DIRECT, Goodness, Joint, JointSpectrum, Refusal, SpectrumCurve, UNIDENTIFIED, headline_rank,
+};
+pub use loop_rows::{Backbone, DecayStep, Force, Hysteresis, ImpactSlope, LoopCurve, ShakerLoop};
 pub use reconstruction::Reconstruction;
 pub use source::{Software, Source, ranges};
 
@@ -46,7 +46,7 @@ pub const MAIN_BAND: Band = Band { low_hz: MAIN_BAND_HZ[0], high_hz: MAIN_BAND_H
 
 /// All that was found. The first six fields are the contract that scripts rely on; the others are there for
 /// the report and may grow.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Results {
     /// Version of this shape.
     pub version: u32,
@@ -111,29 +111,7 @@ pub struct Results {
 impl Results {
     /// An empty document about `source`.
     pub fn new(source: Source) -> Self {
-        Results {
-            version: VERSION,
-            source,
-            joint: Vec::new(),
-            recommended: Vec::new(),
-            bootstrap: None,
-            virtual_points: Vec::new(),
-            interface_modes: None,
-            joint_spectrum: None,
-            hysteresis: Vec::new(),
-            checks: Vec::new(),
-            refused: Vec::new(),
-            missing: Vec::new(),
-            completeness: Vec::new(),
-            frfs: Vec::new(),
-            usable_bands: Vec::new(),
-            example_loop: None,
-            static_arm: None,
-            shaker_loops: Vec::new(),
-            backbones: Vec::new(),
-            reconstruction: None,
-            impact_slopes: Vec::new(),
-        }
+        Results { version: VERSION, source, ..Results::default() }
     }
 
     /// The substructuring result that the headline quotes: `internal` with the most IDMs over the main band,
@@ -142,7 +120,7 @@ impl Results {
         self.joint
             .iter()
             .filter(|j| j.band_hz == MAIN_BAND_HZ && j.sliding_stiffness().is_some())
-            .max_by_key(|j| (j.method == "internal", j.method == "internal-printed", j.idms))
+            .max_by_key(|j| headline_rank(&j.method, j.idms))
     }
 
     /// The estimate to quote over the main band, if it was made; whether it identified a degree of freedom is said there.
@@ -172,4 +150,4 @@ impl Results {
 }
 
 #[cfg(test)]
-mod shape;
+mod shape_tests;

@@ -1,8 +1,8 @@
 //! Impact records of a rig without waiting for them: the exact FRFs at each cell's true (wrong) geometry, times the hammer's
 //! spectrum, back into time, with the sensors' noise. What the analysis sees is what it would read from a campaign file.
 
+use jointrig::analyse::{Cell, CellName, ContactDelays, ContactSignals, Hit, Measurements};
 use jointrig::exchange::read_positions;
-use jointrig::results::campaign::{Cell, CellName, ContactDelays, ContactSignals, Hit, Measurements};
 use jointrig::spectra::MotionQuantity;
 use jointrig::substructuring::geometry::{Geometry, Grouping};
 use jointrig_hil_sim::rig::config::BodyName;

@@ -153,8 +153,8 @@ fn merge(all: &mut Vec<Point>, points: &[Point], configuration: &str) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analyse::geometry;
     use crate::campaign::plan::Plan;
-    use crate::results::campaign::geometry;
 
     const WORKBOOK: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/positions/positions.xlsx");
 

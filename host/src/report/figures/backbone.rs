@@ -4,7 +4,7 @@ use super::super::drawing::{Anchor, Area, Drawing, Stroke};
 use super::super::panel::{BLUE, GREEN, Panel, VERMILION};
 use super::super::scale::{Scale, middle_range};
 use super::WIDTH;
-use crate::results::number::{decimals, micro, short};
+use crate::report::words::number::{decimals, micro, short};
 use crate::results::{Backbone, Force, Hysteresis, OverCycles, Results};
 
 /// Most laws in one figure.

@@ -4,8 +4,9 @@ use super::super::drawing::{Anchor, Area, Drawing, Stroke};
 use super::super::panel::{BLUE, FAINT, INK, Panel, VERMILION};
 use super::super::scale::Scale;
 use super::WIDTH;
-use crate::results::number::{micro, stiffness};
-use crate::results::{MAIN_BAND_HZ, Results, side_by_side};
+use crate::report::words::number::{micro, stiffness};
+use crate::report::words::side_by_side;
+use crate::results::{MAIN_BAND_HZ, Results};
 use crate::substructuring::Dof;
 
 struct Row {

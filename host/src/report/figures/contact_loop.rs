@@ -4,7 +4,7 @@ use super::super::drawing::{Anchor, Area, Drawing, Stroke};
 use super::super::panel::{BLUE, GREEN, INK, Panel, SHADE, VERMILION, legend};
 use super::super::scale::{Scale, middle_range};
 use super::WIDTH;
-use crate::results::number::{decimals, micro};
+use crate::report::words::number::{decimals, micro};
 use crate::results::{LoopCurve, Results};
 
 /// Left: Δx, x_A, x_B and T over time. Right: T against Δx.

@@ -4,8 +4,8 @@ use super::super::drawing::{Anchor, Area, Drawing, Stroke};
 use super::super::panel::{BLUE, INK, Panel, VERMILION};
 use super::super::scale::{Scale, middle_range};
 use super::WIDTH;
+use crate::report::words::number::{micro, stiffness};
 use crate::results::Results;
-use crate::results::number::{micro, stiffness};
 use std::collections::BTreeMap;
 
 /// One dot per record in a column per impact position; mean ± σ across all.

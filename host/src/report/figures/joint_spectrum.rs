@@ -4,8 +4,9 @@ use super::super::drawing::{Anchor, Area, Drawing, Stroke};
 use super::super::panel::{INK, Panel, SHADE, legend};
 use super::super::scale::{Scale, middle_range};
 use super::{WIDTH, idm_stroke};
-use crate::results::number::{band, decimals, micro};
-use crate::results::{JointSpectrum, MAIN_BAND_HZ, Results, SpectrumCurve, words};
+use crate::report::words;
+use crate::report::words::number::{band, decimals, micro};
+use crate::results::{JointSpectrum, MAIN_BAND_HZ, Results, SpectrumCurve};
 
 const LEFT: f64 = 70.0;
 const RIGHT: f64 = 130.0;

@@ -4,8 +4,9 @@ use super::super::drawing::{Anchor, Area, Drawing, Stroke};
 use super::super::panel::{BLUE, FAINT, GREEN, INK, Panel, VERMILION, legend};
 use super::super::scale::{Scale, middle_range};
 use super::WIDTH;
-use crate::results::number::{decimals, micro};
-use crate::results::{Excitation, Force, Hysteresis, OverCycles, Results, words};
+use crate::report::words;
+use crate::report::words::number::{decimals, micro};
+use crate::results::{Excitation, Force, Hysteresis, OverCycles, Results};
 
 /// One level, ready to be drawn.
 struct Dot {

@@ -4,8 +4,8 @@ use super::super::drawing::{Anchor, Area, Drawing, Stroke};
 use super::super::panel::{BLUE, INK, Panel, VERMILION, legend};
 use super::super::scale::{Scale, middle_range};
 use super::WIDTH;
+use crate::report::words::number::{decimals, short};
 use crate::results::Results;
-use crate::results::number::{decimals, short};
 
 /// Above: specimen A; below: specimen B.
 pub fn rebuilt(results: &Results) -> Option<String> {

@@ -4,8 +4,9 @@ use super::super::drawing::{Anchor, Area, Drawing, Stroke};
 use super::super::panel::{BLUE, GREEN, INK, Panel, VERMILION, legend};
 use super::super::scale::{Scale, middle_range};
 use super::WIDTH;
-use crate::results::number::{decimals, micro, short};
-use crate::results::{Results, ShakerLoop, Shape, words};
+use crate::report::words;
+use crate::report::words::number::{decimals, micro, short};
+use crate::results::{Results, ShakerLoop, Shape};
 
 /// Most loops side by side.
 const MOST: usize = 5;

@@ -5,8 +5,8 @@ use super::super::panel::{BLUE, Panel, SHADE, VERMILION, legend};
 use super::super::scale::{Scale, middle_range};
 use super::WIDTH;
 use super::receptances::unbroken;
-use crate::results::number::decimals;
-use crate::results::{FrfCurve, Results, Role};
+use crate::report::words::number::decimals;
+use crate::results::{FrfCurve, HIDDEN_RESONANCE, Results, Role};
 
 const SHOWN_HZ: [f64; 2] = [100.0, 400.0];
 
@@ -22,7 +22,7 @@ pub fn specimens(results: &Results) -> Option<String> {
         (of(Role::ArmB), Stroke::new(BLUE, 1.0).dashed("6 3"), "arm B"),
     ];
     curves.extend(arms.into_iter().filter_map(|(curve, stroke, name)| Some((curve?, stroke, name))));
-    let resonance = results.check("hidden-resonance").and_then(|c| c.frequency_hz);
+    let resonance = results.check(HIDDEN_RESONANCE).and_then(|c| c.frequency_hz);
     let inside = |c: &FrfCurve, values: &[f64]| -> Vec<(f64, f64)> {
         let lines = values.iter().enumerate().map(|(l, v)| (c.frequency_hz(l), *v));
         lines.filter(|(f, _)| *f >= SHOWN_HZ[0] && *f <= SHOWN_HZ[1]).collect()

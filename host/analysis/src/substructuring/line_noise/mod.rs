@@ -7,6 +7,7 @@
 //! then var K = Σ |(1 + iτ) g + (1 − iτ) h*|² v with τ = σ/ω, and ω² var C = Σ |g − h*|² v.
 
 mod dyads;
+mod over_band;
 
 use super::coupling::boolean_difference;
 use super::decoupling::{

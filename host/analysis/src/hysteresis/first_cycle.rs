@@ -1,0 +1,70 @@
+//! The first cycle of a hit's decay: its slope, and what an arm's inertia would add to it.
+
+use super::correction::{Correction, rates};
+use super::impact::DecayCycle;
+use super::loops::slope;
+use super::record::{HysteresisRecord, RelativeMotion};
+use super::{HysteresisError, Shape, analyse};
+
+/// Cycles of a decay that are told: later ones drown, or carry the lowest modes alone.
+pub const DECAY_CYCLES: usize = 8;
+
+/// What one hit's first cycle says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FirstCycle {
+    /// Least-squares slope of T on Δx over the first cycle, N/m.
+    pub slope_n_per_m: f64,
+    /// How much of T that line explains, 0…1.
+    pub r_squared: f64,
+    /// Half the swing of Δx, m.
+    pub amplitude_m: f64,
+    /// Frequency of the decay's main mode, Hz.
+    pub frequency_hz: f64,
+    /// Phase by which Δx lags T, degrees.
+    pub phase_deg: f64,
+    /// The shape.
+    pub shape: Shape,
+    /// Samples of the first cycle: the first, and the first after it.
+    pub cycle: [usize; 2],
+    /// Least-squares slope of specimen B's acceleration on Δx over it, 1/s²: what the arm's inertia adds per kg.
+    pub acceleration_per_m: f64,
+    /// The first cycles of the decay, at most [`DECAY_CYCLES`].
+    pub decay: Vec<DecayCycle>,
+}
+
+impl FirstCycle {
+    /// From the velocities of specimens A and B (m/s) and the load cells' sum (N) after a hit, in step.
+    ///
+    /// # Errors
+    /// The signals hold no whole cycle, or are no numbers.
+    pub fn of(fs_hz: f64, [a, b]: [Vec<f64>; 2], force_n: Vec<f64>) -> Result<Self, HysteresisError> {
+        let acceleration = rates(&b, fs_hz);
+        let found = analyse(&HysteresisRecord {
+            fs_hz,
+            motion: RelativeMotion::Velocity { a_m_per_s: a, b_m_per_s: b },
+            force_n,
+            excitation_hz: None,
+            normal_load_n: None,
+        })?;
+        let first = found.decay_cycles.first().ok_or(HysteresisError::NoMotion)?;
+        let (from, to) = (first.first_sample, first.end_sample);
+        // the loop to be drawn begins with the first cycle
+        let displacement = &found.loop_displacement_m[..(to - from).min(found.loop_displacement_m.len())];
+        Ok(Self {
+            slope_n_per_m: first.stiffness_n_per_m,
+            r_squared: first.r_squared,
+            amplitude_m: first.amplitude_m,
+            frequency_hz: found.frequency_hz,
+            phase_deg: found.phase_deg,
+            shape: found.shape,
+            cycle: [from, to],
+            acceleration_per_m: slope(displacement, &acceleration[from..from + displacement.len()]),
+            decay: found.decay_cycles[..DECAY_CYCLES.min(found.decay_cycles.len())].to_vec(),
+        })
+    }
+
+    /// The slope with the force at the contact in place of T, N/m: a least-squares slope is linear in the force.
+    pub fn corrected_slope(&self, by: &Correction) -> f64 {
+        (1.0 + by.parallel_path) * self.slope_n_per_m + by.effective_mass_kg * self.acceleration_per_m
+    }
+}

@@ -1,0 +1,18 @@
+//! How much a virtual point's modes hold, over a band.
+
+use super::identify::VirtualPointQuality;
+use super::joint::Band;
+
+impl VirtualPointQuality {
+    /// Parts of the measured motion and of the measured force that the modes hold, 0…1: means over the lines of the band, or over all
+    /// lines where it has none.
+    pub fn held_over(&self, band: Band) -> [f64; 2] {
+        let mean = |values: &[f64]| {
+            let lines = self.frequency_hz.iter().zip(values);
+            let inside: Vec<f64> = lines.filter(|(f, _)| band.contains(**f)).map(|(_, v)| *v).collect();
+            let used = if inside.is_empty() { values } else { &inside };
+            used.iter().sum::<f64>() / used.len() as f64
+        };
+        [mean(&self.consistency.overall_sensor), mean(&self.consistency.overall_impact)]
+    }
+}

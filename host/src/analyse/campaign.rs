@@ -1,0 +1,114 @@
+//! The stages of a campaign's analysis, one after the other.
+
+use super::averages::{CellAverage, HIGHEST_HZ, LOWEST_HZ};
+use super::cell::Measurements;
+use super::checks::between_the_arms;
+use super::findings::{Findings, Settings};
+use super::fits::{Fit, NoFit, fits};
+use super::from_frfs::Substructured;
+use super::missing::{Missing, given_up};
+use super::recommended::{Recommended, recommended};
+use super::wanted::{BANDS_HZ, Progress, Wanted};
+use super::{cells_stage, configuration_stage, contact_stage};
+use crate::results::MAIN_BAND;
+use crate::spectra::Windowing;
+use crate::substructuring::averaged::Priors;
+use crate::substructuring::noise::FrfNoise;
+use crate::substructuring::{Band, FrfMatrix, Geometry, IdmSet, Method, fit, identify};
+
+/// The methods whose spectra a campaign's results keep and show; of all others they keep the bands.
+const SHOWN: [Method; 3] = [Method::Internal, Method::InternalPrinted, Method::Inverse];
+
+/// Everything that the measurements say; of what they were measured with, nothing.
+pub fn analyse_measurements<M: Measurements>(
+    measurements: &M,
+    wanted: Wanted,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Findings {
+    let (names, geometry) = (measurements.cells(), measurements.geometry());
+    let cells = cells_stage::read_all(measurements, &names, wanted.replicates > 0, progress);
+    let windowing = Windowing { sigma_per_s: measurements.sigma_per_s(), ..Windowing::default() };
+    let mut found = Findings {
+        settings: Some(Settings { windowing, lines_hz: [LOWEST_HZ, HIGHEST_HZ] }),
+        missing: cells.missing,
+        ..Findings::default()
+    };
+    found.missing.extend(given_up(&names, measurements.given_up()));
+
+    let configurations = [("A", &geometry.a), ("B", &geometry.b), ("AJB", &geometry.ajb)];
+    let all = configurations.map(|(name, points)| {
+        let planned = names.iter().filter(|c| c.configuration == name).count();
+        let own = cells.averages.iter().filter(|a| a.name.configuration == name);
+        let own: Vec<CellAverage> = own.cloned().collect();
+        let one = configuration_stage::of(measurements, name, points, &own, planned);
+        found.missing.extend(one.missing);
+        found.configurations.push(one.measured);
+        (one.frf, one.noise)
+    });
+    let frfs = all.each_ref().map(|(frf, _)| frf.as_ref());
+    let noises = all.each_ref().map(|(_, noise)| noise.as_ref());
+    match frfs {
+        [Some(a), Some(b), Some(ajb)] => match substructured([a, b, ajb], noises, geometry) {
+            Ok(of_frfs) => {
+                found.missing.extend(of_frfs.cmif.as_ref().err().cloned().map(Missing::Cmif));
+                found.substructured = Some(of_frfs);
+            }
+            Err(why) => found.missing.push(why),
+        },
+        _ => {
+            let absent = configurations.iter().zip(frfs).filter(|(_, frf)| frf.is_none());
+            found.missing.push(Missing::Configurations(absent.map(|((name, _), _)| *name).collect()));
+        }
+    }
+    if let Some(ajb) = frfs[2] {
+        let priors = Priors::default();
+        let Recommended { estimates, bootstrap, missing } =
+            recommended(geometry, ajb, noises[2], &priors, &cells.hits, wanted.replicates);
+        found.priors = Some(priors);
+        (found.recommended, found.bootstrap) = (estimates, bootstrap);
+        found.missing.extend(missing);
+    }
+    if let [Some(a), Some(b), Some(ajb)] = frfs {
+        found.fits = fit_of_the_main_band([a, b, ajb], noises, geometry);
+    }
+    let fitted: Vec<_> = found.fits.iter().filter_map(|fit| Some(fit.outcome.as_ref().ok()?.row())).collect();
+    let rows = found.substructured.iter().flat_map(|s| &s.rows).map(|row| &row.joint).chain(&fitted);
+    let fbs = between_the_arms(&found.recommended, rows);
+    let (contact, missing) =
+        contact_stage::at_the_contact(measurements, &cells.averages, &cells.loops, fbs.as_ref());
+    found.missing.extend(missing);
+    found.contact = Some(contact);
+    found
+}
+
+fn substructured(
+    frfs: [&FrfMatrix; 3],
+    noises: [Option<&FrfNoise>; 3],
+    geometry: &Geometry,
+) -> Result<Substructured, Missing> {
+    let [a, b, ajb] = frfs;
+    let bands: Vec<Band> = BANDS_HZ
+        .into_iter()
+        .filter(|b| a.frequency_hz.iter().any(|f| (b[0]..=b[1]).contains(f)))
+        .map(|[low_hz, high_hz]| Band { low_hz, high_hz })
+        .collect();
+    let identified = identify(a, b, ajb, geometry, &Method::ALL, &IdmSet::ALL, &bands);
+    let mut found = identified
+        .map(|found| Substructured::of(frfs, noises, geometry, &Priors::default(), found))
+        .map_err(Missing::Substructuring)?;
+    found.spectra.retain(|(spectrum, _)| SHOWN.iter().any(|m| m.name() == spectrum.method));
+    Ok(found)
+}
+
+/// The fit over the main band, from all three configurations and their noise.
+fn fit_of_the_main_band(
+    frfs: [&FrfMatrix; 3],
+    noises: [Option<&FrfNoise>; 3],
+    geometry: &Geometry,
+) -> Vec<Fit> {
+    let idms = IdmSet::Six;
+    let [Some(a), Some(b), Some(ajb)] = noises else {
+        return vec![Fit { idms, outcome: Err(NoFit::ImportWithoutVariance) }];
+    };
+    fits(frfs, [a, b, ajb], geometry, &[idms], &[MAIN_BAND], &fit::Options::default())
+}

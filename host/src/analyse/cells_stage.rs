@@ -1,0 +1,110 @@
+//! The cells, one at a time on each thread: read, averaged, and their signals forgotten.
+
+use super::averages::{CellAverage, average};
+use super::cell::{CellName, Measurements};
+use super::hit_spectra;
+use super::impact_loops::{self, ImpactLoop};
+use super::missing::Missing;
+use super::wanted::Progress;
+use crate::substructuring::averaged::CellHits;
+use crate::substructuring::geometry::{Geometry, Grouping};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// What came of the cells, in their order.
+#[derive(Debug, Default)]
+pub struct Cells {
+    /// FRFs of those that have a kept hit.
+    pub averages: Vec<CellAverage>,
+    /// Spectra of single hits, where they were asked for.
+    pub hits: Vec<CellHits>,
+    /// The loops of the hits that move the contact.
+    pub loops: Vec<ImpactLoop>,
+    /// What could not be used.
+    pub missing: Vec<Missing>,
+}
+
+/// Reads and averages all of `names`; `keep_hits` asks for the spectra of single hits.
+pub fn read_all<M: Measurements>(
+    measurements: &M,
+    names: &[CellName],
+    keep_hits: bool,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Cells {
+    let done = AtomicUsize::new(0);
+    let cells: Vec<Cells> = names
+        .par_iter()
+        .map(|name| {
+            let cell = read(measurements, name, keep_hits);
+            progress(Progress { done: done.fetch_add(1, Ordering::Relaxed) + 1, total: names.len() });
+            cell
+        })
+        .collect();
+    let mut all = Cells::default();
+    for cell in cells {
+        all.averages.extend(cell.averages);
+        all.hits.extend(cell.hits);
+        all.loops.extend(cell.loops);
+        all.missing.extend(cell.missing);
+    }
+    all
+}
+
+fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> Cells {
+    let mut found = Cells::default();
+    let records = |told: String| Missing::Records { cell: name.clone(), told };
+    let mut cell = match measurements.read(name) {
+        Ok(cell) => cell,
+        Err(error) => {
+            found.missing.push(records(error.to_string()));
+            return found;
+        }
+    };
+    found.missing.extend(std::mem::take(&mut cell.left_out).into_iter().map(records));
+    if cell.hits.is_empty() {
+        return found;
+    }
+    let geometry = measurements.geometry();
+    let moves_contact = counts_for_contact(geometry, name);
+    if moves_contact {
+        for hit in &cell.hits {
+            let Some(signals) = &hit.contact else { continue };
+            match impact_loops::of_hit(hit.record, &name.impact, cell.fs_hz, signals, cell.contact_delay_s) {
+                Ok(one) => found.loops.push(one),
+                Err(error) => {
+                    found.missing.push(Missing::NoLoop { cell: name.clone(), record: hit.record, error });
+                }
+            }
+        }
+    }
+    let (sigma_per_s, quantity) = (measurements.sigma_per_s(), measurements.quantity());
+    if keep_hits {
+        match hit_spectra::of(name, &geometry.ajb, &cell, sigma_per_s, quantity) {
+            Ok(hits) => found.hits.extend(hits),
+            Err(error) => found.missing.push(records(error.to_string())),
+        }
+    }
+    let contact = moves_contact || drives_the_cells(geometry, name);
+    match average(name.clone(), cell, sigma_per_s, quantity, contact) {
+        Ok(averaged) => found.averages.push(averaged),
+        Err(error) => found.missing.push(records(error.to_string())),
+    }
+    found
+}
+
+/// Whether hits at this impact move the contact along z from A's side: hits on B drive the load cells directly, and hits
+/// along x move nothing in z.
+fn counts_for_contact(geometry: &Geometry, name: &CellName) -> bool {
+    name.configuration == "AJB"
+        && geometry.ajb.impacts.iter().any(|p| {
+            p.name == name.impact
+                && matches!(p.grouping, Grouping::InterfaceA | Grouping::InternalA)
+                && p.direction[2].abs() > 0.9
+        })
+}
+
+/// Whether hits at this impact drive the load cells through arm B alone: what the static arm is identified from.
+fn drives_the_cells(geometry: &Geometry, name: &CellName) -> bool {
+    name.configuration == "B"
+        && geometry.b.impacts.iter().any(|p| p.name == name.impact && p.grouping == Grouping::InterfaceB)
+}

@@ -1,0 +1,96 @@
+//! Whether a resonance hides that only one specimen takes part in.
+
+use crate::hysteresis::compliance::{ContactCompliance, ImaginaryPeak};
+use crate::hysteresis::phase_split::{Curve, PhaseSplit};
+use crate::results::{FrfCurve, Role};
+
+/// Less phase than this between the specimens hides nothing.
+const QUIET: f64 = 0.25;
+
+/// What Δx/T says between 100 and 400 Hz.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum HiddenResonance {
+    /// The contact's signals are not here.
+    NoSignals,
+    /// Too few lines.
+    TooFewLines,
+    /// A resonance of one specimen in its clamp, and the phases that tell whose, where the curves for it are here.
+    Found(ImaginaryPeak, Option<PhaseSplit>),
+    /// Both specimens move in phase with the force.
+    Quiet(ImaginaryPeak),
+    /// Some phase, not clear of the noise.
+    Unclear(ImaginaryPeak),
+}
+
+impl HiddenResonance {
+    /// Looks for it in one compliance.
+    pub fn in_compliance(contact: &ContactCompliance) -> Self {
+        match contact.imaginary_peak() {
+            None => Self::TooFewLines,
+            Some(peak) if peak.stands_out() => Self::Found(peak, None),
+            Some(peak) if peak.over_level < QUIET => Self::Quiet(peak),
+            Some(peak) => Self::Unclear(peak),
+        }
+    }
+
+    /// The clearest answer of hits and sweeps; of equal ones that of the hits.
+    pub fn of(hits: Option<&ContactCompliance>, sweeps: &[ContactCompliance]) -> Self {
+        let of_hits = hits.map_or(Self::NoSignals, Self::in_compliance);
+        let rank = |found: &Self| match found.ok() {
+            Some(false) => 2,
+            Some(true) => 1,
+            None => 0,
+        };
+        // the last of equals counts
+        sweeps.iter().map(Self::in_compliance).chain([of_hits]).max_by_key(rank).unwrap_or(of_hits)
+    }
+
+    /// The same with the phases of specimens and arms, where it was found and the curves are all there.
+    #[must_use]
+    pub fn with_phases(self, curves: &[FrfCurve]) -> Self {
+        match self {
+            Self::Found(peak, _) => Self::Found(peak, split(curves, peak.frequency_hz)),
+            other => other,
+        }
+    }
+
+    /// Passed, failed, or none where the data cannot say.
+    pub fn ok(&self) -> Option<bool> {
+        match self {
+            Self::Found(..) => Some(false),
+            Self::Quiet(_) => Some(true),
+            Self::NoSignals | Self::TooFewLines | Self::Unclear(_) => None,
+        }
+    }
+
+    /// Where the resonance is, Hz.
+    pub fn resonance_hz(&self) -> Option<f64> {
+        if let Self::Found(peak, _) = self { Some(peak.frequency_hz) } else { None }
+    }
+}
+
+fn split(curves: &[FrfCurve], resonance_hz: f64) -> Option<PhaseSplit> {
+    let of = |role: Role| {
+        curves.iter().find(|c| c.role == role).map(|c| Curve {
+            first_hz: c.first_hz,
+            step_hz: c.step_hz,
+            magnitude: &c.magnitude_m_per_n,
+            phase_deg: &c.phase_deg,
+        })
+    };
+    let specimens = [of(Role::SpecimenA)?, of(Role::SpecimenB)?];
+    PhaseSplit::near(specimens, [of(Role::ArmA)?, of(Role::ArmB)?], resonance_hz)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_all_the_curves_the_finding_stays_as_it_was() {
+        let peak = ImaginaryPeak { frequency_hz: 192.0, over_level: 0.9, over_median: 9.0 };
+        for found in [HiddenResonance::Quiet(peak), HiddenResonance::Found(peak, None)] {
+            assert_eq!(found.with_phases(&[]), found);
+        }
+    }
+}

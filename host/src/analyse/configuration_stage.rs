@@ -1,0 +1,103 @@
+//! The averaged cells of one configuration as an FRF matrix with its noise; or FRFs from elsewhere in their place.
+
+use super::averages::{CellAverage, FORCE_LINES};
+use super::cell::Measurements;
+use super::findings::{ImportedFrom, Measured};
+use super::missing::Missing;
+use super::{assemble, chosen, imported};
+use crate::results::UsableBand;
+use crate::spectra::usable_band;
+use crate::substructuring::FrfMatrix;
+use crate::substructuring::geometry::Configuration;
+use crate::substructuring::noise::FrfNoise;
+
+/// What came of a configuration.
+#[derive(Debug)]
+pub struct ConfigurationFrfs {
+    /// What the results tell of it.
+    pub measured: Measured,
+    /// Its FRFs; none where nothing was measured.
+    pub frf: Option<FrfMatrix>,
+    /// Their noise, where it is known.
+    pub noise: Option<FrfNoise>,
+    /// What had to be done without.
+    pub missing: Vec<Missing>,
+}
+
+/// Puts the configuration together from its averaged cells, `own`, of which `planned` are in the plan.
+pub fn of<M: Measurements>(
+    measurements: &M,
+    configuration: &'static str,
+    points: &Configuration,
+    own: &[CellAverage],
+    planned: usize,
+) -> ConfigurationFrfs {
+    let mut missing = Vec::new();
+    match imported::of(measurements, configuration, own.len()) {
+        Err(why) => missing.push(why),
+        Ok(None) => {}
+        Ok(Some(found)) => {
+            let measured = Measured {
+                configuration,
+                frfs: chosen::of_matrix(configuration, points, &found.frf),
+                imported: Some(ImportedFrom {
+                    file: found.source,
+                    utc: found.utc,
+                    with_variance: found.noise.is_some(),
+                }),
+                ..Measured::default()
+            };
+            return ConfigurationFrfs { measured, frf: Some(found.frf), noise: found.noise, missing };
+        }
+    }
+    missing.extend(holes(configuration, planned, own));
+    let (sigma_per_s, quantity) = (measurements.sigma_per_s(), measurements.quantity());
+    let measured = Measured {
+        configuration,
+        records: own.iter().flat_map(|c| c.records.iter().copied()).collect(),
+        usable_band: force_band(configuration, own),
+        frfs: chosen::of_cells(configuration, points, own, sigma_per_s, quantity),
+        imported: None,
+    };
+    let assembled = assemble::assemble(configuration, points, own, sigma_per_s, quantity);
+    if assembled.frf.is_some() {
+        let (impacts, responses) = (assembled.impacts_left_out, assembled.responses_left_out);
+        if !impacts.is_empty() {
+            missing.push(Missing::ImpactsLeftOut { configuration, names: impacts });
+        }
+        if !responses.is_empty() {
+            missing.push(Missing::ResponsesLeftOut { configuration, names: responses });
+        }
+    }
+    let noise = assembled.frf.as_ref().map(|frf| assemble::noise(points, frf, own));
+    ConfigurationFrfs { measured, frf: assembled.frf, noise, missing }
+}
+
+fn holes(configuration: &'static str, planned: usize, own: &[CellAverage]) -> Vec<Missing> {
+    let absent = planned.saturating_sub(own.len());
+    let hole = if planned == 0 {
+        Some(Missing::NotInPlan(configuration))
+    } else if own.is_empty() {
+        Some(Missing::NotMeasured { configuration, planned })
+    } else {
+        (absent > 0).then_some(Missing::CellsWithoutHit { configuration, absent, planned })
+    };
+    let cells = own.iter().filter(|c| c.records.len() == 1).count();
+    let single = (cells > 0).then_some(Missing::SingleHits { configuration, cells });
+    hole.into_iter().chain(single).collect()
+}
+
+/// Where the mean force of a configuration's hits is within 6 dB of its level.
+fn force_band(configuration: &str, own: &[CellAverage]) -> Option<UsableBand> {
+    let first = own.first()?;
+    let alike = || own.iter().filter(|c| c.force_spectrum.len() == first.force_spectrum.len());
+    let count = alike().count() as f64;
+    let mean: Vec<f64> = (0..first.force_spectrum.len())
+        .map(|l| alike().map(|c| c.force_spectrum[l]).sum::<f64>() / count)
+        .collect();
+    let frequency_hz: Vec<f64> = (0..mean.len())
+        .map(|block| first.step_hz * ((block * FORCE_LINES) as f64 + 0.5 * (FORCE_LINES - 1) as f64))
+        .collect();
+    let band = usable_band(&frequency_hz, &mean, 6.0)?;
+    Some(UsableBand { configuration: configuration.into(), band_hz: [band.low_hz, band.high_hz] })
+}

@@ -1,0 +1,168 @@
+//! Everything that is read at the specimens themselves: the impacts' loops, the shaker's levels, the contact in frequency.
+
+use super::averages::{CellAverage, ContactAverage};
+use super::cell::Measurements;
+use super::checks::{ContactChange, HiddenResonance, SeriesCompliance, at_the_specimens};
+use super::impact_loops::{self, ImpactLoop, ImpactLoops};
+use super::missing::Missing;
+use super::shaker_levels::{self, Analysed, RecordLoops};
+use super::specimen_curves::specimen_curves;
+use super::{arm_from_hits, chosen};
+use crate::hysteresis::Correction;
+use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
+use crate::hysteresis::impact_spectra::ImpactSpectra;
+use crate::hysteresis::static_arm::{Basis, Identified, from_levels};
+use crate::results::{Backbone, FrfCurve, LoopCurve, Reconstruction, ShakerLoop};
+use crate::substructuring::BandStatistic;
+use crate::substructuring::direct::Direct;
+use crate::substructuring::geometry::{Geometry, Grouping};
+
+/// What the contact's own signals say.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contact {
+    /// FRFs of the specimens, and of both arms from the same impact.
+    pub frfs: Vec<FrfCurve>,
+    /// T/Δx in frequency.
+    pub direct: Option<Direct>,
+    /// Whether a resonance of one specimen is in Δx.
+    pub hidden: HiddenResonance,
+    /// What the corrected force is corrected by.
+    pub arm: Option<Identified>,
+    /// The loops of the impacts.
+    pub impacts: Option<ImpactLoops>,
+    /// The middle one of them.
+    pub example_loop: Option<LoopCurve>,
+    /// Its decay, put together from two sinusoids.
+    pub reconstruction: Option<Reconstruction>,
+    /// The loops of the shaker's levels.
+    pub levels: Vec<RecordLoops>,
+    /// A loop of the shaker at each frequency.
+    pub shaker_loops: Vec<ShakerLoop>,
+    /// How a slipping contact goes with amplitude.
+    pub backbones: Vec<Backbone>,
+    /// FBS against the specimens.
+    pub series: SeriesCompliance,
+    /// The levels before and after the hammer's cells.
+    pub change: Option<ContactChange>,
+}
+
+/// Reads it. `between_the_arms` is what FBS found there.
+pub fn at_the_contact<M: Measurements>(
+    measurements: &M,
+    averages: &[CellAverage],
+    impact_loops: &[ImpactLoop],
+    between_the_arms: Option<&BandStatistic>,
+) -> (Contact, Vec<Missing>) {
+    let (geometry, sigma_per_s) = (measurements.geometry(), measurements.sigma_per_s());
+    let (levels, complaints) = measurements.shaker_levels();
+    let mut missing: Vec<Missing> = complaints.into_iter().map(Missing::Level).collect();
+    let (steady, no_loop) = shaker_levels::analysed(&levels);
+    missing.extend(no_loop);
+
+    let (frequency_hz, by_impact) = summed(averages);
+    let spectra: Vec<ImpactSpectra<'_>> = (by_impact
+        .iter()
+        .filter(|(_, sum)| sum.force.len() == frequency_hz.len()))
+    .map(|(_, sum)| ImpactSpectra { force: &sum.force, cross: sum.cross.each_ref().map(Vec::as_slice) })
+    .collect();
+    let compliance = ContactCompliance::of_impacts(frequency_hz, sigma_per_s, &spectra);
+    let mut frfs = Vec::new();
+    if let Some((impact, sign, sum)) = shown_impact(geometry, &by_impact) {
+        frfs.extend(specimen_curves(impact, sign, frequency_hz, sigma_per_s, sum));
+        frfs.extend(chosen::arms(impact, &geometry.ajb, averages, sigma_per_s, measurements.quantity()));
+    }
+    let hidden = HiddenResonance::of(compliance.as_ref(), &shaker_levels::swept(&levels)).with_phases(&frfs);
+
+    let arm = static_arm(measurements, averages, &steady);
+    if arm.is_none() && !(steady.is_empty() && impact_loops.is_empty()) {
+        missing.push(Missing::EffectiveMass);
+    }
+    let impacts = impact_loops::gathered(impact_loops, arm.as_ref(), &hidden);
+    let shown = example(measurements, averages, impact_loops, hidden.resonance_hz());
+    let (example_loop, reconstruction) =
+        shown.map_or((None, None), |(drawn, rebuilt)| (Some(drawn), rebuilt));
+    let direct = compliance.and_then(|c| Direct::of(&c.frequency_hz, &c.compliance_m_per_n, sigma_per_s));
+    let at_the_specimens = at_the_specimens(direct.as_ref(), impacts.as_ref().map(|i| i.slope_n_per_m));
+    let found = Contact {
+        frfs,
+        direct,
+        hidden,
+        arm,
+        impacts,
+        example_loop,
+        reconstruction,
+        shaker_loops: shaker_levels::curves(&steady),
+        backbones: shaker_levels::backbones(&steady),
+        series: SeriesCompliance::of(between_the_arms, at_the_specimens),
+        change: ContactChange::of(&steady),
+        levels: shaker_levels::loops(steady, arm.as_ref()),
+    };
+    (found, missing)
+}
+
+/// The contact's spectra of the assembly, summed over the cells of each impact.
+fn summed(averages: &[CellAverage]) -> (&[f64], Vec<(&str, ContactAverage)>) {
+    let mut frequency_hz: &[f64] = &[];
+    let mut by_impact: Vec<(&str, ContactAverage)> = Vec::new();
+    for cell in averages.iter().filter(|cell| cell.name.configuration == "AJB") {
+        let Some(contact) = &cell.contact else { continue };
+        if frequency_hz.is_empty() {
+            frequency_hz = &cell.frequency_hz;
+        }
+        match by_impact.iter_mut().find(|(name, _)| *name == cell.name.impact) {
+            Some((_, sum)) if sum.force.len() == contact.force.len() => sum.add(contact),
+            Some(_) => {}
+            None => by_impact.push((&cell.name.impact, contact.clone())),
+        }
+    }
+    (frequency_hz, by_impact)
+}
+
+/// The impact that the specimens are shown from, with the sign of its direction along z: the moving mass drives the contact as the
+/// shaker does; any other impact will do.
+fn shown_impact<'a>(
+    geometry: &Geometry,
+    by_impact: &'a [(&'a str, ContactAverage)],
+) -> Option<(&'a str, f64, &'a ContactAverage)> {
+    let point = |name: &str| geometry.ajb.impacts.iter().find(|p| p.name == name);
+    let on_mass = |name: &str| point(name).is_some_and(|p| p.grouping == Grouping::InternalA);
+    let (name, sum) = by_impact.iter().max_by_key(|(name, _)| on_mass(name))?;
+    Some((name, point(name).map_or(1.0, |p| p.direction[2].signum()), sum))
+}
+
+/// What the force is corrected by: stated, or from hits on B alone, or from stuck levels.
+fn static_arm<M: Measurements>(
+    measurements: &M,
+    averages: &[CellAverage],
+    steady: &[Analysed<'_>],
+) -> Option<Identified> {
+    let known = measurements.known_contact();
+    let parallel_path = known.parallel_path.unwrap_or(0.0);
+    if let Some(effective_mass_kg) = known.effective_mass_kg {
+        let correction = Correction { effective_mass_kg, parallel_path };
+        return Some(Identified { correction, basis: Basis::Given, residual: 0.0 });
+    }
+    let geometry = measurements.geometry();
+    let (points, at, sigma_per_s) = (&geometry.b, geometry.virtual_point_b_m, measurements.sigma_per_s());
+    arm_from_hits::from_hits(averages, points, at, sigma_per_s, known.parallel_path)
+        .or_else(|| from_levels(&shaker_levels::stuck(steady), parallel_path))
+}
+
+/// The signals of the hit whose slope is the middle of all, read once more.
+fn example<M: Measurements>(
+    measurements: &M,
+    averages: &[CellAverage],
+    impact_loops: &[ImpactLoop],
+    resonance_hz: Option<f64>,
+) -> Option<(LoopCurve, Option<Reconstruction>)> {
+    let shown = impact_loops::middle(impact_loops)?;
+    let name = &averages.iter().find(|c| c.records.contains(&shown.record))?.name;
+    let cell = measurements.read(name).ok()?;
+    let hit = cell.hits.iter().find(|h| h.record == shown.record)?;
+    let (contact, delays) = (hit.contact.as_ref()?, cell.contact_delay_s);
+    let inside = resonance_hz.filter(|f| (SEARCH_HZ[0]..=SEARCH_HZ[1]).contains(f));
+    Some((
+        impact_loops::drawn(shown, cell.fs_hz, contact, delays),
+        inside.and_then(|f| impact_loops::rebuilt(shown, cell.fs_hz, contact, delays, f)),
+    ))
+}

@@ -1,0 +1,77 @@
+//! Findings: what the stages of an analysis found, each in its own type and without a word of prose.
+//!
+//! [`crate::report::document`] makes `results.json` of them. The stages hand on what the next ones need as arguments; none reads
+//! what another wrote here.
+
+use super::contact_stage::Contact;
+use super::fits::Fit;
+use super::from_frfs::Substructured;
+use super::missing::Missing;
+use super::shaker_levels::RecordLoops;
+use crate::results::{Bootstrap, Completeness, FrfCurve, Source, UsableBand};
+use crate::spectra::Windowing;
+use crate::substructuring::averaged::{Averaged, Priors};
+
+/// All that was found, as far as it was looked for.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Findings {
+    /// What it was found from.
+    pub source: Source,
+    /// How records became FRFs; none where no records of hits were read.
+    pub settings: Option<Settings>,
+    /// Kept and refused hits.
+    pub completeness: Vec<Completeness>,
+    /// What each configuration gave.
+    pub configurations: Vec<Measured>,
+    /// Joint and interface, line by line.
+    pub substructured: Option<Substructured>,
+    /// The fits that were asked for.
+    pub fits: Vec<Fit>,
+    /// What is assumed of positions and angles, where an estimate with an interval was tried in a campaign.
+    pub priors: Option<Priors>,
+    /// The estimates to quote.
+    pub recommended: Vec<Averaged>,
+    /// Hits drawn anew.
+    pub bootstrap: Option<Bootstrap>,
+    /// What the contact's own signals say in a campaign.
+    pub contact: Option<Contact>,
+    /// The loops of a record of its own.
+    pub record: Option<RecordLoops>,
+    /// What had to be done without, in the order it was noticed.
+    pub missing: Vec<Missing>,
+}
+
+/// How records became FRFs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// The windows.
+    pub windowing: Windowing,
+    /// First and last line, Hz.
+    pub lines_hz: [f64; 2],
+}
+
+/// What a configuration gave.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Measured {
+    /// `A`, `B` or `AJB`.
+    pub configuration: &'static str,
+    /// Ids of the records used.
+    pub records: Vec<i64>,
+    /// Where the hammer's force reaches.
+    pub usable_band: Option<UsableBand>,
+    /// FRFs to look at.
+    pub frfs: Vec<FrfCurve>,
+    /// Where its FRFs came from, if they were measured elsewhere.
+    pub imported: Option<ImportedFrom>,
+}
+
+/// Where FRFs came from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ImportedFrom {
+    /// The file.
+    pub file: String,
+    /// When they were imported, RFC 3339.
+    pub utc: String,
+    /// Whether their variance came with them.
+    pub with_variance: bool,
+}

@@ -1,0 +1,45 @@
+//! Fits of K and C to all three configurations and their noise.
+
+use crate::substructuring::fit::{FitError, Fitted, Noisy, Options, fit};
+use crate::substructuring::noise::FrfNoise;
+use crate::substructuring::{Band, FrfMatrix, Geometry, IdmSet};
+
+/// A fit that was asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fit {
+    /// Its interface deformation modes.
+    pub idms: IdmSet,
+    /// What came of it.
+    pub outcome: Result<Fitted, NoFit>,
+}
+
+/// Why there is no fit.
+#[derive(Debug, Clone, PartialEq)]
+pub enum NoFit {
+    /// FRFs that were imported into the campaign came without their variance.
+    ImportWithoutVariance,
+    /// The file of this configuration has no variance.
+    FileWithoutVariance(&'static str),
+    /// It failed.
+    Failed(FitError),
+}
+
+/// The fit with each set of modes over each band; `frfs` and `noises` are of A, B and AJB.
+pub fn fits(
+    frfs: [&FrfMatrix; 3],
+    noises: [&FrfNoise; 3],
+    geometry: &Geometry,
+    sets: &[IdmSet],
+    bands: &[Band],
+    options: &Options,
+) -> Vec<Fit> {
+    let [a, b, ajb] = [0, 1, 2].map(|i| Noisy { frf: frfs[i], noise: noises[i] });
+    let of = |idms: IdmSet, band: Band| {
+        let outcome = fit(a, b, ajb, geometry, idms, band, options).map_err(NoFit::Failed);
+        Fit { idms, outcome }
+    };
+    sets.iter()
+        .flat_map(|set| bands.iter().map(move |band| (*set, *band)))
+        .map(|(set, band)| of(set, band))
+        .collect()
+}

@@ -1,0 +1,133 @@
+//! From FRFs of A, B and the assembly to what they say of joint and interface: shared by campaigns and by `identify`.
+
+use super::checks::{BackCoupled, InternalsFound, SameStructures};
+use crate::results::MAIN_BAND;
+use crate::substructuring::averaged::Priors;
+use crate::substructuring::cmif::{Cmif, cmif};
+use crate::substructuring::explained::Explained;
+use crate::substructuring::geometry::{Configuration, Geometry, Grouping};
+use crate::substructuring::line_noise::LineNoise;
+use crate::substructuring::noise::FrfNoise;
+use crate::substructuring::{
+    Dof, FrfError, FrfMatrix, Identification, IdmSet, JointRow, JointSpectrum, Method, Refused,
+    VirtualPointQuality, line_noise,
+};
+use std::collections::BTreeMap;
+
+/// What the FRFs say.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Substructured {
+    /// Method × IDM set × band.
+    pub rows: Vec<Row>,
+    /// The lines, Hz; none where nothing was identified.
+    pub frequency_hz: Vec<f64>,
+    /// Stiffness and damping over these lines, with the noise where it is known.
+    pub spectra: Vec<(JointSpectrum, Option<LineNoise>)>,
+    /// Methods that refused this data.
+    pub refused: Vec<Refused>,
+    /// Quality of A's and B's virtual points.
+    pub virtual_points: Vec<VirtualPointQuality>,
+    /// Which motions coupling adds.
+    pub cmif: Result<Cmif, FrfError>,
+    /// n_i against n_c.
+    pub internals: Option<InternalsFound>,
+    /// Whether A and B are the same alone and in the assembly.
+    pub same_structures: Option<SameStructures>,
+    /// Whether A and B with the joint give the assembly.
+    pub back_coupled: Option<BackCoupled>,
+}
+
+/// A row of the joint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Its numbers.
+    pub joint: JointRow,
+    /// What the FRFs' noise alone moves the stiffness of one line by, N/m: median over the band; empty where it is not known.
+    pub noise_n_per_m: BTreeMap<Dof, f64>,
+}
+
+impl Substructured {
+    /// What the same FRFs that `found` was identified from say of joint and interface; `frfs` and `noises` are of A, B and AJB.
+    pub fn of(
+        frfs: [&FrfMatrix; 3],
+        noises: [Option<&FrfNoise>; 3],
+        geometry: &Geometry,
+        priors: &Priors,
+        found: Identification,
+    ) -> Self {
+        let [a, b, ajb] = frfs;
+        let [a, b, ajb] = [(a, &geometry.a), (b, &geometry.b), (ajb, &geometry.ajb)]
+            .map(|(frf, points)| without_spares(frf, points));
+        let cmif = cmif(&a, &b, &ajb, geometry);
+        let (internals, same_structures) = (InternalsFound::of(&found), SameStructures::of(&found));
+        let back_coupled = back_coupled(frfs, noises, geometry, priors, &found);
+        let noise = noise_of_lines(frfs, noises, geometry, &found.spectra);
+        let spectra: Vec<_> = found.spectra.into_iter().zip(noise).collect();
+        Self {
+            rows: found.joint.into_iter().map(|joint| with_noise(joint, &spectra)).collect(),
+            frequency_hz: spectra.first().map_or_else(Vec::new, |(s, _)| s.frequency_hz.clone()),
+            spectra,
+            refused: found.refused,
+            virtual_points: found.virtual_points,
+            cmif,
+            internals,
+            same_structures,
+            back_coupled,
+        }
+    }
+}
+
+fn with_noise(joint: JointRow, spectra: &[(JointSpectrum, Option<LineNoise>)]) -> Row {
+    let own = spectra.iter().find(|(s, _)| s.method == joint.method && s.modes == joint.modes);
+    let noise_n_per_m = match own {
+        Some((spectrum, Some(noise))) => noise.stiffness_over(&spectrum.frequency_hz, joint.band_hz),
+        _ => BTreeMap::new(),
+    };
+    Row { joint, noise_n_per_m }
+}
+
+/// The propagated noise of every spectrum, in their order; none where one of the three came without its variance.
+fn noise_of_lines(
+    frfs: [&FrfMatrix; 3],
+    noises: [Option<&FrfNoise>; 3],
+    geometry: &Geometry,
+    spectra: &[JointSpectrum],
+) -> Vec<Option<LineNoise>> {
+    let [Some(a), Some(b), Some(ajb)] = noises else { return vec![None; spectra.len()] };
+    spectra
+        .chunk_by(|one, next| one.modes == next.modes)
+        .flat_map(|of_set| {
+            let methods: Vec<Method> = of_set.iter().filter_map(|s| s.method.parse().ok()).collect();
+            let idms = IdmSet::of(&of_set[0].modes).filter(|_| methods.len() == of_set.len());
+            // what is refused here was refused by `identify` before, with the reason
+            idms.and_then(|idms| line_noise(frfs, [a, b, ajb], geometry, &methods, idms).ok()).map_or_else(
+                || vec![None; of_set.len()],
+                |all| all.into_iter().map(|(_, noise)| noise.ok()).collect(),
+            )
+        })
+        .collect()
+}
+
+/// The assembly put together again, with the most modes that Eq. (A.1) was asked for with; none where it was not.
+fn back_coupled(
+    frfs: [&FrfMatrix; 3],
+    noises: [Option<&FrfNoise>; 3],
+    geometry: &Geometry,
+    priors: &Priors,
+    found: &Identification,
+) -> Option<BackCoupled> {
+    let by_inverse = found.spectra.iter().filter(|s| s.method == Method::Inverse.name());
+    let idms = IdmSet::of(&by_inverse.max_by_key(|s| s.idms)?.modes)?;
+    BackCoupled::of(&Explained::of(frfs, noises, geometry, idms, MAIN_BAND, priors)?)
+}
+
+/// The matrix without the spare responses of A, which may be anything.
+fn without_spares(frf: &FrfMatrix, points: &Configuration) -> FrfMatrix {
+    let names = points.output_names();
+    let spare = |name: &String| {
+        points.channels.iter().zip(&names).any(|(p, n)| n == name && p.grouping == Grouping::InternalA)
+    };
+    let kept: Vec<String> = frf.outputs.iter().filter(|name| !spare(name)).cloned().collect();
+    // these names were just taken from it
+    frf.select(&kept, &frf.inputs).unwrap_or_else(|_| frf.clone())
+}

@@ -1,0 +1,424 @@
+//! The campaign file as measurements: records decoded, in SI units, one cell at a time, from any thread.
+
+use super::campaign::analyse_measurements;
+use super::cell::{
+    Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel,
+};
+use super::findings::Findings;
+use super::hit_counts::completeness;
+use super::wanted::{Progress, Wanted};
+use crate::campaign::plan::{Plan, configuration_name};
+use crate::campaign::run::shaking;
+use crate::campaign::run::tally::Tally;
+use crate::campaign::store::Store;
+use crate::campaign::store::error::StoreError;
+use crate::campaign::store::frf_table::ImportedFrf;
+use crate::campaign::store::level_table::LevelRow;
+use crate::campaign::store::record_row::{Damaged, RecordRow};
+use crate::device::channels::ChannelMap;
+use crate::hysteresis::HysteresisRecord;
+use crate::results::{Completeness, Source};
+use crate::spectra::MotionQuantity;
+use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
+use jointrig_protocol::channel::{Quantity, Role};
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+
+/// Scans kept before the trigger: the force window begins 1 ms before the pulse, which is 51 scans at 51.2 kHz.
+const LEAD_S: f64 = 1.25e-3;
+
+/// Why a campaign file cannot be analysed, or a cell of it not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum AnalyseError {
+    /// The file cannot be read, or a record is damaged.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// A channel is not there without which an impact cannot be analysed.
+    #[error("record {record}: its session has no channel for {role}")]
+    NoChannel {
+        /// The record.
+        record: i64,
+        /// What is missing.
+        role: &'static str,
+    },
+    /// The response channels of the file's sessions measure different quantities, or none that is motion.
+    #[error(
+        "the vibrometer's channels measure {0}: velocity, displacement or acceleration is needed, the same in all sessions"
+    )]
+    Quantity(String),
+}
+
+/// Everything that a campaign file says about the joint. What is `known` beforehand counts more than what the plan says.
+///
+/// # Errors
+/// The file itself cannot be read. What is missing or damaged in it is told in the findings instead.
+pub fn analyse(
+    store: &Store,
+    wanted: Wanted,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Findings, AnalyseError> {
+    let file = CampaignFile::open(store, wanted.known)?;
+    let (source, completeness) = (file.source(store)?, file.completeness());
+    Ok(Findings { source, completeness, ..analyse_measurements(&file, wanted, progress) })
+}
+
+struct PlannedCell {
+    id: i64,
+    name: CellName,
+    given_up: Option<String>,
+}
+
+struct CampaignFile {
+    path: PathBuf,
+    plan: Plan,
+    known: KnownContact,
+    geometry: Geometry,
+    quantity: MotionQuantity,
+    cells: Vec<PlannedCell>,
+    tally: Tally,
+    records: HashMap<i64, Vec<Result<RecordRow, Damaged>>>,
+    channels: HashMap<i64, ChannelMap>,
+    /// Open connections that no thread uses at the moment: SQLite's cannot be shared, only handed on.
+    idle: Mutex<Vec<Store>>,
+}
+
+impl CampaignFile {
+    fn open(store: &Store, known: KnownContact) -> Result<Self, AnalyseError> {
+        let plan = store.plan()?;
+        let planned = plan.contact.as_ref().map(|contact| *contact.get_ref()).unwrap_or_default();
+        let known = KnownContact {
+            normal_load_n: known.normal_load_n.or(planned.normal_load_n),
+            parallel_path: known.parallel_path.or(planned.parallel_path),
+            effective_mass_kg: known.effective_mass_kg.or(planned.effective_mass_kg),
+        };
+        let (rows, all) = (store.cells()?, store.records()?);
+        let tally = Tally::new(&rows, &all);
+        let cells = rows
+            .into_iter()
+            .map(|row| PlannedCell {
+                id: row.id,
+                name: CellName {
+                    configuration: configuration_name(row.cell.configuration).into(),
+                    impact: row.cell.impact,
+                    response: row.cell.response,
+                },
+                given_up: row.given_up,
+            })
+            .collect();
+        let mut records: HashMap<i64, Vec<Result<RecordRow, Damaged>>> = HashMap::new();
+        for record in all {
+            let cell = record.as_ref().map_or_else(|damaged| damaged.place.cell, |row| row.cell);
+            records.entry(cell).or_default().push(record);
+        }
+        let mut channels = HashMap::new();
+        for (session, _) in store.sessions()? {
+            channels.insert(session, store.channels(session)?);
+        }
+        Ok(CampaignFile {
+            path: store.path().into(),
+            geometry: geometry(&plan),
+            quantity: response_quantity(channels.values())?,
+            known,
+            plan,
+            cells,
+            tally,
+            records,
+            channels,
+            idle: Mutex::new(Vec::new()),
+        })
+    }
+
+    fn source(&self, store: &Store) -> Result<Source, AnalyseError> {
+        let file = self.path.file_name().unwrap_or(self.path.as_os_str()).to_string_lossy().into_owned();
+        let mut source = Source { file, kind: "campaign".into(), ..Source::default() };
+        source.started = self.records.values().flatten().flatten().map(|r| r.utc.clone()).min();
+        let sessions = store.sessions()?;
+        if let Some((_, info)) = sessions.last() {
+            for (key, value) in [
+                ("address", info.address.clone()),
+                ("board", info.board.clone()),
+                ("serial", info.serial.clone()),
+                ("firmware_version", info.firmware_version.clone()),
+                ("target", info.target.clone()),
+                ("build", info.build.to_string()),
+                ("schema_hash", info.schema_hash.to_string()),
+                ("sessions", sessions.len().to_string()),
+            ] {
+                source.device.insert(key.into(), value);
+            }
+        }
+        let (text, plan_file) = store.plan_text()?;
+        source.settings.insert("plan".into(), self.plan.name.clone().into());
+        source.settings.insert("plan_file".into(), plan_file.into());
+        source
+            .settings
+            .insert("plan_crc32".into(), format!("{:08x}", crc32fast::hash(text.as_bytes())).into());
+        source
+            .settings
+            .insert("virtual_point_m".into(), serde_json::json!(self.plan.geometry.virtual_point_m));
+        // what the simulated rig was seeded with, where it was one
+        if let Some(seed) = store.meta("demo_seed")? {
+            source.settings.insert("seed".into(), seed.into());
+        }
+        source.link = store.link_counters()?;
+        Ok(source)
+    }
+
+    fn completeness(&self) -> Vec<Completeness> {
+        let mut names: Vec<&str> = Vec::new();
+        for cell in &self.cells {
+            if !names.contains(&cell.name.configuration.as_str()) {
+                names.push(&cell.name.configuration);
+            }
+        }
+        names
+            .into_iter()
+            .map(|name| {
+                let own = self.cells.iter().filter(|c| c.name.configuration == name).map(|cell| {
+                    let count = self.tally.cell(cell.id);
+                    let refused = count.refused.iter().map(|(kind, n)| (kind.name(), *n as usize)).collect();
+                    (count.wanted as usize, count.kept as usize, refused)
+                });
+                completeness(name, own)
+            })
+            .collect()
+    }
+
+    fn records_of(&self, cell: i64) -> &[Result<RecordRow, Damaged>] {
+        self.records.get(&cell).map_or(&[], Vec::as_slice)
+    }
+
+    /// Runs `work` with a connection of its own.
+    fn with_reader<T>(
+        &self,
+        work: impl FnOnce(&Store) -> Result<T, AnalyseError>,
+    ) -> Result<T, AnalyseError> {
+        // a connection is whole even if the thread that used it panicked
+        let waiting = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
+        let idle = waiting().pop();
+        let store = match idle {
+            Some(store) => store,
+            None => Store::open_read_only(&self.path)?,
+        };
+        let result = work(&store);
+        waiting().push(store);
+        result
+    }
+
+    fn hit(&self, store: &Store, record: &RecordRow) -> Result<(Hit, Cell), AnalyseError> {
+        let missing = |role| AnalyseError::NoChannel { record: record.id, role };
+        let map = self.channels.get(&record.session).ok_or(missing("anything"))?;
+        let samples = store.samples(record)?;
+        let rate = f64::from(map.rate_hz);
+        // exactly as many samples as the plan's length: half-hertz lines from two seconds
+        let lead = (LEAD_S * rate).ceil() as usize;
+        let length = self.plan.post_trigger_scans() as usize;
+        let from = record.trigger_index.saturating_sub(lead);
+        let signal = |place: usize| -> Vec<f64> {
+            let codes = samples.channel(place);
+            map.to_si(place, &codes[from.min(codes.len())..(from + length).min(codes.len())])
+        };
+        let delay = |place: usize| f64::from(map.channels[place].delay_ns) * 1e-9;
+        let force = map.place(Role::HammerForce).ok_or(missing("the hammer's force"))?;
+        let responses = map.responses().ok_or(missing("the response along x, y and z"))?;
+        let late = |place: usize| delay(place) - delay(force);
+        let mut about = Cell { fs_hz: rate, response_delay_s: responses.map(late), ..Cell::default() };
+        let (a, b, cells) =
+            (map.place(Role::SpecimenA), map.place(Role::SpecimenB), map.places(Role::LoadCell));
+        let is_velocity = |place: usize| map.channels[place].quantity == Quantity::Velocity;
+        let contact = match (a, b) {
+            (Some(a), Some(b)) if is_velocity(a) && is_velocity(b) && !cells.is_empty() => {
+                about.contact_delay_s = ContactDelays {
+                    specimen_a: late(a),
+                    specimen_b: late(b),
+                    // one amplifier: the cells are alike
+                    load_cells: late(cells[0]),
+                };
+                let mut tangential_n = vec![0.0; signal(a).len()];
+                for place in &cells {
+                    tangential_n.iter_mut().zip(signal(*place)).for_each(|(sum, v)| *sum += v);
+                }
+                Some(ContactSignals {
+                    specimen_a_m_per_s: signal(a),
+                    specimen_b_m_per_s: signal(b),
+                    tangential_n,
+                })
+            }
+            _ => None,
+        };
+        let hit = Hit { record: record.id, force_n: signal(force), response: responses.map(signal), contact };
+        Ok((hit, about))
+    }
+}
+
+impl CampaignFile {
+    fn level(&self, store: &Store, row: &LevelRow) -> Result<ShakerLevel, String> {
+        if !row.gaps.is_empty() {
+            return Err("samples of it were lost on the way: measure it again".into());
+        }
+        let channels = self.channels.get(&row.session).ok_or("its session is missing")?;
+        let samples = store.level_samples(row).map_err(|error| error.to_string())?;
+        let record = shaking::record(channels, &samples, &row.level()).map_err(|error| error.to_string())?;
+        let record = HysteresisRecord { normal_load_n: self.known.normal_load_n, ..record };
+        Ok(ShakerLevel { id: row.id, moment: row.moment, level: row.level(), record })
+    }
+}
+
+impl Measurements for CampaignFile {
+    type Error = AnalyseError;
+
+    fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    fn sigma_per_s(&self) -> f64 {
+        self.plan.window.exponential_per_s
+    }
+
+    fn quantity(&self) -> MotionQuantity {
+        self.quantity
+    }
+
+    fn cells(&self) -> Vec<CellName> {
+        self.cells.iter().map(|c| c.name.clone()).collect()
+    }
+
+    fn given_up(&self) -> Vec<(CellName, String)> {
+        self.cells.iter().filter_map(|c| Some((c.name.clone(), c.given_up.clone()?))).collect()
+    }
+
+    fn imported(&self, configuration: &str) -> Result<Option<ImportedFrf>, AnalyseError> {
+        self.with_reader(|store| Ok(store.frf(configuration)?))
+    }
+
+    fn known_contact(&self) -> KnownContact {
+        self.known
+    }
+
+    fn shaker_levels(&self) -> (Vec<ShakerLevel>, Vec<String>) {
+        let (mut levels, mut complaints) = (Vec::new(), Vec::new());
+        let read = self.with_reader(|store| {
+            for row in store.levels()? {
+                let row = match row {
+                    Ok(row) => row,
+                    Err(damaged) => {
+                        complaints.push(format!(
+                            "Shaker, level {} is damaged ({}) and was left out.",
+                            damaged.id, damaged.what
+                        ));
+                        continue;
+                    }
+                };
+                match self.level(store, &row) {
+                    Ok(level) => levels.push(level),
+                    Err(why) => {
+                        complaints.push(format!("Shaker, {} ({}): {why}.", row.level(), row.moment.name()));
+                    }
+                }
+            }
+            Ok(())
+        });
+        complaints.extend(read.err().map(|error| format!("The shaker's levels: {error}.")));
+        (levels, complaints)
+    }
+
+    fn read(&self, cell: &CellName) -> Result<Cell, AnalyseError> {
+        let Some(planned) = self.cells.iter().find(|c| c.name == *cell) else { return Ok(Cell::default()) };
+        self.with_reader(|store| {
+            let mut whole = Cell::default();
+            let mut left_out = Vec::new();
+            for record in self.records_of(planned.id) {
+                let record = match record {
+                    Ok(record) if record.kept() => record,
+                    Ok(_) => continue,
+                    Err(Damaged { place, what }) => {
+                        left_out.push(format!("record {} is damaged ({what}) and was left out", place.id));
+                        continue;
+                    }
+                };
+                match self.hit(store, record) {
+                    Ok((hit, about)) => {
+                        let mut hits = std::mem::take(&mut whole.hits);
+                        hits.push(hit);
+                        whole = Cell { hits, ..about };
+                    }
+                    Err(AnalyseError::Store(StoreError::Damaged { record, what, .. })) => {
+                        left_out.push(format!("record {record} is damaged ({what}) and was left out"));
+                    }
+                    Err(other) => return Err(other),
+                }
+            }
+            Ok(Cell { left_out, ..whole })
+        })
+    }
+}
+
+/// The plan's points in the shape that substructuring knows: every response along x, y and z.
+pub fn geometry(plan: &Plan) -> Geometry {
+    const AXES: [(&str, [f64; 3]); 3] =
+        [("x", [1.0, 0.0, 0.0]), ("y", [0.0, 1.0, 0.0]), ("z", [0.0, 0.0, 1.0])];
+    let mut geometry = Geometry {
+        a: Configuration::default(),
+        b: Configuration::default(),
+        ajb: Configuration::default(),
+        virtual_point_a_m: plan.geometry.virtual_point_m,
+        virtual_point_b_m: plan.geometry.virtual_point_m,
+    };
+    for structure in &plan.configuration {
+        let named = |names: &[toml::Spanned<String>], name: &str| names.iter().any(|n| n.get_ref() == name);
+        let mut points = Configuration::default();
+        for response in plan.geometry.response.iter().map(toml::Spanned::get_ref) {
+            let Ok(grouping) = Grouping::try_from(response.grouping) else { continue };
+            if named(&structure.responses, &response.name) {
+                points.channels.extend(AXES.map(|(axis, direction)| Point {
+                    name: response.name.clone(),
+                    description: format!("{}:{axis}", response.name),
+                    grouping,
+                    position_m: response.position_m,
+                    direction,
+                }));
+            }
+        }
+        for impact in plan.geometry.impact.iter().map(toml::Spanned::get_ref) {
+            let Ok(grouping) = Grouping::try_from(impact.grouping) else { continue };
+            if named(&structure.impacts, &impact.name) {
+                points.impacts.push(Point {
+                    name: impact.name.clone(),
+                    description: impact.name.clone(),
+                    grouping,
+                    position_m: impact.position_m,
+                    direction: impact.direction,
+                });
+            }
+        }
+        match structure.name.get_ref().as_str() {
+            "A" => geometry.a = points,
+            "B" => geometry.b = points,
+            _ => geometry.ajb = points,
+        }
+    }
+    geometry
+}
+
+fn response_quantity<'a>(maps: impl Iterator<Item = &'a ChannelMap>) -> Result<MotionQuantity, AnalyseError> {
+    let mut found: Vec<Quantity> = Vec::new();
+    for map in maps {
+        for channel in map.channels.iter().filter(|c| matches!(c.role, Role::Response(_))) {
+            if !found.contains(&channel.quantity) {
+                found.push(channel.quantity);
+            }
+        }
+    }
+    match found[..] {
+        // nothing was connected yet: nothing will be read either
+        [] | [Quantity::Velocity] => Ok(MotionQuantity::Velocity),
+        [Quantity::Displacement] => Ok(MotionQuantity::Displacement),
+        [Quantity::Acceleration] => Ok(MotionQuantity::Acceleration),
+        _ => Err(AnalyseError::Quantity(found.iter().map(|q| q.unit()).collect::<Vec<_>>().join(" and "))),
+    }
+}
+
+#[cfg(test)]
+#[path = "from_store_tests.rs"]
+mod tests;

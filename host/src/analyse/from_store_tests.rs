@@ -1,0 +1,179 @@
+use super::*;
+use crate::analyse::missing::Missing;
+use crate::campaign::plan::SMALL;
+use crate::campaign::store::notes::utc_now;
+use crate::campaign::store::record_row::NewRecord;
+use crate::campaign::store::session_table::{Counters, SessionInfo};
+use crate::campaign::store::stored::Hex;
+use crate::campaign::verdict::{Kind, Verdict};
+use crate::device::recording::Recording;
+use jointrig_protocol::channel::{Axis, Channel};
+use jointrig_protocol::shot::{Phase, Shot};
+use std::f64::consts::{PI, TAU};
+use std::path::Path;
+
+const RATE: u32 = 51_200;
+const TRIGGER: usize = 256;
+/// What the made-up loops have, N/m.
+const SLOPE: f64 = 150e6;
+
+/// Channels with the rig's scales; polarity of B's vibrometer turned round, as the scale's sign says.
+fn map() -> ChannelMap {
+    let channel = |name: &str, role, quantity, units_per_volt| Channel {
+        name: name.try_into().expect("short"),
+        role,
+        quantity,
+        units_per_volt,
+        range_v: 10.0,
+        delay_ns: if matches!(role, Role::Response(_)) { 20_000 } else { 0 },
+        bits: 16,
+    };
+    let mut channels = vec![channel("hammer", Role::HammerForce, Quantity::Force, 44.6)];
+    for (name, axis) in [("x", Axis::X), ("y", Axis::Y), ("z", Axis::Z)] {
+        channels.push(channel(name, Role::Response(axis), Quantity::Velocity, 0.005));
+    }
+    channels.push(channel("ldv_a", Role::SpecimenA, Quantity::Velocity, 0.001));
+    channels.push(channel("ldv_b", Role::SpecimenB, Quantity::Velocity, -0.001));
+    for name in ["lc1", "lc2", "lc3"] {
+        channels.push(channel(name, Role::LoadCell, Quantity::Force, 20.0));
+    }
+    ChannelMap { id: 0, rate_hz: RATE, channels }
+}
+
+/// A hit at the trigger, and a decay at 208 Hz in everything else; T and Δx in phase with the slope above.
+fn recording(map: &ChannelMap, peak_n: f64) -> Recording {
+    let scans = TRIGGER + 2 * RATE as usize;
+    let at = |scan: usize| (scan as f64 - TRIGGER as f64) / f64::from(RATE);
+    let (w, decay) = (TAU * 208.0, 20.0);
+    let value = |role: Role, t: f64| -> f64 {
+        if role == Role::HammerForce {
+            let share = t / 0.41e-3;
+            return if (0.0..1.0).contains(&share) { peak_n * (PI * share).sin() } else { 0.0 };
+        }
+        if t < 0.0 {
+            return 0.0;
+        }
+        let ring = (-decay * t).exp();
+        let (sine, cosine) = (w * t).sin_cos();
+        // derivative of ring · sine
+        let rate = ring * (w * cosine - decay * sine);
+        match role {
+            Role::SpecimenA => peak_n * 6e-9 * rate,
+            Role::SpecimenB => peak_n * 4e-9 * rate,
+            Role::LoadCell => SLOPE * peak_n * 2e-9 * ring * sine / 3.0,
+            _ => peak_n * 5e-9 * rate,
+        }
+    };
+    let codes = map
+        .channels
+        .iter()
+        .flat_map(|c| (0..scans).map(move |s| (value(c.role, at(s)) / c.units_per_code()).round() as i16))
+        .collect();
+    let shot = Shot {
+        number: 1,
+        phase: Phase::Done,
+        fired_at: 0,
+        trigger: TRIGGER as u64,
+        pulse_us: 3_000,
+        peak_n: peak_n as f32,
+        width_us: 410.0,
+        rebound_ratio: 0.0,
+        rebound_after: 0,
+        friction_peak_n: 0.0,
+        quiet_ratio: 0.0,
+    };
+    Recording {
+        epoch: 1,
+        first_scan: 0,
+        trigger_index: TRIGGER,
+        channels: map.len(),
+        codes,
+        gaps: vec![],
+        shot,
+    }
+}
+
+/// A campaign of which only AJB was measured: two good hits and a refused one in each of its cells.
+fn campaign(path: &Path) -> Store {
+    let mut store = Store::create(path, SMALL, "small.toml").expect("created");
+    let info = SessionInfo {
+        address: "sim:".into(),
+        board: "virtual".into(),
+        serial: "7".into(),
+        firmware_version: "0.1.0".into(),
+        target: "x".into(),
+        build: Hex(1),
+        schema_hash: Hex(2),
+    };
+    let map = map();
+    let session = store.begin_session(&info, &map).expect("session");
+    for cell in
+        store.cells().expect("cells").iter().filter(|c| configuration_name(c.cell.configuration) == "AJB")
+    {
+        for (attempt, (peak, kind)) in
+            [(50.0, Kind::Good), (48.0, Kind::DoubleHit), (46.0, Kind::Good)].into_iter().enumerate()
+        {
+            let verdict =
+                Verdict { peak_n: peak, ..Verdict::without_pulse(kind, 0.0, 0.0, "made up".into()) };
+            let record = NewRecord {
+                cell: cell.id,
+                attempt: attempt as u32,
+                session,
+                utc: utc_now(),
+                utc_error_s: None,
+                recording: recording(&map, peak),
+                verdict,
+            };
+            store.insert(&record, &Counters::new()).expect("stored");
+        }
+    }
+    store
+}
+
+#[test]
+fn a_campaign_that_stopped_half_way_gives_what_it_can() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = campaign(&folder.path().join("half.jrig"));
+    store.note_link(1, &[("frames_received".to_owned(), 17)].into()).expect("noted");
+    let found = analyse(&store, Wanted::default(), &|_| {}).expect("readable");
+    let contact = found.contact.as_ref().expect("looked for");
+    let loops = contact.impacts.as_ref().expect("hits along z on A");
+    let slope = loops.slope_n_per_m;
+    // 16-bit steps: 0.3 µm/s in 2 mm/s
+    assert!((slope.mean / SLOPE - 1.0).abs() < 0.01, "{slope:?}");
+    // AZ1 counts, AY1 does not: two locations with two good hits
+    assert_eq!((slope.cycles, loops.slopes.len(), loops.records.len()), (4, 4, 4));
+    let ajb = found.completeness.iter().find(|c| c.configuration == "AJB").expect("counted");
+    assert_eq!((ajb.kept, ajb.refused["double hit"]), (8, 4));
+    assert_eq!(found.source.device["board"], "virtual");
+    assert_eq!(found.source.link["frames_received"], 17);
+    assert_eq!(found.source.file, "half.jrig");
+    let unmeasured = |m: &Missing| matches!(m, Missing::NotMeasured { configuration: "A", .. });
+    assert!(found.missing.iter().any(unmeasured), "{:?}", found.missing);
+    assert!(found.substructured.is_none() && found.fits.is_empty());
+    let frfs = || found.configurations.iter().flat_map(|c| &c.frfs).chain(&contact.frfs);
+    assert!(frfs().count() > 0 && frfs().all(|c| c.step_hz == 0.5), "two seconds give half-hertz lines");
+}
+
+#[test]
+fn a_new_campaign_is_no_error() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = Store::create(&folder.path().join("new.jrig"), SMALL, "small.toml").expect("created");
+    let seen = std::sync::atomic::AtomicUsize::new(0);
+    let found = analyse(&store, Wanted::default(), &|p| {
+        seen.fetch_max(p.done, std::sync::atomic::Ordering::Relaxed);
+    })
+    .expect("readable");
+    assert_eq!(seen.into_inner(), store.cells().expect("cells").len());
+    let contact = found.contact.expect("looked for");
+    assert!(contact.impacts.is_none() && contact.levels.is_empty() && !found.missing.is_empty());
+}
+
+#[test]
+fn the_plan_becomes_a_geometry() {
+    let plan = Plan::parse(SMALL, "small.toml").expect("a plan");
+    let geometry = geometry(&plan);
+    assert_eq!(geometry.ajb.output_names(), ["A1:x", "A1:y", "A1:z", "B1:x", "B1:y", "B1:z"]);
+    assert_eq!(geometry.ajb.input_names(), ["AZ1", "AY1"]);
+    assert_eq!(geometry.b.impacts[0].direction, [0.0, 0.0, -1.0]);
+}

@@ -1,0 +1,23 @@
+//! FRFs that were measured elsewhere stand in for a configuration that was not measured here.
+
+use super::cell::Measurements;
+use super::missing::Missing;
+use crate::campaign::store::frf_table::ImportedFrf;
+
+/// The imported FRFs of a configuration that has no averaged cell, if there are any.
+///
+/// # Errors
+/// They cannot be read; or hits were measured too, and these count.
+pub fn of<M: Measurements>(
+    measurements: &M,
+    configuration: &'static str,
+    cells: usize,
+) -> Result<Option<ImportedFrf>, Missing> {
+    match measurements.imported(configuration) {
+        Err(error) => Err(Missing::ImportUnreadable { configuration, told: error.to_string() }),
+        Ok(Some(found)) if cells > 0 => {
+            Err(Missing::ImportUnused { configuration, file: found.source, cells })
+        }
+        Ok(found) => Ok(found),
+    }
+}

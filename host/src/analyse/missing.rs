@@ -1,0 +1,161 @@
+//! What an analysis had to do without, and why.
+
+use super::cell::CellName;
+use crate::campaign::plan::level::Level;
+use crate::hysteresis::HysteresisError;
+use crate::substructuring::averaged::AveragedError;
+use crate::substructuring::{FrfError, IdentifyError};
+
+/// One thing that was done without. Errors that come from files are kept as they were told.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Missing {
+    /// Something is wrong with a cell's records.
+    Records {
+        /// The cell.
+        cell: CellName,
+        /// What.
+        told: String,
+    },
+    /// A record gives no loop.
+    NoLoop {
+        /// The cell.
+        cell: CellName,
+        /// The record.
+        record: i64,
+        /// Why.
+        error: HysteresisError,
+    },
+    /// Cells of one response location that were given up for one reason.
+    GivenUp {
+        /// Configuration: `A`, `B` or `AJB`.
+        configuration: String,
+        /// The response location.
+        response: String,
+        /// The impacts.
+        impacts: Vec<String>,
+        /// Cells of this location in the plan.
+        planned: usize,
+        /// Why, as it was noted.
+        reason: String,
+    },
+    /// The plan has no cell of this configuration.
+    NotInPlan(&'static str),
+    /// None of this configuration's cells has a kept hit.
+    NotMeasured {
+        /// The configuration.
+        configuration: &'static str,
+        /// Its cells in the plan.
+        planned: usize,
+    },
+    /// Some have none.
+    CellsWithoutHit {
+        /// The configuration.
+        configuration: &'static str,
+        /// How many.
+        absent: usize,
+        /// Its cells in the plan.
+        planned: usize,
+    },
+    /// So many cells have a single hit, and so no coherence.
+    SingleHits {
+        /// The configuration.
+        configuration: &'static str,
+        /// How many.
+        cells: usize,
+    },
+    /// Impacts that substructuring cannot use, because cells are missing.
+    ImpactsLeftOut {
+        /// The configuration.
+        configuration: &'static str,
+        /// Their names.
+        names: Vec<String>,
+    },
+    /// Response locations that it cannot use.
+    ResponsesLeftOut {
+        /// The configuration.
+        configuration: &'static str,
+        /// Their names.
+        names: Vec<String>,
+    },
+    /// FRFs from elsewhere cannot be read.
+    ImportUnreadable {
+        /// The configuration.
+        configuration: &'static str,
+        /// What is wrong.
+        told: String,
+    },
+    /// FRFs from elsewhere stand back behind hits of this campaign.
+    ImportUnused {
+        /// The configuration.
+        configuration: &'static str,
+        /// Where they came from.
+        file: String,
+        /// Cells with hits.
+        cells: usize,
+    },
+    /// Configurations without which there is no substructuring.
+    Configurations(Vec<&'static str>),
+    /// The three configurations do not fit together.
+    Substructuring(IdentifyError),
+    /// No CMIF.
+    Cmif(FrfError),
+    /// No bootstrap over hits.
+    Bootstrap(AveragedError),
+    /// No estimate with an interval.
+    Estimate(AveragedError),
+    /// A level of the shaker cannot be used.
+    Level(String),
+    /// A level gives no loop.
+    LevelLoop {
+        /// The level.
+        level: Level,
+        /// Why.
+        error: HysteresisError,
+    },
+    /// The static arm's effective mass, without which there is no corrected force.
+    EffectiveMass,
+}
+
+/// Cells given up, those of one location and one reason together.
+pub fn given_up(planned: &[CellName], cells: Vec<(CellName, String)>) -> Vec<Missing> {
+    let mut groups: Vec<(String, String, String, Vec<String>)> = Vec::new();
+    for (cell, reason) in cells {
+        let same =
+            groups.iter_mut().find(|g| g.0 == cell.configuration && g.1 == cell.response && g.2 == reason);
+        match same {
+            Some(group) => group.3.push(cell.impact),
+            None => groups.push((cell.configuration, cell.response, reason, vec![cell.impact])),
+        }
+    }
+    let of = |(configuration, response, reason, impacts): (String, String, String, Vec<String>)| {
+        let here = |c: &&CellName| c.configuration == configuration && c.response == response;
+        let planned = planned.iter().filter(here).count();
+        Missing::GivenUp { planned, configuration, response, impacts, reason }
+    };
+    groups.into_iter().map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_given_up_are_told_together() {
+        let cell = |impact: &str, response: &str| CellName {
+            configuration: "A".into(),
+            impact: impact.into(),
+            response: response.into(),
+        };
+        let planned = [cell("AZ1", "A1"), cell("AZ2", "A1"), cell("AZ1", "A4"), cell("AZ2", "A4")];
+        let reason = || "0 of 3 good after 12 hits".to_owned();
+        let cells = [&planned[2], &planned[3], &planned[0]].map(|c| (c.clone(), reason())).to_vec();
+        let group = |response: &str, impacts: &[&str]| Missing::GivenUp {
+            configuration: "A".into(),
+            response: response.into(),
+            impacts: impacts.iter().map(|i| (*i).to_owned()).collect(),
+            planned: 2,
+            reason: reason(),
+        };
+        assert_eq!(given_up(&planned, cells), [group("A4", &["AZ1", "AZ2"]), group("A1", &["AZ1"])]);
+    }
+}

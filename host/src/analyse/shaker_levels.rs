@@ -1,0 +1,153 @@
+//! The shaker's levels: each level's loop with the raw and the corrected force, a loop to look at, the law over amplitude.
+
+use super::cell::ShakerLevel;
+use super::missing::Missing;
+use crate::campaign::plan::level::Moment;
+use crate::hysteresis::backbone::Law;
+use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
+use crate::hysteresis::integration::open_record;
+use crate::hysteresis::static_arm::{Identified, Tones};
+use crate::hysteresis::{HysteresisRecord, LoopAnalysis, RelativeMotion, Shape, analyse, analyse_corrected};
+use crate::results::{Backbone, ShakerLoop, rounded};
+
+/// A sweep's ends belong to the way up and the ramp down, Hz.
+const SWEEP_MARGIN_HZ: f64 = 2.0;
+
+/// One level in steady state, analysed.
+#[derive(Debug)]
+pub struct Analysed<'a> {
+    /// What was measured.
+    pub level: &'a ShakerLevel,
+    /// Its loops with the raw force.
+    pub raw: LoopAnalysis,
+    /// Its amplitudes.
+    pub tones: Option<Tones>,
+}
+
+/// The loops of one record with a steady excitation, or of one decay.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordLoops {
+    /// Of a level of a campaign: its id in the campaign file, and when it was measured.
+    pub level: Option<(i64, Moment)>,
+    /// With the raw force.
+    pub raw: LoopAnalysis,
+    /// With the force corrected by what is known of the static arm.
+    pub corrected: Option<LoopAnalysis>,
+}
+
+/// Every steady level, analysed with the raw force; and those that give no loop.
+pub fn analysed(levels: &[ShakerLevel]) -> (Vec<Analysed<'_>>, Vec<Missing>) {
+    let (mut found, mut missing) = (Vec::new(), Vec::new());
+    for level in levels.iter().filter(|level| level.level.end_hz.is_none()) {
+        match analyse(&level.record) {
+            Ok(raw) => found.push(Analysed { level, raw, tones: Tones::of(&level.record).ok() }),
+            Err(error) => missing.push(Missing::LevelLoop { level: level.level, error }),
+        }
+    }
+    (found, missing)
+}
+
+/// Amplitudes of the levels whose contact sticks: what the static arm may be identified from.
+pub fn stuck(levels: &[Analysed<'_>]) -> Vec<Tones> {
+    levels.iter().filter(|l| l.raw.shape == Shape::Stuck).filter_map(|l| l.tones).collect()
+}
+
+/// Δx/T of the sweeps, inside their ends.
+pub fn swept(levels: &[ShakerLevel]) -> Vec<ContactCompliance> {
+    let sweeps = levels.iter().filter_map(|level| Some((level, level.level.end_hz?)));
+    sweeps
+        .filter_map(|(level, end_hz)| {
+            let [low, high] = [level.level.frequency_hz.min(end_hz), level.level.frequency_hz.max(end_hz)];
+            let band =
+                [(low + SWEEP_MARGIN_HZ).max(SEARCH_HZ[0]), (high - SWEEP_MARGIN_HZ).min(SEARCH_HZ[1])];
+            ContactCompliance::of_record(&level.record, band)
+        })
+        .collect()
+}
+
+/// The loops of every level: raw, and corrected where the static arm is known and gives one.
+pub fn loops(levels: Vec<Analysed<'_>>, arm: Option<&Identified>) -> Vec<RecordLoops> {
+    let corrected =
+        |one: &Analysed<'_>| arm.and_then(|arm| analyse_corrected(&one.level.record, &arm.correction).ok());
+    levels
+        .into_iter()
+        .map(|one| RecordLoops {
+            level: Some((one.level.id, one.level.moment)),
+            corrected: corrected(&one),
+            raw: one.raw,
+        })
+        .collect()
+}
+
+/// The law through the levels of each frequency and moment at which something slips.
+pub fn backbones(levels: &[Analysed<'_>]) -> Vec<Backbone> {
+    let mut usable: Vec<&Analysed<'_>> =
+        levels.iter().filter(|one| one.raw.shape != Shape::Elliptical).collect();
+    let key = |one: &Analysed<'_>| (one.level.moment == Moment::After, one.level.level.frequency_hz);
+    usable.sort_by(|a, b| {
+        let ((after, f), (after_b, f_b)) = (key(a), key(b));
+        after.cmp(&after_b).then(f.total_cmp(&f_b)).then(a.raw.amplitude_m.total_cmp(&b.raw.amplitude_m))
+    });
+    let slips = |one: &&Analysed<'_>| one.raw.shape != Shape::Stuck;
+    let groups = usable.chunk_by(|a, b| key(a) == key(b)).filter(|own| own.iter().any(slips));
+    groups
+        .filter_map(|own| {
+            let points: Vec<(f64, f64)> =
+                own.iter().filter_map(|one| Some((one.raw.amplitude_m, one.raw.k_secant_n_per_m?))).collect();
+            Some(Backbone {
+                frequency_hz: own[0].level.level.frequency_hz,
+                moment: Some(own[0].level.moment.name()),
+                levels: own.iter().map(|one| one.level.id).collect(),
+                law: Law::through(&points)?,
+            })
+        })
+        .collect()
+}
+
+/// Loops of the levels to look at: the middle amplitude of each frequency, one cycle averaged over the record.
+pub fn curves(levels: &[Analysed<'_>]) -> Vec<ShakerLoop> {
+    let mut frequencies: Vec<f64> = levels.iter().map(|l| l.level.level.frequency_hz).collect();
+    frequencies.sort_by(f64::total_cmp);
+    frequencies.dedup();
+    let of = |f: f64| {
+        let mut here: Vec<&Analysed<'_>> =
+            levels.iter().filter(|l| l.level.level.frequency_hz == f).collect();
+        here.sort_by(|a, b| a.raw.amplitude_m.total_cmp(&b.raw.amplitude_m));
+        here.get(here.len() / 2).copied()
+    };
+    frequencies.into_iter().filter_map(of).map(curve).collect()
+}
+
+fn curve(one: &Analysed<'_>) -> ShakerLoop {
+    let short = |values: &[f64]| values.iter().map(|v| rounded(*v, 5)).collect::<Vec<_>>();
+    let [x_a, x_b] = specimens(&one.level.record, one.raw.loop_displacement_m.len());
+    ShakerLoop {
+        level: one.level.id,
+        frequency_hz: one.raw.frequency_hz,
+        moment: one.level.moment.name(),
+        shape: one.raw.shape,
+        slope_n_per_m: one.raw.k_eq_n_per_m.mean,
+        displacement_m: short(&one.raw.loop_displacement_m),
+        force_n: short(&one.raw.loop_force_n),
+        displacement_a_m: short(&x_a),
+        displacement_b_m: short(&x_b),
+    }
+}
+
+/// Displacements of both specimens over the first cycle, from their middle.
+fn specimens(record: &HysteresisRecord, samples: usize) -> [Vec<f64>; 2] {
+    let whole = |x: &[f64]| x[..samples.min(x.len())].to_vec();
+    let integrated = |v: &[f64]| {
+        let v = whole(v);
+        let offset = v.iter().sum::<f64>() / v.len().max(1) as f64;
+        open_record(&v, offset, 1.0 / record.fs_hz)
+    };
+    let pair = match &record.motion {
+        RelativeMotion::Velocity { a_m_per_s, b_m_per_s } => [integrated(a_m_per_s), integrated(b_m_per_s)],
+        RelativeMotion::Displacement { a_m, b_m } => [whole(a_m), whole(b_m)],
+    };
+    pair.map(|x| {
+        let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
+        x.into_iter().map(|v| v - mean).collect()
+    })
+}

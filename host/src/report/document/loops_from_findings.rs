@@ -1,0 +1,90 @@
+//! The loops in the shape of the results.
+
+use crate::analyse::{Contact, Findings, ImpactLoops, RecordLoops, SlopeIs};
+use crate::hysteresis::{Kind, LoopAnalysis, OverCycles, Shape};
+use crate::report::words::warning_sentences;
+use crate::results::{DecayStep, Force, Hysteresis, ranges};
+
+/// The impacts together, the shaker's levels, and a record of its own: each with the raw force, then with the corrected one.
+pub fn rows(found: &Findings) -> Vec<Hysteresis> {
+    let contact = found.contact.as_ref();
+    let mut rows: Vec<Hysteresis> =
+        contact.and_then(|contact| contact.impacts.as_ref()).map_or_else(Vec::new, of_impacts);
+    let levels = contact.map_or(&[][..], |contact| &contact.levels);
+    rows.extend(of_records(levels, contact.and_then(|contact: &Contact| contact.hidden.resonance_hz())));
+    rows.extend(of_records(found.record.as_slice(), None));
+    rows
+}
+
+fn of_impacts(impacts: &ImpactLoops) -> Vec<Hysteresis> {
+    let warnings = warning_sentences::impact_loops(impacts);
+    let row = |force, slope: OverCycles, decay: &[DecayStep]| Hysteresis {
+        force,
+        kind: Kind::Impact,
+        frequency_hz: impacts.frequency_hz,
+        amplitude_m: impacts.amplitude_m,
+        shape: impacts.shape,
+        k_t_n_per_m: (impacts.slope_is == SlopeIs::Contact).then_some(slope),
+        stick_part: None,
+        k_eq_n_per_m: Some(slope),
+        k_secant_n_per_m: None,
+        k_fundamental_n_per_m: None,
+        // the first cycle of a decay is not closed
+        energy_j: None,
+        friction_limit_n: None,
+        friction_coefficient: None,
+        phase_deg: impacts.phase_deg,
+        shape_evidence: None,
+        decay_cycles: Vec::new(),
+        decay: decay.to_vec(),
+        level: None,
+        moment: None,
+        records: ranges(impacts.records.iter().copied()),
+        warnings: warnings.clone(),
+    };
+    let mut rows = vec![row(Force::Raw, impacts.slope_n_per_m, &impacts.decay)];
+    rows.extend(impacts.corrected_n_per_m.map(|slope| row(Force::Corrected, slope, &[])));
+    rows
+}
+
+/// All raw, then all corrected; `resonance_hz` is one of a specimen, which moves Δx at every frequency.
+fn of_records(records: &[RecordLoops], resonance_hz: Option<f64>) -> Vec<Hysteresis> {
+    let row = |one: &RecordLoops, found: &LoopAnalysis, force| {
+        let mut row = of_record(found, force);
+        (row.level, row.moment) = (one.level.map(|(id, _)| id), one.level.map(|(_, moment)| moment.name()));
+        if let (Shape::Stuck, Some(resonance_hz)) = (found.shape, resonance_hz) {
+            row.warnings.push(warning_sentences::beside_resonance(found.frequency_hz, resonance_hz));
+        }
+        row
+    };
+    let raw = records.iter().map(|one| row(one, &one.raw, Force::Raw));
+    let corrected = |one: &RecordLoops| Some(row(one, one.corrected.as_ref()?, Force::Corrected));
+    raw.chain(records.iter().filter_map(corrected)).collect()
+}
+
+/// One record's loops, drawn with this force.
+fn of_record(found: &LoopAnalysis, force: Force) -> Hysteresis {
+    Hysteresis {
+        force,
+        kind: found.kind,
+        frequency_hz: Some(found.frequency_hz),
+        amplitude_m: Some(found.amplitude_m),
+        shape: found.shape,
+        k_t_n_per_m: found.k_t_n_per_m,
+        stick_part: found.stick_part,
+        k_eq_n_per_m: Some(found.k_eq_n_per_m),
+        k_secant_n_per_m: found.k_secant_n_per_m,
+        k_fundamental_n_per_m: found.k_fundamental_n_per_m.map(num_complex::Complex::norm),
+        energy_j: found.energy_j,
+        friction_limit_n: found.friction_limit_n,
+        friction_coefficient: found.friction_coefficient,
+        phase_deg: Some(found.phase_deg),
+        shape_evidence: found.shape_evidence,
+        decay_cycles: found.decay_cycles.clone(),
+        decay: Vec::new(),
+        level: None,
+        moment: None,
+        records: Vec::new(),
+        warnings: found.warnings.clone(),
+    }
+}

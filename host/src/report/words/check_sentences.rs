@@ -1,0 +1,341 @@
+//! The checks, each with its outcome, its figures, and what it means for the reader.
+
+use super::number::{decimals, micro, short};
+use crate::analyse::Findings;
+use crate::analyse::checks::{
+    BackCoupled, ContactChange, HiddenResonance, InternalsFound, Reach, SameStructures, Sameness,
+    SeriesCompliance, Sizes, rigid_motions_suffice,
+};
+use crate::hysteresis::compliance::ImaginaryPeak;
+use crate::hysteresis::phase_split::{PhaseSplit, Specimen};
+use crate::results::{
+    BACK_COUPLING, Check, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, SAME_IN_ALL, SERIES_COMPLIANCE,
+    UNCHANGED,
+};
+use crate::substructuring::cmif::Cmif;
+use crate::substructuring::explained::BEYOND;
+use crate::substructuring::identify::Internals;
+
+/// All that were made.
+pub fn all(found: &Findings) -> Vec<Check> {
+    let mut checks = Vec::new();
+    if let Some(of_frfs) = &found.substructured {
+        checks.extend(of_frfs.cmif.as_ref().ok().map(interface_modes));
+        checks.extend(of_frfs.internals.as_ref().map(internals));
+        checks.extend(of_frfs.same_structures.as_ref().map(same_structures));
+        checks.extend(of_frfs.back_coupled.as_ref().map(back_coupled));
+    }
+    if let Some(contact) = &found.contact {
+        checks.push(series_compliance(&contact.series));
+        checks.push(hidden_resonance(&contact.hidden));
+        checks.extend(contact.change.as_ref().map(contact_change));
+    }
+    checks
+}
+
+/// Which set of modes the CMIF suggests, and whether rigid motions are enough at all.
+fn interface_modes(found: &Cmif) -> Check {
+    let enough = rigid_motions_suffice(found);
+    let mut meaning = format!("The CMIF suggests {} modes: {}.", found.suggested, found.reason);
+    if enough == Some(false) {
+        meaning.push_str(
+            " What six rigid motions leave over is noise or an interface that deforms: look at the virtual points' consistency.",
+        );
+    }
+    let mut check = Check::new(INTERFACE_MODES, Some(enough == Some(true)), meaning)
+        .with("suggested_modes", found.suggested as f64);
+    for (count, part) in &found.explained {
+        check = check.with(&format!("explained_by_{count}"), *part);
+    }
+    check
+}
+
+fn internals(found: &InternalsFound) -> Check {
+    let has = |i: &Internals| {
+        format!("{} impacts on A and {} responses on B for {} interface DoFs", i.impacts, i.responses, i.idms)
+    };
+    let mut sentences = Vec::new();
+    if let Some(i) = &found.least_squares {
+        sentences.push(format!(
+            "Eq. 3 in least squares has {}; P has rank {} (condition {}), Q rank {} (condition {}).",
+            has(i),
+            i.rank_p,
+            short(i.condition_p),
+            i.rank_q,
+            short(i.condition_q)
+        ));
+    }
+    if let Some(refused) = &found.refused {
+        sentences.push(format!(
+            "Eq. 3 in least squares with {} IDMs was refused: {}.",
+            refused.idms, refused.reason
+        ));
+    }
+    if let Some(i) = &found.printed {
+        let exact = if found.printed_is_exact() {
+            "exact"
+        } else {
+            "with n_i ≠ n_c it is right only for the forces that these internals generate"
+        };
+        sentences.push(format!("As printed it has {}: {exact}.", has(i)));
+    }
+    let check = Check::new(INTERNALS, Some(found.ok()), sentences.join(" "));
+    let Some(i) = &found.least_squares else { return check };
+    check
+        .with("interface_dofs", i.idms as f64)
+        .with("internal_impacts", i.impacts as f64)
+        .with("internal_responses", i.responses as f64)
+        .with("rank_p", i.rank_p as f64)
+        .with("rank_q", i.rank_q as f64)
+        .with("condition_p", i.condition_p)
+        .with("condition_q", i.condition_q)
+}
+
+fn same_structures(found: &SameStructures) -> Check {
+    let meaning = match found.sameness {
+        Sameness::Untold => "Eq. A.1 and A.2 scatter too much to tell whether A and B are the same structures in the assembly as alone.".to_owned(),
+        Sameness::Same => "Eq. A.1, which needs neither A nor B alone, and both blocks of A.2 agree: nothing shows that A or B is another structure in the assembly than alone."
+            .to_owned(),
+        Sameness::Changed(changed) => {
+            let sides = found.differences_n_per_m.iter().zip(changed).filter(|(_, changed)| *changed);
+            let sides: Vec<String> =
+                sides.map(|((side, by), _)| format!("{side} (by {} N/µm)", short(micro(*by)))).collect();
+            format!(
+                "Eq. A.2 differs from A.1 for {}: that substructure is not the same alone as in the assembly. Methods that use it (Eq. 3, A.3, its block of A.2) see the \
+                 difference as joint; A.1 and the other block of A.2 do not.",
+                sides.join(" and ")
+            )
+        }
+    };
+    let mut check =
+        Check::new(SAME_IN_ALL, found.ok(), meaning).with("inverse_n_per_m", found.inverse_n_per_m);
+    for (side, difference) in found.differences_n_per_m {
+        check = check.with(&format!("primal_{}_minus_inverse_n_per_m", side.to_lowercase()), difference);
+    }
+    check
+}
+
+fn back_coupled(found: &BackCoupled) -> Check {
+    let percent = |part: f64| if part < 1e-3 { "less than 0.1".into() } else { short(100.0 * part) };
+    let sizes = format!(
+        "in the main band they are {} % off, and noise and errors of position explain {} %",
+        percent(found.median_error),
+        percent(found.median_explained)
+    );
+    let coupled = "A and B, coupled by the joint of Eq. A.1 (its mean over the main band)";
+    let meaning = match found.reach {
+        Reach::Untold => format!("Whether {coupled}, are the measured assembly cannot be told: {sizes}."),
+        Reach::Doubtful => format!(
+            "{coupled}, give the measured assembly no worse than {} times what noise and errors of position explain ({sizes}): too little to call it another path, too \
+             much to exclude one.",
+            short(BEYOND)
+        ),
+        Reach::Whole([from, to]) => format!(
+            "{coupled}, give the measured assembly from {} to {} Hz: {sizes}. Nothing shows another path between A and B.",
+            short(from),
+            short(to)
+        ),
+        Reach::UpTo(to) => format!(
+            "{coupled}, give the measured assembly up to {} Hz ({sizes}), but not above: another path couples A and B there (springs or a foundation that \
+             both stand on), or the joint has a mass. Use no lines above it.",
+            short(to)
+        ),
+        Reach::Within([from, to]) => format!(
+            "{coupled}, give the measured assembly only from {} to {} Hz: {sizes}. Elsewhere a single stiffness does not describe what was measured: A or B changed, \
+             another path couples them, or the joint is no spring and damper.",
+            short(from),
+            short(to)
+        ),
+        Reach::Nowhere => format!(
+            "{coupled}, do not give the measured assembly: {sizes}. The joint is no spring and damper, A or B changed between the configurations, \
+             or another path couples them."
+        ),
+    };
+    Check { frequency_hz: found.edge_hz(), ..Check::new(BACK_COUPLING, found.ok(), meaning) }
+        .with("median_error", found.median_error)
+        .with("median_explained", found.median_explained)
+}
+
+fn series_compliance(found: &SeriesCompliance) -> Check {
+    let both = |sizes: &Sizes| [sizes.loops_n_per_m, sizes.fbs_n_per_m].map(|k| short(micro(k)));
+    let check = |meaning: String| Check::new(SERIES_COMPLIANCE, found.ok(), meaning);
+    let with = |sizes: &Sizes, check: Check| {
+        check
+            .with("ratio", sizes.ratio())
+            .with("fbs_stiffness_n_per_m", sizes.fbs_n_per_m)
+            .with("loop_stiffness_n_per_m", sizes.loops_n_per_m)
+    };
+    match found {
+        SeriesCompliance::NotBoth => check(
+            "FBS and loops are both needed to tell whether clamp and contact are in series; only one of them is here. An FBS value \
+             taken on the arms is k_T only if the clamps are much stiffer than the contact."
+                .into(),
+        ),
+        SeriesCompliance::NotIdentified => check(
+            "FBS did not identify a stiffness well enough to compare it with the loops: its scatter is larger than its value.".into(),
+        ),
+        SeriesCompliance::ClampGivesWay { sizes, compliance_m_per_n, std_m_per_n } => {
+            let [loops, fbs] = both(sizes);
+            let [series, low, high] = found.between_n_per_m().unwrap_or([f64::NAN; 3]);
+            let meaning = format!(
+                "The contact measured at the specimens is {} times stiffer than what FBS sees between the arms ({loops} against {fbs} N/µm). Clamp and contact are in series, and the clamp gives way: \
+                 the FBS value is not k_T. What lies between arms and contact has about {} N/µm by itself \
+                 (95 % {}…{}).",
+                short(sizes.ratio()),
+                short(micro(series)),
+                short(micro(low)),
+                if high.is_finite() { short(micro(high)) } else { "∞".into() }
+            );
+            with(sizes, check(meaning))
+                .with("series_stiffness_n_per_m", series)
+                .with("series_stiffness_low_n_per_m", low)
+                .with("series_stiffness_high_n_per_m", high)
+                .with("series_compliance_m_per_n", *compliance_m_per_n)
+                .with("series_compliance_std_m_per_n", *std_m_per_n)
+        }
+        SeriesCompliance::Softer(sizes) => {
+            let [loops, fbs] = both(sizes);
+            with(sizes, check(format!(
+                "The contact measured at the specimens is softer than what FBS sees between the arms ({loops} against {fbs} N/µm): no series compliance explains that. Look at the loops' shape \
+                 and at the FBS methods' agreement first."
+            )))
+        }
+        SeriesCompliance::SameSize(sizes) => {
+            let [loops, fbs] = both(sizes);
+            with(sizes, check(format!(
+                "FBS on the arms and the vibrometers at the specimens see stiffness of one size ({fbs} and {loops} N/µm): nothing soft lies between arm and contact, so the FBS value may be \
+                 read as k_T."
+            )))
+        }
+    }
+}
+
+fn hidden_resonance(found: &HiddenResonance) -> Check {
+    let check = |meaning: String| Check::new(HIDDEN_RESONANCE, found.ok(), meaning);
+    let over = |peak: &ImaginaryPeak, check: Check| check.with("peak_over_level", peak.over_level);
+    match found {
+        HiddenResonance::NoSignals => check(
+            "Hits along z on A with both specimens' vibrometers and the load cells are needed to look for it.".into(),
+        ),
+        HiddenResonance::TooFewLines => check("Too few lines between 100 and 400 Hz to look for it.".into()),
+        HiddenResonance::Quiet(peak) => over(
+            peak,
+            check("Both specimens move in phase with the force between 100 and 400 Hz: no resonance hides there.".into()),
+        ),
+        HiddenResonance::Unclear(peak) => over(
+            peak,
+            check(format!(
+                "There is some phase between the specimens near {} Hz, but it does not stand out enough from the noise to call it a resonance.",
+                short(peak.frequency_hz)
+            ))
+            .at(peak.frequency_hz),
+        ),
+        HiddenResonance::Found(peak, split) => {
+            let meaning = format!(
+                "Specimen A and specimen B move out of phase near {} Hz, while the force does not: a resonance of one specimen in its clamp. Loops near it \
+                 become ellipses whose slope is k_eq, not k_T.{}",
+                short(peak.frequency_hz),
+                split.as_ref().map_or(String::new(), phases)
+            );
+            let check = over(peak, check(meaning).at(peak.frequency_hz));
+            let Some(split) = split else { return check };
+            check
+                .with("phase_specimen_a_to_b_deg", split.specimens)
+                .with("phase_specimen_a_to_arm_deg", split.a)
+                .with("phase_specimen_b_to_arm_deg", split.b)
+                .with("phase_arm_a_to_b_deg", split.arms)
+        }
+    }
+}
+
+fn phases(split: &PhaseSplit) -> String {
+    let degrees = |value: f64| decimals(value, 0);
+    let whose = match split.moves() {
+        Some(Specimen::A) => " So it is specimen A that moves in its clamp.",
+        Some(Specimen::B) => " So it is specimen B that moves in its clamp.",
+        None => "",
+    };
+    format!(
+        " At {} Hz specimen A turns by {}° against specimen B; against their own arms A turns by {}° and B by {}°, and the arms by {}° \
+         against each other.{whose}",
+        short(split.frequency_hz),
+        degrees(split.specimens),
+        degrees(split.a),
+        degrees(split.b),
+        degrees(split.arms)
+    )
+}
+
+fn contact_change(found: &ContactChange) -> Check {
+    let ContactChange { pairs, beyond, worst, worst_at } = found;
+    let where_most = format!("most at {worst_at}: {} %", short(100.0 * worst));
+    let meaning = if *beyond == 0 {
+        format!(
+            "{pairs} levels of the shaker read the same before and after the hammer's cells ({where_most}): the contact did not change."
+        )
+    } else {
+        format!(
+            "{beyond} of {pairs} levels of the shaker read otherwise after the hammer's cells than before ({where_most}): the contact has \
+             changed while it was measured, and FBS mixes both states."
+        )
+    };
+    Check::new(UNCHANGED, Some(*beyond == 0), meaning)
+        .with("worst_change_percent", 100.0 * worst)
+        .with("levels", f64::from(*pairs))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::campaign::plan::level::{Held, Level};
+
+    #[test]
+    fn a_soft_clamp_is_named_with_its_stiffness() {
+        let sizes = Sizes { fbs_n_per_m: 26.6e6, loops_n_per_m: 180e6 };
+        let check = series_compliance(&SeriesCompliance::ClampGivesWay {
+            sizes,
+            compliance_m_per_n: 1.0 / 31.2e6,
+            std_m_per_n: 1.42e-9,
+        });
+        assert!((check.values["series_stiffness_n_per_m"] / 31.2e6 - 1.0).abs() < 1e-9);
+        assert!(check.meaning.contains("not k_T") && check.meaning.contains("in series"));
+        assert_eq!(check.values.len(), 8);
+        // an interval without an upper end is said, and is no number
+        let open = SeriesCompliance::ClampGivesWay { sizes, compliance_m_per_n: 1e-9, std_m_per_n: 1e-8 };
+        let open = series_compliance(&open);
+        assert!(open.meaning.contains("…∞") && open.values.len() == 7, "{open:?}");
+    }
+
+    #[test]
+    fn the_specimen_that_leaves_its_arm_is_named() {
+        let peak = ImaginaryPeak { frequency_hz: 192.0, over_level: 0.9, over_median: 9.0 };
+        let plain = hidden_resonance(&HiddenResonance::Found(peak, None));
+        assert_eq!((plain.ok, plain.frequency_hz), (Some(false), Some(192.0)));
+        for (a, b, name) in [(40.0, 2.0, "specimen A"), (-2.0, -40.0, "specimen B")] {
+            let split = PhaseSplit { frequency_hz: 193.0, specimens: a - b, a, b, arms: 0.0 };
+            let check = hidden_resonance(&HiddenResonance::Found(peak, Some(split)));
+            assert!(check.meaning.starts_with(&plain.meaning));
+            assert!(check.meaning.contains(&format!("it is {name} that moves")), "{}", check.meaning);
+            assert_eq!(check.values["phase_specimen_a_to_b_deg"], a - b);
+        }
+    }
+
+    #[test]
+    fn a_path_above_a_frequency_is_named_with_it() {
+        let of = |reach| back_coupled(&BackCoupled { reach, median_error: 0.02, median_explained: 0.06 });
+        let path = of(Reach::UpTo(699.0));
+        assert_eq!((path.ok, path.frequency_hz), (Some(false), Some(699.0)));
+        assert!(path.meaning.contains("Use no lines above"), "{}", path.meaning);
+        assert!(of(Reach::Nowhere).meaning.contains("do not give"));
+        assert_eq!(of(Reach::Doubtful).values["median_explained"], 0.06);
+    }
+
+    #[test]
+    fn wear_is_told_with_the_level_that_shows_it() {
+        let worst_at =
+            Level { frequency_hz: 300.0, end_hz: None, held: Held::Displacement, amplitude: 1.5e-7 };
+        let worn = contact_change(&ContactChange { pairs: 2, beyond: 1, worst: -0.17, worst_at });
+        assert_eq!(worn.ok, Some(false));
+        assert!(worn.meaning.contains("1 of 2") && worn.meaning.contains("300 Hz"), "{}", worn.meaning);
+    }
+}

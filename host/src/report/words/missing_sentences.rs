@@ -1,0 +1,87 @@
+//! What an analysis had to do without, in sentences.
+
+use crate::analyse::{CellName, Missing};
+
+/// One sentence.
+pub fn sentence(missing: &Missing) -> String {
+    match missing {
+        Missing::Records { cell, told } => of_cell(cell, told),
+        Missing::NoLoop { cell, record, error } => {
+            of_cell(cell, &format!("record {record} gives no loop: {error}"))
+        }
+        Missing::GivenUp { configuration, response, impacts, planned, reason } => {
+            let where_hit = match impacts.len() {
+                n if n > 1 && n == *planned => format!("all {n} impacts"),
+                n if n > 6 => format!("{n} of {planned} impacts"),
+                _ => impacts.join(", "),
+            };
+            format!("{configuration}: {response} was given up for {where_hit}: {reason}.")
+        }
+        Missing::NotInPlan(configuration) => format!("{configuration} is not in the plan."),
+        Missing::NotMeasured { configuration, planned } => {
+            format!("{configuration} has not been measured: none of its {planned} cells has a kept hit.")
+        }
+        Missing::CellsWithoutHit { configuration, absent, planned } => {
+            format!("{configuration}: {absent} of {planned} cells have no kept hit.")
+        }
+        Missing::SingleHits { configuration, cells } => {
+            format!("{configuration}: {cells} cells have a single kept hit, so their coherence is not known.")
+        }
+        Missing::ImpactsLeftOut { configuration, names } => left_out(configuration, "impacts", names),
+        Missing::ResponsesLeftOut { configuration, names } => {
+            left_out(configuration, "response locations", names)
+        }
+        Missing::ImportUnreadable { configuration, told } => format!("{configuration}: {told}."),
+        Missing::ImportUnused { configuration, file, cells } => format!(
+            "{configuration}: the FRFs imported from {file} are not used, because {cells} cells have hits of their own."
+        ),
+        Missing::Configurations(absent) => {
+            format!("Substructuring needs A, B and AJB; missing: {}.", absent.join(", "))
+        }
+        Missing::Substructuring(error) => format!("Substructuring was not possible: {error}."),
+        Missing::Cmif(error) => format!("No CMIF: {error}."),
+        Missing::Bootstrap(error) => format!("No bootstrap over hits: {error}."),
+        Missing::Estimate(error) => format!("No estimate with an interval by Eq. A.1: {error}."),
+        Missing::Level(told) => told.clone(),
+        Missing::LevelLoop { level, error } => format!("Shaker, {level}: no loop: {error}."),
+        Missing::EffectiveMass => {
+            "No loops of the corrected force: the static arm's effective mass is not known. Hits on B alone give it, or stuck loops of the shaker at three \
+             frequencies or more; or state it (--effective-mass KG)."
+                .into()
+        }
+    }
+}
+
+fn of_cell(cell: &CellName, what: &str) -> String {
+    format!("{}: cell {} × {}: {what}.", cell.configuration, cell.impact, cell.response)
+}
+
+fn left_out(configuration: &str, what: &str, names: &[String]) -> String {
+    format!(
+        "{configuration}: {what} left out of substructuring, because cells are missing: {}.",
+        names.join(", ")
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_given_up_are_told_together() {
+        let group = |response: &str, impacts: &[&str]| Missing::GivenUp {
+            configuration: "A".into(),
+            response: response.into(),
+            impacts: impacts.iter().map(|i| (*i).to_owned()).collect(),
+            planned: 2,
+            reason: "0 of 3 good after 12 hits".into(),
+        };
+        assert_eq!(
+            [group("A4", &["AZ1", "AZ2"]), group("A1", &["AZ1"])].map(|one| sentence(&one)),
+            [
+                "A: A4 was given up for all 2 impacts: 0 of 3 good after 12 hits.",
+                "A: A1 was given up for AZ1: 0 of 3 good after 12 hits."
+            ]
+        );
+    }
+}

@@ -1,0 +1,12 @@
+//! What the report and the terminal say: findings and results in plain sentences, numbers with few digits.
+
+pub(super) mod check_sentences;
+pub(super) mod missing_sentences;
+mod names;
+pub mod number;
+pub mod side_by_side;
+mod summary;
+pub(super) mod warning_sentences;
+
+pub use names::{excitation, method, outcome, shape_name, slope, static_arm};
+pub use summary::{bootstrapped, impact_loops, shaker_loops, substructuring, summary};

@@ -1,0 +1,231 @@
+//! FBS and loops side by side (the paper's Tables 2 and 3): every kind of stiffness that was found, and what it is.
+
+use super::names::slope;
+use super::number::{band, count, decimals, short};
+use crate::results::{
+    DIRECT, Excitation, Force, HIDDEN_RESONANCE, Hysteresis, MAIN_BAND_HZ, OverCycles, Results,
+    SERIES_COMPLIANCE, Shape,
+};
+use crate::substructuring::{Dof, fit};
+
+/// One kind of stiffness.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Kind {
+    /// How it was found.
+    pub found: String,
+    /// Mean and scatter, N/m.
+    pub mean_n_per_m: f64,
+    /// See `mean_n_per_m`.
+    pub std_n_per_m: f64,
+    /// What it is, and what it may be used for.
+    pub meaning: String,
+}
+
+/// Which cycle of the decay stands for the later ones, as in the paper.
+const LATER_CYCLE: usize = 4;
+
+/// Every kind that these results hold, FBS first.
+pub fn kinds(results: &Results) -> Vec<Kind> {
+    let mut kinds = substructuring(results);
+    kinds.extend(direct(results));
+    kinds.extend(shaker(results, Force::Raw));
+    kinds.extend(impacts(results));
+    kinds
+}
+
+/// The loops with the corrected force, the shaker's by frequency.
+pub fn corrected(results: &Results) -> Vec<Kind> {
+    let mut kinds = shaker(results, Force::Corrected);
+    let of_impacts = |h: &&Hysteresis| h.kind == Excitation::Impact && h.force == Force::Corrected;
+    if let Some((name, k)) = results.hysteresis.iter().find(of_impacts).and_then(slope) {
+        kinds.push(Kind {
+            found: format!("{name}, impacts, first cycle of {} hits", count(k.cycles as u64)),
+            mean_n_per_m: k.mean,
+            std_n_per_m: k.std,
+            meaning: String::new(),
+        });
+    }
+    kinds
+}
+
+/// The recommended estimate, the fit, and the paper's method, as far as they are there: each sees the same thing, and only the first two
+/// know how well.
+fn substructuring(results: &Results) -> Vec<Kind> {
+    let series = results.check(SERIES_COMPLIANCE).and_then(|c| c.ok);
+    let what = match series {
+        Some(false) => {
+            "stiffness between the arms: contact and clamps in series. A property of this structure, not of the contact; for models that have no clamps"
+        }
+        Some(true) => {
+            "stiffness between the arms; nothing soft lies between them and the contact, so it is k_T"
+        }
+        None => "stiffness between the arms: k_T only if the clamps are much stiffer than the contact",
+    };
+    let recommended =
+        results.quoted().and_then(|r| Some((r, r.joint.get(&Dof::Z).filter(|z| z.identified)?)));
+    let mut kinds = Vec::new();
+    if let Some((estimate, z)) = recommended {
+        kinds.push(Kind {
+            found: format!("FBS, recommended, {} IDMs, {}", estimate.idms, band(MAIN_BAND_HZ)),
+            mean_n_per_m: z.stiffness,
+            std_n_per_m: z.std,
+            meaning: what.into(),
+        });
+    }
+    let fitted = results.joint.iter().find(|j| j.method == fit::NAME && j.band_hz == MAIN_BAND_HZ);
+    for joint in [fitted, results.headline_joint()].into_iter().flatten() {
+        let Some(k) = joint.sliding_stiffness() else { continue };
+        let meaning = match (kinds.is_empty(), joint.method == fit::NAME) {
+            (true, _) => what,
+            (false, true) => {
+                "the same by maximum likelihood over all cells; needs A and B alone to be what they are in the assembly"
+            }
+            (false, false) => {
+                "the same line by line: ± is the scatter of the lines, no uncertainty of the joint"
+            }
+        };
+        kinds.push(Kind {
+            found: format!("FBS, {} with {} IDMs, {}", joint.method, joint.idms, band(joint.band_hz)),
+            mean_n_per_m: k.mean,
+            std_n_per_m: k.std,
+            meaning: meaning.into(),
+        });
+    }
+    kinds
+}
+
+fn direct(results: &Results) -> Option<Kind> {
+    let joint = results.joint.iter().find(|j| j.method == DIRECT)?;
+    let k = joint.sliding_stiffness()?;
+    Some(Kind {
+        found: format!("T/Δx of the impacts, {}", band(joint.band_hz)),
+        mean_n_per_m: k.mean,
+        std_n_per_m: k.std,
+        meaning: "the contact between the two laser spots, in frequency and away from any local resonance: k_T with raw force".into(),
+    })
+}
+
+/// The steady loops of each frequency with this force: those that are k_T, and those that are only k_eq.
+fn shaker(results: &Results, force: Force) -> Vec<Kind> {
+    let rows: Vec<&Hysteresis> =
+        results.hysteresis.iter().filter(|h| h.kind == Excitation::Shaker && h.force == force).collect();
+    let mut frequencies: Vec<f64> = rows.iter().filter_map(|h| h.frequency_hz).collect();
+    frequencies.sort_by(f64::total_cmp);
+    frequencies.dedup_by(|a, b| (*a / *b - 1.0).abs() < 1e-3);
+    let mut kinds = Vec::new();
+    for f in frequencies {
+        let near = |h: &&&Hysteresis| h.frequency_hz.is_some_and(|g| (g / f - 1.0).abs() < 1e-3);
+        for is_k_t in [true, false] {
+            let own: Vec<&Hysteresis> =
+                rows.iter().filter(near).copied().filter(|h| h.k_t_n_per_m.is_some() == is_k_t).collect();
+            let slopes: Vec<OverCycles> =
+                own.iter().filter_map(|h| if is_k_t { h.k_t_n_per_m } else { h.k_eq_n_per_m }).collect();
+            let Some((mean, std)) = pooled(&slopes) else { continue };
+            let levels = if own.len() == 1 { "1 level".into() } else { format!("{} levels", own.len()) };
+            let name = if is_k_t { "k_T" } else { "k_eq" };
+            kinds.push(Kind {
+                found: format!("{name}, shaker, {} Hz, {levels}", short(f)),
+                mean_n_per_m: mean,
+                std_n_per_m: std,
+                meaning: own.first().map_or(String::new(), |h| meaning(h, results)),
+            });
+        }
+    }
+    kinds
+}
+
+fn meaning(row: &Hysteresis, results: &Results) -> String {
+    let hidden = results.check(HIDDEN_RESONANCE).filter(|c| c.ok == Some(false)).and_then(|c| c.frequency_hz);
+    match (row.shape, hidden) {
+        (Shape::Stuck, Some(f)) => format!(
+            "a straight loop: the contact between the laser spots, with some per cent of the {} Hz resonance in Δx",
+            short(f)
+        ),
+        (Shape::Stuck, None) => {
+            "a straight loop: the contact's own stiffness, for models that have everything else".into()
+        }
+        (Shape::Elliptical, Some(f)) => format!(
+            "an ellipse beside the resonance at {} Hz: an equivalent stiffness of this structure at this frequency, no contact stiffness",
+            short(f)
+        ),
+        (Shape::Elliptical, None) => {
+            "an ellipse: an equivalent stiffness of this structure at this frequency, no contact stiffness"
+                .into()
+        }
+        (Shape::Microslip | Shape::GrossSlip, _) if row.k_t_n_per_m.is_some() => {
+            "slope of the stick part after each reversal: the contact's own stiffness".into()
+        }
+        (Shape::Microslip | Shape::GrossSlip, _) => "the whole slipping loop: falls with amplitude".into(),
+    }
+}
+
+fn impacts(results: &Results) -> Vec<Kind> {
+    let Some(row) = results.impact_loops() else { return Vec::new() };
+    let mut kinds = Vec::new();
+    let hits = row.k_eq_n_per_m.map_or(0, |k| k.cycles as u64);
+    if let Some(k) = row.k_t_n_per_m.or(row.k_eq_n_per_m) {
+        let is_k_t = row.k_t_n_per_m.is_some();
+        kinds.push(Kind {
+            found: format!(
+                "{}, impacts, first cycle of {} hits",
+                if is_k_t { "k_T" } else { "k_eq" },
+                count(hits)
+            ),
+            mean_n_per_m: k.mean,
+            std_n_per_m: k.std,
+            meaning: if is_k_t {
+                "all modes at once, but none of them between the spots: the contact's own stiffness".into()
+            } else {
+                "all modes at once, the local one of a specimen too: near the contact's stiffness, but not it"
+                    .into()
+            },
+        });
+    }
+    if let Some(step) = row.decay.iter().find(|d| d.cycle == LATER_CYCLE) {
+        kinds.push(Kind {
+            found: format!("k_eq, impacts, cycle {LATER_CYCLE}"),
+            mean_n_per_m: step.k_eq_n_per_m.mean,
+            std_n_per_m: step.k_eq_n_per_m.std,
+            meaning: format!(
+                "Δx lags T by {}° on the average: depends on the phase of the decaying modes, linked to no frequency",
+                decimals(step.phase_deg, 0)
+            ),
+        });
+    }
+    kinds
+}
+
+/// Mean of the means, and the scatter of all cycles about it.
+fn pooled(slopes: &[OverCycles]) -> Option<(f64, f64)> {
+    let n = slopes.len() as f64;
+    let mean = slopes.iter().map(|k| k.mean).sum::<f64>() / n;
+    let variance = slopes.iter().map(|k| k.std.powi(2) + (k.mean - mean).powi(2)).sum::<f64>() / n;
+    (!slopes.is_empty()).then(|| (mean, variance.sqrt()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::example_tests as example;
+
+    #[test]
+    fn every_number_has_a_sentence_that_says_what_it_is() {
+        let kinds = kinds(&example::results());
+        assert!(kinds.iter().all(|k| k.mean_n_per_m.is_finite() && !k.meaning.is_empty()));
+        let of = |word: &str| kinds.iter().find(|k| k.found.contains(word)).expect(word);
+        assert!(of("FBS").meaning.contains("in series"));
+        assert!(
+            of("200 Hz").meaning.contains("no contact stiffness") && of("200 Hz").found.starts_with("k_eq")
+        );
+        assert!(of("250 Hz").found.starts_with("k_T") && of("250 Hz").found.contains("2 levels"));
+        assert!(of("first cycle").found.starts_with("k_eq"));
+    }
+
+    #[test]
+    fn levels_are_pooled_with_what_is_between_them() {
+        let one = |mean| OverCycles { mean, std: 3.0, cycles: 10, ci95: None };
+        assert_eq!(pooled(&[one(100.0)]), Some((100.0, 3.0)));
+        assert_eq!(pooled(&[one(96.0), one(104.0)]), Some((100.0, 5.0)));
+        assert_eq!(pooled(&[]), None);
+    }
+}

@@ -1,0 +1,123 @@
+//! The joint by substructuring: numbers over bands, and the spectra they come from.
+
+use crate::substructuring::{BandStatistic as Statistics, Dof};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Name of T/Δx at the specimens among the methods.
+pub const DIRECT: &str = "direct";
+
+/// A scatter over lines of more than this times the mean is no identification.
+pub const UNIDENTIFIED: f64 = 1.5;
+
+/// The headline quotes the row of the main band for which this is largest.
+pub fn headline_rank(method: &str, idms: usize) -> (bool, bool, usize) {
+    (method == "internal", method == "internal-printed", idms)
+}
+
+/// One method, one set of interface deformation modes, one band.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Joint {
+    /// The method's name, as on the command line.
+    pub method: String,
+    /// Interface deformation modes of each virtual point: 2, 4, 6, or another choice.
+    pub idms: usize,
+    /// Which ones; none where no virtual point is used.
+    pub modes: Vec<Dof>,
+    /// The band, ends included, Hz.
+    pub band_hz: [f64; 2],
+    /// Stiffness of the translations by direction (`x`, `y`, `z`), N/m.
+    pub stiffness_n_per_m: BTreeMap<String, Statistics>,
+    /// Damping of the translations by direction, N s/m.
+    pub damping_n_s_per_m: BTreeMap<String, Statistics>,
+    /// Stiffness of the rotations (`rx`, `ry`, `rz`), N m/rad.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub stiffness_n_m_per_rad: BTreeMap<String, Statistics>,
+    /// Damping of the rotations, N m s/rad.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub damping_n_m_s_per_rad: BTreeMap<String, Statistics>,
+    /// Stiffness of flexible interface modes by name: N m for extensions, N m² for the others.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub stiffness_flexible_si: BTreeMap<String, Statistics>,
+    /// Stiffness between two degrees of freedom (`y-z`, `z-rx`, …): N/m, N/rad or N m/rad.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub coupling_si: BTreeMap<String, Statistics>,
+    /// Damping between them, in the same units times seconds.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub coupling_damping_si: BTreeMap<String, Statistics>,
+    /// What the FRFs' noise alone moves the stiffness of one line by, N/m by direction: standard deviation by linear propagation through
+    /// virtual points and method, median over the band. None where a variance is not known.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub noise_n_per_m: BTreeMap<String, f64>,
+    /// Lines of the band that were used.
+    pub lines: usize,
+    /// Of `fit`: how well the model describes the data.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub goodness: Option<Goodness>,
+    /// What a reader must know before using these numbers.
+    pub warnings: Vec<String>,
+}
+
+impl Joint {
+    /// Stiffness along the sliding direction z, N/m.
+    pub fn sliding_stiffness(&self) -> Option<&Statistics> {
+        self.stiffness_n_per_m.get("z")
+    }
+
+    /// Whether the sliding stiffness is a number worth showing alone: the lines neither scatter nor are moved by noise by more than
+    /// the value, and it is positive.
+    pub fn identified(&self) -> bool {
+        let noise = self.noise_n_per_m.get("z").copied().unwrap_or(0.0);
+        self.sliding_stiffness()
+            .is_some_and(|k| k.mean > 0.0 && k.std <= UNIDENTIFIED * k.mean && noise <= k.mean)
+    }
+}
+
+/// How well a model with K and C describes all cells.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Goodness {
+    /// χ² per degree of freedom; some 0.8 to 1 where model, noise and assumed errors of geometry describe the data.
+    pub chi_square_per_dof: f64,
+    /// The largest error of geometry that the fit believes in, in assumed standard deviations.
+    pub largest_error: f64,
+    /// Whether the search came to rest.
+    pub settled: bool,
+}
+
+/// A method that could not be applied, and why.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Refusal {
+    /// The method's name.
+    pub method: String,
+    /// Interface deformation modes of each virtual point.
+    pub idms: usize,
+    /// The reason, as the method gave it.
+    pub reason: String,
+}
+
+/// Stiffness and damping line by line.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct JointSpectrum {
+    /// The lines, Hz.
+    pub frequency_hz: Vec<f64>,
+    /// One curve for each method, IDM set and direction.
+    pub curves: Vec<SpectrumCurve>,
+}
+
+/// One diagonal term of the joint over frequency.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SpectrumCurve {
+    /// The method's name.
+    pub method: String,
+    /// Interface deformation modes of each virtual point.
+    pub idms: usize,
+    /// Direction: `x`, `y` or `z`.
+    pub dof: String,
+    /// Re Z, N/m; null where the line gave none.
+    pub stiffness_n_per_m: Vec<Option<f64>>,
+    /// Standard deviation of the stiffness from the FRFs' noise alone, N/m; empty where their variance is not known.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stiffness_noise_n_per_m: Vec<Option<f64>>,
+    /// Damping, N s/m; null where the line gave none.
+    pub damping_n_s_per_m: Vec<Option<f64>>,
+}
