@@ -1,6 +1,6 @@
 //! Everything that is read at the specimens themselves: the impacts' loops, the shaker's levels, the contact in frequency.
 
-use super::averages::{CellAverage, ContactAverage};
+use super::averages::CellAverage;
 use super::cell::Measurements;
 use super::checks;
 use super::contact::{self, specimen_curves};
@@ -11,6 +11,7 @@ use crate::hysteresis::compliance::ContactCompliance;
 use crate::hysteresis::compliance::SEARCH_HZ;
 use crate::hysteresis::static_arm::{Identified, from_levels};
 use crate::results::{Check, LoopCurve, Reconstruction, Results, words};
+use crate::spectra::CrossSpectra;
 use crate::substructuring::geometry::{Geometry, Grouping};
 
 /// Adds what the contact's own signals say.
@@ -28,12 +29,12 @@ pub fn at_the_contact<M: Measurements>(
     results.missing.extend(complaints);
 
     let (frequency_hz, by_impact) = summed(averages);
-    let sums: Vec<&ContactAverage> =
-        by_impact.iter().map(|(_, c)| c).filter(|c| c.force.len() == frequency_hz.len()).collect();
+    let sums: Vec<&CrossSpectra> =
+        by_impact.iter().map(|(_, c)| c).filter(|c| c.lines() == frequency_hz.len()).collect();
     let compliance = contact::compliance(frequency_hz, sigma_per_s, &sums);
-    if let Some(impact) = show_specimens(results, geometry, frequency_hz, &by_impact, sigma_per_s) {
+    if let Some(impact) = show_specimens(results, geometry, &by_impact) {
         let (points, quantity) = (&geometry.ajb, measurements.quantity());
-        results.frfs.extend(chosen::arms(impact, points, averages, sigma_per_s, quantity));
+        results.frfs.extend(chosen::arms(impact, points, averages, quantity));
     }
     let hidden = hidden_resonance(compliance.as_ref(), &shaker::swept(&levels));
     let hidden = with_phases(hidden, &results.frfs);
@@ -78,17 +79,17 @@ pub fn at_the_contact<M: Measurements>(
 }
 
 /// The contact's spectra of the assembly, summed over the cells of each impact.
-fn summed(averages: &[CellAverage]) -> (&[f64], Vec<(&str, ContactAverage)>) {
+fn summed(averages: &[CellAverage]) -> (&[f64], Vec<(&str, CrossSpectra)>) {
     let mut frequency_hz: &[f64] = &[];
-    let mut by_impact: Vec<(&str, ContactAverage)> = Vec::new();
+    let mut by_impact: Vec<(&str, CrossSpectra)> = Vec::new();
     for cell in averages.iter().filter(|cell| cell.name.configuration == "AJB") {
         let Some(contact) = &cell.contact else { continue };
         if frequency_hz.is_empty() {
-            frequency_hz = &cell.frequency_hz;
+            frequency_hz = cell.spectra.frequency_hz();
         }
         match by_impact.iter_mut().find(|(name, _)| *name == cell.name.impact) {
-            Some((_, sum)) if sum.force.len() == contact.force.len() => sum.add(contact),
-            Some(_) => {}
+            // spectra of other lines do not count
+            Some((_, sum)) => sum.add(contact).unwrap_or_default(),
             None => by_impact.push((&cell.name.impact, contact.clone())),
         }
     }
@@ -100,15 +101,13 @@ fn summed(averages: &[CellAverage]) -> (&[f64], Vec<(&str, ContactAverage)>) {
 fn show_specimens<'a>(
     results: &mut Results,
     geometry: &Geometry,
-    frequency_hz: &[f64],
-    by_impact: &[(&'a str, ContactAverage)],
-    sigma_per_s: f64,
+    by_impact: &[(&'a str, CrossSpectra)],
 ) -> Option<&'a str> {
     let point = |name: &str| geometry.ajb.impacts.iter().find(|p| p.name == name);
     let on_mass = |name: &str| point(name).is_some_and(|p| p.grouping == Grouping::InternalA);
     let (name, sum) = by_impact.iter().max_by_key(|(name, _)| on_mass(name))?;
     let sign = point(name).map_or(1.0, |p| p.direction[2].signum());
-    results.frfs.extend(specimen_curves(name, sign, frequency_hz, sigma_per_s, sum));
+    results.frfs.extend(specimen_curves(name, sign, sum));
     Some(name)
 }
 
@@ -157,7 +156,7 @@ fn example<M: Measurements>(
     let name = &averages.iter().find(|c| c.records.contains(&shown.record))?.name;
     let cell = measurements.read(name).ok()?;
     let hit = cell.hits.iter().find(|h| h.record == shown.record)?;
-    let (contact, delays) = (hit.contact.as_ref()?, cell.contact_delay_s);
+    let (contact, delays) = (hit.contact.as_ref()?, hit.contact.as_ref()?.delay_s);
     let inside = resonance_hz.filter(|f| (SEARCH_HZ[0]..=SEARCH_HZ[1]).contains(f));
     Some((
         Some(loops::drawn(shown, cell.fs_hz, contact, delays)),

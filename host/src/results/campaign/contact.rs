@@ -1,8 +1,8 @@
 //! The contact seen from the specimens, in frequency: Δx per newton of T, and the FRFs of both specimens.
 
-use super::averages::ContactAverage;
 use crate::hysteresis::compliance::ContactCompliance;
 use crate::results::{FrfCurve, Joint, Role, rounded};
+use crate::spectra::CrossSpectra;
 use crate::substructuring::joint::{BandStatistic, stiffness_and_damping};
 use num_complex::Complex;
 use std::collections::BTreeMap;
@@ -22,7 +22,7 @@ pub const DIRECT: &str = "direct";
 pub fn compliance(
     frequency_hz: &[f64],
     sigma_per_s: f64,
-    impacts: &[&ContactAverage],
+    impacts: &[&CrossSpectra],
 ) -> Option<ContactCompliance> {
     if impacts.is_empty() {
         return None;
@@ -35,9 +35,8 @@ pub fn compliance(
             let (mut numerator, mut denominator) = (Complex::default(), 0.0);
             for impact in impacts {
                 // per unit of force, so that a position hit more often does not count more
-                let scale = 1.0 / impact.force[l];
-                let relative = (impact.cross[0][l] - impact.cross[1][l]) * scale / s;
-                let tangential = impact.cross[2][l] * scale;
+                let relative = (impact.h1(l, 0) - impact.h1(l, 1)) / s;
+                let tangential = impact.h1(l, 2);
                 numerator += relative * tangential.conj();
                 denominator += tangential.norm_sqr();
             }
@@ -96,35 +95,25 @@ pub fn direct(found: &ContactCompliance, sigma_per_s: f64) -> Option<Joint> {
 
 /// The two specimens' receptances from one impact, for the report; hit and response count positive along +z, so
 /// `sign` is −1 for a hit towards −z.
-pub fn specimen_curves(
-    impact: &str,
-    sign: f64,
-    frequency_hz: &[f64],
-    sigma_per_s: f64,
-    average: &ContactAverage,
-) -> [FrfCurve; 2] {
+pub fn specimen_curves(impact: &str, sign: f64, average: &CrossSpectra) -> [FrfCurve; 2] {
+    let frequency_hz = average.frequency_hz();
     let step_hz = if frequency_hz.len() > 1 { frequency_hz[1] - frequency_hz[0] } else { 0.0 };
     [(Role::SpecimenA, "x_A", 0), (Role::SpecimenB, "x_B", 1)].map(|(role, output, i)| {
-        let receptance = frequency_hz
-            .iter()
-            .enumerate()
-            .map(|(l, f)| sign * average.cross[i][l] / average.force[l] / Complex::new(sigma_per_s, TAU * f));
+        let receptance = (0..average.lines()).map(|l| sign * average.h1(l, i) / average.s(l));
         let (magnitude_m_per_n, phase_deg) =
             receptance.map(|y| (rounded(y.norm(), 5), rounded(y.arg().to_degrees(), 5))).unzip();
-        let coherence = if average.hits > 1 {
-            (0..frequency_hz.len())
-                .map(|l| average.cross[i][l].norm_sqr() / (average.force[l] * average.auto[i][l]))
-                .map(|c| rounded(if c.is_finite() { c } else { 0.0 }, 5))
-                .collect()
-        } else {
-            Vec::new()
-        };
+        let several = average.hits() > 1;
+        let coherence = (0..average.lines())
+            .filter(|_| several)
+            .map(|l| average.coherence(l, i))
+            .map(|c| rounded(if c.is_finite() { c } else { 0.0 }, 5))
+            .collect();
         FrfCurve {
             configuration: "AJB".into(),
             role,
             output: output.into(),
             input: impact.into(),
-            hits: average.hits,
+            hits: average.hits(),
             first_hz: frequency_hz.first().copied().unwrap_or(0.0),
             step_hz,
             magnitude_m_per_n,
@@ -137,11 +126,12 @@ pub fn specimen_curves(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::spectra::cross_spectra::OutputSums;
 
     const SIGMA: f64 = 2.3;
 
     /// A contact of 180 N/µm with a resonance of strength `a` at 192 Hz between A and B, seen from one impact.
-    fn seen(a: f64) -> (Vec<f64>, ContactAverage) {
+    fn seen(a: f64) -> (Vec<f64>, CrossSpectra) {
         let frequency_hz: Vec<f64> = (0..1981).map(|l| 10.0 + 0.5 * f64::from(l)).collect();
         let lines = frequency_hz.len();
         let s = |l: usize| Complex::new(SIGMA, TAU * frequency_hz[l]);
@@ -152,13 +142,11 @@ mod tests {
             d * tangential[l] * s(l)
         };
         let b: Vec<Complex<f64>> = (0..lines).map(|l| tangential[l] * 1e-8 * s(l)).collect();
-        let average = ContactAverage {
-            hits: 1,
-            force: vec![1.0; lines],
-            cross: [(0..lines).map(|l| b[l] + relative(l)).collect(), b, tangential],
-            auto: [vec![1.0; lines], vec![1.0; lines], vec![1.0; lines]],
-        };
-        (frequency_hz, average)
+        let outputs = [(0..lines).map(|l| b[l] + relative(l)).collect(), b.clone(), tangential.clone()]
+            .map(|s_xf| OutputSums { s_xf, s_xx: vec![1.0; lines], delay_s: 0.0 });
+        let average =
+            CrossSpectra::new(1.0, frequency_hz.clone(), SIGMA, 1, vec![1.0; lines], outputs.to_vec());
+        (frequency_hz, average.expect("one value for each line"))
     }
 
     #[test]

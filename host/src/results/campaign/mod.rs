@@ -28,26 +28,27 @@ mod static_arm;
 #[cfg(test)]
 mod synthetic;
 
+pub use assemble::Measured;
 pub use back_coupling::BACK_COUPLING;
 pub use cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel};
-pub use checks::{HIDDEN_RESONANCE, SERIES_COMPLIANCE, UNIDENTIFIED};
+pub use checks::{HIDDEN_RESONANCE, SERIES_COMPLIANCE};
 pub use contact::DIRECT;
-pub use from_store::{AnalyseError, analyse, geometry};
+pub use from_store::{AnalyseError, CampaignFile, analyse, geometry};
 pub use interface::fill;
 pub use interface_checks::{INTERFACE_MODES, INTERNALS, SAME_IN_ALL};
 
 use super::{Completeness, MAIN_BAND_HZ, Results, UsableBand, ranges};
 use crate::spectra::{Windowing, usable_band};
+use crate::substructuring::Band;
 use crate::substructuring::averaged::{CellHits, Priors};
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping};
 use crate::substructuring::identify::identify;
 use crate::substructuring::idm::IdmSet;
-use crate::substructuring::joint::Band;
 use crate::substructuring::method::Method;
 use crate::substructuring::noise::FrfNoise;
 use at_contact::at_the_contact;
-use averages::{CellAverage, FORCE_LINES, HIGHEST_HZ, LOWEST_HZ, average};
+use averages::{CellAverage, FORCE_LINES, LINES_HZ, average};
 use loops::ImpactLoop;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -134,14 +135,13 @@ pub fn analyse_measurements<M: Measurements>(
             results.source.records.insert(name.into(), records);
         }
         results.usable_bands.extend(force_band(name, &own));
-        results.frfs.extend(chosen::of_cells(name, points, &own, sigma, measurements.quantity()));
-        let assembled = assemble::assemble(name, points, &own, sigma, measurements.quantity());
-        if assembled.frf.is_some() {
+        results.frfs.extend(chosen::of_cells(name, points, &own, measurements.quantity()));
+        let assembled = assemble::assemble(name, points, &own, measurements.quantity());
+        if assembled.measured.is_some() {
             note_left_out(&mut results, name, "impacts", &assembled.impacts_left_out);
             note_left_out(&mut results, name, "response locations", &assembled.responses_left_out);
         }
-        noises[place] = assembled.frf.as_ref().map(|frf| assemble::noise(points, frf, &own));
-        frfs[place] = assembled.frf;
+        (frfs[place], noises[place]) = assembled.measured.map(|m| (m.frf, m.noise)).unzip();
     }
     substructure(&mut results, geometry, &frfs, &noises);
     if let Some(ajb) = &frfs[2] {
@@ -198,7 +198,7 @@ fn one_cell<M: Measurements>(
     if contact {
         for hit in &cell.hits {
             let Some(signals) = &hit.contact else { continue };
-            match loops::of_hit(hit.record, &name.impact, cell.fs_hz, signals, cell.contact_delay_s) {
+            match loops::of_hit(hit.record, &name.impact, cell.fs_hz, signals, signals.delay_s) {
                 Ok(found) => outcome.loops.push(found),
                 Err(error) => {
                     outcome
@@ -216,7 +216,8 @@ fn one_cell<M: Measurements>(
             Err(error) => outcome.complaints.push(complaint(&error)),
         }
     }
-    match average(name.clone(), cell, measurements.sigma_per_s(), measurements.quantity(), contact) {
+    match average(name.clone(), cell, measurements.sigma_per_s(), measurements.quantity(), contact, LINES_HZ)
+    {
         Ok(averaged) => outcome.average = Some(averaged),
         Err(error) => outcome.complaints.push(complaint(&error)),
     }
@@ -230,7 +231,7 @@ fn note_settings(results: &mut Results, sigma_per_s: f64) {
     settings
         .insert("force_window_s".into(), serde_json::json!([-window.force_before_s, window.force_after_s]));
     settings.insert("estimator".into(), "H1 on s = σ + iω".into());
-    settings.insert("lines_hz".into(), serde_json::json!([LOWEST_HZ, HIGHEST_HZ]));
+    settings.insert("lines_hz".into(), serde_json::json!(LINES_HZ));
 }
 
 /// Cells given up, those of one location and one reason in one sentence.
