@@ -1,7 +1,7 @@
 //! The joint by substructuring: numbers over bands, and the spectra they come from.
 
 use super::Statistics;
-use super::campaign::UNIDENTIFIED;
+use crate::identified::SCATTER_OF_LINES;
 use crate::substructuring::Dof;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -60,7 +60,7 @@ impl Joint {
     pub fn identified(&self) -> bool {
         let noise = self.noise_n_per_m.get("z").copied().unwrap_or(0.0);
         self.sliding_stiffness()
-            .is_some_and(|k| k.mean > 0.0 && k.std <= UNIDENTIFIED * k.mean && noise <= k.mean)
+            .is_some_and(|k| k.mean > 0.0 && k.std <= SCATTER_OF_LINES * k.mean && noise <= k.mean)
     }
 }
 

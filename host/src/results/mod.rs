@@ -33,7 +33,7 @@ pub use joint::{Goodness, Joint, JointSpectrum, Refusal, SpectrumCurve};
 pub use reconstruction::Reconstruction;
 pub use source::{Software, Source, ranges};
 
-use crate::substructuring::joint::Band;
+use crate::substructuring::Band;
 use serde::Serialize;
 
 /// The shape's version: 1.

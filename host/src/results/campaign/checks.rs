@@ -1,6 +1,7 @@
 //! Whether the numbers may be believed: clamp in series, hidden resonance.
 
 use crate::hysteresis::compliance::ContactCompliance;
+use crate::identified::SCATTER_OF_LINES;
 use crate::results::number::{micro, short};
 use crate::results::{Check, Joint, OverCycles, Results, Statistics};
 use crate::substructuring::Dof;
@@ -8,9 +9,6 @@ use crate::substructuring::joint::NORMAL_95;
 
 /// Loops stiffer than FBS by more than this: something between arm and specimen gives way.
 const SERIES_RATIO: f64 = 1.5;
-
-/// A scatter over lines of more than this times the mean is no identification.
-pub const UNIDENTIFIED: f64 = 1.5;
 
 /// A scatter of T/Δx over lines below this fraction of its mean is clear enough to compare with.
 const CLEAR: f64 = 0.3;
@@ -52,7 +50,7 @@ pub fn series_compliance(fbs: Option<&Statistics>, loops: Option<OverCycles>) ->
         );
     };
     let (k_fbs, k_loops) = (fbs.mean, loops.mean);
-    if k_fbs <= 0.0 || k_loops <= 0.0 || fbs.std > UNIDENTIFIED * k_fbs {
+    if k_fbs <= 0.0 || k_loops <= 0.0 || fbs.std > SCATTER_OF_LINES * k_fbs {
         return Check::new(
             name,
             None,

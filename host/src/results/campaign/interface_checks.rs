@@ -1,6 +1,6 @@
 //! Whether the interface is described well enough: modes, internals, A and B the same in all configurations.
 
-use super::checks::UNIDENTIFIED;
+use crate::identified::SCATTER_OF_LINES;
 use crate::results::number::{micro, short};
 use crate::results::{Check, MAIN_BAND};
 use crate::substructuring::cmif::Cmif;
@@ -126,7 +126,7 @@ pub fn configuration(found: &Identification) -> Option<Check> {
         }
         clear &= high - low < k.mean.abs();
     }
-    let clear = clear && k.std <= UNIDENTIFIED * k.mean.abs();
+    let clear = clear && k.std <= SCATTER_OF_LINES * k.mean.abs();
     let (ok, meaning) = if !clear {
         (None, "Eq. A.1 and A.2 scatter too much to tell whether A and B are the same structures in the assembly as alone.".to_owned())
     } else if changed.is_empty() {

@@ -2,11 +2,11 @@
 
 use super::{BANDS_HZ, Wanted};
 use crate::results::{Bootstrap, MAIN_BAND_HZ, Results};
+use crate::substructuring::Band;
 use crate::substructuring::averaged::{Averaged, AveragedError, CellHits, Prepared, Priors};
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::Geometry;
 use crate::substructuring::idm::IdmSet;
-use crate::substructuring::joint::Band;
 use crate::substructuring::noise::FrfNoise;
 
 /// The bootstrap's seed: the same file gives the same figures.
