@@ -37,11 +37,11 @@ fn stated_processing_is_reproduced() {
     let scale = expected["mean_abs_h1"].as_f64().expect("a number");
     for (i, hz) in expected["lines_hz"].as_array().expect("lines").iter().enumerate() {
         let hz = hz.as_f64().expect("a number");
-        let line = y.frequency_hz.iter().position(|f| (f - hz).abs() < 1e-9).expect("a half-hertz grid");
+        let line = y.frequency_hz().iter().position(|f| (f - hz).abs() < 1e-9).expect("a half-hertz grid");
         // single-precision storage: 1e-4 is the stated tolerance, 1e-7 is what is expected
-        assert!((y.h1[line][0] - pair(&expected["h1"][i])).norm() < 1e-6 * scale, "{hz} Hz");
+        assert!((y.h1(line, 0) - pair(&expected["h1"][i])).norm() < 1e-6 * scale, "{hz} Hz");
         let coherence = expected["coherence"][i].as_f64().expect("a number");
-        assert!((y.coherence[line][0] - coherence).abs() < 1e-6, "{hz} Hz");
+        assert!((y.coherence(line, 0) - coherence).abs() < 1e-6, "{hz} Hz");
     }
 }
 
@@ -53,17 +53,17 @@ fn default_processing_finds_the_exact_mobility() {
     let scale = expected["mean_abs_h1"].as_f64().expect("a number");
     for (i, hz) in expected["lines_hz"].as_array().expect("lines").iter().enumerate() {
         let hz = hz.as_f64().expect("a number");
-        let line = y.frequency_hz.iter().position(|f| (f - hz).abs() < 1e-9).expect("a half-hertz grid");
-        let error = (y.h1[line][0] - pair(&expected["exact_at_sigma"][i])).norm();
+        let line = y.frequency_hz().iter().position(|f| (f - hz).abs() < 1e-9).expect("a half-hertz grid");
+        let error = (y.h1(line, 0) - pair(&expected["exact_at_sigma"][i])).norm();
         // four deviations of the noise that the variance formula predicts for these three hits, complex; at the resonance
         // a thousandth of its height for what three hits cannot show of their noise
-        let sigma = (2.0 * y.variance[line][0]).sqrt();
+        let sigma = (2.0 * y.variance(line, 0)).sqrt();
         assert!(
-            error < 4.0 * sigma + 1e-3 * y.h1[line][0].norm() + 1e-2 * scale,
+            error < 4.0 * sigma + 1e-3 * y.h1(line, 0).norm() + 1e-2 * scale,
             "{hz} Hz: {error:e} for {sigma:e}"
         );
     }
-    let band = usable_band(&y.frequency_hz, &y.s_ff, 6.0).expect("a hit");
+    let band = usable_band(y.frequency_hz(), &y.force_spectrum(), 6.0).expect("a hit");
     // half sines of 0.40…0.42 ms
     assert!((1900.0..2150.0).contains(&band.high_hz), "{band:?}");
 }

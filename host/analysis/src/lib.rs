@@ -1,8 +1,43 @@
-//! Stiffness of joints from measurements: impact spectra, frequency-based substructuring, hysteresis loops.
+//! The stiffness of a joint from measurements: impact spectra, frequency-based substructuring, hysteresis loops.
 //!
-//! Arrays and geometry in, numbers out: nothing here knows of devices, files or screens.
+//! Arrays and geometry in, numbers out: nothing here knows of devices, files or screens. Stiffness is in N/m, time in seconds,
+//! and every FRF is on a line s = σ + i2πf.
+//!
+//! # A joint in ten lines
+//!
+//! Two masses, alone and joined by a spring of 180 N/µm. In a measurement the three admittances come from hits; here they are
+//! written down. What couples the masses is found again from them:
+//!
+//! ```
+//! use jointrig_analysis::substructuring::{decoupling::interface, joint::stiffness_and_damping};
+//! use nalgebra::{Complex, DMatrix};
+//!
+//! let s = Complex::new(0.0, std::f64::consts::TAU * 400.0);
+//! let (inertia_a, inertia_b, k) = (4.0 * s * s, 2.0 * s * s, Complex::from(180e6));
+//! let y_a = DMatrix::from_element(1, 1, inertia_a.inv());
+//! let y_b = DMatrix::from_element(1, 1, inertia_b.inv());
+//! let joined = DMatrix::from_row_slice(2, 2, &[inertia_a + k, -k, -k, inertia_b + k]);
+//! let y_ajb = joined.try_inverse().ok_or("no line of this rig is singular")?;
+//! let joint = interface(&y_a, &y_b, &y_ajb)?;
+//! let (stiffness_n_per_m, _damping) = stiffness_and_damping(joint[(0, 0)], s);
+//! assert!((stiffness_n_per_m / 180e6 - 1.0).abs() < 1e-9);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Where to go on
+//!
+//! - FRFs of many lines, points and directions: [`substructuring::identify`](fn@substructuring::identify) does all of it;
+//!   [`substructuring::averaged`] gives the value to quote, with its interval.
+//! - FRFs from the records of a hammer: [`spectra::estimate`](fn@spectra::estimate).
+//! - k_T from a record of a sliding contact: [`hysteresis::analyse`](fn@hysteresis::analyse).
+//!
+//! The feature `rayon` uses every core; results are the same to the last bit with and without it.
 #![forbid(unsafe_code)]
 
+pub mod band;
 pub mod hysteresis;
+pub mod identified;
+mod parallel;
 pub mod spectra;
+pub mod structure;
 pub mod substructuring;

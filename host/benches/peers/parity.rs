@@ -12,7 +12,7 @@ use jointrig::exchange::uff::{
     Precision, TraceLine, Units, Values, read, write,
 };
 use jointrig::exchange::{Extra, read_impacts, write_frf, write_impacts};
-use jointrig::spectra::{ImpactRecords, Pulse, SpectraAverage, Windowing};
+use jointrig::spectra::{CrossSpectra, ImpactRecords, Pulse, SpectraAverage, Windowing};
 use num_complex::Complex;
 use serde_json::Value;
 use std::path::Path;
@@ -68,7 +68,7 @@ fn records(folder: &Path) -> Outcome {
     let (samples, window) = (records.force_n[0].len(), Windowing::default());
     let decay = window.decay(records.fs_hz, samples);
     let mut windowed = ImpactRecords { force_n: Vec::new(), response: Vec::new(), ..records.clone() };
-    let mut average = SpectraAverage::new(records.fs_hz, samples, 1).with_noise_ratio(Some(1.0));
+    let mut average = SpectraAverage::new(records.fs_hz, samples, 1);
     for (force, responses) in records.force_n.iter().zip(&records.response) {
         let origin_s = Pulse::locate(force).ok_or("no pulse")?.start as f64 / records.fs_hz;
         let (mut f, mut x) = (vec![0.0; samples], vec![0.0; samples]);
@@ -83,12 +83,16 @@ fn records(folder: &Path) -> Outcome {
     }
     write_impacts(&folder.join("records.npz"), &windowed)?;
     let y = average.finish(0.0, &[])?;
-    let lines = y.frequency_hz.len();
+    let lines = y.lines();
     let complex = |name: &str, rows: &[Vec<Complex<f64>>]| {
         Extra::Complex(name.into(), Array { shape: vec![lines, 1, 1], values: rows.concat() })
     };
-    let coherence = Array { shape: vec![lines, 1], values: y.coherence.concat() };
-    let extras = [complex("h2", &y.h2), complex("hv", &y.hv), Extra::Real("coherence".into(), coherence)];
+    let coherence = Array { shape: vec![lines, 1], values: y.rows(CrossSpectra::coherence).concat() };
+    let extras = [
+        complex("h2", &y.rows(CrossSpectra::h2)),
+        complex("hv", &y.rows(|y, line, output| y.hv(line, output, Some(1.0)))),
+        Extra::Real("coherence".into(), coherence),
+    ];
     write_frf(
         &folder.join("ours.npz"),
         &y.to_matrix(records.quantity.frf(), vec!["x".into()], "f".into()),

@@ -1,7 +1,8 @@
 //! The static arm from hits on B alone, where the hammer is the force at the contact.
 
-use super::averages::{CellAverage, ContactAverage};
+use super::averages::CellAverage;
 use crate::hysteresis::static_arm::{Identified, from_known_force};
+use crate::spectra::CrossSpectra;
 use crate::substructuring::geometry::{Configuration, Point};
 use crate::substructuring::idm::{Dof, IdmSet};
 use crate::substructuring::vpt;
@@ -22,19 +23,19 @@ pub fn from_hits(
     sigma_per_s: f64,
     parallel_path: Option<f64>,
 ) -> Option<Identified> {
-    let mut hit: Vec<(&Point, ContactAverage)> = Vec::new();
+    let mut hit: Vec<(&Point, CrossSpectra)> = Vec::new();
     let mut frequency_hz: &[f64] = &[];
     for cell in averages.iter().filter(|cell| cell.name.configuration == "B") {
         let Some(contact) = &cell.contact else { continue };
         if frequency_hz.is_empty() {
-            frequency_hz = &cell.frequency_hz;
+            frequency_hz = cell.spectra.frequency_hz();
         }
         match hit.iter_mut().find(|(point, _)| point.name == cell.name.impact) {
-            Some((_, sum)) if sum.force.len() == contact.force.len() => sum.add(contact),
-            Some(_) => {}
+            // spectra of other lines do not count
+            Some((_, sum)) => sum.add(contact).unwrap_or_default(),
             None => {
                 let point = points.impacts.iter().find(|point| point.name == cell.name.impact)?;
-                if contact.force.len() == frequency_hz.len() {
+                if contact.lines() == frequency_hz.len() {
                     hit.push((point, contact.clone()));
                 }
             }
@@ -52,10 +53,7 @@ pub fn from_hits(
         .filter(|(_, f)| (FIT_HZ[0]..=FIT_HZ[1]).contains(*f))
         .map(|(l, f)| {
             let per_newton = |signal: usize| -> Complex<f64> {
-                hit.iter()
-                    .enumerate()
-                    .map(|(i, (_, sum))| sum.cross[signal][l] / sum.force[l] * transformation.t[(i, z)])
-                    .sum()
+                hit.iter().enumerate().map(|(i, (_, sum))| sum.h1(l, signal) * transformation.t[(i, z)]).sum()
             };
             // the cells' sum, and B's acceleration from its velocity
             (per_newton(2), per_newton(1) * Complex::new(sigma_per_s, TAU * f))

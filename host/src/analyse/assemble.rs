@@ -2,22 +2,33 @@
 //!
 //! A substructuring matrix has no place for a guess: where a cell is missing that Eq. (3) reads, its impact or its
 //! response location is left out. A cell that Eq. (3) does not read (a spare response, a hit on B in the assembly)
-//! costs nothing: its place holds NaN, and whoever asks for it is refused by name.
+//! costs nothing: its place holds NaN, and whoever asks for it is refused by name. What is written for other programs leaves
+//! nothing out: it has a place for every pair of the geometry.
 
 use super::averages::CellAverage;
 use crate::spectra::MotionQuantity;
-use crate::spectra::averaged::variance_of_part;
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::{Configuration, Grouping, Point};
 use crate::substructuring::noise::FrfNoise;
 use nalgebra::DMatrix;
 use num_complex::Complex;
 
+/// FRFs of a configuration with what is known of their noise; NaN where nothing was measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeasuredFrf {
+    /// H1.
+    pub frf: FrfMatrix,
+    /// Variance of the real part of every value; NaN where a cell has a single hit.
+    pub noise: FrfNoise,
+    /// Coherence (output × input) per line; NaN where a cell has a single hit.
+    pub coherence: Vec<DMatrix<f64>>,
+}
+
 /// What came of a configuration.
 #[derive(Debug)]
 pub struct Assembled {
     /// The FRFs, if anything was measured.
-    pub frf: Option<FrfMatrix>,
+    pub measured: Option<MeasuredFrf>,
     /// Impacts that had to be left out because cells are missing.
     pub impacts_left_out: Vec<String>,
     /// Response locations that had to be left out because cells are missing.
@@ -52,26 +63,20 @@ pub fn assemble(
     configuration: &str,
     points: &Configuration,
     cells: &[CellAverage],
-    sigma_per_s: f64,
     quantity: MotionQuantity,
 ) -> Assembled {
-    let input_names = points.input_names();
-    let output_names = points.output_names();
     let locations = locations(points);
     let groupings: Vec<Grouping> = locations
         .iter()
         .filter_map(|l| points.channels.iter().find(|c| c.name == *l))
         .map(|c| c.grouping)
         .collect();
-    let find = |impact: &str, location: &str| {
-        cells.iter().find(|c| c.name.impact == impact && c.name.response == location)
-    };
     let (impacts, kept_locations) = if cells.is_empty() {
         (Vec::new(), Vec::new())
     } else {
         complete(points.impacts.len(), locations.len(), |i, l| {
             !is_read(configuration, points.impacts[i].grouping, groupings[l])
-                || find(&points.impacts[i].name, locations[l]).is_some()
+                || find(cells, &points.impacts[i], locations[l]).is_some()
         })
     };
     let left_out = |all: usize, kept: &[usize]| (0..all).filter(|i| !kept.contains(i)).collect::<Vec<_>>();
@@ -84,71 +89,73 @@ pub fn assemble(
     let channels: Vec<usize> = (0..points.channels.len())
         .filter(|c| kept_locations.iter().any(|l| locations[*l] == points.channels[*c].name))
         .collect();
+    let measured = measured(points, &channels, &impacts, cells, quantity);
+    Assembled { measured, impacts_left_out, responses_left_out }
+}
+
+/// Every pair of the geometry, measured or not; none where nothing was measured.
+pub fn everything(
+    points: &Configuration,
+    cells: &[CellAverage],
+    quantity: MotionQuantity,
+) -> Option<MeasuredFrf> {
+    let all = |count: usize| (0..count).collect::<Vec<_>>();
+    measured(points, &all(points.channels.len()), &all(points.impacts.len()), cells, quantity)
+}
+
+/// The FRFs of these channels and impacts, with their noise.
+fn measured(
+    points: &Configuration,
+    channels: &[usize],
+    impacts: &[usize],
+    cells: &[CellAverage],
+    quantity: MotionQuantity,
+) -> Option<MeasuredFrf> {
+    let first = &cells.first()?.spectra;
+    if channels.is_empty() || impacts.is_empty() {
+        return None;
+    }
+    let (rows, columns) = (channels.len(), impacts.len());
     let hole = Complex::new(f64::NAN, f64::NAN);
-    let frf = cells.first().filter(|_| !channels.is_empty() && !impacts.is_empty()).map(|first| {
-        let mut lines =
-            vec![DMatrix::<Complex<f64>>::zeros(channels.len(), impacts.len()); first.frequency_hz.len()];
-        for (column, i) in impacts.iter().enumerate() {
-            for (row, c) in channels.iter().enumerate() {
-                let channel = &points.channels[*c];
-                let cell = find(&points.impacts[*i].name, &channel.name)
-                    .filter(|cell| cell.frequency_hz.len() == lines.len());
-                for (line, y) in lines.iter_mut().enumerate() {
-                    y[(row, column)] = cell.map_or(hole, |cell| along(cell, channel, line));
+    let mut lines = vec![DMatrix::from_element(rows, columns, hole); first.lines()];
+    let mut variance = vec![DMatrix::from_element(rows, columns, f64::NAN); first.lines()];
+    let mut coherence = variance.clone();
+    for (column, i) in impacts.iter().enumerate() {
+        for (row, c) in channels.iter().enumerate() {
+            let channel = &points.channels[*c];
+            let Some(cell) = find(cells, &points.impacts[*i], &channel.name) else { continue };
+            let y = &cell.spectra;
+            if y.lines() != first.lines() {
+                continue;
+            }
+            // 0 times a value is left out, so that an axis that is not needed cannot spoil the others
+            let axes: Vec<usize> = (0..3).filter(|axis| channel.direction[*axis] != 0.0).collect();
+            let along = |axis: &usize| channel.direction[*axis];
+            for line in 0..first.lines() {
+                lines[line][(row, column)] = axes.iter().map(|axis| y.h1(line, *axis) * along(axis)).sum();
+                variance[line][(row, column)] =
+                    axes.iter().map(|axis| y.variance(line, *axis) * along(axis).powi(2)).sum();
+                if let [axis] = axes[..] {
+                    coherence[line][(row, column)] = y.coherence(line, axis);
                 }
             }
         }
-        FrfMatrix {
-            frequency_hz: first.frequency_hz.clone(),
-            sigma_per_s,
-            quantity: quantity.frf(),
-            outputs: channels.iter().map(|c| output_names[*c].clone()).collect(),
-            inputs: impacts.iter().map(|i| input_names[*i].clone()).collect(),
-            lines,
-        }
-    });
-    Assembled { frf, impacts_left_out, responses_left_out }
-}
-
-/// Variance of the real part of every cell of `frf`, from coherence and hits; NaN where a cell has a single hit, or none.
-pub fn noise(points: &Configuration, frf: &FrfMatrix, cells: &[CellAverage]) -> FrfNoise {
-    let place = |names: &[String], wanted: &String| names.iter().position(|n| n == wanted);
-    let (outputs, inputs) = (points.output_names(), points.input_names());
-    let (rows, columns) = (frf.outputs.len(), frf.inputs.len());
-    let mut variance = vec![DMatrix::from_element(rows, columns, f64::NAN); frf.lines.len()];
-    for (column, input) in frf.inputs.iter().enumerate() {
-        for (row, output) in frf.outputs.iter().enumerate() {
-            let (Some(i), Some(o)) = (place(&inputs, input), place(&outputs, output)) else { continue };
-            let (impact, channel) = (&points.impacts[i], &points.channels[o]);
-            let own = |c: &&CellAverage| c.name.impact == impact.name && c.name.response == channel.name;
-            let Some(cell) = cells.iter().find(own).filter(|c| c.frequency_hz.len() == variance.len()) else {
-                continue;
-            };
-            for (line, v) in variance.iter_mut().enumerate() {
-                v[(row, column)] = (0..3)
-                    .filter(|axis| channel.direction[*axis] != 0.0)
-                    .map(|axis| {
-                        let part = variance_of_part(
-                            cell.h1[axis][line],
-                            cell.coherence[axis][line],
-                            cell.records.len(),
-                        );
-                        part * channel.direction[axis].powi(2)
-                    })
-                    .sum();
-            }
-        }
     }
-    FrfNoise { variance }
+    let (outputs, inputs) = (points.output_names(), points.input_names());
+    let frf = FrfMatrix {
+        frequency_hz: first.frequency_hz().to_vec(),
+        sigma_per_s: first.sigma_per_s(),
+        quantity: quantity.frf(),
+        outputs: channels.iter().map(|c| outputs[*c].clone()).collect(),
+        inputs: impacts.iter().map(|i| inputs[*i].clone()).collect(),
+        lines,
+    };
+    Some(MeasuredFrf { frf, noise: FrfNoise { variance }, coherence })
 }
 
-/// The response along the channel's direction from the vibrometer's x, y, z.
-fn along(cell: &CellAverage, channel: &Point, line: usize) -> Complex<f64> {
-    (0..3)
-        // 0 times a value is left out, so that an axis that is not needed cannot spoil the others
-        .filter(|axis| channel.direction[*axis] != 0.0)
-        .map(|axis| cell.h1[axis][line] * channel.direction[axis])
-        .sum()
+/// The cell of this impact and response location.
+fn find<'c>(cells: &'c [CellAverage], impact: &Point, location: &str) -> Option<&'c CellAverage> {
+    cells.iter().find(|c| c.name.impact == impact.name && c.name.response == location)
 }
 
 /// Rows and columns of the largest part without holes that leaving out the worst one, again and again, finds.

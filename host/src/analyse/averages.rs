@@ -1,53 +1,37 @@
-//! From kept hits to averaged FRFs, one cell at a time; the time signals are gone when the cell is done.
+//! From kept hits to spectra, one cell at a time; the time signals are gone when the cell is done.
 
-use super::cell::{Cell, CellName};
-use crate::spectra::{FrfSettings, ImpactRecords, MotionQuantity, SpectraError, Windowing, estimate};
-use num_complex::Complex;
+use super::cell::{Cell, CellName, ContactDelays, Hit};
+use crate::spectra::{
+    CrossSpectra, FrfSettings, ImpactRecords, MotionQuantity, SpectraError, Windowing, estimate,
+};
 
-/// Lines below this carry rigid-body drift and the mains' subharmonics, not the joint, Hz.
-pub const LOWEST_HZ: f64 = 10.0;
-/// Lines above this are not used by any band, Hz.
-pub const HIGHEST_HZ: f64 = 1000.0;
+/// The lines that are used, Hz: those below carry rigid-body drift and the mains' subharmonics, not the joint; those above are in
+/// no band.
+pub const LINES_HZ: [f64; 2] = [10.0, 1000.0];
 
 /// Lines in one value of a cell's force spectrum.
 pub const FORCE_LINES: usize = 16;
 
-/// Averaged FRFs of one cell on s = σ + iω, as measured (not yet receptances).
+/// Spectra of one cell on s = σ + iω, as measured (not yet receptances).
 #[derive(Debug, Clone)]
 pub struct CellAverage {
     /// Which cell.
     pub name: CellName,
     /// The records averaged.
     pub records: Vec<i64>,
-    /// Frequency of each line, Hz.
-    pub frequency_hz: Vec<f64>,
-    /// H1 of x, y, z \[axis\]\[line\].
-    pub h1: [Vec<Complex<f64>>; 3],
-    /// Coherence of x, y, z \[axis\]\[line\]; NaN for a single hit.
-    pub coherence: [Vec<f64>; 3],
+    /// The response along x, y and z.
+    pub spectra: CrossSpectra,
     /// Auto-spectrum of the force up to half the sampling rate, N² s²: means of [`FORCE_LINES`] lines each. All lines of all cells
     /// would be most of what an analysis remembers.
     pub force_spectrum: Vec<f64>,
     /// Distance of lines, Hz.
     pub step_hz: f64,
-    /// The contact's spectra, where asked for and measured.
-    pub contact: Option<ContactAverage>,
+    /// v_A, v_B and T at the contact, where asked for and measured.
+    pub contact: Option<CrossSpectra>,
 }
 
-/// Spectra of the contact's signals against the hammer's force, summed over hits.
-#[derive(Debug, Clone)]
-pub struct ContactAverage {
-    /// Hits summed.
-    pub hits: usize,
-    /// S_ff, N² s².
-    pub force: Vec<f64>,
-    /// Cross-spectra with the force of v_A, v_B and T.
-    pub cross: [Vec<Complex<f64>>; 3],
-    /// Auto-spectra of v_A, v_B and T.
-    pub auto: [Vec<f64>; 3],
-}
-
-/// Averages the hits of a cell; `contact` asks for the contact's spectra too.
+/// Sums up the hits of a cell; `contact` asks for the contact's spectra too. Hits of sessions with other delays are brought in
+/// step with the force before they are added.
 ///
 /// # Errors
 /// No hit, or hits that do not fit together.
@@ -57,73 +41,56 @@ pub fn average(
     sigma_per_s: f64,
     quantity: MotionQuantity,
     contact: bool,
+    lines_hz: [f64; 2],
 ) -> Result<CellAverage, SpectraError> {
     let contact = contact && cell.hits.iter().all(|h| h.contact.is_some());
-    let delays = cell.contact_delay_s;
-    let mut delay_s = cell.response_delay_s.to_vec();
-    if contact {
-        delay_s.extend([delays.specimen_a, delays.specimen_b, delays.load_cells]);
-    }
     let records: Vec<i64> = cell.hits.iter().map(|h| h.record).collect();
-    let (mut force_n, mut response) = (Vec::new(), Vec::new());
+    let mut alike: Vec<(Vec<f64>, ImpactRecords)> = Vec::new();
     for hit in cell.hits {
-        force_n.push(hit.force_n);
-        let mut outputs = Vec::from(hit.response);
-        if let (true, Some(c)) = (contact, hit.contact) {
-            outputs.extend([c.specimen_a_m_per_s, c.specimen_b_m_per_s, c.tangential_n]);
+        let (delay_s, force_n, outputs) = signals(hit, contact);
+        let place = alike.iter().position(|(own, _)| *own == delay_s).unwrap_or(alike.len());
+        if place == alike.len() {
+            let none = ImpactRecords { fs_hz: cell.fs_hz, force_n: vec![], response: vec![], quantity };
+            alike.push((delay_s, none));
         }
-        response.push(outputs);
+        alike[place].1.force_n.push(force_n);
+        alike[place].1.response.push(outputs);
     }
-    let used = vec![true; force_n.len()];
-    let settings = FrfSettings {
-        windowing: Windowing { sigma_per_s, ..Windowing::default() },
-        delay_s,
-        ..FrfSettings::default()
-    };
-    let all = estimate(&ImpactRecords { fs_hz: cell.fs_hz, force_n, response, quantity }, &used, &settings)?;
-    let step_hz = all.frequency_hz.get(1).copied().unwrap_or(0.0);
-    let mean = |lines: &[f64]| lines.iter().sum::<f64>() / lines.len() as f64;
-    let force_spectrum = all.s_ff.chunks(FORCE_LINES).map(mean).collect();
-    let kept = all.band(LOWEST_HZ, HIGHEST_HZ);
-    let output = |o: usize| kept.h1.iter().map(|row| row[o]).collect::<Vec<_>>();
-    let coherence = |o: usize| kept.coherence.iter().map(|row| row[o]).collect::<Vec<_>>();
-    let contact = contact.then(|| {
-        let hits = kept.hits as f64;
-        let cross = |o: usize| -> Vec<Complex<f64>> {
-            kept.h1.iter().zip(&kept.s_ff).map(|(row, s)| row[o] * s * hits).collect()
+    let mut all: Option<CrossSpectra> = None;
+    for (delay_s, records) in alike {
+        let settings = FrfSettings {
+            windowing: Windowing { sigma_per_s, ..Windowing::default() },
+            delay_s,
+            ..FrfSettings::default()
         };
-        // |H2| = S_xx / |S_xf|
-        let auto = |o: usize| -> Vec<f64> {
-            kept.h2.iter().zip(cross(o)).map(|(row, s_xf)| row[o].norm() * s_xf.norm()).collect()
-        };
-        ContactAverage {
-            hits: kept.hits,
-            force: kept.s_ff.iter().map(|s| s * hits).collect(),
-            cross: [cross(3), cross(4), cross(5)],
-            auto: [auto(3), auto(4), auto(5)],
+        let own = estimate(&records, &vec![true; records.force_n.len()], &settings)?;
+        match &mut all {
+            Some(sum) => sum.add(&own)?,
+            None => all = Some(own),
         }
-    });
+    }
+    let all = all.ok_or(SpectraError::NoHits)?;
+    let step_hz = all.frequency_hz().get(1).copied().unwrap_or(0.0);
+    let mean = |lines: &[f64]| lines.iter().sum::<f64>() / lines.len() as f64;
+    let force_spectrum = all.force_spectrum().chunks(FORCE_LINES).map(mean).collect();
+    let kept = all.band(lines_hz[0], lines_hz[1]);
     Ok(CellAverage {
         name,
         records,
-        h1: [output(0), output(1), output(2)],
-        coherence: [coherence(0), coherence(1), coherence(2)],
-        frequency_hz: kept.frequency_hz,
+        spectra: kept.of_outputs(0..3),
         force_spectrum,
         step_hz,
-        contact,
+        contact: contact.then(|| kept.of_outputs(3..6)),
     })
 }
 
-impl ContactAverage {
-    /// Adds the hits of another cell of the same impact (or of another impact, for sums over all).
-    pub fn add(&mut self, other: &ContactAverage) {
-        self.hits += other.hits;
-        let sum = |a: &mut [f64], b: &[f64]| a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
-        sum(&mut self.force, &other.force);
-        for i in 0..3 {
-            sum(&mut self.auto[i], &other.auto[i]);
-            self.cross[i].iter_mut().zip(&other.cross[i]).for_each(|(a, b)| *a += b);
-        }
+/// How late the responses are, the force, and the responses: x, y, z, and with `contact` v_A, v_B and T.
+fn signals(hit: Hit, contact: bool) -> (Vec<f64>, Vec<f64>, Vec<Vec<f64>>) {
+    let (mut delay_s, mut outputs) = (hit.response_delay_s.to_vec(), Vec::from(hit.response));
+    if let (true, Some(c)) = (contact, hit.contact) {
+        let ContactDelays { specimen_a, specimen_b, load_cells } = c.delay_s;
+        delay_s.extend([specimen_a, specimen_b, load_cells]);
+        outputs.extend([c.specimen_a_m_per_s, c.specimen_b_m_per_s, c.tangential_n]);
     }
+    (delay_s, hit.force_n, outputs)
 }

@@ -1,6 +1,6 @@
 //! The stages of a campaign's analysis, one after the other.
 
-use super::averages::{CellAverage, HIGHEST_HZ, LOWEST_HZ};
+use super::averages::{CellAverage, LINES_HZ};
 use super::cell::Measurements;
 use super::checks::between_the_arms;
 use super::findings::{Findings, Settings};
@@ -29,7 +29,7 @@ pub fn analyse_measurements<M: Measurements>(
     let cells = cells_stage::read_all(measurements, &names, wanted.replicates > 0, progress);
     let windowing = Windowing { sigma_per_s: measurements.sigma_per_s(), ..Windowing::default() };
     let mut found = Findings {
-        settings: Some(Settings { windowing, lines_hz: [LOWEST_HZ, HIGHEST_HZ] }),
+        settings: Some(Settings { windowing, lines_hz: LINES_HZ }),
         missing: cells.missing,
         ..Findings::default()
     };

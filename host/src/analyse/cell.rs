@@ -26,10 +26,6 @@ pub struct Cell {
     pub hits: Vec<Hit>,
     /// What is said about records that were kept and cannot be used.
     pub left_out: Vec<String>,
-    /// How late the scanning vibrometer's axes x, y, z are against the hammer's force, s.
-    pub response_delay_s: [f64; 3],
-    /// How late the contact's signals are against the hammer's force, s.
-    pub contact_delay_s: ContactDelays,
 }
 
 /// How late the signals at the contact are against the hammer's force, s.
@@ -43,7 +39,7 @@ pub struct ContactDelays {
     pub load_cells: f64,
 }
 
-/// One kept hit.
+/// One kept hit. Its delays are those of the session that recorded it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hit {
     /// The record's id in the campaign file.
@@ -52,6 +48,8 @@ pub struct Hit {
     pub force_n: Vec<f64>,
     /// Scanning vibrometer along x, y, z at the response location, SI.
     pub response: [Vec<f64>; 3],
+    /// How late these are against the hammer's force, s.
+    pub response_delay_s: [f64; 3],
     /// The signals at the contact, where the rig has them.
     pub contact: Option<ContactSignals>,
 }
@@ -65,6 +63,8 @@ pub struct ContactSignals {
     pub specimen_b_m_per_s: Vec<f64>,
     /// Sum of the load cells, N.
     pub tangential_n: Vec<f64>,
+    /// How late they are against the hammer's force.
+    pub delay_s: ContactDelays,
 }
 
 /// A level of the shaker.

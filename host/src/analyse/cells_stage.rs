@@ -1,6 +1,6 @@
 //! The cells, one at a time on each thread: read, averaged, and their signals forgotten.
 
-use super::averages::{CellAverage, average};
+use super::averages::{CellAverage, LINES_HZ, average};
 use super::cell::{CellName, Measurements};
 use super::hit_spectra;
 use super::impact_loops::{self, ImpactLoop};
@@ -69,7 +69,7 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
     if moves_contact {
         for hit in &cell.hits {
             let Some(signals) = &hit.contact else { continue };
-            match impact_loops::of_hit(hit.record, &name.impact, cell.fs_hz, signals, cell.contact_delay_s) {
+            match impact_loops::of_hit(hit.record, &name.impact, cell.fs_hz, signals, signals.delay_s) {
                 Ok(one) => found.loops.push(one),
                 Err(error) => {
                     found.missing.push(Missing::NoLoop { cell: name.clone(), record: hit.record, error });
@@ -85,7 +85,7 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
         }
     }
     let contact = moves_contact || drives_the_cells(geometry, name);
-    match average(name.clone(), cell, sigma_per_s, quantity, contact) {
+    match average(name.clone(), cell, sigma_per_s, quantity, contact, LINES_HZ) {
         Ok(averaged) => found.averages.push(averaged),
         Err(error) => found.missing.push(records(error.to_string())),
     }

@@ -6,14 +6,12 @@ use crate::spectra::MotionQuantity;
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::{Configuration, Grouping, Point};
 use num_complex::Complex;
-use std::f64::consts::TAU;
 
 /// The curves of a configuration that was measured here.
 pub fn of_cells(
     configuration: &str,
     points: &Configuration,
     cells: &[CellAverage],
-    sigma_per_s: f64,
     quantity: MotionQuantity,
 ) -> Vec<FrfCurve> {
     let find = |impact: &Point, channel: &Point| {
@@ -21,7 +19,7 @@ pub fn of_cells(
     };
     let chosen = choose(points, &|impact, channel| find(impact, channel).is_some());
     let curve = |(role, impact, channel): (Role, &Point, &Point)| {
-        Some(of_cell(configuration, (role, impact, channel), find(impact, channel)?, sigma_per_s, quantity))
+        Some(of_cell(configuration, (role, impact, channel), find(impact, channel)?, quantity))
     };
     chosen.into_iter().filter_map(curve).collect()
 }
@@ -30,18 +28,17 @@ fn of_cell(
     configuration: &str,
     pair: (Role, &Point, &Point),
     cell: &CellAverage,
-    sigma_per_s: f64,
     quantity: MotionQuantity,
 ) -> FrfCurve {
     let order = quantity.frf().order_of_s();
-    let s = |f: &f64| Complex::new(sigma_per_s, TAU * f);
-    let receptance = cell.h1[2].iter().zip(&cell.frequency_hz).map(|(h, f)| h * s(f).powi(-order));
+    let y = &cell.spectra;
+    let receptance = (0..y.lines()).map(|line| y.h1(line, 2) * y.s(line).powi(-order));
     let several = cell.records.len() > 1;
-    let coherence = cell.coherence[2].iter().filter(|_| several);
+    let coherence = (0..y.lines()).filter(|_| several).map(|line| y.coherence(line, 2));
     FrfCurve {
         hits: cell.records.len(),
-        coherence: coherence.map(|c| rounded(if c.is_finite() { *c } else { 0.0 }, 5)).collect(),
-        ..curve(configuration, pair, &cell.frequency_hz, receptance)
+        coherence: coherence.map(|c| rounded(if c.is_finite() { c } else { 0.0 }, 5)).collect(),
+        ..curve(configuration, pair, y.frequency_hz(), receptance)
     }
 }
 
@@ -108,7 +105,6 @@ pub fn arms(
     impact: &str,
     points: &Configuration,
     cells: &[CellAverage],
-    sigma_per_s: f64,
     quantity: MotionQuantity,
 ) -> Vec<FrfCurve> {
     let Some(hit) = points.impacts.iter().find(|p| p.name == impact) else { return Vec::new() };
@@ -117,7 +113,7 @@ pub fn arms(
         points.channels.iter().filter(measured).find_map(|channel| {
             let own = |c: &&CellAverage| c.name.impact == impact && c.name.response == channel.name;
             let cell = cells.iter().filter(|c| c.name.configuration == "AJB").find(own)?;
-            Some(of_cell("AJB", (role, hit, channel), cell, sigma_per_s, quantity))
+            Some(of_cell("AJB", (role, hit, channel), cell, quantity))
         })
     };
     let both = [arm(Role::ArmA, Grouping::InterfaceA), arm(Role::ArmB, Grouping::InterfaceB)];

@@ -51,16 +51,16 @@ pub fn of<M: Measurements>(
         }
     }
     missing.extend(holes(configuration, planned, own));
-    let (sigma_per_s, quantity) = (measurements.sigma_per_s(), measurements.quantity());
+    let quantity = measurements.quantity();
     let measured = Measured {
         configuration,
         records: own.iter().flat_map(|c| c.records.iter().copied()).collect(),
         usable_band: force_band(configuration, own),
-        frfs: chosen::of_cells(configuration, points, own, sigma_per_s, quantity),
+        frfs: chosen::of_cells(configuration, points, own, quantity),
         imported: None,
     };
-    let assembled = assemble::assemble(configuration, points, own, sigma_per_s, quantity);
-    if assembled.frf.is_some() {
+    let assembled = assemble::assemble(configuration, points, own, quantity);
+    if assembled.measured.is_some() {
         let (impacts, responses) = (assembled.impacts_left_out, assembled.responses_left_out);
         if !impacts.is_empty() {
             missing.push(Missing::ImpactsLeftOut { configuration, names: impacts });
@@ -69,8 +69,8 @@ pub fn of<M: Measurements>(
             missing.push(Missing::ResponsesLeftOut { configuration, names: responses });
         }
     }
-    let noise = assembled.frf.as_ref().map(|frf| assemble::noise(points, frf, own));
-    ConfigurationFrfs { measured, frf: assembled.frf, noise, missing }
+    let (frf, noise) = assembled.measured.map(|m| (m.frf, m.noise)).unzip();
+    ConfigurationFrfs { measured, frf, noise, missing }
 }
 
 fn holes(configuration: &'static str, planned: usize, own: &[CellAverage]) -> Vec<Missing> {

@@ -1,6 +1,6 @@
 //! Everything that is read at the specimens themselves: the impacts' loops, the shaker's levels, the contact in frequency.
 
-use super::averages::{CellAverage, ContactAverage};
+use super::averages::CellAverage;
 use super::cell::Measurements;
 use super::checks::{ContactChange, HiddenResonance, SeriesCompliance, at_the_specimens};
 use super::impact_loops::{self, ImpactLoop, ImpactLoops};
@@ -10,9 +10,9 @@ use super::specimen_curves::specimen_curves;
 use super::{arm_from_hits, chosen};
 use crate::hysteresis::Correction;
 use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
-use crate::hysteresis::impact_spectra::ImpactSpectra;
 use crate::hysteresis::static_arm::{Basis, Identified, from_levels};
 use crate::results::{Backbone, FrfCurve, LoopCurve, Reconstruction, ShakerLoop};
+use crate::spectra::CrossSpectra;
 use crate::substructuring::BandStatistic;
 use crate::substructuring::direct::Direct;
 use crate::substructuring::geometry::{Geometry, Grouping};
@@ -59,17 +59,13 @@ pub fn at_the_contact<M: Measurements>(
     let (steady, no_loop) = shaker_levels::analysed(&levels);
     missing.extend(no_loop);
 
-    let (frequency_hz, by_impact) = summed(averages);
-    let spectra: Vec<ImpactSpectra<'_>> = (by_impact
-        .iter()
-        .filter(|(_, sum)| sum.force.len() == frequency_hz.len()))
-    .map(|(_, sum)| ImpactSpectra { force: &sum.force, cross: sum.cross.each_ref().map(Vec::as_slice) })
-    .collect();
-    let compliance = ContactCompliance::of_impacts(frequency_hz, sigma_per_s, &spectra);
+    let by_impact = summed(averages);
+    let spectra: Vec<&CrossSpectra> = by_impact.iter().map(|(_, sum)| sum).collect();
+    let compliance = ContactCompliance::of_impacts(&spectra);
     let mut frfs = Vec::new();
     if let Some((impact, sign, sum)) = shown_impact(geometry, &by_impact) {
-        frfs.extend(specimen_curves(impact, sign, frequency_hz, sigma_per_s, sum));
-        frfs.extend(chosen::arms(impact, &geometry.ajb, averages, sigma_per_s, measurements.quantity()));
+        frfs.extend(specimen_curves(impact, sign, sum));
+        frfs.extend(chosen::arms(impact, &geometry.ajb, averages, measurements.quantity()));
     }
     let hidden = HiddenResonance::of(compliance.as_ref(), &shaker_levels::swept(&levels)).with_phases(&frfs);
 
@@ -100,30 +96,29 @@ pub fn at_the_contact<M: Measurements>(
     (found, missing)
 }
 
-/// The contact's spectra of the assembly, summed over the cells of each impact.
-fn summed(averages: &[CellAverage]) -> (&[f64], Vec<(&str, ContactAverage)>) {
-    let mut frequency_hz: &[f64] = &[];
-    let mut by_impact: Vec<(&str, ContactAverage)> = Vec::new();
-    for cell in averages.iter().filter(|cell| cell.name.configuration == "AJB") {
-        let Some(contact) = &cell.contact else { continue };
-        if frequency_hz.is_empty() {
-            frequency_hz = &cell.frequency_hz;
+/// The contact's spectra of the assembly, summed over the cells of each impact. Spectra of other lines than the first do not count.
+fn summed(averages: &[CellAverage]) -> Vec<(&str, CrossSpectra)> {
+    let mut by_impact: Vec<(&str, CrossSpectra)> = Vec::new();
+    let of_assembly = averages.iter().filter(|cell| cell.name.configuration == "AJB");
+    for (name, contact) in of_assembly.filter_map(|cell| Some((&cell.name.impact, cell.contact.as_ref()?))) {
+        if by_impact.first().is_some_and(|(_, first)| first.frequency_hz() != contact.frequency_hz()) {
+            continue;
         }
-        match by_impact.iter_mut().find(|(name, _)| *name == cell.name.impact) {
-            Some((_, sum)) if sum.force.len() == contact.force.len() => sum.add(contact),
-            Some(_) => {}
-            None => by_impact.push((&cell.name.impact, contact.clone())),
+        match by_impact.iter_mut().find(|(impact, _)| impact == name) {
+            // of one campaign, and on the same lines: nothing else keeps spectra from being added
+            Some((_, sum)) => sum.add(contact).unwrap_or_default(),
+            None => by_impact.push((name, contact.clone())),
         }
     }
-    (frequency_hz, by_impact)
+    by_impact
 }
 
 /// The impact that the specimens are shown from, with the sign of its direction along z: the moving mass drives the contact as the
 /// shaker does; any other impact will do.
 fn shown_impact<'a>(
     geometry: &Geometry,
-    by_impact: &'a [(&'a str, ContactAverage)],
-) -> Option<(&'a str, f64, &'a ContactAverage)> {
+    by_impact: &'a [(&'a str, CrossSpectra)],
+) -> Option<(&'a str, f64, &'a CrossSpectra)> {
     let point = |name: &str| geometry.ajb.impacts.iter().find(|p| p.name == name);
     let on_mass = |name: &str| point(name).is_some_and(|p| p.grouping == Grouping::InternalA);
     let (name, sum) = by_impact.iter().max_by_key(|(name, _)| on_mass(name))?;
@@ -159,7 +154,8 @@ fn example<M: Measurements>(
     let name = &averages.iter().find(|c| c.records.contains(&shown.record))?.name;
     let cell = measurements.read(name).ok()?;
     let hit = cell.hits.iter().find(|h| h.record == shown.record)?;
-    let (contact, delays) = (hit.contact.as_ref()?, cell.contact_delay_s);
+    let contact = hit.contact.as_ref()?;
+    let delays = contact.delay_s;
     let inside = resonance_hz.filter(|f| (SEARCH_HZ[0]..=SEARCH_HZ[1]).contains(f));
     Some((
         impact_loops::drawn(shown, cell.fs_hz, contact, delays),

@@ -1,5 +1,7 @@
 //! The campaign file as measurements: records decoded, in SI units, one cell at a time, from any thread.
 
+use super::assemble::{MeasuredFrf, everything};
+use super::averages::average;
 use super::campaign::analyse_measurements;
 use super::cell::{
     Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel,
@@ -42,6 +44,18 @@ pub enum AnalyseError {
         /// What is missing.
         role: &'static str,
     },
+    /// One cell has records of two sampling rates.
+    #[error(
+        "record {record} was sampled at {rate_hz} Hz, those before it at {others_hz} Hz: their spectra have other lines; refuse one or the other and measure again"
+    )]
+    Rate {
+        /// The record.
+        record: i64,
+        /// Its rate, Hz.
+        rate_hz: f64,
+        /// That of the records before it, Hz.
+        others_hz: f64,
+    },
     /// The response channels of the file's sessions measure different quantities, or none that is motion.
     #[error(
         "the vibrometer's channels measure {0}: velocity, displacement or acceleration is needed, the same in all sessions"
@@ -69,7 +83,8 @@ struct PlannedCell {
     given_up: Option<String>,
 }
 
-struct CampaignFile {
+/// A campaign file as measurements.
+pub struct CampaignFile {
     path: PathBuf,
     plan: Plan,
     known: KnownContact,
@@ -84,7 +99,11 @@ struct CampaignFile {
 }
 
 impl CampaignFile {
-    fn open(store: &Store, known: KnownContact) -> Result<Self, AnalyseError> {
+    /// Reads all but the samples. What is `known` beforehand counts more than what the plan says.
+    ///
+    /// # Errors
+    /// The file cannot be read, or its sessions measure different quantities.
+    pub fn open(store: &Store, known: KnownContact) -> Result<Self, AnalyseError> {
         let plan = store.plan()?;
         let planned = plan.contact.as_ref().map(|contact| *contact.get_ref()).unwrap_or_default();
         let known = KnownContact {
@@ -206,7 +225,8 @@ impl CampaignFile {
         result
     }
 
-    fn hit(&self, store: &Store, record: &RecordRow) -> Result<(Hit, Cell), AnalyseError> {
+    /// A record's signals, and its sampling rate, Hz.
+    fn hit(&self, store: &Store, record: &RecordRow) -> Result<(Hit, f64), AnalyseError> {
         let missing = |role| AnalyseError::NoChannel { record: record.id, role };
         let map = self.channels.get(&record.session).ok_or(missing("anything"))?;
         let samples = store.samples(record)?;
@@ -223,18 +243,11 @@ impl CampaignFile {
         let force = map.place(Role::HammerForce).ok_or(missing("the hammer's force"))?;
         let responses = map.responses().ok_or(missing("the response along x, y and z"))?;
         let late = |place: usize| delay(place) - delay(force);
-        let mut about = Cell { fs_hz: rate, response_delay_s: responses.map(late), ..Cell::default() };
         let (a, b, cells) =
             (map.place(Role::SpecimenA), map.place(Role::SpecimenB), map.places(Role::LoadCell));
         let is_velocity = |place: usize| map.channels[place].quantity == Quantity::Velocity;
         let contact = match (a, b) {
             (Some(a), Some(b)) if is_velocity(a) && is_velocity(b) && !cells.is_empty() => {
-                about.contact_delay_s = ContactDelays {
-                    specimen_a: late(a),
-                    specimen_b: late(b),
-                    // one amplifier: the cells are alike
-                    load_cells: late(cells[0]),
-                };
                 let mut tangential_n = vec![0.0; signal(a).len()];
                 for place in &cells {
                     tangential_n.iter_mut().zip(signal(*place)).for_each(|(sum, v)| *sum += v);
@@ -243,16 +256,60 @@ impl CampaignFile {
                     specimen_a_m_per_s: signal(a),
                     specimen_b_m_per_s: signal(b),
                     tangential_n,
+                    // one amplifier: the load cells are alike
+                    delay_s: ContactDelays {
+                        specimen_a: late(a),
+                        specimen_b: late(b),
+                        load_cells: late(cells[0]),
+                    },
                 })
             }
             _ => None,
         };
-        let hit = Hit { record: record.id, force_n: signal(force), response: responses.map(signal), contact };
-        Ok((hit, about))
+        let hit = Hit {
+            record: record.id,
+            force_n: signal(force),
+            response: responses.map(signal),
+            response_delay_s: responses.map(late),
+            contact,
+        };
+        Ok((hit, rate))
     }
 }
 
 impl CampaignFile {
+    /// The FRFs of a configuration's kept hits between two frequencies, Hz, for every pair of the geometry, formed as the analysis
+    /// forms them; and what is said about cells and records that cannot be used. None without a kept hit.
+    pub fn measured(&self, configuration: &str, lines_hz: [f64; 2]) -> (Option<MeasuredFrf>, Vec<String>) {
+        let own = self.cells.iter().filter(|cell| cell.name.configuration == configuration);
+        let (mut averages, mut complaints) = (Vec::new(), Vec::new());
+        for name in own.map(|cell| &cell.name) {
+            let complaint =
+                |what: String| format!("{configuration}: cell {} × {}: {what}.", name.impact, name.response);
+            let cell = match self.read(name) {
+                Ok(cell) => cell,
+                Err(error) => {
+                    complaints.push(complaint(error.to_string()));
+                    continue;
+                }
+            };
+            complaints.extend(cell.left_out.iter().cloned().map(complaint));
+            if cell.hits.is_empty() {
+                continue;
+            }
+            match average(name.clone(), cell, self.sigma_per_s(), self.quantity, false, lines_hz) {
+                Ok(found) => averages.push(found),
+                Err(error) => complaints.push(complaint(error.to_string())),
+            }
+        }
+        let points = match configuration {
+            "A" => &self.geometry.a,
+            "B" => &self.geometry.b,
+            _ => &self.geometry.ajb,
+        };
+        (everything(points, &averages, self.quantity), complaints)
+    }
+
     fn level(&self, store: &Store, row: &LevelRow) -> Result<ShakerLevel, String> {
         if !row.gaps.is_empty() {
             return Err("samples of it were lost on the way: measure it again".into());
@@ -327,29 +384,31 @@ impl Measurements for CampaignFile {
         let Some(planned) = self.cells.iter().find(|c| c.name == *cell) else { return Ok(Cell::default()) };
         self.with_reader(|store| {
             let mut whole = Cell::default();
-            let mut left_out = Vec::new();
             for record in self.records_of(planned.id) {
                 let record = match record {
                     Ok(record) if record.kept() => record,
                     Ok(_) => continue,
                     Err(Damaged { place, what }) => {
-                        left_out.push(format!("record {} is damaged ({what}) and was left out", place.id));
+                        whole.left_out.push(format!("record {} is damaged ({what}) and was left out", place.id));
                         continue;
                     }
                 };
                 match self.hit(store, record) {
-                    Ok((hit, about)) => {
-                        let mut hits = std::mem::take(&mut whole.hits);
-                        hits.push(hit);
-                        whole = Cell { hits, ..about };
+                    Ok((hit, rate)) if whole.hits.is_empty() || whole.fs_hz == rate => {
+                        whole.fs_hz = rate;
+                        whole.hits.push(hit);
+                    }
+                    Ok((_, rate)) => {
+                        let others_hz = whole.fs_hz;
+                        return Err(AnalyseError::Rate { record: record.id, rate_hz: rate, others_hz });
                     }
                     Err(AnalyseError::Store(StoreError::Damaged { record, what, .. })) => {
-                        left_out.push(format!("record {record} is damaged ({what}) and was left out"));
+                        whole.left_out.push(format!("record {record} is damaged ({what}) and was left out"));
                     }
                     Err(other) => return Err(other),
                 }
             }
-            Ok(Cell { left_out, ..whole })
+            Ok(whole)
         })
     }
 }

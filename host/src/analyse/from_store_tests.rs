@@ -1,3 +1,5 @@
+use super::super::assemble::assemble;
+use super::super::averages::LINES_HZ;
 use super::*;
 use crate::analyse::missing::Missing;
 use crate::campaign::plan::SMALL;
@@ -7,6 +9,7 @@ use crate::campaign::store::session_table::{Counters, SessionInfo};
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::{Kind, Verdict};
 use crate::device::recording::Recording;
+use clap::Parser;
 use jointrig_protocol::channel::{Axis, Channel};
 use jointrig_protocol::shot::{Phase, Shot};
 use std::f64::consts::{PI, TAU};
@@ -17,15 +20,18 @@ const TRIGGER: usize = 256;
 /// What the made-up loops have, N/m.
 const SLOPE: f64 = 150e6;
 
+/// How late the responses are, ns.
+const LATE_NS: u32 = 20_000;
+
 /// Channels with the rig's scales; polarity of B's vibrometer turned round, as the scale's sign says.
-fn map() -> ChannelMap {
+fn map(late_ns: u32) -> ChannelMap {
     let channel = |name: &str, role, quantity, units_per_volt| Channel {
         name: name.try_into().expect("short"),
         role,
         quantity,
         units_per_volt,
         range_v: 10.0,
-        delay_ns: if matches!(role, Role::Response(_)) { 20_000 } else { 0 },
+        delay_ns: if matches!(role, Role::Response(_)) { late_ns } else { 0 },
         bits: 16,
     };
     let mut channels = vec![channel("hammer", Role::HammerForce, Quantity::Force, 44.6)];
@@ -40,7 +46,8 @@ fn map() -> ChannelMap {
     ChannelMap { id: 0, rate_hz: RATE, channels }
 }
 
-/// A hit at the trigger, and a decay at 208 Hz in everything else; T and Δx in phase with the slope above.
+/// A hit at the trigger, and a decay at 208 Hz in everything else, late by the channel's delay; T and Δx in phase with the slope
+/// above.
 fn recording(map: &ChannelMap, peak_n: f64) -> Recording {
     let scans = TRIGGER + 2 * RATE as usize;
     let at = |scan: usize| (scan as f64 - TRIGGER as f64) / f64::from(RATE);
@@ -67,7 +74,12 @@ fn recording(map: &ChannelMap, peak_n: f64) -> Recording {
     let codes = map
         .channels
         .iter()
-        .flat_map(|c| (0..scans).map(move |s| (value(c.role, at(s)) / c.units_per_code()).round() as i16))
+        .flat_map(|c| {
+            (0..scans).map(move |s| {
+                let late_s = f64::from(c.delay_ns) * 1e-9;
+                (value(c.role, at(s) - late_s) / c.units_per_code()).round() as i16
+            })
+        })
         .collect();
     let shot = Shot {
         number: 1,
@@ -93,8 +105,9 @@ fn recording(map: &ChannelMap, peak_n: f64) -> Recording {
     }
 }
 
-/// A campaign of which only AJB was measured: two good hits and a refused one in each of its cells.
-fn campaign(path: &Path) -> Store {
+/// A campaign of which only AJB was measured: two good hits and a refused one in each of its cells. There is a session for each of
+/// the delays; the cells' hits take turns among them.
+fn campaign(path: &Path, late_ns: &[u32]) -> Store {
     let mut store = Store::create(path, SMALL, "small.toml").expect("created");
     let info = SessionInfo {
         address: "sim:".into(),
@@ -105,8 +118,10 @@ fn campaign(path: &Path) -> Store {
         build: Hex(1),
         schema_hash: Hex(2),
     };
-    let map = map();
-    let session = store.begin_session(&info, &map).expect("session");
+    let sessions: Vec<(i64, ChannelMap)> = late_ns
+        .iter()
+        .map(|late_ns| (store.begin_session(&info, &map(*late_ns)).expect("session"), map(*late_ns)))
+        .collect();
     for cell in
         store.cells().expect("cells").iter().filter(|c| configuration_name(c.cell.configuration) == "AJB")
     {
@@ -115,13 +130,14 @@ fn campaign(path: &Path) -> Store {
         {
             let verdict =
                 Verdict { peak_n: peak, ..Verdict::without_pulse(kind, 0.0, 0.0, "made up".into()) };
+                let (session, map) = &sessions[(attempt / 2) % sessions.len()];
             let record = NewRecord {
                 cell: cell.id,
                 attempt: attempt as u32,
-                session,
+                session: *session,
                 utc: utc_now(),
                 utc_error_s: None,
-                recording: recording(&map, peak),
+                recording: recording(map, peak),
                 verdict,
             };
             store.insert(&record, &Counters::new()).expect("stored");
@@ -133,7 +149,7 @@ fn campaign(path: &Path) -> Store {
 #[test]
 fn a_campaign_that_stopped_half_way_gives_what_it_can() {
     let folder = tempfile::tempdir().expect("a folder");
-    let store = campaign(&folder.path().join("half.jrig"));
+    let store = campaign(&folder.path().join("half.jrig"), &[LATE_NS]);
     store.note_link(1, &[("frames_received".to_owned(), 17)].into()).expect("noted");
     let found = analyse(&store, Wanted::default(), &|_| {}).expect("readable");
     let contact = found.contact.as_ref().expect("looked for");
@@ -153,6 +169,61 @@ fn a_campaign_that_stopped_half_way_gives_what_it_can() {
     assert!(found.substructured.is_none() && found.fits.is_empty());
     let frfs = || found.configurations.iter().flat_map(|c| &c.frfs).chain(&contact.frfs);
     assert!(frfs().count() > 0 && frfs().all(|c| c.step_hz == 0.5), "two seconds give half-hertz lines");
+}
+
+/// What the analysis makes substructuring's FRFs of.
+fn analysed(store: &Store) -> MeasuredFrf {
+    let file = CampaignFile::open(store, KnownContact::default()).expect("readable");
+    let cells = file.cells();
+    let averages = cells.iter().filter_map(|name| {
+        let cell = file.read(name).expect("readable");
+        (!cell.hits.is_empty()).then(|| {
+            average(name.clone(), cell, file.sigma_per_s(), file.quantity(), true, LINES_HZ).expect("alike")
+        })
+    });
+    let averages: Vec<_> = averages.collect();
+    assemble("AJB", &file.geometry().ajb, &averages, file.quantity()).measured.expect("all of its cells")
+}
+
+#[test]
+fn two_sessions_are_exported_as_they_are_analysed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name);
+    // sixteen samples between the sessions
+    let store = campaign(&path("two.jrig"), &[LATE_NS, LATE_NS + 312_500]);
+    let file = path("two.jrig");
+    let out = path("out");
+    let words = ["jointrig", "export", "--format", "npz", "--out"].map(std::ffi::OsStr::new);
+    let words = words.into_iter().chain([out.as_os_str(), file.as_os_str()]);
+    crate::cli::Cli::parse_from(words).run().expect("exported");
+    let exported = crate::exchange::read_frf(&out.join("frf/AJB.npz")).expect("written");
+    let two = analysed(&store);
+    assert_eq!(exported, two.frf, "to the last bit");
+    let noise = crate::exchange::read_frf_noise(&out.join("frf/AJB.npz"), &exported).expect("written");
+    assert_eq!(noise.expect("two hits"), two.noise, "to the last bit");
+    // each hit by its own session's delays: the same FRFs as in one session
+    let one = analysed(&campaign(&path("one.jrig"), &[LATE_NS]));
+    for (line, f) in two.frf.frequency_hz.iter().enumerate().filter(|(_, f)| (100.0..400.0).contains(*f)) {
+        let difference = (&two.frf.lines[line] - &one.frf.lines[line]).norm();
+        // 16-bit steps; a delay forgotten would be 0.1 at 100 Hz and more above
+        assert!(difference < 1e-3 * one.frf.lines[line].norm(), "{f} Hz: {difference}");
+    }
+}
+
+#[test]
+fn sessions_of_other_rates_are_not_averaged() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = campaign(&folder.path().join("two.jrig"), &[LATE_NS]);
+    let mut file = CampaignFile::open(&store, KnownContact::default()).expect("readable");
+    let other = ChannelMap { rate_hz: RATE / 2, ..map(LATE_NS) };
+    let session = file.channels.keys().max().expect("a session") + 1;
+    file.channels.insert(session, other);
+    let cell = file.records.values_mut().next().expect("a cell");
+    cell.last_mut().expect("three records").session = session;
+    let told: Vec<String> =
+        file.cells().iter().filter_map(|name| file.read(name).err()).map(|e| e.to_string()).collect();
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].contains("25600 Hz") && told[0].contains("51200 Hz"), "{told:?}");
 }
 
 #[test]

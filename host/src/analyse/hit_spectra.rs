@@ -25,11 +25,6 @@ pub fn of(
     if name.configuration != "AJB" || channels.is_empty() || !there || cell.hits.len() < 2 {
         return Ok(None);
     }
-    let settings = FrfSettings {
-        windowing: Windowing { sigma_per_s, ..Windowing::default() },
-        delay_s: cell.response_delay_s.to_vec(),
-        ..FrfSettings::default()
-    };
     let (mut auto, mut cross) = (Vec::<Vec<f64>>::new(), Vec::<Vec<Vec<Complex<f64>>>>::new());
     for hit in &cell.hits {
         let one = ImpactRecords {
@@ -38,14 +33,18 @@ pub fn of(
             response: vec![hit.response.to_vec()],
             quantity,
         };
+        let settings = FrfSettings {
+            windowing: Windowing { sigma_per_s, ..Windowing::default() },
+            delay_s: hit.response_delay_s.to_vec(),
+            ..FrfSettings::default()
+        };
         let y = estimate(&one, &[true], &settings)?.band(MAIN_BAND_HZ[0], MAIN_BAND_HZ[1]);
-        auto.resize(y.s_ff.len(), Vec::new());
-        cross.resize(y.s_ff.len(), vec![Vec::new(); channels.len()]);
-        for (l, s_ff) in y.s_ff.iter().enumerate() {
-            auto[l].push(*s_ff);
+        auto.resize(y.lines(), Vec::new());
+        cross.resize(y.lines(), vec![Vec::new(); channels.len()]);
+        for l in 0..y.lines() {
+            auto[l].push(y.force(l));
             for (of_channel, channel) in cross[l].iter_mut().zip(&channels) {
-                let along: Complex<f64> = (0..3).map(|axis| y.h1[l][axis] * channel.direction[axis]).sum();
-                of_channel.push(along * *s_ff);
+                of_channel.push((0..3).map(|axis| y.cross(l, axis) * channel.direction[axis]).sum());
             }
         }
     }

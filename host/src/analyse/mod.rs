@@ -37,13 +37,14 @@ mod shaker_levels_tests;
 mod specimen_curves;
 mod wanted;
 
+pub use assemble::MeasuredFrf;
 pub use campaign::analyse_measurements;
 pub use cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel};
 pub use contact_stage::Contact;
 pub use findings::{Findings, ImportedFrom, Measured, Settings};
 pub use fits::{Fit, NoFit, fits};
 pub use from_frfs::{Row, Substructured};
-pub use from_store::{AnalyseError, analyse, geometry};
+pub use from_store::{AnalyseError, CampaignFile, analyse, geometry};
 pub use impact_loops::{ImpactLoops, SlopeIs};
 pub use missing::Missing;
 pub use shaker_levels::RecordLoops;

@@ -217,12 +217,18 @@ impl Measurements for Rig {
                     // the load cells are B's spring
                     let x_b = crate::hysteresis::integration::open_record(&b, 0.0, 1.0 / FS_HZ);
                     let tangential_n = x_b.iter().map(|x| 150e6 * x).collect();
-                    ContactSignals { specimen_a_m_per_s: a, specimen_b_m_per_s: b, tangential_n }
+                    ContactSignals {
+                        specimen_a_m_per_s: a,
+                        specimen_b_m_per_s: b,
+                        tangential_n,
+                        delay_s: ContactDelays::default(),
+                    }
                 });
                 Hit {
                     record: i64::try_from(10 * place + i).expect("small"),
                     force_n: scaled(&unit.force),
                     response,
+                    response_delay_s: [0.0; 3],
                     contact,
                 }
             })

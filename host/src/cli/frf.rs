@@ -12,9 +12,10 @@ use crate::exchange::npz::Array;
 use crate::exchange::record_uff::read_record_file;
 use crate::exchange::{Extra, write_frf};
 use crate::spectra::{
-    AveragedFrf, ForceWeighting, FrfSettings, ImpactRecords, MotionQuantity, Origin, UsableBand, Windowing,
-    estimate, usable_band,
+    CrossSpectra, ForceWeighting, FrfSettings, ImpactRecords, MotionQuantity, Origin, Windowing, estimate,
+    usable_band,
 };
+use crate::substructuring::Band;
 
 /// FRFs of impact records from anywhere: verdict on every hit, average of the good ones.
 ///
@@ -134,12 +135,12 @@ impl Frf {
         let settings = self.settings();
         let found = estimate(&records, &used, &settings)
             .map_err(|e| CliError::Bad(format!("{}: {e}", self.records.display())))?;
-        let excited = usable_band(&found.frequency_hz, &found.s_ff, 6.0);
+        let excited = usable_band(found.frequency_hz(), &found.force_spectrum(), 6.0);
         let quantity = self.quantity.map_or(records.quantity, MotionQuantity::from);
         let mut found = found.converted(records.quantity, quantity);
         if let Some((low, high)) = self.band {
             found = found.band(low, high);
-            if found.frequency_hz.is_empty() {
+            if found.lines() == 0 {
                 return Err(CliError::Usage(format!(
                     "there is no line between {low} and {high} Hz: widen --band"
                 )));
@@ -147,7 +148,8 @@ impl Frf {
         }
         if let Some(path) = &self.out {
             let matrix = found.to_matrix(quantity.frf(), names.clone(), self.input.clone());
-            write_frf(path, &matrix, &extras(&found)).map_err(|e| CliError::Bad(e.to_string()))?;
+            write_frf(path, &matrix, &extras(&found, self.noise_ratio))
+                .map_err(|e| CliError::Bad(e.to_string()))?;
         }
         if self.json {
             return output::json(&self.document(
@@ -224,7 +226,7 @@ impl Frf {
         &self,
         records: &ImpactRecords,
         verdicts: &[Verdict],
-        found: Option<(&AveragedFrf, Option<UsableBand>, MotionQuantity, &[String])>,
+        found: Option<(&CrossSpectra, Option<Band>, MotionQuantity, &[String])>,
     ) -> Value {
         let hits: Vec<Value> = verdicts
             .iter()
@@ -240,27 +242,27 @@ impl Frf {
             "records": self.records.display().to_string(),
             "fs_hz": records.fs_hz,
             "hits": hits,
-            "used": found.map_or(0, |(y, ..)| y.hits),
+            "used": found.map_or(0, |(y, ..)| y.hits()),
             "settings": self.settings(),
         });
         if let Some((y, band, quantity, names)) = found {
             document["quantity"] = json!(quantity.frf());
             document["outputs"] = json!(names);
             document["input"] = json!(self.input);
-            document["lines"] = json!(y.frequency_hz.len());
+            document["lines"] = json!(y.lines());
             document["usable_band_hz"] = json!(band.map(|b| [b.low_hz, b.high_hz]));
             document["median_coherence"] = json!(median_coherence(y, band));
         }
         document
     }
 
-    fn words(&self, verdicts: &[Verdict], found: &AveragedFrf, excited: Option<UsableBand>) -> Vec<String> {
+    fn words(&self, verdicts: &[Verdict], found: &CrossSpectra, excited: Option<Band>) -> Vec<String> {
         let mut lines: Vec<String> = verdicts
             .iter()
             .enumerate()
             .map(|(i, v)| format!("hit {i}: {} ({})", v.kind, v.sentence))
             .collect();
-        lines.push(format!("{} of {} hits averaged", found.hits, verdicts.len()));
+        lines.push(format!("{} of {} hits averaged", found.hits(), verdicts.len()));
         if let Some(band) = excited {
             lines.push(format!(
                 "the hammer excites {:.0} … {:.0} Hz (−6 dB of the force's auto-spectrum)",
@@ -276,13 +278,15 @@ impl Frf {
 }
 
 /// Median coherence of each response over the lines that were excited; none for a single hit.
-fn median_coherence(y: &AveragedFrf, band: Option<UsableBand>) -> Option<Vec<f64>> {
+fn median_coherence(y: &CrossSpectra, band: Option<Band>) -> Option<Vec<f64>> {
     let band = band?;
     let inside = y.band(band.low_hz, band.high_hz);
-    let outputs = inside.coherence.first()?.len();
-    (0..outputs)
+    if inside.lines() == 0 {
+        return None;
+    }
+    (0..inside.outputs())
         .map(|o| {
-            let mut values: Vec<f64> = inside.coherence.iter().map(|row| row[o]).collect();
+            let mut values: Vec<f64> = (0..inside.lines()).map(|line| inside.coherence(line, o)).collect();
             values.sort_by(f64::total_cmp);
             values.get(values.len() / 2).copied().filter(|v| v.is_finite())
         })
@@ -290,7 +294,7 @@ fn median_coherence(y: &AveragedFrf, band: Option<UsableBand>) -> Option<Vec<f64
 }
 
 /// The arrays beside H1.
-fn extras(y: &AveragedFrf) -> Vec<Extra> {
+fn extras(y: &CrossSpectra, noise_ratio: Option<f64>) -> Vec<Extra> {
     let real = |name: &str, rows: &[Vec<f64>]| {
         let shape = vec![rows.len(), rows.first().map_or(0, Vec::len)];
         Extra::Real(name.into(), Array { shape, values: rows.concat() })
@@ -300,13 +304,13 @@ fn extras(y: &AveragedFrf) -> Vec<Extra> {
         Extra::Complex(name.into(), Array { shape, values: rows.concat() })
     };
     let mut extras = vec![
-        real("coherence", &y.coherence),
-        real("variance", &y.variance),
-        complex("h2", &y.h2),
-        complex("hv", &y.hv),
+        real("coherence", &y.rows(CrossSpectra::coherence)),
+        real("variance", &y.rows(CrossSpectra::variance)),
+        complex("h2", &y.rows(CrossSpectra::h2)),
+        complex("hv", &y.rows(|y, line, output| y.hv(line, output, noise_ratio))),
     ];
-    extras.extend(y.jackknife.as_ref().map(|rows| real("variance_jackknife", rows)));
-    let force = Array { shape: vec![y.s_ff.len()], values: y.s_ff.clone() };
+    extras.extend(y.jackknife().map(|rows| real("variance_jackknife", &rows)));
+    let force = Array { shape: vec![y.lines()], values: y.force_spectrum() };
     extras.push(Extra::Real("force_spectrum".into(), force));
     extras
 }

@@ -69,28 +69,34 @@ pub fn main() -> ExitCode {
     // clap prints help and usage errors itself, and exits with 0 and 2
     let cli = Cli::parse();
     start_log(cli.verbose);
-    let done = match cli.command {
-        Command::Demo(command) => command.run(),
-        Command::Devices(command) => command.run(),
-        Command::Info(command) => command.run(),
-        Command::Campaign(command) => command.run(),
-        Command::Shaker(command) => command.run(),
-        Command::Analyse(command) => command.run(),
-        Command::Export(command) => command.run(),
-        Command::Frf(command) => command.run(),
-        Command::Hysteresis(command) => command.run(),
-        Command::Import(command) => command.run(),
-        Command::Identify(command) => command.run(),
-        Command::Completions(command) => {
-            command.run();
-            Ok(())
-        }
-    };
-    match done {
+    match cli.run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("jointrig: {error}");
             ExitCode::from(error.code())
+        }
+    }
+}
+
+impl Cli {
+    /// Does what the command line says.
+    pub(crate) fn run(self) -> Result<(), error::CliError> {
+        match self.command {
+            Command::Demo(command) => command.run(),
+            Command::Devices(command) => command.run(),
+            Command::Info(command) => command.run(),
+            Command::Campaign(command) => command.run(),
+            Command::Shaker(command) => command.run(),
+            Command::Analyse(command) => command.run(),
+            Command::Export(command) => command.run(),
+            Command::Frf(command) => command.run(),
+            Command::Hysteresis(command) => command.run(),
+            Command::Import(command) => command.run(),
+            Command::Identify(command) => command.run(),
+            Command::Completions(command) => {
+                command.run();
+                Ok(())
+            }
         }
     }
 }

@@ -1,14 +1,12 @@
 //! The joint by substructuring: numbers over bands, and the spectra they come from.
 
+use crate::identified::SCATTER_OF_LINES;
 use crate::substructuring::{BandStatistic as Statistics, Dof};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Name of T/Δx at the specimens among the methods.
 pub const DIRECT: &str = "direct";
-
-/// A scatter over lines of more than this times the mean is no identification.
-pub const UNIDENTIFIED: f64 = 1.5;
 
 /// The headline quotes the row of the main band for which this is largest.
 pub fn headline_rank(method: &str, idms: usize) -> (bool, bool, usize) {
@@ -69,7 +67,7 @@ impl Joint {
     pub fn identified(&self) -> bool {
         let noise = self.noise_n_per_m.get("z").copied().unwrap_or(0.0);
         self.sliding_stiffness()
-            .is_some_and(|k| k.mean > 0.0 && k.std <= UNIDENTIFIED * k.mean && noise <= k.mean)
+            .is_some_and(|k| k.mean > 0.0 && k.std <= SCATTER_OF_LINES * k.mean && noise <= k.mean)
     }
 }
 

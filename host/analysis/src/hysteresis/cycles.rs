@@ -5,11 +5,12 @@
 
 use super::HysteresisError;
 use super::correction::Correction;
+use super::cycle::Cycle;
 use super::integration::closed_cycle;
 use super::loops::energy;
 use super::record::{HysteresisRecord, RelativeMotion};
 use super::sums::{dot, mean};
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 use std::ops::Range;
 
 /// Fewer samples than this make no loop.
@@ -17,32 +18,6 @@ const FEWEST_SAMPLES: usize = 16;
 
 /// Cycles that are summed one after the other; fixed, so that rounding does not depend on the number of cores.
 const BLOCK: usize = 64;
-
-/// One closed cycle: M equidistant points of one period.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Cycle {
-    /// Relative displacement, mean removed, m.
-    pub displacement_m: Vec<f64>,
-    /// Relative velocity, mean removed, m/s.
-    pub velocity_m_per_s: Vec<f64>,
-    /// Tangential force, mean removed, N.
-    pub force_n: Vec<f64>,
-}
-
-impl Cycle {
-    fn zeros(points: usize) -> Self {
-        let zeros = || vec![0.0; points];
-        Self { displacement_m: zeros(), velocity_m_per_s: zeros(), force_n: zeros() }
-    }
-
-    fn signals(&self) -> [&[f64]; 3] {
-        [&self.displacement_m, &self.velocity_m_per_s, &self.force_n]
-    }
-
-    fn signals_mut(&mut self) -> [&mut Vec<f64>; 3] {
-        [&mut self.displacement_m, &mut self.velocity_m_per_s, &mut self.force_n]
-    }
-}
 
 /// All whole cycles of a steady record, each resampled to the same number of points: a period need not be a whole number of samples.
 pub(super) struct Steady<'a> {

@@ -1,7 +1,7 @@
 //! What is read off one closed loop of T over Δx. Each quantity has its own name, because at 200 Hz beside a hidden resonance the
 //! peak secant says 213 N/µm where the least-squares slope says 90.
 
-use super::cycles::Cycle;
+use super::cycle::Cycle;
 use super::sums::dot;
 use num_complex::Complex;
 use serde::Serialize;

@@ -13,6 +13,7 @@ pub mod analyse;
 pub mod backbone;
 pub mod compliance;
 pub mod correction;
+pub mod cycle;
 pub mod cycles;
 pub mod delays;
 pub mod first_cycle;
@@ -82,4 +83,4 @@ pub enum HysteresisError {
     NoMotion,
 }
 #[cfg(test)]
-mod synthetic;
+mod synthetic_tests;

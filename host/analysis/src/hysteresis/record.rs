@@ -1,7 +1,7 @@
 //! What a hysteresis measurement gives: motion on both sides of the contact, and the tangential force.
 
 use super::HysteresisError;
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 use std::ops::Range;
 
 /// A record shorter than this holds nothing that could be called a loop.

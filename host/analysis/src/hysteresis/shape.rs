@@ -5,7 +5,8 @@
 //! slip from ellipse, against the noise seen from cycle to cycle; the phase tells ellipse from line; the final tangent
 //! tells gross slip from microslip.
 
-use super::cycles::{Cycle, Scatter};
+use super::cycle::Cycle;
+use super::cycles::Scatter;
 use super::loops::{fundamental_stiffness, harmonics};
 use super::stick::{final_tangent, first_part, slope_over, strokes};
 use serde::Serialize;

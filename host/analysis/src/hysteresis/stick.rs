@@ -10,7 +10,7 @@
 //!   Iwan contact).
 //! - Without a plateau nothing rings: 20 to 40 %, clear of the reversal where Δx hardly moves; or the first 20 % where it has bent by then.
 
-use super::cycles::Cycle;
+use super::cycle::Cycle;
 use super::loops::slope;
 
 /// A part of the force's swing after a reversal, from its first to its second fraction.

@@ -1,13 +1,11 @@
-//! Averaged FRFs, one hit at a time: auto- and cross-spectra accumulate, the signals are gone when the hit is in.
+//! Spectra of many hits, one at a time: auto- and cross-spectra accumulate, the signals are gone when the hit is in.
 
 use super::SpectraError;
-use super::averaged::{AveragedFrf, variance_of_part};
-use super::estimators::{h1, h2, hv};
+use super::cross_spectra::{CrossSpectra, OutputSums};
 use super::jackknife;
+use crate::parallel::{self, prelude::*};
 use num_complex::Complex;
-use rayon::prelude::*;
 use realfft::{RealFftPlanner, RealToComplex};
-use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// Sums of spectra over the hits so far.
@@ -24,7 +22,6 @@ pub struct SpectraAverage {
     workers: Vec<Channel>,
     failed: Option<SpectraError>,
     keep_hits: bool,
-    noise_ratio: Option<f64>,
     kept_force: Vec<Vec<Complex<f64>>>,
 }
 
@@ -88,13 +85,10 @@ impl SpectraAverage {
                     kept: Vec::new(),
                 })
                 .collect(),
-            workers: (0..rayon::current_num_threads().min(outputs).max(1))
-                .map(|_| Channel::new(&*fft))
-                .collect(),
+            workers: (0..parallel::threads().min(outputs).max(1)).map(|_| Channel::new(&*fft)).collect(),
             failed: None,
             fft,
             keep_hits: false,
-            noise_ratio: None,
             kept_force: Vec::new(),
         }
     }
@@ -103,13 +97,6 @@ impl SpectraAverage {
     #[must_use]
     pub fn with_jackknife(mut self) -> Self {
         self.keep_hits = true;
-        self
-    }
-
-    /// Hv for this ratio of noise powers, response over force, (SI/N)²; see [`hv`].
-    #[must_use]
-    pub fn with_noise_ratio(mut self, ratio: Option<f64>) -> Self {
-        self.noise_ratio = ratio;
         self
     }
 
@@ -176,18 +163,19 @@ impl SpectraAverage {
         self.forces.resize_with(hits.len(), || fft.make_output_vec());
         let share = hits.len().div_ceil(self.workers.len()).max(1);
         let parts = self.forces.par_chunks_mut(share).zip(hits.par_chunks(share)).zip(&mut self.workers);
-        parts.try_for_each(|((spectra, hits), worker)| {
+        let transformed = parts.map(|((spectra, hits), worker)| {
             for (spectrum, hit) in spectra.iter_mut().zip(hits) {
                 worker.transform(fft, |out| force(hit, out))?;
                 std::mem::swap(spectrum, &mut worker.spectrum);
             }
             Ok(())
-        })?;
+        });
+        transformed.collect::<Result<(), SpectraError>>()?;
         let forces = &self.forces;
         let keep = self.keep_hits;
         let share = self.outputs.len().div_ceil(self.workers.len()).max(1);
         let parts = self.outputs.par_chunks_mut(share).zip(&mut self.workers).enumerate();
-        parts.try_for_each(|(part, (outputs, worker))| {
+        let summed = parts.map(|(part, (outputs, worker))| {
             for (i, output) in outputs.iter_mut().enumerate() {
                 for (hit, force) in hits.iter().zip(forces) {
                     worker.transform(fft, |out| response(hit, part * share + i, out))?;
@@ -202,7 +190,8 @@ impl SpectraAverage {
                 }
             }
             Ok(())
-        })?;
+        });
+        summed.collect::<Result<(), SpectraError>>()?;
         for force in &self.forces {
             for (sum, f) in self.s_ff.iter_mut().zip(force) {
                 *sum += f.norm_sqr();
@@ -215,82 +204,26 @@ impl SpectraAverage {
         Ok(())
     }
 
-    /// The averaged FRFs on s = σ + iω, where σ is the damping of the window that the signals went through.
+    /// The spectra on s = σ + iω, where σ is the damping of the window that the signals went through.
     ///
     /// A channel measured late by `delay_s[output]` relative to the force is corrected by e^(+sτ). Missing delays are 0.
-    /// Where the force has no energy (0 Hz of a signal without mean), nothing is known: H and coherence are 0 there and the
-    /// variance is infinite.
     ///
     /// # Errors
     /// When no hit was added, or adding one failed half way.
-    pub fn finish(&self, sigma_per_s: f64, delay_s: &[f64]) -> Result<AveragedFrf, SpectraError> {
+    pub fn finish(&self, sigma_per_s: f64, delay_s: &[f64]) -> Result<CrossSpectra, SpectraError> {
         if let Some(error) = &self.failed {
             return Err(error.clone());
         }
-        if self.hits == 0 {
-            return Err(SpectraError::NoHits);
-        }
         let frequency_hz: Vec<f64> =
             (0..self.s_ff.len()).map(|l| l as f64 * self.fs_hz / self.samples as f64).collect();
-        let lines: Vec<_> = frequency_hz
-            .par_iter()
-            .enumerate()
-            .map(|(l, f)| self.line(l, Complex::new(sigma_per_s, TAU * f), delay_s))
-            .collect();
-        // spectra are Fourier transforms: sum × Δt
-        let scale = self.hits as f64 * self.fs_hz * self.fs_hz;
-        let mut out = AveragedFrf {
-            frequency_hz,
-            sigma_per_s,
-            hits: self.hits,
-            s_ff: self.s_ff.iter().map(|s| s / scale).collect(),
-            h1: Vec::with_capacity(lines.len()),
-            h2: Vec::with_capacity(lines.len()),
-            hv: Vec::with_capacity(lines.len()),
-            coherence: Vec::with_capacity(lines.len()),
-            variance: Vec::with_capacity(lines.len()),
-            jackknife: self.keep_hits.then(|| self.jackknife(sigma_per_s, delay_s)),
-        };
-        for line in lines {
-            out.h1.push(line.h1);
-            out.h2.push(line.h2);
-            out.hv.push(line.hv);
-            out.coherence.push(line.coherence);
-            out.variance.push(line.variance);
-        }
-        Ok(out)
-    }
-
-    fn line(&self, l: usize, s: Complex<f64>, delay_s: &[f64]) -> Line {
-        let n = self.outputs.len();
-        let mut line = Line {
-            h1: Vec::with_capacity(n),
-            h2: Vec::with_capacity(n),
-            hv: Vec::with_capacity(n),
-            coherence: Vec::with_capacity(n),
-            variance: Vec::with_capacity(n),
-        };
-        let s_ff = self.s_ff[l];
-        for (o, output) in self.outputs.iter().enumerate() {
-            let (s_xf, s_xx) = (output.s_xf[l], output.s_xx[l]);
-            let advance = match delay_s.get(o) {
-                None | Some(0.0) => Complex::new(1.0, 0.0),
-                Some(delay_s) => (s * delay_s).exp(),
-            };
-            let first = h1(s_ff, s_xf) * advance;
-            // A single hit is always coherent with itself: that says nothing about noise.
-            let coherence = match (self.hits, s_ff * s_xx) {
-                (1, _) => f64::NAN,
-                (_, 0.0) => 0.0,
-                (_, power) => s_xf.norm_sqr() / power,
-            };
-            line.h1.push(first);
-            line.h2.push(h2(s_xf, s_xx) * advance);
-            line.hv.push(hv(s_ff, s_xf, s_xx, self.noise_ratio) * advance);
-            line.coherence.push(coherence);
-            line.variance.push(variance_of_part(first, coherence, self.hits));
-        }
-        line
+        let outputs = self.outputs.iter().enumerate().map(|(o, output)| OutputSums {
+            s_xf: output.s_xf.clone(),
+            s_xx: output.s_xx.clone(),
+            delay_s: delay_s.get(o).copied().unwrap_or(0.0),
+        });
+        let (s_ff, outputs) = (self.s_ff.clone(), outputs.collect());
+        let spectra = CrossSpectra::new(self.fs_hz, frequency_hz, sigma_per_s, self.hits, s_ff, outputs)?;
+        Ok(spectra.with_jackknife(self.keep_hits.then(|| self.jackknife(sigma_per_s, delay_s))))
     }
 
     /// Variance by leaving out each hit in turn, \[line\]\[output\].
@@ -309,15 +242,6 @@ impl SpectraAverage {
             })
             .collect()
     }
-}
-
-/// All estimates of one line, by output.
-struct Line {
-    h1: Vec<Complex<f64>>,
-    h2: Vec<Complex<f64>>,
-    hv: Vec<Complex<f64>>,
-    coherence: Vec<f64>,
-    variance: Vec<f64>,
 }
 
 /// Refuses NaN and infinite values, naming the first.

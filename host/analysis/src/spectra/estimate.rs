@@ -1,8 +1,8 @@
-//! From impact records to averaged FRFs: where each hit begins, windows, spectra.
+//! From impact records to spectra: where each hit begins, windows, spectra.
 
 use super::SpectraError;
 use super::average::SpectraAverage;
-use super::averaged::AveragedFrf;
+use super::cross_spectra::CrossSpectra;
 use super::pulse::Pulse;
 use super::records::ImpactRecords;
 use super::window::Windowing;
@@ -62,7 +62,7 @@ struct Hit<'r> {
     origin_s: f64,
 }
 
-/// H1, coherence and variance over those hits of `records` for which `used` is true.
+/// Auto- and cross-spectra over those hits of `records` for which `used` is true.
 ///
 /// # Errors
 /// When no hit is used, hits differ in length or channels, or a used hit has no pulse or values that are not numbers.
@@ -70,7 +70,7 @@ pub fn estimate(
     records: &ImpactRecords,
     used: &[bool],
     settings: &FrfSettings,
-) -> Result<AveragedFrf, SpectraError> {
+) -> Result<CrossSpectra, SpectraError> {
     let first = used.iter().position(|u| *u).ok_or(SpectraError::NoHits)?;
     let samples = records.force_n.get(first).ok_or(SpectraError::NoHits)?.len();
     let outputs = records.response.get(first).ok_or(SpectraError::NoHits)?.len();
@@ -80,8 +80,7 @@ pub fn estimate(
     }
     let window = &settings.windowing;
     let decay = window.decay(records.fs_hz, samples);
-    let mut average =
-        SpectraAverage::new(records.fs_hz, transform, outputs).with_noise_ratio(settings.noise_ratio);
+    let mut average = SpectraAverage::new(records.fs_hz, transform, outputs);
     if settings.jackknife {
         average = average.with_jackknife();
     }

@@ -32,6 +32,14 @@ pub fn hv(s_ff: f64, s_xf: Complex<f64>, s_xx: f64, noise_ratio: Option<f64>) ->
     sum / (2.0 * s_xf.conj())
 }
 
+/// |H|²(1 − γ²)/(2 n γ²): variance of the real, and of the imaginary part of H1 (Bendat and Piersol). Infinite at γ² = 0.
+pub fn variance_of_part(h1: Complex<f64>, coherence: f64, hits: usize) -> f64 {
+    if coherence == 0.0 {
+        return f64::INFINITY;
+    }
+    h1.norm_sqr() * (1.0 - coherence).max(0.0) / (2.0 * hits as f64 * coherence)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

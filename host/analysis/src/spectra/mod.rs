@@ -1,26 +1,26 @@
-//! Spectra: impact records in, averaged FRFs with coherence and variance out.
+//! Spectra: impact records in, FRFs with coherence and variance out.
 //!
 //! [`pulse`] finds the hit, [`window`] cuts and weights, [`average`] accumulates S_ff, S_xf and S_xx one hit at a time,
-//! [`estimators`] and [`jackknife`] make FRFs and their scatter of the sums, [`estimate`](mod@estimate) does all of it over a set of
-//! records, [`band`] says where the hammer excited anything. Which hits are good is
+//! [`cross_spectra`] keeps them and gives FRFs with their scatter by [`estimators`] and [`jackknife`], [`estimate`](mod@estimate) does all of it over a set of
+//! records, [`usable_band`](mod@usable_band) says where the hammer excited anything. Which hits are good is
 //! decided elsewhere, on the raw records: the force window hides a second pulse that the response keeps.
 
 pub mod average;
-pub mod averaged;
-pub mod band;
+pub mod cross_spectra;
 pub mod estimate;
 pub mod estimators;
 pub mod jackknife;
 pub mod pulse;
 pub mod records;
+pub mod usable_band;
 pub mod window;
 
 pub use average::SpectraAverage;
-pub use averaged::AveragedFrf;
-pub use band::{UsableBand, usable_band};
+pub use cross_spectra::CrossSpectra;
 pub use estimate::{FrfSettings, Origin, estimate};
 pub use pulse::Pulse;
 pub use records::{ImpactRecords, MotionQuantity};
+pub use usable_band::usable_band;
 pub use window::{ForceWeighting, Windowing};
 
 /// Why records cannot become FRFs.
@@ -67,10 +67,13 @@ pub enum SpectraError {
         /// Length of the records.
         samples: usize,
     },
+    /// Spectra that cannot be added or put together.
+    #[error("the spectra have other lines, another window or other responses: they do not belong together")]
+    Unlike,
     /// The transform failed (a length it cannot do).
     #[error("Fourier transform: {0}")]
     Transform(String),
 }
 
 #[cfg(test)]
-mod exactness;
+mod exactness_tests;

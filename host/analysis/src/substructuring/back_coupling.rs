@@ -2,10 +2,11 @@
 
 use super::coupling::{boolean_difference, couple};
 use super::frf::FrfMatrix;
-use super::joint::{Band, stiffness_and_damping};
+use super::joint::stiffness_and_damping;
 use super::pseudo_inverse::full_rank_inverse;
+use crate::band::Band;
+use crate::parallel::prelude::*;
 use nalgebra::{Complex, DMatrix};
-use rayon::prelude::*;
 
 type Line = DMatrix<Complex<f64>>;
 

@@ -7,8 +7,8 @@ use super::frf::{FrfError, FrfMatrix, block};
 use super::geometry::{Geometry, Grouping};
 use super::idm::{Dof, IdmSet, rigid_row};
 use super::vpt::ROTATION_LENGTH_M;
+use crate::parallel::prelude::*;
 use nalgebra::{Complex, DMatrix, DVector, Vector3};
-use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 

@@ -6,6 +6,7 @@
 
 use super::product::product;
 use super::vpt::Transformation;
+use crate::parallel;
 use nalgebra::{Complex, DMatrix, DVector};
 use serde::Serialize;
 
@@ -31,7 +32,7 @@ pub fn consistency(
 ) -> Consistency {
     let filter_u = &responses.r * &responses.t;
     let filter_f = &impacts.r * impacts.t.transpose();
-    let ((overall_sensor, specific_sensor), (overall_impact, specific_impact)) = rayon::join(
+    let ((overall_sensor, specific_sensor), (overall_impact, specific_impact)) = parallel::join(
         || side(&filter_u, lines.iter().map(DMatrix::column_sum)),
         || side(&filter_f, lines.iter().map(|y| y.row_sum().transpose())),
     );

@@ -60,7 +60,8 @@ impl Direct {
 mod tests {
     use super::*;
     use crate::hysteresis::compliance::ContactCompliance;
-    use crate::hysteresis::impact_spectra::ImpactSpectra;
+    use crate::spectra::CrossSpectra;
+    use crate::spectra::cross_spectra::OutputSums;
 
     const SIGMA: f64 = 2.3;
 
@@ -77,8 +78,9 @@ mod tests {
         };
         let b: Vec<Complex<f64>> = (0..lines).map(|l| tangential[l] * 1e-8 * s(l)).collect();
         let a: Vec<Complex<f64>> = (0..lines).map(|l| b[l] + relative(l)).collect();
-        let impact = ImpactSpectra { force: &vec![1.0; lines], cross: [&a, &b, &tangential] };
-        ContactCompliance::of_impacts(&frequency_hz, SIGMA, &[impact]).expect("an impact")
+        let sums = [a, b, tangential].map(|s_xf| OutputSums { s_xf, s_xx: vec![1.0; lines], delay_s: 0.0 });
+        let impact = CrossSpectra::new(1.0, frequency_hz, SIGMA, 1, vec![1.0; lines], sums.to_vec());
+        ContactCompliance::of_impacts(&[&impact.expect("one value for each line")]).expect("an impact")
     }
 
     fn direct(found: &ContactCompliance) -> Direct {
@@ -105,6 +107,6 @@ mod tests {
         // exact but for rounding
         assert!((direct.stiffness_n_per_m.mean / 180e6 - 1.0).abs() < 1e-9);
         assert_eq!((<[f64; 2]>::from(BAND), direct.lines), ([250.0, 400.0], 300));
-        assert_eq!(ContactCompliance::of_impacts(&found.frequency_hz, SIGMA, &[]), None);
+        assert_eq!(ContactCompliance::of_impacts(&[]), None);
     }
 }

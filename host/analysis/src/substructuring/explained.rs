@@ -10,13 +10,14 @@ use super::frf::FrfMatrix;
 use super::geometry::{Configuration, Geometry, Point};
 use super::identify::back_coupled;
 use super::idm::IdmSet;
-use super::joint::{Band, median};
+use super::joint::median;
 use super::noise::{FrfNoise, SMOOTH_HZ};
+use crate::band::Band;
+use crate::parallel::prelude::*;
 use nalgebra::{Complex, Unit, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use rayon::prelude::*;
 use std::collections::HashMap;
 
 /// Lines that are looked at: resonances are wider than their distance.

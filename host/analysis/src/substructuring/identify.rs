@@ -1,18 +1,21 @@
 //! The front door: three FRF matrices and the geometry in, the joint's stiffness by every method asked for out.
 
 use super::back_coupling::BackCoupling;
-use super::consistency::Consistency;
 use super::frf::{FrfError, FrfMatrix, Quantity};
 use super::geometry::Geometry;
-use super::idm::{Dof, IdmSet};
+use super::idm::IdmSet;
 use super::interface_data::{InterfaceError, Measured};
-use super::joint::{Band, JointRow, JointSpectrum};
+use super::joint::{JointRow, JointSpectrum};
 use super::line_noise::LineNoise;
 use super::method::Method;
 use super::noise::{FrfNoise, NoiseError, SMOOTH_HZ};
-use super::reduced::{Reduced, Rooms, Solution};
+pub use super::quality::{Internals, VirtualPointQuality};
+use super::reduced::{Reduced, Solution};
+use super::rooms::Rooms;
+use crate::band::Band;
+use crate::parallel::prelude::*;
+use crate::structure::{Abc, Structure};
 use nalgebra::{Complex, DMatrix};
-use rayon::prelude::*;
 use serde::Serialize;
 use std::borrow::Cow;
 
@@ -23,7 +26,7 @@ pub enum IdentifyError {
     #[error("{file}: {source}")]
     Frf {
         /// Which file.
-        file: &'static str,
+        file: Structure,
         /// Why.
         source: FrfError,
     },
@@ -33,7 +36,7 @@ pub enum IdentifyError {
     )]
     Axes {
         /// Which file.
-        file: &'static str,
+        file: Structure,
         /// The first difference.
         detail: String,
     },
@@ -43,7 +46,7 @@ pub enum IdentifyError {
     )]
     Quantities {
         /// Which file.
-        file: &'static str,
+        file: Structure,
         /// Its quantity.
         found: Quantity,
         /// A's quantity.
@@ -55,7 +58,7 @@ pub enum IdentifyError {
     )]
     Damping {
         /// Which file.
-        file: &'static str,
+        file: Structure,
         /// Its σ, 1/s.
         found: f64,
         /// A's σ, 1/s.
@@ -65,7 +68,7 @@ pub enum IdentifyError {
     #[error("{file}: {source}")]
     Noise {
         /// Which file.
-        file: &'static str,
+        file: Structure,
         /// What does not fit.
         source: NoiseError,
     },
@@ -99,56 +102,6 @@ pub struct Refused {
     pub idms: usize,
     /// Why, as a sentence.
     pub reason: String,
-}
-
-/// What a form of Eq. (3) had for internals: n_i against n_c, and whether P and Q see every interface motion.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Internals {
-    /// Which form.
-    pub method: Method,
-    /// n_c.
-    pub idms: usize,
-    /// n_i of the impacts.
-    pub impacts: usize,
-    /// n_i of the responses.
-    pub responses: usize,
-    /// The line that ranks and condition numbers are of, Hz.
-    pub frequency_hz: f64,
-    /// Rank of P to rounding.
-    pub rank_p: usize,
-    /// Rank of Q to rounding.
-    pub rank_q: usize,
-    /// Condition number of P, rotations scaled by 40 mm: by how much noise may be blown up.
-    pub condition_p: f64,
-    /// Condition number of Q.
-    pub condition_q: f64,
-}
-
-/// Quality of the virtual points of A alone and B alone for one IDM set.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct VirtualPointQuality {
-    /// `A` or `B`.
-    pub substructure: &'static str,
-    /// Number of interface deformation modes.
-    pub idms: usize,
-    /// Which ones.
-    pub modes: Vec<Dof>,
-    /// Condition number of R_u, rotations scaled by 40 mm.
-    pub condition_responses: f64,
-    /// Condition number of R_f, rotations scaled by 40 mm.
-    pub condition_impacts: f64,
-    /// Names of the channels, in the order of `consistency.specific_sensor`.
-    pub channels: Vec<String>,
-    /// Names of the impacts, in the order of `consistency.specific_impact`.
-    pub impacts: Vec<String>,
-    /// Frequency of each line of `consistency.overall_*`, Hz.
-    pub frequency_hz: Vec<f64>,
-    /// What the virtual point keeps of motion and force.
-    pub consistency: Consistency,
-    /// Fraction of lines with a passive driving point, by degree of freedom in the set's order.
-    pub passivity: Vec<f64>,
-    /// How far Y_ij equals Y_ji at the virtual point, 0…1; rotations in metres over 40 mm.
-    pub reciprocity: f64,
 }
 
 /// All that was identified.
@@ -281,7 +234,7 @@ pub fn line_noise(
     idms: IdmSet,
 ) -> Result<Vec<(Method, Propagated)>, IdentifyError> {
     check_alike(a, b, ajb)?;
-    for ((file, frf), noise) in [("A", a), ("B", b), ("AJB", ajb)].into_iter().zip(noises) {
+    for ((file, frf), noise) in (Abc { a, b, ajb }).each().into_iter().zip(noises) {
         noise.check(frf).map_err(|source| IdentifyError::Noise { file, source })?;
     }
     let files = [a, b, ajb].map(above_zero);
@@ -319,9 +272,9 @@ pub fn back_coupled(
 fn rooms<'a>(files: &'a [Cow<'_, FrfMatrix>; 3], geometry: &'a Geometry) -> Rooms<'a> {
     let [a, b, ajb] = files;
     Rooms {
-        a: Measured { file: "A", frf: a, points: &geometry.a },
-        b: Measured { file: "B", frf: b, points: &geometry.b },
-        ajb: Measured { file: "AJB", frf: ajb, points: &geometry.ajb },
+        a: Measured { file: Structure::A, frf: a, points: &geometry.a },
+        b: Measured { file: Structure::B, frf: b, points: &geometry.b },
+        ajb: Measured { file: Structure::Ajb, frf: ajb, points: &geometry.ajb },
         geometry,
     }
 }
@@ -349,7 +302,7 @@ fn above_zero(file: &FrfMatrix) -> Cow<'_, FrfMatrix> {
 }
 
 fn check_alike(a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix) -> Result<(), IdentifyError> {
-    for (file, y) in [("A", a), ("B", b), ("AJB", ajb)] {
+    for (file, y) in (Abc { a, b, ajb }).each() {
         y.check().map_err(|source| IdentifyError::Frf { file, source })?;
         if y.quantity != a.quantity {
             return Err(IdentifyError::Quantities { file, found: y.quantity, expected: a.quantity });

@@ -5,6 +5,7 @@ use super::geometry::{Configuration, Geometry, Grouping, Point};
 use super::idm::IdmSet;
 use super::product::product_of_block;
 use super::vpt::{self, ROTATION_LENGTH_M, Transformation, VptError};
+use crate::structure::Structure;
 use nalgebra::{Complex, DMatrix, Vector3};
 
 type Line = DMatrix<Complex<f64>>;
@@ -16,9 +17,9 @@ pub enum InterfaceError {
     #[error("virtual point of {substructure} in {file}: {source}")]
     VirtualPoint {
         /// `A` or `B`.
-        substructure: &'static str,
+        substructure: Structure,
         /// Which FRF file.
-        file: &'static str,
+        file: Structure,
         /// Why.
         source: VptError,
     },
@@ -28,9 +29,9 @@ pub enum InterfaceError {
     )]
     NoPoints {
         /// `A` or `B`.
-        substructure: &'static str,
+        substructure: Structure,
         /// Which FRF file.
-        file: &'static str,
+        file: Structure,
         /// `responses` or `impacts`.
         kind: &'static str,
         /// Names the geometry gives them.
@@ -42,7 +43,7 @@ pub enum InterfaceError {
     #[error("{file}: {source}")]
     Frf {
         /// Which FRF file.
-        file: &'static str,
+        file: Structure,
         /// Why.
         source: FrfError,
     },
@@ -88,7 +89,7 @@ pub(crate) struct VirtualPoint {
 /// Which file of the three, with what it holds.
 #[derive(Clone, Copy)]
 pub(crate) struct Measured<'a> {
-    pub(crate) file: &'static str,
+    pub(crate) file: Structure,
     pub(crate) frf: &'a FrfMatrix,
     pub(crate) points: &'a Configuration,
 }
@@ -109,8 +110,8 @@ impl Measured<'_> {
         idms: IdmSet,
     ) -> Result<VirtualPoint, InterfaceError> {
         let (substructure, origin) = match grouping {
-            Grouping::InterfaceA | Grouping::InternalA => ("A", geometry.virtual_point_a_m),
-            Grouping::InterfaceB | Grouping::InternalB => ("B", geometry.virtual_point_b_m),
+            Grouping::InterfaceA | Grouping::InternalA => (Structure::A, geometry.virtual_point_a_m),
+            Grouping::InterfaceB | Grouping::InternalB => (Structure::B, geometry.virtual_point_b_m),
         };
         let origin = Vector3::from(origin);
         let fail = |source| InterfaceError::VirtualPoint { substructure, file: self.file, source };

@@ -2,18 +2,11 @@
 
 use super::geometry::Grouping;
 use super::interface_data::{Found, InterfaceError};
-use super::reduced::{Balanced, Rooms};
+use super::rooms::{Balanced, Rooms, Side};
 use super::vpt::reduce_inputs;
 use nalgebra::{Complex, DMatrix};
 
 type Line = DMatrix<Complex<f64>>;
-
-/// A substructure.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum Side {
-    A,
-    B,
-}
 
 /// Which points count as internal.
 #[derive(Clone, Copy, PartialEq)]

@@ -1,36 +1,14 @@
 //! From Z^J per line to stiffness and damping over a band, with what can honestly be said of their scatter.
 
 use super::idm::{Dof, IdmSet};
+use crate::band::Band;
+use crate::parallel::prelude::*;
 use nalgebra::{Complex, DMatrix};
-use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// 95 % of a normal distribution lie within this many standard deviations.
 pub const NORMAL_95: f64 = 1.96;
-
-/// A frequency band, Hz; both ends belong to it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[serde(into = "[f64; 2]")]
-pub struct Band {
-    /// Lowest frequency, Hz.
-    pub low_hz: f64,
-    /// Highest frequency, Hz.
-    pub high_hz: f64,
-}
-
-impl Band {
-    /// Whether the line belongs to the band.
-    pub fn contains(&self, frequency_hz: f64) -> bool {
-        (self.low_hz..=self.high_hz).contains(&frequency_hz)
-    }
-}
-
-impl From<Band> for [f64; 2] {
-    fn from(band: Band) -> [f64; 2] {
-        [band.low_hz, band.high_hz]
-    }
-}
 
 /// One quantity over the lines of a band.
 ///

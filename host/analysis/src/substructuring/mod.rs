@@ -24,6 +24,8 @@ pub mod consistency;
 pub mod coupling;
 pub mod decoupling;
 pub mod direct;
+#[cfg(test)]
+mod exact_rig_tests;
 pub mod explained;
 pub mod fit;
 pub mod frf;
@@ -40,16 +42,19 @@ pub mod plausibility;
 mod product;
 pub mod pseudo_inverse;
 mod quality_over_band;
+pub mod quality;
 mod reduced;
+mod rooms;
 pub mod semm;
 pub mod virtual_points;
 pub mod vpt;
 
+pub use crate::band::Band;
+pub use crate::structure::{Abc, Structure};
 pub use frf::{FrfError, FrfMatrix, Quantity};
 pub use geometry::{Configuration, Geometry, Grouping, Point};
-pub use identify::{
-    Decoupled, Identification, IdentifyError, Refused, VirtualPointQuality, decouple, identify, line_noise,
-};
+pub use identify::{Decoupled, Identification, IdentifyError, Refused, decouple, identify, line_noise};
 pub use idm::{Dof, IdmSet};
-pub use joint::{Band, BandStatistic, JointRow, JointSpectrum};
+pub use joint::{BandStatistic, JointRow, JointSpectrum};
 pub use method::Method;
+pub use quality::{Internals, VirtualPointQuality};

@@ -6,18 +6,19 @@ use super::decoupling::{
     ASSEMBLY, DecouplingError, InverseBlock, PrimalBlock, interface, internal, internal_printed, inverse_of,
     observed_rank, primal_of,
 };
-use super::geometry::{Geometry, Grouping};
-use super::identify::{Internals, VirtualPointQuality};
+use super::geometry::Grouping;
 use super::idm::IdmSet;
-use super::interface_data::{InterfaceError, Measured, VirtualPoint, balance, scaled};
-use super::internals::{Rearrangement, Side, Which};
-use super::joint::Band;
+use super::interface_data::{InterfaceError, balance, scaled};
+use super::internals::{Rearrangement, Which};
 use super::method::Method;
 use super::plausibility::{passivity, reciprocity};
 use super::pseudo_inverse::{condition, full_rank_inverse, rank};
-use super::vpt::reduce_inputs;
-use nalgebra::{Complex, DMatrix, DVector};
-use rayon::prelude::*;
+use super::quality::{Internals, VirtualPointQuality};
+use super::rooms::{Balanced, Rooms, Side};
+use crate::band::Band;
+use crate::parallel::prelude::*;
+use crate::structure::Structure;
+use nalgebra::{Complex, DMatrix};
 use std::sync::OnceLock;
 
 type Line = DMatrix<Complex<f64>>;
@@ -36,24 +37,6 @@ pub enum RefusedReason {
         /// Why.
         source: DecouplingError,
     },
-}
-
-/// The three measurements and the geometry.
-pub(super) struct Rooms<'a> {
-    pub(super) a: Measured<'a>,
-    pub(super) b: Measured<'a>,
-    pub(super) ajb: Measured<'a>,
-    pub(super) geometry: &'a Geometry,
-}
-
-impl<'a> Rooms<'a> {
-    /// The file of one substructure alone.
-    pub(super) fn alone(&self, side: Side) -> Measured<'a> {
-        match side {
-            Side::A => self.a,
-            Side::B => self.b,
-        }
-    }
 }
 
 /// What a method is made of.
@@ -117,7 +100,7 @@ impl Reduced {
     }
 
     pub(super) fn quality(&self, rooms: &Rooms<'_>) -> Vec<VirtualPointQuality> {
-        [("A", rooms.a, &self.a.vp, &self.y_a), ("B", rooms.b, &self.b.vp, &self.y_b)]
+        [(Structure::A, rooms.a, &self.a.vp, &self.y_a), (Structure::B, rooms.b, &self.b.vp, &self.y_b)]
             .into_par_iter()
             .filter_map(|(substructure, file, vp, y)| {
                 // what times a driving-point admittance is a mobility
@@ -279,33 +262,6 @@ impl Reduced {
         let d = balance(self.idms);
         let order = rooms.a.frf.quantity.order_of_s();
         every_line(self.y_a.len(), |l| Ok(scaled(solve(l)?, &d, rooms.a.frf.s(l).powi(order))))
-    }
-}
-
-/// A virtual point in one file with its rotations in metres: T_u and T_f between measured points and D u, D⁻¹ f.
-pub(super) struct Balanced {
-    pub(super) vp: VirtualPoint,
-    pub(super) t_u: DMatrix<f64>,
-    pub(super) t_f: DMatrix<f64>,
-}
-
-impl Balanced {
-    pub(super) fn of(
-        file: Measured<'_>,
-        grouping: Grouping,
-        geometry: &Geometry,
-        idms: IdmSet,
-    ) -> Result<Balanced, InterfaceError> {
-        let vp = file.virtual_point(grouping, geometry, idms)?;
-        let d = DMatrix::from_diagonal(&DVector::from_vec(balance(idms)));
-        let (t_u, t_f) = (&d * &vp.responses.t, &vp.impacts.t * &d);
-        Ok(Balanced { vp, t_u, t_f })
-    }
-
-    /// T_u Y T_f of one line, responses at this virtual point and forces at the other.
-    fn admittance(&self, file: Measured<'_>, line: usize, input: &Balanced) -> Result<Line, InterfaceError> {
-        let motions = file.reduced_outputs(line, &self.t_u, &self.vp.rows, &input.vp.columns)?;
-        Ok(reduce_inputs(&motions, &input.t_f))
     }
 }
 

@@ -13,8 +13,8 @@
 
 use super::frf::{FrfError, FrfMatrix, block};
 use super::pseudo_inverse::{RankLost, full_rank_inverse};
+use crate::parallel::prelude::*;
 use nalgebra::{Complex, DMatrix};
-use rayon::prelude::*;
 
 type Line = DMatrix<Complex<f64>>;
 

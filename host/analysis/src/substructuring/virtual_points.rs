@@ -4,8 +4,8 @@ use super::frf::{FrfError, FrfMatrix};
 use super::geometry::{Configuration, Grouping, Point};
 use super::idm::IdmSet;
 use super::vpt::{self, Transformation, VptError, reduce_inputs, reduce_outputs};
+use crate::parallel::prelude::*;
 use nalgebra::{DMatrix, Vector3};
-use rayon::prelude::*;
 
 /// One virtual point: where it is, what it carries, and what it is made of.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,7 @@
 //! Whether A and B are the same structures in all configurations.
 
-use crate::results::{MAIN_BAND, UNIDENTIFIED};
+use crate::identified::SCATTER_OF_LINES;
+use crate::results::MAIN_BAND;
 use crate::substructuring::identify::Identification;
 use crate::substructuring::{BandStatistic, Dof, JointSpectrum, Method};
 
@@ -52,7 +53,7 @@ impl SameStructures {
             Some((difference.mean, changed, high - low < k.mean.abs()))
         };
         let (a, b) = (against(Method::PrimalA)?, against(Method::PrimalB)?);
-        let clear = a.2 && b.2 && k.std <= UNIDENTIFIED * k.mean.abs();
+        let clear = a.2 && b.2 && k.std <= SCATTER_OF_LINES * k.mean.abs();
         let sameness = match [a.1, b.1] {
             _ if !clear => Sameness::Untold,
             [false, false] => Sameness::Same,

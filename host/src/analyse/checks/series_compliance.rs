@@ -1,7 +1,8 @@
 //! Whether something gives way between the arms' points and the contact: FBS against loops.
 
 use crate::hysteresis::OverCycles;
-use crate::results::{MAIN_BAND, UNIDENTIFIED, headline_rank};
+use crate::identified::SCATTER_OF_LINES;
+use crate::results::{MAIN_BAND, headline_rank};
 use crate::substructuring::averaged::Averaged;
 use crate::substructuring::direct::Direct;
 use crate::substructuring::joint::NORMAL_95;
@@ -89,7 +90,7 @@ impl SeriesCompliance {
     pub fn of(fbs: Option<&BandStatistic>, loops: Option<OverCycles>) -> Self {
         let (Some(fbs), Some(loops)) = (fbs, loops) else { return Self::NotBoth };
         let (k_fbs, k_loops) = (fbs.mean, loops.mean);
-        if k_fbs <= 0.0 || k_loops <= 0.0 || fbs.std > UNIDENTIFIED * k_fbs {
+        if k_fbs <= 0.0 || k_loops <= 0.0 || fbs.std > SCATTER_OF_LINES * k_fbs {
             return Self::NotIdentified;
         }
         let sizes = Sizes { fbs_n_per_m: k_fbs, loops_n_per_m: k_loops };

@@ -6,7 +6,7 @@ use jointrig_protocol::channel::{Quantity, Role};
 use crate::campaign::plan::{Enough, Plan};
 use crate::device::channels::ChannelMap;
 use crate::device::recording::Codes;
-use crate::spectra::{Pulse, SpectraAverage, Windowing};
+use crate::spectra::{CrossSpectra, Pulse, SpectraAverage, Windowing};
 
 /// Good records from which on there is something usual.
 const FEW: usize = 3;
@@ -47,12 +47,14 @@ impl Others {
     /// Random error of the averaged FRFs as a part of them, √(Σ var H1 / Σ |H1|²) over lines and axes of the band; none of
     /// fewer than two hits.
     pub fn random_error(&self, enough: &Enough) -> Option<f64> {
-        let found = self.average.as_ref()?.finish(0.0, &[]).ok().filter(|found| found.hits > 1)?;
+        let found = self.average.as_ref()?.finish(0.0, &[]).ok().filter(|found| found.hits() > 1)?;
         let [low_hz, high_hz] = enough.band_hz;
         let band = found.band(low_hz, high_hz);
         // `variance` is the real part's; the imaginary part has as much
-        let variance: f64 = band.variance.iter().flatten().map(|variance| 2.0 * variance).sum();
-        let power: f64 = band.h1.iter().flatten().map(num_complex::Complex::norm_sqr).sum();
+        let variance: f64 =
+            band.rows(CrossSpectra::variance).into_iter().flatten().map(|variance| 2.0 * variance).sum();
+        let power: f64 =
+            band.rows(CrossSpectra::h1).iter().flatten().map(num_complex::Complex::norm_sqr).sum();
         (power > 0.0).then(|| (variance / power).sqrt())
     }
 

@@ -1,12 +1,13 @@
 //! The assembly's interface cells over a band: receptances, their noise, and the two virtual points they reduce to.
 
-use super::sensitivity::Layout;
+use super::layout::Layout;
 use super::{AveragedError, Line};
+use crate::band::Band;
+use crate::structure::Structure;
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::{Geometry, Grouping};
 use crate::substructuring::idm::IdmSet;
 use crate::substructuring::interface_data::{Found, Measured};
-use crate::substructuring::joint::Band;
 use crate::substructuring::noise::{FrfNoise, SMOOTH_HZ};
 use nalgebra::{Complex, DMatrix};
 
@@ -38,7 +39,7 @@ impl Assembly {
         if in_band.is_empty() {
             return Err(AveragedError::EmptyBand { low_hz: band.low_hz, high_hz: band.high_hz });
         }
-        let file = Measured { file: "AJB", frf: ajb, points: &geometry.ajb };
+        let file = Measured { file: Structure::Ajb, frf: ajb, points: &geometry.ajb };
         let a = file.virtual_point(Grouping::InterfaceA, geometry, idms)?;
         let b = file.virtual_point(Grouping::InterfaceB, geometry, idms)?;
         let (rows, columns) = (joined(&a.rows, &b.rows), joined(&a.columns, &b.columns));

@@ -2,11 +2,11 @@
 
 use super::assembly::Assembly;
 use super::{Line, compliance, invert};
+use crate::parallel::prelude::*;
 use nalgebra::Complex;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use rayon::prelude::*;
 
 /// Pairs of draws per line; hundreds of lines average what is left.
 const PAIRS: u64 = 4;

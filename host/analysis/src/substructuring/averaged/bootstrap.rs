@@ -5,13 +5,13 @@
 //! every hit (positions, angles) does not show here: the estimate's geometric part has to be added.
 
 use super::{AveragedError, DofEstimate, Line, Prepared, compliance, invert};
+use crate::parallel::prelude::*;
 use crate::substructuring::idm::Dof;
 use crate::substructuring::interface_data::balance;
 use crate::substructuring::joint::stiffness_and_damping;
 use nalgebra::{Complex, DMatrix};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 

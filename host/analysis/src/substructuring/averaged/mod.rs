@@ -12,6 +12,7 @@
 mod assembly;
 mod bias;
 mod bootstrap;
+mod layout;
 mod sensitivity;
 mod typical;
 
@@ -21,12 +22,14 @@ use super::frf::FrfMatrix;
 use super::geometry::Geometry;
 use super::idm::{Dof, IdmSet};
 use super::interface_data::{InterfaceError, balance};
-use super::joint::{Band, NORMAL_95, stiffness_and_damping};
+use super::joint::{NORMAL_95, stiffness_and_damping};
 use super::noise::{FrfNoise, NoiseError, shared_by_lines};
 use super::pseudo_inverse::{RankLost, full_rank_inverse};
+use crate::band::Band;
+use crate::identified::COMPLIANCE_HALF_WIDTH;
+use crate::parallel::prelude::*;
 use assembly::Assembly;
 use nalgebra::{Complex, DMatrix};
-use rayon::prelude::*;
 use sensitivity::Sums;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -34,8 +37,6 @@ use typical::Typical;
 
 type Line = DMatrix<Complex<f64>>;
 
-/// Above this relative half width the compliance cannot be told from zero well enough: the stiffness has no upper limit worth a name.
-const UNIDENTIFIED: f64 = 0.6;
 /// Above this the even mean of the lines tells nothing, so that weights have nothing to choose from either.
 const HIDDEN: f64 = 2.0;
 /// Of rotations, which may be far softer than the arms' inertia, the even mean itself must tell.
@@ -324,7 +325,7 @@ impl Prepared {
 /// The 95 % interval of a stiffness whose compliance is normally distributed, and whether the upper end is a number.
 fn interval(stiffness: f64, std: f64) -> ([f64; 2], bool) {
     let relative = NORMAL_95 * std / stiffness.abs();
-    let identified = relative < UNIDENTIFIED && stiffness > 0.0;
+    let identified = relative < COMPLIANCE_HALF_WIDTH && stiffness > 0.0;
     let high = if identified { stiffness / (1.0 - relative) } else { f64::INFINITY };
     ([stiffness / (1.0 + relative), high], identified)
 }
@@ -372,3 +373,6 @@ fn weights(lines: &[Sums], shared: f64, priors: &Priors) -> Vec<f64> {
         vec![1.0 / lines.len() as f64; lines.len()]
     }
 }
+
+#[cfg(test)]
+mod tests;

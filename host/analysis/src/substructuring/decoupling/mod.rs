@@ -52,4 +52,4 @@ pub enum DecouplingError {
 }
 
 #[cfg(test)]
-mod exactness;
+mod exactness_tests;

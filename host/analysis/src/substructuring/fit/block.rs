@@ -4,10 +4,11 @@
 //! channels or impacts as they are. The assembly's ports are A's and then B's.
 
 use super::{FitError, Internals};
+use crate::band::Band;
+use crate::structure::Structure;
 use crate::substructuring::geometry::{Geometry, Grouping};
 use crate::substructuring::idm::IdmSet;
 use crate::substructuring::interface_data::{Found, InterfaceError, Measured, balance};
-use crate::substructuring::joint::Band;
 use crate::substructuring::noise::{FrfNoise, SMOOTH_HZ};
 use crate::substructuring::vpt;
 use nalgebra::{Complex, DMatrix, Vector3};
@@ -109,8 +110,11 @@ impl Block {
                     at: kept.iter().map(|&i| found.at[i]).collect(),
                 }
             };
-            let fail =
-                |source| InterfaceError::VirtualPoint { substructure: side.name(), file: file.file, source };
+            let fail = |source| InterfaceError::VirtualPoint {
+                substructure: side.structure(),
+                file: file.file,
+                source,
+            };
             let at = file.outputs(&[interface]);
             let t = if at.at.is_empty() {
                 None
@@ -181,10 +185,10 @@ pub(super) enum Side {
 }
 
 impl Side {
-    fn name(self) -> &'static str {
+    fn structure(self) -> Structure {
         match self {
-            Side::A => "A",
-            Side::B => "B",
+            Side::A => Structure::A,
+            Side::B => Structure::B,
         }
     }
 

@@ -30,8 +30,9 @@ use super::frf::FrfMatrix;
 use super::geometry::{Geometry, Grouping};
 use super::idm::{Dof, IdmSet};
 use super::interface_data::{InterfaceError, Measured};
-use super::joint::Band;
 use super::noise::{FrfNoise, NoiseError, shared_by_lines};
+use crate::band::Band;
+use crate::structure::Structure;
 use block::{Block, Side};
 use model::Layout;
 use nuisance::Nuisances;
@@ -102,7 +103,7 @@ pub enum FitError {
     #[error("{file}: {source}")]
     Noise {
         /// Which file.
-        file: &'static str,
+        file: Structure,
         /// What differs.
         source: NoiseError,
     },
@@ -113,7 +114,7 @@ pub enum FitError {
     )]
     NoiseUnknown {
         /// Which file.
-        file: &'static str,
+        file: Structure,
         /// The cell's output.
         output: String,
         /// The cell's input.
@@ -123,7 +124,7 @@ pub enum FitError {
     #[error("{file} has no line, or other lines than the other files, in the band {low_hz}–{high_hz} Hz")]
     EmptyBand {
         /// Which file.
-        file: &'static str,
+        file: Structure,
         /// Lowest frequency, Hz.
         low_hz: f64,
         /// Highest frequency, Hz.
@@ -257,9 +258,9 @@ fn problem(
     options: &Options,
 ) -> Result<Problem, FitError> {
     let files = [
-        Measured { file: "A", frf: a.frf, points: &geometry.a },
-        Measured { file: "B", frf: b.frf, points: &geometry.b },
-        Measured { file: "AJB", frf: ajb.frf, points: &geometry.ajb },
+        Measured { file: Structure::A, frf: a.frf, points: &geometry.a },
+        Measured { file: Structure::B, frf: b.frf, points: &geometry.b },
+        Measured { file: Structure::Ajb, frf: ajb.frf, points: &geometry.ajb },
     ];
     let lines = files.each_ref().map(|file| Block::lines(file, band));
     for (file, own) in files.iter().zip(&lines) {
@@ -325,3 +326,6 @@ fn internals(side: Side, files: &[Measured<'_>; 3], points: Points) -> Internals
     }
     found
 }
+
+#[cfg(test)]
+mod tests;

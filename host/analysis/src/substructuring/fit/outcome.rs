@@ -3,15 +3,15 @@
 use super::joint::{Chart, Shape};
 use super::solver::Found;
 use super::{Fitted, Options};
+use crate::band::Band;
+use crate::identified::FITTED_HALF_WIDTH;
 use crate::substructuring::idm::{Dof, IdmSet};
 use crate::substructuring::interface_data::balance;
-use crate::substructuring::joint::{Band, BandStatistic, JointRow, NORMAL_95};
+use crate::substructuring::joint::{BandStatistic, JointRow, NORMAL_95};
 use nalgebra::DVector;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Half width over value above which a stiffness is a limit rather than a number.
-const UNIDENTIFIED: f64 = 0.6;
 /// A loss factor known no better than this is its prior's, not the data's.
 const LOSS_UNKNOWN: f64 = 0.5;
 /// χ² per degree of freedom above which a reader must be told, and intervals are widened: of thousands of residuals it scatters by a
@@ -44,7 +44,7 @@ impl FittedDof {
         let k = stiffness(kappa);
         let ci95 = [stiffness(kappa - NORMAL_95 * kappa_std), stiffness(kappa + NORMAL_95 * kappa_std)];
         let std = kappa_std / ((1.0 - kappa) * (1.0 - kappa)) / unit;
-        let identified = k > 0.0 && k.is_finite() && (ci95[1] - ci95[0]) / 2.0 < UNIDENTIFIED * k;
+        let identified = k > 0.0 && k.is_finite() && (ci95[1] - ci95[0]) / 2.0 < FITTED_HALF_WIDTH * k;
         FittedDof {
             stiffness: k,
             std,

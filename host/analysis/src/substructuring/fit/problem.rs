@@ -6,11 +6,11 @@ use super::cell::CellGeometry;
 use super::joint::Chart;
 use super::model::{Layout, Predicted};
 use super::nuisance::Nuisances;
+use crate::parallel::prelude::*;
 use nalgebra::{Complex, DMatrix, DVector};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use rayon::prelude::*;
 use std::ops::Range;
 
 type C = Complex<f64>;

@@ -10,8 +10,8 @@ use super::cell::CellGeometry;
 use super::joint::Chart;
 use super::model::Predicted;
 use super::problem::{Corrected, Problem};
+use crate::parallel::prelude::*;
 use nalgebra::{Complex, DMatrix, DVector};
-use rayon::prelude::*;
 use std::ops::{AddAssign, Range};
 
 type C = Complex<f64>;
@@ -83,10 +83,8 @@ impl Weight {
             .map(|band| point.weight(problem.bands[band].clone()))
             .collect::<Result<_, FitError>>()?;
         let count = problem.nuisances.std.len();
-        let information = bands
-            .par_iter()
-            .map(|b| b.g.transpose() * &b.g)
-            .reduce(|| DMatrix::zeros(count, count), |a, b| a + b);
+        let products: Vec<DMatrix<f64>> = bands.par_iter().map(|b| b.g.transpose() * &b.g).collect();
+        let information = products.into_iter().fold(DMatrix::zeros(count, count), |a, b| a + b);
         Ok(Weight { bands, information })
     }
 }

@@ -1,8 +1,7 @@
 //! What moves Z_dd, as sums of dyads over the cells of measured blocks.
 
-use crate::substructuring::internals::Side;
 use crate::substructuring::product::product;
-use crate::substructuring::reduced::Balanced;
+use crate::substructuring::rooms::{Balanced, Side};
 use nalgebra::{Complex, DMatrix};
 
 type C = Complex<f64>;

@@ -15,12 +15,13 @@ use super::decoupling::{
 };
 use super::idm::Dof;
 use super::interface_data::balance;
-use super::internals::{Rearrangement, Side};
+use super::internals::Rearrangement;
 use super::method::Method;
 use super::noise::FrfNoise;
 use super::product::product;
 use super::pseudo_inverse::full_rank_inverse;
-use super::reduced::{Kind, Reduced, RefusedReason, Rooms, every_line};
+use super::reduced::{Kind, Reduced, RefusedReason, every_line};
+use super::rooms::{Rooms, Side};
 use dyads::{ASSEMBLED, Both, Dyads, Source, own};
 use nalgebra::{Complex, DMatrix};
 use std::collections::BTreeMap;

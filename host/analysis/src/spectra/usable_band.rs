@@ -1,20 +1,11 @@
 //! The band in which the hammer really excited the structure.
 
-use serde::Serialize;
-
-/// The force spectrum's usable band.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct UsableBand {
-    /// First line above 0 Hz that is within the limit, Hz.
-    pub low_hz: f64,
-    /// Last line before the force falls below the limit, Hz.
-    pub high_hz: f64,
-}
+use crate::band::Band;
 
 /// The band around the force auto-spectrum's maximum in which it stays within `drop_db` (6 dB by custom) of it.
 ///
 /// `s_ff` is a power: −6 dB are a quarter. None when there is no line above 0 Hz or no force.
-pub fn usable_band(frequency_hz: &[f64], s_ff: &[f64], drop_db: f64) -> Option<UsableBand> {
+pub fn usable_band(frequency_hz: &[f64], s_ff: &[f64], drop_db: f64) -> Option<Band> {
     let first = frequency_hz.iter().position(|f| *f > 0.0)?;
     let n = frequency_hz.len().min(s_ff.len());
     let top = (first..n).max_by(|&a, &b| s_ff[a].total_cmp(&s_ff[b]))?;
@@ -24,7 +15,7 @@ pub fn usable_band(frequency_hz: &[f64], s_ff: &[f64], drop_db: f64) -> Option<U
     }
     let low = (first..=top).rev().take_while(|&l| s_ff[l] >= limit).last()?;
     let high = (top..n).take_while(|&l| s_ff[l] >= limit).last()?;
-    Some(UsableBand { low_hz: frequency_hz[low], high_hz: frequency_hz[high] })
+    Some(Band { low_hz: frequency_hz[low], high_hz: frequency_hz[high] })
 }
 
 #[cfg(test)]

@@ -1,0 +1,39 @@
+//! The examples' data: FRFs as (frequency, output, input, real, imaginary part), one value in each row.
+
+use jointrig_analysis::substructuring::{FrfMatrix, Quantity};
+use nalgebra::{Complex, DMatrix};
+use std::error::Error;
+use std::path::Path;
+
+/// The rows of a file in `examples/data`, without its first line.
+pub fn rows(file: &str) -> Result<Vec<Vec<String>>, Box<dyn Error>> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/data").join(file);
+    let text = std::fs::read_to_string(path)?;
+    Ok(text.lines().skip(1).map(|line| line.split(',').map(str::to_owned).collect()).collect())
+}
+
+/// Mobilities under an exponential window of 2.3 1/s.
+#[allow(dead_code, reason = "not every example reads FRFs")]
+pub fn frf(file: &str) -> Result<FrfMatrix, Box<dyn Error>> {
+    let rows = rows(file)?;
+    let (mut frequency_hz, mut outputs, mut inputs) = (Vec::<f64>::new(), Vec::new(), Vec::new());
+    for row in &rows {
+        let hz = row[0].parse()?;
+        if frequency_hz.last() != Some(&hz) {
+            frequency_hz.push(hz);
+        }
+        for (names, name) in [(&mut outputs, &row[1]), (&mut inputs, &row[2])] {
+            if !names.contains(name) {
+                names.push(name.clone());
+            }
+        }
+    }
+    let (m, n) = (outputs.len(), inputs.len());
+    let values = rows.iter().map(|row| Ok(Complex::new(row[3].parse()?, row[4].parse()?)));
+    let values = values.collect::<Result<Vec<Complex<f64>>, std::num::ParseFloatError>>()?;
+    let lines = values.chunks(m * n).map(|line| DMatrix::from_row_slice(m, n, line)).collect();
+    let quantity = Quantity::Mobility;
+    let frf = FrfMatrix { frequency_hz, sigma_per_s: 2.3, quantity, outputs, inputs, lines };
+    frf.check()?;
+    Ok(frf)
+}

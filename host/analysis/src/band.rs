@@ -1,0 +1,32 @@
+//! A band of frequencies.
+
+use serde::Serialize;
+
+/// A frequency band, Hz; both ends belong to it. In files it is `[low, high]`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(into = "[f64; 2]")]
+pub struct Band {
+    /// Lowest frequency, Hz.
+    pub low_hz: f64,
+    /// Highest frequency, Hz.
+    pub high_hz: f64,
+}
+
+impl Band {
+    /// Whether the line belongs to the band.
+    pub fn contains(&self, frequency_hz: f64) -> bool {
+        (self.low_hz..=self.high_hz).contains(&frequency_hz)
+    }
+}
+
+impl From<[f64; 2]> for Band {
+    fn from([low_hz, high_hz]: [f64; 2]) -> Band {
+        Band { low_hz, high_hz }
+    }
+}
+
+impl From<Band> for [f64; 2] {
+    fn from(band: Band) -> [f64; 2] {
+        [band.low_hz, band.high_hz]
+    }
+}

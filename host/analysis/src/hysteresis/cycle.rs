@@ -1,0 +1,27 @@
+//! One closed cycle of a record.
+
+/// One closed cycle: M equidistant points of one period.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Cycle {
+    /// Relative displacement, mean removed, m.
+    pub displacement_m: Vec<f64>,
+    /// Relative velocity, mean removed, m/s.
+    pub velocity_m_per_s: Vec<f64>,
+    /// Tangential force, mean removed, N.
+    pub force_n: Vec<f64>,
+}
+
+impl Cycle {
+    pub(super) fn zeros(points: usize) -> Self {
+        let zeros = || vec![0.0; points];
+        Self { displacement_m: zeros(), velocity_m_per_s: zeros(), force_n: zeros() }
+    }
+
+    pub(super) fn signals(&self) -> [&[f64]; 3] {
+        [&self.displacement_m, &self.velocity_m_per_s, &self.force_n]
+    }
+
+    pub(super) fn signals_mut(&mut self) -> [&mut Vec<f64>; 3] {
+        [&mut self.displacement_m, &mut self.velocity_m_per_s, &mut self.force_n]
+    }
+}

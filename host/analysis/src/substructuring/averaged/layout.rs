@@ -1,0 +1,86 @@
+//! Where the cells of the assembly's interface are, and how they reduce to its two virtual points.
+
+use super::Line;
+use crate::substructuring::geometry::{Geometry, Point};
+use crate::substructuring::idm::IdmSet;
+use crate::substructuring::interface_data::{Found, VirtualPoint, balance};
+use crate::substructuring::vpt::{reduce_inputs, reduce_outputs};
+use nalgebra::{DMatrix, Vector3};
+
+/// A channel or impact as the propagation needs it.
+pub(super) struct Place {
+    pub(super) direction: Vector3<f64>,
+    pub(super) offset: Vector3<f64>,
+    /// 0 for A's virtual point, 1 for B's.
+    pub(super) side: usize,
+    /// Which sensor: its axes share one error of position.
+    pub(super) point: usize,
+}
+
+/// Transformations of both virtual points as one, and where everything is.
+pub(super) struct Layout {
+    /// 2n_c × channels and impacts × 2n_c, rotations scaled.
+    pub(super) t_u: DMatrix<f64>,
+    pub(super) t_f: DMatrix<f64>,
+    pub(super) channels: Vec<Place>,
+    pub(super) impacts: Vec<Place>,
+    pub(super) points: usize,
+    pub(super) idms: IdmSet,
+}
+
+impl Layout {
+    pub(super) fn new(
+        a: &VirtualPoint,
+        b: &VirtualPoint,
+        rows: &Found,
+        columns: &Found,
+        geometry: &Geometry,
+        idms: IdmSet,
+    ) -> Layout {
+        let n = idms.count();
+        let d = balance(idms);
+        let (rows_a, columns_a) = (a.rows.at.len(), a.columns.at.len());
+        let t_u = DMatrix::from_fn(2 * n, rows.at.len(), |r, c| match (r < n, c < rows_a) {
+            (true, true) => a.responses.t[(r, c)] * d[r],
+            (false, false) => b.responses.t[(r - n, c - rows_a)] * d[r - n],
+            _ => 0.0,
+        });
+        let t_f = DMatrix::from_fn(columns.at.len(), 2 * n, |r, c| match (r < columns_a, c < n) {
+            (true, true) => a.impacts.t[(r, c)] * d[c],
+            (false, false) => b.impacts.t[(r - columns_a, c - n)] * d[c - n],
+            _ => 0.0,
+        });
+        let origins = [geometry.virtual_point_a_m, geometry.virtual_point_b_m].map(Vector3::from);
+        let place = |p: &Point, side: usize, point: usize| Place {
+            direction: p.direction(),
+            offset: p.position() - origins[side],
+            side,
+            point,
+        };
+        let mut names: Vec<&str> = Vec::new();
+        let mut channels = Vec::new();
+        for (i, channel) in rows.points.iter().enumerate() {
+            let at = names.iter().position(|name| *name == channel.name).unwrap_or(names.len());
+            if at == names.len() {
+                names.push(&channel.name);
+            }
+            channels.push(place(channel, usize::from(i >= rows_a), at));
+        }
+        let impacts = columns
+            .points
+            .iter()
+            .enumerate()
+            .map(|(i, impact)| place(impact, usize::from(i >= columns_a), i))
+            .collect();
+        Layout { t_u, t_f, channels, impacts, points: names.len(), idms }
+    }
+
+    /// T_u Y T_f: cells onto both virtual points, rotations scaled.
+    pub(super) fn reduce(&self, cells: &Line) -> Line {
+        reduce_inputs(&reduce_outputs(&self.t_u, cells), &self.t_f)
+    }
+
+    pub(super) fn cell_count(&self) -> (usize, usize) {
+        (self.channels.len(), self.impacts.len())
+    }
+}

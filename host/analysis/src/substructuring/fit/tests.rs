@@ -1,0 +1,74 @@
+use super::*;
+use crate::substructuring::exact_rig_tests::rig;
+use nalgebra::DMatrix;
+
+const BAND: Band = Band { low_hz: 300.0, high_hz: 600.0 };
+
+struct Case {
+    frf: [FrfMatrix; 3],
+    noise: [FrfNoise; 3],
+    geometry: Geometry,
+}
+
+impl Case {
+    /// The rig's exact FRFs, said to have this noise, relative to their mean size.
+    fn rigid(relative: f64) -> Case {
+        let (frf, geometry) = rig();
+        let noise = frf.each_ref().map(|frf| FrfNoise {
+            variance: frf
+                .lines
+                .iter()
+                .map(|y| {
+                    let mean = y.map(|v| v.norm_sqr()).mean();
+                    DMatrix::from_element(y.nrows(), y.ncols(), relative * relative * mean / 2.0)
+                })
+                .collect(),
+        });
+        Case { frf, noise, geometry }
+    }
+}
+
+/// Jacobian of Eq. (1) by the joint, in both charts, against difference quotients.
+#[test]
+fn the_analytic_derivatives_are_the_difference_quotients() {
+    let case = Case::rigid(1e-3);
+    let [a, b, ajb] = [0, 1, 2].map(|i| Noisy { frf: &case.frf[i], noise: &case.noise[i] });
+    let problem =
+        problem(a, b, ajb, &case.geometry, IdmSet::Six, BAND, &Options::default()).expect("exact data");
+    let diagonal = start::chart(&problem);
+    let p = nalgebra::DVector::from_fn(12, |i, _| {
+        [0.95, 0.9, 0.6, 0.05, 0.2, 0.1][i % 6] * if i < 6 { 1.0 } else { 0.3 }
+    });
+    let (full, mut q) = diagonal.full(&p);
+    // away from the diagonal
+    for i in 0..q.len() {
+        q[i] += 0.01 * (i as f64).sin();
+    }
+    let parts = [0, 1].map(|side: usize| problem.parts[side].reduce(&problem.parts[side].cells[10]));
+    for (chart, p) in [(&diagonal, &p), (&full, &q)] {
+        let at = |p: &nalgebra::DVector<f64>| {
+            problem.predict(chart, p, [&parts[0], &parts[1]], 10, true).expect("regular")
+        };
+        let here = at(p);
+        for (i, slope) in here.slopes.iter().enumerate() {
+            let step = 1e-5;
+            let (mut up, mut down) = (p.clone(), p.clone());
+            up[i] += step;
+            down[i] -= step;
+            let quotient = (at(&up).y - at(&down).y) / nalgebra::Complex::from(2.0 * step);
+            // third order of a step of 1e-5, and rounding over it
+            assert!(
+                (slope - &quotient).norm() < 1e-5 * quotient.norm() + 1e-9 * here.y.norm(),
+                "parameter {i}"
+            );
+        }
+        // L δY R is what a change of Y^A does
+        let change = &parts[0] * nalgebra::Complex::from(1e-6);
+        let moved =
+            problem.predict(chart, p, [&(&parts[0] + &change), &parts[1]], 10, false).expect("regular").y;
+        let left = here.left.columns(0, change.nrows());
+        let right = here.right.rows(0, change.ncols());
+        let linear = left * &change * right;
+        assert!((moved - &here.y - &linear).norm() < 1e-4 * linear.norm());
+    }
+}
