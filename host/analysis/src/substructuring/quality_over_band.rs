@@ -1,7 +1,7 @@
 //! How much a virtual point's modes hold, over a band.
 
 use super::identify::VirtualPointQuality;
-use super::joint::Band;
+use crate::band::Band;
 
 impl VirtualPointQuality {
     /// Parts of the measured motion and of the measured force that the modes hold, 0…1: means over the lines of the band, or over all

@@ -2,7 +2,8 @@
 
 use super::LineNoise;
 use crate::substructuring::idm::Dof;
-use crate::substructuring::joint::{Band, median};
+use crate::band::Band;
+use crate::substructuring::joint::median;
 use std::collections::BTreeMap;
 
 impl LineNoise {
