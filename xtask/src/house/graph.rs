@@ -97,11 +97,21 @@ fn edges(packages: &[Package], rules: &[Rule]) -> Vec<String> {
     faults
 }
 
-/// The names of all packages that `package` is built from, itself included, with its default features. Asked alone:
+/// The names of all packages that `package` is built from, itself included, with all its features. Asked alone:
 /// within the whole workspace, other packages' features would add to it.
 fn needed(project: &Project, package: &str) -> Result<Vec<String>> {
-    let arguments =
-        ["tree", "--locked", "--package", package, "--edges", "normal", "--prefix", "none", "--no-dedupe"];
+    let arguments = [
+        "tree",
+        "--locked",
+        "--package",
+        package,
+        "--all-features",
+        "--edges",
+        "normal",
+        "--prefix",
+        "none",
+        "--no-dedupe",
+    ];
     let text = command::output(command::cargo(&project.root).args(arguments))?;
     // Two versions of a crate are two packages.
     let lines: BTreeSet<(&str, &str)> = text

@@ -5,6 +5,7 @@ mod equations;
 mod graph;
 mod modules;
 mod policy;
+mod rooms;
 mod tokens;
 
 use crate::project::Project;
@@ -13,9 +14,10 @@ use anyhow::{Result, bail};
 /// One law: its name, and its check, which returns a remark.
 type Law = (&'static str, fn(&Project) -> Result<String>);
 
-const LAWS: [Law; 4] = [
+const LAWS: [Law; 5] = [
     ("which crate uses which", graph::check),
     ("files in circles", circles::check),
+    ("the host's rooms", rooms::check),
     ("equations", equations::check),
     ("licences, bans, sources", policy::check),
 ];
