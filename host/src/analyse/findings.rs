@@ -1,6 +1,6 @@
 //! Findings: what the stages of an analysis found, each in its own type and without a word of prose.
 //!
-//! [`crate::report::document`] makes `results.json` of them. The stages hand on what the next ones need as arguments; none reads
+//! [`crate::report::document()`] makes `results.json` of them. The stages hand on what the next ones need as arguments; none reads
 //! what another wrote here.
 
 use super::contact_stage::Contact;

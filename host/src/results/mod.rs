@@ -1,7 +1,7 @@
 //! Results: one document with everything that was found, and what it was found from.
 //!
 //! [`Results`] is `results.json`, field for field, with SI units in the names: data, and nothing that computes.
-//! [`crate::report::document`] makes it of what an analysis found; the report and the terminal show it and add
+//! [`crate::report::document()`] makes it of what an analysis found; the report and the terminal show it and add
 //! nothing. A value that is not known is null, never NaN. Every document carries its [`Source`]: file, record ids, settings, version.
 
 mod check;
