@@ -22,6 +22,7 @@ use crate::results;
 use crate::results::Wanted;
 use crate::results::campaign::{CampaignFile, Measured};
 use crate::spectra::{ImpactRecords, MotionQuantity};
+use crate::structure::Structure;
 use crate::substructuring::geometry::Configuration;
 use crate::substructuring::noise::FrfNoise;
 
@@ -94,8 +95,9 @@ impl Export {
         }
         let file = CampaignFile::open(&store, results::KnownContact::default())?;
         let mut told = Vec::new();
-        for (name, points) in [("A", &geometry.a), ("B", &geometry.b), ("AJB", &geometry.ajb)] {
-            let (measured, complaints) = file.measured(name, [self.band.0, self.band.1]);
+        for structure in Structure::ALL {
+            let (name, points) = (structure.name(), geometry.points(structure));
+            let (measured, complaints) = file.measured(structure, [self.band.0, self.band.1]);
             told.extend(complaints);
             let imported = if measured.is_none() { store.frf(name)?.map(imported) } else { None };
             if let Some(measured) = measured.or(imported) {
