@@ -21,6 +21,7 @@ use crate::device::channels::ChannelMap;
 use crate::hysteresis::HysteresisRecord;
 use crate::results::{Completeness, Source};
 use crate::spectra::MotionQuantity;
+use crate::structure::Structure;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
 use jointrig_protocol::channel::{Quantity, Role};
 use std::collections::HashMap;
@@ -280,12 +281,12 @@ impl CampaignFile {
 impl CampaignFile {
     /// The FRFs of a configuration's kept hits between two frequencies, Hz, for every pair of the geometry, formed as the analysis
     /// forms them; and what is said about cells and records that cannot be used. None without a kept hit.
-    pub fn measured(&self, configuration: &str, lines_hz: [f64; 2]) -> (Option<MeasuredFrf>, Vec<String>) {
-        let own = self.cells.iter().filter(|cell| cell.name.configuration == configuration);
+    pub fn measured(&self, structure: Structure, lines_hz: [f64; 2]) -> (Option<MeasuredFrf>, Vec<String>) {
+        let own = self.cells.iter().filter(|cell| cell.name.configuration == structure.name());
         let (mut averages, mut complaints) = (Vec::new(), Vec::new());
         for name in own.map(|cell| &cell.name) {
             let complaint =
-                |what: String| format!("{configuration}: cell {} × {}: {what}.", name.impact, name.response);
+                |what: String| format!("{structure}: cell {} × {}: {what}.", name.impact, name.response);
             let cell = match self.read(name) {
                 Ok(cell) => cell,
                 Err(error) => {
@@ -302,11 +303,7 @@ impl CampaignFile {
                 Err(error) => complaints.push(complaint(error.to_string())),
             }
         }
-        let points = match configuration {
-            "A" => &self.geometry.a,
-            "B" => &self.geometry.b,
-            _ => &self.geometry.ajb,
-        };
+        let points = self.geometry.points(structure);
         (everything(points, &averages, self.quantity), complaints)
     }
 

@@ -20,6 +20,7 @@ use crate::exchange::npz::Array;
 use crate::exchange::positions_output::write_positions;
 use crate::exchange::{Extra, tables_output, uff_output, write_frf, write_impacts};
 use crate::spectra::{ImpactRecords, MotionQuantity};
+use crate::structure::Structure;
 use crate::substructuring::geometry::Configuration;
 use crate::substructuring::noise::FrfNoise;
 
@@ -92,8 +93,9 @@ impl Export {
         }
         let file = CampaignFile::open(&store, KnownContact::default())?;
         let mut told = Vec::new();
-        for (name, points) in [("A", &geometry.a), ("B", &geometry.b), ("AJB", &geometry.ajb)] {
-            let (measured, complaints) = file.measured(name, [self.band.0, self.band.1]);
+        for structure in Structure::ALL {
+            let (name, points) = (structure.name(), geometry.points(structure));
+            let (measured, complaints) = file.measured(structure, [self.band.0, self.band.1]);
             told.extend(complaints);
             let imported = if measured.is_none() { store.frf(name)?.map(imported) } else { None };
             if let Some(measured) = measured.or(imported) {

@@ -172,20 +172,16 @@ impl Measurements for Assembly {
                 record: i64::try_from(h).expect("few hits") + 1,
                 force_n: self.signal(|l| self.force[l], config.sensors.force.noise_n, &mut stream),
                 response: [0, 1, 2].map(|axis| self.signal(|l| responses[axis][l], floor, &mut stream)),
+                response_delay_s: [0.0; 3],
                 contact: Some(ContactSignals {
+                    delay_s: ContactDelays::default(),
                     specimen_a_m_per_s: self.signal(|l| spots[0][l], spot_floor, &mut stream),
                     specimen_b_m_per_s: self.signal(|l| spots[1][l], spot_floor, &mut stream),
                     tangential_n: self.signal(|l| tangential[l], cell_noise, &mut stream),
                 }),
             })
             .collect();
-        Ok(Cell {
-            fs_hz: RATE_HZ,
-            hits,
-            left_out: Vec::new(),
-            response_delay_s: [0.0; 3],
-            contact_delay_s: ContactDelays::default(),
-        })
+        Ok(Cell { fs_hz: RATE_HZ, hits, left_out: Vec::new() })
     }
 }
 

@@ -37,6 +37,7 @@ pub use shape::{Shape, ShapeEvidence};
 
 /// Why a record gives no loop.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum HysteresisError {
     /// The signals differ in length.
     #[error("motion of A has {a} samples, of B {b}, the force {force}: all three need the same number")]

@@ -2,8 +2,7 @@
 
 use super::SpectraError;
 use super::estimators::{self, variance_of_part};
-use super::records::MotionQuantity;
-use crate::substructuring::frf::{FrfMatrix, Quantity};
+use crate::frf::{FrfMatrix, MotionQuantity, Quantity};
 use nalgebra::DMatrix;
 use num_complex::Complex;
 use std::f64::consts::TAU;

@@ -15,16 +15,18 @@ pub mod records;
 pub mod usable_band;
 pub mod window;
 
+pub use crate::frf::MotionQuantity;
 pub use average::SpectraAverage;
 pub use cross_spectra::CrossSpectra;
 pub use estimate::{FrfSettings, Origin, estimate};
 pub use pulse::Pulse;
-pub use records::{ImpactRecords, MotionQuantity};
+pub use records::ImpactRecords;
 pub use usable_band::usable_band;
 pub use window::{ForceWeighting, Windowing};
 
 /// Why records cannot become FRFs.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SpectraError {
     /// No hit to average.
     #[error("no hit to average: every one was refused, or there is none")]

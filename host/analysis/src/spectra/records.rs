@@ -1,46 +1,6 @@
 //! Impact records: what the hammer and the sensors gave, before any processing.
 
-use crate::substructuring::frf::Quantity;
-use serde::{Deserialize, Serialize};
-
-/// What a response channel measures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum MotionQuantity {
-    /// m.
-    Displacement,
-    /// m/s.
-    Velocity,
-    /// m/s².
-    Acceleration,
-}
-
-impl MotionQuantity {
-    /// The word used in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            MotionQuantity::Displacement => "displacement",
-            MotionQuantity::Velocity => "velocity",
-            MotionQuantity::Acceleration => "acceleration",
-        }
-    }
-
-    /// The quantity called `name`, if there is one.
-    pub fn from_name(name: &str) -> Option<Self> {
-        [MotionQuantity::Displacement, MotionQuantity::Velocity, MotionQuantity::Acceleration]
-            .into_iter()
-            .find(|q| q.name() == name.trim().to_lowercase())
-    }
-
-    /// What an FRF of such a response is called.
-    pub fn frf(self) -> Quantity {
-        match self {
-            MotionQuantity::Displacement => Quantity::Receptance,
-            MotionQuantity::Velocity => Quantity::Mobility,
-            MotionQuantity::Acceleration => Quantity::Accelerance,
-        }
-    }
-}
+use crate::frf::MotionQuantity;
 
 /// Hits of one impact position with the same response channels.
 #[derive(Debug, Clone, PartialEq)]

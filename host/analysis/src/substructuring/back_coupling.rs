@@ -1,10 +1,10 @@
 //! The proof of the pudding: A and B coupled by the identified joint must be the measured assembly.
 
 use super::coupling::{boolean_difference, couple};
-use super::frf::FrfMatrix;
 use super::joint::stiffness_and_damping;
 use super::pseudo_inverse::full_rank_inverse;
 use crate::band::Band;
+use crate::frf::FrfMatrix;
 use crate::parallel::prelude::*;
 use nalgebra::{Complex, DMatrix};
 
@@ -69,8 +69,8 @@ impl BackCoupling {
 
 #[cfg(test)]
 mod tests {
-    use super::super::frf::Quantity;
     use super::*;
+    use crate::frf::Quantity;
 
     /// Two single masses on springs, joined by 1e6 N/m below 200 Hz and by half of it above.
     fn measured() -> (FrfMatrix, [Vec<Line>; 4]) {

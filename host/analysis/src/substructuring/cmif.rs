@@ -3,10 +3,10 @@
 //! The singular values of Y^AJB − blkdiag(Y^A, Y^B) show per line how many independent motions the coupling changes; each left
 //! vector, projected onto the rigid motions of both virtual points, says which.
 
-use super::frf::{FrfError, FrfMatrix, block};
 use super::geometry::{Geometry, Grouping};
 use super::idm::{Dof, IdmSet, rigid_row};
 use super::vpt::ROTATION_LENGTH_M;
+use crate::frf::{FrfError, FrfMatrix, block};
 use crate::parallel::prelude::*;
 use nalgebra::{Complex, DMatrix, DVector, Vector3};
 use serde::Serialize;

@@ -1,11 +1,12 @@
 //! Coupling: the assembly's admittance from its parts, with or without a compliant joint.
 
-use super::frf::{FrfError, FrfMatrix};
 use super::pseudo_inverse::{RankLost, full_rank_inverse};
+use crate::frf::{FrfError, FrfMatrix};
 use nalgebra::{Complex, DMatrix};
 
 /// Why parts cannot be coupled.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CouplingError {
     /// A name is missing or stands twice.
     #[error(transparent)]

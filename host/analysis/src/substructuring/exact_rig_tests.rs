@@ -1,7 +1,7 @@
 //! What tests start from: exact FRFs of two rigid bodies on suspensions, alone and joined by a known contact.
 
-use super::frf::{FrfMatrix, Quantity};
 use super::geometry::{Configuration, Geometry, Grouping, Point};
+use crate::frf::{FrfMatrix, Quantity};
 use nalgebra::{Complex, DMatrix, Vector3};
 use std::f64::consts::TAU;
 

@@ -6,13 +6,13 @@
 //! them: by as much as the difference between coupled and measured assembly then moves, such errors may have made it.
 
 use super::averaged::Priors;
-use super::frf::FrfMatrix;
 use super::geometry::{Configuration, Geometry, Point};
 use super::identify::back_coupled;
 use super::idm::IdmSet;
 use super::joint::median;
-use super::noise::{FrfNoise, SMOOTH_HZ};
 use crate::band::Band;
+use crate::frf::FrfMatrix;
+use crate::frf::noise::{FrfNoise, SMOOTH_HZ};
 use crate::parallel::prelude::*;
 use nalgebra::{Complex, Unit, UnitQuaternion, Vector3};
 use rand::SeedableRng;

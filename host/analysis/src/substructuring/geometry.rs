@@ -1,5 +1,6 @@
 //! Where sensors and hits are, which way they point, and what each is for.
 
+use crate::structure::Structure;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -105,6 +106,17 @@ pub struct Geometry {
     pub virtual_point_a_m: [f64; 3],
     /// B's virtual point, m.
     pub virtual_point_b_m: [f64; 3],
+}
+
+impl Geometry {
+    /// The points of one structure.
+    pub fn points(&self, structure: Structure) -> &Configuration {
+        match structure {
+            Structure::A => &self.a,
+            Structure::B => &self.b,
+            Structure::Ajb => &self.ajb,
+        }
+    }
 }
 
 fn frf_names(points: &[Point]) -> Vec<String> {

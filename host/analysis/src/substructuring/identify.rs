@@ -1,18 +1,18 @@
 //! The front door: three FRF matrices and the geometry in, the joint's stiffness by every method asked for out.
 
 use super::back_coupling::BackCoupling;
-use super::frf::{FrfError, FrfMatrix, Quantity};
 use super::geometry::Geometry;
 use super::idm::IdmSet;
 use super::interface_data::{InterfaceError, Measured};
 use super::joint::{JointRow, JointSpectrum};
 use super::line_noise::LineNoise;
 use super::method::Method;
-use super::noise::{FrfNoise, NoiseError, SMOOTH_HZ};
 pub use super::quality::{Internals, VirtualPointQuality};
 use super::reduced::{Reduced, Solution};
 use super::rooms::Rooms;
 use crate::band::Band;
+use crate::frf::noise::{FrfNoise, NoiseError, SMOOTH_HZ};
+use crate::frf::{FrfError, FrfMatrix, Quantity};
 use crate::parallel::prelude::*;
 use crate::structure::{Abc, Structure};
 use nalgebra::{Complex, DMatrix};
@@ -21,6 +21,7 @@ use std::borrow::Cow;
 
 /// Why nothing at all can be identified from these files.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum IdentifyError {
     /// One of the files is wrong in itself.
     #[error("{file}: {source}")]

@@ -1,10 +1,10 @@
 //! Which rows and columns of the three FRF files a virtual point and the internals take, and the reduced blocks.
 
-use super::frf::{FrfError, FrfMatrix, block};
 use super::geometry::{Configuration, Geometry, Grouping, Point};
 use super::idm::IdmSet;
 use super::product::product_of_block;
 use super::vpt::{self, ROTATION_LENGTH_M, Transformation, VptError};
+use crate::frf::{FrfError, FrfMatrix, block};
 use crate::structure::Structure;
 use nalgebra::{Complex, DMatrix, Vector3};
 
@@ -12,6 +12,7 @@ type Line = DMatrix<Complex<f64>>;
 
 /// Why the data of an interface cannot be formed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum InterfaceError {
     /// The virtual point cannot be formed.
     #[error("virtual point of {substructure} in {file}: {source}")]

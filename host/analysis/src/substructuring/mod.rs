@@ -2,7 +2,7 @@
 //!
 //! Pure functions of arrays and geometry. The way through the room:
 //!
-//! 1. [`frf`]: FRF matrices with named rows and columns, turned into receptances by dividing by s = σ + iω.
+//! 1. [`frf`](crate::frf): FRF matrices with named rows and columns, turned into receptances by dividing by s = σ + iω.
 //! 2. [`geometry`]: where the points are and what each is for (`Grouping`).
 //! 3. [`idm`], [`vpt`]: measured points onto the motions of a virtual point ([`virtual_points`]: of any number of them);
 //!    [`consistency`] says what is lost.
@@ -28,7 +28,6 @@ pub mod direct;
 mod exact_rig_tests;
 pub mod explained;
 pub mod fit;
-pub mod frf;
 pub mod geometry;
 pub mod identify;
 pub mod idm;
@@ -37,7 +36,6 @@ mod internals;
 pub mod joint;
 pub mod line_noise;
 pub mod method;
-pub mod noise;
 pub mod plausibility;
 mod product;
 pub mod pseudo_inverse;
@@ -50,8 +48,8 @@ pub mod virtual_points;
 pub mod vpt;
 
 pub use crate::band::Band;
+pub use crate::frf::{self, FrfError, FrfMatrix, Quantity, noise};
 pub use crate::structure::{Abc, Structure};
-pub use frf::{FrfError, FrfMatrix, Quantity};
 pub use geometry::{Configuration, Geometry, Grouping, Point};
 pub use identify::{Decoupled, Identification, IdentifyError, Refused, decouple, identify, line_noise};
 pub use idm::{Dof, IdmSet};

@@ -25,6 +25,7 @@ type Line = DMatrix<Complex<f64>>;
 
 /// Why one method with one IDM set gave no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RefusedReason {
     /// The virtual points or internals cannot be formed.
     #[error(transparent)]

@@ -11,8 +11,8 @@
 //! would be blown up. pyFBS 1.0.7 has that option too (`fully-extend-svd`), but never reaches it: its condition
 //! `semm_type == "fully-extend" or "extended"` is always true. Here it truncates.
 
-use super::frf::{FrfError, FrfMatrix, block};
 use super::pseudo_inverse::{RankLost, full_rank_inverse};
+use crate::frf::{FrfError, FrfMatrix, block};
 use crate::parallel::prelude::*;
 use nalgebra::{Complex, DMatrix};
 
@@ -40,6 +40,7 @@ pub const FULLY_EXTENDED: Form = Form::FullyExtended { drop_compatibility: 0, dr
 
 /// Why models cannot be mixed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SemmError {
     /// A name of the overlay that the parent does not have, or a matrix that is wrong in itself.
     #[error(transparent)]
@@ -175,8 +176,8 @@ fn pseudo_inverse(a: &Line, dropped: usize, name: &'static str) -> Result<Line, 
 
 #[cfg(test)]
 mod tests {
-    use super::super::frf::Quantity;
     use super::*;
+    use crate::frf::Quantity;
     use proptest::prelude::*;
 
     fn matrix(n: usize, v: &[f64], diagonal: f64) -> Line {

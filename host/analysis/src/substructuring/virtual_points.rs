@@ -1,9 +1,9 @@
 //! Any number of virtual points in one FRF matrix, each with modes of its own; channels and impacts of none pass through.
 
-use super::frf::{FrfError, FrfMatrix};
 use super::geometry::{Configuration, Grouping, Point};
 use super::idm::IdmSet;
 use super::vpt::{self, Transformation, VptError, reduce_inputs, reduce_outputs};
+use crate::frf::{FrfError, FrfMatrix};
 use crate::parallel::prelude::*;
 use nalgebra::{DMatrix, Vector3};
 
@@ -56,6 +56,7 @@ pub struct Weights {
 
 /// Why virtual points cannot be formed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum VirtualPointsError {
     /// The matrix is wrong in itself, or lacks a name.
     #[error(transparent)]
@@ -241,9 +242,9 @@ fn side(
 
 #[cfg(test)]
 mod tests {
-    use super::super::frf::Quantity;
     use super::super::idm::Dof;
     use super::*;
+    use crate::frf::Quantity;
     use nalgebra::Complex;
 
     const CORNERS: [[f64; 3]; 4] =

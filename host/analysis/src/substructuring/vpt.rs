@@ -20,6 +20,7 @@ const RANK_FLOOR: f64 = 1e-6;
 
 /// Why a set of channels or impacts cannot carry a virtual point.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum VptError {
     /// Too few points, or points that cannot tell two motions apart.
     #[error(

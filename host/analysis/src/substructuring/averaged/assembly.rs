@@ -3,12 +3,12 @@
 use super::layout::Layout;
 use super::{AveragedError, Line};
 use crate::band::Band;
+use crate::frf::FrfMatrix;
+use crate::frf::noise::{FrfNoise, SMOOTH_HZ};
 use crate::structure::Structure;
-use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::{Geometry, Grouping};
 use crate::substructuring::idm::IdmSet;
 use crate::substructuring::interface_data::{Found, Measured};
-use crate::substructuring::noise::{FrfNoise, SMOOTH_HZ};
 use nalgebra::{Complex, DMatrix};
 
 /// The assembly's FRFs reduced to its two virtual points, with what is needed to trace an error back to its cell.

@@ -18,14 +18,14 @@ mod typical;
 
 pub use bootstrap::{CellHits, Replicates};
 
-use super::frf::FrfMatrix;
 use super::geometry::Geometry;
 use super::idm::{Dof, IdmSet};
 use super::interface_data::{InterfaceError, balance};
 use super::joint::{NORMAL_95, stiffness_and_damping};
-use super::noise::{FrfNoise, NoiseError, shared_by_lines};
 use super::pseudo_inverse::{RankLost, full_rank_inverse};
 use crate::band::Band;
+use crate::frf::FrfMatrix;
+use crate::frf::noise::{FrfNoise, NoiseError, shared_by_lines};
 use crate::identified::COMPLIANCE_HALF_WIDTH;
 use crate::parallel::prelude::*;
 use assembly::Assembly;
@@ -62,6 +62,7 @@ impl Default for Priors {
 
 /// Why the estimate cannot be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum AveragedError {
     /// The virtual points cannot be formed, or a cell is not a number.
     #[error(transparent)]

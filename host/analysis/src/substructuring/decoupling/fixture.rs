@@ -38,7 +38,7 @@ pub fn remove_fixture(
 ) -> Result<Line, DecouplingError> {
     let all_rows: Vec<usize> = (0..with_fixture.nrows()).collect();
     let all_columns: Vec<usize> = (0..with_fixture.ncols()).collect();
-    let part = |rows: &[usize], columns: &[usize]| super::super::frf::block(with_fixture, rows, columns);
+    let part = |rows: &[usize], columns: &[usize]| crate::frf::block(with_fixture, rows, columns);
     let mut flexibility = part(outputs, inputs) - fixture;
     let mut gap = part(outputs, &all_columns);
     let mut push = part(&all_rows, inputs);

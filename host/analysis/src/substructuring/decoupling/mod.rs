@@ -32,6 +32,7 @@ pub(super) const SUBSTRUCTURE: &str = "the substructure's interface admittance";
 
 /// Why a method cannot be applied to this data.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DecouplingError {
     /// The least-squares form needs at least n_c internal degrees of freedom on both sides.
     #[error(

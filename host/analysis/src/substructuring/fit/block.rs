@@ -5,11 +5,11 @@
 
 use super::{FitError, Internals};
 use crate::band::Band;
+use crate::frf::noise::{FrfNoise, SMOOTH_HZ};
 use crate::structure::Structure;
 use crate::substructuring::geometry::{Geometry, Grouping};
 use crate::substructuring::idm::IdmSet;
 use crate::substructuring::interface_data::{Found, InterfaceError, Measured, balance};
-use crate::substructuring::noise::{FrfNoise, SMOOTH_HZ};
 use crate::substructuring::vpt;
 use nalgebra::{Complex, DMatrix, Vector3};
 

@@ -26,12 +26,12 @@ pub use joint::Shape;
 pub use outcome::FittedDof;
 
 use super::averaged::Priors;
-use super::frf::FrfMatrix;
 use super::geometry::{Geometry, Grouping};
 use super::idm::{Dof, IdmSet};
 use super::interface_data::{InterfaceError, Measured};
-use super::noise::{FrfNoise, NoiseError, shared_by_lines};
 use crate::band::Band;
+use crate::frf::FrfMatrix;
+use crate::frf::noise::{FrfNoise, NoiseError, shared_by_lines};
 use crate::structure::Structure;
 use block::{Block, Side};
 use model::Layout;
@@ -95,6 +95,7 @@ pub enum Points {
 
 /// Why there is no fit.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FitError {
     /// The virtual points cannot be formed, or a cell is not a number.
     #[error(transparent)]

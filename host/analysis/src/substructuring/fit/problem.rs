@@ -38,7 +38,7 @@ pub(super) struct Problem {
     pub(super) rows: Vec<usize>,
     pub(super) columns: Vec<usize>,
     pub(super) nuisances: Nuisances,
-    /// See [`crate::substructuring::noise::shared_by_lines`].
+    /// See [`crate::frf::noise::shared_by_lines`].
     pub(super) shared: f64,
 }
 

@@ -1,58 +1,13 @@
 //! FRF matrices: one complex matrix per frequency line, with the names of its rows and columns.
 
+use super::quantity::Quantity;
 use nalgebra::{Complex, DMatrix};
-use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
-use std::fmt;
-
-/// What an FRF's numerator is, per newton of the hammer's force.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Quantity {
-    /// Displacement per force, m/N.
-    Receptance,
-    /// Velocity per force, m/(s N).
-    Mobility,
-    /// Acceleration per force, m/(s² N).
-    Accelerance,
-}
-
-impl Quantity {
-    /// How many times the receptance was multiplied by s: 0, 1 or 2.
-    pub fn order_of_s(self) -> i32 {
-        match self {
-            Quantity::Receptance => 0,
-            Quantity::Mobility => 1,
-            Quantity::Accelerance => 2,
-        }
-    }
-
-    /// The word used in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Quantity::Receptance => "receptance",
-            Quantity::Mobility => "mobility",
-            Quantity::Accelerance => "accelerance",
-        }
-    }
-
-    /// The quantity called `name` in a file, if there is one.
-    pub fn from_name(name: &str) -> Option<Self> {
-        [Quantity::Receptance, Quantity::Mobility, Quantity::Accelerance]
-            .into_iter()
-            .find(|q| q.name() == name.trim().to_lowercase())
-    }
-}
-
-impl fmt::Display for Quantity {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
 
 /// Why an FRF matrix cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FrfError {
     /// Axis, names and matrices disagree in number.
     #[error(

@@ -1,6 +1,6 @@
 //! Noise of measured FRFs: a variance for every cell and line, and how neighbouring lines share it.
 
-use super::frf::FrfMatrix;
+use super::FrfMatrix;
 use nalgebra::DMatrix;
 
 /// Variances are averaged over this many Hz on either side: one from a handful of hits scatters by its own size.
@@ -8,6 +8,7 @@ pub const SMOOTH_HZ: f64 = 10.0;
 
 /// Why a noise array cannot be used with an FRF matrix.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum NoiseError {
     /// Another number of lines, rows or columns than the FRF has.
     #[error(
@@ -128,7 +129,7 @@ pub fn shared_by_lines(sigma_per_s: f64, step_hz: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::frf::Quantity;
+    use super::super::Quantity;
     use super::*;
 
     /// Correlation (real part) of the noise of two lines `distance_hz` apart.
