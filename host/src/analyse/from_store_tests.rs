@@ -219,7 +219,7 @@ fn sessions_of_other_rates_are_not_averaged() {
     let session = file.channels.keys().max().expect("a session") + 1;
     file.channels.insert(session, other);
     let cell = file.records.values_mut().next().expect("a cell");
-    cell.last_mut().expect("three records").session = session;
+    cell.last_mut().expect("three records").as_mut().expect("whole").session = session;
     let told: Vec<String> =
         file.cells().iter().filter_map(|name| file.read(name).err()).map(|e| e.to_string()).collect();
     assert_eq!(told.len(), 1, "{told:?}");

@@ -2,7 +2,7 @@
 
 use super::assemble;
 use super::campaign::analyse_measurements;
-use super::cell::{Cell, CellName, ContactSignals, Hit, Measurements};
+use super::cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, Measurements};
 use super::checks::{HiddenResonance, SeriesCompliance};
 use super::findings::Findings;
 use super::missing::Missing;
