@@ -3,6 +3,7 @@
 use super::averages::CellAverage;
 use crate::hysteresis::static_arm::{Identified, from_known_force};
 use crate::spectra::CrossSpectra;
+use crate::structure::Structure;
 use crate::substructuring::geometry::{Configuration, Point};
 use crate::substructuring::idm::{Dof, IdmSet};
 use crate::substructuring::vpt;
@@ -25,7 +26,7 @@ pub fn from_hits(
 ) -> Option<Identified> {
     let mut hit: Vec<(&Point, CrossSpectra)> = Vec::new();
     let mut frequency_hz: &[f64] = &[];
-    for cell in averages.iter().filter(|cell| cell.name.configuration == "B") {
+    for cell in averages.iter().filter(|cell| cell.name.configuration == Structure::B) {
         let Some(contact) = &cell.contact else { continue };
         if frequency_hz.is_empty() {
             frequency_hz = cell.spectra.frequency_hz();

@@ -7,6 +7,7 @@
 
 use super::averages::CellAverage;
 use crate::spectra::MotionQuantity;
+use crate::structure::Structure;
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::{Configuration, Grouping, Point};
 use crate::substructuring::noise::FrfNoise;
@@ -48,19 +49,19 @@ pub fn locations(points: &Configuration) -> Vec<&str> {
 
 /// Whether Eq. (3), in either form, reads the cell of this impact and this response: Y^A from everything on A to A's
 /// interface, Y^B from B's interface to everything on B, and across the joint from A to B in the assembly.
-fn is_read(configuration: &str, impact: Grouping, response: Grouping) -> bool {
+fn is_read(configuration: Structure, impact: Grouping, response: Grouping) -> bool {
     let on_a = |g| matches!(g, Grouping::InterfaceA | Grouping::InternalA);
     match configuration {
-        "A" => on_a(impact) && response == Grouping::InterfaceA,
-        "B" => impact == Grouping::InterfaceB && !on_a(response),
-        _ => on_a(impact) && !on_a(response),
+        Structure::A => on_a(impact) && response == Grouping::InterfaceA,
+        Structure::B => impact == Grouping::InterfaceB && !on_a(response),
+        Structure::Ajb => on_a(impact) && !on_a(response),
     }
 }
 
 /// Puts the cells of a configuration together. Where cells are missing that are read, the impact or location with the
 /// largest share of holes is left out, until none remain.
 pub fn assemble(
-    configuration: &str,
+    configuration: Structure,
     points: &Configuration,
     cells: &[CellAverage],
     quantity: MotionQuantity,
@@ -196,10 +197,14 @@ mod tests {
     fn what_is_not_read_costs_nothing() {
         use Grouping::{InterfaceA, InterfaceB, InternalA, InternalB};
         // the spare response of A, and hits on B in the assembly
-        assert!(!is_read("A", InterfaceA, InternalA) && !is_read("AJB", InterfaceB, InternalB));
-        assert!(!is_read("AJB", InternalA, InterfaceA));
-        assert!(is_read("A", InternalA, InterfaceA) && is_read("B", InterfaceB, InternalB));
-        assert!(is_read("AJB", InternalA, InternalB) && is_read("AJB", InterfaceA, InterfaceB));
+        assert!(
+            !is_read(Structure::A, InterfaceA, InternalA) && !is_read(Structure::Ajb, InterfaceB, InternalB)
+        );
+        assert!(!is_read(Structure::Ajb, InternalA, InterfaceA));
+        assert!(is_read(Structure::A, InternalA, InterfaceA) && is_read(Structure::B, InterfaceB, InternalB));
+        assert!(
+            is_read(Structure::Ajb, InternalA, InternalB) && is_read(Structure::Ajb, InterfaceA, InterfaceB)
+        );
     }
 
     #[test]

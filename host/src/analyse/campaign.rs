@@ -12,6 +12,7 @@ use super::wanted::{BANDS_HZ, Progress, Wanted};
 use super::{cells_stage, configuration_stage, contact_stage};
 use crate::results::MAIN_BAND;
 use crate::spectra::Windowing;
+use crate::structure::Structure;
 use crate::substructuring::averaged::Priors;
 use crate::substructuring::noise::FrfNoise;
 use crate::substructuring::{Band, FrfMatrix, Geometry, IdmSet, Method, fit, identify};
@@ -35,12 +36,11 @@ pub fn analyse_measurements<M: Measurements>(
     };
     found.missing.extend(given_up(&names, measurements.given_up()));
 
-    let configurations = [("A", &geometry.a), ("B", &geometry.b), ("AJB", &geometry.ajb)];
-    let all = configurations.map(|(name, points)| {
-        let planned = names.iter().filter(|c| c.configuration == name).count();
-        let own = cells.averages.iter().filter(|a| a.name.configuration == name);
+    let all = Structure::ALL.map(|structure| {
+        let planned = names.iter().filter(|c| c.configuration == structure).count();
+        let own = cells.averages.iter().filter(|a| a.name.configuration == structure);
         let own: Vec<CellAverage> = own.cloned().collect();
-        let one = configuration_stage::of(measurements, name, points, &own, planned);
+        let one = configuration_stage::of(measurements, structure, geometry.points(structure), &own, planned);
         found.missing.extend(one.missing);
         found.configurations.push(one.measured);
         (one.frf, one.noise)
@@ -56,8 +56,8 @@ pub fn analyse_measurements<M: Measurements>(
             Err(why) => found.missing.push(why),
         },
         _ => {
-            let absent = configurations.iter().zip(frfs).filter(|(_, frf)| frf.is_none());
-            found.missing.push(Missing::Configurations(absent.map(|((name, _), _)| *name).collect()));
+            let absent = Structure::ALL.into_iter().zip(frfs).filter(|(_, frf)| frf.is_none());
+            found.missing.push(Missing::Configurations(absent.map(|(structure, _)| structure).collect()));
         }
     }
     if let Some(ajb) = frfs[2] {

@@ -4,13 +4,14 @@ use crate::campaign::plan::level::{Level, Moment};
 use crate::campaign::store::frf_table::ImportedFrf;
 use crate::hysteresis::HysteresisRecord;
 use crate::spectra::MotionQuantity;
+use crate::structure::Structure;
 use crate::substructuring::geometry::Geometry;
 
 /// One impact position with one response location.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CellName {
-    /// Configuration: `A`, `B` or `AJB`.
-    pub configuration: String,
+    /// The structure.
+    pub configuration: Structure,
     /// The impact's name.
     pub impact: String,
     /// The response location's name.
@@ -117,7 +118,7 @@ pub trait Measurements: Sync {
     ///
     /// # Errors
     /// They are damaged, or the file cannot be read.
-    fn imported(&self, _configuration: &str) -> Result<Option<ImportedFrf>, Self::Error> {
+    fn imported(&self, _structure: Structure) -> Result<Option<ImportedFrf>, Self::Error> {
         Ok(None)
     }
 

@@ -6,6 +6,7 @@ use super::hit_spectra;
 use super::impact_loops::{self, ImpactLoop};
 use super::missing::Missing;
 use super::wanted::Progress;
+use crate::structure::Structure;
 use crate::substructuring::averaged::CellHits;
 use crate::substructuring::geometry::{Geometry, Grouping};
 use rayon::prelude::*;
@@ -95,7 +96,7 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
 /// Whether hits at this impact move the contact along z from A's side: hits on B drive the load cells directly, and hits
 /// along x move nothing in z.
 fn counts_for_contact(geometry: &Geometry, name: &CellName) -> bool {
-    name.configuration == "AJB"
+    name.configuration == Structure::Ajb
         && geometry.ajb.impacts.iter().any(|p| {
             p.name == name.impact
                 && matches!(p.grouping, Grouping::InterfaceA | Grouping::InternalA)
@@ -105,6 +106,6 @@ fn counts_for_contact(geometry: &Geometry, name: &CellName) -> bool {
 
 /// Whether hits at this impact drive the load cells through arm B alone: what the static arm is identified from.
 fn drives_the_cells(geometry: &Geometry, name: &CellName) -> bool {
-    name.configuration == "B"
+    name.configuration == Structure::B
         && geometry.b.impacts.iter().any(|p| p.name == name.impact && p.grouping == Grouping::InterfaceB)
 }

@@ -3,13 +3,14 @@
 use super::averages::CellAverage;
 use crate::results::{FrfCurve, Role, rounded};
 use crate::spectra::MotionQuantity;
+use crate::structure::Structure;
 use crate::substructuring::frf::FrfMatrix;
 use crate::substructuring::geometry::{Configuration, Grouping, Point};
 use num_complex::Complex;
 
 /// The curves of a configuration that was measured here.
 pub fn of_cells(
-    configuration: &str,
+    configuration: Structure,
     points: &Configuration,
     cells: &[CellAverage],
     quantity: MotionQuantity,
@@ -25,7 +26,7 @@ pub fn of_cells(
 }
 
 fn of_cell(
-    configuration: &str,
+    configuration: Structure,
     pair: (Role, &Point, &Point),
     cell: &CellAverage,
     quantity: MotionQuantity,
@@ -43,7 +44,7 @@ fn of_cell(
 }
 
 /// The curves of FRFs that were measured elsewhere; none where their lines are not evenly spaced.
-pub fn of_matrix(configuration: &str, points: &Configuration, frf: &FrfMatrix) -> Vec<FrfCurve> {
+pub fn of_matrix(configuration: Structure, points: &Configuration, frf: &FrfMatrix) -> Vec<FrfCurve> {
     let place = |names: &[String], name: &str| names.iter().position(|n| n == name);
     let (outputs, inputs) = (points.output_names(), points.input_names());
     let find = |impact: &Point, channel: &Point| {
@@ -112,8 +113,8 @@ pub fn arms(
         let measured = |channel: &&Point| channel.grouping == grouping && channel.direction[2].abs() > 0.9;
         points.channels.iter().filter(measured).find_map(|channel| {
             let own = |c: &&CellAverage| c.name.impact == impact && c.name.response == channel.name;
-            let cell = cells.iter().filter(|c| c.name.configuration == "AJB").find(own)?;
-            Some(of_cell("AJB", (role, hit, channel), cell, quantity))
+            let cell = cells.iter().filter(|c| c.name.configuration == Structure::Ajb).find(own)?;
+            Some(of_cell(Structure::Ajb, (role, hit, channel), cell, quantity))
         })
     };
     let both = [arm(Role::ArmA, Grouping::InterfaceA), arm(Role::ArmB, Grouping::InterfaceB)];
@@ -122,7 +123,7 @@ pub fn arms(
 
 /// Receptance along the two directions, hit and response both counted positive along z: a driving point starts at 0°.
 fn curve(
-    configuration: &str,
+    configuration: Structure,
     (role, impact, channel): (Role, &Point, &Point),
     frequency_hz: &[f64],
     receptance: impl Iterator<Item = Complex<f64>>,

@@ -2,11 +2,12 @@
 
 use super::averages::{CellAverage, FORCE_LINES};
 use super::cell::Measurements;
-use super::findings::{ImportedFrom, Measured};
+use super::findings::{ConfigurationFindings, ImportedFrom};
 use super::missing::Missing;
 use super::{assemble, chosen, imported};
 use crate::results::UsableBand;
 use crate::spectra::usable_band;
+use crate::structure::Structure;
 use crate::substructuring::FrfMatrix;
 use crate::substructuring::geometry::Configuration;
 use crate::substructuring::noise::FrfNoise;
@@ -15,7 +16,7 @@ use crate::substructuring::noise::FrfNoise;
 #[derive(Debug)]
 pub struct ConfigurationFrfs {
     /// What the results tell of it.
-    pub measured: Measured,
+    pub measured: ConfigurationFindings,
     /// Its FRFs; none where nothing was measured.
     pub frf: Option<FrfMatrix>,
     /// Their noise, where it is known.
@@ -27,7 +28,7 @@ pub struct ConfigurationFrfs {
 /// Puts the configuration together from its averaged cells, `own`, of which `planned` are in the plan.
 pub fn of<M: Measurements>(
     measurements: &M,
-    configuration: &'static str,
+    configuration: Structure,
     points: &Configuration,
     own: &[CellAverage],
     planned: usize,
@@ -37,22 +38,23 @@ pub fn of<M: Measurements>(
         Err(why) => missing.push(why),
         Ok(None) => {}
         Ok(Some(found)) => {
-            let measured = Measured {
+            let measured = ConfigurationFindings {
                 configuration,
+                records: Vec::new(),
+                usable_band: None,
                 frfs: chosen::of_matrix(configuration, points, &found.frf),
                 imported: Some(ImportedFrom {
                     file: found.source,
                     utc: found.utc,
                     with_variance: found.noise.is_some(),
                 }),
-                ..Measured::default()
             };
             return ConfigurationFrfs { measured, frf: Some(found.frf), noise: found.noise, missing };
         }
     }
     missing.extend(holes(configuration, planned, own));
     let quantity = measurements.quantity();
-    let measured = Measured {
+    let measured = ConfigurationFindings {
         configuration,
         records: own.iter().flat_map(|c| c.records.iter().copied()).collect(),
         usable_band: force_band(configuration, own),
@@ -73,7 +75,7 @@ pub fn of<M: Measurements>(
     ConfigurationFrfs { measured, frf, noise, missing }
 }
 
-fn holes(configuration: &'static str, planned: usize, own: &[CellAverage]) -> Vec<Missing> {
+fn holes(configuration: Structure, planned: usize, own: &[CellAverage]) -> Vec<Missing> {
     let absent = planned.saturating_sub(own.len());
     let hole = if planned == 0 {
         Some(Missing::NotInPlan(configuration))
@@ -88,7 +90,7 @@ fn holes(configuration: &'static str, planned: usize, own: &[CellAverage]) -> Ve
 }
 
 /// Where the mean force of a configuration's hits is within 6 dB of its level.
-fn force_band(configuration: &str, own: &[CellAverage]) -> Option<UsableBand> {
+fn force_band(configuration: Structure, own: &[CellAverage]) -> Option<UsableBand> {
     let first = own.first()?;
     let alike = || own.iter().filter(|c| c.force_spectrum.len() == first.force_spectrum.len());
     let count = alike().count() as f64;

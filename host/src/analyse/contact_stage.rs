@@ -13,6 +13,7 @@ use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
 use crate::hysteresis::static_arm::{Basis, Identified, from_levels};
 use crate::results::{Backbone, FrfCurve, LoopCurve, Reconstruction, ShakerLoop};
 use crate::spectra::CrossSpectra;
+use crate::structure::Structure;
 use crate::substructuring::BandStatistic;
 use crate::substructuring::direct::Direct;
 use crate::substructuring::geometry::{Geometry, Grouping};
@@ -99,7 +100,7 @@ pub fn at_the_contact<M: Measurements>(
 /// The contact's spectra of the assembly, summed over the cells of each impact. Spectra of other lines than the first do not count.
 fn summed(averages: &[CellAverage]) -> Vec<(&str, CrossSpectra)> {
     let mut by_impact: Vec<(&str, CrossSpectra)> = Vec::new();
-    let of_assembly = averages.iter().filter(|cell| cell.name.configuration == "AJB");
+    let of_assembly = averages.iter().filter(|cell| cell.name.configuration == Structure::Ajb);
     for (name, contact) in of_assembly.filter_map(|cell| Some((&cell.name.impact, cell.contact.as_ref()?))) {
         if by_impact.first().is_some_and(|(_, first)| first.frequency_hz() != contact.frequency_hz()) {
             continue;

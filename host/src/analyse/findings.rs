@@ -10,6 +10,7 @@ use super::missing::Missing;
 use super::shaker_levels::RecordLoops;
 use crate::results::{Bootstrap, Completeness, FrfCurve, Source, UsableBand};
 use crate::spectra::Windowing;
+use crate::structure::Structure;
 use crate::substructuring::averaged::{Averaged, Priors};
 
 /// All that was found, as far as it was looked for.
@@ -22,7 +23,7 @@ pub struct Findings {
     /// Kept and refused hits.
     pub completeness: Vec<Completeness>,
     /// What each configuration gave.
-    pub configurations: Vec<Measured>,
+    pub configurations: Vec<ConfigurationFindings>,
     /// Joint and interface, line by line.
     pub substructured: Option<Substructured>,
     /// The fits that were asked for.
@@ -51,10 +52,10 @@ pub struct Settings {
 }
 
 /// What a configuration gave.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Measured {
-    /// `A`, `B` or `AJB`.
-    pub configuration: &'static str,
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConfigurationFindings {
+    /// Which.
+    pub configuration: Structure,
     /// Ids of the records used.
     pub records: Vec<i64>,
     /// Where the hammer's force reaches.

@@ -9,7 +9,7 @@ use super::cell::{
 use super::findings::Findings;
 use super::hit_counts::completeness;
 use super::wanted::{Progress, Wanted};
-use crate::campaign::plan::{Plan, configuration_name};
+use crate::campaign::plan::{Plan, structure};
 use crate::campaign::run::shaking;
 use crate::campaign::run::tally::Tally;
 use crate::campaign::store::Store;
@@ -119,7 +119,7 @@ impl CampaignFile {
             .map(|row| PlannedCell {
                 id: row.id,
                 name: CellName {
-                    configuration: configuration_name(row.cell.configuration).into(),
+                    configuration: structure(row.cell.configuration),
                     impact: row.cell.impact,
                     response: row.cell.response,
                 },
@@ -186,10 +186,10 @@ impl CampaignFile {
     }
 
     fn completeness(&self) -> Vec<Completeness> {
-        let mut names: Vec<&str> = Vec::new();
+        let mut names: Vec<Structure> = Vec::new();
         for cell in &self.cells {
-            if !names.contains(&cell.name.configuration.as_str()) {
-                names.push(&cell.name.configuration);
+            if !names.contains(&cell.name.configuration) {
+                names.push(cell.name.configuration);
             }
         }
         names
@@ -200,7 +200,7 @@ impl CampaignFile {
                     let refused = count.refused.iter().map(|(kind, n)| (kind.name(), *n as usize)).collect();
                     (count.wanted as usize, count.kept as usize, refused)
                 });
-                completeness(name, own)
+                completeness(name.name(), own)
             })
             .collect()
     }
@@ -282,7 +282,7 @@ impl CampaignFile {
     /// The FRFs of a configuration's kept hits between two frequencies, Hz, for every pair of the geometry, formed as the analysis
     /// forms them; and what is said about cells and records that cannot be used. None without a kept hit.
     pub fn measured(&self, structure: Structure, lines_hz: [f64; 2]) -> (Option<MeasuredFrf>, Vec<String>) {
-        let own = self.cells.iter().filter(|cell| cell.name.configuration == structure.name());
+        let own = self.cells.iter().filter(|cell| cell.name.configuration == structure);
         let (mut averages, mut complaints) = (Vec::new(), Vec::new());
         for name in own.map(|cell| &cell.name) {
             let complaint =
@@ -342,8 +342,8 @@ impl Measurements for CampaignFile {
         self.cells.iter().filter_map(|c| Some((c.name.clone(), c.given_up.clone()?))).collect()
     }
 
-    fn imported(&self, configuration: &str) -> Result<Option<ImportedFrf>, AnalyseError> {
-        self.with_reader(|store| Ok(store.frf(configuration)?))
+    fn imported(&self, structure: Structure) -> Result<Option<ImportedFrf>, AnalyseError> {
+        self.with_reader(|store| Ok(store.frf(structure.name())?))
     }
 
     fn known_contact(&self) -> KnownContact {
@@ -386,7 +386,9 @@ impl Measurements for CampaignFile {
                     Ok(record) if record.kept() => record,
                     Ok(_) => continue,
                     Err(Damaged { place, what }) => {
-                        whole.left_out.push(format!("record {} is damaged ({what}) and was left out", place.id));
+                        whole
+                            .left_out
+                            .push(format!("record {} is damaged ({what}) and was left out", place.id));
                         continue;
                     }
                 };
@@ -448,10 +450,9 @@ pub fn geometry(plan: &Plan) -> Geometry {
                 });
             }
         }
-        match structure.name.get_ref().as_str() {
-            "A" => geometry.a = points,
-            "B" => geometry.b = points,
-            _ => geometry.ajb = points,
+        // a plan that was read names no other
+        if let Some(structure) = Structure::from_name(structure.name.get_ref()) {
+            *geometry.points_mut(structure) = points;
         }
     }
     geometry

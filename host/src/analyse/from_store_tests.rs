@@ -123,14 +123,14 @@ fn campaign(path: &Path, late_ns: &[u32]) -> Store {
         .map(|late_ns| (store.begin_session(&info, &map(*late_ns)).expect("session"), map(*late_ns)))
         .collect();
     for cell in
-        store.cells().expect("cells").iter().filter(|c| configuration_name(c.cell.configuration) == "AJB")
+        store.cells().expect("cells").iter().filter(|c| structure(c.cell.configuration) == Structure::Ajb)
     {
         for (attempt, (peak, kind)) in
             [(50.0, Kind::Good), (48.0, Kind::DoubleHit), (46.0, Kind::Good)].into_iter().enumerate()
         {
             let verdict =
                 Verdict { peak_n: peak, ..Verdict::without_pulse(kind, 0.0, 0.0, "made up".into()) };
-                let (session, map) = &sessions[(attempt / 2) % sessions.len()];
+            let (session, map) = &sessions[(attempt / 2) % sessions.len()];
             let record = NewRecord {
                 cell: cell.id,
                 attempt: attempt as u32,
@@ -164,7 +164,7 @@ fn a_campaign_that_stopped_half_way_gives_what_it_can() {
     assert_eq!(found.source.device["board"], "virtual");
     assert_eq!(found.source.link["frames_received"], 17);
     assert_eq!(found.source.file, "half.jrig");
-    let unmeasured = |m: &Missing| matches!(m, Missing::NotMeasured { configuration: "A", .. });
+    let unmeasured = |m: &Missing| matches!(m, Missing::NotMeasured { configuration: Structure::A, .. });
     assert!(found.missing.iter().any(unmeasured), "{:?}", found.missing);
     assert!(found.substructured.is_none() && found.fits.is_empty());
     let frfs = || found.configurations.iter().flat_map(|c| &c.frfs).chain(&contact.frfs);
@@ -182,7 +182,9 @@ fn analysed(store: &Store) -> MeasuredFrf {
         })
     });
     let averages: Vec<_> = averages.collect();
-    assemble("AJB", &file.geometry().ajb, &averages, file.quantity()).measured.expect("all of its cells")
+    assemble(Structure::Ajb, &file.geometry().ajb, &averages, file.quantity())
+        .measured
+        .expect("all of its cells")
 }
 
 #[test]

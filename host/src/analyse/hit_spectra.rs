@@ -3,6 +3,7 @@
 use super::cell::{Cell, CellName};
 use crate::results::MAIN_BAND_HZ;
 use crate::spectra::{FrfSettings, ImpactRecords, MotionQuantity, SpectraError, Windowing, estimate};
+use crate::structure::Structure;
 use crate::substructuring::averaged::CellHits;
 use crate::substructuring::geometry::{Configuration, Grouping, Point};
 use num_complex::Complex;
@@ -22,7 +23,7 @@ pub fn of(
     let channels: Vec<&Point> =
         points.channels.iter().filter(interface).filter(|p| p.name == name.response).collect();
     let there = points.impacts.iter().filter(interface).any(|p| p.name == name.impact);
-    if name.configuration != "AJB" || channels.is_empty() || !there || cell.hits.len() < 2 {
+    if name.configuration != Structure::Ajb || channels.is_empty() || !there || cell.hits.len() < 2 {
         return Ok(None);
     }
     let (mut auto, mut cross) = (Vec::<Vec<f64>>::new(), Vec::<Vec<Vec<Complex<f64>>>>::new());

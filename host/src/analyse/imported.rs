@@ -3,6 +3,7 @@
 use super::cell::Measurements;
 use super::missing::Missing;
 use crate::campaign::store::frf_table::ImportedFrf;
+use crate::structure::Structure;
 
 /// The imported FRFs of a configuration that has no averaged cell, if there are any.
 ///
@@ -10,7 +11,7 @@ use crate::campaign::store::frf_table::ImportedFrf;
 /// They cannot be read; or hits were measured too, and these count.
 pub fn of<M: Measurements>(
     measurements: &M,
-    configuration: &'static str,
+    configuration: Structure,
     cells: usize,
 ) -> Result<Option<ImportedFrf>, Missing> {
     match measurements.imported(configuration) {

@@ -3,6 +3,7 @@
 use super::cell::CellName;
 use crate::campaign::plan::level::Level;
 use crate::hysteresis::HysteresisError;
+use crate::structure::Structure;
 use crate::substructuring::averaged::AveragedError;
 use crate::substructuring::{FrfError, IdentifyError};
 
@@ -27,8 +28,8 @@ pub enum Missing {
     },
     /// Cells of one response location that were given up for one reason.
     GivenUp {
-        /// Configuration: `A`, `B` or `AJB`.
-        configuration: String,
+        /// The configuration.
+        configuration: Structure,
         /// The response location.
         response: String,
         /// The impacts.
@@ -39,18 +40,18 @@ pub enum Missing {
         reason: String,
     },
     /// The plan has no cell of this configuration.
-    NotInPlan(&'static str),
+    NotInPlan(Structure),
     /// None of this configuration's cells has a kept hit.
     NotMeasured {
         /// The configuration.
-        configuration: &'static str,
+        configuration: Structure,
         /// Its cells in the plan.
         planned: usize,
     },
     /// Some have none.
     CellsWithoutHit {
         /// The configuration.
-        configuration: &'static str,
+        configuration: Structure,
         /// How many.
         absent: usize,
         /// Its cells in the plan.
@@ -59,42 +60,42 @@ pub enum Missing {
     /// So many cells have a single hit, and so no coherence.
     SingleHits {
         /// The configuration.
-        configuration: &'static str,
+        configuration: Structure,
         /// How many.
         cells: usize,
     },
     /// Impacts that substructuring cannot use, because cells are missing.
     ImpactsLeftOut {
         /// The configuration.
-        configuration: &'static str,
+        configuration: Structure,
         /// Their names.
         names: Vec<String>,
     },
     /// Response locations that it cannot use.
     ResponsesLeftOut {
         /// The configuration.
-        configuration: &'static str,
+        configuration: Structure,
         /// Their names.
         names: Vec<String>,
     },
     /// FRFs from elsewhere cannot be read.
     ImportUnreadable {
         /// The configuration.
-        configuration: &'static str,
+        configuration: Structure,
         /// What is wrong.
         told: String,
     },
     /// FRFs from elsewhere stand back behind hits of this campaign.
     ImportUnused {
         /// The configuration.
-        configuration: &'static str,
+        configuration: Structure,
         /// Where they came from.
         file: String,
         /// Cells with hits.
         cells: usize,
     },
     /// Configurations without which there is no substructuring.
-    Configurations(Vec<&'static str>),
+    Configurations(Vec<Structure>),
     /// The three configurations do not fit together.
     Substructuring(IdentifyError),
     /// No CMIF.
@@ -118,7 +119,7 @@ pub enum Missing {
 
 /// Cells given up, those of one location and one reason together.
 pub fn given_up(planned: &[CellName], cells: Vec<(CellName, String)>) -> Vec<Missing> {
-    let mut groups: Vec<(String, String, String, Vec<String>)> = Vec::new();
+    let mut groups: Vec<(Structure, String, String, Vec<String>)> = Vec::new();
     for (cell, reason) in cells {
         let same =
             groups.iter_mut().find(|g| g.0 == cell.configuration && g.1 == cell.response && g.2 == reason);
@@ -127,7 +128,7 @@ pub fn given_up(planned: &[CellName], cells: Vec<(CellName, String)>) -> Vec<Mis
             None => groups.push((cell.configuration, cell.response, reason, vec![cell.impact])),
         }
     }
-    let of = |(configuration, response, reason, impacts): (String, String, String, Vec<String>)| {
+    let of = |(configuration, response, reason, impacts): (Structure, String, String, Vec<String>)| {
         let here = |c: &&CellName| c.configuration == configuration && c.response == response;
         let planned = planned.iter().filter(here).count();
         Missing::GivenUp { planned, configuration, response, impacts, reason }
@@ -142,7 +143,7 @@ mod tests {
     #[test]
     fn cells_given_up_are_told_together() {
         let cell = |impact: &str, response: &str| CellName {
-            configuration: "A".into(),
+            configuration: Structure::A,
             impact: impact.into(),
             response: response.into(),
         };
@@ -150,7 +151,7 @@ mod tests {
         let reason = || "0 of 3 good after 12 hits".to_owned();
         let cells = [&planned[2], &planned[3], &planned[0]].map(|c| (c.clone(), reason())).to_vec();
         let group = |response: &str, impacts: &[&str]| Missing::GivenUp {
-            configuration: "A".into(),
+            configuration: Structure::A,
             response: response.into(),
             impacts: impacts.iter().map(|i| (*i).to_owned()).collect(),
             planned: 2,

@@ -41,7 +41,7 @@ pub use assemble::MeasuredFrf;
 pub use campaign::analyse_measurements;
 pub use cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel};
 pub use contact_stage::Contact;
-pub use findings::{Findings, ImportedFrom, Measured, Settings};
+pub use findings::{ConfigurationFindings, Findings, ImportedFrom, Settings};
 pub use fits::{Fit, NoFit, fits};
 pub use from_frfs::{Row, Substructured};
 pub use from_store::{AnalyseError, CampaignFile, analyse, geometry};

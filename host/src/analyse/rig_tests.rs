@@ -9,6 +9,7 @@ use super::missing::Missing;
 use super::wanted::{Progress, Wanted};
 use crate::results::MAIN_BAND;
 use crate::spectra::MotionQuantity;
+use crate::structure::Structure;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
 use crate::substructuring::{Dof, JointRow};
 use std::collections::BTreeSet;
@@ -24,7 +25,7 @@ const CONTACT: f64 = 180e6;
 struct Rig {
     geometry: Geometry,
     /// Cells that were not measured.
-    absent: BTreeSet<(String, String, String)>,
+    absent: BTreeSet<(Structure, String, String)>,
     /// One newton on A alone, on B alone, on A and on B in the assembly.
     units: [Unit; 4],
 }
@@ -102,14 +103,8 @@ impl Rig {
         self
     }
 
-    fn configurations(&self) -> [(&'static str, &Configuration); 3] {
-        let Geometry { a, b, ajb, .. } = &self.geometry;
-        [("A", a), ("B", b), ("AJB", ajb)]
-    }
-
-    fn grouping(&self, configuration: &str, name: &str) -> Grouping {
-        let (_, points) =
-            self.configurations().into_iter().find(|(n, _)| *n == configuration).expect("a configuration");
+    fn grouping(&self, configuration: Structure, name: &str) -> Grouping {
+        let points = self.geometry.points(configuration);
         points.impacts.iter().chain(&points.channels).find(|p| p.name == name).expect("a point").grouping
     }
 }
@@ -173,11 +168,12 @@ impl Measurements for Rig {
 
     fn cells(&self) -> Vec<CellName> {
         let mut cells = Vec::new();
-        for (configuration, points) in self.configurations() {
+        for configuration in Structure::ALL {
+            let points = self.geometry.points(configuration);
             for impact in &points.impacts {
                 for response in assemble::locations(points) {
                     cells.push(CellName {
-                        configuration: configuration.into(),
+                        configuration,
                         impact: impact.name.clone(),
                         response: response.into(),
                     });
@@ -188,17 +184,17 @@ impl Measurements for Rig {
     }
 
     fn read(&self, cell: &CellName) -> Result<Cell, Damaged> {
-        if self.absent.contains(&(cell.configuration.clone(), cell.impact.clone(), cell.response.clone())) {
+        if self.absent.contains(&(cell.configuration, cell.impact.clone(), cell.response.clone())) {
             return Ok(Cell::default());
         }
         if cell.response == "damaged" {
             return Err(Damaged);
         }
-        let hit_on_a = matches!(self.grouping(&cell.configuration, &cell.impact), Grouping::InterfaceA);
-        let seen_on_a = matches!(self.grouping(&cell.configuration, &cell.response), Grouping::InterfaceA);
+        let hit_on_a = matches!(self.grouping(cell.configuration, &cell.impact), Grouping::InterfaceA);
+        let seen_on_a = matches!(self.grouping(cell.configuration, &cell.response), Grouping::InterfaceA);
         let along_z = cell.impact.contains('Z');
         let place = self.cells().iter().position(|c| c == cell).expect("a cell of the plan");
-        let coupled = cell.configuration == "AJB";
+        let coupled = cell.configuration == Structure::Ajb;
         let unit = &self.units[2 * usize::from(coupled) + usize::from(!hit_on_a)];
         let hits = [50.0, 47.0]
             .into_iter()
@@ -287,14 +283,15 @@ fn a_known_joint_comes_back_both_ways() {
 
 #[test]
 fn without_a_there_are_still_loops() {
-    let found = run(&Rig::new().without(|c| c.configuration != "A"));
+    let found = run(&Rig::new().without(|c| c.configuration != Structure::A));
     // the specimens' own T/Δx needs the assembly only
     assert!(found.substructured.is_none() && found.fits.is_empty());
     let contact = found.contact.expect("looked for");
     assert!(contact.impacts.is_some() && contact.direct.is_some());
-    for missing in
-        [Missing::NotMeasured { configuration: "A", planned: 8 }, Missing::Configurations(vec!["A"])]
-    {
+    for missing in [
+        Missing::NotMeasured { configuration: Structure::A, planned: 8 },
+        Missing::Configurations(vec![Structure::A]),
+    ] {
         assert!(found.missing.contains(&missing), "{missing:?} not in {:?}", found.missing);
     }
 }
@@ -302,11 +299,12 @@ fn without_a_there_are_still_loops() {
 #[test]
 fn a_hole_costs_a_row_or_column_only_where_it_is_read() {
     let hole = |impact: &'static str, response: &'static str| {
-        run(&Rig::new()
-            .without(|c| !(c.configuration == "AJB" && c.impact == impact && c.response == response)))
+        run(&Rig::new().without(|c| {
+            !(c.configuration == Structure::Ajb && c.impact == impact && c.response == response)
+        }))
     };
     let spare = hole("BZ2", "A1");
-    let absent = Missing::CellsWithoutHit { configuration: "AJB", absent: 1, planned: 32 };
+    let absent = Missing::CellsWithoutHit { configuration: Structure::Ajb, absent: 1, planned: 32 };
     assert!(spare.missing.contains(&absent), "{:?}", spare.missing);
     assert!(!left_out(&spare), "{:?}", spare.missing);
     assert!(headline(&spare), "{:?}", spare.missing);

@@ -2,6 +2,7 @@
 
 use crate::results::{FrfCurve, Role, rounded};
 use crate::spectra::CrossSpectra;
+use crate::structure::Structure;
 
 /// The two specimens' receptances from one impact, for the report; hit and response count positive along +z, so
 /// `sign` is −1 for a hit towards −z.
@@ -19,7 +20,7 @@ pub fn specimen_curves(impact: &str, sign: f64, average: &CrossSpectra) -> [FrfC
             .map(|c| rounded(if c.is_finite() { c } else { 0.0 }, 5))
             .collect();
         FrfCurve {
-            configuration: "AJB".into(),
+            configuration: Structure::Ajb.into(),
             role,
             output: output.into(),
             input: impact.into(),

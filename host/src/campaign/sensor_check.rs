@@ -12,8 +12,9 @@
 //! that factor. (Handbook practice: ISO 7626-5, ratio calibration.)
 
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
+use jointrig_protocol::request::Configuration;
 
-use super::plan::{Plan, configuration_name};
+use super::plan::Plan;
 use super::store::Store;
 use super::store::error::StoreError;
 use super::store::record_row::RecordRow;
@@ -155,7 +156,7 @@ fn candidates<'a>(
             let cell = &cells.iter().find(|cell| cell.id == row.cell)?.cell;
             let (direction, distance) = geometry(plan, &cell.impact, &cell.response)?;
             let along = axis.is_none_or(|axis| direction[axis].abs() >= ALONG);
-            let assembly = configuration_name(cell.configuration) == "AJB";
+            let assembly = cell.configuration == Configuration::Ajb;
             // the contact's channels see anything in the assembly only, and the force path goes from A's side to B
             let seen = matches!(channel.role, Role::Response(_) | Role::HammerForce)
                 || (assembly && grouping(plan, &cell.impact) % 2 == 1);

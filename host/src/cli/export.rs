@@ -127,7 +127,8 @@ impl Export {
     fn write_all_records(&self, store: &Store, folder: &Path) -> Result<(), CliError> {
         let rows = store.records()?;
         for cell in store.cells()? {
-            let own: Vec<&RecordRow> = rows.iter().flatten().filter(|r| r.cell == cell.id && r.scans > 0).collect();
+            let own: Vec<&RecordRow> =
+                rows.iter().flatten().filter(|r| r.cell == cell.id && r.scans > 0).collect();
             let Some(records) = self.records(store, &own)? else { continue };
             let name = configuration_name(cell.cell.configuration);
             let stem = folder.join(format!("{name}_{}_{}", cell.cell.impact, cell.cell.response));

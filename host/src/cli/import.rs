@@ -10,7 +10,7 @@ use clap::Args;
 use super::error::CliError;
 use super::output;
 use crate::analyse;
-use crate::campaign::plan::{configuration_name, configuration_named};
+use crate::campaign::plan::{configuration_name, configuration_named, structure};
 use crate::campaign::store::Store;
 use crate::campaign::verdict::Kind;
 use crate::exchange::npz::Array;
@@ -93,11 +93,7 @@ impl Import {
         let FrfFile { frf, noise, .. } = self.read()?;
         let store = Store::open(into)?;
         let geometry = analyse::geometry(&store.plan()?);
-        let points = match name {
-            "A" => &geometry.a,
-            "B" => &geometry.b,
-            _ => &geometry.ajb,
-        };
+        let points = geometry.points(structure(configuration));
         check_names(&self.file, &frf, name, points).map_err(CliError::Bad)?;
         let cells = store.cells()?;
         let own = |id: i64| {

@@ -1,6 +1,7 @@
 //! Geometry as a folder of csv tables, in the form of the pyFBS workbook that [`super::read_positions`] reads.
 
 use super::positions::PositionsError;
+use crate::structure::Structure;
 use crate::substructuring::geometry::{Geometry, Grouping, Point};
 use std::path::Path;
 
@@ -40,7 +41,8 @@ pub fn write_positions(
         });
         written.map_err(|e| PositionsError::Open { path: path.clone(), reason: e.to_string() })
     };
-    for (name, points) in [("A", &geometry.a), ("B", &geometry.b), ("AJB", &geometry.ajb)] {
+    for structure in Structure::ALL {
+        let (name, points) = (structure.name(), geometry.points(structure));
         table(&format!("Channels_{name}"), response_quantity, &points.channels)?;
         table(&format!("Impacts_{name}"), "Force", &points.impacts)?;
     }

@@ -26,9 +26,7 @@ pub use check::{
 pub use completeness::Completeness;
 pub use curves::{FrfCurve, Role, UsableBand, rounded};
 pub use interface_quality::{Bootstrap, InterfaceModes, VirtualPoint};
-pub use joint_rows::{
-    DIRECT, Goodness, Joint, JointSpectrum, Refusal, SpectrumCurve, headline_rank,
-};
+pub use joint_rows::{DIRECT, Goodness, Joint, JointSpectrum, Refusal, SpectrumCurve, headline_rank};
 pub use loop_rows::{Backbone, DecayStep, Force, Hysteresis, ImpactSlope, LoopCurve, ShakerLoop};
 pub use reconstruction::Reconstruction;
 pub use source::{Software, Source, ranges};

@@ -118,7 +118,7 @@ impl Measurements for Assembly {
                 let mass = impact.grouping == Grouping::InternalA && impact.direction[2].abs() > 0.9;
                 if interface(impact.grouping) || (mass && channel.name == "A1") {
                     cells.push(CellName {
-                        configuration: "AJB".into(),
+                        configuration: jointrig::structure::Structure::Ajb,
                         impact: impact.name.clone(),
                         response: channel.name.clone(),
                     });

@@ -117,6 +117,15 @@ impl Geometry {
             Structure::Ajb => &self.ajb,
         }
     }
+
+    /// The points of one structure, to be changed.
+    pub fn points_mut(&mut self, structure: Structure) -> &mut Configuration {
+        match structure {
+            Structure::A => &mut self.a,
+            Structure::B => &mut self.b,
+            Structure::Ajb => &mut self.ajb,
+        }
+    }
 }
 
 fn frf_names(points: &[Point]) -> Vec<String> {

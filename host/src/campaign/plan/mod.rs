@@ -6,6 +6,7 @@
 mod check;
 pub mod level;
 
+use crate::structure::Structure;
 use jointrig_protocol::request::Configuration;
 use serde::Deserialize;
 use toml::Spanned;
@@ -302,23 +303,25 @@ pub struct Cell {
     pub wanted: u32,
 }
 
+/// What the controller calls a configuration, as the analysis calls it.
+pub fn structure(configuration: Configuration) -> Structure {
+    match configuration {
+        Configuration::A => Structure::A,
+        Configuration::B => Structure::B,
+        Configuration::Ajb => Structure::Ajb,
+    }
+}
+
 /// The name of a configuration in plans, files and reports.
 pub fn configuration_name(configuration: Configuration) -> &'static str {
-    match configuration {
-        Configuration::A => "A",
-        Configuration::B => "B",
-        Configuration::Ajb => "AJB",
-    }
+    structure(configuration).name()
 }
 
 /// The configuration of that name.
 pub fn configuration_named(name: &str) -> Option<Configuration> {
-    match name {
-        "A" => Some(Configuration::A),
-        "B" => Some(Configuration::B),
-        "AJB" => Some(Configuration::Ajb),
-        _ => None,
-    }
+    [Configuration::A, Configuration::B, Configuration::Ajb]
+        .into_iter()
+        .find(|c| configuration_name(*c) == name)
 }
 
 impl Plan {

@@ -8,6 +8,7 @@ use toml::Spanned;
 
 use crate::cli::error::CliError;
 use crate::exchange::read_positions;
+use crate::structure::Structure;
 use crate::substructuring::Geometry;
 use crate::substructuring::geometry::{Configuration, Point};
 
@@ -65,10 +66,10 @@ pub(super) fn read(path: &Path) -> Result<String, CliError> {
 
 /// The points, and the configurations where they are asked for, as tables of a plan.
 fn tables(geometry: &Geometry, configurations: bool) -> Result<String, String> {
-    let all = [("A", &geometry.a), ("B", &geometry.b), ("AJB", &geometry.ajb)];
     let mut out = String::new();
     let (mut responses, mut impacts) = (Vec::<Point>::new(), Vec::<Point>::new());
-    for (name, points) in all {
+    for structure in Structure::ALL {
+        let (name, points) = (structure.name(), geometry.points(structure));
         let locations = locations(name, points)?;
         if configurations {
             let names = |points: &[Point]| points.iter().map(|p| p.name.clone()).collect::<Vec<_>>();

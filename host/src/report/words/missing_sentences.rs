@@ -1,6 +1,7 @@
 //! What an analysis had to do without, in sentences.
 
 use crate::analyse::{CellName, Missing};
+use crate::structure::Structure;
 
 /// One sentence.
 pub fn sentence(missing: &Missing) -> String {
@@ -27,16 +28,17 @@ pub fn sentence(missing: &Missing) -> String {
         Missing::SingleHits { configuration, cells } => {
             format!("{configuration}: {cells} cells have a single kept hit, so their coherence is not known.")
         }
-        Missing::ImpactsLeftOut { configuration, names } => left_out(configuration, "impacts", names),
+        Missing::ImpactsLeftOut { configuration, names } => left_out(*configuration, "impacts", names),
         Missing::ResponsesLeftOut { configuration, names } => {
-            left_out(configuration, "response locations", names)
+            left_out(*configuration, "response locations", names)
         }
         Missing::ImportUnreadable { configuration, told } => format!("{configuration}: {told}."),
         Missing::ImportUnused { configuration, file, cells } => format!(
             "{configuration}: the FRFs imported from {file} are not used, because {cells} cells have hits of their own."
         ),
         Missing::Configurations(absent) => {
-            format!("Substructuring needs A, B and AJB; missing: {}.", absent.join(", "))
+            let names: Vec<&str> = absent.iter().map(|structure| structure.name()).collect();
+            format!("Substructuring needs A, B and AJB; missing: {}.", names.join(", "))
         }
         Missing::Substructuring(error) => format!("Substructuring was not possible: {error}."),
         Missing::Cmif(error) => format!("No CMIF: {error}."),
@@ -56,7 +58,7 @@ fn of_cell(cell: &CellName, what: &str) -> String {
     format!("{}: cell {} × {}: {what}.", cell.configuration, cell.impact, cell.response)
 }
 
-fn left_out(configuration: &str, what: &str, names: &[String]) -> String {
+fn left_out(configuration: Structure, what: &str, names: &[String]) -> String {
     format!(
         "{configuration}: {what} left out of substructuring, because cells are missing: {}.",
         names.join(", ")
@@ -70,7 +72,7 @@ mod tests {
     #[test]
     fn cells_given_up_are_told_together() {
         let group = |response: &str, impacts: &[&str]| Missing::GivenUp {
-            configuration: "A".into(),
+            configuration: Structure::A,
             response: response.into(),
             impacts: impacts.iter().map(|i| (*i).to_owned()).collect(),
             planned: 2,

@@ -1,8 +1,8 @@
 //! The noise of a method's lines over a band.
 
 use super::LineNoise;
-use crate::substructuring::idm::Dof;
 use crate::band::Band;
+use crate::substructuring::idm::Dof;
 use crate::substructuring::joint::median;
 use std::collections::BTreeMap;
 
