@@ -1,6 +1,7 @@
 //! `cargo xtask house`: the laws of the house that a program can check, in seconds and without compiling anything.
 
 mod circles;
+mod declarations;
 mod equations;
 mod graph;
 mod modules;
