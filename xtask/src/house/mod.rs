@@ -1,9 +1,11 @@
 //! `cargo xtask house`: the laws of the house that a program can check, in seconds and without compiling anything.
 
 mod circles;
+mod declarations;
 mod equations;
 mod graph;
 mod modules;
+mod pages;
 mod policy;
 mod rooms;
 mod tokens;
@@ -14,12 +16,13 @@ use anyhow::{Result, bail};
 /// One law: its name, and its check, which returns a remark.
 type Law = (&'static str, fn(&Project) -> Result<String>);
 
-const LAWS: [Law; 5] = [
+const LAWS: [Law; 6] = [
     ("which crate uses which", graph::check),
     ("files in circles", circles::check),
     ("the host's rooms", rooms::check),
     ("equations", equations::check),
     ("licences, bans, sources", policy::check),
+    ("pages", pages::check),
 ];
 
 /// Checks all of them, and fails with everything that was found.

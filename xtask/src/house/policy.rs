@@ -8,7 +8,7 @@ use crate::project::Project;
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
 use spdx::{Expression, Licensee, ParseMode};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// The policy, from the repository's root.
@@ -151,18 +151,20 @@ impl Policy {
         bail!("its licence {text} is not on the list")
     }
 
-    /// The crates that are there in more than one version.
+    /// The crates that are there in more than one version, and versions on the list of exceptions that are gone.
     fn duplicates(&self, crates: &[Crate]) -> Vec<String> {
-        let mut versions = BTreeMap::<&str, Vec<&str>>::new();
+        let (mut versions, mut gone) =
+            (BTreeMap::<&str, Vec<&str>>::new(), BTreeSet::from_iter(&self.skipped));
         for one in crates {
-            if !self.skipped.contains(&format!("{}@{}", one.name, one.version)) {
+            if !gone.remove(&format!("{}@{}", one.name, one.version)) {
                 versions.entry(&one.name).or_default().push(&one.version);
             }
         }
-        versions
-            .into_iter()
-            .filter(|(_, versions)| versions.len() > 1)
+        let gone = gone.into_iter().map(|skipped| format!("[bans] skip names {skipped}, which is not there"));
+        let twice = versions.into_iter().filter(|(_, versions)| versions.len() > 1);
+        twice
             .map(|(name, versions)| format!("{name} is there in versions {}", versions.join(" and ")))
+            .chain(gone)
             .collect()
     }
 }
@@ -251,6 +253,7 @@ mod tests {
             one("zip", "2.0.0", "MIT"),
         ];
         assert_eq!(policy().duplicates(&crates), ["zip is there in versions 1.0.0 and 2.0.0"]);
+        assert_eq!(policy().duplicates(&[]), ["[bans] skip names syn@1.0.0, which is not there"]);
     }
 
     #[test]

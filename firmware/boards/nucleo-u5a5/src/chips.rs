@@ -16,8 +16,7 @@ use embassy_stm32::time::Hertz;
 use embassy_time::Delay;
 use embedded_hal::digital::ErrorType as PinErrorType;
 use embedded_hal::spi::{ErrorType as SpiErrorType, Operation, SpiBus, SpiDevice};
-use jointrig_firmware::ad7606b::part::Lines;
-use jointrig_firmware::ad7606b::part::{AD7606B, Oversampling};
+use jointrig_firmware::ad7606b::part::{AD7606B, Lines, Oversampling};
 use jointrig_firmware::ad7606b::{CHANNELS, Converter, Error, Range, Settings};
 
 /// How both work. Eight conversions are averaged: 10 µs, which with the read-out of 3.6 µs leaves 5 µs of
