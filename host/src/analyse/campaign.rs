@@ -47,18 +47,18 @@ pub fn analyse_measurements<M: Measurements>(
     });
     let frfs = all.each_ref().map(|(frf, _)| frf.as_ref());
     let noises = all.each_ref().map(|(_, noise)| noise.as_ref());
-    match frfs {
-        [Some(a), Some(b), Some(ajb)] => match substructured([a, b, ajb], noises, geometry) {
-            Ok(of_frfs) => {
-                found.missing.extend(of_frfs.cmif.as_ref().err().cloned().map(Missing::Cmif));
-                found.substructured = Some(of_frfs);
-            }
-            Err(why) => found.missing.push(why),
-        },
-        _ => {
-            let absent = Structure::ALL.into_iter().zip(frfs).filter(|(_, frf)| frf.is_none());
-            found.missing.push(Missing::Configurations(absent.map(|(structure, _)| structure).collect()));
+    let identified = if let [Some(a), Some(b), Some(ajb)] = frfs {
+        substructured([a, b, ajb], noises, geometry)
+    } else {
+        let absent = Structure::ALL.into_iter().zip(frfs).filter(|(_, frf)| frf.is_none());
+        Err(Missing::Configurations(absent.map(|(structure, _)| structure).collect()))
+    };
+    match identified {
+        Ok(of_frfs) => {
+            found.missing.extend(of_frfs.cmif.as_ref().err().cloned().map(Missing::Cmif));
+            found.substructured = Some(of_frfs);
         }
+        Err(why) => found.missing.push(why),
     }
     if let Some(ajb) = frfs[2] {
         let priors = Priors::default();
