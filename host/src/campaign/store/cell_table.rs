@@ -10,7 +10,7 @@ use crate::campaign::plan::{Cell, configuration_name};
 
 table! {
     /// The columns of a cell.
-    pub struct CellColumns {
+    pub(super) struct CellColumns {
         "cells" {
             /// Its id in this file.
             id: i64 = "id INTEGER PRIMARY KEY",

@@ -44,7 +44,7 @@ pub struct FrfRow {
 
 table! {
     /// FRFs as they stand in the file; the latest row of a configuration counts.
-    pub struct FrfColumns {
+    pub(super) struct FrfColumns {
         "frfs" {
             "id INTEGER PRIMARY KEY",
             /// `A`, `B` or `AJB`.

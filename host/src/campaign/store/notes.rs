@@ -9,7 +9,7 @@ use crate::campaign::plan::Plan;
 
 table! {
     /// A plan; the last one counts.
-    pub struct PlanText {
+    pub(super) struct PlanText {
         "plan" {
             "id INTEGER PRIMARY KEY",
             /// Since when, RFC 3339.
@@ -24,7 +24,7 @@ table! {
 
 table! {
     /// A line of the log.
-    pub struct LogLine {
+    pub(super) struct LogLine {
         "log" {
             "id INTEGER PRIMARY KEY",
             /// When, RFC 3339.

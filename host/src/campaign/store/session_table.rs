@@ -43,7 +43,7 @@ table! {
 
 table! {
     /// A channel: SI value = code · units_per_volt · range_v / 32768.
-    pub struct ChannelColumns {
+    pub(super) struct ChannelColumns {
         "channels" {
             "session INTEGER NOT NULL REFERENCES sessions(id)",
             "place INTEGER NOT NULL",
