@@ -62,7 +62,7 @@ impl Store {
 
 /// The SQL that makes an empty file.
 fn tables() -> String {
-    let mut sql = [
+    let tables = [
         PAIRS.to_owned(),
         create::<PlanText>(),
         create::<SessionInfo>(),
@@ -76,13 +76,13 @@ fn tables() -> String {
         create::<LevelRow>(),
     ]
     .concat();
-    for (table, row) in APPEND_ONLY {
-        for (name, event, done) in [("stay", "UPDATE", "changed"), ("remain", "DELETE", "deleted")] {
-            sql += &format!(
+    let triggers = APPEND_ONLY.iter().flat_map(|(table, row)| {
+        [("stay", "UPDATE", "changed"), ("remain", "DELETE", "deleted")].map(|(name, event, done)| {
+            format!(
                 "CREATE TRIGGER {table}_{name} BEFORE {event} ON {table}\n\
                  BEGIN SELECT RAISE(ABORT, '{row} never {done}'); END;\n"
-            );
-        }
-    }
-    sql
+            )
+        })
+    });
+    tables + &triggers.collect::<String>()
 }
