@@ -31,14 +31,13 @@ pub fn from_hits(
         if frequency_hz.is_empty() {
             frequency_hz = cell.spectra.frequency_hz();
         }
-        match hit.iter_mut().find(|(point, _)| point.name == cell.name.impact) {
+        if let Some((_, sum)) = hit.iter_mut().find(|(point, _)| point.name == cell.name.impact) {
             // spectra of other lines do not count
-            Some((_, sum)) => sum.add(contact).unwrap_or_default(),
-            None => {
-                let point = points.impacts.iter().find(|point| point.name == cell.name.impact)?;
-                if contact.lines() == frequency_hz.len() {
-                    hit.push((point, contact.clone()));
-                }
+            sum.add(contact).unwrap_or_default();
+        } else {
+            let point = points.impacts.iter().find(|point| point.name == cell.name.impact)?;
+            if contact.lines() == frequency_hz.len() {
+                hit.push((point, contact.clone()));
             }
         }
     }
