@@ -3,13 +3,9 @@
 //! `cargo xtask parity` and `cargo xtask parity --speed` prepare Python with pyFRF, pyuff and pyFBS and start this. Without
 //! `JOINTRIG_PYTHON` the speed of our own side is printed alone.
 
-#[path = "peers/parity.rs"]
 mod parity;
-#[path = "peers/pyfbs_parity.rs"]
 mod pyfbs_parity;
-#[path = "peers/speed.rs"]
 mod speed;
-#[path = "peers/substructuring_speed.rs"]
 mod substructuring_speed;
 
 use std::process::{Command, ExitCode};
