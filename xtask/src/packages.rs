@@ -10,8 +10,9 @@ pub fn available() -> bool {
     command::find_program("apt-get").is_some()
 }
 
-/// Installs `packages` with apt-get, through sudo unless root. The package lists are only refreshed when the first try
-/// fails, which is what happens on a fresh image without lists or with old ones.
+/// Installs `packages` with apt-get, through sudo unless root. The package lists are refreshed first: old ones, as on an image
+/// that is some months old, name packages that are gone, or versions that are too old. Where that fails, the lists that are
+/// there may still do.
 pub fn install(packages: &[&str], consent: Consent) -> Result<()> {
     let names = packages.join(" ");
     if !available() {
@@ -19,15 +20,13 @@ pub fn install(packages: &[&str], consent: Consent) -> Result<()> {
     }
     let prefix = privileges(consent)?;
     consent.require(&format!("Install {names} with apt-get"))?;
-    if command::run(&mut apt(&prefix, consent, &install_arguments(packages))).is_ok() {
-        return Ok(());
+    if let Err(error) = command::run(&mut apt(&prefix, consent, &["update"])) {
+        println!("  the package lists could not be refreshed ({error}); those that are there are used");
     }
-    println!("  apt-get could not install {names}; its package lists may be old, so they are refreshed once");
-    command::run(&mut apt(&prefix, consent, &["update"]))
-        .context("the package lists could not be refreshed; check the network and /etc/apt/sources.list")?;
     command::run(&mut apt(&prefix, consent, &install_arguments(packages))).with_context(|| {
         format!(
-            "{names} could not be installed; `apt-cache policy {names}` says whether this system offers them"
+            "{names} could not be installed; check the network and /etc/apt/sources.list; `apt-cache policy {names}` says whether \
+             this system offers them"
         )
     })
 }
