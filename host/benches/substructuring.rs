@@ -6,7 +6,7 @@ use divan::Bencher;
 use jointrig::exchange::{read_frf, read_positions};
 use jointrig::substructuring::averaged::{CellHits, Prepared, Priors};
 use jointrig::substructuring::geometry::{Geometry, Grouping};
-use jointrig::substructuring::{Band, FrfMatrix, IdmSet, Method, identify};
+use jointrig::substructuring::{Band, Frf, IdmSet, Method, identify};
 use nalgebra::Complex;
 use std::path::{Path, PathBuf};
 
@@ -23,13 +23,12 @@ fn geometry() -> Geometry {
 }
 
 /// The exact FRFs of a rigid clamp, repeated until there are `lines` of them from 300 Hz on, half a hertz apart.
-fn frf(file: &str, lines: usize) -> FrfMatrix {
+fn frf(file: &str, lines: usize) -> Frf {
     let exact = read_frf(&data("frf_rigid").join(file)).expect("test data");
-    FrfMatrix {
-        frequency_hz: (0..lines).map(|l| 300.0 + 0.5 * l as f64).collect(),
-        lines: (0..lines).map(|l| exact.lines[l % exact.lines.len()].clone()).collect(),
-        ..exact
-    }
+    let frequency_hz = (0..lines).map(|l| 300.0 + 0.5 * l as f64).collect();
+    let lines = (0..lines).map(|l| exact.lines()[l % exact.lines().len()].clone()).collect();
+    let (outputs, inputs) = (exact.outputs().to_vec(), exact.inputs().to_vec());
+    Frf::new(frequency_hz, exact.sigma_per_s(), exact.quantity(), outputs, inputs, lines).expect("all agree")
 }
 
 /// VPT and the paper's seven methods, six modes: 27 × 24 measured, 12 × 12 at the virtual points.
@@ -45,16 +44,15 @@ fn all_methods_on_3600_lines(bencher: Bencher) {
 fn bootstrap_of_1000_replicates(bencher: Bencher) {
     let (ajb, geometry) = (frf("AJB.npz", 601), geometry());
     let band = Band { low_hz: 300.0, high_hz: 600.0 };
-    let prepared =
-        Prepared::of(&ajb, None, &geometry, IdmSet::Six, band, &Priors::default()).expect("exact data");
+    let prepared = Prepared::of(&ajb, &geometry, IdmSet::Six, band, &Priors::default()).expect("exact data");
     let interface = |g: Grouping| matches!(g, Grouping::InterfaceA | Grouping::InterfaceB);
     let mut cells: Vec<CellHits> = Vec::new();
     for impact in geometry.ajb.impacts.iter().filter(|p| interface(p.grouping)) {
-        let column = ajb.inputs.iter().position(|i| *i == impact.name).expect("there");
+        let column = ajb.inputs().iter().position(|i| *i == impact.name).expect("there");
         for channels in geometry.ajb.channels.chunks(3).filter(|c| interface(c[0].grouping)) {
             let rows: Vec<usize> = channels
                 .iter()
-                .map(|c| ajb.outputs.iter().position(|o| *o == c.description).expect("there"))
+                .map(|c| ajb.outputs().iter().position(|o| *o == c.description).expect("there"))
                 .collect();
             let hit = |h: usize| Complex::from(1.0 + 1e-3 * h as f64);
             cells.push(CellHits {
@@ -62,7 +60,7 @@ fn bootstrap_of_1000_replicates(bencher: Bencher) {
                 outputs: channels.iter().map(|c| c.description.clone()).collect(),
                 auto: vec![vec![1.0; 8]; 601],
                 cross: ajb
-                    .lines
+                    .lines()
                     .iter()
                     .map(|y| {
                         rows.iter().map(|&r| (0..8).map(|h| y[(r, column)] * hit(h)).collect()).collect()

@@ -9,7 +9,7 @@
 mod simulated;
 
 use jointrig::substructuring::averaged::{CellHits, DofEstimate, Prepared, Priors, averaged};
-use jointrig::substructuring::fit::{self, FittedDof, Noisy};
+use jointrig::substructuring::fit::{self, FittedDof};
 use jointrig::substructuring::geometry::Grouping;
 use jointrig::substructuring::{Band, Dof, IdmSet, Method, identify};
 use jointrig_hil_sim::rig::Configuration;
@@ -89,8 +89,7 @@ fn recommended(truth: f64, floor: f64) -> Outcome {
             let lines = [BAND.low_hz, BAND.high_hz];
             let ajb = measure(&config, Configuration::Ajb, &geometry.ajb, floor, seed, lines);
             let priors = Priors::default();
-            let found =
-                averaged(&ajb.frf, Some(&ajb.noise), &geometry, IdmSet::Six, BAND, &priors).expect("data");
+            let found = averaged(&ajb.frf, &geometry, IdmSet::Six, BAND, &priors).expect("data");
             // the contact's rotations are a thousandth of what the arms' inertia holds against them
             for dof in [Dof::Rx, Dof::Ry, Dof::Rz] {
                 let rotation = &found.joint[&dof];
@@ -108,7 +107,7 @@ fn fitted(truth: f64, floor: f64) -> Outcome {
     let found: Vec<Value> = (1..=CAMPAIGNS)
         .map(|seed| {
             let c = campaign(&config, floor, seed, [BAND.low_hz, BAND.high_hz]);
-            let [a, b, ajb] = [&c.a, &c.b, &c.ajb].map(|m| Noisy { frf: &m.frf, noise: &m.noise });
+            let [a, b, ajb] = [&c.a, &c.b, &c.ajb].map(|m| &m.frf);
             let found = fit::fit(a, b, ajb, &geometry, IdmSet::Six, BAND, &fit::Options::default());
             let found = found.unwrap_or_else(|error| panic!("seed {seed}: {error}"));
             let z = found.joint[&Dof::Z];
@@ -156,7 +155,7 @@ fn the_fit_covers_the_contact_and_describes_the_data() {
     let band = Band { low_hz: 400.0, high_hz: 490.0 };
     for seed in 1..=3 {
         let c = campaign(&config, QUIET, seed, [band.low_hz, band.high_hz]);
-        let [a, b, ajb] = [&c.a, &c.b, &c.ajb].map(|m| Noisy { frf: &m.frf, noise: &m.noise });
+        let [a, b, ajb] = [&c.a, &c.b, &c.ajb].map(|m| &m.frf);
         let found =
             fit::fit(a, b, ajb, &geometry, IdmSet::Six, band, &fit::Options::default()).expect("data");
         let z = found.joint[&Dof::Z];
@@ -176,8 +175,7 @@ fn the_bootstrap_agrees_with_the_propagated_noise() {
     let ajb =
         measure_with_hits(&config, Configuration::Ajb, &geometry.ajb, QUIET, 1, [band.low_hz, band.high_hz]);
     let priors = Priors::default();
-    let prepared =
-        Prepared::of(&ajb.frf, Some(&ajb.noise), &geometry, IdmSet::Six, band, &priors).expect("data");
+    let prepared = Prepared::of(&ajb.frf, &geometry, IdmSet::Six, band, &priors).expect("data");
     let interface = |sensor: &str| {
         geometry.ajb.channels.iter().any(|c| {
             c.description == sensor && matches!(c.grouping, Grouping::InterfaceA | Grouping::InterfaceB)

@@ -14,9 +14,9 @@ fn data(case: &str) -> PathBuf {
 }
 
 struct Case {
-    a: FrfMatrix,
-    b: FrfMatrix,
-    ajb: FrfMatrix,
+    a: Frf,
+    b: Frf,
+    ajb: Frf,
     geometry: Geometry,
     expected: Value,
 }
@@ -171,20 +171,39 @@ fn any_named_set_of_modes() {
     assert!(reason.contains("the impacts") && reason.contains("6 of 7 motions"), "{reason}");
 }
 
+/// The same values in another quantity or under another window; one line, where asked for, is 1 Hz higher.
+fn relabelled(frf: &Frf, higher: Option<usize>, sigma_per_s: f64, quantity: Quantity) -> Frf {
+    let mut frequency_hz = frf.frequency_hz().to_vec();
+    if let Some(line) = higher {
+        frequency_hz[line] += 1.0;
+    }
+    let (outputs, inputs) = (frf.outputs().to_vec(), frf.inputs().to_vec());
+    Frf::new(frequency_hz, sigma_per_s, quantity, outputs, inputs, frf.lines().to_vec()).expect("all agree")
+}
+
+/// The same without a number in this cell at a line.
+fn broken(frf: &Frf, line: usize, row: usize) -> Frf {
+    frf.clone().map_lines(|l, mut y| {
+        if l == line {
+            y[(row, 0)].re = f64::NAN;
+        }
+    })
+}
+
 #[test]
 fn files_that_do_not_fit_are_refused_with_the_reason() {
-    let mut case = Case::read("frf_rigid");
-    let one =
-        |case: &Case| case.identify(&[Method::Inverse], &[IdmSet::Two]).expect_err("no fit").to_string();
-    case.b.quantity = Quantity::Receptance;
-    assert!(one(&case).contains("B holds receptance, A holds mobility"));
-    case.b.quantity = Quantity::Mobility;
-    case.ajb.frequency_hz[3] += 1.0;
-    assert!(one(&case).contains("313 Hz against 312 Hz"));
-    case.ajb.frequency_hz[3] -= 1.0;
-    case.ajb.sigma_per_s = 2.3;
-    assert!(one(&case).contains("s = σ + iω"));
-    case.ajb.sigma_per_s = 0.0;
+    let one = |change: fn(&mut Case)| {
+        let mut case = Case::read("frf_rigid");
+        change(&mut case);
+        case.identify(&[Method::Inverse], &[IdmSet::Two]).expect_err("no fit").to_string()
+    };
+    let labelled = |case: &mut Case| case.b = relabelled(&case.b, None, 0.0, Quantity::Receptance);
+    assert!(one(labelled).contains("B holds receptance, A holds mobility"));
+    let shifted = |case: &mut Case| case.ajb = relabelled(&case.ajb, Some(3), 0.0, Quantity::Mobility);
+    assert!(one(shifted).contains("313 Hz against 312 Hz"));
+    let windowed = |case: &mut Case| case.ajb = relabelled(&case.ajb, None, 2.3, Quantity::Mobility);
+    assert!(one(windowed).contains("s = σ + iω"));
+    let case = Case::read("frf_rigid");
     let band = Band { low_hz: 20.0, high_hz: 30.0 };
     let empty =
         identify(&case.a, &case.b, &case.ajb, &case.geometry, &[Method::Inverse], &[IdmSet::Two], &[band]);
@@ -195,11 +214,11 @@ fn files_that_do_not_fit_are_refused_with_the_reason() {
 fn missing_and_broken_cells_refuse_only_the_methods_that_need_them() {
     let mut case = Case::read("frf_rigid");
     // A4 is a spare: it may be anything.
-    let spare = case.a.outputs.iter().position(|o| o == "A4:x").expect("the spare");
-    case.a.lines[0][(spare, 0)].re = f64::NAN;
+    let spare = case.a.outputs().iter().position(|o| o == "A4:x").expect("the spare");
+    case.a = broken(&case.a, 0, spare);
     // An interface cell of the assembly between A's virtual point and A's impacts: `internal` does not use it.
-    let row = case.ajb.outputs.iter().position(|o| o == "A1:x").expect("a channel of A");
-    case.ajb.lines[5][(row, 0)].re = f64::NAN;
+    let row = case.ajb.outputs().iter().position(|o| o == "A1:x").expect("a channel of A");
+    case.ajb = broken(&case.ajb, 5, row);
     let result = case.identify(&Method::ALL, &[IdmSet::Six]).expect("most of it works");
     let methods: Vec<&str> = result.joint.iter().map(|r| r.method.as_str()).collect();
     assert_eq!(methods, ["internal", "internal-printed", "internal-ab", "internal-bb"]);
@@ -212,8 +231,8 @@ fn missing_and_broken_cells_refuse_only_the_methods_that_need_them() {
     );
     // Five responses on B for six interface DoFs.
     let mut case = Case::read("frf_rigid");
-    let few: Vec<String> = case.ajb.outputs.iter().filter(|o| o.as_str() < "B2:z").cloned().collect();
-    case.ajb = case.ajb.select(&few, &case.ajb.inputs).expect("named");
+    let few: Vec<String> = case.ajb.outputs().iter().filter(|o| o.as_str() < "B2:z").cloned().collect();
+    case.ajb = case.ajb.select(&few, case.ajb.inputs()).expect("named");
     let result = case.identify(&[Method::Internal], &[IdmSet::Six]).expect("readable");
     assert!(result.joint.is_empty());
     assert!(result.refused[0].reason.contains("6 interface DoFs"), "{}", result.refused[0].reason);

@@ -2,9 +2,8 @@
 
 use jointrig::exchange::{read_frf, read_positions};
 use jointrig::substructuring::averaged::Priors;
-use jointrig::substructuring::fit::{FitError, Fitted, Noisy, Options, Shape, fit};
-use jointrig::substructuring::noise::FrfNoise;
-use jointrig::substructuring::{Band, Dof, FrfMatrix, Geometry, IdmSet};
+use jointrig::substructuring::fit::{FitError, Fitted, Options, Shape, fit};
+use jointrig::substructuring::{Band, Dof, Frf, Geometry, IdmSet};
 use nalgebra::DMatrix;
 use std::path::{Path, PathBuf};
 
@@ -16,8 +15,7 @@ const BAND: Band = Band { low_hz: 300.0, high_hz: 600.0 };
 const NOWHERE_WRONG: Priors = Priors { position_m: 0.0, aim_m: 0.0, hammer_angle_rad: 0.0 };
 
 struct Case {
-    frf: [FrfMatrix; 3],
-    noise: [FrfNoise; 3],
+    frf: [Frf; 3],
     geometry: Geometry,
 }
 
@@ -26,22 +24,20 @@ impl Case {
     fn rigid(relative: f64) -> Case {
         let frf =
             ["A", "B", "AJB"].map(|f| read_frf(&data(&format!("frf_rigid/{f}.npz"))).expect("test data"));
-        let noise = frf.each_ref().map(|frf| FrfNoise {
-            variance: frf
-                .lines
-                .iter()
-                .map(|y| {
-                    let mean = y.map(|v| v.norm_sqr()).mean();
-                    DMatrix::from_element(y.nrows(), y.ncols(), relative * relative * mean / 2.0)
-                })
-                .collect(),
+        let frf = frf.map(|frf| {
+            let variance = frf.lines().iter().map(|y| {
+                let mean = y.map(|v| v.norm_sqr()).mean();
+                DMatrix::from_element(y.nrows(), y.ncols(), relative * relative * mean / 2.0)
+            });
+            let variance = variance.collect();
+            frf.with_variance(variance).expect("one for each value")
         });
         let geometry = read_positions(&data("positions/positions.xlsx")).expect("test data").geometry;
-        Case { frf, noise, geometry }
+        Case { frf, geometry }
     }
 
     fn fit(&self, idms: IdmSet, options: &Options) -> Result<Fitted, FitError> {
-        let [a, b, ajb] = [0, 1, 2].map(|i| Noisy { frf: &self.frf[i], noise: &self.noise[i] });
+        let [a, b, ajb] = &self.frf;
         fit(a, b, ajb, &self.geometry, idms, BAND, options)
     }
 }
@@ -79,21 +75,10 @@ fn three_internals_are_enough() {
     let mut case = Case::rigid(1e-3);
     let ajb = &case.frf[2];
     let (outputs, inputs): (Vec<String>, Vec<String>) = (
-        ajb.outputs.iter().filter(|o| o.starts_with("B4")).cloned().collect(),
-        ajb.inputs.iter().filter(|i| i.starts_with("I_")).cloned().collect(),
+        ajb.outputs().iter().filter(|o| o.starts_with("B4")).cloned().collect(),
+        ajb.inputs().iter().filter(|i| i.starts_with("I_")).cloned().collect(),
     );
     assert_eq!((outputs.len(), inputs.len()), (3, 3));
-    let rows: Vec<usize> =
-        outputs.iter().map(|o| ajb.outputs.iter().position(|a| a == o).expect("there")).collect();
-    let columns: Vec<usize> =
-        inputs.iter().map(|i| ajb.inputs.iter().position(|a| a == i).expect("there")).collect();
-    case.noise[2] = FrfNoise {
-        variance: case.noise[2]
-            .variance
-            .iter()
-            .map(|v| DMatrix::from_fn(3, 3, |r, c| v[(rows[r], columns[c])]))
-            .collect(),
-    };
     case.frf[2] = ajb.select(&outputs, &inputs).expect("they are there");
     let options = Options { priors: NOWHERE_WRONG, mounting: 0.0, ..Options::default() };
     let found = case.fit(IdmSet::Six, &options).expect("a model needs no square matrix");
@@ -106,9 +91,8 @@ fn three_internals_are_enough() {
 fn what_the_model_cannot_describe_gives_no_bare_number() {
     let mut case = Case::rigid(1e-4);
     // an assembly of another scale: no K and C makes that of these parts
-    for y in &mut case.frf[2].lines {
-        *y *= nalgebra::Complex::from(1.5);
-    }
+    let [a, b, ajb] = case.frf;
+    case.frf = [a, b, ajb.map_lines(|_, mut y| y *= nalgebra::Complex::from(1.5))];
     let options = Options { priors: NOWHERE_WRONG, mounting: 0.0, ..Options::default() };
     let error = case.fit(IdmSet::Six, &options).expect_err("refused").to_string();
     assert!(error.contains("does not fit") || error.contains("not identified"), "{error}");
@@ -117,10 +101,10 @@ fn what_the_model_cannot_describe_gives_no_bare_number() {
 #[test]
 fn unknown_noise_is_refused_by_cell() {
     let mut case = Case::rigid(1e-3);
-    let row = case.frf[1].outputs.iter().position(|o| o == "B2:y").expect("a channel of B");
-    for v in &mut case.noise[1].variance {
-        v[(row, 0)] = f64::NAN;
-    }
+    let row = case.frf[1].outputs().iter().position(|o| o == "B2:y").expect("a channel of B");
+    let mut variance = case.frf[1].variance().expect("known").to_vec();
+    variance.iter_mut().for_each(|v| v[(row, 0)] = f64::NAN);
+    case.frf[1] = case.frf[1].clone().with_variance(variance).expect("as before");
     let error = case.fit(IdmSet::Six, &Options::default()).expect_err("refused").to_string();
     assert!(error.contains("B2:y") && error.contains("`variance`"), "{error}");
 }

@@ -1,14 +1,19 @@
 //! `jointrig identify` as a script sees it: documents, exit codes, and the reason of every refusal.
 
-use jointrig::exchange::npz::Array;
-use jointrig::exchange::{Extra, read_frf, write_frf};
-use jointrig::substructuring::FrfMatrix;
+use jointrig::exchange::{read_frf, write_frf};
+use jointrig::substructuring::Frf;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 fn data(file: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file)
+}
+
+/// The same values on another axis, under other names.
+fn relabelled(frf: &Frf, frequency_hz: Vec<f64>, outputs: Vec<String>) -> Frf {
+    let (inputs, lines) = (frf.inputs().to_vec(), frf.lines().to_vec());
+    Frf::new(frequency_hz, frf.sigma_per_s(), frf.quantity(), outputs, inputs, lines).expect("all agree")
 }
 
 /// Three FRF files and a geometry in a folder of their own, to be spoilt.
@@ -26,10 +31,9 @@ impl Files {
         Files { folder, geometry: data("positions/positions.xlsx") }
     }
 
-    fn change(&self, file: &str, change: impl FnOnce(&mut FrfMatrix)) {
+    fn change(&self, file: &str, change: impl FnOnce(Frf) -> Frf) {
         let path = self.folder.path().join(file);
-        let mut frf = read_frf(&path).expect("test data");
-        change(&mut frf);
+        let frf = change(read_frf(&path).expect("test data"));
         write_frf(&path, &frf, &[]).expect("written");
     }
 
@@ -101,10 +105,9 @@ fn the_noise_of_a_line_is_its_own_sets() {
     for file in ["A.npz", "B.npz", "AJB.npz"] {
         let path = files.folder.path().join(file);
         let frf = read_frf(&path).expect("test data");
-        let shape = vec![frf.lines.len(), frf.outputs.len(), frf.inputs.len()];
-        let values = vec![1e-18; shape.iter().product()];
-        let variance = Extra::Real("variance".into(), Array { shape, values });
-        write_frf(&path, &frf, &[variance]).expect("written");
+        let variance = frf.lines().iter().map(|y| y.map(|_| 1e-18)).collect();
+        let frf = frf.with_variance(variance).expect("one for each value");
+        write_frf(&path, &frf, &[]).expect("written");
     }
     let noises = |sets: &[&str]| -> Vec<Value> {
         let mut words = vec!["--method", "inverse", "--band", "300:600", "--json"];
@@ -218,11 +221,11 @@ fn three_internals_for_six_modes_are_refused() {
     let files = Files::of("frf_rigid");
     files.change("AJB.npz", |frf| {
         let (outputs, inputs): (Vec<String>, Vec<String>) = (
-            frf.outputs.iter().filter(|o| o.starts_with("B4")).cloned().collect(),
-            frf.inputs.iter().filter(|i| i.starts_with("I_")).cloned().collect(),
+            frf.outputs().iter().filter(|o| o.starts_with("B4")).cloned().collect(),
+            frf.inputs().iter().filter(|i| i.starts_with("I_")).cloned().collect(),
         );
         assert_eq!((outputs.len(), inputs.len()), (3, 3));
-        *frf = frf.select(&outputs, &inputs).expect("they are there");
+        frf.select(&outputs, &inputs).expect("they are there")
     });
     files.refused(
         &["--method", "internal", "--idms", "6"],
@@ -239,7 +242,13 @@ fn three_internals_for_six_modes_are_refused() {
 #[test]
 fn lines_that_are_no_numbers_are_refused() {
     let files = Files::of("frf_rigid");
-    files.change("B.npz", |frf| frf.lines[3].iter_mut().for_each(|v| v.re = f64::NAN));
+    files.change("B.npz", |frf| {
+        frf.map_lines(|line, mut y| {
+            if line == 3 {
+                y.iter_mut().for_each(|v| v.re = f64::NAN);
+            }
+        })
+    });
     files.refused(
         &["--method", "interface", "--idms", "6"],
         &["interface with 6 IDMs", "B: ", "not a number at 312 Hz"],
@@ -249,17 +258,23 @@ fn lines_that_are_no_numbers_are_refused() {
 #[test]
 fn files_on_other_lines_are_refused() {
     let files = Files::of("frf_rigid");
-    files.change("B.npz", |frf| frf.frequency_hz.iter_mut().for_each(|f| *f += 0.5));
+    files.change("B.npz", |frf| {
+        let moved = frf.frequency_hz().iter().map(|f| f + 0.5).collect();
+        relabelled(&frf, moved, frf.outputs().to_vec())
+    });
     files.refused(&[], &["B is on other frequency lines than A", "300.5 Hz against 300 Hz"]);
     let files = Files::of("frf_rigid");
-    files.change("AJB.npz", |frf| *frf = frf.band(300.0, 500.0));
+    files.change("AJB.npz", |frf| frf.band(300.0, 500.0));
     files.refused(&[], &["AJB", "51 lines against 76"]);
 }
 
 #[test]
 fn names_that_do_not_meet_are_refused() {
     let files = Files::of("frf_rigid");
-    files.change("AJB.npz", |frf| frf.outputs.iter_mut().for_each(|o| o.insert(0, '_')));
+    files.change("AJB.npz", |frf| {
+        let renamed = frf.outputs().iter().map(|o| format!("_{o}")).collect();
+        relabelled(&frf, frf.frequency_hz().to_vec(), renamed)
+    });
     files.refused(&["--method", "inverse"], &["AJB has none of its responses", "A1:x", "_A1:x"]);
 }
 

@@ -2,8 +2,7 @@
 
 use jointrig::exchange::{read_frf, read_positions};
 use jointrig::substructuring::joint::stiffness_and_damping;
-use jointrig::substructuring::noise::FrfNoise;
-use jointrig::substructuring::{Dof, FrfMatrix, Geometry, IdmSet, Method, decouple, line_noise};
+use jointrig::substructuring::{Dof, Frf, Geometry, IdmSet, Method, decouple, line_noise};
 use nalgebra::{Complex, DMatrix};
 use std::path::{Path, PathBuf};
 
@@ -12,22 +11,25 @@ fn data(file: &str) -> PathBuf {
 }
 
 /// A, B and AJB of the rigid clamp on three lines, and a window so strong that K is not the real part.
-fn measured() -> ([FrfMatrix; 3], Geometry) {
+fn measured() -> ([Frf; 3], Geometry) {
     let files = ["A.npz", "B.npz", "AJB.npz"].map(|file| {
-        let mut frf = read_frf(&data("frf_rigid").join(file)).expect("test data");
-        frf.sigma_per_s = 300.0;
-        FrfMatrix { frequency_hz: frf.frequency_hz[..3].to_vec(), lines: frf.lines[..3].to_vec(), ..frf }
+        let frf = read_frf(&data("frf_rigid").join(file)).expect("test data");
+        let (outputs, inputs) = (frf.outputs().to_vec(), frf.inputs().to_vec());
+        let (frequency_hz, lines) = (frf.frequency_hz()[..3].to_vec(), frf.lines()[..3].to_vec());
+        Frf::new(frequency_hz, 300.0, frf.quantity(), outputs, inputs, lines).expect("all agree")
     });
     (files, read_positions(&data("positions/positions.xlsx")).expect("test data").geometry)
 }
 
-fn quiet(frf: &FrfMatrix) -> FrfNoise {
-    FrfNoise { variance: frf.lines.iter().map(|y| DMatrix::zeros(y.nrows(), y.ncols())).collect() }
+/// The FRFs with this variance of each cell, the same on all lines.
+fn noisy(frf: &Frf, variance: impl Fn(usize, usize) -> f64) -> Frf {
+    let matrix = |y: &DMatrix<Complex<f64>>| DMatrix::from_fn(y.nrows(), y.ncols(), &variance);
+    frf.clone().with_variance(frf.lines().iter().map(matrix).collect()).expect("one for each value")
 }
 
 /// K and C of every degree of freedom at a line, or nothing where the method refuses.
 fn joint(
-    files: &[FrfMatrix; 3],
+    files: &[Frf; 3],
     geometry: &Geometry,
     method: Method,
     idms: IdmSet,
@@ -50,16 +52,20 @@ fn every_cell_moves_the_joint_as_propagated() {
                 continue;
             }
             for file in 0..3 {
-                let (rows, columns) = files[file].lines[l].shape();
+                let (rows, columns) = files[file].lines()[l].shape();
                 // interface and internal cells of all kinds, some eighty of them
                 for cell in (0..rows * columns).step_by(rows * columns / 29 + 1) {
                     let (o, i) = (cell % rows, cell / rows);
-                    let size = 1e-6 * files[file].lines[l].norm() / ((rows * columns) as f64).sqrt();
+                    let size = 1e-6 * files[file].lines()[l].norm() / ((rows * columns) as f64).sqrt();
                     // central differences of a step in the real, then in the imaginary part
                     let moved = [Complex::new(size, 0.0), Complex::new(0.0, size)].map(|step| {
                         let at = |sign: f64| {
                             let mut files = files.clone();
-                            files[file].lines[l][(o, i)] += step * sign;
+                            files[file] = files[file].clone().map_lines(|line, mut y| {
+                                if line == l {
+                                    y[(o, i)] += step * sign;
+                                }
+                            });
                             joint(&files, &geometry, method, idms, l).expect("as before")
                         };
                         let (up, down) = (at(1.0), at(-1.0));
@@ -68,11 +74,12 @@ fn every_cell_moves_the_joint_as_propagated() {
                             .map(|(u, d)| ((u.0 - d.0) / 2.0, (u.1 - d.1) / 2.0))
                             .collect::<Vec<_>>()
                     });
-                    let mut noises = files.each_ref().map(quiet);
                     // the variance is smoothed over lines: the same on all of them
-                    noises[file].variance.iter_mut().for_each(|v| v[(o, i)] = size * size);
-                    let noise = line_noise(files.each_ref(), noises.each_ref(), &geometry, &[method], idms)
-                        .expect("variances that fit")
+                    let noisy = [0, 1, 2].map(|f| {
+                        noisy(&files[f], |r, c| if (f, r, c) == (file, o, i) { size * size } else { 0.0 })
+                    });
+                    let noise = line_noise(noisy.each_ref(), &geometry, &[method], idms)
+                        .expect("files that fit")
                         .remove(0)
                         .1
                         .expect("as before");
@@ -104,27 +111,14 @@ fn every_cell_moves_the_joint_as_propagated() {
 #[test]
 fn a_cell_of_unknown_variance_spoils_only_what_uses_it() {
     let (files, geometry) = measured();
-    let mut noises = files.each_ref().map(quiet);
-    noises.iter_mut().flat_map(|n| &mut n.variance).for_each(|v| v.fill(1e-20));
-    let internal = files[2].outputs.iter().position(|o| o.starts_with("B4")).expect("an internal response");
-    noises[2].variance.iter_mut().for_each(|v| v.row_mut(internal).fill(f64::NAN));
-    let found = line_noise(
-        files.each_ref(),
-        noises.each_ref(),
-        &geometry,
-        &[Method::Inverse, Method::Internal],
-        IdmSet::Six,
-    )
-    .expect("variances that fit");
+    let internal = files[2].outputs().iter().position(|o| o.starts_with("B4")).expect("an internal response");
+    let known = [0, 1, 2]
+        .map(|f| noisy(&files[f], |row, _| if (f, row) == (2, internal) { f64::NAN } else { 1e-20 }));
+    let methods = [Method::Inverse, Method::Internal];
+    let found = line_noise(known.each_ref(), &geometry, &methods, IdmSet::Six).expect("files that fit");
     let z = |i: usize| found[i].1.as_ref().expect("both work").stiffness_n_per_m[&Dof::Z][0];
     assert!(z(0) > 0.0 && z(0).is_finite() && z(1).is_nan(), "{} {}", z(0), z(1));
-    let error = line_noise(
-        files.each_ref(),
-        [&noises[0], &noises[1], &noises[0]],
-        &geometry,
-        &[Method::Inverse],
-        IdmSet::Six,
-    )
-    .expect_err("A's variance for AJB");
-    assert!(error.to_string().starts_with("AJB: the variance has"), "{error}");
+    let of_a = known[0].variance().expect("known").to_vec();
+    let error = files[2].clone().with_variance(of_a).expect_err("A's variance for AJB");
+    assert!(error.to_string().starts_with("the variance has"), "{error}");
 }

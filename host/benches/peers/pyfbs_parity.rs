@@ -11,7 +11,7 @@ use jointrig::substructuring::geometry::{Configuration, Geometry, Grouping};
 use jointrig::substructuring::semm::{FULLY_EXTENDED, Form, semm};
 use jointrig::substructuring::virtual_points::{VirtualPoint, Weights, transform};
 use jointrig::substructuring::vpt;
-use jointrig::substructuring::{Dof, FrfMatrix, IdmSet, Quantity};
+use jointrig::substructuring::{Dof, Frf, IdmSet, Quantity};
 use nalgebra::{Complex, DMatrix, Vector3};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -97,18 +97,18 @@ pub fn run(python: &str) -> Outcome {
 struct Whole {
     t_u: DMatrix<Complex<f64>>,
     t_f: DMatrix<Complex<f64>>,
-    y: FrfMatrix,
+    y: Frf,
 }
 
 impl Whole {
     fn of(
-        frf: &FrfMatrix,
+        frf: &Frf,
         points: &Configuration,
         plans: &[VirtualPoint],
         weights: &Weights,
     ) -> Result<Whole, Box<dyn std::error::Error>> {
         let unit = |outputs: bool| -> Result<DMatrix<Complex<f64>>, Box<dyn std::error::Error>> {
-            let names = if outputs { &frf.outputs } else { &frf.inputs };
+            let names = if outputs { frf.outputs() } else { frf.inputs() };
             let identity = DMatrix::identity(names.len(), names.len());
             let only = |plan: &VirtualPoint| VirtualPoint {
                 outputs: if outputs { plan.outputs.clone() } else { Vec::new() },
@@ -121,16 +121,12 @@ impl Whole {
             } else {
                 Weights { outputs: Vec::new(), ..weights.clone() }
             };
-            let probe = FrfMatrix {
-                frequency_hz: vec![1.0],
-                sigma_per_s: 0.0,
-                quantity: Quantity::Receptance,
-                outputs: names.clone(),
-                inputs: names.clone(),
-                lines: vec![identity],
+            let probe = {
+                let (outputs, inputs) = (names.to_vec(), names.to_vec());
+                Frf::new(vec![1.0], 0.0, Quantity::Receptance, outputs, inputs, vec![identity])?
             };
             let found = transform(&probe, points, &plans, &weights)?;
-            Ok(found.lines.into_iter().next().ok_or("no line")?)
+            Ok(found.lines().first().cloned().ok_or("no line")?)
         };
         Ok(Whole { t_u: unit(true)?, t_f: unit(false)?, y: transform(frf, points, plans, weights)? })
     }
@@ -144,7 +140,7 @@ impl Whole {
             let found = table.real(&format!("{name}_{array}"), &ours)?;
             table.row(&format!("{what}, {name}"), found);
         }
-        let found = table.lines(&format!("{name}_y"), &self.y.lines)?;
+        let found = table.lines(&format!("{name}_y"), self.y.lines())?;
         table.row(&format!("Y_vp, {name}"), found);
         Ok(())
     }
@@ -180,7 +176,7 @@ fn virtual_points(table: &mut Table, name: &str, geometry: &Geometry) -> Outcome
             vpt::responses(&channels, at, IdmSet::Six, None)?,
             vpt::impacts(&impacts, at, IdmSet::Six, None)?,
         );
-        let found = consistency(&frf.select(&plan.outputs, &plan.inputs)?.lines, &u, &f);
+        let found = consistency(&frf.select(&plan.outputs, &plan.inputs)?.lines(), &u, &f);
         let mut worst = 0.0f64;
         for (what, ours) in [
             ("overall_sensor", &found.overall_sensor),
@@ -210,7 +206,7 @@ fn other_transformations(table: &mut Table, geometry: &Geometry) -> Outcome {
         vec![names.iter().map(of).collect()]
     };
     let weights =
-        Weights { outputs: spread(&frf.outputs, &six.outputs), inputs: spread(&frf.inputs, &six.inputs) };
+        Weights { outputs: spread(frf.outputs(), &six.outputs), inputs: spread(frf.inputs(), &six.inputs) };
     Whole::of(&frf, &geometry.a, std::slice::from_ref(&six), &weights)?.compare(table, "weighted")?;
     let mut modes = Dof::RIGID.to_vec();
     modes.push(Dof::Ex);
@@ -227,8 +223,7 @@ fn mixing(table: &mut Table) -> Outcome {
         .to_receptance()?
         .select(&SEMM_OUTPUTS.map(str::to_owned), &SEMM_INPUTS.map(str::to_owned))?;
     // half as much again, so that the correction is as large as the parent
-    let measured =
-        FrfMatrix { lines: measured.lines.iter().map(|y| y * Complex::from(1.5)).collect(), ..measured };
+    let measured = measured.map_lines(|_, mut y| y *= Complex::from(1.5));
     let truncated = Form::FullyExtended { drop_compatibility: 2, drop_equilibrium: 1 };
     for (what, array, form) in [
         ("SEMM, basic", "semm_basic", Form::Basic),
@@ -236,7 +231,7 @@ fn mixing(table: &mut Table) -> Outcome {
         ("SEMM, fully extended, truncated (the formula)", "semm_truncated", truncated),
     ] {
         let ours = semm(&parent, &measured, form)?;
-        let found = table.lines(array, &ours.lines)?;
+        let found = table.lines(array, ours.lines())?;
         table.row(what, found);
     }
     let (same, as_extended) = (

@@ -6,9 +6,7 @@ use jointrig::exchange::npz::Array;
 use jointrig::exchange::{Extra, read_frf, read_positions, write_frf};
 use jointrig::substructuring::averaged::{CellHits, Prepared, Priors};
 use jointrig::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
-use jointrig::substructuring::{
-    Band, BandStatistic, Dof, FrfMatrix, IdmSet, Method, decouple, identify, vpt,
-};
+use jointrig::substructuring::{Band, BandStatistic, Dof, Frf, IdmSet, Method, decouple, identify, vpt};
 use nalgebra::{Complex, DMatrix, Vector3};
 use serde_json::Value;
 use std::hint::black_box;
@@ -40,7 +38,7 @@ fn both(a: impl Fn(Grouping) -> bool) -> impl Fn(&Point) -> bool {
 
 /// One more sensor and three more impacts on A: 27 channels and 24 impacts in the assembly. A is rigid where they are, so their FRFs
 /// follow from the others.
-fn widened(mut frf: FrfMatrix, points: &mut Configuration) -> Result<FrfMatrix, Box<dyn std::error::Error>> {
+fn widened(frf: &Frf, points: &mut Configuration) -> Result<Frf, Box<dyn std::error::Error>> {
     let on_a = both(|g| g == Grouping::InterfaceA);
     let own = |points: &[Point]| points.iter().filter(|p| on_a(p)).cloned().collect::<Vec<Point>>();
     let at = |names: &[String], wanted: &[Point]| -> Vec<usize> {
@@ -75,41 +73,48 @@ fn widened(mut frf: FrfMatrix, points: &mut Configuration) -> Result<FrfMatrix, 
             Complex::from(Dof::RIGID[d].displacement(points[i].position()).dot(&points[i].direction()))
         })
     };
-    let (rows, columns) = (at(&frf.outputs, &channels), at(&frf.inputs, &impacts));
+    let (rows, columns) = (at(frf.outputs(), &channels), at(frf.inputs(), &impacts));
     let (to_rows, to_columns) =
         (r(&more_channels) * u.t.map(Complex::from), f.t.map(Complex::from) * r(&more_impacts).transpose());
-    for y in &mut frf.lines {
+    let wide = |y: &DMatrix<Complex<f64>>| {
         let (n, m) = y.shape();
         let mut wide = y.clone().resize(n + 3, m + 3, Complex::default());
         let known = DMatrix::from_fn(rows.len(), m, |i, j| y[(rows[i], j)]);
         wide.view_mut((n, 0), (3, m)).copy_from(&(&to_rows * known));
         let known = DMatrix::from_fn(n + 3, columns.len(), |i, j| wide[(i, columns[j])]);
         wide.view_mut((0, m), (n + 3, 3)).copy_from(&(known * &to_columns));
-        *y = wide;
-    }
-    frf.outputs.extend(more_channels.iter().map(|p| p.description.clone()));
-    frf.inputs.extend(more_impacts.iter().map(|p| p.name.clone()));
+        wide
+    };
+    let lines = frf.lines().iter().map(wide).collect();
+    let (mut outputs, mut inputs) = (frf.outputs().to_vec(), frf.inputs().to_vec());
+    outputs.extend(more_channels.iter().map(|p| p.description.clone()));
+    inputs.extend(more_impacts.iter().map(|p| p.name.clone()));
     points.channels.extend(more_channels);
     points.impacts.extend(more_impacts);
-    Ok(frf)
+    let (frequency_hz, sigma_per_s) = (frf.frequency_hz().to_vec(), frf.sigma_per_s());
+    Ok(Frf::new(frequency_hz, sigma_per_s, frf.quantity(), outputs, inputs, lines)?)
 }
 
 /// The exact FRFs of a rigid clamp, repeated until there are `lines` of them from 300 Hz on.
-fn tiled(file: &str, lines: usize) -> Result<FrfMatrix, Box<dyn std::error::Error>> {
+fn tiled(file: &str, lines: usize) -> Result<Frf, Box<dyn std::error::Error>> {
     let exact = read_frf(&data("frf_rigid").join(file))?;
     let step = (BAND.high_hz - BAND.low_hz) / LINES as f64;
-    Ok(FrfMatrix {
-        frequency_hz: (0..lines).map(|l| BAND.low_hz + step * l as f64).collect(),
-        lines: (0..lines).map(|l| exact.lines[l % exact.lines.len()].clone()).collect(),
-        ..exact
-    })
+    let frequency_hz = (0..lines).map(|l| BAND.low_hz + step * l as f64).collect();
+    on_axis(&exact, frequency_hz)
+}
+
+/// The FRFs repeated until there is a line for each of these frequencies.
+fn on_axis(exact: &Frf, frequency_hz: Vec<f64>) -> Result<Frf, Box<dyn std::error::Error>> {
+    let lines = (0..frequency_hz.len()).map(|l| exact.lines()[l % exact.lines().len()].clone()).collect();
+    let (outputs, inputs) = (exact.outputs().to_vec(), exact.inputs().to_vec());
+    Ok(Frf::new(frequency_hz, exact.sigma_per_s(), exact.quantity(), outputs, inputs, lines)?)
 }
 
 pub fn run(python: Option<&str>) -> Outcome {
     let mut geometry = read_positions(&data("positions/positions.xlsx"))?.geometry;
-    let a = widened(tiled("A.npz", LINES)?, &mut geometry.a)?;
+    let a = widened(&tiled("A.npz", LINES)?, &mut geometry.a)?;
     let b = tiled("B.npz", LINES)?;
-    let ajb = widened(tiled("AJB.npz", LINES)?, &mut geometry.ajb)?;
+    let ajb = widened(&tiled("AJB.npz", LINES)?, &mut geometry.ajb)?;
     let (mut ours, mut whole) = (Vec::new(), Vec::new());
     let mut found = Vec::new();
     for _ in 0..RUNS {
@@ -124,8 +129,8 @@ pub fn run(python: Option<&str>) -> Outcome {
     println!(
         "virtual points, {} methods and k_z of {LINES} lines, {} × {} → 12 × 12: {mine:.4} s (quickest of {RUNS})",
         Method::PAPER.len(),
-        ajb.outputs.len(),
-        ajb.inputs.len()
+        ajb.outputs().len(),
+        ajb.inputs().len()
     );
     println!("all of `identify`, with consistency, passivity and statistics of all 42 entries: {whole:.4} s");
     let mut short = Vec::new();
@@ -164,9 +169,9 @@ pub fn run(python: Option<&str>) -> Outcome {
 
 /// What the notebook does: Z^J by all methods, and mean, scatter and median of k_z.
 fn stiffness(
-    a: &FrfMatrix,
-    b: &FrfMatrix,
-    ajb: &FrfMatrix,
+    a: &Frf,
+    b: &Frf,
+    ajb: &Frf,
     geometry: &Geometry,
 ) -> Result<Vec<(Method, BandStatistic)>, Box<dyn std::error::Error>> {
     let z = 2;
@@ -180,12 +185,13 @@ fn stiffness(
         .collect()
 }
 
-fn for_numpy(file: &Path, a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix, geometry: &Geometry) -> Outcome {
-    let complex = |name: &str, y: &FrfMatrix| {
-        let values = y.lines.iter().flat_map(|y| y.transpose().iter().copied().collect::<Vec<_>>()).collect();
+fn for_numpy(file: &Path, a: &Frf, b: &Frf, ajb: &Frf, geometry: &Geometry) -> Outcome {
+    let complex = |name: &str, y: &Frf| {
+        let values =
+            y.lines().iter().flat_map(|y| y.transpose().iter().copied().collect::<Vec<_>>()).collect();
         Extra::Complex(
             name.into(),
-            Array { shape: vec![y.lines.len(), y.outputs.len(), y.inputs.len()], values },
+            Array { shape: vec![y.lines().len(), y.outputs().len(), y.inputs().len()], values },
         )
     };
     let vectors = |name: String, points: &[&Point], of: fn(&Point) -> [f64; 3]| {
@@ -194,32 +200,30 @@ fn for_numpy(file: &Path, a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix, geometr
     };
     let mut extras = Vec::new();
     // the notebook takes the interface first
-    let interface_first = |y: &FrfMatrix,
-                           points: &Configuration,
-                           own: Grouping|
-     -> Result<FrfMatrix, Box<dyn std::error::Error>> {
-        let ordered = |points: &[Point], names: Vec<String>| -> Vec<String> {
-            let of = |want: bool| {
-                points
-                    .iter()
-                    .zip(&names)
-                    .filter(move |(p, _)| (p.grouping == own) == want)
-                    .map(|(_, n)| n.clone())
+    let interface_first =
+        |y: &Frf, points: &Configuration, own: Grouping| -> Result<Frf, Box<dyn std::error::Error>> {
+            let ordered = |points: &[Point], names: Vec<String>| -> Vec<String> {
+                let of = |want: bool| {
+                    points
+                        .iter()
+                        .zip(&names)
+                        .filter(move |(p, _)| (p.grouping == own) == want)
+                        .map(|(_, n)| n.clone())
+                };
+                of(true).chain(of(false)).collect()
             };
-            of(true).chain(of(false)).collect()
+            Ok(y.select(
+                &ordered(&points.channels, points.output_names()),
+                &ordered(&points.impacts, points.input_names()),
+            )?)
         };
-        Ok(y.select(
-            &ordered(&points.channels, points.output_names()),
-            &ordered(&points.impacts, points.input_names()),
-        )?)
-    };
     let a = interface_first(a, &geometry.a, Grouping::InterfaceA)?;
     // A's spare response is no internal
     let spare = |name: &String| {
         geometry.a.channels.iter().any(|c| c.description == *name && c.grouping == Grouping::InternalA)
     };
-    let used: Vec<String> = a.outputs.iter().filter(|o| !spare(o)).cloned().collect();
-    let a = a.select(&used, &a.inputs)?;
+    let used: Vec<String> = a.outputs().iter().filter(|o| !spare(o)).cloned().collect();
+    let a = a.select(&used, a.inputs())?;
     let b = interface_first(b, &geometry.b, Grouping::InterfaceB)?;
     extras.extend([complex("a", &a), complex("b", &b), complex("ajb", ajb)]);
     for (side, own, inner) in
@@ -241,10 +245,10 @@ fn for_numpy(file: &Path, a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix, geometr
             of(own).chain(of(inner)).collect()
         };
         let (all_out, all_in) = (with_inner(&geometry.ajb.channels), with_inner(&geometry.ajb.impacts));
-        extras.push(places(format!("out_{side}"), &channels, &ajb.outputs));
-        extras.push(places(format!("in_{side}"), &impacts, &ajb.inputs));
-        extras.push(places(format!("all_out_{side}"), &all_out.iter().collect::<Vec<_>>(), &ajb.outputs));
-        extras.push(places(format!("all_in_{side}"), &all_in.iter().collect::<Vec<_>>(), &ajb.inputs));
+        extras.push(places(format!("out_{side}"), &channels, ajb.outputs()));
+        extras.push(places(format!("in_{side}"), &impacts, ajb.inputs()));
+        extras.push(places(format!("all_out_{side}"), &all_out.iter().collect::<Vec<_>>(), ajb.outputs()));
+        extras.push(places(format!("all_in_{side}"), &all_in.iter().collect::<Vec<_>>(), ajb.inputs()));
     }
     write_frf(file, ajb, &extras)?;
     Ok(())
@@ -253,18 +257,18 @@ fn for_numpy(file: &Path, a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix, geometr
 /// Seconds for all replicates; the hits' spectra are at hand, as the analysis has them.
 fn bootstrap() -> Result<f64, Box<dyn std::error::Error>> {
     let geometry = read_positions(&data("positions/positions.xlsx"))?.geometry;
-    let mut ajb = tiled("AJB.npz", MAIN_LINES)?;
-    ajb.frequency_hz = (0..MAIN_LINES).map(|l| 300.0 + 0.5 * l as f64).collect();
+    let exact = read_frf(&data("frf_rigid").join("AJB.npz"))?;
+    let ajb = on_axis(&exact, (0..MAIN_LINES).map(|l| 300.0 + 0.5 * l as f64).collect())?;
     let band = Band { low_hz: 300.0, high_hz: 600.0 };
-    let prepared = Prepared::of(&ajb, None, &geometry, IdmSet::Six, band, &Priors::default())?;
+    let prepared = Prepared::of(&ajb, &geometry, IdmSet::Six, band, &Priors::default())?;
     let interface = both(|g| matches!(g, Grouping::InterfaceA | Grouping::InterfaceB));
     let mut cells: Vec<CellHits> = Vec::new();
     for impact in geometry.ajb.impacts.iter().filter(|p| interface(p)) {
-        let column = ajb.inputs.iter().position(|i| *i == impact.name).ok_or("an impact")?;
+        let column = ajb.inputs().iter().position(|i| *i == impact.name).ok_or("an impact")?;
         for channels in geometry.ajb.channels.chunks(3).filter(|c| interface(&c[0])) {
             let rows: Vec<usize> = channels
                 .iter()
-                .filter_map(|c| ajb.outputs.iter().position(|o| *o == c.description))
+                .filter_map(|c| ajb.outputs().iter().position(|o| *o == c.description))
                 .collect();
             let hit = |h: usize| Complex::from(1.0 + 1e-3 * h as f64);
             cells.push(CellHits {
@@ -272,7 +276,7 @@ fn bootstrap() -> Result<f64, Box<dyn std::error::Error>> {
                 outputs: channels.iter().map(|c| c.description.clone()).collect(),
                 auto: vec![vec![1.0; HITS]; MAIN_LINES],
                 cross: ajb
-                    .lines
+                    .lines()
                     .iter()
                     .map(|y| {
                         rows.iter().map(|&r| (0..HITS).map(|h| y[(r, column)] * hit(h)).collect()).collect()

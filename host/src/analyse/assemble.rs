@@ -8,28 +8,16 @@
 use super::averages::CellAverage;
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
-use crate::substructuring::frf::FrfMatrix;
+use crate::substructuring::frf::Frf;
 use crate::substructuring::geometry::{Configuration, Grouping, Point};
-use crate::substructuring::noise::FrfNoise;
 use nalgebra::DMatrix;
 use num_complex::Complex;
-
-/// FRFs of a configuration with what is known of their noise; NaN where nothing was measured.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MeasuredFrf {
-    /// H1.
-    pub frf: FrfMatrix,
-    /// Variance of the real part of every value; NaN where a cell has a single hit.
-    pub noise: FrfNoise,
-    /// Coherence (output × input) per line; NaN where a cell has a single hit.
-    pub coherence: Vec<DMatrix<f64>>,
-}
 
 /// What came of a configuration.
 #[derive(Debug)]
 pub struct Assembled {
-    /// The FRFs, if anything was measured.
-    pub measured: Option<MeasuredFrf>,
+    /// H1 with its variance and coherence, if anything was measured; NaN where nothing was.
+    pub measured: Option<Frf>,
     /// Impacts that had to be left out because cells are missing.
     pub impacts_left_out: Vec<String>,
     /// Response locations that had to be left out because cells are missing.
@@ -94,12 +82,8 @@ pub fn assemble(
     Assembled { measured, impacts_left_out, responses_left_out }
 }
 
-/// Every pair of the geometry, measured or not; none where nothing was measured.
-pub fn everything(
-    points: &Configuration,
-    cells: &[CellAverage],
-    quantity: MotionQuantity,
-) -> Option<MeasuredFrf> {
+/// H1 of every pair of the geometry with its variance and coherence, measured or not; none where nothing was measured.
+pub fn everything(points: &Configuration, cells: &[CellAverage], quantity: MotionQuantity) -> Option<Frf> {
     let all = |count: usize| (0..count).collect::<Vec<_>>();
     measured(points, &all(points.channels.len()), &all(points.impacts.len()), cells, quantity)
 }
@@ -111,7 +95,7 @@ fn measured(
     impacts: &[usize],
     cells: &[CellAverage],
     quantity: MotionQuantity,
-) -> Option<MeasuredFrf> {
+) -> Option<Frf> {
     let first = &cells.first()?.spectra;
     if channels.is_empty() || impacts.is_empty() {
         return None;
@@ -143,15 +127,16 @@ fn measured(
         }
     }
     let (outputs, inputs) = (points.output_names(), points.input_names());
-    let frf = FrfMatrix {
-        frequency_hz: first.frequency_hz().to_vec(),
-        sigma_per_s: first.sigma_per_s(),
-        quantity: quantity.frf(),
-        outputs: channels.iter().map(|c| outputs[*c].clone()).collect(),
-        inputs: impacts.iter().map(|i| inputs[*i].clone()).collect(),
+    let frf = Frf::new(
+        first.frequency_hz().to_vec(),
+        first.sigma_per_s(),
+        quantity.frf(),
+        channels.iter().map(|c| outputs[*c].clone()).collect(),
+        impacts.iter().map(|i| inputs[*i].clone()).collect(),
         lines,
-    };
-    Some(MeasuredFrf { frf, noise: FrfNoise { variance }, coherence })
+    );
+    let whole = frf.and_then(|frf| frf.with_variance(variance)?.with_coherence(coherence));
+    Some(whole.expect("the geometry's names differ, and there is one matrix for each line of the first cell"))
 }
 
 /// The cell of this impact and response location.

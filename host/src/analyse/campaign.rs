@@ -14,8 +14,7 @@ use crate::results::MAIN_BAND;
 use crate::spectra::Windowing;
 use crate::structure::Structure;
 use crate::substructuring::averaged::Priors;
-use crate::substructuring::noise::FrfNoise;
-use crate::substructuring::{Band, FrfMatrix, Geometry, IdmSet, Method, fit, identify};
+use crate::substructuring::{Band, Frf, Geometry, IdmSet, Method, fit, identify};
 
 /// The methods whose spectra a campaign's results keep and show; of all others they keep the bands.
 const SHOWN: [Method; 3] = [Method::Internal, Method::InternalPrinted, Method::Inverse];
@@ -43,12 +42,11 @@ pub fn analyse_measurements<M: Measurements>(
         let one = configuration_stage::of(measurements, structure, geometry.points(structure), &own, planned);
         found.missing.extend(one.missing);
         found.configurations.push(one.measured);
-        (one.frf, one.noise)
+        one.frf
     });
-    let frfs = all.each_ref().map(|(frf, _)| frf.as_ref());
-    let noises = all.each_ref().map(|(_, noise)| noise.as_ref());
+    let frfs = all.each_ref().map(Option::as_ref);
     let identified = if let [Some(a), Some(b), Some(ajb)] = frfs {
-        substructured([a, b, ajb], noises, geometry)
+        substructured([a, b, ajb], geometry)
     } else {
         let absent = Structure::ALL.into_iter().zip(frfs).filter(|(_, frf)| frf.is_none());
         Err(Missing::Configurations(absent.map(|(structure, _)| structure).collect()))
@@ -63,13 +61,13 @@ pub fn analyse_measurements<M: Measurements>(
     if let Some(ajb) = frfs[2] {
         let priors = Priors::default();
         let Recommended { estimates, bootstrap, missing } =
-            recommended(geometry, ajb, noises[2], &priors, &cells.hits, wanted.replicates);
+            recommended(geometry, ajb, &priors, &cells.hits, wanted.replicates);
         found.priors = Some(priors);
         (found.recommended, found.bootstrap) = (estimates, bootstrap);
         found.missing.extend(missing);
     }
     if let [Some(a), Some(b), Some(ajb)] = frfs {
-        found.fits = fit_of_the_main_band([a, b, ajb], noises, geometry);
+        found.fits = fit_of_the_main_band([a, b, ajb], geometry);
     }
     let fitted: Vec<_> = found.fits.iter().filter_map(|fit| Some(fit.outcome.as_ref().ok()?.row())).collect();
     let rows = found.substructured.iter().flat_map(|s| &s.rows).map(|row| &row.joint).chain(&fitted);
@@ -81,34 +79,26 @@ pub fn analyse_measurements<M: Measurements>(
     found
 }
 
-fn substructured(
-    frfs: [&FrfMatrix; 3],
-    noises: [Option<&FrfNoise>; 3],
-    geometry: &Geometry,
-) -> Result<Substructured, Missing> {
+fn substructured(frfs: [&Frf; 3], geometry: &Geometry) -> Result<Substructured, Missing> {
     let [a, b, ajb] = frfs;
     let bands: Vec<Band> = BANDS_HZ
         .into_iter()
-        .filter(|b| a.frequency_hz.iter().any(|f| (b[0]..=b[1]).contains(f)))
+        .filter(|b| a.frequency_hz().iter().any(|f| (b[0]..=b[1]).contains(f)))
         .map(|[low_hz, high_hz]| Band { low_hz, high_hz })
         .collect();
     let identified = identify(a, b, ajb, geometry, &Method::ALL, &IdmSet::ALL, &bands);
     let mut found = identified
-        .map(|found| Substructured::of(frfs, noises, geometry, &Priors::default(), found))
+        .map(|found| Substructured::of(frfs, geometry, &Priors::default(), found))
         .map_err(Missing::Substructuring)?;
     found.spectra.retain(|(spectrum, _)| SHOWN.iter().any(|m| m.name() == spectrum.method));
     Ok(found)
 }
 
 /// The fit over the main band, from all three configurations and their noise.
-fn fit_of_the_main_band(
-    frfs: [&FrfMatrix; 3],
-    noises: [Option<&FrfNoise>; 3],
-    geometry: &Geometry,
-) -> Vec<Fit> {
+fn fit_of_the_main_band(frfs: [&Frf; 3], geometry: &Geometry) -> Vec<Fit> {
     let idms = IdmSet::Six;
-    let [Some(a), Some(b), Some(ajb)] = noises else {
+    if frfs.iter().any(|frf| frf.variance().is_none()) {
         return vec![Fit { idms, outcome: Err(NoFit::ImportWithoutVariance) }];
-    };
-    fits(frfs, [a, b, ajb], geometry, &[idms], &[MAIN_BAND], &fit::Options::default())
+    }
+    fits(frfs, geometry, &[idms], &[MAIN_BAND], &fit::Options::default())
 }

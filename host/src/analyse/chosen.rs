@@ -4,7 +4,7 @@ use super::averages::CellAverage;
 use crate::results::{FrfCurve, Role, rounded};
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
-use crate::substructuring::frf::FrfMatrix;
+use crate::substructuring::frf::Frf;
 use crate::substructuring::geometry::{Configuration, Grouping, Point};
 use num_complex::Complex;
 
@@ -44,15 +44,15 @@ fn of_cell(
 }
 
 /// The curves of FRFs that were measured elsewhere; none where their lines are not evenly spaced.
-pub fn of_matrix(configuration: Structure, points: &Configuration, frf: &FrfMatrix) -> Vec<FrfCurve> {
+pub fn of_matrix(configuration: Structure, points: &Configuration, frf: &Frf) -> Vec<FrfCurve> {
     let place = |names: &[String], name: &str| names.iter().position(|n| n == name);
     let (outputs, inputs) = (points.output_names(), points.input_names());
     let find = |impact: &Point, channel: &Point| {
         let output = points.channels.iter().position(|p| p == channel)?;
         let input = points.impacts.iter().position(|p| p == impact)?;
-        Some((place(&frf.outputs, &outputs[output])?, place(&frf.inputs, &inputs[input])?))
+        Some((place(frf.outputs(), &outputs[output])?, place(frf.inputs(), &inputs[input])?))
     };
-    let steps = || frf.frequency_hz.windows(2).map(|pair| pair[1] - pair[0]);
+    let steps = || frf.frequency_hz().windows(2).map(|pair| pair[1] - pair[0]);
     let first = steps().next().unwrap_or(0.0);
     // files keep their axis to six digits or so
     let even = steps().all(|step| (step - first).abs() <= 1e-3 * first);
@@ -62,8 +62,8 @@ pub fn of_matrix(configuration: Structure, points: &Configuration, frf: &FrfMatr
         let place = find(impact, channel)?;
         // the channel counts along its own direction
         let sign = channel.direction[2].signum();
-        let values = y.lines.iter().map(|y| y[place] * sign);
-        Some(curve(configuration, (role, impact, channel), &y.frequency_hz, values))
+        let values = y.lines().iter().map(|y| y[place] * sign);
+        Some(curve(configuration, (role, impact, channel), y.frequency_hz(), values))
     };
     chosen.into_iter().filter_map(curve).collect()
 }

@@ -8,9 +8,8 @@ use super::{assemble, chosen, imported};
 use crate::results::UsableBand;
 use crate::spectra::usable_band;
 use crate::structure::Structure;
-use crate::substructuring::FrfMatrix;
+use crate::substructuring::Frf;
 use crate::substructuring::geometry::Configuration;
-use crate::substructuring::noise::FrfNoise;
 
 /// What came of a configuration.
 #[derive(Debug)]
@@ -18,9 +17,7 @@ pub struct ConfigurationFrfs {
     /// What the results tell of it.
     pub measured: ConfigurationFindings,
     /// Its FRFs; none where nothing was measured.
-    pub frf: Option<FrfMatrix>,
-    /// Their noise, where it is known.
-    pub noise: Option<FrfNoise>,
+    pub frf: Option<Frf>,
     /// What had to be done without.
     pub missing: Vec<Missing>,
 }
@@ -46,10 +43,10 @@ pub fn of<M: Measurements>(
                 imported: Some(ImportedFrom {
                     file: found.source,
                     utc: found.utc,
-                    with_variance: found.noise.is_some(),
+                    with_variance: found.frf.variance().is_some(),
                 }),
             };
-            return ConfigurationFrfs { measured, frf: Some(found.frf), noise: found.noise, missing };
+            return ConfigurationFrfs { measured, frf: Some(found.frf), missing };
         }
     }
     missing.extend(holes(configuration, planned, own));
@@ -71,8 +68,7 @@ pub fn of<M: Measurements>(
             missing.push(Missing::ResponsesLeftOut { configuration, names: responses });
         }
     }
-    let (frf, noise) = assembled.measured.map(|m| (m.frf, m.noise)).unzip();
-    ConfigurationFrfs { measured, frf, noise, missing }
+    ConfigurationFrfs { measured, frf: assembled.measured, missing }
 }
 
 fn holes(configuration: Structure, planned: usize, own: &[CellAverage]) -> Vec<Missing> {

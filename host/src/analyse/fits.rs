@@ -1,8 +1,7 @@
 //! Fits of K and C to all three configurations and their noise.
 
-use crate::substructuring::fit::{FitError, Fitted, Noisy, Options, fit};
-use crate::substructuring::noise::FrfNoise;
-use crate::substructuring::{Band, FrfMatrix, Geometry, IdmSet};
+use crate::substructuring::fit::{FitError, Fitted, Options, fit};
+use crate::substructuring::{Band, Frf, Geometry, IdmSet};
 
 /// A fit that was asked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,16 +23,14 @@ pub enum NoFit {
     Failed(FitError),
 }
 
-/// The fit with each set of modes over each band; `frfs` and `noises` are of A, B and AJB.
+/// The fit with each set of modes over each band; the FRFs are of A, B and AJB and hold their variance.
 pub fn fits(
-    frfs: [&FrfMatrix; 3],
-    noises: [&FrfNoise; 3],
+    [a, b, ajb]: [&Frf; 3],
     geometry: &Geometry,
     sets: &[IdmSet],
     bands: &[Band],
     options: &Options,
 ) -> Vec<Fit> {
-    let [a, b, ajb] = [0, 1, 2].map(|i| Noisy { frf: frfs[i], noise: noises[i] });
     let of = |idms: IdmSet, band: Band| {
         let outcome = fit(a, b, ajb, geometry, idms, band, options).map_err(NoFit::Failed);
         Fit { idms, outcome }

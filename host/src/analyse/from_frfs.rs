@@ -7,9 +7,8 @@ use crate::substructuring::cmif::{Cmif, cmif};
 use crate::substructuring::explained::Explained;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping};
 use crate::substructuring::line_noise::LineNoise;
-use crate::substructuring::noise::FrfNoise;
 use crate::substructuring::{
-    Dof, FrfError, FrfMatrix, Identification, IdmSet, JointRow, JointSpectrum, Method, Refused,
+    Dof, Frf, FrfError, Identification, IdmSet, JointRow, JointSpectrum, Method, Refused,
     VirtualPointQuality, line_noise,
 };
 use std::collections::BTreeMap;
@@ -47,21 +46,15 @@ pub struct Row {
 }
 
 impl Substructured {
-    /// What the same FRFs that `found` was identified from say of joint and interface; `frfs` and `noises` are of A, B and AJB.
-    pub fn of(
-        frfs: [&FrfMatrix; 3],
-        noises: [Option<&FrfNoise>; 3],
-        geometry: &Geometry,
-        priors: &Priors,
-        found: Identification,
-    ) -> Self {
+    /// What the same FRFs that `found` was identified from say of joint and interface; `frfs` are of A, B and AJB.
+    pub fn of(frfs: [&Frf; 3], geometry: &Geometry, priors: &Priors, found: Identification) -> Self {
         let [a, b, ajb] = frfs;
         let [a, b, ajb] = [(a, &geometry.a), (b, &geometry.b), (ajb, &geometry.ajb)]
             .map(|(frf, points)| without_spares(frf, points));
         let cmif = cmif(&a, &b, &ajb, geometry);
         let (internals, same_structures) = (InternalsFound::of(&found), SameStructures::of(&found));
-        let back_coupled = back_coupled(frfs, noises, geometry, priors, &found);
-        let noise = noise_of_lines(frfs, noises, geometry, &found.spectra);
+        let back_coupled = back_coupled(frfs, geometry, priors, &found);
+        let noise = noise_of_lines(frfs, geometry, &found.spectra);
         let spectra: Vec<_> = found.spectra.into_iter().zip(noise).collect();
         Self {
             rows: found.joint.into_iter().map(|joint| with_noise(joint, &spectra)).collect(),
@@ -87,20 +80,17 @@ fn with_noise(joint: JointRow, spectra: &[(JointSpectrum, Option<LineNoise>)]) -
 }
 
 /// The propagated noise of every spectrum, in their order; none where one of the three came without its variance.
-fn noise_of_lines(
-    frfs: [&FrfMatrix; 3],
-    noises: [Option<&FrfNoise>; 3],
-    geometry: &Geometry,
-    spectra: &[JointSpectrum],
-) -> Vec<Option<LineNoise>> {
-    let [Some(a), Some(b), Some(ajb)] = noises else { return vec![None; spectra.len()] };
+fn noise_of_lines(frfs: [&Frf; 3], geometry: &Geometry, spectra: &[JointSpectrum]) -> Vec<Option<LineNoise>> {
+    if frfs.iter().any(|frf| frf.variance().is_none()) {
+        return vec![None; spectra.len()];
+    }
     spectra
         .chunk_by(|one, next| one.modes == next.modes)
         .flat_map(|of_set| {
             let methods: Vec<Method> = of_set.iter().filter_map(|s| s.method.parse().ok()).collect();
             let idms = IdmSet::of(&of_set[0].modes).filter(|_| methods.len() == of_set.len());
             // what is refused here was refused by `identify` before, with the reason
-            idms.and_then(|idms| line_noise(frfs, [a, b, ajb], geometry, &methods, idms).ok()).map_or_else(
+            idms.and_then(|idms| line_noise(frfs, geometry, &methods, idms).ok()).map_or_else(
                 || vec![None; of_set.len()],
                 |all| all.into_iter().map(|(_, noise)| noise.ok()).collect(),
             )
@@ -110,24 +100,23 @@ fn noise_of_lines(
 
 /// The assembly put together again, with the most modes that Eq. (A.1) was asked for with; none where it was not.
 fn back_coupled(
-    frfs: [&FrfMatrix; 3],
-    noises: [Option<&FrfNoise>; 3],
+    frfs: [&Frf; 3],
     geometry: &Geometry,
     priors: &Priors,
     found: &Identification,
 ) -> Option<BackCoupled> {
     let by_inverse = found.spectra.iter().filter(|s| s.method == Method::Inverse.name());
     let idms = IdmSet::of(&by_inverse.max_by_key(|s| s.idms)?.modes)?;
-    BackCoupled::of(&Explained::of(frfs, noises, geometry, idms, MAIN_BAND, priors)?)
+    BackCoupled::of(&Explained::of(frfs, geometry, idms, MAIN_BAND, priors)?)
 }
 
 /// The matrix without the spare responses of A, which may be anything.
-fn without_spares(frf: &FrfMatrix, points: &Configuration) -> FrfMatrix {
+fn without_spares(frf: &Frf, points: &Configuration) -> Frf {
     let names = points.output_names();
     let spare = |name: &String| {
         points.channels.iter().zip(&names).any(|(p, n)| n == name && p.grouping == Grouping::InternalA)
     };
-    let kept: Vec<String> = frf.outputs.iter().filter(|name| !spare(name)).cloned().collect();
+    let kept: Vec<String> = frf.outputs().iter().filter(|name| !spare(name)).cloned().collect();
     // these names were just taken from it
-    frf.select(&kept, &frf.inputs).unwrap_or_else(|_| frf.clone())
+    frf.select(&kept, frf.inputs()).unwrap_or_else(|_| frf.clone())
 }

@@ -1,6 +1,6 @@
 //! The campaign file as measurements: records decoded, in SI units, one cell at a time, from any thread.
 
-use super::assemble::{MeasuredFrf, everything};
+use super::assemble::everything;
 use super::averages::average;
 use super::campaign::analyse_measurements;
 use super::cell::{
@@ -22,6 +22,7 @@ use crate::hysteresis::HysteresisRecord;
 use crate::results::{Completeness, Source};
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
+use crate::substructuring::Frf;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
 use jointrig_protocol::channel::{Quantity, Role};
 use std::collections::HashMap;
@@ -281,7 +282,7 @@ impl CampaignFile {
 impl CampaignFile {
     /// The FRFs of a configuration's kept hits between two frequencies, Hz, for every pair of the geometry, formed as the analysis
     /// forms them; and what is said about cells and records that cannot be used. None without a kept hit.
-    pub fn measured(&self, structure: Structure, lines_hz: [f64; 2]) -> (Option<MeasuredFrf>, Vec<String>) {
+    pub fn measured(&self, structure: Structure, lines_hz: [f64; 2]) -> (Option<Frf>, Vec<String>) {
         let own = self.cells.iter().filter(|cell| cell.name.configuration == structure);
         let (mut averages, mut complaints) = (Vec::new(), Vec::new());
         for name in own.map(|cell| &cell.name) {

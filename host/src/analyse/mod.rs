@@ -37,7 +37,6 @@ mod shaker_levels_tests;
 mod specimen_curves;
 mod wanted;
 
-pub use assemble::MeasuredFrf;
 pub use campaign::analyse_measurements;
 pub use cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel};
 pub use contact_stage::Contact;

@@ -4,8 +4,7 @@ use super::missing::Missing;
 use super::wanted::BANDS_HZ;
 use crate::results::{Bootstrap, MAIN_BAND};
 use crate::substructuring::averaged::{Averaged, AveragedError, CellHits, Prepared, Priors};
-use crate::substructuring::noise::FrfNoise;
-use crate::substructuring::{Band, FrfMatrix, Geometry, IdmSet};
+use crate::substructuring::{Band, Frf, Geometry, IdmSet};
 
 /// The bootstrap's seed: the same file gives the same figures.
 const SEED: u64 = 1;
@@ -24,8 +23,7 @@ pub struct Recommended {
 /// The estimates to quote, with their intervals, from the assembly alone; `replicates` of the bootstrap.
 pub fn recommended(
     geometry: &Geometry,
-    ajb: &FrfMatrix,
-    noise: Option<&FrfNoise>,
+    ajb: &Frf,
     priors: &Priors,
     hits: &[CellHits],
     replicates: usize,
@@ -33,7 +31,7 @@ pub fn recommended(
     let mut found = Recommended::default();
     for [low_hz, high_hz] in BANDS_HZ {
         let band = Band { low_hz, high_hz };
-        match Prepared::of(ajb, noise, geometry, IdmSet::Six, band, priors) {
+        match Prepared::of(ajb, geometry, IdmSet::Six, band, priors) {
             Ok(prepared) => {
                 let estimate = prepared.estimate();
                 if replicates > 0 && band == MAIN_BAND {

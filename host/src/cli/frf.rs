@@ -147,7 +147,8 @@ impl Frf {
             }
         }
         if let Some(path) = &self.out {
-            let matrix = found.to_matrix(quantity.frf(), names.clone(), self.input.clone());
+            let matrix = (found.to_matrix(quantity.frf(), names.clone(), self.input.clone()))
+                .map_err(|e| CliError::Bad(format!("{}: {e}", self.records.display())))?;
             write_frf(path, &matrix, &extras(&found, self.noise_ratio))
                 .map_err(|e| CliError::Bad(e.to_string()))?;
         }

@@ -9,13 +9,12 @@ use clap::Args;
 use super::error::CliError;
 use super::output;
 use crate::analyse::{BANDS_HZ, Findings, Fit, Missing, NoFit, Substructured, fits};
-use crate::exchange::{FrfFile, PositionsError, read_frf_file, read_positions};
+use crate::exchange::{PositionsError, read_frf_file, read_positions};
 use crate::report::{document, words};
 use crate::results::{Results, Source};
 use crate::substructuring::averaged::{Priors, averaged};
 use crate::substructuring::fit;
-use crate::substructuring::noise::FrfNoise;
-use crate::substructuring::{Band, Dof, FrfMatrix, Geometry, IdmSet, Method, identify};
+use crate::substructuring::{Band, Dof, Frf, Geometry, IdmSet, Method, identify};
 
 /// Identify a joint from FRFs of A, B and the assembly, measured anywhere.
 ///
@@ -70,10 +69,7 @@ pub struct Identify {
 impl Identify {
     pub fn run(self) -> Result<(), CliError> {
         let [a, b, ajb] = [read(&self.a)?, read(&self.b)?, read(&self.ajb)?];
-        let FrfFile { frf: a, noise: noise_a, .. } = a;
-        let FrfFile { frf: b, noise: noise_b, .. } = b;
         let (geometry, notes) = read_geometry(&self.geometry)?;
-        let FrfFile { frf: ajb, noise, .. } = ajb;
         for note in notes {
             eprintln!("jointrig: {note}");
         }
@@ -91,19 +87,18 @@ impl Identify {
         let mut found = Findings { source: self.source(), ..Findings::default() };
         if !methods.is_empty() {
             let identified = identify(&a, &b, &ajb, &geometry, &methods, &idms, &bands).map_err(bad)?;
-            let noises = [noise_a.as_ref(), noise_b.as_ref(), noise.as_ref()];
-            let of_frfs = Substructured::of([&a, &b, &ajb], noises, &geometry, &self.priors(), identified);
+            let of_frfs = Substructured::of([&a, &b, &ajb], &geometry, &self.priors(), identified);
             found.missing.extend(of_frfs.cmif.as_ref().err().cloned().map(Missing::Cmif));
             found.substructured = Some(of_frfs);
         }
         // the estimates with an interval need whole rigid motions
         if idms.contains(&IdmSet::Six) && methods.contains(&Method::Inverse) {
-            let of = |band| averaged(&ajb, noise.as_ref(), &geometry, IdmSet::Six, band, &self.priors());
+            let of = |band| averaged(&ajb, &geometry, IdmSet::Six, band, &self.priors());
             // where it cannot be had, the reason is among the refusals of `inverse` already
             found.recommended = bands.iter().filter_map(|band| of(*band).ok()).collect();
         }
         if self.methods.contains(&Asked::Fit) {
-            found.fits = self.fits([&a, &b, &ajb], [noise_a, noise_b, noise], &geometry, &idms, &bands);
+            found.fits = self.fits([a, b, ajb], &geometry, &idms, &bands);
         }
         let results = document(found);
         let printed =
@@ -120,14 +115,7 @@ impl Identify {
     }
 
     /// The fit with each set of modes over each band.
-    fn fits(
-        &self,
-        frfs: [&FrfMatrix; 3],
-        noises: [Option<FrfNoise>; 3],
-        geometry: &Geometry,
-        idms: &[IdmSet],
-        bands: &[Band],
-    ) -> Vec<Fit> {
+    fn fits(&self, frfs: [Frf; 3], geometry: &Geometry, idms: &[IdmSet], bands: &[Band]) -> Vec<Fit> {
         let shape = if self.full_joint { fit::Shape::Full } else { fit::Shape::Diagonal };
         let options = fit::Options {
             priors: self.priors(),
@@ -136,16 +124,18 @@ impl Identify {
             ..fit::Options::default()
         };
         let mut known = Vec::new();
-        for ((name, frf), noise) in ["A", "B", "AJB"].into_iter().zip(frfs).zip(noises) {
-            let Some(noise) = noise.or_else(|| self.noise.map(|fraction| FrfNoise::relative(frf, fraction)))
-            else {
-                let refused =
-                    |set: &IdmSet| Fit { idms: *set, outcome: Err(NoFit::FileWithoutVariance(name)) };
-                return idms.iter().map(refused).collect();
-            };
-            known.push(noise);
+        for (name, frf) in ["A", "B", "AJB"].into_iter().zip(frfs) {
+            known.push(match self.noise {
+                _ if frf.variance().is_some() => frf,
+                Some(fraction) => frf.with_relative_noise(fraction),
+                None => {
+                    let refused =
+                        |set: &IdmSet| Fit { idms: *set, outcome: Err(NoFit::FileWithoutVariance(name)) };
+                    return idms.iter().map(refused).collect();
+                }
+            });
         }
-        fits(frfs, [&known[0], &known[1], &known[2]], geometry, idms, bands, &options)
+        fits([&known[0], &known[1], &known[2]], geometry, idms, bands, &options)
     }
 
     fn source(&self) -> Source {
@@ -193,14 +183,14 @@ fn refusals(results: &Results) -> Option<String> {
 }
 
 /// The default bands that hold a line of the files.
-fn default_bands(frf: &FrfMatrix) -> Result<Vec<Band>, CliError> {
+fn default_bands(frf: &Frf) -> Result<Vec<Band>, CliError> {
     let bands: Vec<Band> = BANDS_HZ
         .into_iter()
         .map(|[low_hz, high_hz]| Band { low_hz, high_hz })
-        .filter(|band| frf.frequency_hz.iter().any(|f| band.contains(*f)))
+        .filter(|band| frf.frequency_hz().iter().any(|f| band.contains(*f)))
         .collect();
     if bands.is_empty() {
-        let (first, last) = (frf.frequency_hz.first(), frf.frequency_hz.last());
+        let (first, last) = (frf.frequency_hz().first(), frf.frequency_hz().last());
         return Err(CliError::Bad(format!(
             "none of the default bands holds a line of the files, which cover {first:?} to {last:?} Hz: give --band LO:HI"
         )));
@@ -260,12 +250,12 @@ impl FromStr for IdmSets {
 }
 
 /// FRFs from an npz or a universal file; what was left out is said.
-fn read(path: &Path) -> Result<FrfFile, CliError> {
-    let file = read_frf_file(path).map_err(bad)?;
-    for warning in &file.warnings {
+fn read(path: &Path) -> Result<Frf, CliError> {
+    let (frf, warnings) = read_frf_file(path).map_err(bad)?;
+    for warning in &warnings {
         eprintln!("jointrig: {}: {warning}", path.display());
     }
-    Ok(file)
+    Ok(frf)
 }
 
 fn band(text: &str) -> Result<Band, String> {

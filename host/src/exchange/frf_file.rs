@@ -1,25 +1,13 @@
 //! An FRF file of either form: npz, or a universal file. What it is, its first bytes tell, not its name.
 
-use super::frf_npz::{read_frf, read_frf_noise};
+use super::frf_npz::read_frf;
 use super::frf_uff::{FrfUffError, read_frf_uff};
 use super::npz::NpzError;
 use crate::advice;
-use crate::substructuring::frf::FrfMatrix;
-use crate::substructuring::noise::FrfNoise;
+use crate::substructuring::frf::Frf;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
-
-/// What an FRF file holds.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FrfFile {
-    /// The FRFs.
-    pub frf: FrfMatrix,
-    /// Variance of the real part of each value, where the file tells it (npz, array `variance`).
-    pub noise: Option<FrfNoise>,
-    /// What was left out or is missing.
-    pub warnings: Vec<String>,
-}
 
 /// Why a file gives no FRFs.
 #[derive(Debug, thiserror::Error)]
@@ -53,16 +41,10 @@ pub fn is_npz(path: &Path) -> Result<bool, FrfFileError> {
     Ok(first.starts_with(b"PK\x03\x04") || first.starts_with(b"PK\x05\x06"))
 }
 
-/// Reads FRFs from an npz or a universal file.
+/// Reads FRFs from an npz or a universal file. The second value says what was left out or is missing.
 ///
 /// # Errors
 /// [`FrfFileError`] with the file and what is wrong in it.
-pub fn read_frf_file(path: &Path) -> Result<FrfFile, FrfFileError> {
-    if is_npz(path)? {
-        let frf = read_frf(path)?;
-        let noise = read_frf_noise(path, &frf)?;
-        return Ok(FrfFile { frf, noise, warnings: Vec::new() });
-    }
-    let (frf, warnings) = read_frf_uff(path)?;
-    Ok(FrfFile { frf, noise: None, warnings })
+pub fn read_frf_file(path: &Path) -> Result<(Frf, Vec<String>), FrfFileError> {
+    if is_npz(path)? { Ok((read_frf(path)?, Vec::new())) } else { Ok(read_frf_uff(path)?) }
 }

@@ -1,10 +1,10 @@
-//! FRF matrices in npz: `frequency` (line) Hz, `frf` (line, output, input), `quantity`, `outputs`, `inputs`, and optionally
-//! `sigma`, the damping of the exponential window in 1/s (absent means 0).
+//! FRFs in npz: `frequency` (line) Hz, `frf` (line, output, input), `quantity`, `outputs`, `inputs`, and optionally `sigma`, the
+//! damping of the exponential window in 1/s (absent means 0), `variance` of the real part of each value and `coherence`, both shaped like
+//! `frf`.
 
 use super::npz::{Array, NpzError, NpzFile};
 use super::npz_output::NpzOutput;
-use crate::substructuring::frf::{FrfMatrix, Quantity};
-use crate::substructuring::noise::FrfNoise;
+use crate::substructuring::frf::{Frf, Quantity};
 use nalgebra::DMatrix;
 use num_complex::Complex;
 use std::path::Path;
@@ -18,11 +18,12 @@ pub enum Extra {
     Complex(String, Array<Complex<f64>>),
 }
 
-/// Reads an FRF file. Values may be NaN; whoever uses a cell checks it.
+/// Reads an FRF file, with the variance where it has one. Values may be NaN; whoever uses a cell checks it. A coherence of another
+/// shape than the FRFs' is no ordinary one, and is passed over.
 ///
 /// # Errors
 /// [`NpzError`] naming the array that is missing or does not fit.
-pub fn read_frf(path: &Path) -> Result<FrfMatrix, NpzError> {
+pub fn read_frf(path: &Path) -> Result<Frf, NpzError> {
     let mut file = NpzFile::open(path)?;
     let frequency_hz = file.real("frequency", "the frequency of each line, Hz")?.values;
     let outputs = file.text("outputs", "the names of the outputs")?.values;
@@ -50,51 +51,61 @@ pub fn read_frf(path: &Path) -> Result<FrfMatrix, NpzError> {
     } else {
         frf.values.chunks(rows * columns).map(|line| DMatrix::from_row_slice(rows, columns, line)).collect()
     };
-    let matrix = FrfMatrix { frequency_hz, sigma_per_s, quantity, outputs, inputs, lines };
-    matrix.check().map_err(|e| file.content(e.to_string()))?;
-    Ok(matrix)
+    let mut whole = Frf::new(frequency_hz, sigma_per_s, quantity, outputs, inputs, lines)
+        .map_err(|e| file.content(e.to_string()))?;
+    if file.has("variance") {
+        let (lines, rows, columns) = shape(&whole);
+        let expected = format!("the variance of each value's real part, shape ({lines}, {rows}, {columns})");
+        let array = file.real("variance", &expected)?;
+        if !fits(&array, &whole) {
+            return Err(file.unexpected("variance", &format!("has shape {:?}", array.shape), &expected));
+        }
+        whole =
+            whole.with_variance(by_line(&array, rows, columns)).map_err(|e| file.content(e.to_string()))?;
+    }
+    if file.has("coherence")
+        && let Ok(array) = file.real("coherence", "the coherence of each value")
+        && fits(&array, &whole)
+    {
+        let coherence = by_line(&array, rows, columns);
+        whole = whole.with_coherence(coherence).map_err(|e| file.content(e.to_string()))?;
+    }
+    Ok(whole)
 }
 
-/// The array `variance` (line, output, input) of an FRF file, where it has one: of the real part of each value.
-///
-/// # Errors
-/// [`NpzError`] naming what does not fit.
-pub fn read_frf_noise(path: &Path, frf: &FrfMatrix) -> Result<Option<FrfNoise>, NpzError> {
-    let mut file = NpzFile::open(path)?;
-    if !file.has("variance") {
-        return Ok(None);
-    }
-    let (lines, rows, columns) = (frf.lines.len(), frf.outputs.len(), frf.inputs.len());
-    let expected = format!("the variance of each value's real part, shape ({lines}, {rows}, {columns})");
-    let array = file.real("variance", &expected)?;
-    // FRFs of a single impact have no axis of inputs
-    let fits = array.shape == [lines, rows, columns] || (columns == 1 && array.shape == [lines, rows]);
-    if !fits || rows * columns == 0 {
-        return Err(file.unexpected("variance", &format!("has shape {:?}", array.shape), &expected));
-    }
-    let variance = array
-        .values
-        .chunks(rows * columns)
-        .map(|line| DMatrix::from_row_slice(rows, columns, line))
-        .collect();
-    Ok(Some(FrfNoise { variance }))
+fn shape(frf: &Frf) -> (usize, usize, usize) {
+    (frf.lines().len(), frf.outputs().len(), frf.inputs().len())
 }
 
-/// Writes an FRF file, with further arrays beside it.
+/// Whether there is one number for each value; FRFs of a single impact have no axis of inputs.
+fn fits(array: &Array<f64>, frf: &Frf) -> bool {
+    let (lines, rows, columns) = shape(frf);
+    let alike = array.shape == [lines, rows, columns] || (columns == 1 && array.shape == [lines, rows]);
+    alike && rows * columns > 0
+}
+
+fn by_line(array: &Array<f64>, rows: usize, columns: usize) -> Vec<DMatrix<f64>> {
+    array.values.chunks(rows * columns).map(|line| DMatrix::from_row_slice(rows, columns, line)).collect()
+}
+
+/// Writes an FRF file with the coherence and variance that are known, and further arrays beside it.
 ///
 /// # Errors
-/// [`NpzError::Write`], or [`NpzError::Content`] when the matrix contradicts itself.
-pub fn write_frf(path: &Path, frf: &FrfMatrix, extras: &[Extra]) -> Result<(), NpzError> {
-    frf.check().map_err(|e| NpzError::Content { path: path.into(), reason: e.to_string() })?;
+/// [`NpzError::Write`].
+pub fn write_frf(path: &Path, frf: &Frf, extras: &[Extra]) -> Result<(), NpzError> {
     let mut out = NpzOutput::create(path)?;
-    out.real("frequency", &[frf.frequency_hz.len()], &frf.frequency_hz)?;
-    let values: Vec<Complex<f64>> =
-        frf.lines.iter().flat_map(|y| y.transpose().iter().copied().collect::<Vec<_>>()).collect();
-    out.complex("frf", &[frf.lines.len(), frf.outputs.len(), frf.inputs.len()], &values)?;
-    out.text("quantity", &[], &[frf.quantity.name().into()])?;
-    out.text("outputs", &[frf.outputs.len()], &frf.outputs)?;
-    out.text("inputs", &[frf.inputs.len()], &frf.inputs)?;
-    out.real("sigma", &[], &[frf.sigma_per_s])?;
+    out.real("frequency", &[frf.frequency_hz().len()], frf.frequency_hz())?;
+    let (lines, rows, columns) = shape(frf);
+    out.complex("frf", &[lines, rows, columns], &in_c_order(frf.lines()))?;
+    out.text("quantity", &[], &[frf.quantity().name().into()])?;
+    out.text("outputs", &[frf.outputs().len()], frf.outputs())?;
+    out.text("inputs", &[frf.inputs().len()], frf.inputs())?;
+    out.real("sigma", &[], &[frf.sigma_per_s()])?;
+    for (name, known) in [("coherence", frf.coherence()), ("variance", frf.variance())] {
+        if let Some(known) = known {
+            out.real(name, &[lines, rows, columns], &in_c_order(known))?;
+        }
+    }
     for extra in extras {
         match extra {
             Extra::Real(name, array) => out.real(name, &array.shape, &array.values)?,
@@ -102,6 +113,11 @@ pub fn write_frf(path: &Path, frf: &FrfMatrix, extras: &[Extra]) -> Result<(), N
         }
     }
     out.finish()
+}
+
+/// (line, output, input) in C order, which the transposes' columns are.
+fn in_c_order<T: nalgebra::Scalar>(lines: &[DMatrix<T>]) -> Vec<T> {
+    lines.iter().flat_map(|y| y.transpose().data.as_vec().clone()).collect()
 }
 
 #[cfg(test)]
@@ -112,16 +128,17 @@ mod tests {
     fn an_frf_file_comes_back_with_its_extras() {
         let dir = tempfile::tempdir().expect("a temporary folder");
         let path = dir.path().join("frf.npz");
-        let frf = FrfMatrix {
-            frequency_hz: vec![10.0, 20.0],
-            sigma_per_s: 2.3,
-            quantity: Quantity::Mobility,
-            outputs: vec!["A1:x".into(), "A1:y".into(), "A1:z".into()],
-            inputs: vec!["AZ1".into(), "AZ2".into()],
-            lines: (0..2)
+        let frf = Frf::new(
+            vec![10.0, 20.0],
+            2.3,
+            Quantity::Mobility,
+            vec!["A1:x".into(), "A1:y".into(), "A1:z".into()],
+            vec!["AZ1".into(), "AZ2".into()],
+            (0..2)
                 .map(|l| DMatrix::from_fn(3, 2, |r, c| Complex::new(l as f64, (10 * r + c) as f64)))
                 .collect(),
-        };
+        )
+        .expect("all agree");
         let coherence = Array { shape: vec![2, 3], values: vec![1.0; 6] };
         write_frf(&path, &frf, &[Extra::Real("coherence".into(), coherence)]).expect("written");
         assert_eq!(read_frf(&path).expect("read"), frf);

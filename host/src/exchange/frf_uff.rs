@@ -9,7 +9,7 @@ use super::uff::{
     Abscissa, Axis, Contents, DataSet, Dof, Encoding, Function, Values, WriteError, kind, quantity, read,
 };
 use crate::advice;
-use crate::substructuring::frf::{FrfMatrix, Quantity};
+use crate::substructuring::frf::{Frf, Quantity};
 use nalgebra::DMatrix;
 use num_complex::Complex;
 use std::path::{Path, PathBuf};
@@ -48,7 +48,7 @@ pub enum FrfUffError {
 ///
 /// # Errors
 /// [`FrfUffError`] when there is no FRF, or they differ in lines, quantity or damping.
-pub fn read_frf_uff(path: &Path) -> Result<(FrfMatrix, Vec<String>), FrfUffError> {
+pub fn read_frf_uff(path: &Path) -> Result<(Frf, Vec<String>), FrfUffError> {
     let bytes = std::fs::read(path).map_err(|source| FrfUffError::Open { path: path.into(), source })?;
     from_contents(&read(&bytes)).map_err(|reason| FrfUffError::Content { path: path.into(), reason })
 }
@@ -57,7 +57,7 @@ pub fn read_frf_uff(path: &Path) -> Result<(FrfMatrix, Vec<String>), FrfUffError
 ///
 /// # Errors
 /// The reason in words.
-pub fn from_contents(contents: &Contents) -> Result<(FrfMatrix, Vec<String>), String> {
+pub fn from_contents(contents: &Contents) -> Result<(Frf, Vec<String>), String> {
     let mut warnings: Vec<String> = contents.faults.iter().map(|f| format!("{f}; left out")).collect();
     let functions: Vec<(&Function, &[Complex<f64>])> = contents
         .functions()
@@ -122,15 +122,9 @@ pub fn from_contents(contents: &Contents) -> Result<(FrfMatrix, Vec<String>), St
         warnings
             .push(format!("{holes} of {} pairs of output and input are missing and hold NaN", filled.len()));
     }
-    let frf = FrfMatrix {
-        frequency_hz: (0..lines).map(|i| first.abscissa.at(i)).collect(),
-        sigma_per_s,
-        quantity,
-        outputs: rows,
-        inputs: columns,
-        lines: found,
-    };
-    frf.check().map_err(|e| e.to_string())?;
+    let frequency_hz = (0..lines).map(|i| first.abscissa.at(i)).collect();
+    let frf = Frf::new(frequency_hz, sigma_per_s, quantity, rows, columns, found);
+    let frf = frf.map_err(|e| e.to_string())?;
     Ok((frf, warnings))
 }
 
@@ -177,13 +171,8 @@ fn sigma(f: &Function) -> Result<f64, String> {
 ///
 /// # Errors
 /// The matrix contradicts itself, or a name is longer than the format's 10 characters (when written).
-pub fn to_functions(
-    frf: &FrfMatrix,
-    input_directions: &[i64],
-    encoding: Encoding,
-) -> Result<Vec<DataSet>, String> {
-    frf.check().map_err(|e| e.to_string())?;
-    let (ordinate, label, unit) = match frf.quantity {
+pub fn to_functions(frf: &Frf, input_directions: &[i64], encoding: Encoding) -> Result<Vec<DataSet>, String> {
+    let (ordinate, label, unit) = match frf.quantity() {
         Quantity::Receptance => (quantity::DISPLACEMENT, "Displacement", "m"),
         Quantity::Mobility => (quantity::VELOCITY, "Velocity", "m/s"),
         Quantity::Accelerance => (quantity::ACCELERATION, "Acceleration", "m/s^2"),
@@ -201,20 +190,20 @@ pub fn to_functions(
         Axis::default(),
     ];
     let damping =
-        if frf.sigma_per_s == 0.0 { String::new() } else { format!("sigma {} 1/s", frf.sigma_per_s) };
+        if frf.sigma_per_s() == 0.0 { String::new() } else { format!("sigma {} 1/s", frf.sigma_per_s()) };
     let mut sensors: Vec<&str> = Vec::new();
-    for (sensor, _) in frf.outputs.iter().map(|name| split(name)) {
+    for (sensor, _) in frf.outputs().iter().map(|name| split(name)) {
         if !sensors.contains(&sensor) {
             sensors.push(sensor);
         }
     }
-    let abscissa = Abscissa::of(&frf.frequency_hz);
-    let mut sets = Vec::with_capacity(frf.outputs.len() * frf.inputs.len());
-    for ((column, input), node) in frf.inputs.iter().enumerate().zip(101..) {
-        for (row, output) in frf.outputs.iter().enumerate() {
+    let abscissa = Abscissa::of(frf.frequency_hz());
+    let mut sets = Vec::with_capacity(frf.outputs().len() * frf.inputs().len());
+    for ((column, input), node) in frf.inputs().iter().enumerate().zip(101..) {
+        for (row, output) in frf.outputs().iter().enumerate() {
             let (sensor, direction) = split(output);
             let number = (1..).zip(&sensors).find(|(_, name)| **name == sensor).map_or(0, |(at, _)| at);
-            let values = Values::Complex(frf.lines.iter().map(|y| y[(row, column)]).collect());
+            let values = Values::Complex(frf.lines().iter().map(|y| y[(row, column)]).collect());
             let mut function = Function::new(kind::FRF, abscissa.clone(), values);
             function.id[0] = format!("{output} / {input}");
             function.id[3].clone_from(&damping);
@@ -250,17 +239,18 @@ mod tests {
     use super::super::uff::{ByteOrder, write};
     use super::*;
 
-    fn frf() -> FrfMatrix {
-        FrfMatrix {
-            frequency_hz: vec![300.0, 320.0, 340.0],
-            sigma_per_s: 2.3,
-            quantity: Quantity::Mobility,
-            outputs: vec!["A1:x".into(), "A1:z".into(), "A4".into()],
-            inputs: vec!["AZ1".into(), "AX1".into()],
-            lines: (0..3)
+    fn frf() -> Frf {
+        Frf::new(
+            vec![300.0, 320.0, 340.0],
+            2.3,
+            Quantity::Mobility,
+            vec!["A1:x".into(), "A1:z".into(), "A4".into()],
+            vec!["AZ1".into(), "AX1".into()],
+            (0..3)
                 .map(|l| DMatrix::from_fn(3, 2, |r, c| Complex::new(l as f64 + 0.25, (10 * r + c) as f64)))
                 .collect(),
-        }
+        )
+        .expect("all agree")
     }
 
     #[test]

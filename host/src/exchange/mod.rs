@@ -23,8 +23,8 @@ pub mod uff_output;
 
 pub use jointrig_uff as uff;
 
-pub use frf_file::{FrfFile, FrfFileError, read_frf_file};
-pub use frf_npz::{Extra, read_frf, read_frf_noise, write_frf};
+pub use frf_file::{FrfFileError, read_frf_file};
+pub use frf_npz::{Extra, read_frf, write_frf};
 pub use frf_uff::FrfUffError;
 pub use npz::NpzError;
 pub use positions::{PositionsError, read_positions};

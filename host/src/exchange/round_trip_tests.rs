@@ -6,13 +6,12 @@ use super::positions_output::write_positions;
 use super::record_uff::read_record_file;
 use super::uff::{ByteOrder, Encoding};
 use super::{
-    Extra, read_frf, read_frf_noise, read_hysteresis, read_impacts, read_positions, uff_output, write_frf,
-    write_hysteresis, write_impacts,
+    read_frf, read_hysteresis, read_impacts, read_positions, uff_output, write_frf, write_hysteresis,
+    write_impacts,
 };
-use crate::exchange::npz::Array;
 use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 use crate::spectra::{ImpactRecords, MotionQuantity};
-use crate::substructuring::frf::{FrfMatrix, Quantity};
+use crate::substructuring::frf::{Frf, Quantity};
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
 use nalgebra::DMatrix;
 use num_complex::Complex;
@@ -42,23 +41,26 @@ fn motion() -> impl Strategy<Value = MotionQuantity> {
 }
 
 /// FRFs of one to three sensors with three axes, and one to three impacts, on one to nine lines.
-fn frf(value: impl Strategy<Value = f64>) -> impl Strategy<Value = FrfMatrix> {
+fn frf(value: impl Strategy<Value = f64>) -> impl Strategy<Value = Frf> {
     let sizes = (1..4usize, 1..4usize, 1..10usize, 1..4000u32, 0..40u32, quantity());
     (sizes, vec(value, 2 * 9 * 3 * 9)).prop_map(
-        |((sensors, impacts, lines, step, sigma, quantity), values)| FrfMatrix {
-            frequency_hz: (0..lines).map(|l| l as f64 * f64::from(step) / 16.0).collect(),
-            sigma_per_s: f64::from(sigma) / 8.0,
-            quantity,
-            outputs: (0..sensors).flat_map(|s| ["x", "y", "z"].map(|a| format!("A{s}:{a}"))).collect(),
-            inputs: (0..impacts).map(|i| format!("AZ{i}")).collect(),
-            lines: (0..lines)
-                .map(|l| {
-                    DMatrix::from_fn(3 * sensors, impacts, |r, c| {
-                        let at = 2 * ((l * 9 + r) * 3 + c);
-                        Complex::new(values[at], values[at + 1])
+        |((sensors, impacts, lines, step, sigma, quantity), values)| {
+            Frf::new(
+                (0..lines).map(|l| l as f64 * f64::from(step) / 16.0).collect(),
+                f64::from(sigma) / 8.0,
+                quantity,
+                (0..sensors).flat_map(|s| ["x", "y", "z"].map(|a| format!("A{s}:{a}"))).collect(),
+                (0..impacts).map(|i| format!("AZ{i}")).collect(),
+                (0..lines)
+                    .map(|l| {
+                        DMatrix::from_fn(3 * sensors, impacts, |r, c| {
+                            let at = 2 * ((l * 9 + r) * 3 + c);
+                            Complex::new(values[at], values[at + 1])
+                        })
                     })
-                })
-                .collect(),
+                    .collect(),
+            )
+            .expect("all agree")
         },
     )
 }
@@ -127,13 +129,16 @@ proptest! {
     fn frfs_as_npz(y in frf(finite()), variances in vec(0.0..1e9f64, 9 * 9 * 3)) {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("y.npz");
-        let shape = vec![y.lines.len(), y.outputs.len(), y.inputs.len()];
-        let values = variances[..shape.iter().product()].to_vec();
-        write_frf(&path, &y, &[Extra::Real("variance".into(), Array { shape, values: values.clone() })]).expect("written");
-        prop_assert_eq!(&read_frf(&path).expect("read"), &y);
-        let noise = read_frf_noise(&path, &y).expect("read").expect("there");
-        let back: Vec<f64> = noise.variance.iter().flat_map(|v| v.transpose().iter().copied().collect::<Vec<_>>()).collect();
-        prop_assert_eq!(back, values);
+        let (rows, columns) = (y.outputs().len(), y.inputs().len());
+        let cell = |l: usize, r: usize, c: usize| variances[(l * rows + r) * columns + c];
+        let matrices = |scale: f64| -> Vec<DMatrix<f64>> {
+            (0..y.lines().len()).map(|l| DMatrix::from_fn(rows, columns, |r, c| scale * cell(l, r, c))).collect()
+        };
+        let whole = y.clone().with_variance(matrices(1.0)).and_then(|y| y.with_coherence(matrices(1e-9))).expect("alike");
+        for frf in [y.clone(), whole] {
+            write_frf(&path, &frf, &[]).expect("written");
+            prop_assert_eq!(&read_frf(&path).expect("read"), &frf);
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 use crate::spectra::ImpactRecords;
-use crate::substructuring::frf::FrfMatrix;
+use crate::substructuring::frf::Frf;
 use std::path::{Path, PathBuf};
 
 /// A table that cannot be written.
@@ -13,25 +13,24 @@ pub struct TableError {
     source: csv::Error,
 }
 
-/// `frequency_hz`, and for each pair `OUTPUT/INPUT re`, `… im`, `… coherence` (line, output, input). A missing value is empty.
+/// `frequency_hz`, and for each pair `OUTPUT/INPUT re`, `… im`, `… coherence`. A missing value is empty.
 ///
 /// # Errors
 /// [`TableError`].
-pub fn write_frf(path: &Path, frf: &FrfMatrix, coherence: &[f64]) -> Result<(), TableError> {
-    let pairs = || (0..frf.outputs.len()).flat_map(|o| (0..frf.inputs.len()).map(move |i| (o, i)));
+pub fn write_frf(path: &Path, frf: &Frf) -> Result<(), TableError> {
+    let pairs = || (0..frf.outputs().len()).flat_map(|o| (0..frf.inputs().len()).map(move |i| (o, i)));
     let text = |v: f64| if v.is_finite() { v.to_string() } else { String::new() };
     write(path, |out| {
         let heading = pairs().flat_map(|(o, i)| {
-            ["re", "im", "coherence"].map(|part| format!("{}/{} {part}", frf.outputs[o], frf.inputs[i]))
+            ["re", "im", "coherence"].map(|part| format!("{}/{} {part}", frf.outputs()[o], frf.inputs()[i]))
         });
         out.write_record(std::iter::once("frequency_hz".to_string()).chain(heading))?;
-        for (line, y) in frf.lines.iter().enumerate() {
+        for (line, y) in frf.lines().iter().enumerate() {
             let row = pairs().flat_map(|(o, i)| {
-                let at = (line * frf.outputs.len() + o) * frf.inputs.len() + i;
-                let coherence = coherence.get(at).copied().unwrap_or(f64::NAN);
+                let coherence = frf.coherence().map_or(f64::NAN, |all| all[line][(o, i)]);
                 [text(y[(o, i)].re), text(y[(o, i)].im), text(coherence)]
             });
-            out.write_record(std::iter::once(frf.frequency_hz[line].to_string()).chain(row))?;
+            out.write_record(std::iter::once(frf.frequency_hz()[line].to_string()).chain(row))?;
         }
         Ok(())
     })
@@ -109,15 +108,17 @@ mod tests {
         let dir = tempfile::tempdir().expect("a temporary folder");
         let path = dir.path().join("frf.csv");
         let value = Complex::new(0.1 + 0.2, -1e-12);
-        let frf = FrfMatrix {
-            frequency_hz: vec![10.5],
-            sigma_per_s: 0.0,
-            quantity: Quantity::Mobility,
-            outputs: vec!["A1:x".into(), "A1:y".into()],
-            inputs: vec!["AZ1".into()],
-            lines: vec![DMatrix::from_column_slice(2, 1, &[value, Complex::new(f64::NAN, 0.0)])],
-        };
-        write_frf(&path, &frf, &[0.75, f64::NAN]).expect("written");
+        let frf = Frf::new(
+            vec![10.5],
+            0.0,
+            Quantity::Mobility,
+            vec!["A1:x".into(), "A1:y".into()],
+            vec!["AZ1".into()],
+            vec![DMatrix::from_column_slice(2, 1, &[value, Complex::new(f64::NAN, 0.0)])],
+        )
+        .and_then(|frf| frf.with_coherence(vec![DMatrix::from_column_slice(2, 1, &[0.75, f64::NAN])]))
+        .expect("all agree");
+        write_frf(&path, &frf).expect("written");
         let mut table = csv::Reader::from_path(&path).expect("readable");
         assert_eq!(table.headers().expect("headings").get(1), Some("A1:x/AZ1 re"));
         let row = table.records().next().expect("a row").expect("readable");

@@ -6,26 +6,21 @@ use super::uff::{
 };
 use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 use crate::spectra::{ImpactRecords, MotionQuantity};
-use crate::substructuring::frf::FrfMatrix;
+use crate::substructuring::frf::Frf;
 use crate::substructuring::geometry::{Configuration, Point};
 use std::path::Path;
 
 /// Small, exact, and read by everybody.
 const ENCODING: Encoding = Encoding::Binary(ByteOrder::Little);
 
-/// Writes a configuration: its FRFs (those with values), their coherences (line, output, input) where there are some, and its points as nodes:
+/// Writes a configuration: its FRFs (those with values), their coherences where there are some, and its points as nodes:
 /// sensors from 1, impacts from 101.
 ///
 /// # Errors
 /// What does not fit the format, or the disk's.
-pub fn write_frf(
-    path: &Path,
-    frf: &FrfMatrix,
-    coherence: &[f64],
-    points: &Configuration,
-) -> Result<(), FrfUffError> {
+pub fn write_frf(path: &Path, frf: &Frf, points: &Configuration) -> Result<(), FrfUffError> {
     let directions: Vec<i64> = frf
-        .inputs
+        .inputs()
         .iter()
         .map(|name| points.impacts.iter().find(|p| p.name == *name).map_or(0, direction))
         .collect();
@@ -33,19 +28,17 @@ pub fn write_frf(
         .map_err(|reason| FrfUffError::Content { path: path.into(), reason })?;
     let mut sets = start();
     sets.push(DataSet::NodesDouble(nodes(points)));
-    let inputs = frf.inputs.len();
     for (pair, function) in functions.into_iter().enumerate() {
-        let (input, output) = (pair / frf.outputs.len(), pair % frf.outputs.len());
+        let (input, output) = (pair / frf.outputs().len(), pair % frf.outputs().len());
         let DataSet::Function(function) = function else { continue };
         let Values::Complex(values) = &function.values else { continue };
         // a pair that was not measured is left out: readers take a gap for what it is
         if values.iter().any(|v| !v.re.is_finite() || !v.im.is_finite()) {
             continue;
         }
-        let of_pair: Vec<f64> = (0..frf.lines.len())
-            .filter_map(|line| coherence.get((line * frf.outputs.len() + output) * inputs + input).copied())
-            .collect();
-        if of_pair.len() == frf.lines.len() && of_pair.iter().all(|v| v.is_finite()) {
+        let of_pair: Option<Vec<f64>> =
+            frf.coherence().map(|all| all.iter().map(|line| line[(output, input)]).collect());
+        if let Some(of_pair) = of_pair.filter(|all| all.iter().all(|v| v.is_finite())) {
             let coherence = Function {
                 kind: kind::COHERENCE,
                 values: Values::Real(of_pair),

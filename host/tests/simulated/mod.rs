@@ -4,8 +4,7 @@
 use jointrig::exchange::read_positions;
 use jointrig::substructuring::averaged::CellHits;
 use jointrig::substructuring::geometry::{Configuration as Points, Geometry};
-use jointrig::substructuring::noise::FrfNoise;
-use jointrig::substructuring::{FrfMatrix, Quantity};
+use jointrig::substructuring::{Frf, Quantity};
 use jointrig_hil_sim::rig::structure::Structure;
 use jointrig_hil_sim::rig::{Aim, Configuration, RigConfig};
 use nalgebra::{Complex, DMatrix, DVector};
@@ -28,8 +27,7 @@ const WIDTH_S: f64 = 0.41e-3;
 
 /// One configuration as measured.
 pub struct Measurement {
-    pub frf: FrfMatrix,
-    pub noise: FrfNoise,
+    pub frf: Frf,
     /// The hits of every sensor and impact, where they were kept.
     pub hits: Vec<CellHits>,
 }
@@ -199,15 +197,9 @@ fn simulate(
         }
         hits.extend(cell);
     }
-    let frf = FrfMatrix {
-        frequency_hz,
-        sigma_per_s: SIGMA,
-        quantity: Quantity::Mobility,
-        outputs: points.output_names(),
-        inputs: points.input_names(),
-        lines,
-    };
-    Measurement { frf, noise: FrfNoise { variance }, hits }
+    let (outputs, inputs) = (points.output_names(), points.input_names());
+    let frf = Frf::new(frequency_hz, SIGMA, Quantity::Mobility, outputs, inputs, lines);
+    Measurement { frf: frf.and_then(|frf| frf.with_variance(variance)).expect("all agree"), hits }
 }
 
 /// Magnitude of the hammer's spectrum, N s.

@@ -1,6 +1,6 @@
 //! The examples' data: FRFs as (frequency, output, input, real, imaginary part), one value in each row.
 
-use jointrig_analysis::substructuring::{FrfMatrix, Quantity};
+use jointrig_analysis::substructuring::{Frf, Quantity};
 use nalgebra::{Complex, DMatrix};
 use std::error::Error;
 use std::path::Path;
@@ -14,7 +14,7 @@ pub fn rows(file: &str) -> Result<Vec<Vec<String>>, Box<dyn Error>> {
 
 /// Mobilities under an exponential window of 2.3 1/s.
 #[allow(dead_code, reason = "not every example reads FRFs")]
-pub fn frf(file: &str) -> Result<FrfMatrix, Box<dyn Error>> {
+pub fn frf(file: &str) -> Result<Frf, Box<dyn Error>> {
     let rows = rows(file)?;
     let (mut frequency_hz, mut outputs, mut inputs) = (Vec::<f64>::new(), Vec::new(), Vec::new());
     for row in &rows {
@@ -33,7 +33,5 @@ pub fn frf(file: &str) -> Result<FrfMatrix, Box<dyn Error>> {
     let values = values.collect::<Result<Vec<Complex<f64>>, std::num::ParseFloatError>>()?;
     let lines = values.chunks(m * n).map(|line| DMatrix::from_row_slice(m, n, line)).collect();
     let quantity = Quantity::Mobility;
-    let frf = FrfMatrix { frequency_hz, sigma_per_s: 2.3, quantity, outputs, inputs, lines };
-    frf.check()?;
-    Ok(frf)
+    Ok(Frf::new(frequency_hz, 2.3, quantity, outputs, inputs, lines)?)
 }

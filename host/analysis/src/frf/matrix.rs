@@ -1,145 +1,175 @@
-//! FRF matrices: one complex matrix per frequency line, with the names of its rows and columns.
+//! FRFs: one complex matrix per frequency line, with the names of its rows and columns and what is known of its noise.
 
+use super::error::FrfError;
 use super::quantity::Quantity;
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, ComplexField, DMatrix, DMatrixViewMut};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
-/// Why an FRF matrix cannot be used.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum FrfError {
-    /// Axis, names and matrices disagree in number.
-    #[error(
-        "line {line}: the FRF matrix is {rows} × {columns}, but there are {outputs} output and {inputs} input names"
-    )]
-    Shape {
-        /// Index of the line.
-        line: usize,
-        /// Rows found.
-        rows: usize,
-        /// Columns found.
-        columns: usize,
-        /// Output names given.
-        outputs: usize,
-        /// Input names given.
-        inputs: usize,
-    },
-    /// There are not as many matrices as frequencies.
-    #[error("{frequencies} frequencies but {matrices} FRF matrices: one matrix per line is needed")]
-    LineCount {
-        /// Frequencies given.
-        frequencies: usize,
-        /// Matrices given.
-        matrices: usize,
-    },
-    /// The frequency axis is not finite, non-negative and rising.
-    #[error("the frequency axis must be finite, not negative and rising: line {line} is {frequency_hz} Hz")]
-    Axis {
-        /// First line that is wrong.
-        line: usize,
-        /// Its frequency, Hz.
-        frequency_hz: f64,
-    },
-    /// The damping of the exponential window is not a finite number.
-    #[error("the exponential window's damping is {0} 1/s: a finite number that is not negative is needed")]
-    Damping(f64),
-    /// One name stands twice among the outputs or the inputs.
-    #[error("the name `{name}` stands twice among the {side}: rename one of them")]
-    RepeatedName {
-        /// `outputs` or `inputs`.
-        side: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// A row or column was asked for that is not there.
-    #[error("there is no `{name}` among the {side} ({available}): check the geometry against the FRF file")]
-    MissingName {
-        /// `outputs` or `inputs`.
-        side: &'static str,
-        /// The name.
-        name: String,
-        /// The names that are there.
-        available: String,
-    },
-    /// A value is NaN or infinite.
-    #[error(
-        "the FRF from `{input}` to `{output}` is not a number at {frequency_hz} Hz: repeat that cell or cut the line out"
-    )]
-    NotFinite {
-        /// The row's name.
-        output: String,
-        /// The column's name.
-        input: String,
-        /// The line, Hz.
-        frequency_hz: f64,
-    },
-    /// A line at s = 0 cannot be divided by s.
-    #[error("line {line} is at s = 0: a {quantity} has no receptance there; cut the line out")]
-    DivisionByZero {
-        /// Index of the line.
-        line: usize,
-        /// What is stored.
-        quantity: Quantity,
-    },
-}
-
-/// FRFs of one configuration on the line s = σ + i2πf.
+/// FRFs of one configuration on the line s = σ + i2πf, with variance and coherence where they are known. SI units.
 ///
-/// `lines[l][(o, i)]` is the response at `outputs[o]`, along that channel's direction, per newton at
-/// `inputs[i]`, in that impact's direction, sign included. SI units.
+/// `lines()[l][(o, i)]` is the response at `outputs()[o]`, along that channel's direction, per newton at
+/// `inputs()[i]`, in that impact's direction, sign included. Shapes, axis and names always agree. A value that was not
+/// measured is NaN: see [`Frf::check_finite`].
 #[derive(Debug, Clone, PartialEq)]
-pub struct FrfMatrix {
-    /// Frequency of each line, Hz, rising.
-    pub frequency_hz: Vec<f64>,
-    /// Damping σ of the exponential window the records were weighted with, 1/s; 0 without a window.
-    pub sigma_per_s: f64,
-    /// What the values are.
-    pub quantity: Quantity,
-    /// Names of the rows.
-    pub outputs: Vec<String>,
-    /// Names of the columns.
-    pub inputs: Vec<String>,
-    /// One matrix (output × input) per line.
-    pub lines: Vec<DMatrix<Complex<f64>>>,
+pub struct Frf {
+    frequency_hz: Vec<f64>,
+    sigma_per_s: f64,
+    quantity: Quantity,
+    outputs: Vec<String>,
+    inputs: Vec<String>,
+    lines: Vec<DMatrix<Complex<f64>>>,
+    pub(super) variance: Option<Vec<DMatrix<f64>>>,
+    coherence: Option<Vec<DMatrix<f64>>>,
 }
 
-impl FrfMatrix {
-    /// Checks shapes, axis and names. Values may still be NaN: see [`FrfMatrix::check_finite`].
+impl Frf {
+    /// FRFs at `frequency_hz`, rising, under an exponential window of the damping `sigma_per_s` (0 without a window): one matrix
+    /// (output × input) per line, each output and input with a name of its own. Their noise is not known.
     ///
     /// # Errors
     /// The first disagreement found.
-    pub fn check(&self) -> Result<(), FrfError> {
-        if self.frequency_hz.len() != self.lines.len() {
-            return Err(FrfError::LineCount {
-                frequencies: self.frequency_hz.len(),
-                matrices: self.lines.len(),
-            });
+    pub fn new(
+        frequency_hz: Vec<f64>,
+        sigma_per_s: f64,
+        quantity: Quantity,
+        outputs: Vec<String>,
+        inputs: Vec<String>,
+        lines: Vec<DMatrix<Complex<f64>>>,
+    ) -> Result<Frf, FrfError> {
+        if frequency_hz.len() != lines.len() {
+            return Err(FrfError::LineCount { frequencies: frequency_hz.len(), matrices: lines.len() });
         }
         let mut last = -1.0;
-        for (line, &f) in self.frequency_hz.iter().enumerate() {
+        for (line, &f) in frequency_hz.iter().enumerate() {
             if !f.is_finite() || f < 0.0 || f <= last {
                 return Err(FrfError::Axis { line, frequency_hz: f });
             }
             last = f;
         }
-        if !self.sigma_per_s.is_finite() || self.sigma_per_s < 0.0 {
-            return Err(FrfError::Damping(self.sigma_per_s));
+        if !sigma_per_s.is_finite() || sigma_per_s < 0.0 {
+            return Err(FrfError::Damping(sigma_per_s));
         }
-        for (line, y) in self.lines.iter().enumerate() {
-            if y.shape() != (self.outputs.len(), self.inputs.len()) {
+        for (line, y) in lines.iter().enumerate() {
+            if y.shape() != (outputs.len(), inputs.len()) {
                 return Err(FrfError::Shape {
                     line,
                     rows: y.nrows(),
                     columns: y.ncols(),
-                    outputs: self.outputs.len(),
-                    inputs: self.inputs.len(),
+                    outputs: outputs.len(),
+                    inputs: inputs.len(),
                 });
             }
         }
-        places(&self.outputs, "outputs")?;
-        places(&self.inputs, "inputs")?;
-        Ok(())
+        places(&outputs, "outputs")?;
+        places(&inputs, "inputs")?;
+        Ok(Frf {
+            frequency_hz,
+            sigma_per_s,
+            quantity,
+            outputs,
+            inputs,
+            lines,
+            variance: None,
+            coherence: None,
+        })
+    }
+
+    /// The same with this variance (output × input per line) of the real part of each value, and of its imaginary part (the complex
+    /// variance is twice that), in the square of the FRF's own unit; NaN where it is not known (a single hit).
+    ///
+    /// Noise of different cells counts as independent: true for the sensors' floor, while the force cell's own noise, common to the
+    /// three axes of one hit, is far below it.
+    ///
+    /// # Errors
+    /// [`FrfError::Beside`].
+    pub fn with_variance(self, variance: Vec<DMatrix<f64>>) -> Result<Frf, FrfError> {
+        self.beside("variance", &variance)?;
+        Ok(Frf { variance: Some(variance), ..self })
+    }
+
+    /// The same with this coherence (output × input per line); NaN where it is not known (a single hit).
+    ///
+    /// # Errors
+    /// [`FrfError::Beside`].
+    pub fn with_coherence(self, coherence: Vec<DMatrix<f64>>) -> Result<Frf, FrfError> {
+        self.beside("coherence", &coherence)?;
+        Ok(Frf { coherence: Some(coherence), ..self })
+    }
+
+    /// The same with nothing known of its noise: neither variance nor coherence.
+    #[must_use]
+    pub fn without_noise(self) -> Frf {
+        Frf { variance: None, coherence: None, ..self }
+    }
+
+    /// Other values on the same axis, in the same quantity, under the same names; their noise is not known.
+    ///
+    /// # Errors
+    /// [`FrfError::LineCount`] or [`FrfError::Shape`].
+    pub fn with_values(&self, lines: Vec<DMatrix<Complex<f64>>>) -> Result<Frf, FrfError> {
+        let (outputs, inputs) = (self.outputs.clone(), self.inputs.clone());
+        Frf::new(self.frequency_hz.clone(), self.sigma_per_s, self.quantity, outputs, inputs, lines)
+    }
+
+    /// The same with every line's values changed by `change`, which is told the line's index.
+    #[must_use]
+    pub fn map_lines(mut self, mut change: impl FnMut(usize, DMatrixViewMut<'_, Complex<f64>>)) -> Frf {
+        for (line, y) in self.lines.iter_mut().enumerate() {
+            change(line, y.as_view_mut());
+        }
+        self
+    }
+
+    fn beside(&self, what: &'static str, found: &[DMatrix<f64>]) -> Result<(), FrfError> {
+        let (rows, columns) = (self.outputs.len(), self.inputs.len());
+        let bad = found.iter().find(|v| v.shape() != (rows, columns));
+        if found.len() == self.lines.len() && bad.is_none() {
+            return Ok(());
+        }
+        let (found_rows, found_columns) = bad.or(found.first()).map_or((0, 0), nalgebra::Matrix::shape);
+        let (found_lines, lines) = (found.len(), self.lines.len());
+        Err(FrfError::Beside { what, found_lines, found_rows, found_columns, lines, rows, columns })
+    }
+
+    /// Frequency of each line, Hz, rising.
+    pub fn frequency_hz(&self) -> &[f64] {
+        &self.frequency_hz
+    }
+
+    /// Damping σ of the exponential window the records were weighted with, 1/s; 0 without a window.
+    pub fn sigma_per_s(&self) -> f64 {
+        self.sigma_per_s
+    }
+
+    /// What the values are.
+    pub fn quantity(&self) -> Quantity {
+        self.quantity
+    }
+
+    /// Names of the rows.
+    pub fn outputs(&self) -> &[String] {
+        &self.outputs
+    }
+
+    /// Names of the columns.
+    pub fn inputs(&self) -> &[String] {
+        &self.inputs
+    }
+
+    /// One matrix (output × input) per line.
+    pub fn lines(&self) -> &[DMatrix<Complex<f64>>] {
+        &self.lines
+    }
+
+    /// Variance of the real part of each value, if it is known: see [`Frf::with_variance`].
+    pub fn variance(&self) -> Option<&[DMatrix<f64>]> {
+        self.variance.as_deref()
+    }
+
+    /// Coherence (output × input) per line, if it is known; NaN where a cell has a single hit.
+    pub fn coherence(&self) -> Option<&[DMatrix<f64>]> {
+        self.coherence.as_deref()
     }
 
     /// Refuses NaN and infinite values, naming the first.
@@ -169,12 +199,12 @@ impl FrfMatrix {
         Complex::new(self.sigma_per_s, TAU * self.frequency_hz[line])
     }
 
-    /// The same FRFs as receptances (m/N): divided by s once or twice. Under an exponential window it is
-    /// s that differentiation multiplies by, not iω; dividing by iω would shift the phase by atan(σ/ω).
+    /// The same FRFs as receptances (m/N): divided by s once or twice, the variance by |s|² or |s|⁴. Under an exponential window
+    /// it is s that differentiation multiplies by, not iω; dividing by iω would shift the phase by atan(σ/ω).
     ///
     /// # Errors
     /// [`FrfError::DivisionByZero`] for a mobility or accelerance at s = 0.
-    pub fn to_receptance(&self) -> Result<FrfMatrix, FrfError> {
+    pub fn to_receptance(&self) -> Result<Frf, FrfError> {
         let order = self.quantity.order_of_s();
         let mut lines = Vec::with_capacity(self.lines.len());
         for (line, y) in self.lines.iter().enumerate() {
@@ -184,47 +214,66 @@ impl FrfMatrix {
             }
             lines.push(y * s.powi(-order));
         }
-        Ok(FrfMatrix { quantity: Quantity::Receptance, lines, ..self.without_lines() })
+        let scaled = |(line, v): (usize, &DMatrix<f64>)| v * self.s(line).norm_sqr().powi(-order);
+        Ok(Frf {
+            frequency_hz: self.frequency_hz.clone(),
+            sigma_per_s: self.sigma_per_s,
+            quantity: Quantity::Receptance,
+            outputs: self.outputs.clone(),
+            inputs: self.inputs.clone(),
+            lines,
+            variance: self.variance.as_ref().map(|all| all.iter().enumerate().map(scaled).collect()),
+            coherence: self.coherence.clone(),
+        })
     }
 
     /// The rows and columns with these names, in this order.
     ///
     /// # Errors
     /// [`FrfError::MissingName`] or [`FrfError::RepeatedName`].
-    pub fn select(&self, outputs: &[String], inputs: &[String]) -> Result<FrfMatrix, FrfError> {
+    pub fn select(&self, outputs: &[String], inputs: &[String]) -> Result<Frf, FrfError> {
+        places(outputs, "outputs")?;
+        places(inputs, "inputs")?;
         let rows = find(&self.outputs, outputs, "outputs")?;
         let columns = find(&self.inputs, inputs, "inputs")?;
-        let lines = self.lines.iter().map(|y| block(y, &rows, &columns)).collect();
-        Ok(FrfMatrix { outputs: outputs.to_vec(), inputs: inputs.to_vec(), lines, ..self.without_lines() })
+        let noise = |all: &Vec<DMatrix<f64>>| all.iter().map(|v| block(v, &rows, &columns)).collect();
+        Ok(Frf {
+            frequency_hz: self.frequency_hz.clone(),
+            sigma_per_s: self.sigma_per_s,
+            quantity: self.quantity,
+            outputs: outputs.to_vec(),
+            inputs: inputs.to_vec(),
+            lines: self.lines.iter().map(|y| block(y, &rows, &columns)).collect(),
+            variance: self.variance.as_ref().map(noise),
+            coherence: self.coherence.as_ref().map(noise),
+        })
     }
 
     /// The lines with `low_hz` ≤ f ≤ `high_hz`, ends included.
     #[must_use]
-    pub fn band(&self, low_hz: f64, high_hz: f64) -> FrfMatrix {
-        let kept: Vec<usize> = (0..self.frequency_hz.len())
-            .filter(|&l| (low_hz..=high_hz).contains(&self.frequency_hz[l]))
-            .collect();
-        FrfMatrix {
-            frequency_hz: kept.iter().map(|&l| self.frequency_hz[l]).collect(),
-            lines: kept.iter().map(|&l| self.lines[l].clone()).collect(),
-            ..self.without_lines()
-        }
+    pub fn band(&self, low_hz: f64, high_hz: f64) -> Frf {
+        let inside = |l: &usize| (low_hz..=high_hz).contains(&self.frequency_hz[*l]);
+        self.at(&(0..self.lines.len()).filter(inside).collect::<Vec<_>>())
     }
 
-    fn without_lines(&self) -> FrfMatrix {
-        FrfMatrix {
-            frequency_hz: self.frequency_hz.clone(),
+    /// These lines, whose indices rise.
+    pub(crate) fn at(&self, lines: &[usize]) -> Frf {
+        let noise = |all: &Vec<DMatrix<f64>>| lines.iter().map(|&l| all[l].clone()).collect();
+        Frf {
+            frequency_hz: lines.iter().map(|&l| self.frequency_hz[l]).collect(),
             sigma_per_s: self.sigma_per_s,
             quantity: self.quantity,
             outputs: self.outputs.clone(),
             inputs: self.inputs.clone(),
-            lines: Vec::new(),
+            lines: lines.iter().map(|&l| self.lines[l].clone()).collect(),
+            variance: self.variance.as_ref().map(noise),
+            coherence: self.coherence.as_ref().map(noise),
         }
     }
 }
 
 /// The sub-matrix of the given rows and columns, in the given order.
-pub(crate) fn block(y: &DMatrix<Complex<f64>>, rows: &[usize], columns: &[usize]) -> DMatrix<Complex<f64>> {
+pub(crate) fn block<T: ComplexField + Copy>(y: &DMatrix<T>, rows: &[usize], columns: &[usize]) -> DMatrix<T> {
     let mut block = DMatrix::zeros(rows.len(), columns.len());
     for (to, &c) in block.as_mut_slice().chunks_exact_mut(rows.len().max(1)).zip(columns) {
         let from = &y.as_slice()[c * y.nrows()..][..y.nrows()];
@@ -261,19 +310,20 @@ fn find(names: &[String], wanted: &[String], side: &'static str) -> Result<Vec<u
 mod tests {
     use super::*;
 
-    fn small(quantity: Quantity) -> FrfMatrix {
+    fn small(quantity: Quantity) -> Frf {
         let frequency_hz = vec![100.0, 200.0, 300.0];
         let lines = (0..3)
             .map(|l| DMatrix::from_fn(2, 2, |r, c| Complex::new(l as f64 + r as f64, c as f64 - 0.5)))
             .collect();
-        FrfMatrix {
+        Frf::new(
             frequency_hz,
-            sigma_per_s: 2.3,
+            2.3,
             quantity,
-            outputs: vec!["a".into(), "b".into()],
-            inputs: vec!["f".into(), "g".into()],
+            vec!["a".into(), "b".into()],
+            vec!["f".into(), "g".into()],
             lines,
-        }
+        )
+        .expect("all agree")
     }
 
     #[test]
@@ -302,19 +352,24 @@ mod tests {
 
     #[test]
     fn a_nan_is_named_by_cell_and_line() {
-        let mut y = small(Quantity::Mobility);
-        y.lines[2][(0, 1)].im = f64::NAN;
+        let y = small(Quantity::Mobility).map_lines(|line, mut y| {
+            if line == 2 {
+                y[(0, 1)].im = f64::NAN;
+            }
+        });
         let text = y.check_finite().expect_err("a NaN").to_string();
         assert!(text.contains("`g`") && text.contains("`a`") && text.contains("300"));
     }
 
     #[test]
     fn repeated_names_and_falling_axes_are_refused() {
-        let mut y = small(Quantity::Mobility);
-        y.outputs[1] = "a".into();
-        assert!(matches!(y.check(), Err(FrfError::RepeatedName { .. })));
-        let mut y = small(Quantity::Mobility);
-        y.frequency_hz[1] = 100.0;
-        assert!(matches!(y.check(), Err(FrfError::Axis { line: 1, .. })));
+        let of = |frequency_hz: [f64; 3], outputs: [&str; 2]| {
+            let Frf { sigma_per_s, quantity, inputs, lines, .. } = small(Quantity::Mobility);
+            let outputs = outputs.map(String::from).to_vec();
+            Frf::new(frequency_hz.to_vec(), sigma_per_s, quantity, outputs, inputs, lines)
+        };
+        assert!(of([100.0, 200.0, 300.0], ["a", "b"]).is_ok());
+        assert!(matches!(of([100.0, 200.0, 300.0], ["a", "a"]), Err(FrfError::RepeatedName { .. })));
+        assert!(matches!(of([100.0, 100.0, 300.0], ["a", "b"]), Err(FrfError::Axis { line: 1, .. })));
     }
 }

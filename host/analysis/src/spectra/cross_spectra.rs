@@ -2,7 +2,7 @@
 
 use super::SpectraError;
 use super::estimators::{self, variance_of_part};
-use crate::frf::{FrfMatrix, MotionQuantity, Quantity};
+use crate::frf::{Frf, FrfError, MotionQuantity, Quantity};
 use nalgebra::DMatrix;
 use num_complex::Complex;
 use std::f64::consts::TAU;
@@ -230,17 +230,25 @@ impl CrossSpectra {
         CrossSpectra { order: self.order + order, ..self.band(lowest, f64::INFINITY) }
     }
 
-    /// H1 as an FRF matrix with one input.
-    pub fn to_matrix(&self, quantity: Quantity, outputs: Vec<String>, input: String) -> FrfMatrix {
+    /// H1 as FRFs with one input.
+    ///
+    /// # Errors
+    /// Not one name of its own for each output.
+    pub fn to_matrix(
+        &self,
+        quantity: Quantity,
+        outputs: Vec<String>,
+        input: String,
+    ) -> Result<Frf, FrfError> {
         let line = |line| DMatrix::from_fn(self.outputs(), 1, |output, _| self.h1(line, output));
-        FrfMatrix {
-            frequency_hz: self.frequency_hz.clone(),
-            sigma_per_s: self.sigma_per_s,
+        Frf::new(
+            self.frequency_hz.clone(),
+            self.sigma_per_s,
             quantity,
             outputs,
-            inputs: vec![input],
-            lines: (0..self.lines()).map(line).collect(),
-        }
+            vec![input],
+            (0..self.lines()).map(line).collect(),
+        )
     }
 
     /// Sums of products of transforms over this are means of Fourier integrals' products.

@@ -4,7 +4,7 @@ use super::coupling::{boolean_difference, couple};
 use super::joint::stiffness_and_damping;
 use super::pseudo_inverse::full_rank_inverse;
 use crate::band::Band;
-use crate::frf::FrfMatrix;
+use crate::frf::Frf;
 use crate::parallel::prelude::*;
 use nalgebra::{Complex, DMatrix};
 
@@ -23,7 +23,7 @@ impl BackCoupling {
     /// Couples Y^A and Y^B (n_c × n_c) by Eq. (1) with one spring and damper for all lines, K + sC: the mean of `z` over `band`.
     /// Admittances are of the quantity of `axis`. None when no line lies in the band, or the mean joint has no inverse.
     pub fn of(
-        axis: &FrfMatrix,
+        axis: &Frf,
         y_a: &[Line],
         y_b: &[Line],
         y_ajb: &[Line],
@@ -32,7 +32,7 @@ impl BackCoupling {
     ) -> Option<BackCoupling> {
         let n = y_a.first()?.nrows();
         let inside: Vec<usize> =
-            (0..axis.frequency_hz.len()).filter(|&l| band.contains(axis.frequency_hz[l])).collect();
+            (0..axis.frequency_hz().len()).filter(|&l| band.contains(axis.frequency_hz()[l])).collect();
         let mut stiffness = DMatrix::<f64>::zeros(n, n);
         let mut damping = DMatrix::<f64>::zeros(n, n);
         for &l in &inside {
@@ -44,12 +44,12 @@ impl BackCoupling {
             }
         }
         let b = boolean_difference(n);
-        let difference = (0..axis.frequency_hz.len())
+        let difference = (0..axis.frequency_hz().len())
             .into_par_iter()
             .map(|l| {
                 let s = axis.s(l);
                 let joint = DMatrix::from_fn(n, n, |r, c| s * damping[(r, c)] + stiffness[(r, c)]);
-                let to_quantity = s.powi(axis.quantity.order_of_s());
+                let to_quantity = s.powi(axis.quantity().order_of_s());
                 let joint = full_rank_inverse(&joint, "the mean joint").ok()? * to_quantity;
                 let mut y = Line::zeros(2 * n, 2 * n);
                 y.view_mut((0, 0), (n, n)).copy_from(&y_a[l]);
@@ -58,7 +58,7 @@ impl BackCoupling {
                 Some((coupled - &y_ajb[l]) / Complex::from(y_ajb[l].norm()))
             })
             .collect::<Option<_>>()?;
-        (!inside.is_empty()).then(|| BackCoupling { frequency_hz: axis.frequency_hz.clone(), difference })
+        (!inside.is_empty()).then(|| BackCoupling { frequency_hz: axis.frequency_hz().to_vec(), difference })
     }
 
     /// ‖coupled − measured‖ / ‖measured‖ line by line.
@@ -73,16 +73,17 @@ mod tests {
     use crate::frf::Quantity;
 
     /// Two single masses on springs, joined by 1e6 N/m below 200 Hz and by half of it above.
-    fn measured() -> (FrfMatrix, [Vec<Line>; 4]) {
+    fn measured() -> (Frf, [Vec<Line>; 4]) {
         let frequency_hz: Vec<f64> = (20..400).map(f64::from).collect();
-        let axis = FrfMatrix {
-            frequency_hz: frequency_hz.clone(),
-            sigma_per_s: 2.0,
-            quantity: Quantity::Receptance,
-            outputs: vec![],
-            inputs: vec![],
-            lines: vec![],
-        };
+        let axis = Frf::new(
+            frequency_hz.clone(),
+            2.0,
+            Quantity::Receptance,
+            vec![],
+            vec![],
+            vec![Line::zeros(0, 0); frequency_hz.len()],
+        )
+        .expect("all agree");
         let one = |z: Complex<f64>| Line::from_element(1, 1, z.inv());
         let mut all: [Vec<Line>; 4] = Default::default();
         for (l, &f) in frequency_hz.iter().enumerate() {

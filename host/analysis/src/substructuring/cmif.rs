@@ -6,7 +6,7 @@
 use super::geometry::{Geometry, Grouping};
 use super::idm::{Dof, IdmSet, rigid_row};
 use super::vpt::ROTATION_LENGTH_M;
-use crate::frf::{FrfError, FrfMatrix, block};
+use crate::frf::{Frf, FrfError, block};
 use crate::parallel::prelude::*;
 use nalgebra::{Complex, DMatrix, DVector, Vector3};
 use serde::Serialize;
@@ -46,11 +46,11 @@ const VECTORS: usize = 12;
 ///
 /// # Errors
 /// A value that is not a number, a name that stands twice, or lines that differ in number.
-pub fn cmif(a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix, geometry: &Geometry) -> Result<Cmif, FrfError> {
+pub fn cmif(a: &Frf, b: &Frf, ajb: &Frf, geometry: &Geometry) -> Result<Cmif, FrfError> {
     let difference = difference(a, b, ajb)?;
-    let rigid = rigid_motions(&difference.outputs, geometry);
+    let rigid = rigid_motions(difference.outputs(), geometry);
     let lines: Vec<OneLine> = difference
-        .lines
+        .lines()
         .par_iter()
         .map(|line| {
             let svd = line.clone().svd(true, false);
@@ -104,7 +104,7 @@ pub fn cmif(a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix, geometry: &Geometry) 
     );
     let (singular_values, participation) = lines.into_iter().map(|(v, p, _)| (v, p)).unzip();
     Ok(Cmif {
-        frequency_hz: difference.frequency_hz,
+        frequency_hz: difference.frequency_hz().to_vec(),
         singular_values,
         participation,
         explained,
@@ -114,11 +114,15 @@ pub fn cmif(a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix, geometry: &Geometry) 
 }
 
 /// Y^AJB − blkdiag(Y^A, Y^B) in receptance, in the assembly's order.
-fn difference(a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix) -> Result<FrfMatrix, FrfError> {
-    let (a, b, mut whole) = (a.to_receptance()?, b.to_receptance()?, ajb.to_receptance()?);
+fn difference(a: &Frf, b: &Frf, ajb: &Frf) -> Result<Frf, FrfError> {
+    let (a, b, whole) = (a.to_receptance()?, b.to_receptance()?, ajb.to_receptance()?);
+    let mut lines = whole.lines().to_vec();
     for part in [&a, &b] {
-        if part.lines.len() != whole.lines.len() {
-            return Err(FrfError::LineCount { frequencies: part.lines.len(), matrices: whole.lines.len() });
+        if part.lines().len() != whole.lines().len() {
+            return Err(FrfError::LineCount {
+                frequencies: part.lines().len(),
+                matrices: whole.lines().len(),
+            });
         }
         let place = |names: &[String], all: &[String]| -> Vec<(usize, usize)> {
             names
@@ -127,8 +131,8 @@ fn difference(a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix) -> Result<FrfMatrix
                 .filter_map(|(i, name)| Some((i, all.iter().position(|n| n == name)?)))
                 .collect()
         };
-        let (rows, columns) = (place(&part.outputs, &whole.outputs), place(&part.inputs, &whole.inputs));
-        for (line, own) in whole.lines.iter_mut().zip(&part.lines) {
+        let (rows, columns) = (place(part.outputs(), whole.outputs()), place(part.inputs(), whole.inputs()));
+        for (line, own) in lines.iter_mut().zip(part.lines()) {
             for &(r, row) in &rows {
                 for &(c, column) in &columns {
                     line[(row, column)] -= own[(r, c)];
@@ -136,8 +140,9 @@ fn difference(a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix) -> Result<FrfMatrix
             }
         }
     }
-    whole.check_finite()?;
-    Ok(whole)
+    let difference = whole.with_values(lines)?;
+    difference.check_finite()?;
+    Ok(difference)
 }
 
 /// Rigid motions of both virtual points at the assembly's channels: one column per point and motion.

@@ -1,7 +1,7 @@
 //! What tests start from: exact FRFs of two rigid bodies on suspensions, alone and joined by a known contact.
 
 use super::geometry::{Configuration, Geometry, Grouping, Point};
-use crate::frf::{FrfMatrix, Quantity};
+use crate::frf::{Frf, Quantity};
 use nalgebra::{Complex, DMatrix, Vector3};
 use std::f64::consts::TAU;
 
@@ -13,7 +13,7 @@ const AXES: [(&str, [f64; 3]); 3] = [("x", [1.0, 0.0, 0.0]), ("y", [0.0, 1.0, 0.
 pub(super) const CONTACT: [f64; 6] = [180e6, 260e6, 180e6, 22.0, 10.0, 22.0];
 
 /// FRFs of A, B and AJB from 250 to 650 Hz, and the geometry of three sensors and nine impacts on each body.
-pub(super) fn rig() -> ([FrfMatrix; 3], Geometry) {
+pub(super) fn rig() -> ([Frf; 3], Geometry) {
     let (a, b) = (side("A", Grouping::InterfaceA, 1.0), side("B", Grouping::InterfaceB, -1.0));
     let ajb = Configuration {
         channels: [a.channels.clone(), b.channels.clone()].concat(),
@@ -51,7 +51,7 @@ fn row(point: &Point, bodies: &std::ops::Range<usize>) -> Vec<Complex<f64>> {
 }
 
 /// Mobilities of the bodies that these degrees of freedom belong to; both are joined by the contact.
-fn frf(points: &Configuration, bodies: std::ops::Range<usize>) -> FrfMatrix {
+fn frf(points: &Configuration, bodies: std::ops::Range<usize>) -> Frf {
     let matrix = |points: &[Point]| {
         let rows: Vec<_> = points.iter().flat_map(|p| row(p, &bodies)).collect();
         Line::from_row_slice(points.len(), bodies.len(), &rows)
@@ -76,12 +76,7 @@ fn frf(points: &Configuration, bodies: std::ops::Range<usize>) -> FrfMatrix {
         let y = y.view((bodies.start, bodies.start), (bodies.len(), bodies.len()));
         &seen * y * hit.transpose() * s
     };
-    FrfMatrix {
-        sigma_per_s: SIGMA_PER_S,
-        quantity: Quantity::Mobility,
-        outputs: points.output_names(),
-        inputs: points.input_names(),
-        lines: frequency_hz.iter().map(line).collect(),
-        frequency_hz,
-    }
+    let lines = frequency_hz.iter().map(line).collect();
+    let (outputs, inputs) = (points.output_names(), points.input_names());
+    Frf::new(frequency_hz, SIGMA_PER_S, Quantity::Mobility, outputs, inputs, lines).expect("all agree")
 }

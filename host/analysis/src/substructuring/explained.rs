@@ -11,8 +11,7 @@ use super::identify::back_coupled;
 use super::idm::IdmSet;
 use super::joint::median;
 use crate::band::Band;
-use crate::frf::FrfMatrix;
-use crate::frf::noise::{FrfNoise, SMOOTH_HZ};
+use crate::frf::Frf;
 use crate::parallel::prelude::*;
 use nalgebra::{Complex, Unit, UnitQuaternion, Vector3};
 use rand::SeedableRng;
@@ -50,16 +49,14 @@ impl Explained {
     /// Couples A and B by the mean of Eq. (A.1) over `band`, at the nominal geometry and at drawn ones. Noise that is not known is not
     /// drawn. None where the virtual points cannot be formed or no line lies in the band.
     pub fn of(
-        frfs: [&FrfMatrix; 3],
-        noises: [Option<&FrfNoise>; 3],
+        frfs: [&Frf; 3],
         geometry: &Geometry,
         idms: IdmSet,
         band: Band,
         priors: &Priors,
     ) -> Option<Explained> {
-        let parts: Vec<Part> =
-            frfs.into_iter().zip(noises).map(|(frf, noise)| Part::of(frf, noise)).collect();
-        let nominal = back_coupled([&parts[0].frf, &parts[1].frf, &parts[2].frf], geometry, idms, band)?;
+        let [a, b, ajb] = frfs.map(thinned);
+        let nominal = back_coupled([&a, &b, &ajb], geometry, idms, band)?;
         // per draw and line: the square of what the difference changes by
         let changes: Vec<Vec<f64>> = (0..DRAWS)
             .into_par_iter()
@@ -67,8 +64,8 @@ impl Explained {
                 let mut stream = Xoshiro256PlusPlus::seed_from_u64(SEED + draw);
                 let geometry =
                     Wrong { priors, common: HashMap::new(), stream: &mut stream }.geometry(geometry);
-                let noisy: Vec<FrfMatrix> = parts.iter().map(|p| p.drawn(&mut stream)).collect();
-                let drawn = back_coupled([&noisy[0], &noisy[1], &noisy[2]], &geometry, idms, band)?;
+                let [a, b, ajb] = [&a, &b, &ajb].map(|frf| drawn(frf, &mut stream));
+                let drawn = back_coupled([&a, &b, &ajb], &geometry, idms, band)?;
                 let lines = drawn.difference.iter().zip(&nominal.difference);
                 Some(lines.map(|(d, n)| (d - n).norm_squared()).collect())
             })
@@ -123,42 +120,30 @@ fn medians_around(frequency_hz: &[f64], values: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// A configuration's FRFs at some of their lines, with their noise.
-struct Part {
-    frf: FrfMatrix,
-    noise: Option<FrfNoise>,
+/// A configuration's FRFs at some of their lines, with their smooth noise.
+fn thinned(frf: &Frf) -> Frf {
+    let step = frf.lines().len().div_ceil(LINES).max(1);
+    let lines: Vec<usize> = (0..frf.lines().len()).step_by(step).collect();
+    let thin = frf.at(&lines);
+    if frf.variance().is_none() {
+        return thin;
+    }
+    let smooth = frf.smooth_variance();
+    let kept = lines.iter().map(|&l| smooth[l].clone()).collect();
+    thin.with_variance(kept).expect("smoothing keeps the shape")
 }
 
-impl Part {
-    fn of(frf: &FrfMatrix, noise: Option<&FrfNoise>) -> Part {
-        let step = frf.lines.len().div_ceil(LINES).max(1);
-        let lines: Vec<usize> = (0..frf.lines.len()).step_by(step).collect();
-        let smooth = noise.map(|n| n.smoothed(&frf.frequency_hz, SMOOTH_HZ));
-        Part {
-            frf: FrfMatrix {
-                frequency_hz: lines.iter().map(|&l| frf.frequency_hz[l]).collect(),
-                lines: lines.iter().map(|&l| frf.lines[l].clone()).collect(),
-                ..frf.clone()
-            },
-            noise: smooth
-                .map(|n| FrfNoise { variance: lines.iter().map(|&l| n.variance[l].clone()).collect() }),
-        }
-    }
-
-    /// The FRFs with noise drawn once more.
-    fn drawn(&self, stream: &mut Xoshiro256PlusPlus) -> FrfMatrix {
-        let mut frf = self.frf.clone();
-        let Some(noise) = &self.noise else { return frf };
-        for (y, variance) in frf.lines.iter_mut().zip(&noise.variance) {
-            for (y, v) in y.iter_mut().zip(variance.iter()) {
-                let part = Complex::new(normal(stream), normal(stream));
-                if v.is_finite() {
-                    *y += part * v.max(0.0).sqrt();
-                }
+/// The FRFs with noise drawn once more.
+fn drawn(frf: &Frf, stream: &mut Xoshiro256PlusPlus) -> Frf {
+    let Some(variance) = frf.variance() else { return frf.clone() };
+    frf.clone().map_lines(|line, mut y| {
+        for (y, v) in y.iter_mut().zip(variance[line].iter()) {
+            let part = Complex::new(normal(stream), normal(stream));
+            if v.is_finite() {
+                *y += part * v.max(0.0).sqrt();
             }
         }
-        frf
-    }
+    })
 }
 
 fn normal(stream: &mut Xoshiro256PlusPlus) -> f64 {

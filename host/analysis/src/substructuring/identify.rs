@@ -11,8 +11,7 @@ pub use super::quality::{Internals, VirtualPointQuality};
 use super::reduced::{Reduced, Solution};
 use super::rooms::Rooms;
 use crate::band::Band;
-use crate::frf::noise::{FrfNoise, NoiseError, SMOOTH_HZ};
-use crate::frf::{FrfError, FrfMatrix, Quantity};
+use crate::frf::{Frf, Quantity};
 use crate::parallel::prelude::*;
 use crate::structure::{Abc, Structure};
 use nalgebra::{Complex, DMatrix};
@@ -23,14 +22,6 @@ use std::borrow::Cow;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IdentifyError {
-    /// One of the files is wrong in itself.
-    #[error("{file}: {source}")]
-    Frf {
-        /// Which file.
-        file: Structure,
-        /// Why.
-        source: FrfError,
-    },
     /// The files are not on the same lines.
     #[error(
         "{file} is on other frequency lines than A ({detail}): decoupling needs the same lines in all three; process the records alike"
@@ -64,14 +55,6 @@ pub enum IdentifyError {
         found: f64,
         /// A's σ, 1/s.
         expected: f64,
-    },
-    /// A variance belongs to other FRFs.
-    #[error("{file}: {source}")]
-    Noise {
-        /// Which file.
-        file: Structure,
-        /// What does not fit.
-        source: NoiseError,
     },
     /// A band has no line.
     #[error(
@@ -130,9 +113,9 @@ pub struct Identification {
 /// [`IdentifyError`] when the files do not fit together. A method that cannot work on them is listed in
 /// [`Identification::refused`] instead, so that the others still answer.
 pub fn identify(
-    a: &FrfMatrix,
-    b: &FrfMatrix,
-    ajb: &FrfMatrix,
+    a: &Frf,
+    b: &Frf,
+    ajb: &Frf,
     geometry: &Geometry,
     methods: &[Method],
     idms: &[IdmSet],
@@ -144,13 +127,13 @@ pub fn identify(
     check_alike(a, b, ajb)?;
     let files = [a, b, ajb].map(above_zero);
     for band in bands {
-        if !files[0].frequency_hz.iter().any(|&f| band.contains(f)) {
+        if !files[0].frequency_hz().iter().any(|&f| band.contains(f)) {
             return Err(IdentifyError::EmptyBand {
                 low_hz: band.low_hz,
                 high_hz: band.high_hz,
-                from_hz: files[0].frequency_hz.first().copied().unwrap_or(f64::NAN),
-                to_hz: files[0].frequency_hz.last().copied().unwrap_or(f64::NAN),
-                lines: files[0].lines.len(),
+                from_hz: files[0].frequency_hz().first().copied().unwrap_or(f64::NAN),
+                to_hz: files[0].frequency_hz().last().copied().unwrap_or(f64::NAN),
+                lines: files[0].lines().len(),
             });
         }
     }
@@ -178,7 +161,8 @@ pub fn identify(
         let results: Vec<(JointSpectrum, Vec<JointRow>)> = solved
             .par_iter()
             .map(|(method, Solution { z, notes, .. })| {
-                let spectrum = JointSpectrum::of(method.name(), set, &axis.frequency_hz, axis.sigma_per_s, z);
+                let spectrum =
+                    JointSpectrum::of(method.name(), set, axis.frequency_hz(), axis.sigma_per_s(), z);
                 let mut rows: Vec<JointRow> = bands.iter().filter_map(|&band| spectrum.over(band)).collect();
                 for row in &mut rows {
                     row.warnings.splice(0..0, notes.iter().cloned());
@@ -204,9 +188,9 @@ pub type Decoupled = Result<Vec<DMatrix<Complex<f64>>>, Refused>;
 /// # Errors
 /// [`IdentifyError`] when the files do not fit together; [`Refused`] of a method that cannot work on them.
 pub fn decouple(
-    a: &FrfMatrix,
-    b: &FrfMatrix,
-    ajb: &FrfMatrix,
+    a: &Frf,
+    b: &Frf,
+    ajb: &Frf,
     geometry: &Geometry,
     methods: &[Method],
     idms: IdmSet,
@@ -228,22 +212,14 @@ pub type Propagated = Result<LineNoise, Refused>;
 /// # Errors
 /// [`IdentifyError`] when files or variances do not fit together; [`Refused`] of a method that cannot work on them.
 pub fn line_noise(
-    [a, b, ajb]: [&FrfMatrix; 3],
-    noises: [&FrfNoise; 3],
+    [a, b, ajb]: [&Frf; 3],
     geometry: &Geometry,
     methods: &[Method],
     idms: IdmSet,
 ) -> Result<Vec<(Method, Propagated)>, IdentifyError> {
     check_alike(a, b, ajb)?;
-    for ((file, frf), noise) in (Abc { a, b, ajb }).each().into_iter().zip(noises) {
-        noise.check(frf).map_err(|source| IdentifyError::Noise { file, source })?;
-    }
     let files = [a, b, ajb].map(above_zero);
-    let [a, b, ajb] = [0, 1, 2].map(|i| {
-        let lines = &files[i].frequency_hz;
-        let skipped = noises[i].variance.len() - lines.len();
-        FrfNoise { variance: noises[i].variance[skipped..].to_vec() }.smoothed(lines, SMOOTH_HZ)
-    });
+    let [a, b, ajb] = files.each_ref().map(|frf| frf.smooth_variance());
     let rooms = rooms(&files, geometry);
     let reduced = Reduced::of(&rooms, idms);
     let noise = |method| {
@@ -257,7 +233,7 @@ pub fn line_noise(
 /// A and B coupled by the mean over `band` of what Eq. (A.1) gives, against the measured assembly. None where the files do not fit
 /// together, a virtual point cannot be formed, or no line lies in the band.
 pub fn back_coupled(
-    [a, b, ajb]: [&FrfMatrix; 3],
+    [a, b, ajb]: [&Frf; 3],
     geometry: &Geometry,
     idms: IdmSet,
     band: Band,
@@ -270,7 +246,7 @@ pub fn back_coupled(
     reduced.back_coupling(&rooms, &z, band)
 }
 
-fn rooms<'a>(files: &'a [Cow<'_, FrfMatrix>; 3], geometry: &'a Geometry) -> Rooms<'a> {
+fn rooms<'a>(files: &'a [Cow<'_, Frf>; 3], geometry: &'a Geometry) -> Rooms<'a> {
     let [a, b, ajb] = files;
     Rooms {
         a: Measured { file: Structure::A, frf: a, points: &geometry.a },
@@ -294,29 +270,29 @@ fn solve(
 }
 
 /// The file without a line at 0 Hz, where no receptance can be told from a mobility.
-fn above_zero(file: &FrfMatrix) -> Cow<'_, FrfMatrix> {
-    if file.frequency_hz.first().is_some_and(|f| *f > 0.0) {
+fn above_zero(file: &Frf) -> Cow<'_, Frf> {
+    if file.frequency_hz().first().is_some_and(|f| *f > 0.0) {
         Cow::Borrowed(file)
     } else {
         Cow::Owned(file.band(f64::MIN_POSITIVE, f64::MAX))
     }
 }
 
-fn check_alike(a: &FrfMatrix, b: &FrfMatrix, ajb: &FrfMatrix) -> Result<(), IdentifyError> {
+fn check_alike(a: &Frf, b: &Frf, ajb: &Frf) -> Result<(), IdentifyError> {
     for (file, y) in (Abc { a, b, ajb }).each() {
-        y.check().map_err(|source| IdentifyError::Frf { file, source })?;
-        if y.quantity != a.quantity {
-            return Err(IdentifyError::Quantities { file, found: y.quantity, expected: a.quantity });
+        if y.quantity() != a.quantity() {
+            return Err(IdentifyError::Quantities { file, found: y.quantity(), expected: a.quantity() });
         }
-        if (y.sigma_per_s - a.sigma_per_s).abs() > 1e-9 * a.sigma_per_s {
-            return Err(IdentifyError::Damping { file, found: y.sigma_per_s, expected: a.sigma_per_s });
+        if (y.sigma_per_s() - a.sigma_per_s()).abs() > 1e-9 * a.sigma_per_s() {
+            return Err(IdentifyError::Damping { file, found: y.sigma_per_s(), expected: a.sigma_per_s() });
         }
-        if y.frequency_hz.len() != a.frequency_hz.len() {
-            let detail = format!("{} lines against {}", y.frequency_hz.len(), a.frequency_hz.len());
+        if y.frequency_hz().len() != a.frequency_hz().len() {
+            let detail = format!("{} lines against {}", y.frequency_hz().len(), a.frequency_hz().len());
             return Err(IdentifyError::Axes { file, detail });
         }
         // A text format may have rounded the axis to seven digits.
-        let differs = y.frequency_hz.iter().zip(&a.frequency_hz).find(|(f, g)| (*f - *g).abs() > 1e-6 * *g);
+        let differs =
+            y.frequency_hz().iter().zip(a.frequency_hz()).find(|(f, g)| (*f - *g).abs() > 1e-6 * *g);
         if let Some((f, g)) = differs {
             return Err(IdentifyError::Axes { file, detail: format!("{f} Hz against {g} Hz") });
         }

@@ -4,7 +4,7 @@ use super::geometry::{Configuration, Geometry, Grouping, Point};
 use super::idm::IdmSet;
 use super::product::product_of_block;
 use super::vpt::{self, ROTATION_LENGTH_M, Transformation, VptError};
-use crate::frf::{FrfError, FrfMatrix, block};
+use crate::frf::{Frf, FrfError, block};
 use crate::structure::Structure;
 use nalgebra::{Complex, DMatrix, Vector3};
 
@@ -91,17 +91,17 @@ pub(crate) struct VirtualPoint {
 #[derive(Clone, Copy)]
 pub(crate) struct Measured<'a> {
     pub(crate) file: Structure,
-    pub(crate) frf: &'a FrfMatrix,
+    pub(crate) frf: &'a Frf,
     pub(crate) points: &'a Configuration,
 }
 
 impl Measured<'_> {
     pub(crate) fn outputs(&self, groupings: &[Grouping]) -> Found {
-        found(&self.points.channels, &self.points.output_names(), groupings, &self.frf.outputs)
+        found(&self.points.channels, &self.points.output_names(), groupings, self.frf.outputs())
     }
 
     pub(crate) fn inputs(&self, groupings: &[Grouping]) -> Found {
-        found(&self.points.impacts, &self.points.input_names(), groupings, &self.frf.inputs)
+        found(&self.points.impacts, &self.points.input_names(), groupings, self.frf.inputs())
     }
 
     pub(crate) fn virtual_point(
@@ -129,11 +129,11 @@ impl Measured<'_> {
                 "responses",
                 &self.points.channels,
                 self.points.output_names(),
-                &self.frf.outputs,
+                self.frf.outputs(),
             ));
         }
         if columns.at.is_empty() {
-            return Err(lost("impacts", &self.points.impacts, self.points.input_names(), &self.frf.inputs));
+            return Err(lost("impacts", &self.points.impacts, self.points.input_names(), self.frf.inputs()));
         }
         let responses = vpt::responses(&rows.points, origin, idms, None).map_err(fail)?;
         let impacts = vpt::impacts(&columns.points, origin, idms, None).map_err(fail)?;
@@ -142,12 +142,12 @@ impl Measured<'_> {
 
     /// The named block of every line, refusing values that are not numbers.
     pub(crate) fn block(&self, rows: &Found, columns: &Found) -> Result<Vec<Line>, InterfaceError> {
-        (0..self.frf.lines.len()).map(|l| self.cells(l, rows, columns)).collect()
+        (0..self.frf.lines().len()).map(|l| self.cells(l, rows, columns)).collect()
     }
 
     /// The named block of one line, refusing values that are not numbers.
     pub(crate) fn cells(&self, line: usize, rows: &Found, columns: &Found) -> Result<Line, InterfaceError> {
-        let y = block(&self.frf.lines[line], &rows.at, &columns.at);
+        let y = block(&self.frf.lines()[line], &rows.at, &columns.at);
         if finite(&y) { Ok(y) } else { Err(self.not_finite(line, rows, columns)) }
     }
 
@@ -159,20 +159,20 @@ impl Measured<'_> {
         rows: &Found,
         columns: &Found,
     ) -> Result<Line, InterfaceError> {
-        let reduced = product_of_block(t, &self.frf.lines[line], &rows.at, &columns.at);
+        let reduced = product_of_block(t, &self.frf.lines()[line], &rows.at, &columns.at);
         // every value is in some sum, and even 0 times what is not a number is none
         if finite(&reduced) { Ok(reduced) } else { Err(self.not_finite(line, rows, columns)) }
     }
 
     /// The refusal of the first cell of the block that is not a number.
     fn not_finite(&self, line: usize, rows: &Found, columns: &Found) -> InterfaceError {
-        let y = block(&self.frf.lines[line], &rows.at, &columns.at);
+        let y = block(&self.frf.lines()[line], &rows.at, &columns.at);
         // storage is by columns
         let bad = y.iter().position(|v| !v.is_finite()).unwrap_or_default();
         let source = FrfError::NotFinite {
             output: rows.names[bad % y.nrows()].clone(),
             input: columns.names[bad / y.nrows()].clone(),
-            frequency_hz: self.frf.frequency_hz[line],
+            frequency_hz: self.frf.frequency_hz()[line],
         };
         InterfaceError::Frf { file: self.file, source }
     }

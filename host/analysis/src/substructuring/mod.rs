@@ -48,7 +48,7 @@ pub mod virtual_points;
 pub mod vpt;
 
 pub use crate::band::Band;
-pub use crate::frf::{self, FrfError, FrfMatrix, Quantity, noise};
+pub use crate::frf::{self, Frf, FrfError, Quantity, noise};
 pub use crate::structure::{Abc, Structure};
 pub use geometry::{Configuration, Geometry, Grouping, Point};
 pub use identify::{Decoupled, Identification, IdentifyError, Refused, decouple, identify, line_noise};

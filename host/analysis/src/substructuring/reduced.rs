@@ -94,8 +94,8 @@ impl Reduced {
     pub(super) fn of(rooms: &Rooms<'_>, idms: IdmSet) -> Result<Reduced, InterfaceError> {
         let a = Balanced::of(rooms.a, Grouping::InterfaceA, rooms.geometry, idms)?;
         let b = Balanced::of(rooms.b, Grouping::InterfaceB, rooms.geometry, idms)?;
-        let y_a = every_line(rooms.a.frf.lines.len(), |l| a.admittance(rooms.a, l, &a))?;
-        let y_b = every_line(rooms.b.frf.lines.len(), |l| b.admittance(rooms.b, l, &b))?;
+        let y_a = every_line(rooms.a.frf.lines().len(), |l| a.admittance(rooms.a, l, &a))?;
+        let y_b = every_line(rooms.b.frf.lines().len(), |l| b.admittance(rooms.b, l, &b))?;
         let (assembly, impedance) = (OnceLock::new(), OnceLock::new());
         Ok(Reduced { idms, a, b, y_a, y_b, assembly, impedance })
     }
@@ -105,7 +105,7 @@ impl Reduced {
             .into_par_iter()
             .filter_map(|(substructure, file, vp, y)| {
                 // what times a driving-point admittance is a mobility
-                let order = file.frf.quantity.order_of_s();
+                let order = file.frf.quantity().order_of_s();
                 let s: Vec<Complex<f64>> = (0..y.len()).map(|l| file.frf.s(l).powi(1 - order)).collect();
                 let lines = every_line(y.len(), |l| file.cells(l, &vp.rows, &vp.columns)).ok()?;
                 Some(VirtualPointQuality {
@@ -116,7 +116,7 @@ impl Reduced {
                     condition_impacts: vp.impacts.condition,
                     channels: vp.rows.names.clone(),
                     impacts: vp.columns.names.clone(),
-                    frequency_hz: file.frf.frequency_hz.clone(),
+                    frequency_hz: file.frf.frequency_hz().to_vec(),
                     consistency: consistency(&lines, &vp.responses, &vp.impacts),
                     passivity: passivity(y, &s),
                     reciprocity: reciprocity(y),
@@ -169,7 +169,7 @@ impl Reduced {
         let found = self.assembly.get_or_init(|| {
             let n = self.idms.count();
             let vp = self.assembled(rooms)?;
-            every_line(rooms.ajb.frf.lines.len(), |l| {
+            every_line(rooms.ajb.frf.lines().len(), |l| {
                 let mut line = Line::zeros(2 * n, 2 * n);
                 for (r, out) in vp.iter().enumerate() {
                     for (c, input) in vp.iter().enumerate() {
@@ -189,7 +189,7 @@ impl Reduced {
         let found = self.impedance.get_or_init(|| {
             every_line(y.len(), |l| {
                 full_rank_inverse(&y[l], ASSEMBLY).map_err(|lost| RefusedReason::Decoupling {
-                    frequency_hz: rooms.ajb.frf.frequency_hz[l],
+                    frequency_hz: rooms.ajb.frf.frequency_hz()[l],
                     source: lost.into(),
                 })
             })
@@ -228,7 +228,7 @@ impl Reduced {
                 idms: n_c,
                 impacts: n_a,
                 responses: n_b,
-                frequency_hz: rooms.ajb.frf.frequency_hz[middle],
+                frequency_hz: rooms.ajb.frf.frequency_hz()[middle],
                 rank_p: rank(&p),
                 rank_q: rank(&q),
                 condition_p: condition(&p),
@@ -251,7 +251,7 @@ impl Reduced {
     }
 
     pub(super) fn refused(rooms: &Rooms<'_>, line: usize, source: DecouplingError) -> RefusedReason {
-        RefusedReason::Decoupling { frequency_hz: rooms.a.frf.frequency_hz[line], source }
+        RefusedReason::Decoupling { frequency_hz: rooms.a.frf.frequency_hz()[line], source }
     }
 
     /// Solves every line and takes the rotations' scale and the files' quantity out again: Z = D Z' D sᵏ.
@@ -261,7 +261,7 @@ impl Reduced {
         solve: impl Fn(usize) -> Result<Line, RefusedReason> + Sync,
     ) -> Result<Vec<Line>, RefusedReason> {
         let d = balance(self.idms);
-        let order = rooms.a.frf.quantity.order_of_s();
+        let order = rooms.a.frf.quantity().order_of_s();
         every_line(self.y_a.len(), |l| Ok(scaled(solve(l)?, &d, rooms.a.frf.s(l).powi(order))))
     }
 }

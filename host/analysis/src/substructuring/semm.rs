@@ -12,7 +12,7 @@
 //! `semm_type == "fully-extend" or "extended"` is always true. Here it truncates.
 
 use super::pseudo_inverse::{RankLost, full_rank_inverse};
-use crate::frf::{FrfError, FrfMatrix, block};
+use crate::frf::{Frf, FrfError, block};
 use crate::parallel::prelude::*;
 use nalgebra::{Complex, DMatrix};
 
@@ -118,16 +118,14 @@ pub fn mix(
 ///
 /// # Errors
 /// [`SemmError`].
-pub fn semm(parent: &FrfMatrix, overlay: &FrfMatrix, form: Form) -> Result<FrfMatrix, SemmError> {
-    parent.check()?;
-    overlay.check()?;
-    if parent.frequency_hz != overlay.frequency_hz {
+pub fn semm(parent: &Frf, overlay: &Frf, form: Form) -> Result<Frf, SemmError> {
+    if parent.frequency_hz() != overlay.frequency_hz() {
         return Err(SemmError::Unlike("lines"));
     }
-    if parent.quantity != overlay.quantity {
+    if parent.quantity() != overlay.quantity() {
         return Err(SemmError::Unlike("quantity"));
     }
-    if parent.sigma_per_s != overlay.sigma_per_s {
+    if parent.sigma_per_s() != overlay.sigma_per_s() {
         return Err(SemmError::Unlike("window"));
     }
     let places = |names: &[String], wanted: &[String], side| {
@@ -142,15 +140,15 @@ pub fn semm(parent: &FrfMatrix, overlay: &FrfMatrix, form: Form) -> Result<FrfMa
             })
             .collect::<Result<Vec<usize>, FrfError>>()
     };
-    let outputs = places(&parent.outputs, &overlay.outputs, "parent's outputs")?;
-    let inputs = places(&parent.inputs, &overlay.inputs, "parent's inputs")?;
+    let outputs = places(parent.outputs(), overlay.outputs(), "parent's outputs")?;
+    let inputs = places(parent.inputs(), overlay.inputs(), "parent's inputs")?;
     let lines = parent
-        .lines
+        .lines()
         .par_iter()
-        .zip(&overlay.lines)
+        .zip(overlay.lines())
         .map(|(y, measured)| mix(y, measured, &outputs, &inputs, form))
         .collect::<Result<_, _>>()?;
-    Ok(FrfMatrix { lines, ..parent.clone() })
+    Ok(parent.with_values(lines)?)
 }
 
 /// The pseudo-inverse with the `dropped` smallest singular values left out; without any it must have full rank.
@@ -221,16 +219,9 @@ mod tests {
         }
     }
 
-    fn file(names: &[&str], y: Line) -> FrfMatrix {
+    fn file(names: &[&str], y: Line) -> Frf {
         let names: Vec<String> = names.iter().map(|n| (*n).to_string()).collect();
-        FrfMatrix {
-            frequency_hz: vec![100.0],
-            sigma_per_s: 0.0,
-            quantity: Quantity::Mobility,
-            outputs: names.clone(),
-            inputs: names,
-            lines: vec![y],
-        }
+        Frf::new(vec![100.0], 0.0, Quantity::Mobility, names.clone(), names, vec![y]).expect("all agree")
     }
 
     #[test]
@@ -239,15 +230,15 @@ mod tests {
         let parent = file(&["p", "q", "r", "s"], matrix(4, &v, 4.0));
         let overlay = file(&["r", "p"], matrix(2, &v, 2.0));
         let hybrid = semm(&parent, &overlay, Form::Basic).expect("regular");
-        assert!((hybrid.lines[0][(2, 0)] - overlay.lines[0][(0, 1)]).norm() < 1e-12);
-        let refused = |parent: &FrfMatrix, overlay: &FrfMatrix| {
+        assert!((hybrid.lines()[0][(2, 0)] - overlay.lines()[0][(0, 1)]).norm() < 1e-12);
+        let refused = |parent: &Frf, overlay: &Frf| {
             semm(parent, overlay, FULLY_EXTENDED).expect_err("refused").to_string()
         };
-        let mut wrong = overlay.clone();
-        wrong.outputs[0] = "t".into();
+        let wrong = file(&["t", "p"], overlay.lines()[0].clone());
         assert!(refused(&parent, &wrong).contains("`t`"));
-        let mut wrong = overlay.clone();
-        wrong.frequency_hz[0] = 90.0;
+        let (outputs, inputs) = (overlay.outputs().to_vec(), overlay.inputs().to_vec());
+        let lines = overlay.lines().to_vec();
+        let wrong = Frf::new(vec![90.0], 0.0, Quantity::Mobility, outputs, inputs, lines).expect("all agree");
         assert!(refused(&parent, &wrong).contains("lines"));
         let flat = file(&["p", "q", "r", "s"], Line::from_element(4, 4, Complex::from(1.0)));
         assert!(refused(&flat, &overlay).contains("rank 1"));

@@ -3,7 +3,7 @@
 use super::geometry::{Configuration, Grouping, Point};
 use super::idm::IdmSet;
 use super::vpt::{self, Transformation, VptError, reduce_inputs, reduce_outputs};
-use crate::frf::{FrfError, FrfMatrix};
+use crate::frf::{Frf, FrfError};
 use crate::parallel::prelude::*;
 use nalgebra::{DMatrix, Vector3};
 
@@ -116,27 +116,26 @@ struct Side {
 /// # Errors
 /// [`VirtualPointsError`].
 pub fn transform(
-    frf: &FrfMatrix,
+    frf: &Frf,
     geometry: &Configuration,
     virtual_points: &[VirtualPoint],
     weights: &Weights,
-) -> Result<FrfMatrix, VirtualPointsError> {
-    frf.check()?;
+) -> Result<Frf, VirtualPointsError> {
     let fits = |side, given: &[Vec<f64>], names: usize| {
         let wrong = given.iter().find(|row| row.len() != names);
-        if wrong.is_none() && [0, 1, frf.lines.len()].contains(&given.len()) {
+        if wrong.is_none() && [0, 1, frf.lines().len()].contains(&given.len()) {
             return Ok(());
         }
         let columns = wrong.or(given.first()).map_or(0, Vec::len);
-        Err(VirtualPointsError::Weights { side, rows: given.len(), columns, lines: frf.lines.len(), names })
+        Err(VirtualPointsError::Weights { side, rows: given.len(), columns, lines: frf.lines().len(), names })
     };
-    fits("outputs", &weights.outputs, frf.outputs.len())?;
-    fits("inputs", &weights.inputs, frf.inputs.len())?;
+    fits("outputs", &weights.outputs, frf.outputs().len())?;
+    fits("inputs", &weights.inputs, frf.inputs().len())?;
     let outputs = |row: Option<&Vec<f64>>| outputs_side(frf, geometry, virtual_points, row);
     let inputs = |row: Option<&Vec<f64>>| inputs_side(frf, geometry, virtual_points, row);
     let (first_u, first_f) = (outputs(weights.outputs.first())?, inputs(weights.inputs.first())?);
     let lines = frf
-        .lines
+        .lines()
         .par_iter()
         .enumerate()
         .map(|(l, y)| {
@@ -151,18 +150,12 @@ pub fn transform(
             })
         })
         .collect::<Result<_, VirtualPointsError>>()?;
-    Ok(FrfMatrix {
-        frequency_hz: frf.frequency_hz.clone(),
-        sigma_per_s: frf.sigma_per_s,
-        quantity: frf.quantity,
-        outputs: first_u.names,
-        inputs: first_f.names,
-        lines,
-    })
+    let (frequency_hz, sigma_per_s) = (frf.frequency_hz().to_vec(), frf.sigma_per_s());
+    Ok(Frf::new(frequency_hz, sigma_per_s, frf.quantity(), first_u.names, first_f.names, lines)?)
 }
 
 fn outputs_side(
-    frf: &FrfMatrix,
+    frf: &Frf,
     geometry: &Configuration,
     virtual_points: &[VirtualPoint],
     weights: Option<&Vec<f64>>,
@@ -170,11 +163,11 @@ fn outputs_side(
     let known = (geometry.channels.as_slice(), geometry.output_names());
     let chosen: Vec<(&VirtualPoint, &[String])> =
         virtual_points.iter().map(|vp| (vp, vp.outputs.as_slice())).collect();
-    side("output", &frf.outputs, &known, &chosen, weights, vpt::responses)
+    side("output", frf.outputs(), &known, &chosen, weights, vpt::responses)
 }
 
 fn inputs_side(
-    frf: &FrfMatrix,
+    frf: &Frf,
     geometry: &Configuration,
     virtual_points: &[VirtualPoint],
     weights: Option<&Vec<f64>>,
@@ -186,7 +179,7 @@ fn inputs_side(
         let found = vpt::impacts(points, origin, idms, weights)?;
         Ok(Transformation { t: found.t.transpose(), ..found })
     };
-    let side = side("input", &frf.inputs, &known, &chosen, weights, transposed)?;
+    let side = side("input", frf.inputs(), &known, &chosen, weights, transposed)?;
     Ok(Side { t: side.t.transpose(), ..side })
 }
 
@@ -312,30 +305,31 @@ mod tests {
         let truth = DMatrix::from_fn(dofs.len(), dofs.len(), |i, j| {
             Complex::new(((3 * i + 5 * j) % 7) as f64, ((i + 2 * j) % 5) as f64)
         });
-        let frf = FrfMatrix {
-            frequency_hz: vec![100.0, 101.0],
-            sigma_per_s: 0.0,
-            quantity: Quantity::Mobility,
-            outputs: names.clone(),
-            inputs: names.clone(),
-            lines: vec![&r * &truth * r.transpose(); 2],
-        };
+        let frf = Frf::new(
+            vec![100.0, 101.0],
+            0.0,
+            Quantity::Mobility,
+            names.clone(),
+            names.clone(),
+            vec![&r * &truth * r.transpose(); 2],
+        )
+        .expect("all agree");
         let uneven =
             |line: usize| (0..names.len()).map(|i| 0.5 + ((i * 3 + line) % 4) as f64).collect::<Vec<f64>>();
         let weights = Weights { outputs: vec![uneven(0), uneven(1)], inputs: vec![uneven(2)] };
         for weights in [Weights::default(), weights] {
             let found = transform(&frf, &geometry, &plans, &weights).expect("enough points");
-            assert_eq!(found.outputs[..2], ["one:x".to_owned(), "one:y".to_owned()]);
-            assert_eq!(found.inputs[dofs.len() - 1], "three:ry");
-            for line in &found.lines {
+            assert_eq!(found.outputs()[..2], ["one:x".to_owned(), "one:y".to_owned()]);
+            assert_eq!(found.inputs()[dofs.len() - 1], "three:ry");
+            for line in found.lines() {
                 // bending of unit size moves a corner by 5e-4: that many digits are lost on either side
                 assert!((line - &truth).norm() < 1e-8 * truth.norm(), "{}", (line - &truth).norm());
             }
         }
         // two points: the third's channels pass through
         let two = transform(&frf, &geometry, &plans[..2], &Weights::default()).expect("enough points");
-        assert_eq!((two.outputs.len(), two.inputs.len()), (6 + 9 + 12, 6 + 9 + 12));
-        assert_eq!(two.lines[0][(20, 20)], frf.lines[0][(29, 29)]);
+        assert_eq!((two.outputs().len(), two.inputs().len()), (6 + 9 + 12, 6 + 9 + 12));
+        assert_eq!(two.lines()[0][(20, 20)], frf.lines()[0][(29, 29)]);
     }
 
     #[test]
@@ -343,14 +337,15 @@ mod tests {
         let origins = [[0.0; 3]];
         let geometry = around(&origins);
         let names = geometry.output_names();
-        let frf = FrfMatrix {
-            frequency_hz: vec![100.0],
-            sigma_per_s: 0.0,
-            quantity: Quantity::Mobility,
-            outputs: names.clone(),
-            inputs: names.clone(),
-            lines: vec![DMatrix::zeros(names.len(), names.len())],
-        };
+        let frf = Frf::new(
+            vec![100.0],
+            0.0,
+            Quantity::Mobility,
+            names.clone(),
+            names.clone(),
+            vec![DMatrix::zeros(names.len(), names.len())],
+        )
+        .expect("all agree");
         let one = plan("one", 0, &origins, IdmSet::Six);
         let refused = |points: &[VirtualPoint], weights: &Weights| {
             transform(&frf, &geometry, points, weights).expect_err("refused").to_string()

@@ -13,10 +13,9 @@ use super::error::StoreError;
 use super::notes::utc_now;
 use super::table::{Row, table};
 use crate::campaign::plan::configuration_name;
-use crate::substructuring::frf::{FrfMatrix, Quantity};
-use crate::substructuring::noise::FrfNoise;
+use crate::substructuring::frf::{Frf, Quantity};
 
-/// FRFs from elsewhere, with the noise where their file told it.
+/// FRFs from elsewhere, with the variance where their file told it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportedFrf {
     /// The file that they came from, without its folder.
@@ -24,9 +23,7 @@ pub struct ImportedFrf {
     /// When they were imported, RFC 3339.
     pub utc: String,
     /// The FRFs.
-    pub frf: FrfMatrix,
-    /// Variance of the real part of each value.
-    pub noise: Option<FrfNoise>,
+    pub frf: Frf,
 }
 
 /// Which FRFs there are.
@@ -106,18 +103,20 @@ impl FrfColumns {
                 Complex::new(values[at], values[at + 1])
             })
         };
-        let noise = self.variance.as_deref().map(numbers).map(|variance| FrfNoise {
-            variance: lines
-                .clone()
-                .map(|line| DMatrix::from_fn(rows, columns, |r, c| variance[place(line, r, c)]))
-                .collect(),
+        let variance = self.variance.as_deref().map(numbers).map(|variance| {
+            let of_line = |line| DMatrix::from_fn(rows, columns, |r, c| variance[place(line, r, c)]);
+            lines.clone().map(of_line).collect()
         });
         let quantity = Quantity::from_name(&self.quantity)
             .ok_or_else(|| format!("`{}` is no kind of FRF", self.quantity))?;
         let lines = lines.map(matrix).collect();
-        let frf = FrfMatrix { frequency_hz, sigma_per_s: self.sigma_per_s, quantity, outputs, inputs, lines };
-        frf.check().map_err(|e| e.to_string())?;
-        Ok(ImportedFrf { source: self.source, utc: self.utc, frf, noise })
+        let frf = Frf::new(frequency_hz, self.sigma_per_s, quantity, outputs, inputs, lines);
+        let whole = frf.and_then(|frf| match variance {
+            Some(variance) => frf.with_variance(variance),
+            None => Ok(frf),
+        });
+        let frf = whole.map_err(|e| e.to_string())?;
+        Ok(ImportedFrf { source: self.source, utc: self.utc, frf })
     }
 }
 
@@ -125,34 +124,29 @@ impl Store {
     /// Stores FRFs of a configuration; they count instead of earlier ones.
     ///
     /// # Errors
-    /// They contradict themselves, or the file cannot be written.
+    /// The file cannot be written.
     pub fn insert_frf(
         &self,
         configuration: Configuration,
         source: &str,
-        frf: &FrfMatrix,
-        noise: Option<&FrfNoise>,
+        frf: &Frf,
     ) -> Result<(), StoreError> {
-        frf.check().map_err(|e| self.content(e.to_string()))?;
-        if let Some(noise) = noise {
-            noise.check(frf).map_err(|e| self.content(e.to_string()))?;
-        }
         // rows of C order, which nalgebra's columns of the transpose are
-        let values = frf.lines.iter().flat_map(|y| y.transpose().iter().copied().collect::<Vec<_>>());
-        let variances = |noise: &FrfNoise| {
-            bytes(noise.variance.iter().flat_map(|v| v.transpose().iter().copied().collect::<Vec<_>>()))
+        let values = frf.lines().iter().flat_map(|y| y.transpose().iter().copied().collect::<Vec<_>>());
+        let variances = |all: &[DMatrix<f64>]| {
+            bytes(all.iter().flat_map(|v| v.transpose().iter().copied().collect::<Vec<_>>()))
         };
         let row = FrfColumns {
             configuration: configuration_name(configuration).into(),
             utc: utc_now(),
             source: source.into(),
-            quantity: frf.quantity.name().into(),
-            sigma_per_s: frf.sigma_per_s,
-            outputs: serde_json::json!(frf.outputs).to_string(),
-            inputs: serde_json::json!(frf.inputs).to_string(),
-            frequency: bytes(frf.frequency_hz.iter().copied()),
+            quantity: frf.quantity().name().into(),
+            sigma_per_s: frf.sigma_per_s(),
+            outputs: serde_json::json!(frf.outputs()).to_string(),
+            inputs: serde_json::json!(frf.inputs()).to_string(),
+            frequency: bytes(frf.frequency_hz().iter().copied()),
             frf: bytes(values.flat_map(|v| [v.re, v.im])),
-            variance: noise.map(variances),
+            variance: frf.variance().map(variances),
         };
         let crc = row.crc();
         row.insert(&self.connection, &[("crc32", &crc)]).map_err(self.failed("storing FRFs"))

@@ -2,21 +2,23 @@ use super::*;
 use crate::campaign::plan::SMALL;
 use proptest::prelude::*;
 
-fn matrix(lines: usize, seed: f64) -> FrfMatrix {
-    FrfMatrix {
-        frequency_hz: (0..lines).map(|l| 10.0 + 0.5 * l as f64).collect(),
-        sigma_per_s: 2.3,
-        quantity: Quantity::Mobility,
-        outputs: ["A1:x", "A1:y", "A1:z"].map(String::from).to_vec(),
-        inputs: ["AZ1", "AY1"].map(String::from).to_vec(),
-        lines: (0..lines)
+fn matrix(lines: usize, seed: f64) -> Frf {
+    Frf::new(
+        (0..lines).map(|l| 10.0 + 0.5 * l as f64).collect(),
+        2.3,
+        Quantity::Mobility,
+        ["A1:x", "A1:y", "A1:z"].map(String::from).to_vec(),
+        ["AZ1", "AY1"].map(String::from).to_vec(),
+        (0..lines)
             .map(|l| DMatrix::from_fn(3, 2, |r, c| Complex::new(seed + l as f64, (10 * r + c) as f64)))
             .collect(),
-    }
+    )
+    .expect("all agree")
 }
 
-fn noise(lines: usize) -> FrfNoise {
-    FrfNoise { variance: (0..lines).map(|l| DMatrix::from_fn(3, 2, |r, c| (l + 2 * r + c) as f64)).collect() }
+fn noisy(lines: usize, seed: f64) -> Frf {
+    let variance = (0..lines).map(|l| DMatrix::from_fn(3, 2, |r, c| (l + 2 * r + c) as f64)).collect();
+    matrix(lines, seed).with_variance(variance).expect("one for each value")
 }
 
 proptest! {
@@ -30,13 +32,12 @@ proptest! {
         let path = folder.path().join("c.jrig");
         let store = Store::create(&path, SMALL, "small.toml").expect("created");
         prop_assert_eq!(store.frf("A").expect("read"), None);
-        store.insert_frf(Configuration::A, "first.uff", &matrix(3, 0.0), None).expect("stored");
-        store.insert_frf(Configuration::A, "a.npz", &matrix(lines, seed), Some(&noise(lines))).expect("stored");
+        store.insert_frf(Configuration::A, "first.uff", &matrix(3, 0.0)).expect("stored");
+        store.insert_frf(Configuration::A, "a.npz", &noisy(lines, seed)).expect("stored");
         store.close().expect("closed");
         let store = Store::open_read_only(&path).expect("opened");
         let found = store.frf("A").expect("read").expect("there");
-        prop_assert_eq!((found.source.as_str(), &found.frf), ("a.npz", &matrix(lines, seed)));
-        prop_assert_eq!(found.noise, Some(noise(lines)));
+        prop_assert_eq!((found.source.as_str(), &found.frf), ("a.npz", &noisy(lines, seed)));
         prop_assert_eq!(store.frf("B").expect("read"), None);
         prop_assert_eq!(store.verify().expect("checked"), vec![]);
     }
@@ -47,7 +48,7 @@ fn every_flipped_bit_is_seen_and_named() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("c.jrig");
     let store = Store::create(&path, SMALL, "small.toml").expect("created");
-    store.insert_frf(Configuration::Ajb, "joined.uff", &matrix(2, 1.0), Some(&noise(2))).expect("stored");
+    store.insert_frf(Configuration::Ajb, "joined.uff", &noisy(2, 1.0)).expect("stored");
     let change = |sql: &str| store.connection.execute(sql, []).expect("changed");
     assert!(store.connection.execute("UPDATE frfs SET utc = ''", []).is_err(), "FRFs are never changed");
     assert!(store.connection.execute("DELETE FROM frfs", []).is_err(), "nor deleted");
@@ -75,14 +76,16 @@ fn every_flipped_bit_is_seen_and_named() {
 }
 
 #[test]
-fn what_contradicts_itself_is_not_stored() {
+fn what_contradicts_itself_cannot_be_stored() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let store = Store::create(&folder.path().join("c.jrig"), SMALL, "small.toml").expect("created");
-    let mut frf = matrix(2, 0.0);
-    frf.inputs.pop();
-    assert!(store.insert_frf(Configuration::A, "a", &frf, None).is_err());
-    let error =
-        store.insert_frf(Configuration::A, "a", &matrix(2, 0.0), Some(&noise(3))).expect_err("3 lines of 2");
+    let frf = matrix(2, 0.0);
+    let (frequency_hz, outputs, lines) =
+        (frf.frequency_hz().to_vec(), frf.outputs().to_vec(), frf.lines().to_vec());
+    let one = frf.inputs()[..1].to_vec();
+    assert!(Frf::new(frequency_hz, 2.3, Quantity::Mobility, outputs, one, lines).is_err());
+    let variance = noisy(3, 0.0).variance().expect("known").to_vec();
+    let error = frf.with_variance(variance).expect_err("3 lines of 2");
     assert!(error.to_string().contains("3 lines of 3 × 2"), "{error}");
     assert_eq!(store.frf_rows().expect("read"), []);
 }

@@ -11,18 +11,16 @@ use nalgebra::DMatrix;
 use super::analyse::analyse_into;
 use super::error::CliError;
 use super::{frf, output};
-use crate::analyse::{self, CampaignFile, KnownContact, MeasuredFrf, Wanted};
+use crate::analyse::{self, CampaignFile, KnownContact, Wanted};
 use crate::campaign::plan::configuration_name;
 use crate::campaign::store::Store;
-use crate::campaign::store::frf_table::ImportedFrf;
 use crate::campaign::store::record_row::RecordRow;
-use crate::exchange::npz::Array;
 use crate::exchange::positions_output::write_positions;
-use crate::exchange::{Extra, tables_output, uff_output, write_frf, write_impacts};
+use crate::exchange::{tables_output, uff_output, write_frf, write_impacts};
 use crate::spectra::{ImpactRecords, MotionQuantity};
 use crate::structure::Structure;
+use crate::substructuring::frf::Frf;
 use crate::substructuring::geometry::Configuration;
-use crate::substructuring::noise::FrfNoise;
 
 /// Write everything that a campaign file holds for other programs.
 ///
@@ -97,16 +95,17 @@ impl Export {
             let (name, points) = (structure.name(), geometry.points(structure));
             let (measured, complaints) = file.measured(structure, [self.band.0, self.band.1]);
             told.extend(complaints);
-            let imported = if measured.is_none() { store.frf(name)?.map(imported) } else { None };
+            let imported =
+                if measured.is_none() { store.frf(name)?.map(|found| imported(found.frf)) } else { None };
             if let Some(measured) = measured.or(imported) {
                 let path = folders[1].join(name).with_extension(self.format.extension());
                 self.write_frf(&path, &measured, points)?;
                 told.push(format!(
                     "{}: {} outputs, {} inputs, {} lines",
                     path.display(),
-                    measured.frf.outputs.len(),
-                    measured.frf.inputs.len(),
-                    measured.frf.lines.len()
+                    measured.outputs().len(),
+                    measured.inputs().len(),
+                    measured.lines().len()
                 ));
             }
         }
@@ -188,33 +187,20 @@ impl Export {
         }
     }
 
-    fn write_frf(&self, path: &Path, m: &MeasuredFrf, points: &Configuration) -> Result<(), CliError> {
-        let shape = vec![m.frf.lines.len(), m.frf.outputs.len(), m.frf.inputs.len()];
-        let extra = |name: &str, values: &[f64]| {
-            Extra::Real(name.into(), Array { shape: shape.clone(), values: values.to_vec() })
-        };
-        let coherence = in_c_order(&m.coherence);
+    fn write_frf(&self, path: &Path, frf: &Frf, points: &Configuration) -> Result<(), CliError> {
         match self.format {
-            Format::Npz => {
-                let variance = in_c_order(&m.noise.variance);
-                let extras = [extra("coherence", &coherence), extra("variance", &variance)];
-                write_frf(path, &m.frf, &extras).map_err(bad)
-            }
-            Format::Uff58 => uff_output::write_frf(path, &m.frf, &coherence, points).map_err(bad),
-            Format::Csv => tables_output::write_frf(path, &m.frf, &coherence).map_err(bad),
+            Format::Npz => write_frf(path, frf, &[]).map_err(bad),
+            Format::Uff58 => uff_output::write_frf(path, frf, points).map_err(bad),
+            Format::Csv => tables_output::write_frf(path, frf).map_err(bad),
         }
     }
 }
 
-/// (line, output, input) in C order, which the transposes' columns are.
-fn in_c_order(lines: &[DMatrix<f64>]) -> Vec<f64> {
-    lines.iter().flat_map(|v| v.transpose().data.as_vec().clone()).collect()
-}
-
-/// FRFs from elsewhere; their coherence is not known.
-fn imported(imported: ImportedFrf) -> MeasuredFrf {
-    let ImportedFrf { frf, noise, .. } = imported;
-    let unknown = vec![DMatrix::from_element(frf.outputs.len(), frf.inputs.len(), f64::NAN); frf.lines.len()];
-    let noise = noise.unwrap_or_else(|| FrfNoise { variance: unknown.clone() });
-    MeasuredFrf { frf, noise, coherence: unknown }
+/// FRFs from elsewhere; their coherence is not known, and their variance need not be.
+fn imported(frf: Frf) -> Frf {
+    let unknown =
+        vec![DMatrix::from_element(frf.outputs().len(), frf.inputs().len(), f64::NAN); frf.lines().len()];
+    let variance = frf.variance().map_or_else(|| unknown.clone(), <[_]>::to_vec);
+    let whole = frf.with_variance(variance).and_then(|frf| frf.with_coherence(unknown));
+    whole.expect("one of each was made for every value")
 }

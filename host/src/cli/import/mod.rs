@@ -13,11 +13,9 @@ use crate::analyse;
 use crate::campaign::plan::{configuration_name, configuration_named, structure};
 use crate::campaign::store::Store;
 use crate::campaign::verdict::Kind;
-use crate::exchange::npz::Array;
-use crate::exchange::{Extra, FrfFile, read_frf_file, write_frf};
-use crate::substructuring::frf::FrfMatrix;
+use crate::exchange::{read_frf_file, write_frf};
+use crate::substructuring::frf::Frf;
 use crate::substructuring::geometry::Configuration as Points;
-use crate::substructuring::noise::FrfNoise;
 use records::CellName;
 
 /// Bring FRFs or impact records from elsewhere into jointrig's own files.
@@ -68,18 +66,17 @@ impl Import {
         }
     }
 
-    fn read(&self) -> Result<FrfFile, CliError> {
-        let file = read_frf_file(&self.file).map_err(bad)?;
-        for warning in &file.warnings {
+    fn read(&self) -> Result<Frf, CliError> {
+        let (frf, warnings) = read_frf_file(&self.file).map_err(bad)?;
+        for warning in &warnings {
             eprintln!("{}: {warning}", self.file.display());
         }
-        Ok(file)
+        Ok(frf)
     }
 
     fn convert(&self, out: &Path) -> Result<(), CliError> {
-        let FrfFile { frf, noise, .. } = self.read()?;
-        let extras: Vec<Extra> = noise.iter().map(|noise| variance(&frf, noise)).collect();
-        write_frf(out, &frf, &extras).map_err(bad)?;
+        let frf = self.read()?;
+        write_frf(out, &frf, &[]).map_err(bad)?;
         output::lines([format!("{}: {}", out.display(), described(&frf))])
     }
 
@@ -90,7 +87,7 @@ impl Import {
                 "there is no configuration `{name}`: A, B or AJB (which is A joined to B)"
             ))
         })?;
-        let FrfFile { frf, noise, .. } = self.read()?;
+        let frf = self.read()?;
         let store = Store::open(into)?;
         let geometry = analyse::geometry(&store.plan()?);
         let points = geometry.points(structure(configuration));
@@ -109,11 +106,11 @@ impl Import {
             )));
         }
         let source = self.file.file_name().unwrap_or(self.file.as_os_str()).to_string_lossy();
-        store.insert_frf(configuration, &source, &frf, noise.as_ref())?;
+        store.insert_frf(configuration, &source, &frf)?;
         store.log(&format!("imported FRFs of {name} from {}", self.file.display()))?;
         store.close()?;
         let mut told = vec![format!("{}: {name}: {}", into.display(), described(&frf))];
-        if noise.is_none() {
+        if frf.variance().is_none() {
             told.push(
                 "the file tells no variance of its values: what is identified from them has no interval from their noise"
                     .into(),
@@ -124,9 +121,9 @@ impl Import {
 }
 
 /// Names that the plan does not have are a mistake; points of the plan that were not measured are said.
-fn check_names(file: &Path, frf: &FrfMatrix, name: &str, points: &Points) -> Result<(), String> {
+fn check_names(file: &Path, frf: &Frf, name: &str, points: &Points) -> Result<(), String> {
     let sides =
-        [("outputs", &frf.outputs, points.output_names()), ("inputs", &frf.inputs, points.input_names())];
+        [("outputs", frf.outputs(), points.output_names()), ("inputs", frf.inputs(), points.input_names())];
     for (side, found, known) in sides {
         let strange: Vec<&str> = found.iter().filter(|n| !known.contains(n)).map(String::as_str).collect();
         if !strange.is_empty() {
@@ -145,19 +142,12 @@ fn check_names(file: &Path, frf: &FrfMatrix, name: &str, points: &Points) -> Res
     Ok(())
 }
 
-fn described(frf: &FrfMatrix) -> String {
+fn described(frf: &Frf) -> String {
     format!(
         "{} of {} outputs, {} inputs, {} lines",
-        frf.quantity,
-        frf.outputs.len(),
-        frf.inputs.len(),
-        frf.lines.len()
+        frf.quantity(),
+        frf.outputs().len(),
+        frf.inputs().len(),
+        frf.lines().len()
     )
-}
-
-fn variance(frf: &FrfMatrix, noise: &FrfNoise) -> Extra {
-    let shape = vec![frf.lines.len(), frf.outputs.len(), frf.inputs.len()];
-    // C order is the transpose's columns
-    let values = noise.variance.iter().flat_map(|v| v.transpose().iter().copied().collect::<Vec<_>>());
-    Extra::Real("variance".into(), Array { shape, values: values.collect() })
 }

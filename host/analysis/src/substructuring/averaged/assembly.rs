@@ -3,8 +3,7 @@
 use super::layout::Layout;
 use super::{AveragedError, Line};
 use crate::band::Band;
-use crate::frf::FrfMatrix;
-use crate::frf::noise::{FrfNoise, SMOOTH_HZ};
+use crate::frf::Frf;
 use crate::structure::Structure;
 use crate::substructuring::geometry::{Geometry, Grouping};
 use crate::substructuring::idm::IdmSet;
@@ -27,14 +26,13 @@ pub(super) struct Assembly {
 
 impl Assembly {
     pub(super) fn of(
-        ajb: &FrfMatrix,
-        noise: Option<&FrfNoise>,
+        ajb: &Frf,
         geometry: &Geometry,
         idms: IdmSet,
         band: Band,
     ) -> Result<Assembly, AveragedError> {
-        let in_band: Vec<usize> = (0..ajb.frequency_hz.len())
-            .filter(|&l| ajb.frequency_hz[l] > 0.0 && band.contains(ajb.frequency_hz[l]))
+        let in_band: Vec<usize> = (0..ajb.frequency_hz().len())
+            .filter(|&l| ajb.frequency_hz()[l] > 0.0 && band.contains(ajb.frequency_hz()[l]))
             .collect();
         if in_band.is_empty() {
             return Err(AveragedError::EmptyBand { low_hz: band.low_hz, high_hz: band.high_hz });
@@ -45,30 +43,14 @@ impl Assembly {
         let (rows, columns) = (joined(&a.rows, &b.rows), joined(&a.columns, &b.columns));
         let cut = ajb.band(band.low_hz.max(f64::MIN_POSITIVE), band.high_hz);
         let cells = Measured { frf: &cut, ..file }.block(&rows, &columns)?;
-        let order = ajb.quantity.order_of_s();
+        let order = ajb.quantity().order_of_s();
         let s: Vec<Complex<f64>> = in_band.iter().map(|&l| ajb.s(l)).collect();
         let cells = cells.iter().zip(&s).map(|(y, s)| y * s.powi(-order)).collect();
-        let variance = noise
-            .map(|noise| {
-                noise.check(ajb)?;
-                let receptance = noise.to_receptance(ajb);
-                let kept = FrfNoise {
-                    variance: in_band
-                        .iter()
-                        .map(|&l| {
-                            DMatrix::from_fn(rows.at.len(), columns.at.len(), |r, c| {
-                                receptance.variance[l][(rows.at[r], columns.at[c])]
-                            })
-                        })
-                        .collect(),
-                };
-                let frequency_hz: Vec<f64> = in_band.iter().map(|&l| ajb.frequency_hz[l]).collect();
-                Ok::<_, AveragedError>(kept.smoothed(&frequency_hz, SMOOTH_HZ).variance)
-            })
-            .transpose()?
+        let variance = ajb
+            .receptance_variance(&in_band, &rows.at, &columns.at)
             // a cell without any known variance makes the whole unknown: half an interval is none
             .filter(|v| v.iter().all(|line| line.iter().all(|v| v.is_finite())));
-        let frequency_hz = in_band.iter().map(|&l| ajb.frequency_hz[l]).collect();
+        let frequency_hz = in_band.iter().map(|&l| ajb.frequency_hz()[l]).collect();
         let layout = Layout::new(&a, &b, &rows, &columns, geometry, idms);
         Ok(Assembly { frequency_hz, s, cells, variance, layout, outputs: rows.names, inputs: columns.names })
     }

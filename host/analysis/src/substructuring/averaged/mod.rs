@@ -24,8 +24,8 @@ use super::interface_data::{InterfaceError, balance};
 use super::joint::{NORMAL_95, stiffness_and_damping};
 use super::pseudo_inverse::{RankLost, full_rank_inverse};
 use crate::band::Band;
-use crate::frf::FrfMatrix;
-use crate::frf::noise::{FrfNoise, NoiseError, shared_by_lines};
+use crate::frf::Frf;
+use crate::frf::noise::shared_by_lines;
 use crate::identified::COMPLIANCE_HALF_WIDTH;
 use crate::parallel::prelude::*;
 use assembly::Assembly;
@@ -67,9 +67,6 @@ pub enum AveragedError {
     /// The virtual points cannot be formed, or a cell is not a number.
     #[error(transparent)]
     Interface(#[from] InterfaceError),
-    /// The noise belongs to other FRFs.
-    #[error("AJB: {0}")]
-    Noise(#[from] NoiseError),
     /// A block is singular at a line.
     #[error("at {frequency_hz} Hz: {source}")]
     Line {
@@ -175,19 +172,18 @@ fn invert(y: &Line) -> Result<Line, RankLost> {
 
 /// The recommended estimate of the joint over `band` from the assembly alone.
 ///
-/// `noise` is in the FRFs' own quantity. Every degree of freedom gets its own weights.
+/// Every degree of freedom gets its own weights.
 ///
 /// # Errors
 /// [`AveragedError`]: an interface that cannot be formed, a NaN, a singular line, an empty band.
 pub fn averaged(
-    ajb: &FrfMatrix,
-    noise: Option<&FrfNoise>,
+    ajb: &Frf,
     geometry: &Geometry,
     idms: IdmSet,
     band: Band,
     priors: &Priors,
 ) -> Result<Averaged, AveragedError> {
-    Ok(Prepared::of(ajb, noise, geometry, idms, band, priors)?.estimate())
+    Ok(Prepared::of(ajb, geometry, idms, band, priors)?.estimate())
 }
 
 /// The assembly decoupled line by line, and the weights of its lines: what estimate and bootstrap share.
@@ -216,8 +212,7 @@ impl Prepared {
     /// # Errors
     /// As [`averaged`].
     pub fn of(
-        ajb: &FrfMatrix,
-        noise: Option<&FrfNoise>,
+        ajb: &Frf,
         geometry: &Geometry,
         idms: IdmSet,
         band: Band,
@@ -226,7 +221,7 @@ impl Prepared {
         if let Some(flexible) = idms.dofs().into_iter().find(|dof| dof.is_flexible()) {
             return Err(AveragedError::Flexible(flexible));
         }
-        let assembly = Assembly::of(ajb, noise, geometry, idms, band)?;
+        let assembly = Assembly::of(ajb, geometry, idms, band)?;
         let impedance: Vec<Line> = assembly
             .cells
             .par_iter()
@@ -244,7 +239,7 @@ impl Prepared {
                 (0..impedance.len()).into_par_iter().map(|l| assembly.sums(l, &impedance[l], d)).collect()
             })
             .collect();
-        let shared = shared_by_lines(ajb.sigma_per_s, assembly.step_hz());
+        let shared = shared_by_lines(ajb.sigma_per_s(), assembly.step_hz());
         let weights = sums.iter().map(|lines| weights(lines, shared, priors)).collect();
         let typical = (sums.iter().enumerate())
             .map(|(d, lines)| Typical::of(&impedance, d).known(lines, &impedance, d, shared, priors))
@@ -253,8 +248,8 @@ impl Prepared {
             band_hz: band,
             priors: *priors,
             idms,
-            sigma_per_s: ajb.sigma_per_s,
-            order_of_s: ajb.quantity.order_of_s(),
+            sigma_per_s: ajb.sigma_per_s(),
+            order_of_s: ajb.quantity().order_of_s(),
             assembly,
             impedance,
             bias,

@@ -10,8 +10,7 @@ fn the_sensitivity_is_the_difference_quotient() {
     let ([_, _, ajb], geometry) = rig();
     // without priors all weights are even, whatever is moved
     let estimate = |geometry: &Geometry, dof: Dof| {
-        averaged(&ajb, None, geometry, IdmSet::Six, BAND, &NOWHERE_WRONG).expect("exact data").joint[&dof]
-            .stiffness
+        averaged(&ajb, geometry, IdmSet::Six, BAND, &NOWHERE_WRONG).expect("exact data").joint[&dof].stiffness
     };
     let mut squares = BTreeMap::from([(Dof::Z, 0.0), (Dof::Rx, 0.0)]);
     let step = 1e-7;
@@ -33,8 +32,7 @@ fn the_sensitivity_is_the_difference_quotient() {
         *square = moved.iter().map(|one| ((estimate(one, *dof) - base) / step).powi(2)).sum();
     }
     let one_metre = Priors { position_m: 1.0, ..NOWHERE_WRONG };
-    let prepared =
-        Prepared::of(&ajb, None, &geometry, IdmSet::Six, BAND, &NOWHERE_WRONG).expect("exact data");
+    let prepared = Prepared::of(&ajb, &geometry, IdmSet::Six, BAND, &NOWHERE_WRONG).expect("exact data");
     let propagated = |d: usize| {
         let y = Sums::weighted(&prepared.sums[d], &prepared.weights[d]).geometry_variance(&one_metre).sqrt();
         let k = prepared.estimate_of(d).stiffness;

@@ -5,7 +5,6 @@
 
 use super::{FitError, Internals};
 use crate::band::Band;
-use crate::frf::noise::{FrfNoise, SMOOTH_HZ};
 use crate::structure::Structure;
 use crate::substructuring::geometry::{Geometry, Grouping};
 use crate::substructuring::idm::IdmSet;
@@ -75,22 +74,20 @@ pub(super) struct Block {
 impl Block {
     /// The lines of `band` at which the file has something, s > 0.
     pub(super) fn lines(file: &Measured<'_>, band: Band) -> Vec<usize> {
-        (0..file.frf.frequency_hz.len())
-            .filter(|&l| file.frf.frequency_hz[l] > 0.0 && band.contains(file.frf.frequency_hz[l]))
+        (0..file.frf.frequency_hz().len())
+            .filter(|&l| file.frf.frequency_hz()[l] > 0.0 && band.contains(file.frf.frequency_hz()[l]))
             .collect()
     }
 
     /// The block of `file` made of these sides' virtual points and of the internals named.
     pub(super) fn of(
         file: &Measured<'_>,
-        noise: &FrfNoise,
         geometry: &Geometry,
         idms: IdmSet,
         band: Band,
         sides: &[Side],
         internals: &Internals,
     ) -> Result<Block, FitError> {
-        noise.check(file.frf).map_err(|source| FitError::Noise { file: file.file, source })?;
         let lines = Block::lines(file, band);
         let mut rows = Axis::default();
         let mut columns = Axis::default();
@@ -131,21 +128,11 @@ impl Block {
             columns.add(at, t, only(file.inputs(&[internal]), &internals.inputs), origin, idms.count());
         }
         let cells = file.block(&rows.found, &columns.found)?;
-        let order = file.frf.quantity.order_of_s();
+        let order = file.frf.quantity().order_of_s();
         let cells = lines.iter().map(|&l| &cells[l] * file.frf.s(l).powi(-order)).collect();
-        let receptance = noise.to_receptance(file.frf);
-        let kept = FrfNoise {
-            variance: lines
-                .iter()
-                .map(|&l| {
-                    DMatrix::from_fn(rows.found.at.len(), columns.found.at.len(), |r, c| {
-                        receptance.variance[l][(rows.found.at[r], columns.found.at[c])]
-                    })
-                })
-                .collect(),
-        };
-        let frequency_hz: Vec<f64> = lines.iter().map(|&l| file.frf.frequency_hz[l]).collect();
-        let variance = kept.smoothed(&frequency_hz, SMOOTH_HZ).variance;
+        let (at, to) = (&rows.found.at, &columns.found.at);
+        let variance = (file.frf.receptance_variance(&lines, at, to))
+            .unwrap_or_else(|| vec![DMatrix::from_element(at.len(), to.len(), f64::NAN); lines.len()]);
         for line in &variance {
             // a cell without noise would be weighed as infinitely good
             if let Some(bad) = line.iter().position(|v| !(v.is_finite() && *v > 0.0)) {

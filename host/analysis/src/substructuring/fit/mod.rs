@@ -30,8 +30,8 @@ use super::geometry::{Geometry, Grouping};
 use super::idm::{Dof, IdmSet};
 use super::interface_data::{InterfaceError, Measured};
 use crate::band::Band;
-use crate::frf::FrfMatrix;
-use crate::frf::noise::{FrfNoise, NoiseError, shared_by_lines};
+use crate::frf::Frf;
+use crate::frf::noise::shared_by_lines;
 use crate::structure::Structure;
 use block::{Block, Side};
 use model::Layout;
@@ -47,15 +47,6 @@ pub const NAME: &str = "fit";
 const ENOUGH: f64 = 2.0;
 /// χ² per degree of freedom above which no joint is given at all.
 const HOPELESS: f64 = 10.0;
-
-/// FRFs of one configuration and their noise, in the FRFs' own quantity.
-#[derive(Debug, Clone, Copy)]
-pub struct Noisy<'a> {
-    /// The FRFs.
-    pub frf: &'a FrfMatrix,
-    /// Variance of each value's real part.
-    pub noise: &'a FrfNoise,
-}
 
 /// Choices of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,14 +91,6 @@ pub enum FitError {
     /// The virtual points cannot be formed, or a cell is not a number.
     #[error(transparent)]
     Interface(#[from] InterfaceError),
-    /// The noise belongs to other FRFs.
-    #[error("{file}: {source}")]
-    Noise {
-        /// Which file.
-        file: Structure,
-        /// What differs.
-        source: NoiseError,
-    },
     /// A cell has no variance, or none above zero.
     #[error(
         "{file}: the noise of `{output}` from `{input}` is not known, and `fit` weighs every cell with it: store `variance` with the FRFs \
@@ -208,9 +191,9 @@ struct Internals {
 /// # Errors
 /// [`FitError`]; a joint that the data cannot tell is no error but `identified: false`.
 pub fn fit(
-    a: Noisy<'_>,
-    b: Noisy<'_>,
-    ajb: Noisy<'_>,
+    a: &Frf,
+    b: &Frf,
+    ajb: &Frf,
     geometry: &Geometry,
     idms: IdmSet,
     band: Band,
@@ -250,18 +233,18 @@ pub fn fit(
 }
 
 fn problem(
-    a: Noisy<'_>,
-    b: Noisy<'_>,
-    ajb: Noisy<'_>,
+    a: &Frf,
+    b: &Frf,
+    ajb: &Frf,
     geometry: &Geometry,
     idms: IdmSet,
     band: Band,
     options: &Options,
 ) -> Result<Problem, FitError> {
     let files = [
-        Measured { file: Structure::A, frf: a.frf, points: &geometry.a },
-        Measured { file: Structure::B, frf: b.frf, points: &geometry.b },
-        Measured { file: Structure::Ajb, frf: ajb.frf, points: &geometry.ajb },
+        Measured { file: Structure::A, frf: a, points: &geometry.a },
+        Measured { file: Structure::B, frf: b, points: &geometry.b },
+        Measured { file: Structure::Ajb, frf: ajb, points: &geometry.ajb },
     ];
     let lines = files.each_ref().map(|file| Block::lines(file, band));
     for (file, own) in files.iter().zip(&lines) {
@@ -269,7 +252,7 @@ fn problem(
             && own
                 .iter()
                 .zip(&lines[2])
-                .all(|(l, m)| (file.frf.s(*l) - ajb.frf.s(*m)).norm() <= 1e-6 * ajb.frf.s(*m).norm());
+                .all(|(l, m)| (file.frf.s(*l) - ajb.s(*m)).norm() <= 1e-6 * ajb.s(*m).norm());
         if own.is_empty() || !alike {
             return Err(FitError::EmptyBand { file: file.file, low_hz: band.low_hz, high_hz: band.high_hz });
         }
@@ -282,12 +265,12 @@ fn problem(
     // A and B alone need whole virtual points
     files[0].virtual_point(Grouping::InterfaceA, geometry, idms)?;
     files[1].virtual_point(Grouping::InterfaceB, geometry, idms)?;
-    let of = |file: usize, noise: &FrfNoise, sides: &[Side], internals: &Internals| {
-        Block::of(&files[file], noise, geometry, idms, band, sides, internals)
+    let of = |file: usize, sides: &[Side], internals: &Internals| {
+        Block::of(&files[file], geometry, idms, band, sides, internals)
     };
-    let parts = [of(0, a.noise, &[Side::A], &internals[0])?, of(1, b.noise, &[Side::B], &internals[1])?];
-    let assembly = of(2, ajb.noise, &[Side::A, Side::B], &both)?;
-    let s: Vec<_> = lines[2].iter().map(|&l| ajb.frf.s(l)).collect();
+    let parts = [of(0, &[Side::A], &internals[0])?, of(1, &[Side::B], &internals[1])?];
+    let assembly = of(2, &[Side::A, Side::B], &both)?;
+    let s: Vec<_> = lines[2].iter().map(|&l| ajb.s(l)).collect();
     let layout = Layout {
         n: idms.count(),
         rows: parts.each_ref().map(|p| p.rows.clone()),
@@ -299,7 +282,7 @@ fn problem(
     } else {
         (s[s.len() - 1].im - s[0].im) / std::f64::consts::TAU / (s.len() - 1) as f64
     };
-    let shared = shared_by_lines(ajb.frf.sigma_per_s, step_hz);
+    let shared = shared_by_lines(ajb.sigma_per_s(), step_hz);
     let problem = Problem::new(parts, assembly, layout, s, nuisances, shared);
     if problem.rows.is_empty() {
         return Err(FitError::NothingMeasured { kind: "responses" });

@@ -5,8 +5,7 @@ use nalgebra::DMatrix;
 const BAND: Band = Band { low_hz: 300.0, high_hz: 600.0 };
 
 struct Case {
-    frf: [FrfMatrix; 3],
-    noise: [FrfNoise; 3],
+    frf: [Frf; 3],
     geometry: Geometry,
 }
 
@@ -14,17 +13,15 @@ impl Case {
     /// The rig's exact FRFs, said to have this noise, relative to their mean size.
     fn rigid(relative: f64) -> Case {
         let (frf, geometry) = rig();
-        let noise = frf.each_ref().map(|frf| FrfNoise {
-            variance: frf
-                .lines
-                .iter()
-                .map(|y| {
-                    let mean = y.map(|v| v.norm_sqr()).mean();
-                    DMatrix::from_element(y.nrows(), y.ncols(), relative * relative * mean / 2.0)
-                })
-                .collect(),
+        let frf = frf.map(|frf| {
+            let variance = frf.lines().iter().map(|y| {
+                let mean = y.map(|v| v.norm_sqr()).mean();
+                DMatrix::from_element(y.nrows(), y.ncols(), relative * relative * mean / 2.0)
+            });
+            let variance = variance.collect();
+            frf.with_variance(variance).expect("one for each value")
         });
-        Case { frf, noise, geometry }
+        Case { frf, geometry }
     }
 }
 
@@ -32,7 +29,7 @@ impl Case {
 #[test]
 fn the_analytic_derivatives_are_the_difference_quotients() {
     let case = Case::rigid(1e-3);
-    let [a, b, ajb] = [0, 1, 2].map(|i| Noisy { frf: &case.frf[i], noise: &case.noise[i] });
+    let [a, b, ajb] = &case.frf;
     let problem =
         problem(a, b, ajb, &case.geometry, IdmSet::Six, BAND, &Options::default()).expect("exact data");
     let diagonal = start::chart(&problem);

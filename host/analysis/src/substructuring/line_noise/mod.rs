@@ -21,7 +21,6 @@ use super::product::product;
 use super::pseudo_inverse::full_rank_inverse;
 use super::reduced::{Kind, Reduced, RefusedReason, every_line};
 use super::rooms::{Rooms, Side};
-use crate::frf::noise::FrfNoise;
 use dyads::{ASSEMBLED, Both, Dyads, Source, own};
 use nalgebra::{Complex, DMatrix};
 use std::collections::BTreeMap;
@@ -39,11 +38,11 @@ pub struct LineNoise {
 }
 
 impl Reduced {
-    /// The noise of every line by `method`; `noises` are of A, B and AJB and have the files' lines.
+    /// The noise of every line by `method`; `noises`, the variances, are of A, B and AJB and have the files' lines.
     pub(super) fn line_noise(
         &self,
         rooms: &Rooms<'_>,
-        noises: [&FrfNoise; 3],
+        noises: [&[DMatrix<f64>]; 3],
         method: Method,
     ) -> Result<LineNoise, RefusedReason> {
         let own = [own(Side::A, &self.a), own(Side::B, &self.b)];
@@ -174,14 +173,14 @@ impl Reduced {
     fn deviations(
         &self,
         rooms: &Rooms<'_>,
-        noises: [&FrfNoise; 3],
+        noises: [&[DMatrix<f64>]; 3],
         l: usize,
         dyads: &Dyads<'_>,
     ) -> Vec<[f64; 2]> {
         let frf = rooms.a.frf;
         let s = frf.s(l);
-        let quantity = s.powi(frf.quantity.order_of_s());
-        let variance = noises.map(|n| &n.variance[l]);
+        let quantity = s.powi(frf.quantity().order_of_s());
+        let variance = noises.map(|n| &n[l]);
         (balance(self.idms).iter().enumerate())
             .map(|(d, length)| {
                 let factor = quantity * length * length;

@@ -1,0 +1,102 @@
+//! Why FRFs cannot be used.
+
+use super::quantity::Quantity;
+
+/// Why FRFs cannot be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FrfError {
+    /// Axis, names and matrices disagree in number.
+    #[error(
+        "line {line}: the FRF matrix is {rows} × {columns}, but there are {outputs} output and {inputs} input names"
+    )]
+    Shape {
+        /// Index of the line.
+        line: usize,
+        /// Rows found.
+        rows: usize,
+        /// Columns found.
+        columns: usize,
+        /// Output names given.
+        outputs: usize,
+        /// Input names given.
+        inputs: usize,
+    },
+    /// There are not as many matrices as frequencies.
+    #[error("{frequencies} frequencies but {matrices} FRF matrices: one matrix per line is needed")]
+    LineCount {
+        /// Frequencies given.
+        frequencies: usize,
+        /// Matrices given.
+        matrices: usize,
+    },
+    /// Variance or coherence have another number of lines, rows or columns than the FRF.
+    #[error(
+        "the {what} has {found_lines} lines of {found_rows} × {found_columns}, the FRF {lines} lines of {rows} × {columns}"
+    )]
+    Beside {
+        /// `variance` or `coherence`.
+        what: &'static str,
+        /// Its lines.
+        found_lines: usize,
+        /// Rows of its first line, or of the first that differs.
+        found_rows: usize,
+        /// Columns of that line.
+        found_columns: usize,
+        /// Lines of the FRF.
+        lines: usize,
+        /// Rows of the FRF.
+        rows: usize,
+        /// Columns of the FRF.
+        columns: usize,
+    },
+    /// The frequency axis is not finite, non-negative and rising.
+    #[error("the frequency axis must be finite, not negative and rising: line {line} is {frequency_hz} Hz")]
+    Axis {
+        /// First line that is wrong.
+        line: usize,
+        /// Its frequency, Hz.
+        frequency_hz: f64,
+    },
+    /// The damping of the exponential window is not a finite number.
+    #[error("the exponential window's damping is {0} 1/s: a finite number that is not negative is needed")]
+    Damping(f64),
+    /// One name stands twice among the outputs or the inputs.
+    #[error("the name `{name}` stands twice among the {side}: rename one of them")]
+    RepeatedName {
+        /// `outputs` or `inputs`.
+        side: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// A row or column was asked for that is not there.
+    #[error("there is no `{name}` among the {side} ({available}): check the geometry against the FRF file")]
+    MissingName {
+        /// `outputs` or `inputs`.
+        side: &'static str,
+        /// The name.
+        name: String,
+        /// The names that are there.
+        available: String,
+    },
+    /// A value is NaN or infinite.
+    #[error(
+        "the FRF from `{input}` to `{output}` is not a number at {frequency_hz} Hz: repeat that cell or cut the line out"
+    )]
+    NotFinite {
+        /// The row's name.
+        output: String,
+        /// The column's name.
+        input: String,
+        /// The line, Hz.
+        frequency_hz: f64,
+    },
+    /// A line at s = 0 cannot be divided by s.
+    #[error("line {line} is at s = 0: a {quantity} has no receptance there; cut the line out")]
+    DivisionByZero {
+        /// Index of the line.
+        line: usize,
+        /// What is stored.
+        quantity: Quantity,
+    },
+}
