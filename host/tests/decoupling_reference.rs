@@ -172,7 +172,7 @@ fn any_named_set_of_modes() {
 }
 
 /// The same values in another quantity or under another window; one line, where asked for, is 1 Hz higher.
-fn relabelled(frf: &Frf, higher: Option<usize>, sigma_per_s: f64, quantity: Quantity) -> Frf {
+fn relabelled(frf: &Frf, higher: Option<usize>, sigma_per_s: f64, quantity: MotionQuantity) -> Frf {
     let mut frequency_hz = frf.frequency_hz().to_vec();
     if let Some(line) = higher {
         frequency_hz[line] += 1.0;
@@ -197,11 +197,11 @@ fn files_that_do_not_fit_are_refused_with_the_reason() {
         change(&mut case);
         case.identify(&[Method::Inverse], &[IdmSet::Two]).expect_err("no fit").to_string()
     };
-    let labelled = |case: &mut Case| case.b = relabelled(&case.b, None, 0.0, Quantity::Receptance);
+    let labelled = |case: &mut Case| case.b = relabelled(&case.b, None, 0.0, MotionQuantity::Displacement);
     assert!(one(labelled).contains("B holds receptance, A holds mobility"));
-    let shifted = |case: &mut Case| case.ajb = relabelled(&case.ajb, Some(3), 0.0, Quantity::Mobility);
+    let shifted = |case: &mut Case| case.ajb = relabelled(&case.ajb, Some(3), 0.0, MotionQuantity::Velocity);
     assert!(one(shifted).contains("313 Hz against 312 Hz"));
-    let windowed = |case: &mut Case| case.ajb = relabelled(&case.ajb, None, 2.3, Quantity::Mobility);
+    let windowed = |case: &mut Case| case.ajb = relabelled(&case.ajb, None, 2.3, MotionQuantity::Velocity);
     assert!(one(windowed).contains("s = σ + iω"));
     let case = Case::read("frf_rigid");
     let band = Band { low_hz: 20.0, high_hz: 30.0 };

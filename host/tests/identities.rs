@@ -4,7 +4,7 @@ use jointrig::substructuring::coupling::couple;
 use jointrig::substructuring::decoupling::{InverseBlock, PrimalBlock, interface, internal, inverse, primal};
 use jointrig::substructuring::geometry::{Grouping, Point};
 use jointrig::substructuring::idm::{IdmSet, rigid_row};
-use jointrig::substructuring::joint::stiffness_and_damping;
+use jointrig::substructuring::joint_over_bands::stiffness_and_damping;
 use jointrig::substructuring::vpt;
 use nalgebra::{Complex, DMatrix, DVector, Vector3};
 use proptest::prelude::*;

@@ -1,7 +1,7 @@
 //! What noise does to a line, against what it does when it is really added.
 
 use jointrig::exchange::{read_frf, read_positions};
-use jointrig::substructuring::joint::stiffness_and_damping;
+use jointrig::substructuring::joint_over_bands::stiffness_and_damping;
 use jointrig::substructuring::{Dof, Frf, Geometry, IdmSet, Method, decouple, line_noise};
 use nalgebra::{Complex, DMatrix};
 use std::path::{Path, PathBuf};

@@ -95,7 +95,7 @@ fn records(folder: &Path) -> Outcome {
     ];
     write_frf(
         &folder.join("ours.npz"),
-        &y.to_matrix(records.quantity.frf(), vec!["x".into()], "f".into())?,
+        &y.to_matrix(records.quantity, vec!["x".into()], "f".into())?,
         &extras,
     )?;
     Ok(())

@@ -11,7 +11,7 @@ use jointrig::substructuring::geometry::{Configuration, Geometry, Grouping};
 use jointrig::substructuring::semm::{FULLY_EXTENDED, Form, semm};
 use jointrig::substructuring::virtual_points::{VirtualPoint, Weights, transform};
 use jointrig::substructuring::vpt;
-use jointrig::substructuring::{Dof, Frf, IdmSet, Quantity};
+use jointrig::substructuring::{Dof, Frf, IdmSet, MotionQuantity};
 use nalgebra::{Complex, DMatrix, Vector3};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -123,7 +123,7 @@ impl Whole {
             };
             let probe = {
                 let (outputs, inputs) = (names.to_vec(), names.to_vec());
-                Frf::new(vec![1.0], 0.0, Quantity::Receptance, outputs, inputs, vec![identity])?
+                Frf::new(vec![1.0], 0.0, MotionQuantity::Displacement, outputs, inputs, vec![identity])?
             };
             let found = transform(&probe, points, &plans, &weights)?;
             Ok(found.lines().first().cloned().ok_or("no line")?)

@@ -6,9 +6,9 @@
 //! nothing out: it has a place for every pair of the geometry.
 
 use super::averages::CellAverage;
+use crate::frf::Frf;
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
-use crate::substructuring::frf::Frf;
 use crate::substructuring::geometry::{Configuration, Grouping, Point};
 use nalgebra::DMatrix;
 use num_complex::Complex;
@@ -130,7 +130,7 @@ fn measured(
     let frf = Frf::new(
         first.frequency_hz().to_vec(),
         first.sigma_per_s(),
-        quantity.frf(),
+        quantity,
         channels.iter().map(|c| outputs[*c].clone()).collect(),
         impacts.iter().map(|i| inputs[*i].clone()).collect(),
         lines,

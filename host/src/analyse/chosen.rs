@@ -1,10 +1,10 @@
 //! Which FRFs the report shows: a driving point and a transfer of every configuration.
 
 use super::averages::CellAverage;
+use crate::frf::Frf;
 use crate::results::{FrfCurve, Role, rounded};
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
-use crate::substructuring::frf::Frf;
 use crate::substructuring::geometry::{Configuration, Grouping, Point};
 use num_complex::Complex;
 
@@ -31,7 +31,7 @@ fn of_cell(
     cell: &CellAverage,
     quantity: MotionQuantity,
 ) -> FrfCurve {
-    let order = quantity.frf().order_of_s();
+    let order = quantity.order_of_s();
     let y = &cell.spectra;
     let receptance = (0..y.lines()).map(|line| y.h1(line, 2) * y.s(line).powi(-order));
     let several = cell.records.len() > 1;

@@ -1,5 +1,6 @@
 //! Fits of K and C to all three configurations and their noise.
 
+use crate::structure::Structure;
 use crate::substructuring::fit::{FitError, Fitted, Options, fit};
 use crate::substructuring::{Band, Frf, Geometry, IdmSet};
 
@@ -18,7 +19,7 @@ pub enum NoFit {
     /// FRFs that were imported into the campaign came without their variance.
     ImportWithoutVariance,
     /// The file of this configuration has no variance.
-    FileWithoutVariance(&'static str),
+    FileWithoutVariance(Structure),
     /// It failed.
     Failed(FitError),
 }

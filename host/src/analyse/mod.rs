@@ -28,6 +28,7 @@ mod hit_spectra;
 mod impact_loops;
 mod imported;
 mod missing;
+mod plan_geometry;
 mod recommended;
 #[cfg(test)]
 mod rig_tests;
@@ -43,8 +44,9 @@ pub use contact_stage::Contact;
 pub use findings::{ConfigurationFindings, Findings, ImportedFrom, Settings};
 pub use fits::{Fit, NoFit, fits};
 pub use from_frfs::{Row, Substructured};
-pub use from_store::{AnalyseError, CampaignFile, analyse, geometry};
+pub use from_store::{AnalyseError, CampaignFile, analyse};
 pub use impact_loops::{ImpactLoops, SlopeIs};
 pub use missing::Missing;
+pub use plan_geometry::geometry;
 pub use shaker_levels::RecordLoops;
 pub use wanted::{BANDS_HZ, Progress, Wanted};

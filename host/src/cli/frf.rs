@@ -147,7 +147,7 @@ impl Frf {
             }
         }
         if let Some(path) = &self.out {
-            let matrix = (found.to_matrix(quantity.frf(), names.clone(), self.input.clone()))
+            let matrix = (found.to_matrix(quantity, names.clone(), self.input.clone()))
                 .map_err(|e| CliError::Bad(format!("{}: {e}", self.records.display())))?;
             write_frf(path, &matrix, &extras(&found, self.noise_ratio))
                 .map_err(|e| CliError::Bad(e.to_string()))?;
@@ -247,7 +247,7 @@ impl Frf {
             "settings": self.settings(),
         });
         if let Some((y, band, quantity, names)) = found {
-            document["quantity"] = json!(quantity.frf());
+            document["quantity"] = json!(quantity.frf_name());
             document["outputs"] = json!(names);
             document["input"] = json!(self.input);
             document["lines"] = json!(y.lines());

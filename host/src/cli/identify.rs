@@ -12,6 +12,7 @@ use crate::analyse::{BANDS_HZ, Findings, Fit, Missing, NoFit, Substructured, fit
 use crate::exchange::{PositionsError, read_frf_file, read_positions};
 use crate::report::{document, words};
 use crate::results::{Results, Source};
+use crate::structure::Structure;
 use crate::substructuring::averaged::{Priors, averaged};
 use crate::substructuring::fit;
 use crate::substructuring::{Band, Dof, Frf, Geometry, IdmSet, Method, identify};
@@ -124,7 +125,7 @@ impl Identify {
             ..fit::Options::default()
         };
         let mut known = Vec::new();
-        for (name, frf) in ["A", "B", "AJB"].into_iter().zip(frfs) {
+        for (name, frf) in Structure::ALL.into_iter().zip(frfs) {
             known.push(match self.noise {
                 _ if frf.variance().is_some() => frf,
                 Some(fraction) => frf.with_relative_noise(fraction),

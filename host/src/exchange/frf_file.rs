@@ -4,7 +4,7 @@ use super::frf_npz::read_frf;
 use super::frf_uff::{FrfUffError, read_frf_uff};
 use super::npz::NpzError;
 use crate::advice;
-use crate::substructuring::frf::Frf;
+use crate::frf::Frf;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};

@@ -4,7 +4,7 @@
 
 use super::npz::{Array, NpzError, NpzFile};
 use super::npz_output::NpzOutput;
-use crate::substructuring::frf::{Frf, Quantity};
+use crate::frf::{Frf, MotionQuantity};
 use nalgebra::DMatrix;
 use num_complex::Complex;
 use std::path::Path;
@@ -29,7 +29,7 @@ pub fn read_frf(path: &Path) -> Result<Frf, NpzError> {
     let outputs = file.text("outputs", "the names of the outputs")?.values;
     let inputs = file.text("inputs", "the names of the inputs")?.values;
     let word = file.word("quantity", "receptance, mobility or accelerance")?;
-    let quantity = Quantity::from_name(&word).ok_or_else(|| {
+    let quantity = MotionQuantity::from_frf_name(&word).ok_or_else(|| {
         file.unexpected("quantity", &format!("is `{word}`"), "receptance, mobility or accelerance")
     })?;
     let sigma_per_s =
@@ -97,7 +97,7 @@ pub fn write_frf(path: &Path, frf: &Frf, extras: &[Extra]) -> Result<(), NpzErro
     out.real("frequency", &[frf.frequency_hz().len()], frf.frequency_hz())?;
     let (lines, rows, columns) = shape(frf);
     out.complex("frf", &[lines, rows, columns], &in_c_order(frf.lines()))?;
-    out.text("quantity", &[], &[frf.quantity().name().into()])?;
+    out.text("quantity", &[], &[frf.quantity().frf_name().into()])?;
     out.text("outputs", &[frf.outputs().len()], frf.outputs())?;
     out.text("inputs", &[frf.inputs().len()], frf.inputs())?;
     out.real("sigma", &[], &[frf.sigma_per_s()])?;
@@ -131,7 +131,7 @@ mod tests {
         let frf = Frf::new(
             vec![10.0, 20.0],
             2.3,
-            Quantity::Mobility,
+            MotionQuantity::Velocity,
             vec!["A1:x".into(), "A1:y".into(), "A1:z".into()],
             vec!["AZ1".into(), "AZ2".into()],
             (0..2)

@@ -9,7 +9,7 @@ use super::uff::{
     Abscissa, Axis, Contents, DataSet, Dof, Encoding, Function, Values, WriteError, kind, quantity, read,
 };
 use crate::advice;
-use crate::substructuring::frf::{Frf, Quantity};
+use crate::frf::{Frf, MotionQuantity};
 use nalgebra::DMatrix;
 use num_complex::Complex;
 use std::path::{Path, PathBuf};
@@ -146,11 +146,11 @@ fn names<'a>(dofs: impl Iterator<Item = (&'a Dof, bool)> + Clone) -> Vec<String>
         .collect()
 }
 
-fn quantity_of(f: &Function) -> Result<Quantity, String> {
+fn quantity_of(f: &Function) -> Result<MotionQuantity, String> {
     match f.axes[1].quantity {
-        quantity::DISPLACEMENT => Ok(Quantity::Receptance),
-        quantity::VELOCITY => Ok(Quantity::Mobility),
-        quantity::ACCELERATION => Ok(Quantity::Accelerance),
+        quantity::DISPLACEMENT => Ok(MotionQuantity::Displacement),
+        quantity::VELOCITY => Ok(MotionQuantity::Velocity),
+        quantity::ACCELERATION => Ok(MotionQuantity::Acceleration),
         other => Err(format!(
             "an FRF's ordinate is of type {other}: 8 (displacement), 11 (velocity) or 12 (acceleration) per force is needed"
         )),
@@ -173,9 +173,9 @@ fn sigma(f: &Function) -> Result<f64, String> {
 /// The matrix contradicts itself, or a name is longer than the format's 10 characters (when written).
 pub fn to_functions(frf: &Frf, input_directions: &[i64], encoding: Encoding) -> Result<Vec<DataSet>, String> {
     let (ordinate, label, unit) = match frf.quantity() {
-        Quantity::Receptance => (quantity::DISPLACEMENT, "Displacement", "m"),
-        Quantity::Mobility => (quantity::VELOCITY, "Velocity", "m/s"),
-        Quantity::Accelerance => (quantity::ACCELERATION, "Acceleration", "m/s^2"),
+        MotionQuantity::Displacement => (quantity::DISPLACEMENT, "Displacement", "m"),
+        MotionQuantity::Velocity => (quantity::VELOCITY, "Velocity", "m/s"),
+        MotionQuantity::Acceleration => (quantity::ACCELERATION, "Acceleration", "m/s^2"),
     };
     let axis = |quantity, label: &str, unit: &str| Axis {
         quantity,
@@ -243,7 +243,7 @@ mod tests {
         Frf::new(
             vec![300.0, 320.0, 340.0],
             2.3,
-            Quantity::Mobility,
+            MotionQuantity::Velocity,
             vec!["A1:x".into(), "A1:z".into(), "A4".into()],
             vec!["AZ1".into(), "AX1".into()],
             (0..3)

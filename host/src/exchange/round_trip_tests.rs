@@ -9,9 +9,9 @@ use super::{
     read_frf, read_hysteresis, read_impacts, read_positions, uff_output, write_frf, write_hysteresis,
     write_impacts,
 };
+use crate::frf::Frf;
 use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 use crate::spectra::{ImpactRecords, MotionQuantity};
-use crate::substructuring::frf::{Frf, Quantity};
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
 use nalgebra::DMatrix;
 use num_complex::Complex;
@@ -28,8 +28,12 @@ fn finite() -> impl Strategy<Value = f64> {
     prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL | prop::num::f64::ZERO
 }
 
-fn quantity() -> impl Strategy<Value = Quantity> {
-    prop::sample::select(vec![Quantity::Receptance, Quantity::Mobility, Quantity::Accelerance])
+fn quantity() -> impl Strategy<Value = MotionQuantity> {
+    prop::sample::select(vec![
+        MotionQuantity::Displacement,
+        MotionQuantity::Velocity,
+        MotionQuantity::Acceleration,
+    ])
 }
 
 fn motion() -> impl Strategy<Value = MotionQuantity> {

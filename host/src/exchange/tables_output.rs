@@ -1,8 +1,8 @@
 //! FRFs and records as text with commas: one row for each line or sample, one heading for each column.
 
+use crate::frf::Frf;
 use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 use crate::spectra::ImpactRecords;
-use crate::substructuring::frf::Frf;
 use std::path::{Path, PathBuf};
 
 /// A table that cannot be written.
@@ -99,7 +99,7 @@ fn write(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::substructuring::frf::Quantity;
+    use crate::frf::MotionQuantity;
     use nalgebra::DMatrix;
     use num_complex::Complex;
 
@@ -111,7 +111,7 @@ mod tests {
         let frf = Frf::new(
             vec![10.5],
             0.0,
-            Quantity::Mobility,
+            MotionQuantity::Velocity,
             vec!["A1:x".into(), "A1:y".into()],
             vec!["AZ1".into()],
             vec![DMatrix::from_column_slice(2, 1, &[value, Complex::new(f64::NAN, 0.0)])],

@@ -4,9 +4,9 @@ use super::frf_uff::{FrfUffError, to_functions, write_uff};
 use super::uff::{
     Abscissa, Axis, ByteOrder, DataSet, Dof, Encoding, Function, Header, Node, Units, Values, kind, quantity,
 };
+use crate::frf::Frf;
 use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 use crate::spectra::{ImpactRecords, MotionQuantity};
-use crate::substructuring::frf::Frf;
 use crate::substructuring::geometry::{Configuration, Point};
 use std::path::Path;
 

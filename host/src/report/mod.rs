@@ -3,13 +3,13 @@
 //! The page is one self-contained html text: figures are inline SVG, nothing is fetched, it prints. Everything
 //! shown stands in [`Results`]; this room computes no result.
 
+pub mod cell_records;
 mod document;
 mod drawing;
 mod figures;
 mod interface_tables;
 mod page;
 mod panel;
-pub mod records;
 mod scale;
 mod tables;
 pub mod words;

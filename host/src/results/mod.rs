@@ -18,7 +18,7 @@ mod source;
 pub use crate::hysteresis::static_arm::Identified;
 pub use crate::hysteresis::{Kind as Excitation, OverCycles, Shape};
 pub use crate::substructuring::averaged::Averaged;
-pub use crate::substructuring::joint::BandStatistic as Statistics;
+pub use crate::substructuring::joint_over_bands::BandStatistic as Statistics;
 pub use check::{
     BACK_COUPLING, Check, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, SAME_IN_ALL, SERIES_COMPLIANCE,
     UNCHANGED,

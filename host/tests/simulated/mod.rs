@@ -4,7 +4,7 @@
 use jointrig::exchange::read_positions;
 use jointrig::substructuring::averaged::CellHits;
 use jointrig::substructuring::geometry::{Configuration as Points, Geometry};
-use jointrig::substructuring::{Frf, Quantity};
+use jointrig::substructuring::{Frf, MotionQuantity};
 use jointrig_hil_sim::rig::structure::Structure;
 use jointrig_hil_sim::rig::{Aim, Configuration, RigConfig};
 use nalgebra::{Complex, DMatrix, DVector};
@@ -198,7 +198,7 @@ fn simulate(
         hits.extend(cell);
     }
     let (outputs, inputs) = (points.output_names(), points.input_names());
-    let frf = Frf::new(frequency_hz, SIGMA, Quantity::Mobility, outputs, inputs, lines);
+    let frf = Frf::new(frequency_hz, SIGMA, MotionQuantity::Velocity, outputs, inputs, lines);
     Measurement { frf: frf.and_then(|frf| frf.with_variance(variance)).expect("all agree"), hits }
 }
 

@@ -1,6 +1,6 @@
 //! The examples' data: FRFs as (frequency, output, input, real, imaginary part), one value in each row.
 
-use jointrig_analysis::substructuring::{Frf, Quantity};
+use jointrig_analysis::substructuring::{Frf, MotionQuantity};
 use nalgebra::{Complex, DMatrix};
 use std::error::Error;
 use std::path::Path;
@@ -32,6 +32,6 @@ pub fn frf(file: &str) -> Result<Frf, Box<dyn Error>> {
     let values = rows.iter().map(|row| Ok(Complex::new(row[3].parse()?, row[4].parse()?)));
     let values = values.collect::<Result<Vec<Complex<f64>>, std::num::ParseFloatError>>()?;
     let lines = values.chunks(m * n).map(|line| DMatrix::from_row_slice(m, n, line)).collect();
-    let quantity = Quantity::Mobility;
+    let quantity = MotionQuantity::Velocity;
     Ok(Frf::new(frequency_hz, 2.3, quantity, outputs, inputs, lines)?)
 }

@@ -1,6 +1,6 @@
 //! Why FRFs cannot be used.
 
-use super::quantity::Quantity;
+use super::quantity::MotionQuantity;
 
 /// Why FRFs cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -92,11 +92,11 @@ pub enum FrfError {
         frequency_hz: f64,
     },
     /// A line at s = 0 cannot be divided by s.
-    #[error("line {line} is at s = 0: a {quantity} has no receptance there; cut the line out")]
+    #[error("line {line} is at s = 0: a {} has no receptance there; cut the line out", quantity.frf_name())]
     DivisionByZero {
         /// Index of the line.
         line: usize,
         /// What is stored.
-        quantity: Quantity,
+        quantity: MotionQuantity,
     },
 }

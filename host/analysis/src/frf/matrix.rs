@@ -1,7 +1,7 @@
 //! FRFs: one complex matrix per frequency line, with the names of its rows and columns and what is known of its noise.
 
 use super::error::FrfError;
-use super::quantity::Quantity;
+use super::quantity::MotionQuantity;
 use nalgebra::{Complex, ComplexField, DMatrix, DMatrixViewMut};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -15,7 +15,7 @@ use std::f64::consts::TAU;
 pub struct Frf {
     frequency_hz: Vec<f64>,
     sigma_per_s: f64,
-    quantity: Quantity,
+    quantity: MotionQuantity,
     outputs: Vec<String>,
     inputs: Vec<String>,
     lines: Vec<DMatrix<Complex<f64>>>,
@@ -32,7 +32,7 @@ impl Frf {
     pub fn new(
         frequency_hz: Vec<f64>,
         sigma_per_s: f64,
-        quantity: Quantity,
+        quantity: MotionQuantity,
         outputs: Vec<String>,
         inputs: Vec<String>,
         lines: Vec<DMatrix<Complex<f64>>>,
@@ -143,7 +143,7 @@ impl Frf {
     }
 
     /// What the values are.
-    pub fn quantity(&self) -> Quantity {
+    pub fn quantity(&self) -> MotionQuantity {
         self.quantity
     }
 
@@ -218,7 +218,7 @@ impl Frf {
         Ok(Frf {
             frequency_hz: self.frequency_hz.clone(),
             sigma_per_s: self.sigma_per_s,
-            quantity: Quantity::Receptance,
+            quantity: MotionQuantity::Displacement,
             outputs: self.outputs.clone(),
             inputs: self.inputs.clone(),
             lines,
@@ -310,7 +310,7 @@ fn find(names: &[String], wanted: &[String], side: &'static str) -> Result<Vec<u
 mod tests {
     use super::*;
 
-    fn small(quantity: Quantity) -> Frf {
+    fn small(quantity: MotionQuantity) -> Frf {
         let frequency_hz = vec![100.0, 200.0, 300.0];
         let lines = (0..3)
             .map(|l| DMatrix::from_fn(2, 2, |r, c| Complex::new(l as f64 + r as f64, c as f64 - 0.5)))
@@ -328,22 +328,22 @@ mod tests {
 
     #[test]
     fn receptance_divides_by_s_not_by_i_omega() {
-        let y = small(Quantity::Accelerance).to_receptance().expect("no line at zero");
+        let y = small(MotionQuantity::Acceleration).to_receptance().expect("no line at zero");
         let s = Complex::new(2.3, TAU * 200.0);
         let back = y.lines[1][(1, 0)] * s * s;
         // rounding only
         assert!((back - Complex::new(2.0, -0.5)).norm() < 1e-14);
-        assert_eq!(y.quantity, Quantity::Receptance);
+        assert_eq!(y.quantity, MotionQuantity::Displacement);
     }
 
     #[test]
     fn bands_include_both_ends() {
-        assert_eq!(small(Quantity::Mobility).band(100.0, 200.0).frequency_hz, vec![100.0, 200.0]);
+        assert_eq!(small(MotionQuantity::Velocity).band(100.0, 200.0).frequency_hz, vec![100.0, 200.0]);
     }
 
     #[test]
     fn selection_is_by_name_and_keeps_the_order_asked_for() {
-        let y = small(Quantity::Mobility);
+        let y = small(MotionQuantity::Velocity);
         let z = y.select(&["b".into(), "a".into()], &["g".into()]).expect("all there");
         assert_eq!(z.lines[0][(0, 0)], y.lines[0][(1, 1)]);
         let error = y.select(&["c".into()], &[]).expect_err("no such row");
@@ -352,7 +352,7 @@ mod tests {
 
     #[test]
     fn a_nan_is_named_by_cell_and_line() {
-        let y = small(Quantity::Mobility).map_lines(|line, mut y| {
+        let y = small(MotionQuantity::Velocity).map_lines(|line, mut y| {
             if line == 2 {
                 y[(0, 1)].im = f64::NAN;
             }
@@ -364,7 +364,7 @@ mod tests {
     #[test]
     fn repeated_names_and_falling_axes_are_refused() {
         let of = |frequency_hz: [f64; 3], outputs: [&str; 2]| {
-            let Frf { sigma_per_s, quantity, inputs, lines, .. } = small(Quantity::Mobility);
+            let Frf { sigma_per_s, quantity, inputs, lines, .. } = small(MotionQuantity::Velocity);
             let outputs = outputs.map(String::from).to_vec();
             Frf::new(frequency_hz.to_vec(), sigma_per_s, quantity, outputs, inputs, lines)
         };

@@ -8,4 +8,4 @@ mod quantity;
 pub use error::FrfError;
 pub use matrix::Frf;
 pub(crate) use matrix::block;
-pub use quantity::{MotionQuantity, Quantity};
+pub use quantity::MotionQuantity;

@@ -86,7 +86,7 @@ pub fn shared_by_lines(sigma_per_s: f64, step_hz: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Quantity;
+    use super::super::MotionQuantity;
     use super::*;
 
     /// Correlation (real part) of the noise of two lines `distance_hz` apart.
@@ -116,7 +116,8 @@ mod tests {
     fn a_variance_of_another_shape_is_refused() {
         let (outputs, inputs) = (vec!["a".into()], vec!["f".into()]);
         let lines = vec![DMatrix::zeros(1, 1)];
-        let frf = Frf::new(vec![100.0], 0.0, Quantity::Mobility, outputs, inputs, lines).expect("all agree");
+        let frf =
+            Frf::new(vec![100.0], 0.0, MotionQuantity::Velocity, outputs, inputs, lines).expect("all agree");
         let refused = |variance| frf.clone().with_variance(variance).expect_err("another shape").to_string();
         assert!(refused(vec![DMatrix::zeros(1, 2)]).contains("1 × 2"));
         assert!(refused(vec![]).contains("0 lines"));

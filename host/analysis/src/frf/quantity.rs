@@ -1,22 +1,25 @@
-//! What a response is, and what it makes of an FRF.
+//! What a response is, and what that makes of an FRF.
 
 use serde::{Deserialize, Serialize};
-use std::fmt;
 
-/// What a response channel measures.
+/// What a response is; an FRF's numerator, per newton of the hammer's force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum MotionQuantity {
-    /// m.
+    /// m; per force a receptance, m/N.
     Displacement,
-    /// m/s.
+    /// m/s; per force a mobility, m/(s N).
     Velocity,
-    /// m/s².
+    /// m/s²; per force an accelerance, m/(s² N).
     Acceleration,
 }
 
 impl MotionQuantity {
-    /// The word used in files.
+    /// All of them, each the time derivative of the one before.
+    const ALL: [MotionQuantity; 3] =
+        [MotionQuantity::Displacement, MotionQuantity::Velocity, MotionQuantity::Acceleration];
+
+    /// The word used in files of records.
     pub fn name(self) -> &'static str {
         match self {
             MotionQuantity::Displacement => "displacement",
@@ -27,62 +30,25 @@ impl MotionQuantity {
 
     /// The quantity called `name`, if there is one.
     pub fn from_name(name: &str) -> Option<Self> {
-        [MotionQuantity::Displacement, MotionQuantity::Velocity, MotionQuantity::Acceleration]
-            .into_iter()
-            .find(|q| q.name() == name.trim().to_lowercase())
+        Self::ALL.into_iter().find(|q| q.name() == name.trim().to_lowercase())
     }
 
-    /// What an FRF of such a response is called.
-    pub fn frf(self) -> Quantity {
+    /// What an FRF of such a response is called, in files too.
+    pub fn frf_name(self) -> &'static str {
         match self {
-            MotionQuantity::Displacement => Quantity::Receptance,
-            MotionQuantity::Velocity => Quantity::Mobility,
-            MotionQuantity::Acceleration => Quantity::Accelerance,
+            MotionQuantity::Displacement => "receptance",
+            MotionQuantity::Velocity => "mobility",
+            MotionQuantity::Acceleration => "accelerance",
         }
     }
-}
 
-/// What an FRF's numerator is, per newton of the hammer's force.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Quantity {
-    /// Displacement per force, m/N.
-    Receptance,
-    /// Velocity per force, m/(s N).
-    Mobility,
-    /// Acceleration per force, m/(s² N).
-    Accelerance,
-}
+    /// The quantity whose FRFs are called `name`, if there is one.
+    pub fn from_frf_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|q| q.frf_name() == name.trim().to_lowercase())
+    }
 
-impl Quantity {
-    /// How many times the receptance was multiplied by s: 0, 1 or 2.
+    /// How many times the displacement was multiplied by s: 0, 1 or 2.
     pub fn order_of_s(self) -> i32 {
-        match self {
-            Quantity::Receptance => 0,
-            Quantity::Mobility => 1,
-            Quantity::Accelerance => 2,
-        }
-    }
-
-    /// The word used in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Quantity::Receptance => "receptance",
-            Quantity::Mobility => "mobility",
-            Quantity::Accelerance => "accelerance",
-        }
-    }
-
-    /// The quantity called `name` in a file, if there is one.
-    pub fn from_name(name: &str) -> Option<Self> {
-        [Quantity::Receptance, Quantity::Mobility, Quantity::Accelerance]
-            .into_iter()
-            .find(|q| q.name() == name.trim().to_lowercase())
-    }
-}
-
-impl fmt::Display for Quantity {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
+        self as i32
     }
 }

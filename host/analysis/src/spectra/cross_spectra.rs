@@ -2,7 +2,7 @@
 
 use super::SpectraError;
 use super::estimators::{self, variance_of_part};
-use crate::frf::{Frf, FrfError, MotionQuantity, Quantity};
+use crate::frf::{Frf, FrfError, MotionQuantity};
 use nalgebra::DMatrix;
 use num_complex::Complex;
 use std::f64::consts::TAU;
@@ -225,7 +225,7 @@ impl CrossSpectra {
     /// line at s = 0 has no lower derivative: it is left out where one is asked for.
     #[must_use]
     pub fn converted(&self, from: MotionQuantity, to: MotionQuantity) -> CrossSpectra {
-        let order = to.frf().order_of_s() - from.frf().order_of_s();
+        let order = to.order_of_s() - from.order_of_s();
         let lowest = if order < 0 && self.sigma_per_s == 0.0 { f64::MIN_POSITIVE } else { 0.0 };
         CrossSpectra { order: self.order + order, ..self.band(lowest, f64::INFINITY) }
     }
@@ -236,7 +236,7 @@ impl CrossSpectra {
     /// Not one name of its own for each output.
     pub fn to_matrix(
         &self,
-        quantity: Quantity,
+        quantity: MotionQuantity,
         outputs: Vec<String>,
         input: String,
     ) -> Result<Frf, FrfError> {

@@ -3,8 +3,8 @@
 use super::SpectraError;
 use super::average::SpectraAverage;
 use super::cross_spectra::CrossSpectra;
+use super::impact_records::ImpactRecords;
 use super::pulse::Pulse;
-use super::records::ImpactRecords;
 use super::window::Windowing;
 use serde::{Deserialize, Serialize};
 

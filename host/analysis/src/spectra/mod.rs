@@ -9,9 +9,9 @@ pub mod average;
 pub mod cross_spectra;
 pub mod estimate;
 pub mod estimators;
+pub mod impact_records;
 pub mod jackknife;
 pub mod pulse;
-pub mod records;
 pub mod usable_band;
 pub mod window;
 
@@ -19,8 +19,8 @@ pub use crate::frf::MotionQuantity;
 pub use average::SpectraAverage;
 pub use cross_spectra::CrossSpectra;
 pub use estimate::{FrfSettings, Origin, estimate};
+pub use impact_records::ImpactRecords;
 pub use pulse::Pulse;
-pub use records::ImpactRecords;
 pub use usable_band::usable_band;
 pub use window::{ForceWeighting, Windowing};
 

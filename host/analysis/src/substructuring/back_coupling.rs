@@ -1,7 +1,7 @@
 //! The proof of the pudding: A and B coupled by the identified joint must be the measured assembly.
 
 use super::coupling::{boolean_difference, couple};
-use super::joint::stiffness_and_damping;
+use super::joint_over_bands::stiffness_and_damping;
 use super::pseudo_inverse::full_rank_inverse;
 use crate::band::Band;
 use crate::frf::Frf;
@@ -70,7 +70,7 @@ impl BackCoupling {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frf::Quantity;
+    use crate::frf::MotionQuantity;
 
     /// Two single masses on springs, joined by 1e6 N/m below 200 Hz and by half of it above.
     fn measured() -> (Frf, [Vec<Line>; 4]) {
@@ -78,7 +78,7 @@ mod tests {
         let axis = Frf::new(
             frequency_hz.clone(),
             2.0,
-            Quantity::Receptance,
+            MotionQuantity::Displacement,
             vec![],
             vec![],
             vec![Line::zeros(0, 0); frequency_hz.len()],

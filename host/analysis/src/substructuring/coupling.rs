@@ -85,7 +85,8 @@ pub fn couple(
 /// # Errors
 /// Parts that differ in lines, quantity or window; names that stand twice.
 pub fn block_diagonal(parts: &[(&str, &Frf)]) -> Result<Frf, CouplingError> {
-    let (mut frequency_hz, mut sigma_per_s, mut quantity) = (&[][..], 0.0, super::Quantity::Receptance);
+    let (mut frequency_hz, mut sigma_per_s, mut quantity) =
+        (&[][..], 0.0, super::MotionQuantity::Displacement);
     if let Some((_, first)) = parts.first() {
         (frequency_hz, sigma_per_s, quantity) = (first.frequency_hz(), first.sigma_per_s(), first.quantity());
     }
@@ -145,7 +146,7 @@ pub fn boolean(names: &[String], pairs: &[(&str, &str)]) -> Result<DMatrix<f64>,
 
 #[cfg(test)]
 mod tests {
-    use super::super::Quantity;
+    use super::super::MotionQuantity;
     use super::*;
     use std::f64::consts::TAU;
 
@@ -164,7 +165,7 @@ mod tests {
         Frf::new(
             lines.to_vec(),
             0.0,
-            Quantity::Receptance,
+            MotionQuantity::Displacement,
             names.clone(),
             names,
             lines.iter().map(|f| receptance(k, m, *f)).collect(),

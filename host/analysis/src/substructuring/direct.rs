@@ -1,6 +1,6 @@
 //! T/Δx at the specimens as a joint of its own: the contact itself, whatever the clamp does.
 
-use super::joint::{BandStatistic, stiffness_and_damping};
+use super::joint_over_bands::{BandStatistic, stiffness_and_damping};
 use crate::band::Band;
 use num_complex::Complex;
 use std::f64::consts::TAU;

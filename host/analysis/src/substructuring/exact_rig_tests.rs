@@ -1,7 +1,7 @@
 //! What tests start from: exact FRFs of two rigid bodies on suspensions, alone and joined by a known contact.
 
 use super::geometry::{Configuration, Geometry, Grouping, Point};
-use crate::frf::{Frf, Quantity};
+use crate::frf::{Frf, MotionQuantity};
 use nalgebra::{Complex, DMatrix, Vector3};
 use std::f64::consts::TAU;
 
@@ -78,5 +78,5 @@ fn frf(points: &Configuration, bodies: std::ops::Range<usize>) -> Frf {
     };
     let lines = frequency_hz.iter().map(line).collect();
     let (outputs, inputs) = (points.output_names(), points.input_names());
-    Frf::new(frequency_hz, SIGMA_PER_S, Quantity::Mobility, outputs, inputs, lines).expect("all agree")
+    Frf::new(frequency_hz, SIGMA_PER_S, MotionQuantity::Velocity, outputs, inputs, lines).expect("all agree")
 }

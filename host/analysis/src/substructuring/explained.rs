@@ -9,7 +9,7 @@ use super::averaged::Priors;
 use super::geometry::{Configuration, Geometry, Point};
 use super::identify::back_coupled;
 use super::idm::IdmSet;
-use super::joint::median;
+use super::joint_over_bands::median;
 use crate::band::Band;
 use crate::frf::Frf;
 use crate::parallel::prelude::*;

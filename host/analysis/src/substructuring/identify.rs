@@ -4,14 +4,14 @@ use super::back_coupling::BackCoupling;
 use super::geometry::Geometry;
 use super::idm::IdmSet;
 use super::interface_data::{InterfaceError, Measured};
-use super::joint::{JointRow, JointSpectrum};
+use super::joint_over_bands::{JointRow, JointSpectrum};
 use super::line_noise::LineNoise;
 use super::method::Method;
 pub use super::quality::{Internals, VirtualPointQuality};
 use super::reduced::{Reduced, Solution};
 use super::rooms::Rooms;
 use crate::band::Band;
-use crate::frf::{Frf, Quantity};
+use crate::frf::{Frf, MotionQuantity};
 use crate::parallel::prelude::*;
 use crate::structure::{Abc, Structure};
 use nalgebra::{Complex, DMatrix};
@@ -34,15 +34,16 @@ pub enum IdentifyError {
     },
     /// The files hold different quantities.
     #[error(
-        "{file} holds {found}, A holds {expected}: convert them to one quantity first, or correct the label"
+        "{file} holds {}, A holds {}: convert them to one quantity first, or correct the label",
+        found.frf_name(), expected.frf_name()
     )]
     Quantities {
         /// Which file.
         file: Structure,
         /// Its quantity.
-        found: Quantity,
+        found: MotionQuantity,
         /// A's quantity.
-        expected: Quantity,
+        expected: MotionQuantity,
     },
     /// The files were windowed differently.
     #[error(

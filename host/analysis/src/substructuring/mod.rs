@@ -7,9 +7,9 @@
 //! 3. [`idm`], [`vpt`]: measured points onto the motions of a virtual point ([`virtual_points`]: of any number of them);
 //!    [`consistency`] says what is lost.
 //! 4. [`decoupling`]: one file per method, all returning Z^J per line; [`pseudo_inverse`] inverts without truncating.
-//! 5. [`joint`]: K and C per line and over bands, with scatter, interval and warnings.
+//! 5. [`joint_over_bands`]: K and C per line and over bands, with scatter, interval and warnings.
 //! 6. [`identify`](mod@identify): the front door that does all of it; [`line_noise`](mod@line_noise): what the FRFs' noise does to each of its lines.
-//! 7. [`averaged`](mod@averaged): the estimate to quote, with its interval; the bootstrap over hits. [`noise`] is what they start from.
+//! 7. [`averaged`](mod@averaged): the estimate to quote, with its interval; the bootstrap over hits. [`noise`](crate::frf::noise) is what they start from.
 //! 8. [`fit`]: K and C by maximum likelihood over all measured blocks.
 //! 9. [`coupling`]: the other way round, from parts to the assembly; [`cmif`](mod@cmif): how many modes the interface needs;
 //!    [`back_coupling`]: whether the joint found gives the measured assembly, and [`explained`] what may keep it from that; [`plausibility`]: passivity and reciprocity; [`semm`](mod@semm): a model corrected by a measurement.
@@ -32,8 +32,8 @@ pub mod geometry;
 pub mod identify;
 pub mod idm;
 mod interface_data;
-mod internals;
-pub mod joint;
+mod internal_dofs;
+pub mod joint_over_bands;
 pub mod line_noise;
 pub mod method;
 pub mod plausibility;
@@ -48,11 +48,11 @@ pub mod virtual_points;
 pub mod vpt;
 
 pub use crate::band::Band;
-pub use crate::frf::{self, Frf, FrfError, Quantity, noise};
+pub use crate::frf::{Frf, FrfError, MotionQuantity};
 pub use crate::structure::{Abc, Structure};
 pub use geometry::{Configuration, Geometry, Grouping, Point};
 pub use identify::{Decoupled, Identification, IdentifyError, Refused, decouple, identify, line_noise};
 pub use idm::{Dof, IdmSet};
-pub use joint::{BandStatistic, JointRow, JointSpectrum};
+pub use joint_over_bands::{BandStatistic, JointRow, JointSpectrum};
 pub use method::Method;
 pub use quality::{Internals, VirtualPointQuality};

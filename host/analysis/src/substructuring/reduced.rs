@@ -9,7 +9,7 @@ use super::decoupling::{
 use super::geometry::Grouping;
 use super::idm::IdmSet;
 use super::interface_data::{InterfaceError, balance, scaled};
-use super::internals::{Rearrangement, Which};
+use super::internal_dofs::{Rearrangement, Which};
 use super::method::Method;
 use super::plausibility::{passivity, reciprocity};
 use super::pseudo_inverse::{condition, full_rank_inverse, rank};

@@ -175,7 +175,7 @@ fn pseudo_inverse(a: &Line, dropped: usize, name: &'static str) -> Result<Line, 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frf::Quantity;
+    use crate::frf::MotionQuantity;
     use proptest::prelude::*;
 
     fn matrix(n: usize, v: &[f64], diagonal: f64) -> Line {
@@ -221,7 +221,8 @@ mod tests {
 
     fn file(names: &[&str], y: Line) -> Frf {
         let names: Vec<String> = names.iter().map(|n| (*n).to_string()).collect();
-        Frf::new(vec![100.0], 0.0, Quantity::Mobility, names.clone(), names, vec![y]).expect("all agree")
+        Frf::new(vec![100.0], 0.0, MotionQuantity::Velocity, names.clone(), names, vec![y])
+            .expect("all agree")
     }
 
     #[test]
@@ -238,7 +239,8 @@ mod tests {
         assert!(refused(&parent, &wrong).contains("`t`"));
         let (outputs, inputs) = (overlay.outputs().to_vec(), overlay.inputs().to_vec());
         let lines = overlay.lines().to_vec();
-        let wrong = Frf::new(vec![90.0], 0.0, Quantity::Mobility, outputs, inputs, lines).expect("all agree");
+        let wrong =
+            Frf::new(vec![90.0], 0.0, MotionQuantity::Velocity, outputs, inputs, lines).expect("all agree");
         assert!(refused(&parent, &wrong).contains("lines"));
         let flat = file(&["p", "q", "r", "s"], Line::from_element(4, 4, Complex::from(1.0)));
         assert!(refused(&flat, &overlay).contains("rank 1"));

@@ -237,7 +237,7 @@ fn side(
 mod tests {
     use super::super::idm::Dof;
     use super::*;
-    use crate::frf::Quantity;
+    use crate::frf::MotionQuantity;
     use nalgebra::Complex;
 
     const CORNERS: [[f64; 3]; 4] =
@@ -308,7 +308,7 @@ mod tests {
         let frf = Frf::new(
             vec![100.0, 101.0],
             0.0,
-            Quantity::Mobility,
+            MotionQuantity::Velocity,
             names.clone(),
             names.clone(),
             vec![&r * &truth * r.transpose(); 2],
@@ -340,7 +340,7 @@ mod tests {
         let frf = Frf::new(
             vec![100.0],
             0.0,
-            Quantity::Mobility,
+            MotionQuantity::Velocity,
             names.clone(),
             names.clone(),
             vec![DMatrix::zeros(names.len(), names.len())],

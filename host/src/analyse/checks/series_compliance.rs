@@ -5,7 +5,7 @@ use crate::identified::SCATTER_OF_LINES;
 use crate::results::{MAIN_BAND, headline_rank};
 use crate::substructuring::averaged::Averaged;
 use crate::substructuring::direct::Direct;
-use crate::substructuring::joint::NORMAL_95;
+use crate::substructuring::joint_over_bands::NORMAL_95;
 use crate::substructuring::{BandStatistic, Dof, JointRow};
 
 /// Loops stiffer than FBS by more than this: something between arm and specimen gives way.

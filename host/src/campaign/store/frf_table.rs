@@ -13,7 +13,7 @@ use super::error::StoreError;
 use super::notes::utc_now;
 use super::table::{Row, table};
 use crate::campaign::plan::configuration_name;
-use crate::substructuring::frf::{Frf, Quantity};
+use crate::frf::{Frf, MotionQuantity};
 
 /// FRFs from elsewhere, with the variance where their file told it.
 #[derive(Debug, Clone, PartialEq)]
@@ -107,7 +107,7 @@ impl FrfColumns {
             let of_line = |line| DMatrix::from_fn(rows, columns, |r, c| variance[place(line, r, c)]);
             lines.clone().map(of_line).collect()
         });
-        let quantity = Quantity::from_name(&self.quantity)
+        let quantity = MotionQuantity::from_frf_name(&self.quantity)
             .ok_or_else(|| format!("`{}` is no kind of FRF", self.quantity))?;
         let lines = lines.map(matrix).collect();
         let frf = Frf::new(frequency_hz, self.sigma_per_s, quantity, outputs, inputs, lines);
@@ -140,7 +140,7 @@ impl Store {
             configuration: configuration_name(configuration).into(),
             utc: utc_now(),
             source: source.into(),
-            quantity: frf.quantity().name().into(),
+            quantity: frf.quantity().frf_name().into(),
             sigma_per_s: frf.sigma_per_s(),
             outputs: serde_json::json!(frf.outputs()).to_string(),
             inputs: serde_json::json!(frf.inputs()).to_string(),

@@ -6,7 +6,7 @@ fn matrix(lines: usize, seed: f64) -> Frf {
     Frf::new(
         (0..lines).map(|l| 10.0 + 0.5 * l as f64).collect(),
         2.3,
-        Quantity::Mobility,
+        MotionQuantity::Velocity,
         ["A1:x", "A1:y", "A1:z"].map(String::from).to_vec(),
         ["AZ1", "AY1"].map(String::from).to_vec(),
         (0..lines)
@@ -83,7 +83,7 @@ fn what_contradicts_itself_cannot_be_stored() {
     let (frequency_hz, outputs, lines) =
         (frf.frequency_hz().to_vec(), frf.outputs().to_vec(), frf.lines().to_vec());
     let one = frf.inputs()[..1].to_vec();
-    assert!(Frf::new(frequency_hz, 2.3, Quantity::Mobility, outputs, one, lines).is_err());
+    assert!(Frf::new(frequency_hz, 2.3, MotionQuantity::Velocity, outputs, one, lines).is_err());
     let variance = noisy(3, 0.0).variance().expect("known").to_vec();
     let error = frf.with_variance(variance).expect_err("3 lines of 2");
     assert!(error.to_string().contains("3 lines of 3 × 2"), "{error}");

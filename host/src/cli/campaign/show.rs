@@ -13,7 +13,7 @@ use crate::campaign::store::overrules::Overrule;
 use crate::campaign::store::record_row::{Damaged, RecordRow};
 use crate::cli::error::CliError;
 use crate::cli::output;
-use crate::report::records::{Shown, records};
+use crate::report::cell_records::{Shown, records};
 use jointrig_protocol::channel::Role;
 
 /// Show a cell: its records, their verdicts, and a figure.

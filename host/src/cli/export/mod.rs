@@ -17,9 +17,9 @@ use crate::campaign::store::Store;
 use crate::campaign::store::record_row::RecordRow;
 use crate::exchange::positions_output::write_positions;
 use crate::exchange::{tables_output, uff_output, write_frf, write_impacts};
+use crate::frf::Frf;
 use crate::spectra::{ImpactRecords, MotionQuantity};
 use crate::structure::Structure;
-use crate::substructuring::frf::Frf;
 use crate::substructuring::geometry::Configuration;
 
 /// Write everything that a campaign file holds for other programs.

@@ -14,7 +14,7 @@ use crate::campaign::plan::{configuration_name, configuration_named, structure};
 use crate::campaign::store::Store;
 use crate::campaign::verdict::Kind;
 use crate::exchange::{read_frf_file, write_frf};
-use crate::substructuring::frf::Frf;
+use crate::frf::Frf;
 use crate::substructuring::geometry::Configuration as Points;
 use records::CellName;
 
@@ -145,7 +145,7 @@ fn check_names(file: &Path, frf: &Frf, name: &str, points: &Points) -> Result<()
 fn described(frf: &Frf) -> String {
     format!(
         "{} of {} outputs, {} inputs, {} lines",
-        frf.quantity(),
+        frf.quantity().frf_name(),
         frf.outputs().len(),
         frf.inputs().len(),
         frf.lines().len()

@@ -8,7 +8,7 @@ use super::{AveragedError, DofEstimate, Line, Prepared, compliance, invert};
 use crate::parallel::prelude::*;
 use crate::substructuring::idm::Dof;
 use crate::substructuring::interface_data::balance;
-use crate::substructuring::joint::stiffness_and_damping;
+use crate::substructuring::joint_over_bands::stiffness_and_damping;
 use nalgebra::{Complex, DMatrix};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;

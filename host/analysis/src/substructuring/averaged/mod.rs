@@ -21,7 +21,7 @@ pub use bootstrap::{CellHits, Replicates};
 use super::geometry::Geometry;
 use super::idm::{Dof, IdmSet};
 use super::interface_data::{InterfaceError, balance};
-use super::joint::{NORMAL_95, stiffness_and_damping};
+use super::joint_over_bands::{NORMAL_95, stiffness_and_damping};
 use super::pseudo_inverse::{RankLost, full_rank_inverse};
 use crate::band::Band;
 use crate::frf::Frf;

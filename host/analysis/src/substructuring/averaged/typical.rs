@@ -8,7 +8,7 @@
 
 use super::sensitivity::Sums;
 use super::{Line, Priors, compliance};
-use crate::substructuring::joint::median;
+use crate::substructuring::joint_over_bands::median;
 use nalgebra::Complex;
 
 /// κ of a joint that is hardly there, and of one that hardly gives way.

@@ -13,7 +13,7 @@
 
 mod block;
 mod cell;
-mod joint;
+mod chart;
 mod model;
 mod nuisance;
 mod outcome;
@@ -22,7 +22,7 @@ mod solver;
 mod start;
 mod weight;
 
-pub use joint::Shape;
+pub use chart::Shape;
 pub use outcome::FittedDof;
 
 use super::averaged::Priors;

@@ -4,7 +4,7 @@
 //! R = I − Bᵀ G⁻¹ Q; a change of the joint −P δ(G⁻¹) Q.
 
 use super::block::{Line, Ports};
-use super::joint::At;
+use super::chart::At;
 use nalgebra::Complex;
 
 type C = Complex<f64>;

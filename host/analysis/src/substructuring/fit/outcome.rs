@@ -1,13 +1,13 @@
 //! From parameters to K and C with intervals, and to words where the data do not say enough.
 
-use super::joint::{Chart, Shape};
+use super::chart::{Chart, Shape};
 use super::solver::Found;
 use super::{Fitted, Options};
 use crate::band::Band;
 use crate::identified::FITTED_HALF_WIDTH;
 use crate::substructuring::idm::{Dof, IdmSet};
 use crate::substructuring::interface_data::balance;
-use crate::substructuring::joint::{BandStatistic, JointRow, NORMAL_95};
+use crate::substructuring::joint_over_bands::{BandStatistic, JointRow, NORMAL_95};
 use nalgebra::DVector;
 use serde::Serialize;
 use std::collections::BTreeMap;

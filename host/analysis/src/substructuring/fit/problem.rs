@@ -3,7 +3,7 @@
 use super::FitError;
 use super::block::{Block, Line};
 use super::cell::CellGeometry;
-use super::joint::Chart;
+use super::chart::Chart;
 use super::model::{Layout, Predicted};
 use super::nuisance::Nuisances;
 use crate::parallel::prelude::*;

@@ -1,7 +1,7 @@
 //! Levenberg–Marquardt on the joint, with the errors of geometry integrated out and linearised anew where they are believed to be.
 
 use super::FitError;
-use super::joint::{Chart, Shape};
+use super::chart::{Chart, Shape};
 use super::problem::{Corrected, Problem};
 use super::weight::{Point, Weight};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};

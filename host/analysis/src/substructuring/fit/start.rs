@@ -1,11 +1,11 @@
 //! Where the search begins.
 
 use super::block::Line;
-use super::joint::Chart;
+use super::chart::Chart;
 use super::model::Layout;
 use super::problem::Problem;
 use crate::substructuring::idm::IdmSet;
-use crate::substructuring::joint::median;
+use crate::substructuring::joint_over_bands::median;
 use crate::substructuring::pseudo_inverse::full_rank_inverse;
 use nalgebra::{Complex, DVector};
 

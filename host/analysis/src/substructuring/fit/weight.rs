@@ -7,7 +7,7 @@
 use super::FitError;
 use super::block::{Block, Line};
 use super::cell::CellGeometry;
-use super::joint::Chart;
+use super::chart::Chart;
 use super::model::Predicted;
 use super::problem::{Corrected, Problem};
 use crate::parallel::prelude::*;

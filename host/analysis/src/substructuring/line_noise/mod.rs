@@ -15,7 +15,7 @@ use super::decoupling::{
 };
 use super::idm::Dof;
 use super::interface_data::balance;
-use super::internals::Rearrangement;
+use super::internal_dofs::Rearrangement;
 use super::method::Method;
 use super::product::product;
 use super::pseudo_inverse::full_rank_inverse;

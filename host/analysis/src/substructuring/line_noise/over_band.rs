@@ -3,7 +3,7 @@
 use super::LineNoise;
 use crate::band::Band;
 use crate::substructuring::idm::Dof;
-use crate::substructuring::joint::median;
+use crate::substructuring::joint_over_bands::median;
 use std::collections::BTreeMap;
 
 impl LineNoise {
