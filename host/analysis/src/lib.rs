@@ -9,7 +9,7 @@
 //! written down. What couples the masses is found again from them:
 //!
 //! ```
-//! use jointrig_analysis::substructuring::{decoupling::interface, joint::stiffness_and_damping};
+//! use jointrig_analysis::substructuring::{decoupling::interface, joint_over_bands::stiffness_and_damping};
 //! use nalgebra::{Complex, DMatrix};
 //!
 //! let s = Complex::new(0.0, std::f64::consts::TAU * 400.0);
