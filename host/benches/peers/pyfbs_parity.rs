@@ -176,7 +176,7 @@ fn virtual_points(table: &mut Table, name: &str, geometry: &Geometry) -> Outcome
             vpt::responses(&channels, at, IdmSet::Six, None)?,
             vpt::impacts(&impacts, at, IdmSet::Six, None)?,
         );
-        let found = consistency(&frf.select(&plan.outputs, &plan.inputs)?.lines(), &u, &f);
+        let found = consistency(frf.select(&plan.outputs, &plan.inputs)?.lines(), &u, &f);
         let mut worst = 0.0f64;
         for (what, ours) in [
             ("overall_sensor", &found.overall_sensor),
