@@ -9,7 +9,7 @@
 //! | a level of the shaker | [`run::shaking`] |
 //!
 //! [`run::runner::run`] walks the cells of the plan: hammer and laser are brought there ([`run::stage`]), shots are fired at repeatable
-//! scans ([`run::shot`]) with a pulse that finds the target force ([`run::pulse`]), each record is judged ([`verdict::judge`]) and stored on
+//! scans ([`run::shot`]) with a pulse that finds the target force ([`run::pulse`]), each record is judged ([`verdict::judge`](mod@verdict::judge)) and stored on
 //! a thread of its own (`run/keeper.rs`).
 
 pub mod plan;
