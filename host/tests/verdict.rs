@@ -34,7 +34,7 @@ impl Verdict {
 
     fn direct(&self) -> f64 {
         let row = self.results.joint.iter().find(|j| j.method == DIRECT).expect("T and Δx are there");
-        assert_eq!(row.band_hz, [250.0, 400.0]);
+        assert_eq!(row.band_hz, [250.0, 400.0].into());
         row.sliding_stiffness().expect("along z").mean
     }
 }

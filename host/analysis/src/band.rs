@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 /// A frequency band, Hz; both ends belong to it. In files it is `[low, high]`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 #[serde(into = "[f64; 2]")]
 pub struct Band {
     /// Lowest frequency, Hz.

@@ -8,7 +8,7 @@ use super::fits::{Fit, NoFit, fits};
 use super::from_frfs::Substructured;
 use super::missing::{Missing, given_up};
 use super::recommended::{Recommended, recommended};
-use super::wanted::{BANDS_HZ, Progress, Wanted};
+use super::wanted::{BANDS, Progress, Wanted};
 use super::{cells_stage, configuration_stage, contact_stage};
 use crate::results::MAIN_BAND;
 use crate::spectra::Windowing;
@@ -81,11 +81,8 @@ pub fn analyse_measurements<M: Measurements>(
 
 fn substructured(frfs: [&Frf; 3], geometry: &Geometry) -> Result<Substructured, Missing> {
     let [a, b, ajb] = frfs;
-    let bands: Vec<Band> = BANDS_HZ
-        .into_iter()
-        .filter(|b| a.frequency_hz().iter().any(|f| (b[0]..=b[1]).contains(f)))
-        .map(|[low_hz, high_hz]| Band { low_hz, high_hz })
-        .collect();
+    let bands: Vec<Band> =
+        BANDS.into_iter().filter(|band| a.frequency_hz().iter().any(|f| band.contains(*f))).collect();
     let identified = identify(a, b, ajb, geometry, &Method::ALL, &IdmSet::ALL, &bands);
     let mut found = identified
         .map(|found| Substructured::of(frfs, geometry, &Priors::default(), found))

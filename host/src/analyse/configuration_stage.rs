@@ -96,6 +96,6 @@ fn force_band(configuration: Structure, own: &[CellAverage]) -> Option<UsableBan
     let frequency_hz: Vec<f64> = (0..mean.len())
         .map(|block| first.step_hz * ((block * FORCE_LINES) as f64 + 0.5 * (FORCE_LINES - 1) as f64))
         .collect();
-    let band = usable_band(&frequency_hz, &mean, 6.0)?;
-    Some(UsableBand { configuration: configuration.into(), band_hz: [band.low_hz, band.high_hz] })
+    let band_hz = usable_band(&frequency_hz, &mean, 6.0)?;
+    Some(UsableBand { configuration: configuration.into(), band_hz })
 }

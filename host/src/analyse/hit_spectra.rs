@@ -1,7 +1,7 @@
 //! Spectra of single hits, for the bootstrap: only the assembly's interface cells, only the main band.
 
 use super::cell::{Cell, CellName};
-use crate::results::MAIN_BAND_HZ;
+use crate::results::MAIN_BAND;
 use crate::spectra::{FrfSettings, ImpactRecords, MotionQuantity, SpectraError, Windowing, estimate};
 use crate::structure::Structure;
 use crate::substructuring::averaged::CellHits;
@@ -39,7 +39,7 @@ pub fn of(
             delay_s: hit.response_delay_s.to_vec(),
             ..FrfSettings::default()
         };
-        let y = estimate(&one, &[true], &settings)?.band(MAIN_BAND_HZ[0], MAIN_BAND_HZ[1]);
+        let y = estimate(&one, &[true], &settings)?.band(MAIN_BAND.low_hz, MAIN_BAND.high_hz);
         auto.resize(y.lines(), Vec::new());
         cross.resize(y.lines(), vec![Vec::new(); channels.len()]);
         for l in 0..y.lines() {

@@ -49,4 +49,4 @@ pub use impact_loops::{ImpactLoops, SlopeIs};
 pub use missing::Missing;
 pub use plan_geometry::geometry;
 pub use shaker_levels::RecordLoops;
-pub use wanted::{BANDS_HZ, Progress, Wanted};
+pub use wanted::{BANDS, Progress, Wanted};

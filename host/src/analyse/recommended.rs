@@ -1,10 +1,10 @@
 //! The estimates to quote, and the bootstrap over hits where it was asked for.
 
 use super::missing::Missing;
-use super::wanted::BANDS_HZ;
+use super::wanted::BANDS;
 use crate::results::{Bootstrap, MAIN_BAND};
 use crate::substructuring::averaged::{Averaged, AveragedError, CellHits, Prepared, Priors};
-use crate::substructuring::{Band, Frf, Geometry, IdmSet};
+use crate::substructuring::{Frf, Geometry, IdmSet};
 
 /// The bootstrap's seed: the same file gives the same figures.
 const SEED: u64 = 1;
@@ -29,8 +29,7 @@ pub fn recommended(
     replicates: usize,
 ) -> Recommended {
     let mut found = Recommended::default();
-    for [low_hz, high_hz] in BANDS_HZ {
-        let band = Band { low_hz, high_hz };
+    for band in BANDS {
         match Prepared::of(ajb, geometry, IdmSet::Six, band, priors) {
             Ok(prepared) => {
                 let estimate = prepared.estimate();

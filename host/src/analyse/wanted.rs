@@ -1,10 +1,12 @@
 //! What is asked of an analysis, and how far it is.
 
 use super::cell::KnownContact;
-use crate::results::MAIN_BAND_HZ;
+use crate::results::MAIN_BAND;
+use crate::substructuring::Band;
 
 /// The bands that means are taken over, Hz; the first is the main one.
-pub const BANDS_HZ: [[f64; 2]; 3] = [MAIN_BAND_HZ, [100.0, 800.0], [100.0, 300.0]];
+pub const BANDS: [Band; 3] =
+    [MAIN_BAND, Band { low_hz: 100.0, high_hz: 800.0 }, Band { low_hz: 100.0, high_hz: 300.0 }];
 
 /// What is wanted beyond the usual, and what is known beforehand.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

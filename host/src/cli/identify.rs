@@ -8,7 +8,7 @@ use clap::Args;
 
 use super::error::CliError;
 use super::output;
-use crate::analyse::{BANDS_HZ, Findings, Fit, Missing, NoFit, Substructured, fits};
+use crate::analyse::{BANDS, Findings, Fit, Missing, NoFit, Substructured, fits};
 use crate::exchange::{PositionsError, read_frf_file, read_positions};
 use crate::report::{document, words};
 use crate::results::{Results, Source};
@@ -185,11 +185,8 @@ fn refusals(results: &Results) -> Option<String> {
 
 /// The default bands that hold a line of the files.
 fn default_bands(frf: &Frf) -> Result<Vec<Band>, CliError> {
-    let bands: Vec<Band> = BANDS_HZ
-        .into_iter()
-        .map(|[low_hz, high_hz]| Band { low_hz, high_hz })
-        .filter(|band| frf.frequency_hz().iter().any(|f| band.contains(*f)))
-        .collect();
+    let bands: Vec<Band> =
+        BANDS.into_iter().filter(|band| frf.frequency_hz().iter().any(|f| band.contains(*f))).collect();
     if bands.is_empty() {
         let (first, last) = (frf.frequency_hz().first(), frf.frequency_hz().last());
         return Err(CliError::Bad(format!(

@@ -4,7 +4,8 @@ use super::drawing::escape;
 use crate::report::words;
 use crate::report::words::number::{band, count, decimals, micro, short, with_scatter};
 use crate::report::words::side_by_side;
-use crate::results::{MAIN_BAND_HZ, OverCycles, Results};
+use crate::results::{MAIN_BAND, OverCycles, Results};
+use crate::substructuring::Band;
 use std::fmt::Write;
 
 /// Builds one table; cells are escaped, columns after the first `text_columns` are set to the right.
@@ -65,7 +66,7 @@ pub fn joint(results: &Results) -> Option<String> {
         "c_z ± σ, N s/m",
         "lines",
     ];
-    let mut bands: Vec<[f64; 2]> = Vec::new();
+    let mut bands: Vec<Band> = Vec::new();
     for joint in &results.joint {
         if !bands.contains(&joint.band_hz) {
             bands.push(joint.band_hz);
@@ -98,14 +99,14 @@ pub fn joint(results: &Results) -> Option<String> {
                 damping.map_or(UNKNOWN.into(), |c| with_scatter(c.mean, c.std)),
                 joint.lines.to_string(),
             ]);
-            if range != MAIN_BAND_HZ {
+            if range != MAIN_BAND {
                 elsewhere += joint.warnings.len();
                 continue;
             }
             let row = format!("{}, {} IDMs", joint.method, joint.idms);
             notes.extend(joint.warnings.iter().map(|w| (row.clone(), w.as_str())));
         }
-        if range == MAIN_BAND_HZ {
+        if range == MAIN_BAND {
             html.push_str(&table.finish());
         } else {
             write!(html, "<details><summary>{}</summary>{}</details>", band(range), table.finish())
@@ -117,7 +118,7 @@ pub fn joint(results: &Results) -> Option<String> {
         write!(
             html,
             "<p><small>Remarks are on {}; {elsewhere} more, on the other bands, stand in results.json.</small></p>",
-            band(MAIN_BAND_HZ)
+            band(MAIN_BAND)
         )
         .expect("writing into a String cannot fail");
     }

@@ -1,5 +1,6 @@
 //! Curves kept for the figures: a few FRFs with their coherence.
 
+use crate::substructuring::Band;
 use serde::Serialize;
 
 /// What an FRF shows.
@@ -58,7 +59,7 @@ pub struct UsableBand {
     /// Configuration: `A`, `B` or `AJB`.
     pub configuration: String,
     /// Where the force's auto-spectrum is within 6 dB of its level at low frequency, Hz.
-    pub band_hz: [f64; 2],
+    pub band_hz: Band,
 }
 
 /// To `digits` significant decimal digits: keeps files small without losing what a figure shows.

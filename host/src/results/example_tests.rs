@@ -23,7 +23,7 @@ fn joint(method: &str, idms: usize, band_hz: [f64; 2], k: f64, std: f64, warning
         method: method.into(),
         idms,
         modes: IdmSet::from_count(idms).map_or_else(Vec::new, IdmSet::dofs),
-        band_hz,
+        band_hz: band_hz.into(),
         stiffness_n_per_m: translations(statistics(k, std)),
         damping_n_s_per_m: translations(statistics(410.0, 90.0)),
         stiffness_n_m_per_rad: BTreeMap::new(),
@@ -347,8 +347,9 @@ pub fn results() -> Results {
         frf("AJB", Role::SpecimenA, ["x_A", "I_MZ"], &[(192.0, 0.004), (208.0, 0.1)], 2e-10),
         frf("AJB", Role::SpecimenB, ["x_B", "I_MZ"], &[(208.0, 0.09)], 2e-10),
     ];
-    results.usable_bands =
-        ["A", "B", "AJB"].map(|c| UsableBand { configuration: c.into(), band_hz: [0.0, 1985.0] }).to_vec();
+    results.usable_bands = ["A", "B", "AJB"]
+        .map(|c| UsableBand { configuration: c.into(), band_hz: [0.0, 1985.0].into() })
+        .to_vec();
     results.example_loop = Some(example_loop());
     results.impact_slopes = (0..72)
         .map(|i| ImpactSlope {
@@ -362,9 +363,9 @@ pub fn results() -> Results {
 
 /// What only a campaign with all three configurations has: the estimate to quote, the virtual points, the CMIF, hits drawn anew.
 pub fn add_interface(results: &mut Results) {
+    use crate::substructuring::Dof;
     use crate::substructuring::averaged::{DofEstimate, Priors, Replicates};
-    use crate::substructuring::{Band, Dof};
-    let band_hz = Band { low_hz: MAIN_BAND_HZ[0], high_hz: MAIN_BAND_HZ[1] };
+    let band_hz = MAIN_BAND;
     let z = DofEstimate {
         stiffness: 26.7e6,
         std: 0.5e6,

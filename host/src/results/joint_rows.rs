@@ -1,6 +1,7 @@
 //! The joint by substructuring: numbers over bands, and the spectra they come from.
 
 use crate::identified::SCATTER_OF_LINES;
+use crate::substructuring::Band;
 use crate::substructuring::{BandStatistic as Statistics, Dof};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -23,7 +24,7 @@ pub struct Joint {
     /// Which ones; none where no virtual point is used.
     pub modes: Vec<Dof>,
     /// The band, ends included, Hz.
-    pub band_hz: [f64; 2],
+    pub band_hz: Band,
     /// Stiffness of the translations by direction (`x`, `y`, `z`), N/m.
     pub stiffness_n_per_m: BTreeMap<String, Statistics>,
     /// Damping of the translations by direction, N s/m.

@@ -37,10 +37,8 @@ use serde::Serialize;
 /// The shape's version: 1.
 pub const VERSION: u32 = 1;
 
-/// The band the headline is read from, Hz (the paper's Table 2).
-pub const MAIN_BAND_HZ: [f64; 2] = [300.0, 600.0];
-/// The same as a band.
-pub const MAIN_BAND: Band = Band { low_hz: MAIN_BAND_HZ[0], high_hz: MAIN_BAND_HZ[1] };
+/// The band the headline is read from (the paper's Table 2).
+pub const MAIN_BAND: Band = Band { low_hz: 300.0, high_hz: 600.0 };
 
 /// All that was found. The first six fields are the contract that scripts rely on; the others are there for
 /// the report and may grow.
@@ -117,7 +115,7 @@ impl Results {
     pub fn headline_joint(&self) -> Option<&Joint> {
         self.joint
             .iter()
-            .filter(|j| j.band_hz == MAIN_BAND_HZ && j.sliding_stiffness().is_some())
+            .filter(|j| j.band_hz == MAIN_BAND && j.sliding_stiffness().is_some())
             .max_by_key(|j| headline_rank(&j.method, j.idms))
     }
 

@@ -6,7 +6,7 @@ use super::super::scale::Scale;
 use super::WIDTH;
 use crate::report::words::number::{micro, stiffness};
 use crate::report::words::side_by_side;
-use crate::results::{MAIN_BAND_HZ, Results};
+use crate::results::{MAIN_BAND, Results};
 use crate::substructuring::Dof;
 
 struct Row {
@@ -64,7 +64,7 @@ pub fn comparison(results: &Results) -> Option<String> {
 }
 
 fn rows(results: &Results) -> Vec<Row> {
-    let joint = results.joint.iter().filter(|j| j.band_hz == MAIN_BAND_HZ).filter_map(|j| {
+    let joint = results.joint.iter().filter(|j| j.band_hz == MAIN_BAND).filter_map(|j| {
         let k = j.sliding_stiffness()?;
         Some(Row {
             label: format!("FBS {}, {} IDMs", j.method, j.idms),

@@ -4,7 +4,7 @@ use super::super::drawing::{Anchor, Area, Drawing, Stroke};
 use super::super::panel::{BLUE, Panel, SHADE};
 use super::super::scale::Scale;
 use super::WIDTH;
-use crate::results::{MAIN_BAND_HZ, Results};
+use crate::results::{MAIN_BAND, Results};
 
 const AREA: Area = Area { left: 70.0, top: 34.0, width: WIDTH - 90.0, height: 260.0 };
 /// Below this part of the largest value there is rounding.
@@ -28,7 +28,7 @@ pub fn interface_modes(results: &Results) -> Option<String> {
     let title = format!("CMIF: {} modes suggested", modes.suggested);
     drawing.text([AREA.left, 18.0], Anchor::Start, "title", &title);
     panel.grid(&mut drawing, &x_ticks, &y_ticks);
-    panel.shade(&mut drawing, MAIN_BAND_HZ, SHADE, 0.12);
+    panel.shade(&mut drawing, MAIN_BAND.into(), SHADE, 0.12);
     for (i, curve) in modes.singular_values_m_per_n.iter().enumerate() {
         let stroke = if i < modes.suggested { Stroke::new(BLUE, 1.4) } else { Stroke::new("#999", 0.9) };
         panel.curve(&mut drawing, modes.frequency_hz.iter().copied().zip(curve.iter().copied()), stroke);

@@ -6,7 +6,8 @@ use super::super::scale::{Scale, middle_range};
 use super::{WIDTH, idm_stroke};
 use crate::report::words;
 use crate::report::words::number::{band, decimals, micro};
-use crate::results::{JointSpectrum, MAIN_BAND_HZ, Results, SpectrumCurve};
+use crate::results::{JointSpectrum, MAIN_BAND, Results, SpectrumCurve};
+use crate::substructuring::Band;
 
 const LEFT: f64 = 70.0;
 const RIGHT: f64 = 130.0;
@@ -37,7 +38,7 @@ pub fn joint_spectrum(results: &Results) -> Option<String> {
         let (x_ticks, y_ticks) = (x.ticks(9), y.ticks(5));
         let of_method = || curves.iter().copied().filter(|c| c.method == *method);
         panel.grid(&mut drawing, &x_ticks, &y_ticks);
-        panel.shade(&mut drawing, MAIN_BAND_HZ, SHADE, 0.14);
+        panel.shade(&mut drawing, MAIN_BAND.into(), SHADE, 0.14);
         panel.level(&mut drawing, frequencies, 0.0, Stroke::new(INK, 0.8));
         for curve in of_method() {
             let points = spectrum
@@ -64,24 +65,24 @@ pub fn joint_spectrum(results: &Results) -> Option<String> {
 }
 
 /// The bands of the results, widest first.
-fn bands(results: &Results) -> Vec<[f64; 2]> {
-    let mut bands: Vec<[f64; 2]> = Vec::new();
+fn bands(results: &Results) -> Vec<Band> {
+    let mut bands: Vec<Band> = Vec::new();
     for joint in &results.joint {
         if !bands.contains(&joint.band_hz) {
             bands.push(joint.band_hz);
         }
     }
-    bands.sort_by(|a, b| (b[1] - b[0]).total_cmp(&(a[1] - a[0])));
+    bands.sort_by(|a, b| (b.high_hz - b.low_hz).total_cmp(&(a.high_hz - a.low_hz)));
     bands
 }
 
-fn shown_range(spectrum: &JointSpectrum, bands: &[[f64; 2]]) -> Option<[f64; 2]> {
+fn shown_range(spectrum: &JointSpectrum, bands: &[Band]) -> Option<[f64; 2]> {
     let (first, last) = (*spectrum.frequency_hz.first()?, *spectrum.frequency_hz.last()?);
     if bands.is_empty() {
         return Some([first, last]);
     }
-    let low = bands.iter().map(|b| b[0]).fold(f64::INFINITY, f64::min);
-    let high = bands.iter().map(|b| b[1]).fold(0.0, f64::max);
+    let low = bands.iter().map(|b| b.low_hz).fold(f64::INFINITY, f64::min);
+    let high = bands.iter().map(|b| b.high_hz).fold(0.0, f64::max);
     let room = 0.05 * (high - low);
     Some([(low - room).max(first), (high + room).min(last)])
 }
@@ -94,7 +95,7 @@ fn shown_stiffness(spectrum: &JointSpectrum, curves: &[&SpectrumCurve]) -> Optio
         let lines = spectrum.frequency_hz.iter().cycle();
         let values = curves.iter().filter(move |c| c.idms == most).flat_map(|c| &c.stiffness_n_per_m);
         values.zip(lines).filter_map(move |(k, f)| {
-            let main = *f >= MAIN_BAND_HZ[0] && *f <= MAIN_BAND_HZ[1];
+            let main = MAIN_BAND.contains(*f);
             k.filter(|_| main || !main_only).map(micro)
         })
     };
@@ -106,11 +107,11 @@ fn shown_stiffness(spectrum: &JointSpectrum, curves: &[&SpectrumCurve]) -> Optio
 /// The means over the main band, as lines with their values at the right, apart from each other.
 fn means(results: &Results, method: &str, panel: &Panel, drawing: &mut Drawing) {
     let mut labels: Vec<(f64, usize, f64)> = Vec::new();
-    for joint in results.joint.iter().filter(|j| j.method == method && j.band_hz == MAIN_BAND_HZ) {
+    for joint in results.joint.iter().filter(|j| j.method == method && j.band_hz == MAIN_BAND) {
         let Some(k) = joint.sliding_stiffness() else { continue };
         let stroke = Stroke::new(idm_stroke(joint.idms).colour, 2.2);
-        panel.level(drawing, MAIN_BAND_HZ, micro(k.mean), Stroke::new("#fff", 4.0));
-        panel.level(drawing, MAIN_BAND_HZ, micro(k.mean), stroke);
+        panel.level(drawing, MAIN_BAND.into(), micro(k.mean), Stroke::new("#fff", 4.0));
+        panel.level(drawing, MAIN_BAND.into(), micro(k.mean), stroke);
         labels.push((panel.y.place_within(micro(k.mean)), joint.idms, micro(k.mean)));
     }
     labels.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -128,17 +129,18 @@ fn means(results: &Results, method: &str, panel: &Panel, drawing: &mut Drawing) 
 }
 
 /// A bracket above the frame for every band.
-fn brackets(bands: &[[f64; 2]], panel: &Panel, drawing: &mut Drawing) {
-    let mut rows: Vec<Vec<[f64; 2]>> = Vec::new();
+fn brackets(bands: &[Band], panel: &Panel, drawing: &mut Drawing) {
+    let mut rows: Vec<Vec<Band>> = Vec::new();
     for range in bands {
         // bands that only touch share a row
-        let free = |row: &Vec<[f64; 2]>| row.iter().all(|other| other[1] <= range[0] || range[1] <= other[0]);
+        let apart = |one: &Band, other: &Band| one.high_hz <= other.low_hz || other.high_hz <= one.low_hz;
+        let free = |row: &Vec<Band>| row.iter().all(|other| apart(other, range));
         let row = rows.iter().position(free).unwrap_or(rows.len());
         if row == rows.len() {
             rows.push(Vec::new());
         }
         rows[row].push(*range);
-        let (from, to) = (panel.x.place_within(range[0]), panel.x.place_within(range[1]));
+        let (from, to) = (panel.x.place_within(range.low_hz), panel.x.place_within(range.high_hz));
         let at = panel.area.top - 8.0 - 17.0 * row as f64;
         let stroke = Stroke::new("#777", 1.2);
         drawing.line([from + 2.0, at], [to - 2.0, at], stroke);

@@ -4,7 +4,7 @@ use super::super::drawing::{Anchor, Area, Drawing, Stroke};
 use super::super::panel::{BLUE, Panel, SHADE, VERMILION, legend};
 use super::super::scale::{Scale, middle_range};
 use super::WIDTH;
-use crate::results::{FrfCurve, MAIN_BAND_HZ, Results, Role};
+use crate::results::{FrfCurve, MAIN_BAND, Results, Role};
 
 const GAP: f64 = 40.0;
 const LEFT: f64 = 70.0;
@@ -47,10 +47,10 @@ pub fn receptances(results: &Results) -> Option<String> {
             let x_ticks = x.ticks(6);
             let y_ticks = if kind == Kind::Phase { y.ticks_every(90.0) } else { y.ticks(3) };
             panel.grid(&mut drawing, &x_ticks, &y_ticks);
-            panel.shade(&mut drawing, MAIN_BAND_HZ, SHADE, 0.10);
+            panel.shade(&mut drawing, MAIN_BAND.into(), SHADE, 0.10);
             for band in results.usable_bands.iter().filter(|b| b.configuration == *name) {
-                panel.shade(&mut drawing, [frequencies[0], band.band_hz[0]], "#777", 0.18);
-                panel.shade(&mut drawing, [band.band_hz[1], frequencies[1]], "#777", 0.18);
+                panel.shade(&mut drawing, [frequencies[0], band.band_hz.low_hz], "#777", 0.18);
+                panel.shade(&mut drawing, [band.band_hz.high_hz, frequencies[1]], "#777", 0.18);
             }
             for curve in &curves {
                 draw(&panel, &mut drawing, curve, kind);

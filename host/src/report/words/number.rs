@@ -1,5 +1,7 @@
 //! Numbers as people read them: few digits, units beside them, N/µm for stiffness.
 
+use crate::substructuring::Band;
+
 /// `value` with enough decimals to show about three significant digits: 148, 26.8, 0.91, 0.0123.
 pub fn short(value: f64) -> String {
     decimals(value, places(value, 3))
@@ -23,8 +25,8 @@ pub fn stiffness(mean_n_per_m: f64, std_n_per_m: f64) -> String {
 }
 
 /// A band: `300–600 Hz`.
-pub fn band(band_hz: [f64; 2]) -> String {
-    format!("{}–{} Hz", short(band_hz[0]), short(band_hz[1]))
+pub fn band(band: Band) -> String {
+    format!("{}–{} Hz", short(band.low_hz), short(band.high_hz))
 }
 
 /// With the thousands apart: 12 345.
@@ -69,7 +71,7 @@ mod tests {
         assert_eq!(with_scatter(26.8, 0.0), "26.8 ± 0.0");
         assert_eq!(short(0.012_34), "0.0123");
         assert_eq!(short(f64::NAN), "–");
-        assert_eq!(band([300.0, 600.0]), "300–600 Hz");
+        assert_eq!(band([300.0, 600.0].into()), "300–600 Hz");
         assert_eq!(count(1_234_567), "1\u{202f}234\u{202f}567");
         assert_eq!(decimals(-0.001, 1), "0.0");
     }

@@ -3,7 +3,7 @@
 use super::names::slope;
 use super::number::{band, count, decimals, short};
 use crate::results::{
-    DIRECT, Excitation, Force, HIDDEN_RESONANCE, Hysteresis, MAIN_BAND_HZ, OverCycles, Results,
+    DIRECT, Excitation, Force, HIDDEN_RESONANCE, Hysteresis, MAIN_BAND, OverCycles, Results,
     SERIES_COMPLIANCE, Shape,
 };
 use crate::substructuring::{Dof, fit};
@@ -66,13 +66,13 @@ fn substructuring(results: &Results) -> Vec<Kind> {
     let mut kinds = Vec::new();
     if let Some((estimate, z)) = recommended {
         kinds.push(Kind {
-            found: format!("FBS, recommended, {} IDMs, {}", estimate.idms, band(MAIN_BAND_HZ)),
+            found: format!("FBS, recommended, {} IDMs, {}", estimate.idms, band(MAIN_BAND)),
             mean_n_per_m: z.stiffness,
             std_n_per_m: z.std,
             meaning: what.into(),
         });
     }
-    let fitted = results.joint.iter().find(|j| j.method == fit::NAME && j.band_hz == MAIN_BAND_HZ);
+    let fitted = results.joint.iter().find(|j| j.method == fit::NAME && j.band_hz == MAIN_BAND);
     for joint in [fitted, results.headline_joint()].into_iter().flatten() {
         let Some(k) = joint.sliding_stiffness() else { continue };
         let meaning = match (kinds.is_empty(), joint.method == fit::NAME) {

@@ -3,7 +3,7 @@
 use super::names::{method, slope, static_arm};
 use super::number::{band, count, micro, short, stiffness};
 use super::side_by_side;
-use crate::results::{Bootstrap, Excitation, Force, Hysteresis, Joint, MAIN_BAND_HZ, Results, Shape};
+use crate::results::{Bootstrap, Excitation, Force, Hysteresis, Joint, MAIN_BAND, Results, Shape};
 use crate::substructuring::{Dof, fit};
 
 /// What FBS found between the arms, in one sentence: the recommended estimate, or else the headline's method.
@@ -17,7 +17,7 @@ fn recommended(results: &Results) -> Option<String> {
     Some(format!(
         "Substructuring (FBS, Eq. A.1 averaged as an admittance, {} IDMs, {}) sees between the arms, along the sliding direction: {}",
         estimate.idms,
-        band(MAIN_BAND_HZ),
+        band(MAIN_BAND),
         estimate.statement()?
     ))
 }
@@ -160,8 +160,7 @@ pub fn summary(results: &Results) -> Vec<String> {
         lines.push(bootstrapped(bootstrap));
     }
     // a campaign is analysed in every way: the main band is enough to read here
-    let read_here =
-        |j: &&Joint| results.source.kind != "campaign" || j.band_hz == MAIN_BAND_HZ || j.idms == 0;
+    let read_here = |j: &&Joint| results.source.kind != "campaign" || j.band_hz == MAIN_BAND || j.idms == 0;
     let table: Vec<String> = results.joint.iter().filter(read_here).filter_map(joint_line).collect();
     if !table.is_empty() {
         lines.push(String::new());
