@@ -103,7 +103,9 @@ fn unknown_noise_is_refused_by_cell() {
     let mut case = Case::rigid(1e-3);
     let row = case.frf[1].outputs().iter().position(|o| o == "B2:y").expect("a channel of B");
     let mut variance = case.frf[1].variance().expect("known").to_vec();
-    variance.iter_mut().for_each(|v| v[(row, 0)] = f64::NAN);
+    for v in &mut variance {
+        v[(row, 0)] = f64::NAN;
+    }
     case.frf[1] = case.frf[1].clone().with_variance(variance).expect("as before");
     let error = case.fit(IdmSet::Six, &Options::default()).expect_err("refused").to_string();
     assert!(error.contains("B2:y") && error.contains("`variance`"), "{error}");

@@ -34,7 +34,7 @@ pub fn recommended(results: &Results) -> Option<String> {
             let shown = |value: f64| short(scale * value);
             table.row([
                 format!("{dof}, {unit}"),
-                band(estimate.band_hz.into()),
+                band(estimate.band_hz),
                 if k.identified { shown(k.stiffness) } else { UNKNOWN.into() },
                 if k.identified {
                     format!("{} … {}", shown(k.ci95[0]), shown(k.ci95[1]))
@@ -52,10 +52,8 @@ pub fn recommended(results: &Results) -> Option<String> {
         }
     }
     html.push_str(&table.finish());
-    let sentences = results
-        .recommended
-        .iter()
-        .filter_map(|r| Some(format!("{}: {}", band(r.band_hz.into()), r.statement()?)));
+    let sentences =
+        results.recommended.iter().filter_map(|r| Some(format!("{}: {}", band(r.band_hz), r.statement()?)));
     let sentences = sentences.chain(results.bootstrap.as_ref().map(words::bootstrapped));
     html.push_str("<ul class=\"notes\">");
     for sentence in sentences {

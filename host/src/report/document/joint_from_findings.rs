@@ -48,7 +48,7 @@ fn at_the_specimens(found: &Direct) -> Joint {
     let along_z = |s| BTreeMap::from([("z".to_owned(), s)]);
     Joint {
         method: DIRECT.into(),
-        band_hz: direct::BAND.into(),
+        band_hz: direct::BAND,
         stiffness_n_per_m: along_z(found.stiffness_n_per_m),
         damping_n_s_per_m: along_z(found.damping_n_s_per_m),
         lines: found.lines,
@@ -72,7 +72,7 @@ fn of_row(row: &JointRow) -> Joint {
         method: row.method.clone(),
         idms: row.idms,
         modes: row.modes.clone(),
-        band_hz: row.band_hz.into(),
+        band_hz: row.band_hz,
         stiffness_n_per_m: split(&row.stiffness_n_per_m, Dof::is_translation),
         damping_n_s_per_m: split(&row.damping_n_s_per_m, Dof::is_translation),
         stiffness_n_m_per_rad: split(&row.stiffness_n_per_m, Dof::is_rotation),

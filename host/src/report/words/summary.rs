@@ -61,7 +61,7 @@ pub fn bootstrapped(bootstrap: &Bootstrap) -> String {
     format!(
         "Hits drawn anew {} times ({}): {said}.",
         count(bootstrap.replicates as u64),
-        band(bootstrap.band_hz.into())
+        band(bootstrap.band_hz)
     )
 }
 
@@ -152,7 +152,7 @@ pub fn summary(results: &Results) -> Vec<String> {
             results
                 .recommended
                 .iter()
-                .filter_map(|r| Some(format!("  {:>11}  {}", band(r.band_hz.into()), r.statement()?))),
+                .filter_map(|r| Some(format!("  {:>11}  {}", band(r.band_hz), r.statement()?))),
         );
     }
     if let Some(bootstrap) = &results.bootstrap {
