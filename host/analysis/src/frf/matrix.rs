@@ -212,7 +212,8 @@ impl Frf {
             if order > 0 && s.norm() == 0.0 {
                 return Err(FrfError::DivisionByZero { line, quantity: self.quantity });
             }
-            lines.push(y * s.powi(-order));
+            // not ComplexField::powi, which rounds differently
+            lines.push(y * Complex::powi(&s, -order));
         }
         let scaled = |(line, v): (usize, &DMatrix<f64>)| v * self.s(line).norm_sqr().powi(-order);
         Ok(Frf {
