@@ -1,8 +1,9 @@
 //! Where hammer and vibrometer really point: nominal geometry and the errors nobody knows.
 //!
 //! A point's own error belongs to its name and stays all campaign long: where it is, and for an impact also the tilt at which
-//! the hammer's holder meets the surface there. Each cell adds an aiming error. All are keyed to (seed, what they are for),
-//! so visiting cells in another order changes nothing.
+//! the hammer's holder meets the surface there. Each cell adds an aiming error, but not to a point on a specimen: there marks are
+//! small and are found again under the laser's own camera. All are keyed to (seed, what they are for), so visiting cells in another
+//! order changes nothing.
 //!
 //! The tilt belongs to the point because the holder and the surface decide it, not the day: drawn anew for A and AJB it would
 //! differ between the configurations, no longer cancel, and pull every decoupled stiffness some 13 % down.
@@ -29,6 +30,7 @@ impl Aim {
         impact: &ImpactPoint,
         response: &ResponsePoint,
     ) -> Self {
+        let errors = errors.acting();
         let [configuration, hit, seen] = words;
         let cell = |purpose| stream(seed, &[configuration, hit, seen, purpose]);
         let mut impact_aim = cell("impact aim");
@@ -40,11 +42,13 @@ impl Aim {
             errors.aim_m,
             &mut impact_aim,
         );
-        let seen_m = shifted(
-            shifted(response.position_m, errors.position_m, &mut seen_point),
-            errors.aim_m,
-            &mut response_aim,
-        );
+        let (seen_sigma_m, aim_m) = if response.body.is_specimen() {
+            (errors.specimen_point_m, 0.0)
+        } else {
+            (errors.position_m, errors.aim_m)
+        };
+        let seen_m =
+            shifted(shifted(response.position_m, seen_sigma_m, &mut seen_point), aim_m, &mut response_aim);
         let mut hammer = stream(seed, &["hammer angle", hit]);
         let direction = tilted(impact.probe().direction, errors.hammer_angle_rad, &mut hammer);
         Self {
@@ -54,7 +58,7 @@ impl Aim {
     }
 }
 
-fn shifted(position_m: [f64; 3], sigma_m: f64, stream: &mut Stream) -> [f64; 3] {
+pub(super) fn shifted(position_m: [f64; 3], sigma_m: f64, stream: &mut Stream) -> [f64; 3] {
     position_m.map(|coordinate| coordinate + sigma_m * normal(stream))
 }
 

@@ -12,8 +12,10 @@ pub enum BodyName {
     ArmA,
     /// Specimen A (substructure A); arm A itself when the clamp is rigid.
     SpecimenA,
-    /// Arm B with its specimen (substructure B).
+    /// Arm B (substructure B), with its specimen when that clamp is rigid.
     ArmB,
+    /// Specimen B (substructure B); arm B itself when the clamp is rigid.
+    SpecimenB,
 }
 
 impl BodyName {
@@ -24,6 +26,12 @@ impl BodyName {
             Self::ArmA => "arm_a",
             Self::SpecimenA => "specimen_a",
             Self::ArmB => "arm_b",
+            Self::SpecimenB => "specimen_b",
         }
+    }
+
+    /// Whether it is one of the two specimens.
+    pub fn is_specimen(self) -> bool {
+        matches!(self, Self::SpecimenA | Self::SpecimenB)
     }
 }

@@ -30,9 +30,10 @@ impl Configuration {
 
     /// Whether `body` is there.
     pub fn has(self, body: BodyName) -> bool {
+        let of_b = matches!(body, BodyName::ArmB | BodyName::SpecimenB);
         match self {
-            Self::A => body != BodyName::ArmB,
-            Self::B => body == BodyName::ArmB,
+            Self::A => !of_b,
+            Self::B => of_b,
             Self::Ajb => true,
         }
     }

@@ -1,4 +1,4 @@
-//! The friction rig: 24 degrees of freedom, a hammer, a shaker and ten channels.
+//! The friction rig: 24 degrees of freedom (30 with a clamp on side B), a hammer, a shaker and ten channels.
 //!
 //! Axes: x lateral, y vertical (normal load), z horizontal (sliding); origin at the contact's centre; SI units.
 //! One [`Rig`] is one device. It advances by whole scans: [`Rig::scan`] moves structure, bolt and shaker on by one scan period
@@ -17,6 +17,7 @@ mod body;
 pub mod config;
 mod configuration;
 mod error;
+mod flaws;
 pub mod force;
 pub mod hammer;
 mod joint_state;
@@ -29,16 +30,19 @@ pub mod sliders;
 pub mod state_space;
 pub mod stepper;
 pub mod structure;
+mod truth;
 
 pub use aim::Aim;
 pub use config::RigConfig;
 pub use configuration::{Configuration, Quantity};
 pub use error::RigError;
+pub use flaws::Flaws;
 pub use hammer::{Hit, Mishap};
 pub use joint_state::JointState;
 pub use probe::Probe;
 pub use sensors::{CHANNELS, Channel, Measured};
 pub use structure::exact_frf;
+pub use truth::Truth;
 
 use force::ForceSegment;
 use key::stream;
@@ -54,6 +58,7 @@ pub struct Rig {
     seed: u64,
     period_s: f64,
     channels: [Channel; CHANNELS],
+    flaws: Flaws,
     plants: [Plant; 3],
     configuration: Configuration,
     impact: String,
@@ -93,13 +98,15 @@ impl Rig {
         let plant = |configuration| Plant::new(config, configuration, stepping, period_s);
         let plants = [plant(Configuration::A)?, plant(Configuration::B)?, plant(Configuration::Ajb)?];
         let channels = sensors::channels(&config.sensors);
+        let flaws = Flaws::new(seed, config, &channels);
         let configuration = Configuration::Ajb;
         // check() has seen at least one of each.
         let (impact, response) = (&config.impacts[0], &config.responses[0]);
         let words = [configuration.as_str(), &impact.name, &response.name];
         let aim = Aim::new(seed, words, &config.errors, impact, response);
-        let (stepper, slipping) = plants[configuration as usize].aimed(config, &aim, &channels)?;
-        let sensors = Sensors::new(config, &channels, None, stream(seed, &words));
+        let (stepper, slipping) =
+            plants[configuration as usize].aimed(config, &flaws.spots, &aim, &channels)?;
+        let sensors = Sensors::new(config, &channels, &flaws, None, stream(seed, &words));
         let mut rig = Self {
             seed,
             period_s,
@@ -113,6 +120,7 @@ impl Rig {
             slipping,
             sensors,
             channels,
+            flaws,
             pending: Vec::new(),
             scans: 0,
             drive_v: 0.0,
@@ -173,7 +181,7 @@ impl Rig {
         let words = [configuration.as_str(), impact, response];
         let aim = Aim::new(self.seed, words, &self.config.errors, hit, seen);
         let plant = &self.plants[configuration as usize];
-        let (stepper, slipping) = plant.aimed(&self.config, &aim, &self.channels)?;
+        let (stepper, slipping) = plant.aimed(&self.config, &self.flaws.spots, &aim, &self.channels)?;
         let speckle = seen.speckle;
         self.aim = aim;
         self.stepper = stepper;
@@ -184,7 +192,7 @@ impl Rig {
         self.attempt = attempt;
         let idle = self.shot(attempt, "idle");
         let speckle = speckle.then(|| self.shot(attempt, "idle speckle"));
-        self.sensors = Sensors::new(&self.config, &self.channels, speckle, idle);
+        self.sensors = Sensors::new(&self.config, &self.channels, &self.flaws, speckle, idle);
         self.pending.clear();
         self.scans = 0;
         self.drive_v = 0.0;
@@ -246,10 +254,13 @@ impl Rig {
     /// stays through later stagings. The linear law has no limit, whatever the load.
     ///
     /// # Errors
-    /// [`RigError::Field`] for a load that is negative or no number; the rig stays as it was.
+    /// [`RigError::Field`] for a load that is negative, no number, or too large for a load that varies; the rig stays as it was.
     pub fn set_normal_load(&mut self, normal_load_n: f64) -> Result<(), RigError> {
-        config::normal_load(normal_load_n)?;
-        self.config.contact.normal_load_n = normal_load_n;
+        let before = std::mem::replace(&mut self.config.contact.normal_load_n, normal_load_n);
+        if let Err(error) = self.config.check() {
+            self.config.contact.normal_load_n = before;
+            return Err(error);
+        }
         if let Some(slipping) = &mut self.slipping {
             slipping.load(normal_load_n);
         }
@@ -294,7 +305,12 @@ impl Rig {
         &self.aim
     }
 
-    /// The noise-free signals of the last scan, before delay and polarity, in the channels' units; the hammer's force with
+    /// What is wrong with this campaign's instruments: the spots' true places, true gains, skews and cross-talk.
+    pub fn flaws(&self) -> &Flaws {
+        &self.flaws
+    }
+
+    /// The noise-free signals of the last scan, before cross-talk, gain, delay and polarity, in the channels' units; the hammer's force with
     /// its cell's ringing.
     pub fn truth(&self) -> &[f64; CHANNELS] {
         &self.truth

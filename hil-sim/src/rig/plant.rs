@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::config::{BodyName, Contact, ContactLaw, RigConfig};
+use super::config::{BodyName, Contact, ContactLaw, RigConfig, Spots};
 use super::modal::{ModalError, Mode, modes};
 use super::probe::{AXES, Probe};
 use super::sensors::{CHANNELS, Channel, FIRST_SIGNAL};
@@ -63,10 +63,11 @@ impl Plant {
         Ok(Self { structure, space, way, period_s })
     }
 
-    /// A stepper at rest that sees and pushes where `aim` says, and the sliders of its joint if it can slip.
+    /// A stepper at rest that sees and pushes where `aim` and the true `spots` say, and the sliders of its joint if it can slip.
     pub(super) fn aimed(
         &self,
         config: &RigConfig,
+        spots: &Spots,
         aim: &Aim,
         channels: &[Channel; CHANNELS],
     ) -> Result<(Stepper, Option<Slipping>), RigError> {
@@ -94,8 +95,8 @@ impl Plant {
                 seen(x)?,
                 seen(y)?,
                 seen(z)?,
-                spot(&config.spots.ldv_a),
-                spot(&config.spots.ldv_b),
+                spot(&spots.ldv_a),
+                spot(&spots.ldv_b),
                 cell(0),
                 cell(1),
                 cell(2),
@@ -113,7 +114,11 @@ impl Plant {
             }
         };
         let Some(joint) = &aimed.joint else { return Ok((stepper, None)) };
-        let Some(sliders) = Sliders::new(&config.contact, joint.step_s) else { return Ok((stepper, None)) };
+        let Some(sliders) =
+            Sliders::new(&config.contact, config.errors.normal_load_slope_per_m(), joint.step_s)
+        else {
+            return Ok((stepper, None));
+        };
         let slipping = Slipping::new(sliders, joint, &stepper).ok_or_else(|| RigError::Field {
             field: "contact.slip_step_s".to_owned(),
             reason: format!(
@@ -145,7 +150,7 @@ impl Plant {
     fn relative(&self, contact: &Contact) -> Option<DVector<f64>> {
         let at =
             |body| self.structure.row(&Probe { body, position_m: contact.position_m, direction: AXES[2] });
-        Some(at(BodyName::SpecimenA)? - at(BodyName::ArmB)?)
+        Some(at(BodyName::SpecimenA)? - at(BodyName::SpecimenB)?)
     }
 
     /// The joint now; `None` outside the assembly.

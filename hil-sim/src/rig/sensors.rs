@@ -1,13 +1,15 @@
 //! The ten channels: from true signals to converter codes.
 //!
 //! code = round(volts / range · 32768), saturating, volts = (delayed signal · polarity + noise) / scale. Noise is drawn for
-//! every channel in every scan, present or not, so that a channel's stream does not depend on the others.
+//! every channel in every scan, present or not, so that a channel's stream does not depend on the others. Cross-talk, gain and skew
+//! ([`Flaws`]) come in before the noise.
 
 use std::f64::consts::PI;
 
 use num_complex::Complex;
 
 use super::config::{self, Hammer, RigConfig};
+use super::flaws::Flaws;
 use super::force::ForceSegment;
 use super::hammer::nominal_width_s;
 use super::key::{Stream, normal, uniform};
@@ -20,8 +22,15 @@ pub const FORCE: usize = 0;
 pub const FIRST_SIGNAL: usize = 1;
 /// Places of the 3-D vibrometer.
 const VIBROMETER: [usize; 3] = [1, 2, 3];
+/// Places of the load cells.
+pub const LOAD_CELLS: [usize; 3] = [6, 7, 8];
 /// Place of the shaker's force.
 pub const EXCITATION: usize = 9;
+
+/// Whether the channel's gain is in error by `errors.gain`: load cells and vibrometers, not the two forces that go in.
+pub fn is_gauged(at: usize) -> bool {
+    at != FORCE && at != EXCITATION
+}
 
 /// What a channel measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -112,6 +121,7 @@ pub struct Sensors {
     /// Noise (codes rms) of each channel.
     noise: [f64; CHANNELS],
     delays: Vec<(usize, DelayLine)>,
+    cross_talk: Option<[[f64; 3]; 3]>,
     cell: ForceCell,
     speckle: Option<Speckle>,
     stream: Stream,
@@ -122,6 +132,7 @@ impl Sensors {
     pub fn new(
         config: &RigConfig,
         channels: &[Channel; CHANNELS],
+        flaws: &Flaws,
         speckle: Option<Stream>,
         stream: Stream,
     ) -> Self {
@@ -145,14 +156,20 @@ impl Sensors {
         ];
         let mut codes_per_unit = [0.0; CHANNELS];
         for (at, channel) in channels.iter().enumerate() {
-            codes_per_unit[at] = f64::from(channel.polarity) / channel.step();
+            codes_per_unit[at] = flaws.gains[at] * f64::from(channel.polarity) / channel.step();
             noise[at] /= channel.step();
         }
-        let delays = channels.iter().enumerate().filter(|(_, channel)| channel.delay_s > 0.0);
+        let late_scans = channels
+            .iter()
+            .zip(flaws.skews_s)
+            .map(|(channel, skew_s)| f64::from(flaws.latency_scans) + (channel.delay_s + skew_s) * rate_hz);
+        let delays = late_scans.enumerate().filter(|(_, late)| *late > 0.0);
         Self {
             codes_per_unit,
             noise,
-            delays: delays.map(|(at, channel)| (at, DelayLine::new(channel.delay_s * rate_hz))).collect(),
+            delays: delays.map(|(at, late)| (at, DelayLine::new(late))).collect(),
+            cross_talk: Some(flaws.cross_talk)
+                .filter(|parts| parts.as_flattened().iter().any(|part| *part != 0.0)),
             cell: ForceCell::new(&sensors.force, &config.hammer, 1.0 / rate_hz),
             speckle: speckle.map(|stream| Speckle::new(&sensors.vibrometer.speckle, rate_hz, stream)),
             stream,
@@ -177,6 +194,12 @@ impl Sensors {
     /// Converts one scan's true signals.
     #[inline]
     pub fn convert(&mut self, mut signals: [f64; CHANNELS], codes: &mut [i16]) {
+        if let Some(parts) = &self.cross_talk {
+            let own = LOAD_CELLS.map(|at| signals[at]);
+            for (at, parts) in LOAD_CELLS.into_iter().zip(parts) {
+                signals[at] += parts.iter().zip(own).map(|(part, force_n)| part * force_n).sum::<f64>();
+            }
+        }
         for (at, line) in &mut self.delays {
             signals[*at] = line.pass(signals[*at]);
         }
@@ -284,15 +307,17 @@ impl DelayLine {
                 *weight *= (d - j as f64) / (i as f64 - j as f64);
             }
         }
-        Self { past: vec![0.0; first + 4], at: 0, first, weights }
+        // A power of two, so that going round is a mask and no division.
+        Self { past: vec![0.0; (first + 4).next_power_of_two()], at: 0, first, weights }
     }
 
+    #[inline]
     fn pass(&mut self, value: f64) -> f64 {
-        let length = self.past.len();
-        self.past[self.at] = value;
-        let ago = |scans: usize| self.past[(self.at + length - scans) % length];
-        let late = (0..4).map(|i| self.weights[i] * ago(self.first + i)).sum();
-        self.at = (self.at + 1) % length;
+        let mask = self.past.len() - 1;
+        self.past[self.at & mask] = value;
+        let newest = self.at.wrapping_sub(self.first);
+        let late = (0..4).map(|i| self.weights[i] * self.past[newest.wrapping_sub(i) & mask]).sum();
+        self.at = self.at.wrapping_add(1);
         late
     }
 }

@@ -8,6 +8,8 @@
 //! Tᵢ = k (Δ − wᵢ) + β k (Δ' − wᵢ'),   |Tᵢ| ≤ Lᵢ,   wᵢ' = 0 unless |Tᵢ| = Lᵢ, and then along Tᵢ.
 //! ```
 //!
+//! Lᵢ is its share of μN, and N may vary with the motion: N = N₀ (1 + c y), with y as below, which is Δ but for the dashpot's lead.
+//!
 //! Stuck it is the linear contact. In slip it carries Lᵢ whatever the velocity: the dashpot lies within the limit, not beside it, so
 //! nothing jumps when an element lets go or sticks again, and every element only ever takes energy.
 //!
@@ -16,7 +18,7 @@
 //! linearly over a step, so that wᵢ follows vᵢ in closed form and y at the step's end is the root of a monotone, piecewise linear
 //! equation of one unknown.
 
-use super::config::{Contact, ContactLaw};
+use super::config::Contact;
 
 /// Newton's method needs two or three steps; so many halvings of the error bring any start to rounding.
 const ROUNDS: usize = 64;
@@ -37,8 +39,10 @@ pub struct Sliders {
     friction_coefficient: f64,
     /// Each element's part of the limit μN; they sum to 1.
     shares: Vec<f64>,
-    /// Lᵢ / k (m).
+    /// Lᵢ / k (m) at N₀.
     reach: Lanes,
+    /// c (1/m).
+    load_slope_per_m: f64,
     /// wᵢ (m).
     slip: Lanes,
     /// vᵢ (m).
@@ -60,19 +64,20 @@ pub struct Sliders {
 }
 
 impl Sliders {
-    /// At rest, advanced by steps of `step_s`; `None` for the linear law, which has none.
-    pub fn new(contact: &Contact, step_s: f64) -> Option<Self> {
-        let shares = match contact.law {
-            ContactLaw::Linear => return None,
-            ContactLaw::Jenkins => vec![1.0],
-            ContactLaw::Iwan => contact.iwan.shares(),
-        };
+    /// At rest, advanced by steps of `step_s`; `None` for the linear law, which has none. The normal load grows by
+    /// `load_slope_per_m` of itself per metre; that times any Lᵢ / k must be less than 1 in size.
+    pub fn new(contact: &Contact, load_slope_per_m: f64, step_s: f64) -> Option<Self> {
+        let shares = contact.shares();
+        if shares.is_empty() {
+            return None;
+        }
         let rest = vec![[0.0; LANES]; shares.len().div_ceil(LANES)];
         let mut sliders = Self {
             stiffness: contact.stiffness_n_per_m[2] / shares.len() as f64,
             friction_coefficient: contact.friction_coefficient,
             shares,
             reach: vec![[NEVER_SLIPS; LANES]; rest.len()],
+            load_slope_per_m,
             slip: rest.clone(),
             lead: rest.clone(),
             stuck: rest,
@@ -103,8 +108,20 @@ impl Sliders {
     fn bound(&mut self) {
         self.holds = (f64::NEG_INFINITY, f64::INFINITY);
         for (slip, reach) in self.slip.as_flattened().iter().zip(self.reach.as_flattened()) {
-            self.holds = (self.holds.0.max(slip - reach), self.holds.1.min(slip + reach));
+            // |y − w| = reach (1 + c y), solved for y; what never slips stays out of it, or its infinities would meet.
+            if *reach < NEVER_SLIPS {
+                let grows = reach * self.load_slope_per_m;
+                self.holds.0 = self.holds.0.max((slip - reach) / (1.0 + grows));
+                self.holds.1 = self.holds.1.min((slip + reach) / (1.0 - grows));
+            }
         }
+    }
+
+    /// N over N₀ at `y`; a load that would be negative is none.
+    #[inline]
+    fn load_factor(&self, y: f64) -> f64 {
+        let factor = 1.0 + self.load_slope_per_m * y;
+        if factor > 0.0 { factor } else { 0.0 }
     }
 
     /// Stiffness with all elements stuck (N/m).
@@ -127,7 +144,7 @@ impl Sliders {
     /// Whether none slips at `y` either; if so, that is where it stands.
     #[inline]
     pub fn hold(&mut self, y: f64) -> bool {
-        let holds = self.settled && self.holds.0 <= y && y <= self.holds.1;
+        let holds = self.settled && self.holds.0 <= y && y <= self.holds.1 && self.load_factor(y) > 0.0;
         if holds {
             self.y = y;
         }
@@ -152,7 +169,8 @@ impl Sliders {
             if off.abs() <= 4.0 * f64::EPSILON * (self.y.abs() + free.abs()) {
                 break;
             }
-            // All slopes lie between 1 − gain · count and 1, so a wrong choice of the slope still brings it nearer.
+            // All slopes lie between 1 − gain · count and 1, so a wrong choice of the slope still brings it nearer; so does the
+            // slope of the limits, which is left out.
             self.y -= off / (1.0 - gain * sliding);
         }
         self.relax();
@@ -163,9 +181,10 @@ impl Sliders {
     #[inline]
     fn follow(&mut self) -> f64 {
         let (mut sum, mut sliding) = ([0.0; LANES], [0.0; LANES]);
+        let factor = self.load_factor(self.y);
         for ((lead, stuck), reach) in self.lead.iter_mut().zip(&self.stuck).zip(&self.reach) {
             for i in 0..LANES {
-                let (low, high) = (self.y - reach[i], self.y + reach[i]);
+                let (low, high) = (self.y - factor * reach[i], self.y + factor * reach[i]);
                 let above = if stuck[i] < low { low } else { stuck[i] };
                 lead[i] = if above > high { high } else { above };
                 sum[i] += lead[i];
@@ -180,6 +199,7 @@ impl Sliders {
     #[inline]
     fn relax(&mut self) {
         let rest = self.relaxation.1;
+        let factor = self.load_factor(self.y);
         let (mut path, mut work, mut apart) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for (((slip, lead), stuck), reach) in
             self.slip.iter_mut().zip(&self.lead).zip(&self.stuck).zip(&self.reach)
@@ -188,7 +208,7 @@ impl Sliders {
                 let after = lead[i] + rest * (stuck[i] - lead[i]);
                 let moved = (after - slip[i]).abs();
                 path[i] += moved;
-                work[i] += moved * reach[i];
+                work[i] += moved * factor * reach[i];
                 apart[i] += (lead[i] - after).abs();
                 slip[i] = after;
             }
@@ -206,9 +226,10 @@ impl Sliders {
         self.stiffness() * self.y - self.push_n()
     }
 
-    /// The largest force that it can carry (N).
+    /// The largest force that it can carry now (N).
     pub fn limit_n(&self) -> f64 {
-        self.stiffness * self.reach.as_flattened()[..self.shares.len()].iter().sum::<f64>()
+        let factor = self.load_factor(self.y);
+        factor * self.stiffness * self.reach.as_flattened()[..self.shares.len()].iter().sum::<f64>()
     }
 
     /// Part of the elements that slip now, 0…1.
@@ -247,6 +268,7 @@ mod tests {
 
     use super::*;
     use crate::rig::RigConfig;
+    use crate::rig::config::ContactLaw;
 
     fn contact(law: ContactLaw) -> Contact {
         let mut contact = RigConfig::default().contact;
@@ -260,7 +282,8 @@ mod tests {
     /// One steady cycle of Δ = X sin under a driver that nothing moves: Δ and T, step by step, and what friction took.
     fn cycle(contact: &Contact, amplitude_m: f64, hz: f64, steps: u32) -> (Vec<(f64, f64)>, f64) {
         let beta = contact.damping_s[2];
-        let mut sliders = Sliders::new(contact, 1.0 / (hz * f64::from(steps))).expect("a law that slips");
+        let mut sliders =
+            Sliders::new(contact, 0.0, 1.0 / (hz * f64::from(steps))).expect("a law that slips");
         let (mut seen, mut before) = (Vec::new(), 0.0);
         for step in 1..=3 * steps {
             let angle = TAU * f64::from(step) / f64::from(steps);
@@ -351,7 +374,7 @@ mod tests {
 
     #[test]
     fn the_load_is_the_limit_and_none_is_no_contact() {
-        let mut sliders = Sliders::new(&contact(ContactLaw::Iwan), 5e-6).expect("a law that slips");
+        let mut sliders = Sliders::new(&contact(ContactLaw::Iwan), 0.0, 5e-6).expect("a law that slips");
         let (far, stuck) = (1e-4, 0.1 * 171.0 * 0.1 / 143.7e6);
         sliders.slide(stuck, 0.0);
         assert!((sliders.force_n() / (143.7e6 * stuck) - 1.0).abs() < 1e-12 && sliders.settled());
@@ -371,7 +394,7 @@ mod tests {
     fn the_step_is_solved_whatever_the_receptance() {
         let contact = contact(ContactLaw::Iwan);
         for gain in [0.0, 1e-3, 0.1, 0.49] {
-            let mut sliders = Sliders::new(&contact, 5e-6).expect("a law that slips");
+            let mut sliders = Sliders::new(&contact, 0.0, 5e-6).expect("a law that slips");
             let receptance = gain / sliders.stiffness();
             for step in 0..2_000 {
                 let free = 4e-6 * (f64::from(step) * 0.01).sin();

@@ -2,8 +2,9 @@
 //!
 //! A body moves by q = (t, θ) at its centre of gravity; a point r of it by u = t + θ × (r − cg), that is
 //! D = [I, −skew(r − cg); 0, I]. A bushing between two bodies adds Dᵀ diag(k) D to K and Dᵀ diag(β k) D to C with
-//! D = [−D₁, D₂]; ground is a zero row. Six degrees of freedom per body: 18 in A, 6 in B, 24 in AJB; with a rigid clamp the
-//! specimen is lumped onto arm A and A has 12, AJB 18.
+//! D = [−D₁, D₂]; ground is a zero row. Six degrees of freedom per body: 18 in A, 6 in B, 24 in AJB. With a rigid clamp A the
+//! specimen is lumped onto arm A: six fewer in A and AJB. With a clamp B that gives, specimen B is a body of its own: six more in B and
+//! AJB. Arm B's figures are those with its specimen, so that a clamp B that hardly gives is as good as a rigid one.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6};
 use num_complex::Complex;
@@ -16,7 +17,8 @@ use super::{Configuration, Probe, Quantity, RigError};
 pub struct Structure {
     configuration: Configuration,
     bodies: Vec<(BodyName, [f64; 3])>,
-    rigid_clamp: bool,
+    /// Whether the clamps of A and B are rigid: their specimens are then no bodies of their own.
+    rigid: [bool; 2],
     /// Mass (kg, kg m²), symmetric positive definite, n × n.
     pub mass: DMatrix<f64>,
     /// Damping (N s/m, N m s/rad), n × n.
@@ -29,21 +31,27 @@ impl Structure {
     /// Assembles `configuration` of the rig.
     pub fn new(config: &RigConfig, configuration: Configuration) -> Self {
         let bodies = &config.bodies;
-        let rigid = config.clamp.rigid;
+        let rigid = [config.clamp.rigid, config.clamp_b.rigid];
+        let lumped = |name| match name {
+            BodyName::SpecimenA => rigid[0],
+            BodyName::SpecimenB => rigid[1],
+            _ => false,
+        };
         let present: Vec<(BodyName, &RigidBody)> = [
             (BodyName::Mass, &bodies.mass),
             (BodyName::ArmA, &bodies.arm_a),
             (BodyName::SpecimenA, &bodies.specimen_a),
             (BodyName::ArmB, &bodies.arm_b),
+            (BodyName::SpecimenB, &bodies.specimen_b),
         ]
         .into_iter()
-        .filter(|(name, _)| configuration.has(*name) && !(rigid && *name == BodyName::SpecimenA))
+        .filter(|(name, _)| configuration.has(*name) && !lumped(*name))
         .collect();
         let n = 6 * present.len();
         let mut structure = Self {
             configuration,
             bodies: present.iter().map(|(name, body)| (*name, body.cg_m)).collect(),
-            rigid_clamp: rigid,
+            rigid,
             mass: DMatrix::zeros(n, n),
             damping: DMatrix::zeros(n, n),
             stiffness: DMatrix::zeros(n, n),
@@ -52,14 +60,23 @@ impl Structure {
             let mut block = structure.mass.fixed_view_mut::<6, 6>(6 * index, 6 * index);
             block.copy_from(&body_mass(body));
         }
-        if let Some((at, cg)) = structure.find(BodyName::ArmA).filter(|_| rigid) {
-            let lever = rigid_motion(bodies.specimen_a.cg_m, cg);
-            let lumped = lever.transpose() * body_mass(&bodies.specimen_a) * lever;
-            let mut block = structure.mass.fixed_view_mut::<6, 6>(at, at);
-            block += lumped;
+        if rigid[0] {
+            structure.add_inertia(BodyName::ArmA, &bodies.specimen_a, 1.0);
+        }
+        if !rigid[1] {
+            structure.add_inertia(BodyName::ArmB, &bodies.specimen_b, -1.0);
         }
         structure.support(config);
         structure
+    }
+
+    /// Adds `sign` times the inertia of `part` to `body`, if it is there, as if they were one.
+    fn add_inertia(&mut self, body: BodyName, part: &RigidBody, sign: f64) {
+        if let Some((at, cg)) = self.find(body) {
+            let lever = rigid_motion(part.cg_m, cg);
+            let mut block = self.mass.fixed_view_mut::<6, 6>(at, at);
+            block += lever.transpose() * body_mass(part) * lever * sign;
+        }
     }
 
     fn support(&mut self, config: &RigConfig) {
@@ -81,9 +98,14 @@ impl Structure {
             }
         }
         if configuration == Configuration::Ajb {
-            self.connect(Some(BodyName::SpecimenA), BodyName::ArmB, &config.contact.bushing());
+            self.connect(Some(BodyName::SpecimenA), BodyName::SpecimenB, &config.contact.bushing());
         }
         if configuration != Configuration::A {
+            if !config.clamp_b.rigid {
+                let alone = configuration == Configuration::B;
+                let clamp = if alone { &config.clamp_b.free } else { &config.clamp_b.loaded };
+                self.connect(Some(BodyName::ArmB), BodyName::SpecimenB, clamp);
+            }
             for cell in &config.load_cells {
                 self.connect(None, BodyName::ArmB, cell);
             }
@@ -102,7 +124,11 @@ impl Structure {
     }
 
     fn find(&self, body: BodyName) -> Option<(usize, [f64; 3])> {
-        let body = if self.rigid_clamp && body == BodyName::SpecimenA { BodyName::ArmA } else { body };
+        let body = match body {
+            BodyName::SpecimenA if self.rigid[0] => BodyName::ArmA,
+            BodyName::SpecimenB if self.rigid[1] => BodyName::ArmB,
+            other => other,
+        };
         let index = self.bodies.iter().position(|(name, _)| *name == body)?;
         Some((6 * index, self.bodies[index].1))
     }
@@ -206,7 +232,7 @@ pub fn exact_frf(
 }
 
 /// Motion of point `at` (translation, rotation) from that of the body's centre of gravity.
-fn rigid_motion(at: [f64; 3], cg: [f64; 3]) -> Matrix6<f64> {
+pub(super) fn rigid_motion(at: [f64; 3], cg: [f64; 3]) -> Matrix6<f64> {
     let r = [at[0] - cg[0], at[1] - cg[1], at[2] - cg[2]];
     let skew = Matrix3::new(0.0, -r[2], r[1], r[2], 0.0, -r[0], -r[1], r[0], 0.0);
     let mut motion = Matrix6::identity();

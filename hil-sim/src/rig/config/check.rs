@@ -17,6 +17,7 @@ pub fn check(config: &RigConfig) -> Result<(), RigError> {
     body("bodies.arm_a", &bodies.arm_a)?;
     body("bodies.specimen_a", &bodies.specimen_a)?;
     body("bodies.arm_b", &bodies.arm_b)?;
+    body("bodies.specimen_b", &bodies.specimen_b)?;
     for (index, spring) in config.leaf_springs.iter().enumerate() {
         bushing(&format!("leaf_springs[{index}]"), spring)?;
     }
@@ -25,6 +26,14 @@ pub fn check(config: &RigConfig) -> Result<(), RigError> {
     bushing("push_rod_a.bushing", &config.push_rod_a.bushing)?;
     bushing("clamp.loaded", &config.clamp.loaded)?;
     bushing("clamp.free", &config.clamp.free)?;
+    bushing("clamp_b.loaded", &config.clamp_b.loaded)?;
+    bushing("clamp_b.free", &config.clamp_b.free)?;
+    if !config.clamp_b.rigid && bodies.specimen_b.mass_kg >= bodies.arm_b.mass_kg {
+        return Err(bad(
+            "bodies.specimen_b.mass_kg",
+            "must be less than arm B's, which is stated with its specimen",
+        ));
+    }
     contact(config)?;
     if config.load_cells.len() != 3 {
         return Err(bad("load_cells", &format!("must be three, not {}", config.load_cells.len())));
@@ -36,9 +45,44 @@ pub fn check(config: &RigConfig) -> Result<(), RigError> {
     points(config)?;
     hammer(config)?;
     sensors(config)?;
-    not_negative("errors.position_m", config.errors.position_m)?;
-    not_negative("errors.aim_m", config.errors.aim_m)?;
-    not_negative("errors.hammer_angle_rad", config.errors.hammer_angle_rad)
+    errors(config)
+}
+
+fn errors(config: &RigConfig) -> Result<(), RigError> {
+    let errors = &config.errors;
+    for (field, value) in [
+        ("errors.position_m", errors.position_m),
+        ("errors.aim_m", errors.aim_m),
+        ("errors.specimen_point_m", errors.specimen_point_m),
+        ("errors.spot_m", errors.spot_m),
+        ("errors.hammer_angle_rad", errors.hammer_angle_rad),
+        ("errors.gain", errors.gain),
+        ("errors.hammer_gain", errors.hammer_gain),
+        ("errors.skew_s", errors.skew_s),
+        ("errors.load_cell_cross_talk", errors.load_cell_cross_talk),
+    ] {
+        not_negative(field, value)?;
+    }
+    if errors.skew_s * f64::from(config.scan_rate_hz) > 1e3 {
+        return Err(bad("errors.skew_s", "is more than 1000 scans: give it in seconds"));
+    }
+    positive("errors.normal_load_reference_m", errors.normal_load_reference_m)?;
+    finite("errors.normal_load_variation", &[errors.normal_load_variation])?;
+    let contact = &config.contact;
+    if contact.law != ContactLaw::Linear {
+        // The limit must grow more slowly than the spring's force, or what slips could never stick again.
+        let shares = contact.shares();
+        let largest = shares.iter().copied().fold(0.0, f64::max) * shares.len() as f64;
+        let reach_m =
+            contact.friction_coefficient * contact.normal_load_n * largest / contact.stiffness_n_per_m[2];
+        if errors.normal_load_slope_per_m().abs() * reach_m >= 1.0 {
+            return Err(bad(
+                "errors.normal_load_variation",
+                "makes the limit grow faster than the spring's force: lower it, or raise normal_load_reference_m",
+            ));
+        }
+    }
+    Ok(())
 }
 
 fn contact(config: &RigConfig) -> Result<(), RigError> {

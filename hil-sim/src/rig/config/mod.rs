@@ -5,10 +5,12 @@
 
 mod check;
 mod document;
+mod errors;
 mod sensors;
 
 pub use super::body::BodyName;
 pub(crate) use check::normal_load;
+pub use errors::Errors;
 pub use sensors::{Excitation, ForceSensor, LoadCells, Sensors, SpeckleNoise, SpotVibrometer, Vibrometer};
 
 use serde::{Deserialize, Serialize};
@@ -38,7 +40,9 @@ pub struct RigConfig {
     pub push_rod_a: Tether,
     /// Arm A to specimen A.
     pub clamp: Clamp,
-    /// Specimen A (arm A if the clamp is rigid) to arm B: the joint under test.
+    /// Arm B to specimen B.
+    pub clamp_b: Clamp,
+    /// Specimen A to specimen B (the arm, where a clamp is rigid): the joint under test.
     pub contact: Contact,
     /// Ground to arm B; exactly three.
     pub load_cells: Vec<Bushing>,
@@ -56,7 +60,7 @@ pub struct RigConfig {
     pub hammer: Hammer,
     /// Scales, noise and delays of the channels.
     pub sensors: Sensors,
-    /// Errors of position, aim and angle.
+    /// What nobody at the rig knows: errors of places, angles and sensors.
     pub errors: Errors,
 }
 
@@ -93,7 +97,7 @@ impl Default for RigConfig {
     }
 }
 
-/// The four rigid bodies.
+/// The rigid bodies.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bodies {
@@ -103,8 +107,10 @@ pub struct Bodies {
     pub arm_a: RigidBody,
     /// Specimen A.
     pub specimen_a: RigidBody,
-    /// Arm B.
+    /// Arm B with its specimen.
     pub arm_b: RigidBody,
+    /// Specimen B: taken out of arm B and a body of its own when its clamp is not rigid.
+    pub specimen_b: RigidBody,
 }
 
 /// A rigid body: six degrees of freedom at its centre of gravity.
@@ -149,15 +155,15 @@ pub struct Tether {
     pub bushing: Bushing,
 }
 
-/// The clamp between arm A and specimen A.
+/// The clamp between an arm and its specimen.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Clamp {
-    /// No clamp at all: the specimen's inertia is lumped onto arm A.
+    /// No clamp at all: arm and specimen are one body.
     pub rigid: bool,
     /// Under the normal load: in the assembly.
     pub loaded: Bushing,
-    /// Without it: substructure A alone.
+    /// Without it: the substructure alone.
     pub free: Bushing,
 }
 
@@ -218,6 +224,15 @@ pub struct Contact {
 }
 
 impl Contact {
+    /// Each slider's part of μN, the weakest first; none for the linear law. They share the stiffness evenly.
+    pub fn shares(&self) -> Vec<f64> {
+        match self.law {
+            ContactLaw::Linear => Vec::new(),
+            ContactLaw::Jenkins => vec![1.0],
+            ContactLaw::Iwan => self.iwan.shares(),
+        }
+    }
+
     /// The stuck contact's spring and dashpot.
     pub fn bushing(&self) -> Bushing {
         Bushing {
@@ -274,7 +289,7 @@ pub struct Spot {
 pub struct Spots {
     /// On specimen A.
     pub ldv_a: Spot,
-    /// On arm B's specimen.
+    /// On specimen B.
     pub ldv_b: Spot,
 }
 
@@ -340,16 +355,4 @@ pub struct Mishaps {
     pub overload: f64,
     /// Its peak over the undisturbed.
     pub overload_factor: [f64; 2],
-}
-
-/// Standard deviations of what nobody at the rig knows.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Errors {
-    /// Each response and impact point along each axis (m), the same in every cell.
-    pub position_m: f64,
-    /// Added anew in each cell (m along each axis).
-    pub aim_m: f64,
-    /// Hammer's tilt about each of the two axes across the impact (rad), the same in every cell.
-    pub hammer_angle_rad: f64,
 }

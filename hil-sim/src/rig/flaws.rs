@@ -1,0 +1,77 @@
+//! What is wrong with a campaign's instruments: where the spots really are, and what the sensors misread.
+//!
+//! All of it is keyed to (seed, what it is for): the same in every cell and configuration, whatever was visited before.
+
+use super::aim::shifted;
+use super::config::{RigConfig, Spot, Spots};
+use super::key::{normal, stream};
+use super::sensors::{CHANNELS, Channel, FORCE, LOAD_CELLS, is_gauged};
+
+/// One campaign's flaws.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Flaws {
+    /// Where the single-point vibrometers really look.
+    pub spots: Spots,
+    /// What each channel reads over what it should: 1 without error.
+    pub gains: [f64; CHANNELS],
+    /// Delay of each channel beyond the declared one and the latency below (s); negative where it comes early.
+    pub skews_s: [f64; CHANNELS],
+    /// Whole scans by which all channels alike come late, so that none need come before its cause.
+    pub latency_scans: u32,
+    /// Part of the force of each load cell (column) that each other one (row) reads; the diagonal is nothing.
+    pub cross_talk: [[f64; 3]; 3],
+}
+
+impl Flaws {
+    /// Of the rig `seed`.
+    pub(super) fn new(seed: u64, config: &RigConfig, channels: &[Channel; CHANNELS]) -> Self {
+        let errors = config.errors.acting();
+        let draw = |words: &[&str]| normal(&mut stream(seed, words));
+        let gains = std::array::from_fn(|at| {
+            let sigma = match at {
+                FORCE => errors.hammer_gain,
+                _ if is_gauged(at) => errors.gain,
+                _ => 0.0,
+            };
+            1.0 + sigma * draw(&["gain", channels[at].name])
+        });
+        let skews_s = std::array::from_fn(|at| {
+            if at == FORCE { 0.0 } else { errors.skew_s * draw(&["skew", channels[at].name]) }
+        });
+        let name = |cell: usize| channels[LOAD_CELLS[cell]].name;
+        let cross_talk = std::array::from_fn(|reads: usize| {
+            std::array::from_fn(|of: usize| {
+                let words = ["cross-talk", name(reads), name(of)];
+                if reads == of { 0.0 } else { errors.load_cell_cross_talk * draw(&words) }
+            })
+        });
+        let spot = |name: &str, nominal: &Spot| Spot {
+            body: nominal.body,
+            position_m: shifted(
+                nominal.position_m,
+                errors.spot_m,
+                &mut stream(seed, &["spot position", name]),
+            ),
+        };
+        Self {
+            spots: Spots {
+                ldv_a: spot("ldv_a", &config.spots.ldv_a),
+                ldv_b: spot("ldv_b", &config.spots.ldv_b),
+            },
+            gains,
+            skews_s,
+            latency_scans: latency_scans(&skews_s, f64::from(config.scan_rate_hz)),
+            cross_talk,
+        }
+    }
+}
+
+/// One scan more than the earliest channel is early, so that the interpolating cubic has a sample on either side; none where
+/// no channel is skewed.
+fn latency_scans(skews_s: &[f64; CHANNELS], rate_hz: f64) -> u32 {
+    if skews_s.iter().all(|skew| *skew == 0.0) {
+        return 0;
+    }
+    let earliest = skews_s.iter().fold(0.0_f64, |earliest, skew| earliest.min(*skew));
+    1 + (-earliest * rate_hz).ceil() as u32
+}
