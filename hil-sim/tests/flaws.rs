@@ -285,7 +285,7 @@ fn the_normal_load_varies_with_the_displacement() {
     let (low, high) = seen.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), (force_n, _)| {
         (low.min(force_n.abs()), high.max(force_n.abs()))
     });
-    assert!(seen.len() > 1_000 && low < 170.0 && high > 190.0, "{} scans, {low} to {high} N", seen.len());
+    assert!(seen.len() > 500 && low < 170.0 && high > 190.0, "{} scans, {low} to {high} N", seen.len());
     // Too steep: what slips could never stick again.
     config.errors.normal_load_reference_m = 0.2e-6;
     let error = config.check().unwrap_err().to_string();
@@ -311,9 +311,5 @@ fn half_the_step_changes_the_force_of_a_varying_load_little() {
     let whole = taken(&config);
     config.contact.slip_step_s /= 2.0;
     let half = taken(&config);
-    config.contact.slip_step_s /= 2.0;
-    println!("{whole} {half} {} ", taken(&config));
-    config.contact.slip_step_s /= 2.0;
-    println!("{whole} {half} {} ", taken(&config));
     assert!(whole > 0.0 && (whole / half - 1.0).abs() < 1e-4, "{whole} {half}");
 }

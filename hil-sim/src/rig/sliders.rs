@@ -162,6 +162,7 @@ impl Sliders {
             }
         }
         let gain = receptance * self.stiffness;
+        let before = self.load_factor(self.y);
         self.y = free + gain * self.leads;
         for _ in 0..ROUNDS {
             let sliding = self.follow();
@@ -173,7 +174,7 @@ impl Sliders {
             // slope of the limits, which is left out.
             self.y -= off / (1.0 - gain * sliding);
         }
-        self.relax();
+        self.relax(0.5 * (before + self.load_factor(self.y)));
         self.push_n()
     }
 
@@ -195,11 +196,10 @@ impl Sliders {
         sliding.iter().sum()
     }
 
-    /// Ends the step: every wᵢ goes after its vᵢ, and what that takes is counted.
+    /// Ends the step: every wᵢ goes after its vᵢ, and what that takes at the mean load `factor` is counted.
     #[inline]
-    fn relax(&mut self) {
+    fn relax(&mut self, factor: f64) {
         let rest = self.relaxation.1;
-        let factor = self.load_factor(self.y);
         let (mut path, mut work, mut apart) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for (((slip, lead), stuck), reach) in
             self.slip.iter_mut().zip(&self.lead).zip(&self.stuck).zip(&self.reach)
