@@ -3,7 +3,7 @@
 //! A substructuring matrix has no place for a guess: where a cell is missing that Eq. (3) reads, its impact or its
 //! response location is left out. A cell that Eq. (3) does not read (a spare response, a hit on B in the assembly)
 //! costs nothing: its place holds NaN, and whoever asks for it is refused by name. What is written for other programs leaves
-//! nothing out: it has a place for every pair of the geometry.
+//! nothing out: it has a place for every pair of the geometry. Points on specimens are no points of the arms: they are in the latter alone.
 
 use super::averages::CellAverage;
 use crate::frf::Frf;
@@ -35,6 +35,11 @@ pub fn locations(points: &Configuration) -> Vec<&str> {
     names
 }
 
+/// Whether a response location is on an arm, not on a specimen.
+fn on_an_arm(points: &Configuration, location: &str) -> bool {
+    !points.channels.iter().any(|c| c.name == location && c.grouping.is_specimen())
+}
+
 /// Whether Eq. (3), in either form, reads the cell of this impact and this response: Y^A from everything on A to A's
 /// interface, Y^B from B's interface to everything on B, and across the joint from A to B in the assembly.
 fn is_read(configuration: Structure, impact: Grouping, response: Grouping) -> bool {
@@ -54,25 +59,29 @@ pub fn assemble(
     cells: &[CellAverage],
     quantity: MotionQuantity,
 ) -> Assembled {
-    let locations = locations(points);
+    let locations: Vec<&str> = locations(points).into_iter().filter(|name| on_an_arm(points, name)).collect();
     let groupings: Vec<Grouping> = locations
         .iter()
         .filter_map(|l| points.channels.iter().find(|c| c.name == *l))
         .map(|c| c.grouping)
         .collect();
+    let on_arms: Vec<usize> =
+        (0..points.impacts.len()).filter(|i| !points.impacts[*i].grouping.is_specimen()).collect();
     let (impacts, kept_locations) = if cells.is_empty() {
         (Vec::new(), Vec::new())
     } else {
-        complete(points.impacts.len(), locations.len(), |i, l| {
-            !is_read(configuration, points.impacts[i].grouping, groupings[l])
-                || find(cells, &points.impacts[i], locations[l]).is_some()
+        complete(on_arms.len(), locations.len(), |i, l| {
+            let impact = &points.impacts[on_arms[i]];
+            !is_read(configuration, impact.grouping, groupings[l])
+                || find(cells, impact, locations[l]).is_some()
         })
     };
     let left_out = |all: usize, kept: &[usize]| (0..all).filter(|i| !kept.contains(i)).collect::<Vec<_>>();
-    let impacts_left_out = left_out(points.impacts.len(), &impacts)
+    let impacts_left_out = left_out(on_arms.len(), &impacts)
         .into_iter()
-        .map(|i| points.impacts[i].name.clone())
+        .map(|i| points.impacts[on_arms[i]].name.clone())
         .collect();
+    let impacts: Vec<usize> = impacts.into_iter().map(|i| on_arms[i]).collect();
     let responses_left_out =
         left_out(locations.len(), &kept_locations).into_iter().map(|l| locations[l].to_owned()).collect();
     let channels: Vec<usize> = (0..points.channels.len())

@@ -74,7 +74,8 @@ fn choose<'p>(
     points: &'p Configuration,
     measured: &dyn Fn(&Point, &Point) -> bool,
 ) -> Vec<(Role, &'p Point, &'p Point)> {
-    let along_z = |p: &&Point| p.direction[2].abs() > 0.9;
+    // a specimen's motion is the contact's matter
+    let along_z = |p: &&Point| p.direction[2].abs() > 0.9 && !p.grouping.is_specimen();
     let mut pairs: Vec<(&Point, &Point, f64)> = Vec::new();
     for impact in points.impacts.iter().filter(along_z) {
         for channel in points.channels.iter().filter(along_z).filter(|c| measured(impact, c)) {

@@ -5,7 +5,7 @@ use crate::results::MAIN_BAND;
 use crate::substructuring::averaged::Priors;
 use crate::substructuring::cmif::{Cmif, cmif};
 use crate::substructuring::explained::Explained;
-use crate::substructuring::geometry::{Configuration, Geometry, Grouping};
+use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
 use crate::substructuring::line_noise::LineNoise;
 use crate::substructuring::{
     Dof, Frf, FrfError, Identification, IdmSet, JointRow, JointSpectrum, Method, Refused,
@@ -110,13 +110,19 @@ fn back_coupled(
     BackCoupled::of(&Explained::of(frfs, geometry, idms, MAIN_BAND, priors)?)
 }
 
-/// The matrix without the spare responses of A, which may be anything.
+/// The matrix without the spare responses of A, which may be anything, and without points on specimens, which are on no arm.
 fn without_spares(frf: &Frf, points: &Configuration) -> Frf {
-    let names = points.output_names();
-    let spare = |name: &String| {
-        points.channels.iter().zip(&names).any(|(p, n)| n == name && p.grouping == Grouping::InternalA)
+    let is = |points: &[Point], names: &[String], name: &String, what: fn(Grouping) -> bool| {
+        points.iter().zip(names).any(|(p, n)| n == name && what(p.grouping))
     };
+    let (outputs, inputs) = (points.output_names(), points.input_names());
+    let spare = |name: &&String| {
+        let left_out = |g: Grouping| g == Grouping::InternalA || g.is_specimen();
+        is(&points.channels, &outputs, name, left_out)
+    };
+    let on_specimen = |name: &&String| is(&points.impacts, &inputs, name, Grouping::is_specimen);
     let kept: Vec<String> = frf.outputs().iter().filter(|name| !spare(name)).cloned().collect();
+    let hit: Vec<String> = frf.inputs().iter().filter(|name| !on_specimen(name)).cloned().collect();
     // these names were just taken from it
-    frf.select(&kept, frf.inputs()).unwrap_or_else(|_| frf.clone())
+    frf.select(&kept, &hit).unwrap_or_else(|_| frf.clone())
 }

@@ -30,7 +30,7 @@ use super::inbox::Inbox;
 use super::link::Link;
 use super::logs::{DeviceLog, Tables};
 use super::stream::{Accounts, Stream};
-use super::transport::Transport;
+use super::transport::{Simulated, Transport};
 
 /// The line counts as idle when nothing arrived for this long.
 const IDLE: Duration = Duration::from_millis(20);
@@ -59,6 +59,7 @@ pub struct Session {
     pub(super) link: Link,
     pub(super) inbox: Inbox,
     pub(super) address: String,
+    simulated: Option<Simulated>,
     pub(super) hello: Hello,
     pub(super) next_number: u32,
     /// The number for which a caller waits.
@@ -86,10 +87,12 @@ impl Session {
     pub fn open(transport: Box<dyn Transport>, address: &str) -> Result<Self, DeviceError> {
         let now = Instant::now();
         let log = DeviceLog::of(address, transport.image());
+        let simulated = transport.simulated();
         let mut session = Self {
             link: Link::new(transport),
             inbox: Inbox::with_log(log),
             address: address.into(),
+            simulated,
             hello: Hello::host(nonce()),
             next_number: 1,
             waiting: None,
@@ -133,6 +136,11 @@ impl Session {
             }
         }
         Err(DeviceError::NoAnswer { address: self.address.clone(), request: "hello", tries: TRIES })
+    }
+
+    /// What the device is known to be when it is simulated in this process.
+    pub fn simulated(&self) -> Option<&Simulated> {
+        self.simulated.as_ref()
     }
 
     /// What errors call the device.

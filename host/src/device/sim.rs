@@ -1,20 +1,23 @@
 //! `sim:` and `sim:RIG.toml`: the simulated rig, in this process.
 //!
-//! The only place where the host knows of the simulator; what it gets is bytes, as from any device.
+//! The only place where the host knows of the simulator; what it gets is bytes, as from any device. Beside them it is told what the rig's
+//! parameters would have an ideal measurement find: that goes into the campaign file, and no estimator reads it.
 
 use std::io;
 use std::path::Path;
 use std::time::Duration;
 
-use jointrig_hil_sim::board::VirtualBoard;
+use jointrig_hil_sim::board::{Options, VirtualBoard};
 use jointrig_hil_sim::link::HostEnd;
+use jointrig_hil_sim::rig::RigConfig;
 
 use super::error::DeviceError;
-use super::transport::Transport;
+use super::transport::{Simulated, Transport};
 
 /// A running virtual board.
 pub struct Sim {
     link: HostEnd,
+    simulated: Simulated,
     // dropped after the link: its thread ends then
     _board: VirtualBoard,
 }
@@ -33,9 +36,13 @@ impl Sim {
             })?),
             None => None,
         };
+        let config = text.map_or_else(|| Ok(RigConfig::default()), |text| RigConfig::from_toml(&text));
+        let config = config.map_err(|error| open(error.to_string()))?;
+        let options = Options { seed, ..Options::default() };
         let (board, link) =
-            VirtualBoard::start(text.as_deref(), seed).map_err(|error| open(error.to_string()))?;
-        Ok(Self { link, _board: board })
+            VirtualBoard::start_with(&config, &options).map_err(|error| open(error.to_string()))?;
+        let truth = serde_json::to_value(config.truth()).map_err(|error| open(error.to_string()))?;
+        Ok(Self { link, simulated: Simulated { rig: config.name, seed, truth }, _board: board })
     }
 }
 
@@ -46,5 +53,9 @@ impl Transport for Sim {
 
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.link.write_all(bytes)
+    }
+
+    fn simulated(&self) -> Option<Simulated> {
+        Some(self.simulated.clone())
     }
 }

@@ -25,6 +25,23 @@ pub trait Transport: Send {
     fn image(&self) -> Option<&Path> {
         None
     }
+
+    /// What the device is known to be beforehand when it is simulated in this process; none for whatever else may be at the
+    /// other end. It comes from the rig's parameters, and over no wire.
+    fn simulated(&self) -> Option<Simulated> {
+        None
+    }
+}
+
+/// A device that is simulated in this process.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Simulated {
+    /// The rig's name.
+    pub rig: String,
+    /// Its seed.
+    pub seed: u64,
+    /// What an ideal measurement of it would find, as JSON.
+    pub truth: serde_json::Value,
 }
 
 impl<T: Transport + ?Sized> Transport for Box<T> {
@@ -38,5 +55,9 @@ impl<T: Transport + ?Sized> Transport for Box<T> {
 
     fn image(&self) -> Option<&Path> {
         (**self).image()
+    }
+
+    fn simulated(&self) -> Option<Simulated> {
+        (**self).simulated()
     }
 }

@@ -84,12 +84,12 @@ fn records(value: impl Strategy<Value = f64>) -> impl Strategy<Value = ImpactRec
 }
 
 fn points(kind: &'static str, axes: bool) -> impl Strategy<Value = Vec<Point>> {
-    let one = (1..5u8, prop::array::uniform3(-1e3..1e3f64), 0..3usize, any::<bool>());
+    let one = (1..7u8, prop::array::uniform3(-1e3..1e3f64), 0..3usize, any::<bool>());
     vec(one, 1..5).prop_map(move |rows| {
         rows.into_iter()
             .enumerate()
             .flat_map(|(i, (grouping, position_m, axis, turned))| {
-                let grouping = Grouping::try_from(grouping).expect("1 to 4");
+                let grouping = Grouping::try_from(grouping).expect("1 to 6");
                 let point = move |name: String, description: String, axis: usize, sign: f64| Point {
                     name,
                     description,

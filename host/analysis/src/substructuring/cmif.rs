@@ -40,7 +40,8 @@ type OneLine = (Vec<f64>, Vec<[f64; 6]>, [f64; 4]);
 const VECTORS: usize = 12;
 
 /// The CMIF of the assembly against its parts; rows and columns are matched by name, and the substructures' internals count too.
-/// Responses that only the assembly has are left out, and so are spare ones (Grouping 3), which no virtual point uses.
+/// Responses that only the assembly has are left out, and so are spare ones (Grouping 3), which no virtual point uses, and points on
+/// specimens (5 and 6).
 ///
 /// Implements Eq. (B.1).
 ///
@@ -159,6 +160,8 @@ fn rigid_motions(outputs: &[String], geometry: &Geometry) -> Rigid {
         let (side, origin) = match point.grouping {
             Grouping::InterfaceA | Grouping::InternalA => (0, geometry.virtual_point_a_m),
             Grouping::InterfaceB | Grouping::InternalB => (6, geometry.virtual_point_b_m),
+            // moves with no virtual point
+            Grouping::SpecimenA | Grouping::SpecimenB => continue,
         };
         let motion = rigid_row(point.direction(), point.position() - Vector3::from(origin));
         for (d, value) in motion.into_iter().enumerate() {

@@ -17,6 +17,17 @@ pub enum Grouping {
     InternalA,
     /// 4: internal of B.
     InternalB,
+    /// 5: on specimen A, which may move in its clamp: no point of arm A, and never part of substructuring.
+    SpecimenA,
+    /// 6: on specimen B, likewise.
+    SpecimenB,
+}
+
+impl Grouping {
+    /// Whether the point is on a specimen: it tells of the contact, and substructuring leaves it out.
+    pub fn is_specimen(self) -> bool {
+        matches!(self, Grouping::SpecimenA | Grouping::SpecimenB)
+    }
 }
 
 impl TryFrom<u8> for Grouping {
@@ -27,8 +38,10 @@ impl TryFrom<u8> for Grouping {
             2 => Ok(Grouping::InterfaceB),
             3 => Ok(Grouping::InternalA),
             4 => Ok(Grouping::InternalB),
+            5 => Ok(Grouping::SpecimenA),
+            6 => Ok(Grouping::SpecimenB),
             other => Err(format!(
-                "{other} is no grouping: 1 and 2 are the interfaces of A and B, 3 and 4 their internals"
+                "{other} is no grouping: 1 and 2 are the interfaces of A and B, 3 and 4 their internals, 5 and 6 the specimens"
             )),
         }
     }
@@ -41,6 +54,8 @@ impl From<Grouping> for u8 {
             Grouping::InterfaceB => 2,
             Grouping::InternalA => 3,
             Grouping::InternalB => 4,
+            Grouping::SpecimenA => 5,
+            Grouping::SpecimenB => 6,
         }
     }
 }
@@ -164,9 +179,9 @@ mod tests {
     }
 
     #[test]
-    fn grouping_five_is_refused() {
-        assert!(Grouping::try_from(5).is_err());
-        for n in 1..=4u8 {
+    fn groupings_are_one_to_six() {
+        assert!(Grouping::try_from(0).is_err() && Grouping::try_from(7).is_err());
+        for n in 1..=6u8 {
             assert_eq!(Grouping::try_from(n).map(u8::from), Ok(n));
         }
     }

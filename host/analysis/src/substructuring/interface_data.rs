@@ -111,8 +111,12 @@ impl Measured<'_> {
         idms: IdmSet,
     ) -> Result<VirtualPoint, InterfaceError> {
         let (substructure, origin) = match grouping {
-            Grouping::InterfaceA | Grouping::InternalA => (Structure::A, geometry.virtual_point_a_m),
-            Grouping::InterfaceB | Grouping::InternalB => (Structure::B, geometry.virtual_point_b_m),
+            Grouping::InterfaceA | Grouping::InternalA | Grouping::SpecimenA => {
+                (Structure::A, geometry.virtual_point_a_m)
+            }
+            Grouping::InterfaceB | Grouping::InternalB | Grouping::SpecimenB => {
+                (Structure::B, geometry.virtual_point_b_m)
+            }
         };
         let origin = Vector3::from(origin);
         let fail = |source| InterfaceError::VirtualPoint { substructure, file: self.file, source };

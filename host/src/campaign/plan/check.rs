@@ -184,8 +184,8 @@ impl Plan {
             if name.is_empty() || name.len() > NAME_BYTES {
                 return Err((at, format!("geometry: name `{name}` must have 1 to {NAME_BYTES} bytes")));
             }
-            if !(1..=4).contains(&grouping) {
-                return Err((at, format!("geometry: grouping of `{name}` must be 1 to 4")));
+            if !(1..=6).contains(&grouping) {
+                return Err((at, format!("geometry: grouping of `{name}` must be 1 to 6")));
             }
             if !seen.insert(name) {
                 return Err((at, format!("geometry: the name `{name}` stands twice")));
@@ -214,9 +214,6 @@ impl Plan {
             if configuration_named(name).is_none() {
                 return Err((at, format!("configuration.name `{name}` must be A, B or AJB")));
             }
-            if !seen.insert(name) {
-                return Err((at, format!("configuration `{name}` stands twice")));
-            }
             if structure.impacts.is_empty() || structure.responses.is_empty() {
                 return Err((at, format!("configuration `{name}` needs impacts and responses")));
             }
@@ -226,6 +223,18 @@ impl Plan {
             let known: HashSet<&str> =
                 self.geometry.response.iter().map(|point| &*point.get_ref().name).collect();
             check_names(&structure.responses, &known, "responses")?;
+            for impact in &structure.impacts {
+                for response in &structure.responses {
+                    let cell = (name, impact.get_ref(), response.get_ref());
+                    if !seen.insert(cell) {
+                        let (impact, response) = (cell.1, cell.2);
+                        return Err((
+                            at,
+                            format!("configuration `{name}`: the cell {impact} × {response} stands twice"),
+                        ));
+                    }
+                }
+            }
         }
         Ok(())
     }

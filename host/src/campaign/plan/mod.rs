@@ -13,8 +13,12 @@ use toml::Spanned;
 
 /// The paper's campaign: 252 cells of 8 hits.
 pub const PAPER: &str = include_str!("../../../../docs/plans/paper.toml");
-/// All cells of the paper's campaign, three good hits in each.
+/// All cells of the paper's campaign with those on the specimen, three good hits in each.
 pub const DEMO: &str = include_str!("../../../../docs/plans/demo.toml");
+/// What the contact's own stiffness needs, and no more: 63 cells of two hits.
+pub const CONTACT: &str = include_str!("../../../../docs/plans/contact.toml");
+/// The paper's campaign with the cells on the specimen: both stiffnesses.
+pub const PAPER_CONTACT: &str = include_str!("../../../../docs/plans/paper-contact.toml");
 /// A few cells.
 pub const SMALL: &str = include_str!("../../../../docs/plans/small.toml");
 
@@ -61,7 +65,7 @@ pub struct Plan {
     /// What is behind the device's channels; those that are not named are taken as the device describes them.
     #[serde(default)]
     pub channel: Vec<Spanned<SensorPlan>>,
-    /// The structures, in the order in which they are measured.
+    /// The structures, in the order in which they are measured. Blocks of the same name add up.
     pub configuration: Vec<ConfigurationPlan>,
     /// Where everything is.
     pub geometry: GeometryPlan,
@@ -225,7 +229,7 @@ pub struct SensorPlan {
     pub range: Option<f64>,
 }
 
-/// One structure: every impact is combined with every response.
+/// Cells of one structure: every impact is combined with every response.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConfigurationPlan {
@@ -258,7 +262,7 @@ pub struct GeometryPlan {
 pub struct ResponsePoint {
     /// Its name.
     pub name: String,
-    /// 1 interface of A, 2 interface of B, 3 internal of A, 4 internal of B.
+    /// 1 interface of A, 2 interface of B, 3 internal of A, 4 internal of B, 5 on specimen A, 6 on specimen B.
     pub grouping: u8,
     /// Where it is, m.
     pub position_m: [f64; 3],
@@ -270,7 +274,7 @@ pub struct ResponsePoint {
 pub struct ImpactPoint {
     /// Its name.
     pub name: String,
-    /// 1 interface of A, 2 interface of B, 3 internal of A, 4 internal of B.
+    /// 1 interface of A, 2 interface of B, 3 internal of A, 4 internal of B, 5 on specimen A, 6 on specimen B.
     pub grouping: u8,
     /// Where it is, m.
     pub position_m: [f64; 3],
@@ -348,30 +352,55 @@ impl Plan {
     }
 
     /// The cells in the order that moves hammer and laser least: the hammer goes to each impact once, and
-    /// the laser goes through the responses there and back (boustrophedon).
+    /// the laser goes through the responses there and back (boustrophedon). What further blocks of a configuration add at an impact
+    /// comes before the last response of its first block, where the next impact begins.
     pub fn cells(&self) -> Vec<Cell> {
+        let mut names: Vec<&str> = Vec::new();
+        for block in &self.configuration {
+            if !names.contains(&block.name.get_ref().as_str()) {
+                names.push(block.name.get_ref());
+            }
+        }
         let mut cells = Vec::new();
-        for structure in &self.configuration {
-            let Some(configuration) = configuration_named(structure.name.get_ref()) else { continue };
-            for (place, impact) in structure.impacts.iter().enumerate() {
-                let mut here: Vec<Cell> = structure
-                    .responses
-                    .iter()
-                    .map(|response| Cell {
-                        configuration,
-                        impact: impact.get_ref().clone(),
-                        response: response.get_ref().clone(),
-                        wanted: self.hits.get_ref().wanted,
-                    })
-                    .collect();
-                if place % 2 == 1 {
-                    here.reverse();
+        for name in names {
+            let Some(configuration) = configuration_named(name) else { continue };
+            let blocks = || self.configuration.iter().filter(|block| block.name.get_ref() == name);
+            let mut impacts: Vec<&str> = Vec::new();
+            for impact in blocks().flat_map(|block| &block.impacts).map(Spanned::get_ref) {
+                if !impacts.contains(&impact.as_str()) {
+                    impacts.push(impact);
                 }
-                cells.extend(here);
+            }
+            for (place, impact) in impacts.into_iter().enumerate() {
+                let here = blocks().filter(|block| block.impacts.iter().any(|own| own.get_ref() == impact));
+                for response in there_and_back(here, place) {
+                    cells.push(Cell {
+                        configuration,
+                        impact: impact.to_owned(),
+                        response: response.to_owned(),
+                        wanted: self.hits.get_ref().wanted,
+                    });
+                }
             }
         }
         cells
     }
+}
+
+/// The responses of the blocks that have the impact at this place, in the order in which the laser visits them.
+fn there_and_back<'p>(blocks: impl Iterator<Item = &'p ConfigurationPlan>, place: usize) -> Vec<&'p str> {
+    let mut of_blocks = blocks.map(|block| {
+        let mut names: Vec<&str> = block.responses.iter().map(|name| name.get_ref().as_str()).collect();
+        if place % 2 == 1 {
+            names.reverse();
+        }
+        names
+    });
+    let mut all = of_blocks.next().unwrap_or_default();
+    let last = all.pop();
+    all.extend(of_blocks.flatten());
+    all.extend(last);
+    all
 }
 
 /// What toml says, with the line that it points at.

@@ -19,19 +19,61 @@ fn the_papers_plan_has_252_cells_and_2016_hits() {
 
 #[test]
 fn hammer_and_laser_move_as_little_as_they_can() {
-    for text in [PAPER, DEMO, SMALL] {
+    for text in [PAPER, DEMO, SMALL, CONTACT, PAPER_CONTACT] {
         let plan = Plan::parse(text, "plan").expect("a good plan");
         let cells = plan.cells();
         let moves = |of: fn(&Cell) -> String| cells.windows(2).filter(|w| of(&w[0]) != of(&w[1])).count();
         let hammer = moves(|cell| format!("{:?}{}", cell.configuration, cell.impact));
-        let impacts: usize = plan.configuration.iter().map(|structure| structure.impacts.len()).sum();
-        assert_eq!(hammer + 1, impacts, "each impact is visited once");
+        let impacts: HashSet<(&str, &str)> = plan
+            .configuration
+            .iter()
+            .flat_map(|block| {
+                block.impacts.iter().map(|impact| (&**block.name.get_ref(), &**impact.get_ref()))
+            })
+            .collect();
+        assert_eq!(hammer + 1, impacts.len(), "each impact is visited once");
         for pair in cells.windows(2) {
             let same = pair[0].configuration == pair[1].configuration;
             let moved = (pair[0].impact != pair[1].impact, pair[0].response != pair[1].response);
             assert!(!same || moved != (true, true), "only one of the two moves: {pair:?}");
         }
     }
+}
+
+#[test]
+fn the_contacts_plan_has_63_cells_and_no_a() {
+    let plan = Plan::parse(CONTACT, "contact.toml").expect("a good plan");
+    let cells = plan.cells();
+    let of = |wanted| cells.iter().filter(|cell| cell.configuration == wanted).count();
+    assert_eq!((of(Configuration::A), of(Configuration::B), of(Configuration::Ajb)), (0, 27, 36));
+    assert_eq!((plan.hits.get_ref().wanted, plan.hits.get_ref().minimum), (2, 2));
+    assert_eq!(plan.configuration.len(), 2);
+}
+
+#[test]
+fn blocks_of_a_configuration_add_up_and_no_cell_stands_twice() {
+    let paper: HashSet<String> = Plan::parse(PAPER, "paper.toml")
+        .expect("a good plan")
+        .cells()
+        .iter()
+        .map(|c| format!("{c:?}"))
+        .collect();
+    let cells = Plan::parse(PAPER_CONTACT, "paper-contact.toml").expect("a good plan").cells();
+    let whole: HashSet<String> = cells.iter().map(|cell| format!("{cell:?}")).collect();
+    assert_eq!((cells.len(), whole.len()), (276, 276));
+    assert!(whole.is_superset(&paper));
+    let added: Vec<&Cell> = cells.iter().filter(|cell| !paper.contains(&format!("{cell:?}"))).collect();
+    assert_eq!(added.len(), 24);
+    for cell in added {
+        assert!(cell.configuration == Configuration::Ajb && cell.response.starts_with('S'), "{cell:?}");
+        assert!(["AZ1", "AZ2", "AZ3", "I_MZ"].contains(&cell.impact.as_str()), "{cell:?}");
+    }
+    let demo = Plan::parse(DEMO, "demo.toml").expect("a good plan").cells();
+    assert_eq!(demo.len(), 276);
+
+    let twice = PAPER_CONTACT.replace("responses = [\"S1\", \"S2\"", "responses = [\"B3\", \"S2\"");
+    let said = Plan::parse(&twice, "my.toml").expect_err("a cell twice").to_string();
+    assert!(said.contains("AZ1 × B3 stands twice"), "{said}");
 }
 
 #[test]
@@ -45,7 +87,7 @@ fn errors_point_at_line_and_field() {
         ("responses = [\"B1\"]", "responses = [\"B1\", \"B1\"]", "stands twice"),
         ("name = \"B\"", "name = \"C\"", "must be A, B or AJB"),
         ("direction = [0, -1, 0]", "direction = [0, -2, 0]", "length 1"),
-        ("{ name = \"A2\", grouping = 1", "{ name = \"A2\", grouping = 7", "must be 1 to 4"),
+        ("{ name = \"A2\", grouping = 1", "{ name = \"A2\", grouping = 7", "must be 1 to 6"),
         ("pulse_us = 3500", "pulse_us = 9000", "pulse_bounds_us"),
         ("noise_ratio = 3.0", "noise_ratio = 0.5", "limits.noise_ratio"),
         ("weak_n = 30.0", "weak_n = 80.0", "limits: 0 < weak_n < strong_n"),

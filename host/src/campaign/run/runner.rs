@@ -87,6 +87,9 @@ pub fn run(
         schema_hash: Hex(session.hello().schema),
     };
     let id = store.begin_session(&noted, &channels)?;
+    if let Some(simulated) = session.simulated() {
+        store.note_simulated(simulated)?;
+    }
     let (cells, records) = (store.cells()?, store.records()?);
     let tally = Tally::new(&cells, &records);
     let mut pulse = PulseLoop::new(plan.force.get_ref(), info.coil_cap_us);

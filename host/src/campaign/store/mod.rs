@@ -26,6 +26,7 @@ mod row_seal;
 mod schema;
 pub mod session_table;
 mod share;
+pub mod simulated;
 pub mod stored;
 mod table;
 pub mod verify;

@@ -1,0 +1,86 @@
+//! What a campaign's device was known to be, when it was simulated in the process that ran the campaign.
+//!
+//! Two notes of the file: which rig it was, and what an ideal measurement of it would find. They are written by the runner from the
+//! rig's parameters; nothing of them crosses the protocol, and no estimator may read them.
+
+use serde::{Deserialize, Serialize};
+
+use super::Store;
+use super::error::StoreError;
+use crate::device::transport::Simulated;
+
+/// Keys of the notes.
+const RIG: &str = "simulated_rig";
+const TRUTH: &str = "simulated_truth";
+
+/// Which simulated rig it was.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SimulatedRig {
+    /// The rig's name.
+    pub name: String,
+    /// Its seed.
+    pub seed: u64,
+}
+
+/// How the contact answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ContactLaw {
+    /// Stuck, whatever the force.
+    Linear,
+    /// One slider: stuck, then gross slip.
+    Jenkins,
+    /// Many sliders in parallel: microslip, then gross slip.
+    Iwan,
+}
+
+/// What an ideal measurement of the simulated rig would find. Stiffness along z.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SimulatedTruth {
+    /// The contact's own tangential stiffness k_T, all of it stuck, N/m.
+    pub contact_k_t_n_per_m: f64,
+    /// The contact's own tangential damping c_T, N s/m.
+    pub contact_c_t_n_s_per_m: f64,
+    /// Between the arms, as substructuring sees it at the virtual points: contact and clamps in series, N/m.
+    pub between_arms_k_n_per_m: f64,
+    /// Of the clamps alone, the same way, N/m; none when they are rigid.
+    pub clamps_k_n_per_m: Option<f64>,
+    /// The contact's law.
+    pub law: ContactLaw,
+    /// μN, beyond which the contact is in gross slip, N; none for the linear law. An Iwan contact slips in part below it.
+    pub slip_limit_n: Option<f64>,
+}
+
+impl Store {
+    /// Notes which simulated rig the campaign is run on, and its truth; the last session's counts.
+    pub(crate) fn note_simulated(&self, simulated: &Simulated) -> Result<(), StoreError> {
+        let rig = SimulatedRig { name: simulated.rig.clone(), seed: simulated.seed };
+        let rig = serde_json::to_string(&rig).map_err(|error| self.content(error.to_string()))?;
+        self.set_meta(RIG, &rig)?;
+        self.set_meta(TRUTH, &simulated.truth.to_string())
+    }
+
+    /// Which simulated rig the campaign was run on; none where the device was not simulated in the runner's own process.
+    ///
+    /// # Errors
+    /// The note cannot be read.
+    pub fn simulated_rig(&self) -> Result<Option<SimulatedRig>, StoreError> {
+        self.json(RIG)
+    }
+
+    /// What an ideal measurement of the simulated rig would find; none where the device was not simulated in the runner's own
+    /// process, and in files from before it was noted.
+    ///
+    /// # Errors
+    /// The note cannot be read.
+    pub fn simulated_truth(&self) -> Result<Option<SimulatedTruth>, StoreError> {
+        self.json(TRUTH)
+    }
+
+    fn json<T: serde::de::DeserializeOwned>(&self, key: &str) -> Result<Option<T>, StoreError> {
+        let read = |text: String| {
+            serde_json::from_str(&text).map_err(|error| self.content(format!("the note {key}: {error}")))
+        };
+        self.meta(key)?.map(read).transpose()
+    }
+}
