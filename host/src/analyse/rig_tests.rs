@@ -93,6 +93,13 @@ impl Rig {
         }
     }
 
+    /// A point on specimen A, which moves otherwise than its arm, measured with hits along z on A in the assembly and nowhere else.
+    fn with_specimen(mut self) -> Self {
+        let ajb = &mut self.geometry.ajb;
+        ajb.channels.extend(location("S1", Grouping::SpecimenA, [0.009, 0.002, 0.03]));
+        self.without(|cell| cell.response != "S1" || cell.impact.starts_with("AZ"))
+    }
+
     fn without(mut self, keep: impl Fn(&CellName) -> bool) -> Self {
         self.absent = self
             .cells()
@@ -191,9 +198,11 @@ impl Measurements for Rig {
             return Err(Damaged);
         }
         let hit_on_a = matches!(self.grouping(cell.configuration, &cell.impact), Grouping::InterfaceA);
-        let seen_on_a = matches!(self.grouping(cell.configuration, &cell.response), Grouping::InterfaceA);
+        let seen_on = self.grouping(cell.configuration, &cell.response);
+        let seen_on_a = matches!(seen_on, Grouping::InterfaceA | Grouping::SpecimenA);
+        let (apart, own_records) = if seen_on.is_specimen() { (1.5, 10_000) } else { (1.0, 0) };
         let along_z = cell.impact.contains('Z');
-        let place = self.cells().iter().position(|c| c == cell).expect("a cell of the plan");
+        let place = self.cells().iter().filter(|c| c.response != "S1").position(|c| c == cell);
         let coupled = cell.configuration == Structure::Ajb;
         let unit = &self.units[2 * usize::from(coupled) + usize::from(!hit_on_a)];
         let hits = [50.0, 47.0]
@@ -203,6 +212,7 @@ impl Measurements for Rig {
                 // y and z of a body are alike, each moved by hits along it only
                 let scaled = |signal: &[f64]| signal.iter().map(|s| s * peak).collect::<Vec<f64>>();
                 let (still, moved) = (vec![0.0; SAMPLES], scaled(&unit.velocity[usize::from(!seen_on_a)]));
+                let moved: Vec<f64> = moved.into_iter().map(|v| apart * v).collect();
                 let response = if along_z {
                     [still.clone(), still.clone(), moved]
                 } else {
@@ -221,7 +231,7 @@ impl Measurements for Rig {
                     }
                 });
                 Hit {
-                    record: i64::try_from(10 * place + i).expect("small"),
+                    record: i64::try_from(10 * place.unwrap_or_default() + i).expect("small") + own_records,
                     force_n: scaled(&unit.force),
                     response,
                     response_delay_s: [0.0; 3],
@@ -320,4 +330,26 @@ fn nothing_measured_is_no_error() {
     assert!(found.substructured.is_none() && found.fits.is_empty() && found.recommended.is_empty());
     assert!(contact.direct.is_none() && contact.impacts.is_none() && contact.levels.is_empty());
     assert_eq!((contact.series.ok(), contact.hidden.ok(), contact.change), (None, None, None));
+}
+
+/// Their cells are measured and averaged, and tell the contact's stage more; what is made of the arms' FRFs stays as it was.
+#[test]
+fn points_on_a_specimen_change_nothing_of_the_arms() {
+    let (plain, whole) = (run(&Rig::new()), run(&Rig::new().with_specimen()));
+    let arms = |found: &Findings| {
+        let shown: Vec<_> = found.configurations.iter().map(|c| &c.frfs).collect();
+        // not every number is one, and none of those is equal to itself
+        format!("{:?} {:?} {:?} {shown:?}", found.substructured, found.recommended, found.fits)
+    };
+    assert!(headline(&whole) && !left_out(&whole), "{:?}", whole.missing);
+    let (plain_arms, whole_arms) = (arms(&plain), arms(&whole));
+    let differs = plain_arms.bytes().zip(whole_arms.bytes()).position(|(one, other)| one != other);
+    let shown = |text: &str, at: usize| text[at.saturating_sub(200)..(at + 100).min(text.len())].to_owned();
+    assert_eq!(differs.map(|at| (shown(&plain_arms, at), shown(&whole_arms, at))), None);
+    assert_eq!(plain_arms.len(), whole_arms.len());
+    let records = |found: &Findings| found.configurations[2].records.len();
+    assert_eq!(records(&whole), records(&plain) + 2 * 2);
+    // six impacts have no cell on the specimen, as a plan would not have them either
+    let absent = Missing::CellsWithoutHit { configuration: Structure::Ajb, absent: 6, planned: 40 };
+    assert!(whole.missing.contains(&absent), "{:?}", whole.missing);
 }

@@ -185,7 +185,9 @@ impl Wrong<'_> {
     fn configuration(&mut self, points: &mut Configuration) {
         let aim_m = self.priors.aim_m;
         let mut aims: HashMap<String, Vector3<f64>> = HashMap::new();
-        for channel in &mut points.channels {
+        // points on specimens are in no coupling: drawing them too would only shift the stream of the others
+        let on_arms = |points: &&mut Point| !points.grouping.is_specimen();
+        for channel in points.channels.iter_mut().filter(on_arms) {
             let [offset, _] = self.common("sensor", &channel.name);
             // the three axes of a sensor are aimed at once
             let aim = match aims.get(&channel.name) {
@@ -195,7 +197,7 @@ impl Wrong<'_> {
             aims.insert(channel.name.clone(), aim);
             channel.position_m = (channel.position() + offset + aim).into();
         }
-        for impact in &mut points.impacts {
+        for impact in points.impacts.iter_mut().filter(on_arms) {
             let [offset, turn] = self.common("impact", &impact.name);
             let aim = self.vector(aim_m);
             impact.position_m = (impact.position() + offset + aim).into();

@@ -89,6 +89,9 @@ pub fn run(
     };
     let known = store.levels()?;
     let id = store.begin_session(&noted, &channels)?;
+    if let Some(simulated) = session.simulated() {
+        store.note_simulated(simulated)?;
+    }
     let (epoch, _) = session.start(channels.len())?;
     if info.stage {
         assemble(session, &plan)?;
