@@ -78,7 +78,7 @@ fn what_never_slips_is_the_linear_rig_bit_for_bit() {
 #[test]
 fn half_the_step_changes_energy_and_amplitude_by_less_than_1e4() {
     // Just above the limit, where a little more force means far more motion, and far beyond it.
-    let cases = [
+    let cases = vec![
         ("jenkins", rig_of(JENKINS), 30.0, 4.7),
         ("jenkins", rig_of(JENKINS), 100.0, 9.0),
         ("iwan", rig_of(IWAN), 30.0, 4.7),

@@ -5,7 +5,7 @@
 use std::f64::consts::TAU;
 
 use jointrig_hil_sim::rig::config::{BodyName, ContactLaw, Errors};
-use jointrig_hil_sim::rig::{CHANNELS, Configuration, Rig, RigConfig};
+use jointrig_hil_sim::rig::{CHANNELS, Channel, Configuration, Rig, RigConfig};
 
 const RATE: f64 = 51_200.0;
 /// Places of the load cells.
@@ -37,7 +37,7 @@ fn shaken(
     volts: f64,
 ) -> [(num_complex::Complex<f64>, num_complex::Complex<f64>); CHANNELS] {
     let mut found = [(num_complex::Complex::ZERO, num_complex::Complex::ZERO); CHANNELS];
-    let steps: Vec<f64> = rig.channels().iter().map(|channel| channel.step()).collect();
+    let steps: Vec<f64> = rig.channels().iter().map(Channel::step).collect();
     let mut codes = [0; CHANNELS];
     let scans = 3 * 51_200;
     for scan in 0..scans {
@@ -148,7 +148,7 @@ fn gains_and_cross_talk_are_in_what_is_read() {
     let flaws = rig.flaws().clone();
     rig.stage(Configuration::Ajb, "AX1", "A1", 0).unwrap();
     rig.fire(3.5e-3);
-    let steps: Vec<f64> = rig.channels().iter().map(|channel| channel.step()).collect();
+    let steps: Vec<f64> = rig.channels().iter().map(Channel::step).collect();
     let mut codes = [0; CHANNELS];
     // What is read on what was to be expected, and on the true signal: least-squares slopes.
     let (mut on_expected, mut on_truth) = ([[0.0; 2]; CHANNELS], [[0.0; 2]; CHANNELS]);
@@ -187,13 +187,13 @@ fn skew_is_a_delay_beyond_the_declared_one_early_or_late() {
     let hz = 400.0;
     let found = shaken(&mut rig, hz, 0.5);
     let mut seen = 0;
-    for at in 1..CHANNELS {
+    for (at, (read, truth)) in found.iter().enumerate().skip(1) {
         // Where there is something to see: a shaker along z moves little along x.
-        if found[at].1.norm() / 25_600.0 < 200.0 * rig.channels()[at].step() {
+        if truth.norm() / 25_600.0 < 200.0 * rig.channels()[at].step() {
             continue;
         }
         seen += 1;
-        let late_s = -(found[at].0 / found[at].1).arg() / (TAU * hz);
+        let late_s = -(read / truth).arg() / (TAU * hz);
         let declared_s = rig.channels()[at].delay_s + f64::from(flaws.latency_scans) / RATE;
         let skew_s = late_s - declared_s;
         assert!((skew_s - flaws.skews_s[at]).abs() < 1e-7, "{at}: {skew_s} for {}", flaws.skews_s[at]);
