@@ -35,6 +35,7 @@
 #![forbid(unsafe_code)]
 
 pub mod band;
+pub mod contact;
 pub mod frf;
 pub mod hysteresis;
 pub mod identified;

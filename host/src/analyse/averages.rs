@@ -1,6 +1,7 @@
 //! From kept hits to spectra, one cell at a time; the time signals are gone when the cell is done.
 
 use super::cell::{Cell, CellName, ContactDelays, Hit};
+use crate::contact::{BAND, SIGMA_PER_S};
 use crate::spectra::{
     CrossSpectra, FrfSettings, ImpactRecords, MotionQuantity, SpectraError, Windowing, estimate,
 };
@@ -28,9 +29,20 @@ pub struct CellAverage {
     pub step_hz: f64,
     /// v_A, v_B and T at the contact, where asked for and measured.
     pub contact: Option<CrossSpectra>,
+    /// The response, v_A, v_B and T with the heavy damping that the contact is read with, where asked for and measured.
+    pub damped: Option<CrossSpectra>,
 }
 
-/// Sums up the hits of a cell; `contact` asks for the contact's spectra too. Hits of sessions with other delays are brought in
+/// What of a cell is wanted beside its FRFs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Asked {
+    /// The spectra at the contact.
+    pub contact: bool,
+    /// The same, and the response, as the contact's own stiffness is read from.
+    pub damped: bool,
+}
+
+/// Sums up the hits of a cell. Hits of sessions with other delays are brought in
 /// step with the force before they are added.
 ///
 /// # Errors
@@ -40,14 +52,15 @@ pub fn average(
     cell: Cell,
     sigma_per_s: f64,
     quantity: MotionQuantity,
-    contact: bool,
+    asked: Asked,
     lines_hz: [f64; 2],
 ) -> Result<CellAverage, SpectraError> {
-    let contact = contact && cell.hits.iter().all(|h| h.contact.is_some());
+    let measured = cell.hits.iter().all(|h| h.contact.is_some());
+    let (contact, damped) = (asked.contact && measured, asked.damped && measured);
     let records: Vec<i64> = cell.hits.iter().map(|h| h.record).collect();
     let mut alike: Vec<(Vec<f64>, ImpactRecords)> = Vec::new();
     for hit in cell.hits {
-        let (delay_s, force_n, outputs) = signals(hit, contact);
+        let (delay_s, force_n, outputs) = signals(hit, contact || damped);
         let place = alike.iter().position(|(own, _)| *own == delay_s).unwrap_or(alike.len());
         if place == alike.len() {
             let none = ImpactRecords { fs_hz: cell.fs_hz, force_n: vec![], response: vec![], quantity };
@@ -56,20 +69,9 @@ pub fn average(
         alike[place].1.force_n.push(force_n);
         alike[place].1.response.push(outputs);
     }
-    let mut all: Option<CrossSpectra> = None;
-    for (delay_s, records) in alike {
-        let settings = FrfSettings {
-            windowing: Windowing { sigma_per_s, ..Windowing::default() },
-            delay_s,
-            ..FrfSettings::default()
-        };
-        let own = estimate(&records, &vec![true; records.force_n.len()], &settings)?;
-        match &mut all {
-            Some(sum) => sum.add(&own)?,
-            None => all = Some(own),
-        }
-    }
-    let all = all.ok_or(SpectraError::NoHits)?;
+    let all = summed(&alike, sigma_per_s)?;
+    let damped =
+        if damped { Some(summed(&alike, SIGMA_PER_S)?.band(BAND.low_hz, BAND.high_hz)) } else { None };
     let step_hz = all.frequency_hz().get(1).copied().unwrap_or(0.0);
     let mean = |lines: &[f64]| lines.iter().sum::<f64>() / lines.len() as f64;
     let force_spectrum = all.force_spectrum().chunks(FORCE_LINES).map(mean).collect();
@@ -81,7 +83,26 @@ pub fn average(
         force_spectrum,
         step_hz,
         contact: contact.then(|| kept.of_outputs(3..6)),
+        damped,
     })
+}
+
+/// All hits, those that are late by the same times estimated together.
+fn summed(alike: &[(Vec<f64>, ImpactRecords)], sigma_per_s: f64) -> Result<CrossSpectra, SpectraError> {
+    let mut all: Option<CrossSpectra> = None;
+    for (delay_s, records) in alike {
+        let settings = FrfSettings {
+            windowing: Windowing { sigma_per_s, ..Windowing::default() },
+            delay_s: delay_s.clone(),
+            ..FrfSettings::default()
+        };
+        let own = estimate(records, &vec![true; records.force_n.len()], &settings)?;
+        match &mut all {
+            Some(sum) => sum.add(&own)?,
+            None => all = Some(own),
+        }
+    }
+    all.ok_or(SpectraError::NoHits)
 }
 
 /// How late the responses are, the force, and the responses: x, y, z, and with `contact` v_A, v_B and T.

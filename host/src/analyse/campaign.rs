@@ -9,7 +9,7 @@ use super::from_frfs::Substructured;
 use super::missing::{Missing, given_up};
 use super::recommended::{Recommended, recommended};
 use super::wanted::{BANDS, Progress, Wanted};
-use super::{cells_stage, configuration_stage, contact_stage};
+use super::{cells_stage, configuration_stage, contact_answer, contact_stage};
 use crate::results::MAIN_BAND;
 use crate::spectra::Windowing;
 use crate::structure::Structure;
@@ -59,7 +59,7 @@ pub fn analyse_measurements<M: Measurements>(
         Err(why) => found.missing.push(why),
     }
     if let Some(ajb) = frfs[2] {
-        let priors = Priors::default();
+        let priors = measurements.contact_priors().positions;
         let Recommended { estimates, bootstrap, missing } =
             recommended(geometry, ajb, &priors, &cells.hits, wanted.replicates);
         found.priors = Some(priors);
@@ -76,6 +76,7 @@ pub fn analyse_measurements<M: Measurements>(
         contact_stage::at_the_contact(measurements, &cells.averages, &cells.loops, fbs.as_ref());
     found.missing.extend(missing);
     found.contact = Some(contact);
+    found.own_stiffness = Some(contact_answer::answer(measurements, &cells.averages));
     found
 }
 

@@ -2,6 +2,7 @@
 
 use crate::campaign::plan::level::{Level, Moment};
 use crate::campaign::store::frf_table::ImportedFrf;
+use crate::contact::ContactPriors;
 use crate::hysteresis::HysteresisRecord;
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
@@ -130,6 +131,16 @@ pub trait Measurements: Sync {
     /// What is known of contact and static arm beforehand.
     fn known_contact(&self) -> KnownContact {
         KnownContact::default()
+    }
+
+    /// Where the vibrometers beside the contact look, on A and on B, m; none where nobody says.
+    fn spots_m(&self) -> Option<[[f64; 3]; 2]> {
+        None
+    }
+
+    /// What is known beforehand of positions, angles, gains and delays.
+    fn contact_priors(&self) -> ContactPriors {
+        ContactPriors::default()
     }
 
     /// The kept hits of a cell; none if it was not measured.

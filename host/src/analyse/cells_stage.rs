@@ -1,7 +1,8 @@
 //! The cells, one at a time on each thread: read, averaged, and their signals forgotten.
 
-use super::averages::{CellAverage, LINES_HZ, average};
+use super::averages::{Asked, CellAverage, LINES_HZ, average};
 use super::cell::{CellName, Measurements};
+use super::contact_answer;
 use super::hit_spectra;
 use super::impact_loops::{self, ImpactLoop};
 use super::missing::Missing;
@@ -85,8 +86,11 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
             Err(error) => found.missing.push(records(error.to_string())),
         }
     }
-    let contact = moves_contact || drives_the_cells(geometry, name);
-    match average(name.clone(), cell, sigma_per_s, quantity, contact, LINES_HZ) {
+    let asked = Asked {
+        contact: moves_contact || drives_the_cells(geometry, name),
+        damped: contact_answer::reads(geometry, name),
+    };
+    match average(name.clone(), cell, sigma_per_s, quantity, asked, LINES_HZ) {
         Ok(averaged) => found.averages.push(averaged),
         Err(error) => found.missing.push(records(error.to_string())),
     }

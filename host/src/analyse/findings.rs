@@ -8,6 +8,7 @@ use super::fits::Fit;
 use super::from_frfs::Substructured;
 use super::missing::Missing;
 use super::shaker_levels::RecordLoops;
+use crate::contact::{ContactError, Stiffness};
 use crate::results::{Bootstrap, Completeness, FrfCurve, Source, UsableBand};
 use crate::spectra::Windowing;
 use crate::structure::Structure;
@@ -36,6 +37,8 @@ pub struct Findings {
     pub bootstrap: Option<Bootstrap>,
     /// What the contact's own signals say in a campaign.
     pub contact: Option<Contact>,
+    /// The contact's own stiffness, in a campaign.
+    pub own_stiffness: Option<Result<Stiffness, ContactError>>,
     /// The loops of a record of its own.
     pub record: Option<RecordLoops>,
     /// What had to be done without, in the order it was noticed.

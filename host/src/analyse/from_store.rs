@@ -1,7 +1,7 @@
 //! The campaign file as measurements: records decoded, in SI units, one cell at a time, from any thread.
 
 use super::assemble::everything;
-use super::averages::average;
+use super::averages::{Asked, average};
 use super::campaign::analyse_measurements;
 use super::cell::{
     Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel,
@@ -18,6 +18,7 @@ use crate::campaign::store::error::StoreError;
 use crate::campaign::store::frf_table::ImportedFrf;
 use crate::campaign::store::level_table::LevelRow;
 use crate::campaign::store::record_row::{Damaged, RecordRow};
+use crate::contact::ContactPriors;
 use crate::device::channels::ChannelMap;
 use crate::hysteresis::HysteresisRecord;
 use crate::results::{Completeness, Source};
@@ -300,7 +301,7 @@ impl CampaignFile {
             if cell.hits.is_empty() {
                 continue;
             }
-            match average(name.clone(), cell, self.sigma_per_s(), self.quantity, false, lines_hz) {
+            match average(name.clone(), cell, self.sigma_per_s(), self.quantity, Asked::default(), lines_hz) {
                 Ok(found) => averages.push(found),
                 Err(error) => complaints.push(complaint(error.to_string())),
             }
@@ -350,6 +351,15 @@ impl Measurements for CampaignFile {
 
     fn known_contact(&self) -> KnownContact {
         self.known
+    }
+
+    fn spots_m(&self) -> Option<[[f64; 3]; 2]> {
+        let at = |name: &str| self.plan.geometry.sensor.iter().find(|s| s.name == name).map(|s| s.position_m);
+        Some([at("LDV_A")?, at("LDV_B")?])
+    }
+
+    fn contact_priors(&self) -> ContactPriors {
+        self.plan.priors.as_ref().map_or_else(ContactPriors::default, |priors| priors.get_ref().known())
     }
 
     fn shaker_levels(&self) -> (Vec<ShakerLevel>, Vec<String>) {

@@ -178,7 +178,15 @@ fn analysed(store: &Store) -> Frf {
     let averages = cells.iter().filter_map(|name| {
         let cell = file.read(name).expect("readable");
         (!cell.hits.is_empty()).then(|| {
-            average(name.clone(), cell, file.sigma_per_s(), file.quantity(), true, LINES_HZ).expect("alike")
+            average(
+                name.clone(),
+                cell,
+                file.sigma_per_s(),
+                file.quantity(),
+                Asked { contact: true, damped: false },
+                LINES_HZ,
+            )
+            .expect("alike")
         })
     });
     let averages: Vec<_> = averages.collect();

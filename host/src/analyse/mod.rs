@@ -16,8 +16,8 @@ mod cell;
 mod cells_stage;
 pub mod checks;
 mod chosen;
-
 mod configuration_stage;
+mod contact_answer;
 mod contact_stage;
 mod findings;
 mod fits;

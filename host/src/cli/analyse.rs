@@ -65,7 +65,11 @@ pub fn analyse_into(store: &Store, wanted: Wanted, folder: &Path) -> Result<Resu
         bar.set_position(progress.done as u64);
     })?;
     bar.finish_and_clear();
-    let results = report::document(found);
+    let mut results = report::document(found);
+    // the truth joins the document when all is found: no estimator can see it
+    if let Some(answer) = &mut results.answer {
+        answer.truth = store.simulated_truth()?;
+    }
     report::write(&results, folder).map_err(|source| CliError::File {
         path: folder.into(),
         doing: "writing results and report",

@@ -4,6 +4,7 @@
 //! [`crate::report::document()`] makes it of what an analysis found; the report and the terminal show it and add
 //! nothing. A value that is not known is null, never NaN. Every document carries its [`Source`]: file, record ids, settings, version.
 
+mod answer;
 mod check;
 mod completeness;
 mod curves;
@@ -19,6 +20,7 @@ pub use crate::hysteresis::static_arm::Identified;
 pub use crate::hysteresis::{Kind as Excitation, OverCycles, Shape};
 pub use crate::substructuring::averaged::Averaged;
 pub use crate::substructuring::joint_over_bands::BandStatistic as Statistics;
+pub use answer::{Answer, Basis, BetweenArms, Clamp, ContactAnswer, Slip};
 pub use check::{
     BACK_COUPLING, Check, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, SAME_IN_ALL, SERIES_COMPLIANCE,
     UNCHANGED,
@@ -48,6 +50,9 @@ pub struct Results {
     pub version: u32,
     /// Where it comes from.
     pub source: Source,
+    /// What the campaign was measured for; absent where no campaign was analysed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub answer: Option<Answer>,
     /// The joint by substructuring: method × IDM set × band.
     pub joint: Vec<Joint>,
     /// The estimates to quote, each with its interval, by band; needs six motions of both virtual points in the assembly.

@@ -70,6 +70,7 @@ impl Plan {
         self.check_limits()?;
         self.check_shaker()?;
         self.check_contact()?;
+        self.check_priors()?;
         self.check_sensors()?;
         self.check_geometry()?;
         self.check_configurations()
@@ -140,6 +141,14 @@ impl Plan {
         } else {
             Err((at, "contact.parallel_path is a ratio of stiffness, from 0 to 1".into()))
         }
+    }
+
+    fn check_priors(&self) -> Result<(), Wrong> {
+        let Some(priors) = &self.priors else { return Ok(()) };
+        let wrong = priors.get_ref().wrong();
+        wrong.map_or(Ok(()), |name| {
+            Err((priors.span().start, format!("priors.{name} is a standard deviation: zero or more")))
+        })
     }
 
     fn check_sensors(&self) -> Result<(), Wrong> {

@@ -5,6 +5,9 @@
 
 mod check;
 pub mod level;
+mod priors;
+
+pub use priors::PriorsPlan;
 
 use crate::structure::Structure;
 use jointrig_protocol::request::Configuration;
@@ -62,6 +65,8 @@ pub struct Plan {
     pub shaker: Option<Spanned<ShakerPlan>>,
     /// What is known of contact and static arm; without it, only what the records say.
     pub contact: Option<Spanned<ContactPlan>>,
+    /// What the laboratory knows of its own errors; without it, what careful work by hand leaves.
+    pub priors: Option<Spanned<PriorsPlan>>,
     /// What is behind the device's channels; those that are not named are taken as the device describes them.
     #[serde(default)]
     pub channel: Vec<Spanned<SensorPlan>>,

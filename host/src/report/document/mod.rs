@@ -1,5 +1,6 @@
 //! The document made of the findings: every number and sentence of `results.json` in its place.
 
+mod answer_from_findings;
 mod interface_from_findings;
 mod joint_from_findings;
 mod loops_from_findings;
@@ -14,11 +15,13 @@ pub fn document(found: Findings) -> Results {
     let source = source_from_findings::source(&found);
     let checks = check_sentences::all(&found);
     let missing = found.missing.iter().map(missing_sentences::sentence).collect();
+    let answer = answer_from_findings::answer(&found);
     let (joint, refused) = joint_from_findings::rows(&found);
     let hysteresis = loops_from_findings::rows(&found);
     let mut results = Results {
         version: VERSION,
         source,
+        answer,
         joint,
         recommended: found.recommended,
         bootstrap: found.bootstrap,

@@ -1,5 +1,6 @@
 //! What the report and the terminal say: findings and results in plain sentences, numbers with few digits.
 
+pub(super) mod answer_sentences;
 pub(super) mod check_sentences;
 pub(super) mod missing_sentences;
 mod names;

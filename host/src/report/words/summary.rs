@@ -2,7 +2,7 @@
 
 use super::names::{method, slope, static_arm};
 use super::number::{band, count, micro, short, stiffness};
-use super::side_by_side;
+use super::{answer_sentences, side_by_side};
 use crate::results::{Bootstrap, Excitation, Force, Hysteresis, Joint, MAIN_BAND, Results, Shape};
 use crate::substructuring::{Dof, fit};
 
@@ -130,7 +130,7 @@ fn joint_line(joint: &Joint) -> Option<String> {
 
 /// The whole summary, line by line, as `demo` and `analyse` print it.
 pub fn summary(results: &Results) -> Vec<String> {
-    let mut lines = Vec::new();
+    let mut lines = answer_sentences::lines(results);
     lines.extend(substructuring(results));
     lines.extend(impact_loops(results));
     lines.extend(shaker_loops(results));

@@ -1,0 +1,312 @@
+//! The cells of one impact: their rows, their lines, and which parameters they know.
+
+use super::cell::{self, CHANNELS, ContactCell, Values};
+use super::parameters::{DELAYS, FORM, FORM_TERMS, GAINS, MASS_B, Parameter, Parameters, SPOTS, along_z};
+use super::priors::Cause;
+use super::{ContactError, Input};
+use crate::structure::Structure;
+use crate::substructuring::geometry::Grouping;
+use num_complex::Complex;
+use std::collections::BTreeMap;
+
+/// The body under a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Group {
+    /// Arm B.
+    ArmB,
+    /// Specimen A.
+    SpecimenA,
+    /// Specimen B, where it has points of its own.
+    SpecimenB,
+}
+
+impl Group {
+    fn of(grouping: Grouping) -> Option<Self> {
+        match grouping {
+            Grouping::InterfaceB => Some(Group::ArmB),
+            Grouping::SpecimenA => Some(Group::SpecimenA),
+            Grouping::SpecimenB => Some(Group::SpecimenB),
+            _ => None,
+        }
+    }
+}
+
+/// One cell of a block.
+#[derive(Debug, Clone)]
+pub struct BlockCell {
+    /// What its point is on.
+    pub group: Group,
+    /// Place of the point's coordinates among the parameters.
+    pub point: usize,
+    /// Of its own error of aim.
+    pub aim: Option<usize>,
+    /// Of the two errors of the hammer's aim.
+    pub shift: Option<usize>,
+}
+
+/// One row: a channel of a cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Row {
+    /// Which cell of the block.
+    pub cell: usize,
+    /// T 0, spot B 1, spot A 2, the point's x, y, z 3 to 5.
+    pub channel: usize,
+}
+
+/// One line of a block.
+#[derive(Debug, Clone)]
+pub struct BlockLine {
+    /// s = σ + i2πf, 1/s.
+    pub s: Complex<f64>,
+    /// Frequency, Hz.
+    pub frequency_hz: f64,
+    /// Values by row.
+    pub value: Vec<Complex<f64>>,
+    /// One over the noise's standard deviation, by row.
+    pub weight: Vec<f64>,
+}
+
+/// All cells of one impact.
+#[derive(Debug, Clone)]
+pub struct Block {
+    /// The impact's name.
+    pub impact: String,
+    /// What it hits.
+    pub grouping: Grouping,
+    /// On B alone: place of the hammer's part along z among the parameters.
+    pub along_z: Option<usize>,
+    /// The cells.
+    pub cells: Vec<BlockCell>,
+    /// Their channels.
+    pub rows: Vec<Row>,
+    /// The lines that every channel of every cell has.
+    pub lines: Vec<BlockLine>,
+    /// By how much of which other block's motion a shift of the impact moves everything, per metre along two axes.
+    pub shifted_by: Vec<(usize, [f64; 2])>,
+    /// The block's parameters among all.
+    pub parameters: Vec<usize>,
+    local: Vec<usize>,
+    has_specimen_b: bool,
+}
+
+impl Block {
+    /// Where specimen B's coordinates begin, if it has any.
+    pub fn specimen_b(&self) -> Option<usize> {
+        self.has_specimen_b.then_some(if self.along_z.is_some() { 6 } else { 12 })
+    }
+
+    /// Coordinates of the motion.
+    pub fn latent(&self) -> usize {
+        let own = if self.along_z.is_some() { 6 } else { 12 };
+        if self.has_specimen_b { own + 6 } else { own }
+    }
+
+    /// Place of a parameter within the block.
+    pub fn local(&self, parameter: usize) -> usize {
+        self.local[parameter]
+    }
+}
+
+/// One impact's place, direction and cells.
+struct Impact<'a> {
+    structure: Structure,
+    name: &'a str,
+    at_m: [f64; 3],
+    direction: [f64; 3],
+    grouping: Grouping,
+    cells: Vec<(Group, &'a ContactCell<'a>)>,
+}
+
+/// Groups the cells by impact, and gives every unknown of theirs its place among the parameters.
+///
+/// # Errors
+/// What is measured does not tell the motion of arm B and specimen A.
+pub fn blocks(input: &Input<'_>, parameters: &mut Parameters) -> Result<Vec<Block>, ContactError> {
+    let impacts = impacts(input);
+    let chosen = chosen_lines(input)?;
+    let mut points: BTreeMap<(Group, &str), usize> = BTreeMap::new();
+    for impact in &impacts {
+        for (group, cell) in &impact.cells {
+            points.entry((*group, cell.point)).or_insert_with(|| {
+                let (sigma, cause) = match group {
+                    Group::ArmB => (input.priors.positions.position_m, Cause::ArmPoints),
+                    _ => (input.priors.specimen_point_m, Cause::SpecimenPoints),
+                };
+                let at = relative(cell.point_m, input.contact_m);
+                parameters.add(at.map(|start| Parameter { start, sigma, cause }))
+            });
+        }
+    }
+    let mut all = Vec::new();
+    for impact in &impacts {
+        all.push(block(impact, &impacts, &points, input, &chosen, parameters)?);
+    }
+    let count = parameters.all().len();
+    for block in &mut all {
+        block.local = vec![usize::MAX; count];
+        for (place, parameter) in block.parameters.iter().enumerate() {
+            block.local[*parameter] = place;
+        }
+    }
+    Ok(all)
+}
+
+fn relative(at: [f64; 3], origin: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|axis| at[axis] - origin[axis])
+}
+
+/// The impacts that can be used, B alone first; cells of other points left out.
+fn impacts<'a>(input: &'a Input<'a>) -> Vec<Impact<'a>> {
+    let mut found: Vec<Impact<'a>> = Vec::new();
+    for structure in [Structure::B, Structure::Ajb] {
+        for cell in input.cells.iter().filter(|cell| cell.structure == structure) {
+            let Some(group) = Group::of(cell.point_grouping) else { continue };
+            let hits_b = matches!(cell.impact_grouping, Grouping::InterfaceB | Grouping::InternalB);
+            if hits_b != (structure == Structure::B)
+                || (structure == Structure::B && group == Group::SpecimenA)
+            {
+                continue;
+            }
+            let place = found.iter().position(|i| i.structure == structure && i.name == cell.impact);
+            let place = place.unwrap_or_else(|| {
+                found.push(Impact {
+                    structure,
+                    name: cell.impact,
+                    at_m: cell.impact_m,
+                    direction: cell.direction,
+                    grouping: cell.impact_grouping,
+                    cells: Vec::new(),
+                });
+                found.len() - 1
+            });
+            found[place].cells.push((group, cell));
+        }
+    }
+    let specimen_b = found.iter().any(|i| i.cells.iter().any(|(group, _)| *group == Group::SpecimenB));
+    found.retain(|impact| {
+        let count = |of: Group| impact.cells.iter().filter(|(group, _)| *group == of).count();
+        count(Group::ArmB) >= 3
+            && (impact.structure == Structure::B || count(Group::SpecimenA) >= 3)
+            && (!specimen_b || count(Group::SpecimenB) >= 3)
+    });
+    found
+}
+
+/// The lines of the band, as far apart as the window leaves them something of their own to say.
+fn chosen_lines(input: &Input<'_>) -> Result<Vec<usize>, ContactError> {
+    let first = input.cells.first().ok_or(ContactError::NoCells)?;
+    let frequency_hz = first.spectra.frequency_hz();
+    if let Some(other) = input.cells.iter().find(|c| c.spectra.frequency_hz() != frequency_hz) {
+        return Err(ContactError::Unlike { impact: other.impact.into(), point: other.point.into() });
+    }
+    let step_hz = frequency_hz.windows(2).map(|f| f[1] - f[0]).next().unwrap_or(1.0);
+    let stride = ((LINE_DISTANCE * first.spectra.sigma_per_s() / step_hz).round() as usize).max(1);
+    let inside = (0..frequency_hz.len()).filter(|l| input.band_hz.contains(frequency_hz[*l]));
+    Ok(inside.step_by(stride).collect())
+}
+
+/// Distance of the lines used over the window's σ, Hz s: nearer ones say what their neighbours said.
+const LINE_DISTANCE: f64 = 0.4;
+
+fn block(
+    impact: &Impact<'_>,
+    impacts: &[Impact<'_>],
+    points: &BTreeMap<(Group, &str), usize>,
+    input: &Input<'_>,
+    chosen: &[usize],
+    parameters: &mut Parameters,
+) -> Result<Block, ContactError> {
+    let priors = &input.priors;
+    let alone = impact.structure == Structure::B;
+    let mut own: Vec<usize> =
+        if alone { (FORM..FORM + FORM_TERMS + 1).collect() } else { (0..=MASS_B).collect() };
+    own.extend(SPOTS..SPOTS + 4);
+    own.extend(GAINS..GAINS + 5);
+    own.extend(DELAYS..DELAYS + 5);
+    let along_z =
+        alone.then(|| parameters.add([along_z(impact.direction, priors.positions.hammer_angle_rad)]));
+    own.extend(along_z);
+    let shifted_by = shifted_by(impact, impacts);
+    let aim = Parameter { start: 0.0, sigma: priors.positions.aim_m, cause: Cause::ArmPoints };
+    let (mut cells, mut rows, mut lines) = (Vec::new(), Vec::new(), Vec::<Values>::new());
+    for (group, cell) in &impact.cells {
+        let point = points[&(*group, cell.point)];
+        own.extend(point..point + 3);
+        let aimed = *group == Group::ArmB && priors.positions.aim_m > 0.0;
+        let shifts = !shifted_by.is_empty() && priors.positions.aim_m > 0.0;
+        let aimed = aimed.then(|| parameters.add([aim; 3]));
+        let shift = shifts.then(|| parameters.add([aim; 2]));
+        own.extend(aimed.into_iter().flat_map(|at| at..at + 3));
+        own.extend(shift.into_iter().flat_map(|at| at..at + 2));
+        let place = cells.len();
+        let channels = (0..CHANNELS).filter(|channel| !(alone && *channel == 2));
+        rows.extend(channels.map(|channel| Row { cell: place, channel }));
+        cells.push(BlockCell { group: *group, point, aim: aimed, shift });
+        lines.push(cell::values(cell, chosen, input.band_hz)?);
+    }
+    cell::pool(&mut lines);
+    own.sort_unstable();
+    own.dedup();
+    let spectra = impact.cells[0].1.spectra;
+    let line = |(place, l): (usize, &usize)| {
+        let s = spectra.s(*l);
+        let usable = rows.iter().all(|row| lines[row.cell].usable(place, row.channel, s));
+        usable.then(|| BlockLine {
+            s,
+            frequency_hz: spectra.frequency_hz()[*l],
+            value: rows.iter().map(|row| lines[row.cell].value[place][row.channel]).collect(),
+            weight: rows.iter().map(|row| lines[row.cell].sigma(place, row.channel, s).recip()).collect(),
+        })
+    };
+    Ok(Block {
+        impact: impact.name.into(),
+        grouping: impact.grouping,
+        along_z,
+        lines: chosen.iter().enumerate().filter_map(line).collect(),
+        cells,
+        rows,
+        shifted_by,
+        parameters: own,
+        local: Vec::new(),
+        has_specimen_b: impact.cells.iter().any(|(group, _)| *group == Group::SpecimenB),
+    })
+}
+
+/// The motion that a shift of the impact adds, from the differences between impacts that push the same way: a shift across the
+/// direction is a moment on the same body, and so are they. Impacts on the same body are taken if there are three, else those of the
+/// same structure. Empty where no three of them span both axes.
+fn shifted_by(impact: &Impact<'_>, impacts: &[Impact<'_>]) -> Vec<(usize, [f64; 2])> {
+    let parallel = |other: &Impact<'_>| {
+        let cosine: f64 = (0..3).map(|i| other.direction[i] * impact.direction[i]).sum();
+        other.structure == impact.structure && cosine.abs() > 0.99
+    };
+    let candidates: Vec<usize> = (0..impacts.len()).filter(|i| parallel(&impacts[*i])).collect();
+    let same: Vec<usize> =
+        candidates.iter().copied().filter(|i| impacts[*i].grouping == impact.grouping).collect();
+    let mut across: Vec<usize> = (0..3).collect();
+    across.sort_by(|a, b| impact.direction[*a].abs().total_cmp(&impact.direction[*b].abs()));
+    let weights = |chosen: &[usize]| -> Option<Vec<(usize, [f64; 2])>> {
+        if chosen.len() < 3 {
+            return None;
+        }
+        let mean: [f64; 2] = std::array::from_fn(|k| {
+            chosen.iter().map(|i| impacts[*i].at_m[across[k]]).sum::<f64>() / chosen.len() as f64
+        });
+        let at = |i: usize| [0, 1].map(|k| impacts[i].at_m[across[k]] - mean[k]);
+        let product = |a: usize, b: usize| chosen.iter().map(|i| at(*i)[a] * at(*i)[b]).sum::<f64>();
+        let (xx, xy, yy) = (product(0, 0), product(0, 1), product(1, 1));
+        let determinant = xx * yy - xy * xy;
+        // less than a tenth of a right angle between the lines that they lie on tells no second axis
+        if determinant <= 1e-2 * xx * yy || determinant == 0.0 {
+            return None;
+        }
+        let sense = |i: usize| -> f64 { (0..3).map(|a| impacts[i].direction[a] * impact.direction[a]).sum() };
+        let weight = |i: usize| {
+            let [x, y] = at(i);
+            let of = [(yy * x - xy * y) / determinant, (xx * y - xy * x) / determinant];
+            (i, of.map(|w| w * sense(i).signum()))
+        };
+        Some(chosen.iter().map(|i| weight(*i)).collect())
+    };
+    weights(&same).or_else(|| weights(&candidates)).unwrap_or_default()
+}

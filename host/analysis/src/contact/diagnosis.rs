@@ -1,0 +1,129 @@
+//! Whether what the estimate assumes is so: tested on the residuals that it leaves.
+
+use super::block::Block;
+use super::parameters::COMPLIANCE;
+use super::solver::Solution;
+use crate::substructuring::geometry::Grouping;
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+/// χ² per degree of freedom above which a kind of signal contradicts the model, once the noise's own uncertainty is allowed for.
+const CONTRADICTED: f64 = 6.0;
+/// Standard deviations by which two readings of k_T may differ.
+const APART: f64 = 4.0;
+
+/// How well each assumption holds. χ² is per degree of freedom: 1 where only noise is left.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// Of the force's form in the hits on B alone.
+    pub calibration_chi_square: f64,
+    /// Of specimen A's points, as points of a rigid body.
+    pub specimen_a_chi_square: f64,
+    /// Of the spots.
+    pub spots_chi_square: f64,
+    /// Of k_T(f) as one number.
+    pub flatness_chi_square: f64,
+    /// How far the compliance from hits on A is from that of hits on the moving mass, in standard deviations; none where only one was hit.
+    pub sides_apart: Option<f64>,
+}
+
+/// An assumption that does not hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Doubt {
+    /// The form does not give the force in the hits on B alone.
+    Force,
+    /// Specimen A does not move as a rigid body, or a point is misplaced.
+    SpecimenA,
+    /// A spot does not move with its body.
+    Spots,
+    /// k_T changes with frequency.
+    Flatness,
+    /// k_T depends on where the structure is hit.
+    Sides,
+}
+
+/// The compliance of some of the lines, all else being what all lines say: how far it is from the whole's, and its standard deviation.
+#[derive(Debug, Clone, Copy)]
+pub struct Part {
+    /// Deviation, m/N.
+    pub deviation: f64,
+    /// Standard deviation, m/N.
+    pub sigma: f64,
+}
+
+/// The compliance of the lines that `of` chooses by block and bin, as a parameter of its own beside all others (score test).
+pub fn part(blocks: &[Block], solution: &Solution, of: impl Fn(&Block, f64) -> bool) -> Option<Part> {
+    let mut own = 0.0;
+    let mut slope = 0.0;
+    let mut coupling = DVector::zeros(solution.p.len());
+    for bin in &solution.bins {
+        let block = &blocks[bin.block];
+        if block.along_z.is_some() || !of(block, bin.low_hz) {
+            continue;
+        }
+        let weight = solution.trust[bin.block] / solution.shared;
+        let row = block.local(COMPLIANCE);
+        own += weight * bin.normal.information[(row, row)];
+        slope += weight * bin.normal.gradient[row];
+        for (i, parameter) in block.parameters.iter().enumerate() {
+            coupling[*parameter] += weight * bin.normal.information[(row, i)];
+        }
+    }
+    // the covariance is half of the inverse
+    let explained = 2.0 * quadratic(&solution.covariance, &coupling);
+    let left = own - explained;
+    (left > 1e-6 * own && own > 0.0).then(|| Part { deviation: -slope / left, sigma: (0.5 / left).sqrt() })
+}
+
+fn quadratic(matrix: &DMatrix<f64>, v: &DVector<f64>) -> f64 {
+    (matrix * v).dot(v)
+}
+
+/// Asks every assumption.
+pub fn diagnose(blocks: &[Block], solution: &Solution) -> Diagnosis {
+    let chi = |alone: bool, kinds: &[usize]| {
+        let own = solution.bins.iter().filter(|bin| blocks[bin.block].along_z.is_some() == alone);
+        let (sum, expected) = own
+            .flat_map(|bin| kinds.iter().map(move |k| bin.normal.kinds[*k]))
+            .fold((0.0, 0.0), |(sum, expected), [chi, of]| (sum + chi, expected + of));
+        if expected > 1e-9 { sum / expected } else { 0.0 }
+    };
+    let mut lows: Vec<f64> = solution.bins.iter().map(|bin| bin.low_hz).collect();
+    lows.sort_by(f64::total_cmp);
+    lows.dedup();
+    let parts: Vec<Part> = lows.iter().filter_map(|low| part(blocks, solution, |_, at| at == *low)).collect();
+    let flatness: f64 = parts.iter().map(|p| (p.deviation / p.sigma).powi(2)).sum();
+    let on_mass = |block: &Block| block.grouping == Grouping::InternalA;
+    let hit = |wanted: bool| blocks.iter().any(|b| b.along_z.is_none() && on_mass(b) == wanted);
+    let sides =
+        (hit(true) && hit(false)).then(|| part(blocks, solution, |block, _| on_mass(block))).flatten();
+    Diagnosis {
+        calibration_chi_square: chi(true, &[0, 1, 3, 5]),
+        specimen_a_chi_square: chi(false, &[4]),
+        spots_chi_square: chi(false, &[1, 2]),
+        flatness_chi_square: if parts.is_empty() { 1.0 } else { flatness / parts.len() as f64 },
+        sides_apart: sides.map(|part| part.deviation / part.sigma),
+    }
+}
+
+impl Diagnosis {
+    /// What does not hold.
+    pub fn doubts(&self) -> Vec<Doubt> {
+        let mut all = Vec::new();
+        for (chi, doubt) in [
+            (self.calibration_chi_square, Doubt::Force),
+            (self.specimen_a_chi_square, Doubt::SpecimenA),
+            (self.spots_chi_square, Doubt::Spots),
+            (self.flatness_chi_square, Doubt::Flatness),
+        ] {
+            if chi > CONTRADICTED {
+                all.push(doubt);
+            }
+        }
+        if self.sides_apart.is_some_and(|apart| apart.abs() > APART) {
+            all.push(Doubt::Sides);
+        }
+        all
+    }
+}

@@ -1,0 +1,108 @@
+//! One line of a block: the motion is eliminated, and what is left tells the parameters.
+
+use super::block::Block;
+use super::model::{LineModel, Sparse};
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex;
+
+/// Kinds of rows whose residuals are told apart.
+pub const KINDS: usize = 6;
+
+/// Normal equations of some lines of one block: r is the residual left by the motion that fits best, J its derivative by the block's
+/// parameters, all over the noise's standard deviation.
+#[derive(Debug, Clone)]
+pub struct Normal {
+    /// Re(Jᴴ J), parameters of the block.
+    pub information: DMatrix<f64>,
+    /// Re(Jᴴ r).
+    pub gradient: DVector<f64>,
+    /// Σ |r|².
+    pub chi_square: f64,
+    /// Complex numbers in r that are free.
+    pub freedom: f64,
+    /// Σ |r|² and what it should be, by kind of row: T, spot B, spot A, arm B, specimen A, specimen B.
+    pub kinds: [[f64; 2]; KINDS],
+}
+
+impl Normal {
+    /// Nothing yet, for `parameters` of them.
+    pub fn none(parameters: usize) -> Self {
+        Normal {
+            information: DMatrix::zeros(parameters, parameters),
+            gradient: DVector::zeros(parameters),
+            chi_square: 0.0,
+            freedom: 0.0,
+            kinds: [[0.0; 2]; KINDS],
+        }
+    }
+
+    /// Adds one line; the motion that fits best. None where the rows do not tell the motion.
+    pub fn add(
+        &mut self,
+        block: &Block,
+        line: usize,
+        p: &[f64],
+        shifts: Option<&[DVector<Complex<f64>>; 2]>,
+    ) -> Option<DVector<Complex<f64>>> {
+        let line = &block.lines[line];
+        let model = LineModel::new(block, p, line.s);
+        let (map, offsets) = model.map();
+        let rows = map.nrows();
+        let mut seen = DVector::from_fn(rows, |r, _| line.value[r] - offsets[r]);
+        if let Some(shifts) = shifts {
+            let moved = shifts.each_ref().map(|shift| &map * shift);
+            for (r, row) in block.rows.iter().enumerate() {
+                if let Some(at) = block.cells[row.cell].shift {
+                    seen[r] -= moved[0][r] * p[at] + moved[1][r] * p[at + 1];
+                }
+            }
+        }
+        for (r, weight) in line.weight.iter().enumerate() {
+            seen[r] *= *weight;
+        }
+        let weighed = DMatrix::from_fn(rows, map.ncols(), |r, c| map[(r, c)] * line.weight[r]);
+        let factors = weighed.qr();
+        let q = factors.q();
+        let projected = q.ad_mul(&seen);
+        let motion = factors.unpack_r().solve_upper_triangular(&projected)?;
+        let residual = seen - &q * projected;
+
+        self.chi_square += residual.norm_squared();
+        self.freedom += (rows - map.ncols()) as f64;
+        for (r, row) in block.rows.iter().enumerate() {
+            let kind = if row.channel < 3 { row.channel } else { 3 + block.cells[row.cell].group as usize };
+            self.kinds[kind][0] += residual[r].norm_sqr();
+            self.kinds[kind][1] += 1.0 - q.row(r).norm_squared();
+        }
+        self.add_derivatives(&model.derivatives(&motion, shifts, &map), &line.weight, &q, &residual);
+        Some(motion)
+    }
+
+    /// J = −(1 − Q Qᴴ) D with D sparse: Jᴴ J = Dᴴ D − (Qᴴ D)ᴴ (Qᴴ D), and Jᴴ r = −Dᴴ r.
+    fn add_derivatives(
+        &mut self,
+        derivatives: &[Sparse],
+        weight: &[f64],
+        q: &DMatrix<Complex<f64>>,
+        residual: &DVector<Complex<f64>>,
+    ) {
+        let parameters = self.gradient.len();
+        let mut seen = DMatrix::<Complex<f64>>::zeros(q.ncols(), parameters);
+        for (r, row) in derivatives.iter().enumerate() {
+            for (i, value) in row {
+                let value = value * weight[r];
+                self.gradient[*i] -= (value.conj() * residual[r]).re;
+                for (c, at) in seen.column_mut(*i).iter_mut().enumerate() {
+                    *at += q[(r, c)].conj() * value;
+                }
+                for (j, other) in row {
+                    self.information[(*i, *j)] += (value.conj() * other).re * weight[r];
+                }
+            }
+        }
+        let parts = seen.map(|v| v.re);
+        self.information.gemm_tr(-1.0, &parts, &parts, 1.0);
+        let parts = seen.map(|v| v.im);
+        self.information.gemm_tr(-1.0, &parts, &parts, 1.0);
+    }
+}

@@ -1,0 +1,246 @@
+//! The signals of one line as a linear map of the motion that nobody sees, and how that map changes with every parameter.
+//!
+//! The motion is that of rigid bodies: arm B (t, θ), specimen A (t, θ) and, where it has points of its own, specimen B. What ties them
+//! together is the contact: z_A − z_B = F/(k_T + s c_T) at the contact itself, with F = (a₀ + a₁ s) T + Σ (b₀ + b₁ s + b₂ s²) (z_B, θ_x, θ_y).
+//! So z_A is no motion of its own but a consequence of T and B's, and on B alone, where F is the hammer's, T is one of B's.
+
+use super::block::{Block, BlockCell, Group};
+use super::parameters::{COMPLIANCE, DELAYS, FORM, FORM_TERMS, GAINS, MASS_B, RETARDATION, SPOTS};
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex;
+
+type C = Complex<f64>;
+
+/// Coordinates of the motion, at most.
+const MOST: usize = 18;
+/// A number formed linearly from the motion.
+type Linear = [C; MOST];
+/// Where T stands among the assembly's coordinates, and where specimen A's x, y and rotations begin.
+const T: usize = 6;
+const A: usize = 7;
+
+/// Derivatives of one row: (parameter within the block, value).
+pub type Sparse = Vec<(usize, C)>;
+
+/// The map of one block at one line.
+pub struct LineModel<'a> {
+    block: &'a Block,
+    p: &'a [f64],
+    s: C,
+    z_b: Linear,
+    force: Linear,
+    z_a: Linear,
+    t: Linear,
+    t_offset: C,
+    a_t: C,
+}
+
+fn unit(at: usize) -> Linear {
+    let mut one = [C::default(); MOST];
+    one[at] = C::new(1.0, 0.0);
+    one
+}
+
+fn sum(terms: &[(C, &Linear)]) -> Linear {
+    std::array::from_fn(|i| terms.iter().map(|(factor, of)| factor * of[i]).sum())
+}
+
+fn dot(of: &Linear, x: &DVector<C>) -> C {
+    of.iter().zip(x.iter()).map(|(a, b)| a * b).sum()
+}
+
+/// Displacement along `axis` of a body's point: t + θ × r, with the body's rotation θ.
+fn turned(translation: Linear, theta: [usize; 3], r: [f64; 3], axis: usize) -> Linear {
+    let mut moved = translation;
+    // (θ × r): x = θ_y z − θ_z y, y = θ_z x − θ_x z, z = θ_x y − θ_y x
+    let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
+    moved[theta[next]] += r[last];
+    moved[theta[last]] -= r[next];
+    moved
+}
+
+impl<'a> LineModel<'a> {
+    /// With the parameters `p` at s.
+    pub fn new(block: &'a Block, p: &'a [f64], s: C) -> Self {
+        let z_arm = unit(2);
+        let z_b = block.specimen_b().map_or(z_arm, |at| unit(at + 2));
+        let coefficient = |n: usize| C::from(p[FORM + n]);
+        let a_t = coefficient(0) + coefficient(1) * s;
+        let of_motion = |n: usize| coefficient(n) + coefficient(n + 1) * s + coefficient(n + 2) * s * s;
+        let carried = p[MASS_B] * s * s;
+        let rest = sum(&[
+            (of_motion(2), &z_arm),
+            (of_motion(5), &unit(3)),
+            (of_motion(8), &unit(4)),
+            (carried, &z_b),
+            (-carried, &z_arm),
+        ]);
+        let (t, t_offset, force, z_a) = if let Some(along_z) = block.along_z {
+            let t = sum(&[(-a_t.inv(), &rest)]);
+            (t, p[along_z] / a_t, [C::default(); MOST], [C::default(); MOST])
+        } else {
+            let t = unit(T);
+            let force = sum(&[(a_t, &t), (C::new(1.0, 0.0), &rest)]);
+            let compliance = p[COMPLIANCE] / (1.0 + s * p[RETARDATION]);
+            let z_a = sum(&[(C::new(1.0, 0.0), &z_b), (compliance, &force)]);
+            (t, C::default(), force, z_a)
+        };
+        LineModel { block, p, s, z_b, force, z_a, t, t_offset, a_t }
+    }
+
+    /// Gain and delay of a channel: spot A 0, spot B 1, the point's axes 2 to 4.
+    fn sensor(&self, channel: usize) -> C {
+        (1.0 + self.p[GAINS + channel]) * (-self.s * self.p[DELAYS + channel]).exp()
+    }
+
+    fn position(&self, cell: &BlockCell) -> [f64; 3] {
+        std::array::from_fn(|axis| self.p[cell.point + axis] + cell.aim.map_or(0.0, |aim| self.p[aim + axis]))
+    }
+
+    /// Where the motion of the body under a cell's point begins, along `axis`, and its rotations.
+    fn body(&self, group: Group, axis: usize) -> (Linear, [usize; 3]) {
+        match group {
+            Group::ArmB => (unit(axis), [3, 4, 5]),
+            Group::SpecimenB => {
+                let at = self.block.specimen_b().unwrap_or(0);
+                (unit(at + axis), [at + 3, at + 4, at + 5])
+            }
+            Group::SpecimenA => (if axis == 2 { self.z_a } else { unit(A + axis) }, [A + 2, A + 3, A + 4]),
+        }
+    }
+
+    /// Spot A or B along z, without its sensor: the body's z at the contact, its rotations, the spot's place.
+    fn spot(&self, of_a: bool) -> (Linear, [usize; 3], [f64; 3]) {
+        let at = SPOTS + if of_a { 0 } else { 2 };
+        let place = [self.p[at], self.p[at + 1], 0.0];
+        if of_a {
+            (self.z_a, [A + 2, A + 3, A + 4], place)
+        } else {
+            let base = self.block.specimen_b().unwrap_or(0);
+            (self.z_b, [base + 3, base + 4, base + 5], place)
+        }
+    }
+
+    /// The map: one row for each of the block's rows; and what they read without any motion.
+    pub fn map(&self) -> (DMatrix<C>, Vec<C>) {
+        let rows: Vec<Linear> = self.block.rows.iter().map(|row| self.row(row.cell, row.channel)).collect();
+        let map = DMatrix::from_fn(rows.len(), self.block.latent(), |r, c| rows[r][c]);
+        let offsets =
+            self.block.rows.iter().map(|row| if row.channel == 0 { self.t_offset } else { C::default() });
+        (map, offsets.collect())
+    }
+
+    fn row(&self, cell: usize, channel: usize) -> Linear {
+        match channel {
+            0 => self.t,
+            1 | 2 => {
+                let (z, theta, place) = self.spot(channel == 2);
+                sum(&[(self.sensor(2 - channel), &turned(z, theta, place, 2))])
+            }
+            _ => {
+                let (cell, axis) = (&self.block.cells[cell], channel - 3);
+                let (translation, theta) = self.body(cell.group, axis);
+                let moved = turned(translation, theta, self.position(cell), axis);
+                sum(&[(self.sensor(2 + axis), &moved)])
+            }
+        }
+    }
+
+    /// Derivatives of every row by the block's parameters, at the motion `x`; `shifts` is the motion that moving the impact by a metre
+    /// along each of two axes across it would add.
+    pub fn derivatives(
+        &self,
+        x: &DVector<C>,
+        shifts: Option<&[DVector<C>; 2]>,
+        map: &DMatrix<C>,
+    ) -> Vec<Sparse> {
+        let local = |parameter: usize| self.block.local(parameter);
+        let terms = self.form_terms(x);
+        let force = dot(&self.force, x);
+        let damped = 1.0 + self.s * self.p[RETARDATION];
+        let compliance = self.p[COMPLIANCE] / damped;
+        // how the contact's z on A changes, over everything that it depends on
+        let of_z_a = |factor: C, row: &mut Sparse| {
+            row.push((local(COMPLIANCE), factor * force / damped));
+            row.push((local(RETARDATION), -factor * compliance * self.s / damped * force));
+            for (n, term) in terms.iter().enumerate() {
+                row.push((local(FORM + n), factor * compliance * term));
+            }
+        };
+        let mut all = Vec::with_capacity(self.block.rows.len());
+        for (r, row) in self.block.rows.iter().enumerate() {
+            let mut own = Sparse::with_capacity(24);
+            let cell = &self.block.cells[row.cell];
+            let seen: C = map.row(r).iter().zip(x.iter()).map(|(a, b)| a * b).sum();
+            let sensor = |channel: usize, own: &mut Sparse| {
+                own.push((local(GAINS + channel), seen / (1.0 + self.p[GAINS + channel])));
+                own.push((local(DELAYS + channel), -self.s * seen));
+            };
+            match row.channel {
+                0 => {
+                    if let Some(along_z) = self.block.along_z {
+                        own.push((local(along_z), self.a_t.inv()));
+                        for (n, term) in terms.iter().enumerate() {
+                            own.push((local(FORM + n), -term / self.a_t));
+                        }
+                    }
+                }
+                1 | 2 => {
+                    let of_a = row.channel == 2;
+                    sensor(2 - row.channel, &mut own);
+                    let factor = self.sensor(2 - row.channel);
+                    let (_, theta, _) = self.spot(of_a);
+                    let at = SPOTS + if of_a { 0 } else { 2 };
+                    own.push((local(at), -factor * x[theta[1]]));
+                    own.push((local(at + 1), factor * x[theta[0]]));
+                    if of_a {
+                        of_z_a(factor, &mut own);
+                    }
+                }
+                channel => {
+                    let axis = channel - 3;
+                    sensor(2 + axis, &mut own);
+                    let factor = self.sensor(2 + axis);
+                    let (_, theta) = self.body(cell.group, axis);
+                    let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
+                    for base in std::iter::once(cell.point).chain(cell.aim) {
+                        own.push((local(base + last), factor * x[theta[next]]));
+                        own.push((local(base + next), -factor * x[theta[last]]));
+                    }
+                    if cell.group == Group::SpecimenA && axis == 2 {
+                        of_z_a(factor, &mut own);
+                    }
+                }
+            }
+            if let (Some(at), Some(shifts)) = (cell.shift, shifts) {
+                for (k, shift) in shifts.iter().enumerate() {
+                    let moved: C = map.row(r).iter().zip(shift.iter()).map(|(a, b)| a * b).sum();
+                    own.push((local(at + k), moved));
+                }
+            }
+            all.push(own);
+        }
+        all
+    }
+
+    /// What each coefficient of the form, and specimen B's mass, stands before.
+    fn form_terms(&self, x: &DVector<C>) -> [C; FORM_TERMS + 1] {
+        let (s, t) = (self.s, dot(&self.t, x) + self.t_offset);
+        let (z, turn_x, turn_y) = (x[2], x[3], x[4]);
+        let against_the_arm = s * s * (dot(&self.z_b, x) - z);
+        [
+            t,
+            s * t,
+            z,
+            s * z,
+            s * s * z,
+            turn_x,
+            s * turn_x,
+            s * s * turn_x,
+            turn_y,
+            s * turn_y,
+            s * s * turn_y,
+            against_the_arm,
+        ]
+    }
+}

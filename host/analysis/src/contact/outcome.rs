@@ -1,0 +1,144 @@
+//! The answer: k_T and c_T with their intervals, where these come from, and k_T(f).
+
+use super::block::Block;
+use super::diagnosis::{Diagnosis, Doubt, diagnose, part};
+use super::parameters::{COMPLIANCE, Parameters, RETARDATION};
+use super::priors::Cause;
+use super::solver::{BIN_HZ, Solution};
+use super::{ContactError, Input};
+use crate::band::Band;
+use crate::identified::COMPLIANCE_HALF_WIDTH;
+use crate::substructuring::joint_over_bands::NORMAL_95;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// A value with its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Interval {
+    /// The value.
+    pub mean: f64,
+    /// Its interval.
+    pub ci95: [f64; 2],
+}
+
+/// k_T of one bin of frequencies, N/m.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct OfFrequency {
+    /// The bin's middle, Hz.
+    pub frequency_hz: f64,
+    /// k_T there.
+    pub k_t_n_per_m: Interval,
+}
+
+/// What the contact is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Stiffness {
+    /// k_T, N/m. The interval is that of the compliance, inverted.
+    pub k_t_n_per_m: Interval,
+    /// c_T, N s/m.
+    pub c_t_n_s_per_m: Interval,
+    /// The lines used, Hz.
+    pub band_hz: Band,
+    /// Lines used, over all impacts.
+    pub lines: usize,
+    /// Relative standard deviation of k_T by cause; the squares add up.
+    pub budget: BTreeMap<Cause, f64>,
+    /// k_T bin by bin.
+    pub of_frequency: Vec<OfFrequency>,
+    /// Whether the assumptions hold.
+    pub diagnosis: Diagnosis,
+    /// Those that do not.
+    pub doubts: Vec<Doubt>,
+    /// χ² per degree of freedom over all signals.
+    pub chi_square: f64,
+}
+
+/// Puts the answer together.
+///
+/// # Errors
+/// [`ContactError::NotIdentified`] where the compliance cannot be told from none.
+pub fn of(
+    input: &Input<'_>,
+    blocks: &[Block],
+    parameters: &Parameters,
+    solution: &Solution,
+) -> Result<Stiffness, ContactError> {
+    let compliance = solution.p[COMPLIANCE];
+    let covariance = &solution.covariance;
+    let variance = covariance[(COMPLIANCE, COMPLIANCE)];
+    let misfit = solution.chi_square.max(1.0);
+    let relative = |variance: f64| variance.max(0.0) / (compliance * compliance);
+
+    let mut budget: BTreeMap<Cause, f64> = BTreeMap::new();
+    let mut noise = variance;
+    for (i, own) in parameters.all().iter().enumerate() {
+        if !own.sigma.is_finite() || own.sigma == 0.0 || own.cause == Cause::Noise {
+            continue;
+        }
+        // the estimate's answer to an error of the prior: covariance times the prior's precision
+        let share = (covariance[(COMPLIANCE, i)] / own.sigma).powi(2);
+        *budget.entry(own.cause).or_default() += relative(share);
+        noise -= share;
+    }
+    budget.insert(Cause::Noise, relative(noise));
+    budget.insert(Cause::Misfit, relative(variance * (misfit - 1.0)));
+    *budget.entry(Cause::Gains).or_default() += input.priors.hammer_gain.powi(2);
+    let whole: f64 = budget.values().sum::<f64>();
+    let sigma = whole.sqrt() * compliance.abs();
+    for share in budget.values_mut() {
+        *share = share.sqrt();
+    }
+    budget.retain(|_, share| *share > 0.0);
+
+    let half = NORMAL_95 * sigma;
+    if !(compliance > 0.0 && half < COMPLIANCE_HALF_WIDTH * compliance) {
+        let stiffest = compliance + half;
+        return Err(ContactError::NotIdentified(if stiffest > 0.0 {
+            format!(
+                "the contact is too stiff to be told from a rigid one: k_T is above {:.0} N/µm",
+                1e-6 / stiffest
+            )
+        } else {
+            "the compliance comes out negative".into()
+        }));
+    }
+    let k = 1.0 / compliance;
+    let k_t = Interval { mean: k, ci95: [1.0 / (compliance + half), 1.0 / (compliance - half)] };
+    // c = β/c₀
+    let beta = solution.p[RETARDATION];
+    let slopes = [-beta * k * k, k];
+    let at = [COMPLIANCE, RETARDATION];
+    let of_damping: f64 = (0..2)
+        .flat_map(|i| (0..2).map(move |j| (i, j)))
+        .map(|(i, j)| slopes[i] * slopes[j] * covariance[(at[i], at[j])])
+        .sum();
+    let spread = NORMAL_95 * (of_damping.max(0.0) * misfit).sqrt();
+    let c_t = Interval { mean: beta * k, ci95: [beta * k - spread, beta * k + spread] };
+
+    let diagnosis = diagnose(blocks, solution);
+    Ok(Stiffness {
+        k_t_n_per_m: k_t,
+        c_t_n_s_per_m: c_t,
+        band_hz: input.band_hz,
+        lines: blocks.iter().map(|block| block.lines.len()).sum(),
+        budget,
+        of_frequency: of_frequency(blocks, solution, compliance),
+        doubts: diagnosis.doubts(),
+        diagnosis,
+        chi_square: solution.chi_square,
+    })
+}
+
+fn of_frequency(blocks: &[Block], solution: &Solution, compliance: f64) -> Vec<OfFrequency> {
+    let mut lows: Vec<f64> = solution.bins.iter().map(|bin| bin.low_hz).collect();
+    lows.sort_by(f64::total_cmp);
+    lows.dedup();
+    let at = |low: f64| {
+        let part = part(blocks, solution, |_, at| at == low)?;
+        let (mean, half) = (compliance + part.deviation, NORMAL_95 * part.sigma);
+        let interval = Interval { mean: mean.recip(), ci95: [(mean + half).recip(), (mean - half).recip()] };
+        let known = half < COMPLIANCE_HALF_WIDTH * mean;
+        known.then_some(OfFrequency { frequency_hz: low + 0.5 * BIN_HZ, k_t_n_per_m: interval })
+    };
+    lows.into_iter().filter_map(at).collect()
+}

@@ -1,0 +1,238 @@
+//! The most likely parameters: Gauss–Newton steps on the posterior, with the motion eliminated at every line.
+
+use super::ContactError;
+use super::block::Block;
+use super::line::Normal;
+use super::parameters::{COMPLIANCE, Parameters};
+use crate::frf::noise::shared_by_lines;
+use crate::parallel::prelude::*;
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex;
+
+/// Width of the bins whose lines are summed and judged together, Hz.
+pub const BIN_HZ: f64 = 25.0;
+/// Steps at most.
+const STEPS: usize = 25;
+/// The compliance moves less than this part of its standard deviation: done.
+const SETTLED: f64 = 0.01;
+/// A cost may rise by this part between passes: the shifts' motion is that of the pass before.
+const SLACK: f64 = 1e-3;
+/// Above this χ² per degree of freedom a block counts for less: something in it is not in the model.
+const TRUSTED: f64 = 1.1;
+
+/// Motion of every line of every block.
+type Motion = Vec<Vec<DVector<Complex<f64>>>>;
+
+/// The lines of one block in one bin.
+#[derive(Debug, Clone)]
+pub struct Bin {
+    /// Which block.
+    pub block: usize,
+    /// Its lowest frequency, Hz.
+    pub low_hz: f64,
+    /// What its lines say.
+    pub normal: Normal,
+    motion: Vec<DVector<Complex<f64>>>,
+}
+
+/// The most likely parameters, and how well they are known.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    /// The parameters.
+    pub p: Vec<f64>,
+    /// Their covariance, before any misfit is counted.
+    pub covariance: DMatrix<f64>,
+    /// What each block says in each bin, at these parameters.
+    pub bins: Vec<Bin>,
+    /// How much each block counts: 1 where the model describes it down to its noise.
+    pub trust: Vec<f64>,
+    /// By how much neighbouring lines share their noise.
+    pub shared: f64,
+    /// χ² per degree of freedom over all blocks, as they count.
+    pub chi_square: f64,
+}
+
+/// Finds them.
+///
+/// # Errors
+/// [`ContactError::NotIdentified`] if the rows do not tell the motion or the parameters, or no minimum is reached.
+pub fn solve(blocks: &[Block], parameters: &Parameters, sigma_per_s: f64) -> Result<Solution, ContactError> {
+    let shared = shared_by_lines(sigma_per_s, distance_hz(blocks));
+    let mut p = parameters.start();
+    let first = evaluate(blocks, &p, None)?;
+    let mut motion = motions(blocks, &first);
+    let mut trust = vec![1.0; blocks.len()];
+    let mut best: Option<(Vec<f64>, Vec<Bin>, f64)> = None;
+    let mut damping = 1e-9;
+    for step in 0..STEPS {
+        let bins = evaluate(blocks, &p, Some(&motion))?;
+        let cost = cost(parameters, &p, &bins, &trust, shared);
+        let better = best.as_ref().is_none_or(|(_, _, before)| cost <= before * (1.0 + SLACK));
+        if better {
+            motion = motions(blocks, &bins);
+            damping = (damping * 0.1_f64).max(1e-9);
+            let chosen = if step >= 3 { trusted(blocks, &bins) } else { trust.clone() };
+            // another trust is another cost
+            let changed = chosen.iter().zip(&trust).any(|(a, b)| (a / b - 1.0).abs() > 0.02);
+            trust = chosen;
+            let known = self::cost(parameters, &p, &bins, &trust, shared);
+            best = Some((p.clone(), bins, if changed { f64::INFINITY } else { known }));
+        } else {
+            damping = (damping * 100.0).max(1e-6);
+        }
+        let Some((at, bins, known)) = &best else { unreachable!("the first pass is better than none") };
+        let (information, gradient) = normal(parameters, blocks, at, bins, &trust, shared);
+        let (step, covariance) = newton(&information, &gradient, damping)?;
+        let sigma = covariance[(COMPLIANCE, COMPLIANCE)].max(0.0).sqrt();
+        if better && known.is_finite() && step[COMPLIANCE].abs() <= SETTLED * sigma {
+            let (_, undamped) = newton(&information, &gradient, 0.0)?;
+            let chi_square = per_freedom(bins, &trust);
+            let (p, bins) = (at.clone(), bins.clone());
+            return Ok(Solution { p, covariance: undamped, bins, trust, shared, chi_square });
+        }
+        p = at.iter().zip(step.iter()).map(|(at, step)| at + step).collect();
+    }
+    Err(ContactError::NotIdentified("the fit of the contact does not settle".into()))
+}
+
+fn distance_hz(blocks: &[Block]) -> f64 {
+    let lines = blocks.iter().map(|block| &block.lines).find(|lines| lines.len() > 1);
+    lines.map_or(1.0, |lines| lines[1].frequency_hz - lines[0].frequency_hz)
+}
+
+/// All blocks, bin by bin.
+fn evaluate(blocks: &[Block], p: &[f64], before: Option<&Motion>) -> Result<Vec<Bin>, ContactError> {
+    let mut tasks: Vec<(usize, std::ops::Range<usize>)> = Vec::new();
+    for (b, block) in blocks.iter().enumerate() {
+        let mut from = 0;
+        while let Some(first) = block.lines.get(from) {
+            let end_hz = (first.frequency_hz / BIN_HZ).floor() * BIN_HZ + BIN_HZ;
+            let to = from + block.lines[from..].partition_point(|line| line.frequency_hz < end_hz);
+            tasks.push((b, from..to));
+            from = to;
+        }
+    }
+    let bins: Vec<Option<Bin>> =
+        tasks.into_par_iter().map(|(b, lines)| bin(blocks, b, lines, p, before)).collect();
+    bins.into_iter().collect::<Option<Vec<Bin>>>().ok_or_else(|| {
+        ContactError::NotIdentified("the points do not tell how arm B and specimen A move".into())
+    })
+}
+
+fn bin(
+    blocks: &[Block],
+    b: usize,
+    lines: std::ops::Range<usize>,
+    p: &[f64],
+    before: Option<&Motion>,
+) -> Option<Bin> {
+    let block = &blocks[b];
+    let low_hz = (block.lines[lines.start].frequency_hz / BIN_HZ).floor() * BIN_HZ;
+    let mut normal = Normal::none(block.parameters.len());
+    let mut motion = Vec::with_capacity(lines.len());
+    for line in lines {
+        let shifts = before.filter(|_| !block.shifted_by.is_empty()).map(|motion| {
+            [0, 1].map(|axis| {
+                let mut shift = DVector::zeros(block.latent());
+                for (other, weights) in &block.shifted_by {
+                    if let Some(moved) = motion[*other].get(line) {
+                        shift += moved * Complex::from(weights[axis]);
+                    }
+                }
+                shift
+            })
+        });
+        motion.push(normal.add(block, line, p, shifts.as_ref())?);
+    }
+    Some(Bin { block: b, low_hz, normal, motion })
+}
+
+fn motions(blocks: &[Block], bins: &[Bin]) -> Motion {
+    let mut all: Motion = vec![Vec::new(); blocks.len()];
+    for bin in bins {
+        all[bin.block].extend(bin.motion.iter().cloned());
+    }
+    all
+}
+
+/// A block that the model does not describe counts for as much less as its χ² is too large.
+fn trusted(blocks: &[Block], bins: &[Bin]) -> Vec<f64> {
+    let of = |b: usize| {
+        let own = bins.iter().filter(|bin| bin.block == b);
+        let (chi, freedom) = own.fold((0.0, 0.0), |(chi, freedom), bin| {
+            (chi + bin.normal.chi_square, freedom + bin.normal.freedom)
+        });
+        let ratio: f64 = if freedom > 0.0 { chi / freedom } else { 1.0 };
+        if ratio > TRUSTED { 1.0 / ratio } else { 1.0 }
+    };
+    (0..blocks.len()).map(of).collect()
+}
+
+fn per_freedom(bins: &[Bin], trust: &[f64]) -> f64 {
+    let (chi, freedom) = bins.iter().fold((0.0, 0.0), |(chi, freedom), bin| {
+        let trust = trust[bin.block];
+        (chi + trust * bin.normal.chi_square, freedom + bin.normal.freedom)
+    });
+    if freedom > 0.0 { chi / freedom } else { f64::NAN }
+}
+
+fn cost(parameters: &Parameters, p: &[f64], bins: &[Bin], trust: &[f64], shared: f64) -> f64 {
+    let prior = parameters.all().iter().zip(p).filter(|(own, _)| own.sigma.is_finite() && own.sigma > 0.0);
+    let prior: f64 = prior.map(|(own, p)| 0.5 * ((p - own.start) / own.sigma).powi(2)).sum();
+    let noise: f64 = bins.iter().map(|bin| trust[bin.block] * bin.normal.chi_square).sum();
+    prior + noise / shared
+}
+
+/// Half the posterior's curvature, and its slope. |r|² is minus the logarithm of a complex noise's likelihood, half of (p/σ)² that of a prior's.
+fn normal(
+    parameters: &Parameters,
+    blocks: &[Block],
+    p: &[f64],
+    bins: &[Bin],
+    trust: &[f64],
+    shared: f64,
+) -> (DMatrix<f64>, DVector<f64>) {
+    let count = p.len();
+    let mut information = DMatrix::zeros(count, count);
+    let mut gradient = DVector::zeros(count);
+    for bin in bins {
+        let (own, weight) = (&blocks[bin.block].parameters, trust[bin.block] / shared);
+        for (i, to) in own.iter().enumerate() {
+            gradient[*to] += weight * bin.normal.gradient[i];
+            for (j, other) in own.iter().enumerate() {
+                information[(*to, *other)] += weight * bin.normal.information[(i, j)];
+            }
+        }
+    }
+    for (i, (own, p)) in parameters.all().iter().zip(p).enumerate() {
+        if own.sigma.is_infinite() {
+            continue;
+        }
+        // what is known exactly may not move at all
+        let precision = 0.5 / (own.sigma * own.sigma).max(f64::MIN_POSITIVE.sqrt());
+        information[(i, i)] += precision;
+        gradient[i] += precision * (p - own.start);
+    }
+    (information, gradient)
+}
+
+/// The step, and the covariance of the parameters.
+fn newton(
+    information: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    damping: f64,
+) -> Result<(DVector<f64>, DMatrix<f64>), ContactError> {
+    let lost = || ContactError::NotIdentified("the hits do not tell the force at the contact".into());
+    // parameters in metres beside parameters in kilograms: in units of their own they can be factorised
+    let unit = information.diagonal().map(|d| if d > 0.0 { d.sqrt().recip() } else { 1.0 });
+    let mut scaled = DMatrix::from_fn(unit.len(), unit.len(), |i, j| information[(i, j)] * unit[i] * unit[j]);
+    for i in 0..unit.len() {
+        scaled[(i, i)] = scaled[(i, i)].max(f64::MIN_POSITIVE) * (1.0 + damping) + 1e-13;
+    }
+    let factors = scaled.cholesky().ok_or_else(lost)?;
+    let step = -factors.solve(&gradient.component_mul(&unit)).component_mul(&unit);
+    let inverse = factors.inverse();
+    let covariance =
+        DMatrix::from_fn(unit.len(), unit.len(), |i, j| 0.5 * inverse[(i, j)] * unit[i] * unit[j]);
+    Ok((step, covariance))
+}

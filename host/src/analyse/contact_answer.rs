@@ -1,0 +1,70 @@
+//! The contact's own stiffness: which cells tell it, and what they say together.
+
+use super::averages::CellAverage;
+use super::cell::{CellName, Measurements};
+use crate::contact::{self, BAND, ContactCell, ContactError, Input, Stiffness, stiffness};
+use crate::structure::Structure;
+use crate::substructuring::geometry::{Geometry, Grouping};
+
+/// Whether a cell serves the estimate of the contact: arm B's interface from hits on B alone, and from the assembly arm B's interface and the
+/// specimens from hits along z on A or on what stands behind it.
+pub fn reads(geometry: &Geometry, name: &CellName) -> bool {
+    let specimen = geometry.ajb.channels.iter().any(|p| p.grouping == Grouping::SpecimenA);
+    if !specimen || name.configuration == Structure::A {
+        return false;
+    }
+    let points = geometry.points(name.configuration);
+    let served = points.channels.iter().any(|p| p.name == name.response && contact::serves(p.grouping));
+    let hit = points.impacts.iter().find(|p| p.name == name.impact);
+    served
+        && hit.is_some_and(|p| match name.configuration {
+            Structure::B => p.grouping == Grouping::InterfaceB,
+            _ => {
+                matches!(p.grouping, Grouping::InterfaceA | Grouping::InternalA) && p.direction[2].abs() > 0.9
+            }
+        })
+}
+
+/// Reads the contact from the averaged cells.
+///
+/// # Errors
+/// Why there is no answer, and what would change that.
+pub fn answer<M: Measurements>(
+    measurements: &M,
+    averages: &[CellAverage],
+) -> Result<Stiffness, ContactError> {
+    let geometry = measurements.geometry();
+    let cells: Vec<ContactCell<'_>> = averages
+        .iter()
+        .filter_map(|average| {
+            let spectra = average.damped.as_ref()?;
+            let points = geometry.points(average.name.configuration);
+            let impact = points.impacts.iter().find(|p| p.name == average.name.impact)?;
+            let point = points.channels.iter().find(|p| p.name == average.name.response)?;
+            Some(ContactCell {
+                structure: average.name.configuration,
+                impact: &impact.name,
+                impact_m: impact.position_m,
+                direction: impact.direction,
+                impact_grouping: impact.grouping,
+                point: &point.name,
+                point_m: point.position_m,
+                point_grouping: point.grouping,
+                spectra,
+                quantity: measurements.quantity(),
+            })
+        })
+        .collect();
+    if cells.is_empty() {
+        let hit = averages.iter().any(|a| a.name.configuration == Structure::Ajb && a.contact.is_some());
+        return Err(if hit { ContactError::NoRotation } else { ContactError::NoCells });
+    }
+    let spots_m = measurements.spots_m().ok_or(ContactError::NoSpots)?;
+    stiffness(&Input {
+        cells,
+        contact_m: geometry.virtual_point_b_m,
+        spots_m,
+        priors: measurements.contact_priors(),
+        band_hz: BAND,
+    })
+}

@@ -1,0 +1,64 @@
+//! What the laboratory knows of its own errors: the plan's `[priors]`.
+
+use crate::contact::ContactPriors;
+use serde::Deserialize;
+
+/// Standard deviations; what is not stated is taken as careful work by hand leaves it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PriorsPlan {
+    /// Points and impacts on the arms, m along each axis.
+    pub position_m: Option<f64>,
+    /// Added at each aim of hammer and vibrometer, m along each axis.
+    pub aim_m: Option<f64>,
+    /// The hammer's tilt about each axis across its direction, rad.
+    pub hammer_angle_rad: Option<f64>,
+    /// The spots beside the contact, m along each axis.
+    pub spot_m: Option<f64>,
+    /// Points on the specimens, m along each axis.
+    pub specimen_point_m: Option<f64>,
+    /// Gains of the vibrometers, relative.
+    pub gain: Option<f64>,
+    /// Gain of the hammer's force cell, relative.
+    pub hammer_gain: Option<f64>,
+    /// Delays beyond those that the device tells, s.
+    pub skew_s: Option<f64>,
+}
+
+impl PriorsPlan {
+    /// All of them.
+    pub fn known(&self) -> ContactPriors {
+        let mut known = ContactPriors::default();
+        for (stated, at) in [
+            (self.position_m, &mut known.positions.position_m),
+            (self.aim_m, &mut known.positions.aim_m),
+            (self.hammer_angle_rad, &mut known.positions.hammer_angle_rad),
+            (self.spot_m, &mut known.spot_m),
+            (self.specimen_point_m, &mut known.specimen_point_m),
+            (self.gain, &mut known.gain),
+            (self.hammer_gain, &mut known.hammer_gain),
+            (self.skew_s, &mut known.skew_s),
+        ] {
+            if let Some(stated) = stated {
+                *at = stated;
+            }
+        }
+        known
+    }
+
+    /// The first that is no standard deviation.
+    pub fn wrong(&self) -> Option<&'static str> {
+        [
+            ("position_m", self.position_m),
+            ("aim_m", self.aim_m),
+            ("hammer_angle_rad", self.hammer_angle_rad),
+            ("spot_m", self.spot_m),
+            ("specimen_point_m", self.specimen_point_m),
+            ("gain", self.gain),
+            ("hammer_gain", self.hammer_gain),
+            ("skew_s", self.skew_s),
+        ]
+        .into_iter()
+        .find_map(|(name, value)| value.is_some_and(|v| !(v >= 0.0 && v.is_finite())).then_some(name))
+    }
+}

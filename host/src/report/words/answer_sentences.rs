@@ -1,0 +1,143 @@
+//! The answer in words: what a colleague would say of each number.
+
+use super::number::{micro, short};
+use crate::contact::{Cause, ContactError, Doubt, Interval, Stiffness};
+use crate::results::{Answer, Results};
+
+/// What has no answer.
+pub enum Unanswered<'a> {
+    /// The contact's own stiffness.
+    Contact(&'a ContactError),
+    /// What lies between the arms.
+    BetweenArms,
+    /// Whether the contact slips.
+    Slip,
+}
+
+/// A stiffness with its interval, in N/µm.
+pub fn with_interval(k: &Interval) -> String {
+    format!("{} N/µm (95 % {}…{})", short(micro(k.mean)), short(micro(k.ci95[0])), short(micro(k.ci95[1])))
+}
+
+/// Why this k_T may be believed, and what makes its interval.
+pub fn identified(own: &Stiffness) -> String {
+    let mut causes: Vec<(&Cause, &f64)> = own.budget.iter().collect();
+    causes.sort_by(|a, b| b.1.total_cmp(a.1));
+    let largest: Vec<String> = causes
+        .iter()
+        .take(2)
+        .map(|(cause, share)| format!("{} ({:.1} %)", of_cause(**cause), 100.0 * **share))
+        .collect();
+    format!(
+        "The force is calibrated with hits on B alone, and the specimen's rotation is measured: this is the contact's own stiffness, whatever the \
+         clamps do. Most of its uncertainty comes from {}.",
+        largest.join(" and ")
+    )
+}
+
+fn of_cause(cause: Cause) -> &'static str {
+    match cause {
+        Cause::Noise => "noise",
+        Cause::Spots => "where the spots beside the contact are",
+        Cause::SpecimenPoints => "where the points on the specimen are",
+        Cause::ArmPoints => "where the points on arm B are",
+        Cause::HammerTilt => "the hammer's tilt",
+        Cause::Gains => "gains",
+        Cause::Skew => "delays between channels",
+        Cause::Misfit => "signals that the model does not explain",
+    }
+}
+
+/// Why a k_T that came out is not given.
+pub fn doubted(own: &Stiffness) -> String {
+    let reasons: Vec<&str> = own.doubts.iter().map(|doubt| of_doubt(*doubt)).collect();
+    format!(
+        "No k_T is given, although the fit came out at {}: {}.",
+        with_interval(&own.k_t_n_per_m),
+        reasons.join("; ")
+    )
+}
+
+fn of_doubt(doubt: Doubt) -> &'static str {
+    match doubt {
+        Doubt::Force => {
+            "the load cells and arm B's motion do not give the force in the hits on B alone (is a cell loose, or a point misplaced?)"
+        }
+        Doubt::SpecimenA => {
+            "the points on specimen A do not move as one rigid body (is one misplaced, or does the specimen bend?)"
+        }
+        Doubt::Spots => {
+            "the spots beside the contact do not move with arm B and the specimen (a specimen that moves against arm B needs points of its own: grouping 6)"
+        }
+        Doubt::Flatness => "the stiffness changes with frequency, as no contact's does",
+        Doubt::Sides => "hits on A and on the moving mass give different values",
+    }
+}
+
+/// Where the number between the arms comes from.
+pub fn between_the_arms() -> String {
+    "By substructuring: everything between the arms in series, clamps and contact.".into()
+}
+
+/// Why there is no number.
+pub fn unanswered(what: &Unanswered<'_>) -> String {
+    match what {
+        Unanswered::Contact(error) => {
+            let text = error.to_string();
+            let mut letters = text.chars();
+            let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
+            format!("{first}{}.", letters.as_str())
+        }
+        Unanswered::BetweenArms => {
+            "Substructuring needs A, B and the assembly with six motions of both virtual points, and noise that leaves the joint visible.".into()
+        }
+        Unanswered::Slip => "The hits do not tell whether the contact slips.".into(),
+    }
+}
+
+/// The answer's lines: what the terminal says first, and the head of the report.
+pub fn lines(results: &Results) -> Vec<String> {
+    let Some(answer) = &results.answer else { return Vec::new() };
+    let mut lines = vec![contact(answer)];
+    lines.push(match &answer.between_arms.k_n_per_m {
+        Some(k) => format!("Between the arms: {} ({}).", with_interval(k), answer.between_arms.basis),
+        None => format!("Between the arms: not identified. {}", answer.between_arms.why),
+    });
+    if let Some(clamp) = &answer.clamp {
+        lines.push(format!(
+            "The difference is what gives way beside the contact, clamps above all: {} in series with it.",
+            with_interval(&clamp.k_n_per_m)
+        ));
+    }
+    lines.push(match answer.slip.found {
+        Some(true) => format!("The contact slips under the hammer. {}", answer.slip.why),
+        Some(false) => format!("The contact sticks under the hammer. {}", answer.slip.why),
+        None => answer.slip.why.clone(),
+    });
+    if let Some(truth) = &answer.truth {
+        lines.push(format!(
+            "SIMULATED rig: the truth is {} N/µm for the contact and {} N/µm between the arms.",
+            short(micro(truth.contact_k_t_n_per_m)),
+            short(micro(truth.between_arms_k_n_per_m))
+        ));
+    }
+    lines
+}
+
+fn contact(answer: &Answer) -> String {
+    let own = &answer.contact;
+    match (&own.k_t_n_per_m, &own.c_t_n_s_per_m) {
+        (Some(k), c) => format!(
+            "The contact: k_T = {}{}. {}",
+            with_interval(k),
+            c.as_ref().map_or(String::new(), |c| format!(
+                ", c_T = {} N s/m ({}…{})",
+                short(c.mean),
+                short(c.ci95[0]),
+                short(c.ci95[1])
+            )),
+            own.why
+        ),
+        (None, _) => format!("The contact: no k_T. {}", own.why),
+    }
+}
