@@ -1,0 +1,141 @@
+//! Rigs that nobody tuned for: every part of the default rig drawn anew, several at once.
+
+use jointrig_hil_sim::rig::RigConfig;
+use jointrig_hil_sim::rig::config::{BodyName, Bushing, ResponsePoint};
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// What a drawn rig shall be like.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drawn {
+    /// Largest k_T, N/m; the smallest is 60 N/µm.
+    pub stiffest_n_per_m: f64,
+    /// The default errors of position, angle, gain and skew are multiplied by this.
+    pub errors: f64,
+}
+
+/// The rig of this number. A third of them has a clamp on side B too, and six points T1–T6 on specimen B.
+///
+/// Contacts of 60 N/µm and up, clamps × 0.3…3, local yaw modes some 100…350 Hz, arms × 0.6…2, rods, load cells, suspensions, damping,
+/// and floors × 0.3…3: each drawn by itself.
+pub fn drawn(number: u64, drawn: Drawn) -> RigConfig {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(0x0071_0000 + number);
+    let mut between = |low: f64, high: f64| -> f64 {
+        let u: f64 = random.random();
+        low * (high / low).powf(u)
+    };
+    let mut rig = RigConfig { name: format!("drawn-{number}"), ..RigConfig::default() };
+
+    let k = between(60e6, drawn.stiffest_n_per_m);
+    rig.contact.stiffness_n_per_m = [k * between(0.7, 1.4), k * between(1.0, 2.0), k];
+    rig.contact.rotation_nm_per_rad =
+        [22.0 * between(0.5, 2.0), 10.0 * between(0.3, 2.0), 22.0 * between(0.5, 2.0)];
+    rig.contact.damping_s = [1.5e-5 * between(0.4, 2.5); 6];
+
+    let mut clamp = |bushing: &mut Bushing, sign: f64, yaw: [f64; 2]| {
+        let all = between(0.3, 3.0);
+        scale(bushing, all);
+        bushing.rotation_nm_per_rad[1] = 4.95 * between(yaw[0], yaw[1]);
+        bushing.position_m =
+            [1e-3 * between(0.1, 1.0), sign * 0.01 * between(0.7, 1.4), 1e-3 * between(0.1, 1.5)];
+    };
+    clamp(&mut rig.clamp.loaded, 1.0, [0.3, 6.0]);
+    if number.is_multiple_of(3) {
+        rig.clamp_b.rigid = false;
+        clamp(&mut rig.clamp_b.loaded, -1.0, [2.0, 20.0]);
+        let specimen: Vec<ResponsePoint> = rig
+            .responses
+            .iter()
+            .filter(|point| point.body == BodyName::SpecimenA)
+            .map(|point| ResponsePoint {
+                name: point.name.replace('S', "T"),
+                body: BodyName::SpecimenB,
+                position_m: [point.position_m[0], -point.position_m[1], point.position_m[2]],
+                speckle: false,
+            })
+            .collect();
+        rig.responses.extend(specimen);
+    }
+    for specimen in [&mut rig.bodies.specimen_a, &mut rig.bodies.specimen_b] {
+        let factor = between(0.7, 1.5);
+        specimen.mass_kg *= factor;
+        specimen.inertia_kg_m2 = specimen.inertia_kg_m2.map(|i| i.map(|i| i * factor));
+    }
+    rig.bodies.arm_a.mass_kg *= between(0.6, 2.0);
+    rig.bodies.arm_b.mass_kg *= between(0.6, 2.0);
+    scale(&mut rig.lower_push_rod, between(0.4, 8.0));
+    scale(&mut rig.push_rod_a.bushing, between(0.3, 3.0));
+    let cells = between(0.6, 1.6);
+    rig.load_cells.iter_mut().for_each(|cell| scale(cell, cells));
+    let springs = between(0.5, 2.0);
+    rig.leaf_springs.iter_mut().for_each(|spring| scale(spring, springs));
+    scale(&mut rig.knife_edge, between(0.5, 2.0));
+    let damping = between(0.5, 2.0);
+    for bushing in
+        [&mut rig.knife_edge, &mut rig.lower_push_rod, &mut rig.clamp.loaded, &mut rig.clamp_b.loaded]
+    {
+        bushing.damping_s = bushing.damping_s.map(|beta| beta * damping);
+    }
+    let floor = between(0.3, 3.0);
+    rig.sensors.vibrometer.floor *= floor;
+    rig.sensors.ldv_a.floor *= floor;
+    rig.sensors.ldv_b.floor *= floor;
+    rig.sensors.load_cells.noise_n *= between(0.5, 2.0);
+
+    let errors = &mut rig.errors;
+    for error in [
+        &mut errors.position_m,
+        &mut errors.aim_m,
+        &mut errors.specimen_point_m,
+        &mut errors.spot_m,
+        &mut errors.hammer_angle_rad,
+        &mut errors.gain,
+        &mut errors.skew_s,
+        &mut errors.load_cell_cross_talk,
+    ] {
+        *error *= drawn.errors;
+    }
+    rig
+}
+
+fn scale(bushing: &mut Bushing, factor: f64) {
+    bushing.stiffness_n_per_m = bushing.stiffness_n_per_m.map(|k| k * factor);
+    bushing.rotation_nm_per_rad = bushing.rotation_nm_per_rad.map(|k| k * factor);
+}
+
+/// The plan for such a rig: `contact.toml` with its points T1–T6 where it has them, and what is known of its errors.
+pub fn contact_plan(rig: &RigConfig) -> String {
+    let errors = &rig.errors;
+    let mut plan = jointrig::campaign::plan::CONTACT.to_owned();
+    if !rig.clamp_b.rigid {
+        let points: Vec<&ResponsePoint> =
+            rig.responses.iter().filter(|point| point.body == BodyName::SpecimenB).collect();
+        let names: String = points.iter().map(|point| format!("\"{}\", ", point.name)).collect();
+        let rows: String = points
+            .iter()
+            .map(|p| {
+                let [x, y, z] = p.position_m;
+                format!(
+                    "    {{ name = \"{}\", grouping = 6, position_m = [{x:?}, {y:?}, {z:?}] }},\n",
+                    p.name
+                )
+            })
+            .collect();
+        plan = plan
+            .replace("responses = [\"S1\"", &format!("responses = [{names}\"S1\""))
+            .replace("responses = [\"B1\"", &format!("responses = [{names}\"B1\""))
+            .replace("response = [\n", &format!("response = [\n{rows}"));
+    }
+    format!(
+        "{plan}\n[priors]\nposition_m = {:?}\naim_m = {:?}\nhammer_angle_rad = {:?}\nspot_m = {:?}\nspecimen_point_m = {:?}\ngain = {:?}\n\
+         hammer_gain = {:?}\nskew_s = {:?}\n",
+        errors.position_m,
+        errors.aim_m,
+        errors.hammer_angle_rad,
+        errors.spot_m,
+        errors.specimen_point_m,
+        errors.gain,
+        errors.hammer_gain,
+        errors.skew_s
+    )
+}
