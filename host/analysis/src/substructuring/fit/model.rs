@@ -77,7 +77,7 @@ impl Layout {
 
     /// Only the assembly's admittance; none where G is singular.
     pub(super) fn assembly(&self, joint: &At, parts: [&Line; 2]) -> Option<Line> {
-        let g = product(&self.held(joint, &self.interface(parts))?, &joint.d);
+        let g = product(&held(joint, &self.interface(parts))?, &joint.d);
         let (p, q) = self.edges(parts);
         Some(self.apart(parts) - product(&p, &product(&g, &q)))
     }
@@ -85,7 +85,7 @@ impl Layout {
     /// The model with its derivatives; none where G is singular.
     pub(super) fn predict(&self, joint: &At, parts: [&Line; 2]) -> Option<Predicted> {
         let w = self.interface(parts);
-        let h = self.held(joint, &w)?;
+        let h = held(joint, &w)?;
         let g = product(&h, &joint.d);
         let (p, q) = self.edges(parts);
         let (pg, gq) = (product(&p, &g), product(&g, &q));
@@ -115,9 +115,9 @@ impl Layout {
             .collect();
         Some(Predicted { y: self.apart(parts) - product(&p, &gq), left, right, slopes })
     }
+}
 
-    /// H = (D W + E)⁻¹; none where it is singular.
-    fn held(&self, joint: &At, w: &Line) -> Option<Line> {
-        full_rank_inverse(&(product(&joint.d, w) + &joint.e), "the interface with the joint").ok()
-    }
+/// H = (D W + E)⁻¹; none where it is singular.
+fn held(joint: &At, w: &Line) -> Option<Line> {
+    full_rank_inverse(&(product(&joint.d, w) + &joint.e), "the interface with the joint").ok()
 }

@@ -54,7 +54,7 @@ impl Shift {
         let added = &self.matrix * stacked;
         (0..count)
             .map(|l| {
-                let parts = added.column(l).into_iter().zip(added.column(count + l).into_iter());
+                let parts = added.column(l).into_iter().zip(added.column(count + l));
                 Line::from_iterator(rows, columns, parts.map(|(re, im)| Complex::new(*re, *im)))
             })
             .collect()
