@@ -7,6 +7,7 @@
 //!     cargo test --release -p jointrig --test between_arms -- --ignored --nocapture
 #![cfg(feature = "sim")]
 
+#[expect(dead_code, reason = "the rest is for the other tables")]
 mod simulated;
 
 use jointrig::substructuring::averaged::{Priors, averaged};
