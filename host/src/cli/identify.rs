@@ -34,7 +34,7 @@ pub struct Identify {
     /// Where sensors and impacts are: the pyFBS workbook (.xlsx), a folder of its tables as .csv, or .toml.
     #[arg(long, value_name = "FILE")]
     geometry: PathBuf,
-    /// Decoupling methods, by name [default: all that work line by line]; `fit`, which takes some ten seconds for each band, where asked for.
+    /// Decoupling methods, by name [default: all that work line by line]; `fit`, which takes a few seconds for each band, where asked for.
     #[arg(long = "method", value_name = "METHOD", value_delimiter = ',')]
     methods: Vec<Asked>,
     /// For `fit`: K and C full and symmetric instead of diagonal.

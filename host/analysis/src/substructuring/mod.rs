@@ -10,7 +10,7 @@
 //! 5. [`joint_over_bands`]: K and C per line and over bands, with scatter, interval and warnings.
 //! 6. [`identify`](mod@identify): the front door that does all of it; [`line_noise`](mod@line_noise): what the FRFs' noise does to each of its lines.
 //! 7. [`averaged`](mod@averaged): the estimate to quote, with its interval; the bootstrap over hits. [`noise`](crate::frf::noise) is what they start from.
-//! 8. [`fit`]: K and C by maximum likelihood over all measured blocks.
+//! 8. [`fit`]: K and C by maximum likelihood over all measured blocks; [`between_arms`](mod@between_arms): which of the two is the answer.
 //! 9. [`coupling`]: the other way round, from parts to the assembly; [`cmif`](mod@cmif): how many modes the interface needs;
 //!    [`back_coupling`]: whether the joint found gives the measured assembly, and [`explained`] what may keep it from that; [`plausibility`]: passivity and reciprocity; [`semm`](mod@semm): a model corrected by a measurement.
 //!
@@ -19,6 +19,7 @@
 
 pub mod averaged;
 pub mod back_coupling;
+pub mod between_arms;
 pub mod cmif;
 pub mod consistency;
 pub mod coupling;

@@ -101,7 +101,7 @@ pub enum AveragedError {
 pub struct DofEstimate {
     /// Stiffness, the noise's bias taken out.
     pub stiffness: f64,
-    /// Standard deviation of the stiffness, linear propagation.
+    /// Standard deviation of the stiffness: linear propagation, and the size of the bias.
     pub std: f64,
     /// Of it, from the FRFs' noise.
     pub std_noise: f64,
@@ -109,7 +109,8 @@ pub struct DofEstimate {
     pub std_geometry: f64,
     /// 95 % interval: the compliance's, inverted, so it reaches further up than down.
     pub ci95: [f64; 2],
-    /// What noise alone added to the stiffness: expectation with noise minus value without; already taken out.
+    /// What noise alone added to the stiffness: expectation with noise minus value without; already taken out. It is drawn at the noisy
+    /// FRFs, so it is not known better than by its own size, and the interval holds that.
     pub bias: f64,
     /// Damping.
     pub damping: f64,
@@ -329,7 +330,7 @@ fn interval(stiffness: f64, std: f64) -> ([f64; 2], bool) {
 impl DofEstimate {
     /// The same with this standard deviation of the noise; what is not identified stays so.
     fn with_noise(self, std_noise: f64) -> DofEstimate {
-        let std = std_noise.hypot(self.std_geometry);
+        let std = std_noise.hypot(self.std_geometry).hypot(self.bias);
         let same = DofEstimate { std, std_noise, ..self };
         if !self.identified {
             return same;

@@ -9,6 +9,7 @@ use crate::structure::Structure;
 use crate::substructuring::geometry::{Geometry, Grouping};
 use crate::substructuring::idm::IdmSet;
 use crate::substructuring::interface_data::{Found, InterfaceError, Measured, balance};
+use crate::substructuring::product::product;
 use crate::substructuring::vpt;
 use nalgebra::{Complex, DMatrix, Vector3};
 
@@ -160,7 +161,7 @@ impl Block {
 
     /// T_u Y T_f of a line.
     pub(super) fn reduce(&self, cells: &Line) -> Line {
-        self.t_u.map(Complex::from) * cells * self.t_f.map(Complex::from)
+        product(&product(&self.t_u, cells), &self.t_f)
     }
 }
 

@@ -3,9 +3,9 @@
 //! A sensor wrong by δ reads e·(θ × δ) more, where θ is the rotation of its virtual point; a blow wrong by δ adds the moment δ × e; one
 //! tilted pushes along another e.
 
-use super::block::{Block, Impact, Line, Ports, Sensor};
+use super::block::{Block, Impact, Ports, Sensor};
 use crate::substructuring::vpt::ROTATION_LENGTH_M;
-use nalgebra::{Complex, DMatrix, Unit, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, Unit, UnitQuaternion, Vector3};
 
 /// Errors of one cell's geometry: m, m, rad.
 #[derive(Debug, Clone, Copy, Default)]
@@ -18,13 +18,13 @@ pub(super) struct CellError {
 /// One cell at some geometry, as it acts on motions and forces of the ports.
 pub(super) struct CellGeometry {
     /// The sensor's axes × output ports.
-    pub(super) seen: Line,
+    pub(super) seen: DMatrix<f64>,
     /// Its derivative by a shift along x, y and z.
-    pub(super) turned: [Line; 3],
+    pub(super) turned: [DMatrix<f64>; 3],
     /// Input ports × 1: the forces of a unit blow.
-    pub(super) pushed: Line,
+    pub(super) pushed: DMatrix<f64>,
     /// Its derivatives by two shifts and two tilts: input ports × 4.
-    pub(super) slopes: Line,
+    pub(super) slopes: DMatrix<f64>,
 }
 
 impl Block {
@@ -32,10 +32,10 @@ impl Block {
     pub(super) fn cell(&self, sensor: &Sensor, impact: &Impact, error: &CellError) -> CellGeometry {
         let (pushed, slopes) = self.pushed(impact, error);
         CellGeometry {
-            seen: self.seen(sensor, error.sensor).map(Complex::from),
-            turned: [0, 1, 2].map(|axis| self.turned(sensor, Vector3::ith(axis, 1.0)).map(Complex::from)),
-            pushed: pushed.map(Complex::from),
-            slopes: slopes.map(Complex::from),
+            seen: self.seen(sensor, error.sensor),
+            turned: [0, 1, 2].map(|axis| self.turned(sensor, Vector3::ith(axis, 1.0))),
+            pushed,
+            slopes,
         }
     }
 

@@ -43,7 +43,17 @@ pub(super) struct Chart {
 pub(super) struct At {
     pub(super) d: Line,
     pub(super) e: Line,
-    pub(super) slopes: Vec<(Line, Line)>,
+    pub(super) slopes: Vec<Slope>,
+}
+
+/// The derivative of D and E by one parameter: Σ (left dᵀ, left eᵀ).
+pub(super) type Slope = Vec<Dyad>;
+
+/// One term of a derivative.
+pub(super) struct Dyad {
+    pub(super) left: DVector<C>,
+    pub(super) d: DVector<C>,
+    pub(super) e: DVector<C>,
 }
 
 impl Chart {
@@ -139,13 +149,11 @@ impl Chart {
             at.d[(d, d)] = loss * (p[d] / self.unit[d]);
             at.e[(d, d)] = C::from(1.0 - p[d]);
             if slopes {
-                let (mut dd, mut de) = (zero(), zero());
-                dd[(d, d)] = loss / self.unit[d];
-                de[(d, d)] = C::from(-1.0);
-                by_kappa.push((dd, de));
-                let mut dd = zero();
-                dd[(d, d)] = s * (p[d] / self.unit[d] / self.omega);
-                by_loss.push((dd, zero()));
+                let along = |v: C| DVector::from_fn(n, |i, _| if i == d { v } else { C::default() });
+                let dyad =
+                    |dd: C, de: C| vec![Dyad { left: along(C::from(1.0)), d: along(dd), e: along(de) }];
+                by_kappa.push(dyad(loss / self.unit[d], C::from(-1.0)));
+                by_loss.push(dyad(s * (p[d] / self.unit[d] / self.omega), C::default()));
             }
         }
         at.slopes.extend(by_kappa);
@@ -164,12 +172,15 @@ impl Chart {
             for (root, factor) in [(&l, C::from(1.0)), (&m, per)] {
                 for (r, c) in triangle(n) {
                     // d(L Lᵀ) = e_r (column c of L)ᵀ + its transpose
-                    let mut dd = Line::zeros(n, n);
-                    for k in 0..n {
-                        dd[(r, k)] += factor * root[(k, c)];
-                        dd[(k, r)] += factor * root[(k, c)];
-                    }
-                    at.slopes.push((scale(dd), Line::zeros(n, n)));
+                    let unit = |i: usize| self.unit[i].sqrt().recip();
+                    let row =
+                        DVector::from_fn(n, |i, _| if i == r { C::from(unit(i)) } else { C::default() });
+                    let column = DVector::from_fn(n, |i, _| C::from(root[(i, c)] * unit(i)));
+                    let (scaled, none) = (|v: &DVector<C>| v * factor, DVector::zeros(n));
+                    at.slopes.push(vec![
+                        Dyad { d: scaled(&column), left: row.clone(), e: none.clone() },
+                        Dyad { d: scaled(&row), left: column, e: none },
+                    ]);
                 }
             }
         }

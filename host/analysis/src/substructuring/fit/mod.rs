@@ -14,10 +14,14 @@
 mod block;
 mod cell;
 mod chart;
+mod effect;
+mod factor;
 mod model;
+mod noise;
 mod nuisance;
 mod outcome;
 mod problem;
+mod shift;
 mod solver;
 mod start;
 mod weight;
@@ -311,5 +315,7 @@ fn internals(side: Side, files: &[Measured<'_>; 3], points: Points) -> Internals
     found
 }
 
+#[cfg(test)]
+mod naive;
 #[cfg(test)]
 mod tests;

@@ -5,6 +5,8 @@
 
 use super::block::{Line, Ports};
 use super::chart::At;
+use crate::substructuring::product::product;
+use crate::substructuring::pseudo_inverse::full_rank_inverse;
 use nalgebra::Complex;
 
 type C = Complex<f64>;
@@ -75,19 +77,18 @@ impl Layout {
 
     /// Only the assembly's admittance; none where G is singular.
     pub(super) fn assembly(&self, joint: &At, parts: [&Line; 2]) -> Option<Line> {
-        let flexibility = &joint.d * self.interface(parts) + &joint.e;
-        let g = flexibility.lu().solve(&joint.d)?;
+        let g = product(&held(joint, &self.interface(parts))?, &joint.d);
         let (p, q) = self.edges(parts);
-        Some(self.apart(parts) - p * (g * q))
+        Some(self.apart(parts) - product(&p, &product(&g, &q)))
     }
 
     /// The model with its derivatives; none where G is singular.
     pub(super) fn predict(&self, joint: &At, parts: [&Line; 2]) -> Option<Predicted> {
         let w = self.interface(parts);
-        let h = (&joint.d * &w + &joint.e).try_inverse()?;
-        let g = &h * &joint.d;
+        let h = held(joint, &w)?;
+        let g = product(&h, &joint.d);
         let (p, q) = self.edges(parts);
-        let (pg, gq) = (&p * &g, &g * &q);
+        let (pg, gq) = (product(&p, &g), product(&g, &q));
         let (rows, columns) = self.shape();
         let (mut left, mut right) = (Line::identity(rows, rows), Line::identity(columns, columns));
         for side in 0..2 {
@@ -99,9 +100,24 @@ impl Layout {
             at -= &gq * sign;
         }
         // δ(G⁻¹) = H (δD (I − W G⁻¹) − δE G⁻¹)
-        let ph = &p * &h;
-        let held = &q - &w * &gq;
-        let slopes = joint.slopes.iter().map(|(d, e)| -(&ph * (d * &held - e * &gq))).collect();
-        Some(Predicted { y: self.apart(parts) - &p * &gq, left, right, slopes })
+        let ph = product(&p, &h);
+        let rest = &q - product(&w, &gq);
+        let slopes = (joint.slopes.iter())
+            .map(|dyads| {
+                let mut slope = Line::zeros(rows, columns);
+                for dyad in dyads {
+                    let moved = &ph * &dyad.left;
+                    let pushed = rest.tr_mul(&dyad.d) - gq.tr_mul(&dyad.e);
+                    slope.ger(C::from(-1.0), &moved, &pushed, C::from(1.0));
+                }
+                slope
+            })
+            .collect();
+        Some(Predicted { y: self.apart(parts) - product(&p, &gq), left, right, slopes })
     }
+}
+
+/// H = (D W + E)⁻¹; none where it is singular.
+fn held(joint: &At, w: &Line) -> Option<Line> {
+    full_rank_inverse(&(product(&joint.d, w) + &joint.e), "the interface with the joint").ok()
 }

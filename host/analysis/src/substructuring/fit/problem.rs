@@ -5,7 +5,9 @@ use super::block::{Block, Line};
 use super::cell::CellGeometry;
 use super::chart::Chart;
 use super::model::{Layout, Predicted};
+use super::noise::Noise;
 use super::nuisance::Nuisances;
+use super::shift::Shift;
 use crate::parallel::prelude::*;
 use nalgebra::{Complex, DMatrix, DVector};
 use rand::SeedableRng;
@@ -38,6 +40,10 @@ pub(super) struct Problem {
     pub(super) rows: Vec<usize>,
     pub(super) columns: Vec<usize>,
     pub(super) nuisances: Nuisances,
+    /// The assembly's own noise in each band's mean, which no parameter moves.
+    pub(super) own_noise: Vec<Noise>,
+    /// T_u and T_f of the measured ports.
+    pub(super) reductions: (Line, Line),
     /// See [`crate::frf::noise::shared_by_lines`].
     pub(super) shared: f64,
 }
@@ -49,12 +55,6 @@ pub(super) struct Corrected {
     bias: Vec<Line>,
 }
 
-/// Residuals per band (measured ports, by columns) and their derivatives by the joint's parameters.
-pub(super) struct Residuals {
-    pub(super) r: Vec<DVector<C>>,
-    pub(super) slopes: Vec<DMatrix<C>>,
-}
-
 impl Problem {
     pub(super) fn new(
         parts: [Block; 2],
@@ -64,12 +64,26 @@ impl Problem {
         nuisances: Nuisances,
         shared: f64,
     ) -> Problem {
-        let measured = |t: &DMatrix<f64>| (0..t.nrows()).filter(|&r| t.row(r).amax() > 0.0).collect();
+        let measured =
+            |t: &DMatrix<f64>| -> Vec<usize> { (0..t.nrows()).filter(|&r| t.row(r).amax() > 0.0).collect() };
         let (rows, columns) = (measured(&ajb.t_u), measured(&ajb.t_f.transpose()));
         let span = (s[s.len() - 1].im - s[0].im) / std::f64::consts::TAU;
         let count = ((span / WIDTH_HZ).round() as usize).clamp(1, s.len());
-        let bands = (0..count).map(|b| b * s.len() / count..(b + 1) * s.len() / count).collect();
-        Problem { parts, ajb, layout, s, bands, rows, columns, nuisances, shared }
+        let bands: Vec<Range<usize>> =
+            (0..count).map(|b| b * s.len() / count..(b + 1) * s.len() / count).collect();
+        let reductions =
+            (ajb.t_u.select_rows(&rows).map(C::from), ajb.t_f.select_columns(&columns).map(C::from));
+        let own_noise = (bands.par_iter())
+            .map(|band| {
+                let mut noise = Noise::none(rows.len() * columns.len());
+                let share = 1.0 / band.len() as f64;
+                let variance = (band.clone().map(|l| &ajb.variance[l]))
+                    .fold(ajb.variance[band.start].map(|_| 0.0), |sum, v| sum + v * share);
+                noise.spread(&reductions.0, &reductions.1, &variance, 2.0 * shared * share);
+                noise
+            })
+            .collect();
+        Problem { parts, ajb, layout, s, bands, rows, columns, nuisances, own_noise, reductions, shared }
     }
 
     /// A, B and AJB, with the place of each among the nuisance parameters.
@@ -80,11 +94,6 @@ impl Problem {
     /// Entries of a residual.
     pub(super) fn entries(&self) -> usize {
         self.rows.len() * self.columns.len()
-    }
-
-    /// The measured ports of a matrix over all ports.
-    pub(super) fn measured(&self, y: &Line) -> Line {
-        Line::from_fn(self.rows.len(), self.columns.len(), |r, c| y[(self.rows[r], self.columns[c])])
     }
 
     /// Every cell of a block (by impact, then sensor) with the believed errors `eta`, in standard deviations.
@@ -100,23 +109,6 @@ impl Problem {
         cells
     }
 
-    /// How much more every cell of a block reads at the geometry `moved` than at `nominal`, when its ports move by `y` per force.
-    fn effect(&self, place: usize, y: &Line, moved: &[CellGeometry], nominal: &[CellGeometry]) -> Line {
-        let block = self.blocks()[place];
-        let mut effect = Line::zeros(block.t_u.ncols(), block.t_f.nrows());
-        let mut cells = moved.iter().zip(nominal);
-        for i in 0..block.impacts.len() {
-            for sensor in &block.sensors {
-                let Some((moved, nominal)) = cells.next() else { continue };
-                let difference = &moved.seen * (y * &moved.pushed) - &nominal.seen * (y * &nominal.pushed);
-                for (axis, row) in sensor.rows.iter().enumerate() {
-                    effect[(*row, i)] = difference[(axis, 0)];
-                }
-            }
-        }
-        effect
-    }
-
     /// Takes the believed errors `eta` (in standard deviations) out of the data, and draws the model's bias.
     pub(super) fn corrected(
         &self,
@@ -124,39 +116,31 @@ impl Problem {
         p: &DVector<f64>,
         eta: &[f64],
     ) -> Result<Corrected, FitError> {
-        let still = eta.iter().all(|e| *e == 0.0);
-        let none = vec![0.0; eta.len()];
-        let moved = [0, 1, 2].map(|place| self.cells(place, eta));
-        let nominal = [0, 1, 2].map(|place| self.cells(place, &none));
-        let part = |place: usize| -> Vec<Line> {
-            let block = &self.parts[place];
-            (block.cells.par_iter())
-                .map(|cells| {
-                    let mut y = block.reduce(cells);
-                    if !still {
-                        for _ in 0..CORRECTIONS {
-                            let effect = self.effect(place, &y, &moved[place], &nominal[place]);
-                            y = block.reduce(&(cells - effect));
-                        }
-                    }
-                    y
-                })
-                .collect()
+        let reduced = |block: &Block| -> Vec<Line> {
+            block.cells.par_iter().map(|cells| block.reduce(cells)).collect()
         };
-        let parts = [part(0), part(1)];
-        let ajb = (0..self.s.len())
-            .into_par_iter()
-            .map(|l| {
-                let cells = &self.ajb.cells[l];
-                if still {
-                    return Ok(self.ajb.reduce(cells));
+        let mut parts = self.parts.each_ref().map(reduced);
+        let mut ajb = reduced(&self.ajb);
+        if eta.iter().any(|e| *e != 0.0) {
+            let none = vec![0.0; eta.len()];
+            let shift = |place: usize| {
+                Shift::of(self.blocks()[place], &self.cells(place, eta), &self.cells(place, &none))
+            };
+            for (place, part) in parts.iter_mut().enumerate() {
+                let (measured, shift) = (part.clone(), shift(place));
+                for _ in 0..CORRECTIONS {
+                    *part = (measured.iter().zip(shift.added_to(part))).map(|(y, more)| y - more).collect();
                 }
-                let y = self.layout.assembly(&chart.at(p, self.s[l], false), [&parts[0][l], &parts[1][l]]);
-                let y = y.ok_or(FitError::Singular { frequency_hz: self.frequency_hz(l) })?;
-                let effect = self.effect(2, &y, &moved[2], &nominal[2]);
-                Ok(self.ajb.reduce(&(cells - effect)))
-            })
-            .collect::<Result<Vec<Line>, FitError>>()?;
+            }
+            let model: Vec<Line> = (0..self.s.len())
+                .into_par_iter()
+                .map(|l| {
+                    (self.layout.assembly(&chart.at(p, self.s[l], false), [&parts[0][l], &parts[1][l]]))
+                        .ok_or(FitError::Singular { frequency_hz: self.frequency_hz(l) })
+                })
+                .collect::<Result<_, FitError>>()?;
+            ajb.iter_mut().zip(shift(2).added_to(&model)).for_each(|(y, more)| *y -= more);
+        }
         let bias = self.bias(chart, p, &parts)?;
         Ok(Corrected { parts, ajb, bias })
     }
@@ -214,37 +198,35 @@ impl Problem {
             .ok_or(FitError::Singular { frequency_hz: self.frequency_hz(l) })
     }
 
-    /// Measured minus model, averaged over each band, and its derivatives.
+    /// Measured minus model, averaged over a band, and the model's derivatives: real parts above imaginary ones, the residual in
+    /// the first column.
     pub(super) fn residuals(
         &self,
         chart: &Chart,
         p: &DVector<f64>,
         data: &Corrected,
-    ) -> Result<Residuals, FitError> {
-        let m = self.entries();
-        let by_band: Vec<(DVector<C>, DMatrix<C>)> = (self.bands.par_iter())
-            .map(|band| {
-                let mut r = DVector::zeros(m);
-                let mut slopes = DMatrix::zeros(m, chart.count());
-                let share = C::from(1.0 / band.len() as f64);
-                for l in band.clone() {
-                    let parts = [&data.parts[0][l], &data.parts[1][l]];
-                    let predicted = self.predict(chart, p, parts, l, true)?;
-                    let model = predicted.y + &data.bias[l];
-                    let difference = self.measured(&(&data.ajb[l] - model));
-                    for (sum, v) in r.iter_mut().zip(difference.iter()) {
-                        *sum += v * share;
-                    }
-                    for (mut column, slope) in slopes.column_iter_mut().zip(&predicted.slopes) {
-                        for (sum, v) in column.iter_mut().zip(self.measured(slope).iter()) {
-                            *sum += v * share;
-                        }
-                    }
-                }
-                Ok((r, slopes))
-            })
-            .collect::<Result<_, FitError>>()?;
-        let (r, slopes) = by_band.into_iter().unzip();
-        Ok(Residuals { r, slopes })
+        band: Range<usize>,
+    ) -> Result<DMatrix<f64>, FitError> {
+        let mut sums = DMatrix::zeros(2 * self.entries(), 1 + chart.count());
+        let share = 1.0 / band.len() as f64;
+        for l in band {
+            let predicted = self.predict(chart, p, [&data.parts[0][l], &data.parts[1][l]], l, true)?;
+            let difference = &data.ajb[l] - predicted.y - &data.bias[l];
+            self.add_measured(sums.column_mut(0).as_mut_slice(), &difference, share);
+            for (d, slope) in predicted.slopes.iter().enumerate() {
+                self.add_measured(sums.column_mut(1 + d).as_mut_slice(), slope, share);
+            }
+        }
+        Ok(sums)
+    }
+
+    /// Adds the measured ports of `y` times `share` to a column of real parts above imaginary ones.
+    pub(super) fn add_measured(&self, column: &mut [f64], y: &Line, share: f64) {
+        let (re, im) = column.split_at_mut(self.entries());
+        let places = self.columns.iter().flat_map(|c| self.rows.iter().map(move |r| (*r, *c)));
+        for ((re, im), at) in re.iter_mut().zip(im).zip(places) {
+            *re += y[at].re * share;
+            *im += y[at].im * share;
+        }
     }
 }

@@ -2,9 +2,11 @@
 
 use super::FitError;
 use super::chart::{Chart, Shape};
+use super::factor::{Factor, crossed};
 use super::problem::{Corrected, Problem};
 use super::weight::{Point, Weight};
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use crate::parallel::prelude::*;
+use nalgebra::{DMatrix, DVector};
 
 /// How often geometry, weights and bias are evaluated anew. Tilts act in second order too, which the second pass takes out. Many
 /// passes would do harm: the derivatives hold the noise of the FRFs, and what it feigns adds up.
@@ -44,7 +46,8 @@ struct Score {
     chi: f64,
     gradient: DVector<f64>,
     hessian: DMatrix<f64>,
-    eta: DVector<f64>,
+    /// L⁻¹Gᵀ N⁻¹ r, where L Lᵀ is what the nuisance parameters are integrated out with.
+    pulled: DMatrix<f64>,
 }
 
 /// Everything that stays fixed while the joint moves.
@@ -54,67 +57,82 @@ struct Pass<'a> {
     data: &'a Corrected,
     weight: &'a Weight,
     /// G η₀ per band: the residual is that of η₀, while the prior is about zero.
-    believed: Vec<DMatrix<f64>>,
+    believed: &'a [DMatrix<f64>],
     /// Variances are larger by this factor.
     mild: f64,
     /// Of I + Gᵀ N⁻¹ G / mild.
-    marginal: Cholesky<f64, Dyn>,
+    marginal: Factor,
     prior: DVector<f64>,
 }
 
+/// Sums of products of residual and derivatives (residual first), with the nuisance parameters integrated out.
+struct Products {
+    /// (1 + parameters)².
+    all: DMatrix<f64>,
+    /// L⁻¹Gᵀ N⁻¹ of the same columns.
+    pulled: DMatrix<f64>,
+}
+
 impl Pass<'_> {
-    fn score(&self, p: &DVector<f64>) -> Result<Score, FitError> {
-        let residuals = self.problem.residuals(self.chart, p, self.data)?;
-        let (count, nuisances) = (self.chart.count(), self.weight.information.nrows());
-        let mut square = 0.0;
-        let mut jr = DMatrix::zeros(count, 1);
-        let mut jj = DMatrix::zeros(count, count);
-        let mut gr = DMatrix::zeros(nuisances, 1);
-        let mut gj = DMatrix::zeros(nuisances, count);
-        for (b, weight) in self.weight.bands.iter().enumerate() {
-            let r = DMatrix::from_column_slice(residuals.r[b].len(), 1, residuals.r[b].as_slice());
-            let r = weight.whitened(&r) + &self.believed[b];
-            // r falls where the model rises
-            let j = weight.whitened(&residuals.slopes[b]);
-            square += r.norm_squared();
-            jr += crossed(&j, &r);
-            jj += crossed(&j, &j);
-            gr += crossed(&weight.g, &r);
-            gj += crossed(&weight.g, &j);
+    /// Of columns that are in units of their noise, one matrix for each band.
+    fn products(&self, columns: &[DMatrix<f64>]) -> Products {
+        let by_band: Vec<_> = (self.weight.bands.par_iter())
+            .zip(columns)
+            .map(|(weight, columns)| (crossed(columns, columns), crossed(&weight.g, columns)))
+            .collect();
+        let count = 1 + self.chart.count();
+        let mut all = DMatrix::zeros(count, count);
+        let mut pulled = DMatrix::zeros(self.weight.information.nrows(), count);
+        for (own, by_nuisance) in by_band {
+            all += own;
+            pulled += by_nuisance;
         }
-        let mild = self.mild;
-        let held_r = self.marginal.solve(&gr);
-        let held_j = self.marginal.solve(&gj);
-        let chi = (square - gr.dot(&held_r) / mild) / mild;
-        let prior = DMatrix::from_diagonal(&self.prior);
+        self.marginal.forward(&mut pulled);
+        let all = (all - crossed(&pulled, &pulled) / self.mild) / self.mild;
+        Products { all, pulled }
+    }
+
+    fn score(&self, p: &DVector<f64>) -> Result<Score, FitError> {
+        let columns: Vec<DMatrix<f64>> = (self.weight.bands.par_iter())
+            .zip(&self.problem.bands)
+            .zip(self.believed)
+            .map(|((weight, band), believed)| {
+                // r falls where the model rises
+                let residuals = self.problem.residuals(self.chart, p, self.data, band.clone())?;
+                let mut columns = weight.whitening.of(residuals);
+                let mut residual = columns.column_mut(0);
+                residual += believed.column(0);
+                Ok(columns)
+            })
+            .collect::<Result<_, FitError>>()?;
+        let Products { all, pulled } = self.products(&columns);
+        let chi = all[(0, 0)];
+        let count = p.len();
+        let prior = self.prior.component_mul(p);
         Ok(Score {
-            cost: chi + p.dot(&self.prior.component_mul(p)),
+            cost: chi + p.dot(&prior),
             chi,
-            gradient: ((jr - gj.tr_mul(&held_r) / mild) / mild).column(0) - self.prior.component_mul(p),
-            hessian: (jj - gj.tr_mul(&held_j) / mild) / mild + prior,
-            eta: held_r.column(0) / mild,
+            gradient: all.view((1, 0), (count, 1)).column(0) - prior,
+            hessian: all.view((1, 1), (count, count)) + DMatrix::from_diagonal(&self.prior),
+            pulled: pulled.columns(0, 1).clone_owned(),
         })
+    }
+
+    /// The nuisance parameters' own estimate there, in standard deviations of their priors.
+    fn eta(&self, at: &Score) -> DVector<f64> {
+        let mut eta = at.pulled.clone();
+        self.marginal.backward(&mut eta);
+        eta.column(0) / self.mild
     }
 
     /// The minimum without what noise feigns in the derivatives (errors in variables), and its covariance; none where noise is
     /// all there is.
     fn corrected(&self, p: &DVector<f64>, at: &Score) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let (count, nuisances) = (p.len(), self.weight.information.nrows());
-        let mut jr = DMatrix::zeros(count, 1);
-        let mut jj = DMatrix::zeros(count, count);
-        let mut gr = DMatrix::zeros(nuisances, 1);
-        let mut gj = DMatrix::zeros(nuisances, count);
-        for weight in &self.weight.bands {
-            let f = &weight.feigned;
-            jr += crossed(&f.slopes, &f.residual);
-            jj += crossed(&f.slopes, &f.slopes);
-            gr += crossed(&weight.g, &f.residual);
-            gj += crossed(&weight.g, &f.slopes);
-        }
-        let mild = self.mild;
-        let held_j = self.marginal.solve(&gj);
-        let feigned = (jj - gj.tr_mul(&held_j) / mild) / mild;
-        let pull = (jr - held_j.tr_mul(&gr) / mild) / mild;
+        let count = p.len();
+        let columns: Vec<DMatrix<f64>> = self.weight.bands.iter().map(|b| b.feigned.clone()).collect();
+        let all = self.products(&columns).all;
+        let pull = all.view((1, 0), (count, 1));
+        let feigned = all.view((1, 1), (count, count)).clone_owned();
         // in units in which the information is one, the feigned part of each direction is a fraction
         let root = at.hessian.clone().cholesky()?.l();
         let half = root.solve_lower_triangular(&feigned)?;
@@ -178,11 +196,6 @@ impl Pass<'_> {
     }
 }
 
-/// AᵀB by the product that is fast for wide A.
-fn crossed(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    (b.transpose() * a).transpose()
-}
-
 /// The most likely joint near `start`.
 pub(super) fn search(problem: &Problem, chart: &Chart, start: &DVector<f64>) -> Result<Found, FitError> {
     let nuisances = problem.nuisances.std.len();
@@ -199,23 +212,24 @@ pub(super) fn search(problem: &Problem, chart: &Chart, start: &DVector<f64>) -> 
         let believed: Vec<DMatrix<f64>> = weight.bands.iter().map(|b| &b.g * &eta_column).collect();
         let mut mild = 1.0;
         let mut trial = 0;
-        let (score, (next, covariance)) = loop {
+        let (chi, found_eta, (next, covariance)) = loop {
             let marginal = DMatrix::identity(nuisances, nuisances) + &weight.information / mild;
+            let marginal = Factor::of(marginal).ok_or(FitError::NoiseSingular)?;
             let here = Pass {
                 problem,
                 chart,
                 data: &data,
                 weight: &weight,
-                believed: believed.clone(),
+                believed: &believed,
                 mild,
-                marginal: marginal.cholesky().ok_or(FitError::NoiseSingular)?,
+                marginal,
                 prior: chart.prior(),
             };
             let (next, score) = here.descend(&p)?;
             let corrected = here.corrected(&next, &score);
             trial += 1;
             if score.chi / freedom < STEEP || trial > MILDER {
-                break (score, corrected.ok_or(FitError::NoMinimum)?);
+                break (score.chi, here.eta(&score), corrected.ok_or(FitError::NoMinimum)?);
             }
             mild *= score.chi / freedom;
         };
@@ -235,11 +249,11 @@ pub(super) fn search(problem: &Problem, chart: &Chart, start: &DVector<f64>) -> 
             Shape::Full => true,
         };
         let moved = (0..p.len()).any(|i| told(i) && (next[i] - p[i]).abs() > 0.5 * covariance[(i, i)].sqrt());
-        eta = score.eta;
+        eta = found_eta;
         found = Some(Found {
             p: next.clone(),
             covariance,
-            chi_square: score.chi * mild / freedom,
+            chi_square: chi * mild / freedom,
             largest_error: eta.amax(),
             settled: !moved && mild == 1.0,
         });

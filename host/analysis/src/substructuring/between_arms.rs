@@ -1,0 +1,281 @@
+//! The stiffness between the arms along z: one of two estimates, or a reason why neither can be given.
+//!
+//! `fit` knows more: what is wrong alike in all cells and configurations, and the noise of all three; and its model fails loudly. The
+//! recommended estimate (Eq. A.1, averaged) needs the assembly only. It answers where the fit was not made or leaves too wide an
+//! interval. Where the fit's model failed it does not: on random rigs whose specimen resonates between the arms it was wrong by a quarter, with
+//! an interval of 4 %.
+//!
+//! What both estimate is the static compliance along z of everything between the virtual points, contact and clamps in series, their
+//! tilts with their levers included: 1/C_zz. The form of the joint in `fit` is the diagonal one: against the arms' inertia the
+//! joint's rotations push back with next to nothing, so that z feels the couplings of a leaning clamp through a lever of hundredths
+//! of a millimetre, and the full form spends thirty parameters more on it.
+
+use super::averaged::Averaged;
+use super::fit::{FitError, Fitted};
+use super::idm::Dof;
+use serde::Serialize;
+
+/// χ² per degree of freedom up to which a fit is believed; its interval is widened by the root of it.
+pub const BELIEVED: f64 = 4.0;
+/// The recommended estimate is given up where noise alone would have moved it by more than this fraction of it: a correction that large
+/// is drawn at FRFs that are as noisy as itself, and there it has been wrong by as much.
+pub const MOVED: f64 = 0.05;
+/// Two answers further apart than this many standard deviations of their difference contradict each other.
+const APART: f64 = 4.0;
+
+/// Which estimate the answer is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Basis {
+    /// Maximum likelihood over A, B and AJB.
+    Fit,
+    /// Eq. (A.1) of the assembly, averaged as a compliance.
+    Recommended,
+}
+
+/// The stiffness between the arms along z.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct BetweenArms {
+    /// N/m.
+    pub stiffness_n_per_m: f64,
+    /// Its 95 % interval, N/m.
+    pub ci95: [f64; 2],
+    /// Which estimate it is.
+    pub basis: Basis,
+}
+
+/// Why an estimate gives no stiffness along z.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Unfit {
+    /// It was not made.
+    #[error("it was not made")]
+    NotMade,
+    /// The fit ended without a result.
+    #[error("{0}")]
+    Failed(FitError),
+    /// The model of a spring and a damper between A and B does not describe the data.
+    #[error(
+        "the residuals are {:.1} times what noise and errors of position allow, so something that is no spring and damper lies between the arms, or A or B changed",
+        chi_square.sqrt()
+    )]
+    Misfit {
+        /// χ² per degree of freedom.
+        chi_square: f64,
+    },
+    /// It stands on the model that failed in the fit.
+    #[error("it would be the mean of what is no spring and damper")]
+    SameModel,
+    /// Noise or errors of geometry leave no narrow interval.
+    #[error("the data do not tell it from {:.0} N/µm and above", low_n_per_m * 1e-6)]
+    NotIdentified {
+        /// The lower limit that is left, N/m.
+        low_n_per_m: f64,
+    },
+    /// The noise of the FRFs is not known, so the interval would hold half of the errors only.
+    #[error("the noise of the FRFs is not known")]
+    NoiseUnknown,
+    /// Noise moves the estimate by more than can be corrected.
+    #[error("noise alone moves it by {:.0} %, and so large a correction is not known", fraction * 100.0)]
+    Moved {
+        /// Of the stiffness.
+        fraction: f64,
+    },
+}
+
+impl Unfit {
+    /// Whether the model failed, and not the data's precision.
+    fn is_model(&self) -> bool {
+        matches!(self, Unfit::Misfit { .. } | Unfit::Failed(FitError::Misfit { .. }))
+    }
+}
+
+/// Why there is no stiffness between the arms.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoStiffness {
+    /// Neither estimate holds.
+    #[error("not identified: by the fit, {fit}; by the assembly alone, {recommended}")]
+    Neither {
+        /// Why not by the fit.
+        fit: Unfit,
+        /// Why not by the recommended estimate.
+        recommended: Unfit,
+    },
+    /// Both hold, and contradict each other.
+    #[error(
+        "not identified: the fit says {:.1} N/µm and the assembly alone {:.1}, further apart than both intervals allow; A or B alone is not what it is in the assembly",
+        fit_n_per_m * 1e-6, recommended_n_per_m * 1e-6
+    )]
+    Contradiction {
+        /// N/m.
+        fit_n_per_m: f64,
+        /// N/m.
+        recommended_n_per_m: f64,
+    },
+}
+
+/// Decides between the outcome of [`fit`](super::fit::fit) and the recommended estimate, of the same band and modes; `None` where one was not
+/// made.
+///
+/// # Errors
+/// [`NoStiffness`] where neither holds, or both contradict each other.
+pub fn between_arms(
+    fit: Option<Result<&Fitted, &FitError>>,
+    recommended: Option<&Averaged>,
+) -> Result<BetweenArms, NoStiffness> {
+    match (by_fit(fit), by_assembly(recommended)) {
+        // a specimen that resonates between the arms leaves the mean of a compliance narrow and wrong
+        (Err(misfit), _) if misfit.is_model() => {
+            Err(NoStiffness::Neither { fit: misfit, recommended: Unfit::SameModel })
+        }
+        (Ok(fit), Ok(other)) if apart(&fit, &other) > APART => Err(NoStiffness::Contradiction {
+            fit_n_per_m: fit.stiffness_n_per_m,
+            recommended_n_per_m: other.stiffness_n_per_m,
+        }),
+        (Ok(found), _) | (Err(_), Ok(found)) => Ok(found),
+        (Err(fit), Err(recommended)) => Err(NoStiffness::Neither { fit, recommended }),
+    }
+}
+
+fn by_fit(fit: Option<Result<&Fitted, &FitError>>) -> Result<BetweenArms, Unfit> {
+    let fit = fit.ok_or(Unfit::NotMade)?.map_err(|error| Unfit::Failed(error.clone()))?;
+    let z = fit.joint.get(&Dof::Z).ok_or(Unfit::NotMade)?;
+    if fit.chi_square_per_dof > BELIEVED {
+        return Err(Unfit::Misfit { chi_square: fit.chi_square_per_dof });
+    }
+    if !z.identified {
+        return Err(Unfit::NotIdentified { low_n_per_m: z.ci95[0].max(0.0) });
+    }
+    Ok(BetweenArms { stiffness_n_per_m: z.stiffness, ci95: z.ci95, basis: Basis::Fit })
+}
+
+fn by_assembly(recommended: Option<&Averaged>) -> Result<BetweenArms, Unfit> {
+    let recommended = recommended.ok_or(Unfit::NotMade)?;
+    let z = recommended.joint.get(&Dof::Z).ok_or(Unfit::NotMade)?;
+    if !recommended.noise_known {
+        return Err(Unfit::NoiseUnknown);
+    }
+    if !z.identified {
+        return Err(Unfit::NotIdentified { low_n_per_m: z.ci95[0] });
+    }
+    let fraction = (z.bias / z.stiffness).abs();
+    if fraction > MOVED {
+        return Err(Unfit::Moved { fraction });
+    }
+    Ok(BetweenArms { stiffness_n_per_m: z.stiffness, ci95: z.ci95, basis: Basis::Recommended })
+}
+
+/// The difference of the two compliances in its standard deviations: in compliance both are nearly normal.
+fn apart(one: &BetweenArms, other: &BetweenArms) -> f64 {
+    let compliance = |b: &BetweenArms| {
+        let [low, high] = b.ci95.map(f64::recip);
+        (b.stiffness_n_per_m.recip(), (low - high).abs() / 2.0 / super::joint_over_bands::NORMAL_95)
+    };
+    let ((a, a_std), (b, b_std)) = (compliance(one), compliance(other));
+    (a - b).abs() / a_std.hypot(b_std)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::substructuring::averaged::{DofEstimate, Priors};
+    use crate::substructuring::fit::{FittedDof, Shape};
+    use std::collections::BTreeMap;
+
+    const BAND: crate::band::Band = crate::band::Band { low_hz: 300.0, high_hz: 600.0 };
+
+    fn fitted(stiffness: f64, std: f64, chi_square: f64, identified: bool) -> Fitted {
+        let ci95 = [stiffness - 2.0 * std, stiffness + 2.0 * std];
+        let z = FittedDof {
+            stiffness,
+            std,
+            ci95,
+            identified,
+            damping: 0.0,
+            damping_std: 1.0,
+            damping_identified: false,
+        };
+        Fitted {
+            band_hz: BAND,
+            lines: 601,
+            idms: 6,
+            priors: Priors::default(),
+            mounting: 0.005,
+            shape: Shape::Diagonal,
+            joint: BTreeMap::from([(Dof::Z, z)]),
+            coupling_si: BTreeMap::new(),
+            chi_square_per_dof: chi_square,
+            largest_error: 2.0,
+            converged: true,
+        }
+    }
+
+    fn averaged(stiffness: f64, std: f64, bias: f64) -> Averaged {
+        let z = DofEstimate {
+            stiffness,
+            std,
+            std_noise: std,
+            std_geometry: 0.0,
+            ci95: [stiffness - 2.0 * std, stiffness + 2.0 * std],
+            bias,
+            damping: 0.0,
+            identified: true,
+        };
+        Averaged {
+            band_hz: BAND,
+            lines: 601,
+            idms: 6,
+            priors: Priors::default(),
+            noise_known: true,
+            joint: BTreeMap::from([(Dof::Z, z)]),
+        }
+    }
+
+    #[test]
+    fn the_fit_goes_before_what_agrees_with_it() {
+        let (fit, other) = (fitted(27e6, 0.5e6, 0.9, true), averaged(26e6, 0.4e6, 0.0));
+        let found = between_arms(Some(Ok(&fit)), Some(&other)).expect("both hold");
+        assert_eq!((found.basis, found.stiffness_n_per_m), (Basis::Fit, 27e6));
+        assert_eq!(between_arms(Some(Ok(&fit)), None), Ok(found));
+    }
+
+    #[test]
+    fn the_assembly_alone_answers_where_the_fit_cannot() {
+        let other = averaged(26e6, 0.4e6, 0.1e6);
+        let wide = fitted(30e6, 9e6, 0.9, false);
+        for fit in [None, Some(Err(&FitError::NoMinimum)), Some(Ok(&wide))] {
+            let found = between_arms(fit, Some(&other)).expect("the assembly's holds");
+            assert_eq!((found.basis, found.stiffness_n_per_m), (Basis::Recommended, 26e6));
+        }
+    }
+
+    #[test]
+    fn what_neither_holds_is_said_and_not_guessed() {
+        let wide = fitted(30e6, 9e6, 0.9, false);
+        let noisy = averaged(26e6, 0.4e6, 5e6);
+        let mut unknown = averaged(26e6, 0.4e6, 0.0);
+        unknown.noise_known = false;
+        for (other, says) in [(noisy, "19 %"), (unknown, "noise of the FRFs")] {
+            let why = between_arms(Some(Ok(&wide)), Some(&other)).expect_err("neither holds").to_string();
+            assert!(why.contains(says) && why.contains("12 N/µm"), "{why}");
+        }
+    }
+
+    #[test]
+    fn where_the_model_fails_no_mean_takes_its_place() {
+        let other = averaged(26e6, 0.4e6, 0.0);
+        let (poor, misfit) = (fitted(30e6, 0.5e6, 5.0, true), FitError::Misfit { chi_square: 40.0 });
+        for fit in [Ok(&poor), Err(&misfit)] {
+            let why = between_arms(Some(fit), Some(&other)).expect_err("refused").to_string();
+            assert!(why.contains("no spring and damper"), "{why}");
+        }
+    }
+
+    #[test]
+    fn two_that_contradict_each_other_are_no_answer() {
+        let (fit, other) = (fitted(27e6, 0.2e6, 0.9, true), averaged(32e6, 0.2e6, 0.0));
+        let why = between_arms(Some(Ok(&fit)), Some(&other)).expect_err("five apart").to_string();
+        assert!(why.contains("27.0") && why.contains("32.0"), "{why}");
+    }
+}
