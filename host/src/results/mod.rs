@@ -20,8 +20,8 @@ pub use crate::hysteresis::{Kind as Excitation, OverCycles, Shape};
 pub use crate::substructuring::averaged::Averaged;
 pub use crate::substructuring::joint_over_bands::BandStatistic as Statistics;
 pub use check::{
-    BACK_COUPLING, Check, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, SAME_IN_ALL, SERIES_COMPLIANCE,
-    UNCHANGED,
+    BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, SAME_IN_ALL,
+    SERIES_COMPLIANCE, UNCHANGED,
 };
 pub use completeness::Completeness;
 pub use curves::{FrfCurve, Role, UsableBand, rounded};
