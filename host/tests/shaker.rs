@@ -122,6 +122,7 @@ fn the_papers_fifteen_levels_on_the_default_rig() {
     for row in raw {
         let (f, amplitude) = (row.frequency_hz.unwrap(), row.amplitude_m.unwrap());
         let k_t = row.k_t_n_per_m.map(|k| k.mean * 1e-6);
+        assert!(row.findings.is_empty(), "{f} Hz: {:?}", row.findings);
         match f.round() as u32 {
             100 => assert!((k_t.unwrap() - 139.0).abs() < 5.0, "{row:?}"),
             200 => {
@@ -203,6 +204,8 @@ fn slipped(slider: &Slider, levels: Vec<Level>) -> Vec<(Level, [f64; 3])> {
     assert_eq!(rows.len(), levels.len());
     let errors = rows.into_iter().map(|row| {
         assert_eq!(row.shape, Shape::GrossSlip, "{row:?}");
+        // nothing is the matter with these loops, however much they ring
+        assert!(row.findings.is_empty(), "{:?}", row.findings);
         let limit = friction * load;
         let energy = 4.0 * limit * (row.amplitude_m.unwrap() - limit / k * 1e-6);
         let pairs = [

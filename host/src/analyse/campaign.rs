@@ -26,11 +26,11 @@ pub fn analyse_measurements<M: Measurements>(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Findings {
     let (names, geometry) = (measurements.cells(), measurements.geometry());
-    let cells = cells_stage::read_all(measurements, &names, wanted.replicates > 0, progress);
+    let mut cells = cells_stage::read_all(measurements, &names, wanted.replicates > 0, progress);
     let windowing = Windowing { sigma_per_s: measurements.sigma_per_s(), ..Windowing::default() };
     let mut found = Findings {
         settings: Some(Settings { windowing, lines_hz: LINES_HZ }),
-        missing: cells.missing,
+        missing: std::mem::take(&mut cells.missing),
         ..Findings::default()
     };
     found.missing.extend(given_up(&names, measurements.given_up()));
@@ -72,8 +72,7 @@ pub fn analyse_measurements<M: Measurements>(
     let fitted: Vec<_> = found.fits.iter().filter_map(|fit| Some(fit.outcome.as_ref().ok()?.row())).collect();
     let rows = found.substructured.iter().flat_map(|s| &s.rows).map(|row| &row.joint).chain(&fitted);
     let fbs = between_the_arms(&found.recommended, rows);
-    let (contact, missing) =
-        contact_stage::at_the_contact(measurements, &cells.averages, &cells.loops, fbs.as_ref());
+    let (contact, missing) = contact_stage::at_the_contact(measurements, &cells, fbs.as_ref());
     found.missing.extend(missing);
     found.contact = Some(contact);
     found.own_stiffness = Some(contact_answer::answer(measurements, &cells.averages));

@@ -3,6 +3,7 @@
 use super::averages::{Asked, CellAverage, LINES_HZ, average};
 use super::cell::{CellName, Measurements};
 use super::contact_answer;
+use super::hammer_slip::{self, HitAtContact};
 use super::hit_spectra;
 use super::impact_loops::{self, ImpactLoop};
 use super::missing::Missing;
@@ -22,6 +23,8 @@ pub struct Cells {
     pub hits: Vec<CellHits>,
     /// The loops of the hits that move the contact.
     pub loops: Vec<ImpactLoop>,
+    /// What each of these gives per newton, cell by cell.
+    pub at_contact: Vec<HitAtContact>,
     /// What could not be used.
     pub missing: Vec<Missing>,
 }
@@ -47,6 +50,7 @@ pub fn read_all<M: Measurements>(
         all.averages.extend(cell.averages);
         all.hits.extend(cell.hits);
         all.loops.extend(cell.loops);
+        all.at_contact.extend(cell.at_contact);
         all.missing.extend(cell.missing);
     }
     all
@@ -71,6 +75,7 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
     if moves_contact {
         for hit in &cell.hits {
             let Some(signals) = &hit.contact else { continue };
+            found.at_contact.extend(hammer_slip::of_hit(name, cell.fs_hz, hit));
             match impact_loops::of_hit(hit.record, &name.impact, cell.fs_hz, signals, signals.delay_s) {
                 Ok(one) => found.loops.push(one),
                 Err(error) => {

@@ -2,14 +2,16 @@
 
 use super::averages::CellAverage;
 use super::cell::Measurements;
+use super::cells_stage::Cells;
 use super::checks::{ContactChange, HiddenResonance, SeriesCompliance, at_the_specimens};
 use super::impact_loops::{self, ImpactLoop, ImpactLoops};
 use super::missing::Missing;
 use super::shaker_levels::{self, Analysed, RecordLoops};
 use super::specimen_curves::specimen_curves;
-use super::{arm_from_hits, chosen};
+use super::{arm_from_hits, chosen, hammer_slip};
 use crate::hysteresis::Correction;
 use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
+use crate::hysteresis::hammer_slip::HammerSlip;
 use crate::hysteresis::static_arm::{Basis, Identified, from_levels};
 use crate::results::{Backbone, FrfCurve, LoopCurve, Reconstruction, ShakerLoop};
 use crate::spectra::CrossSpectra;
@@ -29,6 +31,8 @@ pub struct Contact {
     pub hidden: HiddenResonance,
     /// What the corrected force is corrected by.
     pub arm: Option<Identified>,
+    /// Whether the contact slips under the hammer.
+    pub slip: HammerSlip,
     /// The loops of the impacts.
     pub impacts: Option<ImpactLoops>,
     /// The middle one of them.
@@ -50,10 +54,10 @@ pub struct Contact {
 /// Reads it. `between_the_arms` is what FBS found there.
 pub fn at_the_contact<M: Measurements>(
     measurements: &M,
-    averages: &[CellAverage],
-    impact_loops: &[ImpactLoop],
+    cells: &Cells,
     between_the_arms: Option<&BandStatistic>,
 ) -> (Contact, Vec<Missing>) {
+    let (averages, impact_loops) = (&cells.averages[..], &cells.loops[..]);
     let (geometry, sigma_per_s) = (measurements.geometry(), measurements.sigma_per_s());
     let (levels, complaints) = measurements.shaker_levels();
     let mut missing: Vec<Missing> = complaints.into_iter().map(Missing::Level).collect();
@@ -74,7 +78,8 @@ pub fn at_the_contact<M: Measurements>(
     if arm.is_none() && !(steady.is_empty() && impact_loops.is_empty()) {
         missing.push(Missing::EffectiveMass);
     }
-    let impacts = impact_loops::gathered(impact_loops, arm.as_ref(), &hidden);
+    let slip = hammer_slip::told(&cells.at_contact);
+    let impacts = impact_loops::gathered(impact_loops, arm.as_ref(), &hidden, slip.found() == Some(true));
     let shown = example(measurements, averages, impact_loops, hidden.resonance_hz());
     let (example_loop, reconstruction) =
         shown.map_or((None, None), |(drawn, rebuilt)| (Some(drawn), rebuilt));
@@ -85,6 +90,7 @@ pub fn at_the_contact<M: Measurements>(
         direct,
         hidden,
         arm,
+        slip,
         impacts,
         example_loop,
         reconstruction,

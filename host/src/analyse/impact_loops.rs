@@ -62,6 +62,8 @@ pub enum SlopeIs {
     Resonant(f64),
     /// k_eq: whether one is in it cannot be told.
     Undecided,
+    /// k_eq: the contact slips under the hammer, so that the slope goes with the force.
+    Slipping,
 }
 
 /// Analyses one hit.
@@ -91,19 +93,25 @@ pub fn gathered(
     loops: &[ImpactLoop],
     arm: Option<&Identified>,
     hidden: &HiddenResonance,
+    slips: bool,
 ) -> Option<ImpactLoops> {
     let over = |value: &dyn Fn(&FirstCycle) -> f64| {
         let values = loops.iter().map(|l| value(&l.first)).filter(|v| v.is_finite());
         OverCycles::of(&values.collect::<Vec<_>>())
     };
     let mean = |value: fn(&FirstCycle) -> f64| over(&value).map(|v| v.mean);
-    let shape = most_common(loops)?;
+    // slip that leaves the decay's frequency alone is still slip
+    let shape = match most_common(loops)? {
+        Shape::Stuck if slips => Shape::Microslip,
+        other => other,
+    };
     Some(ImpactLoops {
         records: loops.iter().map(|l| l.record).collect(),
         shape,
         slope_n_per_m: over(&|l| l.slope_n_per_m)?,
         corrected_n_per_m: arm.and_then(|arm| over(&|l| l.corrected_slope(&arm.correction))),
         slope_is: match (hidden.ok(), hidden.resonance_hz()) {
+            _ if slips => SlopeIs::Slipping,
             _ if shape != Shape::Stuck => SlopeIs::NotStraight,
             (Some(true), _) => SlopeIs::Contact,
             (_, Some(resonance_hz)) => SlopeIs::Resonant(resonance_hz),
@@ -247,7 +255,7 @@ mod tests {
 
     #[test]
     fn nothing_gives_nothing() {
-        assert_eq!(gathered(&[], None, &HiddenResonance::NoSignals), None);
+        assert_eq!(gathered(&[], None, &HiddenResonance::NoSignals, false), None);
         assert_eq!(middle(&[]), None);
     }
 }

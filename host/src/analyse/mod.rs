@@ -23,6 +23,7 @@ mod findings;
 mod fits;
 mod from_frfs;
 mod from_store;
+mod hammer_slip;
 mod hit_counts;
 mod hit_spectra;
 mod impact_loops;

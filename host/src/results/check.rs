@@ -7,6 +7,8 @@ use std::collections::BTreeMap;
 pub const SERIES_COMPLIANCE: &str = "series-compliance";
 /// Name of the check on resonances of one specimen alone.
 pub const HIDDEN_RESONANCE: &str = "hidden-resonance";
+/// Name of the check on slip under the hammer.
+pub const HAMMER_SLIP: &str = "hammer-slip";
 /// Name of the check on wear.
 pub const UNCHANGED: &str = "contact-unchanged";
 /// Name of the check on which rigid motions coupling adds.

@@ -163,6 +163,7 @@ fn levels() -> Vec<Hysteresis> {
                     level: i64::try_from(rows.len() + 1).ok(),
                     moment: Some(moment),
                     records: Vec::new(),
+                    findings: Vec::new(),
                     warnings: Vec::new(),
                 });
             }
@@ -285,6 +286,7 @@ pub fn results() -> Results {
             level: None,
             moment: None,
             records: ranges(260..=331),
+            findings: Vec::new(),
             warnings: Vec::new(),
         });
     }

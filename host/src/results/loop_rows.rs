@@ -2,7 +2,7 @@
 
 use crate::hysteresis::backbone::Law;
 use crate::hysteresis::impact::DecayCycle;
-use crate::hysteresis::{Kind as Excitation, OverCycles, Shape, ShapeEvidence};
+use crate::hysteresis::{Kind as Excitation, LoopFinding, OverCycles, Shape, ShapeEvidence};
 use serde::Serialize;
 
 /// Which force the loop was drawn with.
@@ -68,6 +68,9 @@ pub struct Hysteresis {
     /// Ids of the records used, as closed ranges.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub records: Vec<[i64; 2]>,
+    /// What is wrong with the loops or was put right, with its measure.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub findings: Vec<LoopFinding>,
     /// What a reader must know before using these numbers.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,

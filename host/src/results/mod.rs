@@ -22,8 +22,8 @@ pub use crate::substructuring::averaged::Averaged;
 pub use crate::substructuring::joint_over_bands::BandStatistic as Statistics;
 pub use answer::{Answer, Basis, BetweenArms, Clamp, ContactAnswer, Slip};
 pub use check::{
-    BACK_COUPLING, Check, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, SAME_IN_ALL, SERIES_COMPLIANCE,
-    UNCHANGED,
+    BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, SAME_IN_ALL,
+    SERIES_COMPLIANCE, UNCHANGED,
 };
 pub use completeness::Completeness;
 pub use curves::{FrfCurve, Role, UsableBand, rounded};

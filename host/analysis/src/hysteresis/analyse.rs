@@ -3,14 +3,26 @@
 use super::HysteresisError;
 use super::compliance::{ContactCompliance, ImaginaryPeak, SEARCH_HZ};
 use super::correction::Correction;
+use super::cycle::Cycle;
 use super::cycles::{Steady, Summed};
+use super::finding::LoopFinding;
+use super::friction_harmonic::Quadratures;
+use super::hum;
 use super::impact::{DecayCycle, FIRST_CYCLES, decay, dominant_frequency};
-use super::loops::{OverCycles, fundamental_stiffness, secant_stiffness, swing};
+use super::loops::{
+    OverCycles, energy, equivalent_stiffness, fundamental_stiffness, secant_stiffness, swing,
+};
+use super::plateau::Plateaus;
 use super::record::{HysteresisRecord, Relative};
+use super::repair::Repair;
 use super::shape::{Shape, ShapeEvidence, shape};
-use super::stick::{Part, first_part, flank_part, friction_limit, slope_over, strokes};
+use super::stick::{
+    Part, bends, first_part, flank_part, friction_limit, slope_over, strokes, tangent_at_reversal,
+};
+use super::timing::Timing;
 use num_complex::Complex;
 use serde::Serialize;
+use std::f64::consts::TAU;
 
 /// How the contact was moved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -61,6 +73,8 @@ pub struct LoopAnalysis {
     pub loop_force_n: Vec<f64>,
     /// Every cycle of a decay; empty for a shaker.
     pub decay_cycles: Vec<DecayCycle>,
+    /// What is wrong with the loop or was put right, with its measure.
+    pub findings: Vec<LoopFinding>,
     /// What a reader must know.
     pub warnings: Vec<String>,
 }
@@ -70,6 +84,21 @@ const STEADY: f64 = 0.7;
 
 /// A decay's frequency below this fraction of its later one is slip softening the joint: some of it, all of it.
 const SOFTENED: (f64, f64) = (0.9, 0.6);
+
+/// A frequency that was read off a record may be off by this part.
+const GUESSED: f64 = 5e-3;
+
+/// A stuck loop's phase is positive, or the force is late: below minus this, rad (a quarter of a degree),
+const LATE_RAD: f64 = 4.4e-3;
+
+/// and so many standard deviations.
+const LATE_SIGNIFICANT: f64 = 5.0;
+
+/// A negative slope counts from so many standard errors on,
+const REVERSED_SIGNIFICANT: f64 = 4.0;
+
+/// if the loop's area is no larger than this part of force times displacement.
+const NO_ENERGY: f64 = 0.05;
 
 /// A line explaining less of T than this in the first cycles is no clean loop.
 const CLEAN_LINE: f64 = 0.95;
@@ -123,26 +152,85 @@ fn is_steady(force_n: &[f64]) -> bool {
     quarter > 0 && strength(&force_n[3 * quarter..4 * quarter]) > STEADY * strength(&force_n[..quarter])
 }
 
+/// Cycles as they came, and what is to be said of their frequency.
+fn timing(record: &HysteresisRecord, frequency_hz: f64) -> (Timing, Option<LoopFinding>) {
+    let Some(tracked) = Timing::tracked(&record.force_n, record.fs_hz, frequency_hz) else {
+        return (Timing::steady(frequency_hz), None);
+    };
+    let end_hz = tracked.at(record.force_n.len() as f64 / record.fs_hz);
+    let off = LoopFinding::FrequencyOff {
+        stated_hz: record.excitation_hz,
+        from_hz: tracked.start_hz,
+        to_hz: end_hz,
+    };
+    // a guess from the record's spectrum may be off by a part of a line
+    let drifts = (end_hz / tracked.start_hz - 1.0).abs() > GUESSED;
+    (tracked, (record.excitation_hz.is_some() || drifts).then_some(off))
+}
+
+/// The force against the motion, in loops that show no plateau: late by at least this.
+fn late_at_least(quadratures: &Quadratures, frequency_hz: f64) -> Option<LoopFinding> {
+    // microslip takes energy, which a delay must have given back before any is missing
+    let friction = if quadratures.slips() { 0.6 * -5.0 * quadratures.third } else { 0.0 };
+    let ahead = friction - quadratures.first;
+    let turn = TAU * frequency_hz;
+    (ahead > LATE_RAD.max(LATE_SIGNIFICANT * quadratures.first_std)).then(|| LoopFinding::LateForce {
+        by_s: ahead / turn,
+        std_s: quadratures.first_std / turn,
+        at_least: true,
+        corrected: false,
+    })
+}
+
 fn shaker(
     record: &HysteresisRecord,
     correction: Option<&Correction>,
     frequency_hz: f64,
 ) -> Result<LoopAnalysis, HysteresisError> {
-    let cycles = Steady::new(record, correction, frequency_hz)?;
-    let Summed { mean, slopes, energies, scatter } = cycles.summed();
+    let (timing, off) = timing(record, frequency_hz);
+    let cycles = Steady::new(record, correction, timing)?;
+    let frequency_hz = timing.at(0.5 * record.force_n.len() as f64 / record.fs_hz);
+    let Summed { mean, mut slopes, mut energies, scatter } = cycles.summed();
     if swing(&mean.displacement_m) == 0.0 || swing(&mean.force_n) == 0.0 {
         return Err(HysteresisError::NoMotion);
     }
-    let k_eq = OverCycles::of(&slopes).expect("Steady::new() gives at least one cycle");
-    let (shape, evidence) = shape(&mean, &scatter);
+    let mut findings: Vec<LoopFinding> = off.into_iter().collect();
+    let raw = OverCycles::of(&slopes).expect("Steady::new() gives at least one cycle");
+    let quadratures = Quadratures::of(&cycles, &mean);
+    let (shape, evidence) = shape(&mean, &scatter, quadratures);
+    let taken = OverCycles::of(&energies).expect("as many as slopes");
+    let reversed = is_reversed(&raw, &taken, 0.25 * swing(&mean.force_n) * swing(&mean.displacement_m));
+    if reversed {
+        findings.push(LoopFinding::ReversedForce { k_eq_n_per_m: raw.mean, energy_j: taken.mean });
+    } else if shape != Shape::GrossSlip {
+        findings.extend(quadratures.and_then(|q| late_at_least(&q, frequency_hz)));
+    }
+    findings.extend(hum::at_the_loop(record, frequency_hz));
     let strokes = strokes(&mean);
     let mut warnings = Vec::new();
+    let repair = if shape == Shape::GrossSlip && !reversed {
+        let (repair, said) = Repair::of(&mean, cycles.dt_s());
+        findings.extend(said);
+        repair
+    } else {
+        Repair::default()
+    };
+    if repair.is_late() {
+        let both = cycles.each(|cycle| {
+            let cycle = repair.in_step(cycle);
+            (equivalent_stiffness(&cycle), energy(&cycle))
+        });
+        (slopes, energies) = both.into_iter().unzip();
+    }
+    let k_eq = OverCycles::of(&slopes).expect("as many as there are cycles");
+    let friction = repair.friction(&mean);
     let stick_part: Option<Part> = match shape {
         Shape::Stuck | Shape::Elliptical => None,
-        Shape::Microslip => Some(first_part(&mean, &strokes)),
-        Shape::GrossSlip => Some(flank_part(&mean, &strokes)),
+        Shape::Microslip => Some(first_part(&friction, &strokes)),
+        Shape::GrossSlip => Some(flank_part(&friction, &strokes)),
     };
     let k_t = match (shape, stick_part) {
+        _ if reversed => None,
         (Shape::Stuck, _) => Some(k_eq),
         (_, None) => {
             warnings.push(
@@ -152,8 +240,19 @@ fn shaker(
             None
         }
         (_, Some(part)) => {
-            let values: Vec<f64> =
-                cycles.each(|cycle| slope_over(cycle, &strokes, part)).into_iter().flatten().collect();
+            let read = |cycle: &Cycle| {
+                if bends(part) {
+                    tangent_at_reversal(cycle, &strokes)
+                } else {
+                    slope_over(cycle, &strokes, part)
+                }
+            };
+            let values: Vec<Option<f64>> = if repair.is_some() {
+                cycles.each(|cycle| read(&repair.friction(cycle)))
+            } else {
+                cycles.each(read)
+            };
+            let values: Vec<f64> = values.into_iter().flatten().collect();
             if values.len() < slopes.len() {
                 warnings.push(format!(
                     "{} of {} cycles have too few samples on the stick part: sample faster, or excite more slowly",
@@ -161,10 +260,20 @@ fn shaker(
                     slopes.len()
                 ));
             }
-            OverCycles::of(&values)
+            let before = repair.is_some().then(|| read(&mean)).flatten();
+            OverCycles::of(&values).map(|k| widened(k, before, repair.unsure()))
         }
     };
-    let friction_limit_n = if shape == Shape::GrossSlip { friction_limit(&mean, &strokes) } else { None };
+    let mut friction_limit_n =
+        if shape == Shape::GrossSlip && !reversed { friction_limit(&friction, &strokes) } else { None };
+    if let (Some(limit), Some(k)) = (friction_limit_n, k_t)
+        && let Some(plateaus) = Plateaus::of(&friction, &strokes, k.mean, limit)
+        && plateaus.is_uneven()
+    {
+        findings.push(LoopFinding::UnevenLoad { change: plateaus.change, std: plateaus.std });
+        friction_limit_n = Some(plateaus.limit_n);
+    }
+    let shown = repair.in_step(&mean);
     Ok(LoopAnalysis {
         kind: Kind::Shaker,
         frequency_hz,
@@ -176,16 +285,30 @@ fn shaker(
         stick_part,
         k_eq_n_per_m: k_eq,
         energy_j: OverCycles::of(&energies),
-        k_secant_n_per_m: Some(secant_stiffness(&mean)),
-        k_fundamental_n_per_m: Some(fundamental_stiffness(&mean)),
+        k_secant_n_per_m: Some(secant_stiffness(&shown)),
+        k_fundamental_n_per_m: Some(fundamental_stiffness(&shown)),
         friction_limit_n,
         friction_coefficient: friction_limit_n.zip(record.normal_load_n).map(|(limit, load)| limit / load),
         phase_deg: evidence.phase_deg,
         loop_displacement_m: mean.displacement_m,
         loop_force_n: mean.force_n,
         decay_cycles: Vec::new(),
+        findings,
         warnings,
     })
+}
+
+/// Whether the force has the wrong sign: it falls where the contact is pushed, and the loop takes no energy. One beside a resonance
+/// may fall too, but takes some. `product` is that of both amplitudes, J.
+fn is_reversed(slope: &OverCycles, energy: &OverCycles, product: f64) -> bool {
+    let error = slope.std / (slope.cycles as f64).sqrt();
+    slope.mean < -REVERSED_SIGNIFICANT * error && energy.mean < NO_ENERGY * product
+}
+
+/// The interval opened by what is not known of a repair that moved it here from `before`.
+fn widened(k: OverCycles, before: Option<f64>, unsure: f64) -> OverCycles {
+    let more = before.map_or(0.0, |before| 2.0 * unsure * (k.mean - before).abs());
+    OverCycles { ci95: k.ci95.map(|[low, high]| [low - more, high + more]), ..k }
 }
 
 /// A resonance of one specimen that the record itself shows.
@@ -209,6 +332,11 @@ fn impact(record: &HysteresisRecord, motion: &Relative) -> Result<LoopAnalysis, 
         Shape::Stuck
     };
     let hidden = hidden_resonance(record);
+    // the loops of a decay do not close, and have no energy to ask
+    let findings: Vec<LoopFinding> = (k.mean < 0.0)
+        .then_some(LoopFinding::ReversedForce { k_eq_n_per_m: k.mean, energy_j: 0.0 })
+        .into_iter()
+        .collect();
     let mut warnings = vec![
         "slope over the first cycles of a decay: every mode that the hit excites is in it, so it is not the contact's stiffness alone".to_string(),
     ];
@@ -232,7 +360,7 @@ fn impact(record: &HysteresisRecord, motion: &Relative) -> Result<LoopAnalysis, 
         force_amplitude_n: 0.5 * swing(&record.force_n[used[0].first_sample..used[0].end_sample]),
         shape,
         shape_evidence: None,
-        k_t_n_per_m: (shape == Shape::Stuck && hidden.is_none()).then_some(k),
+        k_t_n_per_m: (shape == Shape::Stuck && hidden.is_none() && findings.is_empty()).then_some(k),
         stick_part: None,
         k_eq_n_per_m: k,
         energy_j: None,
@@ -244,6 +372,7 @@ fn impact(record: &HysteresisRecord, motion: &Relative) -> Result<LoopAnalysis, 
         loop_displacement_m: decay.displacement_m[from..to].to_vec(),
         loop_force_n: record.force_n[from..to].to_vec(),
         decay_cycles: decay.cycles,
+        findings,
         warnings,
     })
 }

@@ -10,6 +10,7 @@ use super::integration::closed_cycle;
 use super::loops::energy;
 use super::record::{HysteresisRecord, RelativeMotion};
 use super::sums::{dot, mean};
+use super::timing::Timing;
 use crate::parallel::prelude::*;
 use std::ops::Range;
 
@@ -23,11 +24,9 @@ const BLOCK: usize = 64;
 pub(super) struct Steady<'a> {
     record: &'a HysteresisRecord,
     correction: Option<&'a Correction>,
-    /// Samples of one period.
-    period: f64,
+    timing: Timing,
     points: usize,
     cycles: usize,
-    dt_s: f64,
 }
 
 /// What all cycles give together.
@@ -83,7 +82,7 @@ struct Scratch {
 }
 
 impl<'a> Steady<'a> {
-    /// The cycles of `frequency_hz` in a record that [`HysteresisRecord::check`] found good, with the force at the contact if a
+    /// The cycles of this timing in a record that [`HysteresisRecord::check`] found good, with the force at the contact if a
     /// correction is given.
     ///
     /// # Errors
@@ -91,18 +90,23 @@ impl<'a> Steady<'a> {
     pub fn new(
         record: &'a HysteresisRecord,
         correction: Option<&'a Correction>,
-        frequency_hz: f64,
+        timing: Timing,
     ) -> Result<Self, HysteresisError> {
         let samples = record.force_n.len();
-        let period = record.fs_hz / frequency_hz;
-        let points = period.round() as usize;
+        let time_s = samples as f64 / record.fs_hz;
+        let frequency_hz = timing.at(0.5 * time_s);
+        let points = (record.fs_hz / frequency_hz).round() as usize;
         // a hair of tolerance: 20 cycles exactly must not count as 19
-        let cycles = (samples as f64 / period + 1e-6).floor() as usize;
+        let cycles = (timing.cycles(time_s) + 1e-6).floor() as usize;
         if cycles == 0 || points < FEWEST_SAMPLES {
             return Err(HysteresisError::NoCycle { frequency_hz, samples, points });
         }
-        let dt_s = 1.0 / (frequency_hz * points as f64);
-        Ok(Self { record, correction, period, points, cycles, dt_s })
+        Ok(Self { record, correction, timing, points, cycles })
+    }
+
+    /// Time between the points of the average cycle, s.
+    pub fn dt_s(&self) -> f64 {
+        self.timing.begin_s(self.cycles as f64) / (self.cycles * self.points) as f64
     }
 
     /// `look` at every cycle, in order.
@@ -162,29 +166,31 @@ impl<'a> Steady<'a> {
     /// Cycle number `cycle`.
     fn cut<'s>(&self, cycle: usize, scratch: &'s mut Scratch) -> &'s Cycle {
         let Scratch { cycle: cut, motion, force } = scratch;
-        let begin = cycle as f64 * self.period;
+        let [begin_s, end_s] = [0.0, 1.0].map(|more| self.timing.begin_s(cycle as f64 + more));
+        let (begin, period) = (begin_s * self.record.fs_hz, (end_s - begin_s) * self.record.fs_hz);
+        let dt_s = (end_s - begin_s) / self.points as f64;
         // a cubic takes one sample before and two after
         let first = begin.floor() as isize - 1;
-        let end = (begin + self.period).floor() as isize + 3;
+        let end = (begin + period).floor() as isize + 3;
         self.record.relative_motion(first..end, motion);
         match self.correction {
             None => self.record.force(first..end, force),
             Some(correction) => correction.force(self.record, first..end, force),
         }
         let from = begin - first as f64;
-        let step = self.period / self.points as f64;
+        let step = period / self.points as f64;
         resample([motion, force], from, step, self.points, [&mut cut.velocity_m_per_s, &mut cut.force_n]);
         centre(&mut cut.velocity_m_per_s);
         centre(&mut cut.force_n);
         match self.record.motion {
             RelativeMotion::Velocity { .. } => {
-                closed_cycle(&cut.velocity_m_per_s, self.dt_s, &mut cut.displacement_m);
+                closed_cycle(&cut.velocity_m_per_s, dt_s, &mut cut.displacement_m);
             }
             RelativeMotion::Displacement { .. } => {
                 std::mem::swap(&mut cut.velocity_m_per_s, &mut cut.displacement_m);
                 let (x, n) = (&cut.displacement_m, self.points);
                 cut.velocity_m_per_s.clear();
-                let slope = |j: usize| (x[(j + 1) % n] - x[(j + n - 1) % n]) / (2.0 * self.dt_s);
+                let slope = |j: usize| (x[(j + 1) % n] - x[(j + n - 1) % n]) / (2.0 * dt_s);
                 cut.velocity_m_per_s.extend((0..n).map(slope));
             }
         }

@@ -16,21 +16,31 @@ pub mod correction;
 pub mod cycle;
 pub mod cycles;
 pub mod delays;
+pub mod finding;
 pub mod first_cycle;
+pub mod friction_harmonic;
+pub mod hammer_slip;
+pub mod hit_response;
+mod hum;
 pub mod impact;
 pub mod impact_spectra;
 pub mod integration;
+mod law_fit;
 pub mod loops;
 pub mod phase_split;
+mod plateau;
 pub mod reconstruction;
 pub mod record;
+mod repair;
 pub mod shape;
 pub mod static_arm;
 mod stick;
 mod sums;
+mod timing;
 
 pub use analyse::{Kind, LoopAnalysis, analyse, analyse_corrected};
 pub use correction::Correction;
+pub use finding::LoopFinding;
 pub use loops::OverCycles;
 pub use record::{HysteresisRecord, RelativeMotion};
 pub use shape::{Shape, ShapeEvidence};
@@ -83,5 +93,9 @@ pub enum HysteresisError {
     #[error("force or relative motion is constant: there is no loop; check the channels")]
     NoMotion,
 }
+#[cfg(test)]
+mod faulty_loops_tests;
+#[cfg(test)]
+mod loop_bench;
 #[cfg(test)]
 mod synthetic_tests;

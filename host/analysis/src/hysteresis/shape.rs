@@ -2,11 +2,13 @@
 //!
 //! A stuck contact beside whatever linear structure gives T = k Δx + c Δẋ at every harmonic: a line, or an ellipse when something
 //! between the measured spots resonates. Slip does not: its loop has corners. So the residual of that two-parameter fit tells
-//! slip from ellipse, against the noise seen from cycle to cycle; the phase tells ellipse from line; the final tangent
+//! slip from ellipse, against the noise seen from cycle to cycle; where it is too small for that, the third harmonic of T tells microslip
+//! from damping; the phase tells ellipse from line; the final tangent
 //! tells gross slip from microslip.
 
 use super::cycle::Cycle;
 use super::cycles::Scatter;
+use super::friction_harmonic::Quadratures;
 use super::loops::{fundamental_stiffness, harmonics};
 use super::stick::{final_tangent, first_part, slope_over, strokes};
 use serde::Serialize;
@@ -38,6 +40,9 @@ pub struct ShapeEvidence {
     pub harmonics: [f64; 4],
     /// Tangent at the end of the strokes over the stiffness after the reversal.
     pub final_tangent: f64,
+    /// What dissipates: friction or a dashpot; none for few cycles.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quadratures: Option<Quadratures>,
 }
 
 /// Below this a residual may be the instruments' linearity.
@@ -53,7 +58,11 @@ const ELLIPSE_DEG: f64 = 10.0;
 const PLATEAU: f64 = 0.05;
 
 /// Tells the shape from the averaged loop and how the cycles scatter about it.
-pub(super) fn shape(mean: &Cycle, scatter: &Scatter) -> (Shape, ShapeEvidence) {
+pub(super) fn shape(
+    mean: &Cycle,
+    scatter: &Scatter,
+    quadratures: Option<Quadratures>,
+) -> (Shape, ShapeEvidence) {
     let (k, c) = linear_fit(mean);
     let residual: Vec<f64> = (0..mean.force_n.len())
         .map(|i| mean.force_n[i] - k * mean.displacement_m[i] - c * mean.velocity_m_per_s[i])
@@ -70,9 +79,14 @@ pub(super) fn shape(mean: &Cycle, scatter: &Scatter) -> (Shape, ShapeEvidence) {
         phase_deg: fundamental_stiffness(mean).arg().to_degrees(),
         harmonics: harmonics(mean),
         final_tangent: final_tangent(mean, &strokes, initial),
+        quadratures,
     };
-    let shape = if evidence.nonlinearity > NONLINEAR.max(SIGNIFICANT * nonlinearity_noise) {
+    let bends = evidence.nonlinearity > NONLINEAR.max(SIGNIFICANT * nonlinearity_noise);
+    let begins_to_slip = evidence.quadratures.is_some_and(|q| q.slips());
+    let shape = if bends {
         if evidence.final_tangent < PLATEAU { Shape::GrossSlip } else { Shape::Microslip }
+    } else if begins_to_slip {
+        Shape::Microslip
     } else if evidence.phase_deg.abs() > ELLIPSE_DEG {
         Shape::Elliptical
     } else {

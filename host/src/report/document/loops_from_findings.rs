@@ -1,7 +1,7 @@
 //! The loops in the shape of the results.
 
 use crate::analyse::{Contact, Findings, ImpactLoops, RecordLoops, SlopeIs};
-use crate::hysteresis::{Kind, LoopAnalysis, OverCycles, Shape};
+use crate::hysteresis::{Kind, LoopAnalysis, OverCycles};
 use crate::report::words::warning_sentences;
 use crate::results::{DecayStep, Force, Hysteresis, ranges};
 
@@ -40,6 +40,7 @@ fn of_impacts(impacts: &ImpactLoops) -> Vec<Hysteresis> {
         level: None,
         moment: None,
         records: ranges(impacts.records.iter().copied()),
+        findings: Vec::new(),
         warnings: warnings.clone(),
     };
     let mut rows = vec![row(Force::Raw, impacts.slope_n_per_m, &impacts.decay)];
@@ -52,7 +53,7 @@ fn of_records(records: &[RecordLoops], resonance_hz: Option<f64>) -> Vec<Hystere
     let row = |one: &RecordLoops, found: &LoopAnalysis, force| {
         let mut row = of_record(found, force);
         (row.level, row.moment) = (one.level.map(|(id, _)| id), one.level.map(|(_, moment)| moment.name()));
-        if let (Shape::Stuck, Some(resonance_hz)) = (found.shape, resonance_hz) {
+        if let (Some(_), Some(resonance_hz)) = (found.k_t_n_per_m, resonance_hz) {
             row.warnings.push(warning_sentences::beside_resonance(found.frequency_hz, resonance_hz));
         }
         row
@@ -85,6 +86,12 @@ fn of_record(found: &LoopAnalysis, force: Force) -> Hysteresis {
         level: None,
         moment: None,
         records: Vec::new(),
-        warnings: found.warnings.clone(),
+        findings: found.findings.clone(),
+        warnings: found
+            .warnings
+            .iter()
+            .cloned()
+            .chain(found.findings.iter().map(warning_sentences::loop_finding))
+            .collect(),
     }
 }

@@ -7,10 +7,11 @@ use crate::analyse::checks::{
     SeriesCompliance, Sizes, rigid_motions_suffice,
 };
 use crate::hysteresis::compliance::ImaginaryPeak;
+use crate::hysteresis::hammer_slip::{HammerSlip, Unclear};
 use crate::hysteresis::phase_split::{PhaseSplit, Specimen};
 use crate::results::{
-    BACK_COUPLING, Check, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, SAME_IN_ALL, SERIES_COMPLIANCE,
-    UNCHANGED,
+    BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, SAME_IN_ALL,
+    SERIES_COMPLIANCE, UNCHANGED,
 };
 use crate::substructuring::cmif::Cmif;
 use crate::substructuring::explained::BEYOND;
@@ -28,6 +29,7 @@ pub fn all(found: &Findings) -> Vec<Check> {
     if let Some(contact) = &found.contact {
         checks.push(series_compliance(&contact.series));
         checks.push(hidden_resonance(&contact.hidden));
+        checks.push(hammer_slip(&contact.slip));
         checks.extend(contact.change.as_ref().map(contact_change));
     }
     checks
@@ -207,6 +209,43 @@ fn series_compliance(found: &SeriesCompliance) -> Check {
                  read as k_T."
             )))
         }
+    }
+}
+
+/// Whether the contact slips under the hammer.
+fn hammer_slip(found: &HammerSlip) -> Check {
+    let meaning = match found {
+        HammerSlip::Slips(scaling) => format!(
+            "The contact slips under the hammer: what it answers per newton depends on how hard it is hit ({} times what scatter explains; 1 % more force changes T \
+             per newton by {} %). What the hits say of stiffness is no k_T: hit more gently, or load the contact more.",
+            short(scaling.variance_ratio),
+            short(scaling.change_per_force)
+        ),
+        HammerSlip::Sticks(scaling) => format!(
+            "The contact sticks under the hammer: over {} hits whose forces scatter by {} %, T and the specimens' motions per newton do not depend on the force (T by \
+             {} ± {} % for 1 % of force).",
+            scaling.hits,
+            short(100.0 * scaling.force_scatter),
+            short(scaling.change_per_force),
+            short(scaling.std)
+        ),
+        HammerSlip::CannotTell(Unclear::TooFewHits { differences, needed }) => format!(
+            "Whether the contact slips under the hammer cannot be told: {differences} hits can be compared with another one of their cell, {needed} are needed."
+        ),
+        HammerSlip::CannotTell(Unclear::TooAlike { force_scatter, .. }) => format!(
+            "Whether the contact slips under the hammer cannot be told: the hits of a cell differ by only {} % in force. Vary the coil's pulse by some per cent.",
+            short(100.0 * force_scatter)
+        ),
+    };
+    let check = Check::new(HAMMER_SLIP, found.found().map(|slips| !slips), meaning);
+    match found {
+        HammerSlip::Slips(scaling) | HammerSlip::Sticks(scaling) => check
+            .with("change_per_force", scaling.change_per_force)
+            .with("change_per_force_std", scaling.std)
+            .with("variance_ratio", scaling.variance_ratio)
+            .with("force_scatter", scaling.force_scatter)
+            .with("peak_tangential_n", scaling.peak_tangential_n),
+        HammerSlip::CannotTell(_) => check,
     }
 }
 

@@ -1,7 +1,8 @@
 //! What a reader must know before using a number.
 
-use super::number::short;
+use super::number::{decimals, micro, short};
 use crate::analyse::{ImpactLoops, NoFit, SlopeIs};
+use crate::hysteresis::LoopFinding;
 use crate::substructuring::direct::Direct;
 
 /// Noise above this part of the stiffness is told.
@@ -50,11 +51,64 @@ pub fn impact_loops(found: &ImpactLoops) -> Vec<String> {
             "This slope is k_eq, not k_T: a resonance of one specimen at {} Hz is excited by every hit and moves Δx without the force.",
             short(f)
         )),
+        SlopeIs::Slipping => warnings.push(
+            "This slope is k_eq, not k_T: the contact slips under the hammer, so that it goes with the force.".into(),
+        ),
         SlopeIs::Undecided => warnings.push(
             "This slope is called k_eq: whether a resonance of one specimen is in it cannot be told from these records.".into(),
         ),
     }
     warnings
+}
+
+/// What a loop shows that must not pass in silence.
+pub fn loop_finding(found: &LoopFinding) -> String {
+    let micros = |s: f64| short(1e6 * s);
+    match *found {
+        LoopFinding::ReversedForce { k_eq_n_per_m, .. } => format!(
+            "the force falls while the contact is pushed ({} N/µm) and the loop takes no energy: the force's sign is wrong, or the signals of A and B are swapped; no k_T is given",
+            short(micro(k_eq_n_per_m))
+        ),
+        LoopFinding::LateForce { by_s, at_least: true, .. } => format!(
+            "the loop gives energy instead of taking it: the force comes at least {} µs later than the motion, or something between the spots resonates; check the channels' delays",
+            micros(by_s)
+        ),
+        LoopFinding::LateForce { by_s, std_s, corrected, .. } => {
+            let way = if by_s < 0.0 { "earlier" } else { "later" };
+            let done =
+                if corrected { "; it was put in step before k_T, friction and energy were read" } else { "" };
+            format!(
+                "the force comes {} ± {} µs {way} than the motion{done}; check the channels' delays",
+                micros(by_s.abs()),
+                micros(std_s)
+            )
+        }
+        LoopFinding::Viscous { viscous_n_s_per_m, force_n, .. } => format!(
+            "beside the friction a force goes with the velocity ({} N s/m, up to {} N): it was taken out before k_T and μN were read",
+            short(viscous_n_s_per_m),
+            short(force_n)
+        ),
+        LoopFinding::Hum { mains_hz, at_hz, part } => format!(
+            "the mains ({} Hz) hum in these signals, and one of their multiples ({} Hz) is the loop's own frequency: the slope may be {} % off; measure some hertz beside it",
+            short(mains_hz),
+            short(at_hz),
+            short(100.0 * part)
+        ),
+        LoopFinding::UnevenLoad { change, std } => format!(
+            "the friction limit changes by {} ± {} % from the middle of the stroke to its end: the normal load varies while the contact slides; μN is that at the middle",
+            short(100.0 * change),
+            short(100.0 * std)
+        ),
+        LoopFinding::FrequencyOff { stated_hz, from_hz, to_hz } => {
+            let stated = stated_hz.map_or(String::new(), |f| format!(", stated {} Hz", decimals(f, 2)));
+            format!(
+                "the excitation runs from {} to {} Hz{stated}: the cycles were cut as they came",
+                decimals(from_hz, 2),
+                decimals(to_hz, 2)
+            )
+        }
+        _ => "something else is the matter with this loop: see its findings".into(),
+    }
 }
 
 /// What a resonance of one specimen does to a loop that still looks stuck.

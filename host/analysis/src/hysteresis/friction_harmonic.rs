@@ -1,0 +1,94 @@
+//! What dissipates in a loop that looks like a straight line or a thin ellipse: friction or a dashpot.
+//!
+//! Under Δx = X cos θ a dashpot gives a force along −sin θ and nothing else. A contact that begins to slip gives −sin²θ sgn(sin θ), whose
+//! third harmonic is a fifth of its fundamental with the other sign, and nearly so for any law of microslip. So the third harmonic of T
+//! in quadrature tells microslip from damping at energies where the loop's residual from an ellipse is still lost in what
+//! instruments may bend.
+
+use super::cycle::Cycle;
+use super::cycles::Steady;
+use num_complex::Complex;
+use serde::Serialize;
+use std::f64::consts::TAU;
+
+/// A scatter needs some cycles.
+const FEWEST_CYCLES: usize = 4;
+
+/// The third harmonic counts from so many of its standard deviations on,
+const SIGNIFICANT: f64 = 5.0;
+
+/// and from this part of the fundamental on,
+const LEAST: f64 = 4e-4;
+
+/// if friction explains this part of what is dissipated, or more. A dashpot alone has 0.
+const SHARE: f64 = 0.3;
+
+/// Quadratures of T against Δx, from cycle to cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Quadratures {
+    /// Quadrature of T at the fundamental over |T₁|: the phase, rad, by which Δx lags T.
+    pub first: f64,
+    /// Its standard deviation.
+    pub first_std: f64,
+    /// Quadrature of T at the third harmonic over |T₁|; that of the stiffness on Δx₃ is taken off.
+    pub third: f64,
+    /// Its standard deviation.
+    pub third_std: f64,
+}
+
+impl Quadratures {
+    /// Of all cycles; none for few, or where nothing moves.
+    pub(super) fn of(cycles: &Steady<'_>, mean: &Cycle) -> Option<Self> {
+        let points = mean.force_n.len();
+        let wheel: Vec<Complex<f64>> = (0..points)
+            .map(|i| Complex::from_polar(2.0 / points as f64, -TAU * i as f64 / points as f64))
+            .collect();
+        let [x1, _, t1, _] = harmonics(mean, &wheel);
+        let turn = Complex::from_polar(1.0, -x1.arg());
+        let (cube, stiffness, force) = (turn.powi(3), (t1 / x1).re, t1.norm());
+        if !stiffness.is_finite() || force <= 0.0 {
+            return None;
+        }
+        // both noises count: that of Δx, raised by integration, is the larger one
+        let own = cycles.each(|cycle| {
+            let [x1, x3, t1, t3] = harmonics(cycle, &wheel);
+            [((t1 - x1 * stiffness) * turn).im / force, ((t3 - x3 * stiffness) * cube).im / force]
+        });
+        if own.len() < FEWEST_CYCLES {
+            return None;
+        }
+        let n = own.len() as f64;
+        let over = |i: usize| {
+            let mean = own.iter().map(|q| q[i]).sum::<f64>() / n;
+            let variance = own.iter().map(|q| (q[i] - mean).powi(2)).sum::<f64>() / (n - 1.0);
+            (mean, (variance / n).sqrt())
+        };
+        let ((first, first_std), (third, third_std)) = (over(0), over(1));
+        Some(Self { first, first_std, third, third_std })
+    }
+
+    /// The part of the dissipation that friction explains: 1 for microslip, 0 for a dashpot.
+    pub fn friction_share(&self) -> f64 {
+        -5.0 * self.third / self.first
+    }
+
+    /// Whether something slips, beyond doubt.
+    pub fn slips(&self) -> bool {
+        self.third < -LEAST.max(SIGNIFICANT * self.third_std)
+            && self.first > 0.0
+            && self.friction_share() > SHARE
+    }
+}
+
+/// First and third harmonic of Δx, and of T.
+fn harmonics(cycle: &Cycle, wheel: &[Complex<f64>]) -> [Complex<f64>; 4] {
+    let mut sums = [Complex::default(); 4];
+    for (i, (x, t)) in cycle.displacement_m.iter().zip(&cycle.force_n).enumerate() {
+        let (once, thrice) = (wheel[i], wheel[3 * i % wheel.len()]);
+        sums[0] += once * x;
+        sums[1] += thrice * x;
+        sums[2] += once * t;
+        sums[3] += thrice * t;
+    }
+    sums
+}

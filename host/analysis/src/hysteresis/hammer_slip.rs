@@ -1,0 +1,325 @@
+//! Whether the contact slips under the hammer: told from hits of different force in the same cell.
+//!
+//! Nothing in a linear structure depends on how hard it is hit. However many modes beat in a decay, and whatever hides between the
+//! measured spots: T, v_A and v_B per newton of the hammer are the same from hit to hit. A contact that slips cuts off what goes beyond
+//! its friction, and all three change with the force. A hammer's own scatter of two per cent is enough to see that,
+//! because the hits of one cell share everything else: place, aim and direction.
+//!
+//! So d ln(response per newton) / d ln(force) is estimated from the differences of hits within each cell, band by band and signal by
+//! signal, against the scatter that is left: as a ratio of variances, which is one in the mean while nothing slips. No model of the
+//! structure, no stiffness and no noise level is assumed.
+
+use super::hit_response::HitResponse;
+use num_complex::Complex;
+use serde::Serialize;
+
+/// Bands in which responses are compared, Hz: in each, the lines count by their strength.
+const BANDS_HZ: [[f64; 2]; 4] = [[60.0, 150.0], [150.0, 250.0], [250.0, 400.0], [400.0, 700.0]];
+
+/// T, v_A, v_B, and v_A − v_B: slip is in the last one first.
+const SIGNALS: usize = 4;
+
+/// Fewer differences between hits than this say nothing about one place of impact.
+const FEWEST_OF_IMPACT: usize = 3;
+
+/// Fewer over all places say nothing at all.
+const FEWEST: usize = 12;
+
+/// A ratio of variances above this is slip. Over 136 stuck campaigns of 56 hits the largest of the sixteen lay between 1.3 and 6.9.
+const FOUND: f64 = 9.0;
+
+/// A gross slider changes T per newton by a per cent and more for each per cent of force, weak microslip by a tenth of that. A
+/// standard deviation above this would not show it.
+const TOO_COARSE: f64 = 0.1;
+
+/// A contact that slips a lot stands elsewhere after each hit, and answers the next one differently: then the ratio of variances is
+/// small, though T per newton falls by much more than this for each part of force,
+const MUCH: f64 = 0.15;
+
+/// and by more than so many of its standard deviations.
+const BEYOND_DOUBT: f64 = 5.0;
+
+/// The hits of one cell: one place of impact, one aim.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CellHits<'a> {
+    /// The impact's name: cells of the same impact are expected to answer alike.
+    pub impact: &'a str,
+    /// Its kept hits.
+    pub hits: Vec<&'a HitResponse>,
+}
+
+/// What the hits say of slip.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum HammerSlip {
+    /// The response per newton changes with the force: the contact slips.
+    Slips(Scaling),
+    /// It does not, and the hits differ enough to have shown it.
+    Sticks(Scaling),
+    /// The hits do not say.
+    CannotTell(Unclear),
+}
+
+/// How the response per newton goes with the hammer's force.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Scaling {
+    /// d ln(T/F) / d ln F where T is best known, its magnitude: 0 for a linear structure; 1 if 1 % more force gives 1 % less T per newton.
+    pub change_per_force: f64,
+    /// Standard deviation of either part of it.
+    pub std: f64,
+    /// Largest ratio of the variance that goes with the force to the variance that does not, over signals and bands.
+    pub variance_ratio: f64,
+    /// Hits compared.
+    pub hits: usize,
+    /// Standard deviation of the hammer's impulse within the cells, over itself.
+    pub force_scatter: f64,
+    /// Largest |T| in the mean over the hits, N.
+    pub peak_tangential_n: f64,
+}
+
+/// Why the hits do not say it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Unclear {
+    /// Too few cells with two hits or more.
+    TooFewHits {
+        /// Hits beyond the first of each cell.
+        differences: usize,
+        /// So many are needed.
+        needed: usize,
+    },
+    /// The hits are too alike in force, or too noisy, for the difference that slip would make.
+    TooAlike {
+        /// Standard deviation of the hammer's impulse within the cells, over itself.
+        force_scatter: f64,
+        /// Standard deviation with which d ln(T/F) / d ln F comes out.
+        std: f64,
+    },
+}
+
+impl HammerSlip {
+    /// Slips, sticks, or none where the hits do not say.
+    pub fn found(&self) -> Option<bool> {
+        match self {
+            Self::Slips(_) => Some(true),
+            Self::Sticks(_) => Some(false),
+            Self::CannotTell(_) => None,
+        }
+    }
+
+    /// From all cells whose hits move the contact.
+    pub fn of(cells: &[CellHits<'_>]) -> Self {
+        let mut names: Vec<&str> = cells.iter().map(|c| c.impact).collect();
+        names.sort_unstable();
+        names.dedup();
+        let impacts: Vec<Impact> = names
+            .into_iter()
+            .map(|name| Impact::of(cells.iter().filter(|c| c.impact == name)))
+            .filter(|impact| impact.freedom() >= FEWEST_OF_IMPACT)
+            .collect();
+        let differences: usize = impacts.iter().map(Impact::freedom).sum();
+        if differences < FEWEST {
+            return Self::CannotTell(Unclear::TooFewHits { differences, needed: FEWEST });
+        }
+        let features = impacts[0].features.len();
+        let ratio =
+            |j: usize| impacts.iter().map(|i| i.features[j].ratio()).sum::<f64>() / impacts.len() as f64;
+        let variance_ratio = (0..features).map(ratio).fold(0.0, f64::max);
+        let (squares, hits) =
+            impacts.iter().fold((0.0, 0), |(s, n), impact| (s + impact.squares, n + impact.hits));
+        let force_scatter = (squares / differences as f64).sqrt();
+        let (change_per_force, std) = tangential(&impacts);
+        let scaling = Scaling {
+            change_per_force,
+            std,
+            variance_ratio,
+            hits,
+            force_scatter,
+            peak_tangential_n: impacts.iter().map(|i| i.peak_tangential_n).sum::<f64>() / hits as f64,
+        };
+        let falls = change_per_force > MUCH && change_per_force > BEYOND_DOUBT * std;
+        if variance_ratio > FOUND || falls {
+            Self::Slips(scaling)
+        } else if std < TOO_COARSE && change_per_force < 2.0 * MUCH {
+            Self::Sticks(scaling)
+        } else {
+            Self::CannotTell(Unclear::TooAlike { force_scatter, std })
+        }
+    }
+}
+
+/// d ln(T/F) / d ln F over all impacts in the band where it is best known, and the standard deviation of its parts.
+fn tangential(impacts: &[Impact]) -> (f64, f64) {
+    let of_band = |band: usize| {
+        let (mut sum, mut weights) = (Complex::default(), 0.0);
+        for impact in impacts {
+            let slope = &impact.features[band];
+            let weight = 1.0 / slope.variance;
+            sum += slope.value * weight;
+            weights += weight;
+        }
+        ((sum / weights).norm(), weights.recip().sqrt())
+    };
+    (0..BANDS_HZ.len())
+        .map(of_band)
+        .fold((0.0, f64::INFINITY), |best, own| if own.1 < best.1 { own } else { best })
+}
+
+/// All cells of one impact.
+struct Impact {
+    /// First T in each band, then v_A, v_B and v_A − v_B.
+    features: Vec<Slope>,
+    /// Hits.
+    hits: usize,
+    /// Σ of squares of ln(impulse) within the cells.
+    squares: f64,
+    /// Hits beyond the first of each cell.
+    differences: usize,
+    /// Σ over the hits, N.
+    peak_tangential_n: f64,
+}
+
+/// Change of one band of one signal with ln(force).
+struct Slope {
+    value: Complex<f64>,
+    /// Of either part.
+    variance: f64,
+}
+
+impl Slope {
+    /// Variance that goes with the force over that which does not: 1 in the mean for a linear structure.
+    fn ratio(&self) -> f64 {
+        self.value.norm_sqr() / (2.0 * self.variance)
+    }
+}
+
+impl Impact {
+    fn of<'a>(cells: impl Iterator<Item = &'a CellHits<'a>>) -> Self {
+        let count = SIGNALS * BANDS_HZ.len();
+        // what is left of each hit after its cell's mean is taken off: of ln(impulse), and of every feature
+        let (mut forces, mut features) = (Vec::new(), vec![Vec::new(); count]);
+        let (mut hits, mut differences, mut peak_tangential_n) = (0, 0, 0.0);
+        for cell in cells {
+            let Some(first) = cell.hits.first() else { continue };
+            let alike = |hit: &&&HitResponse| hit.first_hz == first.first_hz && hit.step_hz == first.step_hz;
+            let own: Vec<&HitResponse> = cell.hits.iter().filter(alike).copied().collect();
+            if own.len() < 2 {
+                continue;
+            }
+            hits += own.len();
+            differences += own.len() - 1;
+            peak_tangential_n += own.iter().map(|h| h.peak_tangential_n).sum::<f64>();
+            let logs: Vec<f64> = own.iter().map(|h| h.impulse_n_s.ln()).collect();
+            let mean = logs.iter().sum::<f64>() / logs.len() as f64;
+            forces.extend(logs.iter().map(|l| l - mean));
+            for (j, feature) in features.iter_mut().enumerate() {
+                feature.extend(apart(&own, j / BANDS_HZ.len(), BANDS_HZ[j % BANDS_HZ.len()]));
+            }
+        }
+        let squares: f64 = forces.iter().map(|f| f * f).sum();
+        let freedom = differences.saturating_sub(1).max(1) as f64;
+        let features = features
+            .into_iter()
+            .map(|values: Vec<Complex<f64>>| {
+                let value = values.iter().zip(&forces).map(|(v, f)| v * f).sum::<Complex<f64>>() / squares;
+                let rest: f64 = values.iter().zip(&forces).map(|(v, f)| (v - value * f).norm_sqr()).sum();
+                Slope { value, variance: rest / (2.0 * freedom * squares) }
+            })
+            .collect();
+        Self { features, hits, squares, differences, peak_tangential_n }
+    }
+
+    /// Differences that are left when one slope is taken out.
+    fn freedom(&self) -> usize {
+        self.differences.saturating_sub(1)
+    }
+}
+
+/// By how much each hit of a cell differs from their mean in one band of one signal, over that mean: the projection on it.
+fn apart(hits: &[&HitResponse], signal: usize, [low, high]: [f64; 2]) -> Vec<Complex<f64>> {
+    let first = hits[0];
+    let inside = (0..first.per_newton[0].len())
+        .filter(|l| (low..high).contains(&(first.first_hz + first.step_hz * *l as f64)));
+    let value = |hit: &HitResponse, l: usize| match signal {
+        3 => hit.per_newton[1][l] - hit.per_newton[2][l],
+        own => hit.per_newton[own][l],
+    };
+    let mut sums = vec![Complex::default(); hits.len()];
+    let mut strength = 0.0;
+    for l in inside {
+        let mean = hits.iter().map(|h| value(h, l)).sum::<Complex<f64>>() / hits.len() as f64;
+        strength += mean.norm_sqr();
+        for (sum, hit) in sums.iter_mut().zip(hits) {
+            *sum += (value(hit, l) - mean) * mean.conj();
+        }
+    }
+    sums.into_iter().map(|s| s / strength).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    /// Hits of 2 % scatter in force, whose response per newton goes with the force to the power −`power` and scatters by `noise`.
+    fn campaign(power: f64, scatter: f64, noise: f64) -> Vec<HitResponse> {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(8);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        (0..56)
+            .map(|_| {
+                let force = 1.0 + scatter * normal();
+                let lines = 200;
+                let own = Complex::new(1.0 + noise * normal(), noise * normal());
+                let line = |l: usize| own * Complex::from_polar(force.powf(-power), 0.03 * l as f64);
+                let signal: Vec<Complex<f64>> = (0..lines).map(line).collect();
+                HitResponse {
+                    impulse_n_s: 0.013 * force,
+                    peak_n: 50.0 * force,
+                    peak_tangential_n: 16.0 * force,
+                    first_hz: 60.0,
+                    step_hz: 3.125,
+                    per_newton: [signal.clone(), signal.clone(), signal.iter().map(|v| v * 0.7).collect()],
+                }
+            })
+            .collect()
+    }
+
+    fn verdict(hits: &[HitResponse]) -> HammerSlip {
+        let impact = |i: usize| ["AZ1", "AZ2", "AZ3", "I_MZ"][i / 7 % 4];
+        let cells: Vec<CellHits<'_>> = hits
+            .chunks(2)
+            .enumerate()
+            .map(|(i, own)| CellHits { impact: impact(i), hits: own.iter().collect() })
+            .collect();
+        HammerSlip::of(&cells)
+    }
+
+    #[test]
+    fn what_goes_with_the_force_is_slip() {
+        for (power, scatter, noise, found) in [
+            (0.0, 0.02, 1e-3, Some(false)),
+            (0.8, 0.02, 1e-3, Some(true)),
+            // each hit finds the contact elsewhere
+            (0.8, 0.02, 8e-3, Some(true)),
+            // hits all alike
+            (0.0, 1e-4, 1e-3, None),
+        ] {
+            let verdict = verdict(&campaign(power, scatter, noise));
+            assert_eq!(verdict.found(), found, "{power} {scatter} {noise}: {verdict:?}");
+        }
+        assert!(matches!(
+            verdict(&campaign(0.0, 0.02, 1e-3)[..8]),
+            HammerSlip::CannotTell(Unclear::TooFewHits { .. })
+        ));
+    }
+
+    #[test]
+    fn the_change_with_force_is_that_of_the_hits() {
+        let HammerSlip::Slips(scaling) = verdict(&campaign(0.5, 0.02, 1e-3)) else { panic!("it slips") };
+        assert!((scaling.change_per_force - 0.5).abs() < 4.0 * scaling.std, "{scaling:?}");
+        assert!((scaling.force_scatter / 0.02 - 1.0).abs() < 0.3, "{scaling:?}");
+        assert_eq!(scaling.hits, 56);
+    }
+}

@@ -1,0 +1,244 @@
+//! A slipping loop taken apart: friction, a dashpot beside it, and a delay of the force.
+//!
+//! Friction of any kind knows where it is and where it turned back, not how fast it goes. So the averaged loop is written as a sum of
+//! Jenkins elements of all reaches with weights that may not be negative (Iwan's model), plus c Δẋ, for a force that comes later by τ. A
+//! delay turns the corners and the flanks, a dashpot bends the plateaus, and neither can be made of friction: where the loop has
+//! both flanks and plateaus, τ and c are told from each other and from any law of friction.
+
+use super::cycle::Cycle;
+use nalgebra::{DMatrix, DVector};
+
+/// Reaches of elements over the whole stroke, and about the one that carries most.
+const COARSE: usize = 16;
+const FINE: usize = 24;
+
+/// Ever closer about what carries most: to this part of its reach, so many each.
+const CLOSER: [f64; 2] = [0.06, 0.015];
+const FINER: usize = 11;
+
+/// Delays that are looked for, s.
+const DELAY_S: [f64; 2] = [-2e-4, 3e-4];
+
+/// Steps of the first look.
+const STEPS: usize = 21;
+
+/// Columns that may join the active ones: a straight flank needs three, a bent one a dozen.
+const ROUNDS: usize = 60;
+
+/// Residuals of neighbouring points go together, which makes the plain formula too sure of itself.
+const TOGETHER: f64 = 3.0;
+
+/// What was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct LawFit {
+    /// τ, s, and its standard deviation.
+    pub late_s: [f64; 2],
+    /// c, N s/m, and its standard deviation.
+    pub viscous_n_s_per_m: [f64; 2],
+    /// Sums of squared residuals: with both, without the delay, without the dashpot.
+    pub residuals: [f64; 3],
+}
+
+/// Least squares with weights that may not be negative, but for the last column.
+struct Problem {
+    columns: DMatrix<f64>,
+    gram: DMatrix<f64>,
+    /// What the unit columns were divided by.
+    scale: Vec<f64>,
+}
+
+impl Problem {
+    fn new(cycle: &Cycle, reaches: &[f64]) -> Self {
+        let points = cycle.displacement_m.len();
+        let mut columns = DMatrix::zeros(points, reaches.len() + 2);
+        for (j, reach) in reaches.iter().enumerate() {
+            columns.set_column(j, &element(&cycle.displacement_m, *reach));
+        }
+        columns.set_column(reaches.len(), &DVector::from_column_slice(&cycle.displacement_m));
+        columns.set_column(reaches.len() + 1, &DVector::from_column_slice(&cycle.velocity_m_per_s));
+        let mut scale = Vec::new();
+        for mut column in columns.column_iter_mut() {
+            column.add_scalar_mut(-column.mean());
+            let norm = column.norm();
+            scale.push(norm);
+            if norm > 0.0 {
+                column /= norm;
+            }
+        }
+        let gram = columns.tr_mul(&columns);
+        Self { columns, gram, scale }
+    }
+
+    /// Weights of the unit columns and the sum of squared residuals, with the dashpot or without: Lawson and Hanson's active sets, in
+    /// which the dashpot may have either sign.
+    fn solved(&self, force: &DVector<f64>, dashpot: bool) -> (DVector<f64>, f64) {
+        let right = self.columns.tr_mul(force);
+        let (count, free) = (right.len(), right.len() - 1);
+        let mut weights = DVector::zeros(count);
+        let mut active: Vec<usize> = if dashpot { vec![free] } else { Vec::new() };
+        let least = 1e-9 * right.amax();
+        for _ in 0..ROUNDS {
+            let slopes = &right - &self.gram * &weights;
+            let next = (0..free)
+                .filter(|j| !active.contains(j) && self.scale[*j] > 0.0)
+                .max_by(|&a, &b| slopes[a].total_cmp(&slopes[b]));
+            match next {
+                Some(j) if slopes[j] > least => active.push(j),
+                _ => break,
+            }
+            // weights that would turn negative leave again, the first to do so first
+            loop {
+                let Some(wanted) = self.least_squares(&right, &active) else {
+                    active.pop();
+                    break;
+                };
+                let part = |i: usize| {
+                    let (j, to) = (active[i], wanted[i]);
+                    if j == free || to > 0.0 { 1.0 } else { weights[j] / (weights[j] - to) }
+                };
+                let step = (0..active.len()).map(part).fold(1.0, f64::min);
+                for (i, &j) in active.iter().enumerate() {
+                    weights[j] += step * (wanted[i] - weights[j]);
+                }
+                if step >= 1.0 {
+                    break;
+                }
+                active.retain(|&j| j == free || weights[j] > 1e-12 * right.amax());
+                (0..free).filter(|j| !active.contains(j)).for_each(|j| weights[j] = 0.0);
+            }
+        }
+        let left = (force - &self.columns * &weights).norm_squared();
+        (weights, left)
+    }
+
+    /// Weights of these columns alone; none where they are not independent.
+    fn least_squares(&self, right: &DVector<f64>, active: &[usize]) -> Option<DVector<f64>> {
+        let ridge = |i, j| if i == j { 1e-11 } else { 0.0 };
+        let gram = DMatrix::from_fn(active.len(), active.len(), |i, j| {
+            self.gram[(active[i], active[j])] + ridge(i, j)
+        });
+        let own = DVector::from_fn(active.len(), |i, _| right[active[i]]);
+        Some(gram.cholesky()?.solve(&own))
+    }
+}
+
+/// What a Jenkins element of this reach (m) carries over the cycle, per stiffness: from one round on it repeats itself.
+fn element(x: &[f64], reach: f64) -> DVector<f64> {
+    let mut slider = 0.0;
+    let mut carried = DVector::zeros(x.len());
+    for _ in 0..2 {
+        for (x, carried) in x.iter().zip(carried.iter_mut()) {
+            *carried = (x - slider).clamp(-reach, reach);
+            slider = x - *carried;
+        }
+    }
+    carried
+}
+
+impl LawFit {
+    /// Takes the averaged loop of a contact in gross slip apart; `dt_s` between its points. None for a loop that does not move.
+    pub fn of(cycle: &Cycle, dt_s: f64) -> Option<Self> {
+        let points = cycle.force_n.len();
+        let half = 0.5 * super::loops::swing(&cycle.displacement_m);
+        if half.is_nan() || half <= 0.0 {
+            return None;
+        }
+        let spread = |from: f64, to: f64, count: usize| -> Vec<f64> {
+            (0..count).map(|i| from * (to / from).powf(i as f64 / (count - 1) as f64)).collect()
+        };
+        let mut reaches = spread(0.01 * half, half, COARSE);
+        let coarse = Problem::new(cycle, &reaches);
+        let (weights, _) = coarse.solved(&shifted(&cycle.force_n, 0.0), true);
+        let most = centre(&coarse, &weights, &reaches)?;
+        reaches.extend(spread(0.7 * most, 1.4 * most, FINE));
+        // each look refines the elements about the one that carries most, at the delay that the last one found: a corner between two
+        // reaches would pass for a delay
+        let mut late = 0.0;
+        for width in CLOSER {
+            let problem = Problem::new(cycle, &reaches);
+            late = earliest(&problem, cycle, dt_s, true);
+            let (weights, _) = problem.solved(&shifted(&cycle.force_n, late / dt_s), true);
+            let about = centre(&problem, &weights, &reaches)?;
+            reaches.extend(spread(about * (1.0 - width), about * (1.0 + width), FINER));
+        }
+        let problem = Problem::new(cycle, &reaches);
+        let free = reaches.len() + 1;
+        let at = |late_s: f64, dashpot: bool| {
+            let (weights, left) = problem.solved(&shifted(&cycle.force_n, late_s / dt_s), dashpot);
+            (left, weights[free] / problem.scale[free])
+        };
+        late = closest(&problem, cycle, dt_s, true, late);
+        let (left, viscous) = at(late, true);
+        let without_delay = at(0.0, true).0;
+        let undamped = closest(&problem, cycle, dt_s, false, late);
+        let without_dashpot = at(undamped, false).0;
+        let variance = TOGETHER * left / points.saturating_sub(8).max(1) as f64;
+        let probe = 1e-5;
+        let bend = (at(late - probe, true).0 - 2.0 * left + at(late + probe, true).0) / (probe * probe);
+        let std_s = if bend > 0.0 { (2.0 * variance / bend).sqrt() } else { f64::INFINITY };
+        // what the other columns leave of the velocity: at least a half in a loop with flanks and plateaus
+        let std_n_s_per_m = variance.sqrt() / (0.5 * problem.scale[free]);
+        Some(Self {
+            late_s: [late, std_s],
+            viscous_n_s_per_m: [viscous, std_n_s_per_m],
+            residuals: [left, without_delay, without_dashpot],
+        })
+    }
+}
+
+/// The reach about which the elements lie that carry most.
+fn centre(problem: &Problem, weights: &DVector<f64>, reaches: &[f64]) -> Option<f64> {
+    let carries = |j: usize| {
+        if problem.scale[j] > 0.0 { weights[j] / problem.scale[j] * reaches[j] } else { 0.0 }
+    };
+    let most = (0..reaches.len()).max_by(|&a, &b| carries(a).total_cmp(&carries(b)))?;
+    let near = |j: &usize| (reaches[*j] / reaches[most]).ln().abs() < 0.1;
+    let (sum, weight) = (0..reaches.len())
+        .filter(near)
+        .fold((0.0, 0.0), |(sum, weight), j| (sum + carries(j) * reaches[j], weight + carries(j)));
+    (weight > 0.0).then(|| sum / weight)
+}
+
+/// The delay (s) that leaves least, of all that are looked for.
+fn earliest(problem: &Problem, cycle: &Cycle, dt_s: f64, dashpot: bool) -> f64 {
+    let step = (DELAY_S[1] - DELAY_S[0]) / (STEPS - 1) as f64;
+    let left = |late_s: &f64| problem.solved(&shifted(&cycle.force_n, late_s / dt_s), dashpot).1;
+    let all: Vec<(f64, f64)> =
+        (0..STEPS).map(|i| DELAY_S[0] + step * i as f64).map(|late_s| (late_s, left(&late_s))).collect();
+    let first = all.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |(late_s, _)| *late_s);
+    closest(problem, cycle, dt_s, dashpot, first)
+}
+
+/// The same near `centre`: a parabola through three, ever closer.
+fn closest(problem: &Problem, cycle: &Cycle, dt_s: f64, dashpot: bool, mut centre: f64) -> f64 {
+    let left = |late_s: f64| problem.solved(&shifted(&cycle.force_n, late_s / dt_s), dashpot).1;
+    let mut width = (DELAY_S[1] - DELAY_S[0]) / (STEPS - 1) as f64;
+    for _ in 0..6 {
+        let [l, m, r] = [-1.0, 0.0, 1.0].map(|o| left(centre + o * width));
+        let bend = l - 2.0 * m + r;
+        if bend > 0.0 {
+            centre += (0.5 * (l - r) / bend).clamp(-1.0, 1.0) * width;
+        }
+        width *= 0.5;
+    }
+    centre
+}
+
+/// The closed cycle's force so many points earlier, by cubics.
+fn shifted(force: &[f64], points: f64) -> DVector<f64> {
+    DVector::from_vec(earlier(force, points))
+}
+
+/// A closed cycle so many points earlier.
+pub(super) fn earlier(x: &[f64], points: f64) -> Vec<f64> {
+    let n = x.len().cast_signed();
+    let (whole, t) = (points.floor() as isize, points - points.floor());
+    (0..n)
+        .map(|i| {
+            let [p0, p1, p2, p3] = [-1, 0, 1, 2].map(|o| x[(i + whole + o).rem_euclid(n).unsigned_abs()]);
+            p1 + 0.5
+                * t
+                * (p2 - p0 + t * (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3 + t * (3.0 * (p1 - p2) + p3 - p0)))
+        })
+        .collect()
+}

@@ -1,0 +1,145 @@
+//! When the cycles of a steady record begin: at the stated frequency, or as they came.
+
+use super::sums::mean;
+use num_complex::Complex;
+use std::f64::consts::TAU;
+
+/// Phase that may build up over a record before its cycles count as off, rad: what less does to an average is below 1 in 1000.
+const OFF_RAD: f64 = 0.05;
+
+/// It must be so many times what the cycles' scatter explains.
+const SIGNIFICANT: f64 = 8.0;
+
+/// What the cycles may scatter about a steady drift for that drift to be believed, rad.
+const SCATTER_RAD: f64 = 0.5;
+
+/// Fewer cycles show no drift.
+const FEWEST_CYCLES: usize = 8;
+
+/// Frequency over the time of a record, a straight line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Timing {
+    /// At the first sample, Hz.
+    pub start_hz: f64,
+    /// Hz/s.
+    pub rate_hz_per_s: f64,
+}
+
+impl Timing {
+    /// One frequency all along.
+    pub fn steady(frequency_hz: f64) -> Self {
+        Self { start_hz: frequency_hz, rate_hz_per_s: 0.0 }
+    }
+
+    /// When a cycle begins, s after the first sample.
+    pub fn begin_s(&self, cycle: f64) -> f64 {
+        if self.rate_hz_per_s == 0.0 {
+            return cycle / self.start_hz;
+        }
+        let root = (self.start_hz.powi(2) + 2.0 * self.rate_hz_per_s * cycle).max(0.0).sqrt();
+        2.0 * cycle / (self.start_hz + root)
+    }
+
+    /// Cycles in so much time.
+    pub fn cycles(&self, time_s: f64) -> f64 {
+        (self.start_hz + 0.5 * self.rate_hz_per_s * time_s) * time_s
+    }
+
+    /// Hz.
+    pub fn at(&self, time_s: f64) -> f64 {
+        self.start_hz + self.rate_hz_per_s * time_s
+    }
+
+    /// The timing that the phase of `force` shows, if it is not `frequency_hz` all along.
+    pub fn tracked(force: &[f64], fs_hz: f64, frequency_hz: f64) -> Option<Self> {
+        let period = fs_hz / frequency_hz;
+        let cycles = (force.len() as f64 / period).floor() as usize;
+        if cycles < FEWEST_CYCLES {
+            return None;
+        }
+        let turn = TAU / period;
+        let mut phases: Vec<f64> = Vec::with_capacity(cycles);
+        for c in 0..cycles {
+            let edge = |c: usize| ((c as f64 * period).round() as usize).min(force.len());
+            let (from, to) = (edge(c), edge(c + 1));
+            let own = &force[from..to];
+            let (rest, step) = (mean(own), Complex::from_polar(1.0, -turn));
+            let mut wheel = Complex::from_polar(1.0, -turn * (from as f64 - c as f64 * period));
+            let mut tone = Complex::<f64>::default();
+            for value in own {
+                tone += wheel * (value - rest);
+                wheel *= step;
+            }
+            let last = phases.last().copied().unwrap_or(0.0);
+            phases.push(last + wrapped(tone.arg() - last));
+        }
+        // phase over u = -1…1 by Legendre's polynomials, which are orthogonal over many cycles
+        let n = cycles as f64;
+        let u = |c: usize| (2.0 * c as f64 + 1.0) / n - 1.0;
+        let basis = |c: usize| [1.0, u(c), 0.5 * (3.0 * u(c).powi(2) - 1.0)];
+        let mut fit = [0.0; 3];
+        for _ in 0..3 {
+            // a few rounds, because sums over finitely many cycles are not quite orthogonal
+            let mut left = [0.0; 3];
+            let mut norm = [0.0; 3];
+            for (c, phase) in phases.iter().enumerate() {
+                let b = basis(c);
+                let rest = phase - (0..3).map(|i| fit[i] * b[i]).sum::<f64>();
+                for i in 0..3 {
+                    left[i] += rest * b[i];
+                    norm[i] += b[i] * b[i];
+                }
+            }
+            (0..3).for_each(|i| fit[i] += left[i] / norm[i]);
+        }
+        let rest = |(c, phase): (usize, &f64)| {
+            let b = basis(c);
+            (phase - (0..3).map(|i| fit[i] * b[i]).sum::<f64>()).powi(2)
+        };
+        let scatter = (phases.iter().enumerate().map(rest).sum::<f64>() / (n - 3.0)).sqrt();
+        // from end to end the line rises by twice its slope, the parabola by 1.5 of its factor
+        let (line, bow) = (2.0 * fit[1], 1.5 * fit[2]);
+        let limit = |over: f64| OFF_RAD.max(SIGNIFICANT * scatter * over / n.sqrt());
+        if scatter > SCATTER_RAD || (line.abs() < limit(3.5) && bow.abs() < limit(3.4)) {
+            return None;
+        }
+        let time_s = cycles as f64 / frequency_hz;
+        // dφ/du at the beginning and the end, and u goes from -1 to 1
+        let [from_hz, to_hz] =
+            [-1.0, 1.0].map(|u| frequency_hz + (fit[1] + 3.0 * fit[2] * u) * 2.0 / time_s / TAU);
+        Some(Self { start_hz: from_hz, rate_hz_per_s: (to_hz - from_hz) / time_s })
+    }
+}
+
+/// Into −π…π.
+fn wrapped(phase: f64) -> f64 {
+    phase - TAU * (phase / TAU).round()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_drift_is_tracked_and_a_steady_record_has_none() {
+        for (start, rate) in [(200.0, 4.0), (198.0, 0.0), (61.0, -1.2), (200.0, 0.0)] {
+            let truth = Timing { start_hz: start, rate_hz_per_s: rate };
+            let force: Vec<f64> =
+                (0..51_200).map(|i| (TAU * truth.cycles(f64::from(i) / 51_200.0)).sin()).collect();
+            let stated = if start < 100.0 { 61.0 } else { 200.0 };
+            let found = Timing::tracked(&force, 51_200.0, stated);
+            if truth == Timing::steady(stated) {
+                assert_eq!(found, None);
+                continue;
+            }
+            let found = found.expect("it is off");
+            assert!(
+                (found.start_hz - start).abs() < 0.02 && (found.at(1.0) - truth.at(1.0)).abs() < 0.02,
+                "{found:?}"
+            );
+            for cycle in [0.0, 17.0, 58.0] {
+                assert!((found.cycles(found.begin_s(cycle)) - cycle).abs() < 1e-9);
+            }
+        }
+    }
+}
