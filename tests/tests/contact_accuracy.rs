@@ -29,8 +29,11 @@ impl Row {
 }
 
 fn campaign(number: u64, seed: u64, like: Drawn) -> Row {
-    let folder = tempfile::tempdir().unwrap();
-    let (file, description) = (folder.path().join("c.jrig"), folder.path().join("rig.toml"));
+    let temporary = tempfile::tempdir().unwrap();
+    // JOINTRIG_KEEP names a folder that keeps the campaigns, to look into one afterwards
+    let folder = std::env::var_os("JOINTRIG_KEEP").map_or(temporary.path().to_owned(), Into::into);
+    let at = |ending: &str| folder.join(format!("{number}-{seed}.{ending}"));
+    let (file, description) = (at("jrig"), at("toml"));
     let rig = drawn(number, like);
     std::fs::write(&description, rig.to_toml()).unwrap();
     let address: Address = format!("sim:{}", description.display()).parse().unwrap();

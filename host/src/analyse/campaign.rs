@@ -14,6 +14,7 @@ use crate::results::MAIN_BAND;
 use crate::spectra::Windowing;
 use crate::structure::Structure;
 use crate::substructuring::averaged::Priors;
+use crate::substructuring::between_arms::{BetweenArms, NoStiffness, between_arms};
 use crate::substructuring::{Band, Frf, Geometry, IdmSet, Method, fit, identify};
 
 /// The methods whose spectra a campaign's results keep and show; of all others they keep the bands.
@@ -67,7 +68,9 @@ pub fn analyse_measurements<M: Measurements>(
         found.missing.extend(missing);
     }
     if let [Some(a), Some(b), Some(ajb)] = frfs {
-        found.fits = fit_of_the_main_band([a, b, ajb], geometry);
+        let options =
+            fit::Options { priors: measurements.contact_priors().positions, ..fit::Options::default() };
+        found.fits = fit_of_the_main_band([a, b, ajb], geometry, &options);
     }
     let fitted: Vec<_> = found.fits.iter().filter_map(|fit| Some(fit.outcome.as_ref().ok()?.row())).collect();
     let rows = found.substructured.iter().flat_map(|s| &s.rows).map(|row| &row.joint).chain(&fitted);
@@ -76,6 +79,7 @@ pub fn analyse_measurements<M: Measurements>(
     found.missing.extend(missing);
     found.contact = Some(contact);
     found.own_stiffness = Some(contact_answer::answer(measurements, &cells.averages));
+    found.between_arms = Some(decided(&found));
     found
 }
 
@@ -92,10 +96,20 @@ fn substructured(frfs: [&Frf; 3], geometry: &Geometry) -> Result<Substructured, 
 }
 
 /// The fit over the main band, from all three configurations and their noise.
-fn fit_of_the_main_band(frfs: [&Frf; 3], geometry: &Geometry) -> Vec<Fit> {
+fn fit_of_the_main_band(frfs: [&Frf; 3], geometry: &Geometry, options: &fit::Options) -> Vec<Fit> {
     let idms = IdmSet::Six;
     if frfs.iter().any(|frf| frf.variance().is_none()) {
         return vec![Fit { idms, outcome: Err(NoFit::ImportWithoutVariance) }];
     }
-    fits(frfs, geometry, &[idms], &[MAIN_BAND], &fit::Options::default())
+    fits(frfs, geometry, &[idms], &[MAIN_BAND], options)
+}
+
+/// Which estimate of the main band is the stiffness between the arms.
+fn decided(found: &Findings) -> Result<BetweenArms, NoStiffness> {
+    let fitted = found.fits.first().and_then(|fit| match &fit.outcome {
+        Ok(fitted) => Some(Ok(fitted)),
+        Err(NoFit::Failed(error)) => Some(Err(error)),
+        Err(_) => None,
+    });
+    between_arms(fitted, found.recommended.iter().find(|r| r.band_hz == MAIN_BAND))
 }

@@ -13,6 +13,7 @@ use crate::results::{Bootstrap, Completeness, FrfCurve, Source, UsableBand};
 use crate::spectra::Windowing;
 use crate::structure::Structure;
 use crate::substructuring::averaged::{Averaged, Priors};
+use crate::substructuring::between_arms::{BetweenArms, NoStiffness};
 
 /// All that was found, as far as it was looked for.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -39,6 +40,8 @@ pub struct Findings {
     pub contact: Option<Contact>,
     /// The contact's own stiffness, in a campaign.
     pub own_stiffness: Option<Result<Stiffness, ContactError>>,
+    /// The stiffness between the arms, in a campaign.
+    pub between_arms: Option<Result<BetweenArms, NoStiffness>>,
     /// The loops of a record of its own.
     pub record: Option<RecordLoops>,
     /// What had to be done without, in the order it was noticed.

@@ -69,10 +69,10 @@ pub struct BlockLine {
 /// All cells of one impact.
 #[derive(Debug, Clone)]
 pub struct Block {
-    /// The impact's name.
-    pub impact: String,
     /// What it hits.
     pub grouping: Grouping,
+    /// Whether impacts on the same body tell what its shifts do; else those of another body stand in.
+    pub aim_known: bool,
     /// On B alone: place of the hammer's part along z among the parameters.
     pub along_z: Option<usize>,
     /// The cells.
@@ -226,7 +226,7 @@ fn block(
     let along_z =
         alone.then(|| parameters.add([along_z(impact.direction, priors.positions.hammer_angle_rad)]));
     own.extend(along_z);
-    let shifted_by = shifted_by(impact, impacts);
+    let (shifted_by, aim_known) = shifted_by(impact, impacts);
     let aim = Parameter { start: 0.0, sigma: priors.positions.aim_m, cause: Cause::ArmPoints };
     let (mut cells, mut rows, mut lines) = (Vec::new(), Vec::new(), Vec::<Values>::new());
     for (group, cell) in &impact.cells {
@@ -259,7 +259,7 @@ fn block(
         })
     };
     Ok(Block {
-        impact: impact.name.into(),
+        aim_known,
         grouping: impact.grouping,
         along_z,
         lines: chosen.iter().enumerate().filter_map(line).collect(),
@@ -274,8 +274,8 @@ fn block(
 
 /// The motion that a shift of the impact adds, from the differences between impacts that push the same way: a shift across the
 /// direction is a moment on the same body, and so are they. Impacts on the same body are taken if there are three, else those of the
-/// same structure. Empty where no three of them span both axes.
-fn shifted_by(impact: &Impact<'_>, impacts: &[Impact<'_>]) -> Vec<(usize, [f64; 2])> {
+/// same structure. Empty where no three of them span both axes; and whether they are on the same body.
+fn shifted_by(impact: &Impact<'_>, impacts: &[Impact<'_>]) -> (Vec<(usize, [f64; 2])>, bool) {
     let parallel = |other: &Impact<'_>| {
         let cosine: f64 = (0..3).map(|i| other.direction[i] * impact.direction[i]).sum();
         other.structure == impact.structure && cosine.abs() > 0.99
@@ -308,5 +308,8 @@ fn shifted_by(impact: &Impact<'_>, impacts: &[Impact<'_>]) -> Vec<(usize, [f64; 
         };
         Some(chosen.iter().map(|i| weight(*i)).collect())
     };
-    weights(&same).or_else(|| weights(&candidates)).unwrap_or_default()
+    match weights(&same) {
+        Some(own) => (own, true),
+        None => (weights(&candidates).unwrap_or_default(), false),
+    }
 }

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 /// χ² per degree of freedom above which a kind of signal contradicts the model, once the noise's own uncertainty is allowed for.
-const CONTRADICTED: f64 = 6.0;
+const CONTRADICTED: f64 = 10.0;
 /// Standard deviations by which two readings of k_T may differ.
 const APART: f64 = 4.0;
 
@@ -82,8 +82,14 @@ fn quadratic(matrix: &DMatrix<f64>, v: &DVector<f64>) -> f64 {
 
 /// Asks every assumption.
 pub fn diagnose(blocks: &[Block], solution: &Solution) -> Diagnosis {
+    // where the hammer's aim is known by halves only, its errors are not the points'
+    let judged =
+        |block: &Block| block.aim_known || !blocks.iter().any(|b| b.aim_known && b.along_z.is_none());
     let chi = |alone: bool, kinds: &[usize]| {
-        let own = solution.bins.iter().filter(|bin| blocks[bin.block].along_z.is_some() == alone);
+        let own = solution.bins.iter().filter(|bin| {
+            let block = &blocks[bin.block];
+            block.along_z.is_some() == alone && (alone || judged(block))
+        });
         let (sum, expected) = own
             .flat_map(|bin| kinds.iter().map(move |k| bin.normal.kinds[*k]))
             .fold((0.0, 0.0), |(sum, expected), [chi, of]| (sum + chi, expected + of));

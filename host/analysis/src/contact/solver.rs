@@ -12,7 +12,9 @@ use num_complex::Complex;
 /// Width of the bins whose lines are summed and judged together, Hz.
 pub const BIN_HZ: f64 = 25.0;
 /// Steps at most.
-const STEPS: usize = 25;
+const STEPS: usize = 60;
+/// Passes in which a block's trust may still change.
+const TRUST_STEPS: std::ops::Range<usize> = 3..12;
 /// The compliance moves less than this part of its standard deviation: done.
 const SETTLED: f64 = 0.01;
 /// A cost may rise by this part between passes: the shifts' motion is that of the pass before.
@@ -71,7 +73,7 @@ pub fn solve(blocks: &[Block], parameters: &Parameters, sigma_per_s: f64) -> Res
         if better {
             motion = motions(blocks, &bins);
             damping = (damping * 0.1_f64).max(1e-9);
-            let chosen = if step >= 3 { trusted(blocks, &bins) } else { trust.clone() };
+            let chosen = if TRUST_STEPS.contains(&step) { trusted(blocks, &bins) } else { trust.clone() };
             // another trust is another cost
             let changed = chosen.iter().zip(&trust).any(|(a, b)| (a / b - 1.0).abs() > 0.02);
             trust = chosen;

@@ -2,32 +2,38 @@
 
 use crate::analyse::Findings;
 use crate::contact::{ContactError, Interval, Stiffness};
-use crate::report::words::answer_sentences::{self as say, Unanswered};
-use crate::results::{Answer, Basis, BetweenArms, Clamp, ContactAnswer, MAIN_BAND, Slip};
-use crate::substructuring::Dof;
+use crate::report::words::answer_sentences as say;
+use crate::report::words::check_sentences::hammer_slip;
+use crate::results::{Answer, Basis, BetweenArms, Clamp, ContactAnswer, Slip};
+use crate::substructuring::between_arms::Basis as Estimate;
 use crate::substructuring::joint_over_bands::NORMAL_95;
 
 /// The answer of a campaign; none where no campaign was analysed.
 pub fn answer(found: &Findings) -> Option<Answer> {
     let own = found.own_stiffness.as_ref()?;
+    let slip = slip(found);
     let contact = match own {
-        Ok(own) => of_stiffness(own),
+        Ok(own) => of_stiffness(own, slip.found == Some(true)),
         Err(error) => unknown(error),
     };
     let between_arms = between_arms(found);
     let clamp = contact.k_t_n_per_m.zip(between_arms.k_n_per_m).and_then(|(own, whole)| clamp(own, whole));
-    Some(Answer { contact, between_arms, clamp, slip: slip(found), truth: None })
+    Some(Answer { contact, between_arms, clamp, slip, truth: None })
 }
 
-fn of_stiffness(own: &Stiffness) -> ContactAnswer {
-    let trusted = own.doubts.is_empty();
+fn of_stiffness(own: &Stiffness, slips: bool) -> ContactAnswer {
+    let trusted = own.doubts.is_empty() && !slips;
     ContactAnswer {
         k_t_n_per_m: trusted.then_some(own.k_t_n_per_m),
         c_t_n_s_per_m: trusted.then_some(own.c_t_n_s_per_m),
         basis: if trusted { Basis::SpecimenPoints } else { Basis::None },
         band_hz: Some(own.band_hz.into()),
         budget: own.budget.iter().map(|(cause, share)| (cause.name(), *share)).collect(),
-        why: if trusted { say::identified(own) } else { say::doubted(own) },
+        why: match (trusted, slips) {
+            (true, _) => say::identified(own),
+            (_, true) => say::slipping(),
+            _ => say::doubted(own),
+        },
         of_frequency: own.of_frequency.clone(),
         diagnosis: Some(own.diagnosis.clone()),
         doubts: own.doubts.clone(),
@@ -41,7 +47,7 @@ fn unknown(error: &ContactError) -> ContactAnswer {
         basis: Basis::None,
         band_hz: None,
         budget: std::collections::BTreeMap::new(),
-        why: say::unanswered(&Unanswered::Contact(error)),
+        why: say::capital(&error.to_string()),
         of_frequency: Vec::new(),
         diagnosis: None,
         doubts: Vec::new(),
@@ -49,17 +55,17 @@ fn unknown(error: &ContactError) -> ContactAnswer {
 }
 
 fn between_arms(found: &Findings) -> BetweenArms {
-    let quoted = found.recommended.iter().find(|r| r.band_hz == MAIN_BAND);
-    let z = quoted.and_then(|r| r.joint.get(&Dof::Z)).filter(|z| z.identified);
-    match z {
-        Some(z) => BetweenArms {
-            k_n_per_m: Some(Interval { mean: z.stiffness, ci95: z.ci95 }),
-            basis: "recommended",
-            why: say::between_the_arms(),
+    match &found.between_arms {
+        Some(Ok(between)) => BetweenArms {
+            k_n_per_m: Some(Interval { mean: between.stiffness_n_per_m, ci95: between.ci95 }),
+            basis: match between.basis {
+                Estimate::Fit => "fit",
+                Estimate::Recommended => "recommended",
+            },
+            why: say::between_the_arms(between.basis),
         },
-        None => {
-            BetweenArms { k_n_per_m: None, basis: "none", why: say::unanswered(&Unanswered::BetweenArms) }
-        }
+        Some(Err(why)) => BetweenArms { k_n_per_m: None, basis: "none", why: say::capital(&why.to_string()) },
+        None => BetweenArms { k_n_per_m: None, basis: "none", why: say::not_looked_for() },
     }
 }
 
@@ -76,6 +82,9 @@ fn clamp(own: Interval, whole: Interval) -> Option<Clamp> {
     })
 }
 
-fn slip(_found: &Findings) -> Slip {
-    Slip { found: None, why: say::unanswered(&Unanswered::Slip) }
+fn slip(found: &Findings) -> Slip {
+    found.contact.as_ref().map_or_else(
+        || Slip { found: None, why: say::not_looked_for() },
+        |contact| Slip { found: contact.slip.found(), why: hammer_slip(&contact.slip).meaning },
+    )
 }

@@ -1,18 +1,9 @@
 //! The answer in words: what a colleague would say of each number.
 
 use super::number::{micro, short};
-use crate::contact::{Cause, ContactError, Doubt, Interval, Stiffness};
+use crate::contact::{Cause, Doubt, Interval, Stiffness};
 use crate::results::{Answer, Results};
-
-/// What has no answer.
-pub enum Unanswered<'a> {
-    /// The contact's own stiffness.
-    Contact(&'a ContactError),
-    /// What lies between the arms.
-    BetweenArms,
-    /// Whether the contact slips.
-    Slip,
-}
+use crate::substructuring::between_arms::Basis as Estimate;
 
 /// A stiffness with its interval, in N/µm.
 pub fn with_interval(k: &Interval) -> String {
@@ -75,24 +66,33 @@ fn of_doubt(doubt: Doubt) -> &'static str {
 }
 
 /// Where the number between the arms comes from.
-pub fn between_the_arms() -> String {
-    "By substructuring: everything between the arms in series, clamps and contact.".into()
+pub fn between_the_arms(basis: Estimate) -> String {
+    match basis {
+        Estimate::Fit => {
+            "Maximum likelihood over A, B and the assembly (300–600 Hz): everything between the arms in series, clamps and contact."
+        }
+        Estimate::Recommended => {
+            "Eq. (A.1) of the assembly, averaged (300–600 Hz): everything between the arms in series, clamps and contact."
+        }
+    }
+    .into()
 }
 
-/// Why there is no number.
-pub fn unanswered(what: &Unanswered<'_>) -> String {
-    match what {
-        Unanswered::Contact(error) => {
-            let text = error.to_string();
-            let mut letters = text.chars();
-            let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
-            format!("{first}{}.", letters.as_str())
-        }
-        Unanswered::BetweenArms => {
-            "Substructuring needs A, B and the assembly with six motions of both virtual points, and noise that leaves the joint visible.".into()
-        }
-        Unanswered::Slip => "The hits do not tell whether the contact slips.".into(),
-    }
+/// There is no k_T of a contact that slips.
+pub fn slipping() -> String {
+    "The contact slips under the hammer, so that its stiffness depends on the force: hit more softly, or press harder, for the stuck stiffness.".into()
+}
+
+/// The question was not put.
+pub fn not_looked_for() -> String {
+    "It was not looked for.".into()
+}
+
+/// An error's text as a sentence.
+pub fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{}.", letters.as_str())
 }
 
 /// The answer's lines: what the terminal says first, and the head of the report.
@@ -110,8 +110,9 @@ pub fn lines(results: &Results) -> Vec<String> {
         ));
     }
     lines.push(match answer.slip.found {
-        Some(true) => format!("The contact slips under the hammer. {}", answer.slip.why),
-        Some(false) => format!("The contact sticks under the hammer. {}", answer.slip.why),
+        // the check below says how it was told
+        Some(true) => "The contact slips under the hammer.".into(),
+        Some(false) => "The contact sticks under the hammer.".into(),
         None => answer.slip.why.clone(),
     });
     if let Some(truth) = &answer.truth {

@@ -213,7 +213,7 @@ fn series_compliance(found: &SeriesCompliance) -> Check {
 }
 
 /// Whether the contact slips under the hammer.
-fn hammer_slip(found: &HammerSlip) -> Check {
+pub fn hammer_slip(found: &HammerSlip) -> Check {
     let meaning = match found {
         HammerSlip::Slips(scaling) => format!(
             "The contact slips under the hammer: what it answers per newton depends on how hard it is hit ({} times what scatter explains; 1 % more force changes T \
