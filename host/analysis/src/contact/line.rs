@@ -20,8 +20,8 @@ pub struct Normal {
     pub chi_square: f64,
     /// Complex numbers in r that are free.
     pub freedom: f64,
-    /// Σ |r|² and what it should be, by kind of row: T, spot B, spot A, arm B, specimen A, specimen B.
-    pub kinds: [[f64; 2]; KINDS],
+    /// Σ |r|², what it should be, and the signals' own Σ, by kind of row: T, spot B, spot A, arm B, specimen A, specimen B.
+    pub kinds: [[f64; 3]; KINDS],
 }
 
 impl Normal {
@@ -32,7 +32,7 @@ impl Normal {
             gradient: DVector::zeros(parameters),
             chi_square: 0.0,
             freedom: 0.0,
-            kinds: [[0.0; 2]; KINDS],
+            kinds: [[0.0; 3]; KINDS],
         }
     }
 
@@ -73,6 +73,7 @@ impl Normal {
             let kind = if row.channel < 3 { row.channel } else { 3 + block.cells[row.cell].group as usize };
             self.kinds[kind][0] += residual[r].norm_sqr();
             self.kinds[kind][1] += 1.0 - q.row(r).norm_squared();
+            self.kinds[kind][2] += (line.value[r] * line.weight[r]).norm_sqr();
         }
         self.add_derivatives(&model.derivatives(&motion, shifts, &map), &line.weight, &q, &residual);
         Some(motion)

@@ -26,7 +26,7 @@ mod priors;
 mod solver;
 
 pub use cell::{ContactCell, SIGMA_PER_S};
-pub use diagnosis::{Diagnosis, Doubt};
+pub use diagnosis::{Diagnosis, Doubt, Left};
 pub use outcome::{Interval, OfFrequency, Stiffness};
 pub use priors::{Cause, ContactPriors};
 

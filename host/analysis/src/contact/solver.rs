@@ -13,14 +13,10 @@ use num_complex::Complex;
 pub const BIN_HZ: f64 = 25.0;
 /// Steps at most.
 const STEPS: usize = 60;
-/// Passes in which a block's trust may still change.
-const TRUST_STEPS: std::ops::Range<usize> = 3..12;
 /// The compliance moves less than this part of its standard deviation: done.
 const SETTLED: f64 = 0.01;
 /// A cost may rise by this part between passes: the shifts' motion is that of the pass before.
 const SLACK: f64 = 1e-3;
-/// Above this χ² per degree of freedom a block counts for less: something in it is not in the model.
-const TRUSTED: f64 = 1.1;
 
 /// Motion of every line of every block.
 type Motion = Vec<Vec<DVector<Complex<f64>>>>;
@@ -46,11 +42,9 @@ pub struct Solution {
     pub covariance: DMatrix<f64>,
     /// What each block says in each bin, at these parameters.
     pub bins: Vec<Bin>,
-    /// How much each block counts: 1 where the model describes it down to its noise.
-    pub trust: Vec<f64>,
     /// By how much neighbouring lines share their noise.
     pub shared: f64,
-    /// χ² per degree of freedom over all blocks, as they count.
+    /// χ² per degree of freedom over all blocks.
     pub chi_square: f64,
 }
 
@@ -63,34 +57,28 @@ pub fn solve(blocks: &[Block], parameters: &Parameters, sigma_per_s: f64) -> Res
     let mut p = parameters.start();
     let first = evaluate(blocks, &p, None)?;
     let mut motion = motions(blocks, &first);
-    let mut trust = vec![1.0; blocks.len()];
     let mut best: Option<(Vec<f64>, Vec<Bin>, f64)> = None;
     let mut damping = 1e-9;
-    for step in 0..STEPS {
+    for _ in 0..STEPS {
         let bins = evaluate(blocks, &p, Some(&motion))?;
-        let cost = cost(parameters, &p, &bins, &trust, shared);
+        let cost = cost(parameters, &p, &bins, shared);
         let better = best.as_ref().is_none_or(|(_, _, before)| cost <= before * (1.0 + SLACK));
         if better {
             motion = motions(blocks, &bins);
             damping = (damping * 0.1_f64).max(1e-9);
-            let chosen = if TRUST_STEPS.contains(&step) { trusted(blocks, &bins) } else { trust.clone() };
-            // another trust is another cost
-            let changed = chosen.iter().zip(&trust).any(|(a, b)| (a / b - 1.0).abs() > 0.02);
-            trust = chosen;
-            let known = self::cost(parameters, &p, &bins, &trust, shared);
-            best = Some((p.clone(), bins, if changed { f64::INFINITY } else { known }));
+            best = Some((p.clone(), bins, cost));
         } else {
             damping = (damping * 100.0).max(1e-6);
         }
-        let Some((at, bins, known)) = &best else { unreachable!("the first pass is better than none") };
-        let (information, gradient) = normal(parameters, blocks, at, bins, &trust, shared);
+        let Some((at, bins, _)) = &best else { unreachable!("the first pass is better than none") };
+        let (information, gradient) = normal(parameters, blocks, at, bins, shared);
         let (step, covariance) = newton(&information, &gradient, damping)?;
         let sigma = covariance[(COMPLIANCE, COMPLIANCE)].max(0.0).sqrt();
-        if better && known.is_finite() && step[COMPLIANCE].abs() <= SETTLED * sigma {
+        if better && step[COMPLIANCE].abs() <= SETTLED * sigma {
             let (_, undamped) = newton(&information, &gradient, 0.0)?;
-            let chi_square = per_freedom(bins, &trust);
+            let chi_square = per_freedom(bins);
             let (p, bins) = (at.clone(), bins.clone());
-            return Ok(Solution { p, covariance: undamped, bins, trust, shared, chi_square });
+            return Ok(Solution { p, covariance: undamped, bins, shared, chi_square });
         }
         p = at.iter().zip(step.iter()).map(|(at, step)| at + step).collect();
     }
@@ -157,31 +145,16 @@ fn motions(blocks: &[Block], bins: &[Bin]) -> Motion {
     all
 }
 
-/// A block that the model does not describe counts for as much less as its χ² is too large.
-fn trusted(blocks: &[Block], bins: &[Bin]) -> Vec<f64> {
-    let of = |b: usize| {
-        let own = bins.iter().filter(|bin| bin.block == b);
-        let (chi, freedom) = own.fold((0.0, 0.0), |(chi, freedom), bin| {
-            (chi + bin.normal.chi_square, freedom + bin.normal.freedom)
-        });
-        let ratio: f64 = if freedom > 0.0 { chi / freedom } else { 1.0 };
-        if ratio > TRUSTED { 1.0 / ratio } else { 1.0 }
-    };
-    (0..blocks.len()).map(of).collect()
-}
-
-fn per_freedom(bins: &[Bin], trust: &[f64]) -> f64 {
-    let (chi, freedom) = bins.iter().fold((0.0, 0.0), |(chi, freedom), bin| {
-        let trust = trust[bin.block];
-        (chi + trust * bin.normal.chi_square, freedom + bin.normal.freedom)
-    });
+fn per_freedom(bins: &[Bin]) -> f64 {
+    let chi: f64 = bins.iter().map(|bin| bin.normal.chi_square).sum();
+    let freedom: f64 = bins.iter().map(|bin| bin.normal.freedom).sum();
     if freedom > 0.0 { chi / freedom } else { f64::NAN }
 }
 
-fn cost(parameters: &Parameters, p: &[f64], bins: &[Bin], trust: &[f64], shared: f64) -> f64 {
+fn cost(parameters: &Parameters, p: &[f64], bins: &[Bin], shared: f64) -> f64 {
     let prior = parameters.all().iter().zip(p).filter(|(own, _)| own.sigma.is_finite() && own.sigma > 0.0);
     let prior: f64 = prior.map(|(own, p)| 0.5 * ((p - own.start) / own.sigma).powi(2)).sum();
-    let noise: f64 = bins.iter().map(|bin| trust[bin.block] * bin.normal.chi_square).sum();
+    let noise: f64 = bins.iter().map(|bin| bin.normal.chi_square).sum();
     prior + noise / shared
 }
 
@@ -191,14 +164,13 @@ fn normal(
     blocks: &[Block],
     p: &[f64],
     bins: &[Bin],
-    trust: &[f64],
     shared: f64,
 ) -> (DMatrix<f64>, DVector<f64>) {
     let count = p.len();
     let mut information = DMatrix::zeros(count, count);
     let mut gradient = DVector::zeros(count);
     for bin in bins {
-        let (own, weight) = (&blocks[bin.block].parameters, trust[bin.block] / shared);
+        let (own, weight) = (&blocks[bin.block].parameters, shared.recip());
         for (i, to) in own.iter().enumerate() {
             gradient[*to] += weight * bin.normal.gradient[i];
             for (j, other) in own.iter().enumerate() {
