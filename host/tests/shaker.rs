@@ -121,7 +121,7 @@ fn the_papers_fifteen_levels_on_the_default_rig() {
     assert_eq!(raw.len(), 15);
     for row in raw {
         let (f, amplitude) = (row.frequency_hz.unwrap(), row.amplitude_m.unwrap());
-        let k_t = row.k_t_n_per_m.map(|k| k.mean * 1e-6);
+        let k_t = row.stick_slope().map(|k| k.mean * 1e-6);
         assert!(row.findings.is_empty(), "{f} Hz: {:?}", row.findings);
         match f.round() as u32 {
             100 => assert!((k_t.unwrap() - 139.0).abs() < 5.0, "{row:?}"),
@@ -152,12 +152,12 @@ fn with_a_rigid_clamp_every_corrected_loop_is_the_contact() {
     let corrected = rows(&results, Force::Corrected);
     assert_eq!(corrected.len(), 5);
     for row in corrected {
-        let k = row.k_t_n_per_m.expect("a straight line").mean;
+        let k = row.stick_slope().expect("a straight line").mean;
         assert!((k / 180e6 - 1.0).abs() < 0.03, "{:?} Hz: {k}", row.frequency_hz);
     }
     // and raw it is not: 14 % too much at 500 Hz
     let raw = rows(&results, Force::Raw);
-    assert!(raw.iter().any(|row| row.k_t_n_per_m.unwrap().mean > 1.1 * 180e6));
+    assert!(raw.iter().any(|row| row.stick_slope().unwrap().mean > 1.1 * 180e6));
 }
 
 #[test]
@@ -209,7 +209,7 @@ fn slipped(slider: &Slider, levels: Vec<Level>) -> Vec<(Level, [f64; 3])> {
         let limit = friction * load;
         let energy = 4.0 * limit * (row.amplitude_m.unwrap() - limit / k * 1e-6);
         let pairs = [
-            (row.k_t_n_per_m.unwrap().mean, 1e6 * k),
+            (row.stick_slope().unwrap().mean, 1e6 * k),
             (row.friction_coefficient.unwrap(), limit / 300.0),
             (row.energy_j.unwrap().mean, energy),
         ];

@@ -223,7 +223,7 @@ fn told(store: &Store, outcome: &Outcome) -> (String, Value) {
     match found {
         Some(Ok(found)) => {
             let (name, k) = match found.k_t_n_per_m {
-                Some(k) if found.shape == Shape::Stuck => ("k_T", k),
+                Some(k) if found.shape == Shape::Stuck => ("slope between the spots", k),
                 _ => ("k_eq", found.k_eq_n_per_m),
             };
             let said = format!(
@@ -234,7 +234,7 @@ fn told(store: &Store, outcome: &Outcome) -> (String, Value) {
             );
             line += &said;
             value["shape"] = json!(found.shape);
-            value["k_t_n_per_m"] = json!(found.k_t_n_per_m);
+            value["slope_between_spots_n_per_m"] = json!(found.k_t_n_per_m);
             value["k_eq_n_per_m"] = json!(found.k_eq_n_per_m);
         }
         Some(Err(why)) => line.extend(["; no loop: ", &why]),

@@ -64,11 +64,11 @@ pub fn page(results: &Results) -> String {
             tables::decay(results),
             figure(
                 figures::levels(results),
-                "The shaker's levels. Round marks are k_T of straight loops, square ones k_eq of ellipses or of slip; full before the hammer's cells, hollow after them.",
+                "The shaker's levels. Round marks are slopes of straight loops between the spots, square ones k_eq of ellipses or of slip; full before the hammer's cells, hollow after them.",
             ),
             figure(
                 figures::backbone(results),
-                "The contact against amplitude where it slips. Left k_T of the stick part and the loop's peak secant, right the force at the loops' tips; the curves are \
+                "The contact against amplitude where it slips. Left the slope of the stick part and the loop's peak secant, right the force at the loops' tips; the curves are \
                  the law of parallel sliders that fits the tips best.",
             ),
             figure(

@@ -204,7 +204,7 @@ pub fn hysteresis(results: &Results) -> Option<String> {
         "excitation",
         "shape",
         "Δx, nm",
-        "k_T ± σ, N/µm",
+        "stick slope ± σ, N/µm",
         "k_eq ± σ, N/µm",
         "peak secant, |T₁/Δx₁|, N/µm",
         "energy ± σ, µJ",
@@ -219,12 +219,12 @@ pub fn hysteresis(results: &Results) -> Option<String> {
     // a remark stands once, at the first row that has it
     let mut told: Vec<&String> = Vec::new();
     for h in &results.hysteresis {
-        let cycles = h.k_t_n_per_m.or(h.k_eq_n_per_m).map_or(UNKNOWN.into(), |k| k.cycles.to_string());
+        let cycles = h.stick_slope().or(h.k_eq_n_per_m).map_or(UNKNOWN.into(), |k| k.cycles.to_string());
         table.row([
             words::excitation(h),
             words::shape_name(h.shape).into(),
             h.amplitude_m.map_or(UNKNOWN.into(), |a| format!("± {}", short(a * 1e9))),
-            over(h.k_t_n_per_m, 1e-6),
+            over(h.stick_slope(), 1e-6),
             over(h.k_eq_n_per_m, 1e-6),
             h.k_secant_n_per_m
                 .zip(h.k_fundamental_n_per_m)

@@ -28,8 +28,12 @@ pub struct Hysteresis {
     pub amplitude_m: Option<f64>,
     /// The shape that most cycles have.
     pub shape: Shape,
-    /// Slope of T on Δx over the stick part, N/m; null where the loop has none.
+    /// k_T: slope of the stick part, N/m, of a record whose signals are said to be those of the contact. Always null in a campaign, where
+    /// they are those of spots beside it and of load cells behind an arm.
     pub k_t_n_per_m: Option<OverCycles>,
+    /// The same slope in a campaign, N/m: between the spots, with whatever else lies there; null where the loop has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slope_between_spots_n_per_m: Option<OverCycles>,
     /// The part of the force's swing after each reversal in which it was read; only where something slips.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stick_part: Option<[f64; 2]>,
@@ -74,6 +78,19 @@ pub struct Hysteresis {
     /// What a reader must know before using these numbers.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
+}
+
+impl Hysteresis {
+    /// Slope of the stick part, whatever it may be called.
+    pub fn stick_slope(&self) -> Option<OverCycles> {
+        self.k_t_n_per_m.or(self.slope_between_spots_n_per_m)
+    }
+
+    /// In a campaign no slope is k_T.
+    #[must_use]
+    pub fn between_spots(self) -> Self {
+        Hysteresis { k_t_n_per_m: None, slope_between_spots_n_per_m: self.stick_slope(), ..self }
+    }
 }
 
 /// How a slipping contact goes with amplitude: the law through the shaker's levels of one frequency, raw force.

@@ -63,7 +63,8 @@ fn a_loop_has_its_fields_and_null_for_the_unknown() {
         v["hysteresis"].as_array().expect("a list").iter().filter(|row| row["kind"] == "shaker").collect();
     assert!(levels.len() > 3);
     for row in levels {
-        assert_eq!(row["k_t_n_per_m"].is_null(), row["shape"] == "elliptical");
+        assert!(row["k_t_n_per_m"].is_null());
+        assert_eq!(row.get("slope_between_spots_n_per_m").is_none(), row["shape"] == "elliptical");
         numbers(
             row,
             &["frequency_hz", "amplitude_m", "phase_deg", "k_secant_n_per_m", "k_fundamental_n_per_m"],

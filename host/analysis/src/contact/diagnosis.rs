@@ -1,7 +1,8 @@
 //! Whether what the estimate assumes is so: tested on the residuals that it leaves.
 
 use super::block::Block;
-use super::parameters::COMPLIANCE;
+use super::parameters::{COMPLIANCE, Parameters};
+use super::priors::Cause;
 use super::solver::Solution;
 use crate::substructuring::geometry::Grouping;
 use nalgebra::{DMatrix, DVector};
@@ -12,6 +13,8 @@ const CONTRADICTED: f64 = 10.0;
 /// Part of the signal that may be left unexplained beside noise, of the force, of the points on specimen A, and of the spots: errors of aim
 /// leave about a per cent of a strong local mode, and the misfit widens the interval; a point that is misplaced or loose leaves more.
 const UNEXPLAINED: [f64; 3] = [0.01, 0.04, 0.02];
+/// Standard deviations by which one of some hundred stated quantities may be off.
+const BEYOND: f64 = 5.0;
 /// Standard deviations by which two readings of k_T may differ.
 const APART: f64 = 4.0;
 
@@ -35,6 +38,8 @@ pub struct Diagnosis {
     pub spots: Left,
     /// Of k_T(f) as one number.
     pub flatness_chi_square: f64,
+    /// The largest distance of a position, angle, gain or delay from what is stated of it, in its stated standard deviations.
+    pub farthest: f64,
     /// How far the compliance from hits on A is from that of hits on the moving mass, in standard deviations; none where only one was hit.
     pub sides_apart: Option<f64>,
 }
@@ -49,6 +54,8 @@ pub enum Doubt {
     SpecimenA,
     /// A spot does not move with its body.
     Spots,
+    /// A position, angle, gain or delay is further from what is stated than its stated error allows.
+    Stated,
     /// k_T changes with frequency.
     Flatness,
     /// k_T depends on where the structure is hit.
@@ -93,7 +100,13 @@ fn quadratic(matrix: &DMatrix<f64>, v: &DVector<f64>) -> f64 {
 }
 
 /// Asks every assumption.
-pub fn diagnose(blocks: &[Block], solution: &Solution) -> Diagnosis {
+pub fn diagnose(blocks: &[Block], parameters: &Parameters, solution: &Solution) -> Diagnosis {
+    let stated = parameters
+        .all()
+        .iter()
+        .zip(&solution.p)
+        .filter(|(own, _)| own.cause != Cause::Noise && own.sigma > 0.0);
+    let farthest = stated.map(|(own, p)| ((p - own.start) / own.sigma).abs()).fold(0.0, f64::max);
     // where the hammer's aim is known by halves only, its errors are not the points'
     let judged =
         |block: &Block| block.aim_known || !blocks.iter().any(|b| b.aim_known && b.along_z.is_none());
@@ -123,6 +136,7 @@ pub fn diagnose(blocks: &[Block], solution: &Solution) -> Diagnosis {
         calibration: left(true, &[0, 1, 3, 5]),
         specimen_a: left(false, &[4]),
         spots: left(false, &[1, 2]),
+        farthest,
         flatness_chi_square: if parts.is_empty() { 1.0 } else { flatness / parts.len() as f64 },
         sides_apart: sides.map(|part| part.deviation / part.sigma),
     }
@@ -141,6 +155,9 @@ impl Diagnosis {
             if left.chi_square > CONTRADICTED && left.part > unexplained {
                 all.push(doubt);
             }
+        }
+        if self.farthest > BEYOND {
+            all.push(Doubt::Stated);
         }
         if self.flatness_chi_square > CONTRADICTED {
             all.push(Doubt::Flatness);

@@ -24,6 +24,8 @@ mod outcome;
 mod parameters;
 mod priors;
 mod solver;
+#[cfg(test)]
+mod tests;
 
 pub use cell::{ContactCell, SIGMA_PER_S};
 pub use diagnosis::{Diagnosis, Doubt, Left};

@@ -115,7 +115,7 @@ pub fn of(
     let spread = NORMAL_95 * (of_damping.max(0.0) * misfit).sqrt();
     let c_t = Interval { mean: beta * k, ci95: [beta * k - spread, beta * k + spread] };
 
-    let diagnosis = diagnose(blocks, solution);
+    let diagnosis = diagnose(blocks, parameters, solution);
     Ok(Stiffness {
         k_t_n_per_m: k_t,
         c_t_n_s_per_m: c_t,

@@ -24,7 +24,8 @@ fn of_impacts(impacts: &ImpactLoops) -> Vec<Hysteresis> {
         frequency_hz: impacts.frequency_hz,
         amplitude_m: impacts.amplitude_m,
         shape: impacts.shape,
-        k_t_n_per_m: (impacts.slope_is == SlopeIs::Contact).then_some(slope),
+        k_t_n_per_m: None,
+        slope_between_spots_n_per_m: (impacts.slope_is == SlopeIs::Contact).then_some(slope),
         stick_part: None,
         k_eq_n_per_m: Some(slope),
         k_secant_n_per_m: None,
@@ -52,6 +53,9 @@ fn of_impacts(impacts: &ImpactLoops) -> Vec<Hysteresis> {
 fn of_records(records: &[RecordLoops], resonance_hz: Option<f64>) -> Vec<Hysteresis> {
     let row = |one: &RecordLoops, found: &LoopAnalysis, force| {
         let mut row = of_record(found, force);
+        if one.level.is_some() {
+            row = row.between_spots();
+        }
         (row.level, row.moment) = (one.level.map(|(id, _)| id), one.level.map(|(_, moment)| moment.name()));
         if let (Some(_), Some(resonance_hz)) = (found.k_t_n_per_m, resonance_hz) {
             row.warnings.push(warning_sentences::beside_resonance(found.frequency_hz, resonance_hz));
@@ -72,6 +76,7 @@ fn of_record(found: &LoopAnalysis, force: Force) -> Hysteresis {
         amplitude_m: Some(found.amplitude_m),
         shape: found.shape,
         k_t_n_per_m: found.k_t_n_per_m,
+        slope_between_spots_n_per_m: None,
         stick_part: found.stick_part,
         k_eq_n_per_m: Some(found.k_eq_n_per_m),
         k_secant_n_per_m: found.k_secant_n_per_m,

@@ -15,7 +15,7 @@ const COLOURS: [&str; MOST] = [BLUE, VERMILION, GREEN];
 /// Points of a law's curve.
 const POINTS: usize = 160;
 
-/// Left: k_T and peak secant of each level and the law's secant. Right: the force at the loops' tips and the law's backbone.
+/// Left: slope of the stick part and peak secant of each level and the law's secant. Right: the force at the loops' tips and the law's backbone.
 pub fn backbone(results: &Results) -> Option<String> {
     let shown = &results.backbones[..results.backbones.len().min(MOST)];
     let rows: Vec<Vec<&Hysteresis>> = shown.iter().map(|one| rows(results, one)).collect();
@@ -23,7 +23,7 @@ pub fn backbone(results: &Results) -> Option<String> {
     let amplitudes = all().filter_map(|row| row.amplitude_m).map(|x| (1e6 * x).log10());
     let [low, high] = middle_range(amplitudes, 1.0, 0.1)?;
     let (low, high) = (10f64.powf(low), 10f64.powf(high));
-    let k_t = all().filter_map(|row| row.k_t_n_per_m).map(|k| k.mean + k.std);
+    let k_t = all().filter_map(|row| row.stick_slope()).map(|k| k.mean + k.std);
     let stiffest = k_t.chain(all().filter_map(|row| row.k_secant_n_per_m)).map(micro).fold(0.0, f64::max);
     let strongest = all().filter_map(|row| tip(row)).fold(0.0, f64::max);
     let most_n = shown.iter().map(|one| one.law.tip(1e-6 * high)).fold(strongest, f64::max);
@@ -62,7 +62,7 @@ pub fn backbone(results: &Results) -> Option<String> {
         [70.0, 16.0],
         Anchor::Start,
         "legend",
-        "○ k_T   ■ peak secant; force at the tip   (bars: ± σ over cycles; raw force)",
+        "○ slope of the stick part   ■ peak secant; force at the tip   (bars: ± σ over cycles; raw force)",
     );
     Some(drawing.finish("Stiffness and tip force of the shaker's loops against amplitude, with the law of sliders through them"))
 }
@@ -79,7 +79,7 @@ fn level(drawing: &mut Drawing, [left, right]: &[Panel; 2], row: &Hysteresis, co
         let ends = [k.mean - k.std, k.mean + k.std].map(|end| at(left, micro(end)));
         drawing.line(ends[0], ends[1], Stroke::new(colour, 1.4));
     };
-    if let Some(k) = &row.k_t_n_per_m {
+    if let Some(k) = &row.stick_slope() {
         bar(drawing, k);
         drawing.dot(at(left, micro(k.mean)), 5.0, colour, true);
     }

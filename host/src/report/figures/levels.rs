@@ -15,7 +15,7 @@ struct Dot {
     mean: f64,
     std: f64,
     /// Whether it is k_T; k_eq otherwise.
-    is_k_t: bool,
+    straight: bool,
     after: bool,
 }
 
@@ -71,7 +71,7 @@ pub fn levels(results: &Results) -> Option<String> {
         [70.0, 16.0],
         Anchor::Start,
         "legend",
-        "● k_T, before   ○ k_T, after   ■ k_eq, before   □ k_eq, after   (bars: ± σ over cycles; raw force)",
+        "● slope, before   ○ slope, after   ■ k_eq, before   □ k_eq, after   (bars: ± σ over cycles; raw force)",
     );
     Some(drawing.finish(
         "Stiffness of the shaker's loops against frequency and amplitude, before and after the campaign",
@@ -121,7 +121,7 @@ fn panel(drawing: &mut Drawing, area: Area, dots: &[Dot], range: [f64; 2], axis:
             let at = [panel.x.place_within((axis.of)(d)) + side, panel.y.place_within(d.mean)];
             let bar = [panel.y.place_within(d.mean - d.std), panel.y.place_within(d.mean + d.std)];
             drawing.line([at[0], bar[0]], [at[0], bar[1]], Stroke::new(colour, 1.4));
-            if d.is_k_t {
+            if d.straight {
                 drawing.dot(at, 4.0, colour, d.after);
             } else {
                 let square = |half: f64| Area {
@@ -161,7 +161,7 @@ fn dot(row: &Hysteresis) -> Option<Dot> {
         nanometres: 1e9 * row.amplitude_m?,
         mean: micro(mean),
         std: micro(std),
-        is_k_t: name == "k_T",
+        straight: name != "k_eq",
         after: row.moment == Some("after"),
     })
 }

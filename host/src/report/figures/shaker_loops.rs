@@ -55,7 +55,7 @@ fn one(drawing: &mut Drawing, shown: &ShakerLoop, left: f64, width: f64, first: 
     let line = horizontal.into_iter().map(|at| (at, shown.slope_n_per_m * 1e-9 * at));
     panel.curve(drawing, line, Stroke::new(VERMILION, 1.4).dashed("6 4"));
     panel.axes(drawing, (&x_ticks, Some("Δx in nm")), (&y_ticks, first.then_some("T in N")));
-    let name = if shown.shape == Shape::Stuck { "k_T" } else { "k_eq" };
+    let name = if shown.shape == Shape::Stuck { "slope" } else { "k_eq" };
     let title = format!("{} Hz: {}", short(shown.frequency_hz), words::shape_name(shown.shape));
     drawing.text([left, 40.0], Anchor::Start, "title", &title);
     let slope = format!("{name} {} N/µm", decimals(micro(shown.slope_n_per_m), 0));

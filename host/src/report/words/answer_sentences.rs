@@ -60,6 +60,9 @@ fn of_doubt(doubt: Doubt) -> &'static str {
         Doubt::Spots => {
             "the spots beside the contact do not move with arm B and the specimen (a specimen that moves against arm B needs points of its own: grouping 6)"
         }
+        Doubt::Stated => {
+            "a point, a spot, the hammer's tilt or a gain is further from what the plan says than its stated error allows (is one misplaced, or are the plan's [priors] too small?)"
+        }
         Doubt::Flatness => "the stiffness changes with frequency, as no contact's does",
         Doubt::Sides => "hits on A and on the moving mass give different values",
     }

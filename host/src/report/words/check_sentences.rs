@@ -170,7 +170,7 @@ fn series_compliance(found: &SeriesCompliance) -> Check {
     match found {
         SeriesCompliance::NotBoth => check(
             "FBS and loops are both needed to tell whether clamp and contact are in series; only one of them is here. An FBS value \
-             taken on the arms is k_T only if the clamps are much stiffer than the contact."
+             taken on the arms holds the clamps too."
                 .into(),
         ),
         SeriesCompliance::NotIdentified => check(

@@ -4,9 +4,14 @@ use super::number::{decimals, short};
 use crate::hysteresis::static_arm::Basis;
 use crate::results::{Excitation, Force, Hysteresis, Identified, OverCycles, Shape};
 
-/// The slope that may be quoted for a loop, with its name: k_T where it has one, k_eq otherwise.
+/// What the slope between the spots is called.
+pub const BETWEEN_SPOTS: &str = "slope between the spots";
+
+/// The slope that may be quoted for a loop, with its name: that of the stick part where it has one, k_eq otherwise.
 pub fn slope(loops: &Hysteresis) -> Option<(&'static str, OverCycles)> {
-    loops.k_t_n_per_m.map(|k| ("k_T", k)).or(loops.k_eq_n_per_m.map(|k| ("k_eq", k)))
+    let between = loops.slope_between_spots_n_per_m.map(|k| (BETWEEN_SPOTS, k));
+    let whole = loops.k_eq_n_per_m.map(|k| ("k_eq", k));
+    loops.k_t_n_per_m.map(|k| ("k_T", k)).or(between).or(whole)
 }
 
 /// The method as a tribologist would call it.

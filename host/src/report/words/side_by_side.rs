@@ -1,6 +1,6 @@
 //! FBS and loops side by side (the paper's Tables 2 and 3): every kind of stiffness that was found, and what it is.
 
-use super::names::slope;
+use super::names::{BETWEEN_SPOTS, slope};
 use super::number::{band, count, decimals, short};
 use crate::results::{
     DIRECT, Excitation, Force, HIDDEN_RESONANCE, Hysteresis, MAIN_BAND, OverCycles, Results,
@@ -57,9 +57,9 @@ fn substructuring(results: &Results) -> Vec<Kind> {
             "stiffness between the arms: contact and clamps in series. A property of this structure, not of the contact; for models that have no clamps"
         }
         Some(true) => {
-            "stiffness between the arms; nothing soft lies between them and the contact, so it is k_T"
+            "stiffness between the arms: nothing soft was found between them and the contact, whose own stiffness is the answer's"
         }
-        None => "stiffness between the arms: k_T only if the clamps are much stiffer than the contact",
+        None => "stiffness between the arms: contact and clamps in series",
     };
     let recommended =
         results.quoted().and_then(|r| Some((r, r.joint.get(&Dof::Z).filter(|z| z.identified)?)));
@@ -101,11 +101,11 @@ fn direct(results: &Results) -> Option<Kind> {
         found: format!("T/Δx of the impacts, {}", band(joint.band_hz)),
         mean_n_per_m: k.mean,
         std_n_per_m: k.std,
-        meaning: "the contact between the two laser spots, in frequency and away from any local resonance: k_T with raw force".into(),
+        meaning: "stiffness between the two laser spots with the raw force, away from local resonances: holds the specimen's tilt and lacks arm B's inertia".into(),
     })
 }
 
-/// The steady loops of each frequency with this force: those that are k_T, and those that are only k_eq.
+/// The steady loops of each frequency with this force: the straight ones' slope between the spots, and the others' k_eq.
 fn shaker(results: &Results, force: Force) -> Vec<Kind> {
     let rows: Vec<&Hysteresis> =
         results.hysteresis.iter().filter(|h| h.kind == Excitation::Shaker && h.force == force).collect();
@@ -115,14 +115,14 @@ fn shaker(results: &Results, force: Force) -> Vec<Kind> {
     let mut kinds = Vec::new();
     for f in frequencies {
         let near = |h: &&&Hysteresis| h.frequency_hz.is_some_and(|g| (g / f - 1.0).abs() < 1e-3);
-        for is_k_t in [true, false] {
+        for straight in [true, false] {
             let own: Vec<&Hysteresis> =
-                rows.iter().filter(near).copied().filter(|h| h.k_t_n_per_m.is_some() == is_k_t).collect();
+                rows.iter().filter(near).copied().filter(|h| h.stick_slope().is_some() == straight).collect();
             let slopes: Vec<OverCycles> =
-                own.iter().filter_map(|h| if is_k_t { h.k_t_n_per_m } else { h.k_eq_n_per_m }).collect();
+                own.iter().filter_map(|h| if straight { h.stick_slope() } else { h.k_eq_n_per_m }).collect();
             let Some((mean, std)) = pooled(&slopes) else { continue };
             let levels = if own.len() == 1 { "1 level".into() } else { format!("{} levels", own.len()) };
-            let name = if is_k_t { "k_T" } else { "k_eq" };
+            let name = if straight { BETWEEN_SPOTS } else { "k_eq" };
             kinds.push(Kind {
                 found: format!("{name}, shaker, {} Hz, {levels}", short(f)),
                 mean_n_per_m: mean,
@@ -142,7 +142,7 @@ fn meaning(row: &Hysteresis, results: &Results) -> String {
             short(f)
         ),
         (Shape::Stuck, None) => {
-            "a straight loop: the contact's own stiffness, for models that have everything else".into()
+            "a straight loop: what lies between the spots, contact and specimens' tilt".into()
         }
         (Shape::Elliptical, Some(f)) => format!(
             "an ellipse beside the resonance at {} Hz: an equivalent stiffness of this structure at this frequency, no contact stiffness",
@@ -152,8 +152,8 @@ fn meaning(row: &Hysteresis, results: &Results) -> String {
             "an ellipse: an equivalent stiffness of this structure at this frequency, no contact stiffness"
                 .into()
         }
-        (Shape::Microslip | Shape::GrossSlip, _) if row.k_t_n_per_m.is_some() => {
-            "slope of the stick part after each reversal: the contact's own stiffness".into()
+        (Shape::Microslip | Shape::GrossSlip, _) if row.stick_slope().is_some() => {
+            "slope of the stick part after each reversal, between the spots".into()
         }
         (Shape::Microslip | Shape::GrossSlip, _) => "the whole slipping loop: falls with amplitude".into(),
     }
@@ -163,18 +163,18 @@ fn impacts(results: &Results) -> Vec<Kind> {
     let Some(row) = results.impact_loops() else { return Vec::new() };
     let mut kinds = Vec::new();
     let hits = row.k_eq_n_per_m.map_or(0, |k| k.cycles as u64);
-    if let Some(k) = row.k_t_n_per_m.or(row.k_eq_n_per_m) {
-        let is_k_t = row.k_t_n_per_m.is_some();
+    if let Some(k) = row.stick_slope().or(row.k_eq_n_per_m) {
+        let straight = row.stick_slope().is_some();
         kinds.push(Kind {
             found: format!(
                 "{}, impacts, first cycle of {} hits",
-                if is_k_t { "k_T" } else { "k_eq" },
+                if straight { BETWEEN_SPOTS } else { "k_eq" },
                 count(hits)
             ),
             mean_n_per_m: k.mean,
             std_n_per_m: k.std,
-            meaning: if is_k_t {
-                "all modes at once, but none of them between the spots: the contact's own stiffness".into()
+            meaning: if straight {
+                "all modes at once, but none of them between the spots: contact and specimens' tilt".into()
             } else {
                 "all modes at once, the local one of a specimen too: near the contact's stiffness, but not it"
                     .into()
@@ -217,7 +217,7 @@ mod tests {
         assert!(
             of("200 Hz").meaning.contains("no contact stiffness") && of("200 Hz").found.starts_with("k_eq")
         );
-        assert!(of("250 Hz").found.starts_with("k_T") && of("250 Hz").found.contains("2 levels"));
+        assert!(of("250 Hz").found.starts_with(BETWEEN_SPOTS) && of("250 Hz").found.contains("2 levels"));
         assert!(of("first cycle").found.starts_with("k_eq"));
     }
 

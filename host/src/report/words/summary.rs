@@ -80,11 +80,11 @@ pub fn impact_loops(results: &Results) -> Option<String> {
     ))
 }
 
-/// What the shaker's loops found, in one sentence: k_T where they stick, with its range over frequency and amplitude.
+/// What the shaker's loops found, in one sentence: the slope between the spots where they stick, with its range over frequency and amplitude.
 pub fn shaker_loops(results: &Results) -> Option<String> {
     let rows: Vec<&Hysteresis> =
         results.hysteresis.iter().filter(|h| h.kind == Excitation::Shaker && h.force == Force::Raw).collect();
-    let values: Vec<f64> = rows.iter().filter_map(|h| h.k_t_n_per_m).map(|k| micro(k.mean)).collect();
+    let values: Vec<f64> = rows.iter().filter_map(|h| h.stick_slope()).map(|k| micro(k.mean)).collect();
     let ellipses = rows.iter().filter(|h| h.shape == Shape::Elliptical).count();
     let aside = match ellipses {
         0 => String::new(),
@@ -94,10 +94,12 @@ pub fn shaker_loops(results: &Results) -> Option<String> {
         values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     match values.len() {
         0 if rows.is_empty() => None,
-        0 => Some(format!("None of the shaker's {} loops gives k_T.", rows.len())),
-        1 => Some(format!("The shaker's loop gives k_T = {} N/µm{aside}.", short(low))),
+        0 => Some(format!("None of the shaker's {} loops gives a slope between the spots.", rows.len())),
+        1 => {
+            Some(format!("The shaker's loop gives a slope between the spots of {} N/µm{aside}.", short(low)))
+        }
         n => Some(format!(
-            "The shaker's loops ({n}) give k_T = {} to {} N/µm{aside}.",
+            "The shaker's loops ({n}) give slopes between the spots of {} to {} N/µm{aside}.",
             short(low),
             short(high)
         )),

@@ -115,7 +115,7 @@ pub fn loop_finding(found: &LoopFinding) -> String {
 pub fn beside_resonance(frequency_hz: f64, resonance_hz: f64) -> String {
     let (way, effect) = if frequency_hz < resonance_hz { ("adds to", "low") } else { ("takes from", "high") };
     format!(
-        "a resonance of one specimen at {} Hz {way} Δx here: this k_T reads {effect}, by more the nearer it is",
+        "a resonance of one specimen at {} Hz {way} Δx here: this slope reads {effect}, by more the nearer it is",
         short(resonance_hz)
     )
 }

@@ -1,0 +1,210 @@
+//! Signals written down from motions that nobody solved for: the estimate must find the contact that was put in.
+
+use super::*;
+use crate::frf::MotionQuantity;
+use crate::spectra::cross_spectra::{CrossSpectra, OutputSums};
+use crate::structure::Structure;
+use num_complex::Complex;
+use rand::{RngExt, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use std::f64::consts::TAU;
+
+type C = Complex<f64>;
+
+const K: f64 = 140e6;
+const DAMPING: f64 = 2000.0;
+/// Of the force's form: stiffness beside the cells, mass and the lever of its centre, as no prior knows them.
+const BESIDE: f64 = 6e6;
+const MASS: f64 = 2.3;
+const LEVER_M: f64 = -0.038;
+const ARM: [[f64; 3]; 3] = [[-0.02, -0.02, 0.03], [0.02, -0.02, 0.03], [0.0, -0.045, 0.03]];
+const SPECIMEN: [[f64; 3]; 6] = [
+    [0.009, 0.002, 0.0],
+    [-0.009, 0.002, 0.0],
+    [0.009, 0.014, 0.0],
+    [-0.009, 0.014, 0.0],
+    [0.0, 0.008, 0.007],
+    [0.0, 0.008, -0.007],
+];
+const SPOTS: [[f64; 3]; 2] = [[0.0006, 0.0005, 0.0], [0.0006, -0.0005, 0.0]];
+
+/// What may be wrong.
+#[derive(Clone, Copy)]
+struct World {
+    noise_m_per_s: f64,
+    /// Error of the spot on A, m.
+    spot_m: f64,
+    /// A point on specimen A that stands this far from where it is said to be, m.
+    misplaced_m: f64,
+}
+
+struct Cell {
+    structure: Structure,
+    impact: usize,
+    point: usize,
+    on_specimen: bool,
+    spectra: CrossSpectra,
+}
+
+fn moved(t: [C; 3], turn: [C; 3], r: [f64; 3]) -> [C; 3] {
+    [
+        t[0] + turn[1] * r[2] - turn[2] * r[1],
+        t[1] + turn[2] * r[0] - turn[0] * r[2],
+        t[2] + turn[0] * r[1] - turn[1] * r[0],
+    ]
+}
+
+/// Two hits of every cell.
+fn measured(world: World) -> Vec<Cell> {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
+    let frequency_hz: Vec<f64> = (200..=1200).map(|l| 0.5 * f64::from(l)).collect();
+    let line = |f: f64| C::new(SIGMA_PER_S, TAU * f);
+    let mut cells = Vec::new();
+    for structure in [Structure::B, Structure::Ajb] {
+        for impact in 0..if structure == Structure::B { 6 } else { 3 } {
+            let along_z = if impact < 3 { -1.0 } else { 0.0 };
+            // compliances of six motions of B and six of A, and where each resonates
+            let draw: Vec<f64> = (0..24).map(|_| random.random::<f64>()).collect();
+            let mode = |n: usize, s: C, scale: f64| {
+                let w = TAU * (150.0 + 900.0 * draw[n]);
+                scale * (0.3 + draw[12 + n]) / (1.0 + s * s / (w * w) + s * 3e-5)
+            };
+            let motion = |s: C| {
+                let b: [C; 6] = std::array::from_fn(|n| mode(n, s, if n < 3 { 6e-9 } else { 1e-7 }));
+                let a: [C; 6] = std::array::from_fn(|n| mode(6 + n, s, if n < 3 { 9e-9 } else { 4e-7 }));
+                (b, a)
+            };
+            let (points, specimens): (usize, usize) = (3, if structure == Structure::Ajb { 6 } else { 0 });
+            for point in 0..points + specimens {
+                let on_specimen = point >= points;
+                let mut outputs = vec![OutputSums::default(); 6];
+                let mut s_ff = Vec::new();
+                for &f in &frequency_hz {
+                    let s = line(f);
+                    let (b, a) = motion(s);
+                    let form = b[2] * (BESIDE + MASS * s * s) + b[3] * MASS * LEVER_M * s * s;
+                    let force = if structure == Structure::B { C::from(along_z) } else { C::from(1.3) };
+                    let t = force - form;
+                    let z_a = b[2] + force / (K + DAMPING * s);
+                    let (of_b, turn_b) = ([b[0], b[1], b[2]], [b[3], b[4], b[5]]);
+                    let (of_a, turn_a) = ([a[0], a[1], z_a], [a[3], a[4], a[5]]);
+                    let mut at = if on_specimen { SPECIMEN[point - points] } else { ARM[point] };
+                    if on_specimen && point == points {
+                        at[1] += world.misplaced_m;
+                    }
+                    let seen = if on_specimen { moved(of_a, turn_a, at) } else { moved(of_b, turn_b, at) };
+                    let mut spot_a = SPOTS[0];
+                    spot_a[1] += world.spot_m;
+                    let v = |x: C| x * s;
+                    let exact = [
+                        v(seen[0]),
+                        v(seen[1]),
+                        v(seen[2]),
+                        v(moved(of_a, turn_a, spot_a)[2]),
+                        v(moved(of_b, turn_b, SPOTS[1])[2]),
+                        t,
+                    ];
+                    s_ff.push(2.0);
+                    for (n, (x, sums)) in exact.iter().zip(&mut outputs).enumerate() {
+                        let sigma = if n == 5 { 1e-3 } else { world.noise_m_per_s };
+                        let mut hit = || {
+                            let part = |r: &mut Xoshiro256PlusPlus| -> f64 { StandardNormal.sample(r) };
+                            x + C::new(part(&mut random), part(&mut random)) * sigma
+                        };
+                        let (one, two) = (hit(), hit());
+                        sums.s_xf.push(one + two);
+                        sums.s_xx.push(one.norm_sqr() + two.norm_sqr());
+                    }
+                }
+                let spectra = CrossSpectra::new(1.0, frequency_hz.clone(), SIGMA_PER_S, 2, s_ff, outputs)
+                    .expect("alike");
+                cells.push(Cell { structure, impact, point, on_specimen, spectra });
+            }
+        }
+    }
+    cells
+}
+
+const NAMES: [&str; 9] = ["1", "2", "3", "4", "5", "6", "7", "8", "9"];
+
+fn input(cells: &[Cell]) -> Input<'_> {
+    // aims are exact here, and so are gains: what is tested is what the fit makes of spots, points and noise
+    let mut priors = ContactPriors { gain: 0.0, hammer_gain: 0.0, skew_s: 0.0, ..ContactPriors::default() };
+    priors.positions.aim_m = 0.0;
+    priors.positions.position_m = 1e-5;
+    priors.specimen_point_m = 1e-5;
+    priors.positions.hammer_angle_rad = 0.0;
+    fn of(cell: &Cell) -> ContactCell<'_> {
+        let across = [[0.0, 0.0, -1.0], [0.0, -1.0, 0.0]];
+        ContactCell {
+            structure: cell.structure,
+            impact: NAMES[cell.impact],
+            impact_m: [0.0; 3],
+            direction: across[usize::from(cell.impact >= 3)],
+            impact_grouping: if cell.structure == Structure::B {
+                Grouping::InterfaceB
+            } else {
+                Grouping::InterfaceA
+            },
+            point: NAMES[cell.point],
+            point_m: if cell.on_specimen { SPECIMEN[cell.point - 3] } else { ARM[cell.point] },
+            point_grouping: if cell.on_specimen { Grouping::SpecimenA } else { Grouping::InterfaceB },
+            spectra: &cell.spectra,
+            quantity: MotionQuantity::Velocity,
+        }
+    }
+    Input {
+        cells: cells.iter().map(of).collect(),
+        contact_m: [0.0; 3],
+        spots_m: SPOTS,
+        priors,
+        band_hz: BAND,
+    }
+}
+
+const QUIET: World = World { noise_m_per_s: 2e-9, spot_m: 0.0, misplaced_m: 0.0 };
+
+#[test]
+fn without_noise_the_contact_is_found_to_a_thousandth() {
+    let cells = measured(QUIET);
+    let found = stiffness(&input(&cells)).expect("all is there");
+    assert!((found.k_t_n_per_m.mean / K - 1.0).abs() < 1e-3, "{found:?}");
+    assert!((found.c_t_n_s_per_m.mean / DAMPING - 1.0).abs() < 0.02, "{found:?}");
+    assert!(found.doubts.is_empty(), "{:?}", found.diagnosis);
+    let budget: f64 = found.budget.values().map(|share| share * share).sum();
+    let [low, high] = found.k_t_n_per_m.ci95;
+    let sigma = (low.recip() - high.recip()) / (2.0 * 1.96) * found.k_t_n_per_m.mean;
+    // 1.96 for the exact quantile
+    assert!((sigma / budget.sqrt() - 1.0).abs() < 1e-3, "the budget adds up: {sigma} {budget}");
+}
+
+#[test]
+fn a_spot_that_is_not_where_it_is_said_to_be_is_inside_the_interval() {
+    let world = World { noise_m_per_s: 5e-7, spot_m: 4e-5, misplaced_m: 0.0 };
+    let cells = measured(world);
+    let found = stiffness(&input(&cells)).expect("all is there");
+    let [low, high] = found.k_t_n_per_m.ci95;
+    assert!(low < K && K < high && high - low < 0.2 * K, "{found:?}");
+}
+
+#[test]
+fn a_point_that_is_millimetres_off_is_doubted() {
+    let cells = measured(World { misplaced_m: 4e-3, ..QUIET });
+    let found = stiffness(&input(&cells)).expect("a fit, if a bad one");
+    assert!(found.doubts.contains(&Doubt::Stated), "{:?}", found.diagnosis);
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    let cells = measured(QUIET);
+    let only = |keep: &dyn Fn(&Cell) -> bool| {
+        let whole = input(&cells);
+        let some = whole.cells.iter().zip(&cells).filter(|(_, own)| keep(own)).map(|(cell, _)| *cell);
+        stiffness(&Input { cells: some.collect(), ..whole.clone() })
+    };
+    assert_eq!(only(&|_| false), Err(ContactError::NoCells));
+    assert_eq!(only(&|cell| cell.structure == Structure::Ajb), Err(ContactError::NoForce));
+    assert_eq!(only(&|cell| !cell.on_specimen), Err(ContactError::NoRotation));
+    assert_eq!(only(&|cell| cell.structure == Structure::B), Err(ContactError::NoRotation));
+}
