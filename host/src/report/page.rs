@@ -104,11 +104,12 @@ pub fn page(results: &Results) -> String {
 }
 
 fn headline(html: &mut String, results: &Results) {
-    let found: Vec<String> =
+    let mut found = words::answer_sentences::lines(results);
+    found.extend(
         [words::substructuring(results), words::impact_loops(results), words::shaker_loops(results)]
             .into_iter()
-            .flatten()
-            .collect();
+            .flatten(),
+    );
     if found.is_empty() {
         put(
             html,
