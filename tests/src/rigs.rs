@@ -110,8 +110,8 @@ pub fn contact_plan(rig: &RigConfig) -> String {
     if !rig.clamp_b.rigid {
         let points: Vec<&ResponsePoint> =
             rig.responses.iter().filter(|point| point.body == BodyName::SpecimenB).collect();
-        let names: String = points.iter().map(|point| format!("\"{}\", ", point.name)).collect();
-        let rows: String = points
+        let names: Vec<String> = points.iter().map(|point| format!("\"{}\", ", point.name)).collect();
+        let rows: Vec<String> = points
             .iter()
             .map(|p| {
                 let [x, y, z] = p.position_m;
@@ -121,6 +121,7 @@ pub fn contact_plan(rig: &RigConfig) -> String {
                 )
             })
             .collect();
+        let (names, rows) = (names.concat(), rows.concat());
         plan = plan
             .replace("responses = [\"S1\"", &format!("responses = [{names}\"S1\""))
             .replace("responses = [\"B1\"", &format!("responses = [{names}\"B1\""))

@@ -3,9 +3,9 @@
 //! All of it is keyed to (seed, what it is for): the same in every cell and configuration, whatever was visited before.
 
 use super::aim::shifted;
+use super::channels::{CHANNELS, Channel, FORCE, LOAD_CELLS, is_gauged};
 use super::config::{RigConfig, Spot, Spots};
 use super::key::{normal, stream};
-use super::sensors::{CHANNELS, Channel, FORCE, LOAD_CELLS, is_gauged};
 
 /// One campaign's flaws.
 #[derive(Debug, Clone, PartialEq)]

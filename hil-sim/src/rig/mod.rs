@@ -14,6 +14,7 @@
 
 mod aim;
 mod body;
+mod channels;
 pub mod config;
 mod configuration;
 mod error;
@@ -33,6 +34,7 @@ pub mod structure;
 mod truth;
 
 pub use aim::Aim;
+pub use channels::{CHANNELS, Channel, Measured};
 pub use config::RigConfig;
 pub use configuration::{Configuration, Quantity};
 pub use error::RigError;
@@ -40,15 +42,15 @@ pub use flaws::Flaws;
 pub use hammer::{Hit, Mishap};
 pub use joint_state::JointState;
 pub use probe::Probe;
-pub use sensors::{CHANNELS, Channel, Measured};
 pub use structure::exact_frf;
 pub use truth::Truth;
 
+use channels::{EXCITATION, FIRST_SIGNAL, FORCE};
 use force::ForceSegment;
 use key::stream;
 use plant::Plant;
 pub use plant::Stepping;
-use sensors::{EXCITATION, FIRST_SIGNAL, FORCE, Sensors};
+use sensors::Sensors;
 use stepper::{ScanForces, Slipping, Span, Stepper};
 
 /// One rig.
@@ -97,7 +99,7 @@ impl Rig {
         let period_s = 1.0 / f64::from(config.scan_rate_hz);
         let plant = |configuration| Plant::new(config, configuration, stepping, period_s);
         let plants = [plant(Configuration::A)?, plant(Configuration::B)?, plant(Configuration::Ajb)?];
-        let channels = sensors::channels(&config.sensors);
+        let channels = channels::channels(&config.sensors);
         let flaws = Flaws::new(seed, config, &channels);
         let configuration = Configuration::Ajb;
         // check() has seen at least one of each.

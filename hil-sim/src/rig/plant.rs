@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::channels::{CHANNELS, Channel, FIRST_SIGNAL};
 use super::config::{BodyName, Contact, ContactLaw, RigConfig, Spots};
 use super::modal::{ModalError, Mode, modes};
 use super::probe::{AXES, Probe};
-use super::sensors::{CHANNELS, Channel, FIRST_SIGNAL};
 use super::sliders::Sliders;
 use super::state_space::StateSpace;
 use super::stepper::{Aimed, ExponentialStepper, Joint, ModalStepper, Slipping, Stepper};

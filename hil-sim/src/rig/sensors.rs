@@ -1,4 +1,4 @@
-//! The ten channels: from true signals to converter codes.
+//! The sensors: from true signals to converter codes.
 //!
 //! code = round(volts / range · 32768), saturating, volts = (delayed signal · polarity + noise) / scale. Noise is drawn for
 //! every channel in every scan, present or not, so that a channel's stream does not depend on the others. Cross-talk, gain and skew
@@ -8,111 +8,12 @@ use std::f64::consts::PI;
 
 use num_complex::Complex;
 
+use super::channels::{CHANNELS, Channel, LOAD_CELLS, VIBROMETER};
 use super::config::{self, Hammer, RigConfig};
 use super::flaws::Flaws;
 use super::force::ForceSegment;
 use super::hammer::nominal_width_s;
 use super::key::{Stream, normal, uniform};
-
-/// Channels of the rig.
-pub const CHANNELS: usize = 10;
-/// Place of the hammer's force among the channels.
-pub const FORCE: usize = 0;
-/// Place of the first of the structure's signals; they follow in the order of [`super::stepper::SIGNALS`].
-pub const FIRST_SIGNAL: usize = 1;
-/// Places of the 3-D vibrometer.
-const VIBROMETER: [usize; 3] = [1, 2, 3];
-/// Places of the load cells.
-pub const LOAD_CELLS: [usize; 3] = [6, 7, 8];
-/// Place of the shaker's force.
-pub const EXCITATION: usize = 9;
-
-/// Whether the channel's gain is in error by `errors.gain`: load cells and vibrometers, not the two forces that go in.
-pub fn is_gauged(at: usize) -> bool {
-    at != FORCE && at != EXCITATION
-}
-
-/// What a channel measures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Measured {
-    /// Force (N).
-    Force,
-    /// Velocity (m/s).
-    Velocity,
-}
-
-/// One channel of the rig.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Channel {
-    /// Its name: `force`, `vib_x` … `excitation`.
-    pub name: &'static str,
-    /// What it measures.
-    pub quantity: Measured,
-    /// `N` or `m/s`.
-    pub unit: &'static str,
-    /// Units per volt.
-    pub units_per_volt: f64,
-    /// The converter spans ± this (V).
-    pub range_v: f64,
-    /// How late the signal is (s).
-    pub delay_s: f64,
-    /// 1, or −1 where the sensor reads backwards.
-    pub polarity: i8,
-    /// The axis it measures along (x, y, z); `None` for the hammer, which measures along the impact.
-    pub axis: Option<usize>,
-}
-
-impl Channel {
-    /// What one converter step is worth, in the channel's unit.
-    pub fn step(&self) -> f64 {
-        self.units_per_volt * self.range_v / 32768.0
-    }
-}
-
-/// The ten channels in order.
-pub fn channels(sensors: &config::Sensors) -> [Channel; CHANNELS] {
-    let channel = |name, quantity, units_per_volt, delay_s, polarity, axis| Channel {
-        name,
-        quantity,
-        unit: if quantity == Measured::Force { "N" } else { "m/s" },
-        units_per_volt,
-        range_v: sensors.range_v,
-        delay_s,
-        polarity,
-        axis,
-    };
-    let vibrometer = |name, axis: usize| {
-        let it = &sensors.vibrometer;
-        channel(name, Measured::Velocity, it.units_per_volt, it.delay_s[axis], it.polarity[axis], Some(axis))
-    };
-    let spot = |name, it: &config::SpotVibrometer| {
-        channel(name, Measured::Velocity, it.units_per_volt, it.delay_s, it.polarity, Some(2))
-    };
-    let cell = |name, index: usize| {
-        let it = &sensors.load_cells;
-        channel(name, Measured::Force, it.units_per_volt, it.delay_s[index], it.polarity[index], Some(2))
-    };
-    let (force, excitation) = (&sensors.force, &sensors.excitation);
-    [
-        channel("force", Measured::Force, force.units_per_volt, force.delay_s, force.polarity, None),
-        vibrometer("vib_x", 0),
-        vibrometer("vib_y", 1),
-        vibrometer("vib_z", 2),
-        spot("ldv_a", &sensors.ldv_a),
-        spot("ldv_b", &sensors.ldv_b),
-        cell("lc_1", 0),
-        cell("lc_2", 1),
-        cell("lc_3", 2),
-        channel(
-            "excitation",
-            Measured::Force,
-            excitation.units_per_volt,
-            excitation.delay_s,
-            excitation.polarity,
-            Some(2),
-        ),
-    ]
-}
 
 /// Everything between the true signals and the codes.
 #[derive(Debug, Clone)]

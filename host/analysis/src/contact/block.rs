@@ -1,7 +1,7 @@
 //! The cells of one impact: their rows, their lines, and which parameters they know.
 
 use super::cell::{self, CHANNELS, ContactCell, Values};
-use super::parameters::{DELAYS, FORM, FORM_TERMS, GAINS, MASS_B, Parameter, Parameters, SPOTS, along_z};
+use super::parameters::{DELAYS, FORM, GAINS, MASS_B, Parameter, Parameters, SPOTS, along_z};
 use super::priors::Cause;
 use super::{ContactError, Input};
 use crate::structure::Structure;
@@ -218,8 +218,7 @@ fn block(
 ) -> Result<Block, ContactError> {
     let priors = &input.priors;
     let alone = impact.structure == Structure::B;
-    let mut own: Vec<usize> =
-        if alone { (FORM..FORM + FORM_TERMS + 1).collect() } else { (0..=MASS_B).collect() };
+    let mut own: Vec<usize> = if alone { (FORM..=MASS_B).collect() } else { (0..=MASS_B).collect() };
     own.extend(SPOTS..SPOTS + 4);
     own.extend(GAINS..GAINS + 5);
     own.extend(DELAYS..DELAYS + 5);

@@ -111,7 +111,9 @@ pub(super) fn pool(cells: &mut [Values]) {
     let count = cells.len().max(1) as f64;
     for channel in 0..3 {
         let mean = cells.iter().map(|cell| cell.noise[channel]).sum::<f64>() / count;
-        cells.iter_mut().for_each(|cell| cell.noise[channel] = mean);
+        for cell in cells.iter_mut() {
+            cell.noise[channel] = mean;
+        }
     }
     for cell in cells {
         let mean = cell.noise[3..].iter().sum::<f64>() / 3.0;

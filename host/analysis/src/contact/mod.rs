@@ -11,13 +11,14 @@
 //!    eliminated at every line (`line`), so that noise in what the force is formed from does not pull k_T down. Spots, points, gains, delays, the
 //!    hammer's tilt and each cell's aim are unknowns with priors ([`ContactPriors`]); the local resonances of the specimen calibrate them.
 //!
-//! The way through the room: `cell` what is measured, `block` the cells of an impact, `parameters` the unknowns, `model` the signals as
+//! The way through the room: `cell` what is measured, `block` the cells of an impact, `parameters` the unknowns, `form_scale` how large the form's may be, `model` the signals as
 //! a linear map of the motion, `line` its elimination, `solver` the most likely parameters, `diagnosis` whether the assumptions
 //! hold, `outcome` the answer.
 
 mod block;
 mod cell;
 mod diagnosis;
+mod form_scale;
 mod line;
 mod model;
 mod outcome;
@@ -118,7 +119,7 @@ pub fn stiffness(input: &Input<'_>) -> Result<Stiffness, ContactError> {
     if !blocks.iter().any(|block| block.along_z.is_none()) {
         return Err(ContactError::NoRotation);
     }
-    parameters.scale_form(&blocks);
+    form_scale::scale_form(&mut parameters, &blocks);
     let sigma_per_s = input.cells[0].spectra.sigma_per_s();
     let solution = solver::solve(&blocks, &parameters, sigma_per_s)?;
     outcome::of(input, &blocks, &parameters, &solution)

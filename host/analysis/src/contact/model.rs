@@ -50,8 +50,8 @@ fn dot(of: &Linear, x: &DVector<C>) -> C {
 }
 
 /// Displacement along `axis` of a body's point: t + θ × r, with the body's rotation θ.
-fn turned(translation: Linear, theta: [usize; 3], r: [f64; 3], axis: usize) -> Linear {
-    let mut moved = translation;
+fn turned(translation: &Linear, theta: [usize; 3], r: [f64; 3], axis: usize) -> Linear {
+    let mut moved = *translation;
     // (θ × r): x = θ_y z − θ_z y, y = θ_z x − θ_x z, z = θ_x y − θ_y x
     let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
     moved[theta[next]] += r[last];
@@ -135,12 +135,12 @@ impl<'a> LineModel<'a> {
             0 => self.t,
             1 | 2 => {
                 let (z, theta, place) = self.spot(channel == 2);
-                sum(&[(self.sensor(2 - channel), &turned(z, theta, place, 2))])
+                sum(&[(self.sensor(2 - channel), &turned(&z, theta, place, 2))])
             }
             _ => {
                 let (cell, axis) = (&self.block.cells[cell], channel - 3);
                 let (translation, theta) = self.body(cell.group, axis);
-                let moved = turned(translation, theta, self.position(cell), axis);
+                let moved = turned(&translation, theta, self.position(cell), axis);
                 sum(&[(self.sensor(2 + axis), &moved)])
             }
         }

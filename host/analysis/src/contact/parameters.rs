@@ -1,6 +1,5 @@
 //! What the fit may choose: the contact, the form that gives its force, and everything that nobody at the rig knows, each with its prior.
 
-use super::block::{Block, Group};
 use super::priors::{Cause, ContactPriors};
 
 /// 1/k_T, m/N.
@@ -71,6 +70,11 @@ impl Parameters {
         at
     }
 
+    /// States how far a parameter may go.
+    pub fn narrow(&mut self, at: usize, sigma: f64) {
+        self.0[at].sigma = sigma;
+    }
+
     /// The parameters.
     pub fn all(&self) -> &[Parameter] {
         &self.0
@@ -92,32 +96,5 @@ pub fn along_z(direction: [f64; 3], tilt_rad: f64) -> Parameter {
         start: z * (1.0 - tilt_rad * tilt_rad),
         sigma: (tilt_rad * across).hypot(second),
         cause: Cause::HammerTilt,
-    }
-}
-
-impl Parameters {
-    /// How large the form's coefficients may be, from what the load cells say of their own stiffness K = |T/z_B|: half of K beside them, an
-    /// arm whose mass resonates on K above 250 Hz, damping of 3·10⁻⁵ s; for rotations the same at the lever of arm B's points. It keeps the form
-    /// from following noise where the hits tell it little.
-    pub fn scale_form(&mut self, blocks: &[Block]) {
-        let mut stiffness: Vec<f64> = Vec::new();
-        let mut lever_m: f64 = 0.0;
-        for block in blocks.iter().filter(|b| b.along_z.is_some_and(|at| self.0[at].start.abs() > 0.5)) {
-            let place = |channel| block.rows.iter().position(|row| row.cell == 0 && row.channel == channel);
-            if let (Some(t), Some(spot)) = (place(0), place(1)) {
-                stiffness.extend(block.lines.iter().map(|line| (line.value[t] / line.value[spot]).norm()));
-            }
-            for cell in block.cells.iter().filter(|cell| cell.group == Group::ArmB) {
-                lever_m = lever_m.max(self.0[cell.point].start.hypot(self.0[cell.point + 1].start));
-            }
-        }
-        stiffness.sort_by(f64::total_cmp);
-        let Some(k) = stiffness.get(stiffness.len() / 2).copied() else { return };
-        let mass = k / (std::f64::consts::TAU * 250.0).powi(2);
-        for (term, sigma) in [0.5 * k, 3e-5 * k, mass].into_iter().enumerate() {
-            for (of, lever) in [1.0, lever_m, lever_m].into_iter().enumerate() {
-                self.0[FORM + 2 + 3 * of + term].sigma = sigma * lever;
-            }
-        }
     }
 }

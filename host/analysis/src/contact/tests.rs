@@ -128,6 +128,26 @@ fn measured(world: World) -> Vec<Cell> {
 
 const NAMES: [&str; 9] = ["1", "2", "3", "4", "5", "6", "7", "8", "9"];
 
+fn of(cell: &Cell) -> ContactCell<'_> {
+    let across = [[0.0, 0.0, -1.0], [0.0, -1.0, 0.0]];
+    ContactCell {
+        structure: cell.structure,
+        impact: NAMES[cell.impact],
+        impact_m: [0.0; 3],
+        direction: across[usize::from(cell.impact >= 3)],
+        impact_grouping: if cell.structure == Structure::B {
+            Grouping::InterfaceB
+        } else {
+            Grouping::InterfaceA
+        },
+        point: NAMES[cell.point],
+        point_m: if cell.on_specimen { SPECIMEN[cell.point - 3] } else { ARM[cell.point] },
+        point_grouping: if cell.on_specimen { Grouping::SpecimenA } else { Grouping::InterfaceB },
+        spectra: &cell.spectra,
+        quantity: MotionQuantity::Velocity,
+    }
+}
+
 fn input(cells: &[Cell]) -> Input<'_> {
     // aims are exact here, and so are gains: what is tested is what the fit makes of spots, points and noise
     let mut priors = ContactPriors { gain: 0.0, hammer_gain: 0.0, skew_s: 0.0, ..ContactPriors::default() };
@@ -135,25 +155,6 @@ fn input(cells: &[Cell]) -> Input<'_> {
     priors.positions.position_m = 1e-5;
     priors.specimen_point_m = 1e-5;
     priors.positions.hammer_angle_rad = 0.0;
-    fn of(cell: &Cell) -> ContactCell<'_> {
-        let across = [[0.0, 0.0, -1.0], [0.0, -1.0, 0.0]];
-        ContactCell {
-            structure: cell.structure,
-            impact: NAMES[cell.impact],
-            impact_m: [0.0; 3],
-            direction: across[usize::from(cell.impact >= 3)],
-            impact_grouping: if cell.structure == Structure::B {
-                Grouping::InterfaceB
-            } else {
-                Grouping::InterfaceA
-            },
-            point: NAMES[cell.point],
-            point_m: if cell.on_specimen { SPECIMEN[cell.point - 3] } else { ARM[cell.point] },
-            point_grouping: if cell.on_specimen { Grouping::SpecimenA } else { Grouping::InterfaceB },
-            spectra: &cell.spectra,
-            quantity: MotionQuantity::Velocity,
-        }
-    }
     Input {
         cells: cells.iter().map(of).collect(),
         contact_m: [0.0; 3],
