@@ -226,7 +226,7 @@ fn block(
         alone.then(|| parameters.add([along_z(impact.direction, priors.positions.hammer_angle_rad)]));
     own.extend(along_z);
     let (shifted_by, aim_known) = shifted_by(impact, impacts);
-    let aim = Parameter { start: 0.0, sigma: priors.positions.aim_m, cause: Cause::ArmPoints };
+    let aim = Parameter { start: 0.0, sigma: priors.positions.aim_m, cause: Cause::Aim };
     let (mut cells, mut rows, mut lines) = (Vec::new(), Vec::new(), Vec::<Values>::new());
     for (group, cell) in &impact.cells {
         let point = points[&(*group, cell.point)];

@@ -45,8 +45,10 @@ pub enum Cause {
     Spots,
     /// Where the points on the specimens are.
     SpecimenPoints,
-    /// Where the points on arm B are, and how well each cell was aimed.
+    /// Where the points on arm B are.
     ArmPoints,
+    /// How well hammer and vibrometer were aimed in each cell.
+    Aim,
     /// The tilt of the hammer in the hits on B alone.
     HammerTilt,
     /// Gains of vibrometers, load cells and hammer.
@@ -65,6 +67,7 @@ impl Cause {
             Cause::Spots => "spots",
             Cause::SpecimenPoints => "specimen-points",
             Cause::ArmPoints => "arm-points",
+            Cause::Aim => "aim",
             Cause::HammerTilt => "hammer-tilt",
             Cause::Gains => "gains",
             Cause::Skew => "skew",

@@ -32,6 +32,7 @@ fn of_cause(cause: Cause) -> &'static str {
         Cause::Spots => "where the spots beside the contact are",
         Cause::SpecimenPoints => "where the points on the specimen are",
         Cause::ArmPoints => "where the points on arm B are",
+        Cause::Aim => "how well each cell was aimed",
         Cause::HammerTilt => "the hammer's tilt",
         Cause::Gains => "gains",
         Cause::Skew => "delays between channels",
