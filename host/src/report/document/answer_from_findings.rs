@@ -1,7 +1,7 @@
 //! The answer, from what was found.
 
 use crate::analyse::Findings;
-use crate::contact::{ContactError, Interval, Stiffness};
+use crate::contact::{Interval, Stiffness};
 use crate::report::words::answer_sentences as say;
 use crate::report::words::check_sentences::hammer_slip;
 use crate::results::{Answer, Basis, BetweenArms, Clamp, ContactAnswer, Slip};
@@ -14,7 +14,8 @@ pub fn answer(found: &Findings) -> Option<Answer> {
     let slip = slip(found);
     let contact = match own {
         Ok(own) => of_stiffness(own, slip.found == Some(true)),
-        Err(error) => unknown(error),
+        Err(_) if slip.found == Some(true) => unknown(say::slipping()),
+        Err(error) => unknown(say::capital(&error.to_string())),
     };
     let between_arms = between_arms(found);
     let clamp = contact.k_t_n_per_m.zip(between_arms.k_n_per_m).and_then(|(own, whole)| clamp(own, whole));
@@ -40,14 +41,14 @@ fn of_stiffness(own: &Stiffness, slips: bool) -> ContactAnswer {
     }
 }
 
-fn unknown(error: &ContactError) -> ContactAnswer {
+fn unknown(why: String) -> ContactAnswer {
     ContactAnswer {
         k_t_n_per_m: None,
         c_t_n_s_per_m: None,
         basis: Basis::None,
         band_hz: None,
         budget: std::collections::BTreeMap::new(),
-        why: say::capital(&error.to_string()),
+        why,
         of_frequency: Vec::new(),
         diagnosis: None,
         doubts: Vec::new(),

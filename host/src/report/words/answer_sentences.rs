@@ -105,7 +105,7 @@ pub fn lines(results: &Results) -> Vec<String> {
     let mut lines = vec![contact(answer)];
     lines.push(match &answer.between_arms.k_n_per_m {
         Some(k) => format!("Between the arms: {} ({}).", with_interval(k), answer.between_arms.basis),
-        None => format!("Between the arms: not identified. {}", answer.between_arms.why),
+        None => format!("Between the arms: no stiffness. {}", answer.between_arms.why),
     });
     if let Some(clamp) = &answer.clamp {
         lines.push(format!(
