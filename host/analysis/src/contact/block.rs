@@ -141,6 +141,12 @@ pub fn blocks(input: &Input<'_>, parameters: &mut Parameters) -> Result<Vec<Bloc
     for impact in &impacts {
         all.push(block(impact, &impacts, &points, input, &chosen, parameters)?);
     }
+    // a shift of one impact is formed from the others' motion, line by line
+    let everywhere: Vec<Vec<f64>> =
+        all.iter().map(|block| block.lines.iter().map(|line| line.frequency_hz).collect()).collect();
+    for block in &mut all {
+        block.lines.retain(|line| everywhere.iter().all(|own| own.contains(&line.frequency_hz)));
+    }
     let count = parameters.all().len();
     for block in &mut all {
         block.local = vec![usize::MAX; count];

@@ -35,7 +35,7 @@ fn of_stiffness(own: &Stiffness, slips: bool) -> ContactAnswer {
             (_, true) => say::slipping(),
             _ => say::doubted(own),
         },
-        of_frequency: own.of_frequency.clone(),
+        of_frequency: if trusted { own.of_frequency.clone() } else { Vec::new() },
         diagnosis: Some(own.diagnosis.clone()),
         doubts: own.doubts.clone(),
     }
