@@ -30,14 +30,16 @@ impl Row {
 
 fn campaign(number: u64, seed: u64, like: Drawn) -> Row {
     let temporary = tempfile::tempdir().unwrap();
-    // JOINTRIG_KEEP names a folder that keeps the campaigns, to look into one afterwards
+    // JOINTRIG_KEEP names a folder that keeps the campaigns, to look into one afterwards; those found there are analysed again, not run
     let folder = std::env::var_os("JOINTRIG_KEEP").map_or(temporary.path().to_owned(), Into::into);
     let at = |ending: &str| folder.join(format!("{number}-{seed}.{ending}"));
     let (file, description) = (at("jrig"), at("toml"));
     let rig = drawn(number, like);
     std::fs::write(&description, rig.to_toml()).unwrap();
     let address: Address = format!("sim:{}", description.display()).parse().unwrap();
-    let _ = run(&file, &contact_plan(&rig), address.open(1000 * number + seed).unwrap());
+    if !file.exists() {
+        let _ = run(&file, &contact_plan(&rig), address.open(1000 * number + seed).unwrap());
+    }
     let store = Store::open_read_only(&file).unwrap();
     let results = document(jointrig::analyse::analyse(&store, Wanted::default(), &|_| {}).unwrap());
     let contact = results.answer.unwrap().contact;

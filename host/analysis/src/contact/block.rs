@@ -1,7 +1,7 @@
 //! The cells of one impact: their rows, their lines, and which parameters they know.
 
 use super::cell::{self, CHANNELS, ContactCell, Values};
-use super::parameters::{DELAYS, FORM, GAINS, MASS_B, Parameter, Parameters, SPOTS, along_z};
+use super::parameters::{DELAYS, FORM, GAINS, Parameter, Parameters, SPOTS, along_z};
 use super::priors::Cause;
 use super::{ContactError, Input};
 use crate::structure::Structure;
@@ -42,6 +42,8 @@ pub struct BlockCell {
     pub aim: Option<usize>,
     /// Of the two errors of the hammer's aim.
     pub shift: Option<usize>,
+    /// Part of the signal that the model does not explain, of load cells and spots, and of the point: noise that goes with it.
+    pub unexplained: [f64; 2],
 }
 
 /// One row: a channel of a cell.
@@ -62,7 +64,9 @@ pub struct BlockLine {
     pub frequency_hz: f64,
     /// Values by row.
     pub value: Vec<Complex<f64>>,
-    /// One over the noise's standard deviation, by row.
+    /// The noise's standard deviation, by row.
+    pub sigma: Vec<f64>,
+    /// One over that of the noise and all else that is not explained, by row.
     pub weight: Vec<f64>,
 }
 
@@ -133,7 +137,9 @@ pub fn blocks(input: &Input<'_>, parameters: &mut Parameters) -> Result<Vec<Bloc
                     _ => (input.priors.specimen_point_m, Cause::SpecimenPoints),
                 };
                 let at = relative(cell.point_m, input.contact_m);
-                parameters.add(at.map(|start| Parameter { start, sigma, cause }))
+                parameters.add(["x", "y", "z"].into_iter().zip(at).map(|(axis, start)| {
+                    Parameter::new(format!("{axis} of point {}", cell.point), start, sigma, cause)
+                }))
             });
         }
     }
@@ -224,43 +230,51 @@ fn block(
 ) -> Result<Block, ContactError> {
     let priors = &input.priors;
     let alone = impact.structure == Structure::B;
-    let mut own: Vec<usize> = if alone { (FORM..=MASS_B).collect() } else { (0..=MASS_B).collect() };
+    let mut own: Vec<usize> = if alone { (FORM..SPOTS).collect() } else { (0..SPOTS).collect() };
     own.extend(SPOTS..SPOTS + 4);
     own.extend(GAINS..GAINS + 5);
     own.extend(DELAYS..DELAYS + 5);
     let along_z =
-        alone.then(|| parameters.add([along_z(impact.direction, priors.positions.hammer_angle_rad)]));
+        alone.then(|| parameters.add([along_z(impact.name, impact.direction, priors.positions.hammer_angle_rad)]));
     own.extend(along_z);
     let (shifted_by, aim_known) = shifted_by(impact, impacts);
-    let aim = Parameter { start: 0.0, sigma: priors.positions.aim_m, cause: Cause::Aim };
     let (mut cells, mut rows, mut lines) = (Vec::new(), Vec::new(), Vec::<Values>::new());
     for (group, cell) in &impact.cells {
         let point = points[&(*group, cell.point)];
         own.extend(point..point + 3);
         let aimed = *group == Group::ArmB && priors.positions.aim_m > 0.0;
         let shifts = !shifted_by.is_empty() && priors.positions.aim_m > 0.0;
-        let aimed = aimed.then(|| parameters.add([aim; 3]));
-        let shift = shifts.then(|| parameters.add([aim; 2]));
+        let aim = |what: &str| {
+            let name = format!("the {what}'s aim in {} × {}", impact.name, cell.point);
+            Parameter::new(name, 0.0, priors.positions.aim_m, Cause::Aim)
+        };
+        let aimed = aimed.then(|| parameters.add((0..3).map(|_| aim("vibrometer"))));
+        let shift = shifts.then(|| parameters.add((0..2).map(|_| aim("hammer"))));
         own.extend(aimed.into_iter().flat_map(|at| at..at + 3));
         own.extend(shift.into_iter().flat_map(|at| at..at + 2));
         let place = cells.len();
         let channels = (0..CHANNELS).filter(|channel| !(alone && *channel == 2));
         rows.extend(channels.map(|channel| Row { cell: place, channel }));
-        cells.push(BlockCell { group: *group, point, aim: aimed, shift });
+        cells.push(BlockCell { group: *group, point, aim: aimed, shift, unexplained: [0.0; 2] });
         lines.push(cell::values(cell, chosen, input.band_hz)?);
     }
-    cell::pool(&mut lines);
+    cell::pool(&mut lines).ok_or_else(|| ContactError::SingleHits { impact: impact.name.into() })?;
     own.sort_unstable();
     own.dedup();
     let spectra = impact.cells[0].1.spectra;
     let line = |(place, l): (usize, &usize)| {
         let s = spectra.s(*l);
         let usable = rows.iter().all(|row| lines[row.cell].usable(place, row.channel, s));
-        usable.then(|| BlockLine {
-            s,
-            frequency_hz: spectra.frequency_hz()[*l],
-            value: rows.iter().map(|row| lines[row.cell].value[place][row.channel]).collect(),
-            weight: rows.iter().map(|row| lines[row.cell].sigma(place, row.channel, s).recip()).collect(),
+        usable.then(|| {
+            let sigma: Vec<f64> =
+                rows.iter().map(|row| lines[row.cell].sigma(place, row.channel, s)).collect();
+            BlockLine {
+                s,
+                frequency_hz: spectra.frequency_hz()[*l],
+                value: rows.iter().map(|row| lines[row.cell].value[place][row.channel]).collect(),
+                weight: sigma.iter().map(|sigma| sigma.recip()).collect(),
+                sigma,
+            }
         })
     };
     Ok(Block {

@@ -68,21 +68,15 @@ pub(super) struct Values {
 /// The cell's values at some of its lines. The noise is taken as white over `band_hz`: a line of a few hits tells next to nothing of its own.
 ///
 /// # Errors
-/// A single hit, whose noise nobody knows; spectra that have not six outputs, or other lines.
+/// Spectra that have not six outputs, or other lines.
 pub(super) fn values(
     cell: &ContactCell<'_>,
     chosen: &[usize],
     band_hz: Band,
 ) -> Result<Values, ContactError> {
     let spectra = cell.spectra;
-    let names = || (cell.impact.to_owned(), cell.point.to_owned());
     if spectra.outputs() != CHANNELS || chosen.iter().any(|l| *l >= spectra.lines()) {
-        let (impact, point) = names();
-        return Err(ContactError::Unlike { impact, point });
-    }
-    if spectra.hits() < 2 {
-        let (impact, point) = names();
-        return Err(ContactError::SingleHit { impact, point });
+        return Err(ContactError::Unlike { impact: cell.impact.into(), point: cell.point.into() });
     }
     let response = cell.quantity.order_of_s();
     let order = [0, 1, 1, response, response, response];
@@ -90,6 +84,10 @@ pub(super) fn values(
         (0..spectra.lines()).filter(|l| band_hz.contains(spectra.frequency_hz()[*l])).collect();
     let hits = spectra.hits() as f64;
     let noise = std::array::from_fn(|c| {
+        // a single hit does not tell its noise
+        if spectra.hits() < 2 {
+            return f64::NAN;
+        }
         // of both parts, of one hit; the textbook divides by n what n − 1 hits have told
         let scale = 2.0 * hits * hits / (hits - 1.0);
         let power = |l: &usize| spectra.variance(*l, OUTPUT[c]) * spectra.force(*l) * scale;
@@ -106,19 +104,24 @@ pub(super) fn values(
 }
 
 /// What the noise of a channel is taken for: the mean of those that share an instrument and its distance. The spots and the load
-/// cells do in all cells of an impact, the three axes of the vibrometer in each cell.
-pub(super) fn pool(cells: &mut [Values]) {
-    let count = cells.len().max(1) as f64;
-    for channel in 0..3 {
-        let mean = cells.iter().map(|cell| cell.noise[channel]).sum::<f64>() / count;
-        for cell in cells.iter_mut() {
-            cell.noise[channel] = mean;
-        }
-    }
-    for cell in cells {
+/// cells do in all cells of an impact, the three axes of the vibrometer in each cell. A cell with a single hit tells no noise of its own: its point
+/// is taken to be as noisy as the impact's others. None where no cell has two hits.
+pub(super) fn pool(cells: &mut [Values]) -> Option<()> {
+    for cell in cells.iter_mut() {
         let mean = cell.noise[3..].iter().sum::<f64>() / 3.0;
         cell.noise[3..].fill(mean);
     }
+    for channel in 0..CHANNELS {
+        let known: Vec<f64> = cells.iter().map(|cell| cell.noise[channel]).filter(|n| n.is_finite()).collect();
+        if known.is_empty() {
+            return None;
+        }
+        let mean = known.iter().sum::<f64>() / known.len() as f64;
+        for cell in cells.iter_mut().filter(|cell| channel < 3 || !cell.noise[channel].is_finite()) {
+            cell.noise[channel] = mean;
+        }
+    }
+    Some(())
 }
 
 impl Values {

@@ -27,6 +27,15 @@ pub struct Left {
     pub part: f64,
 }
 
+/// What is furthest from what is stated of it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Farthest {
+    /// Which position, angle, gain or delay.
+    pub what: String,
+    /// Its distance, in its stated standard deviations.
+    pub deviations: f64,
+}
+
 /// How well each assumption holds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
@@ -38,8 +47,8 @@ pub struct Diagnosis {
     pub spots: Left,
     /// Of k_T(f) as one number.
     pub flatness_chi_square: f64,
-    /// The largest distance of a position, angle, gain or delay from what is stated of it, in its stated standard deviations.
-    pub farthest: f64,
+    /// The position, angle, gain or delay that is furthest from what is stated of it; none if nothing is stated.
+    pub farthest: Option<Farthest>,
     /// How far the compliance from hits on A is from that of hits on the moving mass, in standard deviations; none where only one was hit.
     pub sides_apart: Option<f64>,
 }
@@ -89,8 +98,8 @@ pub fn part(blocks: &[Block], solution: &Solution, of: impl Fn(&Block, f64) -> b
             coupling[*parameter] += weight * bin.normal.information[(row, i)];
         }
     }
-    // the covariance is half of the inverse
-    let explained = 2.0 * quadratic(&solution.covariance, &coupling);
+    // half of the inverse
+    let explained = 2.0 * quadratic(&solution.answer, &coupling);
     let left = own - explained;
     (left > 1e-6 * own && own > 0.0).then(|| Part { deviation: -slope / left, sigma: (0.5 / left).sqrt() })
 }
@@ -106,7 +115,10 @@ pub fn diagnose(blocks: &[Block], parameters: &Parameters, solution: &Solution) 
         .iter()
         .zip(&solution.p)
         .filter(|(own, _)| !matches!(own.cause, Cause::Noise | Cause::Aim) && own.sigma > 0.0);
-    let farthest = stated.map(|(own, p)| ((p - own.start) / own.sigma).abs()).fold(0.0, f64::max);
+    let farthest = stated
+        .map(|(own, p)| (own, own.deviations(*p)))
+        .max_by(|(_, a), (_, b)| a.total_cmp(b))
+        .map(|(own, deviations)| Farthest { what: own.name.clone(), deviations });
     // where the hammer's aim is known by halves only, its errors are not the points'
     let judged =
         |block: &Block| block.aim_known || !blocks.iter().any(|b| b.aim_known && b.along_z.is_none());
@@ -156,7 +168,7 @@ impl Diagnosis {
                 all.push(doubt);
             }
         }
-        if self.farthest > BEYOND {
+        if self.farthest.as_ref().is_some_and(|one| one.deviations > BEYOND) {
             all.push(Doubt::Stated);
         }
         if self.flatness_chi_square > CONTRADICTED {

@@ -24,6 +24,15 @@ pub struct Normal {
     pub kinds: [[f64; 3]; KINDS],
 }
 
+/// What is left at one line.
+#[derive(Debug, Clone)]
+pub struct Residual {
+    /// Which of the block's lines.
+    pub line: usize,
+    /// r over the noise's standard deviation, and what |r|² should be, by row.
+    pub rows: Vec<(Complex<f64>, f64)>,
+}
+
 impl Normal {
     /// Nothing yet, for `parameters` of them.
     pub fn none(parameters: usize) -> Self {
@@ -36,15 +45,15 @@ impl Normal {
         }
     }
 
-    /// Adds one line; the motion that fits best. None where the rows do not tell the motion.
+    /// Adds one line; the motion that fits best, and what it leaves. None where the rows do not tell the motion.
     pub fn add(
         &mut self,
         block: &Block,
         line: usize,
         p: &[f64],
         shifts: Option<&[DVector<Complex<f64>>; 2]>,
-    ) -> Option<DVector<Complex<f64>>> {
-        let line = &block.lines[line];
+    ) -> Option<(DVector<Complex<f64>>, Residual)> {
+        let (index, line) = (line, &block.lines[line]);
         let model = LineModel::new(block, p, line.s);
         let (map, offsets) = model.map();
         let rows = map.nrows();
@@ -69,14 +78,38 @@ impl Normal {
 
         self.chi_square += residual.norm_squared();
         self.freedom += (rows - map.ncols()) as f64;
+        let mut left_of_rows = Vec::with_capacity(rows);
         for (r, row) in block.rows.iter().enumerate() {
             let kind = if row.channel < 3 { row.channel } else { 3 + block.cells[row.cell].group as usize };
-            self.kinds[kind][0] += residual[r].norm_sqr();
-            self.kinds[kind][1] += 1.0 - q.row(r).norm_squared();
-            self.kinds[kind][2] += (line.value[r] * line.weight[r]).norm_sqr();
+            let (left, free) = (residual[r].norm_sqr(), 1.0 - q.row(r).norm_squared());
+            // against the noise alone, whatever else the weights allow for
+            self.kinds[kind][0] += left * (line.weight[r] * line.sigma[r]).powi(-2);
+            self.kinds[kind][1] += free;
+            left_of_rows.push((residual[r], free));
+            self.kinds[kind][2] += (line.value[r] / line.sigma[r]).norm_sqr();
         }
         self.add_derivatives(&model.derivatives(&motion, shifts, &map), &line.weight, &q, &residual);
-        Some(motion)
+        Some((motion, Residual { line: index, rows: left_of_rows }))
+    }
+
+    /// Adds what noise alone gives to the information of one line: the motion is known through noise only, so that a product with it looks larger
+    /// than it is. Nothing where the rows do not tell the motion.
+    pub fn add_of_noise(&mut self, block: &Block, line: usize, p: &[f64]) {
+        let line = &block.lines[line];
+        let model = LineModel::new(block, p, line.s).of_motion();
+        let (map, _) = model.map();
+        let (rows, latent) = (map.nrows(), map.ncols());
+        let weighed = DMatrix::from_fn(rows, latent, |r, c| map[(r, c)] * line.weight[r]);
+        let factors = weighed.qr();
+        let q = factors.q();
+        // the motion's covariance is R⁻¹ R⁻ᴴ: each column of R⁻¹ is a motion that noise makes
+        let identity = DMatrix::identity(latent, latent);
+        let Some(made) = factors.unpack_r().solve_upper_triangular(&identity) else { return };
+        let nothing = DVector::zeros(rows);
+        for motion in made.column_iter() {
+            let derivatives = model.derivatives(&motion.into_owned(), None, &map);
+            self.add_derivatives(&derivatives, &line.weight, &q, &nothing);
+        }
     }
 
     /// J = −(1 − Q Qᴴ) D with D sparse: Jᴴ J = Dᴴ D − (Qᴴ D)ᴴ (Qᴴ D), and Jᴴ r = −Dᴴ r.

@@ -25,11 +25,12 @@ mod outcome;
 mod parameters;
 mod priors;
 mod solver;
+mod unexplained;
 #[cfg(test)]
 mod tests;
 
 pub use cell::{ContactCell, SIGMA_PER_S};
-pub use diagnosis::{Diagnosis, Doubt, Left};
+pub use diagnosis::{Diagnosis, Doubt, Farthest, Left};
 pub use outcome::{Interval, OfFrequency, Stiffness};
 pub use priors::{Cause, ContactPriors};
 
@@ -43,6 +44,9 @@ pub const BAND: Band = Band { low_hz: 100.0, high_hz: 600.0 };
 
 /// Where the search for the compliance begins: a contact of 150 N/µm, m/N.
 const START_M_PER_N: f64 = 1.0 / 150e6;
+
+/// Lines of the hits on the assembly without which nothing is fitted: k_T and c_T are two numbers, and k_T(f) is to be compared with k_T.
+const FEWEST_LINES: usize = 8;
 
 /// What the contact is read from.
 #[derive(Debug, Clone)]
@@ -85,12 +89,10 @@ pub enum ContactError {
     )]
     NoSpots,
     /// One hit tells no noise.
-    #[error("cell {impact} × {point} has a single hit, whose noise is not known: keep two or more")]
-    SingleHit {
+    #[error("every cell of {impact} has a single hit, so that the noise is not known: keep two or more in some")]
+    SingleHits {
         /// The impact.
         impact: String,
-        /// The point.
-        point: String,
     },
     /// Spectra that do not belong together.
     #[error("cell {impact} × {point} has other lines or channels than the rest")]
@@ -112,16 +114,22 @@ pub enum ContactError {
 pub fn stiffness(input: &Input<'_>) -> Result<Stiffness, ContactError> {
     let spots = input.spots_m.map(|spot| std::array::from_fn(|axis| spot[axis] - input.contact_m[axis]));
     let mut parameters = Parameters::new(&input.priors, START_M_PER_N, spots);
-    let blocks = blocks(input, &mut parameters)?;
+    let mut blocks = blocks(input, &mut parameters)?;
     if blocks.iter().filter(|block| block.along_z.is_some()).count() < 3 {
         return Err(ContactError::NoForce);
     }
     if !blocks.iter().any(|block| block.along_z.is_none()) {
         return Err(ContactError::NoRotation);
     }
+    let lines: usize = blocks.iter().filter(|block| block.along_z.is_none()).map(|block| block.lines.len()).sum();
+    if lines < FEWEST_LINES {
+        return Err(ContactError::NotIdentified(format!(
+            "only {lines} lines of the hits on the assembly are numbers with a known noise in every cell"
+        )));
+    }
     form_scale::scale_form(&mut parameters, &blocks);
     let sigma_per_s = input.cells[0].spectra.sigma_per_s();
-    let solution = solver::solve(&blocks, &parameters, sigma_per_s)?;
+    let solution = solver::solve(&mut blocks, &parameters, sigma_per_s)?;
     outcome::of(input, &blocks, &parameters, &solution)
 }
 

@@ -5,7 +5,7 @@
 //! So z_A is no motion of its own but a consequence of T and B's, and on B alone, where F is the hammer's, T is one of B's.
 
 use super::block::{Block, BlockCell, Group};
-use super::parameters::{COMPLIANCE, DELAYS, FORM, FORM_TERMS, GAINS, MASS_B, RETARDATION, SPOTS};
+use super::parameters::{COMPLIANCE, DELAYS, FORM, FORM_TERMS, GAINS, INERTIA_B, INERTIA_TERMS, RETARDATION, SPOTS};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex;
 
@@ -33,6 +33,8 @@ pub struct LineModel<'a> {
     t: Linear,
     t_offset: C,
     a_t: C,
+    /// The hammer's own unit of force on B alone; none where only motion is asked for.
+    hammer: f64,
 }
 
 fn unit(at: usize) -> Linear {
@@ -67,13 +69,18 @@ impl<'a> LineModel<'a> {
         let coefficient = |n: usize| C::from(p[FORM + n]);
         let a_t = coefficient(0) + coefficient(1) * s;
         let of_motion = |n: usize| coefficient(n) + coefficient(n + 1) * s + coefficient(n + 2) * s * s;
-        let carried = p[MASS_B] * s * s;
+        let b = block.specimen_b().unwrap_or(0);
+        let carried: [C; INERTIA_TERMS] = std::array::from_fn(|n| p[INERTIA_B + n] * s * s);
         let rest = sum(&[
             (of_motion(2), &z_arm),
             (of_motion(5), &unit(3)),
             (of_motion(8), &unit(4)),
-            (carried, &z_b),
-            (-carried, &z_arm),
+            (carried[0], &z_b),
+            (-carried[0], &z_arm),
+            (carried[1], &unit(b + 3)),
+            (-carried[1], &unit(3)),
+            (-carried[2], &unit(b + 4)),
+            (carried[2], &unit(4)),
         ]);
         let (t, t_offset, force, z_a) = if let Some(along_z) = block.along_z {
             let t = sum(&[(-a_t.inv(), &rest)]);
@@ -85,7 +92,12 @@ impl<'a> LineModel<'a> {
             let z_a = sum(&[(C::new(1.0, 0.0), &z_b), (compliance, &force)]);
             (t, C::default(), force, z_a)
         };
-        LineModel { block, p, s, z_b, force, z_a, t, t_offset, a_t }
+        LineModel { block, p, s, z_b, force, z_a, t, t_offset, a_t, hammer: 1.0 }
+    }
+
+    /// Without the hammer: what a motion alone gives.
+    pub fn of_motion(self) -> Self {
+        LineModel { t_offset: C::default(), hammer: 0.0, ..self }
     }
 
     /// Gain and delay of a channel: spot A 0, spot B 1, the point's axes 2 to 4.
@@ -179,7 +191,7 @@ impl<'a> LineModel<'a> {
             match row.channel {
                 0 => {
                     if let Some(along_z) = self.block.along_z {
-                        own.push((local(along_z), self.a_t.inv()));
+                        own.push((local(along_z), self.hammer / self.a_t));
                         for (n, term) in terms.iter().enumerate() {
                             own.push((local(FORM + n), -term / self.a_t));
                         }
@@ -223,11 +235,13 @@ impl<'a> LineModel<'a> {
         all
     }
 
-    /// What each coefficient of the form, and specimen B's mass, stands before.
-    fn form_terms(&self, x: &DVector<C>) -> [C; FORM_TERMS + 1] {
+    /// What each coefficient of the form, and specimen B's inertia, stands before.
+    fn form_terms(&self, x: &DVector<C>) -> [C; FORM_TERMS + INERTIA_TERMS] {
         let (s, t) = (self.s, dot(&self.t, x) + self.t_offset);
         let (z, turn_x, turn_y) = (x[2], x[3], x[4]);
-        let against_the_arm = s * s * (dot(&self.z_b, x) - z);
+        let b = self.block.specimen_b().unwrap_or(0);
+        let against_the_arm =
+            [dot(&self.z_b, x) - z, x[b + 3] - turn_x, turn_y - x[b + 4]].map(|moved| s * s * moved);
         [
             t,
             s * t,
@@ -240,7 +254,9 @@ impl<'a> LineModel<'a> {
             turn_y,
             s * turn_y,
             s * s * turn_y,
-            against_the_arm,
+            against_the_arm[0],
+            against_the_arm[1],
+            against_the_arm[2],
         ]
     }
 }

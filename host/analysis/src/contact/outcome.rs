@@ -75,8 +75,8 @@ pub fn of(
         if !own.sigma.is_finite() || own.sigma == 0.0 || own.cause == Cause::Noise {
             continue;
         }
-        // the estimate's answer to an error of the prior: covariance times the prior's precision
-        let share = (covariance[(COMPLIANCE, i)] / own.sigma).powi(2);
+        // the estimate's answer to an error of the prior, whose precision is that of half an inverse
+        let share = (solution.answer[(COMPLIANCE, i)] / own.sigma).powi(2);
         *budget.entry(own.cause).or_default() += relative(share);
         noise -= share;
     }

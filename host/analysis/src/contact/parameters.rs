@@ -10,10 +10,13 @@ pub const RETARDATION: usize = 1;
 pub const FORM: usize = 2;
 /// Its coefficients: 1 and s of T, then 1, s and s² of z_B, θ_x and θ_y.
 pub const FORM_TERMS: usize = 11;
-/// Mass of specimen B where it moves against its arm, kg.
-pub const MASS_B: usize = FORM + FORM_TERMS;
+/// Specimen B's inertia where it moves against its arm: its mass (kg), then the mass times y and times x of its centre of gravity against the
+/// contact (kg m).
+pub const INERTIA_B: usize = FORM + FORM_TERMS;
+/// Its parameters.
+pub const INERTIA_TERMS: usize = 3;
 /// x and y of spot A, then of spot B, m.
-pub const SPOTS: usize = MASS_B + 1;
+pub const SPOTS: usize = INERTIA_B + INERTIA_TERMS;
 /// Relative errors of gain: spot A, spot B, and the point's x, y, z.
 pub const GAINS: usize = SPOTS + 4;
 /// Errors of delay of the same channels, s.
@@ -21,6 +24,14 @@ pub const DELAYS: usize = GAINS + 5;
 /// The first of the points' coordinates.
 const POINTS: usize = DELAYS + 5;
 
+/// The sensors with a gain and a delay, in order.
+const SENSORS: [&str; 5] = [
+    "the vibrometer on A's spot",
+    "the vibrometer on B's spot",
+    "the 3-D vibrometer along x",
+    "the 3-D vibrometer along y",
+    "the 3-D vibrometer along z",
+];
 /// The load cells' springs make T a form of z_B, θ_x and θ_y of its own: what its gain is wrong by goes into theirs, and T's own factor
 /// and delay are held.
 const LOAD_CELL_GAIN: f64 = 1e-3;
@@ -28,16 +39,38 @@ const LOAD_CELL_GAIN: f64 = 1e-3;
 const LOAD_CELL_SKEW_S: f64 = 1e-7;
 /// A specimen weighs no more than this, kg.
 const SPECIMEN_KG: f64 = 0.5;
+/// Its centre of gravity is no further from the contact than this, m.
+const SPECIMEN_M: f64 = 0.03;
 
 /// One parameter: where it starts, how far it may go, and what its share of the uncertainty is called.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Parameter {
+    /// What it is, for people.
+    pub name: String,
     /// Prior mean, in the parameter's unit.
     pub start: f64,
     /// Prior standard deviation; infinite where nothing is known.
     pub sigma: f64,
     /// What it is called in the budget.
     pub cause: Cause,
+    /// Of a part of a hit along z: the direction's own, and how far the hammer may be tilted, rad.
+    pub tilted: Option<[f64; 2]>,
+}
+
+impl Parameter {
+    /// One with a Gaussian prior.
+    pub fn new(name: String, start: f64, sigma: f64, cause: Cause) -> Self {
+        Parameter { name, start, sigma, cause, tilted: None }
+    }
+
+    /// How far `value` is from what is stated, in standard deviations. For the hammer that is the tilt it would take: the part along z of a hit
+    /// along z falls with the tilt's square, whose tail is long.
+    pub fn deviations(&self, value: f64) -> f64 {
+        match self.tilted {
+            Some([z, tilt_rad]) if value.abs() <= 1.0 => (value.acos() - z.acos()).abs() / tilt_rad,
+            _ => ((value - self.start) / self.sigma).abs(),
+        }
+    }
 }
 
 /// All parameters, in order.
@@ -47,18 +80,26 @@ pub struct Parameters(Vec<Parameter>);
 impl Parameters {
     /// Those that every fit has. The spots are where `spots_m` says, against the contact.
     pub fn new(priors: &ContactPriors, compliance_m_per_n: f64, spots_m: [[f64; 3]; 2]) -> Self {
-        let free = |start| Parameter { start, sigma: f64::INFINITY, cause: Cause::Noise };
-        let known = |start, sigma, cause| Parameter { start, sigma, cause };
-        let mut all = vec![free(compliance_m_per_n), free(0.0)];
-        all.push(known(1.0, LOAD_CELL_GAIN, Cause::Gains));
-        all.push(known(0.0, LOAD_CELL_SKEW_S, Cause::Skew));
-        all.extend([free(0.0); FORM_TERMS - 2]);
-        all.push(known(0.0, SPECIMEN_KG, Cause::Noise));
-        for spot in spots_m {
-            all.extend([spot[0], spot[1]].map(|at| known(at, priors.spot_m, Cause::Spots)));
+        let named = |name: &str, start, sigma, cause| Parameter::new(name.to_owned(), start, sigma, cause);
+        let free = |name: &str, start| named(name, start, f64::INFINITY, Cause::Noise);
+        let mut all = vec![free("1/k_T", compliance_m_per_n), free("c_T/k_T", 0.0)];
+        all.push(named("the load cells' gain", 1.0, LOAD_CELL_GAIN, Cause::Gains));
+        all.push(named("the load cells' delay", 0.0, LOAD_CELL_SKEW_S, Cause::Skew));
+        all.extend((2..FORM_TERMS).map(|_| free("the force's form", 0.0)));
+        for lever in [1.0, SPECIMEN_M, SPECIMEN_M] {
+            all.push(named("specimen B's inertia", 0.0, SPECIMEN_KG * lever, Cause::Noise));
         }
-        all.extend([known(0.0, priors.gain, Cause::Gains); 5]);
-        all.extend([known(0.0, priors.skew_s, Cause::Skew); 5]);
+        for (spot, side) in spots_m.into_iter().zip(["A", "B"]) {
+            for (axis, of) in ["x", "y"].into_iter().enumerate() {
+                let name = format!("{of} of the spot on {side}");
+                all.push(named(&name, spot[axis], priors.spot_m, Cause::Spots));
+            }
+        }
+        for (what, sigma, cause) in
+            [("gain", priors.gain, Cause::Gains), ("delay", priors.skew_s, Cause::Skew)]
+        {
+            all.extend(SENSORS.map(|sensor| named(&format!("{what} of {sensor}"), 0.0, sigma, cause)));
+        }
         debug_assert_eq!(all.len(), POINTS);
         Parameters(all)
     }
@@ -88,13 +129,15 @@ impl Parameters {
 
 /// Force along z that a hit on B alone gives per newton of the hammer: the direction's z with the tilt's prior. A tilt σ about each
 /// of two axes turns a hit along z by σ² in the mean, and one across it by σ.
-pub fn along_z(direction: [f64; 3], tilt_rad: f64) -> Parameter {
+pub fn along_z(impact: &str, direction: [f64; 3], tilt_rad: f64) -> Parameter {
     let z = direction[2];
     let across = (1.0 - z * z).max(0.0).sqrt();
     let second = tilt_rad * tilt_rad * z.abs();
     Parameter {
+        name: format!("the hammer's tilt in {impact} on B alone"),
         start: z * (1.0 - tilt_rad * tilt_rad),
         sigma: (tilt_rad * across).hypot(second),
         cause: Cause::HammerTilt,
+        tilted: Some([z, tilt_rad]),
     }
 }

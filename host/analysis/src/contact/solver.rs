@@ -2,8 +2,9 @@
 
 use super::ContactError;
 use super::block::Block;
-use super::line::Normal;
+use super::line::{Normal, Residual};
 use super::parameters::{COMPLIANCE, Parameters};
+use super::unexplained;
 use crate::frf::noise::shared_by_lines;
 use crate::parallel::prelude::*;
 use nalgebra::{DMatrix, DVector};
@@ -14,9 +15,12 @@ pub const BIN_HZ: f64 = 25.0;
 /// Steps at most.
 const STEPS: usize = 60;
 /// The compliance moves less than this part of its standard deviation: done.
-const SETTLED: f64 = 0.01;
+const SETTLED: f64 = 0.03;
 /// A cost may rise by this part between passes: the shifts' motion is that of the pass before.
-const SLACK: f64 = 1e-3;
+const SLACK: f64 = 3e-3;
+
+/// How often the noise is widened by what is left, at most.
+const WIDENED: usize = 6;
 
 /// Motion of every line of every block.
 type Motion = Vec<Vec<DVector<Complex<f64>>>>;
@@ -30,6 +34,8 @@ pub struct Bin {
     pub low_hz: f64,
     /// What its lines say.
     pub normal: Normal,
+    /// What is left of each row, line by line, over the noise.
+    pub residuals: Vec<Residual>,
     motion: Vec<DVector<Complex<f64>>>,
 }
 
@@ -38,6 +44,8 @@ pub struct Bin {
 pub struct Solution {
     /// The parameters.
     pub p: Vec<f64>,
+    /// How they answer to what is measured and stated: half the inverse of the posterior's curvature.
+    pub answer: DMatrix<f64>,
     /// Their covariance, before any misfit is counted.
     pub covariance: DMatrix<f64>,
     /// What each block says in each bin, at these parameters.
@@ -48,13 +56,36 @@ pub struct Solution {
     pub chi_square: f64,
 }
 
-/// Finds them.
+/// Finds them. What the model leaves of a cell beyond its noise is counted as noise of that cell from then on.
 ///
 /// # Errors
 /// [`ContactError::NotIdentified`] if the rows do not tell the motion or the parameters, or no minimum is reached.
-pub fn solve(blocks: &[Block], parameters: &Parameters, sigma_per_s: f64) -> Result<Solution, ContactError> {
+pub fn solve(
+    blocks: &mut [Block],
+    parameters: &Parameters,
+    sigma_per_s: f64,
+) -> Result<Solution, ContactError> {
     let shared = shared_by_lines(sigma_per_s, distance_hz(blocks));
-    let mut p = parameters.start();
+    let mut solution = settle(blocks, parameters, parameters.start(), shared)?;
+    for _ in 0..WIDENED {
+        if !unexplained::widen(blocks, &solution.bins) {
+            break;
+        }
+        solution = settle(blocks, parameters, solution.p, shared)?;
+    }
+    let (answer, covariance) = under_noise(blocks, parameters, &solution)?;
+    solution.answer = answer;
+    solution.covariance = covariance;
+    Ok(solution)
+}
+
+/// Steps from `p` to the nearest minimum.
+fn settle(
+    blocks: &[Block],
+    parameters: &Parameters,
+    mut p: Vec<f64>,
+    shared: f64,
+) -> Result<Solution, ContactError> {
     let first = evaluate(blocks, &p, None)?;
     let mut motion = motions(blocks, &first);
     let mut best: Option<(Vec<f64>, Vec<Bin>, f64)> = None;
@@ -74,11 +105,11 @@ pub fn solve(blocks: &[Block], parameters: &Parameters, sigma_per_s: f64) -> Res
         let (information, gradient) = normal(parameters, blocks, at, bins, shared);
         let (step, covariance) = newton(&information, &gradient, damping)?;
         let sigma = covariance[(COMPLIANCE, COMPLIANCE)].max(0.0).sqrt();
-        if better && step[COMPLIANCE].abs() <= SETTLED * sigma {
+        if damping <= 1e-6 && step[COMPLIANCE].abs() <= SETTLED * sigma {
             let (_, undamped) = newton(&information, &gradient, 0.0)?;
             let chi_square = per_freedom(bins);
             let (p, bins) = (at.clone(), bins.clone());
-            return Ok(Solution { p, covariance: undamped, bins, shared, chi_square });
+            return Ok(Solution { p, answer: undamped.clone(), covariance: undamped, bins, shared, chi_square });
         }
         p = at.iter().zip(step.iter()).map(|(at, step)| at + step).collect();
     }
@@ -88,6 +119,32 @@ pub fn solve(blocks: &[Block], parameters: &Parameters, sigma_per_s: f64) -> Res
 fn distance_hz(blocks: &[Block]) -> f64 {
     let lines = blocks.iter().map(|block| &block.lines).find(|lines| lines.len() > 1);
     lines.map_or(1.0, |lines| lines[1].frequency_hz - lines[0].frequency_hz)
+}
+
+/// The posterior's curvature without what noise adds to it, inverted, and the covariance that follows. With J the information of the steps and
+/// N what noise alone adds to it, the curvature is J − N in the mean, and the slope at the truth scatters by J: the covariance
+/// is (J − N)⁻¹ J (J − N)⁻¹, as for any regression whose regressors are noisy.
+fn under_noise(
+    blocks: &[Block],
+    parameters: &Parameters,
+    solution: &Solution,
+) -> Result<(DMatrix<f64>, DMatrix<f64>), ContactError> {
+    let of_noise: Vec<Bin> = (solution.bins.par_iter())
+        .map(|bin| {
+            let block = &blocks[bin.block];
+            let mut normal = Normal::none(block.parameters.len());
+            for residual in &bin.residuals {
+                normal.add_of_noise(block, residual.line, &solution.p);
+            }
+            Bin { normal, residuals: Vec::new(), motion: Vec::new(), ..*bin }
+        })
+        .collect();
+    let (seen, gradient) = normal(parameters, blocks, &solution.p, &solution.bins, solution.shared);
+    let noise = of_bins(blocks, &of_noise, solution.p.len(), solution.shared).0;
+    let (_, answer) = newton(&(&seen - noise), &gradient, 0.0)?;
+    // answer is half an inverse
+    let covariance = 2.0 * (&answer * &seen * &answer);
+    Ok((answer, covariance))
 }
 
 /// All blocks, bin by bin.
@@ -120,6 +177,7 @@ fn bin(
     let low_hz = (block.lines[lines.start].frequency_hz / BIN_HZ).floor() * BIN_HZ;
     let mut normal = Normal::none(block.parameters.len());
     let mut motion = Vec::with_capacity(lines.len());
+    let mut residuals = Vec::with_capacity(lines.len());
     for line in lines {
         let shifts = before.filter(|_| !block.shifted_by.is_empty()).map(|motion| {
             [0, 1].map(|axis| {
@@ -132,9 +190,11 @@ fn bin(
                 shift
             })
         });
-        motion.push(normal.add(block, line, p, shifts.as_ref())?);
+        let (moved, residual) = normal.add(block, line, p, shifts.as_ref())?;
+        motion.push(moved);
+        residuals.push(residual);
     }
-    Some(Bin { block: b, low_hz, normal, motion })
+    Some(Bin { block: b, low_hz, normal, residuals, motion })
 }
 
 fn motions(blocks: &[Block], bins: &[Bin]) -> Motion {
@@ -166,7 +226,21 @@ fn normal(
     bins: &[Bin],
     shared: f64,
 ) -> (DMatrix<f64>, DVector<f64>) {
-    let count = p.len();
+    let (mut information, mut gradient) = of_bins(blocks, bins, p.len(), shared);
+    for (i, (own, p)) in parameters.all().iter().zip(p).enumerate() {
+        if own.sigma.is_infinite() {
+            continue;
+        }
+        // what is known exactly may not move at all
+        let precision = 0.5 / (own.sigma * own.sigma).max(f64::MIN_POSITIVE.sqrt());
+        information[(i, i)] += precision;
+        gradient[i] += precision * (p - own.start);
+    }
+    (information, gradient)
+}
+
+/// The bins' part of it, for `count` parameters.
+fn of_bins(blocks: &[Block], bins: &[Bin], count: usize, shared: f64) -> (DMatrix<f64>, DVector<f64>) {
     let mut information = DMatrix::zeros(count, count);
     let mut gradient = DVector::zeros(count);
     for bin in bins {
@@ -177,15 +251,6 @@ fn normal(
                 information[(*to, *other)] += weight * bin.normal.information[(i, j)];
             }
         }
-    }
-    for (i, (own, p)) in parameters.all().iter().zip(p).enumerate() {
-        if own.sigma.is_infinite() {
-            continue;
-        }
-        // what is known exactly may not move at all
-        let precision = 0.5 / (own.sigma * own.sigma).max(f64::MIN_POSITIVE.sqrt());
-        information[(i, i)] += precision;
-        gradient[i] += precision * (p - own.start);
     }
     (information, gradient)
 }

@@ -126,6 +126,19 @@ fn measured(world: World) -> Vec<Cell> {
     cells
 }
 
+/// What a single hit would give.
+fn single(spectra: &CrossSpectra) -> CrossSpectra {
+    let lines = spectra.lines();
+    let outputs = (0..spectra.outputs())
+        .map(|n| {
+            let h1: Vec<C> = (0..lines).map(|l| spectra.h1(l, n)).collect();
+            OutputSums { s_xx: h1.iter().map(C::norm_sqr).collect(), s_xf: h1, ..OutputSums::default() }
+        })
+        .collect();
+    let frequency_hz = spectra.frequency_hz().to_vec();
+    CrossSpectra::new(1.0, frequency_hz, SIGMA_PER_S, 1, vec![1.0; lines], outputs).expect("alike")
+}
+
 const NAMES: [&str; 9] = ["1", "2", "3", "4", "5", "6", "7", "8", "9"];
 
 fn of(cell: &Cell) -> ContactCell<'_> {
@@ -193,7 +206,18 @@ fn a_spot_that_is_not_where_it_is_said_to_be_is_inside_the_interval() {
 fn a_point_that_is_millimetres_off_is_doubted() {
     let cells = measured(World { misplaced_m: 4e-3, ..QUIET });
     let found = stiffness(&input(&cells)).expect("a fit, if a bad one");
-    assert!(found.doubts.contains(&Doubt::Stated), "{:?}", found.diagnosis);
+    assert!(found.doubts.contains(&Doubt::SpecimenA), "{:?}", found.diagnosis);
+    // it weighs less, and the other five hold
+    assert!((found.k_t_n_per_m.mean / K - 1.0).abs() < 0.01, "{found:?}");
+}
+
+#[test]
+fn a_cell_with_a_single_hit_is_as_noisy_as_its_neighbours() {
+    let mut cells = measured(QUIET);
+    let one = single(&cells[0].spectra);
+    cells[0].spectra = one;
+    let found = stiffness(&input(&cells)).expect("the others tell the noise");
+    assert!((found.k_t_n_per_m.mean / K - 1.0).abs() < 2e-3, "{found:?}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The answer in words: what a colleague would say of each number.
 
 use super::number::{micro, short};
-use crate::contact::{Cause, Doubt, Interval, Stiffness};
+use crate::contact::{Cause, Diagnosis, Doubt, Interval, Stiffness};
 use crate::results::{Answer, Results};
 use crate::substructuring::between_arms::Basis as Estimate;
 
@@ -42,7 +42,7 @@ fn of_cause(cause: Cause) -> &'static str {
 
 /// Why a k_T that came out is not given.
 pub fn doubted(own: &Stiffness) -> String {
-    let reasons: Vec<&str> = own.doubts.iter().map(|doubt| of_doubt(*doubt)).collect();
+    let reasons: Vec<String> = own.doubts.iter().map(|doubt| of_doubt(*doubt, &own.diagnosis)).collect();
     format!(
         "No k_T is given, although the fit came out at {}: {}.",
         with_interval(&own.k_t_n_per_m),
@@ -50,7 +50,7 @@ pub fn doubted(own: &Stiffness) -> String {
     )
 }
 
-fn of_doubt(doubt: Doubt) -> &'static str {
+fn of_doubt(doubt: Doubt, diagnosis: &Diagnosis) -> String {
     match doubt {
         Doubt::Force => {
             "the load cells and arm B's motion do not give the force in the hits on B alone (is a cell loose, or a point misplaced?)"
@@ -62,11 +62,18 @@ fn of_doubt(doubt: Doubt) -> &'static str {
             "the spots beside the contact do not move with arm B and the specimen (a specimen that moves against arm B needs points of its own: grouping 6)"
         }
         Doubt::Stated => {
-            "a point, a spot, the hammer's tilt or a gain is further from what the plan says than its stated error allows (is one misplaced, or are the plan's [priors] too small?)"
+            let farthest = diagnosis.farthest.as_ref();
+            return farthest.map_or_else(String::new, |far| {
+                format!(
+                    "{} is {:.0} times its stated error from what the plan says (is something misplaced or uncalibrated, or are the plan's [priors] too small?)",
+                    far.what, far.deviations
+                )
+            });
         }
         Doubt::Flatness => "the stiffness changes with frequency, as no contact's does",
         Doubt::Sides => "hits on A and on the moving mass give different values",
     }
+    .to_owned()
 }
 
 /// Where the number between the arms comes from.
