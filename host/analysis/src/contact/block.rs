@@ -234,8 +234,8 @@ fn block(
     own.extend(SPOTS..SPOTS + 4);
     own.extend(GAINS..GAINS + 5);
     own.extend(DELAYS..DELAYS + 5);
-    let along_z =
-        alone.then(|| parameters.add([along_z(impact.name, impact.direction, priors.positions.hammer_angle_rad)]));
+    let along_z = alone
+        .then(|| parameters.add([along_z(impact.name, impact.direction, priors.positions.hammer_angle_rad)]));
     own.extend(along_z);
     let (shifted_by, aim_known) = shifted_by(impact, impacts);
     let (mut cells, mut rows, mut lines) = (Vec::new(), Vec::new(), Vec::<Values>::new());

@@ -112,7 +112,8 @@ pub(super) fn pool(cells: &mut [Values]) -> Option<()> {
         cell.noise[3..].fill(mean);
     }
     for channel in 0..CHANNELS {
-        let known: Vec<f64> = cells.iter().map(|cell| cell.noise[channel]).filter(|n| n.is_finite()).collect();
+        let known: Vec<f64> =
+            cells.iter().map(|cell| cell.noise[channel]).filter(|n| n.is_finite()).collect();
         if known.is_empty() {
             return None;
         }

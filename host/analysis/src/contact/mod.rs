@@ -25,9 +25,9 @@ mod outcome;
 mod parameters;
 mod priors;
 mod solver;
-mod unexplained;
 #[cfg(test)]
 mod tests;
+mod unexplained;
 
 pub use cell::{ContactCell, SIGMA_PER_S};
 pub use diagnosis::{Diagnosis, Doubt, Farthest, Left};
@@ -89,7 +89,9 @@ pub enum ContactError {
     )]
     NoSpots,
     /// One hit tells no noise.
-    #[error("every cell of {impact} has a single hit, so that the noise is not known: keep two or more in some")]
+    #[error(
+        "every cell of {impact} has a single hit, so that the noise is not known: keep two or more in some"
+    )]
     SingleHits {
         /// The impact.
         impact: String,
@@ -121,7 +123,8 @@ pub fn stiffness(input: &Input<'_>) -> Result<Stiffness, ContactError> {
     if !blocks.iter().any(|block| block.along_z.is_none()) {
         return Err(ContactError::NoRotation);
     }
-    let lines: usize = blocks.iter().filter(|block| block.along_z.is_none()).map(|block| block.lines.len()).sum();
+    let lines: usize =
+        blocks.iter().filter(|block| block.along_z.is_none()).map(|block| block.lines.len()).sum();
     if lines < FEWEST_LINES {
         return Err(ContactError::NotIdentified(format!(
             "only {lines} lines of the hits on the assembly are numbers with a known noise in every cell"

@@ -5,7 +5,9 @@
 //! So z_A is no motion of its own but a consequence of T and B's, and on B alone, where F is the hammer's, T is one of B's.
 
 use super::block::{Block, BlockCell, Group};
-use super::parameters::{COMPLIANCE, DELAYS, FORM, FORM_TERMS, GAINS, INERTIA_B, INERTIA_TERMS, RETARDATION, SPOTS};
+use super::parameters::{
+    COMPLIANCE, DELAYS, FORM, FORM_TERMS, GAINS, INERTIA_B, INERTIA_TERMS, RETARDATION, SPOTS,
+};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex;
 

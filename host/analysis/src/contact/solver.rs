@@ -22,6 +22,11 @@ const SLACK: f64 = 3e-3;
 /// How often the noise is widened by what is left, at most.
 const WIDENED: usize = 6;
 
+/// A parameter that nothing tells stays finite by this part of its own unit.
+const REGULAR: f64 = 1e-13;
+/// Of what seems known of a combination of parameters, so much may be noise; the sums of so few lines scatter themselves, and tell no more.
+const MOSTLY_NOISE: f64 = 0.8;
+
 /// Motion of every line of every block.
 type Motion = Vec<Vec<DVector<Complex<f64>>>>;
 
@@ -109,7 +114,14 @@ fn settle(
             let (_, undamped) = newton(&information, &gradient, 0.0)?;
             let chi_square = per_freedom(bins);
             let (p, bins) = (at.clone(), bins.clone());
-            return Ok(Solution { p, answer: undamped.clone(), covariance: undamped, bins, shared, chi_square });
+            return Ok(Solution {
+                p,
+                answer: undamped.clone(),
+                covariance: undamped,
+                bins,
+                shared,
+                chi_square,
+            });
         }
         p = at.iter().zip(step.iter()).map(|(at, step)| at + step).collect();
     }
@@ -139,12 +151,27 @@ fn under_noise(
             Bin { normal, residuals: Vec::new(), motion: Vec::new(), ..*bin }
         })
         .collect();
-    let (seen, gradient) = normal(parameters, blocks, &solution.p, &solution.bins, solution.shared);
+    let (seen, _) = normal(parameters, blocks, &solution.p, &solution.bins, solution.shared);
     let noise = of_bins(blocks, &of_noise, solution.p.len(), solution.shared).0;
-    let (_, answer) = newton(&(&seen - noise), &gradient, 0.0)?;
-    // answer is half an inverse
-    let covariance = 2.0 * (&answer * &seen * &answer);
-    Ok((answer, covariance))
+    // in units in which J is the identity, what noise adds to it has eigenvalues from 0 to about 1
+    let unit = units(&seen);
+    let scaled =
+        |of: &DMatrix<f64>| DMatrix::from_fn(unit.len(), unit.len(), |i, j| of[(i, j)] * unit[i] * unit[j]);
+    let lost = || ContactError::NotIdentified("the hits do not tell the force at the contact".into());
+    let lower = (scaled(&seen) + DMatrix::identity(unit.len(), unit.len()) * REGULAR)
+        .cholesky()
+        .ok_or_else(lost)?
+        .unpack();
+    let half = lower.solve_lower_triangular(&scaled(&noise)).ok_or_else(lost)?;
+    let added = lower.solve_lower_triangular(&half.transpose()).ok_or_else(lost)?.symmetric_eigen();
+    let axes = lower.transpose().solve_upper_triangular(&added.eigenvectors).ok_or_else(lost)?;
+    let left = added.eigenvalues.map(|of_noise| 1.0 - of_noise.clamp(0.0, MOSTLY_NOISE));
+    let inverse = |power: i32| {
+        let weighed = DMatrix::from_fn(unit.len(), unit.len(), |i, k| axes[(i, k)] * left[k].powi(-power));
+        let whole = 0.5 * weighed * axes.transpose();
+        scaled(&whole)
+    };
+    Ok((inverse(1), inverse(2)))
 }
 
 /// All blocks, bin by bin.
@@ -255,6 +282,11 @@ fn of_bins(blocks: &[Block], bins: &[Bin], count: usize, shared: f64) -> (DMatri
     (information, gradient)
 }
 
+/// Parameters in metres beside parameters in kilograms: in units of their own they can be factorised.
+fn units(information: &DMatrix<f64>) -> DVector<f64> {
+    information.diagonal().map(|d| if d > 0.0 { d.sqrt().recip() } else { 1.0 })
+}
+
 /// The step, and the covariance of the parameters.
 fn newton(
     information: &DMatrix<f64>,
@@ -262,11 +294,10 @@ fn newton(
     damping: f64,
 ) -> Result<(DVector<f64>, DMatrix<f64>), ContactError> {
     let lost = || ContactError::NotIdentified("the hits do not tell the force at the contact".into());
-    // parameters in metres beside parameters in kilograms: in units of their own they can be factorised
-    let unit = information.diagonal().map(|d| if d > 0.0 { d.sqrt().recip() } else { 1.0 });
+    let unit = units(information);
     let mut scaled = DMatrix::from_fn(unit.len(), unit.len(), |i, j| information[(i, j)] * unit[i] * unit[j]);
     for i in 0..unit.len() {
-        scaled[(i, i)] = scaled[(i, i)].max(f64::MIN_POSITIVE) * (1.0 + damping) + 1e-13;
+        scaled[(i, i)] = scaled[(i, i)].max(f64::MIN_POSITIVE) * (1.0 + damping) + REGULAR;
     }
     let factors = scaled.cholesky().ok_or_else(lost)?;
     let step = -factors.solve(&gradient.component_mul(&unit)).component_mul(&unit);

@@ -92,7 +92,8 @@ mod tests {
             })
             .collect();
         assert!((part_of_signal(&seen) - 0.02).abs() < 0.04 * 0.02, "{}", part_of_signal(&seen));
-        let quiet: Vec<[f64; 4]> = seen.iter().map(|[_, free, variance, signal]| [1.2, *free, *variance, *signal]).collect();
+        let quiet: Vec<[f64; 4]> =
+            seen.iter().map(|[_, free, variance, signal]| [1.2, *free, *variance, *signal]).collect();
         assert_eq!(part_of_signal(&quiet), 0.0);
     }
 }
