@@ -75,10 +75,11 @@ pub fn analyse_measurements<M: Measurements>(
     let fitted: Vec<_> = found.fits.iter().filter_map(|fit| Some(fit.outcome.as_ref().ok()?.row())).collect();
     let rows = found.substructured.iter().flat_map(|s| &s.rows).map(|row| &row.joint).chain(&fitted);
     let fbs = between_the_arms(&found.recommended, rows);
-    let (contact, missing) = contact_stage::at_the_contact(measurements, &cells, fbs.as_ref());
+    let own = contact_answer::answer(measurements, &cells.averages);
+    let (contact, missing) = contact_stage::at_the_contact(measurements, &cells, fbs.as_ref(), own.as_ref());
     found.missing.extend(missing);
     found.contact = Some(contact);
-    found.own_stiffness = Some(contact_answer::answer(measurements, &cells.averages));
+    found.own_stiffness = Some(own.map(|(stiffness, _)| stiffness));
     found.between_arms = Some(decided(&found));
     found
 }

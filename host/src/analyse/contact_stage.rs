@@ -8,7 +8,8 @@ use super::impact_loops::{self, ImpactLoop, ImpactLoops};
 use super::missing::Missing;
 use super::shaker_levels::{self, Analysed, RecordLoops};
 use super::specimen_curves::specimen_curves;
-use super::{arm_from_hits, chosen, hammer_slip};
+use super::{arm_from_hits, chosen, hammer_slip, level_stiffness};
+use crate::contact::{ContactError, Known, Stiffness};
 use crate::hysteresis::Correction;
 use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
 use crate::hysteresis::hammer_slip::HammerSlip;
@@ -51,11 +52,12 @@ pub struct Contact {
     pub change: Option<ContactChange>,
 }
 
-/// Reads it. `between_the_arms` is what FBS found there.
+/// Reads it. `between_the_arms` is what FBS found there, `own` what the hits say of the contact's own stiffness.
 pub fn at_the_contact<M: Measurements>(
     measurements: &M,
     cells: &Cells,
     between_the_arms: Option<&BandStatistic>,
+    own: Result<&(Stiffness, Known), &ContactError>,
 ) -> (Contact, Vec<Missing>) {
     let (averages, impact_loops) = (&cells.averages[..], &cells.loops[..]);
     let (geometry, sigma_per_s) = (measurements.geometry(), measurements.sigma_per_s());
@@ -79,7 +81,9 @@ pub fn at_the_contact<M: Measurements>(
         missing.push(Missing::EffectiveMass);
     }
     let slip = hammer_slip::told(&cells.at_contact);
-    let impacts = impact_loops::gathered(impact_loops, arm.as_ref(), &hidden, slip.found() == Some(true));
+    let slips = slip.found() == Some(true);
+    let impacts = impact_loops::gathered(impact_loops, arm.as_ref(), &hidden, slips);
+    let own = level_stiffness::of(measurements, averages, own, slips, &steady);
     let shown = example(measurements, averages, impact_loops, hidden.resonance_hz());
     let (example_loop, reconstruction) =
         shown.map_or((None, None), |(drawn, rebuilt)| (Some(drawn), rebuilt));
@@ -98,7 +102,7 @@ pub fn at_the_contact<M: Measurements>(
         backbones: shaker_levels::backbones(&steady),
         series: SeriesCompliance::of(between_the_arms, at_the_specimens),
         change: ContactChange::of(&steady),
-        levels: shaker_levels::loops(steady, arm.as_ref()),
+        levels: shaker_levels::loops(steady, arm.as_ref(), own),
     };
     (found, missing)
 }
