@@ -19,11 +19,13 @@ type C = Complex<f64>;
 /// The motions that matter: z, θ_x, θ_y of arm B, then of specimen B (the same where it has no points of its own), then θ_x, θ_y of A.
 pub const MOTIONS: usize = 8;
 
-/// Lines this far from the frequency count, Hz: some ten of them tell a parabola's middle with a third of a line's noise, and a mode
-/// twice as far off bends it by less than that.
+/// Lines this far from the frequency count, Hz: some twelve of them tell the middle of a quartic with half of a line's noise, and a mode twice
+/// as far off leaves a thirtieth of what it does there.
 pub const REACH_HZ: f64 = 6.0;
-/// Order of the polynomial.
-const ORDER: usize = 2;
+/// Order of the polynomial. An odd one more would change nothing in the middle of lines that lie alike on both sides.
+const ORDER: usize = 4;
+/// The next that does.
+const HIGHER: usize = ORDER + 2;
 
 /// One line of one impact: its motion, and what is needed to say how it changes.
 struct Line {
@@ -58,7 +60,7 @@ pub struct Driven<'a> {
     motion: Vec<DVector<C>>,
     /// Complex weight of each line's ratio in the ratio at the frequency.
     weights: Vec<C>,
-    /// The same with a polynomial of one order more.
+    /// The same with the higher polynomial.
     higher: Vec<C>,
     /// How much more the sum of neighbouring lines scatters than that of independent ones.
     shared: f64,
@@ -72,7 +74,7 @@ pub struct Known {
     pub by_parameter: Vec<(usize, C)>,
     /// Variance E|δ|² of the lines' noise; the polynomial's misfit is counted.
     pub noise: f64,
-    /// |δ|² between the polynomial and one of the next order.
+    /// |δ|² between the polynomial and the higher one.
     pub bend: f64,
     /// E|δ|² of where the impacts' lines of action are; none where no other impacts tell what that does.
     pub place: Option<f64>,
@@ -102,7 +104,8 @@ impl<'a> Driven<'a> {
         let (first, last) = (*near.first()?, *near.last()?);
         // an interpolation, whatever was lost at the band's ends
         let spans = at(first) < frequency_hz && frequency_hz < at(last);
-        if near.len() < 2 * (ORDER + 2) || !spans {
+        // so many that something is left to tell the polynomial's misfit by
+        if near.len() < HIGHER + 4 || !spans {
             return None;
         }
         let of_parts = |l: &usize| parts.iter().map(|part| line(blocks, part.block, *l, p)).collect();
@@ -117,7 +120,7 @@ impl<'a> Driven<'a> {
         let motion: Vec<DVector<C>> = lines.iter().map(together).collect();
         let s = C::new(0.0, std::f64::consts::TAU * frequency_hz);
         let nodes: Vec<C> = lines.iter().map(|own| own[0].s - s).collect();
-        let (weights, higher) = (extrapolating(&nodes, ORDER)?, extrapolating(&nodes, ORDER + 1)?);
+        let (weights, higher) = (extrapolating(&nodes, ORDER)?, extrapolating(&nodes, HIGHER)?);
         let coordinates = places(block);
         let per_t = std::array::from_fn(|k| {
             motion.iter().zip(&weights).map(|(x, w)| w * x[coordinates[k]] / x[T]).sum()

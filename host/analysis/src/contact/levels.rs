@@ -229,9 +229,9 @@ fn one(
     let omega = TAU * level.frequency_hz;
     let stiffness = compliance.inv();
     let k = stiffness.re;
-    // dK = −K² dC; of a complex noise without preferred phase half the variance is in the real part
+    // dK = −K² dC. Of a complex noise without preferred phase half the variance is in the real part; what a shift does may be all in it
     let slope = -stiffness * stiffness;
-    let half_noise = 0.5 * slope.norm_sqr();
+    let unknown = slope.norm_sqr() * (0.5 * turning + place);
     let real = by_parameter.map(|d| (slope * d).re);
     let imaginary = by_parameter.map(|d| (slope * d).im / omega);
     let of_fit = |row: &DVector<f64>| (&known.covariance * row).dot(row).max(0.0);
@@ -244,8 +244,8 @@ fn one(
     let shares = Shares {
         fit: relative(of_fit(&real)),
         hammer_gain: light.priors.hammer_gain,
-        turning: relative(half_noise * turning),
-        place: relative(half_noise * place),
+        turning: relative(0.5 * slope.norm_sqr() * turning),
+        place: relative(slope.norm_sqr() * place),
         level: relative(of_mean(|c| c.re)),
     };
     let Shares { fit, hammer_gain, turning: of_turning, place: of_place, level: of_level } = shares;
@@ -256,7 +256,7 @@ fn one(
     }
     let c = stiffness.im / omega;
     let of_c = of_fit(&imaginary)
-        + half_noise * (turning + place) / (omega * omega)
+        + unknown / (omega * omega)
         + of_mean(|c| c.im) / (omega * omega)
         + (hammer_gain * c).powi(2);
     let half_c = NORMAL_95 * of_c.sqrt();
