@@ -74,7 +74,7 @@ pub struct Known {
     pub by_parameter: Vec<(usize, C)>,
     /// Variance E|δ|² of the lines' noise; the polynomial's misfit is counted.
     pub noise: f64,
-    /// |δ|² between the polynomial and the higher one.
+    /// |δ|² of what the polynomial may miss: twice the way to the higher one.
     pub bend: f64,
     /// E|δ|² of where the impacts' lines of action are; none where no other impacts tell what that does.
     pub place: Option<f64>,
@@ -182,7 +182,8 @@ impl<'a> Driven<'a> {
         Known {
             by_parameter: by_parameter.into_iter().collect(),
             noise: noise * self.shared * misfit,
-            bend: bend.norm_sqr(),
+            // two orders halve what is missing at least, or the next two would show more
+            bend: 4.0 * bend.norm_sqr(),
             place: tells_place.then(|| {
                 let of = |(axes, part): (&[C; 2], &Part)| {
                     part.place_m2 * axes.iter().map(C::norm_sqr).sum::<f64>()
