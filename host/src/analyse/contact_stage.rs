@@ -83,7 +83,8 @@ pub fn at_the_contact<M: Measurements>(
     let slip = hammer_slip::told(&cells.at_contact);
     let slips = slip.found() == Some(true);
     let impacts = impact_loops::gathered(impact_loops, arm.as_ref(), &hidden, slips);
-    let own = level_stiffness::of(measurements, averages, own, slips, &steady);
+    let loops: Vec<_> = steady.iter().map(|one| (one.level, &one.raw)).collect();
+    let own = level_stiffness::of(measurements, averages, own, slips, &loops);
     let shown = example(measurements, averages, impact_loops, hidden.resonance_hz());
     let (example_loop, reconstruction) =
         shown.map_or((None, None), |(drawn, rebuilt)| (Some(drawn), rebuilt));

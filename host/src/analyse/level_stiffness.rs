@@ -1,14 +1,13 @@
 //! k_T of the shaker's steady levels: each corrected by what the hits told, or why it has none.
 
 use super::averages::CellAverage;
-use super::cell::Measurements;
+use super::cell::{Measurements, ShakerLevel};
 use super::contact_answer::{cells, input};
-use super::shaker_levels::Analysed;
 use crate::contact::{
     ContactError, Known, LevelError, LevelStiffness, SteadyLevel, Stiffness, level_stiffness,
 };
 use crate::hysteresis::tones::stretches;
-use crate::hysteresis::{LoopFinding, Shape};
+use crate::hysteresis::{LoopAnalysis, LoopFinding, Shape};
 
 /// Stretches of a record whose scatter is its noise: enough to know a standard deviation to a quarter.
 const STRETCHES: usize = 10;
@@ -39,13 +38,13 @@ pub enum NoLevelStiffness {
     Wide(f64),
 }
 
-/// The levels' k_T, one for each. `slips` is what the hits say of the contact.
+/// The levels' k_T, one for each steady level and its loop with the raw force. `slips` is what the hits say of the contact.
 pub fn of<M: Measurements>(
     measurements: &M,
     averages: &[CellAverage],
     own: Result<&(Stiffness, Known), &ContactError>,
     slips: bool,
-    levels: &[Analysed<'_>],
+    levels: &[(&ShakerLevel, &LoopAnalysis)],
 ) -> Vec<Outcome> {
     let all = |why: NoLevelStiffness| levels.iter().map(|_| Err(why.clone())).collect();
     if slips {
@@ -57,7 +56,8 @@ pub fn of<M: Measurements>(
     }
     let light = cells(measurements, averages, |average| average.light.as_ref());
     let Ok(light) = input(measurements, light) else { return all(NoLevelStiffness::NoContact) };
-    let usable: Vec<Result<SteadyLevel, NoLevelStiffness>> = levels.iter().map(steady).collect();
+    let usable: Vec<Result<SteadyLevel, NoLevelStiffness>> =
+        levels.iter().map(|(level, raw)| steady(level, raw)).collect();
     let read: Vec<SteadyLevel> = usable.iter().filter_map(|level| level.as_ref().ok().cloned()).collect();
     let mut found = level_stiffness(&light, known, &read).into_iter();
     let outcome = |usable: Result<SteadyLevel, NoLevelStiffness>| {
@@ -71,18 +71,18 @@ pub fn of<M: Measurements>(
 }
 
 /// The amplitudes of a level that sticks. An ellipse sticks as well: what opens it is taken out here.
-fn steady(one: &Analysed<'_>) -> Result<SteadyLevel, NoLevelStiffness> {
-    if !matches!(one.raw.shape, Shape::Stuck | Shape::Elliptical) {
+fn steady(level: &ShakerLevel, raw: &LoopAnalysis) -> Result<SteadyLevel, NoLevelStiffness> {
+    if !matches!(raw.shape, Shape::Stuck | Shape::Elliptical) {
         return Err(NoLevelStiffness::Slips);
     }
     // a force that seems late beside a resonance is early motion of the spots; what delays may be is in the fit
     let wrong = |finding: &&LoopFinding| {
         matches!(finding, LoopFinding::Hum { .. } | LoopFinding::FrequencyOff { .. })
     };
-    if let Some(finding) = one.raw.findings.iter().find(wrong) {
+    if let Some(finding) = raw.findings.iter().find(wrong) {
         return Err(NoLevelStiffness::Finding(*finding));
     }
     let stretches =
-        stretches(&one.level.record, STRETCHES).map_err(|_| NoLevelStiffness::Level(LevelError::Short))?;
-    Ok(SteadyLevel { frequency_hz: one.level.level.frequency_hz, stretches })
+        stretches(&level.record, STRETCHES).map_err(|_| NoLevelStiffness::Level(LevelError::Short))?;
+    Ok(SteadyLevel { frequency_hz: level.level.frequency_hz, stretches })
 }

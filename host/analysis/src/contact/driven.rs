@@ -198,7 +198,7 @@ impl<'a> Driven<'a> {
 fn powers(nodes: &[C], order: usize) -> DMatrix<C> {
     let mean = nodes.iter().sum::<C>() / nodes.len() as f64;
     let largest = nodes.iter().map(|x| (x - mean).norm()).fold(f64::MIN_POSITIVE, f64::max);
-    DMatrix::from_fn(nodes.len(), order + 1, |l, m| (nodes[l] / largest).powi(m as i32))
+    DMatrix::from_fn(nodes.len(), order + 1, |l, m| (nodes[l] / largest).powu(m as u32))
 }
 
 /// By how much each value at a node counts in the least-squares polynomial's value at 0.
@@ -278,6 +278,8 @@ fn solved(block: &Block, line: usize, p: &[f64], shifts: Option<[DVector<C>; 2]>
     let mut derivatives = model.derivatives(&x, shifts.as_ref(), &map);
     // specimen A's z is free: what the contact would make of it does not count
     let freed = block.local(COMPLIANCE);
-    derivatives.iter_mut().for_each(|row| row.retain(|(i, _)| *i != freed));
+    for row in &mut derivatives {
+        row.retain(|(i, _)| *i != freed);
+    }
     x[T].is_finite().then(|| Line { s: line.s, x, q, r, derivatives, weight: line.weight.clone(), shifts })
 }

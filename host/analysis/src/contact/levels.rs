@@ -235,7 +235,7 @@ fn one(
     let real = by_parameter.map(|d| (slope * d).re);
     let imaginary = by_parameter.map(|d| (slope * d).im / omega);
     let of_fit = |row: &DVector<f64>| (&known.covariance * row).dot(row).max(0.0);
-    let scattered: Vec<C> = stretches.iter().map(|c| c.inv()).collect();
+    let scattered: Vec<C> = stretches.iter().map(C::inv).collect();
     let n = scattered.len() as f64;
     let mean = scattered.iter().sum::<C>() / n;
     let of_mean =
