@@ -140,8 +140,8 @@ impl Counted {
 
 #[test]
 fn a_level_is_called_k_t_only_where_its_interval_holds() {
-    // a contact of 290 N/µm; between the spots it is 62 at 100 Hz
-    let campaign = campaign(4, 0, Drawn { stiffest_n_per_m: 300e6, errors: 1.0 });
+    // a contact of 93 N/µm; between the spots it is 24 at 100 Hz
+    let campaign = campaign(8, 0, Drawn { stiffest_n_per_m: 300e6, errors: 1.0 });
     let mut counted = Counted::default();
     counted.add(&campaign);
     assert_eq!(counted.levels, 6);
