@@ -140,3 +140,11 @@ pub fn contact_plan(rig: &RigConfig) -> String {
         errors.skew_s
     )
 }
+
+/// Frequencies of the shaker's levels on such a rig, Hz.
+pub const LEVELS_HZ: [f64; 6] = [100.0, 150.0, 200.0, 300.0, 400.0, 500.0];
+
+/// The same plan with levels of the shaker: 0.15 µm between the spots, at which every contact that is drawn sticks.
+pub fn levels_plan(rig: &RigConfig) -> String {
+    format!("{}\n[shaker]\nfrequencies_hz = {LEVELS_HZ:?}\namplitudes_m = [1.5e-7]\n", contact_plan(rig))
+}

@@ -1,6 +1,7 @@
 //! The static arm from hits on B alone, where the hammer is the force at the contact.
 
 use super::averages::CellAverage;
+use super::missing::Missing;
 use crate::hysteresis::static_arm::{Identified, from_known_force};
 use crate::spectra::CrossSpectra;
 use crate::structure::Structure;
@@ -16,13 +17,14 @@ const FIT_HZ: [f64; 2] = [100.0, 600.0];
 
 /// Fits mass and parallel path to the hits on B alone; none without a whole set of them.
 ///
-/// The hits are moved to the virtual point by the impacts' transformation, so that a hit beside the contact counts with its lever.
+/// Cells of other lines than the first are told in `missing`. The hits are moved to the virtual point by the impacts' transformation, so that a hit beside the contact counts with its lever.
 pub fn from_hits(
     averages: &[CellAverage],
     points: &Configuration,
     virtual_point_m: [f64; 3],
     sigma_per_s: f64,
     parallel_path: Option<f64>,
+    missing: &mut Vec<Missing>,
 ) -> Option<Identified> {
     let mut hit: Vec<(&Point, CrossSpectra)> = Vec::new();
     let mut frequency_hz: &[f64] = &[];
@@ -31,14 +33,17 @@ pub fn from_hits(
         if frequency_hz.is_empty() {
             frequency_hz = cell.spectra.frequency_hz();
         }
-        if let Some((_, sum)) = hit.iter_mut().find(|(point, _)| point.name == cell.name.impact) {
-            // spectra of other lines do not count
-            sum.add(contact).unwrap_or_default();
-        } else {
-            let point = points.impacts.iter().find(|point| point.name == cell.name.impact)?;
-            if contact.lines() == frequency_hz.len() {
+        let added = match hit.iter_mut().find(|(point, _)| point.name == cell.name.impact) {
+            Some((_, sum)) => sum.add(contact).is_ok(),
+            None if contact.lines() != frequency_hz.len() => false,
+            None => {
+                let point = points.impacts.iter().find(|point| point.name == cell.name.impact)?;
                 hit.push((point, contact.clone()));
+                true
             }
+        };
+        if !added {
+            missing.push(Missing::OtherLines(cell.name.clone()));
         }
     }
     if hit.is_empty() {

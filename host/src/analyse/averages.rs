@@ -1,7 +1,7 @@
 //! From kept hits to spectra, one cell at a time; the time signals are gone when the cell is done.
 
 use super::cell::{Cell, CellName, ContactDelays, Hit};
-use crate::contact::{BAND, SIGMA_PER_S};
+use crate::contact::{BAND, LEVEL_LINES, SIGMA_PER_S};
 use crate::spectra::{
     CrossSpectra, FrfSettings, ImpactRecords, MotionQuantity, SpectraError, Windowing, estimate,
 };
@@ -31,6 +31,8 @@ pub struct CellAverage {
     pub contact: Option<CrossSpectra>,
     /// The response, v_A, v_B and T with the heavy damping that the contact is read with, where asked for and measured.
     pub damped: Option<CrossSpectra>,
+    /// As `damped` with the plan's light damping: what the shaker's levels are corrected by.
+    pub light: Option<CrossSpectra>,
 }
 
 /// What of a cell is wanted beside its FRFs.
@@ -72,6 +74,7 @@ pub fn average(
     let all = summed(&alike, sigma_per_s)?;
     let damped =
         if damped { Some(summed(&alike, SIGMA_PER_S)?.band(BAND.low_hz, BAND.high_hz)) } else { None };
+    let light = damped.is_some().then(|| all.band(LEVEL_LINES.low_hz, LEVEL_LINES.high_hz));
     let step_hz = all.frequency_hz().get(1).copied().unwrap_or(0.0);
     let mean = |lines: &[f64]| lines.iter().sum::<f64>() / lines.len() as f64;
     let force_spectrum = all.force_spectrum().chunks(FORCE_LINES).map(mean).collect();
@@ -84,6 +87,7 @@ pub fn average(
         step_hz,
         contact: contact.then(|| kept.of_outputs(3..6)),
         damped,
+        light,
     })
 }
 

@@ -15,6 +15,7 @@ use crate::spectra::Windowing;
 use crate::structure::Structure;
 use crate::substructuring::averaged::Priors;
 use crate::substructuring::between_arms::{BetweenArms, NoStiffness, between_arms};
+use crate::substructuring::geometry::Grouping;
 use crate::substructuring::{Band, Frf, Geometry, IdmSet, Method, fit, identify};
 
 /// The methods whose spectra a campaign's results keep and show; of all others they keep the bands.
@@ -59,7 +60,9 @@ pub fn analyse_measurements<M: Measurements>(
         }
         Err(why) => found.missing.push(why),
     }
-    if let Some(ajb) = frfs[2] {
+    // a plan without A's interface asks for nothing between the arms
+    let asks = geometry.ajb.channels.iter().any(|p| p.grouping == Grouping::InterfaceA);
+    if let Some(ajb) = frfs[2].filter(|_| asks) {
         let priors = measurements.contact_priors().positions;
         let Recommended { estimates, bootstrap, missing } =
             recommended(geometry, ajb, &priors, &cells.hits, wanted.replicates);
@@ -75,10 +78,11 @@ pub fn analyse_measurements<M: Measurements>(
     let fitted: Vec<_> = found.fits.iter().filter_map(|fit| Some(fit.outcome.as_ref().ok()?.row())).collect();
     let rows = found.substructured.iter().flat_map(|s| &s.rows).map(|row| &row.joint).chain(&fitted);
     let fbs = between_the_arms(&found.recommended, rows);
-    let (contact, missing) = contact_stage::at_the_contact(measurements, &cells, fbs.as_ref());
+    let own = contact_answer::answer(measurements, &cells.averages);
+    let (contact, missing) = contact_stage::at_the_contact(measurements, &cells, fbs.as_ref(), own.as_ref());
     found.missing.extend(missing);
     found.contact = Some(contact);
-    found.own_stiffness = Some(contact_answer::answer(measurements, &cells.averages));
+    found.own_stiffness = Some(own.map(|(stiffness, _)| stiffness));
     found.between_arms = Some(decided(&found));
     found
 }

@@ -2,7 +2,8 @@
 
 use super::averages::CellAverage;
 use super::cell::{CellName, Measurements};
-use crate::contact::{self, BAND, ContactCell, ContactError, Input, Stiffness, stiffness};
+use crate::contact::{self, BAND, ContactCell, ContactError, Input, Known, Stiffness, read};
+use crate::spectra::CrossSpectra;
 use crate::structure::Structure;
 use crate::substructuring::geometry::{Geometry, Grouping};
 
@@ -32,38 +33,55 @@ pub fn reads(geometry: &Geometry, name: &CellName) -> bool {
 pub fn answer<M: Measurements>(
     measurements: &M,
     averages: &[CellAverage],
-) -> Result<Stiffness, ContactError> {
-    let geometry = measurements.geometry();
-    let cells: Vec<ContactCell<'_>> = averages
-        .iter()
-        .filter_map(|average| {
-            let spectra = average.damped.as_ref()?;
-            let points = geometry.points(average.name.configuration);
-            let impact = points.impacts.iter().find(|p| p.name == average.name.impact)?;
-            let point = points.channels.iter().find(|p| p.name == average.name.response)?;
-            Some(ContactCell {
-                structure: average.name.configuration,
-                impact: &impact.name,
-                impact_m: impact.position_m,
-                direction: impact.direction,
-                impact_grouping: impact.grouping,
-                point: &point.name,
-                point_m: point.position_m,
-                point_grouping: point.grouping,
-                spectra,
-                quantity: measurements.quantity(),
-            })
-        })
-        .collect();
+) -> Result<(Stiffness, Known), ContactError> {
+    let cells = cells(measurements, averages, |average| average.damped.as_ref());
     if cells.is_empty() {
         let hit = averages.iter().any(|a| a.name.configuration == Structure::Ajb && a.contact.is_some());
         return Err(if hit { ContactError::NoRotation } else { ContactError::NoCells });
     }
-    let spots_m = measurements.spots_m().ok_or(ContactError::NoSpots)?;
-    stiffness(&Input {
+    read(&input(measurements, cells)?)
+}
+
+/// The cells that have these spectra.
+pub fn cells<'a, M: Measurements>(
+    measurements: &'a M,
+    averages: &'a [CellAverage],
+    spectra: impl Fn(&'a CellAverage) -> Option<&'a CrossSpectra>,
+) -> Vec<ContactCell<'a>> {
+    let geometry = measurements.geometry();
+    let cell = |average: &'a CellAverage| {
+        let spectra = spectra(average)?;
+        let points = geometry.points(average.name.configuration);
+        let impact = points.impacts.iter().find(|p| p.name == average.name.impact)?;
+        let point = points.channels.iter().find(|p| p.name == average.name.response)?;
+        Some(ContactCell {
+            structure: average.name.configuration,
+            impact: &impact.name,
+            impact_m: impact.position_m,
+            direction: impact.direction,
+            impact_grouping: impact.grouping,
+            point: &point.name,
+            point_m: point.position_m,
+            point_grouping: point.grouping,
+            spectra,
+            quantity: measurements.quantity(),
+        })
+    };
+    averages.iter().filter_map(cell).collect()
+}
+
+/// What the contact is read from.
+///
+/// # Errors
+/// The plan does not say where the spots are.
+pub fn input<'a, M: Measurements>(
+    measurements: &M,
+    cells: Vec<ContactCell<'a>>,
+) -> Result<Input<'a>, ContactError> {
+    Ok(Input {
         cells,
-        contact_m: geometry.virtual_point_b_m,
-        spots_m,
+        contact_m: measurements.geometry().virtual_point_b_m,
+        spots_m: measurements.spots_m().ok_or(ContactError::NoSpots)?,
         priors: measurements.contact_priors(),
         band_hz: BAND,
     })

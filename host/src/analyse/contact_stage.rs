@@ -8,7 +8,8 @@ use super::impact_loops::{self, ImpactLoop, ImpactLoops};
 use super::missing::Missing;
 use super::shaker_levels::{self, Analysed, RecordLoops};
 use super::specimen_curves::specimen_curves;
-use super::{arm_from_hits, chosen, hammer_slip};
+use super::{arm_from_hits, chosen, hammer_slip, level_stiffness};
+use crate::contact::{ContactError, Known, Stiffness};
 use crate::hysteresis::Correction;
 use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
 use crate::hysteresis::hammer_slip::HammerSlip;
@@ -51,11 +52,12 @@ pub struct Contact {
     pub change: Option<ContactChange>,
 }
 
-/// Reads it. `between_the_arms` is what FBS found there.
+/// Reads it. `between_the_arms` is what FBS found there, `own` what the hits say of the contact's own stiffness.
 pub fn at_the_contact<M: Measurements>(
     measurements: &M,
     cells: &Cells,
     between_the_arms: Option<&BandStatistic>,
+    own: Result<&(Stiffness, Known), &ContactError>,
 ) -> (Contact, Vec<Missing>) {
     let (averages, impact_loops) = (&cells.averages[..], &cells.loops[..]);
     let (geometry, sigma_per_s) = (measurements.geometry(), measurements.sigma_per_s());
@@ -64,7 +66,7 @@ pub fn at_the_contact<M: Measurements>(
     let (steady, no_loop) = shaker_levels::analysed(&levels);
     missing.extend(no_loop);
 
-    let by_impact = summed(averages);
+    let by_impact = summed(averages, &mut missing);
     let spectra: Vec<&CrossSpectra> = by_impact.iter().map(|(_, sum)| sum).collect();
     let compliance = ContactCompliance::of_impacts(&spectra);
     let mut frfs = Vec::new();
@@ -74,12 +76,15 @@ pub fn at_the_contact<M: Measurements>(
     }
     let hidden = HiddenResonance::of(compliance.as_ref(), &shaker_levels::swept(&levels)).with_phases(&frfs);
 
-    let arm = static_arm(measurements, averages, &steady);
+    let arm = static_arm(measurements, averages, &steady, &mut missing);
     if arm.is_none() && !(steady.is_empty() && impact_loops.is_empty()) {
         missing.push(Missing::EffectiveMass);
     }
     let slip = hammer_slip::told(&cells.at_contact);
-    let impacts = impact_loops::gathered(impact_loops, arm.as_ref(), &hidden, slip.found() == Some(true));
+    let slips = slip.found() == Some(true);
+    let impacts = impact_loops::gathered(impact_loops, arm.as_ref(), &hidden, slips);
+    let loops: Vec<_> = steady.iter().map(|one| (one.level, &one.raw)).collect();
+    let own = level_stiffness::of(measurements, averages, own, slips, &loops);
     let shown = example(measurements, averages, impact_loops, hidden.resonance_hz());
     let (example_loop, reconstruction) =
         shown.map_or((None, None), |(drawn, rebuilt)| (Some(drawn), rebuilt));
@@ -98,23 +103,28 @@ pub fn at_the_contact<M: Measurements>(
         backbones: shaker_levels::backbones(&steady),
         series: SeriesCompliance::of(between_the_arms, at_the_specimens),
         change: ContactChange::of(&steady),
-        levels: shaker_levels::loops(steady, arm.as_ref()),
+        levels: shaker_levels::loops(steady, arm.as_ref(), own),
     };
     (found, missing)
 }
 
-/// The contact's spectra of the assembly, summed over the cells of each impact. Spectra of other lines than the first do not count.
-fn summed(averages: &[CellAverage]) -> Vec<(&str, CrossSpectra)> {
+/// The contact's spectra of the assembly, summed over the cells of each impact; cells of other lines than the first are told in `missing`.
+fn summed<'a>(averages: &'a [CellAverage], missing: &mut Vec<Missing>) -> Vec<(&'a str, CrossSpectra)> {
     let mut by_impact: Vec<(&str, CrossSpectra)> = Vec::new();
     let of_assembly = averages.iter().filter(|cell| cell.name.configuration == Structure::Ajb);
-    for (name, contact) in of_assembly.filter_map(|cell| Some((&cell.name.impact, cell.contact.as_ref()?))) {
-        if by_impact.first().is_some_and(|(_, first)| first.frequency_hz() != contact.frequency_hz()) {
-            continue;
-        }
-        match by_impact.iter_mut().find(|(impact, _)| impact == name) {
-            // of one campaign, and on the same lines: nothing else keeps spectra from being added
-            Some((_, sum)) => sum.add(contact).unwrap_or_default(),
-            None => by_impact.push((name, contact.clone())),
+    for (name, contact) in of_assembly.filter_map(|cell| Some((&cell.name, cell.contact.as_ref()?))) {
+        let unlike =
+            by_impact.first().is_some_and(|(_, first)| first.frequency_hz() != contact.frequency_hz());
+        let added = match by_impact.iter_mut().find(|(impact, _)| *impact == name.impact) {
+            _ if unlike => false,
+            Some((_, sum)) => sum.add(contact).is_ok(),
+            None => {
+                by_impact.push((&name.impact, contact.clone()));
+                true
+            }
+        };
+        if !added {
+            missing.push(Missing::OtherLines(name.clone()));
         }
     }
     by_impact
@@ -137,6 +147,7 @@ fn static_arm<M: Measurements>(
     measurements: &M,
     averages: &[CellAverage],
     steady: &[Analysed<'_>],
+    missing: &mut Vec<Missing>,
 ) -> Option<Identified> {
     let known = measurements.known_contact();
     let parallel_path = known.parallel_path.unwrap_or(0.0);
@@ -146,7 +157,7 @@ fn static_arm<M: Measurements>(
     }
     let geometry = measurements.geometry();
     let (points, at, sigma_per_s) = (&geometry.b, geometry.virtual_point_b_m, measurements.sigma_per_s());
-    arm_from_hits::from_hits(averages, points, at, sigma_per_s, known.parallel_path)
+    arm_from_hits::from_hits(averages, points, at, sigma_per_s, known.parallel_path, missing)
         .or_else(|| from_levels(&shaker_levels::stuck(steady), parallel_path))
 }
 

@@ -31,6 +31,9 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
+/// What boards call themselves that have a simulated rig behind them, whatever the wire to them.
+const SIMULATED_BOARDS: [&str; 2] = ["jointrig-sim", "mps2-an505"];
+
 /// Scans kept before the trigger: the force window begins 1 ms before the pulse, which is 51 scans at 51.2 kHz.
 const LEAD_S: f64 = 1.25e-3;
 
@@ -157,6 +160,8 @@ impl CampaignFile {
         let mut source = Source { file, kind: "campaign".into(), ..Source::default() };
         source.started = self.records.values().flatten().flatten().map(|r| r.utc.clone()).min();
         let sessions = store.sessions()?;
+        let on_simulated = sessions.iter().any(|(_, info)| SIMULATED_BOARDS.contains(&info.board.as_str()));
+        source.simulated = on_simulated || store.simulated_rig()?.is_some();
         if let Some((_, info)) = sessions.last() {
             for (key, value) in [
                 ("address", info.address.clone()),

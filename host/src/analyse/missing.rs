@@ -94,6 +94,8 @@ pub enum Missing {
         /// Cells with hits.
         cells: usize,
     },
+    /// A cell's signals at the contact have other lines than the rest, and do not count there.
+    OtherLines(CellName),
     /// Configurations without which there is no substructuring.
     Configurations(Vec<Structure>),
     /// The three configurations do not fit together.

@@ -1,6 +1,7 @@
 //! The shaker's levels: each level's loop with the raw and the corrected force, a loop to look at, the law over amplitude.
 
 use super::cell::ShakerLevel;
+use super::level_stiffness;
 use super::missing::Missing;
 use crate::campaign::plan::level::Moment;
 use crate::hysteresis::backbone::Law;
@@ -33,6 +34,8 @@ pub struct RecordLoops {
     pub raw: LoopAnalysis,
     /// With the force corrected by what is known of the static arm.
     pub corrected: Option<LoopAnalysis>,
+    /// Of a level of a campaign: the contact's own k_T at it, or why there is none.
+    pub own: Option<level_stiffness::Outcome>,
 }
 
 /// Every steady level, analysed with the raw force; and those that give no loop.
@@ -65,16 +68,22 @@ pub fn swept(levels: &[ShakerLevel]) -> Vec<ContactCompliance> {
         .collect()
 }
 
-/// The loops of every level: raw, and corrected where the static arm is known and gives one.
-pub fn loops(levels: Vec<Analysed<'_>>, arm: Option<&Identified>) -> Vec<RecordLoops> {
+/// The loops of every level: raw, and corrected where the static arm is known and gives one; `own` is what each is at the contact.
+pub fn loops(
+    levels: Vec<Analysed<'_>>,
+    arm: Option<&Identified>,
+    own: Vec<level_stiffness::Outcome>,
+) -> Vec<RecordLoops> {
     let corrected =
         |one: &Analysed<'_>| arm.and_then(|arm| analyse_corrected(&one.level.record, &arm.correction).ok());
     levels
         .into_iter()
-        .map(|one| RecordLoops {
+        .zip(own)
+        .map(|(one, own)| RecordLoops {
             level: Some((one.level.id, one.level.moment)),
             corrected: corrected(&one),
             raw: one.raw,
+            own: Some(own),
         })
         .collect()
 }

@@ -2,6 +2,7 @@
 
 use super::cell::ShakerLevel;
 use super::checks::ContactChange;
+use super::level_stiffness::NoLevelStiffness;
 use super::shaker_levels::{analysed, curves, loops};
 use crate::campaign::plan::level::{Held, Level, Moment};
 use crate::hysteresis::static_arm::{Basis, Identified};
@@ -53,7 +54,9 @@ fn raw_and_corrected_stand_side_by_side() {
     assert_eq!(curves(&found).len(), 1);
     let correction = Correction { effective_mass_kg: 1.5, parallel_path: 0.01 };
     let arm = Identified { correction, basis: Basis::Given, residual: 0.0 };
-    let [one] = &loops(found, Some(&arm))[..] else { panic!("one level") };
+    let [one] = &loops(found, Some(&arm), vec![Err(NoLevelStiffness::NoContact)])[..] else {
+        panic!("one level")
+    };
     let both = [Some(&one.raw), one.corrected.as_ref()].map(|loops| loops.expect("both forces"));
     let k = both.map(|loops| loops.k_t_n_per_m.expect("stuck").mean);
     // F = 1.01 T − m ω² x_B, x_B = Δx / 1.5

@@ -49,6 +49,7 @@ impl Loops {
         });
         let loops = RecordLoops {
             level: None,
+            own: None,
             raw: found(&record)?,
             corrected: correction.map(|correction| found(&correction.applied(&record))).transpose()?,
         };

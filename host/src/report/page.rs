@@ -106,9 +106,14 @@ pub fn page(results: &Results) -> String {
 fn headline(html: &mut String, results: &Results) {
     let mut found = words::answer_sentences::lines(results);
     found.extend(
-        [words::substructuring(results), words::impact_loops(results), words::shaker_loops(results)]
-            .into_iter()
-            .flatten(),
+        [
+            words::substructuring(results),
+            words::impact_loops(results),
+            words::shaker_loops(results),
+            words::levels_at_the_contact(results),
+        ]
+        .into_iter()
+        .flatten(),
     );
     if found.is_empty() {
         put(

@@ -204,6 +204,7 @@ pub fn hysteresis(results: &Results) -> Option<String> {
         "excitation",
         "shape",
         "Δx, nm",
+        "k_T of the contact (95 %), N/µm",
         "stick slope ± σ, N/µm",
         "k_eq ± σ, N/µm",
         "peak secant, |T₁/Δx₁|, N/µm",
@@ -224,6 +225,10 @@ pub fn hysteresis(results: &Results) -> Option<String> {
             words::excitation(h),
             words::shape_name(h.shape).into(),
             h.amplitude_m.map_or(UNKNOWN.into(), |a| format!("± {}", short(a * 1e9))),
+            h.own_k_t().map_or(UNKNOWN.into(), |k| {
+                let [low, high] = k.ci95.map(|limit| short(micro(limit)));
+                format!("{} ({low}…{high})", short(micro(k.mean)))
+            }),
             over(h.stick_slope(), 1e-6),
             over(h.k_eq_n_per_m, 1e-6),
             h.k_secant_n_per_m
@@ -240,6 +245,10 @@ pub fn hysteresis(results: &Results) -> Option<String> {
             table.note(heads.len(), warning);
         }
         told.extend(&h.warnings);
+        if let Some(why) = h.k_t_why.as_ref().filter(|why| h.k_t_n_per_m.is_none() && !told.contains(why)) {
+            table.note(heads.len(), why);
+            told.push(why);
+        }
     }
     Some(table.finish())
 }

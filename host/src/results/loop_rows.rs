@@ -1,5 +1,6 @@
 //! The contact by hysteresis loops: numbers per kind of excitation, and one loop to look at.
 
+use crate::contact::{Interval, Shares};
 use crate::hysteresis::backbone::Law;
 use crate::hysteresis::impact::DecayCycle;
 use crate::hysteresis::{Kind as Excitation, LoopFinding, OverCycles, Shape, ShapeEvidence};
@@ -28,9 +29,19 @@ pub struct Hysteresis {
     pub amplitude_m: Option<f64>,
     /// The shape that most cycles have.
     pub shape: Shape,
-    /// k_T: slope of the stick part, N/m, of a record whose signals are said to be those of the contact. Always null in a campaign, where
-    /// they are those of spots beside it and of load cells behind an arm.
+    /// k_T, N/m. Of a record whose signals are said to be those of the contact: slope of the stick part. In a campaign, where they are those of
+    /// spots beside it and of load cells behind an arm: of a steady level whose force and Δx at the contact are known from the hits, with the
+    /// interval of all that it rests on (`std` is the scatter over stretches of its record); null otherwise.
     pub k_t_n_per_m: Option<OverCycles>,
+    /// c_T beside it in a campaign, N s/m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub c_t_n_s_per_m: Option<Interval>,
+    /// Relative standard deviation of this k_T by what it comes from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub k_t_budget: Option<Shares>,
+    /// Of a level of a campaign: what k_T rests on, or why there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub k_t_why: Option<String>,
     /// The same slope in a campaign, N/m: between the spots, with whatever else lies there; null where the loop has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slope_between_spots_n_per_m: Option<OverCycles>,
@@ -81,12 +92,19 @@ pub struct Hysteresis {
 }
 
 impl Hysteresis {
-    /// Slope of the stick part, whatever it may be called.
+    /// Slope of the stick part, whatever it may be called. A level's k_T is none: it is not read off the loop that the row is about.
     pub fn stick_slope(&self) -> Option<OverCycles> {
-        self.k_t_n_per_m.or(self.slope_between_spots_n_per_m)
+        let read_off = self.k_t_n_per_m.filter(|_| self.k_t_budget.is_none());
+        self.slope_between_spots_n_per_m.or(read_off)
     }
 
-    /// In a campaign no slope is k_T.
+    /// k_T of a level of a campaign, with its interval.
+    pub fn own_k_t(&self) -> Option<Interval> {
+        let k = self.k_t_n_per_m.filter(|_| self.k_t_budget.is_some())?;
+        Some(Interval { mean: k.mean, ci95: k.ci95? })
+    }
+
+    /// In a campaign no slope of a loop is k_T.
     #[must_use]
     pub fn between_spots(self) -> Self {
         Hysteresis { k_t_n_per_m: None, slope_between_spots_n_per_m: self.stick_slope(), ..self }

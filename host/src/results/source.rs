@@ -10,6 +10,8 @@ pub struct Source {
     pub file: String,
     /// What was analysed: `campaign`, `frf` or `record`.
     pub kind: String,
+    /// Whether the device was simulated.
+    pub simulated: bool,
     /// The software that computed this.
     pub software: Software,
     /// When the campaign was begun, as its file says, RFC 3339.

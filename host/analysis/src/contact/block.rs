@@ -75,6 +75,10 @@ pub struct BlockLine {
 pub struct Block {
     /// What it hits.
     pub grouping: Grouping,
+    /// Where, m.
+    pub at_m: [f64; 3],
+    /// Along which unit vector.
+    pub direction: [f64; 3],
     /// Whether impacts on the same body tell what its shifts do; else those of another body stand in.
     pub aim_known: bool,
     /// On B alone: place of the hammer's part along z among the parameters.
@@ -280,6 +284,8 @@ fn block(
     Ok(Block {
         aim_known,
         grouping: impact.grouping,
+        at_m: impact.at_m,
+        direction: impact.direction,
         along_z,
         lines: chosen.iter().enumerate().filter_map(line).collect(),
         cells,

@@ -13,12 +13,16 @@
 //!
 //! The way through the room: `cell` what is measured, `block` the cells of an impact, `parameters` the unknowns, `form_scale` how large the form's may be, `model` the signals as
 //! a linear map of the motion, `line` its elimination, `solver` the most likely parameters, `diagnosis` whether the assumptions
-//! hold, `outcome` the answer.
+//! hold, `outcome` the answer. `levels` reads the shaker's levels by what the hits told, `driven` how bodies turn there.
 
 mod block;
 mod cell;
 mod diagnosis;
+mod driven;
 mod form_scale;
+mod levels;
+#[cfg(test)]
+mod levels_tests;
 mod line;
 mod model;
 mod outcome;
@@ -31,12 +35,14 @@ mod unexplained;
 
 pub use cell::{ContactCell, SIGMA_PER_S};
 pub use diagnosis::{Diagnosis, Doubt, Farthest, Left};
+pub use levels::{LEVEL_LINES, LevelError, LevelStiffness, Shares, SteadyLevel, level_stiffness};
 pub use outcome::{Interval, OfFrequency, Stiffness};
 pub use priors::{Cause, ContactPriors};
 
 use crate::band::Band;
 use crate::substructuring::geometry::Grouping;
 use block::blocks;
+use nalgebra::DMatrix;
 use parameters::Parameters;
 
 /// Where the contact is read, Hz: above the drift of hammer and windows, below the first bending modes of arms and specimens.
@@ -114,6 +120,22 @@ pub enum ContactError {
 /// # Errors
 /// [`ContactError`]: cells are missing, or the data do not tell it.
 pub fn stiffness(input: &Input<'_>) -> Result<Stiffness, ContactError> {
+    read(input).map(|(found, _)| found)
+}
+
+/// All parameters as the hits leave them: what a level of the shaker is corrected by.
+#[derive(Debug, Clone)]
+pub struct Known {
+    p: Vec<f64>,
+    /// Their covariance, with the misfit counted.
+    covariance: DMatrix<f64>,
+}
+
+/// As [`stiffness`], with everything else that the fit found.
+///
+/// # Errors
+/// As [`stiffness`].
+pub fn read(input: &Input<'_>) -> Result<(Stiffness, Known), ContactError> {
     let spots = input.spots_m.map(|spot| std::array::from_fn(|axis| spot[axis] - input.contact_m[axis]));
     let mut parameters = Parameters::new(&input.priors, START_M_PER_N, spots);
     let mut blocks = blocks(input, &mut parameters)?;
@@ -133,7 +155,9 @@ pub fn stiffness(input: &Input<'_>) -> Result<Stiffness, ContactError> {
     form_scale::scale_form(&mut parameters, &blocks);
     let sigma_per_s = input.cells[0].spectra.sigma_per_s();
     let solution = solver::solve(&mut blocks, &parameters, sigma_per_s)?;
-    outcome::of(input, &blocks, &parameters, &solution)
+    let found = outcome::of(input, &blocks, &parameters, &solution)?;
+    let covariance = &solution.covariance * solution.chi_square.max(1.0);
+    Ok((found, Known { p: solution.p, covariance }))
 }
 
 /// Whether a response point is of any use here.

@@ -18,8 +18,9 @@ const MOST: usize = 18;
 /// A number formed linearly from the motion.
 type Linear = [C; MOST];
 /// Where T stands among the assembly's coordinates, and where specimen A's x, y and rotations begin.
-const T: usize = 6;
-const A: usize = 7;
+pub const T: usize = 6;
+/// As [`T`].
+pub const A: usize = 7;
 
 /// Derivatives of one row: (parameter within the block, value).
 pub type Sparse = Vec<(usize, C)>;

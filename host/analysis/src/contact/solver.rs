@@ -73,7 +73,10 @@ pub fn solve(
     let shared = shared_by_lines(sigma_per_s, distance_hz(blocks));
     let mut solution = settle(blocks, parameters, parameters.start(), shared)?;
     for _ in 0..WIDENED {
-        if !unexplained::widen(blocks, &solution.bins) {
+        let left: Vec<(usize, &Residual)> = (solution.bins.iter())
+            .flat_map(|bin| bin.residuals.iter().map(|residual| (bin.block, residual)))
+            .collect();
+        if !unexplained::widen(blocks, &left) {
             break;
         }
         solution = settle(blocks, parameters, solution.p, shared)?;

@@ -4,7 +4,7 @@
 //! residual what it should be. A cell that strays thus weighs less; the others say what they said.
 
 use super::block::Block;
-use super::solver::Bin;
+use super::line::Residual;
 
 /// χ² per degree of freedom above which a cell is not described down to its noise. A cell has some fifty degrees of freedom, so that its χ²
 /// scatters by 0.2.
@@ -15,12 +15,12 @@ const ACCURACY: f64 = 0.03;
 /// One row of one line: |r|², what it should be over the noise's variance, the noise's variance without any addition, |value|².
 type Seen = [f64; 4];
 
-/// Widens the noise where it is needed; whether anything changed by enough to fit again.
-pub fn widen(blocks: &mut [Block], bins: &[Bin]) -> bool {
+/// Widens the noise where it is needed, from what is left of each block's lines; whether anything changed by enough to fit again.
+pub fn widen(blocks: &mut [Block], left: &[(usize, &Residual)]) -> bool {
     let mut changed = false;
     for (b, block) in blocks.iter_mut().enumerate() {
         let mut seen: Vec<[Vec<Seen>; 2]> = vec![[Vec::new(), Vec::new()]; block.cells.len()];
-        for residual in bins.iter().filter(|bin| bin.block == b).flat_map(|bin| &bin.residuals) {
+        for (_, residual) in left.iter().filter(|(of, _)| *of == b) {
             let line = &block.lines[residual.line];
             for (r, row) in block.rows.iter().enumerate() {
                 let (left, free) = residual.rows[r];

@@ -37,6 +37,7 @@ pub mod static_arm;
 mod stick;
 mod sums;
 mod timing;
+pub mod tones;
 
 pub use analyse::{Kind, LoopAnalysis, analyse, analyse_corrected};
 pub use correction::Correction;

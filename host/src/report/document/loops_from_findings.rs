@@ -2,7 +2,7 @@
 
 use crate::analyse::{Contact, Findings, ImpactLoops, RecordLoops, SlopeIs};
 use crate::hysteresis::{Kind, LoopAnalysis, OverCycles};
-use crate::report::words::warning_sentences;
+use crate::report::words::{level_sentences, warning_sentences};
 use crate::results::{DecayStep, Force, Hysteresis, ranges};
 
 /// The impacts together, the shaker's levels, and a record of its own: each with the raw force, then with the corrected one.
@@ -25,6 +25,9 @@ fn of_impacts(impacts: &ImpactLoops) -> Vec<Hysteresis> {
         amplitude_m: impacts.amplitude_m,
         shape: impacts.shape,
         k_t_n_per_m: None,
+        c_t_n_s_per_m: None,
+        k_t_budget: None,
+        k_t_why: None,
         slope_between_spots_n_per_m: (impacts.slope_is == SlopeIs::Contact).then_some(slope),
         stick_part: None,
         k_eq_n_per_m: Some(slope),
@@ -62,9 +65,28 @@ fn of_records(records: &[RecordLoops], resonance_hz: Option<f64>) -> Vec<Hystere
         }
         row
     };
-    let raw = records.iter().map(|one| row(one, &one.raw, Force::Raw));
+    let raw = records.iter().map(|one| at_the_contact(row(one, &one.raw, Force::Raw), one));
     let corrected = |one: &RecordLoops| Some(row(one, one.corrected.as_ref()?, Force::Corrected));
     raw.chain(records.iter().filter_map(corrected)).collect()
+}
+
+/// The row of a level with what is known of the contact itself.
+fn at_the_contact(row: Hysteresis, one: &RecordLoops) -> Hysteresis {
+    match &one.own {
+        None => row,
+        Some(Err(why)) => Hysteresis { k_t_why: Some(level_sentences::none(why)), ..row },
+        Some(Ok(own)) => {
+            let k = own.k_t_n_per_m;
+            let (std, cycles) = (own.std_n_per_m, one.raw.k_eq_n_per_m.cycles);
+            Hysteresis {
+                k_t_n_per_m: Some(OverCycles { mean: k.mean, std, cycles, ci95: Some(k.ci95) }),
+                c_t_n_s_per_m: Some(own.c_t_n_s_per_m),
+                k_t_budget: Some(own.shares),
+                k_t_why: Some(level_sentences::corrected(own)),
+                ..row
+            }
+        }
+    }
 }
 
 /// One record's loops, drawn with this force.
@@ -76,6 +98,9 @@ fn of_record(found: &LoopAnalysis, force: Force) -> Hysteresis {
         amplitude_m: Some(found.amplitude_m),
         shape: found.shape,
         k_t_n_per_m: found.k_t_n_per_m,
+        c_t_n_s_per_m: None,
+        k_t_budget: None,
+        k_t_why: None,
         slope_between_spots_n_per_m: None,
         stick_part: found.stick_part,
         k_eq_n_per_m: Some(found.k_eq_n_per_m),

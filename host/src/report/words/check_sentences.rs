@@ -180,7 +180,7 @@ fn series_compliance(found: &SeriesCompliance) -> Check {
             let [loops, fbs] = both(sizes);
             let [series, low, high] = found.between_n_per_m().unwrap_or([f64::NAN; 3]);
             let meaning = format!(
-                "The contact measured at the specimens is {} times stiffer than what FBS sees between the arms ({loops} against {fbs} N/µm). Clamp and contact are in series, and the clamp gives way: \
+                "Between the laser spots it is {} times stiffer than between the arms, where FBS looks ({loops} against {fbs} N/µm). Clamp and contact are in series, and the clamp gives way: \
                  the FBS value is not k_T. What lies between arms and contact has about {} N/µm by itself \
                  (95 % {}…{}).",
                 short(sizes.ratio()),
@@ -198,15 +198,15 @@ fn series_compliance(found: &SeriesCompliance) -> Check {
         SeriesCompliance::Softer(sizes) => {
             let [loops, fbs] = both(sizes);
             with(sizes, check(format!(
-                "The contact measured at the specimens is softer than what FBS sees between the arms ({loops} against {fbs} N/µm): no series compliance explains that. Look at the loops' shape \
+                "Between the laser spots it is softer than between the arms, where FBS looks ({loops} against {fbs} N/µm): no series compliance explains that. Look at the loops' shape \
                  and at the FBS methods' agreement first."
             )))
         }
         SeriesCompliance::SameSize(sizes) => {
             let [loops, fbs] = both(sizes);
             with(sizes, check(format!(
-                "FBS on the arms and the vibrometers at the specimens see stiffness of one size ({fbs} and {loops} N/µm): nothing soft lies between arm and contact, so the FBS value may be \
-                 read as k_T."
+                "Between the arms, where FBS looks, and between the laser spots the stiffness is of one size ({fbs} and {loops} N/µm): nothing much softer than the contact shows between \
+                 them. Neither is the contact's own."
             )))
         }
     }

@@ -36,6 +36,9 @@ pub fn sentence(missing: &Missing) -> String {
         Missing::ImportUnused { configuration, file, cells } => format!(
             "{configuration}: the FRFs imported from {file} are not used, because {cells} cells have hits of their own."
         ),
+        Missing::OtherLines(cell) => {
+            of_cell(cell, "its signals at the contact have other lines than the other cells' and do not count there")
+        }
         Missing::Configurations(absent) => {
             let names: Vec<&str> = absent.iter().map(|structure| structure.name()).collect();
             format!("Substructuring needs A, B and AJB; missing: {}.", names.join(", "))

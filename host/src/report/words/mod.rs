@@ -2,6 +2,7 @@
 
 pub(super) mod answer_sentences;
 pub(super) mod check_sentences;
+pub(super) mod level_sentences;
 pub(super) mod missing_sentences;
 mod names;
 pub mod number;
@@ -10,4 +11,4 @@ mod summary;
 pub(super) mod warning_sentences;
 
 pub use names::{excitation, method, outcome, shape_name, slope, static_arm};
-pub use summary::{bootstrapped, impact_loops, shaker_loops, substructuring, summary};
+pub use summary::{bootstrapped, impact_loops, levels_at_the_contact, shaker_loops, substructuring, summary};

@@ -24,7 +24,7 @@ pub fn method(name: &str) -> &str {
         "primal-b" => "Eq. A.2, block of B",
         "inverse" => "Eq. A.1",
         "inverse-ba" => "Eq. A.1, the other block",
-        "direct" => "T/Δx at the specimens",
+        "direct" => "stiffness between the laser spots",
         "internal-aa" => "Eq. 1 rearranged for A alone",
         "internal-ab" => "Eq. 1 rearranged for hits on B seen on A",
         "internal-bb" => "Eq. 1 rearranged for B alone",

@@ -106,6 +106,28 @@ pub fn shaker_loops(results: &Results) -> Option<String> {
     }
 }
 
+/// What the shaker's levels say of the contact itself.
+pub fn levels_at_the_contact(results: &Results) -> Option<String> {
+    let asked: Vec<&Hysteresis> = results.hysteresis.iter().filter(|h| h.k_t_why.is_some()).collect();
+    let values: Vec<f64> = asked.iter().filter_map(|h| h.k_t_n_per_m).map(|k| micro(k.mean)).collect();
+    let levels = asked.len();
+    let (low, high) =
+        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    match values.len() {
+        0 if levels == 0 => None,
+        0 => Some(format!("The contact's own k_T is known at none of the shaker's {levels} levels.")),
+        1 => Some(format!(
+            "Corrected for the specimens' rotation and arm B, one of {levels} levels gives a k_T of the contact's own: {} N/µm.",
+            short(low)
+        )),
+        n => Some(format!(
+            "Corrected for the specimens' rotation and arm B, {n} of {levels} levels give a k_T of the contact's own: {} to {} N/µm.",
+            short(low),
+            short(high)
+        )),
+    }
+}
+
 /// One row of the joint table as text.
 fn joint_line(joint: &Joint) -> Option<String> {
     let k = joint.sliding_stiffness()?;
@@ -136,6 +158,7 @@ pub fn summary(results: &Results) -> Vec<String> {
     lines.extend(substructuring(results));
     lines.extend(impact_loops(results));
     lines.extend(shaker_loops(results));
+    lines.extend(levels_at_the_contact(results));
     if lines.is_empty() {
         lines.push("No stiffness could be found from this file.".into());
     }

@@ -1,0 +1,285 @@
+//! How arm B and the specimens move per newton of T at one frequency, driven from where the shaker pushes: read off the hits there.
+//!
+//! A hit is seen at s = σ + iω, a steady level is at s = iω. The ratios of two motions of one hit are analytic functions of s, so a
+//! polynomial through the lines around a frequency, as a function of s, gives them at iω as well. The lines are those of a lightly damped
+//! window: from σ = 50 /s, where k_T is read, a mode of the specimen 10 Hz away is too near for that.
+//!
+//! The motion of each line is the one that fits its signals best, as in `line`; but here specimen A's z is a coordinate of its own, not
+//! what the contact makes of T: what is formed shall tell the contact, and not repeat what the hits said of it.
+
+use super::block::{Block, Group};
+use super::model::{A, LineModel, Sparse, T};
+use super::parameters::{COMPLIANCE, DELAYS, GAINS, RETARDATION};
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex;
+use std::collections::BTreeMap;
+
+type C = Complex<f64>;
+
+/// The motions that matter: z, θ_x, θ_y of arm B, then of specimen B (the same where it has no points of its own), then θ_x, θ_y of A.
+pub const MOTIONS: usize = 8;
+
+/// Lines this far from the frequency count, Hz: some twelve of them tell the middle of a quartic with half of a line's noise, and a mode twice
+/// as far off leaves a thirtieth of what it does there.
+pub const REACH_HZ: f64 = 6.0;
+/// Order of the polynomial. An odd one more would change nothing in the middle of lines that lie alike on both sides.
+const ORDER: usize = 4;
+/// The next that does.
+const HIGHER: usize = ORDER + 2;
+
+/// One line of one impact: its motion, and what is needed to say how it changes.
+struct Line {
+    s: C,
+    x: DVector<C>,
+    q: DMatrix<C>,
+    r: DMatrix<C>,
+    derivatives: Vec<Sparse>,
+    weight: Vec<f64>,
+    /// What a shift of the impact by a metre along two axes adds to the motion.
+    shifts: Option<[DVector<C>; 2]>,
+}
+
+/// An impact that takes part in driving the contact.
+#[derive(Debug, Clone, Copy)]
+pub struct Part {
+    /// Which block.
+    pub block: usize,
+    /// By how much of it.
+    pub weight: f64,
+    /// Variance of where its line of action is, m² along each axis across it.
+    pub place_m2: f64,
+}
+
+/// Motion per newton of T at one frequency.
+pub struct Driven<'a> {
+    blocks: &'a [Block],
+    parts: &'a [Part],
+    /// By line and part.
+    lines: Vec<Vec<Line>>,
+    /// The parts' motion together, by line.
+    motion: Vec<DVector<C>>,
+    /// Complex weight of each line's ratio in the ratio at the frequency.
+    weights: Vec<C>,
+    /// The same with the higher polynomial.
+    higher: Vec<C>,
+    /// How much more the sum of neighbouring lines scatters than that of independent ones.
+    shared: f64,
+    /// The motions per newton of T.
+    pub per_t: [C; MOTIONS],
+}
+
+/// How something formed from the motions is known: δ = Σ g_k δ(motion_k).
+pub struct Known {
+    /// Its derivatives by the block's parameters: (parameter among all, value).
+    pub by_parameter: Vec<(usize, C)>,
+    /// Variance E|δ|² of the lines' noise; the polynomial's misfit is counted.
+    pub noise: f64,
+    /// |δ|² of what the polynomial may miss: twice the way to the higher one.
+    pub bend: f64,
+    /// E|δ|² of where the impacts' lines of action are; none where no other impacts tell what that does.
+    pub place: Option<f64>,
+}
+
+/// Which coordinates of the motion the [`MOTIONS`] are.
+fn places(block: &Block) -> [usize; MOTIONS] {
+    let base = block.specimen_b().unwrap_or(0);
+    [2, 3, 4, base + 2, base + 3, base + 4, A + 2, A + 3]
+}
+
+impl<'a> Driven<'a> {
+    /// Motions of the parts' impacts together at `frequency_hz`, from lines of a lightly damped window; none where the lines do not reach
+    /// around it or do not tell the motion.
+    pub fn of(
+        blocks: &'a [Block],
+        parts: &'a [Part],
+        p: &[f64],
+        frequency_hz: f64,
+        shared: impl Fn(f64) -> f64,
+    ) -> Option<Self> {
+        let block = &blocks[parts.first()?.block];
+        let near: Vec<usize> = (0..block.lines.len())
+            .filter(|l| (block.lines[*l].frequency_hz - frequency_hz).abs() <= REACH_HZ)
+            .collect();
+        let at = |l: usize| block.lines[l].frequency_hz;
+        let (first, last) = (*near.first()?, *near.last()?);
+        // an interpolation, whatever was lost at the band's ends
+        let spans = at(first) < frequency_hz && frequency_hz < at(last);
+        // so many that something is left to tell the polynomial's misfit by
+        if near.len() < HIGHER + 4 || !spans {
+            return None;
+        }
+        let of_parts = |l: &usize| parts.iter().map(|part| line(blocks, part.block, *l, p)).collect();
+        let lines: Vec<Vec<Line>> = near.iter().map(of_parts).collect::<Option<_>>()?;
+        let together = |own: &Vec<Line>| {
+            let mut sum = DVector::zeros(own[0].x.len());
+            for (line, part) in own.iter().zip(parts) {
+                sum += &line.x * C::from(part.weight);
+            }
+            sum
+        };
+        let motion: Vec<DVector<C>> = lines.iter().map(together).collect();
+        let s = C::new(0.0, std::f64::consts::TAU * frequency_hz);
+        let nodes: Vec<C> = lines.iter().map(|own| own[0].s - s).collect();
+        let (weights, higher) = (extrapolating(&nodes, ORDER)?, extrapolating(&nodes, HIGHER)?);
+        let coordinates = places(block);
+        let per_t = std::array::from_fn(|k| {
+            motion.iter().zip(&weights).map(|(x, w)| w * x[coordinates[k]] / x[T]).sum()
+        });
+        let step_hz = (at(last) - at(first)) / (near.len() - 1) as f64;
+        Some(Driven { blocks, parts, lines, motion, weights, higher, shared: shared(step_hz), per_t })
+    }
+
+    /// How well Σ g_k motion_k is known.
+    pub fn known(&self, g: &[C; MOTIONS]) -> Known {
+        let coordinates = places(&self.blocks[self.parts[0].block]);
+        let (mut noise, mut expected, mut bend) = (0.0, 0.0, C::default());
+        let mut place = vec![[C::default(); 2]; self.parts.len()];
+        let mut tells_place = true;
+        let mut by_parameter: BTreeMap<usize, C> = BTreeMap::new();
+        let mut values = Vec::with_capacity(self.lines.len());
+        for ((own, x), weight) in self.lines.iter().zip(&self.motion).zip(&self.weights) {
+            let mut v = DVector::<C>::zeros(x.len());
+            let mut value = C::default();
+            for (k, g) in g.iter().enumerate() {
+                let u = x[coordinates[k]] / x[T];
+                value += g * u;
+                v[coordinates[k]] += g / x[T];
+                v[T] -= g * u / x[T];
+            }
+            values.push(value);
+            for (n, (line, part)) in own.iter().zip(self.parts).enumerate() {
+                let counts = weight * part.weight;
+                // vᵀ R⁻¹, then vᵀ R⁻¹ Qᴴ
+                let Some(z) = line.r.transpose().solve_lower_triangular(&v) else { continue };
+                noise += counts.norm_sqr() * z.norm_squared();
+                expected += part.weight.powi(2) * z.norm_squared();
+                let a = line.q.map(|q| q.conj()) * z;
+                let parameters = &self.blocks[part.block].parameters;
+                for (r, row) in line.derivatives.iter().enumerate() {
+                    for (i, value) in row {
+                        *by_parameter.entry(parameters[*i]).or_default() -=
+                            counts * a[r] * value * line.weight[r];
+                    }
+                }
+                match &line.shifts {
+                    Some(shifts) => {
+                        for (sum, shift) in place[n].iter_mut().zip(shifts) {
+                            *sum += counts * v.iter().zip(shift.iter()).map(|(v, x)| v * x).sum::<C>();
+                        }
+                    }
+                    None => tells_place = false,
+                }
+            }
+        }
+        // what the polynomial leaves of the lines, against their noise
+        let nodes: Vec<C> = self.lines.iter().map(|own| own[0].s).collect();
+        let left = residual(&nodes, &values, ORDER) / (values.len() - ORDER - 1) as f64;
+        expected /= values.len() as f64;
+        for ((value, low), high) in values.iter().zip(&self.weights).zip(&self.higher) {
+            bend += (high - low) * value;
+        }
+        let misfit = if expected > 0.0 { (left / expected).max(1.0) } else { 1.0 };
+        Known {
+            by_parameter: by_parameter.into_iter().collect(),
+            noise: noise * self.shared * misfit,
+            // two orders halve what is missing at least, or the next two would show more
+            bend: 4.0 * bend.norm_sqr(),
+            place: tells_place.then(|| {
+                let of = |(axes, part): (&[C; 2], &Part)| {
+                    part.place_m2 * axes.iter().map(C::norm_sqr).sum::<f64>()
+                };
+                place.iter().zip(self.parts).map(of).sum()
+            }),
+        }
+    }
+}
+
+/// Powers of the nodes up to `order`, over the largest of them.
+fn powers(nodes: &[C], order: usize) -> DMatrix<C> {
+    let mean = nodes.iter().sum::<C>() / nodes.len() as f64;
+    let largest = nodes.iter().map(|x| (x - mean).norm()).fold(f64::MIN_POSITIVE, f64::max);
+    DMatrix::from_fn(nodes.len(), order + 1, |l, m| (nodes[l] / largest).powu(m as u32))
+}
+
+/// By how much each value at a node counts in the least-squares polynomial's value at 0.
+fn extrapolating(nodes: &[C], order: usize) -> Option<Vec<C>> {
+    let factors = powers(nodes, order).qr();
+    let mut unit = DVector::<C>::zeros(order + 1);
+    unit[0] = C::new(1.0, 0.0);
+    let z = factors.r().transpose().solve_lower_triangular(&unit)?;
+    Some((factors.q().map(|q| q.conj()) * z).iter().copied().collect())
+}
+
+/// Σ |value − polynomial|².
+fn residual(nodes: &[C], values: &[C], order: usize) -> f64 {
+    let mean = nodes.iter().sum::<C>() / nodes.len() as f64;
+    let centred: Vec<C> = nodes.iter().map(|x| x - mean).collect();
+    let q = powers(&centred, order).qr().q();
+    let values = DVector::from_column_slice(values);
+    let found = &q * q.ad_mul(&values);
+    (values - found).norm_squared()
+}
+
+/// The motion of one line. Shifts of the hammer are taken out as far as the hits told them.
+fn line(blocks: &[Block], which: usize, line: usize, p: &[f64]) -> Option<Line> {
+    let block = &blocks[which];
+    let shifts = if block.shifted_by.is_empty() {
+        None
+    } else {
+        let others: Vec<(DVector<C>, [f64; 2])> = block
+            .shifted_by
+            .iter()
+            .map(|(other, weights)| Some((solved(&blocks[*other], line, p, None)?.x, *weights)))
+            .collect::<Option<_>>()?;
+        let mut all = [0, 1].map(|_| DVector::<C>::zeros(others[0].0.len()));
+        for (moved, weights) in &others {
+            for (shift, weight) in all.iter_mut().zip(weights) {
+                *shift += moved * C::from(*weight);
+            }
+        }
+        Some(all)
+    };
+    solved(block, line, p, shifts)
+}
+
+/// Eliminates one line with specimen A's z set free.
+fn solved(block: &Block, line: usize, p: &[f64], shifts: Option<[DVector<C>; 2]>) -> Option<Line> {
+    let line = &block.lines[line];
+    let mut free = p.to_vec();
+    (free[COMPLIANCE], free[RETARDATION]) = (0.0, 0.0);
+    let model = LineModel::new(block, &free, line.s);
+    let (map, offsets) = model.map();
+    let last = map.ncols();
+    let sensor = |channel: usize| (1.0 + p[GAINS + channel]) * (-line.s * p[DELAYS + channel]).exp();
+    let mut map = map.insert_column(last, C::default());
+    for (r, row) in block.rows.iter().enumerate() {
+        map[(r, last)] = match row.channel {
+            2 => sensor(0),
+            5 if block.cells[row.cell].group == Group::SpecimenA => sensor(4),
+            _ => C::default(),
+        };
+    }
+    let mut seen = DVector::from_fn(map.nrows(), |r, _| line.value[r] - offsets[r]);
+    if let Some(shifts) = &shifts {
+        let moved = shifts.each_ref().map(|shift| &map * shift);
+        for (r, row) in block.rows.iter().enumerate() {
+            if let Some(at) = block.cells[row.cell].shift {
+                seen[r] -= moved[0][r] * p[at] + moved[1][r] * p[at + 1];
+            }
+        }
+    }
+    for (r, weight) in line.weight.iter().enumerate() {
+        seen[r] *= *weight;
+    }
+    let weighed = DMatrix::from_fn(map.nrows(), map.ncols(), |r, c| map[(r, c)] * line.weight[r]);
+    let factors = weighed.qr();
+    let (q, r) = (factors.q(), factors.unpack_r());
+    let x = r.solve_upper_triangular(&q.ad_mul(&seen))?;
+    let mut derivatives = model.derivatives(&x, shifts.as_ref(), &map);
+    // specimen A's z is free: what the contact would make of it does not count
+    let freed = block.local(COMPLIANCE);
+    for row in &mut derivatives {
+        row.retain(|(i, _)| *i != freed);
+    }
+    x[T].is_finite().then(|| Line { s: line.s, x, q, r, derivatives, weight: line.weight.clone(), shifts })
+}

@@ -1,0 +1,338 @@
+//! k_T from a steady level of the shaker: force and Δx at the contact instead of T and Δx at the spots.
+//!
+//! A level shows T and both spots. What it does not show, how arm B and the specimens turn per newton of T at its frequency, the hits on
+//! the moving mass do (`driven`): they push it where the shaker does. All else (the force's form, where the spots are, gains, delays) is
+//! what the fit of all hits made of it, with its covariance. So
+//! F = (a₀ + a₁s) T + Σ (b₀ + b₁s + b₂s²)(z_B, θ_x, θ_y), Δx = x_A − x_B − r_A × θ_A + r_B × θ_B at s = iω, and F/Δx = k_T + iω c_T.
+
+use super::block::{Block, blocks};
+use super::driven::{Driven, MOTIONS, Part, REACH_HZ};
+use super::outcome::Interval;
+use super::parameters::{DELAYS, FORM, GAINS, INERTIA_B, Parameters, SPOTS};
+use super::{BAND, ContactError, Input, Known, START_M_PER_N};
+use crate::band::Band;
+use crate::frf::noise::shared_by_lines;
+use crate::identified::COMPLIANCE_HALF_WIDTH;
+use crate::parallel::prelude::*;
+use crate::substructuring::geometry::Grouping;
+use crate::substructuring::joint_over_bands::NORMAL_95;
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex;
+use serde::Serialize;
+use std::f64::consts::TAU;
+
+type C = Complex<f64>;
+
+/// The light lines that are needed beside the band in which levels can be read.
+pub const LEVEL_LINES: Band =
+    Band { low_hz: BAND.low_hz - REACH_HZ - 1.0, high_hz: BAND.high_hz + REACH_HZ + 1.0 };
+
+/// Relative step of differences: F/Δx is a ratio of two bilinear forms, so that rounding and curvature both stay below 1e-8.
+const STEP: f64 = 1e-4;
+
+/// One steady level.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SteadyLevel {
+    /// Its frequency, Hz.
+    pub frequency_hz: f64,
+    /// Complex amplitudes of T (N) and of the spots' displacements on A and B (m), in step with one another; one for each of several
+    /// stretches of the record as long as one another, whose scatter is its noise.
+    pub stretches: Vec<[C; 3]>,
+}
+
+/// Relative standard deviations of a level's k_T by what they come from.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Shares {
+    /// The fit of the hits: spots, points, gains, delays, form.
+    pub fit: f64,
+    /// The gain of the hammer's force cell.
+    pub hammer_gain: f64,
+    /// The motions per newton at this frequency: noise of the hits there, and the way to s = iω.
+    pub turning: f64,
+    /// Where the shaker pushes, against where the hammer hits.
+    pub place: f64,
+    /// The level's own scatter.
+    pub level: f64,
+}
+
+/// k_T of one level.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LevelStiffness {
+    /// k_T, N/m.
+    pub k_t_n_per_m: Interval,
+    /// Scatter of k_T over the level's stretches, N/m.
+    pub std_n_per_m: f64,
+    /// c_T, N s/m.
+    pub c_t_n_s_per_m: Interval,
+    /// Where the interval of k_T comes from.
+    pub shares: Shares,
+    /// By how much of the contact's own motion Δx at the spots and T in place of F are wrong together, |k_T/(T/Δx) − 1|.
+    pub correction: f64,
+}
+
+/// Why a level has no k_T.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LevelError {
+    /// Its frequency is not one at which the bodies are rigid and the hits tell something.
+    #[error("its frequency is outside {low:.0}–{high:.0} Hz, where the contact is read", low = BAND.low_hz, high = BAND.high_hz)]
+    OutOfBand,
+    /// Nothing was hit that drives the contact.
+    #[error("no impact along z on the moving mass (grouping 3) says where the shaker pushes")]
+    NoImpact,
+    /// The hits have no lines around it.
+    #[error("the hits have no usable lines around its frequency")]
+    NoLines,
+    /// Where the shaker pushes matters, and nobody knows by how much.
+    #[error(
+        "what a tilt of the hammer does is not known: hit A along z at three places that are not in a line"
+    )]
+    NoPlace,
+    /// A single stretch tells no scatter.
+    #[error("its record is too short: its scatter is not known")]
+    Short,
+    /// The compliance cannot be told from none.
+    #[error("the specimens' rotation makes so much of Δx here that nothing is known of the contact")]
+    NotIdentified,
+    /// The spectra do not belong together.
+    #[error(transparent)]
+    Contact(#[from] ContactError),
+}
+
+/// Corrects levels by what the hits told. `light` is the input of the fit with spectra of a light window in place of the heavy one's, of
+/// the same cells in the same order; `known` what the fit found.
+pub fn level_stiffness(
+    light: &Input<'_>,
+    known: &Known,
+    levels: &[SteadyLevel],
+) -> Vec<Result<LevelStiffness, LevelError>> {
+    let spots = light.spots_m.map(|spot| std::array::from_fn(|axis| spot[axis] - light.contact_m[axis]));
+    let mut parameters = Parameters::new(&light.priors, START_M_PER_N, spots);
+    let blocks = match blocks(&Input { band_hz: LEVEL_LINES, ..light.clone() }, &mut parameters) {
+        Ok(blocks) if parameters.all().len() == known.p.len() => blocks,
+        Ok(_) => return levels.iter().map(|_| Err(LevelError::NoLines)).collect(),
+        Err(error) => return levels.iter().map(|_| Err(error.clone().into())).collect(),
+    };
+    let sigma_per_s = light.cells.first().map_or(0.0, |cell| cell.spectra.sigma_per_s());
+    let read = |level: &SteadyLevel| one(light, known, &blocks, sigma_per_s, level);
+    levels.par_iter().map(read).collect()
+}
+
+/// What may stand for the shaker: each impact on the moving mass, and those on arm A put together to push along the same line. A rod between
+/// mass and arm hands on little else than the push.
+///
+/// A hit's line of action is known by where it hits and how it is tilted: a tilted hit pushes across as well, and turns what it hits about
+/// wherever its supports hold it. Nobody states where that is, so it is taken to be anywhere along the structure.
+fn stand_ins(light: &Input<'_>, blocks: &[Block]) -> Vec<Vec<Part>> {
+    let positions = &light.priors.positions;
+    let assembly = |grouping: fn(Grouping) -> bool| -> Vec<usize> {
+        (0..blocks.len()).filter(|b| blocks[*b].along_z.is_none() && grouping(blocks[*b].grouping)).collect()
+    };
+    let [low, high] = assembly(|_| true)
+        .iter()
+        .map(|b| blocks[*b].at_m[2])
+        .fold([light.contact_m[2]; 2], |[low, high]: [f64; 2], z| [low.min(z), high.max(z)]);
+    let place_m2 = |b: usize| {
+        let [below, above] = [blocks[b].at_m[2] - low, high - blocks[b].at_m[2]];
+        // mean square of the distance to a point that is anywhere between both ends
+        let lever_m2 = (below.powi(3) + above.powi(3)) / (3.0 * (high - low)).max(f64::MIN_POSITIVE);
+        positions.position_m.powi(2) + positions.aim_m.powi(2) + positions.hammer_angle_rad.powi(2) * lever_m2
+    };
+    let part = |block: usize, weight: f64| Part { block, weight, place_m2: place_m2(block) };
+    let on_mass = assembly(|grouping| grouping == Grouping::InternalA);
+    let mut all: Vec<Vec<Part>> = on_mass.iter().map(|b| vec![part(*b, 1.0)]).collect();
+    let Some(line) = on_mass.first().map(|b| blocks[*b].at_m) else { return all };
+    let on_arm = assembly(|grouping| grouping == Grouping::InterfaceA);
+    if let Some(weights) = along(&on_arm.iter().map(|b| blocks[*b].at_m).collect::<Vec<_>>(), line) {
+        let weight = |(b, weight): (&usize, f64)| part(*b, weight * blocks[*b].direction[2].signum());
+        all.push(on_arm.iter().zip(weights).map(weight).collect());
+    }
+    all
+}
+
+/// The smallest weights of parallel pushes at `from` whose sum pushes along the line through `to`; none where they do not span it.
+fn along(from: &[[f64; 3]], to: [f64; 3]) -> Option<Vec<f64>> {
+    let rows = DMatrix::from_fn(3, from.len(), |r, c| if r == 0 { 1.0 } else { from[c][r - 1] - to[r - 1] });
+    let gram = &rows * rows.transpose();
+    let wanted = DVector::from_column_slice(&[1.0, 0.0, 0.0]);
+    let solved = gram.cholesky()?.solve(&wanted);
+    let weights: Vec<f64> = (rows.transpose() * solved).iter().copied().collect();
+    // on a line they span nothing, and what remains is rounding
+    weights.iter().all(|w| w.abs() < 10.0).then_some(weights)
+}
+
+/// A compliance at the contact as one stand-in's motions give it, with what is not known of it.
+struct Found {
+    compliance: C,
+    by_parameter: DVector<C>,
+    /// E|δ|² of what the motions per newton are not known by, and of where the shaker pushes.
+    turning: f64,
+    place: f64,
+    /// One of each stretch.
+    stretches: Vec<C>,
+}
+
+/// The mean of what the stand-ins give, each counted by what it knows. Where they are further apart than that, none knew so much.
+fn together(found: &[Found]) -> Found {
+    let certainty = |one: &Found| (one.turning + one.place).max(f64::MIN_POSITIVE).recip();
+    let whole: f64 = found.iter().map(certainty).sum();
+    let counts: Vec<f64> = found.iter().map(|one| certainty(one) / whole).collect();
+    let mean =
+        |of: &dyn Fn(&Found) -> C| -> C { found.iter().zip(&counts).map(|(one, w)| of(one) * *w).sum() };
+    let compliance = mean(&|one| one.compliance);
+    let apart: f64 = found.iter().map(|one| (one.compliance - compliance).norm_sqr() * certainty(one)).sum();
+    let wider = (apart / (found.len().max(2) - 1) as f64).max(1.0);
+    let squares =
+        |of: fn(&Found) -> f64| -> f64 { found.iter().zip(&counts).map(|(one, w)| of(one) * w * w).sum() };
+    let mut by_parameter = DVector::<C>::zeros(found[0].by_parameter.len());
+    for (one, w) in found.iter().zip(&counts) {
+        by_parameter += &one.by_parameter * C::from(*w);
+    }
+    Found {
+        compliance,
+        by_parameter,
+        turning: squares(|one| one.turning) * wider,
+        place: squares(|one| one.place) * wider,
+        stretches: (0..found[0].stretches.len()).map(|n| mean(&|one| one.stretches[n])).collect(),
+    }
+}
+
+fn one(
+    light: &Input<'_>,
+    known: &Known,
+    blocks: &[Block],
+    sigma_per_s: f64,
+    level: &SteadyLevel,
+) -> Result<LevelStiffness, LevelError> {
+    if !BAND.contains(level.frequency_hz) {
+        return Err(LevelError::OutOfBand);
+    }
+    if level.stretches.len() < 2 {
+        return Err(LevelError::Short);
+    }
+    let chosen = stand_ins(light, blocks);
+    if chosen.is_empty() {
+        return Err(LevelError::NoImpact);
+    }
+    let shared = |step_hz: f64| shared_by_lines(sigma_per_s, step_hz);
+    let driven: Vec<Driven<'_>> = chosen
+        .iter()
+        .filter_map(|parts| Driven::of(blocks, parts, &known.p, level.frequency_hz, shared))
+        .collect();
+    let near = !driven.is_empty();
+    let found: Vec<Found> = driven.iter().filter_map(|driven| through(driven, known, level)).collect();
+    if found.is_empty() {
+        return Err(if near { LevelError::NoPlace } else { LevelError::NoLines });
+    }
+    let Found { compliance, by_parameter, turning, place, stretches } = together(&found);
+
+    let omega = TAU * level.frequency_hz;
+    let stiffness = compliance.inv();
+    let k = stiffness.re;
+    // dK = −K² dC. Of a complex noise without preferred phase half the variance is in the real part; what a shift does may be all in it
+    let slope = -stiffness * stiffness;
+    let unknown = slope.norm_sqr() * (0.5 * turning + place);
+    let real = by_parameter.map(|d| (slope * d).re);
+    let imaginary = by_parameter.map(|d| (slope * d).im / omega);
+    let of_fit = |row: &DVector<f64>| (&known.covariance * row).dot(row).max(0.0);
+    let scattered: Vec<C> = stretches.iter().map(C::inv).collect();
+    let n = scattered.len() as f64;
+    let mean = scattered.iter().sum::<C>() / n;
+    let of_mean =
+        |part: fn(C) -> f64| scattered.iter().map(|k| part(k - mean).powi(2)).sum::<f64>() / (n * (n - 1.0));
+    let relative = |variance: f64| variance.sqrt() / k.abs();
+    let shares = Shares {
+        fit: relative(of_fit(&real)),
+        hammer_gain: light.priors.hammer_gain,
+        turning: relative(0.5 * slope.norm_sqr() * turning),
+        place: relative(slope.norm_sqr() * place),
+        level: relative(of_mean(|c| c.re)),
+    };
+    let Shares { fit, hammer_gain, turning: of_turning, place: of_place, level: of_level } = shares;
+    let sigma = [fit, hammer_gain, of_turning, of_place, of_level].iter().map(|s| s * s).sum::<f64>().sqrt();
+    let half = NORMAL_95 * sigma;
+    if !(k > 0.0 && half < COMPLIANCE_HALF_WIDTH) {
+        return Err(LevelError::NotIdentified);
+    }
+    let c = stiffness.im / omega;
+    let of_c = of_fit(&imaginary)
+        + unknown / (omega * omega)
+        + of_mean(|c| c.im) / (omega * omega)
+        + (hammer_gain * c).powi(2);
+    let half_c = NORMAL_95 * of_c.sqrt();
+    let [t, a, b] = mean_of(&level.stretches);
+    Ok(LevelStiffness {
+        k_t_n_per_m: Interval { mean: k, ci95: [k / (1.0 + half), k / (1.0 - half)] },
+        std_n_per_m: shares.level * k * n.sqrt(),
+        c_t_n_s_per_m: Interval { mean: c, ci95: [c - half_c, c + half_c] },
+        shares,
+        correction: (stiffness * (a - b) / t - 1.0).norm(),
+    })
+}
+
+fn mean_of(stretches: &[[C; 3]]) -> [C; 3] {
+    std::array::from_fn(|c| stretches.iter().map(|s| s[c]).sum::<C>() / stretches.len() as f64)
+}
+
+/// The level's compliance with these motions per newton, and its derivatives.
+fn through(driven: &Driven<'_>, known: &Known, level: &SteadyLevel) -> Option<Found> {
+    let s = C::new(0.0, TAU * level.frequency_hz);
+    let p = &known.p;
+    let tones = mean_of(&level.stretches);
+    let u = driven.per_t;
+    let compliance = contact(p, s, &u, tones);
+    // a body moves by some 1/K of the cells per newton: no motion is so small that a part of all would not move it
+    let largest = u.iter().map(|u| u.norm()).fold(0.0, f64::max);
+    let g: [C; MOTIONS] = std::array::from_fn(|k| {
+        let step = STEP * largest;
+        let moved = |by: f64| {
+            let mut moved = u;
+            moved[k] += by;
+            contact(p, s, &moved, tones)
+        };
+        (moved(step) - moved(-step)) / (2.0 * step)
+    });
+    let turning = driven.known(&g);
+    let mut by_parameter = DVector::<C>::zeros(p.len());
+    let own = (FORM..SPOTS + 4).chain([GAINS, GAINS + 1, DELAYS, DELAYS + 1]);
+    for i in own {
+        let step = STEP * known.covariance[(i, i)].max(0.0).sqrt();
+        if step > 0.0 {
+            let moved = |by: f64| {
+                let mut moved = p.clone();
+                moved[i] += by;
+                contact(&moved, s, &u, tones)
+            };
+            by_parameter[i] = (moved(step) - moved(-step)) / (2.0 * step);
+        }
+    }
+    for (i, value) in &turning.by_parameter {
+        by_parameter[*i] += value;
+    }
+    Some(Found {
+        compliance,
+        by_parameter,
+        turning: turning.noise + turning.bend,
+        place: turning.place?,
+        stretches: level.stretches.iter().map(|own| contact(p, s, &u, *own)).collect(),
+    })
+}
+
+/// Δx/F at the contact from a level's T, x_A and x_B, with the motions `u` per newton of T.
+fn contact(p: &[f64], s: C, u: &[C; MOTIONS], [t, a, b]: [C; 3]) -> C {
+    let displacement =
+        |channel: usize, seen: C| seen / ((1.0 + p[GAINS + channel]) * (-s * p[DELAYS + channel]).exp());
+    // (θ × r) along z is θ_x y − θ_y x
+    let tilt = |spot: usize, turn: [C; 2]| t * (turn[0] * p[SPOTS + spot + 1] - turn[1] * p[SPOTS + spot]);
+    let z_a = displacement(0, a) - tilt(0, [u[6], u[7]]);
+    let z_b = displacement(1, b) - tilt(2, [u[4], u[5]]);
+    let z_arm = z_b + t * (u[0] - u[3]);
+    let form = |n: usize| p[FORM + n] + p[FORM + n + 1] * s + p[FORM + n + 2] * s * s;
+    let force = (p[FORM] + p[FORM + 1] * s) * t
+        + form(2) * z_arm
+        + t * (form(5) * u[1] + form(8) * u[2])
+        + s * s
+            * (p[INERTIA_B] * (z_b - z_arm)
+                + t * (p[INERTIA_B + 1] * (u[4] - u[1]) - p[INERTIA_B + 2] * (u[5] - u[2])));
+    (z_a - z_b) / force
+}
