@@ -1,7 +1,7 @@
 //! Rigs that nobody tuned for: every part of the default rig drawn anew, several at once.
 
 use jointrig_hil_sim::rig::RigConfig;
-use jointrig_hil_sim::rig::config::{BodyName, Bushing, ResponsePoint};
+use jointrig_hil_sim::rig::config::{BodyName, Bushing, ContactLaw, ResponsePoint};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -12,6 +12,15 @@ pub struct Drawn {
     pub stiffest_n_per_m: f64,
     /// The default errors of position, angle, gain and skew are multiplied by this.
     pub errors: f64,
+    /// μN, N: contacts of even number slip as a whole beyond it (Jenkins), those of odd number bit by bit below it (Iwan). None: nothing slips.
+    pub slip_limit_n: Option<f64>,
+}
+
+impl Default for Drawn {
+    /// Contacts to 300 N/µm that stick, with the default errors.
+    fn default() -> Self {
+        Drawn { stiffest_n_per_m: 300e6, errors: 1.0, slip_limit_n: None }
+    }
 }
 
 /// The rig of this number. A third of them has a clamp on side B too, and six points T1–T6 on specimen B.
@@ -31,6 +40,11 @@ pub fn drawn(number: u64, drawn: Drawn) -> RigConfig {
     rig.contact.rotation_nm_per_rad =
         [22.0 * between(0.5, 2.0), 10.0 * between(0.3, 2.0), 22.0 * between(0.5, 2.0)];
     rig.contact.damping_s = [1.5e-5 * between(0.4, 2.5); 6];
+
+    if let Some(limit_n) = drawn.slip_limit_n {
+        rig.contact.law = if number.is_multiple_of(2) { ContactLaw::Jenkins } else { ContactLaw::Iwan };
+        rig.contact.normal_load_n = limit_n / rig.contact.friction_coefficient;
+    }
 
     let mut clamp = |bushing: &mut Bushing, sign: f64, yaw: [f64; 2]| {
         let all = between(0.3, 3.0);

@@ -141,7 +141,7 @@ impl Counted {
 #[test]
 fn a_level_is_called_k_t_only_where_its_interval_holds() {
     // a contact of 93 N/µm; between the spots it is 24 at 100 Hz
-    let campaign = campaign(8, 0, Drawn { stiffest_n_per_m: 300e6, errors: 1.0 });
+    let campaign = campaign(8, 0, Drawn::default());
     let mut counted = Counted::default();
     counted.add(&campaign);
     assert_eq!(counted.levels, 6);
@@ -164,7 +164,7 @@ fn accuracy_of_the_shakers_levels() {
         std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(otherwise)
     };
     let (rigs, seeds) = (variable("RIGS", 12), variable("SEEDS", 2));
-    let like = Drawn { stiffest_n_per_m: 300e6, errors: 1.0 };
+    let like = Drawn::default();
     let next = AtomicU64::new(0);
     // all, then those with a clamp on side A only, and on both
     let counted = Mutex::new([Counted::default(), Counted::default(), Counted::default()]);

@@ -21,6 +21,9 @@ use crate::substructuring::BandStatistic;
 use crate::substructuring::direct::Direct;
 use crate::substructuring::geometry::{Geometry, Grouping};
 
+/// Groups of hits by which a resonance is told from noise.
+const GROUPS: usize = 4;
+
 /// What the contact's own signals say.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contact {
@@ -74,7 +77,9 @@ pub fn at_the_contact<M: Measurements>(
         frfs.extend(specimen_curves(impact, sign, sum));
         frfs.extend(chosen::arms(impact, &geometry.ajb, averages, measurements.quantity()));
     }
-    let hidden = HiddenResonance::of(compliance.as_ref(), &shaker_levels::swept(&levels)).with_phases(&frfs);
+    let hidden =
+        HiddenResonance::of(compliance.as_ref(), &in_groups(averages), &shaker_levels::swept(&levels))
+            .with_phases(&frfs);
 
     let arm = static_arm(measurements, averages, &steady, &mut missing);
     if arm.is_none() && !(steady.is_empty() && impact_loops.is_empty()) {
@@ -109,9 +114,12 @@ pub fn at_the_contact<M: Measurements>(
 }
 
 /// The contact's spectra of the assembly, summed over the cells of each impact; cells of other lines than the first are told in `missing`.
-fn summed<'a>(averages: &'a [CellAverage], missing: &mut Vec<Missing>) -> Vec<(&'a str, CrossSpectra)> {
+fn summed<'a>(
+    averages: impl IntoIterator<Item = &'a CellAverage>,
+    missing: &mut Vec<Missing>,
+) -> Vec<(&'a str, CrossSpectra)> {
     let mut by_impact: Vec<(&str, CrossSpectra)> = Vec::new();
-    let of_assembly = averages.iter().filter(|cell| cell.name.configuration == Structure::Ajb);
+    let of_assembly = averages.into_iter().filter(|cell| cell.name.configuration == Structure::Ajb);
     for (name, contact) in of_assembly.filter_map(|cell| Some((&cell.name, cell.contact.as_ref()?))) {
         let unlike =
             by_impact.first().is_some_and(|(_, first)| first.frequency_hz() != contact.frequency_hz());
@@ -128,6 +136,32 @@ fn summed<'a>(averages: &'a [CellAverage], missing: &mut Vec<Missing>) -> Vec<(&
         }
     }
     by_impact
+}
+
+/// Δx/T of groups of cells that have no hit in common: each impact's cells are dealt out in turn. With few cells each is a group of its own,
+/// and what differs between the impacts counts as noise.
+fn in_groups(averages: &[CellAverage]) -> Vec<ContactCompliance> {
+    let cells = || averages.iter().filter(|c| c.contact.is_some() && c.name.configuration == Structure::Ajb);
+    let mut dealt: Vec<Vec<&CellAverage>> = vec![Vec::new(); GROUPS];
+    let mut counts: Vec<(&str, usize)> = Vec::new();
+    for cell in cells() {
+        let impact = cell.name.impact.as_str();
+        let place = counts.iter().position(|(name, _)| *name == impact).unwrap_or_else(|| {
+            counts.push((impact, 0));
+            counts.len() - 1
+        });
+        dealt[counts[place].1 % GROUPS].push(cell);
+        counts[place].1 += 1;
+    }
+    if counts.iter().any(|(_, count)| *count < GROUPS) {
+        dealt = cells().map(|cell| vec![cell]).collect();
+    }
+    let of = |cells: &Vec<&CellAverage>| {
+        // what is left out is told where all cells are summed
+        let sums = summed(cells.iter().copied(), &mut Vec::new());
+        ContactCompliance::of_impacts(&sums.iter().map(|(_, sum)| sum).collect::<Vec<_>>())
+    };
+    dealt.iter().filter_map(of).collect()
 }
 
 /// The impact that the specimens are shown from, with the sign of its direction along z: the moving mass drives the contact as the

@@ -76,18 +76,22 @@ impl ContactCompliance {
         (!found.frequency_hz.is_empty()).then_some(found)
     }
 
-    /// The largest imaginary part between 100 and 400 Hz, averaged over 1.5 Hz; none with too few lines there.
-    pub fn imaginary_peak(&self) -> Option<ImaginaryPeak> {
-        let step_hz = self.frequency_hz.get(1)? - self.frequency_hz[0];
-        let width = ((SMOOTH_HZ / step_hz).round() as usize).clamp(1, self.frequency_hz.len());
+    /// The lines between 100 and 400 Hz, averaged over 1.5 Hz.
+    pub(super) fn smoothed(&self) -> Vec<(f64, Complex<f64>)> {
+        let [Some(first), Some(second)] = [0, 1].map(|l| self.frequency_hz.get(l)) else { return Vec::new() };
+        let width = ((SMOOTH_HZ / (second - first)).round() as usize).clamp(1, self.frequency_hz.len());
         let inside = |f: f64| (SEARCH_HZ[0]..=SEARCH_HZ[1]).contains(&f);
-        let smooth: Vec<(f64, Complex<f64>)> = self
-            .compliance_m_per_n
+        self.compliance_m_per_n
             .windows(width)
             .zip(self.frequency_hz.windows(width))
             .map(|(d, f)| (f[width / 2], d.iter().sum::<Complex<f64>>() / width as f64))
             .filter(|(f, d)| inside(*f) && d.re.is_finite() && d.im.is_finite())
-            .collect();
+            .collect()
+    }
+
+    /// The largest imaginary part between 100 and 400 Hz, averaged over 1.5 Hz; none with too few lines there.
+    pub fn imaginary_peak(&self) -> Option<ImaginaryPeak> {
+        let smooth = self.smoothed();
         if smooth.len() < FEWEST_LINES {
             return None;
         }

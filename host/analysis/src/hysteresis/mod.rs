@@ -32,6 +32,7 @@ mod plateau;
 pub mod reconstruction;
 pub mod record;
 mod repair;
+pub mod repeated_peak;
 pub mod shape;
 pub mod static_arm;
 mod stick;

@@ -2,6 +2,7 @@
 
 use crate::hysteresis::compliance::{ContactCompliance, ImaginaryPeak};
 use crate::hysteresis::phase_split::{Curve, PhaseSplit};
+use crate::hysteresis::repeated_peak::{CLEAR, over_noise};
 use crate::results::{FrfCurve, Role};
 
 /// Less phase than this between the specimens hides nothing.
@@ -33,9 +34,21 @@ impl HiddenResonance {
         }
     }
 
-    /// The clearest answer of hits and sweeps; of equal ones that of the hits.
-    pub fn of(hits: Option<&ContactCompliance>, sweeps: &[ContactCompliance]) -> Self {
-        let of_hits = hits.map_or(Self::NoSignals, Self::in_compliance);
+    /// The clearest answer of hits and sweeps; of equal ones that of the hits. A peak of the hits must be in each of some `groups` of them, where
+    /// there are enough.
+    pub fn of(
+        hits: Option<&ContactCompliance>,
+        groups: &[ContactCompliance],
+        sweeps: &[ContactCompliance],
+    ) -> Self {
+        let of_hits = match hits.map_or(Self::NoSignals, Self::in_compliance) {
+            Self::Found(peak, _)
+                if over_noise(groups, peak.frequency_hz).is_some_and(|over| over < CLEAR) =>
+            {
+                Self::Unclear(peak)
+            }
+            other => other,
+        };
         let rank = |found: &Self| match found.ok() {
             Some(false) => 2,
             Some(true) => 1,
