@@ -163,7 +163,7 @@ fn accuracy_of_the_shakers_levels() {
     let variable = |name: &str, otherwise: u64| -> u64 {
         std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(otherwise)
     };
-    let (rigs, seeds) = (variable("RIGS", 12), variable("SEEDS", 2));
+    let (first, rigs, seeds) = (variable("FIRST", 40), variable("RIGS", 12), variable("SEEDS", 2));
     let like = Drawn::default();
     let next = AtomicU64::new(0);
     // all, then those with a clamp on side A only, and on both
@@ -176,7 +176,7 @@ fn accuracy_of_the_shakers_levels() {
                     if i >= rigs * seeds {
                         break;
                     }
-                    let (number, seed) = (i / seeds, i % seeds);
+                    let (number, seed) = (first + i / seeds, i % seeds);
                     let campaign = campaign(number, seed, like);
                     let label = format!("rig {number:2} seed {seed} ({:5.1} N/µm)", 1e-6 * campaign.truth);
                     campaign.tell(&label);

@@ -12,8 +12,8 @@
 //!    hammer's tilt and each cell's aim are unknowns with priors ([`ContactPriors`]); the local resonances of the specimen calibrate them.
 //!
 //! The way through the room: `cell` what is measured, `block` the cells of an impact, `parameters` the unknowns, `form_scale` how large the form's may be, `model` the signals as
-//! a linear map of the motion, `line` its elimination, `solver` the most likely parameters, `diagnosis` whether the assumptions
-//! hold, `outcome` the answer. `levels` reads the shaker's levels by what the hits told, `driven` how bodies turn there.
+//! a linear map of the motion, `line` its elimination, `solver` the most likely parameters, `unexplained` what the model leaves of a cell beyond
+//! its noise, `diagnosis` whether the assumptions hold, `outcome` the answer. `levels` reads the shaker's levels by what the hits told, `driven` how bodies turn there.
 
 mod block;
 mod cell;

@@ -37,6 +37,8 @@ struct World {
     spot_m: f64,
     /// A point on specimen A that stands this far from where it is said to be, m.
     misplaced_m: f64,
+    /// Of the noise.
+    seed: u64,
 }
 
 struct Cell {
@@ -58,6 +60,7 @@ fn moved(t: [C; 3], turn: [C; 3], r: [f64; 3]) -> [C; 3] {
 /// Two hits of every cell.
 fn measured(world: World) -> Vec<Cell> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
+    let mut scatter = Xoshiro256PlusPlus::seed_from_u64(world.seed);
     let frequency_hz: Vec<f64> = (200..=1200).map(|l| 0.5 * f64::from(l)).collect();
     let line = |f: f64| C::new(SIGMA_PER_S, TAU * f);
     let mut cells = Vec::new();
@@ -110,7 +113,7 @@ fn measured(world: World) -> Vec<Cell> {
                         let sigma = if n == 5 { 1e-3 } else { world.noise_m_per_s };
                         let mut hit = || {
                             let part = |r: &mut Xoshiro256PlusPlus| -> f64 { StandardNormal.sample(r) };
-                            x + C::new(part(&mut random), part(&mut random)) * sigma
+                            x + C::new(part(&mut scatter), part(&mut scatter)) * sigma
                         };
                         let (one, two) = (hit(), hit());
                         sums.s_xf.push(one + two);
@@ -177,7 +180,7 @@ fn input(cells: &[Cell]) -> Input<'_> {
     }
 }
 
-const QUIET: World = World { noise_m_per_s: 2e-9, spot_m: 0.0, misplaced_m: 0.0 };
+const QUIET: World = World { noise_m_per_s: 2e-9, spot_m: 0.0, misplaced_m: 0.0, seed: 1 };
 
 #[test]
 fn without_noise_the_contact_is_found_to_a_thousandth() {
@@ -195,11 +198,31 @@ fn without_noise_the_contact_is_found_to_a_thousandth() {
 
 #[test]
 fn a_spot_that_is_not_where_it_is_said_to_be_is_inside_the_interval() {
-    let world = World { noise_m_per_s: 5e-7, spot_m: 4e-5, misplaced_m: 0.0 };
+    let world = World { noise_m_per_s: 5e-7, spot_m: 4e-5, misplaced_m: 0.0, seed: 1 };
     let cells = measured(world);
     let found = stiffness(&input(&cells)).expect("all is there");
     let [low, high] = found.k_t_n_per_m.ci95;
     assert!(low < K && K < high && high - low < 0.2 * K, "{found:?}");
+}
+
+#[test]
+fn the_interval_is_what_repeated_measurements_scatter_by() {
+    // noise of some fifth of the motions at a line, so that the motion itself is known through noise
+    let deviations: Vec<f64> = (0..24)
+        .map(|seed| {
+            let world = World { noise_m_per_s: 2e-6, spot_m: 0.0, misplaced_m: 0.0, seed };
+            let cells = measured(world);
+            let mut input = input(&cells);
+            input.priors.spot_m = 1e-7;
+            let found = stiffness(&input).expect("all is there");
+            let [low, high] = found.k_t_n_per_m.ci95;
+            let sigma = (low.recip() - high.recip()) / (2.0 * 1.96);
+            (found.k_t_n_per_m.mean.recip() - K.recip()) / sigma
+        })
+        .collect();
+    let rms = (deviations.iter().map(|z| z * z).sum::<f64>() / deviations.len() as f64).sqrt();
+    // of 24 draws the rms scatters by 0.14; three of these either way
+    assert!((0.58..1.42).contains(&rms), "{rms}: {deviations:?}");
 }
 
 #[test]
