@@ -163,6 +163,13 @@ pub struct Info {
     pub drive_v: f32,
 }
 
+impl Info {
+    /// What the simulated rig in a process calls its board.
+    pub const VIRTUAL_BOARD: &'static str = "jointrig-sim";
+    /// What the emulated board calls itself, which measures a simulated rig too.
+    pub const EMULATED_BOARD: &'static str = "mps2-an505";
+}
+
 /// What the hammer does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -6,4 +6,5 @@
 
 pub mod campaign;
 pub mod command;
+pub mod drawn_campaigns;
 pub mod rigs;

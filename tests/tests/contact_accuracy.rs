@@ -2,22 +2,16 @@
 //! that of the rig's parameters.
 #![allow(clippy::unwrap_used)]
 
-use jointrig::analyse::Wanted;
 use jointrig::campaign::store::Store;
-use jointrig::device::address::Address;
-use jointrig::report::document;
 use jointrig::results::Results;
-use jointrig_tests::campaign::run;
-use jointrig_tests::rigs::{Drawn, contact_plan, drawn};
-use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
+use jointrig_tests::drawn_campaigns::{self, DrawnCampaign, count, found};
+use jointrig_tests::rigs::{Drawn, contact_plan};
+use std::path::Path;
 
 /// One campaign's answer beside the truth.
 #[derive(Debug, Clone)]
 struct Row {
-    rig: u64,
-    seed: u64,
+    /// The rig's own k_T, N/m.
     truth: f64,
     /// k_T with its interval, N/m.
     found: Option<[f64; 3]>,
@@ -32,82 +26,36 @@ impl Row {
     }
 }
 
-/// Runs the campaign of a rig and seed into `folder`; one that is there already is left as it is.
-fn measured(number: u64, seed: u64, like: Drawn, folder: &Path) -> PathBuf {
-    let at = |ending: &str| folder.join(format!("{number}-{seed}.{ending}"));
-    let (file, description) = (at("jrig"), at("toml"));
-    let rig = drawn(number, like);
-    std::fs::write(&description, rig.to_toml()).unwrap();
-    let address: Address = format!("sim:{}", description.display()).parse().unwrap();
-    if !file.exists() {
-        let _ = run(&file, &contact_plan(&rig), address.open(1000 * number + seed).unwrap());
-    }
-    file
-}
-
-/// What a campaign file tells.
-fn found(file: &Path) -> Results {
-    let store = Store::open_read_only(file).unwrap();
-    document(jointrig::analyse::analyse(&store, Wanted::default(), &|_| {}).unwrap())
-}
-
-fn campaign(number: u64, seed: u64, like: Drawn) -> Row {
-    let temporary = tempfile::tempdir().unwrap();
-    // JOINTRIG_KEEP names a folder that keeps the campaigns, to look into one afterwards; those found there are analysed again, not run
-    let folder = std::env::var_os("JOINTRIG_KEEP").map_or(temporary.path().to_owned(), Into::into);
-    row(number, seed, like, found(&measured(number, seed, like, &folder)))
-}
-
-fn row(number: u64, seed: u64, like: Drawn, results: Results) -> Row {
+fn row(campaign: DrawnCampaign, results: Results) -> Row {
     let answer = results.answer.unwrap();
     let contact = answer.contact;
     Row {
         slips: answer.slip.found,
-        rig: number,
-        seed,
-        truth: drawn(number, like).truth().contact_k_t_n_per_m,
+        truth: campaign.truth_n_per_m(),
         found: contact.k_t_n_per_m.map(|k| [k.mean, k.ci95[0], k.ci95[1]]),
         why: contact.why,
     }
 }
 
-/// Several campaigns, two at a time.
-fn campaigns(rigs: std::ops::Range<u64>, seeds: u64, like: Drawn) -> Vec<Row> {
-    let next = AtomicU64::new(0);
-    let rows = Mutex::new(Vec::new());
-    let count = (rigs.end - rigs.start) * seeds;
-    std::thread::scope(|scope| {
-        for _ in 0..2 {
-            scope.spawn(|| {
-                loop {
-                    let i = next.fetch_add(1, Ordering::Relaxed);
-                    if i >= count {
-                        break;
-                    }
-                    let row = campaign(rigs.start + i / seeds, i % seeds, like);
-                    let told = match row.found {
-                        Some([k, low, high]) => format!(
-                            "{:6.1} [{:6.1}, {:6.1}]  {:+5.1} % {}",
-                            1e-6 * k,
-                            1e-6 * low,
-                            1e-6 * high,
-                            100.0 * (k / row.truth - 1.0),
-                            if row.covers() { "" } else { "MISSED" }
-                        ),
-                        None => row.why.clone(),
-                    };
-                    println!(
-                        "rig {:2} seed {}: truth {:6.1}, found {told}",
-                        row.rig,
-                        row.seed,
-                        1e-6 * row.truth
-                    );
-                    rows.lock().unwrap().push(row);
-                }
-            });
-        }
-    });
-    rows.into_inner().unwrap()
+/// Several campaigns, told as they end.
+fn campaigns(first: u64, rigs: u64, seeds: u64, like: Drawn) -> Vec<Row> {
+    drawn_campaigns::campaigns(first, rigs, seeds, like, |campaign| {
+        let row = row(campaign, campaign.results(contact_plan, |_, _, _| {}));
+        let told = match row.found {
+            Some([k, low, high]) => format!(
+                "{:6.1} [{:6.1}, {:6.1}]  {:+5.1} % {}",
+                1e-6 * k,
+                1e-6 * low,
+                1e-6 * high,
+                100.0 * (k / row.truth - 1.0),
+                if row.covers() { "" } else { "MISSED" }
+            ),
+            None => row.why.clone(),
+        };
+        let (rig, seed, truth) = (campaign.number, campaign.seed, 1e-6 * row.truth);
+        println!("rig {rig:2} seed {seed}: truth {truth:6.1}, found {told}");
+        row
+    })
 }
 
 /// What a table's line says of them.
@@ -151,11 +99,12 @@ fn the_contacts_own_stiffness_is_found_on_rigs_that_nobody_tuned_for() {
     let folder = tempfile::tempdir().unwrap();
     let rows = std::thread::scope(|scope| {
         let one = |number| {
-            let file = measured(number, 0, like, folder.path());
+            let campaign = DrawnCampaign { number, seed: 0, like };
+            let file = campaign.measured(folder.path(), contact_plan, |_, _, _| {});
             let results = found(&file);
             forget_the_truth(&file);
             assert!(found(&file) == results, "an estimate of rig {number} saw the truth");
-            row(number, 0, like, results)
+            row(campaign, results)
         };
         [30, 31].map(|number| scope.spawn(move || one(number))).map(|thread| thread.join().unwrap())
     });
@@ -168,9 +117,9 @@ fn the_contacts_own_stiffness_is_found_on_rigs_that_nobody_tuned_for() {
 #[test]
 #[ignore = "prints docs/accuracy.md's table of slipping contacts: half an hour"]
 fn a_contact_that_may_slip_has_its_stuck_stiffness_or_none() {
-    let count = count("RIGS", 50);
+    let (first, rigs) = (count("FIRST", 400), count("RIGS", 50));
     // hits of some 50 N against 15 N of friction
-    let rows = campaigns(400..400 + count, 1, Drawn { slip_limit_n: Some(15.0), ..Drawn::default() });
+    let rows = campaigns(first, rigs, 1, Drawn { slip_limit_n: Some(15.0), ..Drawn::default() });
     let told = rows.iter().filter(|row| row.slips == Some(true)).count();
     let none = rows.iter().filter(|row| row.found.is_none()).count();
     let covered = rows.iter().filter(|row| row.found.is_some() && row.covers()).count();
@@ -178,11 +127,6 @@ fn a_contact_that_may_slip_has_its_stuck_stiffness_or_none() {
     println!("| {} | {told} | {none} | {covered} | {} |", rows.len(), rows.len() - none - covered);
     // what passes the contact may stay below its limit, and then it sticks; but nothing else may be called k_T
     assert!(20 * (none + covered) >= 19 * rows.len(), "{rows:?}");
-}
-
-/// A count from the environment.
-fn count(name: &str, otherwise: u64) -> u64 {
-    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(otherwise)
 }
 
 #[test]
@@ -197,7 +141,7 @@ fn accuracy_of_the_contacts_own_stiffness() {
         ("60–600 N/µm, default errors", 200, Drawn { stiffest_n_per_m: 600e6, ..drawn }),
         ("60–300 N/µm, twice the errors", 300, Drawn { errors: 2.0, ..drawn }),
     ] {
-        let rows = campaigns(first..first + rigs, seeds, like);
+        let rows = campaigns(first, rigs, seeds, like);
         lines.push((name, rows));
         println!("| errors | campaigns | covered | rms error | half width (median) | no answer |");
         for (name, rows) in &lines {

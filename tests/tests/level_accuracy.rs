@@ -2,19 +2,17 @@
 //! spectra, estimate. The truth is that of the rig's parameters.
 #![allow(clippy::unwrap_used)]
 
-use jointrig::analyse::Wanted;
 use jointrig::campaign::plan::level::{Held, Level, Moment};
 use jointrig::campaign::run::shaking::{self, Limits, Options};
 use jointrig::campaign::store::Store;
 use jointrig::device::address::Address;
 use jointrig::device::session::Session;
-use jointrig::report::document;
 use jointrig::results::{Excitation, Force, Hysteresis, Results};
-use jointrig_tests::campaign::run;
-use jointrig_tests::rigs::{Drawn, drawn, levels_plan};
+use jointrig_tests::drawn_campaigns::{DrawnCampaign, campaigns, count};
+use jointrig_tests::rigs::{Drawn, levels_plan};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// One campaign: the rig's k_T, and its results.
 struct Campaign {
@@ -23,6 +21,10 @@ struct Campaign {
 }
 
 impl Campaign {
+    fn of(drawn: DrawnCampaign) -> Self {
+        Campaign { truth: drawn.truth_n_per_m(), results: drawn.results(levels_plan, shake) }
+    }
+
     fn levels(&self) -> impl Iterator<Item = &Hysteresis> {
         let rows = self.results.hysteresis.iter();
         rows.filter(|row| row.kind == Excitation::Shaker && row.force == Force::Raw)
@@ -79,25 +81,6 @@ fn shake(file: &Path, address: &Address, seed: u64) {
     store.close().unwrap();
 }
 
-fn campaign(number: u64, seed: u64, like: Drawn) -> Campaign {
-    let temporary = tempfile::tempdir().unwrap();
-    // JOINTRIG_KEEP names a folder that keeps the campaigns; those that are in it are not measured again
-    let folder = std::env::var_os("JOINTRIG_KEEP").map_or(temporary.path().to_owned(), Into::into);
-    let at = |ending: &str| folder.join(format!("{number}-{seed}.{ending}"));
-    let (file, description) = (at("jrig"), at("toml"));
-    let rig = drawn(number, like);
-    let drawn_seed = 1000 * number + seed;
-    if !file.exists() {
-        std::fs::write(&description, rig.to_toml()).unwrap();
-        let address: Address = format!("sim:{}", description.display()).parse().unwrap();
-        let _ = run(&file, &levels_plan(&rig), address.open(drawn_seed).unwrap());
-        shake(&file, &address, drawn_seed);
-    }
-    let store = Store::open_read_only(&file).unwrap();
-    let results = document(jointrig::analyse::analyse(&store, Wanted::default(), &|_| {}).unwrap());
-    Campaign { truth: rig.truth().contact_k_t_n_per_m, results }
-}
-
 /// What is counted of some campaigns.
 #[derive(Default)]
 struct Counted {
@@ -146,7 +129,7 @@ impl Counted {
 #[test]
 fn a_level_is_called_k_t_only_where_its_interval_holds() {
     // a contact of 93 N/µm; between the spots it is 24 at 100 Hz
-    let campaign = campaign(8, 0, Drawn::default());
+    let campaign = Campaign::of(DrawnCampaign { number: 8, seed: 0, like: Drawn::default() });
     let mut counted = Counted::default();
     counted.add(&campaign);
     assert_eq!(counted.levels, 6);
@@ -165,40 +148,27 @@ fn a_level_is_called_k_t_only_where_its_interval_holds() {
 #[test]
 #[ignore = "prints docs/accuracy.md's table of the shaker's levels: half an hour"]
 fn accuracy_of_the_shakers_levels() {
-    let variable = |name: &str, otherwise: u64| -> u64 {
-        std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(otherwise)
-    };
-    let (first, rigs, seeds) = (variable("FIRST", 40), variable("RIGS", 12), variable("SEEDS", 2));
-    let like = Drawn::default();
-    let next = AtomicU64::new(0);
-    // all, then those with a clamp on side A only, and on both
-    let counted = Mutex::new([Counted::default(), Counted::default(), Counted::default()]);
-    std::thread::scope(|scope| {
-        for _ in 0..2 {
-            scope.spawn(|| {
-                loop {
-                    let i = next.fetch_add(1, Ordering::Relaxed);
-                    if i >= rigs * seeds {
-                        break;
-                    }
-                    let (number, seed) = (first + i / seeds, i % seeds);
-                    let campaign = campaign(number, seed, like);
-                    let label = format!("rig {number:2} seed {seed} ({:5.1} N/µm)", 1e-6 * campaign.truth);
-                    campaign.tell(&label);
-                    let mut counted = counted.lock().unwrap();
-                    let kind = if number.is_multiple_of(3) { 2 } else { 1 };
-                    counted[0].add(&campaign);
-                    counted[kind].add(&campaign);
-                }
-            });
-        }
+    let (first, rigs, seeds) = (count("FIRST", 40), count("RIGS", 12), count("SEEDS", 2));
+    let all = campaigns(first, rigs, seeds, Drawn::default(), |drawn| {
+        let campaign = Campaign::of(drawn);
+        campaign.tell(&format!(
+            "rig {:2} seed {} ({:5.1} N/µm)",
+            drawn.number,
+            drawn.seed,
+            1e-6 * campaign.truth
+        ));
+        (!drawn.rig().clamp_b.rigid, campaign)
     });
+    // all, then those with a clamp on side A only, and on both
+    let mut counted = [Counted::default(), Counted::default(), Counted::default()];
+    for (both, campaign) in &all {
+        counted[0].add(campaign);
+        counted[if *both { 2 } else { 1 }].add(campaign);
+    }
     println!(
         "| rigs | campaigns | levels | named k_T | covered | rms error | half width (median) | rms error between the spots |"
     );
-    for (name, counted) in
-        ["all", "clamp on A", "clamps on A and B"].iter().zip(counted.into_inner().unwrap().iter())
-    {
+    for (name, counted) in ["all", "clamp on A", "clamps on A and B"].iter().zip(&counted) {
         println!("{}", counted.row(name));
     }
 }

@@ -20,6 +20,7 @@ use heapless::String as Text;
 use jointrig_firmware::board::Drive;
 use jointrig_firmware::ring::Slot;
 use jointrig_firmware::{Core, Facts};
+use jointrig_protocol::answer::Info;
 use jointrig_protocol::limits::{COIL_PULSE_CAP_US, scans_per_block};
 
 use crate::executor::{Poller, Polling, Woken, jump};
@@ -118,7 +119,7 @@ fn run(rig: Rig, options: &Options, link: &DeviceEnd, controls: &Arc<Controls>) 
     let slots = ring_slots(rate_hz, per_block);
     let drive = VirtualDrive::default();
     let facts = Facts {
-        board: name("jointrig-sim"),
+        board: name(Info::VIRTUAL_BOARD),
         serial: name(&format!("sim-{:016x}", options.seed)),
         target: text(env!("JOINTRIG_TARGET")),
         build: 0,

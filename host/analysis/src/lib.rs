@@ -36,6 +36,7 @@
 
 pub mod band;
 pub mod contact;
+mod errors_in_variables;
 pub mod frf;
 pub mod hysteresis;
 pub mod identified;

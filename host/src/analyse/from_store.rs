@@ -7,7 +7,6 @@ use super::cell::{
     Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel,
 };
 use super::findings::Findings;
-use super::hit_counts::completeness;
 use super::plan_geometry::geometry;
 use super::wanted::{Progress, Wanted};
 use crate::campaign::plan::{Plan, structure};
@@ -21,7 +20,6 @@ use crate::campaign::store::record_row::{Damaged, RecordRow};
 use crate::contact::ContactPriors;
 use crate::device::channels::ChannelMap;
 use crate::hysteresis::HysteresisRecord;
-use crate::results::{Completeness, Source};
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
 use crate::substructuring::Frf;
@@ -30,9 +28,6 @@ use jointrig_protocol::channel::{Quantity, Role};
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
-
-/// What boards call themselves that have a simulated rig behind them, whatever the wire to them.
-const SIMULATED_BOARDS: [&str; 2] = ["jointrig-sim", "mps2-an505"];
 
 /// Scans kept before the trigger: the force window begins 1 ms before the pulse, which is 51 scans at 51.2 kHz.
 const LEAD_S: f64 = 1.25e-3;
@@ -84,22 +79,22 @@ pub fn analyse(
     Ok(Findings { source, completeness, ..analyse_measurements(&file, wanted, progress) })
 }
 
-struct PlannedCell {
-    id: i64,
-    name: CellName,
+pub(super) struct PlannedCell {
+    pub(super) id: i64,
+    pub(super) name: CellName,
     given_up: Option<String>,
 }
 
 /// A campaign file as measurements.
 pub struct CampaignFile {
-    path: PathBuf,
-    plan: Plan,
+    pub(super) path: PathBuf,
+    pub(super) plan: Plan,
     known: KnownContact,
     geometry: Geometry,
     quantity: MotionQuantity,
-    cells: Vec<PlannedCell>,
-    tally: Tally,
-    records: HashMap<i64, Vec<Result<RecordRow, Damaged>>>,
+    pub(super) cells: Vec<PlannedCell>,
+    pub(super) tally: Tally,
+    pub(super) records: HashMap<i64, Vec<Result<RecordRow, Damaged>>>,
     channels: HashMap<i64, ChannelMap>,
     /// Open connections that no thread uses at the moment: SQLite's cannot be shared, only handed on.
     idle: Mutex<Vec<Store>>,
@@ -153,64 +148,6 @@ impl CampaignFile {
             channels,
             idle: Mutex::new(Vec::new()),
         })
-    }
-
-    fn source(&self, store: &Store) -> Result<Source, AnalyseError> {
-        let file = self.path.file_name().unwrap_or(self.path.as_os_str()).to_string_lossy().into_owned();
-        let mut source = Source { file, kind: "campaign".into(), ..Source::default() };
-        source.started = self.records.values().flatten().flatten().map(|r| r.utc.clone()).min();
-        let sessions = store.sessions()?;
-        let on_simulated = sessions.iter().any(|(_, info)| SIMULATED_BOARDS.contains(&info.board.as_str()));
-        source.simulated = on_simulated || store.simulated_rig()?.is_some();
-        if let Some((_, info)) = sessions.last() {
-            for (key, value) in [
-                ("address", info.address.clone()),
-                ("board", info.board.clone()),
-                ("serial", info.serial.clone()),
-                ("firmware_version", info.firmware_version.clone()),
-                ("target", info.target.clone()),
-                ("build", info.build.to_string()),
-                ("schema_hash", info.schema_hash.to_string()),
-                ("sessions", sessions.len().to_string()),
-            ] {
-                source.device.insert(key.into(), value);
-            }
-        }
-        let (text, plan_file) = store.plan_text()?;
-        source.settings.insert("plan".into(), self.plan.name.clone().into());
-        source.settings.insert("plan_file".into(), plan_file.into());
-        source
-            .settings
-            .insert("plan_crc32".into(), format!("{:08x}", crc32fast::hash(text.as_bytes())).into());
-        source
-            .settings
-            .insert("virtual_point_m".into(), serde_json::json!(self.plan.geometry.virtual_point_m));
-        // what the simulated rig was seeded with, where it was one
-        if let Some(seed) = store.meta("demo_seed")? {
-            source.settings.insert("seed".into(), seed.into());
-        }
-        source.link = store.link_counters()?;
-        Ok(source)
-    }
-
-    fn completeness(&self) -> Vec<Completeness> {
-        let mut names: Vec<Structure> = Vec::new();
-        for cell in &self.cells {
-            if !names.contains(&cell.name.configuration) {
-                names.push(cell.name.configuration);
-            }
-        }
-        names
-            .into_iter()
-            .map(|name| {
-                let own = self.cells.iter().filter(|c| c.name.configuration == name).map(|cell| {
-                    let count = self.tally.cell(cell.id);
-                    let refused = count.refused.iter().map(|(kind, n)| (kind.name(), *n as usize)).collect();
-                    (count.wanted as usize, count.kept as usize, refused)
-                });
-                completeness(name.name(), own)
-            })
-            .collect()
     }
 
     fn records_of(&self, cell: i64) -> &[Result<RecordRow, Damaged>] {

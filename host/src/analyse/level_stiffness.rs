@@ -6,7 +6,7 @@ use super::contact_answer::{cells, input};
 use crate::contact::{
     ContactError, Known, LevelError, LevelStiffness, SteadyLevel, Stiffness, level_stiffness,
 };
-use crate::hysteresis::tones::stretches;
+use crate::hysteresis::tones::Tones;
 use crate::hysteresis::{LoopAnalysis, LoopFinding, Shape};
 
 /// Stretches of a record whose scatter is its noise: enough to know a standard deviation to a quarter.
@@ -83,6 +83,7 @@ fn steady(level: &ShakerLevel, raw: &LoopAnalysis) -> Result<SteadyLevel, NoLeve
         return Err(NoLevelStiffness::Finding(*finding));
     }
     let stretches =
-        stretches(&level.record, STRETCHES).map_err(|_| NoLevelStiffness::Level(LevelError::Short))?;
+        Tones::stretches(&level.record, STRETCHES).map_err(|_| NoLevelStiffness::Level(LevelError::Short))?;
+    let stretches = stretches.iter().map(|one| [one.force_n, one.a_m, one.b_m]).collect();
     Ok(SteadyLevel { frequency_hz: level.level.frequency_hz, stretches })
 }

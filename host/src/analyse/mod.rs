@@ -19,6 +19,7 @@ mod chosen;
 mod configuration_stage;
 mod contact_answer;
 mod contact_stage;
+mod file_source;
 mod findings;
 mod fits;
 mod from_frfs;

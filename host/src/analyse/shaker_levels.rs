@@ -7,7 +7,8 @@ use crate::campaign::plan::level::Moment;
 use crate::hysteresis::backbone::Law;
 use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
 use crate::hysteresis::integration::open_record;
-use crate::hysteresis::static_arm::{Identified, Tones};
+use crate::hysteresis::static_arm::Identified;
+use crate::hysteresis::tones::Tones;
 use crate::hysteresis::{HysteresisRecord, LoopAnalysis, RelativeMotion, Shape, analyse, analyse_corrected};
 use crate::results::{Backbone, ShakerLoop, rounded};
 

@@ -5,6 +5,7 @@ use jointrig_firmware::board::{self, Board};
 use jointrig_firmware::lockstep::Setup;
 use jointrig_firmware::ring::Slot;
 use jointrig_firmware::{Core, Facts};
+use jointrig_protocol::answer::Info;
 use jointrig_protocol::channel::{Channel, Name};
 use jointrig_protocol::limits::{COIL_PULSE_CAP_US, MAX_CHANNELS, scans_per_block};
 use static_cell::{ConstStaticCell, StaticCell};
@@ -27,7 +28,7 @@ pub fn run(setup: &Setup) -> ! {
     let channels: &'static [Channel] = CHANNELS.init(setup.channels.clone());
     let per_block = scans_per_block(channels.len()).expect("a set-up names 1 to 16 channels");
     let facts = Facts {
-        board: Name::try_from("mps2-an505").unwrap_or_default(),
+        board: Name::try_from(Info::EMULATED_BOARD).unwrap_or_default(),
         serial: setup.serial.clone(),
         target: String::try_from(env!("JOINTRIG_TARGET")).unwrap_or_default(),
         build: jointrig_board_log::build_id(),

@@ -155,7 +155,10 @@ pub fn blocks(input: &Input<'_>, parameters: &mut Parameters) -> Result<Vec<Bloc
     let everywhere: Vec<Vec<f64>> =
         all.iter().map(|block| block.lines.iter().map(|line| line.frequency_hz).collect()).collect();
     for block in &mut all {
-        block.lines.retain(|line| everywhere.iter().all(|own| own.contains(&line.frequency_hz)));
+        block.lines.retain(|line| {
+            let has = |own: &Vec<f64>| own.binary_search_by(|f| f.total_cmp(&line.frequency_hz)).is_ok();
+            everywhere.iter().all(has)
+        });
     }
     let count = parameters.all().len();
     for block in &mut all {

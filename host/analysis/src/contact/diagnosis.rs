@@ -14,7 +14,7 @@ const CONTRADICTED: f64 = 10.0;
 /// leave about a per cent of a strong local mode, and the misfit widens the interval; a point that is misplaced or loose leaves more.
 const UNEXPLAINED: [f64; 3] = [0.01, 0.04, 0.02];
 /// Standard deviations by which one of some hundred stated quantities may be off.
-const BEYOND: f64 = 6.0;
+const BEYOND: f64 = 5.0;
 /// Standard deviations by which two readings of k_T may differ.
 const APART: f64 = 4.0;
 
@@ -99,7 +99,7 @@ pub fn part(blocks: &[Block], solution: &Solution, of: impl Fn(&Block, f64) -> b
         }
     }
     // half of the inverse
-    let explained = 2.0 * quadratic(&solution.answer, &coupling);
+    let explained = 2.0 * quadratic(&solution.certainty.answer, &coupling);
     let left = own - explained;
     (left > 1e-6 * own && own > 0.0).then(|| Part { deviation: -slope / left, sigma: (0.5 / left).sqrt() })
 }

@@ -8,6 +8,7 @@
 //! what the contact makes of T: what is formed shall tell the contact, and not repeat what the hits said of it.
 
 use super::block::{Block, Group};
+use super::line::{Eliminated, eliminated};
 use super::model::{A, LineModel, Sparse, T};
 use super::parameters::{COMPLIANCE, DELAYS, GAINS, RETARDATION};
 use nalgebra::{DMatrix, DVector};
@@ -259,22 +260,7 @@ fn solved(block: &Block, line: usize, p: &[f64], shifts: Option<[DVector<C>; 2]>
             _ => C::default(),
         };
     }
-    let mut seen = DVector::from_fn(map.nrows(), |r, _| line.value[r] - offsets[r]);
-    if let Some(shifts) = &shifts {
-        let moved = shifts.each_ref().map(|shift| &map * shift);
-        for (r, row) in block.rows.iter().enumerate() {
-            if let Some(at) = block.cells[row.cell].shift {
-                seen[r] -= moved[0][r] * p[at] + moved[1][r] * p[at + 1];
-            }
-        }
-    }
-    for (r, weight) in line.weight.iter().enumerate() {
-        seen[r] *= *weight;
-    }
-    let weighed = DMatrix::from_fn(map.nrows(), map.ncols(), |r, c| map[(r, c)] * line.weight[r]);
-    let factors = weighed.qr();
-    let (q, r) = (factors.q(), factors.unpack_r());
-    let x = r.solve_upper_triangular(&q.ad_mul(&seen))?;
+    let Eliminated { q, r, motion: x, .. } = eliminated(block, line, &map, &offsets, p, shifts.as_ref())?;
     let mut derivatives = model.derivatives(&x, shifts.as_ref(), &map);
     // specimen A's z is free: what the contact would make of it does not count
     let freed = block.local(COMPLIANCE);

@@ -1,5 +1,6 @@
 //! Levels written down from the same motions as the hits: the contact that was put in must come out at each.
 
+use super::tests::{ARM, BESIDE, DAMPING, K, LEVER_M, MASS, NAMES, SPECIMEN, SPOTS};
 use super::*;
 use crate::frf::MotionQuantity;
 use crate::spectra::cross_spectra::{CrossSpectra, OutputSums};
@@ -12,24 +13,9 @@ use std::f64::consts::TAU;
 
 type C = Complex<f64>;
 
-const K: f64 = 140e6;
-const DAMPING: f64 = 2000.0;
-const BESIDE: f64 = 6e6;
-const MASS: f64 = 2.3;
-const LEVER_M: f64 = -0.038;
 /// Sum of the forces at the contact per newton of any hit on A, N.
 const FORCE: f64 = 1.3;
 const LIGHT_PER_S: f64 = 2.3;
-const ARM: [[f64; 3]; 3] = [[-0.02, -0.02, 0.03], [0.02, -0.02, 0.03], [0.0, -0.045, 0.03]];
-const SPECIMEN: [[f64; 3]; 6] = [
-    [0.009, 0.002, 0.0],
-    [-0.009, 0.002, 0.0],
-    [0.009, 0.014, 0.0],
-    [-0.009, 0.014, 0.0],
-    [0.0, 0.008, 0.007],
-    [0.0, 0.008, -0.007],
-];
-const SPOTS: [[f64; 3]; 2] = [[0.0006, 0.0005, 0.0], [0.0006, -0.0005, 0.0]];
 /// Three hits on A, then one on the moving mass.
 const HITS: [([f64; 3], f64, Grouping); 4] = [
     ([-0.015, 0.028, 0.03], -1.0, Grouping::InterfaceA),
@@ -37,7 +23,6 @@ const HITS: [([f64; 3], f64, Grouping); 4] = [
     ([0.0, 0.05, 0.03], -1.0, Grouping::InterfaceA),
     ([0.0, 0.035, -0.31], 1.0, Grouping::InternalA),
 ];
-const NAMES: [&str; 9] = ["1", "2", "3", "4", "5", "6", "7", "8", "9"];
 
 /// Motions of B and A at the contact that nobody solved for: z_B, T and z_A follow from force and contact.
 struct World {

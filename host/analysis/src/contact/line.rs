@@ -1,6 +1,6 @@
 //! One line of a block: the motion is eliminated, and what is left tells the parameters.
 
-use super::block::Block;
+use super::block::{Block, BlockLine};
 use super::model::{LineModel, Sparse};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex;
@@ -33,6 +33,53 @@ pub struct Residual {
     pub rows: Vec<(Complex<f64>, f64)>,
 }
 
+/// One line with the motion eliminated, over the noise.
+pub struct Eliminated {
+    /// Q of the map over the noise.
+    pub q: DMatrix<Complex<f64>>,
+    /// R of it.
+    pub r: DMatrix<Complex<f64>>,
+    /// The motion that fits best.
+    pub motion: DVector<Complex<f64>>,
+    /// What it leaves.
+    pub residual: DVector<Complex<f64>>,
+}
+
+/// Eliminates the motion that `map` tells of, after what the shifts of the hammer make is taken out; none where the rows do not tell it.
+pub fn eliminated(
+    block: &Block,
+    line: &BlockLine,
+    map: &DMatrix<Complex<f64>>,
+    offsets: &[Complex<f64>],
+    p: &[f64],
+    shifts: Option<&[DVector<Complex<f64>>; 2]>,
+) -> Option<Eliminated> {
+    let mut seen = DVector::from_fn(map.nrows(), |r, _| line.value[r] - offsets[r]);
+    if let Some(shifts) = shifts {
+        let moved = shifts.each_ref().map(|shift| map * shift);
+        for (r, row) in block.rows.iter().enumerate() {
+            if let Some(at) = block.cells[row.cell].shift {
+                seen[r] -= moved[0][r] * p[at] + moved[1][r] * p[at + 1];
+            }
+        }
+    }
+    for (r, weight) in line.weight.iter().enumerate() {
+        seen[r] *= *weight;
+    }
+    let (q, r) = factors(map, line);
+    let projected = q.ad_mul(&seen);
+    let motion = r.solve_upper_triangular(&projected)?;
+    let residual = seen - &q * projected;
+    Some(Eliminated { q, r, motion, residual })
+}
+
+/// Q and R of the map over the noise.
+fn factors(map: &DMatrix<Complex<f64>>, line: &BlockLine) -> (DMatrix<Complex<f64>>, DMatrix<Complex<f64>>) {
+    let weighed = DMatrix::from_fn(map.nrows(), map.ncols(), |r, c| map[(r, c)] * line.weight[r]);
+    let factors = weighed.qr();
+    (factors.q(), factors.unpack_r())
+}
+
 impl Normal {
     /// Nothing yet, for `parameters` of them.
     pub fn none(parameters: usize) -> Self {
@@ -57,24 +104,7 @@ impl Normal {
         let model = LineModel::new(block, p, line.s);
         let (map, offsets) = model.map();
         let rows = map.nrows();
-        let mut seen = DVector::from_fn(rows, |r, _| line.value[r] - offsets[r]);
-        if let Some(shifts) = shifts {
-            let moved = shifts.each_ref().map(|shift| &map * shift);
-            for (r, row) in block.rows.iter().enumerate() {
-                if let Some(at) = block.cells[row.cell].shift {
-                    seen[r] -= moved[0][r] * p[at] + moved[1][r] * p[at + 1];
-                }
-            }
-        }
-        for (r, weight) in line.weight.iter().enumerate() {
-            seen[r] *= *weight;
-        }
-        let weighed = DMatrix::from_fn(rows, map.ncols(), |r, c| map[(r, c)] * line.weight[r]);
-        let factors = weighed.qr();
-        let q = factors.q();
-        let projected = q.ad_mul(&seen);
-        let motion = factors.unpack_r().solve_upper_triangular(&projected)?;
-        let residual = seen - &q * projected;
+        let Eliminated { q, motion, residual, .. } = eliminated(block, line, &map, &offsets, p, shifts)?;
 
         self.chi_square += residual.norm_squared();
         self.freedom += (rows - map.ncols()) as f64;
@@ -99,12 +129,10 @@ impl Normal {
         let model = LineModel::new(block, p, line.s).of_motion();
         let (map, _) = model.map();
         let (rows, latent) = (map.nrows(), map.ncols());
-        let weighed = DMatrix::from_fn(rows, latent, |r, c| map[(r, c)] * line.weight[r]);
-        let factors = weighed.qr();
-        let q = factors.q();
+        let (q, r) = factors(&map, line);
         // the motion's covariance is R⁻¹ R⁻ᴴ: each column of R⁻¹ is a motion that noise makes
         let identity = DMatrix::identity(latent, latent);
-        let Some(made) = factors.unpack_r().solve_upper_triangular(&identity) else { return };
+        let Some(made) = r.solve_upper_triangular(&identity) else { return };
         let nothing = DVector::zeros(rows);
         for motion in made.column_iter() {
             let derivatives = model.derivatives(&motion.into_owned(), None, &map);

@@ -12,11 +12,13 @@
 //!    hammer's tilt and each cell's aim are unknowns with priors ([`ContactPriors`]); the local resonances of the specimen calibrate them.
 //!
 //! The way through the room: `cell` what is measured, `block` the cells of an impact, `parameters` the unknowns, `form_scale` how large the form's may be, `model` the signals as
-//! a linear map of the motion, `line` its elimination, `solver` the most likely parameters, `unexplained` what the model leaves of a cell beyond
+//! a linear map of the motion, `line` its elimination, `bins` their sums, `solver` the most likely parameters, `covariance` how well they are known, `unexplained` what the model leaves of a cell beyond
 //! its noise, `diagnosis` whether the assumptions hold, `outcome` the answer. `levels` reads the shaker's levels by what the hits told, `driven` how bodies turn there.
 
+mod bins;
 mod block;
 mod cell;
+mod covariance;
 mod diagnosis;
 mod driven;
 mod form_scale;
@@ -115,6 +117,13 @@ pub enum ContactError {
     NotIdentified(String),
 }
 
+impl ContactError {
+    /// The hits on B alone leave the force open.
+    fn no_force() -> Self {
+        ContactError::NotIdentified("the hits do not tell the force at the contact".into())
+    }
+}
+
 /// Finds k_T and c_T.
 ///
 /// # Errors
@@ -156,7 +165,7 @@ pub fn read(input: &Input<'_>) -> Result<(Stiffness, Known), ContactError> {
     let sigma_per_s = input.cells[0].spectra.sigma_per_s();
     let solution = solver::solve(&mut blocks, &parameters, sigma_per_s)?;
     let found = outcome::of(input, &blocks, &parameters, &solution)?;
-    let covariance = &solution.covariance * solution.chi_square.max(1.0);
+    let covariance = &solution.certainty.covariance * solution.chi_square.max(1.0);
     Ok((found, Known { p: solution.p, covariance }))
 }
 

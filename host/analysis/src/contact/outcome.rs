@@ -1,10 +1,11 @@
 //! The answer: k_T and c_T with their intervals, where these come from, and k_T(f).
 
+use super::bins::BIN_HZ;
 use super::block::Block;
 use super::diagnosis::{Diagnosis, Doubt, diagnose, part};
 use super::parameters::{COMPLIANCE, Parameters, RETARDATION};
 use super::priors::Cause;
-use super::solver::{BIN_HZ, Solution};
+use super::solver::Solution;
 use super::{ContactError, Input};
 use crate::band::Band;
 use crate::identified::COMPLIANCE_HALF_WIDTH;
@@ -64,7 +65,7 @@ pub fn of(
     solution: &Solution,
 ) -> Result<Stiffness, ContactError> {
     let compliance = solution.p[COMPLIANCE];
-    let covariance = &solution.covariance;
+    let covariance = &solution.certainty.covariance;
     let variance = covariance[(COMPLIANCE, COMPLIANCE)];
     let misfit = solution.chi_square.max(1.0);
     let relative = |variance: f64| variance.max(0.0) / (compliance * compliance);
@@ -76,7 +77,7 @@ pub fn of(
             continue;
         }
         // the estimate's answer to an error of the prior, whose precision is that of half an inverse
-        let share = (solution.answer[(COMPLIANCE, i)] / own.sigma).powi(2);
+        let share = (solution.certainty.answer[(COMPLIANCE, i)] / own.sigma).powi(2);
         *budget.entry(own.cause).or_default() += relative(share);
         noise -= share;
     }

@@ -12,14 +12,14 @@ use std::f64::consts::TAU;
 
 type C = Complex<f64>;
 
-const K: f64 = 140e6;
-const DAMPING: f64 = 2000.0;
+pub(super) const K: f64 = 140e6;
+pub(super) const DAMPING: f64 = 2000.0;
 /// Of the force's form: stiffness beside the cells, mass and the lever of its centre, as no prior knows them.
-const BESIDE: f64 = 6e6;
-const MASS: f64 = 2.3;
-const LEVER_M: f64 = -0.038;
-const ARM: [[f64; 3]; 3] = [[-0.02, -0.02, 0.03], [0.02, -0.02, 0.03], [0.0, -0.045, 0.03]];
-const SPECIMEN: [[f64; 3]; 6] = [
+pub(super) const BESIDE: f64 = 6e6;
+pub(super) const MASS: f64 = 2.3;
+pub(super) const LEVER_M: f64 = -0.038;
+pub(super) const ARM: [[f64; 3]; 3] = [[-0.02, -0.02, 0.03], [0.02, -0.02, 0.03], [0.0, -0.045, 0.03]];
+pub(super) const SPECIMEN: [[f64; 3]; 6] = [
     [0.009, 0.002, 0.0],
     [-0.009, 0.002, 0.0],
     [0.009, 0.014, 0.0],
@@ -27,7 +27,7 @@ const SPECIMEN: [[f64; 3]; 6] = [
     [0.0, 0.008, 0.007],
     [0.0, 0.008, -0.007],
 ];
-const SPOTS: [[f64; 3]; 2] = [[0.0006, 0.0005, 0.0], [0.0006, -0.0005, 0.0]];
+pub(super) const SPOTS: [[f64; 3]; 2] = [[0.0006, 0.0005, 0.0], [0.0006, -0.0005, 0.0]];
 
 /// What may be wrong.
 #[derive(Clone, Copy)]
@@ -142,7 +142,7 @@ fn single(spectra: &CrossSpectra) -> CrossSpectra {
     CrossSpectra::new(1.0, frequency_hz, SIGMA_PER_S, 1, vec![1.0; lines], outputs).expect("alike")
 }
 
-const NAMES: [&str; 9] = ["1", "2", "3", "4", "5", "6", "7", "8", "9"];
+pub(super) const NAMES: [&str; 9] = ["1", "2", "3", "4", "5", "6", "7", "8", "9"];
 
 fn of(cell: &Cell) -> ContactCell<'_> {
     let across = [[0.0, 0.0, -1.0], [0.0, -1.0, 0.0]];

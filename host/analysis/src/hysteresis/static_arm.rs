@@ -6,12 +6,10 @@
 //! at all of them; ρ cannot be told from k this way and must be known. A contact with a hidden resonance gives no one k, and the fit's
 //! residual says so.
 
-use super::HysteresisError;
 use super::correction::Correction;
-use super::record::{HysteresisRecord, RelativeMotion};
+use super::tones::Tones;
 use num_complex::Complex;
 use serde::Serialize;
-use std::f64::consts::TAU;
 
 /// A worse fit (rms residual of the force, as a part of it) identifies nothing.
 pub const WORST_RESIDUAL: f64 = 0.03;
@@ -41,55 +39,6 @@ pub struct Identified {
     pub basis: Basis,
     /// rms of what the fit leaves of the force, as a part of it; 0 where they were given.
     pub residual: f64,
-}
-
-/// Amplitudes of one steady level.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tones {
-    /// Circular frequency, rad/s.
-    pub omega_rad_s: f64,
-    /// Δx, m.
-    pub relative_m: Complex<f64>,
-    /// x_B, m.
-    pub b_m: Complex<f64>,
-    /// T, N.
-    pub force_n: Complex<f64>,
-}
-
-impl Tones {
-    /// Of a steady record of known excitation, over its whole cycles.
-    ///
-    /// # Errors
-    /// The signals do not fit together, or there is no excitation frequency or whole cycle.
-    pub fn of(record: &HysteresisRecord) -> Result<Self, HysteresisError> {
-        record.check()?;
-        let frequency_hz = record.excitation_hz.ok_or(HysteresisError::Excitation(0.0))?;
-        let period = record.fs_hz / frequency_hz;
-        let cycles = (record.force_n.len() as f64 / period).floor();
-        let whole = (cycles * period).round() as usize;
-        if whole == 0 {
-            let (samples, points) = (record.force_n.len(), period as usize);
-            return Err(HysteresisError::NoCycle { frequency_hz, samples, points });
-        }
-        let omega_rad_s = TAU * frequency_hz;
-        let tone = |x: &[f64]| -> Complex<f64> {
-            let mean = x[..whole].iter().sum::<f64>() / whole as f64;
-            let sum: Complex<f64> = x[..whole]
-                .iter()
-                .enumerate()
-                .map(|(i, v)| Complex::cis(-omega_rad_s * i as f64 / record.fs_hz) * (v - mean))
-                .sum();
-            2.0 * sum / whole as f64
-        };
-        let integrated = Complex::new(0.0, omega_rad_s);
-        let (a, b) = match &record.motion {
-            RelativeMotion::Velocity { a_m_per_s, b_m_per_s } => {
-                (tone(a_m_per_s) / integrated, tone(b_m_per_s) / integrated)
-            }
-            RelativeMotion::Displacement { a_m, b_m } => (tone(a_m), tone(b_m)),
-        };
-        Ok(Self { omega_rad_s, relative_m: a - b, b_m: b, force_n: tone(&record.force_n) })
-    }
 }
 
 /// From lines of (T/F, ẍ_B/F) with F known at the contact; `parallel_path` is fitted where it is not known. None without lines, or
@@ -126,8 +75,8 @@ pub fn from_levels(levels: &[Tones], parallel_path: f64) -> Option<Identified> {
     let points: Vec<(f64, f64)> = levels
         .iter()
         .map(|t| {
-            let inertia = t.omega_rad_s.powi(2) * t.b_m / t.relative_m;
-            (inertia.re, (t.force_n / t.relative_m).re)
+            let inertia = t.omega_rad_s.powi(2) * t.b_m / t.relative_m();
+            (inertia.re, (t.force_n / t.relative_m()).re)
         })
         .collect();
     let (stiffness, slope) = least_squares(points.iter().map(|(x, y)| ([1.0, *x], *y)))?;
@@ -162,6 +111,7 @@ fn least_squares(rows: impl Iterator<Item = ([f64; 2], f64)>) -> Option<(f64, f6
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
 
     const MASS: f64 = 1.56;
     const CELLS: f64 = 150e6;
@@ -173,7 +123,7 @@ mod tests {
         let b = 20.0 / stiffness;
         Tones {
             omega_rad_s: w,
-            relative_m: Complex::from_polar(20.0 / contact, 0.3),
+            a_m: Complex::from_polar(b + 20.0 / contact, 0.3),
             b_m: Complex::from_polar(b, 0.3),
             force_n: Complex::from_polar(CELLS * b, 0.3),
         }

@@ -9,35 +9,72 @@ use std::f64::consts::TAU;
 /// Fewest cycles of a stretch: over these a mean, a cosine and a sine are told apart.
 const FEWEST_CYCLES: f64 = 4.0;
 
-/// T (N) and the displacements of A and B (m) at the excitation's frequency over at most `count` stretches of whole cycles, one after the
-/// other. Their scatter holds the noise and whatever drifts.
-///
-/// # Errors
-/// The signals do not fit together, or there is no excitation frequency or whole cycle.
-pub fn stretches(record: &HysteresisRecord, count: usize) -> Result<Vec<[Complex<f64>; 3]>, HysteresisError> {
+/// Complex amplitudes of one steady level, or of a stretch of it, in step with one another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tones {
+    /// Circular frequency, rad/s.
+    pub omega_rad_s: f64,
+    /// x_A, m.
+    pub a_m: Complex<f64>,
+    /// x_B, m.
+    pub b_m: Complex<f64>,
+    /// T, N.
+    pub force_n: Complex<f64>,
+}
+
+impl Tones {
+    /// Of a steady record of known excitation, over its whole cycles.
+    ///
+    /// # Errors
+    /// The signals do not fit together, or there is no excitation frequency or whole cycle.
+    pub fn of(record: &HysteresisRecord) -> Result<Self, HysteresisError> {
+        let all = of_stretches(record, |_| 1)?;
+        all.first().copied().ok_or(HysteresisError::Excitation(0.0))
+    }
+
+    /// Of at most `count` stretches of whole cycles, one after the other. Their scatter holds the noise and whatever drifts.
+    ///
+    /// # Errors
+    /// As [`Tones::of`]; fewer than four cycles.
+    pub fn stretches(record: &HysteresisRecord, count: usize) -> Result<Vec<Self>, HysteresisError> {
+        of_stretches(record, |cycles| count.min((cycles / FEWEST_CYCLES).floor() as usize))
+    }
+
+    /// Δx, m.
+    pub fn relative_m(&self) -> Complex<f64> {
+        self.a_m - self.b_m
+    }
+}
+
+/// As many stretches as `count` says of a record's whole cycles.
+fn of_stretches(
+    record: &HysteresisRecord,
+    count: impl Fn(f64) -> usize,
+) -> Result<Vec<Tones>, HysteresisError> {
     record.check()?;
     let frequency_hz = record.excitation_hz.ok_or(HysteresisError::Excitation(0.0))?;
     let period = record.fs_hz / frequency_hz;
     let samples = record.force_n.len();
+    let none = || HysteresisError::NoCycle { frequency_hz, samples, points: period as usize };
     let cycles = (samples as f64 / period).floor();
-    let count = count.min((cycles / FEWEST_CYCLES).floor() as usize);
-    if count == 0 {
-        return Err(HysteresisError::NoCycle { frequency_hz, samples, points: period as usize });
+    let count = count(cycles);
+    if count == 0 || cycles < 1.0 {
+        return Err(none());
     }
     let long = (cycles / count as f64).floor() * period;
-    let omega = TAU * frequency_hz;
+    let omega_rad_s = TAU * frequency_hz;
     let (a, b, order) = match &record.motion {
         RelativeMotion::Velocity { a_m_per_s, b_m_per_s } => (a_m_per_s, b_m_per_s, 1),
         RelativeMotion::Displacement { a_m, b_m } => (a_m, b_m, 0),
     };
-    let integrated = Complex::new(0.0, omega).powi(order);
+    let integrated = Complex::new(0.0, omega_rad_s).powi(order);
     let of = |n: usize| {
         let (from, to) = ((n as f64 * long).round() as usize, ((n + 1) as f64 * long).round() as usize);
-        let tone = |x: &[f64]| amplitude(&x[from..to.min(samples)], from, omega / record.fs_hz);
-        Some([tone(&record.force_n)?, tone(a)? / integrated, tone(b)? / integrated])
+        let tone = |x: &[f64]| amplitude(&x[from..to.min(samples)], from, omega_rad_s / record.fs_hz);
+        let (force_n, a_m, b_m) = (tone(&record.force_n)?, tone(a)? / integrated, tone(b)? / integrated);
+        Some(Tones { omega_rad_s, a_m, b_m, force_n })
     };
-    let found: Option<Vec<_>> = (0..count).map(of).collect();
-    found.ok_or(HysteresisError::NoCycle { frequency_hz, samples, points: period as usize })
+    (0..count).map(of).collect::<Option<_>>().ok_or_else(none)
 }
 
 /// Complex amplitude of x = Re(X e^(iφn)) + mean by least squares, with n counted from `first`: exact where a period is no whole number of
@@ -75,7 +112,7 @@ mod tests {
             excitation_hz: Some(f),
             normal_load_n: None,
         };
-        let found = stretches(&record, 8).expect("182 cycles");
+        let found = Tones::stretches(&record, 8).expect("182 cycles");
         assert_eq!(found.len(), 8);
         let i_omega = Complex::new(0.0, TAU * f);
         let expected = [
@@ -83,12 +120,12 @@ mod tests {
             Complex::from_polar(3e-4, 0.4) / i_omega,
             Complex::from_polar(1e-4, -0.2) / i_omega,
         ];
-        for one in &found {
-            for (got, expected) in one.iter().zip(&expected) {
+        for one in found.iter().chain([&Tones::of(&record).expect("182 cycles")]) {
+            for (got, expected) in [one.force_n, one.a_m, one.b_m].iter().zip(&expected) {
                 assert!((got - expected).norm() < 1e-9 * expected.norm(), "{got} for {expected}");
             }
         }
         let short = HysteresisRecord { force_n: vec![1.0; 100], ..record };
-        assert!(stretches(&short, 8).is_err());
+        assert!(Tones::stretches(&short, 8).is_err() && Tones::of(&short).is_err());
     }
 }

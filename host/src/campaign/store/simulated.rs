@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::Store;
 use super::error::StoreError;
 use crate::device::transport::Simulated;
+use jointrig_protocol::answer::Info;
 
 /// Keys of the notes.
 const RIG: &str = "simulated_rig";
@@ -66,6 +67,16 @@ impl Store {
     /// The note cannot be read.
     pub fn simulated_rig(&self) -> Result<Option<SimulatedRig>, StoreError> {
         self.json(RIG)
+    }
+
+    /// Whether any session's device was simulated, in the runner's own process or behind a wire.
+    ///
+    /// # Errors
+    /// The notes or sessions cannot be read.
+    pub fn is_simulated(&self) -> Result<bool, StoreError> {
+        let simulated = [Info::VIRTUAL_BOARD, Info::EMULATED_BOARD];
+        let behind_a_wire = self.sessions()?.iter().any(|(_, info)| simulated.contains(&info.board.as_str()));
+        Ok(behind_a_wire || self.simulated_rig()?.is_some())
     }
 
     /// What an ideal measurement of the simulated rig would find; none where the device was not simulated in the runner's own

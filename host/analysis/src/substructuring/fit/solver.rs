@@ -5,6 +5,7 @@ use super::chart::{Chart, Shape};
 use super::factor::{Factor, crossed};
 use super::problem::{Corrected, Problem};
 use super::weight::{Point, Weight};
+use crate::errors_in_variables::Feigned;
 use crate::parallel::prelude::*;
 use nalgebra::{DMatrix, DVector};
 
@@ -133,15 +134,8 @@ impl Pass<'_> {
         let all = self.products(&columns).all;
         let pull = all.view((1, 0), (count, 1));
         let feigned = all.view((1, 1), (count, count)).clone_owned();
-        // in units in which the information is one, the feigned part of each direction is a fraction
-        let root = at.hessian.clone().cholesky()?.l();
-        let half = root.solve_lower_triangular(&feigned)?;
-        let fraction = root.solve_lower_triangular(&half.transpose())?.symmetric_eigen();
-        let left = fraction.eigenvalues.map(|f| 1.0 - f.clamp(0.0, FEIGNED_MOST));
-        let turn = root.transpose().solve_upper_triangular(&fraction.eigenvectors)?;
-        let told =
-            fraction.eigenvalues.map(|f| if f < FEIGNED_MOST { 1.0 / (1.0 - f.max(0.0)) } else { 0.0 });
-        let inverse = &turn * DMatrix::from_diagonal(&told) * turn.transpose();
+        let feigned = Feigned::of(at.hessian.clone(), &feigned)?;
+        let inverse = feigned.weighed(|f| if f < FEIGNED_MOST { 1.0 / (1.0 - f.max(0.0)) } else { 0.0 });
         let mut rest = &at.gradient - pull.column(0);
         for i in 0..count {
             if self.chart.held(p, i, rest[i] > 0.0) {
@@ -149,7 +143,10 @@ impl Pass<'_> {
             }
         }
         let next = self.chart.bounded(&(p + &inverse * rest));
-        let mut covariance = &turn * DMatrix::from_diagonal(&left.map(|l| 1.0 / (l * l))) * turn.transpose();
+        let mut covariance = feigned.weighed(|f| {
+            let left = 1.0 - f.clamp(0.0, FEIGNED_MOST);
+            1.0 / (left * left)
+        });
         // one draw and the first order: the correction is not known better than by its own size
         for (i, step) in (&next - p).iter().enumerate() {
             covariance[(i, i)] += step * step;

@@ -1,0 +1,53 @@
+//! Regressions whose regressors are noisy: how much of an information matrix noise only feigns.
+//!
+//! With J the information formed from noisy regressors and N what their noise adds to it in the mean, the curvature is J − N and the slope at
+//! the truth scatters by J: the estimate's covariance is (J − N)⁻¹ J (J − N)⁻¹. In units in which J is the identity, N has eigenvalues from 0
+//! to about 1, the feigned fraction of each axis; sums of finitely many lines scatter, so that J − N itself need not be positive.
+
+use nalgebra::{DMatrix, DVector};
+
+/// The axes along which noise feigns information, and how much.
+#[derive(Debug, Clone)]
+pub struct Feigned {
+    /// Columns x with xᵀ J x = 1.
+    axes: DMatrix<f64>,
+    /// xᵀ N x of each.
+    fraction: DVector<f64>,
+}
+
+impl Feigned {
+    /// Of J and N, both n × n and symmetric; none where J is not positive.
+    pub fn of(information: DMatrix<f64>, noise: &DMatrix<f64>) -> Option<Self> {
+        let root = information.cholesky()?.l();
+        let half = root.solve_lower_triangular(noise)?;
+        let found = root.solve_lower_triangular(&half.transpose())?.symmetric_eigen();
+        let axes = root.transpose().solve_upper_triangular(&found.eigenvectors)?;
+        Some(Feigned { axes, fraction: found.eigenvalues })
+    }
+
+    /// Σ weight(fraction) x xᵀ over the axes: with 1/(1 − f) the inverse of J − N, with 1/(1 − f)² the estimate's covariance.
+    pub fn weighed(&self, weight: impl Fn(f64) -> f64) -> DMatrix<f64> {
+        &self.axes * DMatrix::from_diagonal(&self.fraction.map(weight)) * self.axes.transpose()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_weights_give_the_matrices_they_are_said_to() {
+        let root =
+            DMatrix::from_fn(7, 7, |r, c| ((r * 5 + c * 3) % 11) as f64 / 11.0 + f64::from(u8::from(r == c)));
+        let information = &root * root.transpose();
+        let part = root.columns(0, 3);
+        let noise = part * part.transpose() * 0.4;
+        let feigned = Feigned::of(information.clone(), &noise).expect("positive");
+        let inverse = (&information - &noise).try_inverse().expect("regular");
+        let covariance = &inverse * &information * &inverse;
+        // rounding: the condition number is below 1e4
+        let near = |a: &DMatrix<f64>, b: &DMatrix<f64>| (a - b).norm() < 1e-10 * b.norm();
+        assert!(near(&feigned.weighed(|f| 1.0 / (1.0 - f)), &inverse));
+        assert!(near(&feigned.weighed(|f| (1.0 - f).powi(-2)), &covariance));
+    }
+}
