@@ -8,3 +8,4 @@ pub mod campaign;
 pub mod command;
 pub mod drawn_campaigns;
 pub mod rigs;
+pub mod slip_truth;
