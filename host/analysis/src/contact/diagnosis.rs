@@ -1,5 +1,6 @@
 //! Whether what the estimate assumes is so: tested on the residuals that it leaves.
 
+use super::bins::Bin;
 use super::block::Block;
 use super::parameters::{COMPLIANCE, Parameters};
 use super::priors::Cause;
@@ -10,9 +11,6 @@ use serde::Serialize;
 
 /// χ² per degree of freedom above which a kind of signal contradicts the model, once the noise's own uncertainty is allowed for.
 const CONTRADICTED: f64 = 10.0;
-/// Part of the signal that may be left unexplained beside noise, of the force, of the points on specimen A, and of the spots: errors of aim
-/// leave about a per cent of a strong local mode, and the misfit widens the interval; a point that is misplaced or loose leaves more.
-const UNEXPLAINED: [f64; 3] = [0.01, 0.04, 0.02];
 /// Standard deviations by which one of some hundred stated quantities may be off.
 const BEYOND: f64 = 5.0;
 /// Standard deviations by which two readings of k_T may differ.
@@ -25,6 +23,74 @@ pub struct Left {
     pub chi_square: f64,
     /// Rms of what is left over the signals' own, both over the noise.
     pub part: f64,
+}
+
+/// Signals that are judged together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Signals {
+    /// All of the hits on B alone: the force's form.
+    Calibration,
+    /// The points on specimen A.
+    SpecimenA,
+    /// The spots in the assembly.
+    Spots,
+}
+
+impl Signals {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Calibration, Self::SpecimenA, Self::Spots];
+
+    /// Kinds of rows.
+    fn kinds(self) -> &'static [usize] {
+        match self {
+            Self::Calibration => &[0, 1, 3, 5],
+            Self::SpecimenA => &[4],
+            Self::Spots => &[1, 2],
+        }
+    }
+
+    /// What they say of an assumption that does not hold.
+    fn doubt(self) -> Doubt {
+        match self {
+            Self::Calibration => Doubt::Force,
+            Self::SpecimenA => Doubt::SpecimenA,
+            Self::Spots => Doubt::Spots,
+        }
+    }
+
+    /// Part of them that may be left unexplained beside noise: errors of aim leave about a per cent of a strong local mode, and the misfit widens
+    /// the interval; a point that is misplaced or loose leaves more.
+    fn unexplained(self) -> f64 {
+        match self {
+            Self::Calibration => 0.01,
+            Self::SpecimenA => 0.04,
+            Self::Spots => 0.02,
+        }
+    }
+
+    /// Of these signals in some bins, what the model leaves.
+    pub fn left<'a>(self, blocks: &[Block], bins: impl Iterator<Item = &'a Bin>) -> Left {
+        let alone = self == Self::Calibration;
+        // where the hammer's aim is known by halves only, its errors are not the points'
+        let judged =
+            |block: &Block| block.aim_known || !blocks.iter().any(|b| b.aim_known && b.along_z.is_none());
+        let own = bins.filter(|bin| {
+            let block = &blocks[bin.block];
+            block.along_z.is_some() == alone && (alone || judged(block))
+        });
+        let kinds = own.flat_map(|bin| self.kinds().iter().map(move |k| bin.normal.kinds[*k]));
+        let [chi, expected, signal] =
+            kinds.fold([0.0; 3], |sum: [f64; 3], of| std::array::from_fn(|i| sum[i] + of[i]));
+        Left {
+            chi_square: if expected > 1e-9 { chi / expected } else { 0.0 },
+            part: if signal > 0.0 { (chi / signal).sqrt() } else { 0.0 },
+        }
+    }
+
+    /// Whether that contradicts the model.
+    pub fn contradict(self, left: Left) -> bool {
+        left.chi_square > CONTRADICTED && left.part > self.unexplained()
+    }
 }
 
 /// What is furthest from what is stated of it.
@@ -119,22 +185,6 @@ pub fn diagnose(blocks: &[Block], parameters: &Parameters, solution: &Solution) 
         .map(|(own, p)| (own, own.deviations(*p)))
         .max_by(|(_, a), (_, b)| a.total_cmp(b))
         .map(|(own, deviations)| Farthest { what: own.name.clone(), deviations });
-    // where the hammer's aim is known by halves only, its errors are not the points'
-    let judged =
-        |block: &Block| block.aim_known || !blocks.iter().any(|b| b.aim_known && b.along_z.is_none());
-    let left = |alone: bool, kinds: &[usize]| {
-        let own = solution.bins.iter().filter(|bin| {
-            let block = &blocks[bin.block];
-            block.along_z.is_some() == alone && (alone || judged(block))
-        });
-        let kinds = own.flat_map(|bin| kinds.iter().map(move |k| bin.normal.kinds[*k]));
-        let [chi, expected, signal] =
-            kinds.fold([0.0; 3], |sum: [f64; 3], of| std::array::from_fn(|i| sum[i] + of[i]));
-        Left {
-            chi_square: if expected > 1e-9 { chi / expected } else { 0.0 },
-            part: if signal > 0.0 { (chi / signal).sqrt() } else { 0.0 },
-        }
-    };
     let mut lows: Vec<f64> = solution.bins.iter().map(|bin| bin.low_hz).collect();
     lows.sort_by(f64::total_cmp);
     lows.dedup();
@@ -145,9 +195,9 @@ pub fn diagnose(blocks: &[Block], parameters: &Parameters, solution: &Solution) 
     let sides =
         (hit(true) && hit(false)).then(|| part(blocks, solution, |block, _| on_mass(block))).flatten();
     Diagnosis {
-        calibration: left(true, &[0, 1, 3, 5]),
-        specimen_a: left(false, &[4]),
-        spots: left(false, &[1, 2]),
+        calibration: Signals::Calibration.left(blocks, solution.bins.iter()),
+        specimen_a: Signals::SpecimenA.left(blocks, solution.bins.iter()),
+        spots: Signals::Spots.left(blocks, solution.bins.iter()),
         farthest,
         flatness_chi_square: if parts.is_empty() { 1.0 } else { flatness / parts.len() as f64 },
         sides_apart: sides.map(|part| part.deviation / part.sigma),
@@ -157,17 +207,10 @@ pub fn diagnose(blocks: &[Block], parameters: &Parameters, solution: &Solution) 
 impl Diagnosis {
     /// What does not hold.
     pub fn doubts(&self) -> Vec<Doubt> {
-        let mut all = Vec::new();
-        let [force, specimen, spots] = UNEXPLAINED;
-        for (left, unexplained, doubt) in [
-            (self.calibration, force, Doubt::Force),
-            (self.specimen_a, specimen, Doubt::SpecimenA),
-            (self.spots, spots, Doubt::Spots),
-        ] {
-            if left.chi_square > CONTRADICTED && left.part > unexplained {
-                all.push(doubt);
-            }
-        }
+        let left = [self.calibration, self.specimen_a, self.spots];
+        let contradicting =
+            Signals::ALL.into_iter().zip(left).filter(|(signals, left)| signals.contradict(*left));
+        let mut all: Vec<Doubt> = contradicting.map(|(signals, _)| signals.doubt()).collect();
         if self.farthest.as_ref().is_some_and(|one| one.deviations > BEYOND) {
             all.push(Doubt::Stated);
         }

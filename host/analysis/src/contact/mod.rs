@@ -13,7 +13,7 @@
 //!
 //! The way through the room: `cell` what is measured, `block` the cells of an impact, `parameters` the unknowns, `form_scale` how large the form's may be, `model` the signals as
 //! a linear map of the motion, `line` its elimination, `bins` their sums, `solver` the most likely parameters, `covariance` how well they are known, `unexplained` what the model leaves of a cell beyond
-//! its noise, `diagnosis` whether the assumptions hold, `outcome` the answer. `levels` reads the shaker's levels by what the hits told, `driven` how bodies turn there.
+//! its noise, `trusted_band` where the bodies are rigid, `diagnosis` whether the assumptions hold, `outcome` the answer. `levels` reads the shaker's levels by what the hits told, `driven` how bodies turn there.
 
 mod bins;
 mod block;
@@ -33,6 +33,7 @@ mod priors;
 mod solver;
 #[cfg(test)]
 mod tests;
+mod trusted_band;
 mod unexplained;
 
 pub use cell::{ContactCell, SIGMA_PER_S};
@@ -43,11 +44,14 @@ pub use priors::{Cause, ContactPriors};
 
 use crate::band::Band;
 use crate::substructuring::geometry::Grouping;
-use block::blocks;
+use block::{Block, blocks};
 use nalgebra::DMatrix;
 use parameters::Parameters;
+use solver::Solution;
+use trusted_band::trusted;
 
-/// Where the contact is read, Hz: above the drift of hammer and windows, below the first bending modes of arms and specimens.
+/// Where the contact is looked for, Hz: above the drift of hammer and windows, below the first bending modes of the paper's arms and specimens. Where
+/// others bend sooner, the band ends there ([`Stiffness::band_hz`]).
 pub const BAND: Band = Band { low_hz: 100.0, high_hz: 600.0 };
 
 /// Where the search for the compliance begins: a contact of 150 N/µm, m/N.
@@ -145,6 +149,35 @@ pub struct Known {
 /// # Errors
 /// As [`stiffness`].
 pub fn read(input: &Input<'_>) -> Result<(Stiffness, Known), ContactError> {
+    let mut input = input.clone();
+    loop {
+        let fit = fit(&input)?;
+        let band_hz = trusted(&fit.blocks, &fit.solution.bins, input.band_hz);
+        if band_hz == input.band_hz {
+            return fit.told(&input);
+        }
+        // what strayed at an end has pulled the rest: the next fit tells more of it
+        input.band_hz = band_hz;
+    }
+}
+
+/// What the hits in a band say.
+struct Fit {
+    parameters: Parameters,
+    blocks: Vec<Block>,
+    solution: Solution,
+}
+
+impl Fit {
+    fn told(self, input: &Input<'_>) -> Result<(Stiffness, Known), ContactError> {
+        let Fit { parameters, blocks, solution } = self;
+        let found = outcome::of(input, &blocks, &parameters, &solution)?;
+        let covariance = &solution.certainty.covariance * solution.chi_square.max(1.0);
+        Ok((found, Known { p: solution.p, covariance }))
+    }
+}
+
+fn fit(input: &Input<'_>) -> Result<Fit, ContactError> {
     let spots = input.spots_m.map(|spot| std::array::from_fn(|axis| spot[axis] - input.contact_m[axis]));
     let mut parameters = Parameters::new(&input.priors, START_M_PER_N, spots);
     let mut blocks = blocks(input, &mut parameters)?;
@@ -164,9 +197,7 @@ pub fn read(input: &Input<'_>) -> Result<(Stiffness, Known), ContactError> {
     form_scale::scale_form(&mut parameters, &blocks);
     let sigma_per_s = input.cells[0].spectra.sigma_per_s();
     let solution = solver::solve(&mut blocks, &parameters, sigma_per_s)?;
-    let found = outcome::of(input, &blocks, &parameters, &solution)?;
-    let covariance = &solution.certainty.covariance * solution.chi_square.max(1.0);
-    Ok((found, Known { p: solution.p, covariance }))
+    Ok(Fit { parameters, blocks, solution })
 }
 
 /// Whether a response point is of any use here.

@@ -37,6 +37,8 @@ struct World {
     spot_m: f64,
     /// A point on specimen A that stands this far from where it is said to be, m.
     misplaced_m: f64,
+    /// A bending mode that the first point on specimen A takes part in, Hz.
+    bends_hz: Option<f64>,
     /// Of the noise.
     seed: u64,
 }
@@ -96,7 +98,13 @@ fn measured(world: World) -> Vec<Cell> {
                     if on_specimen && point == points {
                         at[1] += world.misplaced_m;
                     }
-                    let seen = if on_specimen { moved(of_a, turn_a, at) } else { moved(of_b, turn_b, at) };
+                    let mut seen =
+                        if on_specimen { moved(of_a, turn_a, at) } else { moved(of_b, turn_b, at) };
+                    if let Some(bends) = world.bends_hz.filter(|_| on_specimen && point == points) {
+                        let w = TAU * bends;
+                        // some per cent of the body's motion well below it, and as much as that beside it
+                        seen[2] -= 0.03 * seen[2] * s * s / (w * w + s * s + 0.02 * w * s);
+                    }
                     let mut spot_a = SPOTS[0];
                     spot_a[1] += world.spot_m;
                     let v = |x: C| x * s;
@@ -180,7 +188,7 @@ fn input(cells: &[Cell]) -> Input<'_> {
     }
 }
 
-const QUIET: World = World { noise_m_per_s: 2e-9, spot_m: 0.0, misplaced_m: 0.0, seed: 1 };
+const QUIET: World = World { noise_m_per_s: 2e-9, spot_m: 0.0, misplaced_m: 0.0, bends_hz: None, seed: 1 };
 
 #[test]
 fn without_noise_the_contact_is_found_to_a_thousandth() {
@@ -198,7 +206,7 @@ fn without_noise_the_contact_is_found_to_a_thousandth() {
 
 #[test]
 fn a_spot_that_is_not_where_it_is_said_to_be_is_inside_the_interval() {
-    let world = World { noise_m_per_s: 5e-7, spot_m: 4e-5, misplaced_m: 0.0, seed: 1 };
+    let world = World { noise_m_per_s: 5e-7, spot_m: 4e-5, misplaced_m: 0.0, bends_hz: None, seed: 1 };
     let cells = measured(world);
     let found = stiffness(&input(&cells)).expect("all is there");
     let [low, high] = found.k_t_n_per_m.ci95;
@@ -210,7 +218,7 @@ fn the_interval_is_what_repeated_measurements_scatter_by() {
     // noise of some fifth of the motions at a line, so that the motion itself is known through noise
     let deviations: Vec<f64> = (0..24)
         .map(|seed| {
-            let world = World { noise_m_per_s: 2e-6, spot_m: 0.0, misplaced_m: 0.0, seed };
+            let world = World { noise_m_per_s: 2e-6, spot_m: 0.0, misplaced_m: 0.0, bends_hz: None, seed };
             let cells = measured(world);
             let mut input = input(&cells);
             input.priors.spot_m = 1e-7;
@@ -232,6 +240,20 @@ fn a_point_that_is_millimetres_off_is_doubted() {
     assert!(found.doubts.contains(&Doubt::SpecimenA), "{:?}", found.diagnosis);
     // it weighs less, and the other five hold
     assert!((found.k_t_n_per_m.mean / K - 1.0).abs() < 0.01, "{found:?}");
+}
+
+#[test]
+fn where_a_specimen_bends_the_band_ends() {
+    let cells = measured(World { noise_m_per_s: 1e-7, bends_hz: Some(620.0), ..QUIET });
+    let found = stiffness(&input(&cells)).expect("the lower part of the band is enough");
+    let Band { low_hz, high_hz } = found.band_hz;
+    assert_eq!(low_hz, BAND.low_hz);
+    assert!((350.0..575.0).contains(&high_hz), "{high_hz}");
+    assert!(found.doubts.is_empty(), "{:?}", found.diagnosis);
+    let [low, high] = found.k_t_n_per_m.ci95;
+    assert!(low < K && K < high && high - low < 0.2 * K, "{found:?}");
+    // and what bends nowhere loses nothing
+    assert_eq!(stiffness(&input(&measured(QUIET))).expect("all is there").band_hz, BAND);
 }
 
 #[test]
