@@ -38,7 +38,20 @@ impl Campaign {
         Some((k.mean / self.truth - 1.0, 0.5 * (high - low) / k.mean, covers))
     }
 
+    /// The same of the answer, to which hits and levels both contribute.
+    fn answer(&self) -> Option<(f64, f64, bool)> {
+        let k = self.results.answer.as_ref()?.contact.k_t_n_per_m?;
+        let [low, high] = k.ci95;
+        let covers = low <= self.truth && self.truth <= high;
+        Some((k.mean / self.truth - 1.0, 0.5 * (high - low) / k.mean, covers))
+    }
+
     fn tell(&self, label: &str) {
+        if let Some((error, half, covers)) = self.answer() {
+            let basis = self.results.answer.as_ref().unwrap().contact.basis;
+            let missed = if covers { "" } else { "MISSED" };
+            println!("{label} answer: {:+5.1} % ± {:.1} % {basis:?} {missed}", 100.0 * error, 100.0 * half);
+        }
         for row in self.levels() {
             let told = match self.named(row) {
                 Some((error, half, covers)) => format!(
@@ -88,6 +101,8 @@ struct Counted {
     levels: usize,
     /// Error and half width of each level that is named k_T, relative; whether its interval covers.
     named: Vec<(f64, f64, bool)>,
+    /// The same of the answers.
+    answers: Vec<(f64, f64, bool)>,
     /// Error of the slope between the spots of the same levels where it has one.
     raw: Vec<f64>,
 }
@@ -95,6 +110,7 @@ struct Counted {
 impl Counted {
     fn add(&mut self, campaign: &Campaign) {
         self.campaigns += 1;
+        self.answers.extend(campaign.answer());
         for row in campaign.levels() {
             self.levels += 1;
             if let Some(slope) = row.slope_between_spots_n_per_m {
@@ -108,20 +124,28 @@ impl Counted {
         let rms = |errors: &[f64]| {
             100.0 * (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt()
         };
-        let covered = self.named.iter().filter(|(.., covers)| *covers).count();
-        let mut half: Vec<f64> = self.named.iter().map(|(_, half, _)| 100.0 * half).collect();
-        half.sort_by(f64::total_cmp);
-        let errors: Vec<f64> = self.named.iter().map(|(error, ..)| *error).collect();
+        let told = |all: &[(f64, f64, bool)]| {
+            let covered = all.iter().filter(|(.., covers)| *covers).count();
+            let mut half: Vec<f64> = all.iter().map(|(_, half, _)| 100.0 * half).collect();
+            half.sort_by(f64::total_cmp);
+            let errors: Vec<f64> = all.iter().map(|(error, ..)| *error).collect();
+            format!(
+                "{} | {covered} ({:.1} %) | {:.1} % | {:.1} %",
+                all.len(),
+                100.0 * covered as f64 / all.len().max(1) as f64,
+                rms(&errors),
+                half.get(half.len() / 2).copied().unwrap_or(f64::NAN)
+            )
+        };
         format!(
-            "| {name} | {} | {} | {} | {covered} ({:.1} %) | {:.1} % | {:.1} % | {:.0} % ({} levels) |",
+            "| {name} | {} | {} | {} | {:.0} % ({} levels) |\n| {name}: answer.contact | {} | – | {} | – |",
             self.campaigns,
             self.levels,
-            self.named.len(),
-            100.0 * covered as f64 / self.named.len().max(1) as f64,
-            rms(&errors),
-            half.get(half.len() / 2).copied().unwrap_or(f64::NAN),
+            told(&self.named),
             rms(&self.raw),
-            self.raw.len()
+            self.raw.len(),
+            self.campaigns,
+            told(&self.answers)
         )
     }
 }
@@ -137,6 +161,16 @@ fn a_level_is_called_k_t_only_where_its_interval_holds() {
     assert!(counted.named.iter().all(|(error, half, covers)| *covers && *half <= 0.1 && error.abs() < 0.1));
     // what stands beside it, between the spots, is another number
     assert!(counted.raw.iter().any(|error| error.abs() > 0.1), "{:?}", counted.raw);
+    // the levels that have a k_T count in the answer as well
+    let contact = &campaign.results.answer.as_ref().unwrap().contact;
+    assert_eq!(contact.basis, jointrig::results::Basis::Joint, "{}", contact.why);
+    let (_, half, covers) = campaign.answer().unwrap();
+    assert!(covers && half < 0.05, "{}", contact.why);
+    let shares: f64 = contact.budget.values().map(|share| share * share).sum();
+    let k = contact.k_t_n_per_m.unwrap();
+    let sigma = (k.ci95[0].recip() - k.ci95[1].recip()) / (2.0 * 1.96) * k.mean;
+    // 1.96 for the exact quantile
+    assert!((sigma / shares.sqrt() - 1.0).abs() < 1e-3, "the budget adds up");
     for row in campaign.levels() {
         let why = row.k_t_why.as_ref().expect("a level says what it rests on, or why it has none");
         assert_eq!(row.k_t_n_per_m.is_none(), why.starts_with("no k_T: "), "{why}");

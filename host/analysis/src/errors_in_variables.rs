@@ -6,6 +6,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+/// A fraction of information smaller than the square of a rounding error.
+const NOTHING: f64 = f64::EPSILON * f64::EPSILON;
+
 /// The axes along which noise feigns information, and how much.
 #[derive(Debug, Clone)]
 pub struct Feigned {
@@ -16,13 +19,21 @@ pub struct Feigned {
 }
 
 impl Feigned {
-    /// Of J and N, both n × n and symmetric; none where J is not positive.
+    /// Of J and N, both n × n and symmetric; none where J is not positive, or either is no number.
     pub fn of(information: DMatrix<f64>, noise: &DMatrix<f64>) -> Option<Self> {
         let root = information.cholesky()?.l();
         let half = root.solve_lower_triangular(noise)?;
-        let found = root.solve_lower_triangular(&half.transpose())?.symmetric_eigen();
+        let mut fractions = root.solve_lower_triangular(&half.transpose())?;
+        // fractions of one that are below any rounding; their squares vanish, and with them the lengths that the eigensolver divides by
+        fractions.apply(|entry| {
+            if entry.abs() < NOTHING {
+                *entry = 0.0;
+            }
+        });
+        let found = fractions.symmetric_eigen();
         let axes = root.transpose().solve_upper_triangular(&found.eigenvectors)?;
-        Some(Feigned { axes, fraction: found.eigenvalues })
+        let numbers = axes.iter().chain(found.eigenvalues.iter()).all(|v| v.is_finite());
+        numbers.then_some(Feigned { axes, fraction: found.eigenvalues })
     }
 
     /// Σ weight(fraction) x xᵀ over the axes: with 1/(1 − f) the inverse of J − N, with 1/(1 − f)² the estimate's covariance.
@@ -34,6 +45,21 @@ impl Feigned {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_known_exactly_does_not_break_the_rest() {
+        // the last is known so well that in units of its own, whatever noise adds to it vanishes when squared
+        let mut noise = DMatrix::from_diagonal_element(3, 3, 0.25);
+        noise.row_mut(2).fill(1e-170);
+        noise.column_mut(2).fill(1e-170);
+        noise[(2, 0)] = 1e-200;
+        noise[(0, 2)] = 1e-200;
+        let feigned = Feigned::of(DMatrix::identity(3, 3), &noise).expect("positive");
+        let inverse = feigned.weighed(|f| 1.0 / (1.0 - f));
+        let expected = DMatrix::from_diagonal(&DVector::from_vec(vec![4.0 / 3.0, 4.0 / 3.0, 1.0]));
+        assert!((inverse - expected).norm() < 1e-12);
+        assert!(Feigned::of(DMatrix::identity(2, 2), &DMatrix::from_element(2, 2, f64::NAN)).is_none());
+    }
 
     #[test]
     fn the_weights_give_the_matrices_they_are_said_to() {

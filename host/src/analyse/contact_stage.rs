@@ -9,7 +9,7 @@ use super::missing::Missing;
 use super::shaker_levels::{self, Analysed, RecordLoops};
 use super::specimen_curves::specimen_curves;
 use super::{arm_from_hits, chosen, hammer_slip, level_stiffness};
-use crate::contact::{ContactError, Known, Stiffness};
+use crate::contact::{ContactError, Joint, Known, Stiffness};
 use crate::hysteresis::Correction;
 use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
 use crate::hysteresis::hammer_slip::HammerSlip;
@@ -45,6 +45,8 @@ pub struct Contact {
     pub reconstruction: Option<Reconstruction>,
     /// The loops of the shaker's levels.
     pub levels: Vec<RecordLoops>,
+    /// k_T of the hits and the levels together; none where the levels add nothing.
+    pub joint: Option<Joint>,
     /// A loop of the shaker at each frequency.
     pub shaker_loops: Vec<ShakerLoop>,
     /// How a slipping contact goes with amplitude.
@@ -89,7 +91,7 @@ pub fn at_the_contact<M: Measurements>(
     let slips = slip.found() == Some(true);
     let impacts = impact_loops::gathered(impact_loops, arm.as_ref(), &hidden, slips);
     let loops: Vec<_> = steady.iter().map(|one| (one.level, &one.raw)).collect();
-    let own = level_stiffness::of(measurements, averages, own, slips, &loops);
+    let at_levels = level_stiffness::of(measurements, averages, own, slips, &loops);
     let shown = example(measurements, averages, impact_loops, hidden.resonance_hz());
     let (example_loop, reconstruction) =
         shown.map_or((None, None), |(drawn, rebuilt)| (Some(drawn), rebuilt));
@@ -108,7 +110,8 @@ pub fn at_the_contact<M: Measurements>(
         backbones: shaker_levels::backbones(&steady),
         series: SeriesCompliance::of(between_the_arms, at_the_specimens),
         change: ContactChange::of(&steady),
-        levels: shaker_levels::loops(steady, arm.as_ref(), own),
+        joint: level_stiffness::together(own, &at_levels),
+        levels: shaker_levels::loops(steady, arm.as_ref(), at_levels),
     };
     (found, missing)
 }

@@ -4,7 +4,7 @@ use super::averages::CellAverage;
 use super::cell::{Measurements, ShakerLevel};
 use super::contact_answer::{cells, input};
 use crate::contact::{
-    ContactError, Known, LevelError, LevelStiffness, SteadyLevel, Stiffness, level_stiffness,
+    ContactError, Joint, Known, LevelError, LevelStiffness, SteadyLevel, Stiffness, joint, level_stiffness,
 };
 use crate::hysteresis::tones::Tones;
 use crate::hysteresis::{LoopAnalysis, LoopFinding, Shape};
@@ -15,6 +15,10 @@ const STRETCHES: usize = 10;
 /// Half width of the interval over k_T above which a level's value is not called k_T. Scripts and people read the mean without its interval as
 /// well: what it is called must not mislead them by more than a tenth. T/Δx between the spots is off by more than that at most frequencies.
 const WIDEST: f64 = 0.1;
+
+/// Standard deviations of their difference by which a level's k_T may be apart from that of the hits: beyond, one of both is wrong, and of the
+/// two the level rests on more.
+const APART: f64 = 4.0;
 
 /// What a level's k_T is, or why it has none.
 pub type Outcome = Result<LevelStiffness, NoLevelStiffness>;
@@ -34,6 +38,8 @@ pub enum NoLevelStiffness {
     Finding(LoopFinding),
     /// It cannot be corrected.
     Level(LevelError),
+    /// It contradicts the hits: by so many standard deviations.
+    Apart(f64),
     /// It can, but not well enough: half width of its interval over k_T.
     Wide(f64),
 }
@@ -65,9 +71,19 @@ pub fn of<M: Measurements>(
         let one = found.next().unwrap_or(Err(LevelError::NoLines)).map_err(NoLevelStiffness::Level)?;
         let [low, high] = one.k_t_n_per_m.ci95;
         let half = 0.5 * (high - low) / one.k_t_n_per_m.mean;
+        if one.apart.abs() > APART {
+            return Err(NoLevelStiffness::Apart(one.apart.abs()));
+        }
         if half > WIDEST { Err(NoLevelStiffness::Wide(half)) } else { Ok(one) }
     };
     usable.into_iter().map(outcome).collect()
+}
+
+/// k_T of the hits and of those levels together that have one; none where there is none, or they add nothing.
+pub fn together(own: Result<&(Stiffness, Known), &ContactError>, levels: &[Outcome]) -> Option<Joint> {
+    let (hits, known) = own.ok()?;
+    let levels: Vec<&LevelStiffness> = levels.iter().flatten().collect();
+    if levels.is_empty() { None } else { joint(hits, known, &levels) }
 }
 
 /// The amplitudes of a level that sticks. An ellipse sticks as well: what opens it is taken out here.

@@ -53,6 +53,8 @@ pub struct ContactAnswer {
 pub enum Basis {
     /// The specimen's rotation from points on it.
     SpecimenPoints,
+    /// The same, and the shaker's levels that it corrects.
+    Joint,
     /// Nothing: there is no k_T.
     None,
 }

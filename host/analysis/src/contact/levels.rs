@@ -7,8 +7,9 @@
 
 use super::block::{Block, blocks};
 use super::driven::{Driven, MOTIONS, Part, REACH_HZ};
-use super::outcome::Interval;
+use super::interval::Interval;
 use super::parameters::{DELAYS, FORM, GAINS, INERTIA_B, Parameters, SPOTS};
+use super::reading::{Reading, apart};
 use super::{BAND, ContactError, Input, Known, START_M_PER_N};
 use crate::band::Band;
 use crate::frf::noise::shared_by_lines;
@@ -66,6 +67,10 @@ pub struct LevelStiffness {
     pub c_t_n_s_per_m: Interval,
     /// Where the interval of k_T comes from.
     pub shares: Shares,
+    /// By how many standard deviations of their difference it is apart from the hits' own k_T.
+    pub apart: f64,
+    /// What it is averaged by.
+    pub(super) reading: Reading,
     /// By how much of the contact's own motion Δx at the spots and T in place of F are wrong together, |k_T/(T/Δx) − 1|.
     pub correction: f64,
 }
@@ -234,7 +239,7 @@ fn one(
     let unknown = slope.norm_sqr() * (0.5 * turning + place);
     let real = by_parameter.map(|d| (slope * d).re);
     let imaginary = by_parameter.map(|d| (slope * d).im / omega);
-    let of_fit = |row: &DVector<f64>| (&known.covariance * row).dot(row).max(0.0);
+    let of_fit = |row: &DVector<f64>| known.variance(row);
     let scattered: Vec<C> = stretches.iter().map(C::inv).collect();
     let n = scattered.len() as f64;
     let mean = scattered.iter().sum::<C>() / n;
@@ -261,7 +266,18 @@ fn one(
         + (hammer_gain * c).powi(2);
     let half_c = NORMAL_95 * of_c.sqrt();
     let [t, a, b] = mean_of(&level.stretches);
+    // d(1/k) = −dk/k²
+    let reading = Reading {
+        frequency_hz: level.frequency_hz,
+        compliance: k.recip(),
+        row: &real * -(k * k).recip(),
+        turning: (shares.turning / k).powi(2),
+        place: (shares.place / k).powi(2),
+        level: (shares.level / k).powi(2),
+    };
     Ok(LevelStiffness {
+        apart: apart(known, &reading),
+        reading,
         k_t_n_per_m: Interval { mean: k, ci95: [k / (1.0 + half), k / (1.0 - half)] },
         std_n_per_m: shares.level * k * n.sqrt(),
         c_t_n_s_per_m: Interval { mean: c, ci95: [c - half_c, c + half_c] },
@@ -296,7 +312,7 @@ fn through(driven: &Driven<'_>, known: &Known, level: &SteadyLevel) -> Option<Fo
     let mut by_parameter = DVector::<C>::zeros(p.len());
     let own = (FORM..SPOTS + 4).chain([GAINS, GAINS + 1, DELAYS, DELAYS + 1]);
     for i in own {
-        let step = STEP * known.covariance[(i, i)].max(0.0).sqrt();
+        let step = STEP * known.certainty.covariance[(i, i)].max(0.0).sqrt();
         if step > 0.0 {
             let moved = |by: f64| {
                 let mut moved = p.clone();

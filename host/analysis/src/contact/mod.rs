@@ -13,15 +13,19 @@
 //!
 //! The way through the room: `cell` what is measured, `block` the cells of an impact, `parameters` the unknowns, `form_scale` how large the form's may be, `model` the signals as
 //! a linear map of the motion, `line` its elimination, `bins` their sums, `solver` the most likely parameters, `covariance` how well they are known, `unexplained` what the model leaves of a cell beyond
-//! its noise, `trusted_band` where the bodies are rigid, `diagnosis` whether the assumptions hold, `outcome` the answer. `levels` reads the shaker's levels by what the hits told, `driven` how bodies turn there.
+//! its noise, `trusted_band` where the bodies are rigid, `diagnosis` whether the assumptions hold, `outcome` the answer. `budget` where its interval comes from. `levels` reads the shaker's levels by what the hits
+//! told, `driven` how bodies turn there, `joint` averages both.
 
 mod bins;
 mod block;
+mod budget;
 mod cell;
 mod covariance;
 mod diagnosis;
 mod driven;
 mod form_scale;
+mod interval;
+mod joint;
 mod levels;
 #[cfg(test)]
 mod levels_tests;
@@ -30,6 +34,7 @@ mod model;
 mod outcome;
 mod parameters;
 mod priors;
+mod reading;
 mod solver;
 #[cfg(test)]
 mod tests;
@@ -38,14 +43,18 @@ mod unexplained;
 
 pub use cell::{ContactCell, SIGMA_PER_S};
 pub use diagnosis::{Diagnosis, Doubt, Farthest, Left};
+pub use interval::Interval;
+pub use joint::{Joint, joint};
 pub use levels::{LEVEL_LINES, LevelError, LevelStiffness, Shares, SteadyLevel, level_stiffness};
-pub use outcome::{Interval, OfFrequency, Stiffness};
+pub use outcome::{OfFrequency, Stiffness};
 pub use priors::{Cause, ContactPriors};
 
 use crate::band::Band;
 use crate::substructuring::geometry::Grouping;
 use block::{Block, blocks};
-use nalgebra::DMatrix;
+use budget::{Variances, of_sum};
+use covariance::Certainty;
+use nalgebra::DVector;
 use parameters::Parameters;
 use solver::Solution;
 use trusted_band::trusted;
@@ -140,8 +149,23 @@ pub fn stiffness(input: &Input<'_>) -> Result<Stiffness, ContactError> {
 #[derive(Debug, Clone)]
 pub struct Known {
     p: Vec<f64>,
-    /// Their covariance, with the misfit counted.
-    covariance: DMatrix<f64>,
+    parameters: Parameters,
+    certainty: Certainty,
+    /// By how much χ² exceeds what it should be; 1 at least.
+    misfit: f64,
+    hammer_gain: f64,
+}
+
+impl Known {
+    /// Variances of Σ row_i p_i by cause.
+    fn of_sum(&self, row: &DVector<f64>) -> Variances {
+        of_sum(row, &self.parameters, &self.certainty, self.misfit)
+    }
+
+    /// Variance of Σ row_i p_i, the misfit counted.
+    fn variance(&self, row: &DVector<f64>) -> f64 {
+        (&self.certainty.covariance * row).dot(row) * self.misfit
+    }
 }
 
 /// As [`stiffness`], with everything else that the fit found.
@@ -172,8 +196,9 @@ impl Fit {
     fn told(self, input: &Input<'_>) -> Result<(Stiffness, Known), ContactError> {
         let Fit { parameters, blocks, solution } = self;
         let found = outcome::of(input, &blocks, &parameters, &solution)?;
-        let covariance = &solution.certainty.covariance * solution.chi_square.max(1.0);
-        Ok((found, Known { p: solution.p, covariance }))
+        let Solution { p, certainty, chi_square, .. } = solution;
+        let (misfit, hammer_gain) = (chi_square.max(1.0), input.priors.hammer_gain);
+        Ok((found, Known { p, parameters, certainty, misfit, hammer_gain }))
     }
 }
 

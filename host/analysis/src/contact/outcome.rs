@@ -2,7 +2,9 @@
 
 use super::bins::BIN_HZ;
 use super::block::Block;
+use super::budget::{of_sum, stiffness_of};
 use super::diagnosis::{Diagnosis, Doubt, diagnose, part};
+use super::interval::Interval;
 use super::parameters::{COMPLIANCE, Parameters, RETARDATION};
 use super::priors::Cause;
 use super::solver::Solution;
@@ -10,17 +12,9 @@ use super::{ContactError, Input};
 use crate::band::Band;
 use crate::identified::COMPLIANCE_HALF_WIDTH;
 use crate::substructuring::joint_over_bands::NORMAL_95;
+use nalgebra::DVector;
 use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// A value with its 95 % interval.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Interval {
-    /// The value.
-    pub mean: f64,
-    /// Its interval.
-    pub ci95: [f64; 2],
-}
 
 /// k_T of one bin of frequencies, N/m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -66,45 +60,12 @@ pub fn of(
 ) -> Result<Stiffness, ContactError> {
     let compliance = solution.p[COMPLIANCE];
     let covariance = &solution.certainty.covariance;
-    let variance = covariance[(COMPLIANCE, COMPLIANCE)];
     let misfit = solution.chi_square.max(1.0);
-    let relative = |variance: f64| variance.max(0.0) / (compliance * compliance);
-
-    let mut budget: BTreeMap<Cause, f64> = BTreeMap::new();
-    let mut noise = variance;
-    for (i, own) in parameters.all().iter().enumerate() {
-        if !own.sigma.is_finite() || own.sigma == 0.0 || own.cause == Cause::Noise {
-            continue;
-        }
-        // the estimate's answer to an error of the prior, whose precision is that of half an inverse
-        let share = (solution.certainty.answer[(COMPLIANCE, i)] / own.sigma).powi(2);
-        *budget.entry(own.cause).or_default() += relative(share);
-        noise -= share;
-    }
-    budget.insert(Cause::Noise, relative(noise));
-    budget.insert(Cause::Misfit, relative(variance * (misfit - 1.0)));
-    *budget.entry(Cause::Gains).or_default() += input.priors.hammer_gain.powi(2);
-    let whole: f64 = budget.values().sum::<f64>();
-    let sigma = whole.sqrt() * compliance.abs();
-    for share in budget.values_mut() {
-        *share = share.sqrt();
-    }
-    budget.retain(|_, share| *share > 0.0);
-
-    let half = NORMAL_95 * sigma;
-    if !(compliance > 0.0 && half < COMPLIANCE_HALF_WIDTH * compliance) {
-        let stiffest = compliance + half;
-        return Err(ContactError::NotIdentified(if stiffest > 0.0 {
-            format!(
-                "the contact is too stiff to be told from a rigid one: k_T is above {:.0} N/µm",
-                1e-6 / stiffest
-            )
-        } else {
-            "the compliance comes out negative".into()
-        }));
-    }
-    let k = 1.0 / compliance;
-    let k_t = Interval { mean: k, ci95: [1.0 / (compliance + half), 1.0 / (compliance - half)] };
+    let mut row = DVector::zeros(solution.p.len());
+    row[COMPLIANCE] = 1.0;
+    let variances = of_sum(&row, parameters, &solution.certainty, misfit);
+    let (k_t, budget) = stiffness_of(compliance, variances, input.priors.hammer_gain)?;
+    let k = k_t.mean;
     // c = β/c₀
     let beta = solution.p[RETARDATION];
     let slopes = [-beta * k * k, k];

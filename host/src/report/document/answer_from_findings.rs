@@ -1,7 +1,7 @@
 //! The answer, from what was found.
 
 use crate::analyse::Findings;
-use crate::contact::{Interval, Stiffness};
+use crate::contact::{Interval, Joint, Stiffness};
 use crate::report::words::answer_sentences as say;
 use crate::report::words::check_sentences::hammer_slip;
 use crate::results::{Answer, Basis, BetweenArms, Clamp, ContactAnswer, Slip};
@@ -13,7 +13,10 @@ pub fn answer(found: &Findings) -> Option<Answer> {
     let own = found.own_stiffness.as_ref()?;
     let slip = slip(found);
     let contact = match own {
-        Ok(own) => of_stiffness(own, slip.found == Some(true)),
+        Ok(own) => {
+            let joint = found.contact.as_ref().and_then(|contact| contact.joint.as_ref());
+            of_stiffness(own, joint, slip.found == Some(true))
+        }
         Err(_) if slip.found == Some(true) => unknown(say::slipping()),
         Err(error) => unknown(say::capital(&error.to_string())),
     };
@@ -22,16 +25,22 @@ pub fn answer(found: &Findings) -> Option<Answer> {
     Some(Answer { contact, between_arms, clamp, slip, truth: None })
 }
 
-fn of_stiffness(own: &Stiffness, slips: bool) -> ContactAnswer {
+fn of_stiffness(own: &Stiffness, joint: Option<&Joint>, slips: bool) -> ContactAnswer {
     let trusted = own.doubts.is_empty() && !slips;
+    let joint = joint.filter(|_| trusted);
+    let (k_t, budget) = joint.map_or((own.k_t_n_per_m, &own.budget), |both| (both.k_t_n_per_m, &both.budget));
     ContactAnswer {
-        k_t_n_per_m: trusted.then_some(own.k_t_n_per_m),
+        k_t_n_per_m: trusted.then_some(k_t),
         c_t_n_s_per_m: trusted.then_some(own.c_t_n_s_per_m),
-        basis: if trusted { Basis::SpecimenPoints } else { Basis::None },
+        basis: match (trusted, joint) {
+            (false, _) => Basis::None,
+            (true, None) => Basis::SpecimenPoints,
+            (true, Some(_)) => Basis::Joint,
+        },
         band_hz: Some(own.band_hz.into()),
-        budget: own.budget.iter().map(|(cause, share)| (cause.name(), *share)).collect(),
+        budget: budget.iter().map(|(cause, share)| (cause.name(), *share)).collect(),
         why: match (trusted, slips) {
-            (true, _) => say::identified(own),
+            (true, _) => say::identified(budget, joint.map_or(0, |both| both.levels)),
             (_, true) => say::slipping(),
             _ => say::doubted(own),
         },

@@ -82,7 +82,7 @@ fn at_the_contact(row: Hysteresis, one: &RecordLoops) -> Hysteresis {
                 k_t_n_per_m: Some(OverCycles { mean: k.mean, std, cycles, ci95: Some(k.ci95) }),
                 c_t_n_s_per_m: Some(own.c_t_n_s_per_m),
                 k_t_budget: Some(own.shares),
-                k_t_why: Some(level_sentences::corrected(own)),
+                k_t_why: Some(level_sentences::corrected(&own.shares, own.correction)),
                 ..row
             }
         }

@@ -4,24 +4,30 @@ use super::number::{micro, short};
 use crate::contact::{Cause, Diagnosis, Doubt, Interval, Stiffness};
 use crate::results::{Answer, Results};
 use crate::substructuring::between_arms::Basis as Estimate;
+use std::collections::BTreeMap;
 
 /// A stiffness with its interval, in N/µm.
 pub fn with_interval(k: &Interval) -> String {
     format!("{} N/µm (95 % {}…{})", short(micro(k.mean)), short(micro(k.ci95[0])), short(micro(k.ci95[1])))
 }
 
-/// Why this k_T may be believed, and what makes its interval.
-pub fn identified(own: &Stiffness) -> String {
-    let mut causes: Vec<(&Cause, &f64)> = own.budget.iter().collect();
+/// Why this k_T may be believed, and what makes its interval; `levels` of the shaker count beside the hits.
+pub fn identified(budget: &BTreeMap<Cause, f64>, levels: usize) -> String {
+    let mut causes: Vec<(&Cause, &f64)> = budget.iter().collect();
     causes.sort_by(|a, b| b.1.total_cmp(a.1));
     let largest: Vec<String> = causes
         .iter()
         .take(2)
         .map(|(cause, share)| format!("{} ({:.1} %)", of_cause(**cause), 100.0 * **share))
         .collect();
+    let beside = match levels {
+        0 => String::new(),
+        1 => " A level of the shaker, corrected by the hits, counts beside them.".into(),
+        _ => format!(" {levels} levels of the shaker, corrected by the hits, count beside them."),
+    };
     format!(
         "The force is calibrated with hits on B alone, and the specimen's rotation is measured: this is the contact's own stiffness, whatever the \
-         clamps do. Most of its uncertainty comes from {}.",
+         clamps do.{beside} Most of its uncertainty comes from {}.",
         largest.join(" and ")
     )
 }

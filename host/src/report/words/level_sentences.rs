@@ -4,12 +4,11 @@ use super::names::shape_name;
 use super::number::short;
 use super::warning_sentences::loop_finding;
 use crate::analyse::NoLevelStiffness;
-use crate::contact::LevelStiffness;
+use crate::contact::Shares;
 use crate::hysteresis::Shape;
 
-/// What makes a level's interval.
-pub fn corrected(found: &LevelStiffness) -> String {
-    let shares = &found.shares;
+/// What makes a level's interval; `correction` is the part of T/Δx at the spots that is not the contact's.
+pub fn corrected(shares: &Shares, correction: f64) -> String {
     let mut causes = [
         (shares.fit, "what the hits tell of spots, points, gains and force"),
         (shares.hammer_gain, "the gain of the hammer's force cell"),
@@ -21,7 +20,7 @@ pub fn corrected(found: &LevelStiffness) -> String {
     format!(
         "Force and Δx are those at the contact, by the specimens' rotation from the hits: {} % of T/Δx at the spots was not the contact's. Most of its \
          uncertainty comes from {} ({:.1} %).",
-        short(100.0 * found.correction),
+        short(100.0 * correction),
         causes[0].1,
         100.0 * causes[0].0
     )
@@ -43,6 +42,10 @@ pub fn none(why: &NoLevelStiffness) -> String {
         }
         NoLevelStiffness::Finding(finding) => loop_finding(finding),
         NoLevelStiffness::Level(error) => error.to_string(),
+        NoLevelStiffness::Apart(deviations) => format!(
+            "it is {} standard deviations from what the hits say: see answer.contact",
+            short(*deviations)
+        ),
         NoLevelStiffness::Wide(half) => format!(
             "the specimens' rotation makes so much of Δx here that k_T is known to ± {} % only",
             short(100.0 * half)
@@ -54,22 +57,13 @@ pub fn none(why: &NoLevelStiffness) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::{Interval, Shares};
     use crate::report::words::levels_at_the_contact;
     use crate::results::{OverCycles, example_tests as example};
 
     #[test]
     fn a_level_says_what_made_its_interval() {
         let shares = Shares { fit: 0.01, hammer_gain: 0.005, turning: 0.002, place: 0.021, level: 1e-4 };
-        let interval = Interval { mean: 180e6, ci95: [172e6, 189e6] };
-        let found = LevelStiffness {
-            k_t_n_per_m: interval,
-            std_n_per_m: 1e5,
-            c_t_n_s_per_m: interval,
-            shares,
-            correction: 0.31,
-        };
-        let said = corrected(&found);
+        let said = corrected(&shares, 0.31);
         assert!(said.contains("31") && said.contains("where the shaker pushes (2.1 %)"), "{said}");
     }
 
