@@ -1,12 +1,13 @@
 //! What is measured, corrected for what is believed of the geometry, and its residuals against the model.
 
 use super::FitError;
+use super::assembly_aims::Pushes;
 use super::block::{Block, Line};
 use super::cell::CellGeometry;
 use super::chart::Chart;
 use super::model::{Layout, Predicted};
-use super::noise::Noise;
-use super::nuisance::Nuisances;
+use super::noise::{ByImpact, Noise};
+use super::nuisance::{AIMS, Nuisances};
 use super::shift::Shift;
 use crate::parallel::prelude::*;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -44,6 +45,7 @@ pub(super) struct Problem {
     pub(super) own_noise: Vec<Noise>,
     /// T_u and T_f of the measured ports.
     pub(super) reductions: (Line, Line),
+    pub(super) pushes: Pushes,
     /// See [`crate::frf::noise::shared_by_lines`].
     pub(super) shared: f64,
 }
@@ -71,19 +73,35 @@ impl Problem {
         let count = ((span / WIDTH_HZ).round() as usize).clamp(1, s.len());
         let bands: Vec<Range<usize>> =
             (0..count).map(|b| b * s.len() / count..(b + 1) * s.len() / count).collect();
-        let reductions =
-            (ajb.t_u.select_rows(&rows).map(C::from), ajb.t_f.select_columns(&columns).map(C::from));
+        let t_f = ajb.t_f.select_columns(&columns);
+        let reductions = (ajb.t_u.select_rows(&rows).map(C::from), t_f.map(C::from));
+        let pushes = Pushes::of(&t_f);
         let own_noise = (bands.par_iter())
             .map(|band| {
-                let mut noise = Noise::none(rows.len() * columns.len());
+                let mut noise = Noise::none(rows.len(), columns.len());
                 let share = 1.0 / band.len() as f64;
                 let variance = (band.clone().map(|l| &ajb.variance[l]))
                     .fold(ajb.variance[band.start].map(|_| 0.0), |sum, v| sum + v * share);
-                noise.spread(&reductions.0, &reductions.1, &variance, 2.0 * shared * share);
+                let own =
+                    ByImpact::of_cells(&reductions.0, reductions.1.clone(), &variance, 2.0 * shared * share);
+                noise.add_by_impact(&[own]);
                 noise
             })
             .collect();
-        Problem { parts, ajb, layout, s, bands, rows, columns, nuisances, own_noise, reductions, shared }
+        Problem {
+            parts,
+            ajb,
+            layout,
+            s,
+            bands,
+            rows,
+            columns,
+            nuisances,
+            own_noise,
+            reductions,
+            pushes,
+            shared,
+        }
     }
 
     /// A, B and AJB, with the place of each among the nuisance parameters.
@@ -143,6 +161,12 @@ impl Problem {
         }
         let bias = self.bias(chart, p, &parts)?;
         Ok(Corrected { parts, ajb, bias })
+    }
+
+    /// The nuisance parameter that is aim `k` at the assembly's cells of an impact, sensor by sensor.
+    pub(super) fn assembly_aim(&self, impact: usize, k: usize) -> usize {
+        let (sensor, own) = (k / AIMS, k % AIMS);
+        self.nuisances.of_assembly() + AIMS * (sensor * self.ajb.impacts.len() + impact) + own
     }
 
     pub(super) fn frequency_hz(&self, line: usize) -> f64 {

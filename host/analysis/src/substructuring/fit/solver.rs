@@ -79,7 +79,10 @@ impl Pass<'_> {
     fn products(&self, columns: &[DMatrix<f64>]) -> Products {
         let by_band: Vec<_> = (self.weight.bands.par_iter())
             .zip(columns)
-            .map(|(weight, columns)| (crossed(columns, columns), crossed(&weight.g, columns)))
+            .map(|(weight, columns)| {
+                let pulled = weight.g.pulled(self.problem, &weight.whitening, columns);
+                (crossed(columns, columns), pulled)
+            })
             .collect();
         let count = 1 + self.chart.count();
         let mut all = DMatrix::zeros(count, count);
@@ -205,8 +208,9 @@ pub(super) fn search(problem: &Problem, chart: &Chart, start: &DVector<f64>) -> 
         let data = problem.corrected(chart, &p, eta.as_slice())?;
         let cells = [0, 1, 2].map(|place| problem.cells(place, eta.as_slice()));
         let weight = Weight::of(Point { problem, chart, p: &p, cells: &cells, data: &data })?;
-        let eta_column = DMatrix::from_column_slice(nuisances, 1, eta.as_slice());
-        let believed: Vec<DMatrix<f64>> = weight.bands.iter().map(|b| &b.g * &eta_column).collect();
+        let believed: Vec<DMatrix<f64>> = (weight.bands.par_iter())
+            .map(|band| band.g.times(problem, &band.whitening, eta.as_slice()))
+            .collect();
         let mut mild = 1.0;
         let mut trial = 0;
         let (chi, found_eta, (next, covariance)) = loop {
