@@ -32,8 +32,18 @@ pub(super) struct Effect {
 /// From a block's cells to the residual: left · cells · right. The cells read what the ports' admittance y makes them.
 struct Way {
     y: Line,
-    left: Line,
+    /// Real parts above imaginary ones.
+    left: DMatrix<f64>,
     right: Line,
+}
+
+/// Real parts above imaginary ones.
+fn stacked(y: &Line) -> DMatrix<f64> {
+    let columns = y.column_iter().flat_map(|column| {
+        let (re, im): (Vec<f64>, Vec<f64>) = column.iter().map(|v| (v.re, v.im)).unzip();
+        re.into_iter().chain(im)
+    });
+    DMatrix::from_iterator(2 * y.nrows(), y.ncols(), columns)
 }
 
 impl Point<'_> {
@@ -51,19 +61,19 @@ impl Point<'_> {
         let (rows, columns) = problem.layout.shape();
         let mut mean = Line::zeros(rows, columns);
         let mut ways: [Vec<Way>; 2] = [vec![], vec![]];
+        let mut lines_slopes = Vec::with_capacity(lines.len());
         for l in lines.clone() {
             let y = [part(0, l), part(1, l)];
             let predicted = problem.predict(chart, self.p, [&y[0], &y[1]], l, slopes)?;
             mean += &predicted.y * C::from(share);
-            for (d, slope) in predicted.slopes.iter().enumerate() {
-                problem.add_measured(model.column_mut(1 + d).as_mut_slice(), slope, share);
-            }
             for (side, y) in y.into_iter().enumerate() {
                 let (left, right) = problem.through(side, &predicted);
-                ways[side].push(Way { y, left, right });
+                ways[side].push(Way { y, left: stacked(&left), right });
             }
+            lines_slopes.push(predicted.slopes);
         }
         problem.add_measured(model.column_mut(0).as_mut_slice(), &mean, 1.0);
+        problem.put_slopes(&mut model, &lines_slopes, share);
         for (side, ways) in ways.iter().enumerate() {
             // Y^A and Y^B stand on the model's side of the residual: minus
             self.aims(side, ways, -share, &mut written);
@@ -166,10 +176,11 @@ impl Point<'_> {
                         let re = &mut re[height * l + at..][..rows];
                         let im = &mut im[height * l + at..][..rows];
                         for (row, v) in sensor.rows.iter().zip(values.by_ref()) {
-                            let left = &way.left.as_slice()[row * rows..][..rows];
-                            for ((re, im), left) in re.iter_mut().zip(im.iter_mut()).zip(left) {
-                                *re += left.re * v.re - left.im * v.im;
-                                *im += left.re * v.im + left.im * v.re;
+                            let (left, left_im) = way.left.as_slice()[2 * row * rows..][..2 * rows].split_at(rows);
+                            let parts = re.iter_mut().zip(im.iter_mut()).zip(left.iter().zip(left_im));
+                            for ((re, im), (left, left_im)) in parts {
+                                *re += left * v.re - left_im * v.im;
+                                *im += left * v.im + left_im * v.re;
                             }
                         }
                     }

@@ -4,7 +4,7 @@
 //! R = I − Bᵀ G⁻¹ Q; a change of the joint −P δ(G⁻¹) Q.
 
 use super::block::{Line, Ports};
-use super::chart::At;
+use super::chart::{At, Dyad};
 use crate::substructuring::product::product;
 use crate::substructuring::pseudo_inverse::full_rank_inverse;
 use nalgebra::Complex;
@@ -26,8 +26,14 @@ pub(super) struct Predicted {
     /// P G⁻¹ and G⁻¹ Q.
     pg: Line,
     gq: Line,
-    /// Derivative of `y` by each parameter of the joint.
-    pub(super) slopes: Vec<Line>,
+    /// Derivative of `y` by each parameter of the joint, as sums of products.
+    pub(super) slopes: Vec<Vec<Product>>,
+}
+
+/// A column for all output ports times a row for all input ports.
+pub(super) struct Product {
+    pub(super) moved: Vec<C>,
+    pub(super) by: Vec<C>,
 }
 
 impl Layout {
@@ -92,25 +98,19 @@ impl Layout {
         // δ(G⁻¹) = H (δD (I − W G⁻¹) − δE G⁻¹)
         let ph = product(&p, &h);
         let rest = &q - product(&w, &gq);
-        let mut moved = vec![C::default(); rows];
-        let slopes = (joint.slopes.iter())
-            .map(|dyads| {
-                let mut slope = Line::zeros(rows, columns);
-                for dyad in dyads {
-                    moved.fill(C::default());
-                    for (i, v) in &dyad.left {
-                        moved.iter_mut().zip(ph.column(*i).iter()).for_each(|(to, p)| *to -= p * v);
-                    }
-                    for (c, to) in slope.as_mut_slice().chunks_exact_mut(rows.max(1)).enumerate() {
-                        let pushed: C = dyad.d.iter().map(|(i, v)| rest[(*i, c)] * v).sum();
-                        let eased: C = dyad.e.iter().map(|(i, v)| gq[(*i, c)] * v).sum();
-                        let by = pushed - eased;
-                        to.iter_mut().zip(&moved).for_each(|(to, moved)| *to += moved * by);
-                    }
-                }
-                slope
-            })
-            .collect();
+        let product_of = |dyad: &Dyad| {
+            let mut moved = vec![C::default(); rows];
+            for (i, v) in &dyad.left {
+                moved.iter_mut().zip(ph.column(*i).iter()).for_each(|(to, p)| *to -= p * v);
+            }
+            let by = (0..columns).map(|c| {
+                let pushed: C = dyad.d.iter().map(|(i, v)| rest[(*i, c)] * v).sum();
+                let eased: C = dyad.e.iter().map(|(i, v)| gq[(*i, c)] * v).sum();
+                pushed - eased
+            });
+            Product { moved, by: by.collect() }
+        };
+        let slopes = joint.slopes.iter().map(|dyads| dyads.iter().map(product_of).collect()).collect();
         Some(Predicted { y: self.apart(parts) - product(&p, &gq), pg, gq, slopes })
     }
 

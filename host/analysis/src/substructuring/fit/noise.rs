@@ -1,7 +1,7 @@
 //! The covariance of one band's residual. Noise of a line is circular, so it is one Hermitian matrix N.
 
 use super::block::Line;
-use super::factor::Factor;
+use super::factor::{Factor, rows};
 use crate::substructuring::product::product;
 use nalgebra::DMatrix;
 
@@ -84,7 +84,7 @@ impl Noise {
     pub(super) fn add(&mut self, x: &DMatrix<f64>) {
         let m = self.re.nrows();
         // beside each other, in memory of their own: products of views with few rows read past their end
-        let (re, im) = (x.rows(0, m).clone_owned(), x.rows(m, m).clone_owned());
+        let (re, im) = (rows(x, 0, m), rows(x, m, m));
         let re_t = re.transpose();
         let crossed: DMatrix<f64> = &im * &re_t;
         self.im += &crossed - crossed.transpose();
@@ -138,7 +138,7 @@ impl Whitening {
     pub(super) fn inverse(&self) -> [DMatrix<f64>; 2] {
         let m = self.scale.len();
         let left = self.back(self.of(DMatrix::identity(2 * m, m)));
-        [left.rows(0, m).clone_owned(), left.rows(m, m).clone_owned()]
+        [rows(&left, 0, m), rows(&left, m, m)]
     }
 
     fn scaled(&self, x: &mut DMatrix<f64>) {

@@ -5,7 +5,7 @@ use super::assembly_aims::Pushes;
 use super::block::{Block, Line};
 use super::cell::CellGeometry;
 use super::chart::Chart;
-use super::model::{Layout, Predicted};
+use super::model::{Layout, Predicted, Product};
 use super::noise::{ByImpact, Noise};
 use super::nuisance::{AIMS, Nuisances};
 use super::shift::Shift;
@@ -233,15 +233,41 @@ impl Problem {
     ) -> Result<DMatrix<f64>, FitError> {
         let mut sums = DMatrix::zeros(2 * self.entries(), 1 + chart.count());
         let share = 1.0 / band.len() as f64;
+        let mut slopes = Vec::with_capacity(band.len());
         for l in band {
             let predicted = self.predict(chart, p, [&data.parts[0][l], &data.parts[1][l]], l, true)?;
             let difference = &data.ajb[l] - predicted.y - &data.bias[l];
             self.add_measured(sums.column_mut(0).as_mut_slice(), &difference, share);
-            for (d, slope) in predicted.slopes.iter().enumerate() {
-                self.add_measured(sums.column_mut(1 + d).as_mut_slice(), slope, share);
-            }
+            slopes.push(predicted.slopes);
         }
+        self.put_slopes(&mut sums, &slopes, share);
         Ok(sums)
+    }
+
+    /// Puts the derivatives of lines, summed and times `share`, into the columns after the first.
+    ///
+    /// Each is a column times a row, so their sum over lines is one product of matrices.
+    pub(super) fn put_slopes(&self, sums: &mut DMatrix<f64>, lines: &[Vec<Vec<Product>>], share: f64) {
+        let (rows, columns) = (self.rows.len(), self.columns.len());
+        for parameter in 0..lines.first().map_or(0, Vec::len) {
+            let count: usize = lines.iter().map(|slopes| slopes[parameter].len()).sum();
+            let mut moved = DMatrix::<f64>::zeros(rows, 2 * count);
+            let mut by = DMatrix::<f64>::zeros(2 * count, 2 * columns);
+            for (j, product) in lines.iter().flat_map(|slopes| &slopes[parameter]).enumerate() {
+                for (r, port) in self.rows.iter().enumerate() {
+                    moved[(r, j)] = product.moved[*port].re;
+                    moved[(r, count + j)] = product.moved[*port].im;
+                }
+                for (c, port) in self.columns.iter().enumerate() {
+                    let v = product.by[*port] * share;
+                    by[(j, c)] = v.re;
+                    by[(count + j, c)] = -v.im;
+                    by[(j, columns + c)] = v.im;
+                    by[(count + j, columns + c)] = v.re;
+                }
+            }
+            sums.column_mut(1 + parameter).copy_from_slice((moved * by).as_slice());
+        }
     }
 
     /// Adds the measured ports of `y` times `share` to a column of real parts above imaginary ones.

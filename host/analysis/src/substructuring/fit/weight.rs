@@ -9,7 +9,7 @@ use super::assembly_aims::{AssemblyAims, Met, OfImpact};
 use super::block::Line;
 use super::cell::CellGeometry;
 use super::chart::Chart;
-use super::factor::crossed;
+use super::factor::{crossed, rows as own_rows};
 use super::noise::{ByImpact, Whitening};
 use super::problem::{Corrected, Problem};
 use crate::parallel::prelude::*;
@@ -98,7 +98,7 @@ fn put_written(bands: &[BandWeight], information: &mut DMatrix<f64>) {
             for (band, turned) in bands.iter().zip(&turned) {
                 let right = band.g.written.columns(columns.start, columns.len());
                 // a copy of its own: products of views with few rows read past their end
-                sum.gemm(1.0, &turned.rows(rows.start, rows.len()).clone_owned(), &right, 1.0);
+                sum.gemm(1.0, &own_rows(turned, rows.start, rows.len()), &right, 1.0);
             }
             sum
         })
