@@ -1,8 +1,8 @@
 //! What aims at the assembly's cells do to a band's residual, without writing it out.
 //!
 //! A cell of impact i reaches the residual through its row tᵢ of T_f, which is real and the same at every line. So what an aim does is
-//! v ⊗ tᵢ, where v has an entry for each measured row only, and the products with N⁻¹ that the fit needs are made of these short columns: of two
-//! thirds of all nuisance parameters a tenth of the work.
+//! v ⊗ tᵢ, where v has an entry for each measured row only, and the products with N⁻¹ that the fit needs are made of these short columns: two
+//! thirds of all nuisance parameters are such aims.
 
 use super::noise::{ByImpact, Whitening};
 use nalgebra::{Complex, DMatrix, DMatrixView};
@@ -45,7 +45,7 @@ impl Pushes {
 }
 
 impl AssemblyAims {
-    /// Half the difference of these and others, times `scale`.
+    /// The difference of these and others, times `scale`.
     pub(super) fn apart(&self, other: &AssemblyAims, scale: f64) -> AssemblyAims {
         let pairs = self.by_impact.iter().zip(&other.by_impact);
         AssemblyAims { by_impact: pairs.map(|(one, other)| (one - other) * scale).collect() }

@@ -176,7 +176,8 @@ impl Point<'_> {
                         let re = &mut re[height * l + at..][..rows];
                         let im = &mut im[height * l + at..][..rows];
                         for (row, v) in sensor.rows.iter().zip(values.by_ref()) {
-                            let (left, left_im) = way.left.as_slice()[2 * row * rows..][..2 * rows].split_at(rows);
+                            let (left, left_im) =
+                                way.left.as_slice()[2 * row * rows..][..2 * rows].split_at(rows);
                             let parts = re.iter_mut().zip(im.iter_mut()).zip(left.iter().zip(left_im));
                             for ((re, im), (left, left_im)) in parts {
                                 *re += left * v.re - left_im * v.im;
