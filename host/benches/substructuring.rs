@@ -1,14 +1,20 @@
-//! The hot paths of substructuring: all methods on a campaign's lines, and the bootstrap of 1000 replicates.
+//! The hot paths of substructuring: all methods on a campaign's lines, the fit, and the bootstrap of 1000 replicates.
 //!
 //!     cargo bench -p jointrig --bench substructuring
 
 use divan::Bencher;
 use jointrig::exchange::{read_frf, read_positions};
 use jointrig::substructuring::averaged::{CellHits, Prepared, Priors};
+use jointrig::substructuring::fit::{Options, fit};
 use jointrig::substructuring::geometry::{Geometry, Grouping};
 use jointrig::substructuring::{Band, Frf, IdmSet, Method, identify};
 use nalgebra::Complex;
 use std::path::{Path, PathBuf};
+
+#[cfg(feature = "sim")]
+#[expect(dead_code, reason = "the rest is for the tables of the tests")]
+#[path = "../tests/simulated/mod.rs"]
+mod simulated;
 
 fn main() {
     divan::main();
@@ -37,6 +43,19 @@ fn all_methods_on_3600_lines(bencher: Bencher) {
     let (a, b, ajb, geometry) = (frf("A.npz", 3600), frf("B.npz", 3600), frf("AJB.npz", 3600), geometry());
     let band = Band { low_hz: 300.0, high_hz: 3000.0 };
     bencher.bench(|| identify(&a, &b, &ajb, &geometry, &Method::PAPER, &[IdmSet::Six], &[band]));
+}
+
+/// `fit` of a simulated campaign over 300–600 Hz: 162 cells of the interface, 20 bands of 30 lines, 900 errors of geometry. What its weights
+/// alone gain over the formulas as they are written is printed by
+/// `cargo test --release -p jointrig-analysis --lib speed_of_the_weights -- --ignored --nocapture`.
+#[cfg(feature = "sim")]
+#[divan::bench(sample_count = 3)]
+fn fit_over_the_main_band(bencher: Bencher) {
+    let c = simulated::campaign(&simulated::rigid_rig(180e6), 0.05e-6, 1, [300.0, 600.0]);
+    let geometry = geometry();
+    let band = Band { low_hz: 300.0, high_hz: 600.0 };
+    let [a, b, ajb] = [&c.a, &c.b, &c.ajb].map(|m| &m.frf);
+    bencher.bench(|| fit(a, b, ajb, &geometry, IdmSet::Six, band, &Options::default()).expect("a joint"));
 }
 
 /// 1000 replicates of eight hits on 18 × 18 interface cells over 300–600 Hz.

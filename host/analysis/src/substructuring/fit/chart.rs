@@ -51,10 +51,13 @@ pub(super) type Slope = Vec<Dyad>;
 
 /// One term of a derivative.
 pub(super) struct Dyad {
-    pub(super) left: DVector<C>,
-    pub(super) d: DVector<C>,
-    pub(super) e: DVector<C>,
+    pub(super) left: Sparse,
+    pub(super) d: Sparse,
+    pub(super) e: Sparse,
 }
+
+/// A vector of which only these entries differ from zero.
+pub(super) type Sparse = Vec<(usize, C)>;
 
 impl Chart {
     pub(super) fn diagonal(unit: Vec<f64>, omega: f64) -> Chart {
@@ -149,9 +152,9 @@ impl Chart {
             at.d[(d, d)] = loss * (p[d] / self.unit[d]);
             at.e[(d, d)] = C::from(1.0 - p[d]);
             if slopes {
-                let along = |v: C| DVector::from_fn(n, |i, _| if i == d { v } else { C::default() });
-                let dyad =
-                    |dd: C, de: C| vec![Dyad { left: along(C::from(1.0)), d: along(dd), e: along(de) }];
+                let dyad = |dd: C, de: C| {
+                    vec![Dyad { left: vec![(d, C::from(1.0))], d: vec![(d, dd)], e: vec![(d, de)] }]
+                };
                 by_kappa.push(dyad(loss / self.unit[d], C::from(-1.0)));
                 by_loss.push(dyad(s * (p[d] / self.unit[d] / self.omega), C::default()));
             }
@@ -173,13 +176,12 @@ impl Chart {
                 for (r, c) in triangle(n) {
                     // d(L Lᵀ) = e_r (column c of L)ᵀ + its transpose
                     let unit = |i: usize| self.unit[i].sqrt().recip();
-                    let row =
-                        DVector::from_fn(n, |i, _| if i == r { C::from(unit(i)) } else { C::default() });
-                    let column = DVector::from_fn(n, |i, _| C::from(root[(i, c)] * unit(i)));
-                    let (scaled, none) = (|v: &DVector<C>| v * factor, DVector::zeros(n));
+                    let row: Sparse = vec![(r, C::from(unit(r)))];
+                    let column: Sparse = (0..n).map(|i| (i, C::from(root[(i, c)] * unit(i)))).collect();
+                    let scaled = |v: &Sparse| v.iter().map(|(i, v)| (*i, v * factor)).collect();
                     at.slopes.push(vec![
-                        Dyad { d: scaled(&column), left: row.clone(), e: none.clone() },
-                        Dyad { d: scaled(&row), left: column, e: none },
+                        Dyad { d: scaled(&column), left: row.clone(), e: vec![] },
+                        Dyad { d: scaled(&row), left: column, e: vec![] },
                     ]);
                 }
             }

@@ -1,9 +1,11 @@
 //! What every error of geometry does to a band's residual, at one set of Y^A and Y^B.
 
 use super::FitError;
+use super::assembly_aims::AssemblyAims;
 use super::block::{Block, Line};
 use super::cell::CellGeometry;
 use super::model::Predicted;
+use super::nuisance::AIMS;
 use super::problem::Problem;
 use super::weight::Point;
 use crate::substructuring::product::product;
@@ -12,75 +14,146 @@ use std::ops::{AddAssign, Range};
 
 type C = Complex<f64>;
 
-/// Nuisance parameters of a cell's own aim: three of the sensor, two of the impact.
-const AIMS: usize = 5;
-
 /// A band's means at one set of Y^A and Y^B: real parts of the measured entries above imaginary ones.
 pub(super) struct Evaluated {
-    /// The model, then its derivatives by the joint.
+    /// The model, then its derivatives by the joint where they were asked for.
     pub(super) model: DMatrix<f64>,
-    /// ∂r/∂η, η in standard deviations: one column for each nuisance parameter.
-    pub(super) effect: DMatrix<f64>,
+    pub(super) effect: Effect,
+}
+
+/// ∂r/∂η, η in standard deviations.
+pub(super) struct Effect {
+    /// Of positions, tilts and the aims at A's and B's cells: one column for each.
+    pub(super) written: DMatrix<f64>,
+    /// Of the aims at the assembly's cells, the last of all nuisance parameters.
+    pub(super) aims: AssemblyAims,
 }
 
 /// From a block's cells to the residual: left · cells · right. The cells read what the ports' admittance y makes them.
 struct Way {
     y: Line,
-    left: Line,
+    /// Real parts above imaginary ones.
+    left: DMatrix<f64>,
     right: Line,
+}
+
+/// Real parts above imaginary ones.
+fn stacked(y: &Line) -> DMatrix<f64> {
+    let columns = y.column_iter().flat_map(|column| {
+        let (re, im): (Vec<f64>, Vec<f64>) = column.iter().map(|v| (v.re, v.im)).unzip();
+        re.into_iter().chain(im)
+    });
+    DMatrix::from_iterator(2 * y.nrows(), y.ncols(), columns)
 }
 
 impl Point<'_> {
     pub(super) fn evaluated(
         &self,
         lines: &Range<usize>,
+        slopes: bool,
         part: impl Fn(usize, usize) -> Line,
     ) -> Result<Evaluated, FitError> {
         let Point { problem, chart, .. } = *self;
         let m = problem.entries();
         let share = 1.0 / lines.len() as f64;
-        let mut model = DMatrix::zeros(2 * m, 1 + chart.count());
-        let mut effect = DMatrix::zeros(2 * m, problem.nuisances.std.len());
+        let mut model = DMatrix::zeros(2 * m, if slopes { 1 + chart.count() } else { 1 });
+        let mut written = DMatrix::zeros(2 * m, problem.nuisances.of_assembly());
         let (rows, columns) = problem.layout.shape();
         let mut mean = Line::zeros(rows, columns);
         let mut ways: [Vec<Way>; 2] = [vec![], vec![]];
+        let mut lines_slopes = Vec::with_capacity(lines.len());
         for l in lines.clone() {
             let y = [part(0, l), part(1, l)];
-            let predicted = problem.predict(chart, self.p, [&y[0], &y[1]], l, true)?;
+            let predicted = problem.predict(chart, self.p, [&y[0], &y[1]], l, slopes)?;
             mean += &predicted.y * C::from(share);
-            for (d, slope) in predicted.slopes.iter().enumerate() {
-                problem.add_measured(model.column_mut(1 + d).as_mut_slice(), slope, share);
-            }
             for (side, y) in y.into_iter().enumerate() {
                 let (left, right) = problem.through(side, &predicted);
-                ways[side].push(Way { y, left, right });
+                ways[side].push(Way { y, left: stacked(&left), right });
             }
+            lines_slopes.push(predicted.slopes);
         }
         problem.add_measured(model.column_mut(0).as_mut_slice(), &mean, 1.0);
+        problem.put_slopes(&mut model, &lines_slopes, share);
         for (side, ways) in ways.iter().enumerate() {
             // Y^A and Y^B stand on the model's side of the residual: minus
-            self.aims(side, ways, -share, &mut effect);
+            self.aims(side, ways, -share, &mut written);
         }
-        let (left, right) = problem.reductions.clone();
-        self.aims(2, &[Way { y: mean, left, right }], 1.0, &mut effect);
-        self.positions(&mut effect);
-        for (j, std) in problem.nuisances.std.iter().enumerate() {
-            effect.column_mut(j).scale_mut(*std);
+        self.positions(&mut written);
+        let aims = self.assembly_aims(&mean, &mut written);
+        for (mut column, std) in written.column_iter_mut().zip(&problem.nuisances.std) {
+            column.scale_mut(*std);
         }
-        Ok(Evaluated { model, effect })
+        Ok(Evaluated { model, effect: Effect { written, aims } })
     }
 
-    /// Adds ∂(left · cells · right)/∂η (unscaled) of a block, summed over `ways` and times `share`: of the aims, and of the tilts,
+    /// The aims at the assembly's cells, whose ports move by `y`; adds what they do together, the positions and tilts (unscaled).
+    fn assembly_aims(&self, y: &Line, written: &mut DMatrix<f64>) -> AssemblyAims {
+        let problem = self.problem;
+        let block = &problem.ajb;
+        let sensors = block.sensors.len();
+        let (rows, left) = (problem.rows.len(), &problem.reductions.0);
+        let mut by_impact = Vec::with_capacity(block.impacts.len());
+        for (i, cells) in self.cells[2].chunks_exact(sensors.max(1)).enumerate() {
+            let mut add = |j: usize, v: &[f64]| {
+                let (re, im) = v.split_at(rows);
+                let mut to = written.column_mut(j);
+                let (to_re, to_im) = to.as_mut_slice().split_at_mut(problem.entries());
+                for (to, own) in [(to_re, re), (to_im, im)] {
+                    for (c, to) in to.chunks_exact_mut(rows).enumerate() {
+                        let t = problem.reductions.1[(i, c)].re;
+                        to.iter_mut().zip(own).for_each(|(to, v)| *to += v * t);
+                    }
+                }
+            };
+            let mut shown = DMatrix::<f64>::zeros(2 * rows, AIMS * sensors);
+            // what all cells of the impact show: two shifts and two tilts
+            let mut together = DMatrix::<f64>::zeros(2 * rows, 4);
+            for (s, (cell, sensor)) in cells.iter().zip(&block.sensors).enumerate() {
+                let at = problem.nuisances.of_cell(2, block, s, i);
+                let seen = product(&left.select_columns(&sensor.rows), &of_cell(cell, y));
+                for (k, seen) in seen.column_iter().enumerate() {
+                    let stacked: Vec<f64> =
+                        seen.iter().map(|v| v.re).chain(seen.iter().map(|v| v.im)).collect();
+                    if k < AIMS {
+                        let std = problem.nuisances.std[at.aim + k];
+                        let mut to = shown.column_mut(AIMS * s + k);
+                        to.iter_mut().zip(&stacked).for_each(|(to, v)| *to = v * std);
+                    }
+                    if k < 3 {
+                        if let Some(own) = at.sensor {
+                            add(own + k, &stacked);
+                        }
+                    } else {
+                        let mut to = together.column_mut(k - 3);
+                        to.iter_mut().zip(&stacked).for_each(|(to, v)| *to += v);
+                    }
+                }
+            }
+            if let Some(own) =
+                (sensors > 0).then(|| problem.nuisances.of_cell(2, block, 0, i).impact).flatten()
+            {
+                for (k, column) in together.as_slice().chunks_exact(2 * rows).enumerate() {
+                    add(own + k, column);
+                }
+            }
+            by_impact.push(shown);
+        }
+        AssemblyAims { by_impact }
+    }
+
+    /// Adds ∂(left · cells · right)/∂η (unscaled) of A or B, summed over `ways` and times `share`: of the aims, and of the tilts,
     /// which are no aims.
     ///
     /// An impact's cells have one row of `right`, so the sum over lines is a product of matrices: what the cells show through
     /// `left`, by what comes of the impact through `right`.
-    fn aims(&self, place: usize, ways: &[Way], share: f64, effect: &mut DMatrix<f64>) {
+    fn aims(&self, side: usize, ways: &[Way], share: f64, effect: &mut DMatrix<f64>) {
         let problem = self.problem;
-        let block: &Block = problem.blocks()[place];
+        let block: &Block = &problem.parts[side];
         let sensors = block.sensors.len();
         let (rows, columns, lines) = (problem.rows.len(), problem.columns.len(), ways.len());
-        for (i, cells) in self.cells[place].chunks_exact(sensors.max(1)).enumerate() {
+        let effects = effects(&self.cells[side], ways);
+        let mut first = 0;
+        for (i, cells) in self.cells[side].chunks_exact(sensors.max(1)).enumerate() {
             // per cell its five aims, then both tilts of all cells together
             let count = AIMS * sensors + 2;
             let height = rows * count;
@@ -94,23 +167,27 @@ impl Point<'_> {
                     come[(l, columns + c)] = v.im;
                     come[(lines + l, columns + c)] = v.re;
                 }
-                for (s, (cell, sensor)) in cells.iter().zip(&block.sensors).enumerate() {
-                    let effects = of_cell(cell, &way.y);
-                    for (k, axes) in effects.column_iter().enumerate() {
+                let own = |part: usize| &effects.as_slice()[(part * lines + l) * effects.nrows() + first..];
+                let mut values = own(0).iter().zip(own(1)).map(|(re, im)| C::new(*re, *im));
+                for (s, sensor) in block.sensors.iter().enumerate() {
+                    for k in 0..AIMS + 2 {
                         let at = rows * if k < AIMS { AIMS * s + k } else { AIMS * sensors + k - AIMS };
                         let (re, im) = shown.as_mut_slice().split_at_mut(height * lines);
                         let re = &mut re[height * l + at..][..rows];
                         let im = &mut im[height * l + at..][..rows];
-                        for (v, row) in axes.iter().zip(&sensor.rows) {
-                            let left = &way.left.as_slice()[row * rows..][..rows];
-                            for ((re, im), left) in re.iter_mut().zip(im.iter_mut()).zip(left) {
-                                *re += left.re * v.re - left.im * v.im;
-                                *im += left.re * v.im + left.im * v.re;
+                        for (row, v) in sensor.rows.iter().zip(values.by_ref()) {
+                            let (left, left_im) =
+                                way.left.as_slice()[2 * row * rows..][..2 * rows].split_at(rows);
+                            let parts = re.iter_mut().zip(im.iter_mut()).zip(left.iter().zip(left_im));
+                            for ((re, im), (left, left_im)) in parts {
+                                *re += left * v.re - left_im * v.im;
+                                *im += left * v.im + left_im * v.re;
                             }
                         }
                     }
                 }
             }
+            first += (AIMS + 2) * cells.iter().map(|cell| cell.seen.nrows()).sum::<usize>();
             // real parts in the first columns, imaginary ones in the others
             let seen: DMatrix<f64> = shown * come;
             let mut add = |j: usize, parameter: usize| {
@@ -121,7 +198,7 @@ impl Point<'_> {
                 }
             };
             for s in 0..sensors {
-                let at = problem.nuisances.of_cell(place, block, s, i);
+                let at = problem.nuisances.of_cell(side, block, s, i);
                 for k in 0..AIMS {
                     add(at.aim + k, AIMS * s + k);
                 }
@@ -133,10 +210,10 @@ impl Point<'_> {
         }
     }
 
-    /// A position acts as the aims of all its cells do, each alike: their sum.
+    /// A position acts as the aims of all its cells do, each alike: their sum, here of A's and B's cells.
     fn positions(&self, effect: &mut DMatrix<f64>) {
         let problem = self.problem;
-        for (place, block) in problem.blocks().into_iter().enumerate() {
+        for (place, block) in problem.parts.iter().enumerate() {
             for i in 0..block.impacts.len() {
                 for s in 0..block.sensors.len() {
                     let at = problem.nuisances.of_cell(place, block, s, i);
@@ -151,6 +228,37 @@ impl Point<'_> {
             }
         }
     }
+}
+
+/// The derivatives of all cells' readings, cell by cell as [`of_cell`] has them by columns; each line's real parts in its column, then the
+/// imaginary parts.
+///
+/// Each is linear in y with real factors that are the same at every line.
+fn effects(cells: &[CellGeometry], ways: &[Way]) -> DMatrix<f64> {
+    let (rows, columns) = ways.first().map_or((0, 0), |way| way.y.shape());
+    let count: usize = cells.iter().map(|cell| cell.seen.nrows() * (AIMS + 2)).sum();
+    // transposed, so that the factors of one value stand together
+    let mut factors = DMatrix::<f64>::zeros(rows * columns, count);
+    let mut values = factors.column_iter_mut();
+    for cell in cells {
+        let by_shift = cell.turned.iter().map(|turned| (turned, cell.pushed.column(0)));
+        let by_impact = cell.slopes.column_iter().map(|slope| (&cell.seen, slope));
+        for (seen, pushed) in by_shift.chain(by_impact) {
+            for (axis, mut own) in (0..seen.nrows()).zip(values.by_ref()) {
+                for (own, push) in own.as_mut_slice().chunks_exact_mut(rows.max(1)).zip(pushed.iter()) {
+                    own.iter_mut().zip(seen.row(axis).iter()).for_each(|(to, seen)| *to = seen * push);
+                }
+            }
+        }
+    }
+    let mut y = DMatrix::zeros(rows * columns, 2 * ways.len());
+    for (l, way) in ways.iter().enumerate() {
+        for (at, v) in way.y.iter().enumerate() {
+            y[(at, l)] = v.re;
+            y[(at, ways.len() + l)] = v.im;
+        }
+    }
+    factors.transpose() * y
 }
 
 /// The derivatives of one cell's reading (axes × 7, where the ports' admittance is y): by three shifts of the sensor, two of the impact, and
@@ -170,10 +278,8 @@ impl Problem {
     /// What the cells of A or B pass through on their way to the residual: L T_u and T_f R.
     pub(super) fn through(&self, side: usize, predicted: &Predicted) -> (Line, Line) {
         let block = &self.parts[side];
-        let (row, column) = self.layout.corner(side);
-        let left = predicted.left.select_rows(&self.rows).columns(row, block.rows.count).clone_owned();
-        let right =
-            predicted.right.select_columns(&self.columns).rows(column, block.columns.count).clone_owned();
+        let left = self.layout.left(predicted, side).select_rows(&self.rows);
+        let right = self.layout.right(predicted, side).select_columns(&self.columns);
         (product(&left, &block.t_u), product(&block.t_f, &right))
     }
 }

@@ -12,60 +12,80 @@ pub(super) fn crossed(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     (b.transpose() * a).transpose()
 }
 
+/// These rows in memory of their own, column by column: a view of them is copied value by value.
+pub(super) fn rows(x: &DMatrix<f64>, first: usize, count: usize) -> DMatrix<f64> {
+    let mut values = Vec::with_capacity(count * x.ncols());
+    for column in x.as_slice().chunks_exact(x.nrows().max(1)) {
+        values.extend_from_slice(&column[first..first + count]);
+    }
+    DMatrix::from_vec(count, x.ncols(), values)
+}
+
 /// L of A = L Lᵀ.
 pub(super) struct Factor {
-    /// L in the lower triangle; what is above it means nothing.
-    lower: DMatrix<f64>,
-    /// Inverses of L's blocks on the diagonal.
-    inverses: Vec<DMatrix<f64>>,
+    /// L, a block of columns at a time.
+    blocks: Vec<Block>,
+}
+
+/// Some columns of L. In memory of their own: views of few rows are slow to multiply, and their products read past their end.
+struct Block {
+    /// Inverse of what stands on the diagonal, and its transpose.
+    inverse: DMatrix<f64>,
+    inverse_turned: DMatrix<f64>,
+    /// What stands below it, and its transpose.
+    below: DMatrix<f64>,
+    below_turned: DMatrix<f64>,
 }
 
 impl Factor {
     /// Of a symmetric matrix, of which only the lower triangle is read; none where it is not positive.
     pub(super) fn of(mut a: DMatrix<f64>) -> Option<Factor> {
         let n = a.nrows();
-        let mut inverses = Vec::with_capacity(n.div_ceil(BLOCK));
+        let mut blocks = Vec::with_capacity(n.div_ceil(BLOCK));
         for first in (0..n).step_by(BLOCK) {
             let size = BLOCK.min(n - first);
             let below = first + size;
             let l = a.view((first, first), (size, size)).clone_owned().cholesky()?.l();
             let inverse = l.solve_lower_triangular(&DMatrix::identity(size, size))?;
-            a.view_mut((first, first), (size, size)).copy_from(&l);
-            let panel = a.view((below, first), (n - below, size)) * inverse.transpose();
-            a.view_mut((below, first), (n - below, size)).copy_from(&panel);
+            let inverse_turned = inverse.transpose();
+            let panel = a.view((below, first), (n - below, size)).clone_owned() * &inverse_turned;
+            let turned = panel.transpose();
             for column in (below..n).step_by(BLOCK) {
                 let width = BLOCK.min(n - column);
-                let own = panel.rows(column - below, n - column);
-                let other = panel.rows(column - below, width).transpose();
-                a.view_mut((column, column), (n - column, width)).gemm(-1.0, &own, &other, 1.0);
+                let own = rows(&panel, column - below, n - column);
+                let other = turned.columns(column - below, width);
+                let taken = own * other;
+                let mut rest = a.view_mut((column, column), (n - column, width));
+                rest -= taken;
             }
-            inverses.push(inverse);
+            blocks.push(Block { inverse, inverse_turned, below: panel, below_turned: turned });
         }
-        Some(Factor { lower: a, inverses })
+        Some(Factor { blocks })
     }
 
     /// L⁻¹X, in the place of X.
     pub(super) fn forward(&self, x: &mut DMatrix<f64>) {
-        let n = self.lower.nrows();
-        for (block, inverse) in self.inverses.iter().enumerate() {
-            let (first, size) = (block * BLOCK, inverse.nrows());
-            let below = first + size;
-            let solved = inverse * x.rows(first, size);
+        let mut first = 0;
+        for block in &self.blocks {
+            let size = block.inverse.nrows();
+            let solved = &block.inverse * rows(x, first, size);
             x.rows_mut(first, size).copy_from(&solved);
-            let l = self.lower.view((below, first), (n - below, size));
-            x.rows_mut(below, n - below).gemm(-1.0, &l, &solved, 1.0);
+            first += size;
+            let mut rest = x.rows_mut(first, block.below.nrows());
+            rest -= &block.below * solved;
         }
     }
 
     /// L⁻ᵀX, in the place of X.
     pub(super) fn backward(&self, x: &mut DMatrix<f64>) {
-        let n = self.lower.nrows();
-        for (block, inverse) in self.inverses.iter().enumerate().rev() {
-            let (first, size) = (block * BLOCK, inverse.nrows());
-            let below = first + size;
-            let l = self.lower.view((below, first), (n - below, size)).transpose();
-            let solved = inverse.transpose() * (x.rows(first, size) - l * x.rows(below, n - below));
+        let mut below = x.nrows();
+        for block in self.blocks.iter().rev() {
+            let size = block.inverse.nrows();
+            let first = below - size;
+            let known = &block.below_turned * rows(x, below, block.below.nrows());
+            let solved = &block.inverse_turned * (rows(x, first, size) - known);
             x.rows_mut(first, size).copy_from(&solved);
+            below = first;
         }
     }
 }

@@ -11,6 +11,7 @@
 //! `model` Eq. (1) and its derivatives, `problem` the residuals, `weight` their covariance, `start`, `solver`,
 //! `outcome`.
 
+mod assembly_aims;
 mod block;
 mod cell;
 mod chart;

@@ -4,7 +4,7 @@
 //! R = I − Bᵀ G⁻¹ Q; a change of the joint −P δ(G⁻¹) Q.
 
 use super::block::{Line, Ports};
-use super::chart::At;
+use super::chart::{At, Dyad};
 use crate::substructuring::product::product;
 use crate::substructuring::pseudo_inverse::full_rank_inverse;
 use nalgebra::Complex;
@@ -23,11 +23,17 @@ pub(super) struct Layout {
 pub(super) struct Predicted {
     /// All output ports × all input ports.
     pub(super) y: Line,
-    /// L and R.
-    pub(super) left: Line,
-    pub(super) right: Line,
-    /// Derivative of `y` by each parameter of the joint.
-    pub(super) slopes: Vec<Line>,
+    /// P G⁻¹ and G⁻¹ Q.
+    pg: Line,
+    gq: Line,
+    /// Derivative of `y` by each parameter of the joint, as sums of products.
+    pub(super) slopes: Vec<Vec<Product>>,
+}
+
+/// A column for all output ports times a row for all input ports.
+pub(super) struct Product {
+    pub(super) moved: Vec<C>,
+    pub(super) by: Vec<C>,
 }
 
 impl Layout {
@@ -55,11 +61,10 @@ impl Layout {
         let (rows, columns) = self.shape();
         let (mut p, mut q) = (Line::zeros(rows, self.n), Line::zeros(self.n, columns));
         for (side, part) in parts.into_iter().enumerate() {
-            let sign = C::from(if side == 0 { 1.0 } else { -1.0 });
             let (row, column) = self.corner(side);
-            let pushed = part.columns(self.columns[side].first[0], self.n) * sign;
+            let pushed = part.columns(self.columns[side].first[0], self.n) * sign(side);
             p.view_mut((row, 0), pushed.shape()).copy_from(&pushed);
-            let moved = part.rows(self.rows[side].first[0], self.n) * sign;
+            let moved = part.rows(self.rows[side].first[0], self.n) * sign(side);
             q.view_mut((0, column), moved.shape()).copy_from(&moved);
         }
         (p, q)
@@ -90,31 +95,49 @@ impl Layout {
         let (p, q) = self.edges(parts);
         let (pg, gq) = (product(&p, &g), product(&g, &q));
         let (rows, columns) = self.shape();
-        let (mut left, mut right) = (Line::identity(rows, rows), Line::identity(columns, columns));
-        for side in 0..2 {
-            let sign = C::from(if side == 0 { 1.0 } else { -1.0 });
-            let (row, column) = self.corner(side);
-            let mut at = left.columns_mut(row + self.rows[side].first[0], self.n);
-            at -= &pg * sign;
-            let mut at = right.rows_mut(column + self.columns[side].first[0], self.n);
-            at -= &gq * sign;
-        }
         // δ(G⁻¹) = H (δD (I − W G⁻¹) − δE G⁻¹)
         let ph = product(&p, &h);
         let rest = &q - product(&w, &gq);
-        let slopes = (joint.slopes.iter())
-            .map(|dyads| {
-                let mut slope = Line::zeros(rows, columns);
-                for dyad in dyads {
-                    let moved = &ph * &dyad.left;
-                    let pushed = rest.tr_mul(&dyad.d) - gq.tr_mul(&dyad.e);
-                    slope.ger(C::from(-1.0), &moved, &pushed, C::from(1.0));
-                }
-                slope
-            })
-            .collect();
-        Some(Predicted { y: self.apart(parts) - product(&p, &gq), left, right, slopes })
+        let product_of = |dyad: &Dyad| {
+            let mut moved = vec![C::default(); rows];
+            for (i, v) in &dyad.left {
+                moved.iter_mut().zip(ph.column(*i).iter()).for_each(|(to, p)| *to -= p * v);
+            }
+            let by = (0..columns).map(|c| {
+                let pushed: C = dyad.d.iter().map(|(i, v)| rest[(*i, c)] * v).sum();
+                let eased: C = dyad.e.iter().map(|(i, v)| gq[(*i, c)] * v).sum();
+                pushed - eased
+            });
+            Product { moved, by: by.collect() }
+        };
+        let slopes = joint.slopes.iter().map(|dyads| dyads.iter().map(product_of).collect()).collect();
+        Some(Predicted { y: self.apart(parts) - product(&p, &gq), pg, gq, slopes })
     }
+
+    /// The columns of L that a side's output ports pass through: all output ports × the side's.
+    pub(super) fn left(&self, at: &Predicted, side: usize) -> Line {
+        let (ports, row) = (&self.rows[side], self.corner(side).0);
+        let mut left = Line::zeros(at.y.nrows(), ports.count);
+        left.view_mut((row, 0), (ports.count, ports.count)).fill_with_identity();
+        let mut own = left.columns_mut(ports.first[0], self.n);
+        own -= &at.pg * sign(side);
+        left
+    }
+
+    /// The rows of R that its input ports pass through: the side's input ports × all.
+    pub(super) fn right(&self, at: &Predicted, side: usize) -> Line {
+        let (ports, column) = (&self.columns[side], self.corner(side).1);
+        let mut right = Line::zeros(ports.count, at.y.ncols());
+        right.view_mut((0, column), (ports.count, ports.count)).fill_with_identity();
+        let mut own = right.rows_mut(ports.first[0], self.n);
+        own -= &at.gq * sign(side);
+        right
+    }
+}
+
+/// B's entry of a side: what A's interface moves less B's.
+fn sign(side: usize) -> C {
+    C::from(if side == 0 { 1.0 } else { -1.0 })
 }
 
 /// H = (D W + E)⁻¹; none where it is singular.

@@ -1,55 +1,95 @@
 //! The covariance of one band's residual. Noise of a line is circular, so it is one Hermitian matrix N.
 
 use super::block::Line;
-use super::factor::Factor;
+use super::factor::{Factor, rows};
+use crate::substructuring::product::product;
 use nalgebra::DMatrix;
 
 /// N, gathered from real products, which are the fast ones.
 #[derive(Clone)]
 pub(super) struct Noise {
+    /// Rows and columns of the residual; its entries stand by columns.
+    shape: (usize, usize),
     re: DMatrix<f64>,
     im: DMatrix<f64>,
 }
 
+/// A part Σᵢ Uᵢ ⊗ (ρᵢ ρᵢᴴ) of N: what the cells of one impact do to the rows, by what comes of it in the columns.
+///
+/// Written out, each cell is a column as long as the residual; in this form all cells of an impact are one small matrix.
+pub(super) struct ByImpact {
+    /// Uᵢ by columns, one column for each impact: rows² × impacts.
+    pub(super) by_rows: Line,
+    /// ρᵢ: impacts × columns.
+    pub(super) by_columns: Line,
+}
+
+impl ByImpact {
+    /// scale · Σ v_oi x xᴴ, x = (column o of left) ⊗ (row i of right).
+    pub(super) fn of_cells(left: &Line, right: Line, variance: &DMatrix<f64>, scale: f64) -> ByImpact {
+        let rows = left.nrows();
+        let mut squares = Line::zeros(rows * rows, left.ncols());
+        for (mut square, column) in squares.column_iter_mut().zip(left.column_iter()) {
+            let pairs =
+                column.iter().flat_map(|other| column.iter().map(move |own| own * other.conj() * scale));
+            square.iter_mut().zip(pairs).for_each(|(to, v)| *to = v);
+        }
+        ByImpact { by_rows: product(&squares, variance), by_columns: right }
+    }
+}
+
 impl Noise {
-    pub(super) fn none(entries: usize) -> Noise {
-        Noise { re: DMatrix::zeros(entries, entries), im: DMatrix::zeros(entries, entries) }
+    pub(super) fn none(rows: usize, columns: usize) -> Noise {
+        let none = || DMatrix::zeros(rows * columns, rows * columns);
+        Noise { shape: (rows, columns), re: none(), im: none() }
     }
 
-    /// Adds scale · Σ v_oi x xᴴ, x = (column o of left) ⊗ (row i of right) by columns.
-    pub(super) fn spread(&mut self, left: &Line, right: &Line, variance: &DMatrix<f64>, scale: f64) {
-        let (rows, columns) = (left.nrows(), right.ncols());
-        let (outputs, inputs) = variance.shape();
-        let mut x = DMatrix::zeros(2 * rows * columns, outputs * inputs);
-        for i in 0..inputs {
-            for o in 0..outputs {
-                let std = variance[(o, i)].sqrt();
-                let mut both = x.column_mut(i * outputs + o);
-                let (re, im) = both.as_mut_slice().split_at_mut(rows * columns);
-                let parts = re.chunks_exact_mut(rows).zip(im.chunks_exact_mut(rows));
-                for (c, (re, im)) in parts.enumerate() {
-                    let factor = right[(i, c)] * std;
-                    for ((re, im), l) in re.iter_mut().zip(im).zip(left.column(o).iter()) {
-                        let v = l * factor;
-                        (*re, *im) = (v.re, v.im);
-                    }
+    /// Adds these parts: one product of matrices, and its entries put where they belong.
+    pub(super) fn add_by_impact(&mut self, parts: &[ByImpact]) {
+        let (rows, columns) = self.shape;
+        let (height, width) = (rows * rows, columns * columns);
+        let count: usize = parts.iter().map(|part| part.by_columns.nrows()).sum();
+        let (mut left, mut right) = (DMatrix::zeros(2 * height, 2 * count), DMatrix::zeros(2 * count, width));
+        let impacts = parts.iter().flat_map(|p| (0..p.by_columns.nrows()).map(move |i| (p, i)));
+        for (j, (part, i)) in impacts.enumerate() {
+            for (at, u) in part.by_rows.column(i).iter().enumerate() {
+                left[(at, j)] = u.re;
+                left[(height + at, j)] = u.im;
+                left[(at, count + j)] = -u.im;
+                left[(height + at, count + j)] = u.re;
+            }
+            let row = part.by_columns.row(i);
+            for (at, v) in
+                row.iter().flat_map(|other| row.iter().map(move |own| own * other.conj())).enumerate()
+            {
+                right[(j, at)] = v.re;
+                right[(count + j, at)] = v.im;
+            }
+        }
+        let both: DMatrix<f64> = left * right;
+        for (pair, both) in both.as_slice().chunks_exact((2 * height).max(1)).enumerate() {
+            let (c, other) = (pair % columns, pair / columns);
+            let (re, im) = both.split_at(height);
+            for (part, own) in [(&mut self.re, re), (&mut self.im, im)] {
+                for (r, own) in own.chunks_exact(rows).enumerate() {
+                    let first = (other * rows + r) * rows * columns + c * rows;
+                    let to = &mut part.as_mut_slice()[first..first + rows];
+                    to.iter_mut().zip(own).for_each(|(to, v)| *to += v);
                 }
             }
         }
-        self.add(&x, scale);
     }
 
-    /// Adds scale · X Xᴴ of an X whose real parts stand above its imaginary ones.
-    pub(super) fn add(&mut self, x: &DMatrix<f64>, scale: f64) {
+    /// Adds X Xᴴ of an X whose real parts stand above its imaginary ones.
+    pub(super) fn add(&mut self, x: &DMatrix<f64>) {
         let m = self.re.nrows();
-        let (re, im) = (x.rows(0, m), x.rows(m, m));
-        let turned = x.transpose();
-        let (re_t, im_t) = (turned.columns(0, m), turned.columns(m, m));
-        self.re.gemm(scale, &re, &re_t, 1.0);
-        self.re.gemm(scale, &im, &im_t, 1.0);
-        let mut crossed = DMatrix::zeros(m, m);
-        crossed.gemm(scale, &im, &re_t, 0.0);
+        // beside each other, in memory of their own: products of views with few rows read past their end
+        let (re, im) = (rows(x, 0, m), rows(x, m, m));
+        let re_t = re.transpose();
+        let crossed: DMatrix<f64> = &im * &re_t;
         self.im += &crossed - crossed.transpose();
+        self.re.gemm(1.0, &re, &re_t, 1.0);
+        self.re.gemm(1.0, &im, &im.transpose(), 1.0);
     }
 
     pub(super) fn whitening(&self) -> Option<Whitening> {
@@ -81,12 +121,31 @@ pub(super) struct Whitening {
 impl Whitening {
     /// Columns of real parts above imaginary ones in units of their noise.
     pub(super) fn of(&self, mut x: DMatrix<f64>) -> DMatrix<f64> {
+        self.scaled(&mut x);
+        self.factor.forward(&mut x);
+        x
+    }
+
+    /// Whitened columns weighed once more: what the transpose of unwhitened columns has to be multiplied by.
+    pub(super) fn back(&self, mut x: DMatrix<f64>) -> DMatrix<f64> {
+        self.factor.backward(&mut x);
+        self.scaled(&mut x);
+        x
+    }
+
+    /// The left half of N's inverse as it acts on (real parts, imaginary parts): the upper block, and the lower one. The right half is
+    /// the same two, the lower one with its sign turned, above and below.
+    pub(super) fn inverse(&self) -> [DMatrix<f64>; 2] {
+        let m = self.scale.len();
+        let left = self.back(self.of(DMatrix::identity(2 * m, m)));
+        [rows(&left, 0, m), rows(&left, m, m)]
+    }
+
+    fn scaled(&self, x: &mut DMatrix<f64>) {
         for mut column in x.column_iter_mut() {
             for (v, scale) in column.iter_mut().zip(self.scale.iter().cycle()) {
                 *v *= scale;
             }
         }
-        self.factor.forward(&mut x);
-        x
     }
 }

@@ -5,6 +5,9 @@ use super::cell::CellError;
 use crate::substructuring::averaged::Priors;
 use nalgebra::Vector3;
 
+/// Nuisance parameters of a cell's own aim: three of the sensor, two of the impact.
+pub(super) const AIMS: usize = 5;
+
 /// Every error of geometry that is not known, with its prior: the nuisance parameters.
 ///
 /// A sensor's position (three) and an impact's position and tilt (two each) are one error in all configurations; of each cell
@@ -46,9 +49,14 @@ impl Nuisances {
         for block in blocks {
             n.aims.push(n.std.len());
             let cells = block.sensors.len() * block.impacts.len();
-            n.std.extend(std::iter::repeat_n(priors.aim_m, 5 * cells));
+            n.std.extend(std::iter::repeat_n(priors.aim_m, AIMS * cells));
         }
         n
+    }
+
+    /// First aim error of the assembly, the last block; all after it are aims at its cells.
+    pub(super) fn of_assembly(&self) -> usize {
+        self.aims.last().copied().unwrap_or_default()
     }
 
     pub(super) fn of_cell(&self, block: usize, of: &Block, sensor: usize, impact: usize) -> CellNuisances {
@@ -57,7 +65,7 @@ impl Nuisances {
         CellNuisances {
             sensor: find(&self.sensors, &of.sensors[sensor].name).filter(|_| !of.sensors[sensor].internal()),
             impact: find(&self.impacts, &of.impacts[impact].name).filter(|_| !of.impacts[impact].internal()),
-            aim: self.aims[block] + 5 * (sensor * of.impacts.len() + impact),
+            aim: self.aims[block] + AIMS * (sensor * of.impacts.len() + impact),
         }
     }
 

@@ -1,12 +1,13 @@
 //! What is measured, corrected for what is believed of the geometry, and its residuals against the model.
 
 use super::FitError;
+use super::assembly_aims::Pushes;
 use super::block::{Block, Line};
 use super::cell::CellGeometry;
 use super::chart::Chart;
-use super::model::{Layout, Predicted};
-use super::noise::Noise;
-use super::nuisance::Nuisances;
+use super::model::{Layout, Predicted, Product};
+use super::noise::{ByImpact, Noise};
+use super::nuisance::{AIMS, Nuisances};
 use super::shift::Shift;
 use crate::parallel::prelude::*;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -44,6 +45,7 @@ pub(super) struct Problem {
     pub(super) own_noise: Vec<Noise>,
     /// T_u and T_f of the measured ports.
     pub(super) reductions: (Line, Line),
+    pub(super) pushes: Pushes,
     /// See [`crate::frf::noise::shared_by_lines`].
     pub(super) shared: f64,
 }
@@ -71,19 +73,35 @@ impl Problem {
         let count = ((span / WIDTH_HZ).round() as usize).clamp(1, s.len());
         let bands: Vec<Range<usize>> =
             (0..count).map(|b| b * s.len() / count..(b + 1) * s.len() / count).collect();
-        let reductions =
-            (ajb.t_u.select_rows(&rows).map(C::from), ajb.t_f.select_columns(&columns).map(C::from));
+        let t_f = ajb.t_f.select_columns(&columns);
+        let reductions = (ajb.t_u.select_rows(&rows).map(C::from), t_f.map(C::from));
+        let pushes = Pushes::of(&t_f);
         let own_noise = (bands.par_iter())
             .map(|band| {
-                let mut noise = Noise::none(rows.len() * columns.len());
+                let mut noise = Noise::none(rows.len(), columns.len());
                 let share = 1.0 / band.len() as f64;
                 let variance = (band.clone().map(|l| &ajb.variance[l]))
                     .fold(ajb.variance[band.start].map(|_| 0.0), |sum, v| sum + v * share);
-                noise.spread(&reductions.0, &reductions.1, &variance, 2.0 * shared * share);
+                let own =
+                    ByImpact::of_cells(&reductions.0, reductions.1.clone(), &variance, 2.0 * shared * share);
+                noise.add_by_impact(&[own]);
                 noise
             })
             .collect();
-        Problem { parts, ajb, layout, s, bands, rows, columns, nuisances, own_noise, reductions, shared }
+        Problem {
+            parts,
+            ajb,
+            layout,
+            s,
+            bands,
+            rows,
+            columns,
+            nuisances,
+            own_noise,
+            reductions,
+            pushes,
+            shared,
+        }
     }
 
     /// A, B and AJB, with the place of each among the nuisance parameters.
@@ -143,6 +161,12 @@ impl Problem {
         }
         let bias = self.bias(chart, p, &parts)?;
         Ok(Corrected { parts, ajb, bias })
+    }
+
+    /// The nuisance parameter that is aim `k` at the assembly's cells of an impact, sensor by sensor.
+    pub(super) fn assembly_aim(&self, impact: usize, k: usize) -> usize {
+        let (sensor, own) = (k / AIMS, k % AIMS);
+        self.nuisances.of_assembly() + AIMS * (sensor * self.ajb.impacts.len() + impact) + own
     }
 
     pub(super) fn frequency_hz(&self, line: usize) -> f64 {
@@ -209,15 +233,41 @@ impl Problem {
     ) -> Result<DMatrix<f64>, FitError> {
         let mut sums = DMatrix::zeros(2 * self.entries(), 1 + chart.count());
         let share = 1.0 / band.len() as f64;
+        let mut slopes = Vec::with_capacity(band.len());
         for l in band {
             let predicted = self.predict(chart, p, [&data.parts[0][l], &data.parts[1][l]], l, true)?;
             let difference = &data.ajb[l] - predicted.y - &data.bias[l];
             self.add_measured(sums.column_mut(0).as_mut_slice(), &difference, share);
-            for (d, slope) in predicted.slopes.iter().enumerate() {
-                self.add_measured(sums.column_mut(1 + d).as_mut_slice(), slope, share);
-            }
+            slopes.push(predicted.slopes);
         }
+        self.put_slopes(&mut sums, &slopes, share);
         Ok(sums)
+    }
+
+    /// Puts the derivatives of lines, summed and times `share`, into the columns after the first.
+    ///
+    /// Each is a column times a row, so their sum over lines is one product of matrices.
+    pub(super) fn put_slopes(&self, sums: &mut DMatrix<f64>, lines: &[Vec<Vec<Product>>], share: f64) {
+        let (rows, columns) = (self.rows.len(), self.columns.len());
+        for parameter in 0..lines.first().map_or(0, Vec::len) {
+            let count: usize = lines.iter().map(|slopes| slopes[parameter].len()).sum();
+            let mut moved = DMatrix::<f64>::zeros(rows, 2 * count);
+            let mut by = DMatrix::<f64>::zeros(2 * count, 2 * columns);
+            for (j, product) in lines.iter().flat_map(|slopes| &slopes[parameter]).enumerate() {
+                for (r, port) in self.rows.iter().enumerate() {
+                    moved[(r, j)] = product.moved[*port].re;
+                    moved[(r, count + j)] = product.moved[*port].im;
+                }
+                for (c, port) in self.columns.iter().enumerate() {
+                    let v = product.by[*port] * share;
+                    by[(j, c)] = v.re;
+                    by[(count + j, c)] = -v.im;
+                    by[(j, columns + c)] = v.im;
+                    by[(count + j, columns + c)] = v.re;
+                }
+            }
+            sums.column_mut(1 + parameter).copy_from_slice((moved * by).as_slice());
+        }
     }
 
     /// Adds the measured ports of `y` times `share` to a column of real parts above imaginary ones.

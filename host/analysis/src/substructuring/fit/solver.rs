@@ -14,8 +14,12 @@ use nalgebra::{DMatrix, DVector};
 const PASSES: usize = 4;
 /// Steps of one pass; a handful do from a fair start.
 const STEPS: usize = 40;
-/// A step that gains less than this in χ² is the last.
+/// A step that gains less than this in χ² is the last: a hundredth of a standard deviation is left.
 const GAIN: f64 = 1e-4;
+/// The same where another pass follows, which starts from there: a tenth.
+const COARSE_GAIN: f64 = 1e-2;
+/// A descent whose steps gain less than this fraction of χ² has shown how much too steep its weights are.
+const SHOWN: f64 = 1e-3;
 /// χ² per degree of freedom above which geometry is far from linear at these weights: they are made milder for the pass.
 const STEEP: f64 = 1.5;
 const MILDER: usize = 4;
@@ -79,7 +83,10 @@ impl Pass<'_> {
     fn products(&self, columns: &[DMatrix<f64>]) -> Products {
         let by_band: Vec<_> = (self.weight.bands.par_iter())
             .zip(columns)
-            .map(|(weight, columns)| (crossed(columns, columns), crossed(&weight.g, columns)))
+            .map(|(weight, columns)| {
+                let pulled = weight.g.pulled(self.problem, &weight.whitening, columns);
+                (crossed(columns, columns), pulled)
+            })
             .collect();
         let count = 1 + self.chart.count();
         let mut all = DMatrix::zeros(count, count);
@@ -154,8 +161,12 @@ impl Pass<'_> {
         Some((next, covariance))
     }
 
-    /// Goes downhill from `p` until nothing is gained.
-    fn descend(&self, p: &DVector<f64>) -> Result<(DVector<f64>, Score), FitError> {
+    /// Goes downhill from `p` until a step's gain is `enough`.
+    fn descend(
+        &self,
+        p: &DVector<f64>,
+        enough: impl Fn(f64, &Score) -> bool,
+    ) -> Result<(DVector<f64>, Score), FitError> {
         let (mut p, mut here) = (p.clone(), self.score(p)?);
         let mut damping = 1e-3;
         for _ in 0..STEPS {
@@ -178,7 +189,7 @@ impl Pass<'_> {
                     let gain = here.cost - score.cost;
                     (p, here) = (next, score);
                     damping = (damping / 10.0f64).max(1e-9);
-                    if gain < GAIN {
+                    if enough(gain, &here) {
                         break;
                     }
                 }
@@ -205,8 +216,9 @@ pub(super) fn search(problem: &Problem, chart: &Chart, start: &DVector<f64>) -> 
         let data = problem.corrected(chart, &p, eta.as_slice())?;
         let cells = [0, 1, 2].map(|place| problem.cells(place, eta.as_slice()));
         let weight = Weight::of(Point { problem, chart, p: &p, cells: &cells, data: &data })?;
-        let eta_column = DMatrix::from_column_slice(nuisances, 1, eta.as_slice());
-        let believed: Vec<DMatrix<f64>> = weight.bands.iter().map(|b| &b.g * &eta_column).collect();
+        let believed: Vec<DMatrix<f64>> = (weight.bands.par_iter())
+            .map(|band| band.g.times(problem, &band.whitening, eta.as_slice()))
+            .collect();
         let mut mild = 1.0;
         let mut trial = 0;
         let (chi, found_eta, (next, covariance)) = loop {
@@ -222,7 +234,11 @@ pub(super) fn search(problem: &Problem, chart: &Chart, start: &DVector<f64>) -> 
                 marginal,
                 prior: chart.prior(),
             };
-            let (next, score) = here.descend(&p)?;
+            let last = if pass + 1 < PASSES { COARSE_GAIN } else { GAIN };
+            let (next, score) = here.descend(&p, |gain, at| {
+                let again = at.chi / freedom >= STEEP && trial < MILDER;
+                gain < last || (again && gain < SHOWN * at.cost)
+            })?;
             let corrected = here.corrected(&next, &score);
             trial += 1;
             if score.chi / freedom < STEEP || trial > MILDER {

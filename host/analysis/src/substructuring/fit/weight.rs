@@ -5,10 +5,12 @@
 //! with S = I + Gᵀ N⁻¹ G, rᵀ Σ⁻¹ r = rᵀ N⁻¹ r − (Gᵀ N⁻¹ r)ᵀ S⁻¹ (Gᵀ N⁻¹ r), and η's own estimate is S⁻¹ Gᵀ N⁻¹ r.
 
 use super::FitError;
+use super::assembly_aims::{AssemblyAims, Met, OfImpact};
 use super::block::Line;
 use super::cell::CellGeometry;
 use super::chart::Chart;
-use super::noise::Whitening;
+use super::factor::{crossed, rows as own_rows};
+use super::noise::{ByImpact, Whitening};
 use super::problem::{Corrected, Problem};
 use crate::parallel::prelude::*;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -26,14 +28,21 @@ const TILE: usize = 128;
 /// The noise of one band, and the nuisance parameters' effect in units of it.
 pub(super) struct BandWeight {
     pub(super) whitening: Whitening,
-    /// 2m × nuisance parameters.
-    pub(super) g: DMatrix<f64>,
+    pub(super) g: Whitened,
     /// One draw of the noise of Y^A and Y^B as it shows in a band's mean, in units of the residual's noise: in the residual (first
     /// column) and in ∂model/∂joint.
     ///
     /// J is evaluated at noisy Y^A and Y^B, so JᵀJ is too large by δJᵀδJ and Jᵀr by δJᵀδr: the estimate and its interval are
     /// corrected by both.
     pub(super) feigned: DMatrix<f64>,
+}
+
+/// G, the nuisance parameters' effect.
+pub(super) struct Whitened {
+    /// In units of the noise: 2m × those before the assembly's aims.
+    pub(super) written: DMatrix<f64>,
+    /// The assembly's aims as they are.
+    pub(super) aims: AssemblyAims,
 }
 
 /// The weights of all bands, and Gᵀ N⁻¹ G (its lower triangle).
@@ -56,39 +65,72 @@ pub(super) struct Point<'a> {
 impl Weight {
     pub(super) fn of(point: Point<'_>) -> Result<Weight, FitError> {
         let problem = point.problem;
-        let bands: Vec<BandWeight> = (problem.bands.par_iter())
+        let (bands, met): (Vec<BandWeight>, Vec<Met>) = (problem.bands.par_iter())
             .enumerate()
-            .map(|(band, lines)| point.weight(band, lines.clone()))
-            .collect::<Result<_, FitError>>()?;
-        let information = information(&bands, problem.nuisances.std.len());
+            .map(|(band, lines)| {
+                let weight = point.weight(band, lines.clone())?;
+                let met = Met::of(&weight.whitening, &problem.pushes, &weight.g.written, &weight.g.aims);
+                Ok((weight, met))
+            })
+            .collect::<Result<Vec<_>, FitError>>()?
+            .into_iter()
+            .unzip();
+        let mut information = DMatrix::zeros(problem.nuisances.std.len(), problem.nuisances.std.len());
+        put_written(&bands, &mut information);
+        put_aims(problem, &bands, &met, &mut information);
         Ok(Weight { bands, information })
     }
 }
 
-/// The lower triangle of Σ gᵀg, tile by tile.
-fn information(bands: &[BandWeight], count: usize) -> DMatrix<f64> {
+/// The lower triangle of Σ gᵀg of the columns that are written out, tile by tile.
+fn put_written(bands: &[BandWeight], information: &mut DMatrix<f64>) {
+    let count = bands.first().map_or(0, |band| band.g.written.ncols());
     let tile = |first: usize| first..(first + TILE).min(count);
     let places: Vec<(usize, usize)> = (0..count)
         .step_by(TILE)
         .flat_map(|row| (0..=row).step_by(TILE).map(move |column| (row, column)))
         .collect();
-    let turned: Vec<DMatrix<f64>> = bands.par_iter().map(|band| band.g.transpose()).collect();
+    let turned: Vec<DMatrix<f64>> = bands.par_iter().map(|band| band.g.written.transpose()).collect();
     let tiles: Vec<DMatrix<f64>> = (places.par_iter())
         .map(|&(row, column)| {
             let (rows, columns) = (tile(row), tile(column));
             let mut sum = DMatrix::zeros(rows.len(), columns.len());
             for (band, turned) in bands.iter().zip(&turned) {
-                let right = band.g.columns(columns.start, columns.len());
-                sum.gemm(1.0, &turned.rows(rows.start, rows.len()), &right, 1.0);
+                let right = band.g.written.columns(columns.start, columns.len());
+                // a copy of its own: products of views with few rows read past their end
+                sum.gemm(1.0, &own_rows(turned, rows.start, rows.len()), &right, 1.0);
             }
             sum
         })
         .collect();
-    let mut information = DMatrix::zeros(count, count);
     for (at, tile) in places.into_iter().zip(tiles) {
         information.view_mut(at, tile.shape()).copy_from(&tile);
     }
-    information
+}
+
+/// The rows of the lower triangle that belong to the assembly's aims.
+fn put_aims(problem: &Problem, bands: &[BandWeight], met: &[Met], information: &mut DMatrix<f64>) {
+    let block = &problem.ajb;
+    let sums: Vec<Option<OfImpact>> = (0..block.impacts.len())
+        .into_par_iter()
+        .map(|i| OfImpact::sum(i, bands.iter().map(|band| &band.g.aims).zip(met)))
+        .collect();
+    let first = problem.nuisances.of_assembly();
+    for (i, sum) in sums.into_iter().enumerate() {
+        let Some(sum) = sum else { continue };
+        let place = |impact: usize, k: usize| problem.assembly_aim(impact, k);
+        for (k, column) in sum.written.column_iter().enumerate() {
+            (0..first).zip(column.iter()).for_each(|(j, v)| information[(place(i, k), j)] = *v);
+        }
+        for (later, tile) in sum.later.iter().enumerate() {
+            for k in 0..tile.ncols() {
+                for other in 0..tile.nrows() {
+                    let (one, two) = (place(i, k), place(i + later, other));
+                    information[(one.max(two), one.min(two))] = tile[(other, k)];
+                }
+            }
+        }
+    }
 }
 
 impl Point<'_> {
@@ -96,35 +138,66 @@ impl Point<'_> {
         let Point { problem, data, .. } = *self;
         // variance of a band's mean: 2 for real and imaginary part together
         let averaged = 2.0 * problem.shared / lines.len() as f64;
-        let mut noise = problem.own_noise[band].clone();
         let step = (lines.len() / SAMPLED).max(1);
         let sampled = lines.clone().step_by(step).count() as f64;
+        let mut parts = Vec::new();
         for l in lines.clone().step_by(step) {
             let predicted =
                 problem.predict(self.chart, self.p, [&data.parts[0][l], &data.parts[1][l]], l, false)?;
             for side in 0..2 {
                 let (left, right) = problem.through(side, &predicted);
-                noise.spread(&left, &right, &problem.parts[side].variance[l], averaged / sampled);
+                let variance = &problem.parts[side].variance[l];
+                parts.push(ByImpact::of_cells(&left, right, variance, averaged / sampled));
             }
         }
         let draws: Vec<[Line; 2]> = lines.clone().map(|l| problem.noise(l, NOISE_SEED)).collect();
         let moved = |sign: f64| {
-            self.evaluated(&lines, |side, l| {
+            self.evaluated(&lines, true, |side, l| {
                 &data.parts[side][l] + &draws[l - lines.start][side] * C::from(sign)
             })
         };
-        let here = self.evaluated(&lines, |side, l| data.parts[side][l].clone())?;
+        let here = self.evaluated(&lines, false, |side, l| data.parts[side][l].clone())?.effect;
         let (plus, minus) = (moved(1.0)?, moved(-1.0)?);
         // neighbouring lines share their noise, the draws do not
         let half = 0.5 * problem.shared.sqrt();
         // an error of geometry whose effect is known only to δG leaves δG η behind, and η has variance one
-        noise.add(&((plus.effect - minus.effect) * half), 1.0);
+        parts.push(plus.effect.aims.apart(&minus.effect.aims, half).covariance(&problem.pushes));
+        let mut noise = problem.own_noise[band].clone();
+        noise.add_by_impact(&parts);
+        noise.add(&((plus.effect.written - minus.effect.written) * half));
         let whitening = noise.whitening().ok_or(FitError::NoiseSingular)?;
-        let g = whitening.of(here.effect);
+        let g = Whitened { written: whitening.of(here.written), aims: here.aims };
         let mut feigned = (plus.model - minus.model) * half;
         // what raises the model lowers the residual
         feigned.column_mut(0).neg_mut();
         let feigned = whitening.of(feigned);
         Ok(BandWeight { whitening, g, feigned })
+    }
+}
+
+impl Whitened {
+    /// G η in units of the noise.
+    pub(super) fn times(&self, problem: &Problem, whitening: &Whitening, eta: &[f64]) -> DMatrix<f64> {
+        let (written, _) = eta.split_at(problem.nuisances.of_assembly());
+        let aims = self.aims.times(&problem.pushes, |i, k| eta[problem.assembly_aim(i, k)]);
+        whitening.of(aims) + &self.written * DMatrix::from_column_slice(written.len(), 1, written)
+    }
+
+    /// Gᵀ N⁻¹ of what these columns are in units of the noise.
+    pub(super) fn pulled(
+        &self,
+        problem: &Problem,
+        whitening: &Whitening,
+        columns: &DMatrix<f64>,
+    ) -> DMatrix<f64> {
+        let mut pulled = DMatrix::zeros(problem.nuisances.std.len(), columns.ncols());
+        pulled.rows_mut(0, self.written.ncols()).copy_from(&crossed(&self.written, columns));
+        let aims = self.aims.pulled(&problem.pushes, &whitening.back(columns.clone()));
+        for (i, own) in aims.iter().enumerate() {
+            for k in 0..own.nrows() {
+                pulled.row_mut(problem.assembly_aim(i, k)).copy_from(&own.row(k));
+            }
+        }
+        pulled
     }
 }
