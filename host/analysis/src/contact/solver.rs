@@ -61,7 +61,7 @@ pub fn solve(
     sigma_per_s: f64,
 ) -> Result<Solution, ContactError> {
     let shared = shared_by_lines(sigma_per_s, distance_hz(blocks));
-    let mut here = Posterior { blocks, parameters, shared }.settle(parameters.start())?;
+    let (mut here, mut settled) = Posterior { blocks, parameters, shared }.settle(parameters.start())?;
     for _ in 0..WIDENED {
         let left: Vec<(usize, &Residual)> = (here.bins.iter())
             .flat_map(|bin| bin.residuals.iter().map(|residual| (bin.block, residual)))
@@ -69,7 +69,10 @@ pub fn solve(
         if !unexplained::widen(blocks, &left) {
             break;
         }
-        here = Posterior { blocks, parameters, shared }.settle(here.p)?;
+        (here, settled) = Posterior { blocks, parameters, shared }.settle(here.p)?;
+    }
+    if !settled {
+        return Err(ContactError::NotIdentified("the fit of the contact does not settle".into()));
     }
     let (information, _) = Posterior { blocks, parameters, shared }.normal(&here);
     let certainty = certainty(blocks, &here.bins, &here.p, &information, shared)?;
@@ -79,8 +82,9 @@ pub fn solve(
 
 impl Posterior<'_> {
     /// Steps from `p` to the nearest minimum. The shifts' motion is that of the last place taken, so that a place's cost is not that of the
-    /// next one's motion: where a step seems to lead uphill, the place it left is asked again.
-    fn settle(&self, p: Vec<f64>) -> Result<Place, ContactError> {
+    /// next one's motion: where a step seems to lead uphill, the place it left is asked again. And whether it is there: before the noise is
+    /// widened, cells that stray can keep it from coming to rest.
+    fn settle(&self, p: Vec<f64>) -> Result<(Place, bool), ContactError> {
         let mut motion = motions(self.blocks, &evaluate(self.blocks, &p, None)?);
         let mut here = self.place(p, &motion)?;
         motion = motions(self.blocks, &here.bins);
@@ -90,7 +94,7 @@ impl Posterior<'_> {
             let (information, gradient) = self.normal(&here);
             let (step, sigma) = newton(&information, &gradient, damping)?;
             if damping <= HARDLY_DAMPED && step[COMPLIANCE].abs() <= SETTLED * sigma {
-                return Ok(here);
+                return Ok((here, true));
             }
             let next = here.p.iter().zip(step.iter()).map(|(at, step)| at + step).collect();
             let next = self.place(next, &motion)?;
@@ -106,7 +110,7 @@ impl Posterior<'_> {
                 damping = (damping * 100.0).max(1e-6);
             }
         }
-        Err(ContactError::NotIdentified("the fit of the contact does not settle".into()))
+        Ok((here, false))
     }
 
     fn place(&self, p: Vec<f64>, motion: &Motion) -> Result<Place, ContactError> {
