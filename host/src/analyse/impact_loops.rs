@@ -195,8 +195,15 @@ pub fn drawn(shown: &ImpactLoop, fs_hz: f64, contact: &ContactSignals, delays: C
         displacement_b_m: short(x_b),
         force_n: short(force_n[from..to].iter().map(|f| f - rest).collect()),
         cycle: [start - from, end - from],
+        cycles: cycles(&shown.first, from, to),
         slope_n_per_m: shown.first.slope_n_per_m,
     }
+}
+
+/// The first cycle and those of the decay after it, as samples of what is shown.
+fn cycles(first: &FirstCycle, from: usize, to: usize) -> Vec<[usize; 2]> {
+    let all = first.decay.iter().map(|one| [one.first_sample, one.end_sample]);
+    all.filter(|[a, b]| *a >= from && a < b && *b <= to).map(|[a, b]| [a - from, b - from]).collect()
 }
 
 /// Length of the decay that is put together again, s: long enough to tell 192 Hz from 208 Hz.

@@ -4,13 +4,15 @@
 //! shown stands in [`Results`]; this room computes no result.
 
 pub mod cell_records;
+mod csv;
 mod document;
-mod drawing;
+pub mod figure;
 mod figures;
-mod interface_tables;
 mod page;
-mod panel;
+#[cfg(feature = "png")]
+mod png;
 mod scale;
+mod svg;
 mod tables;
 pub mod words;
 
@@ -27,20 +29,55 @@ pub const RESULTS_FILE: &str = "results.json";
 /// The file for people.
 pub const REPORT_FILE: &str = "report.html";
 
-/// Writes `results.json` and `report.html` into `folder`, which is made if it is not there. Each file appears
-/// whole or not at all: it is written beside its place and renamed.
+/// The folder of single figures.
+pub const FIGURES_FOLDER: &str = "figures";
+
+/// A file format of single figures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// Vectors.
+    Svg,
+    /// Pixels, two for each of the drawing's.
+    #[cfg(feature = "png")]
+    Png,
+    /// Numbers.
+    Csv,
+}
+
+/// Writes `results.json`, `report.html` and the figures in these formats into `folder`, which is made if it is not there. Each file
+/// appears whole or not at all: it is written beside its place and renamed.
 ///
 /// # Errors
 /// The folder cannot be made or written.
-pub fn write(results: &Results, folder: &Path) -> io::Result<()> {
+pub fn write(results: &Results, folder: &Path, formats: &[Format]) -> io::Result<()> {
     fs::create_dir_all(folder)?;
     let json = results.to_json().map_err(io::Error::other)?;
     replace(&folder.join(RESULTS_FILE), json.as_bytes())?;
-    replace(&folder.join(REPORT_FILE), page(results).as_bytes())
+    replace(&folder.join(REPORT_FILE), page(results).as_bytes())?;
+    if formats.is_empty() {
+        return Ok(());
+    }
+    write_figures(&figures::all(results), &folder.join(FIGURES_FOLDER), formats)
+}
+
+fn write_figures(figures: &[figure::Figure], folder: &Path, formats: &[Format]) -> io::Result<()> {
+    fs::create_dir_all(folder)?;
+    for figure in figures {
+        for format in formats {
+            let (ending, content) = match format {
+                Format::Svg => ("svg", svg::file(figure).into_bytes()),
+                #[cfg(feature = "png")]
+                Format::Png => ("png", png::png(&svg::file(figure)).map_err(io::Error::other)?),
+                Format::Csv => ("csv", csv::csv(figure).into_bytes()),
+            };
+            replace(&folder.join(format!("{}.{ending}", figure.name)), &content)?;
+        }
+    }
+    Ok(())
 }
 
 fn replace(place: &Path, content: &[u8]) -> io::Result<()> {
-    let beside = place.with_extension(format!("{}.part", std::process::id()));
+    let beside = place.with_added_extension(format!("{}.part", std::process::id()));
     let written = File::create(&beside)
         .and_then(|mut file| file.write_all(content).and_then(|()| file.sync_all()))
         .and_then(|()| fs::rename(&beside, place));
@@ -135,8 +172,8 @@ mod tests {
     fn both_files_are_written_whole_and_no_others() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let place = folder.path().join("new/folder");
-        write(&example::results(), &place).expect("written");
-        write(&example::results(), &place).expect("written over");
+        write(&example::results(), &place, &[]).expect("written");
+        write(&example::results(), &place, &[]).expect("written over");
         let mut names: Vec<_> =
             fs::read_dir(&place).expect("there").map(|e| e.expect("entry").file_name()).collect();
         names.sort();

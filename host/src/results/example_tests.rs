@@ -95,6 +95,7 @@ fn example_loop() -> LoopCurve {
         displacement_b_m,
         force_n,
         cycle: [0, 246],
+        cycles: vec![[0, 246], [246, 492], [492, 738], [738, 900]],
         slope_n_per_m: 148.9e6,
     }
 }

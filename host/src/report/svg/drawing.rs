@@ -4,25 +4,19 @@ use std::fmt::Write;
 
 /// How a line looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stroke {
-    /// Colour, as css writes it.
-    pub colour: &'static str,
+pub struct Stroke<'a> {
+    /// Its class: the style sheet gives the colour.
+    pub class: &'a str,
     /// Width, px.
     pub width: f64,
     /// Dash pattern, empty for a full line.
     pub dash: &'static str,
 }
 
-impl Stroke {
+impl<'a> Stroke<'a> {
     /// A full line.
-    pub const fn new(colour: &'static str, width: f64) -> Self {
-        Stroke { colour, width, dash: "" }
-    }
-
-    /// The same, dashed.
-    #[must_use]
-    pub const fn dashed(self, dash: &'static str) -> Self {
-        Stroke { dash, ..self }
+    pub const fn new(class: &'a str, width: f64) -> Self {
+        Stroke { class, width, dash: "" }
     }
 }
 
@@ -65,7 +59,7 @@ impl Area {
 /// A drawing under way.
 #[derive(Debug)]
 pub struct Drawing {
-    name: &'static str,
+    name: String,
     width: f64,
     height: f64,
     clips: usize,
@@ -74,42 +68,50 @@ pub struct Drawing {
 
 impl Drawing {
     /// An empty drawing; `name` keeps its ids apart from those of the page's other drawings.
-    pub fn new(name: &'static str, width: f64, height: f64) -> Self {
-        Drawing { name, width, height, clips: 0, body: String::new() }
+    pub fn new(name: &str, width: f64, height: f64) -> Self {
+        Drawing { name: name.to_owned(), width, height, clips: 0, body: String::new() }
     }
 
     /// A straight line.
-    pub fn line(&mut self, from: [f64; 2], to: [f64; 2], stroke: Stroke) {
+    pub fn line(&mut self, from: [f64; 2], to: [f64; 2], stroke: Stroke<'_>) {
         let path = format!("M{} {}L{} {}", px(from[0]), px(from[1]), px(to[0]), px(to[1]));
         self.path(&path, stroke);
     }
 
     /// A curve through points in pixels; `None` breaks it. Many points in one pixel column are reduced to
     /// the first, the lowest, the highest and the last, which looks the same.
-    pub fn curve(&mut self, points: &[Option<[f64; 2]>], stroke: Stroke) {
+    pub fn curve(&mut self, points: &[Option<[f64; 2]>], stroke: Stroke<'_>) {
         let path = path_of(points);
         if !path.is_empty() {
             self.path(&path, stroke);
         }
     }
 
-    fn path(&mut self, path: &str, stroke: Stroke) {
+    fn path(&mut self, path: &str, stroke: Stroke<'_>) {
         let dash = if stroke.dash.is_empty() {
             String::new()
         } else {
             format!(" stroke-dasharray=\"{}\"", stroke.dash)
         };
         self.push(format_args!(
-            "<path d=\"{path}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"{dash}/>",
-            stroke.colour,
+            "<path d=\"{path}\" fill=\"none\" class=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"{dash}/>",
+            stroke.class,
             px(stroke.width)
         ));
     }
 
+    /// A closed curve through points, filled.
+    pub fn area(&mut self, points: &[[f64; 2]], class: &str, opacity: f64) {
+        let path = path_of(&points.iter().copied().map(Some).collect::<Vec<_>>());
+        if !path.is_empty() {
+            self.push(format_args!("<path d=\"{path}Z\" class=\"{class}\" fill-opacity=\"{opacity:.2}\"/>"));
+        }
+    }
+
     /// A filled rectangle.
-    pub fn fill(&mut self, area: Area, colour: &str, opacity: f64) {
+    pub fn fill(&mut self, area: Area, class: &str, opacity: f64) {
         self.push(format_args!(
-            "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"{colour}\" fill-opacity=\"{opacity}\"/>",
+            "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" class=\"{class}\" fill-opacity=\"{opacity:.2}\"/>",
             px(area.left),
             px(area.top),
             px(area.width.max(0.0)),
@@ -117,14 +119,24 @@ impl Drawing {
         ));
     }
 
-    /// A dot; hollow when `hollow`.
-    pub fn dot(&mut self, at: [f64; 2], radius: f64, colour: &str, hollow: bool) {
-        let fill = if hollow { "#fff" } else { colour };
+    /// A dot or ring; `classes` fill and stroke it.
+    pub fn dot(&mut self, at: [f64; 2], radius: f64, classes: &str) {
         self.push(format_args!(
-            "<circle cx=\"{}\" cy=\"{}\" r=\"{}\" fill=\"{fill}\" stroke=\"{colour}\" stroke-width=\"1.4\"/>",
+            "<circle cx=\"{}\" cy=\"{}\" r=\"{}\" class=\"{classes}\" stroke-width=\"1.4\"/>",
             px(at[0]),
             px(at[1]),
             px(radius)
+        ));
+    }
+
+    /// A square, full or empty.
+    pub fn square(&mut self, at: [f64; 2], half: f64, classes: &str) {
+        self.push(format_args!(
+            "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" class=\"{classes}\" stroke-width=\"1.4\"/>",
+            px(at[0] - half),
+            px(at[1] - half),
+            px(2.0 * half),
+            px(2.0 * half)
         ));
     }
 
@@ -170,13 +182,28 @@ impl Drawing {
 
     /// The finished drawing; `meaning` is read to those who cannot see it.
     pub fn finish(self, meaning: &str) -> String {
+        let size = format!("0 0 {} {}", px(self.width), px(self.height));
+        format!("<svg viewBox=\"{size}\" role=\"img\" aria-label=\"{}\">{}</svg>", escape(meaning), self.body)
+    }
+
+    /// The finished drawing as an ornament that need not be read out.
+    pub fn decoration(self) -> String {
+        let (width, height) = (px(self.width), px(self.height));
         format!(
-            "<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">{}</svg>",
-            px(self.width),
-            px(self.height),
-            escape(meaning),
+            "<svg viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" aria-hidden=\"true\">{}</svg>",
             self.body
         )
+    }
+
+    /// The finished drawing as a part of a larger one, with its upper left corner at `at`.
+    pub fn inside(self, at: [f64; 2]) -> String {
+        let (x, y, width, height) = (px(at[0]), px(at[1]), px(self.width), px(self.height));
+        format!("<svg x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\">{}</svg>", self.body)
+    }
+
+    /// Its size, px.
+    pub fn size(&self) -> [f64; 2] {
+        [self.width, self.height]
     }
 
     fn push(&mut self, arguments: std::fmt::Arguments<'_>) {
