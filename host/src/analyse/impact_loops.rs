@@ -172,13 +172,15 @@ pub fn middle(loops: &[ImpactLoop]) -> Option<&ImpactLoop> {
     sorted.get(sorted.len() / 2).copied()
 }
 
-/// Its signals from shortly before the first cycle to four cycles on.
+/// Its signals from shortly before the first cycle to the end of the fourth.
 pub fn drawn(shown: &ImpactLoop, fs_hz: f64, contact: &ContactSignals, delays: ContactDelays) -> LoopCurve {
     let [a, b, force_n] = in_step(contact, delays, fs_hz);
     let [start, end] = shown.first.cycle;
     let lead = (end - start) / 10;
     let from = start.saturating_sub(lead);
-    let to = (start + 4 * (end - start)).min(force_n.len());
+    // the paper shows the fourth cycle too, which a longer period puts later
+    let fourth = shown.first.decay.get(3).map_or(0, |cycle| cycle.end_sample);
+    let to = (start + 4 * (end - start)).max(fourth).min(force_n.len());
     let offset = |v: &[f64]| {
         v[..start.max(1).min(v.len())].iter().sum::<f64>() / start.max(1).min(v.len()).max(1) as f64
     };

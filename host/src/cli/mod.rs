@@ -5,6 +5,7 @@
 
 mod analyse;
 mod campaign;
+mod compare;
 mod completions;
 mod demo;
 mod devices;
@@ -53,6 +54,8 @@ enum Command {
     Analyse(analyse::Analyse),
     /// Make the report of a campaign file, and its figures as files.
     Report(report::Report),
+    /// Compare two campaigns.
+    Compare(compare::Compare),
     /// Write everything that a campaign file holds for other programs.
     Export(export::Export),
     /// FRFs of impact records from anywhere.
@@ -92,6 +95,7 @@ impl Cli {
             Command::Shaker(command) => command.run(),
             Command::Analyse(command) => command.run(),
             Command::Report(command) => command.run(),
+            Command::Compare(command) => command.run(),
             Command::Export(command) => command.run(),
             Command::Frf(command) => command.run(),
             Command::Hysteresis(command) => command.run(),
@@ -153,6 +157,7 @@ mod tests {
             "analyse p.jrig --out d --json",
             "analyse p.jrig --out d --details",
             "report p.jrig --out d --figures svg,csv",
+            "compare p.jrig q.jrig --out d --json",
             "identify --a A.npz --b B.npz --ajb AJB.npz --geometry p.xlsx --method internal,inverse --idms 4,6 --band 300:600 --json",
             "completions bash",
             "frf records.npz --json",

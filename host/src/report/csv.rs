@@ -15,6 +15,9 @@ pub fn csv(figure: &Figure) -> String {
     text
 }
 
+/// No number: an empty cell.
+const NONE: f64 = f64::NAN;
+
 fn rows(text: &mut String, title: &str, panel: &Panel, mark: &Mark) {
     let name = if mark.name.is_empty() { mark.role.name() } else { &mark.name };
     let (x_label, y_label) = (panel.x.label(), panel.y.label());
@@ -24,14 +27,13 @@ fn rows(text: &mut String, title: &str, panel: &Panel, mark: &Mark) {
         let _ = writeln!(text, "{head},{x},{},{y},{low},{high}", quoted(&y_label));
     };
     let at = |values: &Packed, i: usize| values.0.get(i).copied().map_or(f64::NAN, f64::from);
-    const NONE: f64 = f64::NAN;
     match &mark.shape {
         Shape::Line { x, y } => (0..y.0.len()).for_each(|i| put(x.at(i), at(y, i), NONE, NONE)),
         Shape::Ribbon { x, low, high } => {
-            (0..low.0.len()).for_each(|i| put(x.at(i), NONE, at(low, i), at(high, i)))
+            (0..low.0.len()).for_each(|i| put(x.at(i), NONE, at(low, i), at(high, i)));
         }
         Shape::Loop { x, y } => {
-            (0..y.0.len()).for_each(|i| put(Along::List(x.clone()).at(i), at(y, i), NONE, NONE))
+            (0..y.0.len()).for_each(|i| put(Along::List(x.clone()).at(i), at(y, i), NONE, NONE));
         }
         Shape::Points { x, y, bars, .. } => {
             for i in 0..y.0.len() {
@@ -45,6 +47,15 @@ fn rows(text: &mut String, title: &str, panel: &Panel, mark: &Mark) {
             let columns = panel.x.names.len().max(1);
             for i in 0..values.0.len() {
                 put((i % columns) as f64, (i / columns) as f64, at(values, i), NONE);
+            }
+        }
+        Shape::Strips { x, values, says } => {
+            for (row, name) in says.iter().enumerate() {
+                let head = format!("{},{},{}", quoted(title), quoted(name), quoted(&x_label));
+                for i in 0..x.0.len() {
+                    let [f, value] = [at(x, i), at(values, row * x.0.len() + i)].map(six_digits);
+                    let _ = writeln!(text, "{head},{f},{},{value},,", quoted(&mark.name));
+                }
             }
         }
         Shape::Scene(scene) => {
@@ -66,12 +77,12 @@ fn quoted(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::figure::{Axis, Role};
+    use super::super::figure::{Axis, Marker, Role};
     use super::*;
 
     #[test]
     fn every_point_has_a_line_with_its_units() {
-        let mark = Mark::points(Role::Loops, Default::default(), [[200.0, 148.5]])
+        let mark = Mark::points(Role::Loops, Marker::default(), [[200.0, 148.5]])
             .barred("y", [[147.0, 150.0]])
             .named("k, \"slope\"");
         let panel = Panel::new(

@@ -17,9 +17,9 @@ mod tables;
 pub mod words;
 
 pub use document::document;
-pub use page::page;
+pub use page::{comparison_page, page};
 
-use crate::results::Results;
+use crate::results::{Compared, Results};
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::Path;
@@ -60,6 +60,23 @@ pub fn write(results: &Results, folder: &Path, formats: &[Format]) -> io::Result
     write_figures(&figures::all(results), &folder.join(FIGURES_FOLDER), formats)
 }
 
+/// Two campaigns compared, for people.
+pub const COMPARISON_FILE: &str = "compare.html";
+/// The same for scripts.
+pub const COMPARED_FILE: &str = "compare.json";
+
+/// Writes `compare.json` and `compare.html` into `folder`, as [`write`] does.
+///
+/// # Errors
+/// The folder cannot be made or written.
+pub fn write_comparison(compared: &Compared, both: [&Results; 2], folder: &Path) -> io::Result<()> {
+    fs::create_dir_all(folder)?;
+    let mut json = serde_json::to_string(compared).map_err(io::Error::other)?;
+    json.push('\n');
+    replace(&folder.join(COMPARED_FILE), json.as_bytes())?;
+    replace(&folder.join(COMPARISON_FILE), comparison_page(compared, both).as_bytes())
+}
+
 fn write_figures(figures: &[figure::Figure], folder: &Path, formats: &[Format]) -> io::Result<()> {
     fs::create_dir_all(folder)?;
     for figure in figures {
@@ -74,6 +91,17 @@ fn write_figures(figures: &[figure::Figure], folder: &Path, formats: &[Format]) 
         }
     }
     Ok(())
+}
+
+/// The labels of an axis' ticks, the empty ones of minor ticks included: for the test that holds the page's twin to them. `length` in px.
+pub fn axis_labels(logarithmic: bool, range: [f64; 2], length: f64, upright: bool) -> Vec<String> {
+    let scale = if logarithmic {
+        scale::Scale::logarithmic(range, [0.0, length])
+    } else {
+        scale::Scale::linear(range, [0.0, length])
+    };
+    let lie = if upright { scale::Lie::Up } else { scale::Lie::Across };
+    scale.ticks(lie).into_iter().map(|tick| tick.label).collect()
 }
 
 fn replace(place: &Path, content: &[u8]) -> io::Result<()> {

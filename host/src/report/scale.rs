@@ -206,6 +206,10 @@ const DIGIT: f64 = 7.0;
 const BESIDE: f64 = 26.0;
 /// From one label to the next above it, px.
 const ABOVE: f64 = 30.0;
+/// Labels never come nearer than this, px: taken where wider steps would leave a single one.
+const TIGHT_ABOVE: f64 = 16.0;
+/// The same beside one another.
+const TIGHT_BESIDE: f64 = 48.0;
 /// A tick this part of a step beyond the end is still at the end: what rounding does.
 const NEAR: f64 = 1e-9;
 /// An axis never has more: what is asked for is some dozens at most.
@@ -214,8 +218,8 @@ const MOST_TICKS: f64 = 200.0;
 impl Lie {
     fn least(self) -> f64 {
         match self {
-            Lie::Across => DIGIT + BESIDE,
-            Lie::Up => ABOVE,
+            Lie::Across => TIGHT_BESIDE,
+            Lie::Up => TIGHT_ABOVE,
         }
     }
 

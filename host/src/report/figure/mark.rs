@@ -157,6 +157,9 @@ pub enum Shape {
         /// How far they may be off.
         #[serde(skip_serializing_if = "Option::is_none")]
         bars: Option<Bars>,
+        /// How far aside they are drawn, px, so that points of the same place are seen beside one another.
+        #[serde(skip_serializing_if = "is_zero")]
+        aside: f64,
         /// Their sign.
         marker: Marker,
         /// What is said of each when it is touched.
@@ -209,8 +212,22 @@ pub enum Shape {
         /// What is said of each when it is touched.
         says: Vec<String>,
     },
+    /// One strip for each row of the upright axis, 0…1 along the horizontal one: drawn where it is low.
+    Strips {
+        /// Where the values lie.
+        x: Packed,
+        /// Row by row; NaN where there is none.
+        values: Packed,
+        /// The rows' names.
+        says: Vec<String>,
+    },
     /// Bodies and places in space.
     Scene(Scene),
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 impl Shape {
@@ -218,7 +235,9 @@ impl Shape {
     pub fn drawn(&self) -> Drawn {
         match self {
             Shape::Points { marker, .. } => Drawn::Points(*marker),
-            Shape::Ribbon { .. } | Shape::Shade { .. } | Shape::Cells { .. } => Drawn::Area,
+            Shape::Ribbon { .. } | Shape::Shade { .. } | Shape::Cells { .. } | Shape::Strips { .. } => {
+                Drawn::Area
+            }
             _ => Drawn::Line,
         }
     }
@@ -243,8 +262,14 @@ impl Mark {
     /// Points without bars.
     pub fn points(role: Role, marker: Marker, at: impl IntoIterator<Item = [f64; 2]>) -> Self {
         let (x, y): (Vec<f64>, Vec<f64>) = at.into_iter().map(|[x, y]| (x, y)).unzip();
-        let shape =
-            Shape::Points { x: Packed::of(x), y: Packed::of(y), bars: None, marker, says: Vec::new() };
+        let shape = Shape::Points {
+            x: Packed::of(x),
+            y: Packed::of(y),
+            bars: None,
+            aside: 0.0,
+            marker,
+            says: Vec::new(),
+        };
         Mark::new(role, shape)
     }
 
@@ -254,6 +279,15 @@ impl Mark {
         if let Shape::Points { bars, .. } = &mut self.shape {
             let (low, high): (Vec<f64>, Vec<f64>) = ends.into_iter().map(|[low, high]| (low, high)).unzip();
             *bars = Some(Bars { along, low: Packed::of(low), high: Packed::of(high) });
+        }
+        self
+    }
+
+    /// The same points, drawn this far aside, px; other marks stay as they are.
+    #[must_use]
+    pub fn aside(mut self, px: f64) -> Self {
+        if let Shape::Points { aside, .. } = &mut self.shape {
+            *aside = px;
         }
         self
     }

@@ -74,6 +74,9 @@ pub struct Panel {
     /// What this panel shows, where the figure has several.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub title: String,
+    /// Whether its names stand in the legend of a panel above it.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub named_above: bool,
     /// How high it is.
     pub height: Height,
     /// The horizontal axis.
@@ -87,7 +90,7 @@ pub struct Panel {
 impl Panel {
     /// An empty panel.
     pub fn new(x: Axis, y: Axis) -> Self {
-        Panel { title: String::new(), height: Height::Usual, x, y, marks: Vec::new() }
+        Panel { title: String::new(), named_above: false, height: Height::Usual, x, y, marks: Vec::new() }
     }
 
     /// The same with this title.
@@ -100,6 +103,12 @@ impl Panel {
     #[must_use]
     pub fn high(self, height: Height) -> Self {
         Panel { height, ..self }
+    }
+
+    /// The same, whose names stand in the legend of a panel above it.
+    #[must_use]
+    pub fn named_above(self) -> Self {
+        Panel { named_above: true, ..self }
     }
 
     /// The same with one more mark.
@@ -119,7 +128,7 @@ impl Panel {
     /// Names and looks for its legend, each once, in the order drawn.
     pub fn legend(&self) -> Vec<(&str, Role, Drawn)> {
         let mut entries: Vec<(&str, Role, Drawn)> = Vec::new();
-        for mark in self.marks.iter().filter(|mark| !mark.name.is_empty()) {
+        for mark in self.marks.iter().filter(|mark| !mark.name.is_empty() && !self.named_above) {
             if !entries.iter().any(|(name, role, _)| *name == mark.name && *role == mark.role) {
                 entries.push((&mark.name, mark.role, mark.shape.drawn()));
             }

@@ -2,7 +2,6 @@
 
 use super::MICRO;
 use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role};
-use crate::report::words::answer_sentences::with_interval;
 use crate::report::words::number::{decimals, micro, short, stiffness};
 use crate::results::{Excitation, Force, HIDDEN_RESONANCE, Hysteresis, Results};
 use crate::substructuring::Dof;
@@ -31,7 +30,7 @@ pub fn answer(results: &Results) -> Option<Figure> {
     let names = rows.iter().map(|r| r.label.clone()).collect();
     let mut panel = Panel::new(x, Axis::named("", names)).high(Height::Rows);
     for (i, row) in rows.iter().enumerate() {
-        let y = i as f64 + 0.2;
+        let y = i as f64 + 0.26;
         let marker = if row.believed { Marker::Dot } else { Marker::Cross };
         panel.marks.push(
             Mark::points(row.role, marker, [[row.mean, y]])
@@ -66,7 +65,7 @@ fn rows(results: &Results) -> Vec<Row> {
             });
         };
         if let Some(k) = &answer.contact.k_t_n_per_m {
-            let label = format!("k_T of the contact: {}", with_interval(k));
+            let label = format!("k_T of the contact: {}", interval(k));
             put(
                 label,
                 Role::Answer,
@@ -76,7 +75,7 @@ fn rows(results: &Results) -> Vec<Row> {
             );
         }
         if let Some(clamp) = &answer.clamp {
-            let label = format!("clamps in series with it: {}", with_interval(&clamp.k_n_per_m));
+            let label = format!("clamps alone: {}", interval(&clamp.k_n_per_m));
             put(
                 label,
                 Role::Clamp,
@@ -86,7 +85,7 @@ fn rows(results: &Results) -> Vec<Row> {
             );
         }
         if let Some(k) = &answer.between_arms.k_n_per_m {
-            let label = format!("between the arms: {}", with_interval(k));
+            let label = format!("between the arms: {}", interval(k));
             put(
                 label,
                 Role::BetweenArms,
@@ -102,6 +101,12 @@ fn rows(results: &Results) -> Vec<Row> {
     rows.extend(levels(results));
     rows.extend(impacts(results));
     rows
+}
+
+/// `178 N/µm (173…183)`.
+fn interval(k: &crate::contact::Interval) -> String {
+    let [mean, low, high] = [k.mean, k.ci95[0], k.ci95[1]].map(|k| short(micro(k)));
+    format!("{mean} N/µm ({low}…{high})")
 }
 
 fn quoted(results: &Results) -> Option<Row> {
@@ -143,7 +148,7 @@ fn levels(results: &Results) -> Option<Row> {
         .hysteresis
         .iter()
         .filter(straight)
-        .filter_map(|h| h.stick_slope())
+        .filter_map(Hysteresis::stick_slope)
         .map(|k| micro(k.mean))
         .collect();
     found.sort_by(f64::total_cmp);
@@ -153,7 +158,7 @@ fn levels(results: &Results) -> Option<Row> {
         label: if found.len() == 1 {
             format!("the shaker's loop: {} N/µm", short(low))
         } else {
-            format!("the shaker's {} straight loops: {}…{} N/µm", found.len(), short(low), short(high))
+            format!("{} straight shaker loops: {}…{} N/µm", found.len(), short(low), short(high))
         },
         role: Role::Loops,
         mean: found[found.len() / 2],
@@ -168,9 +173,9 @@ fn levels(results: &Results) -> Option<Row> {
 fn impacts(results: &Results) -> Option<Row> {
     let k = results.impact_loops()?.k_eq_n_per_m?;
     let hidden = results.check(HIDDEN_RESONANCE).filter(|c| c.ok == Some(false)).and_then(|c| c.frequency_hz);
-    let beside = hidden.map_or(String::new(), |f| format!(" ({} Hz in it)", decimals(f, 0)));
+    let beside = hidden.map_or(String::new(), |f| format!(", with {} Hz", decimals(f, 0)));
     Some(Row {
-        label: format!("the impacts' first cycles: {}{beside}", stiffness(k.mean, k.std)),
+        label: format!("impacts, first cycle: {}{beside}", stiffness(k.mean, k.std)),
         role: Role::Loops,
         mean: micro(k.mean),
         ends: [micro(k.mean - k.std), micro(k.mean + k.std)],

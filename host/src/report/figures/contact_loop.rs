@@ -17,11 +17,11 @@ pub fn contact_loop(results: &Results) -> Option<Figure> {
     );
     Some(
         figure
-            .across(2)
+            .across(3)
             .of_records(vec![[curve.record; 2]])
             .with(displacements(curve)?)
-            .with(first_cycle(curve)?)
-            .with(force(curve)?),
+            .with(force(curve)?)
+            .with(first_cycle(curve)?),
     )
 }
 

@@ -5,7 +5,7 @@ use crate::report::figure::{Along, Axis, Figure, Height, Mark, Packed, Panel, Ro
 use crate::report::scale::middle_range;
 use crate::report::words;
 use crate::report::words::number::{decimals, micro};
-use crate::results::{JointSpectrum, MAIN_BAND, Results, SpectrumCurve};
+use crate::results::{Joint, JointSpectrum, MAIN_BAND, Results, SpectrumCurve};
 use crate::substructuring::Band;
 
 /// Stiffness along z line by line.
@@ -20,7 +20,7 @@ pub fn joint_spectrum(results: &Results) -> Option<Figure> {
         }
     }
     let frequencies = shown_range(spectrum, &bands(results))?;
-    let stiffness = shown_stiffness(spectrum, &curves)?;
+    let stiffness = shown_stiffness(results, spectrum, &curves)?;
     let mut figure = Figure::new(
         "joint-spectrum",
         "10, A.11–A.13",
@@ -111,14 +111,23 @@ fn shown_range(spectrum: &JointSpectrum, bands: &[Band]) -> Option<[f64; 2]> {
     Some([(low - room).max(first), (high + room).min(last)])
 }
 
-/// N/µm: the middle of what the richest set of modes shows in the main band, and zero. (Two modes may run off by
-/// hundreds; they must not flatten the curve that the headline quotes.)
-fn shown_stiffness(spectrum: &JointSpectrum, curves: &[(usize, &SpectrumCurve)]) -> Option<[f64; 2]> {
+/// N/µm: the middle of what the richest set of modes shows in the main band by the methods that identified a stiffness there, and zero.
+/// (What failed may run off by hundreds; it must not flatten the curve that the headline quotes.)
+fn shown_stiffness(
+    results: &Results,
+    spectrum: &JointSpectrum,
+    curves: &[(usize, &SpectrumCurve)],
+) -> Option<[f64; 2]> {
     let most = curves.iter().map(|(_, c)| c.idms).max()?;
+    let identified = |c: &SpectrumCurve| {
+        let row = |j: &&Joint| j.method == c.method && j.idms == c.idms && j.band_hz == MAIN_BAND;
+        results.joint.iter().find(row).is_some_and(Joint::identified)
+    };
+    let any = curves.iter().any(|(_, c)| c.idms == most && identified(c));
     let inside = |main_only: bool| {
         let lines = spectrum.frequency_hz.iter().cycle();
-        let values =
-            curves.iter().filter(move |(_, c)| c.idms == most).flat_map(|(_, c)| &c.stiffness_n_per_m);
+        let setting = curves.iter().filter(move |(_, c)| c.idms == most && (!any || identified(c)));
+        let values = setting.flat_map(|(_, c)| &c.stiffness_n_per_m);
         values.zip(lines).filter_map(move |(k, f)| {
             let main = MAIN_BAND.contains(*f);
             k.filter(|_| main || !main_only).map(micro)

@@ -18,6 +18,9 @@ struct Dot {
     after: bool,
 }
 
+/// How far apart points of the same place are drawn, px: about their own width.
+const SIDE: f64 = 8.0;
+
 /// As many groups as have roles that can be told apart.
 const MOST: usize = 6;
 
@@ -79,7 +82,7 @@ fn group(
         let name = if i + 1 >= MOST && groups.len() > MOST {
             format!("{} more", groups.len() + 1 - MOST)
         } else {
-            format!("{} {unit}", short(*centre))
+            format!("{} {unit}", decimals(*centre, if *centre < 10.0 { 2 } else { 0 }))
         };
         for (after, straight) in [(false, true), (true, true), (false, false), (true, false)] {
             let own = || {
@@ -107,6 +110,10 @@ fn group(
             marks.push(
                 Mark::points(role, marker, own().map(|d| [place(d), d.mean]))
                     .barred("y", own().map(|d| [d.mean - d.std, d.mean + d.std]))
+                    .aside(
+                        SIDE * (i as f64 - 0.5 * (groups.len() - 1) as f64)
+                            + if after { 0.5 * SIDE } else { 0.0 },
+                    )
                     .saying(says.collect())
                     .named(name.clone())
                     .from("y", "/hysteresis/*/*/mean", 1.0 / MICRO),

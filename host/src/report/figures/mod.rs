@@ -4,17 +4,29 @@
 
 mod answer;
 mod backbone;
+mod band_means;
+mod budget;
+mod cells;
+mod coherence;
 mod comparison;
+mod consistency;
 mod contact_loop;
 mod decay_loops;
+mod geometry;
 mod impacts;
 mod interface_modes;
 mod joint_spectrum;
 mod levels;
+mod loop_parts;
+mod noise_floor;
+mod participation;
+mod pulses;
+mod random_error;
 mod rebuilt;
 mod receptances;
 mod shaker_loops;
 mod specimens;
+mod usable_bands;
 
 use super::figure::{Figure, Source};
 use crate::results::Results;
@@ -30,6 +42,8 @@ pub enum Chapter {
     Joint,
     /// The contact by loops.
     Loops,
+    /// Where, how much and how well it was measured.
+    Measured,
     /// Frequency response functions.
     Frfs,
 }
@@ -58,14 +72,31 @@ const fn entry(
 
 const IMPACTS: &str = "hits on the assembly with both vibrometers and the load cells";
 const LEVELS: &str = "levels of the shaker (`jointrig shaker`)";
+const CAMPAIGN: &str = "a campaign's own records";
 const ALL_THREE: &str = "FRFs of A, B and the assembly";
 
 /// Every figure, in the order of the report.
 pub const ALL: &[Entry] = &[
     entry(Chapter::Answer, "The answer", "an identified stiffness", answer::answer),
     entry(Chapter::SideBySide, "Every method side by side", ALL_THREE, comparison::comparison),
+    entry(Chapter::SideBySide, "What makes the interval of k_T", "an identified k_T", budget::budget),
+    entry(Chapter::Measured, "Where hammer and vibrometer went", CAMPAIGN, geometry::geometry),
+    entry(Chapter::Measured, "Every cell", CAMPAIGN, cells::cells),
+    entry(Chapter::Measured, "Coherence of every cell", "two hits or more in a cell", coherence::coherence),
+    entry(
+        Chapter::Measured,
+        "Random error by cell",
+        "two hits or more in a cell",
+        random_error::random_error,
+    ),
+    entry(Chapter::Measured, "The hammer over the campaign", CAMPAIGN, pulses::pulses),
+    entry(Chapter::Measured, "The usable band", CAMPAIGN, usable_bands::usable_bands),
     entry(Chapter::Joint, "Joint stiffness over frequency", ALL_THREE, joint_spectrum::joint_spectrum),
     entry(Chapter::Joint, "What coupling adds", ALL_THREE, interface_modes::interface_modes),
+    entry(Chapter::Joint, "Which motions couple", ALL_THREE, participation::participation),
+    entry(Chapter::Joint, "Means over two bands", ALL_THREE, band_means::band_means),
+    entry(Chapter::Joint, "Consistency of the virtual points", ALL_THREE, consistency::consistency),
+    entry(Chapter::Loops, "A loop and its parts", LEVELS, loop_parts::loop_parts),
     entry(Chapter::Loops, "One impact at the contact", IMPACTS, contact_loop::contact_loop),
     entry(Chapter::Loops, "The first, third and fourth cycle", IMPACTS, decay_loops::decay_loops),
     entry(Chapter::Loops, "The slope of every impact", IMPACTS, impacts::impacts),
@@ -80,6 +111,12 @@ pub const ALL: &[Entry] = &[
     entry(Chapter::Loops, "FRFs at the contact", IMPACTS, specimens::specimens),
     entry(Chapter::Loops, "The decay put together from two sinusoids", IMPACTS, rebuilt::rebuilt),
     entry(Chapter::Frfs, "Receptances", "records of hits, or imported FRFs", receptances::receptances),
+    entry(
+        Chapter::Frfs,
+        "Noise floor and dynamic stiffness",
+        "two hits or more in a cell of the assembly",
+        noise_floor::noise_floor,
+    ),
 ];
 
 impl Entry {

@@ -38,6 +38,8 @@ pub fn receptances(results: &Results) -> Option<Figure> {
             let mut panel = Panel::new(x, kind.axis(magnitudes)).high(kind.height());
             if kind == Kind::Magnitude {
                 panel.title = title(name).into();
+            } else {
+                panel = panel.named_above();
             }
             panel.marks.push(Mark::shade(Role::Band, MAIN_BAND));
             for band in results.usable_bands.iter().filter(|b| b.configuration == *name) {

@@ -38,7 +38,8 @@ pub fn shaker_loops(results: &Results) -> Option<Figure> {
         figure = figure.with(closed_loop(*i, one, x, t));
     }
     for (i, one) in picked.iter().zip(&shown) {
-        figure = figure.with(over_the_cycle(*i, one, motion));
+        let panel = over_the_cycle(*i, one, motion);
+        figure = figure.with(if Some(i) == picked.first() { panel } else { panel.named_above() });
     }
     for (i, one) in picked.iter().zip(&shown) {
         let y = Axis::linear("force T", "N", t);

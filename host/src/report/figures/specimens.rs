@@ -27,7 +27,7 @@ pub fn specimens(results: &Results) -> Option<Figure> {
     let [low, high] = magnitudes(curves.iter().map(|(_, c, ..)| *c))?;
     let x = || Axis::frequency(Spread::Linear, SHOWN_HZ);
     let mut magnitude = Panel::new(x(), Axis::log("receptance", "m/N", [low, high])).high(Height::Tall);
-    let mut phase = Panel::new(x(), degrees()).high(Height::Low);
+    let mut phase = Panel::new(x(), degrees()).high(Height::Low).named_above();
     for (i, curve, role, name) in &curves {
         magnitude.marks.push(
             Mark::line(
@@ -35,10 +35,15 @@ pub fn specimens(results: &Results) -> Option<Figure> {
                 along(curve, curve.magnitude_m_per_n.len()),
                 curve.magnitude_m_per_n.iter().copied(),
             )
-            .named(format!("{name} ({} from {})", curve.output, curve.input))
+            .named(if curve.output == *name {
+                (*name).to_owned()
+            } else {
+                format!("{name} ({})", curve.output)
+            })
             .from("y", format!("/frfs/{i}/magnitude_m_per_n/*"), 1.0),
         );
-        phase.marks.push(phase_line(curve, *i, *role));
+        let line = phase_line(curve, *i, *role);
+        phase.marks.push(line.named(magnitude.marks.last().map_or(String::new(), |m| m.name.clone())));
     }
     let resonance = results.check(HIDDEN_RESONANCE).and_then(|c| c.frequency_hz);
     if let Some((f, peak)) = resonance.and_then(|f| Some((f, at(of(Shows::SpecimenA)?.1, f)?))) {
@@ -50,7 +55,7 @@ pub fn specimens(results: &Results) -> Option<Figure> {
         "specimens",
         "8",
         "FRFs at the contact",
-        "Both specimens, their difference Δx, and both arms in the assembly, from one impact. A peak or a step of phase that only one specimen has is a resonance on its own clamp; loops near it are ellipses.",
+        format!("Hit at {}. Both specimens, their difference Δx, and both arms in the assembly, from one impact. A peak or a step of phase that only one specimen has is a resonance on its own clamp; loops near it are ellipses.", curves[0].1.input),
     )
     .with(magnitude)
     .with(phase);

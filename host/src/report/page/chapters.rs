@@ -10,10 +10,11 @@ use crate::results::Results;
 
 type Drawn<'a> = [(&'a Entry, Option<Figure>)];
 
-const CHAPTERS: [(Chapter, &str, &str); 4] = [
+const CHAPTERS: [(Chapter, &str, &str); 5] = [
     (Chapter::SideBySide, "side-by-side", "What each measurement sees"),
     (Chapter::Joint, "joint", "Joint by substructuring"),
     (Chapter::Loops, "loops", "Contact by loops"),
+    (Chapter::Measured, "measured", "What was measured"),
     (Chapter::Frfs, "frfs", "Frequency response functions"),
 ];
 
@@ -32,7 +33,7 @@ pub fn contents(html: &mut Html, results: &Results, drawn: &Drawn<'_>) {
         }
         html.raw("</ul></li>");
     }
-    html.raw("<li><a href=\"#measured\">What was measured</a></li><li><a href=\"#source\">Where it comes from</a></li><li><a href=\"#glossary\">Words</a></li></ul></nav>");
+    html.raw("<li><a href=\"#source\">Where it comes from</a></li><li><a href=\"#glossary\">Words</a></li></ul></nav>");
 }
 
 /// All chapters after the first screen.
@@ -60,11 +61,7 @@ pub fn all(html: &mut Html, results: &Results, drawn: &Drawn<'_>) {
         }
         html.raw("</section>");
     }
-    html.raw("<section id=\"measured\"><h2>What was measured</h2>");
-    for table in [tables::completeness(results), missing(results)].into_iter().flatten() {
-        html.raw(&table);
-    }
-    html.raw("</section><section id=\"source\"><h2>Where it comes from</h2>");
+    html.raw("<section id=\"source\"><h2>Where it comes from</h2>");
     html.raw(&tables::provenance(results));
     html.raw("</section><section id=\"glossary\"><h2>Words</h2>");
     glossary_html::list(html);
@@ -90,6 +87,7 @@ fn tables_beside(results: &Results, figure: &str) -> Vec<Option<String>> {
 fn tables_of(results: &Results, chapter: Chapter) -> Vec<Option<String>> {
     match chapter {
         Chapter::Answer | Chapter::Frfs => Vec::new(),
+        Chapter::Measured => vec![tables::completeness(results), missing(results)],
         Chapter::SideBySide => vec![tables::checks(results)],
         Chapter::Joint => {
             vec![tables::recommended(results), tables::joint(results), tables::refusals(results)]

@@ -87,12 +87,12 @@ function svgOf(figure,element){
   return`<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${W} ${below.toFixed(0)}" width="${W}" height="${below.toFixed(0)}" font-family='${FONT}'><rect width="100%" height="100%" fill="#ffffff"/><text x="8" y="22" font-size="17" font-weight="600" fill="#333333">${escapeText(figure.title)}</text><text x="8" y="42" font-size="12" fill="#333333">${escapeText(from)}</text>${pen.parts.join('')}</svg>`;
 }
 function panelInto(pen,panel,chart,x0,y0,width){
-  const rows=panel.height==='rows',left=x0+(rows?12:64),right=x0+width-14,grid={colour:'#e4e4e4',width:1,dash:''},frame={colour:'#888888',width:1,dash:''};
+  const rows=panel.height==='rows',left=x0+(rows?12:panel.y.names?20+6.6*Math.max(...panel.y.names.map(n=>n.length)):64),right=x0+width-20,grid={colour:'#e4e4e4',width:1,dash:''},frame={colour:'#888888',width:1,dash:''};
   let top=y0+6;
   if(panel.title){pen.text(left,top+14,panel.title,'start','ink',14);top+=22}
   let x=left;
   const seen=new Set();
-  for(const m of panel.marks)if(m.name&&!seen.has(m.name)&&!chart.hidden.has(m.name)){
+  if(!panel.named_above)for(const m of panel.marks)if(m.name&&!seen.has(m.name)&&!chart.hidden.has(m.name)){
     seen.add(m.name);
     const need=28+6.8*m.name.length+18;
     if(x>left&&x+need>right){x=left;top+=18}
@@ -110,7 +110,7 @@ function panelInto(pen,panel,chart,x0,y0,width){
   pen.path([[left,box.top],[right,box.top],[right,box.bottom],[left,box.bottom],[left,box.top]],frame);
   for(const t of xt)if(t.label)pen.text(sx(t.value),box.bottom+18,t.label,'middle','ink',12);
   for(const t of yt)if(t.label)pen.text(left-8,sy(t.value)+4,t.label,'end','ink',12);
-  if(rows)panel.y.names.forEach((n,i)=>pen.text(left+8,sy(i)-7,n,'start','ink',13));
+  if(rows)panel.y.names.forEach((n,i)=>pen.text(left+8,sy(i)-3,n,'start','ink',13));
   pen.text((left+right)/2,box.bottom+37,labelOf(panel.x),'middle','ink',13);
   if(!panel.y.names)pen.text(x0+14,(box.top+box.bottom)/2,labelOf(panel.y),'middle','ink',13,true);
   return box.bottom+46;

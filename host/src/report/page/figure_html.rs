@@ -28,6 +28,9 @@ pub fn figure(html: &mut Html, figure: &Figure, level: u8) {
 
 fn one_panel(html: &mut Html, figure: &Figure, panel: &Panel, index: usize, width: f64) {
     html.raw(&format!("<div class=\"panel\" data-panel=\"{index}\">"));
+    if !panel.title.is_empty() {
+        html.element("p class=\"panel-title\"", &panel.title);
+    }
     let legend = panel.legend();
     if !legend.is_empty() {
         html.raw("<ul class=\"legend\">");

@@ -7,14 +7,6 @@ use crate::report::figures::{Chapter, Entry};
 use crate::report::words::{self, answer_sentences, brief};
 use crate::results::Results;
 
-/// What the page is about, above everything and on every print.
-pub fn banner(html: &mut Html, results: &Results) {
-    let class = if results.source.simulated { "banner simulated" } else { "banner" };
-    html.raw(&format!("<header class=\"{class}\"><p>"));
-    html.text(&brief::on_what(results));
-    html.raw("</p><div class=\"tools\" id=\"page-tools\"></div></header>");
-}
-
 /// The answer beside its figure.
 pub fn answer(html: &mut Html, results: &Results, drawn: &[(&Entry, Option<Figure>)]) {
     html.raw("<section id=\"answer\" class=\"first\"><div class=\"words\"><h1>How stiff is the contact in its sliding direction?</h1>");

@@ -6,7 +6,7 @@ const unpack=s=>{
 };
 // curves as numbers, once
 function unpackMark(mark){
-  for(const shape of[mark.line,mark.ribbon,mark.points,mark.loop,mark.cells]){
+  for(const shape of[mark.line,mark.ribbon,mark.points,mark.loop,mark.cells,mark.strips]){
     if(!shape)continue;
     for(const key of['x','y','low','high','values'])if(typeof shape[key]==='string')shape[key]=unpack(shape[key]);
     if(shape.bars){shape.bars.low=unpack(shape.bars.low);shape.bars.high=unpack(shape.bars.high)}
@@ -18,13 +18,14 @@ const countOf=(x,y)=>Math.min(x.length===undefined?x.count:x.length,y.length);
 const RADIUS=4;
 
 // a curve thinned to what its pixel columns show: first, lowest, highest, last of each
-function curve(pen,x,y,n,sx,sy,look){
-  const at=along(x),points=[];
+// what lies further than half the frame beyond it breaks the curve: lines to and from there would stand as a hedge
+function curve(pen,x,y,n,sx,sy,look,box){
+  const at=along(x),points=[],far=.5*(box.bottom-box.top);
   let column=NaN,held=null;
   const flush=()=>{if(held){for(const p of held.p)points.push(p);held=null}};
   for(let i=0;i<n;i++){
     const px=sx(at(i)),py=sy(y[i]);
-    if(!Number.isFinite(px)||!Number.isFinite(py)){flush();column=NaN;points.push(null);continue}
+    if(!Number.isFinite(px)||!(py>=box.top-far&&py<=box.bottom+far)){flush();column=NaN;points.push(null);continue}
     const c=Math.floor(px);
     if(c!==column){flush();column=c;held={p:[[px,py]],low:py,high:py}}
     else if(held.p.length<4)held.p.push([px,py]),held.low=Math.min(held.low,py),held.high=Math.max(held.high,py);
@@ -56,9 +57,11 @@ function bar(pen,bars,i,x,y,sx,sy,box,look){
     else pen.path([turned(at,other-4*k),turned(at,other+4*k)],line);
   });
 }
+const STEPS=[[.5,1],[.7,.75],[.9,.5],[.95,.3],[.99,.15]];
+const strength=v=>{for(const[below,s]of STEPS)if(v<below)return s;return 0};
 function drawMark(pen,mark,sx,sy,box,look){
   let m;
-  if((m=mark.line)||(m=mark.loop))curve(pen,m.x,m.y,countOf(m.x,m.y),sx,sy,look);
+  if((m=mark.line)||(m=mark.loop))curve(pen,m.x,m.y,countOf(m.x,m.y),sx,sy,look,box);
   else if(m=mark.ribbon){
     const at=along(m.x),n=countOf(m.x,m.low),hold=v=>Math.min(Math.max(v,box.top-9),box.bottom+9),points=[];
     const put=(i,v)=>{const x=sx(at(i)),y=sy(v);if(Number.isFinite(x)&&Number.isFinite(y))points.push([x,hold(y)])};
@@ -66,10 +69,24 @@ function drawMark(pen,mark,sx,sy,box,look){
     for(let i=n-1;i>=0;i--)put(i,m.high[i]);
     pen.area(points,look.colour,look.opacity);
   }else if(m=mark.points)for(let i=0;i<m.x.length;i++){
-    const x=sx(m.x[i]),y=sy(m.y[i]);
+    const x=sx(m.x[i])+(m.aside||0)*pen.k,y=sy(m.y[i]);
     if(!Number.isFinite(x)||!Number.isFinite(y))continue;
     if(m.bars)bar(pen,m.bars,i,x,y,sx,sy,box,look);
     marker(pen,x,y,m.marker,look);
+  }
+  else if(m=mark.strips){
+    const n=m.x.length,hold=v=>Math.min(Math.max(v,box.left),box.right),edge=i=>hold(sx(m.x[Math.min(i,n-1)]));
+    for(let row=0;row*n<m.values.length;row++){
+      const a=sy(row-.5),b=sy(row+.5),top=Math.min(a,b),height=Math.abs(b-a);
+      if(top>box.bottom||top+height<box.top)continue;
+      for(let i=0;i<n;){
+        const s=strength(m.values[row*n+i]);
+        let to=i+1;
+        while(to<n&&strength(m.values[row*n+to])===s)to++;
+        if(s)pen.rect(edge(i),top,edge(to)-edge(i),height,look.colour,s);
+        i=to;
+      }
+    }
   }
   else if(m=mark.level){const y=sy(m.at),[a,b]=m.between?m.between.map(sx):[box.left,box.right];pen.path([[a,y],[b,y]],look)}
   else if(m=mark.upright){const x=sx(m.at);pen.path([[x,box.top],[x,box.bottom]],look)}

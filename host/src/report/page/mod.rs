@@ -1,15 +1,19 @@
 //! The page: the answer, then figures and tables by chapter, in one html text without anything from outside.
 
 mod chapters;
+mod comparison_page;
 mod figure_html;
 mod first_screen;
 mod glossary_html;
 mod policy;
 mod text;
 
-use super::figure::role;
+use super::figure::{Figure, role};
 use super::figures;
+use super::words::brief;
 use crate::results::Results;
+
+pub use comparison_page::comparison_page;
 
 pub(super) use text::{Html, escaped};
 
@@ -30,22 +34,38 @@ const SCRIPTS: [&str; 7] = [
 /// The whole report as html.
 pub fn page(results: &Results) -> String {
     let drawn: Vec<_> = figures::ALL.iter().map(|entry| (entry, entry.of(results))).collect();
+    let mut body = Html::default();
+    chapters::contents(&mut body, results, &drawn);
+    body.raw("<main>");
+    first_screen::answer(&mut body, results, &drawn);
+    chapters::all(&mut body, results, &drawn);
+    body.raw("</main>");
+    let title = format!("Contact stiffness: {}", results.source.file);
+    let figures = drawn.iter().filter_map(|(_, figure)| figure.as_ref());
+    shell(&title, &brief::on_what(results), results.source.simulated, &body.finish(), figures)
+}
+
+/// A page around `body`: its policy, style, banner, the figures' data, and the script that makes them alive.
+fn shell<'a>(
+    title: &str,
+    banner: &str,
+    simulated: bool,
+    body: &str,
+    figures: impl Iterator<Item = &'a Figure>,
+) -> String {
     let style = style();
     let script = format!("{CHARTS}\n(()=>{{\"use strict\";\n{}}})();\n", SCRIPTS.concat());
     let mut html = Html::default();
     html.raw("<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">");
     html.raw(&policy::meta(&style, &script));
-    html.raw("<title>");
-    html.text(&format!("Contact stiffness: {}", results.source.file));
-    html.raw(&format!("</title><style>{style}</style></head><body>"));
-    first_screen::banner(&mut html, results);
-    html.raw("<div class=\"frame\">");
-    chapters::contents(&mut html, results, &drawn);
-    html.raw("<main>");
-    first_screen::answer(&mut html, results, &drawn);
-    chapters::all(&mut html, results, &drawn);
-    html.raw("</main></div>");
-    figure_html::data(&mut html, drawn.iter().filter_map(|(_, figure)| figure.as_ref()));
+    html.element("title", title);
+    html.raw(&format!("<style>{style}</style></head><body>"));
+    html.raw(if simulated { "<header class=\"banner simulated\">" } else { "<header class=\"banner\">" });
+    html.element("p", banner);
+    html.raw("<div class=\"tools\" id=\"page-tools\"></div></header><div class=\"frame\">");
+    html.raw(body);
+    html.raw("</div>");
+    figure_html::data(&mut html, figures);
     html.raw(&format!("<script>{script}</script></body></html>\n"));
     html.finish()
 }
@@ -69,7 +89,11 @@ mod tests {
     #[test]
     fn the_charts_are_the_ones_that_were_published() {
         let hash = |text: &str| {
-            Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect::<String>()
+            use std::fmt::Write;
+            Sha256::digest(text.as_bytes()).iter().fold(String::new(), |mut hash, byte| {
+                write!(hash, "{byte:02x}").expect("a String takes everything");
+                hash
+            })
         };
         let about = include_str!("../../../vendor/uplot/README.md");
         for file in [CHARTS, CHARTS_STYLE] {

@@ -29,9 +29,9 @@ function axisTicks(axis,view,length,up){
     let free=-Infinity;
     const per=length/(view[1]-view[0]);
     return axis.names.map((label,value)=>({value,label})).filter(t=>t.value>=view[0]&&t.value<=view[1]).map(t=>{
-      const at=(t.value-view[0])*per,half=3.3*t.label.length;
+      const at=(t.value-view[0])*per,half=3.65*t.label.length;
       if(!up&&at-half<free)return{value:t.value,label:''};
-      free=at+half+4;return t;
+      free=at+half+8;return t;
     });
   }
   if(axis.every&&(view[1]-view[0])/axis.every>=2)return ticksEvery(view[0],view[1],axis.every);
@@ -44,7 +44,7 @@ class Chart{
     const rows=panel.height==='rows';
     const axis=(own,key,up)=>({
       scale:key,stroke:()=>css('--ink'),grid:{stroke:()=>css('--grid'),width:1},ticks:{stroke:()=>css('--frame'),size:5,width:1},
-      font:'12px '+FONT,labelFont:'13px '+FONT,label:up&&own.names?undefined:labelOf(own),labelSize:up?18:20,size:up?(own.names?8:46):26,gap:4,
+      font:'12px '+FONT,labelFont:'13px '+FONT,label:up&&own.names?undefined:labelOf(own),labelSize:up?18:20,size:up?(own.names?16+6.6*Math.max(...own.names.map(n=>n.length)):46):26,gap:4,
       space:0,incrs:[1],
       splits:u=>{
         const length=up?u.bbox.height/devicePixelRatio:u.bbox.width/devicePixelRatio;
@@ -60,7 +60,7 @@ class Chart{
     if(panel.x.names)axis.grid={show:false};
     const width=host.clientWidth||600;
     this.plot=new uPlot({
-      mode:2,width,height:this.height(width),pxAlign:false,legend:{show:false},padding:[10,14,0,rows?8:0],
+      mode:2,width,height:this.height(width),pxAlign:false,legend:{show:false},padding:[10,20,0,rows?8:0],
       cursor:{points:{show:false},drag:{x:true,y:true,uni:24,setScale:false},dataIdx:()=>null,focus:{prox:-1}},
       scales:{x:scale(panel.x,'x'),y:scale(panel.y,'y')},
       axes:[axis(panel.x,'x',false),y],
@@ -86,7 +86,7 @@ class Chart{
     ctx.save();ctx.beginPath();ctx.rect(b.left,b.top,b.width,b.height);ctx.clip();
     const sx=v=>this.panel.x.scale==='log'&&v<=0?NaN:u.valToPos(v,'x',true),sy=v=>this.panel.y.scale==='log'&&v<=0?NaN:u.valToPos(v,'y',true);
     for(const mark of this.marks())drawMark(pen,mark,sx,sy,box,look(mark.role));
-    if(this.panel.height==='rows')this.panel.y.names.forEach((n,i)=>pen.text(b.left+8*k,sy(i)-7*k,n,'start','ink',13));
+    if(this.panel.height==='rows')this.panel.y.names.forEach((n,i)=>pen.text(b.left+8*k,sy(i)-3*k,n,'start','ink',13));
     ctx.restore();
     ctx.strokeStyle=css('--frame');ctx.lineWidth=k;ctx.strokeRect(b.left,b.top,b.width,b.height);
     this.drawn=(this.drawn||0)+1;
@@ -128,6 +128,7 @@ class Chart{
     for(const m of this.marks()){
       const c=m.line||m.loop,pt=m.points;
       if(m.line&&m.name){const i=nearestOf(c,x);if(i>=0&&Number.isFinite(c.y[i]))parts.push(`${m.name} ${sixDigits(c.y[i])}`)}
+      if(m.strips){const row=Math.round(this.plot.posToVal(top,'y')),i=nearestOf({x:m.strips.x,y:m.strips.x},x);if(m.strips.says[row])return`${m.strips.says[row]}: ${sixDigits(m.strips.values[row*m.strips.x.length+i])} at ${sixDigits(m.strips.x[i])} ${p.x.unit}`}
       if(pt)for(let i=0;i<pt.x.length;i++){
         const d=Math.hypot(this.plot.valToPos(pt.x[i],'x')-left,this.plot.valToPos(pt.y[i],'y')-top);
         if(d<nearest[0])nearest=[d,(pt.says&&pt.says[i])||`${m.name} ${sixDigits(pt.y[i])}`];

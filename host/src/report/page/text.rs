@@ -49,6 +49,10 @@ pub fn unbroken(text: &str) -> String {
     for (i, c) in text.char_indices() {
         if c != ' ' {
             out.push(c);
+            // a range stays on one line
+            if c == '…' && before.is_ascii_digit() {
+                out.push('\u{2060}');
+            }
             before = c;
             continue;
         }
@@ -76,6 +80,7 @@ mod tests {
             unbroken("26.8 ± 0.9 N/µm (95 % of it)"),
             "26.8\u{a0}±\u{a0}0.9\u{a0}N/µm (95\u{a0}% of it)"
         );
+        assert_eq!(unbroken("25…28"), "25…\u{2060}28");
         assert_eq!(unbroken("2 Next 3 m/Nothing"), "2 Next 3 m/Nothing");
     }
 

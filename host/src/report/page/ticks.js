@@ -1,5 +1,5 @@
 // Ticks of an axis: the twin of report/scale.rs, which a test holds them to.
-const DIGIT=7,BESIDE=26,ABOVE=30,NEAR=1e-9,MOST_TICKS=200;
+const DIGIT=7,BESIDE=26,ABOVE=30,TIGHT_ABOVE=16,TIGHT_BESIDE=48,NEAR=1e-9,MOST_TICKS=200;
 const exponent=v=>+v.toExponential().split('e')[1];
 const power=(digit,decade)=>+(digit+'e'+decade);
 const superscript=e=>String(e).replace(/-/g,'⁻').replace(/\d/g,d=>'⁰¹²³⁴⁵⁶⁷⁸⁹'[d]);
@@ -9,7 +9,7 @@ function decimals(v,places){
   return /^-?[0.]+$/.test(text)?text.replace('-',''):text.replace('-','−');
 }
 const room=(label,up)=>up?ABOVE:DIGIT*[...label].length+BESIDE;
-const least=up=>up?ABOVE:DIGIT+BESIDE;
+const least=up=>up?TIGHT_ABOVE:TIGHT_BESIDE;
 function ticksEvery(low,high,step){
   const places=Math.max(0,-exponent(step));
   const first=Math.ceil(low/step-NEAR),last=Math.floor(high/step+NEAR);

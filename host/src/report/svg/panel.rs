@@ -26,7 +26,9 @@ pub struct Place {
 
 /// The panel as a picture of its own for the page, `width` px wide.
 pub fn panel(panel: &Panel, name: &str, width: f64, meaning: &str) -> String {
-    drawing(panel, name, width).finish(meaning)
+    // the page writes the title itself
+    let untitled = Panel { title: String::new(), ..panel.clone() };
+    drawing(&untitled, name, width).finish(meaning)
 }
 
 /// The panel as a drawing; `name` keeps its ids apart from all others of the page.
@@ -40,7 +42,7 @@ pub fn drawing(panel: &Panel, name: &str, width: f64) -> Drawing {
         20.0 + LETTER * panel.y.names.iter().map(|n| n.chars().count()).max().unwrap_or(0) as f64
     };
     let top = if panel.title.is_empty() { 10.0 } else { 28.0 };
-    let inner = width - left - 14.0;
+    let inner = width - left - 20.0;
     let height = match panel.height {
         Height::Tall => 300.0,
         Height::Usual => 210.0,
@@ -72,7 +74,7 @@ pub fn drawing(panel: &Panel, name: &str, width: f64) -> Drawing {
     axes(&mut drawing, panel, &place, &x_ticks, &y_ticks);
     if rows {
         for (i, name) in panel.y.names.iter().enumerate() {
-            let y = place.y.place_within(i as f64) - 7.0;
+            let y = place.y.place_within(i as f64) - 3.0;
             drawing.text([area.left + 8.0, y], Anchor::Start, "row", name);
         }
     }
@@ -121,13 +123,13 @@ fn axes(drawing: &mut Drawing, panel: &Panel, place: &Place, x_ticks: &[Tick], y
     let mut free = f64::NEG_INFINITY;
     for tick in x_ticks {
         let Some(at) = place.x.place(tick.value) else { continue };
-        let half = 0.5 * LETTER * tick.label.chars().count() as f64;
+        let half = 0.55 * LETTER * tick.label.chars().count() as f64;
         // names give way where they would touch
         let shown = !tick.label.is_empty() && at - half >= free;
         drawing.line([at, bottom], [at, bottom + if shown { 5.0 } else { 3.0 }], FRAME);
         if shown {
             drawing.text([at, bottom + 18.0], Anchor::Middle, "tick", &tick.label);
-            free = at + half + 4.0;
+            free = at + half + 8.0;
         }
     }
     for tick in y_ticks.iter().filter(|_| panel.height != Height::Rows) {

@@ -4,6 +4,7 @@ use crate::report::page::escaped;
 use crate::report::words;
 use crate::report::words::number::{count, short};
 use crate::results::Results;
+use std::fmt::Write;
 
 /// Checks with their outcome, meaning and figures.
 pub fn checks(results: &Results) -> Option<String> {
@@ -35,13 +36,14 @@ pub fn checks(results: &Results) -> Option<String> {
             format!("<span data-path=\"{path}\">{}</span>", escaped(&figure(name, *value)))
         }));
         let name = escaped(&check.name);
-        html.push_str(&format!(
+        let _ = write!(
+            html,
             "<tr id=\"check-{name}\"><th scope=\"row\">{}</th><td><span class=\"{class}\">{sign} {}</span></td><td>{} <small>{}</small></td></tr>",
             escaped(&check.name.replace('-', " ")),
             words::outcome(check.ok),
             escaped(&check.meaning),
             figures.join("; ")
-        ));
+        );
     }
     html.push_str("</tbody></table></div>");
     Some(html)

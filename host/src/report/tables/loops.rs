@@ -5,7 +5,8 @@ use crate::report::page::escaped;
 use crate::report::words as said;
 use crate::report::words::number::{decimals, micro, short, with_scatter};
 use crate::report::words::side_by_side;
-use crate::results::{OverCycles, Results};
+use crate::results::{Excitation, Force, Hysteresis, OverCycles, Results, Shape};
+use std::fmt::Write;
 
 /// FBS and loops side by side, each with what it is.
 pub fn side_by_side(results: &Results) -> Option<String> {
@@ -18,12 +19,13 @@ pub fn side_by_side(results: &Results) -> Option<String> {
          <th scope=\"col\">found by</th><th scope=\"col\" class=\"n\">k ± σ, N/µm</th><th scope=\"col\">what it is</th></tr></thead><tbody>",
     );
     for kind in kinds {
-        html.push_str(&format!(
+        let _ = write!(
+            html,
             "<tr><th scope=\"row\">{}</th><td class=\"n\">{}</td><td>{}</td></tr>",
             escaped(&kind.found),
             escaped(&with_scatter(micro(kind.mean_n_per_m), micro(kind.std_n_per_m))),
             escaped(&kind.meaning)
-        ));
+        );
     }
     html.push_str("</tbody></table></div>");
     Some(html)
@@ -92,7 +94,9 @@ pub fn hysteresis(results: &Results) -> Option<String> {
     if friction {
         heads.push("μ");
     }
-    let mut table = Table::new(2, "Loops (the paper's Table 3)", &heads);
+    let mut table = Table::new(2, "Loops with the raw force (the paper's Table 3)", &heads);
+    let mut corrected = Table::new(2, "Loops with the corrected force", &heads);
+    let mut any_corrected = false;
     let over =
         |value: Option<OverCycles>, scale: f64| value.map(|v| with_scatter(v.mean * scale, v.std * scale));
     let mut told: Vec<(String, &str)> = Vec::new();
@@ -125,24 +129,32 @@ pub fn hysteresis(results: &Results) -> Option<String> {
         if friction {
             cells.push(number(h.friction_coefficient.map(short), at("friction_coefficient")));
         }
-        table.row(cells);
+        if h.force == Force::Corrected {
+            corrected.row(cells);
+            any_corrected = true;
+        } else {
+            table.row(cells);
+        }
         told.extend(h.warnings.iter().map(|w| (said::excitation(h), w.as_str())));
         if let Some(why) = h.k_t_why.as_ref().filter(|_| h.k_t_n_per_m.is_none()) {
             told.push((said::excitation(h), why));
         }
     }
-    Some(format!("{}{}", table.finish(), remarks(&told)))
+    let mut html = table.finish() + &remarks(&told);
+    if any_corrected {
+        let _ = write!(
+            html,
+            "<details><summary>The same with the corrected force</summary>{}</details>",
+            corrected.finish()
+        );
+    }
+    Some(html)
 }
 
 /// The shape in words. Of impacts it is what the decay's frequency tells; whether their loops are straight lines is another question.
-fn shape(h: &crate::results::Hysteresis) -> String {
+fn shape(h: &Hysteresis) -> String {
     let name = said::shape_name(h.shape);
-    let opened = h.kind == crate::results::Excitation::Impact
-        && h.slope_between_spots_n_per_m.is_none()
-        && h.k_t_n_per_m.is_none();
-    if opened && h.shape == crate::results::Shape::Stuck {
-        "sticks, but not a straight line".into()
-    } else {
-        name.into()
-    }
+    let opened =
+        h.kind == Excitation::Impact && h.slope_between_spots_n_per_m.is_none() && h.k_t_n_per_m.is_none();
+    if opened && h.shape == Shape::Stuck { "sticks, but not a straight line".into() } else { name.into() }
 }

@@ -1,6 +1,7 @@
 //! The tables: html text from results. Every number says where it stands in `results.json`.
 
 mod checks;
+mod differences;
 mod interface;
 mod joint;
 mod loops;
@@ -8,6 +9,7 @@ mod provenance;
 mod recommended;
 
 pub use checks::checks;
+pub use differences::differences;
 pub use interface::virtual_points;
 pub use joint::{joint, refusals};
 pub use loops::{decay, hysteresis, side_by_side, static_arm};

@@ -24,7 +24,9 @@ fn line(head: &str, text: impl Into<String>) -> Line {
 pub fn on_what(results: &Results) -> String {
     let source = &results.source;
     let file = &source.file;
-    let seed = source.settings.get("seed").map_or(String::new(), |seed| format!(", seed {seed}"));
+    let seed = source.settings.get("seed").map_or(String::new(), |seed| {
+        format!(", seed {}", seed.as_str().map_or_else(|| seed.to_string(), str::to_owned))
+    });
     if source.simulated {
         let rig =
             source.settings.get("rig").and_then(|r| r.as_str()).map_or(String::new(), |r| format!(" “{r}”"));
