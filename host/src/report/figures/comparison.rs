@@ -13,6 +13,7 @@ struct Row {
     median: Option<f64>,
     role: Role,
     believed: bool,
+    path: &'static str,
 }
 
 /// Mean and scatter of k_z over the main band, by method: of those that identified it, or of all where none did.
@@ -45,7 +46,7 @@ pub fn comparison(results: &Results) -> Option<Figure> {
                 Mark::points(role, marker, [[row.mean, y]])
                     .barred("x", [[row.mean - row.std, row.mean + row.std]])
                     .saying(vec![row.label.clone()])
-                    .from("x", "/joint/*/stiffness_n_per_m/z/mean", 1.0 / MICRO),
+                    .from("x", row.path, 1.0 / MICRO),
             );
         }
         if let Some(median) = row.median.filter(|m| range[0] < *m && *m < range[1]) {
@@ -79,6 +80,7 @@ fn row(joint: &Joint) -> Option<Row> {
         median: Some(micro(k.median)),
         role: if joint.method == DIRECT { Role::Loops } else { Role::modes(joint.idms) },
         believed: joint.identified(),
+        path: "/joint/*/stiffness_n_per_m/z/mean",
     })
 }
 
@@ -93,5 +95,6 @@ fn quoted(results: &Results) -> Option<Row> {
         median: None,
         role: Role::BetweenArms,
         believed: true,
+        path: "/recommended/*/joint/z/stiffness",
     })
 }

@@ -18,7 +18,7 @@ pub fn pulses(results: &Results) -> Option<Figure> {
     let points = |kept: bool, of: fn(&HitRow) -> f64| {
         let own = hits.iter().filter(move |h| h.kept == kept && of(h) > 0.0);
         let (role, marker, name) = if kept {
-            (Role::Group1, Marker::Ring, "kept")
+            (Role::Group1, Marker::Dot, "kept")
         } else {
             (Role::Refused, Marker::Cross, "refused")
         };

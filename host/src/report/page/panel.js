@@ -138,8 +138,22 @@ class Chart{
     if(p.x.names||p.height==='rows')return parts.join(' · ');
     return[`${p.x.quantity} ${sixDigits(x)} ${p.x.unit}`,...parts.map(t=>`${t} ${p.y.unit}`)].join(' · ');
   }
+  // from one point to the next, in the order in which they lie
+  stepPoint(by){
+    const p=this.panel,along=p.height==='rows'?'y':'x',all=[];
+    for(const m of this.marks())if(m.points)for(let i=0;i<m.points.x.length;i++)all.push({x:m.points.x[i],y:m.points.y[i],m,i});
+    if(!all.length)return false;
+    all.sort((a,b)=>a[along]-b[along]);
+    this.point=this.point===undefined?0:Math.max(0,Math.min(all.length-1,this.point+by));
+    const{x,y,m,i}=all[this.point],u=this.plot;
+    u.setCursor({left:u.valToPos(x,'x'),top:u.valToPos(y,'y')});
+    const said=(m.points.says&&m.points.says[i])||`${m.name} ${sixDigits(x)} ${p.x.unit}, ${sixDigits(y)} ${p.y.unit}`;
+    this.host.closest('figure').querySelector('.readout').textContent=said;
+    return true;
+  }
   step(by){
-    const first=this.panel.marks.find(m=>m.line),u=this.plot;
+    const first=this.panel.marks.find(m=>m.line&&m.name)||this.panel.marks.find(m=>m.line),u=this.plot;
+    if(!first&&this.stepPoint(by))return;
     const at=u.cursor.left>=0?u.posToVal(u.cursor.left,'x'):(this.view.x[0]+this.view.x[1])/2;
     let x;
     if(first){const c=first.line,n=countOf(c.x,c.y),i=Math.max(0,Math.min(n-1,nearestOf(c,at)+by));x=along(c.x)(i)}

@@ -79,7 +79,7 @@ impl Drawing {
     }
 
     /// A curve through points in pixels; `None` breaks it. Many points in one pixel column are reduced to
-    /// the first, the lowest, the highest and the last, which looks the same.
+    /// the lowest and the highest, which looks the same.
     pub fn curve(&mut self, points: &[Option<[f64; 2]>], stroke: Stroke<'_>) {
         let path = path_of(points);
         if !path.is_empty() {
@@ -291,7 +291,7 @@ fn held(value: f64) -> f64 {
     if value.is_finite() { value.clamp(-20_000.0, 20_000.0) } else { 0.0 }
 }
 
-/// Per pixel column, in the order they come: first, lowest, highest, last.
+/// Per pixel column, in the order they come: lowest and highest.
 fn thinned(run: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut kept = Vec::new();
     for column in run.chunk_by(|a, b| a[0].floor() == b[0].floor()) {
@@ -300,7 +300,7 @@ fn thinned(run: &[[f64; 2]]) -> Vec<[f64; 2]> {
             continue;
         }
         let by_height = |a: &usize, b: &usize| column[*a][1].total_cmp(&column[*b][1]);
-        let mut indices = vec![0, column.len() - 1];
+        let mut indices = Vec::with_capacity(2);
         indices.extend((0..column.len()).min_by(by_height));
         indices.extend((0..column.len()).max_by(by_height));
         indices.sort_unstable();

@@ -1,11 +1,9 @@
 //! The marks of a panel, drawn. The page's twin is `page/marks.js`.
 
 use super::drawing::{Anchor, Area, Drawing, Stroke};
-use super::panel::Place;
+use super::place::Place;
+use super::sign::{self, RADIUS};
 use crate::report::figure::{Along, Bars, Mark, Marker, Packed, Role, Shape};
-
-/// Radius of a point, px.
-const RADIUS: f64 = 4.0;
 
 /// One mark; what lies outside the frame is cut by who calls.
 pub fn draw(drawing: &mut Drawing, place: &Place, mark: &Mark) {
@@ -30,7 +28,7 @@ pub fn draw(drawing: &mut Drawing, place: &Place, mark: &Mark) {
                     bar(drawing, place, bars, i, at, *aside, stroke);
                 }
                 if let Some(at) = inside(place, at) {
-                    self::marker(drawing, [at[0] + aside, at[1]], role, *marker);
+                    sign::marker(drawing, [at[0] + aside, at[1]], role, *marker);
                 }
             }
         }
@@ -196,27 +194,5 @@ fn strips(drawing: &mut Drawing, place: &Place, fill: &str, x: &Packed, values: 
             }
         }
         drawing.fills(&areas, fill, opacity);
-    }
-}
-
-/// The sign of a point.
-pub fn marker(drawing: &mut Drawing, at: [f64; 2], role: Role, marker: Marker) {
-    let name = role.name();
-    let stroke = format!("s-{name}");
-    match marker {
-        Marker::Dot => drawing.dot(at, RADIUS, &format!("f-{name} s-{name}")),
-        Marker::Ring => drawing.dot(at, RADIUS, &format!("paper s-{name}")),
-        Marker::Square => drawing.square(at, RADIUS, &format!("f-{name} s-{name}")),
-        Marker::Frame => drawing.square(at, RADIUS, &format!("paper s-{name}")),
-        Marker::Stroke => {
-            drawing.line([at[0], at[1] - 7.0], [at[0], at[1] + 7.0], Stroke::new(&stroke, 1.6));
-        }
-        Marker::Cross => {
-            for side in [-1.0, 1.0] {
-                let (a, b) =
-                    ([at[0] - RADIUS, at[1] - side * RADIUS], [at[0] + RADIUS, at[1] + side * RADIUS]);
-                drawing.line(a, b, Stroke::new(&stroke, 1.8));
-            }
-        }
     }
 }

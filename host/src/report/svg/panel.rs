@@ -1,6 +1,7 @@
 //! One panel as a drawing: frame, grid, ticks, and what stands in it.
 
 use super::drawing::{Anchor, Area, Drawing, Stroke};
+use super::place::Place;
 use super::{marks, scene};
 use crate::report::figure::{Axis, Height, Panel, Shape};
 use crate::report::scale::{Lie, Scale, Tick};
@@ -13,16 +14,6 @@ const MINOR: Stroke<'_> = Stroke::new("grid", 0.5);
 pub const ROW: f64 = 42.0;
 /// Of a letter at the size of ticks, px.
 const LETTER: f64 = 6.6;
-
-/// A panel with its frame and axes in pixels.
-pub struct Place {
-    /// The frame.
-    pub area: Area,
-    /// The horizontal axis.
-    pub x: Scale,
-    /// The upright axis.
-    pub y: Scale,
-}
 
 /// The panel as a picture of its own for the page, `width` px wide.
 pub fn panel(panel: &Panel, name: &str, width: f64, meaning: &str) -> String {
