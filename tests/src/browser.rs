@@ -96,6 +96,7 @@ impl Browser {
     }
 
     /// A command, and its answer. Events that come meanwhile are kept.
+    #[allow(clippy::needless_pass_by_value, reason = "every caller makes them on the spot")]
     fn call(&mut self, session: Option<&str>, method: &str, params: Value) -> Value {
         self.last += 1;
         let id = self.last;
@@ -265,8 +266,7 @@ impl Page<'_> {
             .browser
             .events
             .iter()
-            .filter_map(|e| e["params"]["documentURL"].as_str())
-            .next()
+            .find_map(|e| e["params"]["documentURL"].as_str())
             .unwrap_or_default()
             .to_owned();
         urls.filter(|url| *url != own && !url.starts_with("data:") && !url.starts_with("blob:")).collect()

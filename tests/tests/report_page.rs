@@ -309,7 +309,7 @@ fn agrees(value: f64, text: &str) -> bool {
         let number = text[start..end].trim_end_matches('.');
         let shown: f64 = number.parse().unwrap();
         let places = number.split_once('.').map_or(0, |(_, d)| d.len());
-        let half = 0.5001 * 10f64.powi(-(places as i32));
+        let half: f64 = format!("0.5001e-{places}").parse().unwrap();
         [1.0, 1e-6, 1e6, 1e-3, 100.0].into_iter().any(|factor| (value.abs() * factor - shown).abs() <= half)
     })
 }

@@ -134,7 +134,10 @@ impl Drawing {
 
     /// Round or square points this wide, as one shape.
     pub fn ends(&mut self, points: &[[f64; 2]], class: &str, width: f64, round: bool) {
-        let path: String = points.iter().map(|p| format!("M{} {}h0", px(p[0]), px(p[1]))).collect();
+        let mut path = String::new();
+        for p in points {
+            let _ = write!(path, "M{} {}h0", px(p[0]), px(p[1]));
+        }
         let cap = if round { "round" } else { "square" };
         let width = px(width);
         self.push(format_args!("<path d=\"{path}\" class=\"{class}\" stroke-width=\"{width}\" stroke-linecap=\"{cap}\" fill=\"none\"/>"));
