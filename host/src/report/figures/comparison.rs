@@ -50,13 +50,11 @@ pub fn comparison(results: &Results) -> Option<Figure> {
             );
         }
         if let Some(median) = row.median.filter(|m| range[0] < *m && *m < range[1]) {
-            panel.marks.push(
-                Mark::points(role, Marker::Stroke, [[median, y]]).named("median of the lines").from(
-                    "x",
-                    "/joint/*/stiffness_n_per_m/z/median",
-                    1.0 / MICRO,
-                ),
-            );
+            panel.marks.push(Mark::points(role, Marker::Stroke, [[median, y]]).from(
+                "x",
+                "/joint/*/stiffness_n_per_m/z/median",
+                1.0 / MICRO,
+            ));
         }
     }
     let say = format!(

@@ -63,6 +63,7 @@ pub fn unbroken(text: &str) -> String {
         };
         let holds = (before.is_ascii_digit() && (rest.starts_with('±') || UNITS.iter().any(|u| unit(u))))
             || before == '±'
+            || (before == '%' && rest.starts_with(|c: char| c.is_ascii_digit()))
             || (before == '=' && rest.starts_with(|c: char| c.is_ascii_digit() || c == '−'));
         out.push(if holds { HARD } else { ' ' });
         before = c;
