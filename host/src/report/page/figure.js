@@ -134,6 +134,7 @@ function csvOf(figure,element){
       if(m.ribbon){const at=along(m.ribbon.x);for(let n=0;n<m.ribbon.low.length;n++)put(at(n),undefined,m.ribbon.low[n],m.ribbon.high[n])}
       if(m.points)for(let n=0;n<m.points.x.length;n++)put(m.points.x[n],m.points.y[n],m.points.bars?.low[n],m.points.bars?.high[n]);
       if(m.level)put(undefined,m.level.at);
+      if(m.strips)m.strips.says.forEach((name,row)=>{const n=m.strips.x.length;for(let i=0;i<n;i++)if(m.strips.x[i]>=low&&m.strips.x[i]<=high)lines.push([quoted(head),quoted(name),quoted(labelOf(panel.x)),num(m.strips.x[i]),quoted(m.name),num(m.strips.values[row*n+i]),'',''].join(','))});
       if(m.cells)m.cells.values.forEach((v,n)=>{if(Number.isFinite(v))put(n%panel.x.names.length,Math.floor(n/panel.x.names.length),v)});
       if(m.scene)for(const s of m.scene.spots)lines.push([s.toward?'impact':'response',quoted(s.name),'x y z in m',num(s.at[0]),'',num(s.at[1]),num(s.at[2]),''].join(','));
     }
