@@ -4,6 +4,7 @@
 //! test the command, and the libraries where they look inside.
 #![allow(clippy::unwrap_used, clippy::missing_panics_doc, reason = "a scenario that cannot go on has failed")]
 
+pub mod browser;
 pub mod campaign;
 pub mod command;
 pub mod drawn_campaigns;

@@ -6,6 +6,7 @@
 
 mod bench;
 mod budgets;
+mod chromium;
 mod command;
 mod consent;
 mod emulator;

@@ -1,4 +1,4 @@
-//! Debian packages, for the two things cargo cannot fetch: a compiler with sources, and QEMU.
+//! Debian packages, for the things cargo cannot fetch: a compiler with sources, QEMU, and the browser.
 
 use crate::command;
 use crate::consent::Consent;

@@ -2,8 +2,8 @@
 
 use crate::consent::Consent;
 use crate::project::Project;
-use crate::qemu;
 use crate::toolchain::{self, Mode, Toolchain};
+use crate::{chromium, qemu};
 use anyhow::Result;
 
 /// The choice a person has, shown by `--help`.
@@ -13,10 +13,11 @@ JOINTRIG_FIRMWARE_TOOLCHAIN chooses the compiler for the microcontroller:
   rustup  rustup's target only
   distro  Debian's rustc-web, rust-web-src and rust-web-clippy; core is built once into a private sysroot";
 
-/// Makes the target and the emulator available, and returns the compiler for the target.
+/// Makes the target, the emulator and the browser available, and returns the compiler for the target.
 pub fn everything(project: &Project, consent: Consent) -> Result<Toolchain> {
     let toolchain = target(project, consent)?;
     qemu::ensure(consent)?;
+    chromium::ensure(consent)?;
     Ok(toolchain)
 }
 

@@ -9,8 +9,8 @@ use super::from_frfs::Substructured;
 use super::missing::{Missing, given_up};
 use super::recommended::{Recommended, recommended};
 use super::wanted::{BANDS, Progress, Wanted};
-use super::{cells_stage, configuration_stage, contact_answer, contact_stage};
-use crate::results::MAIN_BAND;
+use super::{cells_stage, configuration_stage, contact_answer, contact_stage, heard};
+use crate::results::{CellRow, Cells, MAIN_BAND};
 use crate::spectra::Windowing;
 use crate::structure::Structure;
 use crate::substructuring::averaged::Priors;
@@ -19,7 +19,14 @@ use crate::substructuring::geometry::Grouping;
 use crate::substructuring::{Band, Frf, Geometry, IdmSet, Method, fit, identify};
 
 /// The methods whose spectra a campaign's results keep and show; of all others they keep the bands.
-const SHOWN: [Method; 3] = [Method::Internal, Method::InternalPrinted, Method::Inverse];
+const SHOWN: [Method; 6] = [
+    Method::Internal,
+    Method::InternalPrinted,
+    Method::Interface,
+    Method::PrimalA,
+    Method::PrimalB,
+    Method::Inverse,
+];
 
 /// Everything that the measurements say; of what they were measured with, nothing.
 pub fn analyse_measurements<M: Measurements>(
@@ -36,6 +43,10 @@ pub fn analyse_measurements<M: Measurements>(
         ..Findings::default()
     };
     found.missing.extend(given_up(&names, measurements.given_up()));
+    found.cells = Some(Cells {
+        frequency_hz: heard::frequencies(&cells.averages),
+        cells: heard::heard(geometry, &cells.averages).into_iter().map(cell_row).collect(),
+    });
 
     let all = Structure::ALL.map(|structure| {
         let planned = names.iter().filter(|c| c.configuration == structure).count();
@@ -85,6 +96,20 @@ pub fn analyse_measurements<M: Measurements>(
     found.own_stiffness = Some(own.map(|(stiffness, _)| stiffness));
     found.between_arms = Some(decided(&found));
     found
+}
+
+/// How a cell was heard; what was wanted and refused, the file knows.
+fn cell_row(heard: heard::Heard) -> CellRow {
+    CellRow {
+        configuration: heard.name.configuration.into(),
+        impact: heard.name.impact,
+        response: heard.name.response,
+        wanted: 0,
+        kept: 0,
+        refused: std::collections::BTreeMap::new(),
+        coherence: heard.coherence,
+        random_error: heard.random_error,
+    }
 }
 
 fn substructured(frfs: [&Frf; 3], geometry: &Geometry) -> Result<Substructured, Missing> {

@@ -2,7 +2,7 @@
 
 use super::averages::CellAverage;
 use crate::frf::Frf;
-use crate::results::{FrfCurve, Role, rounded};
+use crate::results::{FrfCurve, NoiseFloor, Role, rounded};
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
 use crate::substructuring::geometry::{Configuration, Grouping, Point};
@@ -23,6 +23,41 @@ pub fn of_cells(
         Some(of_cell(configuration, (role, impact, channel), find(impact, channel)?, quantity))
     };
     chosen.into_iter().filter_map(curve).collect()
+}
+
+/// The driving point against its own noise.
+pub fn noise_floor(
+    configuration: Structure,
+    points: &Configuration,
+    cells: &[CellAverage],
+    quantity: MotionQuantity,
+) -> Option<NoiseFloor> {
+    let find = |impact: &Point, channel: &Point| {
+        cells.iter().find(|c| c.name.impact == impact.name && c.name.response == channel.name)
+    };
+    let chosen = choose(points, &|impact, channel| find(impact, channel).is_some());
+    let (_, impact, channel) = chosen.into_iter().find(|(role, ..)| *role == Role::DrivingPoint)?;
+    let y = &find(impact, channel)?.spectra;
+    if y.hits() < 2 {
+        return None;
+    }
+    let order = quantity.order_of_s();
+    let lines = || 0..y.lines();
+    let magnitude = |l: usize| (y.h1(l, 2) * y.s(l).powi(-order)).norm();
+    let frequency_hz = y.frequency_hz();
+    let first_hz = frequency_hz.first().copied().unwrap_or(0.0);
+    Some(NoiseFloor {
+        configuration: configuration.into(),
+        output: channel.description.clone(),
+        input: impact.name.clone(),
+        first_hz,
+        step_hz: frequency_hz.get(1).map_or(0.0, |second| second - first_hz),
+        magnitude_m_per_n: lines().map(|l| rounded(magnitude(l), 5)).collect(),
+        noise_m_per_n: lines()
+            .map(|l| rounded(y.variance(l, 2).sqrt() * y.s(l).norm().powi(-order), 5))
+            .collect(),
+        dynamic_stiffness_n_per_m: lines().map(|l| rounded(1.0 / magnitude(l), 5)).collect(),
+    })
 }
 
 fn of_cell(

@@ -40,6 +40,7 @@ pub fn of<M: Measurements>(
                 records: Vec::new(),
                 usable_band: None,
                 frfs: chosen::of_matrix(configuration, points, &found.frf),
+                noise_floor: None,
                 imported: Some(ImportedFrom {
                     file: found.source,
                     utc: found.utc,
@@ -56,6 +57,7 @@ pub fn of<M: Measurements>(
         records: own.iter().flat_map(|c| c.records.iter().copied()).collect(),
         usable_band: force_band(configuration, own),
         frfs: chosen::of_cells(configuration, points, own, quantity),
+        noise_floor: chosen::noise_floor(configuration, points, own, quantity),
         imported: None,
     };
     let assembled = assemble::assemble(configuration, points, own, quantity);

@@ -3,7 +3,7 @@
 use super::from_store::{AnalyseError, CampaignFile};
 use super::hit_counts::completeness;
 use crate::campaign::store::Store;
-use crate::results::{Completeness, Source};
+use crate::results::{CellRow, Cells, Completeness, HitRow, Place, Source, rounded};
 use crate::structure::Structure;
 
 impl CampaignFile {
@@ -37,12 +37,78 @@ impl CampaignFile {
         source
             .settings
             .insert("virtual_point_m".into(), serde_json::json!(self.plan.geometry.virtual_point_m));
-        // what the simulated rig was seeded with, where it was one
-        if let Some(seed) = store.meta("demo_seed")? {
+        // which simulated rig it was, and what it was seeded with
+        if let Some(rig) = store.simulated_rig()? {
+            source.settings.insert("rig".into(), rig.name.into());
+            source.settings.insert("seed".into(), rig.seed.to_string().into());
+        } else if let Some(seed) = store.meta("demo_seed")? {
             source.settings.insert("seed".into(), seed.into());
         }
         source.link = store.link_counters()?;
         Ok(source)
+    }
+
+    /// Where hammer and vibrometer went, as the plan says.
+    pub(super) fn places(&self) -> Vec<Place> {
+        let geometry = &self.plan.geometry;
+        let responses = geometry.response.iter().map(toml::Spanned::get_ref).map(|p| Place {
+            name: p.name.clone(),
+            kind: "response",
+            grouping: p.grouping,
+            position_m: p.position_m,
+            direction: None,
+        });
+        let impacts = geometry.impact.iter().map(toml::Spanned::get_ref).map(|p| Place {
+            name: p.name.clone(),
+            kind: "impact",
+            grouping: p.grouping,
+            position_m: p.position_m,
+            direction: Some(p.direction),
+        });
+        responses.chain(impacts).collect()
+    }
+
+    /// Every cell of the plan, in its order, with how it was heard.
+    pub(super) fn cell_rows(&self, heard: Cells) -> Cells {
+        let rows = self.cells.iter().map(|cell| {
+            let count = self.tally.cell(cell.id);
+            let name = &cell.name;
+            let own = heard.cells.iter().find(|h| {
+                h.configuration == name.configuration.name()
+                    && h.impact == name.impact
+                    && h.response == name.response
+            });
+            CellRow {
+                configuration: name.configuration.into(),
+                impact: name.impact.clone(),
+                response: name.response.clone(),
+                wanted: count.wanted as usize,
+                kept: count.kept as usize,
+                refused: count
+                    .refused
+                    .iter()
+                    .map(|(kind, n)| (kind.name().to_owned(), *n as usize))
+                    .collect(),
+                coherence: own.map_or_else(Vec::new, |h| h.coherence.clone()),
+                random_error: own.and_then(|h| h.random_error),
+            }
+        });
+        Cells { cells: rows.collect(), frequency_hz: heard.frequency_hz }
+    }
+
+    /// Every firing of the hammer that left a readable record, in order.
+    pub(super) fn hit_rows(&self) -> Vec<HitRow> {
+        let mut rows: Vec<HitRow> = (self.records.values().flatten().flatten())
+            .map(|r| HitRow {
+                record: r.id,
+                peak_n: rounded(r.peak_n, 5),
+                pulse_us: r.pulse_us,
+                verdict: r.standing().name().into(),
+                kept: r.kept(),
+            })
+            .collect();
+        rows.sort_by_key(|row| row.record);
+        rows
     }
 
     /// How much of the plan was measured, by structure.

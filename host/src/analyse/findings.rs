@@ -9,7 +9,9 @@ use super::from_frfs::Substructured;
 use super::missing::Missing;
 use super::shaker_levels::RecordLoops;
 use crate::contact::{ContactError, Stiffness};
-use crate::results::{Bootstrap, Completeness, FrfCurve, Source, UsableBand};
+use crate::results::{
+    Bootstrap, Cells, Completeness, FrfCurve, HitRow, NoiseFloor, Place, Source, UsableBand,
+};
 use crate::spectra::Windowing;
 use crate::structure::Structure;
 use crate::substructuring::averaged::{Averaged, Priors};
@@ -24,6 +26,12 @@ pub struct Findings {
     pub settings: Option<Settings>,
     /// Kept and refused hits.
     pub completeness: Vec<Completeness>,
+    /// Where hammer and vibrometer went.
+    pub geometry: Vec<Place>,
+    /// Every cell of a campaign.
+    pub cells: Option<Cells>,
+    /// Every firing of the hammer.
+    pub hits: Vec<HitRow>,
     /// What each configuration gave.
     pub configurations: Vec<ConfigurationFindings>,
     /// Joint and interface, line by line.
@@ -68,6 +76,8 @@ pub struct ConfigurationFindings {
     pub usable_band: Option<UsableBand>,
     /// FRFs to look at.
     pub frfs: Vec<FrfCurve>,
+    /// One FRF against its noise.
+    pub noise_floor: Option<NoiseFloor>,
     /// Where its FRFs came from, if they were measured elsewhere.
     pub imported: Option<ImportedFrom>,
 }

@@ -76,7 +76,9 @@ pub fn analyse(
 ) -> Result<Findings, AnalyseError> {
     let file = CampaignFile::open(store, wanted.known)?;
     let (source, completeness) = (file.source(store)?, file.completeness());
-    Ok(Findings { source, completeness, ..analyse_measurements(&file, wanted, progress) })
+    let found = analyse_measurements(&file, wanted, progress);
+    let cells = found.cells.map(|heard| file.cell_rows(heard));
+    Ok(Findings { source, completeness, cells, geometry: file.places(), hits: file.hit_rows(), ..found })
 }
 
 pub(super) struct PlannedCell {

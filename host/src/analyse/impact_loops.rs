@@ -172,13 +172,15 @@ pub fn middle(loops: &[ImpactLoop]) -> Option<&ImpactLoop> {
     sorted.get(sorted.len() / 2).copied()
 }
 
-/// Its signals from shortly before the first cycle to four cycles on.
+/// Its signals from shortly before the first cycle to the end of the fourth.
 pub fn drawn(shown: &ImpactLoop, fs_hz: f64, contact: &ContactSignals, delays: ContactDelays) -> LoopCurve {
     let [a, b, force_n] = in_step(contact, delays, fs_hz);
     let [start, end] = shown.first.cycle;
     let lead = (end - start) / 10;
     let from = start.saturating_sub(lead);
-    let to = (start + 4 * (end - start)).min(force_n.len());
+    // the paper shows the fourth cycle too, which a longer period puts later
+    let fourth = shown.first.decay.get(3).map_or(0, |cycle| cycle.end_sample);
+    let to = (start + 4 * (end - start)).max(fourth).min(force_n.len());
     let offset = |v: &[f64]| {
         v[..start.max(1).min(v.len())].iter().sum::<f64>() / start.max(1).min(v.len()).max(1) as f64
     };
@@ -195,8 +197,15 @@ pub fn drawn(shown: &ImpactLoop, fs_hz: f64, contact: &ContactSignals, delays: C
         displacement_b_m: short(x_b),
         force_n: short(force_n[from..to].iter().map(|f| f - rest).collect()),
         cycle: [start - from, end - from],
+        cycles: cycles(&shown.first, from, to),
         slope_n_per_m: shown.first.slope_n_per_m,
     }
+}
+
+/// The first cycle and those of the decay after it, as samples of what is shown.
+fn cycles(first: &FirstCycle, from: usize, to: usize) -> Vec<[usize; 2]> {
+    let all = first.decay.iter().map(|one| [one.first_sample, one.end_sample]);
+    all.filter(|[a, b]| *a >= from && a < b && *b <= to).map(|[a, b]| [a - from, b - from]).collect()
 }
 
 /// Length of the decay that is put together again, s: long enough to tell 192 Hz from 208 Hz.

@@ -35,6 +35,9 @@ pub struct Analyse {
     /// Draw the hits of every interface cell anew this often, for an interval that needs no model of the noise (1000 is usual).
     #[arg(long, value_name = "N", default_value_t = 0)]
     bootstrap: usize,
+    /// Print every method, check and loop too.
+    #[arg(long)]
+    details: bool,
     /// Print results.json on stdout too.
     #[arg(long)]
     json: bool,
@@ -48,13 +51,27 @@ impl Analyse {
             parallel_path: self.parallel_path,
             effective_mass_kg: self.effective_mass,
         };
-        let found = analyse_into(&store, Wanted { replicates: self.bootstrap, known }, &self.out)?;
-        if self.json { output::json(&found) } else { output::lines(words::summary(&found)) }
+        let found = analyse_into(&store, Wanted { replicates: self.bootstrap, known }, &self.out, &[])?;
+        if self.json {
+            return output::json(&found);
+        }
+        if self.details {
+            output::lines(words::summary(&found))?;
+            output::lines([String::new()])?;
+        }
+        ending(&found, &self.out)
     }
 }
 
-/// Analyses what the file holds and writes `results.json` and `report.html` into `folder`.
-pub fn analyse_into(store: &Store, wanted: Wanted, folder: &Path) -> Result<Results, CliError> {
+/// The answer in a few lines, and where the report is.
+pub fn ending(found: &Results, folder: &Path) -> Result<(), CliError> {
+    let last = format!("Open {} for figures and tables.", folder.join(report::REPORT_FILE).display());
+    output::lines(words::brief::terminal(found, 1))?;
+    output::lines([last])
+}
+
+/// Analyses what the file holds.
+pub fn analysed(store: &Store, wanted: Wanted) -> Result<Results, CliError> {
     let bar = if std::io::stderr().is_terminal() {
         ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr())
     } else {
@@ -70,7 +87,18 @@ pub fn analyse_into(store: &Store, wanted: Wanted, folder: &Path) -> Result<Resu
     if let Some(answer) = &mut results.answer {
         answer.truth = store.simulated_truth()?;
     }
-    report::write(&results, folder).map_err(|source| CliError::File {
+    Ok(results)
+}
+
+/// Analyses what the file holds and writes `results.json`, `report.html` and the figures asked for into `folder`.
+pub fn analyse_into(
+    store: &Store,
+    wanted: Wanted,
+    folder: &Path,
+    formats: &[report::Format],
+) -> Result<Results, CliError> {
+    let results = analysed(store, wanted)?;
+    report::write(&results, folder, formats).map_err(|source| CliError::File {
         path: folder.into(),
         doing: "writing results and report",
         source,

@@ -30,6 +30,9 @@ pub struct Demo {
     /// Decides noise, scatter and every error of position.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// Print every method, check and loop too.
+    #[arg(long)]
+    details: bool,
 }
 
 /// Notes in the file that tell one demo from another: key and value.
@@ -56,8 +59,13 @@ impl Demo {
             return Err(CliError::Bad("stopped before the campaign was complete".into()));
         }
         let store = Store::open_read_only(&file)?;
-        let found = analyse_into(&store, Wanted::default(), folder)?;
-        output::lines(words::summary(&found))?;
+        let found = analyse_into(&store, Wanted::default(), folder, &[])?;
+        if self.details {
+            output::lines(words::summary(&found))?;
+            output::lines([String::new()])?;
+        }
+        // two more lines follow
+        output::lines(words::brief::terminal(&found, 2))?;
         let (stored, raw) = store.sample_bytes()?;
         output::lines([
             format!(

@@ -5,6 +5,7 @@
 
 mod analyse;
 mod campaign;
+mod compare;
 mod completions;
 mod demo;
 mod devices;
@@ -19,6 +20,7 @@ mod interrupt;
 mod measure;
 mod number;
 mod output;
+mod report;
 mod shaker;
 
 use std::process::ExitCode;
@@ -50,6 +52,10 @@ enum Command {
     Shaker(shaker::Shaker),
     /// Analyse a campaign file: results.json and report.html.
     Analyse(analyse::Analyse),
+    /// Make the report of a campaign file, and its figures as files.
+    Report(report::Report),
+    /// Compare two campaigns.
+    Compare(compare::Compare),
     /// Write everything that a campaign file holds for other programs.
     Export(export::Export),
     /// FRFs of impact records from anywhere.
@@ -88,6 +94,8 @@ impl Cli {
             Command::Campaign(command) => command.run(),
             Command::Shaker(command) => command.run(),
             Command::Analyse(command) => command.run(),
+            Command::Report(command) => command.run(),
+            Command::Compare(command) => command.run(),
             Command::Export(command) => command.run(),
             Command::Frf(command) => command.run(),
             Command::Hysteresis(command) => command.run(),
@@ -147,6 +155,9 @@ mod tests {
             "campaign backup p.jrig q.jrig",
             "campaign verify p.jrig",
             "analyse p.jrig --out d --json",
+            "analyse p.jrig --out d --details",
+            "report p.jrig --out d --figures svg,csv",
+            "compare p.jrig q.jrig --out d --json",
             "identify --a A.npz --b B.npz --ajb AJB.npz --geometry p.xlsx --method internal,inverse --idms 4,6 --band 300:600 --json",
             "completions bash",
             "frf records.npz --json",
@@ -167,6 +178,7 @@ mod tests {
         for line in [
             "",
             "campaign new p.jrig",
+            "report p.jrig --out d --figures gif",
             "campaign new p.jrig --paper --plan x.toml",
             "campaign run p.jrig --stage robot",
             "campaign drop p.jrig",

@@ -1,21 +1,10 @@
 //! The raw records of one cell, one over the other: force, and the response along each axis, by time after the trigger.
 
-use super::drawing::{Anchor, Area, Drawing, Stroke};
-use super::panel::{BLUE, Panel, VERMILION, legend};
-use super::scale::Scale;
-
-const WIDTH: f64 = 1040.0;
-const LEFT: f64 = 78.0;
-const TOP: f64 = 58.0;
-const GAP: f64 = 12.0;
-const BESIDE: f64 = 96.0;
-const HEIGHT: f64 = 118.0;
+use super::figure::{Along, Axis, Figure, Height, Mark, Panel, Role};
+use super::svg;
 
 /// The close view, ms after the trigger: pulse, rebound, and what the structure makes of it at first.
 const CLOSE_MS: [f64; 2] = [-1.0, 8.0];
-
-const KEPT: Stroke = Stroke::new(BLUE, 1.0);
-const REFUSED: Stroke = Stroke::new(VERMILION, 1.0);
 
 /// A record to be drawn.
 #[derive(Debug, Clone)]
@@ -37,14 +26,14 @@ pub struct Shown {
 }
 
 impl Shown {
-    /// (name, factor to the shown unit, samples) of each row of the figure.
-    fn rows(&self) -> [(&'static str, f64, &[f64]); 4] {
+    /// (name, unit, factor to it, samples) of each row of the figure.
+    fn rows(&self) -> [(&'static str, &'static str, f64, &[f64]); 4] {
         let [x, y, z] = &self.response_m_per_s;
         [
-            ("force in N", 1.0, &self.force_n),
-            ("x in mm/s", 1e3, x),
-            ("y in mm/s", 1e3, y),
-            ("z in mm/s", 1e3, z),
+            ("force", "N", 1.0, &self.force_n),
+            ("x", "mm/s", 1e3, x),
+            ("y", "mm/s", 1e3, y),
+            ("z", "mm/s", 1e3, z),
         ]
     }
 
@@ -60,78 +49,53 @@ pub fn records(title: &str, shown: &[Shown]) -> Option<String> {
         shown.iter().map(|record| record.milliseconds(0)).fold(f64::INFINITY, f64::min),
         shown.iter().map(|record| record.milliseconds(record.force_n.len())).fold(0.0, f64::max),
     ];
-    let column = (WIDTH - LEFT - BESIDE - 20.0) / 2.0;
-    let rows = first.rows().len();
-    let mut drawing = Drawing::new("records", WIDTH, TOP + rows as f64 * (HEIGHT + GAP) + 40.0);
-    drawing.fill(Area { left: 0.0, top: 0.0, width: WIDTH, height: 5_000.0 }, "#fff", 1.0);
-    drawing.text([LEFT, 20.0], Anchor::Start, "title", title);
-    legend(&mut drawing, [LEFT, 42.0], &entries(shown));
-    for row in 0..rows {
-        let (label, factor, _) = first.rows()[row];
-        for (side, range_ms) in [CLOSE_MS, whole].into_iter().enumerate() {
-            let area = Area {
-                left: LEFT + side as f64 * (column + BESIDE),
-                top: TOP + row as f64 * (HEIGHT + GAP),
-                width: column,
-                height: HEIGHT,
-            };
-            let x = Scale::linear(range_ms, [area.left, area.right()]);
-            let y = Scale::linear(span(shown, row, range_ms, factor), [area.bottom(), area.top]);
-            let panel = Panel { area, x, y };
-            let (x_ticks, y_ticks) = (x.ticks(6), y.ticks(3));
-            panel.grid(&mut drawing, &x_ticks, &y_ticks);
+    let mut figure =
+        Figure::new("records", "", title, "The records of one cell, one over the other").across(2);
+    figure.from.file = listed(shown);
+    for row in 0..first.rows().len() {
+        let (quantity, unit, factor, _) = first.rows()[row];
+        for range_ms in [CLOSE_MS, whole] {
+            let y = Axis::linear(quantity, unit, span(shown, row, range_ms, factor));
+            let mut panel =
+                Panel::new(Axis::linear("time after the trigger", "ms", range_ms), y).high(Height::Low);
             // kept ones on top: they are what counts
             for record in shown.iter().filter(|r| !r.kept).chain(shown.iter().filter(|r| r.kept)) {
-                let samples = record.rows()[row].2;
-                let points = samples
-                    .iter()
-                    .enumerate()
-                    .map(|(i, value)| (record.milliseconds(i), value * factor))
-                    .filter(|(t, _)| (range_ms[0]..=range_ms[1]).contains(t));
-                panel.curve(&mut drawing, points, if record.kept { KEPT } else { REFUSED });
+                let (role, name) =
+                    if record.kept { (Role::Group1, "kept") } else { (Role::Refused, "refused") };
+                let step = 1e3 / record.rate_hz;
+                let from = ((range_ms[0] - record.milliseconds(0)) / step).floor().max(0.0) as usize;
+                let samples = record.rows()[row].3;
+                let to = (((range_ms[1] - record.milliseconds(0)) / step).ceil().max(0.0) as usize + 1)
+                    .min(samples.len());
+                let from = from.min(to);
+                let along = Along::Regular { first: record.milliseconds(from), step, count: to - from };
+                let mark = Mark::line(role, along, samples[from..to].iter().map(|v| v * factor));
+                panel.marks.push(if row == 0 { mark.named(name) } else { mark });
             }
-            let x_label = (row + 1 == rows).then_some("time after the trigger in ms");
-            panel.axes(&mut drawing, (&x_ticks, x_label), (&y_ticks, Some(label)));
+            figure = figure.with(panel);
         }
     }
-    let text = drawing.finish(title);
-    // on its own, a drawing needs the name space and the letters that the report's page gives it
-    let style = "<style>text{fill:#333;font-family:system-ui,\"Segoe UI\",Roboto,\"Liberation Sans\",Arial,sans-serif}\
-                 .tick{font-size:12px}.legend{font-size:12.5px}.label{font-size:13px}.title{font-size:14px;font-weight:600}</style>";
-    let (head, body) = text.split_once('>')?;
-    let head = if head.contains("xmlns") {
-        head.to_owned()
-    } else {
-        head.replacen("<svg", "<svg xmlns=\"http://www.w3.org/2000/svg\"", 1)
-    };
-    Some(format!("{head}>{style}{body}\n"))
+    Some(svg::file(&figure))
 }
 
-fn entries(shown: &[Shown]) -> Vec<(Stroke, String)> {
-    let list = |kept: bool| {
-        let of: Vec<String> = shown
-            .iter()
-            .filter(|record| record.kept == kept)
-            .map(|record| {
-                if kept {
-                    record.record.to_string()
-                } else {
-                    format!("{} ({})", record.record, record.verdict)
-                }
-            })
-            .collect();
-        (!of.is_empty()).then(|| of.join(", "))
+/// `kept: 7; refused: 8 (double hit)`.
+fn listed(shown: &[Shown]) -> String {
+    let list = |kept: bool| -> Vec<String> {
+        let of = shown.iter().filter(|record| record.kept == kept);
+        of.map(|r| if kept { r.record.to_string() } else { format!("{} ({})", r.record, r.verdict) })
+            .collect()
     };
-    let kept = list(true).map(|of| (KEPT, format!("kept: {of}")));
-    let refused = list(false).map(|of| (REFUSED, format!("refused: {of}")));
-    kept.into_iter().chain(refused).collect()
+    let parts = [("kept", list(true)), ("refused", list(false))];
+    let told =
+        parts.iter().filter(|(_, of)| !of.is_empty()).map(|(name, of)| format!("{name}: {}", of.join(", ")));
+    told.collect::<Vec<_>>().join("; ")
 }
 
 /// Lowest and highest value of a row within the time shown, with a margin.
 fn span(shown: &[Shown], row: usize, range_ms: [f64; 2], factor: f64) -> [f64; 2] {
     let mut range = [f64::INFINITY, f64::NEG_INFINITY];
     for record in shown {
-        for (i, value) in record.rows()[row].2.iter().enumerate() {
+        for (i, value) in record.rows()[row].3.iter().enumerate() {
             if (range_ms[0]..=range_ms[1]).contains(&record.milliseconds(i)) {
                 range = [range[0].min(value * factor), range[1].max(value * factor)];
             }
@@ -158,10 +122,14 @@ mod tests {
         };
         let text =
             records("AJB <1>", &[record(7, true, "good"), record(8, false, "double hit")]).expect("drawn");
-        for part in ["kept: 7", "refused: 8 (double hit)", "AJB &lt;1&gt;", "xmlns=", "force in N"] {
+        for part in ["kept: 7", "refused: 8 (double hit)", "AJB &lt;1&gt;", "xmlns=", "force, N"] {
             assert!(text.contains(part), "{part}");
         }
-        assert_eq!(text.matches(VERMILION).count(), 8 + 1, "four rows, two views, and the legend");
+        assert_eq!(
+            text.matches("class=\"s-refused\"").count(),
+            8 + 2,
+            "four rows, two views, and a legend over each of the two"
+        );
         assert!(records("none", &[]).is_none());
     }
 }

@@ -1,15 +1,7 @@
 //! Axes: from values to pixels, with ticks at 1, 2 and 5.
 
+use super::figure::{Axis, Spread};
 use crate::report::words::number::decimals;
-
-/// How values are spread over an axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Spread {
-    /// Evenly.
-    Linear,
-    /// By their logarithm; both ends must be positive.
-    Logarithmic,
-}
 
 /// One axis: a range of values on a range of pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,8 +31,16 @@ impl Scale {
 
     /// A logarithmic axis from `range` onto `pixels`.
     pub fn logarithmic(range: [f64; 2], pixels: [f64; 2]) -> Self {
-        let [low, high] = drawable(range, Spread::Logarithmic);
-        Scale { spread: Spread::Logarithmic, low, high, from: pixels[0], to: pixels[1] }
+        let [low, high] = drawable(range, Spread::Log);
+        Scale { spread: Spread::Log, low, high, from: pixels[0], to: pixels[1] }
+    }
+
+    /// That of a described axis.
+    pub fn of(axis: &Axis, pixels: [f64; 2]) -> Self {
+        match axis.scale {
+            Spread::Linear => Scale::linear(axis.range, pixels),
+            Spread::Log => Scale::logarithmic(axis.range, pixels),
+        }
     }
 
     /// The range of values.
@@ -52,8 +52,8 @@ impl Scale {
     pub fn place(&self, value: f64) -> Option<f64> {
         let share = match self.spread {
             Spread::Linear => (value - self.low) / (self.high - self.low),
-            Spread::Logarithmic if value <= 0.0 => return None,
-            Spread::Logarithmic => (value / self.low).ln() / (self.high / self.low).ln(),
+            Spread::Log if value <= 0.0 => return None,
+            Spread::Log => (value / self.low).ln() / (self.high / self.low).ln(),
         };
         let place = self.from + share * (self.to - self.from);
         place.is_finite().then_some(place)
@@ -65,74 +65,184 @@ impl Scale {
         self.place(value).map_or(low, |p| p.clamp(low, high))
     }
 
-    /// About `wanted` labelled ticks; a logarithmic axis adds minor ones.
-    pub fn ticks(&self, wanted: usize) -> Vec<Tick> {
+    /// Ticks with as many labels as stand apart on these pixels, at 1, 2 and 5; those between them have none. The page's twin is
+    /// `page/ticks.js`: a test draws random axes in both.
+    pub fn ticks(&self, lie: Lie) -> Vec<Tick> {
         match self.spread {
-            Spread::Linear => self.even_ticks(wanted),
-            Spread::Logarithmic => self.decade_ticks(),
+            Spread::Linear => self.even_ticks(lie),
+            Spread::Log => self.decade_ticks(lie),
         }
     }
 
     /// Ticks at multiples of `step` (for degrees, where 1-2-5 is not the custom).
     pub fn ticks_every(&self, step: f64) -> Vec<Tick> {
-        let places = if step >= 1.0 { 0 } else { (-step.log10().floor()) as usize };
-        let (first, last) =
-            ((self.low / step - 1e-9).ceil() as i64, (self.high / step + 1e-9).floor() as i64);
-        (first..=last)
+        let places = usize::try_from(-exponent(step)).unwrap_or(0);
+        let first = (self.low / step - NEAR).ceil();
+        let last = (self.high / step + NEAR).floor();
+        let count = (last - first + 1.0).clamp(0.0, MOST_TICKS) as usize;
+        (0..count)
             .map(|i| {
-                let value = i as f64 * step;
+                let value = (first + i as f64) * step;
                 Tick { value, label: decimals(value, places) }
             })
             .collect()
     }
 
-    fn even_ticks(&self, wanted: usize) -> Vec<Tick> {
-        let raw = (self.high - self.low) / wanted.max(1) as f64;
-        let decade = 10f64.powf(raw.log10().floor());
-        let step = [1.0, 2.0, 5.0, 10.0]
-            .into_iter()
-            .map(|m| m * decade)
-            .find(|s| *s >= raw * 0.999)
-            .unwrap_or(decade * 10.0);
-        self.ticks_every(step)
+    fn length(&self) -> f64 {
+        (self.to - self.from).abs()
     }
 
-    fn decade_ticks(&self) -> Vec<Tick> {
-        let (first, last) = (self.low.log10().floor() as i32, self.high.log10().ceil() as i32);
-        let decades = (self.high / self.low).log10();
-        let plain = self.low >= 0.1 && self.high <= 1e5;
-        let mut ticks = Vec::new();
-        for decade in first..=last {
-            for digit in 1..10 {
-                let value = f64::from(digit) * 10f64.powi(decade);
-                if value < self.low * 0.999 || value > self.high * 1.001 {
+    fn even_ticks(&self, lie: Lie) -> Vec<Tick> {
+        let span = self.high - self.low;
+        let finest = span * lie.least() / self.length();
+        let mut found: Vec<Tick> = Vec::new();
+        for decade in exponent(finest)..exponent(finest) + 4 {
+            for digit in [1, 2, 5] {
+                let step = power(digit, decade);
+                if step < finest {
                     continue;
                 }
-                let labelled = match digit {
-                    1 => true,
-                    2 | 5 => decades < 3.2,
-                    _ => false,
-                };
-                let label = if !labelled {
-                    String::new()
-                } else if plain {
-                    decimals(value, usize::try_from(-decade).unwrap_or(0))
-                } else if digit == 1 {
-                    format!("10{}", superscript(decade))
-                } else if decades < 1.2 {
-                    format!("{digit}·10{}", superscript(decade))
-                } else {
-                    String::new()
-                };
-                ticks.push(Tick { value, label });
+                let ticks = self.ticks_every(step);
+                if ticks.len() < 2 && !found.is_empty() {
+                    return found;
+                }
+                let apart = step / span * self.length();
+                found = ticks;
+                if apart >= found.iter().map(|t| lie.room(&t.label)).fold(0.0, f64::max) {
+                    return found;
+                }
+            }
+        }
+        found
+    }
+
+    fn decade_ticks(&self, lie: Lie) -> Vec<Tick> {
+        let (first, last) = (exponent(self.low), exponent(self.high));
+        let plain = self.low >= 0.1 && self.high <= 1e5;
+        let within = |value: f64| value >= self.low * (1.0 - NEAR) && value <= self.high * (1.0 + NEAR);
+        let places = |digits: &[u32], every: i32| {
+            let mut chosen: Vec<(u32, i32)> = Vec::new();
+            for decade in (first..=last).filter(|d| d.rem_euclid(every) == 0) {
+                chosen.extend(digits.iter().map(|d| (*d, decade)).filter(|(d, e)| within(power(*d, *e))));
+            }
+            chosen
+        };
+        let label = |digit: u32, decade: i32| match (plain, digit) {
+            (true, _) => decimals(power(digit, decade), usize::try_from(-decade).unwrap_or(0)),
+            (false, 1) => format!("10{}", superscript(decade)),
+            (false, _) => format!("{digit}·10{}", superscript(decade)),
+        };
+        let choices: [(&[u32], i32); 8] = [
+            (&[1, 2, 3, 4, 5, 6, 7, 8, 9], 1),
+            (&[1, 2, 5], 1),
+            (&[1, 3], 1),
+            (&[1], 1),
+            (&[1], 2),
+            (&[1], 3),
+            (&[1], 5),
+            (&[1], 10),
+        ];
+        for (digits, every) in choices {
+            let chosen = places(digits, every);
+            if chosen.len() < 2 {
+                break;
+            }
+            let at = |(digit, decade): (u32, i32)| self.place(power(digit, decade)).unwrap_or(f64::NAN);
+            let apart = chosen.windows(2).all(|two| {
+                (at(two[1]) - at(two[0])).abs()
+                    >= two.iter().map(|(d, e)| lie.room(&label(*d, *e))).fold(0.0, f64::max)
+            });
+            if !apart {
+                continue;
+            }
+            // minor lines only where decades are wide enough to tell them apart
+            let minor = (self.high / self.low).log10() < 3.0;
+            let all = if minor { places(&[1, 2, 3, 4, 5, 6, 7, 8, 9], 1) } else { places(&[1], 1) };
+            return all
+                .into_iter()
+                .map(|(digit, decade)| Tick {
+                    value: power(digit, decade),
+                    label: if chosen.contains(&(digit, decade)) {
+                        label(digit, decade)
+                    } else {
+                        String::new()
+                    },
+                })
+                .collect();
+        }
+        self.within_a_decade(lie)
+    }
+
+    /// Even steps on a logarithmic axis of less than a decade; labels that would touch the one before are left out.
+    fn within_a_decade(&self, lie: Lie) -> Vec<Tick> {
+        let even = Scale { spread: Spread::Linear, ..*self };
+        let mut end = f64::NEG_INFINITY;
+        let mut ticks = even.even_ticks(lie);
+        ticks.retain(|tick| tick.value > 0.0);
+        for tick in &mut ticks {
+            let at = (self.place(tick.value).unwrap_or(f64::NAN) - self.from).abs();
+            if at < end {
+                tick.label.clear();
+            } else {
+                end = at + lie.room(&tick.label);
             }
         }
         ticks
     }
 }
 
+/// How an axis lies: labels beside one another need more room than labels over one another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lie {
+    /// Horizontal.
+    Across,
+    /// Upright.
+    Up,
+}
+
+/// Width of a digit at the size of ticks, px.
+const DIGIT: f64 = 7.0;
+/// Between labels beside one another, px.
+const BESIDE: f64 = 26.0;
+/// From one label to the next above it, px.
+const ABOVE: f64 = 30.0;
+/// Labels never come nearer than this, px: taken where wider steps would leave a single one.
+const TIGHT_ABOVE: f64 = 16.0;
+/// The same beside one another.
+const TIGHT_BESIDE: f64 = 48.0;
+/// A tick this part of a step beyond the end is still at the end: what rounding does.
+const NEAR: f64 = 1e-9;
+/// An axis never has more: what is asked for is some dozens at most.
+const MOST_TICKS: f64 = 200.0;
+
+impl Lie {
+    fn least(self) -> f64 {
+        match self {
+            Lie::Across => TIGHT_BESIDE,
+            Lie::Up => TIGHT_ABOVE,
+        }
+    }
+
+    fn room(self, label: &str) -> f64 {
+        match self {
+            Lie::Across => DIGIT * label.chars().count() as f64 + BESIDE,
+            Lie::Up => ABOVE,
+        }
+    }
+}
+
+/// The decimal exponent: of the digits themselves, so that every machine finds the same.
+fn exponent(value: f64) -> i32 {
+    format!("{value:e}").split_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or(0)
+}
+
+/// digit · 10^decade, the nearest number to it.
+fn power(digit: u32, decade: i32) -> f64 {
+    format!("{digit}e{decade}").parse().unwrap_or(f64::NAN)
+}
+
 fn drawable([low, high]: [f64; 2], spread: Spread) -> [f64; 2] {
-    let positive = spread == Spread::Logarithmic;
+    let positive = spread == Spread::Log;
     if !(low.is_finite() && high.is_finite()) || (positive && low.max(high) <= 0.0) {
         return if positive { [1.0, 10.0] } else { [0.0, 1.0] };
     }
@@ -169,16 +279,16 @@ pub fn middle_range(values: impl IntoIterator<Item = f64>, keep: f64, margin: f6
 mod tests {
     use super::*;
 
-    fn labels(scale: &Scale, wanted: usize) -> Vec<String> {
-        scale.ticks(wanted).into_iter().map(|t| t.label).filter(|l| !l.is_empty()).collect()
+    fn labels(scale: &Scale) -> Vec<String> {
+        scale.ticks(Lie::Across).into_iter().map(|t| t.label).filter(|l| !l.is_empty()).collect()
     }
 
     #[test]
     fn linear_ticks_stand_at_one_two_five() {
-        assert_eq!(labels(&Scale::linear([0.0, 103.0], [0.0, 1.0]), 5), ["0", "50", "100"]);
-        assert_eq!(labels(&Scale::linear([-0.13, 0.14], [0.0, 1.0]), 5), ["−0.1", "0.0", "0.1"]);
+        assert_eq!(labels(&Scale::linear([0.0, 103.0], [0.0, 150.0])), ["0", "50", "100"]);
+        assert_eq!(labels(&Scale::linear([-0.13, 0.14], [0.0, 200.0])), ["−0.1", "0.0", "0.1"]);
         assert_eq!(
-            labels(&Scale::linear([0.0, 1.0], [0.0, 1.0]), 5),
+            labels(&Scale::linear([0.0, 1.0], [0.0, 300.0])),
             ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]
         );
     }
@@ -186,17 +296,29 @@ mod tests {
     #[test]
     fn logarithmic_ticks_read_as_frequencies_or_powers() {
         assert_eq!(
-            labels(&Scale::logarithmic([20.0, 1000.0], [0.0, 1.0]), 5),
+            labels(&Scale::logarithmic([20.0, 1000.0], [0.0, 400.0])),
             ["20", "50", "100", "200", "500", "1000"]
         );
-        assert_eq!(labels(&Scale::logarithmic([3e-10, 2e-7], [0.0, 1.0]), 5), ["10⁻⁹", "10⁻⁸", "10⁻⁷"]);
+        assert_eq!(labels(&Scale::logarithmic([3e-10, 2e-7], [0.0, 200.0])), ["10⁻⁹", "10⁻⁸", "10⁻⁷"]);
+        assert_eq!(
+            labels(&Scale::logarithmic([190.0, 194.0], [0.0, 300.0])),
+            ["190", "191", "192", "193", "194"]
+        );
+    }
+
+    #[test]
+    fn an_axis_with_room_for_two_labels_has_two() {
+        for [low, high] in [[-3.1e-5, 2.9e-5], [0.2, 0.9], [-1.0, 256.0], [1e6, 1.2e6]] {
+            let found = labels(&Scale::linear([low, high], [0.0, 260.0]));
+            assert!(found.len() >= 2, "{low}…{high}: {found:?}");
+        }
     }
 
     #[test]
     fn broken_ranges_are_still_drawable() {
         for range in [[f64::NAN, 1.0], [0.0, 0.0], [5.0, 5.0], [3.0, -2.0], [f64::NEG_INFINITY, 0.0]] {
             for scale in [Scale::linear(range, [0.0, 100.0]), Scale::logarithmic(range, [0.0, 100.0])] {
-                assert!(scale.ticks(5).len() < 100);
+                assert!(scale.ticks(Lie::Up).len() < 100);
                 assert!(scale.place_within(1.0).is_finite());
             }
         }

@@ -15,6 +15,10 @@ pub enum Role {
     SpecimenA,
     /// The vibrometer on specimen B.
     SpecimenB,
+    /// Specimen A minus specimen B: Δx.
+    Relative,
+    /// The load cells' sum T, newton per newton of the hammer.
+    Force,
     /// A point on the arm of A, from the impact that the specimens' curves are from.
     ArmA,
     /// A point on the arm of B, from the same.
@@ -38,7 +42,7 @@ pub struct FrfCurve {
     pub first_hz: f64,
     /// Distance of lines, Hz.
     pub step_hz: f64,
-    /// Magnitude of the receptance, m/N, line by line.
+    /// Magnitude of the receptance, m/N (of `force`: N/N), line by line.
     pub magnitude_m_per_n: Vec<f64>,
     /// Phase, degrees, −180…180.
     pub phase_deg: Vec<f64>,

@@ -95,6 +95,7 @@ fn example_loop() -> LoopCurve {
         displacement_b_m,
         force_n,
         cycle: [0, 246],
+        cycles: vec![[0, 246], [246, 492], [492, 738], [738, 900]],
         slope_n_per_m: 148.9e6,
     }
 }
@@ -418,6 +419,7 @@ pub fn add_interface(results: &mut Results) {
             .map(|c| frequency_hz.iter().map(|f| 1e-3 / f / 10f64.powi(c)).collect())
             .collect(),
         frequency_hz,
+        participation: (0..6).map(|c| std::array::from_fn(|dof| if dof == c { 0.9 } else { 0.02 })).collect(),
         explained: BTreeMap::from([(2, 0.7), (4, 0.96), (6, 0.99)]),
         suggested: 4,
         reason: "4 explain 96 %".into(),

@@ -39,6 +39,8 @@ pub struct InterfaceModes {
     pub frequency_hz: Vec<f64>,
     /// The largest singular values, \[curve\]\[line\], m/N.
     pub singular_values_m_per_n: Vec<Vec<f64>>,
+    /// How much each of x, y, z, rx, ry, rz takes part in each curve, 0…1: mean over the main band (over all lines where it has none).
+    pub participation: Vec<[f64; 6]>,
     /// Part of the motion added by coupling that 2, 4 and 6 modes explain, 0…1.
     pub explained: BTreeMap<usize, f64>,
     /// Number of modes suggested.

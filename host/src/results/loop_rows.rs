@@ -157,6 +157,8 @@ pub struct LoopCurve {
     pub force_n: Vec<f64>,
     /// Range of samples that is the first cycle.
     pub cycle: [usize; 2],
+    /// Ranges of samples of the first cycle and the next ones, as far as they are shown.
+    pub cycles: Vec<[usize; 2]>,
     /// The fitted slope, N/m.
     pub slope_n_per_m: f64,
 }

@@ -6,6 +6,7 @@
 
 mod answer;
 mod check;
+mod compared;
 mod completeness;
 mod curves;
 #[cfg(test)]
@@ -13,6 +14,7 @@ pub(crate) mod example_tests;
 mod interface_quality;
 mod joint_rows;
 mod loop_rows;
+mod measured;
 mod reconstruction;
 mod source;
 
@@ -25,11 +27,13 @@ pub use check::{
     BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, SAME_IN_ALL,
     SERIES_COMPLIANCE, UNCHANGED,
 };
+pub use compared::{Compared, Difference};
 pub use completeness::Completeness;
 pub use curves::{FrfCurve, Role, UsableBand, rounded};
 pub use interface_quality::{Bootstrap, InterfaceModes, VirtualPoint};
 pub use joint_rows::{DIRECT, Goodness, Joint, JointSpectrum, Refusal, SpectrumCurve, headline_rank};
 pub use loop_rows::{Backbone, DecayStep, Force, Hysteresis, ImpactSlope, LoopCurve, ShakerLoop};
+pub use measured::{CellRow, Cells, HitRow, NoiseFloor, Place};
 pub use reconstruction::Reconstruction;
 pub use source::{Software, Source, ranges};
 
@@ -83,6 +87,18 @@ pub struct Results {
     /// Kept and refused hits per configuration.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub completeness: Vec<Completeness>,
+    /// Where hammer and vibrometer went.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub geometry: Vec<Place>,
+    /// Every cell: what was kept, and how well it was heard.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cells: Option<Cells>,
+    /// Every firing of the hammer.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub hits: Vec<HitRow>,
+    /// One FRF of the assembly against its noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_floor: Option<NoiseFloor>,
     /// A few FRFs to look at.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub frfs: Vec<FrfCurve>,

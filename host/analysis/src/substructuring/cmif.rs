@@ -6,6 +6,7 @@
 use super::geometry::{Geometry, Grouping};
 use super::idm::{Dof, IdmSet, rigid_row};
 use super::vpt::ROTATION_LENGTH_M;
+use crate::band::Band;
 use crate::frf::{Frf, FrfError, block};
 use crate::parallel::prelude::*;
 use nalgebra::{Complex, DMatrix, DVector, Vector3};
@@ -31,6 +32,21 @@ pub struct Cmif {
     pub suggested: usize,
     /// Why.
     pub reason: String,
+}
+
+impl Cmif {
+    /// Mean participation of each vector over the lines of `band`, over all lines where it has none.
+    pub fn participation_over(&self, band: Band) -> Vec<[f64; 6]> {
+        let inside: Vec<&Vec<[f64; 6]>> = (self.frequency_hz.iter().zip(&self.participation))
+            .filter(|(f, _)| band.contains(**f))
+            .map(|(_, line)| line)
+            .collect();
+        let lines = if inside.is_empty() { self.participation.iter().collect() } else { inside };
+        let vectors = lines.iter().map(|line| line.len()).min().unwrap_or(0);
+        let mean =
+            |v: usize, dof: usize| lines.iter().map(|line| line[v][dof]).sum::<f64>() / lines.len() as f64;
+        (0..vectors).map(|v| std::array::from_fn(|dof| mean(v, dof))).collect()
+    }
 }
 
 /// Singular values, participation of their left vectors, and what the three sets and everything explain of the whole.

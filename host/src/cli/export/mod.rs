@@ -117,7 +117,7 @@ impl Export {
         if levels > 0 {
             told.push(format!("{}: {levels} levels of the shaker", folder.display()));
         }
-        analyse_into(&store, Wanted::default(), &self.out)?;
+        analyse_into(&store, Wanted::default(), &self.out, &[])?;
         told.push(format!("geometry, results.json and report.html are in {}", self.out.display()));
         output::lines(told)
     }

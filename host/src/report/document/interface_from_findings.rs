@@ -36,6 +36,12 @@ pub fn interface_modes(found: &Cmif) -> InterfaceModes {
         singular_values_m_per_n: (0..curves)
             .map(|c| found.singular_values.iter().map(|line| rounded(line[c], 4)).collect())
             .collect(),
+        participation: found
+            .participation_over(MAIN_BAND)
+            .into_iter()
+            .take(curves)
+            .map(|parts| parts.map(|part| rounded(part, 4)))
+            .collect(),
         explained: found.explained.clone(),
         suggested: found.suggested,
         reason: found.reason.clone(),

@@ -30,6 +30,9 @@ pub fn document(found: Findings) -> Results {
         refused,
         missing,
         completeness: found.completeness,
+        geometry: found.geometry,
+        cells: found.cells,
+        hits: found.hits,
         ..Results::default()
     };
     if let Some(of_frfs) = &found.substructured {
@@ -41,6 +44,8 @@ pub fn document(found: Findings) -> Results {
     for measured in found.configurations {
         results.usable_bands.extend(measured.usable_band);
         results.frfs.extend(measured.frfs);
+        // the assembly comes last, and counts
+        results.noise_floor = measured.noise_floor.or(results.noise_floor);
     }
     if let Some(contact) = found.contact {
         results.frfs.extend(contact.frfs);

@@ -1,12 +1,9 @@
-//! All stiffness values of one sliding direction on one axis: what each measurement sees.
+//! All stiffness values of one sliding direction on one axis: what each method sees.
 
-use super::super::drawing::{Anchor, Area, Drawing, Stroke};
-use super::super::panel::{BLUE, FAINT, INK, Panel, VERMILION};
-use super::super::scale::Scale;
-use super::WIDTH;
+use super::MICRO;
+use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role};
 use crate::report::words::number::{micro, stiffness};
-use crate::report::words::side_by_side;
-use crate::results::{MAIN_BAND, Results};
+use crate::results::{DIRECT, Joint, MAIN_BAND, Results};
 use crate::substructuring::Dof;
 
 struct Row {
@@ -14,75 +11,75 @@ struct Row {
     mean: f64,
     std: f64,
     median: Option<f64>,
-    colour: &'static str,
+    role: Role,
+    believed: bool,
+    path: &'static str,
 }
 
-const ROW_HEIGHT: f64 = 25.0;
-
-/// Mean and scatter of k_z over the main band, by method, beside the loops' slopes.
-pub fn comparison(results: &Results) -> Option<String> {
-    let rows = rows(results);
+/// Mean and scatter of k_z over the main band, by method: of those that identified it, or of all where none did.
+pub fn comparison(results: &Results) -> Option<Figure> {
+    let mut rows: Vec<Row> = quoted(results).into_iter().collect();
+    let of_band = |j: &&Joint| j.band_hz == MAIN_BAND || j.method == DIRECT;
+    rows.extend(results.joint.iter().filter(of_band).filter_map(row));
+    let all = rows.len();
+    // methods that failed would stretch the axis and tell nothing: the table has them
+    if rows.iter().any(|row| row.believed) {
+        rows.retain(|row| row.believed);
+    }
     if rows.is_empty() {
         return None;
     }
-    // the scatter of a bad method may leave the frame; its mean may not
+    let failed = all - rows.len();
+    let high = rows.iter().map(|r| r.mean + r.std).fold(0.0, f64::max);
     let low = rows.iter().map(|r| r.mean).fold(0.0, f64::min);
-    let high = rows.iter().map(|r| r.mean).fold(0.0, f64::max);
-    let height = ROW_HEIGHT * rows.len() as f64 + 12.0;
-    let area = Area { left: 300.0, top: 12.0, width: WIDTH - 300.0 - 150.0, height };
-    let room = 0.12 * (high - low);
-    let range = [if low < 0.0 { low - room } else { 0.0 }, high + room];
-    let x = Scale::linear(range, [area.left, area.right()]);
-    let y = Scale::linear([0.0, 1.0], [area.bottom(), area.top]);
-    let panel = Panel { area, x, y };
-    let mut drawing = Drawing::new("comparison", WIDTH, area.bottom() + 48.0);
-    let ticks = x.ticks(8);
-    panel.grid(&mut drawing, &ticks, &[]);
+    let range = [1.1 * low, 1.1 * high.max(-0.1 * low)];
+    let names = rows.iter().map(|r| r.label.clone()).collect();
+    let x = Axis::linear("k_z", "N/µm", range);
+    let mut panel = Panel::new(x, Axis::named("", names)).high(Height::Rows);
     for (i, row) in rows.iter().enumerate() {
-        let at = area.top + 6.0 + ROW_HEIGHT * (i as f64 + 0.5);
-        drawing.line([area.left, at], [area.right(), at], Stroke::new(FAINT, 1.0).dashed("2 3"));
-        drawing.text([area.left - 12.0, at + 4.0], Anchor::End, "row", &row.label);
-        let (from, to) = (x.place_within(row.mean - row.std), x.place_within(row.mean + row.std));
-        drawing.line([from, at], [to, at], Stroke::new(row.colour, 2.0));
-        for end in [from, to] {
-            drawing.line([end, at - 4.0], [end, at + 4.0], Stroke::new(row.colour, 1.5));
+        let y = i as f64 + 0.26;
+        let marker = if row.believed { Marker::Dot } else { Marker::Cross };
+        let role = if row.believed { row.role } else { Role::Refused };
+        let within = row.mean.clamp(range[0], range[1]);
+        if within == row.mean {
+            panel.marks.push(
+                Mark::points(role, marker, [[row.mean, y]])
+                    .barred("x", [[row.mean - row.std, row.mean + row.std]])
+                    .saying(vec![row.label.clone()])
+                    .from("x", row.path, 1.0 / MICRO),
+            );
         }
-        drawing.dot([x.place_within(row.mean), at], 4.5, row.colour, false);
-        if let Some(median) = row.median {
-            let m = x.place_within(median);
-            drawing.line([m, at - 7.0], [m, at + 7.0], Stroke::new(INK, 1.2));
+        if let Some(median) = row.median.filter(|m| range[0] < *m && *m < range[1]) {
+            panel.marks.push(Mark::points(role, Marker::Stroke, [[median, y]]).from(
+                "x",
+                "/joint/*/stiffness_n_per_m/z/median",
+                1.0 / MICRO,
+            ));
         }
-        let text = stiffness(row.mean * 1e6, row.std * 1e6);
-        drawing.text([area.right() + 10.0, at + 4.0], Anchor::Start, "row", &text);
     }
-    panel.axes(
-        &mut drawing,
-        (&ticks, Some("stiffness along z in N/µm (dot: mean, bar: ± σ, tick: median)")),
-        (&[], None),
+    let say = format!(
+        "Mean (point), scatter (bar) and median (stroke) of k_z over the lines of the main band, 300–600 Hz, of the methods that identified a stiffness. {}",
+        if failed > 0 {
+            format!("{failed} others did not; the table of methods says why.")
+        } else {
+            String::new()
+        }
     );
-    Some(drawing.finish("Stiffness along the sliding direction by every method, with scatter"))
+    Some(Figure::new("comparison", "", "Every method side by side", say).across(2).with(panel))
 }
 
-fn rows(results: &Results) -> Vec<Row> {
-    let joint = results.joint.iter().filter(|j| j.band_hz == MAIN_BAND).filter_map(|j| {
-        let k = j.sliding_stiffness()?;
-        Some(Row {
-            label: format!("FBS {}, {} IDMs", j.method, j.idms),
-            mean: micro(k.mean),
-            std: micro(k.std),
-            median: Some(micro(k.median)),
-            colour: BLUE,
-        })
-    });
-    // the kinds that are measured at the specimens; FBS stands above by every method
-    let loops = side_by_side::kinds(results).into_iter().filter(|k| k.found.starts_with("k_")).map(|k| Row {
-        label: k.found,
-        mean: micro(k.mean_n_per_m),
-        std: micro(k.std_n_per_m),
-        median: None,
-        colour: VERMILION,
-    });
-    quoted(results).into_iter().chain(joint).chain(loops).collect()
+fn row(joint: &Joint) -> Option<Row> {
+    let k = joint.sliding_stiffness()?;
+    let modes = if joint.idms == 0 { String::new() } else { format!(", {} IDMs", joint.idms) };
+    Some(Row {
+        label: format!("{}{modes}: {}", joint.method, stiffness(k.mean, k.std)),
+        mean: micro(k.mean),
+        std: micro(k.std),
+        median: Some(micro(k.median)),
+        role: if joint.method == DIRECT { Role::Loops } else { Role::modes(joint.idms) },
+        believed: joint.identified(),
+        path: "/joint/*/stiffness_n_per_m/z/mean",
+    })
 }
 
 /// The estimate to quote, which is no method's row.
@@ -90,10 +87,12 @@ fn quoted(results: &Results) -> Option<Row> {
     let estimate = results.quoted()?;
     let z = estimate.joint.get(&Dof::Z).filter(|z| z.identified)?;
     Some(Row {
-        label: format!("FBS recommended, {} IDMs", estimate.idms),
+        label: format!("recommended, {} IDMs: {}", estimate.idms, stiffness(z.stiffness, z.std)),
         mean: micro(z.stiffness),
         std: micro(z.std),
         median: None,
-        colour: BLUE,
+        role: Role::BetweenArms,
+        believed: true,
+        path: "/recommended/*/joint/z/stiffness",
     })
 }

@@ -1,60 +1,56 @@
 //! The slope that each impact gave, by where it was hit.
 
-use super::super::drawing::{Anchor, Area, Drawing, Stroke};
-use super::super::panel::{BLUE, INK, Panel, VERMILION};
-use super::super::scale::{Scale, middle_range};
-use super::WIDTH;
+use super::MICRO;
+use crate::report::figure::{Axis, Figure, Mark, Marker, Panel, Role};
+use crate::report::scale::middle_range;
 use crate::report::words::number::{micro, stiffness};
 use crate::results::Results;
 use std::collections::BTreeMap;
 
-/// One dot per record in a column per impact position; mean ± σ across all.
-pub fn impacts(results: &Results) -> Option<String> {
+/// One point per record in a column per impact position; mean ± σ across all.
+pub fn impacts(results: &Results) -> Option<Figure> {
     if results.impact_slopes.len() < 2 {
         return None;
     }
-    let mut columns: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    let mut columns: BTreeMap<&str, Vec<(i64, f64)>> = BTreeMap::new();
     for slope in &results.impact_slopes {
-        columns.entry(&slope.impact).or_default().push(micro(slope.k_eq_n_per_m));
+        columns.entry(&slope.impact).or_default().push((slope.record, micro(slope.k_eq_n_per_m)));
     }
-    let range = middle_range(columns.values().flatten().copied(), 1.0, 0.15)?;
-    let area = Area { left: 70.0, top: 14.0, width: WIDTH - 70.0 - 130.0, height: 190.0 };
-    let panel = Panel {
-        area,
-        x: Scale::linear([0.0, columns.len() as f64], [area.left, area.right()]),
-        y: Scale::linear(range, [area.bottom(), area.top]),
-    };
-    let y_ticks = panel.y.ticks(5);
-    let mut drawing = Drawing::new("impacts", WIDTH, area.bottom() + 44.0);
-    panel.grid(&mut drawing, &[], &y_ticks);
+    let values = || columns.values().flatten().map(|(_, k)| *k);
+    let range = middle_range(values(), 1.0, 0.15)?;
+    let names: Vec<String> = columns.keys().map(|name| (*name).to_owned()).collect();
+    let mut panel = Panel::new(Axis::named("hit at", names), Axis::linear("slope", "N/µm", range));
+    let whole = panel.x.range;
     if let Some(k) = results.impact_loops().and_then(|h| h.k_eq_n_per_m) {
         let (mean, std) = (micro(k.mean), micro(k.std));
-        let (top, bottom) = (panel.y.place_within(mean + std), panel.y.place_within(mean - std));
-        drawing.fill(Area { top, height: bottom - top, ..area }, VERMILION, 0.12);
-        panel.level(&mut drawing, panel.x.range(), mean, Stroke::new(VERMILION, 1.6));
-        let at = panel.y.place_within(mean) + 4.0;
-        drawing.text([area.right() + 8.0, at], Anchor::Start, "legend", &stiffness(k.mean, k.std));
+        let ribbon = crate::report::figure::Shape::Ribbon {
+            x: crate::report::figure::Along::of(&whole),
+            low: crate::report::figure::Packed::of([mean - std; 2]),
+            high: crate::report::figure::Packed::of([mean + std; 2]),
+        };
+        panel = panel
+            .with(Mark::new(Role::Loops, ribbon))
+            .with(Mark::level(Role::Loops, mean).named(format!("all hits: {}", stiffness(k.mean, k.std))));
     }
-    for (i, (name, values)) in columns.iter().enumerate() {
-        let (left, right) = (panel.x.place_within(i as f64 + 0.2), panel.x.place_within(i as f64 + 0.8));
-        let step = (right - left) / values.len() as f64;
-        for (j, value) in values.iter().enumerate() {
-            let at = [left + (j as f64 + 0.5) * step, panel.y.place_within(*value)];
-            drawing.dot(at, 2.6, BLUE, true);
-        }
-        let text = format!("{name} ({})", values.len());
-        drawing.text([f64::midpoint(left, right), area.bottom() + 18.0], Anchor::Middle, "tick", &text);
-        if i > 0 {
-            let x = panel.x.place_within(i as f64);
-            drawing.line([x, area.top], [x, area.bottom()], Stroke::new(INK, 0.4).dashed("2 4"));
-        }
-    }
-    panel.axes(&mut drawing, (&[], None), (&y_ticks, Some("slope in N/µm")));
-    drawing.text(
-        [f64::midpoint(area.left, area.right()), area.bottom() + 38.0],
-        Anchor::Middle,
-        "label",
-        "hit at (records)",
+    let points = columns.values().enumerate().flat_map(|(column, own)| {
+        let step = 0.7 / own.len() as f64;
+        own.iter().enumerate().map(move |(i, (_, k))| [column as f64 - 0.35 + (i as f64 + 0.5) * step, *k])
+    });
+    let says = columns.iter().flat_map(|(name, own)| {
+        own.iter().map(move |(record, k)| format!("record {record}, {name}: {k:.1} N/µm"))
+    });
+    let dots = Mark::points(Role::Group1, Marker::Ring, points).saying(says.collect()).named("one hit").from(
+        "y",
+        "/impact_slopes/*/k_eq_n_per_m",
+        1.0 / MICRO,
     );
-    Some(drawing.finish("Slope of the first cycle of every impact, by impact position"))
+    Some(
+        Figure::new(
+            "impacts",
+            "",
+            "The slope of every impact",
+            "Every hit that counts, along z on A or on the moving mass. Columns that differ from one another say that the slope depends on where the structure is hit, as no contact's stiffness does.",
+        )
+        .with(panel.with(dots)),
+    )
 }

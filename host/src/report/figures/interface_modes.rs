@@ -1,17 +1,13 @@
-//! The CMIF: singular values of what coupling changes, over frequency.
+//! The CMIF: singular values of what coupling changes, over frequency (the paper's Fig. B.15).
 
-use super::super::drawing::{Anchor, Area, Drawing, Stroke};
-use super::super::panel::{BLUE, Panel, SHADE};
-use super::super::scale::Scale;
-use super::WIDTH;
+use crate::report::figure::{Along, Axis, Figure, Height, Mark, Panel, Role, Spread};
 use crate::results::{MAIN_BAND, Results};
 
-const AREA: Area = Area { left: 70.0, top: 34.0, width: WIDTH - 90.0, height: 260.0 };
 /// Below this part of the largest value there is rounding.
 const FLOOR: f64 = 1e-8;
 
 /// The largest singular values; as many as modes were suggested are drawn stronger.
-pub fn interface_modes(results: &Results) -> Option<String> {
+pub fn interface_modes(results: &Results) -> Option<Figure> {
     let modes = results.interface_modes.as_ref()?;
     let frequencies = [*modes.frequency_hz.first()?, *modes.frequency_hz.last()?];
     let values = || modes.singular_values_m_per_n.iter().flatten().copied();
@@ -20,19 +16,24 @@ pub fn interface_modes(results: &Results) -> Option<String> {
     if low >= high || frequencies[0] >= frequencies[1] || frequencies[0] <= 0.0 {
         return None;
     }
-    let x = Scale::logarithmic(frequencies, [AREA.left, AREA.right()]);
-    let y = Scale::logarithmic([low, high], [AREA.bottom(), AREA.top]);
-    let panel = Panel { area: AREA, x, y };
-    let (x_ticks, y_ticks) = (x.ticks(9), y.ticks(5));
-    let mut drawing = Drawing::new("interface-modes", WIDTH, AREA.bottom() + 48.0);
-    let title = format!("CMIF: {} modes suggested", modes.suggested);
-    drawing.text([AREA.left, 18.0], Anchor::Start, "title", &title);
-    panel.grid(&mut drawing, &x_ticks, &y_ticks);
-    panel.shade(&mut drawing, MAIN_BAND.into(), SHADE, 0.12);
-    for (i, curve) in modes.singular_values_m_per_n.iter().enumerate() {
-        let stroke = if i < modes.suggested { Stroke::new(BLUE, 1.4) } else { Stroke::new("#999", 0.9) };
-        panel.curve(&mut drawing, modes.frequency_hz.iter().copied().zip(curve.iter().copied()), stroke);
-    }
-    panel.axes(&mut drawing, (&x_ticks, Some("frequency in Hz")), (&y_ticks, Some("singular value in m/N")));
-    Some(drawing.finish("Singular values of the motion that coupling adds"))
+    let along = Along::of(&modes.frequency_hz);
+    let lines = modes.singular_values_m_per_n.iter().enumerate().map(|(i, curve)| {
+        let strong = i < modes.suggested;
+        Mark::line(if strong { Role::Group1 } else { Role::Noise }, along.clone(), curve.iter().copied())
+            .named(if strong { format!("{} suggested", modes.suggested) } else { "the rest".into() })
+            .from("y", format!("/interface_modes/singular_values_m_per_n/{i}/*"), 1.0)
+    });
+    let panel = Panel::new(
+        Axis::frequency(Spread::Log, frequencies),
+        Axis::log("singular value", "m/N", [low, 1.3 * high]),
+    );
+    Some(
+        Figure::new(
+            "interface-modes",
+            "B.15",
+            format!("What coupling adds: {} modes suggested", modes.suggested),
+            "Singular values of Y(AJB) − Y(A) − Y(B), the CMIF. As many motions couple the parts as curves stand clear of the rest.",
+        )
+        .with(panel.high(Height::Tall).with(Mark::shade(Role::Band, MAIN_BAND)).with_all(lines)),
+    )
 }

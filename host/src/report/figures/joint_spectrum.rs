@@ -1,70 +1,95 @@
-//! k_z over frequency, one panel per method, one curve per IDM set, with the bands that means are taken over.
+//! k_z over frequency, one panel per method, one curve per IDM set, with the band that means are taken over (the paper's Fig. 10, A.11 to A.13).
 
-use super::super::drawing::{Anchor, Area, Drawing, Stroke};
-use super::super::panel::{INK, Panel, SHADE, legend};
-use super::super::scale::{Scale, middle_range};
-use super::{WIDTH, idm_stroke};
+use super::MICRO;
+use crate::report::figure::{Along, Axis, Figure, Height, Mark, Packed, Panel, Role, Shape, Spread};
+use crate::report::scale::middle_range;
 use crate::report::words;
-use crate::report::words::number::{band, decimals, micro};
-use crate::results::{JointSpectrum, MAIN_BAND, Results, SpectrumCurve};
+use crate::report::words::number::{decimals, micro};
+use crate::results::{Joint, JointSpectrum, MAIN_BAND, Results, SpectrumCurve};
 use crate::substructuring::Band;
 
-const LEFT: f64 = 70.0;
-const RIGHT: f64 = 130.0;
-const HEIGHT: f64 = 230.0;
-const ABOVE: f64 = 74.0;
-
 /// Stiffness along z line by line.
-pub fn joint_spectrum(results: &Results) -> Option<String> {
+pub fn joint_spectrum(results: &Results) -> Option<Figure> {
     let spectrum = results.joint_spectrum.as_ref()?;
-    let curves: Vec<&SpectrumCurve> = spectrum.curves.iter().filter(|c| c.dof == "z").collect();
+    let curves: Vec<(usize, &SpectrumCurve)> =
+        spectrum.curves.iter().enumerate().filter(|(_, c)| c.dof == "z").collect();
     let mut methods: Vec<&str> = Vec::new();
-    for curve in &curves {
+    for (_, curve) in &curves {
         if !methods.contains(&curve.method.as_str()) {
             methods.push(&curve.method);
         }
     }
-    let bands = bands(results);
-    let frequencies = shown_range(spectrum, &bands)?;
-    let stiffness = shown_stiffness(spectrum, &curves)?;
-    let pitch = ABOVE + HEIGHT + 22.0;
-    let mut drawing = Drawing::new("joint-spectrum", WIDTH, pitch * methods.len() as f64 + 26.0);
-    for (i, method) in methods.iter().enumerate() {
-        let area =
-            Area { left: LEFT, top: i as f64 * pitch + ABOVE, width: WIDTH - LEFT - RIGHT, height: HEIGHT };
-        let x = Scale::linear(frequencies, [area.left, area.right()]);
-        let y = Scale::linear(stiffness, [area.bottom(), area.top]);
-        let panel = Panel { area, x, y };
-        let (x_ticks, y_ticks) = (x.ticks(9), y.ticks(5));
-        let of_method = || curves.iter().copied().filter(|c| c.method == *method);
-        panel.grid(&mut drawing, &x_ticks, &y_ticks);
-        panel.shade(&mut drawing, MAIN_BAND.into(), SHADE, 0.14);
-        panel.level(&mut drawing, frequencies, 0.0, Stroke::new(INK, 0.8));
-        for curve in of_method() {
-            let points = spectrum
-                .frequency_hz
-                .iter()
-                .zip(&curve.stiffness_n_per_m)
-                .map(|(f, k)| (*f, k.map_or(f64::NAN, micro)));
-            panel.curve(&mut drawing, points, idm_stroke(curve.idms));
+    let frequencies = shown_range(spectrum, &bands(results))?;
+    let stiffness = shown_stiffness(results, spectrum, &curves)?;
+    let mut figure = Figure::new(
+        "joint-spectrum",
+        "10, A.11–A.13",
+        "Joint stiffness over frequency",
+        "Real part of the joint's dynamic stiffness along the sliding direction, by method and set of interface deformation modes (IDMs). The ribbon is ± σ of the FRFs' noise for the largest set; the main band is shaded, with the means over it. Values beyond the frame are cut.",
+    )
+    .across(2);
+    for method in methods {
+        let own = || curves.iter().filter(|(_, c)| c.method == method);
+        let mut panel = Panel::new(
+            Axis::frequency(Spread::Linear, frequencies),
+            Axis::linear("k_z", "N/µm", stiffness).linked("k-z"),
+        )
+        .titled(format!("{method} ({})", words::method(method)))
+        .high(Height::Usual)
+        .with(Mark::shade(Role::Band, MAIN_BAND))
+        .with(Mark::level(Role::Guide, 0.0));
+        let along = Along::of(&spectrum.frequency_hz);
+        let most = own().max_by_key(|(_, c)| c.idms);
+        panel.marks.extend(most.and_then(|(_, curve)| ribbon(curve, &along)));
+        for (i, curve) in own() {
+            let values = curve.stiffness_n_per_m.iter().map(|k| k.map_or(f64::NAN, micro));
+            panel.marks.push(
+                Mark::line(Role::modes(curve.idms), along.clone(), values)
+                    .named(named(results, method, curve.idms))
+                    .from("y", format!("/joint_spectrum/curves/{i}/stiffness_n_per_m/*"), 1.0 / MICRO),
+            );
         }
-        means(results, method, &panel, &mut drawing);
-        brackets(&bands, &panel, &mut drawing);
-        let last = i + 1 == methods.len();
-        panel.axes(
-            &mut drawing,
-            (&x_ticks, last.then_some("frequency in Hz")),
-            (&y_ticks, Some("k_z in N/µm")),
-        );
-        let title = format!("{method} ({})", words::method(method));
-        drawing.text([area.left, area.top - ABOVE + 18.0], Anchor::Start, "title", &title);
-        let entries: Vec<_> = of_method().map(|c| (idm_stroke(c.idms), format!("{} IDMs", c.idms))).collect();
-        legend(&mut drawing, [area.left + 420.0, area.top - ABOVE + 18.0], &entries);
+        for joint in results.joint.iter().filter(|j| j.method == method && j.band_hz == MAIN_BAND) {
+            let Some(k) = joint.sliding_stiffness() else { continue };
+            let between = Some([MAIN_BAND.low_hz, MAIN_BAND.high_hz]);
+            let level = Shape::Level { at: micro(k.mean), between };
+            panel.marks.push(Mark::new(Role::modes(joint.idms), level));
+        }
+        figure = figure.with(panel);
     }
-    Some(drawing.finish("Joint stiffness along z over frequency for each method and set of interface modes"))
+    Some(figure)
 }
 
-/// The bands of the results, widest first.
+/// `6 IDMs, mean 26.8`.
+fn named(results: &Results, method: &str, idms: usize) -> String {
+    let mean = results
+        .joint
+        .iter()
+        .find(|j| j.method == method && j.idms == idms && j.band_hz == MAIN_BAND)
+        .and_then(|j| j.sliding_stiffness())
+        .map(|k| micro(k.mean));
+    mean.map_or(format!("{idms} IDMs"), |k| {
+        format!("{idms} IDMs: {}", decimals(k, usize::from(k.abs() < 100.0)))
+    })
+}
+
+fn ribbon(curve: &SpectrumCurve, along: &Along) -> Option<Mark> {
+    if curve.stiffness_noise_n_per_m.len() != curve.stiffness_n_per_m.len() {
+        return None;
+    }
+    let edge = |side: f64| {
+        let both = curve.stiffness_n_per_m.iter().zip(&curve.stiffness_noise_n_per_m);
+        Packed::of(
+            both.map(|(k, noise)| k.zip(*noise).map_or(f64::NAN, |(k, noise)| micro(k + side * noise))),
+        )
+    };
+    Some(Mark::new(
+        Role::modes(curve.idms),
+        Shape::Ribbon { x: along.clone(), low: edge(-1.0), high: edge(1.0) },
+    ))
+}
+
+/// The bands of the results.
 fn bands(results: &Results) -> Vec<Band> {
     let mut bands: Vec<Band> = Vec::new();
     for joint in &results.joint {
@@ -72,7 +97,6 @@ fn bands(results: &Results) -> Vec<Band> {
             bands.push(joint.band_hz);
         }
     }
-    bands.sort_by(|a, b| (b.high_hz - b.low_hz).total_cmp(&(a.high_hz - a.low_hz)));
     bands
 }
 
@@ -87,13 +111,23 @@ fn shown_range(spectrum: &JointSpectrum, bands: &[Band]) -> Option<[f64; 2]> {
     Some([(low - room).max(first), (high + room).min(last)])
 }
 
-/// N/µm: the middle of what the richest set of modes shows in the main band, and zero. (Two modes may run off by
-/// hundreds; they must not flatten the curve that the headline quotes.)
-fn shown_stiffness(spectrum: &JointSpectrum, curves: &[&SpectrumCurve]) -> Option<[f64; 2]> {
-    let most = curves.iter().map(|c| c.idms).max()?;
+/// N/µm: the middle of what the richest set of modes shows in the main band by the methods that identified a stiffness there, and zero.
+/// (What failed may run off by hundreds; it must not flatten the curve that the headline quotes.)
+fn shown_stiffness(
+    results: &Results,
+    spectrum: &JointSpectrum,
+    curves: &[(usize, &SpectrumCurve)],
+) -> Option<[f64; 2]> {
+    let most = curves.iter().map(|(_, c)| c.idms).max()?;
+    let identified = |c: &SpectrumCurve| {
+        let row = |j: &&Joint| j.method == c.method && j.idms == c.idms && j.band_hz == MAIN_BAND;
+        results.joint.iter().find(row).is_some_and(Joint::identified)
+    };
+    let any = curves.iter().any(|(_, c)| c.idms == most && identified(c));
     let inside = |main_only: bool| {
         let lines = spectrum.frequency_hz.iter().cycle();
-        let values = curves.iter().filter(move |c| c.idms == most).flat_map(|c| &c.stiffness_n_per_m);
+        let setting = curves.iter().filter(move |(_, c)| c.idms == most && (!any || identified(c)));
+        let values = setting.flat_map(|(_, c)| &c.stiffness_n_per_m);
         values.zip(lines).filter_map(move |(k, f)| {
             let main = MAIN_BAND.contains(*f);
             k.filter(|_| main || !main_only).map(micro)
@@ -102,51 +136,4 @@ fn shown_stiffness(spectrum: &JointSpectrum, curves: &[&SpectrumCurve]) -> Optio
     let [low, high] =
         middle_range(inside(true), 0.95, 0.5).or_else(|| middle_range(inside(false), 0.9, 0.2))?;
     Some([low.min(-0.08 * high.abs()), high.max(0.08 * low.abs())])
-}
-
-/// The means over the main band, as lines with their values at the right, apart from each other.
-fn means(results: &Results, method: &str, panel: &Panel, drawing: &mut Drawing) {
-    let mut labels: Vec<(f64, usize, f64)> = Vec::new();
-    for joint in results.joint.iter().filter(|j| j.method == method && j.band_hz == MAIN_BAND) {
-        let Some(k) = joint.sliding_stiffness() else { continue };
-        let stroke = Stroke::new(idm_stroke(joint.idms).colour, 2.2);
-        panel.level(drawing, MAIN_BAND.into(), micro(k.mean), Stroke::new("#fff", 4.0));
-        panel.level(drawing, MAIN_BAND.into(), micro(k.mean), stroke);
-        labels.push((panel.y.place_within(micro(k.mean)), joint.idms, micro(k.mean)));
-    }
-    labels.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut free = panel.area.top + 10.0;
-    let count = labels.len();
-    for (i, (at, idms, mean)) in labels.into_iter().enumerate() {
-        let below = (count - 1 - i) as f64 * 17.0;
-        let y = at.max(free).min((panel.area.bottom() - below).max(free));
-        let stroke = Stroke::new(idm_stroke(idms).colour, 2.2);
-        drawing.line([panel.area.right() + 8.0, y], [panel.area.right() + 22.0, y], stroke);
-        let text = format!("{idms} IDMs: {}", decimals(mean, usize::from(mean.abs() < 100.0)));
-        drawing.text([panel.area.right() + 27.0, y + 4.0], Anchor::Start, "legend", &text);
-        free = y + 17.0;
-    }
-}
-
-/// A bracket above the frame for every band.
-fn brackets(bands: &[Band], panel: &Panel, drawing: &mut Drawing) {
-    let mut rows: Vec<Vec<Band>> = Vec::new();
-    for range in bands {
-        // bands that only touch share a row
-        let apart = |one: &Band, other: &Band| one.high_hz <= other.low_hz || other.high_hz <= one.low_hz;
-        let free = |row: &Vec<Band>| row.iter().all(|other| apart(other, range));
-        let row = rows.iter().position(free).unwrap_or(rows.len());
-        if row == rows.len() {
-            rows.push(Vec::new());
-        }
-        rows[row].push(*range);
-        let (from, to) = (panel.x.place_within(range.low_hz), panel.x.place_within(range.high_hz));
-        let at = panel.area.top - 8.0 - 17.0 * row as f64;
-        let stroke = Stroke::new("#777", 1.2);
-        drawing.line([from + 2.0, at], [to - 2.0, at], stroke);
-        for end in [from + 2.0, to - 2.0] {
-            drawing.line([end, at], [end, at + 4.0], stroke);
-        }
-        drawing.text([f64::midpoint(from, to), at - 3.0], Anchor::Middle, "tick", &band(*range));
-    }
 }

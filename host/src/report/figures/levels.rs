@@ -1,164 +1,137 @@
-//! The shaker's levels: stiffness against frequency and against amplitude, before and after the hammer's cells.
+//! The shaker's levels: stiffness against frequency and against amplitude, before and after the hammer's cells (the paper's Fig. 5).
 
-use super::super::drawing::{Anchor, Area, Drawing, Stroke};
-use super::super::panel::{BLUE, FAINT, GREEN, INK, Panel, VERMILION, legend};
-use super::super::scale::{Scale, middle_range};
-use super::WIDTH;
+use super::MICRO;
+use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role, Spread};
+use crate::report::scale::middle_range;
 use crate::report::words;
-use crate::report::words::number::{decimals, micro};
+use crate::report::words::number::{decimals, micro, short};
 use crate::results::{Excitation, Force, Hysteresis, OverCycles, Results};
 
 /// One level, ready to be drawn.
 struct Dot {
     frequency_hz: f64,
-    nanometres: f64,
+    micrometres: f64,
     mean: f64,
     std: f64,
-    /// Whether it is k_T; k_eq otherwise.
+    /// Whether it is the slope of a straight loop; k_eq otherwise.
     straight: bool,
     after: bool,
 }
 
-const COLOURS: [&str; 6] = [BLUE, VERMILION, GREEN, "#cc79a7", "#8a6d00", INK];
+/// How far apart points of the same place are drawn, px: about their own width.
+const SIDE: f64 = 8.0;
 
-/// As many names as the legend of a panel has room for.
-const NAMED: usize = 5;
+/// As many groups as have roles that can be told apart.
+const MOST: usize = 6;
 
-/// Left: against frequency, a colour for each amplitude. Right: against amplitude, a colour for each frequency.
-pub fn levels(results: &Results) -> Option<String> {
+/// Left: against frequency, a role for each amplitude. Right: against amplitude, a role for each frequency.
+pub fn levels(results: &Results) -> Option<Figure> {
     let dots: Vec<Dot> = results.hysteresis.iter().filter_map(dot).collect();
     if dots.len() < 2 {
         return None;
     }
     let highest = dots.iter().map(|d| d.mean + d.std).fold(0.0, f64::max);
-    let range = [0.0, 1.08 * highest];
-    let mut drawing = Drawing::new("levels", WIDTH, 372.0);
+    let lowest = dots.iter().map(|d| d.mean - d.std).fold(0.0, f64::min);
+    let y = Axis::linear("stiffness", "N/µm", [1.08 * lowest, 1.08 * highest]);
     let frequencies = distinct(&dots, |d| d.frequency_hz, 0.001);
-    let amplitudes = distinct(&dots, |d| d.nanometres, 0.04);
-    let areas = [70.0, 590.0].map(|left| Area { left, top: 62.0, width: 438.0, height: 262.0 });
-    panel(
-        &mut drawing,
-        areas[0],
-        &dots,
-        range,
-        Axis {
-            of: |d| d.frequency_hz,
-            colour: |d| d.nanometres,
-            groups: &amplitudes,
-            unit: "nm",
-            label: "frequency in Hz",
-            spread: 0.012,
-            logarithmic: false,
-        },
-    )?;
-    let span = amplitudes.last()? / amplitudes.first()?;
-    panel(
-        &mut drawing,
-        areas[1],
-        &dots,
-        range,
-        Axis {
-            of: |d| d.nanometres,
-            colour: |d| d.frequency_hz,
-            groups: &frequencies,
-            unit: "Hz",
-            label: "amplitude of Δx in nm",
-            spread: 0.006,
-            logarithmic: span > 8.0,
-        },
-    )?;
-    drawing.text(
-        [70.0, 16.0],
-        Anchor::Start,
-        "legend",
-        "● slope, before   ○ slope, after   ■ k_eq, before   □ k_eq, after   (bars: ± σ over cycles; raw force)",
-    );
-    Some(drawing.finish(
-        "Stiffness of the shaker's loops against frequency and amplitude, before and after the campaign",
-    ))
+    let amplitudes = distinct(&dots, |d| d.micrometres, 0.04);
+    let by_frequency =
+        Panel::new(axis("frequency", "Hz", dots.iter().map(|d| d.frequency_hz), false)?, y.clone());
+    let wide = amplitudes.last()? / amplitudes.first()? > 8.0;
+    let by_amplitude =
+        Panel::new(axis("amplitude of Δx", "µm", dots.iter().map(|d| d.micrometres), wide)?, y);
+    Some(
+        Figure::new(
+            "levels",
+            "5",
+            "The shaker's levels",
+            "Round signs are slopes of straight loops between the spots, square ones k_eq of ellipses or of slip; full before the hammer's cells, hollow after them. Bars are ± σ over cycles, with the raw force.",
+        )
+        .across(2)
+        .with(group(by_frequency, &dots, &amplitudes, |d| d.frequency_hz, |d| d.micrometres, "µm"))
+        .with(group(by_amplitude, &dots, &frequencies, |d| d.micrometres, |d| d.frequency_hz, "Hz")),
+    )
 }
 
-/// How one panel is laid out.
-#[derive(Clone, Copy)]
-struct Axis<'a> {
-    of: fn(&Dot) -> f64,
-    colour: fn(&Dot) -> f64,
-    groups: &'a [f64],
-    unit: &'a str,
-    label: &'a str,
-    /// How far apart dots of the same place stand, as a part of the axis.
-    spread: f64,
+fn axis(
+    quantity: &str,
+    unit: &'static str,
+    values: impl Iterator<Item = f64>,
     logarithmic: bool,
+) -> Option<Axis> {
+    if logarithmic {
+        let range = middle_range(values.map(f64::log10), 1.0, 0.08)?.map(|e| 10f64.powf(e));
+        return Some(Axis { scale: Spread::Log, ..Axis::linear(quantity, unit, range) });
+    }
+    let [low, high] = middle_range(values, 1.0, 0.12)?;
+    let high = if high > low { high } else { 1.2 * high };
+    Some(Axis::linear(quantity, unit, [low.max(0.0), high]))
 }
 
-fn panel(drawing: &mut Drawing, area: Area, dots: &[Dot], range: [f64; 2], axis: Axis<'_>) -> Option<()> {
-    let values = dots.iter().map(axis.of);
-    let x = if axis.logarithmic {
-        let [low, high] = middle_range(values.map(f64::log10), 1.0, 0.08)?;
-        Scale::logarithmic([10f64.powf(low), 10f64.powf(high)], [area.left, area.right()])
-    } else {
-        let [low, high] = middle_range(values, 1.0, 0.12)?;
-        Scale::linear([low.max(0.0), high], [area.left, area.right()])
-    };
-    let panel = Panel { area, x, y: Scale::linear(range, [area.bottom(), area.top]) };
-    let (x_ticks, y_ticks) = (x.ticks(6), panel.y.ticks(6));
-    panel.grid(drawing, &x_ticks, &y_ticks);
-    let colour_of = |group: usize| COLOURS[group % COLOURS.len()];
-    let mut entries = Vec::new();
-    for (group, centre) in axis.groups.iter().enumerate() {
-        let colour = colour_of(group);
-        let mut own: Vec<&Dot> =
-            dots.iter().filter(|d| ((axis.colour)(d) / centre - 1.0).abs() < 0.05).collect();
-        own.sort_by(|a, b| (axis.of)(a).total_cmp(&(axis.of)(b)));
-        let aside = (group as f64 - 0.5 * (axis.groups.len() - 1) as f64) * axis.spread * area.width;
-        for after in [false, true] {
-            let line = own.iter().filter(|d| d.after == after).map(|d| ((axis.of)(d), d.mean));
-            let stroke = Stroke::new(colour, 0.8);
-            panel.curve(drawing, line, if after { stroke.dashed("4 4") } else { stroke });
-        }
-        for d in own {
-            let side = aside + if d.after { 3.0 } else { 0.0 };
-            let at = [panel.x.place_within((axis.of)(d)) + side, panel.y.place_within(d.mean)];
-            let bar = [panel.y.place_within(d.mean - d.std), panel.y.place_within(d.mean + d.std)];
-            drawing.line([at[0], bar[0]], [at[0], bar[1]], Stroke::new(colour, 1.4));
-            if d.straight {
-                drawing.dot(at, 4.0, colour, d.after);
-            } else {
-                let square = |half: f64| Area {
-                    left: at[0] - half,
-                    top: at[1] - half,
-                    width: 2.0 * half,
-                    height: 2.0 * half,
-                };
-                drawing.fill(square(4.2), colour, 1.0);
-                if d.after {
-                    drawing.fill(square(2.6), "#fff", 1.0);
-                }
+fn group(
+    panel: Panel,
+    dots: &[Dot],
+    groups: &[f64],
+    place: fn(&Dot) -> f64,
+    of: fn(&Dot) -> f64,
+    unit: &str,
+) -> Panel {
+    let mut marks = Vec::new();
+    for (i, centre) in groups.iter().enumerate() {
+        let role = Role::group(i);
+        let name = if i + 1 >= MOST && groups.len() > MOST {
+            format!("{} more", groups.len() + 1 - MOST)
+        } else {
+            format!("{} {unit}", decimals(*centre, if *centre < 10.0 { 2 } else { 0 }))
+        };
+        for (after, straight) in [(false, true), (true, true), (false, false), (true, false)] {
+            let own = || {
+                let near = move |d: &&Dot| (of(d) / centre - 1.0).abs() < 0.05;
+                dots.iter().filter(near).filter(move |d| d.after == after && d.straight == straight)
+            };
+            if own().next().is_none() {
+                continue;
             }
+            let marker = match (after, straight) {
+                (false, true) => Marker::Dot,
+                (true, true) => Marker::Ring,
+                (false, false) => Marker::Square,
+                (true, false) => Marker::Frame,
+            };
+            let says = own().map(|d| {
+                let moment = if d.after { "after" } else { "before" };
+                format!(
+                    "{} Hz, {} µm, {moment}: {} N/µm",
+                    decimals(d.frequency_hz, 0),
+                    short(d.micrometres),
+                    short(d.mean)
+                )
+            });
+            marks.push(
+                Mark::points(role, marker, own().map(|d| [place(d), d.mean]))
+                    .barred("y", own().map(|d| [d.mean - d.std, d.mean + d.std]))
+                    .aside(
+                        SIDE * (i as f64 - 0.5 * (groups.len() - 1) as f64)
+                            + if after { 0.5 * SIDE } else { 0.0 },
+                    )
+                    .saying(says.collect())
+                    .named(name.clone())
+                    .from("y", "/hysteresis/*/*/mean", 1.0 / MICRO),
+            );
         }
-        entries.push((
-            Stroke::new(colour, 1.6),
-            format!("{} {}", decimals(*centre, usize::from(*centre < 10.0)), axis.unit),
-        ));
     }
-    if entries.len() > NAMED {
-        let more = entries.len() + 1 - NAMED;
-        entries.truncate(NAMED - 1);
-        entries.push((Stroke::new(FAINT, 1.6), format!("{more} more")));
-    }
-    legend(drawing, [area.left, 44.0], &entries);
-    panel.axes(drawing, (&x_ticks, Some(axis.label)), (&y_ticks, Some("stiffness in N/µm")));
-    Some(())
+    panel.high(Height::Tall).with_all(marks)
 }
 
 fn dot(row: &Hysteresis) -> Option<Dot> {
     if row.kind != Excitation::Shaker || row.force != Force::Raw {
         return None;
     }
-    let (name, OverCycles { mean, std, .. }) = words::slope(row)?;
+    let (name, OverCycles { mean, std, .. }) =
+        words::slope(&Hysteresis { k_t_n_per_m: None, ..row.clone() })?;
     Some(Dot {
         frequency_hz: row.frequency_hz?,
-        nanometres: 1e9 * row.amplitude_m?,
+        micrometres: MICRO * row.amplitude_m?,
         mean: micro(mean),
         std: micro(std),
         straight: name != "k_eq",

@@ -1,40 +1,143 @@
-//! The figures, one file each: results in, an SVG text out, or nothing when the results lack the data.
+//! The figures, one file each: results in, a description out, or nothing when the results lack the data.
+//!
+//! A new figure is one file and one line of [`ALL`].
 
+mod answer;
 mod backbone;
+mod band_means;
+mod budget;
+mod cells;
+mod coherence;
 mod comparison;
+mod consistency;
 mod contact_loop;
+mod decay_loops;
+mod geometry;
 mod impacts;
 mod interface_modes;
 mod joint_spectrum;
 mod levels;
+mod loop_parts;
+mod noise_floor;
+mod participation;
+mod pulses;
+mod random_error;
 mod rebuilt;
 mod receptances;
 mod shaker_loops;
 mod specimens;
+mod usable_bands;
 
-pub use backbone::backbone;
-pub use comparison::comparison;
-pub use contact_loop::contact_loop;
-pub use impacts::impacts;
-pub use interface_modes::interface_modes;
-pub use joint_spectrum::joint_spectrum;
-pub use levels::levels;
-pub use rebuilt::rebuilt;
-pub use receptances::receptances;
-pub use shaker_loops::shaker_loops;
-pub use specimens::specimens;
+use super::figure::{Figure, Source};
+use crate::results::Results;
 
-use super::drawing::Stroke;
-use super::panel::{BLUE, GREEN, VERMILION};
+/// A chapter of the report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Chapter {
+    /// The first screen.
+    Answer,
+    /// What each measurement sees.
+    SideBySide,
+    /// The joint by substructuring.
+    Joint,
+    /// The contact by loops.
+    Loops,
+    /// Where, how much and how well it was measured.
+    Measured,
+    /// Frequency response functions.
+    Frfs,
+}
 
-/// Width of every figure, in the drawing's own pixels.
-const WIDTH: f64 = 1040.0;
+/// A figure of the report.
+#[derive(Clone, Copy)]
+pub struct Entry {
+    /// Where it stands.
+    pub chapter: Chapter,
+    /// What it is called where it cannot be drawn.
+    pub title: &'static str,
+    /// What it would need.
+    pub needs: &'static str,
+    /// What makes it.
+    pub make: fn(&Results) -> Option<Figure>,
+}
 
-/// The line of an IDM set, the same in every figure.
-fn idm_stroke(idms: usize) -> Stroke {
-    match idms {
-        2 => Stroke::new(GREEN, 1.0),
-        4 => Stroke::new(VERMILION, 1.0),
-        _ => Stroke::new(BLUE, 1.3),
+const fn entry(
+    chapter: Chapter,
+    title: &'static str,
+    needs: &'static str,
+    make: fn(&Results) -> Option<Figure>,
+) -> Entry {
+    Entry { chapter, title, needs, make }
+}
+
+const IMPACTS: &str = "hits on the assembly with both vibrometers and the load cells";
+const LEVELS: &str = "levels of the shaker (`jointrig shaker`)";
+const CAMPAIGN: &str = "a campaign's own records";
+const ALL_THREE: &str = "FRFs of A, B and the assembly";
+
+/// Every figure, in the order of the report.
+pub const ALL: &[Entry] = &[
+    entry(Chapter::Answer, "The answer", "an identified stiffness", answer::answer),
+    entry(Chapter::SideBySide, "Every method side by side", ALL_THREE, comparison::comparison),
+    entry(Chapter::SideBySide, "What makes the interval of k_T", "an identified k_T", budget::budget),
+    entry(Chapter::Measured, "Where hammer and vibrometer went", CAMPAIGN, geometry::geometry),
+    entry(Chapter::Measured, "Every cell", CAMPAIGN, cells::cells),
+    entry(Chapter::Measured, "Coherence of every cell", "two hits or more in a cell", coherence::coherence),
+    entry(
+        Chapter::Measured,
+        "Random error by cell",
+        "two hits or more in a cell",
+        random_error::random_error,
+    ),
+    entry(Chapter::Measured, "The hammer over the campaign", CAMPAIGN, pulses::pulses),
+    entry(Chapter::Measured, "The usable band", CAMPAIGN, usable_bands::usable_bands),
+    entry(Chapter::Joint, "Joint stiffness over frequency", ALL_THREE, joint_spectrum::joint_spectrum),
+    entry(Chapter::Joint, "What coupling adds", ALL_THREE, interface_modes::interface_modes),
+    entry(Chapter::Joint, "Which motions couple", ALL_THREE, participation::participation),
+    entry(Chapter::Joint, "Means over two bands", ALL_THREE, band_means::band_means),
+    entry(Chapter::Joint, "Consistency of the virtual points", ALL_THREE, consistency::consistency),
+    entry(Chapter::Loops, "A loop and its parts", LEVELS, loop_parts::loop_parts),
+    entry(Chapter::Loops, "One impact at the contact", IMPACTS, contact_loop::contact_loop),
+    entry(Chapter::Loops, "The first, third and fourth cycle", IMPACTS, decay_loops::decay_loops),
+    entry(Chapter::Loops, "The slope of every impact", IMPACTS, impacts::impacts),
+    entry(Chapter::Loops, "The shaker's levels", LEVELS, levels::levels),
+    entry(Chapter::Loops, "Loops of the shaker", LEVELS, shaker_loops::shaker_loops),
+    entry(
+        Chapter::Loops,
+        "The contact against amplitude",
+        "levels of the shaker at which the contact slips",
+        backbone::backbone,
+    ),
+    entry(Chapter::Loops, "FRFs at the contact", IMPACTS, specimens::specimens),
+    entry(Chapter::Loops, "The decay put together from two sinusoids", IMPACTS, rebuilt::rebuilt),
+    entry(Chapter::Frfs, "Receptances", "records of hits, or imported FRFs", receptances::receptances),
+    entry(
+        Chapter::Frfs,
+        "Noise floor and dynamic stiffness",
+        "two hits or more in a cell of the assembly",
+        noise_floor::noise_floor,
+    ),
+];
+
+impl Entry {
+    /// The figure of these results, with what it was made from.
+    pub fn of(&self, results: &Results) -> Option<Figure> {
+        let mut figure = (self.make)(results)?;
+        let source = &results.source;
+        figure.from = Source {
+            records: figure.from.records,
+            file: source.file.clone(),
+            simulated: source.simulated,
+            version: source.software.version.clone(),
+        };
+        Some(figure)
     }
 }
+
+/// Every figure that these results have the data for.
+pub fn all(results: &Results) -> Vec<Figure> {
+    ALL.iter().filter_map(|entry| entry.of(results)).collect()
+}
+
+/// m to µm, N/m to N/µm the other way round.
+const MICRO: f64 = 1e6;

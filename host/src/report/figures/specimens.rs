@@ -1,68 +1,103 @@
-//! The two specimens' own vibrometers in the assembly: where one of them leaves the common motion.
+//! FRFs at the contact: the two specimens, their difference, the force, and the arms (the paper's Fig. 8).
 
-use super::super::drawing::{Anchor, Area, Drawing, Stroke};
-use super::super::panel::{BLUE, Panel, SHADE, VERMILION, legend};
-use super::super::scale::{Scale, middle_range};
-use super::WIDTH;
-use super::receptances::unbroken;
+use super::receptances::{along, unbroken};
+use crate::report::figure::{Axis, Figure, Height, Mark, Panel, Role, Shape, Spread};
+use crate::report::scale::middle_range;
 use crate::report::words::number::decimals;
-use crate::results::{FrfCurve, HIDDEN_RESONANCE, Results, Role};
+use crate::results::{FrfCurve, HIDDEN_RESONANCE, Results, Role as Shows};
 
 const SHOWN_HZ: [f64; 2] = [100.0, 400.0];
 
-/// Magnitude and phase of x_A and x_B over the hammer's force, 100–400 Hz, with a point of each arm where there is one.
-pub fn specimens(results: &Results) -> Option<String> {
-    let of = |role| results.frfs.iter().find(|c| c.role == role && c.configuration == "AJB");
-    let mut curves = vec![
-        (of(Role::SpecimenA)?, Stroke::new(VERMILION, 1.2), "specimen A"),
-        (of(Role::SpecimenB)?, Stroke::new(BLUE, 1.2), "specimen B"),
-    ];
-    let arms = [
-        (of(Role::ArmA), Stroke::new(VERMILION, 1.0).dashed("6 3"), "arm A"),
-        (of(Role::ArmB), Stroke::new(BLUE, 1.0).dashed("6 3"), "arm B"),
-    ];
-    curves.extend(arms.into_iter().filter_map(|(curve, stroke, name)| Some((curve?, stroke, name))));
-    let resonance = results.check(HIDDEN_RESONANCE).and_then(|c| c.frequency_hz);
-    let inside = |c: &FrfCurve, values: &[f64]| -> Vec<(f64, f64)> {
-        let lines = values.iter().enumerate().map(|(l, v)| (c.frequency_hz(l), *v));
-        lines.filter(|(f, _)| *f >= SHOWN_HZ[0] && *f <= SHOWN_HZ[1]).collect()
-    };
-    let levels = curves.iter().flat_map(|(c, ..)| inside(c, &c.magnitude_m_per_n)).map(|(_, m)| m.log10());
-    let [low, high] = middle_range(levels, 1.0, 0.06)?;
-    let mut drawing = Drawing::new("specimens", WIDTH, 400.0);
-    let entries: Vec<_> =
-        curves.iter().map(|(c, s, name)| (*s, format!("{name} ({} from {})", c.output, c.input))).collect();
-    legend(&mut drawing, [70.0, 16.0], &entries);
-    for (top, height, phase) in [(28.0, 190.0, false), (232.0, 120.0, true)] {
-        let area = Area { left: 70.0, top, width: WIDTH - 70.0 - 12.0, height };
-        let pixels = [area.bottom(), area.top];
-        let panel = Panel {
-            area,
-            x: Scale::linear(SHOWN_HZ, [area.left, area.right()]),
-            y: if phase {
-                Scale::linear([-190.0, 190.0], pixels)
+const MOTIONS: [(Shows, Role, &str); 5] = [
+    (Shows::SpecimenA, Role::SpecimenA, "x_A"),
+    (Shows::SpecimenB, Role::SpecimenB, "x_B"),
+    (Shows::Relative, Role::Relative, "Δx"),
+    (Shows::ArmA, Role::ArmA, "arm A"),
+    (Shows::ArmB, Role::ArmB, "arm B"),
+];
+
+/// Magnitude and phase over the hammer's force, 100–400 Hz; T in a panel of its own.
+pub fn specimens(results: &Results) -> Option<Figure> {
+    let of = |role| results.frfs.iter().enumerate().find(|(_, c)| c.role == role && c.configuration == "AJB");
+    of(Shows::SpecimenA).zip(of(Shows::SpecimenB))?;
+    let curves: Vec<(usize, &FrfCurve, Role, &str)> = MOTIONS
+        .into_iter()
+        .filter_map(|(shows, role, name)| of(shows).map(|(i, curve)| (i, curve, role, name)))
+        .collect();
+    let [low, high] = magnitudes(curves.iter().map(|(_, c, ..)| *c))?;
+    let x = || Axis::frequency(Spread::Linear, SHOWN_HZ);
+    let mut magnitude = Panel::new(x(), Axis::log("receptance", "m/N", [low, high])).high(Height::Tall);
+    let mut phase = Panel::new(x(), degrees()).high(Height::Low).named_above();
+    for (i, curve, role, name) in &curves {
+        magnitude.marks.push(
+            Mark::line(
+                *role,
+                along(curve, curve.magnitude_m_per_n.len()),
+                curve.magnitude_m_per_n.iter().copied(),
+            )
+            .named(if curve.output == *name {
+                (*name).to_owned()
             } else {
-                Scale::logarithmic([10f64.powf(low), 10f64.powf(high)], pixels)
-            },
-        };
-        let x_ticks = panel.x.ticks(8);
-        let y_ticks = if phase { panel.y.ticks_every(90.0) } else { panel.y.ticks(5) };
-        panel.grid(&mut drawing, &x_ticks, &y_ticks);
-        if let Some(f) = resonance {
-            panel.shade(&mut drawing, [f - 2.0, f + 2.0], SHADE, 0.45);
-            if !phase {
-                let text = format!("{} Hz", decimals(f, 0));
-                drawing.text([panel.x.place_within(f - 3.0), area.top + 15.0], Anchor::End, "legend", &text);
-            }
-        }
-        for (curve, stroke, _) in &curves {
-            let values = if phase { &curve.phase_deg } else { &curve.magnitude_m_per_n };
-            let points = inside(curve, values);
-            let points = if phase { unbroken(&points) } else { points };
-            panel.curve(&mut drawing, points.into_iter(), *stroke);
-        }
-        let label = if phase { "phase in °" } else { "receptance in m/N" };
-        panel.axes(&mut drawing, (&x_ticks, phase.then_some("frequency in Hz")), (&y_ticks, Some(label)));
+                format!("{name} ({})", curve.output)
+            })
+            .from("y", format!("/frfs/{i}/magnitude_m_per_n/*"), 1.0),
+        );
+        let line = phase_line(curve, *i, *role);
+        phase.marks.push(line.named(magnitude.marks.last().map_or(String::new(), |m| m.name.clone())));
     }
-    Some(drawing.finish("Receptance of the two specimens in the assembly"))
+    let resonance = results.check(HIDDEN_RESONANCE).and_then(|c| c.frequency_hz);
+    if let Some((f, peak)) = resonance.and_then(|f| Some((f, at(of(Shows::SpecimenA)?.1, f)?))) {
+        let text = format!("{} Hz", decimals(f, 0));
+        magnitude.marks.push(Mark::new(Role::Guide, Shape::Ring { at: [f, peak], text }));
+        phase.marks.push(Mark::new(Role::Guide, Shape::Upright { at: f }));
+    }
+    let mut figure = Figure::new(
+        "specimens",
+        "8",
+        "FRFs at the contact",
+        format!("Hit at {}. Both specimens, their difference Δx, and both arms in the assembly, from one impact. A peak or a step of phase that only one specimen has is a resonance on its own clamp; loops near it are ellipses.", curves[0].1.input),
+    )
+    .with(magnitude)
+    .with(phase);
+    if let Some((i, force)) = of(Shows::Force)
+        && let Some([low, high]) = magnitudes([force].into_iter())
+    {
+        let line = Mark::line(
+            Role::Force,
+            along(force, force.magnitude_m_per_n.len()),
+            force.magnitude_m_per_n.iter().copied(),
+        )
+        .named("T over the hammer's force")
+        .from("y", format!("/frfs/{i}/magnitude_m_per_n/*"), 1.0);
+        figure = figure.with(Panel::new(x(), Axis::log("T per newton", "N/N", [low, high])).with(line));
+    }
+    Some(figure)
+}
+
+fn degrees() -> Axis {
+    Axis::linear("phase", "°", [-190.0, 190.0]).every(90.0)
+}
+
+fn phase_line(curve: &FrfCurve, index: usize, role: Role) -> Mark {
+    Mark::line(role, along(curve, curve.phase_deg.len()), unbroken(&curve.phase_deg)).from(
+        "y",
+        format!("/frfs/{index}/phase_deg/*"),
+        1.0,
+    )
+}
+
+/// What the curves reach within the frequencies shown.
+fn magnitudes<'a>(curves: impl Iterator<Item = &'a FrfCurve>) -> Option<[f64; 2]> {
+    let inside = curves.flat_map(|c| {
+        let lines = c.magnitude_m_per_n.iter().enumerate();
+        lines
+            .filter(|(l, m)| (SHOWN_HZ[0]..=SHOWN_HZ[1]).contains(&c.frequency_hz(*l)) && **m > 0.0)
+            .map(|(_, m)| m.log10())
+    });
+    middle_range(inside, 1.0, 0.06).map(|range| range.map(|e| 10f64.powf(e)))
+}
+
+fn at(curve: &FrfCurve, frequency_hz: f64) -> Option<f64> {
+    let line = ((frequency_hz - curve.first_hz) / curve.step_hz).round();
+    curve.magnitude_m_per_n.get(line as usize).copied()
 }

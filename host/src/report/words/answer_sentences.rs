@@ -112,6 +112,25 @@ pub fn capital(text: &str) -> String {
     format!("{first}{}.", letters.as_str())
 }
 
+/// Why the contact and what lies between the arms differ, in one sentence; none where one of them is not known.
+pub fn why_they_differ(results: &Results) -> Option<String> {
+    let answer = results.answer.as_ref()?;
+    let contact = micro(answer.contact.k_t_n_per_m.as_ref()?.mean);
+    let between = micro(answer.between_arms.k_n_per_m.as_ref()?.mean);
+    Some(match &answer.clamp {
+        Some(clamp) => format!(
+            "They differ because the clamps ({} N/µm) and the contact ({}) give way one after the other, in series: together {} N/µm are left.",
+            short(micro(clamp.k_n_per_m.mean)),
+            short(contact),
+            short(between)
+        ),
+        None => {
+            "Nothing soft was found between the arms and the contact, so that both see the same stiffness."
+                .into()
+        }
+    })
+}
+
 /// The answer's lines: what the terminal says first, and the head of the report.
 pub fn lines(results: &Results) -> Vec<String> {
     let Some(answer) = &results.answer else { return Vec::new() };

@@ -1,6 +1,7 @@
 //! What the report and the terminal say: findings and results in plain sentences, numbers with few digits.
 
 pub(super) mod answer_sentences;
+pub mod brief;
 pub(super) mod check_sentences;
 pub(super) mod level_sentences;
 pub(super) mod missing_sentences;

@@ -10,7 +10,9 @@ pub fn short(value: f64) -> String {
 /// `mean ± std`, both with the decimals that the mean's three or the scatter's two digits need, whichever
 /// is fewer; never `26.8134 ± 4`.
 pub fn with_scatter(mean: f64, std: f64) -> String {
-    let places = places(mean, 3).min(places(std, 2));
+    let few = places(mean, 3).min(places(std, 2));
+    // a scatter that is not zero is not shown as zero
+    let places = if std > 0.0 { few.max(places(std, 1).min(few + 2)) } else { few };
     format!("{} ± {}", decimals(mean, places), decimals(std, places))
 }
 
@@ -46,7 +48,10 @@ fn places(value: f64, significant: i32) -> usize {
     if value == 0.0 || !value.is_finite() {
         return significant.max(1) as usize - 1;
     }
-    (significant - 1 - value.abs().log10().floor() as i32).clamp(0, 12) as usize
+    let places = |value: f64| (significant - 1 - value.abs().log10().floor() as i32).clamp(0, 12);
+    // 0.09998 is 0.100 when it is rounded, not 0.1000
+    let scale = 10f64.powi(places(value));
+    places((value * scale).round() / scale) as usize
 }
 
 /// `value` with this many decimals and a true minus sign; a dash when it is no number.
@@ -70,6 +75,8 @@ mod tests {
         assert_eq!(stiffness(-12.3e6, 241.0e6), "−12 ± 241 N/µm");
         assert_eq!(with_scatter(26.8, 0.0), "26.8 ± 0.0");
         assert_eq!(short(0.012_34), "0.0123");
+        assert_eq!(short(0.099_98), "0.100");
+        assert_eq!(with_scatter(184.2, 0.31), "184.2 ± 0.3");
         assert_eq!(short(f64::NAN), "–");
         assert_eq!(band([300.0, 600.0].into()), "300–600 Hz");
         assert_eq!(count(1_234_567), "1\u{202f}234\u{202f}567");

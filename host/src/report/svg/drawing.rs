@@ -4,25 +4,19 @@ use std::fmt::Write;
 
 /// How a line looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stroke {
-    /// Colour, as css writes it.
-    pub colour: &'static str,
+pub struct Stroke<'a> {
+    /// Its class: the style sheet gives the colour.
+    pub class: &'a str,
     /// Width, px.
     pub width: f64,
     /// Dash pattern, empty for a full line.
     pub dash: &'static str,
 }
 
-impl Stroke {
+impl<'a> Stroke<'a> {
     /// A full line.
-    pub const fn new(colour: &'static str, width: f64) -> Self {
-        Stroke { colour, width, dash: "" }
-    }
-
-    /// The same, dashed.
-    #[must_use]
-    pub const fn dashed(self, dash: &'static str) -> Self {
-        Stroke { dash, ..self }
+    pub const fn new(class: &'a str, width: f64) -> Self {
+        Stroke { class, width, dash: "" }
     }
 }
 
@@ -65,7 +59,7 @@ impl Area {
 /// A drawing under way.
 #[derive(Debug)]
 pub struct Drawing {
-    name: &'static str,
+    name: String,
     width: f64,
     height: f64,
     clips: usize,
@@ -74,42 +68,50 @@ pub struct Drawing {
 
 impl Drawing {
     /// An empty drawing; `name` keeps its ids apart from those of the page's other drawings.
-    pub fn new(name: &'static str, width: f64, height: f64) -> Self {
-        Drawing { name, width, height, clips: 0, body: String::new() }
+    pub fn new(name: &str, width: f64, height: f64) -> Self {
+        Drawing { name: name.to_owned(), width, height, clips: 0, body: String::new() }
     }
 
     /// A straight line.
-    pub fn line(&mut self, from: [f64; 2], to: [f64; 2], stroke: Stroke) {
+    pub fn line(&mut self, from: [f64; 2], to: [f64; 2], stroke: Stroke<'_>) {
         let path = format!("M{} {}L{} {}", px(from[0]), px(from[1]), px(to[0]), px(to[1]));
         self.path(&path, stroke);
     }
 
     /// A curve through points in pixels; `None` breaks it. Many points in one pixel column are reduced to
-    /// the first, the lowest, the highest and the last, which looks the same.
-    pub fn curve(&mut self, points: &[Option<[f64; 2]>], stroke: Stroke) {
+    /// the lowest and the highest, which looks the same.
+    pub fn curve(&mut self, points: &[Option<[f64; 2]>], stroke: Stroke<'_>) {
         let path = path_of(points);
         if !path.is_empty() {
             self.path(&path, stroke);
         }
     }
 
-    fn path(&mut self, path: &str, stroke: Stroke) {
+    fn path(&mut self, path: &str, stroke: Stroke<'_>) {
         let dash = if stroke.dash.is_empty() {
             String::new()
         } else {
             format!(" stroke-dasharray=\"{}\"", stroke.dash)
         };
         self.push(format_args!(
-            "<path d=\"{path}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"{dash}/>",
-            stroke.colour,
+            "<path d=\"{path}\" fill=\"none\" class=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"{dash}/>",
+            stroke.class,
             px(stroke.width)
         ));
     }
 
+    /// A closed curve through points, filled.
+    pub fn area(&mut self, points: &[[f64; 2]], class: &str, opacity: f64) {
+        let path = path_of(&points.iter().copied().map(Some).collect::<Vec<_>>());
+        if !path.is_empty() {
+            self.push(format_args!("<path d=\"{path}Z\" class=\"{class}\" fill-opacity=\"{opacity:.2}\"/>"));
+        }
+    }
+
     /// A filled rectangle.
-    pub fn fill(&mut self, area: Area, colour: &str, opacity: f64) {
+    pub fn fill(&mut self, area: Area, class: &str, opacity: f64) {
         self.push(format_args!(
-            "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"{colour}\" fill-opacity=\"{opacity}\"/>",
+            "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" class=\"{class}\" fill-opacity=\"{opacity:.2}\"/>",
             px(area.left),
             px(area.top),
             px(area.width.max(0.0)),
@@ -117,14 +119,58 @@ impl Drawing {
         ));
     }
 
-    /// A dot; hollow when `hollow`.
-    pub fn dot(&mut self, at: [f64; 2], radius: f64, colour: &str, hollow: bool) {
-        let fill = if hollow { "#fff" } else { colour };
+    /// Filled rectangles, as one shape.
+    pub fn fills(&mut self, areas: &[Area], class: &str, opacity: f64) {
+        if areas.is_empty() {
+            return;
+        }
+        let mut path = String::new();
+        for area in areas {
+            let (left, top, width, height) = (px(area.left), px(area.top), px(area.width), px(area.height));
+            let _ = write!(path, "M{left} {top}h{width}v{height}h-{width}z");
+        }
+        self.push(format_args!("<path d=\"{path}\" class=\"{class}\" fill-opacity=\"{opacity:.2}\"/>"));
+    }
+
+    /// Round or square points this wide, as one shape.
+    pub fn ends(&mut self, points: &[[f64; 2]], class: &str, width: f64, round: bool) {
+        let mut path = String::new();
+        for p in points {
+            let _ = write!(path, "M{} {}h0", px(p[0]), px(p[1]));
+        }
+        let cap = if round { "round" } else { "square" };
+        let width = px(width);
+        self.push(format_args!("<path d=\"{path}\" class=\"{class}\" stroke-width=\"{width}\" stroke-linecap=\"{cap}\" fill=\"none\"/>"));
+    }
+
+    /// Lying crosses, as one shape.
+    pub fn crosses(&mut self, points: &[[f64; 2]], class: &str, half: f64) {
+        let (whole, back) = (px(2.0 * half), px(-2.0 * half));
+        let one = |p: &[f64; 2]| {
+            format!("M{} {}l{whole} {whole}m{back} 0l{whole} {back}", px(p[0] - half), px(p[1] - half))
+        };
+        let path: String = points.iter().map(one).collect();
+        self.push(format_args!("<path d=\"{path}\" class=\"{class}\" stroke-width=\"1.8\" fill=\"none\"/>"));
+    }
+
+    /// A dot or ring; `classes` fill and stroke it.
+    pub fn dot(&mut self, at: [f64; 2], radius: f64, classes: &str) {
         self.push(format_args!(
-            "<circle cx=\"{}\" cy=\"{}\" r=\"{}\" fill=\"{fill}\" stroke=\"{colour}\" stroke-width=\"1.4\"/>",
+            "<circle cx=\"{}\" cy=\"{}\" r=\"{}\" class=\"{classes}\" stroke-width=\"1.4\"/>",
             px(at[0]),
             px(at[1]),
             px(radius)
+        ));
+    }
+
+    /// A square, full or empty.
+    pub fn square(&mut self, at: [f64; 2], half: f64, classes: &str) {
+        self.push(format_args!(
+            "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" class=\"{classes}\" stroke-width=\"1.4\"/>",
+            px(at[0] - half),
+            px(at[1] - half),
+            px(2.0 * half),
+            px(2.0 * half)
         ));
     }
 
@@ -170,13 +216,28 @@ impl Drawing {
 
     /// The finished drawing; `meaning` is read to those who cannot see it.
     pub fn finish(self, meaning: &str) -> String {
+        let size = format!("0 0 {} {}", px(self.width), px(self.height));
+        format!("<svg viewBox=\"{size}\" role=\"img\" aria-label=\"{}\">{}</svg>", escape(meaning), self.body)
+    }
+
+    /// The finished drawing as an ornament that need not be read out.
+    pub fn decoration(self) -> String {
+        let (width, height) = (px(self.width), px(self.height));
         format!(
-            "<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">{}</svg>",
-            px(self.width),
-            px(self.height),
-            escape(meaning),
+            "<svg viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" aria-hidden=\"true\">{}</svg>",
             self.body
         )
+    }
+
+    /// The finished drawing as a part of a larger one, with its upper left corner at `at`.
+    pub fn inside(self, at: [f64; 2]) -> String {
+        let (x, y, width, height) = (px(at[0]), px(at[1]), px(self.width), px(self.height));
+        format!("<svg x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\">{}</svg>", self.body)
+    }
+
+    /// Its size, px.
+    pub fn size(&self) -> [f64; 2] {
+        [self.width, self.height]
     }
 
     fn push(&mut self, arguments: std::fmt::Arguments<'_>) {
@@ -184,21 +245,56 @@ impl Drawing {
     }
 }
 
+/// A path in tenths of a pixel, each point relative to the one before: half as long as with places.
 fn path_of(points: &[Option<[f64; 2]>]) -> String {
     let mut path = String::new();
     for run in points.split(Option::is_none) {
         let run: Vec<[f64; 2]> = run.iter().copied().flatten().collect();
+        let mut before = [0i64; 2];
+        let mut lined = false;
         for (i, p) in thinned(&run).into_iter().enumerate() {
-            path.push(if i == 0 { 'M' } else { 'L' });
-            path.push_str(&px(p[0]));
-            path.push(' ');
-            path.push_str(&px(p[1]));
+            let at = p.map(|v| (10.0 * held(v)).round() as i64);
+            if i == 0 {
+                path.push('M');
+            } else if at == before {
+                continue;
+            } else if !lined {
+                path.push('l');
+                lined = true;
+            }
+            for (n, (now, then)) in at.into_iter().zip(before).enumerate() {
+                let step = if i == 0 { now } else { now - then };
+                if step >= 0 && (n > 0 || !path.ends_with(['M', 'l'])) {
+                    path.push(' ');
+                }
+                tenths(&mut path, step);
+            }
+            before = at;
         }
     }
     path
 }
 
-/// Per pixel column, in the order they come: first, lowest, highest, last.
+/// `-0.3` as `-.3`, `12.0` as `12`.
+fn tenths(path: &mut String, value: i64) {
+    if value < 0 {
+        path.push('-');
+    }
+    let (whole, tenth) = (value.abs() / 10, value.abs() % 10);
+    if whole > 0 || tenth == 0 {
+        let _ = write!(path, "{whole}");
+    }
+    if tenth > 0 {
+        let _ = write!(path, ".{tenth}");
+    }
+}
+
+/// Far-away values are held where every browser can draw them.
+fn held(value: f64) -> f64 {
+    if value.is_finite() { value.clamp(-20_000.0, 20_000.0) } else { 0.0 }
+}
+
+/// Per pixel column, in the order they come: lowest and highest.
 fn thinned(run: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut kept = Vec::new();
     for column in run.chunk_by(|a, b| a[0].floor() == b[0].floor()) {
@@ -207,7 +303,7 @@ fn thinned(run: &[[f64; 2]]) -> Vec<[f64; 2]> {
             continue;
         }
         let by_height = |a: &usize, b: &usize| column[*a][1].total_cmp(&column[*b][1]);
-        let mut indices = vec![0, column.len() - 1];
+        let mut indices = Vec::with_capacity(2);
         indices.extend((0..column.len()).min_by(by_height));
         indices.extend((0..column.len()).max_by(by_height));
         indices.sort_unstable();
@@ -217,10 +313,9 @@ fn thinned(run: &[[f64; 2]]) -> Vec<[f64; 2]> {
     kept
 }
 
-/// Pixels to a tenth; far-away values are held where every browser can draw them.
+/// Pixels to a tenth.
 fn px(value: f64) -> String {
-    let value = if value.is_finite() { value.clamp(-20_000.0, 20_000.0) } else { 0.0 };
-    let text = format!("{value:.1}");
+    let text = format!("{:.1}", held(value));
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
 }
 
@@ -257,7 +352,7 @@ mod tests {
     fn gaps_break_the_curve_and_nothing_is_not_a_number() {
         let path = path_of(&[Some([0.0, 1.0]), None, Some([2.0, f64::INFINITY]), Some([3.0, f64::NAN])]);
         assert_eq!(path.matches('M').count(), 2);
-        assert!(!path.contains("NaN") && !path.contains("inf"), "{path}");
+        assert_eq!(path, "M0 1M2 0l1 0", "relative, in tenths, and nothing but numbers");
     }
 
     #[test]

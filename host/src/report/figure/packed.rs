@@ -1,0 +1,89 @@
+//! Numbers of curves as compact text: `f32:` and base64 of 32-bit floats, little endian.
+
+use serde::{Serialize, Serializer};
+
+/// The values of a curve; one that is not known is NaN.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Packed(pub Vec<f32>);
+
+impl Packed {
+    /// From numbers of any kind of list.
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
+        Packed(values.into_iter().map(|v| v as f32).collect())
+    }
+
+    /// The finite values' range.
+    pub fn range(&self) -> Option<[f64; 2]> {
+        let finite = || self.0.iter().copied().filter(|v| v.is_finite());
+        let low = finite().reduce(f32::min)?;
+        Some([low.into(), finite().fold(low, f32::max).into()])
+    }
+}
+
+impl Serialize for Packed {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        let bytes: Vec<u8> = self.0.iter().flat_map(|v| v.to_le_bytes()).collect();
+        to.serialize_str(&format!("f32:{}", base64(&bytes)))
+    }
+}
+
+/// Base64 (RFC 4648, section 4, with padding).
+pub fn base64(bytes: &[u8]) -> String {
+    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for three in bytes.chunks(3) {
+        let byte = |i: usize| u32::from(three.get(i).copied().unwrap_or(0));
+        let word = byte(0) << 16 | byte(1) << 8 | byte(2);
+        for i in 0..4 {
+            if i <= three.len() {
+                text.push(char::from(LETTERS[(word >> (18 - 6 * i)) as usize & 63]));
+            } else {
+                text.push('=');
+            }
+        }
+    }
+    text
+}
+
+/// A number with six significant digits, as csv files and readouts show it; empty when it is none.
+pub fn six_digits(value: f64) -> String {
+    if !value.is_finite() {
+        return String::new();
+    }
+    let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
+    if rounded != 0.0 && !(1e-4..1e9).contains(&rounded.abs()) {
+        format!("{rounded:e}")
+    } else {
+        rounded.to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn base64_is_that_of_the_rfc() {
+        let pairs = [
+            ("", ""),
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foob", "Zm9vYg=="),
+            ("foobar", "Zm9vYmFy"),
+        ];
+        for (plain, text) in pairs {
+            assert_eq!(base64(plain.as_bytes()), text);
+        }
+    }
+
+    #[test]
+    fn six_digits_survive_thirty_two_bits() {
+        for value in [1.234_56e-9, 26.889_5, 999_999.0, -0.000_123_456] {
+            assert_eq!(six_digits(f64::from(value as f32)), six_digits(value));
+        }
+        assert_eq!(six_digits(f64::NAN), "");
+        assert_eq!(six_digits(1.234_567e-8), "1.23457e-8");
+        assert_eq!(serde_json::to_string(&Packed::of([1.0])).expect("text"), "\"f32:AACAPw==\"");
+    }
+}

@@ -1,0 +1,192 @@
+//! What marks stand for, and how each role looks: in light and dark, in report, files and dashboard.
+//!
+//! Colours after Okabe and Ito, which stay apart for colour-blind readers; neighbours differ in lightness and dash too, so that grey
+//! print holds. Contrast against the paper is at least 3 : 1 in both lights, which a test measures.
+
+use serde::Serialize;
+use std::fmt::Write;
+
+macro_rules! roles {
+    ($($(#[$about:meta])* $role:ident = $name:literal $light:literal $dark:literal $dash:literal $width:literal;)*) => {
+        /// What a mark stands for.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+        pub enum Role {
+            $($(#[$about])* #[serde(rename = $name)] $role,)*
+        }
+
+        /// Every role.
+        pub const ALL: &[Role] = &[$(Role::$role),*];
+
+        impl Role {
+            /// Its name in css classes and in JSON.
+            pub const fn name(self) -> &'static str {
+                match self { $(Role::$role => $name),* }
+            }
+
+            /// Its colour on light paper.
+            pub const fn light(self) -> &'static str {
+                match self { $(Role::$role => $light),* }
+            }
+
+            /// Its colour on dark paper.
+            pub const fn dark(self) -> &'static str {
+                match self { $(Role::$role => $dark),* }
+            }
+
+            /// Its dash pattern; empty for a full line.
+            pub const fn dash(self) -> &'static str {
+                match self { $(Role::$role => $dash),* }
+            }
+
+            /// The width of its lines, px.
+            pub const fn width(self) -> f64 {
+                match self { $(Role::$role => $width),* }
+            }
+        }
+    };
+}
+
+roles! {
+    /// Specimen A.
+    SpecimenA = "specimen-a" "#c24e00" "#ff9d5c" "" 1.4;
+    /// Specimen B.
+    SpecimenB = "specimen-b" "#0072b2" "#56b4e9" "" 1.4;
+    /// Arm A.
+    ArmA = "arm-a" "#c24e00" "#ff9d5c" "6 3" 1.1;
+    /// Arm B.
+    ArmB = "arm-b" "#0072b2" "#56b4e9" "6 3" 1.1;
+    /// Δx between the specimens.
+    Relative = "relative" "#00805d" "#2fc79a" "" 1.4;
+    /// The force through the contact.
+    Force = "force" "#333333" "#dddddd" "" 1.2;
+    /// An estimate between the arms.
+    BetweenArms = "between-arms" "#0072b2" "#56b4e9" "" 2.0;
+    /// The answer: the contact's own stiffness.
+    Answer = "answer" "#00704f" "#2fc79a" "" 3.0;
+    /// Clamps in series with the contact.
+    Clamp = "clamp" "#8a6100" "#e6b84c" "" 2.0;
+    /// What a loop or a level gives.
+    Loops = "loops" "#c24e00" "#ff9d5c" "" 2.0;
+    /// What an ideal measurement of a simulated rig would find.
+    Truth = "truth" "#7a2e8e" "#d69be6" "4 3" 1.8;
+    /// Two interface deformation modes.
+    Modes2 = "modes-2" "#00805d" "#2fc79a" "2 2" 1.1;
+    /// Four.
+    Modes4 = "modes-4" "#c24e00" "#ff9d5c" "6 3" 1.1;
+    /// Six.
+    Modes6 = "modes-6" "#0072b2" "#56b4e9" "" 1.4;
+    /// What was measured.
+    Measured = "measured" "#333333" "#dddddd" "" 1.1;
+    /// A model's curve through it.
+    Fitted = "fitted" "#c24e00" "#ff9d5c" "7 4" 1.8;
+    /// Noise.
+    Noise = "noise" "#6b6b6b" "#a0a0a0" "3 3" 1.0;
+    /// What is not believed or was refused.
+    Refused = "refused" "#b0392b" "#ff8f80" "" 1.2;
+    /// The first of several groups.
+    Group1 = "group-1" "#0072b2" "#56b4e9" "" 1.2;
+    /// The second.
+    Group2 = "group-2" "#c24e00" "#ff9d5c" "6 3" 1.2;
+    /// The third.
+    Group3 = "group-3" "#00805d" "#2fc79a" "2 2" 1.2;
+    /// The fourth.
+    Group4 = "group-4" "#a8488a" "#e39ac4" "8 3 2 3" 1.2;
+    /// The fifth.
+    Group5 = "group-5" "#806600" "#e6b84c" "4 4" 1.2;
+    /// The sixth and all further ones.
+    Group6 = "group-6" "#333333" "#dddddd" "1 3" 1.2;
+    /// The band that numbers are read from.
+    Band = "band" "#b98900" "#e6b84c" "" 1.0;
+    /// Where the hammer put too little force.
+    Unusable = "unusable" "#777777" "#9a9a9a" "" 1.0;
+    /// A line to guide the eye.
+    Guide = "guide" "#777777" "#9a9a9a" "3 3" 1.0;
+}
+
+impl Role {
+    /// One for each of several groups.
+    pub fn group(index: usize) -> Role {
+        const GROUPS: [Role; 6] =
+            [Role::Group1, Role::Group2, Role::Group3, Role::Group4, Role::Group5, Role::Group6];
+        GROUPS[index.min(GROUPS.len() - 1)]
+    }
+
+    /// That of a set of interface deformation modes.
+    pub fn modes(count: usize) -> Role {
+        match count {
+            2 => Role::Modes2,
+            4 => Role::Modes4,
+            _ => Role::Modes6,
+        }
+    }
+
+    /// How much of the paper an area of this role covers, 0…1.
+    pub fn opacity(self) -> f64 {
+        match self {
+            Role::Band => 0.16,
+            Role::Unusable => 0.22,
+            _ => 0.2,
+        }
+    }
+}
+
+/// The paper in light and dark.
+pub const PAPER: [&str; 2] = ["#ffffff", "#16181b"];
+
+/// The roles as css: `--r-NAME` in light; in dark within `dark`.
+pub fn variables(dark: bool) -> String {
+    let mut css = String::new();
+    for role in ALL {
+        let colour = if dark { role.dark() } else { role.light() };
+        let _ = write!(css, "--r-{}:{colour};", role.name());
+    }
+    css
+}
+
+/// Classes that draw with the variables: `s-NAME` strokes, `f-NAME` fills.
+pub fn classes() -> String {
+    let mut css = String::new();
+    for role in ALL {
+        let name = role.name();
+        let _ = write!(css, ".s-{name}{{stroke:var(--r-{name})}}.f-{name}{{fill:var(--r-{name})}}");
+    }
+    css
+}
+
+/// The same with the colours for light paper in place, for files that stand alone.
+pub fn plain_classes() -> String {
+    let mut css = String::new();
+    for role in ALL {
+        let (name, colour) = (role.name(), role.light());
+        let _ = write!(css, ".s-{name}{{stroke:{colour}}}.f-{name}{{fill:{colour}}}");
+    }
+    css
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Relative luminance by WCAG 2.
+    fn luminance(colour: &str) -> f64 {
+        let part = |at: usize| {
+            let v = f64::from(u8::from_str_radix(&colour[at..at + 2], 16).expect("a colour")) / 255.0;
+            if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+        };
+        0.2126 * part(1) + 0.7152 * part(3) + 0.0722 * part(5)
+    }
+
+    #[test]
+    fn every_role_stands_out_from_both_papers() {
+        let contrast = |a: &str, b: &str| {
+            let (a, b) = (luminance(a), luminance(b));
+            (a.max(b) + 0.05) / (a.min(b) + 0.05)
+        };
+        for role in ALL {
+            for (colour, paper) in [(role.light(), PAPER[0]), (role.dark(), PAPER[1])] {
+                let found = contrast(colour, paper);
+                assert!(found >= 3.0, "{}: {found:.2}", role.name());
+            }
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! The answer on one axis: the contact, the clamps, what lies between the arms, and what the loops see, with their intervals.
+
+use super::MICRO;
+use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role};
+use crate::report::words::number::{decimals, micro, short, stiffness};
+use crate::results::{Excitation, Force, HIDDEN_RESONANCE, Hysteresis, Results};
+use crate::substructuring::Dof;
+
+struct Row {
+    label: String,
+    role: Role,
+    mean: f64,
+    ends: [f64; 2],
+    /// Whether it may be taken for what it is called.
+    believed: bool,
+    truth: Option<f64>,
+    path: &'static str,
+}
+
+/// A few estimates, the one to quote first.
+pub fn answer(results: &Results) -> Option<Figure> {
+    let rows = rows(results);
+    if rows.is_empty() {
+        return None;
+    }
+    let all = || rows.iter().flat_map(|r| [r.mean, r.ends[0], r.ends[1]].into_iter().chain(r.truth));
+    let high = all().fold(0.0, f64::max);
+    let low = rows.iter().map(|r| r.mean).fold(0.0, f64::min);
+    let x = Axis::linear("stiffness along the sliding direction", "N/µm", [1.1 * low, 1.08 * high]);
+    let names = rows.iter().map(|r| r.label.clone()).collect();
+    let mut panel = Panel::new(x, Axis::named("", names)).high(Height::Rows);
+    for (i, row) in rows.iter().enumerate() {
+        let y = i as f64 + 0.26;
+        let marker = if row.believed { Marker::Dot } else { Marker::Cross };
+        panel.marks.push(
+            Mark::points(row.role, marker, [[row.mean, y]])
+                .barred("x", [row.ends])
+                .saying(vec![row.label.clone()])
+                .from("x", row.path, 1.0 / MICRO),
+        );
+        panel.marks.extend(row.truth.map(|truth| {
+            Mark::points(Role::Truth, Marker::Stroke, [[truth, y]])
+                .named("truth of the simulated rig")
+                .saying(vec![format!("truth: {} N/µm", short(truth))])
+                .from("x", "/answer/truth/*", 1.0 / MICRO)
+        }));
+    }
+    let say = "Estimates with their 95 % intervals (loops: ± σ). A cross marks what must not be taken for the contact's stiffness.";
+    Some(Figure::new("answer", "", "What was found, on one axis", say).across(2).with(panel))
+}
+
+fn rows(results: &Results) -> Vec<Row> {
+    let mut rows = Vec::new();
+    if let Some(answer) = &results.answer {
+        let truth = answer.truth.as_ref();
+        let mut put = |label: String, role, k: &crate::contact::Interval, truth: Option<f64>, path| {
+            rows.push(Row {
+                label,
+                role,
+                mean: micro(k.mean),
+                ends: k.ci95.map(micro),
+                believed: true,
+                truth: truth.map(micro),
+                path,
+            });
+        };
+        if let Some(k) = &answer.contact.k_t_n_per_m {
+            let label = format!("k_T of the contact: {}", interval(k));
+            put(
+                label,
+                Role::Answer,
+                k,
+                truth.map(|t| t.contact_k_t_n_per_m),
+                "/answer/contact/k_t_n_per_m/mean",
+            );
+        }
+        if let Some(clamp) = &answer.clamp {
+            let label = format!("clamps alone: {}", interval(&clamp.k_n_per_m));
+            put(
+                label,
+                Role::Clamp,
+                &clamp.k_n_per_m,
+                truth.and_then(|t| t.clamps_k_n_per_m),
+                "/answer/clamp/k_n_per_m/mean",
+            );
+        }
+        if let Some(k) = &answer.between_arms.k_n_per_m {
+            let label = format!("between the arms: {}", interval(k));
+            put(
+                label,
+                Role::BetweenArms,
+                k,
+                truth.map(|t| t.between_arms_k_n_per_m),
+                "/answer/between_arms/k_n_per_m/mean",
+            );
+        }
+    }
+    if !rows.iter().any(|row| row.role == Role::BetweenArms) {
+        rows.extend(quoted(results).or_else(|| headline(results)));
+    }
+    rows.extend(levels(results));
+    rows.extend(impacts(results));
+    rows
+}
+
+/// `178 N/µm (173…183)`.
+fn interval(k: &crate::contact::Interval) -> String {
+    let [mean, low, high] = [k.mean, k.ci95[0], k.ci95[1]].map(|k| short(micro(k)));
+    format!("{mean} N/µm ({low}…{high})")
+}
+
+fn quoted(results: &Results) -> Option<Row> {
+    let z = results.quoted()?.joint.get(&Dof::Z).filter(|z| z.identified)?;
+    Some(Row {
+        label: format!(
+            "between the arms: {} N/µm ({}…{})",
+            short(micro(z.stiffness)),
+            short(micro(z.ci95[0])),
+            short(micro(z.ci95[1]))
+        ),
+        role: Role::BetweenArms,
+        mean: micro(z.stiffness),
+        ends: z.ci95.map(micro),
+        believed: true,
+        truth: None,
+        path: "/recommended/*/joint/z/stiffness",
+    })
+}
+
+fn headline(results: &Results) -> Option<Row> {
+    let joint = results.headline_joint()?;
+    let k = joint.sliding_stiffness()?;
+    Some(Row {
+        label: format!("between the arms, {}: {}", joint.method, stiffness(k.mean, k.std)),
+        role: Role::BetweenArms,
+        mean: micro(k.mean),
+        ends: [micro(k.mean - k.std), micro(k.mean + k.std)],
+        believed: joint.identified(),
+        truth: None,
+        path: "/joint/*/stiffness_n_per_m/z/mean",
+    })
+}
+
+/// The levels' straight loops from the softest to the stiffest.
+fn levels(results: &Results) -> Option<Row> {
+    let straight = |h: &&Hysteresis| h.kind == Excitation::Shaker && h.force == Force::Raw;
+    let mut found: Vec<f64> = results
+        .hysteresis
+        .iter()
+        .filter(straight)
+        .filter_map(Hysteresis::stick_slope)
+        .map(|k| micro(k.mean))
+        .collect();
+    found.sort_by(f64::total_cmp);
+    let (low, high) = (*found.first()?, *found.last()?);
+    let campaign = results.source.kind == "campaign";
+    Some(Row {
+        label: if found.len() == 1 {
+            format!("the shaker's loop: {} N/µm", short(low))
+        } else {
+            format!("{} straight shaker loops: {}…{} N/µm", found.len(), short(low), short(high))
+        },
+        role: Role::Loops,
+        mean: found[found.len() / 2],
+        ends: [low, high],
+        // between the spots a specimen's tilt is in it
+        believed: !campaign,
+        truth: None,
+        path: "/hysteresis/*/*/mean",
+    })
+}
+
+fn impacts(results: &Results) -> Option<Row> {
+    let k = results.impact_loops()?.k_eq_n_per_m?;
+    let hidden = results.check(HIDDEN_RESONANCE).filter(|c| c.ok == Some(false)).and_then(|c| c.frequency_hz);
+    let beside = hidden.map_or(String::new(), |f| format!(", with {} Hz", decimals(f, 0)));
+    Some(Row {
+        label: format!("impacts, first cycle: {}{beside}", stiffness(k.mean, k.std)),
+        role: Role::Loops,
+        mean: micro(k.mean),
+        ends: [micro(k.mean - k.std), micro(k.mean + k.std)],
+        believed: false,
+        truth: None,
+        path: "/hysteresis/*/k_eq_n_per_m/mean",
+    })
+}

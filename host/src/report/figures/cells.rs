@@ -1,0 +1,54 @@
+//! The matrix of cells: what was kept of what was wanted.
+
+use crate::report::figure::{Axis, Figure, Height, Mark, Packed, Panel, Role, Shape};
+use crate::results::{CellRow, Results};
+
+/// One matrix for each configuration: responses down, impacts across.
+pub fn cells(results: &Results) -> Option<Figure> {
+    let all = &results.cells.as_ref()?.cells;
+    let mut figure = Figure::new(
+        "cells",
+        "",
+        "Every cell",
+        "The stronger the square, the more of the hits wanted were kept. A pale one lacks hits, an empty one was never measured.",
+    );
+    for configuration in ["A", "B", "AJB"] {
+        let own: Vec<&CellRow> = all.iter().filter(|c| c.configuration == configuration).collect();
+        let (mut impacts, mut responses): (Vec<String>, Vec<String>) = (Vec::new(), Vec::new());
+        for cell in &own {
+            for (names, name) in [(&mut impacts, &cell.impact), (&mut responses, &cell.response)] {
+                if !names.contains(name) {
+                    names.push(name.clone());
+                }
+            }
+        }
+        if own.is_empty() {
+            continue;
+        }
+        let pairs = || responses.iter().flat_map(|r| impacts.iter().map(move |i| (r, i)));
+        let found: Vec<Option<&&CellRow>> =
+            pairs().map(|(r, i)| own.iter().find(|c| c.response == *r && c.impact == *i)).collect();
+        let values = found.iter().map(|c| c.map_or(f64::NAN, |c| c.kept as f64 / c.wanted.max(1) as f64));
+        let shape = Shape::Cells {
+            values: Packed::of(values),
+            says: found.iter().flatten().map(|c| said(c)).collect(),
+        };
+        let panel = Panel::new(Axis::named("impact", impacts), Axis::named("response", responses))
+            .titled(format!("{configuration}: {} cells", own.len()))
+            .high(Height::Usual)
+            .with(Mark::new(Role::BetweenArms, shape));
+        figure = figure.with(panel);
+    }
+    (!figure.panels.is_empty()).then_some(figure)
+}
+
+fn said(cell: &CellRow) -> String {
+    let refused: Vec<String> =
+        cell.refused.iter().filter(|(_, n)| **n > 0).map(|(verdict, n)| format!("{n} {verdict}")).collect();
+    let refused =
+        if refused.is_empty() { String::new() } else { format!("; refused: {}", refused.join(", ")) };
+    format!(
+        "{}, hit at {}, seen at {}: {} of {} kept{refused}",
+        cell.configuration, cell.impact, cell.response, cell.kept, cell.wanted
+    )
+}

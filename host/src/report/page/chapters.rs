@@ -1,0 +1,110 @@
+//! The chapters, as in the paper: figures and tables, what is missing with what it would need, and where everything comes from.
+
+use super::figure_html;
+use super::glossary_html;
+use super::text::Html;
+use crate::report::figure::Figure;
+use crate::report::figures::{Chapter, Entry};
+use crate::report::tables;
+use crate::results::Results;
+
+type Drawn<'a> = [(&'a Entry, Option<Figure>)];
+
+const CHAPTERS: [(Chapter, &str, &str); 5] = [
+    (Chapter::SideBySide, "side-by-side", "What each measurement sees"),
+    (Chapter::Joint, "joint", "Joint by substructuring"),
+    (Chapter::Loops, "loops", "Contact by loops"),
+    (Chapter::Measured, "measured", "What was measured"),
+    (Chapter::Frfs, "frfs", "Frequency response functions"),
+];
+
+/// The list of chapters, at the side.
+pub fn contents(html: &mut Html, results: &Results, drawn: &Drawn<'_>) {
+    html.raw("<nav aria-label=\"contents\"><ul><li><a href=\"#answer\">The answer</a></li>");
+    for (chapter, id, title) in CHAPTERS {
+        if chapter_is_empty(results, chapter, drawn) {
+            continue;
+        }
+        html.raw(&format!("<li><a href=\"#{id}\">{title}</a><ul>"));
+        for figure in drawn.iter().filter(|(e, _)| e.chapter == chapter).filter_map(|(_, f)| f.as_ref()) {
+            html.raw(&format!("<li><a href=\"#fig-{}\">", figure.name));
+            html.text(&figure.title);
+            html.raw("</a></li>");
+        }
+        html.raw("</ul></li>");
+    }
+    html.raw("<li><a href=\"#source\">Where it comes from</a></li><li><a href=\"#glossary\">Words</a></li></ul></nav>");
+}
+
+/// All chapters after the first screen.
+pub fn all(html: &mut Html, results: &Results, drawn: &Drawn<'_>) {
+    for (chapter, id, title) in CHAPTERS {
+        if chapter_is_empty(results, chapter, drawn) {
+            continue;
+        }
+        html.raw(&format!("<section id=\"{id}\"><h2>{title}</h2>"));
+        for (entry, figure) in drawn.iter().filter(|(entry, _)| entry.chapter == chapter) {
+            if let Some(figure) = figure {
+                figure_html::figure(html, figure, 3);
+                for table in tables_beside(results, figure.name).into_iter().flatten() {
+                    html.raw(&table);
+                }
+            } else {
+                html.element(
+                    "p class=\"absent\"",
+                    &format!("{}: not drawn, it would need {}.", entry.title, entry.needs),
+                );
+            }
+        }
+        for table in tables_of(results, chapter).into_iter().flatten() {
+            html.raw(&table);
+        }
+        html.raw("</section>");
+    }
+    html.raw("<section id=\"source\"><h2>Where it comes from</h2>");
+    html.raw(&tables::provenance(results));
+    html.raw("</section><section id=\"glossary\"><h2>Words</h2>");
+    glossary_html::list(html);
+    html.raw("</section>");
+}
+
+fn chapter_is_empty(results: &Results, chapter: Chapter, drawn: &Drawn<'_>) -> bool {
+    drawn.iter().all(|(entry, figure)| entry.chapter != chapter || figure.is_none())
+        && tables_of(results, chapter).iter().all(Option::is_none)
+}
+
+/// Tables that explain one figure.
+fn tables_beside(results: &Results, figure: &str) -> Vec<Option<String>> {
+    match figure {
+        "comparison" => vec![tables::side_by_side(results)],
+        "decay-loops" => vec![tables::decay(results)],
+        "interface-modes" => vec![tables::virtual_points(results)],
+        _ => Vec::new(),
+    }
+}
+
+/// Tables of a whole chapter.
+fn tables_of(results: &Results, chapter: Chapter) -> Vec<Option<String>> {
+    match chapter {
+        Chapter::Answer | Chapter::Frfs => Vec::new(),
+        Chapter::Measured => vec![tables::completeness(results), missing(results)],
+        Chapter::SideBySide => vec![tables::checks(results)],
+        Chapter::Joint => {
+            vec![tables::recommended(results), tables::joint(results), tables::refusals(results)]
+        }
+        Chapter::Loops => vec![tables::hysteresis(results), tables::static_arm(results)],
+    }
+}
+
+fn missing(results: &Results) -> Option<String> {
+    if results.missing.is_empty() {
+        return None;
+    }
+    let mut html = Html::default();
+    html.raw("<h3>Missing</h3><ul class=\"notes\">");
+    for line in &results.missing {
+        html.element("li", line);
+    }
+    html.raw("</ul>");
+    Some(html.finish())
+}

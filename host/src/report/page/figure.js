@@ -1,0 +1,143 @@
+// Figures come alive when they come near the window; what they show can be taken away as csv, svg and png.
+const alive=new Map();   // figure's name → its charts
+const pending=new Map(); // section and link → view of charts that are not alive yet
+const sectionOf=host=>host.closest('section')?.id||'';
+function link(from,name,view){
+  const section=sectionOf(from.host);
+  pending.set(section+'/'+name,view);
+  for(const charts of alive.values())for(const chart of charts){
+    if(chart===from||!(chart instanceof Chart)||sectionOf(chart.host)!==section)continue;
+    for(const key of['x','y'])if(chart.panel[key].link===name)chart.show({[key]:view});
+  }
+}
+function enliven(element,figure){
+  if(alive.has(figure.name))return alive.get(figure.name);
+  const charts=[];
+  alive.set(figure.name,charts);
+  figure.panels.forEach((panel,i)=>{
+    const host=element.querySelector(`[data-panel="${i}"] .plot`);
+    panel.marks.forEach(unpackMark);
+    if(panel.marks.some(m=>m.cells)){charts.push(new Cells(figure,panel,host));return}
+    if(panel.marks.some(m=>m.scene)){charts.push(new SceneView(figure,panel,host));host.classList.add('alive');return}
+    const chart=new Chart(figure,panel,host);
+    charts.push(chart);
+    host.classList.add('alive');
+    for(const key of['x','y']){const view=pending.get(sectionOf(host)+'/'+panel[key].link);if(panel[key].link&&view)chart.show({[key]:view})}
+  });
+  element.classList.add('ready');
+  return charts;
+}
+// a matrix stays a drawing; it says what a cell holds
+class Cells{
+  constructor(figure,panel,host){
+    this.figure=figure;this.panel=panel;this.host=host;this.hidden=new Set();this.at=0;
+    this.cells=panel.marks.find(m=>m.cells).cells;
+    this.columns=panel.x.names.length;
+    const rects=()=>[...host.querySelectorAll('rect[class^="f-"]')];
+    this.shown=[...this.cells.values].map((v,i)=>Number.isFinite(v)?i:-1).filter(i=>i>=0);
+    host.addEventListener('pointermove',e=>{const n=rects().indexOf(e.target);if(n>=0)this.say(n)});
+    this.drawn=1;
+  }
+  say(n){
+    this.at=n;
+    this.host.closest('figure').querySelector('.readout').textContent=this.cells.says[this.shown[n]]||'';
+  }
+  key(e){
+    const by={ArrowLeft:-1,ArrowRight:1,ArrowUp:-this.columns,ArrowDown:this.columns}[e.key];
+    if(!by)return false;
+    this.say(Math.max(0,Math.min(this.shown.length-1,this.at+by)));return true;
+  }
+  whole(){}
+}
+function remember(chart){
+  const{view,panel,figure}=chart,i=figure.panels.indexOf(panel),part=key=>view[key].map(v=>+v.toPrecision(9)).join(':');
+  chart.fragment=`#view=${figure.name}/${i}/${part('x')}/${part('y')}`;
+  const element=document.getElementById('fig-'+figure.name);
+  element.dataset.fragment=chart.fragment;
+}
+function recall(){
+  const m=/^#view=([a-z0-9-]+)\/(\d+)\/([^/:]+):([^/:]+)\/([^/:]+):([^/:]+)$/.exec(location.hash);
+  const figure=m&&FIGURES.find(f=>f.name===m[1]);
+  if(!figure||!figure.panels[m[2]])return;
+  const element=document.getElementById('fig-'+m[1]),chart=enliven(element,figure)[m[2]];
+  const[x0,x1,y0,y1]=m.slice(3).map(Number);
+  if(chart instanceof Chart&&[x0,x1,y0,y1].every(Number.isFinite)){chart.zoom({x:[x0,x1],y:[y0,y1]});element.scrollIntoView()}
+}
+function toggle(figure,element,name,alone){
+  const charts=enliven(element,figure),names=new Set(figure.panels.flatMap(p=>p.marks.map(m=>m.name).filter(Boolean)));
+  const hidden=charts[0].hidden,others=[...names].filter(n=>n!==name);
+  if(alone){const all=others.every(n=>hidden.has(n));for(const n of others)all?hidden.delete(n):hidden.add(n);hidden.delete(name)}
+  else hidden.has(name)?hidden.delete(name):hidden.add(name);
+  for(const c of charts){c.hidden=hidden;if(c.plot)c.plot.redraw()}
+  for(const item of element.querySelectorAll('.legend li'))item.querySelector('button')?.setAttribute('aria-pressed',String(!hidden.has(item.dataset.name)));
+}
+// the view as an SVG text of its own, on light paper
+function svgOf(figure,element){
+  const charts=enliven(element,figure),columns=figure.columns,W=1040,gap=16,width=(W-gap*(columns-1))/columns;
+  const light=root.dataset.light;root.dataset.light='light';
+  const pen=new SvgPen();
+  let top=52,below=top;
+  figure.panels.forEach((panel,i)=>{
+    if(i%columns===0)top=below;
+    const left=(i%columns)*(width+gap),chart=charts[i];
+    below=Math.max(below,panelInto(pen,panel,chart,left,top,width)+gap);
+  });
+  if(light===undefined)delete root.dataset.light;else root.dataset.light=light;
+  const from=(figure.from.simulated?'SIMULATED rig. ':'')+figure.from.file+', jointrig '+figure.from.version;
+  return`<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${W} ${below.toFixed(0)}" width="${W}" height="${below.toFixed(0)}" font-family='${FONT}'><rect width="100%" height="100%" fill="#ffffff"/><text x="8" y="22" font-size="17" font-weight="600" fill="#333333">${escapeText(figure.title)}</text><text x="8" y="42" font-size="12" fill="#333333">${escapeText(from)}</text>${pen.parts.join('')}</svg>`;
+}
+function panelInto(pen,panel,chart,x0,y0,width){
+  const rows=panel.height==='rows',left=x0+(rows?12:panel.y.names?20+6.6*Math.max(...panel.y.names.map(n=>n.length)):64),right=x0+width-20,grid={colour:'#e4e4e4',width:1,dash:''},frame={colour:'#888888',width:1,dash:''};
+  let top=y0+6;
+  if(panel.title){pen.text(left,top+14,panel.title,'start','ink',14);top+=22}
+  let x=left;
+  const seen=new Set();
+  if(!panel.named_above)for(const m of panel.marks)if(m.name&&!seen.has(m.name)&&!chart.hidden.has(m.name)){
+    seen.add(m.name);
+    const need=28+6.8*m.name.length+18;
+    if(x>left&&x+need>right){x=left;top+=18}
+    pen.path([[x,top+10],[x+22,top+10]],{...look(m.role),width:2});pen.text(x+28,top+14,m.name,'start','ink',12.5);
+    x+=need;
+  }
+  if(seen.size)top+=24;
+  const box={left,right,top,bottom:top+(chart.scene?300:frameHeight(panel,width))};
+  if(!(chart instanceof Chart))return box.bottom;
+  const sx=scaleOf(panel.x,chart.view.x,left,right),sy=scaleOf(panel.y,chart.view.y,panel.y.names?box.top:box.bottom,panel.y.names?box.bottom:box.top);
+  const xt=axisTicks(panel.x,chart.view.x,right-left,false),yt=rows?[]:axisTicks(panel.y,chart.view.y,box.bottom-box.top,true);
+  for(const t of xt)if(!panel.x.names)pen.path([[sx(t.value),box.top],[sx(t.value),box.bottom]],grid);
+  for(const t of yt)pen.path([[left,sy(t.value)],[right,sy(t.value)]],grid);
+  pen.clipped(box,()=>{for(const m of chart.marks())drawMark(pen,m,sx,sy,box,look(m.role))});
+  pen.path([[left,box.top],[right,box.top],[right,box.bottom],[left,box.bottom],[left,box.top]],frame);
+  for(const t of xt)if(t.label)pen.text(sx(t.value),box.bottom+18,t.label,'middle','ink',12);
+  for(const t of yt)if(t.label)pen.text(left-8,sy(t.value)+4,t.label,'end','ink',12);
+  if(rows)panel.y.names.forEach((n,i)=>pen.text(left+8,sy(i)-3,n,'start','ink',13));
+  pen.text((left+right)/2,box.bottom+37,labelOf(panel.x),'middle','ink',13);
+  if(!panel.y.names)pen.text(x0+14,(box.top+box.bottom)/2,labelOf(panel.y),'middle','ink',13,true);
+  return box.bottom+46;
+}
+const scaleOf=(axis,[a,b],from,to)=>v=>{
+  if(!lin(axis)&&v<=0)return NaN;
+  const share=(warp(axis,v)-warp(axis,a))/(warp(axis,b)-warp(axis,a));
+  return from+share*(to-from);
+};
+// what is in view, one line for each point, as report/csv.rs writes the whole
+function csvOf(figure,element){
+  const charts=enliven(element,figure),lines=['panel,curve,horizontal,x,upright,y,low,high'];
+  const quoted=t=>{t=/^[=+@\t]/.test(t)?"'"+t:t;return/[",\n\r]/.test(t)?`"${t.replace(/"/g,'""')}"`:t},num=v=>v===undefined||!Number.isFinite(v)?'':sixDigits(v);
+  figure.panels.forEach((panel,i)=>{
+    const chart=charts[i],[low,high]=chart.view?chart.view.x:[-Infinity,Infinity],head=panel.title||String(i+1);
+    for(const m of panel.marks){
+      if(chart.hidden.has(m.name))continue;
+      const put=(x,y,l,h)=>{if(x===undefined||(x>=low&&x<=high))lines.push([quoted(head),quoted(m.name||m.role),quoted(labelOf(panel.x)),num(x),quoted(labelOf(panel.y)),num(y),num(l),num(h)].join(','))};
+      const c=m.line||m.loop;
+      if(c){const at=along(c.x);for(let n=0;n<c.y.length;n++)put(at(n),c.y[n])}
+      if(m.ribbon){const at=along(m.ribbon.x);for(let n=0;n<m.ribbon.low.length;n++)put(at(n),undefined,m.ribbon.low[n],m.ribbon.high[n])}
+      if(m.points)for(let n=0;n<m.points.x.length;n++)put(m.points.x[n],m.points.y[n],m.points.bars?.low[n],m.points.bars?.high[n]);
+      if(m.level)put(undefined,m.level.at);
+      if(m.strips)m.strips.says.forEach((name,row)=>{const n=m.strips.x.length;for(let i=0;i<n;i++)if(m.strips.x[i]>=low&&m.strips.x[i]<=high)lines.push([quoted(head),quoted(name),quoted(labelOf(panel.x)),num(m.strips.x[i]),quoted(m.name),num(m.strips.values[row*n+i]),'',''].join(','))});
+      if(m.cells)m.cells.values.forEach((v,n)=>{if(Number.isFinite(v))put(n%panel.x.names.length,Math.floor(n/panel.x.names.length),v)});
+      if(m.scene)for(const s of m.scene.spots)lines.push([s.toward?'impact':'response',quoted(s.name),'x y z in m',num(s.at[0]),'',num(s.at[1]),num(s.at[2]),''].join(','));
+    }
+  });
+  return lines.join('\n')+'\n';
+}

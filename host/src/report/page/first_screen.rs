@@ -1,0 +1,66 @@
+//! The first screen: on what was measured, the answer, why its parts differ, what failed; one figure beside it.
+
+use super::figure_html;
+use super::text::{Html, escaped};
+use crate::report::figure::Figure;
+use crate::report::figures::{Chapter, Entry};
+use crate::report::words::{self, answer_sentences, brief};
+use crate::results::Results;
+
+/// The answer beside its figure.
+pub fn answer(html: &mut Html, results: &Results, drawn: &[(&Entry, Option<Figure>)]) {
+    html.raw("<section id=\"answer\" class=\"first\"><div class=\"words\"><h1>How stiff is the contact in its sliding direction?</h1>");
+    let mut lines = brief::answer(results);
+    if lines.is_empty() {
+        lines.extend(
+            [
+                words::substructuring(results),
+                words::impact_loops(results),
+                words::shaker_loops(results),
+                words::levels_at_the_contact(results),
+            ]
+            .into_iter()
+            .flatten()
+            .map(|text| brief::Line { head: String::new(), text }),
+        );
+    }
+    if lines.is_empty() {
+        html.raw("<div class=\"found warn\"><p>No stiffness could be found from this file.</p></div>");
+    } else {
+        html.raw("<div class=\"found\">");
+        for (i, line) in lines.iter().enumerate() {
+            html.raw(if i == 0 && !line.head.is_empty() { "<p class=\"headline\">" } else { "<p>" });
+            if !line.head.is_empty() {
+                html.raw(&format!("<strong>{}</strong> ", escaped(&line.head)));
+            }
+            html.text(&line.text);
+            html.raw("</p>");
+        }
+        html.raw("</div>");
+    }
+    if let Some(why) = answer_sentences::why_they_differ(results) {
+        html.element("p class=\"differ\"", &why);
+    }
+    failed(html, results);
+    html.raw("</div>");
+    for (_, figure) in drawn.iter().filter(|(entry, _)| entry.chapter == Chapter::Answer) {
+        if let Some(figure) = figure {
+            figure_html::figure(html, figure, 2);
+        }
+    }
+    html.raw("</section>");
+}
+
+fn failed(html: &mut Html, results: &Results) {
+    let failed: Vec<_> = results.checks.iter().filter(|c| c.ok == Some(false)).collect();
+    if failed.is_empty() {
+        return;
+    }
+    html.raw("<div class=\"found warn\"><h2>Look here</h2><ul>");
+    for check in failed {
+        html.raw(&format!("<li><a href=\"#check-{}\">", escaped(&check.name)));
+        html.text(&brief::failed(check));
+        html.raw("</a></li>");
+    }
+    html.raw("</ul></div>");
+}

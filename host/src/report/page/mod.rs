@@ -1,0 +1,116 @@
+//! The page: the answer, then figures and tables by chapter, in one html text without anything from outside.
+
+mod chapters;
+mod comparison_page;
+mod figure_html;
+mod first_screen;
+mod glossary_html;
+mod policy;
+mod text;
+
+use super::figure::{Figure, role};
+use super::figures;
+use super::words::brief;
+use crate::results::Results;
+
+pub use comparison_page::comparison_page;
+
+pub(super) use text::{Html, escaped};
+
+const STYLE: &str = include_str!("page.css");
+const CHARTS_STYLE: &str = include_str!("../../../vendor/uplot/uPlot.min.css");
+const CHARTS: &str = include_str!("../../../vendor/uplot/uPlot.iife.min.js");
+/// In the order in which they build on one another.
+const SCRIPTS: [&str; 7] = [
+    include_str!("ticks.js"),
+    include_str!("marks.js"),
+    include_str!("pens.js"),
+    include_str!("panel.js"),
+    include_str!("scene.js"),
+    include_str!("figure.js"),
+    include_str!("page.js"),
+];
+
+/// The whole report as html.
+pub fn page(results: &Results) -> String {
+    let drawn: Vec<_> = figures::ALL.iter().map(|entry| (entry, entry.of(results))).collect();
+    let mut body = Html::default();
+    chapters::contents(&mut body, results, &drawn);
+    body.raw("<main>");
+    first_screen::answer(&mut body, results, &drawn);
+    chapters::all(&mut body, results, &drawn);
+    body.raw("</main>");
+    let title = format!("Contact stiffness: {}", results.source.file);
+    let figures = drawn.iter().filter_map(|(_, figure)| figure.as_ref());
+    shell(&title, &brief::on_what(results), results.source.simulated, &body.finish(), figures)
+}
+
+/// A page around `body`: its policy, style, banner, the figures' data, and the script that makes them alive.
+fn shell<'a>(
+    title: &str,
+    banner: &str,
+    simulated: bool,
+    body: &str,
+    figures: impl Iterator<Item = &'a Figure>,
+) -> String {
+    let style = style();
+    let script = format!("{CHARTS}\n(()=>{{\"use strict\";\n{}}})();\n", SCRIPTS.concat());
+    let mut html = Html::default();
+    html.raw("<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">");
+    html.raw(&policy::meta(&style, &script));
+    html.element("title", title);
+    html.raw(&format!("<style>{style}</style></head><body>"));
+    html.raw(if simulated { "<header class=\"banner simulated\">" } else { "<header class=\"banner\">" });
+    html.element("p", banner);
+    html.raw("<div class=\"tools\" id=\"page-tools\"></div></header><div class=\"frame\">");
+    html.raw(body);
+    html.raw("</div>");
+    figure_html::data(&mut html, figures);
+    html.raw(&format!("<script>{script}</script></body></html>\n"));
+    html.finish()
+}
+
+/// The style sheet with the colours of the roles in light and dark.
+fn style() -> String {
+    let (light, dark) = (role::variables(false), role::variables(true));
+    format!(
+        "{CHARTS_STYLE}\n:root{{{light}}}\n@media(prefers-color-scheme:dark){{:root:not([data-light=light]){{{dark}}}}}\n:root[data-light=dark]{{{dark}}}\n\
+         @media print{{:root:root:root{{{light}}}}}\n{}{STYLE}",
+        role::classes()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::figure::base64;
+    use sha2::{Digest, Sha256};
+
+    #[test]
+    fn the_charts_are_the_ones_that_were_published() {
+        let hash = |text: &str| {
+            use std::fmt::Write;
+            Sha256::digest(text.as_bytes()).iter().fold(String::new(), |mut hash, byte| {
+                write!(hash, "{byte:02x}").expect("a String takes everything");
+                hash
+            })
+        };
+        let about = include_str!("../../../vendor/uplot/README.md");
+        for file in [CHARTS, CHARTS_STYLE] {
+            assert!(about.contains(&hash(file)), "a vendored file is not the one that its README names");
+        }
+    }
+
+    #[test]
+    fn the_policy_names_the_only_script_and_the_only_style() {
+        let html = page(&crate::results::example_tests::results());
+        for tag in ["script", "style"] {
+            let from = html.find(&format!("<{tag}>")).expect(tag) + tag.len() + 2;
+            let inside = &html[from..from + html[from..].find(&format!("</{tag}>")).expect(tag)];
+            let hash = base64(&Sha256::digest(inside.as_bytes()));
+            assert!(html.contains(&format!("{tag}-src 'sha256-{hash}'")), "{tag}");
+            assert_eq!(html.matches(&format!("<{tag}>")).count(), 1);
+        }
+        assert!(!html.contains(" style=") && !html.contains(" onclick"));
+    }
+}

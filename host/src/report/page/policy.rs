@@ -1,0 +1,14 @@
+//! What the page may do: run its one script, use its one style sheet, and nothing from anywhere else.
+
+use crate::report::figure::base64;
+use sha2::{Digest, Sha256};
+
+/// The policy as an element of the head; hashes are of these very texts.
+pub fn meta(style: &str, script: &str) -> String {
+    let hash = |text: &str| base64(&Sha256::digest(text.as_bytes()));
+    format!(
+        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'sha256-{}'; style-src 'sha256-{}'; img-src data: blob:\">",
+        hash(script),
+        hash(style)
+    )
+}

@@ -1,0 +1,94 @@
+//! Html under way: everything from a file goes through [`escaped`], and no number is parted from its unit.
+
+use crate::report::svg::drawing::escape;
+use std::fmt::Write;
+
+/// A page under way.
+#[derive(Debug, Default)]
+pub struct Html(String);
+
+impl Html {
+    /// Markup of ours.
+    pub fn raw(&mut self, markup: &str) {
+        self.0.push_str(markup);
+    }
+
+    /// Text from anywhere.
+    pub fn text(&mut self, text: &str) {
+        self.0.push_str(&escaped(text));
+    }
+
+    /// Text from anywhere within an element of ours; `open` is what stands between its angle brackets.
+    pub fn element(&mut self, open: &str, text: &str) {
+        let tag = open.split(' ').next().unwrap_or(open);
+        let _ = write!(self.0, "<{open}>{}</{tag}>", escaped(text));
+    }
+
+    /// What was written.
+    pub fn finish(self) -> String {
+        self.0
+    }
+}
+
+/// Text made safe for html, with numbers and units held together.
+pub fn escaped(text: &str) -> String {
+    unbroken(&escape(text))
+}
+
+/// What stands behind a number and is not parted from it.
+const UNITS: [&str; 22] = [
+    "N/µm", "N/m", "N s/m", "N m/rad", "µm/N", "m/N", "µm", "nm", "mm", "ms", "Hz", "%", "°", "N", "µJ",
+    "kg", "s", "m", "dB", "MB", "IDMs", "hits",
+];
+
+/// Spaces between a number and its unit, and around ±, do not break.
+pub fn unbroken(text: &str) -> String {
+    const HARD: char = '\u{a0}';
+    let mut out = String::with_capacity(text.len());
+    let mut before = ' ';
+    for (i, c) in text.char_indices() {
+        if c != ' ' {
+            out.push(c);
+            // a range stays on one line
+            if c == '…' && before.is_ascii_digit() {
+                out.push('\u{2060}');
+            }
+            before = c;
+            continue;
+        }
+        let rest = &text[i + 1..];
+        let unit = |unit: &str| {
+            rest.strip_prefix(unit)
+                .is_some_and(|after| !after.starts_with(|c: char| c.is_alphanumeric() || c == '/'))
+        };
+        let holds = (before.is_ascii_digit() && (rest.starts_with('±') || UNITS.iter().any(|u| unit(u))))
+            || before == '±'
+            || (before == '%' && rest.starts_with(|c: char| c.is_ascii_digit()))
+            || (before == '=' && rest.starts_with(|c: char| c.is_ascii_digit() || c == '−'));
+        out.push(if holds { HARD } else { ' ' });
+        before = c;
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_their_units() {
+        assert_eq!(
+            unbroken("26.8 ± 0.9 N/µm (95 % of it)"),
+            "26.8\u{a0}±\u{a0}0.9\u{a0}N/µm (95\u{a0}% of it)"
+        );
+        assert_eq!(unbroken("25…28"), "25…\u{2060}28");
+        assert_eq!(unbroken("2 Next 3 m/Nothing"), "2 Next 3 m/Nothing");
+    }
+
+    #[test]
+    fn nothing_from_a_file_is_markup() {
+        let mut html = Html::default();
+        html.element("p class=\"x\"", "</p><script>");
+        assert_eq!(html.finish(), "<p class=\"x\">&lt;/p&gt;&lt;script&gt;</p>");
+    }
+}

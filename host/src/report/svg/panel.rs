@@ -1,0 +1,136 @@
+//! One panel as a drawing: frame, grid, ticks, and what stands in it.
+
+use super::drawing::{Anchor, Area, Drawing, Stroke};
+use super::place::Place;
+use super::{marks, scene};
+use crate::report::figure::{Axis, Height, Panel, Shape};
+use crate::report::scale::{Lie, Scale, Tick};
+
+const FRAME: Stroke<'_> = Stroke::new("frame", 1.0);
+const GRID: Stroke<'_> = Stroke::new("grid", 1.0);
+const MINOR: Stroke<'_> = Stroke::new("grid", 0.5);
+
+/// Height of a row of a list, px: a line of words, and its bar beneath.
+pub const ROW: f64 = 42.0;
+/// Of a letter at the size of ticks, px.
+const LETTER: f64 = 6.6;
+
+/// The panel as a picture of its own for the page, `width` px wide.
+pub fn panel(panel: &Panel, name: &str, width: f64, meaning: &str) -> String {
+    // the page writes the title itself
+    let untitled = Panel { title: String::new(), ..panel.clone() };
+    drawing(&untitled, name, width).finish(meaning)
+}
+
+/// The panel as a drawing; `name` keeps its ids apart from all others of the page.
+pub fn drawing(panel: &Panel, name: &str, width: f64) -> Drawing {
+    let rows = panel.height == Height::Rows;
+    let left = if rows {
+        12.0
+    } else if panel.y.names.is_empty() {
+        64.0
+    } else {
+        20.0 + LETTER * panel.y.names.iter().map(|n| n.chars().count()).max().unwrap_or(0) as f64
+    };
+    let top = if panel.title.is_empty() { 10.0 } else { 28.0 };
+    let inner = width - left - 20.0;
+    let height = match panel.height {
+        Height::Tall => 300.0,
+        Height::Usual => 210.0,
+        Height::Low => 120.0,
+        Height::Square => (0.8 * inner).min(460.0),
+        Height::Rows => ROW * panel.y.names.len() as f64,
+    };
+    let area = Area { left, top, width: inner, height };
+    let mut drawing = Drawing::new(name, width, area.bottom() + 46.0);
+    if !panel.title.is_empty() {
+        drawing.text([left, 18.0], Anchor::Start, "title", &panel.title);
+    }
+    if let [mark] = &panel.marks[..]
+        && let Shape::Scene(found) = &mark.shape
+    {
+        scene::draw(&mut drawing, Area { left: 0.0, width, height: height + 40.0, ..area }, found);
+        return drawing;
+    }
+    let upright =
+        if panel.y.names.is_empty() { [area.bottom(), area.top] } else { [area.top, area.bottom()] };
+    let place =
+        Place { area, x: Scale::of(&panel.x, [area.left, area.right()]), y: Scale::of(&panel.y, upright) };
+    let (x_ticks, y_ticks) = (ticks(&panel.x, &place.x, Lie::Across), ticks(&panel.y, &place.y, Lie::Up));
+    drawing.fill(area, "paper", 1.0);
+    grid(&mut drawing, panel, &place, &x_ticks, &y_ticks);
+    for mark in &panel.marks {
+        drawing.clipped(area, |d| marks::draw(d, &place, mark));
+    }
+    axes(&mut drawing, panel, &place, &x_ticks, &y_ticks);
+    if rows {
+        for (i, name) in panel.y.names.iter().enumerate() {
+            let y = place.y.place_within(i as f64) - 3.0;
+            drawing.text([area.left + 8.0, y], Anchor::Start, "row", name);
+        }
+    }
+    drawing
+}
+
+fn ticks(axis: &Axis, scale: &Scale, lie: Lie) -> Vec<Tick> {
+    match axis.every {
+        _ if !axis.names.is_empty() => axis
+            .names
+            .iter()
+            .enumerate()
+            .map(|(i, name)| Tick { value: i as f64, label: name.clone() })
+            .collect(),
+        Some(every) => scale.ticks_every(every),
+        None => scale.ticks(lie),
+    }
+}
+
+fn grid(drawing: &mut Drawing, panel: &Panel, place: &Place, x_ticks: &[Tick], y_ticks: &[Tick]) {
+    let area = place.area;
+    let stroke = |tick: &Tick| if tick.label.is_empty() { MINOR } else { GRID };
+    if panel.x.names.is_empty() {
+        for (tick, x) in x_ticks.iter().filter_map(|t| Some((t, place.x.place(t.value)?))) {
+            drawing.line([x, area.top], [x, area.bottom()], stroke(tick));
+        }
+    }
+    if panel.y.names.is_empty() {
+        for (tick, y) in y_ticks.iter().filter_map(|t| Some((t, place.y.place(t.value)?))) {
+            drawing.line([area.left, y], [area.right(), y], stroke(tick));
+        }
+    }
+}
+
+fn axes(drawing: &mut Drawing, panel: &Panel, place: &Place, x_ticks: &[Tick], y_ticks: &[Tick]) {
+    let (left, right, top, bottom) =
+        (place.area.left, place.area.right(), place.area.top, place.area.bottom());
+    for (from, to) in [
+        ([left, top], [right, top]),
+        ([right, top], [right, bottom]),
+        ([left, bottom], [right, bottom]),
+        ([left, top], [left, bottom]),
+    ] {
+        drawing.line(from, to, FRAME);
+    }
+    let mut free = f64::NEG_INFINITY;
+    for tick in x_ticks {
+        let Some(at) = place.x.place(tick.value) else { continue };
+        let half = 0.55 * LETTER * tick.label.chars().count() as f64;
+        // names give way where they would touch
+        let shown = !tick.label.is_empty() && at - half >= free;
+        drawing.line([at, bottom], [at, bottom + if shown { 5.0 } else { 3.0 }], FRAME);
+        if shown {
+            drawing.text([at, bottom + 18.0], Anchor::Middle, "tick", &tick.label);
+            free = at + half + 8.0;
+        }
+    }
+    for tick in y_ticks.iter().filter(|_| panel.height != Height::Rows) {
+        let Some(at) = place.y.place(tick.value) else { continue };
+        let length = if tick.label.is_empty() { 3.0 } else { 5.0 };
+        drawing.line([left - length, at], [left, at], FRAME);
+        drawing.text([left - 8.0, at + 4.0], Anchor::End, "tick", &tick.label);
+    }
+    drawing.text([f64::midpoint(left, right), bottom + 37.0], Anchor::Middle, "label", &panel.x.label());
+    if panel.height != Height::Rows && panel.y.names.is_empty() {
+        drawing.text_upwards([14.0, f64::midpoint(top, bottom)], "label", &panel.y.label());
+    }
+}

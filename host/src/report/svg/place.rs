@@ -1,0 +1,14 @@
+//! Where a panel's values stand on the drawing.
+
+use super::drawing::Area;
+use crate::report::scale::Scale;
+
+/// A panel with its frame and axes in pixels.
+pub struct Place {
+    /// The frame.
+    pub area: Area,
+    /// The horizontal axis.
+    pub x: Scale,
+    /// The upright axis.
+    pub y: Scale,
+}

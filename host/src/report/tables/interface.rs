@@ -1,0 +1,52 @@
+//! How well the virtual points hold what was measured.
+
+use super::{Table, UNKNOWN, number, words};
+use crate::report::words::number::{decimals, short};
+use crate::results::Results;
+use std::collections::BTreeMap;
+
+/// How well the virtual points hold what was measured.
+pub fn virtual_points(results: &Results) -> Option<String> {
+    if results.virtual_points.is_empty() {
+        return None;
+    }
+    let heads = [
+        "virtual point",
+        "IDMs",
+        "condition, sensors",
+        "condition, impacts",
+        "consistency, sensors",
+        "consistency, impacts",
+        "worst sensor",
+        "worst impact",
+        "passive lines",
+        "reciprocity",
+    ];
+    let mut table = Table::new(1, "Quality of the virtual points", &heads);
+    for (i, point) in results.virtual_points.iter().enumerate() {
+        let at = |field: &str| format!("/virtual_points/{i}/{field}");
+        let worst = |all: &BTreeMap<String, f64>| {
+            all.iter()
+                .min_by(|a, b| a.1.total_cmp(b.1))
+                .map_or(UNKNOWN.into(), |(name, value)| format!("{name} {}", decimals(*value, 2)))
+        };
+        let passive = point.passivity.values().copied().fold(f64::INFINITY, f64::min);
+        table.row([
+            words(format!("{} alone", point.substructure)),
+            words(point.idms.to_string()),
+            number(Some(short(point.condition_responses)), at("condition_responses")),
+            number(Some(short(point.condition_impacts)), at("condition_impacts")),
+            number(Some(decimals(point.overall_sensor, 3)), at("overall_sensor")),
+            number(Some(decimals(point.overall_impact, 3)), at("overall_impact")),
+            words(worst(&point.sensors)),
+            words(worst(&point.impacts)),
+            words(format!("{} %", decimals(100.0 * passive, 0))),
+            number(Some(decimals(point.reciprocity, 3)), at("reciprocity")),
+        ]);
+    }
+    Some(format!(
+        "<p>Condition numbers take rotations at 40 mm; consistency is the part of motion or force that the modes hold (mean over the main \
+         band, 1 for a rigid interface); passive lines are those of the worst mode.</p>{}",
+        table.finish()
+    ))
+}

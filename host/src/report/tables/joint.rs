@@ -1,0 +1,117 @@
+//! Joint stiffness and damping by method, IDM set and band: behind a fold, what failed last, each with its reason in few words.
+
+use super::{Cell, Table, kind_of, number, remarks, words};
+use crate::report::page::escaped;
+use crate::report::words::number::{band, micro, short, with_scatter};
+use crate::results::{Joint, MAIN_BAND, Results};
+use crate::substructuring::Band;
+use std::fmt::Write;
+
+const HEADS: [&str; 9] = [
+    "method",
+    "verdict",
+    "IDMs",
+    "k_z ± σ, N/µm",
+    "of noise, σ",
+    "median",
+    "95 % of the mean",
+    "k_y ± σ, N/µm",
+    "c_z ± σ, N s/m",
+];
+
+/// One table for each band, the main one first.
+pub fn joint(results: &Results) -> Option<String> {
+    if results.joint.is_empty() {
+        return None;
+    }
+    let mut bands: Vec<Band> = Vec::new();
+    for joint in &results.joint {
+        if !bands.contains(&joint.band_hz) {
+            bands.push(joint.band_hz);
+        }
+    }
+    bands.sort_by_key(|range| *range != MAIN_BAND);
+    let mut html = String::from("<details class=\"methods\"><summary>Every method in numbers</summary>");
+    for range in bands {
+        let mut rows: Vec<(usize, &Joint)> =
+            results.joint.iter().enumerate().filter(|(_, j)| j.band_hz == range).collect();
+        rows.sort_by_key(|(_, j)| verdict(j).is_some());
+        let lines = rows.iter().map(|(_, j)| j.lines).max().unwrap_or(0);
+        let mut table = Table::new(2, &format!("Joint by method, {}, {lines} lines", band(range)), &HEADS);
+        for (i, joint) in &rows {
+            table.row(row(*i, joint));
+        }
+        html.push_str(&table.finish());
+        if range == MAIN_BAND {
+            let named = |j: &Joint| format!("{}, {} IDMs", j.method, j.idms);
+            let all: Vec<(String, &str)> =
+                rows.iter().flat_map(|(_, j)| j.warnings.iter().map(|w| (named(j), w.as_str()))).collect();
+            html.push_str(&remarks(&all));
+        }
+    }
+    html.push_str("</details>");
+    Some(html)
+}
+
+fn row(i: usize, joint: &Joint) -> Vec<Cell> {
+    let k = joint.sliding_stiffness();
+    let over = |s: Option<&crate::results::Statistics>, scale: f64, path: String| {
+        number(s.map(|s| with_scatter(s.mean * scale, s.std * scale)), path)
+    };
+    vec![
+        words(joint.method.clone()),
+        words(verdict(joint).map_or_else(|| "✓ identified".into(), |why| format!("✗ {why}"))),
+        words(if joint.idms == 0 { String::new() } else { joint.idms.to_string() }),
+        over(k, 1e-6, format!("/joint/{i}/stiffness_n_per_m/z/mean")),
+        number(joint.noise_n_per_m.get("z").map(|n| short(micro(*n))), format!("/joint/{i}/noise_n_per_m/z")),
+        number(k.map(|k| short(micro(k.median))), format!("/joint/{i}/stiffness_n_per_m/z/median")),
+        number(
+            k.and_then(|k| k.ci95).map(|[low, high]| format!("{}…{}", short(micro(low)), short(micro(high)))),
+            format!("/joint/{i}/stiffness_n_per_m/z/ci95/0"),
+        ),
+        over(joint.stiffness_n_per_m.get("y"), 1e-6, format!("/joint/{i}/stiffness_n_per_m/y/mean")),
+        over(joint.damping_n_s_per_m.get("z"), 1.0, format!("/joint/{i}/damping_n_s_per_m/z/mean")),
+    ]
+}
+
+/// Why a row identified nothing, in a few words; none where it did.
+pub fn verdict(joint: &Joint) -> Option<&'static str> {
+    if joint.identified() {
+        return None;
+    }
+    let Some(k) = joint.sliding_stiffness() else { return Some("no k_z") };
+    let noise = joint.noise_n_per_m.get("z").copied().unwrap_or(0.0);
+    Some(if k.mean <= 0.0 {
+        "negative on average"
+    } else if noise > k.mean {
+        "buried in noise"
+    } else {
+        "lines scatter widely"
+    })
+}
+
+/// What could not be applied, each kind of reason once.
+pub fn refusals(results: &Results) -> Option<String> {
+    if results.refused.is_empty() {
+        return None;
+    }
+    let mut kinds: Vec<(String, &str, Vec<String>)> = Vec::new();
+    for r in &results.refused {
+        let named = format!("{} ({} IDMs)", r.method, r.idms);
+        match kinds.iter_mut().find(|(kind, ..)| *kind == kind_of(&r.reason)) {
+            Some((_, _, names)) => names.push(named),
+            None => kinds.push((kind_of(&r.reason), &r.reason, vec![named])),
+        }
+    }
+    let mut html = String::new();
+    let _ = write!(
+        html,
+        "<details class=\"remarks\"><summary>{} methods could not be applied to this data</summary><ul class=\"notes\">",
+        results.refused.len()
+    );
+    for (_, reason, names) in kinds {
+        let _ = write!(html, "<li><b>{}</b>: {}</li>", escaped(&names.join(", ")), escaped(reason));
+    }
+    html.push_str("</ul></details>");
+    Some(html)
+}

@@ -1,0 +1,160 @@
+//! The contact by loops in numbers: kinds side by side (the paper's Tables 2 and 3), the decay's cycles, every level.
+
+use super::{Table, number, remarks, words};
+use crate::report::page::escaped;
+use crate::report::words as said;
+use crate::report::words::number::{decimals, micro, short, with_scatter};
+use crate::report::words::side_by_side;
+use crate::results::{Excitation, Force, Hysteresis, OverCycles, Results, Shape};
+use std::fmt::Write;
+
+/// FBS and loops side by side, each with what it is.
+pub fn side_by_side(results: &Results) -> Option<String> {
+    let kinds = side_by_side::kinds(results);
+    if kinds.is_empty() {
+        return None;
+    }
+    let mut html = String::from(
+        "<div class=\"wide\"><table class=\"checks\"><caption>FBS and loops side by side (the paper's Tables 2 and 3)</caption><thead><tr>\
+         <th scope=\"col\">found by</th><th scope=\"col\" class=\"n\">k ± σ, N/µm</th><th scope=\"col\">what it is</th></tr></thead><tbody>",
+    );
+    for kind in kinds {
+        let _ = write!(
+            html,
+            "<tr><th scope=\"row\">{}</th><td class=\"n\">{}</td><td>{}</td></tr>",
+            escaped(&kind.found),
+            escaped(&with_scatter(micro(kind.mean_n_per_m), micro(kind.std_n_per_m))),
+            escaped(&kind.meaning)
+        );
+    }
+    html.push_str("</tbody></table></div>");
+    Some(html)
+}
+
+/// A cycle whose slope scatters by more than this part of it over the hits tells nothing of its own.
+const UNSTEADY: f64 = 0.08;
+
+/// The decay's cycles after the hits: slope and phase of each.
+pub fn decay(results: &Results) -> Option<String> {
+    let (row, loops) = results.hysteresis.iter().enumerate().find(|(_, h)| !h.decay.is_empty())?;
+    let steps = &loops.decay;
+    if steps.len() < 2 {
+        return None;
+    }
+    let heads =
+        ["cycle after the hit", "what it tells", "k_eq ± σ over hits, N/µm", "Δx lags T, °", "Δx, µm"];
+    let mut table = Table::new(2, "The decay's cycles over all hits (the paper's Table 3, impacts)", &heads);
+    for (i, step) in steps.iter().enumerate() {
+        let k = step.k_eq_n_per_m;
+        let at = |field: &str| format!("/hysteresis/{row}/decay/{i}/{field}");
+        let tells = if k.std > UNSTEADY * k.mean.abs() {
+            "differs from hit to hit: the decaying modes' phases decide"
+        } else if step.cycle == 1 {
+            "nearest to the contact's own line"
+        } else {
+            "the loop has turned"
+        };
+        table.row([
+            words(step.cycle.to_string()),
+            words(tells),
+            number(Some(with_scatter(micro(k.mean), micro(k.std))), at("k_eq_n_per_m/mean")),
+            number(Some(decimals(step.phase_deg, 1)), at("phase_deg")),
+            number(Some(short(step.amplitude_m * 1e6)), at("amplitude_m")),
+        ]);
+    }
+    Some(table.finish())
+}
+
+/// What the corrected force was corrected by.
+pub fn static_arm(results: &Results) -> Option<String> {
+    let arm = results.static_arm.as_ref()?;
+    Some(format!("<p>{}</p>", escaped(said::static_arm(arm).trim_end_matches(':'))))
+}
+
+const HEADS: [&str; 10] = [
+    "excitation",
+    "shape",
+    "Δx, µm",
+    "k_T of the contact (95 %), N/µm",
+    "stick slope ± σ, N/µm",
+    "k_eq ± σ, N/µm",
+    "peak secant, N/µm",
+    "energy ± σ, µJ",
+    "phase, °",
+    "cycles",
+];
+
+/// Loops: stiffness, energy, phase. Friction where something slips.
+pub fn hysteresis(results: &Results) -> Option<String> {
+    if results.hysteresis.is_empty() {
+        return None;
+    }
+    let friction = results.hysteresis.iter().any(|h| h.friction_coefficient.is_some());
+    let mut heads = HEADS.to_vec();
+    if friction {
+        heads.push("μ");
+    }
+    let mut table = Table::new(2, "Loops with the raw force (the paper's Table 3)", &heads);
+    let mut corrected = Table::new(2, "Loops with the corrected force", &heads);
+    let mut any_corrected = false;
+    let over =
+        |value: Option<OverCycles>, scale: f64| value.map(|v| with_scatter(v.mean * scale, v.std * scale));
+    let mut told: Vec<(String, &str)> = Vec::new();
+    for (i, h) in results.hysteresis.iter().enumerate() {
+        let at = |field: &str| format!("/hysteresis/{i}/{field}");
+        let slope = if h.slope_between_spots_n_per_m.is_some() {
+            "slope_between_spots_n_per_m/mean"
+        } else {
+            "k_t_n_per_m/mean"
+        };
+        let of_cycles = h.stick_slope().or(h.k_eq_n_per_m);
+        let mut cells = vec![
+            words(said::excitation(h)),
+            words(shape(h)),
+            number(h.amplitude_m.map(|a| format!("± {}", short(a * 1e6))), at("amplitude_m")),
+            number(
+                h.own_k_t().map(|k| {
+                    let [low, high] = k.ci95.map(|limit| short(micro(limit)));
+                    format!("{} ({low}…{high})", short(micro(k.mean)))
+                }),
+                at("k_t_n_per_m/mean"),
+            ),
+            number(over(h.stick_slope(), 1e-6), at(slope)),
+            number(over(h.k_eq_n_per_m, 1e-6), at("k_eq_n_per_m/mean")),
+            number(h.k_secant_n_per_m.map(|k| short(micro(k))), at("k_secant_n_per_m")),
+            number(over(h.energy_j, 1e6), at("energy_j/mean")),
+            number(h.phase_deg.map(|p| decimals(p, 1)), at("phase_deg")),
+            words(of_cycles.map_or(super::UNKNOWN.into(), |k| k.cycles.to_string())),
+        ];
+        if friction {
+            cells.push(number(h.friction_coefficient.map(short), at("friction_coefficient")));
+        }
+        if h.force == Force::Corrected {
+            corrected.row(cells);
+            any_corrected = true;
+        } else {
+            table.row(cells);
+        }
+        told.extend(h.warnings.iter().map(|w| (said::excitation(h), w.as_str())));
+        if let Some(why) = h.k_t_why.as_ref().filter(|_| h.k_t_n_per_m.is_none()) {
+            told.push((said::excitation(h), why));
+        }
+    }
+    let mut html = table.finish() + &remarks(&told);
+    if any_corrected {
+        let _ = write!(
+            html,
+            "<details><summary>The same with the corrected force</summary>{}</details>",
+            corrected.finish()
+        );
+    }
+    Some(html)
+}
+
+/// The shape in words. Of impacts it is what the decay's frequency tells; whether their loops are straight lines is another question.
+fn shape(h: &Hysteresis) -> String {
+    let name = said::shape_name(h.shape);
+    let opened =
+        h.kind == Excitation::Impact && h.slope_between_spots_n_per_m.is_none() && h.k_t_n_per_m.is_none();
+    if opened && h.shape == Shape::Stuck { "sticks, but not a straight line".into() } else { name.into() }
+}

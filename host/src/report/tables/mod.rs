@@ -1,0 +1,152 @@
+//! The tables: html text from results. Every number says where it stands in `results.json`.
+
+mod checks;
+mod differences;
+mod interface;
+mod joint;
+mod loops;
+mod provenance;
+mod recommended;
+
+pub use checks::checks;
+pub use differences::differences;
+pub use interface::virtual_points;
+pub use joint::{joint, refusals};
+pub use loops::{decay, hysteresis, side_by_side, static_arm};
+pub use provenance::{completeness, provenance};
+pub use recommended::recommended;
+
+use super::page::escaped;
+use std::fmt::Write;
+
+/// What stands where nothing is known.
+pub(super) const UNKNOWN: &str = "–";
+
+/// One cell: words, or a number with its place in `results.json`.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Cell {
+    text: String,
+    path: String,
+}
+
+/// Words.
+pub(super) fn words(text: impl Into<String>) -> Cell {
+    Cell { text: text.into(), path: String::new() }
+}
+
+/// A number, or nothing where it is not known.
+pub(super) fn number(text: Option<String>, path: impl Into<String>) -> Cell {
+    match text {
+        Some(text) => Cell { text, path: path.into() },
+        None => words(UNKNOWN),
+    }
+}
+
+/// Builds one table; cells are escaped, columns after the first `text_columns` are set to the right.
+pub(super) struct Table {
+    html: String,
+    text_columns: usize,
+}
+
+impl Table {
+    pub(super) fn new(text_columns: usize, caption: &str, heads: &[&str]) -> Self {
+        let mut html =
+            format!("<div class=\"wide\"><table><caption>{}</caption><thead><tr>", escaped(caption));
+        for (i, head) in heads.iter().enumerate() {
+            let class = if i < text_columns { "" } else { " class=\"n\"" };
+            let _ = write!(html, "<th scope=\"col\"{class}>{}</th>", escaped(head));
+        }
+        html.push_str("</tr></thead><tbody>");
+        Table { html, text_columns }
+    }
+
+    pub(super) fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
+        self.html.push_str("<tr>");
+        for (i, cell) in cells.into_iter().enumerate() {
+            let class = if i < self.text_columns { "" } else { " class=\"n\"" };
+            let (tag, scope) = if i == 0 { ("th", " scope=\"row\"") } else { ("td", "") };
+            let path = if cell.path.is_empty() {
+                String::new()
+            } else {
+                format!(" data-path=\"{}\"", escaped(&cell.path))
+            };
+            let _ = write!(self.html, "<{tag}{scope}{class}{path}>{}</{tag}>", escaped(&cell.text));
+        }
+        self.html.push_str("</tr>");
+    }
+
+    pub(super) fn finish(mut self) -> String {
+        self.html.push_str("</tbody></table></div>");
+        self.html
+    }
+}
+
+/// Remarks, each kind once with the number of rows that it belongs to, and the first of them.
+pub(super) fn remarks(all: &[(String, &str)]) -> String {
+    let mut kinds: Vec<(String, &str, Vec<&str>)> = Vec::new();
+    for (row, remark) in all {
+        let kind = kind_of(remark);
+        match kinds.iter_mut().find(|(k, ..)| *k == kind) {
+            Some((_, _, rows)) => rows.push(row),
+            None => kinds.push((kind, remark, vec![row])),
+        }
+    }
+    if kinds.is_empty() {
+        return String::new();
+    }
+    let mut html = String::from("<details class=\"remarks\"><summary>");
+    let _ = write!(html, "{} kinds of remarks on these rows</summary><ul class=\"notes\">", kinds.len());
+    for (_, remark, mut rows) in kinds {
+        rows.dedup();
+        let of = if rows.len() == 1 {
+            rows[0].to_owned()
+        } else {
+            format!("{} rows, such as {}", rows.len(), rows[0])
+        };
+        let _ = write!(html, "<li><b>{}</b>: {}</li>", escaped(&of), escaped(remark));
+    }
+    html.push_str("</ul></details>");
+    html
+}
+
+/// A remark without its numbers: two that differ in nothing else are of one kind.
+pub(super) fn kind_of(remark: &str) -> String {
+    let mut kind = String::with_capacity(remark.len());
+    for c in remark.chars() {
+        let numeric = c.is_ascii_digit() || matches!(c, '.' | '−' | '-' | '…');
+        if !numeric {
+            kind.push(c);
+        } else if !kind.ends_with('#') {
+            kind.push('#');
+        }
+    }
+    kind
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn remarks_that_differ_in_numbers_alone_are_one() {
+        let rows = |n: usize| format!("row {n}");
+        let remarks_of: Vec<(String, &str)> = vec![
+            (rows(1), "scatters by 421 % of its mean"),
+            (rows(2), "scatters by 12.5 % of its mean"),
+            (rows(3), "another"),
+        ];
+        let html = remarks(&remarks_of);
+        assert_eq!(html.matches("<li>").count(), 2);
+        assert!(html.contains("2 rows, such as row 1"));
+    }
+
+    #[test]
+    fn a_number_says_where_it_stands() {
+        let mut table = Table::new(1, "c", &["a", "b"]);
+        table.row([words("<x>"), number(Some("26.8".into()), "/joint/0/x")]);
+        table.row([words("y"), number(None, "/joint/1/x")]);
+        let html = table.finish();
+        assert!(html.contains("data-path=\"/joint/0/x\">26.8<") && html.contains("&lt;x&gt;"));
+        assert_eq!(html.matches("data-path").count(), 1);
+    }
+}

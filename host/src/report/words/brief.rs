@@ -1,0 +1,175 @@
+//! The answer in a few lines, for those who will read no more: the first screen and the end of the terminal's output.
+
+use super::answer_sentences::{why_they_differ, with_interval};
+use super::number::{decimals, micro, short};
+use crate::results::{
+    BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, Results, SAME_IN_ALL,
+    SERIES_COMPLIANCE, UNCHANGED,
+};
+
+/// One line: what it is about, and what is said of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Line {
+    /// What it is about; may be empty.
+    pub head: String,
+    /// What is said.
+    pub text: String,
+}
+
+fn line(head: &str, text: impl Into<String>) -> Line {
+    Line { head: head.into(), text: text.into() }
+}
+
+/// On what was measured: a simulated rig is called so before anything else.
+pub fn on_what(results: &Results) -> String {
+    let source = &results.source;
+    let file = &source.file;
+    let seed = source.settings.get("seed").map_or(String::new(), |seed| {
+        format!(", seed {}", seed.as_str().map_or_else(|| seed.to_string(), str::to_owned))
+    });
+    if source.simulated {
+        let rig =
+            source.settings.get("rig").and_then(|r| r.as_str()).map_or(String::new(), |r| format!(" “{r}”"));
+        return format!("SIMULATED rig{rig}{seed}: {file}");
+    }
+    let of = |key: &str| source.device.get(key).map(String::as_str);
+    match (of("board"), of("serial")) {
+        (Some(board), Some(serial)) => format!("Measured by {board}, serial number {serial}: {file}"),
+        (Some(board), None) => format!("Measured by {board}: {file}"),
+        _ => format!("From {file}"),
+    }
+}
+
+/// The numbers that the user came for; none where no campaign was analysed.
+pub fn answer(results: &Results) -> Vec<Line> {
+    let Some(answer) = &results.answer else { return Vec::new() };
+    let own = &answer.contact;
+    let mut lines = vec![match &own.k_t_n_per_m {
+        Some(k) => line("k_T of the contact:", format!("{}.", with_interval(k))),
+        None => line("k_T of the contact:", format!("not known. {}", own.why)),
+    }];
+    lines.push(match &answer.between_arms.k_n_per_m {
+        Some(k) => line("Between the arms:", format!("{}, which is not k_T.", with_interval(k))),
+        None => line("Between the arms:", format!("not known. {}", answer.between_arms.why)),
+    });
+    if let Some(clamp) = &answer.clamp {
+        lines.push(line(
+            "Clamps, in series with the contact:",
+            format!("{}.", with_interval(&clamp.k_n_per_m)),
+        ));
+    }
+    if let Some(truth) = &answer.truth {
+        let clamps =
+            truth.clamps_k_n_per_m.map_or(String::new(), |k| format!(", clamps {}", short(micro(k))));
+        lines.push(line(
+            "SIMULATED rig, its truth:",
+            format!(
+                "contact {}{clamps}, between the arms {} N/µm.",
+                short(micro(truth.contact_k_t_n_per_m)),
+                short(micro(truth.between_arms_k_n_per_m))
+            ),
+        ));
+    }
+    lines
+}
+
+/// A failed check in a few words, for those who never heard of it.
+pub fn failed(check: &Check) -> String {
+    let at = check.frequency_hz.map_or(String::new(), |f| format!(" at {} Hz", decimals(f, 0)));
+    match check.name.as_str() {
+        HIDDEN_RESONANCE => format!(
+            "One specimen resonates on its own clamp{at}: loops near it are no measure of the contact."
+        ),
+        SERIES_COMPLIANCE => {
+            "The clamps give way: what is found between the arms is softer than the contact.".into()
+        }
+        HAMMER_SLIP => "The contact slips under the hammer.".into(),
+        UNCHANGED => "The contact is not the same after the hits as before.".into(),
+        INTERFACE_MODES => "Six rigid motions do not describe what couples the parts.".into(),
+        INTERNALS => "The points away from the interface do not suffice for every method.".into(),
+        SAME_IN_ALL => "A or B is not the same alone as in the assembly.".into(),
+        BACK_COUPLING => {
+            format!("A and B, joined by the stiffness found, do not give the measured assembly{at}.")
+        }
+        other => format!("{other} failed."),
+    }
+}
+
+/// Most lines on the terminal.
+pub const MOST: usize = 15;
+
+/// What `demo` and `analyse` end with: at most [`MOST`] lines, of which the caller needs `after`.
+pub fn terminal(results: &Results, after: usize) -> Vec<String> {
+    let mut lines = vec![on_what(results)];
+    let answer = answer(results);
+    if answer.is_empty() {
+        let found = [
+            super::substructuring(results),
+            super::impact_loops(results),
+            super::shaker_loops(results),
+            super::levels_at_the_contact(results),
+        ];
+        lines.extend(found.into_iter().flatten());
+    } else {
+        lines.extend(answer.into_iter().map(|line| format!("{} {}", line.head, line.text)));
+        lines.extend(why_they_differ(results));
+    }
+    if lines.len() == 1 {
+        lines.push("No stiffness could be found from this file.".into());
+    }
+    let failed: Vec<String> = results
+        .checks
+        .iter()
+        .filter(|c| c.ok == Some(false))
+        .map(|c| format!("Look here: {}", failed(c)))
+        .collect();
+    // what is missing keeps a line at least
+    let kept = usize::from(!results.missing.is_empty());
+    let room = MOST.saturating_sub(lines.len() + after + kept);
+    shortened(&mut lines, &failed, room, "checks failed");
+    let missing: Vec<String> = results.missing.iter().map(|one| format!("Missing: {one}")).collect();
+    let room = MOST.saturating_sub(lines.len() + after);
+    shortened(&mut lines, &missing, room, "things are missing");
+    lines
+}
+
+/// As many of `all` as there is room for; the last line counts the others.
+fn shortened(lines: &mut Vec<String>, all: &[String], room: usize, what: &str) {
+    if all.len() <= room {
+        lines.extend_from_slice(all);
+    } else if room > 0 {
+        lines.extend_from_slice(&all[..room - 1]);
+        lines.push(format!("{} more {what}: see the report.", all.len() + 1 - room));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::example_tests as example;
+
+    #[test]
+    fn the_end_of_the_output_is_short_even_when_everything_failed() {
+        let mut results = example::results();
+        for n in 0..20 {
+            results.checks.push(Check::new(&format!("check-{n}"), Some(false), "no"));
+            results.missing.push("something".into());
+        }
+        let lines = terminal(&results, 2);
+        assert!(lines.len() + 2 <= MOST, "{}", lines.join("\n"));
+        assert!(lines.iter().any(|l| l.contains("more checks failed")));
+        assert!(lines.iter().any(|l| l.contains("things are missing")), "{lines:?}");
+    }
+
+    #[test]
+    fn a_simulated_rig_is_called_so_first() {
+        let mut results = example::results();
+        results.source.simulated = true;
+        results.source.settings.insert("seed".into(), 7.into());
+        assert!(on_what(&results).starts_with("SIMULATED rig, seed 7"));
+        results.source.simulated = false;
+        results.source.device.insert("board".into(), "nucleo-u5a5".into());
+        results.source.device.insert("serial".into(), "0042".into());
+        assert!(on_what(&results).contains("nucleo-u5a5, serial number 0042"));
+    }
+}

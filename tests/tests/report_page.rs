@@ -1,0 +1,414 @@
+//! The report's page in a browser: every figure there and alive, nothing asked of the network, nothing wider than the window.
+#![allow(clippy::unwrap_used)]
+
+use jointrig_tests::browser::{Browser, Look, Page};
+use jointrig_tests::command::jointrig;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+/// Runs a command that must succeed.
+fn done(command: &mut Command) -> String {
+    let out = command.output().unwrap();
+    assert!(out.status.success(), "{command:?}: {}", String::from_utf8_lossy(&out.stderr));
+    String::from_utf8(out.stdout).unwrap()
+}
+
+/// A campaign of all three configurations with the shaker's levels, as quick as it can be with coherence: two hits in each cell.
+fn campaign() -> &'static Path {
+    static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
+    let folder = FOLDER.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let plan = include_str!("../../docs/plans/demo.toml")
+            .replace("wanted = 3", "wanted = 2")
+            .replace("minimum = 3", "minimum = 2");
+        let (plan_file, file) = (folder.path().join("plan.toml"), folder.path().join("campaign.jrig"));
+        std::fs::write(&plan_file, plan).unwrap();
+        done(jointrig().args(["campaign", "new"]).arg(&file).arg("--plan").arg(&plan_file));
+        let levels = ["--freq", "100", "200", "250", "--amplitude", "1e-7", "2e-7"];
+        done(jointrig().arg("shaker").arg(&file).args(["--device", "sim:"]).args(levels));
+        done(jointrig().args(["campaign", "run"]).arg(&file).args(["--device", "sim:", "--yes"]));
+        let printed = done(
+            jointrig()
+                .arg("report")
+                .arg(&file)
+                .arg("--out")
+                .arg(folder.path())
+                .args(["--figures", "svg,csv"]),
+        );
+        assert!(printed.lines().count() <= 15, "the terminal ends with at most fifteen lines:\n{printed}");
+        assert!(printed.starts_with("SIMULATED rig"), "{printed}");
+        folder
+    });
+    folder.path()
+}
+
+fn report() -> PathBuf {
+    campaign().join("report.html")
+}
+
+/// Each figure by name.
+fn figures(page: &mut Page<'_>) -> Vec<String> {
+    let names = page.eval("report.FIGURES.map(f => f.name)");
+    names.as_array().unwrap().iter().map(|n| n.as_str().unwrap().to_owned()).collect()
+}
+
+/// Figures of this campaign: all but those that need slip.
+const EXPECTED: usize = 24;
+
+/// The middle of a figure's first plot, after it was brought into view and came alive.
+fn middle(page: &mut Page<'_>, name: &str) -> [f64; 2] {
+    page.eval(&format!(
+        "document.getElementById('fig-{name}').scrollIntoView({{block:'start',behavior:'instant'}})"
+    ));
+    page.until(&format!("report.alive.has('{name}')"));
+    let at = page.eval(&format!(
+        "(() => {{ const f = document.getElementById('fig-{name}'), o = f.querySelector('.u-over, .turned') || f.querySelector('.plot svg'); o.scrollIntoView({{block:'center',behavior:'instant'}}); \
+         const r = o.getBoundingClientRect(); return [r.left + r.width / 2, r.top + r.height / 2] }})()"
+    ));
+    [at[0].as_f64().unwrap(), at[1].as_f64().unwrap()]
+}
+
+fn view(page: &mut Page<'_>, name: &str) -> Value {
+    page.eval(&format!(
+        "JSON.stringify(report.alive.get('{name}').map(c => c.view || [c.yaw, c.pitch, c.size, c.at]))"
+    ))
+}
+
+#[test]
+fn the_page_is_whole_in_every_light_and_at_every_width() {
+    let mut browser = Browser::start();
+    for look in [Look::DESK, Look { dark: true, ..Look::DESK }, Look::HAND, Look { dark: true, ..Look::HAND }]
+    {
+        let mut page = browser.open(&report(), look);
+        let names = figures(&mut page);
+        assert_eq!(names.len(), EXPECTED, "{names:?}");
+        for name in &names {
+            middle(&mut page, name);
+        }
+        page.until("[...report.alive.values()].every(charts => charts.every(c => c.drawn > 0))");
+        // before the test itself reads the pixels back, of which Chromium warns
+        assert_eq!(page.errors(), Vec::<String>::new(), "{look:?}");
+        assert_eq!(page.requests(), Vec::<String>::new(), "{look:?}");
+        let wide = page.eval("document.documentElement.scrollWidth").as_u64().unwrap();
+        assert!(wide <= u64::from(look.width), "{look:?}: {wide} px wide");
+        let blank = page.eval(BLANK);
+        assert_eq!(blank, serde_json::json!([]), "{look:?}: blank panels");
+        let touching = page.eval(TOUCHING);
+        assert_eq!(touching, serde_json::json!([]), "{look:?}: labels over one another");
+    }
+}
+
+/// Panels whose canvas shows nothing but its axes: at least 40 pixels, the size of one point, must differ from paper and grid.
+const BLANK: &str = "(async () => {
+  const blank = [];
+  // a chart draws when the present task is over
+  const drawn = () => new Promise(r => setTimeout(r, 0));
+  for (const [name, charts] of report.alive) for (const [i, c] of charts.entries()) {
+    if (!c.plot) { if (!c.host.querySelector('svg').childElementCount) blank.push(name + '/' + i); continue; }
+    const b = c.plot.bbox, look = () => new Uint32Array(c.plot.ctx.getImageData(b.left + 2, b.top + 2, b.width - 4, b.height - 4).data.buffer);
+    const before = look(), marks = c.panel.marks;
+    c.panel.marks = []; c.plot.redraw(); await drawn();
+    const after = look();
+    c.panel.marks = marks; c.plot.redraw(); await drawn();
+    let differ = 0;
+    for (let k = 0; k < after.length; k++) if (after[k] !== before[k]) differ++;
+    if (differ < 40) blank.push(name + '/' + i + ': ' + differ);
+  }
+  return blank;
+})()";
+
+/// Tick labels of the static drawings that stand over one another.
+const TOUCHING: &str = "(() => {
+  const touching = [];
+  for (const svg of document.querySelectorAll('.plot > svg:first-child')) {
+    svg.closest('.plot').classList.remove('alive');
+    const boxes = [...svg.querySelectorAll('text.tick, text.row')].map(t => [t.textContent, t.getBBox()]).filter(([t]) => t);
+    boxes.forEach(([t, a], i) => boxes.slice(i + 1).forEach(([u, b]) => {
+      if (a.x < b.x + b.width - 1 && b.x < a.x + a.width - 1 && a.y < b.y + b.height - 3 && b.y < a.y + a.height - 3) touching.push(svg.getAttribute('aria-label') + ': ' + t + ' | ' + u);
+    }));
+  }
+  return touching;
+})()";
+
+#[test]
+fn every_figure_reacts_to_drag_wheel_and_keys_and_returns() {
+    let mut browser = Browser::start();
+    let mut page = browser.open(&report(), Look::DESK);
+    for name in figures(&mut page) {
+        let [x, y] = middle(&mut page, &name);
+        let whole = view(&mut page, &name);
+        // a matrix is no chart: it answers to the keys alone
+        let matrix =
+            page.eval(&format!("report.alive.get('{name}').every(c => !c.plot && !c.scene)")) == true;
+        page.drag([x - 40.0, y - 20.0], [x + 40.0, y + 25.0]);
+        if !matrix {
+            assert_ne!(view(&mut page, &name), whole, "{name}: drag");
+            page.click([x, y], 2);
+            assert_eq!(view(&mut page, &name), whole, "{name}: double click returns");
+            page.eval(&format!("document.getElementById('fig-{name}').focus()"));
+            page.wheel([x, y], -120.0);
+            page.until(&format!("JSON.stringify(report.alive.get('{name}').map(c => c.view || [c.yaw, c.pitch, c.size, c.at])) !== {whole}"));
+        }
+        page.eval(&format!("document.getElementById('fig-{name}').focus()"));
+        page.key("0");
+        if !matrix {
+            assert_eq!(view(&mut page, &name), whole, "{name}: 0 returns");
+        }
+        page.key("ArrowRight");
+        page.key("ArrowRight");
+        let said = page.eval(&format!("document.querySelector('#fig-{name} .readout').textContent + (report.alive.get('{name}')[0].yaw || '')"));
+        assert_ne!(said, "", "{name}: the arrow keys say nothing");
+        // what is taken away holds numbers and curves
+        let csv = page.eval(&format!("report.csvOf(report.FIGURES.find(f => f.name === '{name}'), document.getElementById('fig-{name}'))"));
+        assert!(csv.as_str().unwrap().lines().count() > 1, "{name}: csv");
+        let svg = page.eval(&format!("report.svgOf(report.FIGURES.find(f => f.name === '{name}'), document.getElementById('fig-{name}'))"));
+        assert!(svg.as_str().unwrap().starts_with("<svg xmlns="), "{name}: svg");
+    }
+    assert_eq!(page.errors(), Vec::<String>::new());
+}
+
+#[test]
+fn names_can_be_hidden_and_the_light_switched() {
+    let mut browser = Browser::start();
+    let mut page = browser.open(&report(), Look::DESK);
+    middle(&mut page, "specimens");
+    let hidden = "document.querySelector('#fig-specimens .legend button').click(), report.alive.get('specimens')[0].hidden.size";
+    assert_eq!(page.eval(hidden), 1);
+    let paper = "getComputedStyle(document.body).backgroundColor";
+    let light = page.eval(paper);
+    page.eval("document.querySelector('#page-tools button').click()");
+    assert_ne!(page.eval(paper), light);
+    assert_eq!(page.errors(), Vec::<String>::new());
+}
+
+#[test]
+fn twenty_thousand_zooms_break_nothing() {
+    let mut browser = Browser::start();
+    let mut page = browser.open(&report(), Look::DESK);
+    middle(&mut page, "receptances");
+    // a small generator with a seed, so that a failure comes again
+    let worst = page.eval(
+        "(() => {
+            const chart = report.alive.get('receptances')[0], axis = chart.panel.x;
+            let seed = 7; const random = () => (seed = (seed * 48271) % 2147483647) / 2147483647;
+            let view = [...axis.range], most = 0;
+            for (let n = 0; n < 20000; n++) {
+                if (n % 50 === 0) view = [...axis.range];
+                const at = view[0] * (view[1] / view[0]) ** random();
+                view = report.zoomed(axis, view, random() < .6 ? .3 + .6 * random() : 1.2 + random(), at);
+                if (!(view[0] < view[1] && view[0] >= axis.range[0] && view[1] <= axis.range[1])) return 'view ' + view;
+                const labels = report.ticks('log', view[0], view[1], 300, false).filter(t => t.label);
+                most = Math.max(most, labels.length);
+                if (n % 200 === 0) chart.show({ x: view });
+            }
+            return most;
+        })()",
+    );
+    assert!(worst.as_u64().is_some_and(|most| (2..=20).contains(&most)), "{worst}");
+    assert_eq!(page.errors(), Vec::<String>::new());
+}
+
+#[test]
+fn without_scripts_and_on_paper_nothing_is_lost() {
+    let mut browser = Browser::start();
+    for look in [Look { scripts: false, ..Look::DESK }, Look { scripts: false, ..Look::HAND }] {
+        let mut page = browser.open(&report(), look);
+        let shown = page.eval("[...document.querySelectorAll('figure')].filter(f => f.querySelector('.plot > svg')?.getBoundingClientRect().height > 40).length");
+        assert_eq!(shown, EXPECTED, "{look:?}");
+        let wide = page.eval("document.documentElement.scrollWidth").as_u64().unwrap();
+        assert!(wide <= u64::from(look.width), "{look:?}: {wide} px wide");
+        assert_eq!(page.errors(), Vec::<String>::new());
+    }
+    let mut page = browser.open(&report(), Look::DESK);
+    let pdf = page.pdf();
+    // each page of a PDF is an object of this type; Chromium writes them uncompressed
+    let bytes = decoded(&pdf);
+    let pages = bytes.windows(11).filter(|w| *w == b"/Type /Page").count();
+    let trees = bytes.windows(12).filter(|w| *w == b"/Type /Pages").count();
+    assert!((4..=30).contains(&(pages - trees)), "{} pages", pages - trees);
+}
+
+/// Base64, back to bytes.
+fn decoded(text: &str) -> Vec<u8> {
+    let value = |c: u8| match c {
+        b'A'..=b'Z' => c - b'A',
+        b'a'..=b'z' => c - b'a' + 26,
+        b'0'..=b'9' => c - b'0' + 52,
+        b'+' => 62,
+        _ => 63,
+    };
+    let mut out = Vec::new();
+    for four in text.as_bytes().chunks(4) {
+        let known: Vec<u8> = four.iter().copied().filter(|c| *c != b'=').map(value).collect();
+        let word = known.iter().enumerate().fold(0u32, |w, (i, v)| w | u32::from(*v) << (18 - 6 * i));
+        out.extend(word.to_be_bytes()[1..].iter().take(known.len() - 1));
+    }
+    out
+}
+
+/// Every number that says where it stands in results.json stands there, and so does every curve of every figure.
+#[test]
+fn every_number_is_found_in_the_results() {
+    let results: Value =
+        serde_json::from_str(&std::fs::read_to_string(campaign().join("results.json")).unwrap()).unwrap();
+    let mut browser = Browser::start();
+    let mut page = browser.open(&report(), Look::DESK);
+    let told =
+        page.eval("[...document.querySelectorAll('[data-path]')].map(e => [e.dataset.path, e.textContent])");
+    let told = told.as_array().unwrap();
+    assert!(told.len() > 200, "{} numbers", told.len());
+    for one in told {
+        let (path, text) = (one[0].as_str().unwrap(), one[1].as_str().unwrap());
+        let value = results
+            .pointer(path)
+            .unwrap_or_else(|| panic!("{path} is not in results.json"))
+            .as_f64()
+            .unwrap_or_else(|| panic!("{path} is no number"));
+        assert!(agrees(value, text), "{path}: {value} is shown as {text}");
+    }
+    // a curve's points, by their pattern of paths, to six digits
+    let curves = page.eval(
+        "(() => { const out = []; for (const f of report.FIGURES) { report.enliven(document.getElementById('fig-' + f.name), f);
+            for (const p of f.panels) for (const m of p.marks) for (const o of m.origin || []) {
+              const s = m.line || m.loop || m.points || m.cells || m.strips, list = o.of === 'low' ? s.bars.low : s[o.of];
+              out.push([f.name, o.path, o.factor, [...list].filter((v, i) => Number.isFinite(v) && i % 37 === 0).slice(0, 60)]); } } return out })()",
+    );
+    for one in curves.as_array().unwrap() {
+        let (name, path, factor) =
+            (one[0].as_str().unwrap(), one[1].as_str().unwrap(), one[2].as_f64().unwrap());
+        let mut known: Vec<f64> = matching(&results, path).into_iter().map(|v| v * factor).collect();
+        assert!(!known.is_empty(), "{name}: nothing at {path}");
+        known.sort_by(f64::total_cmp);
+        for value in one[3].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()) {
+            let near = known.partition_point(|k| *k < value);
+            let found = [near.wrapping_sub(1), near, near + 1]
+                .iter()
+                .filter_map(|i| known.get(*i))
+                .any(|k| (k - value).abs() <= 1e-6 * value.abs().max(1e-30));
+            assert!(found, "{name}: {value} is not at {path}");
+        }
+    }
+}
+
+/// Whether the first number of a text is this value in some unit, to the digits that are shown.
+fn agrees(value: f64, text: &str) -> bool {
+    let text = text.replace('−', "-").replace('\u{202f}', "");
+    let start = text.find(|c: char| c.is_ascii_digit()).unwrap_or_else(|| panic!("no number in {text}"));
+    // a check's figure has its name before it, in which digits may stand
+    let starts = text
+        .char_indices()
+        .filter(|(i, c)| {
+            c.is_ascii_digit() && !text[..*i].ends_with(|c: char| c.is_alphanumeric() || c == '.')
+        })
+        .map(|(i, _)| i);
+    std::iter::once(start).chain(starts).any(|start| {
+        let end =
+            text[start..].find(|c: char| !c.is_ascii_digit() && c != '.').map_or(text.len(), |n| start + n);
+        let number = text[start..end].trim_end_matches('.');
+        let shown: f64 = number.parse().unwrap();
+        let places = number.split_once('.').map_or(0, |(_, d)| d.len());
+        let half: f64 = format!("0.5001e-{places}").parse().unwrap();
+        [1.0, 1e-6, 1e6, 1e-3, 100.0].into_iter().any(|factor| (value.abs() * factor - shown).abs() <= half)
+    })
+}
+
+/// All numbers at a path in which `*` stands for any key or index.
+fn matching(value: &Value, path: &str) -> Vec<f64> {
+    let Some(rest) = path.strip_prefix('/') else { return value.as_f64().into_iter().collect() };
+    let (head, tail) = rest.split_once('/').map_or((rest, ""), |(head, _)| (head, &rest[head.len()..]));
+    match (value, head) {
+        (Value::Array(all), "*") => all.iter().flat_map(|v| matching(v, tail)).collect(),
+        (Value::Object(all), "*") => all.values().flat_map(|v| matching(v, tail)).collect(),
+        (Value::Array(all), index) => {
+            index.parse::<usize>().ok().and_then(|i| all.get(i)).map_or_else(Vec::new, |v| matching(v, tail))
+        }
+        (Value::Object(all), key) => all.get(key).map_or_else(Vec::new, |v| matching(v, tail)),
+        _ => Vec::new(),
+    }
+}
+
+/// Ticks of the static drawings and of the living charts are by the same rule.
+#[test]
+fn a_thousand_random_axes_have_the_same_ticks_in_both_languages() {
+    use jointrig::report::axis_labels;
+    use rand::{RngExt, SeedableRng};
+    let mut random = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(16);
+    let mut browser = Browser::start();
+    let mut page = browser.open(&report(), Look::DESK);
+    let mut asked = Vec::new();
+    for _ in 0..1000 {
+        let log = random.random::<bool>();
+        let size = 10f64.powf(random.random_range(-12.0..9.0));
+        let low = if log { size } else { size * random.random_range(-1.0..1.0) };
+        let high = if log {
+            size * 10f64.powf(random.random_range(0.01..9.0))
+        } else {
+            low + size * random.random_range(0.001..2.0)
+        };
+        asked.push((log, [low, high], random.random_range(60.0..1200.0), random.random::<bool>()));
+    }
+    let list: Vec<Value> = asked
+        .iter()
+        .map(|(log, [low, high], length, up)| {
+            serde_json::json!([if *log { "log" } else { "linear" }, low, high, length, up])
+        })
+        .collect();
+    let found = page.eval(&format!("{}.map(a => report.ticks(...a).map(t => t.label))", Value::Array(list)));
+    for ((log, range, length, up), labels) in asked.into_iter().zip(found.as_array().unwrap()) {
+        let ours = axis_labels(log, range, length, up);
+        assert_eq!(serde_json::json!(ours), *labels, "{log} {range:?} {length} {up}");
+    }
+}
+
+/// A plan's names can be anything; none of them is markup, and none breaks the page.
+#[test]
+fn hostile_names_break_nothing() {
+    let mut results: Value =
+        serde_json::from_str(&std::fs::read_to_string(campaign().join("results.json")).unwrap()).unwrap();
+    results["source"]["file"] = "</script><script>alert(1)</script>]]>\u{202e}.jrig".into();
+    let folder = tempfile::tempdir().unwrap();
+    let long = "n".repeat(300);
+    let hostile = ["<script>alert(1)</script>", "]]>", "</script>", "\u{202e}abc", &long, "a\"b'c&d"];
+    let names: Vec<jointrig::results::Place> = hostile
+        .iter()
+        .enumerate()
+        .map(|(i, name)| jointrig::results::Place {
+            name: (*name).to_owned(),
+            kind: "response",
+            grouping: 1 + (i % 4) as u8,
+            position_m: [0.01 * i as f64, 0.02, -0.01 * i as f64],
+            direction: None,
+        })
+        .collect();
+    let source = jointrig::results::Source {
+        file: results["source"]["file"].as_str().unwrap().into(),
+        ..Default::default()
+    };
+    let mut shown = jointrig::results::Results::new(source);
+    shown.geometry = names;
+    shown.missing = hostile.iter().map(|name| (*name).to_owned()).collect();
+    shown.hits = (1..40)
+        .map(|n| jointrig::results::HitRow {
+            record: n,
+            peak_n: 50.0 + n as f64,
+            pulse_us: 3000 + n as u32,
+            verdict: hostile[n as usize % 6].into(),
+            kept: n % 2 == 0,
+        })
+        .collect();
+    let file = folder.path().join("report.html");
+    std::fs::write(&file, jointrig::report::page(&shown)).unwrap();
+    let mut browser = Browser::start();
+    for look in [Look::DESK, Look::HAND] {
+        let mut page = browser.open(&file, look);
+        for name in ["geometry", "pulses"] {
+            middle(&mut page, name);
+        }
+        assert_eq!(page.eval("document.querySelectorAll('script').length"), 2);
+        let wide = page.eval("document.documentElement.scrollWidth").as_u64().unwrap();
+        assert!(wide <= u64::from(look.width), "{look:?}: {wide} px wide");
+        assert_eq!(page.errors(), Vec::<String>::new());
+    }
+}
