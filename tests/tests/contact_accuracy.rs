@@ -135,7 +135,11 @@ fn the_contacts_own_stiffness_is_found_on_rigs_that_nobody_tuned_for() {
             let file = campaign.measured(folder.path(), contact_plan, |_, _, _| {});
             let results = found(&file);
             forget_the_truth(&file);
-            assert!(found(&file) == results, "an estimate of rig {number} saw the truth");
+            let blind = found(&file);
+            assert!(!blind.source.settings.contains_key("rig") && blind.source.simulated);
+            // which rig it was is forgotten as well; everything that was found must be the same
+            let blind = Results { source: results.source.clone(), ..blind };
+            assert!(blind == results, "an estimate of rig {number} saw the truth");
             row(campaign, results)
         };
         [30, 31].map(|number| scope.spawn(move || one(number))).map(|thread| thread.join().unwrap())

@@ -28,16 +28,16 @@ const FEWEST: usize = 12;
 /// A ratio of variances above this is slip. Over 136 stuck campaigns of 56 hits the largest of the sixteen lay between 1.3 and 6.9.
 const FOUND: f64 = 9.0;
 
-/// T per newton that changes by more than this part for each part of force is slip, however the ratio comes out: a contact that slips a lot
-/// stands elsewhere after each hit, and answers the next one differently. Over 24 stuck campaigns it was 0.02 at most, with a standard
-/// deviation of 0.003 to 0.006; microslip that changes T by as much changes k_T by more than its interval.
-const MUCH: f64 = 0.03;
+/// A gross slider changes T per newton by a per cent and more for each per cent of force, weak microslip by a tenth of that. A
+/// standard deviation above this would not show it.
+const TOO_COARSE: f64 = 0.1;
 
-/// and by more than so many of its standard deviations. Less than [`MUCH`] with a standard deviation below it is no slip;
+/// A contact that slips a lot stands elsewhere after each hit, and answers the next one differently: then the ratio of variances is
+/// small, though T per newton falls by much more than this for each part of force,
+const MUCH: f64 = 0.15;
+
+/// and by more than so many of its standard deviations.
 const BEYOND_DOUBT: f64 = 5.0;
-
-/// above, weak microslip would not show.
-const TOO_COARSE: f64 = MUCH;
 
 /// The hits of one cell: one place of impact, one aim.
 #[derive(Debug, Clone, PartialEq)]
@@ -140,7 +140,7 @@ impl HammerSlip {
         let falls = change_per_force > MUCH && change_per_force > BEYOND_DOUBT * std;
         if variance_ratio > FOUND || falls {
             Self::Slips(scaling)
-        } else if std < TOO_COARSE && change_per_force < MUCH {
+        } else if std < TOO_COARSE && change_per_force < 2.0 * MUCH {
             Self::Sticks(scaling)
         } else {
             Self::CannotTell(Unclear::TooAlike { force_scatter, std })
