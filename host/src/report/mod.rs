@@ -65,7 +65,7 @@ pub const COMPARISON_FILE: &str = "compare.html";
 /// The same for scripts.
 pub const COMPARED_FILE: &str = "compare.json";
 
-/// Writes `compare.json` and `compare.html` into `folder`, as [`write`] does.
+/// Writes `compare.json` and `compare.html` into `folder`, as [`write`](fn@write) does.
 ///
 /// # Errors
 /// The folder cannot be made or written.
