@@ -10,23 +10,13 @@ use super::missing::{Missing, given_up};
 use super::recommended::{Recommended, recommended};
 use super::wanted::{BANDS, Progress, Wanted};
 use super::{cells_stage, configuration_stage, contact_answer, contact_stage, heard};
-use crate::results::{CellRow, Cells, MAIN_BAND};
+use crate::results::MAIN_BAND;
 use crate::spectra::Windowing;
 use crate::structure::Structure;
 use crate::substructuring::averaged::Priors;
 use crate::substructuring::between_arms::{BetweenArms, NoStiffness, between_arms};
 use crate::substructuring::geometry::Grouping;
 use crate::substructuring::{Band, Frf, Geometry, IdmSet, Method, fit, identify};
-
-/// The methods whose spectra a campaign's results keep and show; of all others they keep the bands.
-const SHOWN: [Method; 6] = [
-    Method::Internal,
-    Method::InternalPrinted,
-    Method::Interface,
-    Method::PrimalA,
-    Method::PrimalB,
-    Method::Inverse,
-];
 
 /// Everything that the measurements say; of what they were measured with, nothing.
 pub fn analyse_measurements<M: Measurements>(
@@ -43,10 +33,7 @@ pub fn analyse_measurements<M: Measurements>(
         ..Findings::default()
     };
     found.missing.extend(given_up(&names, measurements.given_up()));
-    found.cells = Some(Cells {
-        frequency_hz: heard::frequencies(&cells.averages),
-        cells: heard::heard(geometry, &cells.averages).into_iter().map(cell_row).collect(),
-    });
+    found.heard = heard::heard(geometry, &cells.averages);
 
     let all = Structure::ALL.map(|structure| {
         let planned = names.iter().filter(|c| c.configuration == structure).count();
@@ -98,20 +85,6 @@ pub fn analyse_measurements<M: Measurements>(
     found
 }
 
-/// How a cell was heard; what was wanted and refused, the file knows.
-fn cell_row(heard: heard::Heard) -> CellRow {
-    CellRow {
-        configuration: heard.name.configuration.into(),
-        impact: heard.name.impact,
-        response: heard.name.response,
-        wanted: 0,
-        kept: 0,
-        refused: std::collections::BTreeMap::new(),
-        coherence: heard.coherence,
-        random_error: heard.random_error,
-    }
-}
-
 fn substructured(frfs: [&Frf; 3], geometry: &Geometry) -> Result<Substructured, Missing> {
     let [a, b, ajb] = frfs;
     let bands: Vec<Band> =
@@ -120,7 +93,9 @@ fn substructured(frfs: [&Frf; 3], geometry: &Geometry) -> Result<Substructured, 
     let mut found = identified
         .map(|found| Substructured::of(frfs, geometry, &Priors::default(), found))
         .map_err(Missing::Substructuring)?;
-    found.spectra.retain(|(spectrum, _)| SHOWN.iter().any(|m| m.name() == spectrum.method));
+    // of the paper's methods the results keep the spectra too; A.1 the other way round is the same but for rounding
+    let kept = |name: &str| Method::PAPER.iter().any(|m| *m != Method::InverseBa && m.name() == name);
+    found.spectra.retain(|(spectrum, _)| kept(&spectrum.method));
     Ok(found)
 }
 

@@ -8,6 +8,11 @@ use crate::structure::Structure;
 use crate::substructuring::geometry::{Configuration, Grouping, Point};
 use num_complex::Complex;
 
+/// The cell of this impact and channel, if it was measured.
+fn find<'c>(cells: &'c [CellAverage], impact: &Point, channel: &Point) -> Option<&'c CellAverage> {
+    cells.iter().find(|c| c.name.impact == impact.name && c.name.response == channel.name)
+}
+
 /// The curves of a configuration that was measured here.
 pub fn of_cells(
     configuration: Structure,
@@ -15,12 +20,9 @@ pub fn of_cells(
     cells: &[CellAverage],
     quantity: MotionQuantity,
 ) -> Vec<FrfCurve> {
-    let find = |impact: &Point, channel: &Point| {
-        cells.iter().find(|c| c.name.impact == impact.name && c.name.response == channel.name)
-    };
-    let chosen = choose(points, &|impact, channel| find(impact, channel).is_some());
+    let chosen = choose(points, &|impact, channel| find(cells, impact, channel).is_some());
     let curve = |(role, impact, channel): (Role, &Point, &Point)| {
-        Some(of_cell(configuration, (role, impact, channel), find(impact, channel)?, quantity))
+        Some(of_cell(configuration, (role, impact, channel), find(cells, impact, channel)?, quantity))
     };
     chosen.into_iter().filter_map(curve).collect()
 }
@@ -32,12 +34,9 @@ pub fn noise_floor(
     cells: &[CellAverage],
     quantity: MotionQuantity,
 ) -> Option<NoiseFloor> {
-    let find = |impact: &Point, channel: &Point| {
-        cells.iter().find(|c| c.name.impact == impact.name && c.name.response == channel.name)
-    };
-    let chosen = choose(points, &|impact, channel| find(impact, channel).is_some());
+    let chosen = choose(points, &|impact, channel| find(cells, impact, channel).is_some());
     let (_, impact, channel) = chosen.into_iter().find(|(role, ..)| *role == Role::DrivingPoint)?;
-    let y = &find(impact, channel)?.spectra;
+    let y = &find(cells, impact, channel)?.spectra;
     if y.hits() < 2 {
         return None;
     }

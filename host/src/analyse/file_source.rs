@@ -1,6 +1,7 @@
 //! What a campaign file says of itself: where it comes from, and how much of its plan was measured.
 
 use super::from_store::{AnalyseError, CampaignFile};
+use super::heard::Heard;
 use super::hit_counts::completeness;
 use crate::campaign::store::Store;
 use crate::results::{CellRow, Cells, Completeness, HitRow, Place, Source, rounded};
@@ -69,15 +70,11 @@ impl CampaignFile {
     }
 
     /// Every cell of the plan, in its order, with how it was heard.
-    pub(super) fn cell_rows(&self, heard: Cells) -> Cells {
+    pub(super) fn cell_rows(&self, heard: &Heard) -> Cells {
         let rows = self.cells.iter().map(|cell| {
             let count = self.tally.cell(cell.id);
             let name = &cell.name;
-            let own = heard.cells.iter().find(|h| {
-                h.configuration == name.configuration.name()
-                    && h.impact == name.impact
-                    && h.response == name.response
-            });
+            let own = heard.cells.iter().find(|h| h.name == *name);
             CellRow {
                 configuration: name.configuration.into(),
                 impact: name.impact.clone(),
@@ -93,7 +90,7 @@ impl CampaignFile {
                 random_error: own.and_then(|h| h.random_error),
             }
         });
-        Cells { cells: rows.collect(), frequency_hz: heard.frequency_hz }
+        Cells { cells: rows.collect(), frequency_hz: heard.frequency_hz.clone() }
     }
 
     /// Every firing of the hammer that left a readable record, in order.

@@ -6,6 +6,7 @@
 use super::contact_stage::Contact;
 use super::fits::Fit;
 use super::from_frfs::Substructured;
+use super::heard::Heard;
 use super::missing::Missing;
 use super::shaker_levels::RecordLoops;
 use crate::contact::{ContactError, Stiffness};
@@ -28,7 +29,9 @@ pub struct Findings {
     pub completeness: Vec<Completeness>,
     /// Where hammer and vibrometer went.
     pub geometry: Vec<Place>,
-    /// Every cell of a campaign.
+    /// How every cell was heard.
+    pub heard: Heard,
+    /// Every cell of a campaign's plan, with how it was heard.
     pub cells: Option<Cells>,
     /// Every firing of the hammer.
     pub hits: Vec<HitRow>,

@@ -77,7 +77,7 @@ pub fn analyse(
     let file = CampaignFile::open(store, wanted.known)?;
     let (source, completeness) = (file.source(store)?, file.completeness());
     let found = analyse_measurements(&file, wanted, progress);
-    let cells = found.cells.map(|heard| file.cell_rows(heard));
+    let cells = Some(file.cell_rows(&found.heard));
     Ok(Findings { source, completeness, cells, geometry: file.places(), hits: file.hit_rows(), ..found })
 }
 

@@ -8,14 +8,23 @@ use crate::substructuring::geometry::Geometry;
 /// Lines at which coherence is told: enough to see every dip, few enough to show all cells.
 const SHOWN_LINES: usize = 140;
 
-/// One cell's.
-#[derive(Debug, Clone, PartialEq)]
+/// How all cells were heard.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Heard {
+    /// Where coherence is told, Hz: lines of the first cell, which all share.
+    pub frequency_hz: Vec<f64>,
+    /// In the order in which they were averaged.
+    pub cells: Vec<HeardCell>,
+}
+
+/// How one cell was heard.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeardCell {
     /// Which.
     pub name: CellName,
-    /// At the frequencies of [`frequencies`].
+    /// At [`Heard::frequency_hz`].
     pub coherence: Vec<f64>,
-    /// Median over the main band; none with fewer than two hits.
+    /// Of H1's magnitude, as a part of it: median over the main band; none with fewer than two hits.
     pub random_error: Option<f64>,
 }
 
@@ -30,18 +39,16 @@ fn shown(frequency_hz: &[f64]) -> Vec<usize> {
     lines
 }
 
-/// The frequencies at which coherence is told, Hz; those of the first cell, which all share.
-pub fn frequencies(cells: &[CellAverage]) -> Vec<f64> {
-    let lines = cells.first().map_or(&[][..], |cell| cell.spectra.frequency_hz());
-    shown(lines).into_iter().map(|line| lines[line]).collect()
-}
-
 /// All cells.
-pub fn heard(geometry: &Geometry, cells: &[CellAverage]) -> Vec<Heard> {
-    cells.iter().map(|cell| one(geometry, cell)).collect()
+pub fn heard(geometry: &Geometry, cells: &[CellAverage]) -> Heard {
+    let lines = cells.first().map_or(&[][..], |cell| cell.spectra.frequency_hz());
+    Heard {
+        frequency_hz: shown(lines).into_iter().map(|line| lines[line]).collect(),
+        cells: cells.iter().map(|cell| one(geometry, cell)).collect(),
+    }
 }
 
-fn one(geometry: &Geometry, cell: &CellAverage) -> Heard {
+fn one(geometry: &Geometry, cell: &CellAverage) -> HeardCell {
     let y = &cell.spectra;
     let axis = geometry
         .points(cell.name.configuration)
@@ -54,14 +61,11 @@ fn one(geometry: &Geometry, cell: &CellAverage) -> Heard {
     let several = y.hits() > 1;
     let value = |line: usize| y.coherence(line, axis).clamp(0.0, 1.0);
     let lines = if several { shown(y.frequency_hz()) } else { Vec::new() };
-    let error = |line: usize| {
-        let c = value(line).max(f64::EPSILON);
-        ((1.0 - c) / (2.0 * y.hits() as f64 * c)).sqrt()
-    };
+    let error = |line: usize| y.variance(line, axis).sqrt() / y.h1(line, axis).norm();
     let mut errors: Vec<f64> =
         (0..y.lines()).filter(|l| several && MAIN_BAND.contains(y.frequency_hz()[*l])).map(error).collect();
     errors.sort_by(f64::total_cmp);
-    Heard {
+    HeardCell {
         name: cell.name.clone(),
         coherence: lines.into_iter().map(|l| rounded(value(l), 3)).collect(),
         random_error: errors.get(errors.len() / 2).map(|e| rounded(*e, 4)),

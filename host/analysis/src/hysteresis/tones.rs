@@ -28,8 +28,8 @@ impl Tones {
     /// # Errors
     /// The signals do not fit together, or there is no excitation frequency or whole cycle.
     pub fn of(record: &HysteresisRecord) -> Result<Self, HysteresisError> {
-        let all = of_stretches(record, |_| 1)?;
-        all.first().copied().ok_or(HysteresisError::Excitation(0.0))
+        // as many as are asked for, or an error
+        of_stretches(record, |_| 1).map(|one| one[0])
     }
 
     /// Of at most `count` stretches of whole cycles, one after the other. Their scatter holds the noise and whatever drifts.

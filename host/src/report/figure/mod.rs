@@ -11,7 +11,7 @@ mod scene;
 
 pub use axis::{Axis, Spread};
 pub use mark::{Along, Bars, Drawn, Mark, Marker, Origin, Shape};
-pub use packed::{Packed, base64, six_digits};
+pub use packed::{Packed, six_digits};
 pub use role::Role;
 pub use scene::{Body, Scene, Spot};
 

@@ -1,5 +1,7 @@
 //! Numbers of curves as compact text: `f32:` and base64 of 32-bit floats, little endian.
 
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
 use serde::{Serialize, Serializer};
 
 /// The values of a curve; one that is not known is NaN.
@@ -23,26 +25,8 @@ impl Packed {
 impl Serialize for Packed {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         let bytes: Vec<u8> = self.0.iter().flat_map(|v| v.to_le_bytes()).collect();
-        to.serialize_str(&format!("f32:{}", base64(&bytes)))
+        to.serialize_str(&format!("f32:{}", BASE64_STANDARD.encode(bytes)))
     }
-}
-
-/// Base64 (RFC 4648, section 4, with padding).
-pub fn base64(bytes: &[u8]) -> String {
-    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for three in bytes.chunks(3) {
-        let byte = |i: usize| u32::from(three.get(i).copied().unwrap_or(0));
-        let word = byte(0) << 16 | byte(1) << 8 | byte(2);
-        for i in 0..4 {
-            if i <= three.len() {
-                text.push(char::from(LETTERS[(word >> (18 - 6 * i)) as usize & 63]));
-            } else {
-                text.push('=');
-            }
-        }
-    }
-    text
 }
 
 /// A number with six significant digits, as csv files and readouts show it; empty when it is none.
@@ -61,21 +45,6 @@ pub fn six_digits(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn base64_is_that_of_the_rfc() {
-        let pairs = [
-            ("", ""),
-            ("f", "Zg=="),
-            ("fo", "Zm8="),
-            ("foo", "Zm9v"),
-            ("foob", "Zm9vYg=="),
-            ("foobar", "Zm9vYmFy"),
-        ];
-        for (plain, text) in pairs {
-            assert_eq!(base64(plain.as_bytes()), text);
-        }
-    }
 
     #[test]
     fn six_digits_survive_thirty_two_bits() {

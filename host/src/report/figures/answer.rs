@@ -1,6 +1,7 @@
 //! The answer on one axis: the contact, the clamps, what lies between the arms, and what the loops see, with their intervals.
 
-use super::MICRO;
+use super::{MICRO, below_name};
+use crate::contact::Interval;
 use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role};
 use crate::report::words::number::{decimals, micro, short, stiffness};
 use crate::results::{Excitation, Force, HIDDEN_RESONANCE, Hysteresis, Results};
@@ -30,7 +31,7 @@ pub fn answer(results: &Results) -> Option<Figure> {
     let names = rows.iter().map(|r| r.label.clone()).collect();
     let mut panel = Panel::new(x, Axis::named("", names)).high(Height::Rows);
     for (i, row) in rows.iter().enumerate() {
-        let y = i as f64 + 0.26;
+        let y = below_name(i);
         let marker = if row.believed { Marker::Dot } else { Marker::Cross };
         panel.marks.push(
             Mark::points(row.role, marker, [[row.mean, y]])
@@ -53,47 +54,33 @@ fn rows(results: &Results) -> Vec<Row> {
     let mut rows = Vec::new();
     if let Some(answer) = &results.answer {
         let truth = answer.truth.as_ref();
-        let mut put = |label: String, role, k: &crate::contact::Interval, truth: Option<f64>, path| {
-            rows.push(Row {
-                label,
-                role,
-                mean: micro(k.mean),
-                ends: k.ci95.map(micro),
-                believed: true,
-                truth: truth.map(micro),
-                path,
-            });
-        };
-        if let Some(k) = &answer.contact.k_t_n_per_m {
-            let label = format!("k_T of the contact: {}", interval(k));
-            put(
-                label,
+        let found = [
+            (
+                "k_T of the contact",
                 Role::Answer,
-                k,
+                answer.contact.k_t_n_per_m,
                 truth.map(|t| t.contact_k_t_n_per_m),
                 "/answer/contact/k_t_n_per_m/mean",
-            );
-        }
-        if let Some(clamp) = &answer.clamp {
-            let label = format!("clamps alone: {}", interval(&clamp.k_n_per_m));
-            put(
-                label,
+            ),
+            (
+                "clamps alone",
                 Role::Clamp,
-                &clamp.k_n_per_m,
+                answer.clamp.map(|clamp| clamp.k_n_per_m),
                 truth.and_then(|t| t.clamps_k_n_per_m),
                 "/answer/clamp/k_n_per_m/mean",
-            );
-        }
-        if let Some(k) = &answer.between_arms.k_n_per_m {
-            let label = format!("between the arms: {}", interval(k));
-            put(
-                label,
+            ),
+            (
+                "between the arms",
                 Role::BetweenArms,
-                k,
+                answer.between_arms.k_n_per_m,
                 truth.map(|t| t.between_arms_k_n_per_m),
                 "/answer/between_arms/k_n_per_m/mean",
-            );
-        }
+            ),
+        ];
+        let known = found.into_iter().filter_map(|(what, role, k, truth, path)| {
+            Some(Row { truth: truth.map(micro), ..estimated(what, role, k?, path) })
+        });
+        rows.extend(known);
     }
     if !rows.iter().any(|row| row.role == Role::BetweenArms) {
         rows.extend(quoted(results).or_else(|| headline(results)));
@@ -103,28 +90,24 @@ fn rows(results: &Results) -> Vec<Row> {
     rows
 }
 
-/// `178 N/µm (173…183)`.
-fn interval(k: &crate::contact::Interval) -> String {
+/// An estimate with its interval: `between the arms: 26.9 N/µm (25.4…28.4)`.
+fn estimated(what: &str, role: Role, k: Interval, path: &'static str) -> Row {
     let [mean, low, high] = [k.mean, k.ci95[0], k.ci95[1]].map(|k| short(micro(k)));
-    format!("{mean} N/µm ({low}…{high})")
+    Row {
+        label: format!("{what}: {mean} N/µm ({low}…{high})"),
+        role,
+        mean: micro(k.mean),
+        ends: k.ci95.map(micro),
+        believed: true,
+        truth: None,
+        path,
+    }
 }
 
 fn quoted(results: &Results) -> Option<Row> {
     let z = results.quoted()?.joint.get(&Dof::Z).filter(|z| z.identified)?;
-    Some(Row {
-        label: format!(
-            "between the arms: {} N/µm ({}…{})",
-            short(micro(z.stiffness)),
-            short(micro(z.ci95[0])),
-            short(micro(z.ci95[1]))
-        ),
-        role: Role::BetweenArms,
-        mean: micro(z.stiffness),
-        ends: z.ci95.map(micro),
-        believed: true,
-        truth: None,
-        path: "/recommended/*/joint/z/stiffness",
-    })
+    let k = Interval { mean: z.stiffness, ci95: z.ci95 };
+    Some(estimated("between the arms", Role::BetweenArms, k, "/recommended/*/joint/z/stiffness"))
 }
 
 fn headline(results: &Results) -> Option<Row> {

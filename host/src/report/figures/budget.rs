@@ -1,6 +1,6 @@
 //! What makes the interval of k_T, and whether k_T changes with frequency.
 
-use super::MICRO;
+use super::{MICRO, below_name};
 use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role, Spread};
 use crate::report::words::number::{micro, short};
 use crate::results::Results;
@@ -23,7 +23,7 @@ pub fn budget(results: &Results) -> Option<Figure> {
     .high(Height::Rows);
     for (i, (cause, part)) in causes.iter().enumerate() {
         shares.marks.push(
-            Mark::points(Role::Answer, Marker::Stroke, [[*part, i as f64 + 0.26]])
+            Mark::points(Role::Answer, Marker::Stroke, [[*part, below_name(i)]])
                 .barred("x", [[0.0, *part]])
                 .from("x", format!("/answer/contact/budget/{cause}"), 100.0),
         );

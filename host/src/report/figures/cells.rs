@@ -31,7 +31,8 @@ pub fn cells(results: &Results) -> Option<Figure> {
         let values = found.iter().map(|c| c.map_or(f64::NAN, |c| c.kept as f64 / c.wanted.max(1) as f64));
         let shape = Shape::Cells {
             values: Packed::of(values),
-            says: found.iter().flatten().map(|c| said(c)).collect(),
+            // one for each place: the page finds them by it, holes or not
+            says: found.iter().map(|c| c.map_or_else(String::new, |c| said(c))).collect(),
         };
         let panel = Panel::new(Axis::named("impact", impacts), Axis::named("response", responses))
             .titled(format!("{configuration}: {} cells", own.len()))

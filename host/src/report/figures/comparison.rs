@@ -1,6 +1,6 @@
 //! All stiffness values of one sliding direction on one axis: what each method sees.
 
-use super::MICRO;
+use super::{MICRO, below_name};
 use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role};
 use crate::report::words::number::{micro, stiffness};
 use crate::results::{DIRECT, Joint, MAIN_BAND, Results};
@@ -37,7 +37,7 @@ pub fn comparison(results: &Results) -> Option<Figure> {
     let x = Axis::linear("k_z", "N/µm", range);
     let mut panel = Panel::new(x, Axis::named("", names)).high(Height::Rows);
     for (i, row) in rows.iter().enumerate() {
-        let y = i as f64 + 0.26;
+        let y = below_name(i);
         let marker = if row.believed { Marker::Dot } else { Marker::Cross };
         let role = if row.believed { row.role } else { Role::Refused };
         let within = row.mean.clamp(range[0], range[1]);

@@ -141,3 +141,8 @@ pub fn all(results: &Results) -> Vec<Figure> {
 
 /// m to µm, N/m to N/µm the other way round.
 const MICRO: f64 = 1e6;
+
+/// Where the sign of row `i` stands on an axis of rows: below its name.
+fn below_name(i: usize) -> f64 {
+    i as f64 + 0.26
+}

@@ -1,5 +1,6 @@
 //! Over which frequencies the hammer put enough force.
 
+use super::below_name;
 use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role, Spread};
 use crate::report::words::number::short;
 use crate::results::{MAIN_BAND, Results};
@@ -22,7 +23,7 @@ pub fn usable_bands(results: &Results) -> Option<Figure> {
     for (i, band) in bands.iter().enumerate() {
         let (from, to) = (band.band_hz.low_hz.max(low), band.band_hz.high_hz);
         panel.marks.push(
-            Mark::points(Role::Group1, Marker::Stroke, [[from, i as f64 + 0.26], [to, i as f64 + 0.26]])
+            Mark::points(Role::Group1, Marker::Stroke, [[from, below_name(i)], [to, below_name(i)]])
                 .barred("x", [[from, to], [from, to]])
                 .from("x", "/usable_bands/*/band_hz/*", 1.0),
         );

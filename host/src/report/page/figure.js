@@ -30,22 +30,27 @@ function enliven(element,figure){
 // a matrix stays a drawing; it says what a cell holds
 class Cells{
   constructor(figure,panel,host){
-    this.figure=figure;this.panel=panel;this.host=host;this.hidden=new Set();this.at=0;
+    this.figure=figure;this.panel=panel;this.host=host;this.hidden=new Set();
     this.cells=panel.marks.find(m=>m.cells).cells;
     this.columns=panel.x.names.length;
     const rects=()=>[...host.querySelectorAll('rect[class^="f-"]')];
-    this.shown=[...this.cells.values].map((v,i)=>Number.isFinite(v)?i:-1).filter(i=>i>=0);
-    host.addEventListener('pointermove',e=>{const n=rects().indexOf(e.target);if(n>=0)this.say(n)});
+    const values=this.cells.values;
+    // only what is known is drawn
+    const shown=[...values.keys()].filter(i=>Number.isFinite(values[i]));
+    this.at=shown[0];
+    host.addEventListener('pointermove',e=>{const n=rects().indexOf(e.target);if(n>=0)this.say(shown[n])});
     this.drawn=1;
   }
-  say(n){
-    this.at=n;
-    this.host.closest('figure').querySelector('.readout').textContent=this.cells.says[this.shown[n]]||'';
+  say(i){
+    this.at=i;
+    this.host.closest('figure').querySelector('.readout').textContent=this.cells.says[i];
   }
   key(e){
     const by={ArrowLeft:-1,ArrowRight:1,ArrowUp:-this.columns,ArrowDown:this.columns}[e.key];
     if(!by)return false;
-    this.say(Math.max(0,Math.min(this.shown.length-1,this.at+by)));return true;
+    let i=this.at+by;
+    while(i in this.cells.values&&!Number.isFinite(this.cells.values[i]))i+=by;
+    this.say(i in this.cells.values?i:this.at);return true;
   }
   whole(){}
 }

@@ -83,7 +83,8 @@ fn style() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::figure::base64;
+    use base64::Engine;
+    use base64::prelude::BASE64_STANDARD;
     use sha2::{Digest, Sha256};
 
     #[test]
@@ -107,7 +108,7 @@ mod tests {
         for tag in ["script", "style"] {
             let from = html.find(&format!("<{tag}>")).expect(tag) + tag.len() + 2;
             let inside = &html[from..from + html[from..].find(&format!("</{tag}>")).expect(tag)];
-            let hash = base64(&Sha256::digest(inside.as_bytes()));
+            let hash = BASE64_STANDARD.encode(Sha256::digest(inside.as_bytes()));
             assert!(html.contains(&format!("{tag}-src 'sha256-{hash}'")), "{tag}");
             assert_eq!(html.matches(&format!("<{tag}>")).count(), 1);
         }

@@ -1,11 +1,12 @@
 //! What the page may do: run its one script, use its one style sheet, and nothing from anywhere else.
 
-use crate::report::figure::base64;
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
 use sha2::{Digest, Sha256};
 
 /// The policy as an element of the head; hashes are of these very texts.
 pub fn meta(style: &str, script: &str) -> String {
-    let hash = |text: &str| base64(&Sha256::digest(text.as_bytes()));
+    let hash = |text: &str| BASE64_STANDARD.encode(Sha256::digest(text.as_bytes()));
     format!(
         "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'sha256-{}'; style-src 'sha256-{}'; img-src data: blob:\">",
         hash(script),
