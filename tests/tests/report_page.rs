@@ -1,6 +1,8 @@
 //! The report's page in a browser: every figure there and alive, nothing asked of the network, nothing wider than the window.
 #![allow(clippy::unwrap_used)]
 
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
 use jointrig_tests::browser::{Browser, Look, Page};
 use jointrig_tests::command::jointrig;
 use serde_json::Value;
@@ -101,36 +103,10 @@ fn the_page_is_whole_in_every_light_and_at_every_width() {
 }
 
 /// Panels whose canvas shows nothing but its axes: at least 40 pixels, the size of one point, must differ from paper and grid.
-const BLANK: &str = "(async () => {
-  const blank = [];
-  // a chart draws when the present task is over
-  const drawn = () => new Promise(r => setTimeout(r, 0));
-  for (const [name, charts] of report.alive) for (const [i, c] of charts.entries()) {
-    if (!c.plot) { if (!c.host.querySelector('svg').childElementCount) blank.push(name + '/' + i); continue; }
-    const b = c.plot.bbox, look = () => new Uint32Array(c.plot.ctx.getImageData(b.left + 2, b.top + 2, b.width - 4, b.height - 4).data.buffer);
-    const before = look(), marks = c.panel.marks;
-    c.panel.marks = []; c.plot.redraw(); await drawn();
-    const after = look();
-    c.panel.marks = marks; c.plot.redraw(); await drawn();
-    let differ = 0;
-    for (let k = 0; k < after.length; k++) if (after[k] !== before[k]) differ++;
-    if (differ < 40) blank.push(name + '/' + i + ': ' + differ);
-  }
-  return blank;
-})()";
+const BLANK: &str = include_str!("page_probes/blank_panels.js");
 
 /// Tick labels of the static drawings that stand over one another.
-const TOUCHING: &str = "(() => {
-  const touching = [];
-  for (const svg of document.querySelectorAll('.plot > svg:first-child')) {
-    svg.closest('.plot').classList.remove('alive');
-    const boxes = [...svg.querySelectorAll('text.tick, text.row')].map(t => [t.textContent, t.getBBox()]).filter(([t]) => t);
-    boxes.forEach(([t, a], i) => boxes.slice(i + 1).forEach(([u, b]) => {
-      if (a.x < b.x + b.width - 1 && b.x < a.x + a.width - 1 && a.y < b.y + b.height - 3 && b.y < a.y + a.height - 3) touching.push(svg.getAttribute('aria-label') + ': ' + t + ' | ' + u);
-    }));
-  }
-  return touching;
-})()";
+const TOUCHING: &str = include_str!("page_probes/touching_labels.js");
 
 #[test]
 fn every_figure_reacts_to_drag_wheel_and_keys_and_returns() {
@@ -227,28 +203,10 @@ fn without_scripts_and_on_paper_nothing_is_lost() {
     let mut page = browser.open(&report(), Look::DESK);
     let pdf = page.pdf();
     // each page of a PDF is an object of this type; Chromium writes them uncompressed
-    let bytes = decoded(&pdf);
+    let bytes = BASE64_STANDARD.decode(pdf).unwrap();
     let pages = bytes.windows(11).filter(|w| *w == b"/Type /Page").count();
     let trees = bytes.windows(12).filter(|w| *w == b"/Type /Pages").count();
     assert!((4..=30).contains(&(pages - trees)), "{} pages", pages - trees);
-}
-
-/// Base64, back to bytes.
-fn decoded(text: &str) -> Vec<u8> {
-    let value = |c: u8| match c {
-        b'A'..=b'Z' => c - b'A',
-        b'a'..=b'z' => c - b'a' + 26,
-        b'0'..=b'9' => c - b'0' + 52,
-        b'+' => 62,
-        _ => 63,
-    };
-    let mut out = Vec::new();
-    for four in text.as_bytes().chunks(4) {
-        let known: Vec<u8> = four.iter().copied().filter(|c| *c != b'=').map(value).collect();
-        let word = known.iter().enumerate().fold(0u32, |w, (i, v)| w | u32::from(*v) << (18 - 6 * i));
-        out.extend(word.to_be_bytes()[1..].iter().take(known.len() - 1));
-    }
-    out
 }
 
 /// Every number that says where it stands in results.json stands there, and so does every curve of every figure.

@@ -16,7 +16,6 @@ mod cell;
 mod cells_stage;
 pub mod checks;
 mod chosen;
-mod compare;
 mod configuration_stage;
 mod contact_answer;
 mod contact_stage;
@@ -45,7 +44,6 @@ mod wanted;
 
 pub use campaign::analyse_measurements;
 pub use cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel};
-pub use compare::compare;
 pub use contact_stage::Contact;
 pub use findings::{ConfigurationFindings, Findings, ImportedFrom, Settings};
 pub use fits::{Fit, NoFit, fits};

@@ -7,7 +7,7 @@ use clap::Args;
 use super::analyse::analysed;
 use super::error::CliError;
 use super::output;
-use crate::analyse::{Wanted, compare};
+use crate::analyse::Wanted;
 use crate::campaign::store::Store;
 use crate::report;
 
@@ -32,7 +32,7 @@ impl Compare {
     pub fn run(self) -> Result<(), CliError> {
         let a = analysed(&Store::open_read_only(&self.a)?, Wanted::default())?;
         let b = analysed(&Store::open_read_only(&self.b)?, Wanted::default())?;
-        let compared = compare(&a, &b);
+        let compared = report::compare(&a, &b);
         report::write_comparison(&compared, [&a, &b], &self.out).map_err(|source| CliError::File {
             path: self.out.clone(),
             doing: "writing the comparison",

@@ -1,78 +1,87 @@
 //! A figure's numbers as a table: one line for each point, in the units of its axes.
 
 use super::figure::{Along, Figure, Mark, Packed, Panel, Shape, six_digits};
-use std::fmt::Write;
+use ::csv::Writer;
+use std::borrow::Cow;
 
 /// The figure as csv (RFC 4180), with one line of names above.
 pub fn csv(figure: &Figure) -> String {
-    let mut text = String::from("panel,curve,horizontal,x,upright,y,low,high\n");
+    let mut table = Table(Writer::from_writer(Vec::new()));
+    table.line(["panel", "curve", "horizontal", "x", "upright", "y", "low", "high"]);
     for (i, panel) in figure.panels.iter().enumerate() {
         let title = if panel.title.is_empty() { (i + 1).to_string() } else { panel.title.clone() };
         for mark in &panel.marks {
-            rows(&mut text, &title, panel, mark);
+            table.mark(&title, panel, mark);
         }
     }
-    text
+    String::from_utf8(table.0.into_inner().expect("memory takes every byte")).expect("made of text alone")
 }
 
 /// No number: an empty cell.
 const NONE: f64 = f64::NAN;
 
-fn rows(text: &mut String, title: &str, panel: &Panel, mark: &Mark) {
-    let name = if mark.name.is_empty() { mark.role.name() } else { &mark.name };
-    let (x_label, y_label) = (panel.x.label(), panel.y.label());
-    let head = format!("{},{},{}", quoted(title), quoted(name), quoted(&x_label));
-    let mut put = |x: f64, y: f64, low: f64, high: f64| {
-        let [x, y, low, high] = [x, y, low, high].map(six_digits);
-        let _ = writeln!(text, "{head},{x},{},{y},{low},{high}", quoted(&y_label));
-    };
-    let at = |values: &Packed, i: usize| values.0.get(i).copied().map_or(f64::NAN, f64::from);
-    match &mark.shape {
-        Shape::Line { x, y } => (0..y.0.len()).for_each(|i| put(x.at(i), at(y, i), NONE, NONE)),
-        Shape::Ribbon { x, low, high } => {
-            (0..low.0.len()).for_each(|i| put(x.at(i), NONE, at(low, i), at(high, i)));
-        }
-        Shape::Loop { x, y } => {
-            (0..y.0.len()).for_each(|i| put(Along::List(x.clone()).at(i), at(y, i), NONE, NONE));
-        }
-        Shape::Points { x, y, bars, .. } => {
-            for i in 0..y.0.len() {
-                let [low, high] = bars.as_ref().map_or([NONE; 2], |b| [at(&b.low, i), at(&b.high, i)]);
-                put(at(x, i), at(y, i), low, high);
+struct Table(Writer<Vec<u8>>);
+
+impl Table {
+    fn line(&mut self, cells: [&str; 8]) {
+        self.0.write_record(cells).expect("memory takes every line, and all have eight cells");
+    }
+
+    fn mark(&mut self, title: &str, panel: &Panel, mark: &Mark) {
+        let name = if mark.name.is_empty() { mark.role.name() } else { &mark.name };
+        let (title, name) = (guarded(title), guarded(name));
+        let labels = [panel.x.label(), panel.y.label()];
+        let [x_label, y_label] = [guarded(&labels[0]), guarded(&labels[1])];
+        let mut put = |x: f64, y: f64, low: f64, high: f64| {
+            let [x, y, low, high] = [x, y, low, high].map(six_digits);
+            self.line([&title, &name, &x_label, &x, &y_label, &y, &low, &high]);
+        };
+        let at = |values: &Packed, i: usize| values.0.get(i).copied().map_or(NONE, f64::from);
+        match &mark.shape {
+            Shape::Line { x, y } => (0..y.0.len()).for_each(|i| put(x.at(i), at(y, i), NONE, NONE)),
+            Shape::Ribbon { x, low, high } => {
+                (0..low.0.len()).for_each(|i| put(x.at(i), NONE, at(low, i), at(high, i)));
             }
-        }
-        Shape::Level { at, .. } => put(NONE, *at, NONE, NONE),
-        Shape::Ring { at, .. } => put(at[0], at[1], NONE, NONE),
-        Shape::Cells { values, .. } => {
-            let columns = panel.x.names.len().max(1);
-            for i in 0..values.0.len() {
-                put((i % columns) as f64, (i / columns) as f64, at(values, i), NONE);
+            Shape::Loop { x, y } => {
+                (0..y.0.len()).for_each(|i| put(Along::List(x.clone()).at(i), at(y, i), NONE, NONE));
             }
-        }
-        Shape::Strips { x, values, says } => {
-            for (row, name) in says.iter().enumerate() {
-                let head = format!("{},{},{}", quoted(title), quoted(name), quoted(&x_label));
-                for i in 0..x.0.len() {
-                    let [f, value] = [at(x, i), at(values, row * x.0.len() + i)].map(six_digits);
-                    let _ = writeln!(text, "{head},{f},{},{value},,", quoted(&mark.name));
+            Shape::Points { x, y, bars, .. } => {
+                for i in 0..y.0.len() {
+                    let [low, high] = bars.as_ref().map_or([NONE; 2], |b| [at(&b.low, i), at(&b.high, i)]);
+                    put(at(x, i), at(y, i), low, high);
                 }
             }
-        }
-        Shape::Scene(scene) => {
-            for spot in &scene.spots {
-                let [x, y, z] = spot.at.map(six_digits);
-                let what = if spot.toward.is_some() { "impact" } else { "response" };
-                let _ = writeln!(text, "{what},{},x y z in m,{x},,{y},{z},", quoted(&spot.name));
+            Shape::Level { at, .. } => put(NONE, *at, NONE, NONE),
+            Shape::Ring { at, .. } => put(at[0], at[1], NONE, NONE),
+            Shape::Cells { values, .. } => {
+                let columns = panel.x.names.len().max(1);
+                for i in 0..values.0.len() {
+                    put((i % columns) as f64, (i / columns) as f64, at(values, i), NONE);
+                }
             }
+            Shape::Strips { x, values, says } => {
+                for (row, says) in says.iter().enumerate() {
+                    for i in 0..x.0.len() {
+                        let [f, value] = [at(x, i), at(values, row * x.0.len() + i)].map(six_digits);
+                        self.line([&title, &guarded(says), &x_label, &f, &name, &value, "", ""]);
+                    }
+                }
+            }
+            Shape::Scene(scene) => {
+                for spot in &scene.spots {
+                    let [x, y, z] = spot.at.map(six_digits);
+                    let what = if spot.toward.is_some() { "impact" } else { "response" };
+                    self.line([what, &guarded(&spot.name), "x y z in m", &x, "", &y, &z, ""]);
+                }
+            }
+            Shape::Upright { .. } | Shape::Shade { .. } | Shape::Text { .. } => {}
         }
-        Shape::Upright { .. } | Shape::Shade { .. } | Shape::Text { .. } => {}
     }
 }
 
-/// A cell, in quotes where it needs them. A name that a spreadsheet would take for a formula is held back by an apostrophe.
-fn quoted(text: &str) -> String {
-    let text = if text.starts_with(['=', '+', '@', '\t']) { format!("'{text}") } else { text.to_owned() };
-    if text.contains(['"', ',', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text }
+/// A name that a spreadsheet would take for a formula is held back by an apostrophe.
+fn guarded(text: &str) -> Cow<'_, str> {
+    if text.starts_with(['=', '+', '-', '@', '\t']) { format!("'{text}").into() } else { text.into() }
 }
 
 #[cfg(test)]

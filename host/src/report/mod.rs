@@ -16,7 +16,7 @@ mod svg;
 mod tables;
 pub mod words;
 
-pub use document::document;
+pub use document::{compare, document};
 pub use page::{comparison_page, page};
 
 use crate::results::{Compared, Results};

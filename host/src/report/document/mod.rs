@@ -1,10 +1,13 @@
 //! The document made of the findings: every number and sentence of `results.json` in its place.
 
 mod answer_from_findings;
+mod compared_from_results;
 mod interface_from_findings;
 mod joint_from_findings;
 mod loops_from_findings;
 mod source_from_findings;
+
+pub use compared_from_results::compare;
 
 use super::words::{check_sentences, missing_sentences};
 use crate::analyse::Findings;

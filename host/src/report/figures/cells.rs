@@ -2,6 +2,7 @@
 
 use crate::report::figure::{Axis, Figure, Height, Mark, Packed, Panel, Role, Shape};
 use crate::results::{CellRow, Results};
+use crate::structure::Structure;
 
 /// One matrix for each configuration: responses down, impacts across.
 pub fn cells(results: &Results) -> Option<Figure> {
@@ -12,7 +13,7 @@ pub fn cells(results: &Results) -> Option<Figure> {
         "Every cell",
         "The stronger the square, the more of the hits wanted were kept. A pale one lacks hits, an empty one was never measured.",
     );
-    for configuration in ["A", "B", "AJB"] {
+    for configuration in Structure::ALL.map(Structure::name) {
         let own: Vec<&CellRow> = all.iter().filter(|c| c.configuration == configuration).collect();
         let (mut impacts, mut responses): (Vec<String>, Vec<String>) = (Vec::new(), Vec::new());
         for cell in &own {

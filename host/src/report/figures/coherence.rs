@@ -2,6 +2,7 @@
 
 use crate::report::figure::{Axis, Figure, Height, Mark, Packed, Panel, Role, Shape, Spread};
 use crate::results::{CellRow, Cells, Results};
+use crate::structure::Structure;
 
 /// A panel for each configuration.
 pub fn coherence(results: &Results) -> Option<Figure> {
@@ -14,7 +15,7 @@ pub fn coherence(results: &Results) -> Option<Figure> {
     )
     .across(3);
     let range = [*cells.frequency_hz.first()?, *cells.frequency_hz.last()?];
-    for configuration in ["A", "B", "AJB"] {
+    for configuration in Structure::ALL.map(Structure::name) {
         figure.panels.extend(panel(cells, configuration, range));
     }
     (!figure.panels.is_empty() && range[0] < range[1]).then_some(figure)

@@ -2,6 +2,7 @@
 
 use crate::report::figure::{Axis, Figure, Mark, Marker, Panel, Role};
 use crate::results::Results;
+use crate::structure::Structure;
 
 /// Cells in the order of the plan, a role for each configuration.
 pub fn random_error(results: &Results) -> Option<Figure> {
@@ -17,7 +18,7 @@ pub fn random_error(results: &Results) -> Option<Figure> {
         Axis::linear("cell, in the order of the plan", "", [-1.0, cells.len() as f64]),
         Axis::log("random error", "%", [0.8 * low, 1.25 * high]),
     );
-    for (group, configuration) in ["A", "B", "AJB"].into_iter().enumerate() {
+    for (group, configuration) in Structure::ALL.map(Structure::name).into_iter().enumerate() {
         let own: Vec<&(usize, f64)> =
             known.iter().filter(|(i, _)| cells[*i].configuration == configuration).collect();
         if own.is_empty() {

@@ -3,6 +3,7 @@
 use crate::report::figure::{Along, Axis, Figure, Height, Mark, Panel, Role, Spread};
 use crate::report::scale::middle_range;
 use crate::results::{FrfCurve, MAIN_BAND, Results, Role as Shows};
+use crate::structure::Structure;
 
 /// Below this no hammer and no vibrometer tells anything, Hz.
 const LOWEST_HZ: f64 = 5.0;
@@ -11,8 +12,9 @@ const LOWEST_HZ: f64 = 5.0;
 pub fn receptances(results: &Results) -> Option<Figure> {
     let shown = |c: &&FrfCurve| matches!(c.role, Shows::DrivingPoint | Shows::Transfer);
     let indexed = || results.frfs.iter().enumerate().filter(|(_, c)| shown(c));
-    let configurations: Vec<&str> = ["A", "B", "AJB"]
+    let configurations: Vec<&str> = Structure::ALL
         .into_iter()
+        .map(Structure::name)
         .filter(|name| indexed().any(|(_, c)| c.configuration == *name))
         .collect();
     if configurations.is_empty() {

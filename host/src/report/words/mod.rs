@@ -3,6 +3,7 @@
 pub(super) mod answer_sentences;
 pub mod brief;
 pub(super) mod check_sentences;
+pub(super) mod comparison_sentences;
 pub(super) mod level_sentences;
 pub(super) mod missing_sentences;
 mod names;
