@@ -157,8 +157,12 @@ fn a_contact_that_may_slip_has_its_stuck_stiffness_or_none() {
     // hits of some 50 N against 15 N of friction
     let like = Drawn { slip_limit_n: Some(15.0), ..Drawn::default() };
     let rows = campaigns(first, rigs, 1, like);
-    let slide =
-        |row: &Row| slid(&DrawnCampaign { number: row.rig, seed: 0, like }).iter().any(|hit| hit.path > 0.0);
+    let slide = |row: &Row| {
+        let slid = slid(&DrawnCampaign { number: row.rig, seed: 0, like });
+        let paths: Vec<String> = slid.iter().map(|hit| format!("{:.3}", hit.path)).collect();
+        println!("rig {}: slid {} of its elastic travel, called {:?}", row.rig, paths.join(", "), row.slips);
+        slid.iter().any(|hit| hit.path > 0.0)
+    };
     let (slipping, stuck): (Vec<&Row>, Vec<&Row>) = rows.iter().partition(|row| slide(row));
     println!(
         "| contacts that | campaigns | called slipping | called stuck | not told | no k_T | the stuck k_T | another |"

@@ -7,7 +7,8 @@
 //!
 //! So d ln(response per newton) / d ln(force) is estimated from the differences of hits within each cell, band by band and signal by
 //! signal, against the scatter that is left: as a ratio of variances, which is one in the mean while nothing slips. No model of the
-//! structure, no stiffness and no noise level is assumed.
+//! structure, no stiffness and no noise level is assumed. A plan that makes every second hit softer (`force.softer`) tells it ten times more
+//! finely than a hammer's own scatter.
 
 use super::hit_response::HitResponse;
 use num_complex::Complex;
@@ -25,19 +26,23 @@ const FEWEST_OF_IMPACT: usize = 3;
 /// Fewer over all places say nothing at all.
 const FEWEST: usize = 12;
 
-/// A ratio of variances above this is slip. Over 136 stuck campaigns of 56 hits the largest of the sixteen lay between 1.3 and 6.9.
-const FOUND: f64 = 9.0;
+/// What goes with the force is no accident where chance alone would give it this rarely: one campaign of a thousand that stick.
+const NO_ACCIDENT: f64 = 1e-3;
+
+/// Nor is it slip below this change of T per newton: the hammer strikes when some 0.3 % of the last hit's motion is left, and hits of two forces that
+/// differ by a third follow one another in the same order, so that up to a per cent of it goes with the force. Stuck campaigns had up to 0.6 %.
+const LEFT_BEHIND: f64 = 0.015;
+
+/// Standard deviations from which on one change is not scatter.
+const CERTAIN: f64 = 4.0;
 
 /// A gross slider changes T per newton by a per cent and more for each per cent of force, weak microslip by a tenth of that. A
 /// standard deviation above this would not show it.
 const TOO_COARSE: f64 = 0.1;
 
-/// A contact that slips a lot stands elsewhere after each hit, and answers the next one differently: then the ratio of variances is
-/// small, though T per newton falls by much more than this for each part of force,
+/// A contact that slips a lot stands elsewhere after each hit, and answers the next one differently: then the scatter hides what goes with the
+/// force. A change of this size is not called sticking.
 const MUCH: f64 = 0.15;
-
-/// and by more than so many of its standard deviations.
-const BEYOND_DOUBT: f64 = 5.0;
 
 /// The hits of one cell: one place of impact, one aim.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,8 +72,8 @@ pub struct Scaling {
     pub change_per_force: f64,
     /// Standard deviation of either part of it.
     pub std: f64,
-    /// Largest ratio of the variance that goes with the force to the variance that does not, over signals and bands.
-    pub variance_ratio: f64,
+    /// How probable changes as large as the largest are in a contact that sticks.
+    pub chance: f64,
     /// Hits compared.
     pub hits: usize,
     /// Standard deviation of the hammer's impulse within the cells, over itself.
@@ -122,9 +127,9 @@ impl HammerSlip {
             return Self::CannotTell(Unclear::TooFewHits { differences, needed: FEWEST });
         }
         let features = impacts[0].features.len();
-        let ratio =
-            |j: usize| impacts.iter().map(|i| i.features[j].ratio()).sum::<f64>() / impacts.len() as f64;
-        let variance_ratio = (0..features).map(ratio).fold(0.0, f64::max);
+        let least = (0..features).map(|j| chance(impacts.iter().map(|i| (&i.features[j], i.freedom()))));
+        // any of the features may be the one
+        let chance = (features as f64 * least.fold(1.0, f64::min)).min(1.0);
         let (squares, hits) =
             impacts.iter().fold((0.0, 0), |(s, n), impact| (s + impact.squares, n + impact.hits));
         let force_scatter = (squares / differences as f64).sqrt();
@@ -132,20 +137,37 @@ impl HammerSlip {
         let scaling = Scaling {
             change_per_force,
             std,
-            variance_ratio,
+            chance,
             hits,
             force_scatter,
             peak_tangential_n: impacts.iter().map(|i| i.peak_tangential_n).sum::<f64>() / hits as f64,
         };
-        let falls = change_per_force > MUCH && change_per_force > BEYOND_DOUBT * std;
-        if variance_ratio > FOUND || falls {
-            Self::Slips(scaling)
-        } else if std < TOO_COARSE && change_per_force < 2.0 * MUCH {
+        let largest = impacts.iter().map(Impact::largest_of_tangential).fold(0.0, f64::max);
+        if chance < NO_ACCIDENT && largest > LEFT_BEHIND {
+            Self::Slips(Scaling { change_per_force: change_per_force.max(largest), ..scaling })
+        } else if std < TOO_COARSE && change_per_force < MUCH {
             Self::Sticks(scaling)
         } else {
             Self::CannotTell(Unclear::TooAlike { force_scatter, std })
         }
     }
+}
+
+/// How probable changes as large as these are where nothing goes with the force: of one feature over all impacts, each with its hits' freedom ν.
+/// A change over its scatter is F(2, 2ν), whose tail is (1 + F/ν)^−ν; −2 Σ ln of n such probabilities is χ² with 2n degrees of freedom (Fisher).
+fn chance<'a>(slopes: impl Iterator<Item = (&'a Slope, usize)>) -> f64 {
+    let (mut half, mut count) = (0.0, 0);
+    for (slope, freedom) in slopes {
+        let freedom = freedom as f64;
+        half += freedom * (slope.ratio() / freedom).ln_1p();
+        count += 1;
+    }
+    let (mut term, mut sum) = (1.0, 1.0);
+    for k in 1..count {
+        term *= half / f64::from(k);
+        sum += term;
+    }
+    if half.is_finite() { (-half).exp() * sum } else { 0.0 }
 }
 
 /// d ln(T/F) / d ln F over all impacts in the band where it is best known, and the standard deviation of its parts.
@@ -189,31 +211,31 @@ struct Slope {
 impl Slope {
     /// Variance that goes with the force over that which does not: 1 in the mean for a linear structure.
     fn ratio(&self) -> f64 {
-        self.value.norm_sqr() / (2.0 * self.variance)
+        let change = self.value.norm_sqr();
+        if change > 0.0 { change / (2.0 * self.variance) } else { 0.0 }
     }
 }
 
 impl Impact {
     fn of<'a>(cells: impl Iterator<Item = &'a CellHits<'a>>) -> Self {
-        let count = SIGNALS * BANDS_HZ.len();
+        let cells: Vec<Vec<&HitResponse>> =
+            cells.map(|cell| alike(&cell.hits)).filter(|own| own.len() > 1).collect();
         // what is left of each hit after its cell's mean is taken off: of ln(impulse), and of every feature
-        let (mut forces, mut features) = (Vec::new(), vec![Vec::new(); count]);
+        let (mut forces, mut features) = (Vec::new(), vec![Vec::new(); SIGNALS * BANDS_HZ.len()]);
         let (mut hits, mut differences, mut peak_tangential_n) = (0, 0, 0.0);
-        for cell in cells {
-            let Some(first) = cell.hits.first() else { continue };
-            let alike = |hit: &&&HitResponse| hit.first_hz == first.first_hz && hit.step_hz == first.step_hz;
-            let own: Vec<&HitResponse> = cell.hits.iter().filter(alike).copied().collect();
-            if own.len() < 2 {
-                continue;
-            }
+        for (i, own) in cells.iter().enumerate() {
             hits += own.len();
             differences += own.len() - 1;
             peak_tangential_n += own.iter().map(|h| h.peak_tangential_n).sum::<f64>();
             let logs: Vec<f64> = own.iter().map(|h| h.impulse_n_s.ln()).collect();
             let mean = logs.iter().sum::<f64>() / logs.len() as f64;
             forces.extend(logs.iter().map(|l| l - mean));
+            let others =
+                || cells.iter().enumerate().filter(|(j, _)| *j != i).flat_map(|(_, cell)| cell).copied();
+            let usual: Vec<&HitResponse> = others().filter(|hit| same_lines(hit, own[0])).collect();
+            let usual = if usual.is_empty() { own } else { &usual };
             for (j, feature) in features.iter_mut().enumerate() {
-                feature.extend(apart(&own, j / BANDS_HZ.len(), BANDS_HZ[j % BANDS_HZ.len()]));
+                feature.extend(apart(own, usual, j / BANDS_HZ.len(), BANDS_HZ[j % BANDS_HZ.len()]));
             }
         }
         let squares: f64 = forces.iter().map(|f| f * f).sum();
@@ -229,14 +251,36 @@ impl Impact {
         Self { features, hits, squares, differences, peak_tangential_n }
     }
 
+    /// Largest d ln(T/F) / d ln F of all bands, where it is no scatter.
+    fn largest_of_tangential(&self) -> f64 {
+        let of_t = self.features[..BANDS_HZ.len()].iter();
+        let certain = of_t.filter(|slope| slope.value.norm_sqr() > CERTAIN * CERTAIN * slope.variance);
+        certain.map(|slope| slope.value.norm()).fold(0.0, f64::max)
+    }
+
     /// Differences that are left when one slope is taken out.
     fn freedom(&self) -> usize {
         self.differences.saturating_sub(1)
     }
 }
 
-/// By how much each hit of a cell differs from their mean in one band of one signal, over that mean: the projection on it.
-fn apart(hits: &[&HitResponse], signal: usize, [low, high]: [f64; 2]) -> Vec<Complex<f64>> {
+fn same_lines(a: &HitResponse, b: &HitResponse) -> bool {
+    a.first_hz == b.first_hz && a.step_hz == b.step_hz && a.per_newton[0].len() == b.per_newton[0].len()
+}
+
+/// The hits that have the lines of the first.
+fn alike<'a>(hits: &[&'a HitResponse]) -> Vec<&'a HitResponse> {
+    hits.iter().filter(|hit| same_lines(hit, hits[0])).copied().collect()
+}
+
+/// By how much each hit of a cell differs from their mean in one band of one signal: the projection on what is `usual` at this impact, over
+/// that. Hits of other cells say what is usual: a hit's own noise would be larger per newton the softer it is, and look like slip.
+fn apart(
+    hits: &[&HitResponse],
+    usual: &[&HitResponse],
+    signal: usize,
+    [low, high]: [f64; 2],
+) -> Vec<Complex<f64>> {
     let first = hits[0];
     let inside = (0..first.per_newton[0].len())
         .filter(|l| (low..high).contains(&(first.first_hz + first.step_hz * *l as f64)));
@@ -244,13 +288,16 @@ fn apart(hits: &[&HitResponse], signal: usize, [low, high]: [f64; 2]) -> Vec<Com
         3 => hit.per_newton[1][l] - hit.per_newton[2][l],
         own => hit.per_newton[own][l],
     };
+    let mean = |of: &[&HitResponse], l: usize| {
+        of.iter().map(|h| value(h, l)).sum::<Complex<f64>>() / of.len() as f64
+    };
     let mut sums = vec![Complex::default(); hits.len()];
     let mut strength = 0.0;
     for l in inside {
-        let mean = hits.iter().map(|h| value(h, l)).sum::<Complex<f64>>() / hits.len() as f64;
-        strength += mean.norm_sqr();
+        let (own, usual) = (mean(hits, l), mean(usual, l));
+        strength += usual.norm_sqr();
         for (sum, hit) in sums.iter_mut().zip(hits) {
-            *sum += (value(hit, l) - mean) * mean.conj();
+            *sum += (value(hit, l) - own) * usual.conj();
         }
     }
     sums.into_iter().map(|s| s / strength).collect()

@@ -44,6 +44,13 @@ impl Plan {
             at,
             "force.tolerance must lie between 0 and 1",
         )?;
+        require(
+            force.softer.is_none_or(|part| {
+                part < 1.0 && part * force.target_n * (1.0 - force.tolerance) > self.limits.get_ref().weak_n
+            }),
+            at,
+            "force.softer must be below 1, and its hits must stay above limits.weak_n",
+        )?;
         let [shortest, longest] = force.pulse_bounds_us;
         require(
             shortest > 0

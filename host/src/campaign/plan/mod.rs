@@ -106,6 +106,8 @@ pub struct Hits {
 pub struct Force {
     /// Peak force wanted, N.
     pub target_n: f64,
+    /// Part of it that every second good hit of a cell is to have: hits of two forces tell whether the contact slips. Without it all are alike.
+    pub softer: Option<f64>,
     /// Part of the target within which the pulse is left alone.
     pub tolerance: f64,
     /// First coil pulse, µs.

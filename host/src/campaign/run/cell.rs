@@ -43,7 +43,10 @@ impl Runner<'_> {
                 break;
             }
             let known = again.front().map(|known| (known.id, known.crc, known.shot.pulse_us));
-            let pulse_us = known.map_or(self.pulse.pulse_us(), |(_, _, pulse_us)| pulse_us);
+            let pulse_us = known.map_or_else(
+                || self.forces.pulse_us(self.tally.kept_in(row.id)),
+                |(_, _, pulse_us)| pulse_us,
+            );
             self.mark()?;
             let outcome = self.shooter.shoot(self.session, pulse_us, &quiet, &self.options.stop)?;
             if let (Some((record, stored, _)), Some(crc)) = (known, crc_of(&outcome)) {

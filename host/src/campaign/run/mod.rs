@@ -1,7 +1,8 @@
 //! A campaign under way: cell after cell with the hammer ([`runner`]), level after level with the shaker ([`shaking`]).
 //!
 //! `runner.rs` walks the cells and keeps what comes, `cell.rs` brings one cell to its end, `shot.rs` fires once, `stage.rs` moves hammer and
-//! laser, `fit.rs` asks before all that whether the device fits the plan.
+//! laser, `forces.rs` says how hard (by the closed loops of `pulse.rs`),
+//! `fit.rs` asks before all that whether the device fits the plan.
 
 mod cell;
 mod clock;
@@ -9,6 +10,7 @@ mod directions;
 mod earlier;
 pub mod error;
 mod fit;
+mod forces;
 mod keeper;
 mod progress;
 pub mod pulse;

@@ -22,7 +22,7 @@ const REACH: f64 = 0.12;
 const SLOPES: (f64, f64) = (0.5, 8.0);
 
 /// The slope assumed before there is one to measure.
-const FIRST_SLOPE: f64 = 3.0;
+pub(super) const FIRST_SLOPE: f64 = 3.0;
 
 /// A peak this far (ln) from what the same pulse gave before is an accident of the bolt and no news of the coil, unless the next
 /// one is as far off.
@@ -127,8 +127,13 @@ impl PulseLoop {
 mod tests {
     use super::*;
 
-    const FORCE: Force =
-        Force { target_n: 50.0, tolerance: 0.05, pulse_us: 3_000, pulse_bounds_us: [500, 8_000] };
+    const FORCE: Force = Force {
+        target_n: 50.0,
+        softer: None,
+        tolerance: 0.05,
+        pulse_us: 3_000,
+        pulse_bounds_us: [500, 8_000],
+    };
 
     fn settle(peak: impl Fn(u32, usize) -> f64) -> Vec<Hit> {
         let mut pulse = PulseLoop::new(&FORCE, 8_000);

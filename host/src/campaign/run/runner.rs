@@ -14,9 +14,10 @@ use super::clock::ScanClock;
 use super::earlier::Earlier;
 use super::error::RunError;
 use super::fit::check_fit;
+use super::forces::Forces;
 use super::keeper::Keeper;
 use super::progress::Progress;
-use super::pulse::{Hit, PulseLoop};
+use super::pulse::Hit;
 use super::shot::Shooter;
 use super::stage::Stage;
 use super::tally::Tally;
@@ -92,9 +93,9 @@ pub fn run(
     }
     let (cells, records) = (store.cells()?, store.records()?);
     let tally = Tally::new(&cells, &records);
-    let mut pulse = PulseLoop::new(plan.force.get_ref(), info.coil_cap_us);
+    let mut forces = Forces::new(plan.force.get_ref(), info.coil_cap_us);
     for record in records.iter().flatten() {
-        pulse.learn(Hit { pulse_us: record.shot.pulse_us, peak_n: record.peak_n });
+        forces.learn(Hit { pulse_us: record.shot.pulse_us, peak_n: record.peak_n });
     }
     session.set_load_cells([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])?;
     let (epoch, _) = session.start(channels.len())?;
@@ -111,7 +112,7 @@ pub fn run(
         session,
         judge,
         shooter,
-        pulse,
+        forces,
         clock: ScanClock::new(f64::from(channels.rate_hz), block),
         keeper: Keeper::start(store),
         session_id: id,
@@ -134,7 +135,7 @@ pub(super) struct Runner<'a> {
     pub(super) session: &'a mut Session,
     pub(super) judge: &'a mut dyn Judge,
     pub(super) shooter: Shooter,
-    pub(super) pulse: PulseLoop,
+    pub(super) forces: Forces,
     pub(super) clock: ScanClock,
     pub(super) keeper: Keeper,
     pub(super) session_id: i64,
@@ -197,7 +198,7 @@ impl Runner<'_> {
         self.mark()?;
         self.hits += 1;
         let shot = recording.shot;
-        self.pulse.learn(Hit { pulse_us: shot.pulse_us, peak_n: verdict.peak_n });
+        self.forces.learn(Hit { pulse_us: shot.pulse_us, peak_n: verdict.peak_n });
         let attempt = self.tally.add(row.id, verdict.kind == Kind::Good);
         self.progress.judged(&row.cell, &verdict, self.tally.kept(), self.left(row));
         log::debug!("{:?} attempt {attempt}: {} ({})", row.cell, verdict.kind, verdict.sentence);

@@ -216,10 +216,14 @@ fn series_compliance(found: &SeriesCompliance) -> Check {
 pub fn hammer_slip(found: &HammerSlip) -> Check {
     let meaning = match found {
         HammerSlip::Slips(scaling) => format!(
-            "The contact slips under the hammer: what it answers per newton depends on how hard it is hit ({} times what scatter explains; 1 % more force changes T \
-             per newton by {} %). What the hits say of stiffness is no k_T: hit more gently, or load the contact more.",
-            short(scaling.variance_ratio),
-            short(scaling.change_per_force)
+            "The contact slips under the hammer: what it answers per newton depends on how hard it is hit: 1 % more force changes T per newton by \
+             {} %, which {}. What the hits say of stiffness is no k_T: hit more gently, or load the contact more.",
+            short(scaling.change_per_force),
+            if scaling.chance < 1e-6 {
+                "is no accident".into()
+            } else {
+                format!("one stuck campaign of {:.0} would show by chance", scaling.chance.recip())
+            }
         ),
         HammerSlip::Sticks(scaling) => format!(
             "The contact sticks under the hammer: over {} hits whose forces scatter by {} %, T and the specimens' motions per newton do not depend on the force (T by \
@@ -242,7 +246,7 @@ pub fn hammer_slip(found: &HammerSlip) -> Check {
         HammerSlip::Slips(scaling) | HammerSlip::Sticks(scaling) => check
             .with("change_per_force", scaling.change_per_force)
             .with("change_per_force_std", scaling.std)
-            .with("variance_ratio", scaling.variance_ratio)
+            .with("chance", scaling.chance)
             .with("force_scatter", scaling.force_scatter)
             .with("peak_tangential_n", scaling.peak_tangential_n),
         HammerSlip::CannotTell(_) => check,
