@@ -80,7 +80,7 @@ const HEADS: [&str; 10] = [
     "k_eq ± σ, N/µm",
     "peak secant, N/µm",
     "energy ± σ, µJ",
-    "phase, °",
+    "Δx lags T, °",
     "cycles",
 ];
 
