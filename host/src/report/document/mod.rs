@@ -9,7 +9,7 @@ mod source_from_findings;
 
 pub use compared_from_results::compare;
 
-use super::words::{check_sentences, missing_sentences};
+use super::words::{check_sentences, missing_sentences, side_by_side};
 use crate::analyse::Findings;
 use crate::results::{Results, VERSION};
 
@@ -59,6 +59,7 @@ pub fn document(found: Findings) -> Results {
         results.backbones = contact.backbones;
         results.impact_slopes = contact.impacts.map_or_else(Vec::new, |impacts| impacts.slopes);
     }
+    results.side_by_side = side_by_side::kinds(&results);
     results
 }
 

@@ -1,6 +1,6 @@
 //! The matrix of cells: what was kept of what was wanted.
 
-use crate::report::figure::{Axis, Figure, Height, Mark, Packed, Panel, Role, Shape};
+use crate::report::figure::{Axis, Figure, Height, How, Mark, Packed, Panel, Role, Shape};
 use crate::results::{CellRow, Results};
 use crate::structure::Structure;
 
@@ -38,7 +38,13 @@ pub fn cells(results: &Results) -> Option<Figure> {
         let panel = Panel::new(Axis::named("impact", impacts), Axis::named("response", responses))
             .titled(format!("{configuration}: {} cells", own.len()))
             .high(Height::Usual)
-            .with(Mark::new(Role::BetweenArms, shape));
+            .with(Mark::new(Role::BetweenArms, shape).from_two(
+                "values",
+                "/cells/cells/*/kept",
+                How::Per,
+                "/cells/cells/*/wanted",
+                1.0,
+            ));
         figure = figure.with(panel);
     }
     (!figure.panels.is_empty()).then_some(figure)

@@ -13,14 +13,15 @@ struct Row {
     median: Option<f64>,
     role: Role,
     believed: bool,
-    path: &'static str,
+    path: String,
+    median_path: String,
 }
 
 /// Mean and scatter of k_z over the main band, by method: of those that identified it, or of all where none did.
 pub fn comparison(results: &Results) -> Option<Figure> {
     let mut rows: Vec<Row> = quoted(results).into_iter().collect();
-    let of_band = |j: &&Joint| j.band_hz == MAIN_BAND || j.method == DIRECT;
-    rows.extend(results.joint.iter().filter(of_band).filter_map(row));
+    let of_band = |j: &Joint| j.band_hz == MAIN_BAND || j.method == DIRECT;
+    rows.extend(results.joint.iter().enumerate().filter(|(_, j)| of_band(j)).filter_map(|(i, j)| row(i, j)));
     let all = rows.len();
     // methods that failed would stretch the axis and tell nothing: the table has them
     if rows.iter().any(|row| row.believed) {
@@ -46,13 +47,13 @@ pub fn comparison(results: &Results) -> Option<Figure> {
                 Mark::points(role, marker, [[row.mean, y]])
                     .barred("x", [[row.mean - row.std, row.mean + row.std]])
                     .saying(vec![row.label.clone()])
-                    .from("x", row.path, 1.0 / MICRO),
+                    .scatter("x", &row.path, 1.0 / MICRO),
             );
         }
         if let Some(median) = row.median.filter(|m| range[0] < *m && *m < range[1]) {
             panel.marks.push(Mark::points(role, Marker::Stroke, [[median, y]]).from(
                 "x",
-                "/joint/*/stiffness_n_per_m/z/median",
+                row.median_path.clone(),
                 1.0 / MICRO,
             ));
         }
@@ -68,7 +69,7 @@ pub fn comparison(results: &Results) -> Option<Figure> {
     Some(Figure::new("comparison", "", "Every method side by side", say).across(2).with(panel))
 }
 
-fn row(joint: &Joint) -> Option<Row> {
+fn row(index: usize, joint: &Joint) -> Option<Row> {
     let k = joint.sliding_stiffness()?;
     let modes = if joint.idms == 0 { String::new() } else { format!(", {} IDMs", joint.idms) };
     Some(Row {
@@ -78,7 +79,8 @@ fn row(joint: &Joint) -> Option<Row> {
         median: Some(micro(k.median)),
         role: if joint.method == DIRECT { Role::Loops } else { Role::modes(joint.idms) },
         believed: joint.identified(),
-        path: "/joint/*/stiffness_n_per_m/z/mean",
+        path: format!("/joint/{index}/stiffness_n_per_m/z/mean"),
+        median_path: format!("/joint/{index}/stiffness_n_per_m/z/median"),
     })
 }
 
@@ -93,6 +95,7 @@ fn quoted(results: &Results) -> Option<Row> {
         median: None,
         role: Role::BetweenArms,
         believed: true,
-        path: "/recommended/*/joint/z/stiffness",
+        path: "/recommended/*/joint/z/stiffness".into(),
+        median_path: String::new(),
     })
 }

@@ -103,12 +103,22 @@ fn line(curve: &FrfCurve, index: usize, kind: Kind) -> Option<Mark> {
         format!("/frfs/{index}/{field}/*"),
         1.0,
     );
+    let mark = placed(mark, index);
     (curve.magnitude_m_per_n.len() > 1).then(|| mark.named(format!("{} from {}", curve.output, curve.input)))
 }
 
 /// Where the lines of an FRF lie.
 pub(super) fn along(curve: &FrfCurve, count: usize) -> Along {
     Along::Regular { first: curve.first_hz, step: curve.step_hz, count }
+}
+
+/// A curve with where its frequencies stand.
+pub(super) fn placed(mark: Mark, index: usize) -> Mark {
+    mark.from("first", format!("/frfs/{index}/first_hz"), 1.0).from(
+        "step",
+        format!("/frfs/{index}/step_hz"),
+        1.0,
+    )
 }
 
 /// A gap wherever the phase jumps from one edge to the other, instead of a line across the whole frame.

@@ -4,6 +4,7 @@ use super::figure_html;
 use super::text::{Html, escaped};
 use crate::report::figure::Figure;
 use crate::report::figures::{Chapter, Entry};
+use crate::report::words::line::Line;
 use crate::report::words::{self, answer_sentences, brief};
 use crate::results::Results;
 
@@ -21,7 +22,7 @@ pub fn answer(html: &mut Html, results: &Results, drawn: &[(&Entry, Option<Figur
             ]
             .into_iter()
             .flatten()
-            .map(|text| brief::Line { head: String::new(), text }),
+            .map(Line::words),
         );
     }
     if lines.is_empty() {
@@ -33,13 +34,15 @@ pub fn answer(html: &mut Html, results: &Results, drawn: &[(&Entry, Option<Figur
             if !line.head.is_empty() {
                 html.raw(&format!("<strong>{}</strong> ", escaped(&line.head)));
             }
-            html.text(&line.text);
+            told(html, line);
             html.raw("</p>");
         }
         html.raw("</div>");
     }
     if let Some(why) = answer_sentences::why_they_differ(results) {
-        html.element("p class=\"differ\"", &why);
+        html.raw("<p class=\"differ\">");
+        told(html, &why);
+        html.raw("</p>");
     }
     failed(html, results);
     html.raw("</div>");
@@ -49,6 +52,19 @@ pub fn answer(html: &mut Html, results: &Results, drawn: &[(&Entry, Option<Figur
         }
     }
     html.raw("</section>");
+}
+
+/// A line's text, in which each number says where it stands in `results.json`.
+fn told(html: &mut Html, line: &Line) {
+    let mut rest = escaped(&line.text);
+    for (shown, place) in &line.numbers {
+        let shown = escaped(shown);
+        let Some(at) = rest.find(&shown) else { continue };
+        html.raw(&rest[..at]);
+        html.raw(&format!("<span data-path=\"{}\">{shown}</span>", escaped(place)));
+        rest = rest.split_off(at + shown.len());
+    }
+    html.raw(&rest);
 }
 
 fn failed(html: &mut Html, results: &Results) {

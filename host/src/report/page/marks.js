@@ -88,6 +88,14 @@ function drawMark(pen,mark,sx,sy,box,look){
       }
     }
   }
+  else if(m=mark.cells){
+    const columns=Math.round(mark.columns);
+    m.values.forEach((v,i)=>{
+      if(!Number.isFinite(v))return;
+      const column=i%columns,row=Math.floor(i/columns),x=sx(column-.46),y=[sy(row-.44),sy(row+.44)];
+      pen.rect(x,Math.min(...y),sx(column+.46)-x,Math.abs(y[1]-y[0]),look.colour,.06+.94*Math.min(Math.max(v,0),1));
+    });
+  }
   else if(m=mark.level){const y=sy(m.at),[a,b]=m.between?m.between.map(sx):[box.left,box.right];pen.path([[a,y],[b,y]],look)}
   else if(m=mark.upright){const x=sx(m.at);pen.path([[x,box.top],[x,box.bottom]],look)}
   else if(m=mark.shade){

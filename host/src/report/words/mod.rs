@@ -5,6 +5,7 @@ pub mod brief;
 pub(super) mod check_sentences;
 pub(super) mod comparison_sentences;
 pub(super) mod level_sentences;
+pub mod line;
 pub(super) mod missing_sentences;
 mod names;
 pub mod number;

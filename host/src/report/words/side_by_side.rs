@@ -4,22 +4,9 @@ use super::names::{BETWEEN_SPOTS, slope};
 use super::number::{band, count, decimals, short};
 use crate::results::{
     DIRECT, Excitation, Force, HIDDEN_RESONANCE, Hysteresis, MAIN_BAND, OverCycles, Results,
-    SERIES_COMPLIANCE, Shape,
+    SERIES_COMPLIANCE, Shape, SideBySide as Kind,
 };
 use crate::substructuring::{Dof, fit};
-
-/// One kind of stiffness.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Kind {
-    /// How it was found.
-    pub found: String,
-    /// Mean and scatter, N/m.
-    pub mean_n_per_m: f64,
-    /// See `mean_n_per_m`.
-    pub std_n_per_m: f64,
-    /// What it is, and what it may be used for.
-    pub meaning: String,
-}
 
 /// Which cycle of the decay stands for the later ones, as in the paper.
 const LATER_CYCLE: usize = 4;
