@@ -45,6 +45,9 @@ pub fn document(found: Findings) -> Results {
         results.joint_spectrum = joint_from_findings::spectrum(of_frfs);
     }
     for measured in found.configurations {
+        if let Some(from) = measured.imported.as_ref().filter(|_| measured.records.is_empty()) {
+            results.missing.push(missing_sentences::imported(measured.configuration, &from.file));
+        }
         results.usable_bands.extend(measured.usable_band);
         results.frfs.extend(measured.frfs);
         // the assembly comes last, and counts

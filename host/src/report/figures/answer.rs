@@ -4,7 +4,7 @@ use super::{MICRO, below_name};
 use crate::contact::Interval;
 use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role};
 use crate::report::words::number::{decimals, micro, short, stiffness};
-use crate::results::{Excitation, Force, HIDDEN_RESONANCE, Hysteresis, Results};
+use crate::results::{Excitation, Force, HIDDEN_RESONANCE, Hysteresis, Results, Shape};
 use crate::substructuring::Dof;
 
 struct Row {
@@ -144,13 +144,10 @@ fn headline(results: &Results) -> Option<Row> {
 /// The levels' straight loops from the softest to the stiffest.
 fn levels(results: &Results) -> Option<Row> {
     let straight = |h: &&Hysteresis| h.kind == Excitation::Shaker && h.force == Force::Raw;
-    let mut found: Vec<f64> = results
-        .hysteresis
-        .iter()
-        .filter(straight)
-        .filter_map(Hysteresis::stick_slope)
-        .map(|k| micro(k.mean))
-        .collect();
+    let slipping = |h: &Hysteresis| matches!(h.shape, Shape::Microslip | Shape::GrossSlip);
+    let rows = || results.hysteresis.iter().filter(straight);
+    let slips = rows().any(|h| h.stick_slope().is_some() && slipping(h));
+    let mut found: Vec<f64> = rows().filter_map(Hysteresis::stick_slope).map(|k| micro(k.mean)).collect();
     found.sort_by(f64::total_cmp);
     let (low, high) = (*found.first()?, *found.last()?);
     let campaign = results.source.kind == "campaign";
@@ -158,7 +155,8 @@ fn levels(results: &Results) -> Option<Row> {
         label: if found.len() == 1 {
             format!("the shaker's loop: {} N/µm", short(low))
         } else {
-            format!("{} straight shaker loops: {}…{} N/µm", found.len(), short(low), short(high))
+            let which = if slips { "shaker loops, where they stick" } else { "straight shaker loops" };
+            format!("{} {which}: {}…{} N/µm", found.len(), short(low), short(high))
         },
         role: Role::Loops,
         mean: found[found.len() / 2],

@@ -43,7 +43,7 @@ fn panel(cells: &Cells, configuration: &str, range: [f64; 2]) -> Option<Panel> {
     let y = Axis::linear("cell", "", [-0.5, own.len() as f64 - 0.5]);
     Some(
         Panel::new(Axis::frequency(Spread::Log, range), y)
-            .titled(format!("{configuration}: {} cells", own.len()))
+            .titled(super::cells::counted(configuration, own.len()))
             .high(Height::Tall)
             .with(mark),
     )

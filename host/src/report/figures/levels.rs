@@ -68,7 +68,8 @@ fn axis(
         return Some(Axis { scale: Spread::Log, ..Axis::linear(quantity, unit, range) });
     }
     let [low, high] = middle_range(values, 1.0, 0.12)?;
-    let high = if high > low { high } else { 1.2 * high };
+    // a single place stands in the middle
+    let [low, high] = if high > low { [low, high] } else { [0.8 * low, 1.2 * high] };
     Some(Axis::linear(quantity, unit, [low.max(0.0), high]))
 }
 

@@ -109,7 +109,12 @@ pub const ALL: &[Entry] = &[
         backbone::backbone,
     ),
     entry(Chapter::Loops, "FRFs at the contact", IMPACTS, specimens::specimens),
-    entry(Chapter::Loops, "The decay put together from two sinusoids", IMPACTS, rebuilt::rebuilt),
+    entry(
+        Chapter::Loops,
+        "The decay put together from two sinusoids",
+        "hits on the assembly in which a resonance of one specimen hides",
+        rebuilt::rebuilt,
+    ),
     entry(Chapter::Frfs, "Receptances", "records of hits, or imported FRFs", receptances::receptances),
     entry(
         Chapter::Frfs,

@@ -31,10 +31,14 @@ pub fn receptances(results: &Results) -> Option<Figure> {
         "receptances",
         "",
         "Receptances of A, B and the assembly",
-        "By H1, with phase and coherence, at a driving point and across. The main band is shaded yellow; grey, where the hammer's force is more than 6 dB down.",
+        "With phase and coherence as far as it is known, at a driving point and across. The main band is shaded yellow; grey, where the hammer's force is more than 6 dB down.",
     )
     .across(configurations.len());
+    let heard = indexed().any(|(_, c)| !c.coherence.is_empty());
     for kind in [Kind::Magnitude, Kind::Phase, Kind::Coherence] {
+        if kind == Kind::Coherence && !heard {
+            continue;
+        }
         for name in &configurations {
             let x = Axis::frequency(Spread::Log, frequencies);
             let mut panel = Panel::new(x, kind.axis(magnitudes)).high(kind.height());

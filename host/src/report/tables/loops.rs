@@ -47,10 +47,12 @@ pub fn decay(results: &Results) -> Option<String> {
         let at = |field: &str| format!("/hysteresis/{row}/decay/{i}/{field}");
         let tells = if k.std > UNSTEADY * k.mean.abs() {
             "differs from hit to hit: the decaying modes' phases decide"
+        } else if step.phase_deg.abs() > said::TURNED_DEG {
+            "the loop has turned"
         } else if step.cycle == 1 {
             "nearest to the contact's own line"
         } else {
-            "the loop has turned"
+            "near a straight line"
         };
         table.row([
             words(step.cycle.to_string()),

@@ -101,6 +101,11 @@ pub fn slipping() -> String {
     "The contact slips under the hammer, so that its stiffness depends on the force: hit more softly, or press harder, for the stuck stiffness.".into()
 }
 
+/// What lies between the arms cannot be looked for.
+pub fn without_all_three() -> String {
+    "It needs FRFs of A, B and the assembly.".into()
+}
+
 /// The question was not put.
 pub fn not_looked_for() -> String {
     "It was not looked for.".into()

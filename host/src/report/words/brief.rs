@@ -1,7 +1,7 @@
 //! The answer in a few lines, for those who will read no more: the first screen and the end of the terminal's output.
 
 use super::answer_sentences::{why_they_differ, with_interval};
-use super::line::{BETWEEN, CLAMP, CONTACT, Line};
+use super::line::{BETWEEN, CLAMP, CONTACT, Line, TRUTH, UNKNOWN};
 use super::number::{decimals, micro, short};
 use crate::results::{
     BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, Results, SAME_IN_ALL,
@@ -38,13 +38,13 @@ pub fn answer(results: &Results) -> Vec<Line> {
     let own = &answer.contact;
     let mut lines = vec![match &own.k_t_n_per_m {
         Some(k) => line("k_T of the contact:", format!("{}.", with_interval(k))).interval(k, CONTACT),
-        None => line("k_T of the contact:", format!("not known. {}", own.why)),
+        None => line("k_T of the contact:", format!("{UNKNOWN} {}", own.why)),
     }];
     lines.push(match &answer.between_arms.k_n_per_m {
         Some(k) => {
             line("Between the arms:", format!("{}, which is not k_T.", with_interval(k))).interval(k, BETWEEN)
         }
-        None => line("Between the arms:", format!("not known. {}", answer.between_arms.why)),
+        None => line("Between the arms:", format!("{UNKNOWN} {}", answer.between_arms.why)),
     });
     if let Some(clamp) = &answer.clamp {
         let k = &clamp.k_n_per_m;
@@ -56,7 +56,7 @@ pub fn answer(results: &Results) -> Vec<Line> {
         let clamps =
             truth.clamps_k_n_per_m.map_or(String::new(), |k| format!(", clamps {}", short(micro(k))));
         let told = line(
-            "SIMULATED rig, its truth:",
+            TRUTH,
             format!(
                 "contact {}{clamps}, between the arms {} N/µm.",
                 short(micro(truth.contact_k_t_n_per_m)),

@@ -3,6 +3,12 @@
 use super::number::{micro, short};
 use crate::contact::Interval;
 
+/// How a line begins that has no number.
+pub const UNKNOWN: &str = "not known.";
+
+/// What the truth of a simulated rig is announced by.
+pub const TRUTH: &str = "SIMULATED rig, its truth:";
+
 /// Where the answers stand.
 pub const CONTACT: &str = "/answer/contact/k_t_n_per_m";
 /// See [`CONTACT`].
@@ -22,6 +28,11 @@ pub struct Line {
 }
 
 impl Line {
+    /// Whether it tells a simulated rig's truth, which nobody measured.
+    pub fn is_truth(&self) -> bool {
+        self.head == TRUTH
+    }
+
     /// Words without a head and without numbers that stand elsewhere.
     pub fn words(text: String) -> Self {
         Line { head: String::new(), text, numbers: Vec::new() }

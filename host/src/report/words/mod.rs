@@ -13,5 +13,5 @@ pub mod side_by_side;
 mod summary;
 pub(super) mod warning_sentences;
 
-pub use names::{excitation, method, outcome, shape_name, slope, static_arm};
+pub use names::{TURNED_DEG, excitation, method, outcome, shape_name, slope, static_arm};
 pub use summary::{bootstrapped, impact_loops, levels_at_the_contact, shaker_loops, substructuring, summary};

@@ -114,11 +114,16 @@ fn shaker(results: &Results, force: Force) -> Vec<Kind> {
                 found: format!("{name}, shaker, {} Hz, {levels}", short(f)),
                 mean_n_per_m: mean,
                 std_n_per_m: std,
-                meaning: own.first().map_or(String::new(), |h| meaning(h, results)),
+                // one that slips tells what all of them are: slopes of stick parts
+                meaning: own.iter().max_by_key(|h| slips(h)).map_or(String::new(), |h| meaning(h, results)),
             });
         }
     }
     kinds
+}
+
+fn slips(row: &Hysteresis) -> bool {
+    matches!(row.shape, Shape::Microslip | Shape::GrossSlip)
 }
 
 fn meaning(row: &Hysteresis, results: &Results) -> String {
