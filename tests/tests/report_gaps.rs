@@ -63,8 +63,12 @@ fn reported(browser: &mut Browser, file: &Path) -> Said {
         assert_eq!(page.requests(), Vec::<String>::new(), "{}: {look:?}", file.display());
         let wide = page.eval("document.documentElement.scrollWidth").as_u64().unwrap();
         assert!(wide <= u64::from(look.width), "{}: {look:?}: {wide} px wide", file.display());
-        words =
-            page.eval("document.querySelector('main').textContent").as_str().unwrap().replace('\u{a0}', " ");
+        words = page
+            .eval("document.querySelector('main').textContent")
+            .as_str()
+            .unwrap()
+            .replace('\u{a0}', " ")
+            .replace('\u{2060}', "");
         figures = page.eval("report.FIGURES.map(f => f.name)");
     }
     let missing = results["missing"].as_array().into_iter().flatten();

@@ -34,8 +34,28 @@ pub fn comparison(results: &Results) -> Option<Figure> {
     let high = rows.iter().map(|r| r.mean + r.std).fold(0.0, f64::max);
     let low = rows.iter().map(|r| r.mean).fold(0.0, f64::min);
     let range = [1.1 * low, 1.1 * high.max(-0.1 * low)];
+    // many rows stand in two columns on the same axis
+    let per_panel = if rows.len() > TALLEST { rows.len().div_ceil(2) } else { rows.len() };
+    let panels = rows.chunks(per_panel).map(|rows| panel(rows, range));
+    let say = format!(
+        "Mean (point), scatter (bar) and median (stroke) of k_z over the lines of the main band, 300–600 Hz, of the methods that identified a stiffness. {}",
+        if failed > 0 {
+            format!("{failed} others did not; the table of methods says why.")
+        } else {
+            String::new()
+        }
+    );
+    let mut figure = Figure::new("comparison", "", "Every method side by side", say).across(2);
+    figure.panels.extend(panels);
+    Some(figure)
+}
+
+/// More rows than these are too many for one column.
+const TALLEST: usize = 10;
+
+fn panel(rows: &[Row], range: [f64; 2]) -> Panel {
     let names = rows.iter().map(|r| r.label.clone()).collect();
-    let x = Axis::linear("k_z", "N/µm", range);
+    let x = Axis::linear("k_z", "N/µm", range).linked("every-method");
     let mut panel = Panel::new(x, Axis::named("", names)).high(Height::Rows);
     for (i, row) in rows.iter().enumerate() {
         let y = below_name(i);
@@ -58,15 +78,7 @@ pub fn comparison(results: &Results) -> Option<Figure> {
             ));
         }
     }
-    let say = format!(
-        "Mean (point), scatter (bar) and median (stroke) of k_z over the lines of the main band, 300–600 Hz, of the methods that identified a stiffness. {}",
-        if failed > 0 {
-            format!("{failed} others did not; the table of methods says why.")
-        } else {
-            String::new()
-        }
-    );
-    Some(Figure::new("comparison", "", "Every method side by side", say).across(2).with(panel))
+    panel
 }
 
 fn row(index: usize, joint: &Joint) -> Option<Row> {

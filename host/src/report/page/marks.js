@@ -104,8 +104,9 @@ function drawMark(pen,mark,sx,sy,box,look){
   }else if((m=mark.ring)||(m=mark.text)){
     const x=sx(m.at[0]),y=sy(m.at[1]),k=pen.k;
     if(x<box.left||x>box.right||y<box.top||y>box.bottom)return;
-    if(mark.ring)pen.circle(x,y,9*k,null,look.colour);
-    const beside=mark.ring?13*k:0,end=x+beside+6.6*k*m.text.length>box.right;
-    pen.text(end?x-beside:x+beside,Math.max(mark.ring?y-8*k:y,box.top+12*k),m.text,end?'end':'start','ink',12.5);
+    // above the ring: curves leave it sideways
+    if(mark.ring){pen.circle(x,y,9*k,null,look.colour);pen.text(x,Math.max(y-14*k,box.top+12*k),m.text,'middle','ink',12.5);return}
+    const end=x+6.6*k*m.text.length>box.right;
+    pen.text(x,Math.max(y,box.top+12*k),m.text,end?'end':'start','ink',12.5);
   }
 }
