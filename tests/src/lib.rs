@@ -8,5 +8,6 @@ pub mod browser;
 pub mod campaign;
 pub mod command;
 pub mod drawn_campaigns;
+pub mod origins;
 pub mod rigs;
 pub mod slip_truth;

@@ -5,7 +5,9 @@ use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use jointrig_tests::browser::{Browser, Look, Page};
 use jointrig_tests::command::jointrig;
+use jointrig_tests::origins;
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
@@ -163,6 +165,51 @@ fn names_can_be_hidden_and_the_light_switched() {
 }
 
 #[test]
+fn drawings_are_taken_away_whole_and_axes_change_their_spread() {
+    let mut browser = Browser::start();
+    let mut page = browser.open(&report(), Look::DESK);
+    let count = |page: &mut Page<'_>, name: &str, mark: &str| {
+        page.eval(&format!("report.svgOf(report.FIGURES.find(f => f.name === '{name}'), document.getElementById('fig-{name}')).split('{mark}').length - 1"))
+            .as_u64()
+            .unwrap()
+    };
+    // the paper, and a square for each of 276 cells, or each pair of six values and six motions
+    assert!(count(&mut page, "cells", "<rect") > 276 && count(&mut page, "participation", "<rect") > 36);
+    assert!(count(&mut page, "geometry", "<circle") >= 21 && count(&mut page, "geometry", ">AZ1<") == 1);
+
+    middle(&mut page, "noise-floor");
+    let spread = "(k => { [...document.querySelectorAll('#fig-noise-floor .tools button')].find(b => b.textContent === k).click(); const c = report.alive.get('noise-floor')[0]; return [c.panel.y.scale, c.plot.scales.y.distr, c.view.y[0]] })('log y')";
+    let even = page.eval(spread);
+    assert_eq!([&even[0], &even[1], &even[2]], ["linear".into(), Value::from(1), 0.into()].each_ref());
+    let log = page.eval(spread);
+    assert_eq!([&log[0], &log[1]], ["log".into(), Value::from(3)].each_ref());
+
+    let [x, y] = middle(&mut page, "interface-modes");
+    page.drag([x - 9.0, y], [x - 8.0, y]);
+    let said = page.eval("document.querySelector('#fig-interface-modes .readout').textContent");
+    assert!(said.as_str().unwrap().contains("singular value"), "{said}");
+    let motion = page.eval("Math.max(...report.arms().motion)");
+    assert_eq!(motion, 1, "the arms move as far as there is room");
+    assert_eq!(page.errors(), Vec::<String>::new());
+}
+
+#[test]
+fn terms_are_linked_to_their_meaning_once() {
+    let mut browser = Browser::start();
+    let mut page = browser.open(&report(), Look::DESK);
+    let links = page.eval("[...document.querySelectorAll('a.word')].map(a => [a.getAttribute('href').slice(1), document.getElementById(a.getAttribute('href').slice(1))?.nextElementSibling?.textContent || ''])");
+    let links = links.as_array().unwrap();
+    let linked: BTreeSet<&str> = links.iter().map(|l| l[0].as_str().unwrap()).collect();
+    assert_eq!(linked.len(), links.len(), "a term is linked twice: {links:?}");
+    assert!(links.iter().all(|l| l[1].as_str().unwrap().len() > 9), "{links:?}");
+    for word in ["kT", "keq", "T", "Δx", "FBS", "IDM", "virtual-point", "internals", "CMIF", "coherence"] {
+        let word = format!("word-{}", word.to_ascii_lowercase());
+        assert!(linked.contains(word.as_str()), "{word} is not among {linked:?}");
+    }
+    assert_eq!(page.eval("document.body.innerText.includes('`')"), false);
+}
+
+#[test]
 fn twenty_thousand_zooms_break_nothing() {
     let mut browser = Browser::start();
     let mut page = browser.open(&report(), Look::DESK);
@@ -209,85 +256,61 @@ fn without_scripts_and_on_paper_nothing_is_lost() {
     assert!((4..=30).contains(&(pages - trees)), "{} pages", pages - trees);
 }
 
-/// Every number that says where it stands in results.json stands there, and so does every curve of every figure.
+/// Every number that says where it stands in results.json stands there; so does every number of a table, and of the first screen.
 #[test]
 fn every_number_is_found_in_the_results() {
-    let results: Value =
-        serde_json::from_str(&std::fs::read_to_string(campaign().join("results.json")).unwrap()).unwrap();
+    let results = results();
     let mut browser = Browser::start();
     let mut page = browser.open(&report(), Look::DESK);
-    let told =
-        page.eval("[...document.querySelectorAll('[data-path]')].map(e => [e.dataset.path, e.textContent])");
-    let told = told.as_array().unwrap();
-    assert!(told.len() > 200, "{} numbers", told.len());
-    for one in told {
-        let (path, text) = (one[0].as_str().unwrap(), one[1].as_str().unwrap());
-        let value = results
-            .pointer(path)
-            .unwrap_or_else(|| panic!("{path} is not in results.json"))
-            .as_f64()
-            .unwrap_or_else(|| panic!("{path} is no number"));
-        assert!(agrees(value, text), "{path}: {value} is shown as {text}");
-    }
-    // a curve's points, by their pattern of paths, to six digits
-    let curves = page.eval(
-        "(() => { const out = []; for (const f of report.FIGURES) { report.enliven(document.getElementById('fig-' + f.name), f);
-            for (const p of f.panels) for (const m of p.marks) for (const o of m.origin || []) {
-              const s = m.line || m.loop || m.points || m.cells || m.strips, list = o.of === 'low' ? s.bars.low : s[o.of];
-              out.push([f.name, o.path, o.factor, [...list].filter((v, i) => Number.isFinite(v) && i % 37 === 0).slice(0, 60)]); } } return out })()",
+    let told = page.eval(
+        "[...document.querySelectorAll('[data-path]')].map(e => [e.dataset.path, e.textContent, e.matches('td.n') && !/[a-z]/i.test(e.textContent)])",
     );
-    for one in curves.as_array().unwrap() {
-        let (name, path, factor) =
-            (one[0].as_str().unwrap(), one[1].as_str().unwrap(), one[2].as_f64().unwrap());
-        let mut known: Vec<f64> = matching(&results, path).into_iter().map(|v| v * factor).collect();
-        assert!(!known.is_empty(), "{name}: nothing at {path}");
-        known.sort_by(f64::total_cmp);
-        for value in one[3].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()) {
-            let near = known.partition_point(|k| *k < value);
-            let found = [near.wrapping_sub(1), near, near + 1]
-                .iter()
-                .filter_map(|i| known.get(*i))
-                .any(|k| (k - value).abs() <= 1e-6 * value.abs().max(1e-30));
-            assert!(found, "{name}: {value} is not at {path}");
+    let told = told.as_array().unwrap();
+    assert!(told.len() > 600, "{} numbers", told.len());
+    for one in told {
+        let (paths, text) = (one[0].as_str().unwrap(), one[1].as_str().unwrap());
+        let numbers = origins::shown(text);
+        let paths: Vec<&str> = paths.split(' ').collect();
+        for path in &paths {
+            let path = path.replace("%20", " ").replace("%25", "%");
+            let value = results.pointer(&path).unwrap_or_else(|| panic!("{path} is not in results.json"));
+            let value = value.as_f64().unwrap_or_else(|| panic!("{path} is no number"));
+            let found = numbers.iter().any(|number| origins::agrees(value, *number));
+            assert!(found, "{path}: {value} is shown as {text}");
         }
+        // where nothing but numbers stands, each has its path
+        assert!(one[2] == false || numbers.len() == paths.len(), "{paths:?}: {text}");
+    }
+    let silent = page.eval(
+        "[...document.querySelectorAll('td.n:not([data-path])')].map(e => e.textContent).filter(t => /[0-9]/.test(t))",
+    );
+    assert_eq!(silent, serde_json::json!([]), "cells of tables that say no path");
+    // units are no numbers, nor is the share of an interval
+    let screen = page.eval(
+        "[...document.querySelectorAll('#answer .found:not(.warn) p, #answer .differ')].map(p => { const c = p.cloneNode(true); for (const e of c.querySelectorAll('[data-path]')) e.remove(); return c.textContent.replaceAll('95\u{a0}%', '') }).filter(t => /[0-9]/.test(t))",
+    );
+    assert_eq!(screen, serde_json::json!([]), "numbers of the first screen that say no path");
+}
+
+/// Every number of every figure's csv file stands in results.json, where the figure says.
+#[test]
+fn every_number_of_a_csv_file_is_found_in_the_results() {
+    let results = results();
+    let html = std::fs::read_to_string(report()).unwrap();
+    let (_, data) = html.split_once("id=\"figures\">").unwrap();
+    let data: Value = serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap();
+    let figures = data["figures"].as_array().unwrap();
+    assert_eq!(figures.len(), EXPECTED);
+    for figure in figures {
+        let name = figure["name"].as_str().unwrap();
+        let csv = std::fs::read_to_string(campaign().join(format!("figures/{name}.csv"))).unwrap();
+        let count = origins::hold_csv(&results, figure, &csv);
+        assert!(count > 1, "{name}: {count} numbers");
     }
 }
 
-/// Whether the first number of a text is this value in some unit, to the digits that are shown.
-fn agrees(value: f64, text: &str) -> bool {
-    let text = text.replace('−', "-").replace('\u{202f}', "");
-    let start = text.find(|c: char| c.is_ascii_digit()).unwrap_or_else(|| panic!("no number in {text}"));
-    // a check's figure has its name before it, in which digits may stand
-    let starts = text
-        .char_indices()
-        .filter(|(i, c)| {
-            c.is_ascii_digit() && !text[..*i].ends_with(|c: char| c.is_alphanumeric() || c == '.')
-        })
-        .map(|(i, _)| i);
-    std::iter::once(start).chain(starts).any(|start| {
-        let end =
-            text[start..].find(|c: char| !c.is_ascii_digit() && c != '.').map_or(text.len(), |n| start + n);
-        let number = text[start..end].trim_end_matches('.');
-        let shown: f64 = number.parse().unwrap();
-        let places = number.split_once('.').map_or(0, |(_, d)| d.len());
-        let half: f64 = format!("0.5001e-{places}").parse().unwrap();
-        [1.0, 1e-6, 1e6, 1e-3, 100.0].into_iter().any(|factor| (value.abs() * factor - shown).abs() <= half)
-    })
-}
-
-/// All numbers at a path in which `*` stands for any key or index.
-fn matching(value: &Value, path: &str) -> Vec<f64> {
-    let Some(rest) = path.strip_prefix('/') else { return value.as_f64().into_iter().collect() };
-    let (head, tail) = rest.split_once('/').map_or((rest, ""), |(head, _)| (head, &rest[head.len()..]));
-    match (value, head) {
-        (Value::Array(all), "*") => all.iter().flat_map(|v| matching(v, tail)).collect(),
-        (Value::Object(all), "*") => all.values().flat_map(|v| matching(v, tail)).collect(),
-        (Value::Array(all), index) => {
-            index.parse::<usize>().ok().and_then(|i| all.get(i)).map_or_else(Vec::new, |v| matching(v, tail))
-        }
-        (Value::Object(all), key) => all.get(key).map_or_else(Vec::new, |v| matching(v, tail)),
-        _ => Vec::new(),
-    }
+fn results() -> Value {
+    serde_json::from_str(&std::fs::read_to_string(campaign().join("results.json")).unwrap()).unwrap()
 }
 
 /// Ticks of the static drawings and of the living charts are by the same rule.
@@ -326,8 +349,7 @@ fn a_thousand_random_axes_have_the_same_ticks_in_both_languages() {
 /// A plan's names can be anything; none of them is markup, and none breaks the page.
 #[test]
 fn hostile_names_break_nothing() {
-    let mut results: Value =
-        serde_json::from_str(&std::fs::read_to_string(campaign().join("results.json")).unwrap()).unwrap();
+    let mut results = results();
     results["source"]["file"] = "</script><script>alert(1)</script>]]>\u{202e}.jrig".into();
     let folder = tempfile::tempdir().unwrap();
     let long = "n".repeat(300);

@@ -13,6 +13,7 @@ const LONGEST: [(&str, &str); 4] = [
     ("jointrig-tests", "demo"),
     ("jointrig-tests", "killed"),
     ("jointrig", "jointrig"),
+    ("jointrig-tests", "compare"),
     ("jointrig-tests", "mishaps"),
 ];
 

@@ -41,7 +41,7 @@ pub struct ImpactLoops {
     pub frequency_hz: Option<f64>,
     /// Mean of half the swing of Δx, m.
     pub amplitude_m: Option<f64>,
-    /// Mean phase by which Δx lags T, degrees.
+    /// Mean phase by which Δx lags T over the first cycle, degrees: that of the decay's first step.
     pub phase_deg: Option<f64>,
     /// Cycles of which a straight line explains less than 90 % of T.
     pub open: usize,

@@ -1,6 +1,6 @@
 //! A figure's numbers as a table: one line for each point, in the units of its axes.
 
-use super::figure::{Along, Figure, Mark, Packed, Panel, Shape, six_digits};
+use super::figure::{Axis, Figure, Mark, Packed, Panel, Shape, six_digits};
 use ::csv::Writer;
 use std::borrow::Cow;
 
@@ -27,36 +27,55 @@ impl Table {
         self.0.write_record(cells).expect("memory takes every line, and all have eight cells");
     }
 
+    /// Numbers that stand in `results.json`; what is drawn to help the eye (fits, guides, words) is left out.
     fn mark(&mut self, title: &str, panel: &Panel, mark: &Mark) {
         let name = if mark.name.is_empty() { mark.role.name() } else { &mark.name };
         let (title, name) = (guarded(title), guarded(name));
         let labels = [panel.x.label(), panel.y.label()];
         let [x_label, y_label] = [guarded(&labels[0]), guarded(&labels[1])];
-        let mut put = |x: f64, y: f64, low: f64, high: f64| {
-            let [x, y, low, high] = [x, y, low, high].map(six_digits);
-            self.line([&title, &name, &x_label, &x, &y_label, &y, &low, &high]);
+        let told = |of: &str, value: f64| if mark.tells(of) { six_digits(value) } else { String::new() };
+        // places of a regular curve are told by their step, those among names by the name
+        let x_told = mark.tells("x") || mark.tells("step") || panel.x.link == "cycle";
+        let across = |value: f64| match named(&panel.x, value) {
+            None if x_told => six_digits(value),
+            None => String::new(),
+            Some(name) => guarded(name).into_owned(),
+        };
+        let upright = |value: f64| {
+            named(&panel.y, value).map_or_else(|| told("y", value), |name| guarded(name).into_owned())
+        };
+        let mut put = |[x, y, low, high]: [&str; 4]| {
+            self.line([&title, &name, &x_label, x, &y_label, y, low, high]);
         };
         let at = |values: &Packed, i: usize| values.0.get(i).copied().map_or(NONE, f64::from);
         match &mark.shape {
-            Shape::Line { x, y } => (0..y.0.len()).for_each(|i| put(x.at(i), at(y, i), NONE, NONE)),
-            Shape::Ribbon { x, low, high } => {
-                (0..low.0.len()).for_each(|i| put(x.at(i), NONE, at(low, i), at(high, i)));
+            Shape::Line { x, y } if mark.tells("y") => {
+                (0..y.0.len()).for_each(|i| put([&across(x.at(i)), &upright(at(y, i)), "", ""]));
             }
-            Shape::Loop { x, y } => {
-                (0..y.0.len()).for_each(|i| put(Along::List(x.clone()).at(i), at(y, i), NONE, NONE));
-            }
-            Shape::Points { x, y, bars, .. } => {
-                for i in 0..y.0.len() {
-                    let [low, high] = bars.as_ref().map_or([NONE; 2], |b| [at(&b.low, i), at(&b.high, i)]);
-                    put(at(x, i), at(y, i), low, high);
+            Shape::Ribbon { x, low, high } if mark.tells("low") => {
+                for i in 0..low.0.len() {
+                    put([&across(x.at(i)), "", &told("low", at(low, i)), &told("high", at(high, i))]);
                 }
             }
-            Shape::Level { at, .. } => put(NONE, *at, NONE, NONE),
-            Shape::Ring { at, .. } => put(at[0], at[1], NONE, NONE),
+            Shape::Loop { x, y } if mark.tells("y") => {
+                (0..y.0.len()).for_each(|i| put([&across(at(x, i)), &upright(at(y, i)), "", ""]));
+            }
+            Shape::Points { x, y, bars, .. } if mark.tells("x") || mark.tells("y") => {
+                for i in 0..y.0.len() {
+                    let [low, high] = bars.as_ref().map_or([NONE; 2], |b| [at(&b.low, i), at(&b.high, i)]);
+                    put([&across(at(x, i)), &upright(at(y, i)), &told("low", low), &told("high", high)]);
+                }
+            }
+            Shape::Level { at, .. } if mark.tells("at") => put(["", &six_digits(*at), "", ""]),
             Shape::Cells { values, .. } => {
                 let columns = panel.x.names.len().max(1);
-                for i in 0..values.0.len() {
-                    put((i % columns) as f64, (i / columns) as f64, at(values, i), NONE);
+                for i in (0..values.0.len()).filter(|i| at(values, *i).is_finite()) {
+                    put([
+                        &across((i % columns) as f64),
+                        &upright((i / columns) as f64),
+                        &told("values", at(values, i)),
+                        "",
+                    ]);
                 }
             }
             Shape::Strips { x, values, says } => {
@@ -74,9 +93,14 @@ impl Table {
                     self.line([what, &guarded(&spot.name), "x y z in m", &x, "", &y, &z, ""]);
                 }
             }
-            Shape::Upright { .. } | Shape::Shade { .. } | Shape::Text { .. } => {}
+            _ => {}
         }
     }
+}
+
+/// The name at this place of an axis of names: the nearest, since signs stand beside their names.
+fn named(axis: &Axis, at: f64) -> Option<&str> {
+    axis.names.get(at.round().max(0.0) as usize).map(String::as_str)
 }
 
 /// A name that a spreadsheet would take for a formula is held back by an apostrophe.
@@ -86,19 +110,23 @@ fn guarded(text: &str) -> Cow<'_, str> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::figure::{Axis, Marker, Role};
+    use super::super::figure::{Along, Marker, Role};
     use super::*;
 
     #[test]
     fn every_point_has_a_line_with_its_units() {
         let mark = Mark::points(Role::Loops, Marker::default(), [[200.0, 148.5]])
             .barred("y", [[147.0, 150.0]])
-            .named("k, \"slope\"");
+            .named("k, \"slope\"")
+            .from("x", "/hysteresis/*/frequency_hz", 1.0)
+            .scatter("y", "/hysteresis/*/k_eq_n_per_m/mean", 1e-6);
         let panel = Panel::new(
             Axis::linear("frequency", "Hz", [0.0, 300.0]),
             Axis::linear("k", "N/µm", [0.0, 200.0]),
         );
-        let text = csv(&Figure::new("x", "", "t", "s").with(panel.with(mark)));
+        let help = Mark::line(Role::Fitted, Along::of(&[0.0, 300.0]), [0.0, 200.0]);
+        let text = csv(&Figure::new("x", "", "t", "s").with(panel.with(mark).with(help)));
+        assert_eq!(text.lines().count(), 2, "a fitted line is no data");
         assert_eq!(
             text.lines().nth(1),
             Some("1,\"k, \"\"slope\"\"\",\"frequency, Hz\",200,\"k, N/µm\",148.5,147,150")

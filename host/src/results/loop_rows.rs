@@ -63,7 +63,7 @@ pub struct Hysteresis {
     pub friction_limit_n: Option<f64>,
     /// Friction limit over normal load; null where the contact did not slip or the load is not known.
     pub friction_coefficient: Option<f64>,
-    /// Phase of T against Δx, degrees.
+    /// Phase by which Δx lags T, degrees; of impacts over the first cycle, mean over hits.
     pub phase_deg: Option<f64>,
     /// What the shape was told from.
     #[serde(skip_serializing_if = "Option::is_none")]

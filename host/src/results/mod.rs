@@ -16,6 +16,7 @@ mod joint_rows;
 mod loop_rows;
 mod measured;
 mod reconstruction;
+mod side_by_side;
 mod source;
 
 pub use crate::hysteresis::static_arm::Identified;
@@ -35,6 +36,7 @@ pub use joint_rows::{DIRECT, Goodness, Joint, JointSpectrum, Refusal, SpectrumCu
 pub use loop_rows::{Backbone, DecayStep, Force, Hysteresis, ImpactSlope, LoopCurve, ShakerLoop};
 pub use measured::{CellRow, Cells, HitRow, NoiseFloor, Place};
 pub use reconstruction::Reconstruction;
+pub use side_by_side::SideBySide;
 pub use source::{Software, Source, ranges};
 
 use crate::substructuring::Band;
@@ -78,6 +80,9 @@ pub struct Results {
     pub hysteresis: Vec<Hysteresis>,
     /// Whether the numbers may be believed.
     pub checks: Vec<Check>,
+    /// Every kind of stiffness that was found along the sliding direction, with what it is.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub side_by_side: Vec<SideBySide>,
     /// Methods that were refused, with the reason.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub refused: Vec<Refusal>,

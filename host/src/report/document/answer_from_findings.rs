@@ -74,6 +74,10 @@ fn between_arms(found: &Findings) -> BetweenArms {
             },
             why: say::between_the_arms(between.basis),
         },
+        // without three configurations nobody could ask
+        Some(Err(_)) if found.substructured.is_none() => {
+            BetweenArms { k_n_per_m: None, basis: "none", why: say::without_all_three() }
+        }
         Some(Err(why)) => BetweenArms { k_n_per_m: None, basis: "none", why: say::capital(&why.to_string()) },
         None => BetweenArms { k_n_per_m: None, basis: "none", why: say::not_looked_for() },
     }

@@ -86,6 +86,13 @@ fn of_row(row: &JointRow) -> Joint {
     }
 }
 
+/// Significant digits of a curve: what six digits of an FRF can carry.
+const DIGITS: i32 = 6;
+/// Of a line's standard deviation, which a few hits tell to a tenth at best.
+const NOISE_DIGITS: i32 = 3;
+/// Of a line's damping, which scatters more than its stiffness; every mean is computed before this.
+const DAMPING_DIGITS: i32 = 4;
+
 /// Translations line by line: they are what the figures show. None where nothing was identified.
 pub fn spectrum(found: &Substructured) -> Option<JointSpectrum> {
     let mut curves = Vec::new();
@@ -96,9 +103,9 @@ pub fn spectrum(found: &Substructured) -> Option<JointSpectrum> {
                 method: spectrum.method.clone(),
                 idms: spectrum.idms,
                 dof: dof.name().into(),
-                stiffness_n_per_m: column(Some(stiffness)),
-                stiffness_noise_n_per_m: column(noise),
-                damping_n_s_per_m: column(spectrum.damping_n_s_per_m.get(dof)),
+                stiffness_n_per_m: column(Some(stiffness), DIGITS),
+                stiffness_noise_n_per_m: column(noise, NOISE_DIGITS),
+                damping_n_s_per_m: column(spectrum.damping_n_s_per_m.get(dof), DAMPING_DIGITS),
             });
         }
     }
@@ -106,6 +113,6 @@ pub fn spectrum(found: &Substructured) -> Option<JointSpectrum> {
     (!frequency_hz.is_empty()).then_some(JointSpectrum { frequency_hz, curves })
 }
 
-fn column(values: Option<&Vec<f64>>) -> Vec<Option<f64>> {
-    values.map_or_else(Vec::new, |v| v.iter().map(|v| v.is_finite().then(|| rounded(*v, 6))).collect())
+fn column(values: Option<&Vec<f64>>, digits: i32) -> Vec<Option<f64>> {
+    values.map_or_else(Vec::new, |v| v.iter().map(|v| v.is_finite().then(|| rounded(*v, digits))).collect())
 }

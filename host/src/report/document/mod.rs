@@ -9,7 +9,7 @@ mod source_from_findings;
 
 pub use compared_from_results::compare;
 
-use super::words::{check_sentences, missing_sentences};
+use super::words::{check_sentences, missing_sentences, side_by_side};
 use crate::analyse::Findings;
 use crate::results::{Results, VERSION};
 
@@ -45,6 +45,9 @@ pub fn document(found: Findings) -> Results {
         results.joint_spectrum = joint_from_findings::spectrum(of_frfs);
     }
     for measured in found.configurations {
+        if let Some(from) = measured.imported.as_ref().filter(|_| measured.records.is_empty()) {
+            results.missing.push(missing_sentences::imported(measured.configuration, &from.file));
+        }
         results.usable_bands.extend(measured.usable_band);
         results.frfs.extend(measured.frfs);
         // the assembly comes last, and counts
@@ -59,6 +62,7 @@ pub fn document(found: Findings) -> Results {
         results.backbones = contact.backbones;
         results.impact_slopes = contact.impacts.map_or_else(Vec::new, |impacts| impacts.slopes);
     }
+    results.side_by_side = side_by_side::kinds(&results);
     results
 }
 

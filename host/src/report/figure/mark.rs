@@ -24,12 +24,38 @@ pub struct Mark {
 /// Where numbers of a mark stand in `results.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Origin {
-    /// Which of the mark's lists: `x`, `y`, `low`, `high`.
+    /// Which of the mark's lists: `x`, `y`, `low`, `high`, `values`; `first` and `step` of regular places; `at` of a level.
     pub of: &'static str,
     /// The path; `*` stands for any key or index.
     pub path: String,
     /// What the numbers there were multiplied by for the unit shown.
     pub factor: f64,
+    /// A second number that was brought in before that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub with: Option<Second>,
+}
+
+/// The second number of a sum or quotient, as of `mean ± σ`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Second {
+    /// What was done with it.
+    pub how: How,
+    /// Its path, with as many places as the first one's.
+    pub path: String,
+}
+
+/// What was done with a second number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum How {
+    /// It was added.
+    Plus,
+    /// It was taken away.
+    Minus,
+    /// The first was multiplied by it.
+    Times,
+    /// The first was divided by it.
+    Per,
 }
 
 /// Where the points of a curve lie along the horizontal axis.
@@ -320,7 +346,56 @@ impl Mark {
     /// The same, whose list `of` stands at `path` of `results.json` and was multiplied by `factor`.
     #[must_use]
     pub fn from(mut self, of: &'static str, path: impl Into<String>, factor: f64) -> Self {
-        self.origin.push(Origin { of, path: path.into(), factor });
+        self.origin.push(Origin { of, path: path.into(), factor, with: None });
         self
     }
+
+    /// The same, whose list `of` was made of the numbers at two paths.
+    #[must_use]
+    pub fn from_two(
+        mut self,
+        of: &'static str,
+        path: impl Into<String>,
+        how: How,
+        second: impl Into<String>,
+        factor: f64,
+    ) -> Self {
+        let with = Some(Second { how, path: second.into() });
+        self.origin.push(Origin { of, path: path.into(), factor, with });
+        self
+    }
+
+    /// The same points, whose values stand at `path` and the ends of whose bars in `ci95` beside it.
+    #[must_use]
+    pub fn estimate(self, of: &'static str, path: &str, factor: f64) -> Self {
+        let beside = beside(path);
+        self.from(of, path, factor).from("low", format!("{beside}/ci95/0"), factor).from(
+            "high",
+            format!("{beside}/ci95/1"),
+            factor,
+        )
+    }
+
+    /// The same points, whose values stand at `path`, and whose bars reach as far as `std` beside it.
+    #[must_use]
+    pub fn scatter(self, of: &'static str, path: &str, factor: f64) -> Self {
+        let std = format!("{}/std", beside(path));
+        self.from(of, path, factor).from_two("low", path, How::Minus, std.clone(), factor).from_two(
+            "high",
+            path,
+            How::Plus,
+            std,
+            factor,
+        )
+    }
+
+    /// Whether it is said where this list stands.
+    pub fn tells(&self, of: &str) -> bool {
+        self.origin.iter().any(|origin| origin.of == of)
+    }
+}
+
+/// The path of what a number stands in.
+fn beside(path: &str) -> &str {
+    path.rsplit_once('/').map_or(path, |(above, _)| above)
 }

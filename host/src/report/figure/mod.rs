@@ -8,9 +8,10 @@ mod mark;
 mod packed;
 pub mod role;
 mod scene;
+mod trim;
 
 pub use axis::{Axis, Spread};
-pub use mark::{Along, Bars, Drawn, Mark, Marker, Origin, Shape};
+pub use mark::{Along, Bars, Drawn, How, Mark, Marker, Origin, Second, Shape};
 pub use packed::{Packed, six_digits};
 pub use role::Role;
 pub use scene::{Body, Scene, Spot};

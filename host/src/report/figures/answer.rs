@@ -4,7 +4,7 @@ use super::{MICRO, below_name};
 use crate::contact::Interval;
 use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role};
 use crate::report::words::number::{decimals, micro, short, stiffness};
-use crate::results::{Excitation, Force, HIDDEN_RESONANCE, Hysteresis, Results};
+use crate::results::{Excitation, Force, HIDDEN_RESONANCE, Hysteresis, Results, Shape};
 use crate::substructuring::Dof;
 
 struct Row {
@@ -15,7 +15,18 @@ struct Row {
     /// Whether it may be taken for what it is called.
     believed: bool,
     truth: Option<f64>,
-    path: &'static str,
+    /// Where it stands.
+    path: String,
+    ends_are: Ends,
+}
+
+/// What the ends of a row's bar are.
+#[derive(Clone, Copy, PartialEq)]
+enum Ends {
+    Interval,
+    Scatter,
+    /// The smallest and the largest of all.
+    Extremes,
 }
 
 /// A few estimates, the one to quote first.
@@ -33,12 +44,16 @@ pub fn answer(results: &Results) -> Option<Figure> {
     for (i, row) in rows.iter().enumerate() {
         let y = below_name(i);
         let marker = if row.believed { Marker::Dot } else { Marker::Cross };
-        panel.marks.push(
-            Mark::points(row.role, marker, [[row.mean, y]])
-                .barred("x", [row.ends])
-                .saying(vec![row.label.clone()])
-                .from("x", row.path, 1.0 / MICRO),
-        );
+        let mark = Mark::points(row.role, marker, [[row.mean, y]])
+            .barred("x", [row.ends])
+            .saying(vec![row.label.clone()]);
+        panel.marks.push(match row.ends_are {
+            Ends::Interval => mark.estimate("x", &row.path, 1.0 / MICRO),
+            Ends::Scatter => mark.scatter("x", &row.path, 1.0 / MICRO),
+            Ends::Extremes => {
+                ["x", "low", "high"].into_iter().fold(mark, |m, of| m.from(of, row.path.clone(), 1.0 / MICRO))
+            }
+        });
         panel.marks.extend(row.truth.map(|truth| {
             Mark::points(Role::Truth, Marker::Stroke, [[truth, y]])
                 .named("truth of the simulated rig")
@@ -91,7 +106,7 @@ fn rows(results: &Results) -> Vec<Row> {
 }
 
 /// An estimate with its interval: `between the arms: 26.9 N/µm (25.4…28.4)`.
-fn estimated(what: &str, role: Role, k: Interval, path: &'static str) -> Row {
+fn estimated(what: &str, role: Role, k: Interval, path: &str) -> Row {
     let [mean, low, high] = [k.mean, k.ci95[0], k.ci95[1]].map(|k| short(micro(k)));
     Row {
         label: format!("{what}: {mean} N/µm ({low}…{high})"),
@@ -100,7 +115,8 @@ fn estimated(what: &str, role: Role, k: Interval, path: &'static str) -> Row {
         ends: k.ci95.map(micro),
         believed: true,
         truth: None,
-        path,
+        path: path.into(),
+        ends_are: Ends::Interval,
     }
 }
 
@@ -120,20 +136,18 @@ fn headline(results: &Results) -> Option<Row> {
         ends: [micro(k.mean - k.std), micro(k.mean + k.std)],
         believed: joint.identified(),
         truth: None,
-        path: "/joint/*/stiffness_n_per_m/z/mean",
+        path: "/joint/*/stiffness_n_per_m/z/mean".into(),
+        ends_are: Ends::Scatter,
     })
 }
 
 /// The levels' straight loops from the softest to the stiffest.
 fn levels(results: &Results) -> Option<Row> {
     let straight = |h: &&Hysteresis| h.kind == Excitation::Shaker && h.force == Force::Raw;
-    let mut found: Vec<f64> = results
-        .hysteresis
-        .iter()
-        .filter(straight)
-        .filter_map(Hysteresis::stick_slope)
-        .map(|k| micro(k.mean))
-        .collect();
+    let slipping = |h: &Hysteresis| matches!(h.shape, Shape::Microslip | Shape::GrossSlip);
+    let rows = || results.hysteresis.iter().filter(straight);
+    let slips = rows().any(|h| h.stick_slope().is_some() && slipping(h));
+    let mut found: Vec<f64> = rows().filter_map(Hysteresis::stick_slope).map(|k| micro(k.mean)).collect();
     found.sort_by(f64::total_cmp);
     let (low, high) = (*found.first()?, *found.last()?);
     let campaign = results.source.kind == "campaign";
@@ -141,7 +155,8 @@ fn levels(results: &Results) -> Option<Row> {
         label: if found.len() == 1 {
             format!("the shaker's loop: {} N/µm", short(low))
         } else {
-            format!("{} straight shaker loops: {}…{} N/µm", found.len(), short(low), short(high))
+            let which = if slips { "shaker loops, where they stick" } else { "straight shaker loops" };
+            format!("{} {which}: {}…{} N/µm", found.len(), short(low), short(high))
         },
         role: Role::Loops,
         mean: found[found.len() / 2],
@@ -149,7 +164,8 @@ fn levels(results: &Results) -> Option<Row> {
         // between the spots a specimen's tilt is in it
         believed: !campaign,
         truth: None,
-        path: "/hysteresis/*/*/mean",
+        path: "/hysteresis/*/*/mean".into(),
+        ends_are: Ends::Extremes,
     })
 }
 
@@ -164,6 +180,7 @@ fn impacts(results: &Results) -> Option<Row> {
         ends: [micro(k.mean - k.std), micro(k.mean + k.std)],
         believed: false,
         truth: None,
-        path: "/hysteresis/*/k_eq_n_per_m/mean",
+        path: "/hysteresis/*/k_eq_n_per_m/mean".into(),
+        ends_are: Ends::Scatter,
     })
 }

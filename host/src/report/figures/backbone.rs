@@ -1,13 +1,17 @@
 //! A contact that slips, against amplitude: stiffness and tip force of the levels, and the law through them.
 
 use super::MICRO;
-use crate::report::figure::{Along, Axis, Figure, Height, Mark, Marker, Packed, Panel, Role};
+use crate::report::figure::{Along, Axis, Figure, Height, How, Mark, Marker, Packed, Panel, Role};
 use crate::report::scale::middle_range;
 use crate::report::words::number::{decimals, micro, short};
 use crate::results::{Backbone, Force, Hysteresis, Results};
 
 /// Most laws in one figure.
 const MOST: usize = 3;
+
+/// Where amplitudes and secants stand.
+const AMPLITUDE: &str = "/hysteresis/*/amplitude_m";
+const SECANT: &str = "/hysteresis/*/k_secant_n_per_m";
 
 /// Points of a law's curve.
 const POINTS: usize = 160;
@@ -48,16 +52,25 @@ pub fn backbone(results: &Results) -> Option<Figure> {
             .with(
                 Mark::points(role, Marker::Ring, slopes.iter().map(|(at, _)| *at))
                     .barred("y", slopes.iter().map(|(at, std)| [at[1] - std, at[1] + std]))
-                    .named("slope of the stick part"),
+                    .named("slope of the stick part")
+                    .from("x", AMPLITUDE, MICRO)
+                    .scatter("y", "/hysteresis/*/*/mean", 1.0 / MICRO),
             )
-            .with(Mark::points(role, Marker::Square, secants).named("peak secant").from(
+            .with(
+                Mark::points(role, Marker::Square, secants)
+                    .named("peak secant")
+                    .from("x", AMPLITUDE, MICRO)
+                    .from("y", SECANT, 1.0 / MICRO),
+            );
+        force = force.with(Mark::line(role, packed.clone(), along.iter().map(|x| law.tip(x / MICRO)))).with(
+            Mark::points(role, Marker::Square, tips).from("x", AMPLITUDE, MICRO).from_two(
                 "y",
-                "/hysteresis/*/k_secant_n_per_m",
-                1.0 / MICRO,
-            ));
-        force = force
-            .with(Mark::line(role, packed.clone(), along.iter().map(|x| law.tip(x / MICRO))))
-            .with(Mark::points(role, Marker::Square, tips));
+                SECANT,
+                How::Times,
+                AMPLITUDE,
+                1.0,
+            ),
+        );
         words.push(in_words(one));
     }
     Some(

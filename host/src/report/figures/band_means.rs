@@ -30,15 +30,17 @@ struct Row {
     std: f64,
     ends: [f64; 2],
     identified: bool,
+    /// Where it stands among the joints, and its lines among the curves.
+    places: [usize; 2],
 }
 
 fn panel(results: &Results, frequency_hz: &[f64], range: Band) -> Option<Panel> {
     let curves = &results.joint_spectrum.as_ref()?.curves;
-    let rows: Vec<Row> = (results.joint.iter().filter(|j| j.band_hz == range))
-        .filter_map(|joint| {
+    let rows: Vec<Row> = (results.joint.iter().enumerate().filter(|(_, j)| j.band_hz == range))
+        .filter_map(|(index, joint)| {
             let k = joint.sliding_stiffness()?;
-            let curve =
-                curves.iter().find(|c| c.method == joint.method && c.idms == joint.idms && c.dof == "z")?;
+            let (line, curve) = (curves.iter().enumerate())
+                .find(|(_, c)| c.method == joint.method && c.idms == joint.idms && c.dof == "z")?;
             let inside = || {
                 let lines = frequency_hz.iter().zip(&curve.stiffness_n_per_m);
                 lines.filter(|(f, _)| range.contains(**f)).filter_map(|(_, k)| k.map(micro))
@@ -50,6 +52,7 @@ fn panel(results: &Results, frequency_hz: &[f64], range: Band) -> Option<Panel> 
                 std: micro(k.std),
                 ends: [inside().reduce(f64::min)?, inside().reduce(f64::max)?],
                 identified: joint.identified(),
+                places: [index, line],
             })
         })
         .collect();
@@ -64,12 +67,14 @@ fn panel(results: &Results, frequency_hz: &[f64], range: Band) -> Option<Panel> 
         let role = if row.identified { Role::modes(row.idms) } else { Role::Refused };
         let at = |marker| Mark::points(role, marker, [[row.mean, i as f64]]);
         let marker = if row.identified { Marker::Dot } else { Marker::Cross };
+        let mean = format!("/joint/{}/stiffness_n_per_m/z/mean", row.places[0]);
+        let lines = format!("/joint_spectrum/curves/{}/stiffness_n_per_m/*", row.places[1]);
         panel.marks.push(
-            Mark::points(Role::Noise, Marker::Stroke, [[row.mean, i as f64]]).barred("x", [row.ends]).from(
-                "low",
-                "/joint_spectrum/curves/*/stiffness_n_per_m/*",
-                1.0 / MICRO,
-            ),
+            Mark::points(Role::Noise, Marker::Stroke, [[row.mean, i as f64]])
+                .barred("x", [row.ends])
+                .from("x", mean.clone(), 1.0 / MICRO)
+                .from("low", lines.clone(), 1.0 / MICRO)
+                .from("high", lines, 1.0 / MICRO),
         );
         panel.marks.push(
             at(marker)
@@ -78,7 +83,7 @@ fn panel(results: &Results, frequency_hz: &[f64], range: Band) -> Option<Panel> 
                     "{}: {:.1} ± {:.1} N/µm, {:.1} to {:.1}",
                     row.name, row.mean, row.std, row.ends[0], row.ends[1]
                 )])
-                .from("x", "/joint/*/stiffness_n_per_m/z/mean", 1.0 / MICRO),
+                .scatter("x", &mean, 1.0 / MICRO),
         );
     }
     Some(panel)

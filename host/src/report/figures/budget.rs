@@ -51,15 +51,22 @@ pub fn budget(results: &Results) -> Option<Figure> {
     )
     .barred("y", bars)
     .named("k_T of a bin, 95 %")
-    .from("y", "/answer/contact/of_frequency/*/k_t_n_per_m/mean", 1.0 / MICRO);
+    .from("x", "/answer/contact/of_frequency/*/frequency_hz", 1.0)
+    .estimate("y", "/answer/contact/of_frequency/*/k_t_n_per_m/mean", 1.0 / MICRO);
     let x = Axis::frequency(Spread::Linear, [first.frequency_hz - 15.0, last.frequency_hz + 15.0]);
     let mut flat = Panel::new(x, Axis::linear("k_T", "N/µm", [0.9 * low, 1.05 * high]))
         .high(Height::Tall)
-        .with(Mark::level(Role::Answer, micro(k.mean)).named(format!("k_T {} N/µm", short(micro(k.mean)))))
+        .with(
+            Mark::level(Role::Answer, micro(k.mean))
+                .named(format!("k_T {} N/µm", short(micro(k.mean))))
+                .from("at", "/answer/contact/k_t_n_per_m/mean", 1.0 / MICRO),
+        )
         .with(bin);
     if let Some(truth) = results.answer.as_ref().and_then(|a| a.truth.as_ref()) {
         flat.marks.push(
-            Mark::level(Role::Truth, micro(truth.contact_k_t_n_per_m)).named("truth of the simulated rig"),
+            Mark::level(Role::Truth, micro(truth.contact_k_t_n_per_m))
+                .named("truth of the simulated rig")
+                .from("at", "/answer/truth/contact_k_t_n_per_m", 1.0 / MICRO),
         );
     }
     figure.panels.push(flat);

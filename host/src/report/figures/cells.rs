@@ -1,12 +1,24 @@
 //! The matrix of cells: what was kept of what was wanted.
 
-use crate::report::figure::{Axis, Figure, Height, Mark, Packed, Panel, Role, Shape};
+use crate::report::figure::{Axis, Figure, Height, How, Mark, Packed, Panel, Role, Shape};
 use crate::results::{CellRow, Results};
 use crate::structure::Structure;
+
+/// So many impacts have room in a third of the page.
+const FEW: usize = 5;
+
+/// `AJB: 192 cells`.
+pub(super) fn counted(configuration: &str, cells: usize) -> String {
+    format!("{configuration}: {cells} {}", if cells == 1 { "cell" } else { "cells" })
+}
 
 /// One matrix for each configuration: responses down, impacts across.
 pub fn cells(results: &Results) -> Option<Figure> {
     let all = &results.cells.as_ref()?.cells;
+    // FRFs that were imported leave the plan's cells without hits, as they should
+    if all.iter().all(|c| c.kept == 0 && c.refused.values().all(|n| *n == 0)) {
+        return None;
+    }
     let mut figure = Figure::new(
         "cells",
         "",
@@ -36,12 +48,20 @@ pub fn cells(results: &Results) -> Option<Figure> {
             says: found.iter().map(|c| c.map_or_else(String::new, |c| said(c))).collect(),
         };
         let panel = Panel::new(Axis::named("impact", impacts), Axis::named("response", responses))
-            .titled(format!("{configuration}: {} cells", own.len()))
+            .titled(counted(configuration, own.len()))
             .high(Height::Usual)
-            .with(Mark::new(Role::BetweenArms, shape));
+            .with(Mark::new(Role::BetweenArms, shape).from_two(
+                "values",
+                "/cells/cells/*/kept",
+                How::Per,
+                "/cells/cells/*/wanted",
+                1.0,
+            ));
         figure = figure.with(panel);
     }
-    (!figure.panels.is_empty()).then_some(figure)
+    // few cells need no squares as large as a hand
+    let most = figure.panels.iter().map(|p| p.x.names.len()).max().unwrap_or(0);
+    (!figure.panels.is_empty()).then(|| if most <= FEW { figure.across(3) } else { figure })
 }
 
 fn said(cell: &CellRow) -> String {

@@ -36,15 +36,14 @@ fn panel(cells: &Cells, configuration: &str, range: [f64; 2]) -> Option<Panel> {
         values: Packed::of(own.iter().flat_map(|c| c.coherence.iter().copied())),
         says: own.iter().map(|c| format!("{} seen at {}", c.impact, c.response)).collect(),
     };
-    let mark = Mark::new(Role::Refused, shape).named("coherence below 0.99").from(
-        "values",
-        "/cells/cells/*/coherence/*",
-        1.0,
-    );
+    let mark = Mark::new(Role::Refused, shape)
+        .named("coherence below 0.99")
+        .from("values", "/cells/cells/*/coherence/*", 1.0)
+        .from("x", "/cells/frequency_hz/*", 1.0);
     let y = Axis::linear("cell", "", [-0.5, own.len() as f64 - 0.5]);
     Some(
         Panel::new(Axis::frequency(Spread::Log, range), y)
-            .titled(format!("{configuration}: {} cells", own.len()))
+            .titled(super::cells::counted(configuration, own.len()))
             .high(Height::Tall)
             .with(mark),
     )

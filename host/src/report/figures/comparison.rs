@@ -13,14 +13,15 @@ struct Row {
     median: Option<f64>,
     role: Role,
     believed: bool,
-    path: &'static str,
+    path: String,
+    median_path: String,
 }
 
 /// Mean and scatter of k_z over the main band, by method: of those that identified it, or of all where none did.
 pub fn comparison(results: &Results) -> Option<Figure> {
     let mut rows: Vec<Row> = quoted(results).into_iter().collect();
-    let of_band = |j: &&Joint| j.band_hz == MAIN_BAND || j.method == DIRECT;
-    rows.extend(results.joint.iter().filter(of_band).filter_map(row));
+    let of_band = |j: &Joint| j.band_hz == MAIN_BAND || j.method == DIRECT;
+    rows.extend(results.joint.iter().enumerate().filter(|(_, j)| of_band(j)).filter_map(|(i, j)| row(i, j)));
     let all = rows.len();
     // methods that failed would stretch the axis and tell nothing: the table has them
     if rows.iter().any(|row| row.believed) {
@@ -33,8 +34,28 @@ pub fn comparison(results: &Results) -> Option<Figure> {
     let high = rows.iter().map(|r| r.mean + r.std).fold(0.0, f64::max);
     let low = rows.iter().map(|r| r.mean).fold(0.0, f64::min);
     let range = [1.1 * low, 1.1 * high.max(-0.1 * low)];
+    // many rows stand in two columns on the same axis
+    let per_panel = if rows.len() > TALLEST { rows.len().div_ceil(2) } else { rows.len() };
+    let panels = rows.chunks(per_panel).map(|rows| panel(rows, range));
+    let say = format!(
+        "Mean (point), scatter (bar) and median (stroke) of k_z over the lines of the main band, 300–600 Hz, of the methods that identified a stiffness. {}",
+        if failed > 0 {
+            format!("{failed} others did not; the table of methods says why.")
+        } else {
+            String::new()
+        }
+    );
+    let mut figure = Figure::new("comparison", "", "Every method side by side", say).across(2);
+    figure.panels.extend(panels);
+    Some(figure)
+}
+
+/// More rows than these are too many for one column.
+const TALLEST: usize = 10;
+
+fn panel(rows: &[Row], range: [f64; 2]) -> Panel {
     let names = rows.iter().map(|r| r.label.clone()).collect();
-    let x = Axis::linear("k_z", "N/µm", range);
+    let x = Axis::linear("k_z", "N/µm", range).linked("every-method");
     let mut panel = Panel::new(x, Axis::named("", names)).high(Height::Rows);
     for (i, row) in rows.iter().enumerate() {
         let y = below_name(i);
@@ -46,29 +67,21 @@ pub fn comparison(results: &Results) -> Option<Figure> {
                 Mark::points(role, marker, [[row.mean, y]])
                     .barred("x", [[row.mean - row.std, row.mean + row.std]])
                     .saying(vec![row.label.clone()])
-                    .from("x", row.path, 1.0 / MICRO),
+                    .scatter("x", &row.path, 1.0 / MICRO),
             );
         }
         if let Some(median) = row.median.filter(|m| range[0] < *m && *m < range[1]) {
             panel.marks.push(Mark::points(role, Marker::Stroke, [[median, y]]).from(
                 "x",
-                "/joint/*/stiffness_n_per_m/z/median",
+                row.median_path.clone(),
                 1.0 / MICRO,
             ));
         }
     }
-    let say = format!(
-        "Mean (point), scatter (bar) and median (stroke) of k_z over the lines of the main band, 300–600 Hz, of the methods that identified a stiffness. {}",
-        if failed > 0 {
-            format!("{failed} others did not; the table of methods says why.")
-        } else {
-            String::new()
-        }
-    );
-    Some(Figure::new("comparison", "", "Every method side by side", say).across(2).with(panel))
+    panel
 }
 
-fn row(joint: &Joint) -> Option<Row> {
+fn row(index: usize, joint: &Joint) -> Option<Row> {
     let k = joint.sliding_stiffness()?;
     let modes = if joint.idms == 0 { String::new() } else { format!(", {} IDMs", joint.idms) };
     Some(Row {
@@ -78,7 +91,8 @@ fn row(joint: &Joint) -> Option<Row> {
         median: Some(micro(k.median)),
         role: if joint.method == DIRECT { Role::Loops } else { Role::modes(joint.idms) },
         believed: joint.identified(),
-        path: "/joint/*/stiffness_n_per_m/z/mean",
+        path: format!("/joint/{index}/stiffness_n_per_m/z/mean"),
+        median_path: format!("/joint/{index}/stiffness_n_per_m/z/median"),
     })
 }
 
@@ -93,6 +107,7 @@ fn quoted(results: &Results) -> Option<Row> {
         median: None,
         role: Role::BetweenArms,
         believed: true,
-        path: "/recommended/*/joint/z/stiffness",
+        path: "/recommended/*/joint/z/stiffness".into(),
+        median_path: String::new(),
     })
 }

@@ -6,6 +6,9 @@ use crate::report::scale::middle_range;
 use crate::report::words::number::{decimals, micro};
 use crate::results::{LoopCurve, Results};
 
+/// Where the time between samples stands.
+const STEP: &str = "/example_loop/step_s";
+
 /// Δx, x_A, x_B and T over time; T against Δx.
 pub fn contact_loop(results: &Results) -> Option<Figure> {
     let curve = results.example_loop.as_ref()?;
@@ -54,11 +57,10 @@ fn displacements(curve: &LoopCurve) -> Option<Panel> {
     let range = middle_range(shown.iter().flat_map(|(v, ..)| v.iter().map(|v| v * MICRO)), 1.0, 0.06)?;
     let (x, along) = time(curve);
     let lines = shown.into_iter().filter(|(v, ..)| !v.is_empty()).map(|(values, role, name, field)| {
-        Mark::line(role, along.clone(), values.iter().map(|v| v * MICRO)).named(name).from(
-            "y",
-            format!("/example_loop/{field}/*"),
-            MICRO,
-        )
+        Mark::line(role, along.clone(), values.iter().map(|v| v * MICRO))
+            .named(name)
+            .from("y", format!("/example_loop/{field}/*"), MICRO)
+            .from("step", STEP, 1e3)
     });
     Some(Panel::new(x, Axis::linear("displacement", "µm", range)).with(shade(curve)).with_all(lines))
 }
@@ -66,11 +68,10 @@ fn displacements(curve: &LoopCurve) -> Option<Panel> {
 fn force(curve: &LoopCurve) -> Option<Panel> {
     let range = middle_range(curve.force_n.iter().copied(), 1.0, 0.06)?;
     let (x, along) = time(curve);
-    let line = Mark::line(Role::Force, along, curve.force_n.iter().copied()).named("T").from(
-        "y",
-        "/example_loop/force_n/*",
-        1.0,
-    );
+    let line = Mark::line(Role::Force, along, curve.force_n.iter().copied())
+        .named("T")
+        .from("y", "/example_loop/force_n/*", 1.0)
+        .from("step", STEP, 1e3);
     Some(Panel::new(x, Axis::linear("force T", "N", range)).with(shade(curve)).with(line))
 }
 

@@ -3,6 +3,7 @@
 use super::MICRO;
 use crate::report::figure::{Axis, Figure, Height, Mark, Panel, Role};
 use crate::report::scale::middle_range;
+use crate::report::words::TURNED_DEG;
 use crate::results::Results;
 
 /// Those that the paper shows.
@@ -25,11 +26,18 @@ pub fn decay_loops(results: &Results) -> Option<Figure> {
         return None;
     }
     let (x, y) = (most(&curve.displacement_m)?.map(|v| v * MICRO), most(&curve.force_n)?);
+    let steps = results.impact_loops().map_or(&[][..], |loops| &loops.decay);
+    let turns =
+        steps.is_empty() || steps.iter().any(|s| SHOWN.contains(&s.cycle) && s.phase_deg.abs() > TURNED_DEG);
     let mut figure = Figure::new(
         "decay-loops",
         "7",
         "The first, third and fourth cycle after one hit",
-        "The loop turns and opens from cycle to cycle, because the modes that the hit excites decay at different rates: only the first cycle lies near the contact's own line.",
+        if turns {
+            "The loop turns and opens from cycle to cycle, because the modes that the hit excites decay at different rates: only the first cycle lies near the contact's own line."
+        } else {
+            "The first cycle holds every mode that the hit excites. Those that die away fast leave straight lines behind: no resonance of one specimen turns them."
+        },
     )
     .across(3)
     .of_records(vec![[curve.record; 2]]);

@@ -22,7 +22,11 @@ pub fn geometry(results: &Results) -> Option<Figure> {
         .collect();
     let panel = Panel::new(Axis::linear("", "", [0.0, 1.0]), Axis::linear("", "", [0.0, 1.0]))
         .high(Height::Square)
-        .with(Mark::new(Role::Measured, Shape::Scene(Scene { bodies, spots })));
+        .with(Mark::new(Role::Measured, Shape::Scene(Scene { bodies, spots })).from(
+            "at",
+            "/geometry/*/position_m/*",
+            1.0,
+        ));
     Some(
         Figure::new(
             "geometry",

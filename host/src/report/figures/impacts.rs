@@ -28,9 +28,13 @@ pub fn impacts(results: &Results) -> Option<Figure> {
             low: crate::report::figure::Packed::of([mean - std; 2]),
             high: crate::report::figure::Packed::of([mean + std; 2]),
         };
-        panel = panel
-            .with(Mark::new(Role::Loops, ribbon))
-            .with(Mark::level(Role::Loops, mean).named(format!("all hits: {}", stiffness(k.mean, k.std))));
+        panel = panel.with(Mark::new(Role::Loops, ribbon)).with(
+            Mark::level(Role::Loops, mean).named(format!("all hits: {}", stiffness(k.mean, k.std))).from(
+                "at",
+                "/hysteresis/*/k_eq_n_per_m/mean",
+                1.0 / MICRO,
+            ),
+        );
     }
     let points = columns.values().enumerate().flat_map(|(column, own)| {
         let step = 0.7 / own.len() as f64;

@@ -22,6 +22,7 @@ pub fn interface_modes(results: &Results) -> Option<Figure> {
         Mark::line(if strong { Role::Group1 } else { Role::Noise }, along.clone(), curve.iter().copied())
             .named(if strong { format!("{} suggested", modes.suggested) } else { "the rest".into() })
             .from("y", format!("/interface_modes/singular_values_m_per_n/{i}/*"), 1.0)
+            .from("x", "/interface_modes/frequency_hz/*", 1.0)
     });
     let panel = Panel::new(
         Axis::frequency(Spread::Log, frequencies),

@@ -1,12 +1,15 @@
 //! k_z over frequency, one panel per method, one curve per IDM set, with the band that means are taken over (the paper's Fig. 10, A.11 to A.13).
 
 use super::MICRO;
-use crate::report::figure::{Along, Axis, Figure, Height, Mark, Packed, Panel, Role, Shape, Spread};
+use crate::report::figure::{Along, Axis, Figure, Height, How, Mark, Packed, Panel, Role, Shape, Spread};
 use crate::report::scale::middle_range;
 use crate::report::words;
 use crate::report::words::number::{decimals, micro};
 use crate::results::{Joint, JointSpectrum, MAIN_BAND, Results, SpectrumCurve};
 use crate::substructuring::Band;
+
+/// Where the frequencies stand.
+const LINES: &str = "/joint_spectrum/frequency_hz/*";
 
 /// Stiffness along z line by line.
 pub fn joint_spectrum(results: &Results) -> Option<Figure> {
@@ -40,20 +43,26 @@ pub fn joint_spectrum(results: &Results) -> Option<Figure> {
         .with(Mark::level(Role::Guide, 0.0));
         let along = Along::of(&spectrum.frequency_hz);
         let most = own().max_by_key(|(_, c)| c.idms);
-        panel.marks.extend(most.and_then(|(_, curve)| ribbon(curve, &along)));
+        panel.marks.extend(most.and_then(|(i, curve)| ribbon(*i, curve, &along)));
         for (i, curve) in own() {
             let values = curve.stiffness_n_per_m.iter().map(|k| k.map_or(f64::NAN, micro));
             panel.marks.push(
                 Mark::line(Role::modes(curve.idms), along.clone(), values)
                     .named(named(results, method, curve.idms))
-                    .from("y", format!("/joint_spectrum/curves/{i}/stiffness_n_per_m/*"), 1.0 / MICRO),
+                    .from("y", format!("/joint_spectrum/curves/{i}/stiffness_n_per_m/*"), 1.0 / MICRO)
+                    .from("x", LINES, 1.0),
             );
         }
-        for joint in results.joint.iter().filter(|j| j.method == method && j.band_hz == MAIN_BAND) {
+        let of_method = |j: &Joint| j.method == method && j.band_hz == MAIN_BAND;
+        for (i, joint) in results.joint.iter().enumerate().filter(|(_, j)| of_method(j)) {
             let Some(k) = joint.sliding_stiffness() else { continue };
             let between = Some([MAIN_BAND.low_hz, MAIN_BAND.high_hz]);
             let level = Shape::Level { at: micro(k.mean), between };
-            panel.marks.push(Mark::new(Role::modes(joint.idms), level));
+            panel.marks.push(Mark::new(Role::modes(joint.idms), level).from(
+                "at",
+                format!("/joint/{i}/stiffness_n_per_m/z/mean"),
+                1.0 / MICRO,
+            ));
         }
         figure = figure.with(panel);
     }
@@ -73,7 +82,7 @@ fn named(results: &Results, method: &str, idms: usize) -> String {
     })
 }
 
-fn ribbon(curve: &SpectrumCurve, along: &Along) -> Option<Mark> {
+fn ribbon(index: usize, curve: &SpectrumCurve, along: &Along) -> Option<Mark> {
     if curve.stiffness_noise_n_per_m.len() != curve.stiffness_n_per_m.len() {
         return None;
     }
@@ -83,10 +92,13 @@ fn ribbon(curve: &SpectrumCurve, along: &Along) -> Option<Mark> {
             both.map(|(k, noise)| k.zip(*noise).map_or(f64::NAN, |(k, noise)| micro(k + side * noise))),
         )
     };
-    Some(Mark::new(
-        Role::modes(curve.idms),
-        Shape::Ribbon { x: along.clone(), low: edge(-1.0), high: edge(1.0) },
-    ))
+    let at = |field: &str| format!("/joint_spectrum/curves/{index}/{field}/*");
+    let two = |mark: Mark, of, how| {
+        mark.from_two(of, at("stiffness_n_per_m"), how, at("stiffness_noise_n_per_m"), 1.0 / MICRO)
+    };
+    let shape = Shape::Ribbon { x: along.clone(), low: edge(-1.0), high: edge(1.0) };
+    let mark = Mark::new(Role::modes(curve.idms), shape).from("x", LINES, 1.0);
+    Some(two(two(mark, "low", How::Minus), "high", How::Plus))
 }
 
 /// The bands of the results.

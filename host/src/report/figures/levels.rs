@@ -21,6 +21,10 @@ struct Dot {
 /// How far apart points of the same place are drawn, px: about their own width.
 const SIDE: f64 = 8.0;
 
+/// Where stiffnesses stand.
+const SLOPE: &str = "/hysteresis/*/slope_between_spots_n_per_m/mean";
+const WHOLE: &str = "/hysteresis/*/k_eq_n_per_m/mean";
+
 /// As many groups as have roles that can be told apart.
 const MOST: usize = 6;
 
@@ -48,8 +52,8 @@ pub fn levels(results: &Results) -> Option<Figure> {
             "Round signs are slopes of straight loops between the spots, square ones k_eq of ellipses or of slip; full before the hammer's cells, hollow after them. Bars are ± σ over cycles, with the raw force.",
         )
         .across(2)
-        .with(group(by_frequency, &dots, &amplitudes, |d| d.frequency_hz, |d| d.micrometres, "µm"))
-        .with(group(by_amplitude, &dots, &frequencies, |d| d.micrometres, |d| d.frequency_hz, "Hz")),
+        .with(group(by_frequency, &dots, &amplitudes, (|d| d.frequency_hz, "/hysteresis/*/frequency_hz", 1.0), |d| d.micrometres, "µm"))
+        .with(group(by_amplitude, &dots, &frequencies, (|d| d.micrometres, "/hysteresis/*/amplitude_m", MICRO), |d| d.frequency_hz, "Hz")),
     )
 }
 
@@ -64,7 +68,8 @@ fn axis(
         return Some(Axis { scale: Spread::Log, ..Axis::linear(quantity, unit, range) });
     }
     let [low, high] = middle_range(values, 1.0, 0.12)?;
-    let high = if high > low { high } else { 1.2 * high };
+    // a single place stands in the middle
+    let [low, high] = if high > low { [low, high] } else { [0.8 * low, 1.2 * high] };
     Some(Axis::linear(quantity, unit, [low.max(0.0), high]))
 }
 
@@ -72,7 +77,7 @@ fn group(
     panel: Panel,
     dots: &[Dot],
     groups: &[f64],
-    place: fn(&Dot) -> f64,
+    (place, place_path, factor): (fn(&Dot) -> f64, &str, f64),
     of: fn(&Dot) -> f64,
     unit: &str,
 ) -> Panel {
@@ -116,7 +121,8 @@ fn group(
                     )
                     .saying(says.collect())
                     .named(name.clone())
-                    .from("y", "/hysteresis/*/*/mean", 1.0 / MICRO),
+                    .from("x", place_path, factor)
+                    .scatter("y", if straight { SLOPE } else { WHOLE }, 1.0 / MICRO),
             );
         }
     }

@@ -28,7 +28,7 @@ mod shaker_loops;
 mod specimens;
 mod usable_bands;
 
-use super::figure::{Figure, Source};
+use super::figure::{Figure, Panel, Source};
 use crate::results::Results;
 
 /// A chapter of the report.
@@ -71,7 +71,7 @@ const fn entry(
 }
 
 const IMPACTS: &str = "hits on the assembly with both vibrometers and the load cells";
-const LEVELS: &str = "levels of the shaker (`jointrig shaker`)";
+const LEVELS: &str = "levels of the shaker, measured by `jointrig shaker`";
 const CAMPAIGN: &str = "a campaign's own records";
 const ALL_THREE: &str = "FRFs of A, B and the assembly";
 
@@ -109,7 +109,12 @@ pub const ALL: &[Entry] = &[
         backbone::backbone,
     ),
     entry(Chapter::Loops, "FRFs at the contact", IMPACTS, specimens::specimens),
-    entry(Chapter::Loops, "The decay put together from two sinusoids", IMPACTS, rebuilt::rebuilt),
+    entry(
+        Chapter::Loops,
+        "The decay put together from two sinusoids",
+        "hits on the assembly in which a resonance of one specimen hides",
+        rebuilt::rebuilt,
+    ),
     entry(Chapter::Frfs, "Receptances", "records of hits, or imported FRFs", receptances::receptances),
     entry(
         Chapter::Frfs,
@@ -123,6 +128,7 @@ impl Entry {
     /// The figure of these results, with what it was made from.
     pub fn of(&self, results: &Results) -> Option<Figure> {
         let mut figure = (self.make)(results)?;
+        figure.panels.iter_mut().for_each(Panel::trim);
         let source = &results.source;
         figure.from = Source {
             records: figure.from.records,

@@ -19,11 +19,10 @@ pub fn noise_floor(results: &Results) -> Option<Figure> {
     let stiffness = logarithmic(&mut one.dynamic_stiffness_n_per_m.iter().map(|k| k / MICRO))?;
     let x = || Axis::frequency(Spread::Log, frequencies);
     let line = |role, values: &[f64], field: &str, factor: f64| {
-        Mark::line(role, along.clone(), values.iter().map(|v| v * factor)).from(
-            "y",
-            format!("/noise_floor/{field}/*"),
-            factor,
-        )
+        Mark::line(role, along.clone(), values.iter().map(|v| v * factor))
+            .from("y", format!("/noise_floor/{field}/*"), factor)
+            .from("first", "/noise_floor/first_hz", 1.0)
+            .from("step", "/noise_floor/step_hz", 1.0)
     };
     Some(
         Figure::new(

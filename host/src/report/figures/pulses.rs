@@ -22,7 +22,11 @@ pub fn pulses(results: &Results) -> Option<Figure> {
         } else {
             (Role::Refused, Marker::Cross, "refused")
         };
-        Mark::points(role, marker, own.clone().map(|h| [h.record as f64, of(h)])).named(name)
+        Mark::points(role, marker, own.clone().map(|h| [h.record as f64, of(h)])).named(name).from(
+            "x",
+            "/hits/*/record",
+            1.0,
+        )
     };
     let mut peak = Panel::new(x(), Axis::linear("peak force", "N", [0.0, 1.5 * force[1]]));
     let mut coil = Panel::new(x(), Axis::linear("coil's pulse", "µs", pulse)).high(Height::Low);

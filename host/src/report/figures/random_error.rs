@@ -31,6 +31,7 @@ pub fn random_error(results: &Results) -> Option<Figure> {
             Mark::points(Role::group(group), Marker::Ring, own.iter().map(|(i, e)| [*i as f64, *e]))
                 .saying(says.collect())
                 .named(configuration)
+                .from("x", "/cells/cells/*", 1.0)
                 .from("y", "/cells/cells/*/random_error", 100.0),
         );
     }

@@ -41,11 +41,9 @@ pub fn rebuilt(results: &Results) -> Option<Figure> {
         let along = Along::Regular { first: 0.0, step, count: found.len() };
         let x = Axis::linear("time after the second cycle begins", "ms", [0.0, step * found.len() as f64]);
         let line = |role, values: &[f64], field: &str| {
-            Mark::line(role, along.clone(), values.iter().map(|v| v * MICRO)).from(
-                "y",
-                format!("/reconstruction/{field}/*"),
-                MICRO,
-            )
+            Mark::line(role, along.clone(), values.iter().map(|v| v * MICRO))
+                .from("y", format!("/reconstruction/{field}/*"), MICRO)
+                .from("step", "/reconstruction/step_s", 1e3)
         };
         figure = figure.with(
             Panel::new(x.linked("decay-time"), Axis::linear("displacement", "µm", range))

@@ -31,10 +31,14 @@ pub fn receptances(results: &Results) -> Option<Figure> {
         "receptances",
         "",
         "Receptances of A, B and the assembly",
-        "By H1, with phase and coherence, at a driving point and across. The main band is shaded yellow; grey, where the hammer's force is more than 6 dB down.",
+        "With phase and coherence as far as it is known, at a driving point and across. The main band is shaded yellow; grey, where the hammer's force is more than 6 dB down.",
     )
     .across(configurations.len());
+    let heard = indexed().any(|(_, c)| !c.coherence.is_empty());
     for kind in [Kind::Magnitude, Kind::Phase, Kind::Coherence] {
+        if kind == Kind::Coherence && !heard {
+            continue;
+        }
         for name in &configurations {
             let x = Axis::frequency(Spread::Log, frequencies);
             let mut panel = Panel::new(x, kind.axis(magnitudes)).high(kind.height());
@@ -103,12 +107,22 @@ fn line(curve: &FrfCurve, index: usize, kind: Kind) -> Option<Mark> {
         format!("/frfs/{index}/{field}/*"),
         1.0,
     );
+    let mark = placed(mark, index);
     (curve.magnitude_m_per_n.len() > 1).then(|| mark.named(format!("{} from {}", curve.output, curve.input)))
 }
 
 /// Where the lines of an FRF lie.
 pub(super) fn along(curve: &FrfCurve, count: usize) -> Along {
     Along::Regular { first: curve.first_hz, step: curve.step_hz, count }
+}
+
+/// A curve with where its frequencies stand.
+pub(super) fn placed(mark: Mark, index: usize) -> Mark {
+    mark.from("first", format!("/frfs/{index}/first_hz"), 1.0).from(
+        "step",
+        format!("/frfs/{index}/step_hz"),
+        1.0,
+    )
 }
 
 /// A gap wherever the phase jumps from one edge to the other, instead of a line across the whole frame.

@@ -1,6 +1,6 @@
 //! FRFs at the contact: the two specimens, their difference, the force, and the arms (the paper's Fig. 8).
 
-use super::receptances::{along, unbroken};
+use super::receptances::{along, placed, unbroken};
 use crate::report::figure::{Axis, Figure, Height, Mark, Panel, Role, Shape, Spread};
 use crate::report::scale::middle_range;
 use crate::report::words::number::decimals;
@@ -29,20 +29,15 @@ pub fn specimens(results: &Results) -> Option<Figure> {
     let mut magnitude = Panel::new(x(), Axis::log("receptance", "m/N", [low, high])).high(Height::Tall);
     let mut phase = Panel::new(x(), degrees()).high(Height::Low).named_above();
     for (i, curve, role, name) in &curves {
-        magnitude.marks.push(
-            Mark::line(
-                *role,
-                along(curve, curve.magnitude_m_per_n.len()),
-                curve.magnitude_m_per_n.iter().copied(),
-            )
-            .named(if curve.output == *name {
-                (*name).to_owned()
-            } else {
-                format!("{name} ({})", curve.output)
-            })
-            .from("y", format!("/frfs/{i}/magnitude_m_per_n/*"), 1.0),
-        );
-        let line = phase_line(curve, *i, *role);
+        let line = Mark::line(
+            *role,
+            along(curve, curve.magnitude_m_per_n.len()),
+            curve.magnitude_m_per_n.iter().copied(),
+        )
+        .named(if curve.output == *name { (*name).to_owned() } else { format!("{name} ({})", curve.output) })
+        .from("y", format!("/frfs/{i}/magnitude_m_per_n/*"), 1.0);
+        magnitude.marks.push(placed(line, *i));
+        let line = placed(phase_line(curve, *i, *role), *i);
         phase.marks.push(line.named(magnitude.marks.last().map_or(String::new(), |m| m.name.clone())));
     }
     let resonance = results.check(HIDDEN_RESONANCE).and_then(|c| c.frequency_hz);
@@ -69,6 +64,7 @@ pub fn specimens(results: &Results) -> Option<Figure> {
         )
         .named("T over the hammer's force")
         .from("y", format!("/frfs/{i}/magnitude_m_per_n/*"), 1.0);
+        let line = placed(line, i);
         figure = figure.with(Panel::new(x(), Axis::log("T per newton", "N/N", [low, high])).with(line));
     }
     Some(figure)

@@ -43,18 +43,15 @@ pub fn all(html: &mut Html, results: &Results, drawn: &Drawn<'_>) {
             continue;
         }
         html.raw(&format!("<section id=\"{id}\"><h2>{title}</h2>"));
-        for (entry, figure) in drawn.iter().filter(|(entry, _)| entry.chapter == chapter) {
-            if let Some(figure) = figure {
-                figure_html::figure(html, figure, 3);
-                for table in tables_beside(results, figure.name).into_iter().flatten() {
-                    html.raw(&table);
-                }
-            } else {
-                html.element(
-                    "p class=\"absent\"",
-                    &format!("{}: not drawn, it would need {}.", entry.title, entry.needs),
-                );
+        let own = drawn.iter().filter(|(entry, _)| entry.chapter == chapter);
+        for figure in own.filter_map(|(_, figure)| figure.as_ref()) {
+            figure_html::figure(html, figure, 3);
+            for table in tables_beside(results, figure.name).into_iter().flatten() {
+                html.raw(&table);
             }
+        }
+        for line in absent(chapter, drawn) {
+            html.element("p class=\"absent\"", &line);
         }
         for table in tables_of(results, chapter).into_iter().flatten() {
             html.raw(&table);
@@ -66,6 +63,21 @@ pub fn all(html: &mut Html, results: &Results, drawn: &Drawn<'_>) {
     html.raw("</section><section id=\"glossary\"><h2>Words</h2>");
     glossary_html::list(html);
     html.raw("</section>");
+}
+
+/// What cannot be drawn in a chapter, those of the same need together.
+fn absent(chapter: Chapter, drawn: &Drawn<'_>) -> Vec<String> {
+    let mut needs: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (entry, _) in drawn.iter().filter(|(entry, figure)| entry.chapter == chapter && figure.is_none()) {
+        match needs.iter_mut().find(|(need, _)| *need == entry.needs) {
+            Some((_, titles)) => titles.push(entry.title),
+            None => needs.push((entry.needs, vec![entry.title])),
+        }
+    }
+    needs
+        .iter()
+        .map(|(need, titles)| format!("Not drawn, for want of {need}: {}.", titles.join("; ")))
+        .collect()
 }
 
 fn chapter_is_empty(results: &Results, chapter: Chapter, drawn: &Drawn<'_>) -> bool {
@@ -101,7 +113,7 @@ fn missing(results: &Results) -> Option<String> {
         return None;
     }
     let mut html = Html::default();
-    html.raw("<h3>Missing</h3><ul class=\"notes\">");
+    html.raw("<h3 id=\"missing\">Missing</h3><ul class=\"notes\">");
     for line in &results.missing {
         html.element("li", line);
     }

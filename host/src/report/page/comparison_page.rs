@@ -1,7 +1,7 @@
 //! The page of two campaigns: the verdict, the differences, and the figures of both side by side on the same axes.
 
 use super::text::Html;
-use super::{figure_html, shell};
+use super::{figure_html, glossary_html, shell};
 use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role, Source};
 use crate::report::figures;
 use crate::report::tables;
@@ -20,7 +20,7 @@ pub fn comparison_page(compared: &Compared, both: [&Results; 2]) -> String {
     let banner = both.map(brief::on_what).join("   |   ");
     let simulated = both.iter().any(|r| r.source.simulated);
     let mut body = Html::default();
-    body.raw("<nav aria-label=\"contents\"><ul><li><a href=\"#answer\">The verdict</a></li><li><a href=\"#both\">Both side by side</a></li></ul></nav><main>");
+    body.raw("<nav aria-label=\"contents\"><ul><li><a href=\"#answer\">The verdict</a></li><li><a href=\"#both\">Both side by side</a></li><li><a href=\"#glossary\">Words</a></li></ul></nav><main>");
     body.raw(
         "<section id=\"answer\" class=\"first\"><div class=\"words\"><h1>Do the two contacts differ?</h1>",
     );
@@ -44,6 +44,8 @@ pub fn comparison_page(compared: &Compared, both: [&Results; 2]) -> String {
     for figure in drawn.iter().filter(|f| f.name != "differences") {
         figure_html::figure(&mut body, figure, 3);
     }
+    body.raw("</section><section id=\"glossary\"><h2>Words</h2>");
+    glossary_html::list(&mut body);
     body.raw("</section></main>");
     shell("Two contacts compared", &banner, simulated, &body.finish(), drawn.iter())
 }

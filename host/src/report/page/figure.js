@@ -17,13 +17,14 @@ function enliven(element,figure){
   figure.panels.forEach((panel,i)=>{
     const host=element.querySelector(`[data-panel="${i}"] .plot`);
     panel.marks.forEach(unpackMark);
-    if(panel.marks.some(m=>m.cells)){charts.push(new Cells(figure,panel,host));return}
+    if(panel.marks.some(m=>m.cells)){panel.marks.forEach(m=>m.columns=panel.x.names.length);charts.push(new Cells(figure,panel,host));return}
     if(panel.marks.some(m=>m.scene)){charts.push(new SceneView(figure,panel,host));host.classList.add('alive');return}
     const chart=new Chart(figure,panel,host);
     charts.push(chart);
     host.classList.add('alive');
     for(const key of['x','y']){const view=pending.get(sectionOf(host)+'/'+panel[key].link);if(panel[key].link&&view)chart.show({[key]:view})}
   });
+  if(figure.name==='interface-modes')armsBelow(element);
   element.classList.add('ready');
   return charts;
 }
@@ -33,6 +34,7 @@ class Cells{
     this.figure=figure;this.panel=panel;this.host=host;this.hidden=new Set();
     this.cells=panel.marks.find(m=>m.cells).cells;
     this.columns=panel.x.names.length;
+    this.view={x:panel.x.range,y:panel.y.range,fixed:true};
     const rects=()=>[...host.querySelectorAll('rect[class^="f-"]')];
     const values=this.cells.values;
     // only what is known is drawn
@@ -44,7 +46,9 @@ class Cells{
   say(i){
     this.at=i;
     this.host.closest('figure').querySelector('.readout').textContent=this.cells.says[i];
+    if(this.figure.name==='participation')moveArms(partsOf(Math.floor(i/this.columns)));
   }
+  marks(){return this.panel.marks}
   key(e){
     const by={ArrowLeft:-1,ArrowRight:1,ArrowUp:-this.columns,ArrowDown:this.columns}[e.key];
     if(!by)return false;
@@ -55,18 +59,18 @@ class Cells{
   whole(){}
 }
 function remember(chart){
-  const{view,panel,figure}=chart,i=figure.panels.indexOf(panel),part=key=>view[key].map(v=>+v.toPrecision(9)).join(':');
+  const{view,panel,figure}=chart,i=figure.panels.indexOf(panel),part=key=>view[key].map(v=>+v.toPrecision(9)).join(':')+':'+panel[key].scale;
   chart.fragment=`#view=${figure.name}/${i}/${part('x')}/${part('y')}`;
   const element=document.getElementById('fig-'+figure.name);
   element.dataset.fragment=chart.fragment;
 }
 function recall(){
-  const m=/^#view=([a-z0-9-]+)\/(\d+)\/([^/:]+):([^/:]+)\/([^/:]+):([^/:]+)$/.exec(location.hash);
+  const m=/^#view=([a-z0-9-]+)\/(\d+)\/([^/:]+):([^/:]+):(log|linear)\/([^/:]+):([^/:]+):(log|linear)$/.exec(location.hash);
   const figure=m&&FIGURES.find(f=>f.name===m[1]);
   if(!figure||!figure.panels[m[2]])return;
   const element=document.getElementById('fig-'+m[1]),chart=enliven(element,figure)[m[2]];
-  const[x0,x1,y0,y1]=m.slice(3).map(Number);
-  if(chart instanceof Chart&&[x0,x1,y0,y1].every(Number.isFinite)){chart.zoom({x:[x0,x1],y:[y0,y1]});element.scrollIntoView()}
+  const[x0,x1,y0,y1]=[3,4,6,7].map(n=>Number(m[n]));
+  if(chart instanceof Chart&&[x0,x1,y0,y1].every(Number.isFinite)){chart.spread('x',m[5]);chart.spread('y',m[8]);chart.zoom({x:[x0,x1],y:[y0,y1]});element.scrollIntoView()}
 }
 function toggle(figure,element,name,alone){
   const charts=enliven(element,figure),names=new Set(figure.panels.flatMap(p=>p.marks.map(m=>m.name).filter(Boolean)));
@@ -105,12 +109,12 @@ function panelInto(pen,panel,chart,x0,y0,width){
     x+=need;
   }
   if(seen.size)top+=24;
-  const box={left,right,top,bottom:top+(chart.scene?300:frameHeight(panel,width))};
-  if(!(chart instanceof Chart))return box.bottom;
+  if(chart instanceof SceneView){chart.paint(scenePen(pen,x0,top),width,SCENE_HIGH);return top+SCENE_HIGH}
+  const box={left,right,top,bottom:top+frameHeight(panel,width)};
   const sx=scaleOf(panel.x,chart.view.x,left,right),sy=scaleOf(panel.y,chart.view.y,panel.y.names?box.top:box.bottom,panel.y.names?box.bottom:box.top);
   const xt=axisTicks(panel.x,chart.view.x,right-left,false),yt=rows?[]:axisTicks(panel.y,chart.view.y,box.bottom-box.top,true);
   for(const t of xt)if(!panel.x.names)pen.path([[sx(t.value),box.top],[sx(t.value),box.bottom]],grid);
-  for(const t of yt)pen.path([[left,sy(t.value)],[right,sy(t.value)]],grid);
+  for(const t of yt)if(!panel.y.names)pen.path([[left,sy(t.value)],[right,sy(t.value)]],grid);
   pen.clipped(box,()=>{for(const m of chart.marks())drawMark(pen,m,sx,sy,box,look(m.role))});
   pen.path([[left,box.top],[right,box.top],[right,box.bottom],[left,box.bottom],[left,box.top]],frame);
   for(const t of xt)if(t.label)pen.text(sx(t.value),box.bottom+18,t.label,'middle','ink',12);
@@ -130,17 +134,20 @@ function csvOf(figure,element){
   const charts=enliven(element,figure),lines=['panel,curve,horizontal,x,upright,y,low,high'];
   const quoted=t=>{t=/^[=+@\t]/.test(t)?"'"+t:t;return/[",\n\r]/.test(t)?`"${t.replace(/"/g,'""')}"`:t},num=v=>v===undefined||!Number.isFinite(v)?'':sixDigits(v);
   figure.panels.forEach((panel,i)=>{
-    const chart=charts[i],[low,high]=chart.view?chart.view.x:[-Infinity,Infinity],head=panel.title||String(i+1);
+    const chart=charts[i],[low,high]=chart instanceof Chart?chart.view.x:[-Infinity,Infinity],head=panel.title||String(i+1);
     for(const m of panel.marks){
       if(chart.hidden.has(m.name))continue;
-      const put=(x,y,l,h)=>{if(x===undefined||(x>=low&&x<=high))lines.push([quoted(head),quoted(m.name||m.role),quoted(labelOf(panel.x)),num(x),quoted(labelOf(panel.y)),num(y),num(l),num(h)].join(','))};
+      const tells=of=>(m.origin||[]).some(o=>o.of===of),nameAt=(axis,v)=>axis.names?axis.names[Math.max(0,Math.round(v))]:undefined;
+      const xTold=tells('x')||tells('step')||panel.x.link==='cycle',told=(of,v)=>tells(of)?num(v):'';
+      const across=v=>{const n=nameAt(panel.x,v);return n===undefined?(xTold?num(v):''):quoted(n)},upright=v=>{const n=nameAt(panel.y,v);return n===undefined?told('y',v):quoted(n)};
+      const put=(x,...cells)=>{if(x===undefined||(x>=low&&x<=high))lines.push([quoted(head),quoted(m.name||m.role),quoted(labelOf(panel.x)),x===undefined?'':across(x),quoted(labelOf(panel.y)),...cells].join(','))};
       const c=m.line||m.loop;
-      if(c){const at=along(c.x);for(let n=0;n<c.y.length;n++)put(at(n),c.y[n])}
-      if(m.ribbon){const at=along(m.ribbon.x);for(let n=0;n<m.ribbon.low.length;n++)put(at(n),undefined,m.ribbon.low[n],m.ribbon.high[n])}
-      if(m.points)for(let n=0;n<m.points.x.length;n++)put(m.points.x[n],m.points.y[n],m.points.bars?.low[n],m.points.bars?.high[n]);
-      if(m.level)put(undefined,m.level.at);
+      if(c&&tells('y')){const at=along(c.x);for(let n=0;n<c.y.length;n++)put(at(n),upright(c.y[n]),'','')}
+      if(m.ribbon&&tells('low')){const at=along(m.ribbon.x);for(let n=0;n<m.ribbon.low.length;n++)put(at(n),'',num(m.ribbon.low[n]),num(m.ribbon.high[n]))}
+      if(m.points&&(tells('x')||tells('y')))for(let n=0;n<m.points.x.length;n++)put(m.points.x[n],upright(m.points.y[n]),told('low',m.points.bars?.low[n]),told('high',m.points.bars?.high[n]));
+      if(m.level&&tells('at'))put(undefined,num(m.level.at),'','');
       if(m.strips)m.strips.says.forEach((name,row)=>{const n=m.strips.x.length;for(let i=0;i<n;i++)if(m.strips.x[i]>=low&&m.strips.x[i]<=high)lines.push([quoted(head),quoted(name),quoted(labelOf(panel.x)),num(m.strips.x[i]),quoted(m.name),num(m.strips.values[row*n+i]),'',''].join(','))});
-      if(m.cells)m.cells.values.forEach((v,n)=>{if(Number.isFinite(v))put(n%panel.x.names.length,Math.floor(n/panel.x.names.length),v)});
+      if(m.cells)m.cells.values.forEach((v,n)=>{if(Number.isFinite(v))put(n%panel.x.names.length,upright(Math.floor(n/panel.x.names.length)),told('values',v),'')});
       if(m.scene)for(const s of m.scene.spots)lines.push([s.toward?'impact':'response',quoted(s.name),'x y z in m',num(s.at[0]),'',num(s.at[1]),num(s.at[2]),''].join(','));
     }
   });

@@ -47,8 +47,11 @@ fn one_panel(html: &mut Html, figure: &Figure, panel: &Panel, index: usize, widt
         html.raw("</ul>");
     }
     let scene = panel.marks.iter().any(|m| matches!(m.shape, Shape::Scene(_)));
+    let matrix = panel.marks.iter().any(|m| matches!(m.shape, Shape::Cells { .. }));
     let class = if scene {
         "plot scene"
+    } else if matrix {
+        "plot matrix"
     } else if panel.height == Height::Rows {
         "plot rows"
     } else {

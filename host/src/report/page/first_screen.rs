@@ -4,6 +4,7 @@ use super::figure_html;
 use super::text::{Html, escaped};
 use crate::report::figure::Figure;
 use crate::report::figures::{Chapter, Entry};
+use crate::report::words::line::{Line, UNKNOWN};
 use crate::report::words::{self, answer_sentences, brief};
 use crate::results::Results;
 
@@ -21,27 +22,33 @@ pub fn answer(html: &mut Html, results: &Results, drawn: &[(&Entry, Option<Figur
             ]
             .into_iter()
             .flatten()
-            .map(|text| brief::Line { head: String::new(), text }),
+            .map(Line::words),
         );
     }
     if lines.is_empty() {
         html.raw("<div class=\"found warn\"><p>No stiffness could be found from this file.</p></div>");
     } else {
-        html.raw("<div class=\"found\">");
+        let known = lines.iter().any(|line| !line.text.starts_with(UNKNOWN) && !line.is_truth());
+        html.raw(if known { "<div class=\"found\">" } else { "<div class=\"found warn\">" });
         for (i, line) in lines.iter().enumerate() {
-            html.raw(if i == 0 && !line.head.is_empty() { "<p class=\"headline\">" } else { "<p>" });
+            // what is not known has its reason in letters of the usual size
+            let large = i == 0 && !line.head.is_empty() && !line.text.starts_with(UNKNOWN);
+            html.raw(if large { "<p class=\"headline\">" } else { "<p>" });
             if !line.head.is_empty() {
                 html.raw(&format!("<strong>{}</strong> ", escaped(&line.head)));
             }
-            html.text(&line.text);
+            told(html, line);
             html.raw("</p>");
         }
         html.raw("</div>");
     }
     if let Some(why) = answer_sentences::why_they_differ(results) {
-        html.element("p class=\"differ\"", &why);
+        html.raw("<p class=\"differ\">");
+        told(html, &why);
+        html.raw("</p>");
     }
     failed(html, results);
+    missing(html, results);
     html.raw("</div>");
     for (_, figure) in drawn.iter().filter(|(entry, _)| entry.chapter == Chapter::Answer) {
         if let Some(figure) = figure {
@@ -49,6 +56,36 @@ pub fn answer(html: &mut Html, results: &Results, drawn: &[(&Entry, Option<Figur
         }
     }
     html.raw("</section>");
+}
+
+/// So many things that are missing are named on the first screen.
+const NAMED: usize = 3;
+
+fn missing(html: &mut Html, results: &Results) {
+    if results.missing.is_empty() {
+        return;
+    }
+    html.raw("<div class=\"found warn\"><h2><a href=\"#missing\">Missing</a></h2><ul>");
+    for line in results.missing.iter().take(NAMED) {
+        html.element("li", line);
+    }
+    if results.missing.len() > NAMED {
+        html.element("li", &format!("and {} more", results.missing.len() - NAMED));
+    }
+    html.raw("</ul></div>");
+}
+
+/// A line's text, in which each number says where it stands in `results.json`.
+fn told(html: &mut Html, line: &Line) {
+    let mut rest = escaped(&line.text);
+    for (shown, place) in &line.numbers {
+        let shown = escaped(shown);
+        let Some(at) = rest.find(&shown) else { continue };
+        html.raw(&rest[..at]);
+        html.raw(&format!("<span data-path=\"{}\">{shown}</span>", escaped(place)));
+        rest = rest.split_off(at + shown.len());
+    }
+    html.raw(&rest);
 }
 
 fn failed(html: &mut Html, results: &Results) {

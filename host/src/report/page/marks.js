@@ -88,6 +88,14 @@ function drawMark(pen,mark,sx,sy,box,look){
       }
     }
   }
+  else if(m=mark.cells){
+    const columns=Math.round(mark.columns);
+    m.values.forEach((v,i)=>{
+      if(!Number.isFinite(v))return;
+      const column=i%columns,row=Math.floor(i/columns),x=sx(column-.46),y=[sy(row-.44),sy(row+.44)];
+      pen.rect(x,Math.min(...y),sx(column+.46)-x,Math.abs(y[1]-y[0]),look.colour,.06+.94*Math.min(Math.max(v,0),1));
+    });
+  }
   else if(m=mark.level){const y=sy(m.at),[a,b]=m.between?m.between.map(sx):[box.left,box.right];pen.path([[a,y],[b,y]],look)}
   else if(m=mark.upright){const x=sx(m.at);pen.path([[x,box.top],[x,box.bottom]],look)}
   else if(m=mark.shade){
@@ -96,8 +104,9 @@ function drawMark(pen,mark,sx,sy,box,look){
   }else if((m=mark.ring)||(m=mark.text)){
     const x=sx(m.at[0]),y=sy(m.at[1]),k=pen.k;
     if(x<box.left||x>box.right||y<box.top||y>box.bottom)return;
-    if(mark.ring)pen.circle(x,y,9*k,null,look.colour);
-    const beside=mark.ring?13*k:0,end=x+beside+6.6*k*m.text.length>box.right;
-    pen.text(end?x-beside:x+beside,Math.max(mark.ring?y-8*k:y,box.top+12*k),m.text,end?'end':'start','ink',12.5);
+    // above the ring: curves leave it sideways
+    if(mark.ring){pen.circle(x,y,9*k,null,look.colour);pen.text(x,Math.max(y-14*k,box.top+12*k),m.text,'middle','ink',12.5);return}
+    const end=x+6.6*k*m.text.length>box.right;
+    pen.text(x,Math.max(y,box.top+12*k),m.text,end?'end':'start','ink',12.5);
   }
 }

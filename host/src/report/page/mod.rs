@@ -5,6 +5,7 @@ mod comparison_page;
 mod figure_html;
 mod first_screen;
 mod glossary_html;
+mod linked_words;
 mod policy;
 mod text;
 
@@ -21,12 +22,13 @@ const STYLE: &str = include_str!("page.css");
 const CHARTS_STYLE: &str = include_str!("../../../vendor/uplot/uPlot.min.css");
 const CHARTS: &str = include_str!("../../../vendor/uplot/uPlot.iife.min.js");
 /// In the order in which they build on one another.
-const SCRIPTS: [&str; 7] = [
+const SCRIPTS: [&str; 8] = [
     include_str!("ticks.js"),
     include_str!("marks.js"),
     include_str!("pens.js"),
     include_str!("panel.js"),
     include_str!("scene.js"),
+    include_str!("arms.js"),
     include_str!("figure.js"),
     include_str!("page.js"),
 ];
@@ -63,7 +65,7 @@ fn shell<'a>(
     html.raw(if simulated { "<header class=\"banner simulated\">" } else { "<header class=\"banner\">" });
     html.element("p", banner);
     html.raw("<div class=\"tools\" id=\"page-tools\"></div></header><div class=\"frame\">");
-    html.raw(body);
+    html.raw(&linked_words::linked(body));
     html.raw("</div>");
     figure_html::data(&mut html, figures);
     html.raw(&format!("<script>{script}</script></body></html>\n"));

@@ -35,6 +35,15 @@ for(const figure of FIGURES){
     navigator.clipboard?.writeText(to).catch(()=>{});
     history.replaceState(null,'',to.slice(to.indexOf('#')));
   });
+  for(const key of['x','y'])if(figure.panels.some(p=>p.marks.some(m=>!m.cells&&!m.scene)&&canSpread(p,key))){
+    const panels=figure.panels.filter(p=>canSpread(p,key));
+    const b=button(tools,'log '+key,`${key==='x'?'horizontal':'upright'} axis by logarithm, or even`,()=>{
+      const to=panels[0][key].scale==='log'?'linear':'log';
+      for(const c of enliven(element,figure))if(c instanceof Chart&&canSpread(c.panel,key)){c.spread(key,to);remember(c)}
+      b.setAttribute('aria-pressed',String(to==='log'));
+    });
+    b.setAttribute('aria-pressed',String(panels[0][key].scale==='log'));
+  }
   element.querySelector('.say').after(tools);
   for(const item of element.querySelectorAll('.legend li')){
     const b=document.createElement('button');
@@ -72,4 +81,4 @@ addEventListener('beforeprint',()=>{for(const d of document.querySelectorAll('de
 addEventListener('hashchange',recall);
 recall();
 // for the tests
-window.report={ticks,alive,enliven,FIGURES,svgOf,csvOf,held,zoomed,Chart};
+window.report={ticks,alive,enliven,FIGURES,svgOf,csvOf,held,zoomed,Chart,arms:()=>small};

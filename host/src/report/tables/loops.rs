@@ -1,27 +1,25 @@
 //! The contact by loops in numbers: kinds side by side (the paper's Tables 2 and 3), the decay's cycles, every level.
 
-use super::{Table, number, remarks, words};
+use super::{Table, number, remarks, scattered, words};
 use crate::report::page::escaped;
 use crate::report::words as said;
 use crate::report::words::number::{decimals, micro, short, with_scatter};
-use crate::report::words::side_by_side;
 use crate::results::{Excitation, Force, Hysteresis, OverCycles, Results, Shape};
 use std::fmt::Write;
 
 /// FBS and loops side by side, each with what it is.
 pub fn side_by_side(results: &Results) -> Option<String> {
-    let kinds = side_by_side::kinds(results);
-    if kinds.is_empty() {
+    if results.side_by_side.is_empty() {
         return None;
     }
     let mut html = String::from(
         "<div class=\"wide\"><table class=\"checks\"><caption>FBS and loops side by side (the paper's Tables 2 and 3)</caption><thead><tr>\
          <th scope=\"col\">found by</th><th scope=\"col\" class=\"n\">k ± σ, N/µm</th><th scope=\"col\">what it is</th></tr></thead><tbody>",
     );
-    for kind in kinds {
+    for (i, kind) in results.side_by_side.iter().enumerate() {
         let _ = write!(
             html,
-            "<tr><th scope=\"row\">{}</th><td class=\"n\">{}</td><td>{}</td></tr>",
+            "<tr><th scope=\"row\">{}</th><td class=\"n\" data-path=\"/side_by_side/{i}/mean_n_per_m /side_by_side/{i}/std_n_per_m\">{}</td><td>{}</td></tr>",
             escaped(&kind.found),
             escaped(&with_scatter(micro(kind.mean_n_per_m), micro(kind.std_n_per_m))),
             escaped(&kind.meaning)
@@ -49,15 +47,17 @@ pub fn decay(results: &Results) -> Option<String> {
         let at = |field: &str| format!("/hysteresis/{row}/decay/{i}/{field}");
         let tells = if k.std > UNSTEADY * k.mean.abs() {
             "differs from hit to hit: the decaying modes' phases decide"
+        } else if step.phase_deg.abs() > said::TURNED_DEG {
+            "the loop has turned"
         } else if step.cycle == 1 {
             "nearest to the contact's own line"
         } else {
-            "the loop has turned"
+            "near a straight line"
         };
         table.row([
             words(step.cycle.to_string()),
             words(tells),
-            number(Some(with_scatter(micro(k.mean), micro(k.std))), at("k_eq_n_per_m/mean")),
+            scattered(Some(with_scatter(micro(k.mean), micro(k.std))), &at("k_eq_n_per_m")),
             number(Some(decimals(step.phase_deg, 1)), at("phase_deg")),
             number(Some(short(step.amplitude_m * 1e6)), at("amplitude_m")),
         ]);
@@ -80,7 +80,7 @@ const HEADS: [&str; 10] = [
     "k_eq ± σ, N/µm",
     "peak secant, N/µm",
     "energy ± σ, µJ",
-    "phase, °",
+    "Δx lags T, °",
     "cycles",
 ];
 
@@ -103,9 +103,9 @@ pub fn hysteresis(results: &Results) -> Option<String> {
     for (i, h) in results.hysteresis.iter().enumerate() {
         let at = |field: &str| format!("/hysteresis/{i}/{field}");
         let slope = if h.slope_between_spots_n_per_m.is_some() {
-            "slope_between_spots_n_per_m/mean"
+            "slope_between_spots_n_per_m"
         } else {
-            "k_t_n_per_m/mean"
+            "k_t_n_per_m"
         };
         let of_cycles = h.stick_slope().or(h.k_eq_n_per_m);
         let mut cells = vec![
@@ -117,14 +117,17 @@ pub fn hysteresis(results: &Results) -> Option<String> {
                     let [low, high] = k.ci95.map(|limit| short(micro(limit)));
                     format!("{} ({low}…{high})", short(micro(k.mean)))
                 }),
-                at("k_t_n_per_m/mean"),
+                format!("{0}/mean {0}/ci95/0 {0}/ci95/1", at("k_t_n_per_m")),
             ),
-            number(over(h.stick_slope(), 1e-6), at(slope)),
-            number(over(h.k_eq_n_per_m, 1e-6), at("k_eq_n_per_m/mean")),
+            scattered(over(h.stick_slope(), 1e-6), &at(slope)),
+            scattered(over(h.k_eq_n_per_m, 1e-6), &at("k_eq_n_per_m")),
             number(h.k_secant_n_per_m.map(|k| short(micro(k))), at("k_secant_n_per_m")),
-            number(over(h.energy_j, 1e6), at("energy_j/mean")),
+            scattered(over(h.energy_j, 1e6), &at("energy_j")),
             number(h.phase_deg.map(|p| decimals(p, 1)), at("phase_deg")),
-            words(of_cycles.map_or(super::UNKNOWN.into(), |k| k.cycles.to_string())),
+            number(
+                of_cycles.map(|k| k.cycles.to_string()),
+                at(&format!("{}/cycles", if h.stick_slope().is_some() { slope } else { "k_eq_n_per_m" })),
+            ),
         ];
         if friction {
             cells.push(number(h.friction_coefficient.map(short), at("friction_coefficient")));

@@ -22,7 +22,7 @@ use std::fmt::Write;
 /// What stands where nothing is known.
 pub(super) const UNKNOWN: &str = "–";
 
-/// One cell: words, or a number with its place in `results.json`.
+/// One cell: words, or a number with its place in `results.json`; of several numbers the places in their order, with spaces between.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Cell {
     text: String,
@@ -40,6 +40,21 @@ pub(super) fn number(text: Option<String>, path: impl Into<String>) -> Cell {
         Some(text) => Cell { text, path: path.into() },
         None => words(UNKNOWN),
     }
+}
+
+/// A number with its scatter, both beside one another at `place`.
+pub(super) fn scattered(text: Option<String>, place: &str) -> Cell {
+    number(text, format!("{place}/mean {place}/std"))
+}
+
+/// An interval that stands at `place`.
+pub(super) fn interval(text: Option<String>, place: &str) -> Cell {
+    number(text, format!("{place}/0 {place}/1"))
+}
+
+/// A key of any name as a part of a path (RFC 6901), in which no space may stand.
+pub(super) fn key(name: &str) -> String {
+    name.replace('~', "~0").replace('/', "~1").replace('%', "%25").replace(' ', "%20")
 }
 
 /// Builds one table; cells are escaped, columns after the first `text_columns` are set to the right.

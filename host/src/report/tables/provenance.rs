@@ -1,6 +1,6 @@
 //! What was measured, and where everything comes from.
 
-use super::{Table, number, words};
+use super::{Table, key, number, words};
 use crate::report::page::escaped as escape;
 use crate::report::words::number::count;
 use crate::results::Results;
@@ -27,12 +27,18 @@ pub fn completeness(results: &Results) -> Option<String> {
             words(c.configuration.clone()),
             number(
                 Some(format!("{} of {}", c.cells_complete, c.cells)),
-                format!("/completeness/{i}/cells_complete"),
+                format!("/completeness/{i}/cells_complete /completeness/{i}/cells"),
             ),
             number(Some(count(c.wanted as u64)), format!("/completeness/{i}/wanted")),
             number(Some(count(c.kept as u64)), format!("/completeness/{i}/kept")),
         ];
-        cells.extend(verdicts.iter().map(|v| words(c.refused.get(*v).copied().unwrap_or(0).to_string())));
+        cells.extend(verdicts.iter().map(|v| {
+            let refused = c.refused.get(*v);
+            refused.map_or_else(
+                || words("none"),
+                |n| number(Some(n.to_string()), format!("/completeness/{i}/refused/{}", key(v))),
+            )
+        }));
         table.row(cells);
     }
     Some(table.finish())

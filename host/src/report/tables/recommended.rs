@@ -1,6 +1,6 @@
 //! The estimates to quote, with their intervals, and what hits drawn anew say.
 
-use super::{Table, number, words};
+use super::{Table, interval, number, words};
 use crate::report::page::escaped as escape;
 use crate::report::words as said;
 use crate::report::words::number::{band, short};
@@ -34,16 +34,16 @@ pub fn recommended(results: &Results) -> Option<String> {
             let (scale, unit) = if dof.is_translation() { (1e-6, "N/µm") } else { (1e-3, "kN m/rad") };
             let shown = |value: f64| short(scale * value);
             let at = |field: &str| format!("/recommended/{i}/joint/{dof}/{field}");
-            let interval = if k.identified {
-                Some(format!("{}…{}", shown(k.ci95[0]), shown(k.ci95[1])))
+            let range = if k.identified {
+                interval(Some(format!("{}…{}", shown(k.ci95[0]), shown(k.ci95[1]))), &at("ci95"))
             } else {
-                (k.ci95[0] > 0.0).then(|| format!("above {}", shown(k.ci95[0])))
+                number((k.ci95[0] > 0.0).then(|| format!("above {}", shown(k.ci95[0]))), at("ci95/0"))
             };
             table.row([
                 words(format!("{dof}, {unit}")),
-                words(band(estimate.band_hz)),
+                interval(Some(band(estimate.band_hz)), &format!("/recommended/{i}/band_hz")),
                 number(k.identified.then(|| shown(k.stiffness)), at("stiffness")),
-                number(interval, at("ci95/0")),
+                range,
                 number(estimate.noise_known.then(|| shown(k.std_noise)), at("std_noise")),
                 number(Some(shown(k.std_geometry)), at("std_geometry")),
                 number(Some(shown(k.bias)), at("bias")),

@@ -1,5 +1,6 @@
 //! The answer in words: what a colleague would say of each number.
 
+use super::line::{BETWEEN, CLAMP, CONTACT, Line};
 use super::number::{micro, short};
 use crate::contact::{Cause, Diagnosis, Doubt, Interval, Stiffness};
 use crate::results::{Answer, Results};
@@ -100,6 +101,11 @@ pub fn slipping() -> String {
     "The contact slips under the hammer, so that its stiffness depends on the force: hit more softly, or press harder, for the stuck stiffness.".into()
 }
 
+/// What lies between the arms cannot be looked for.
+pub fn without_all_three() -> String {
+    "It needs FRFs of A, B and the assembly.".into()
+}
+
 /// The question was not put.
 pub fn not_looked_for() -> String {
     "It was not looked for.".into()
@@ -113,22 +119,27 @@ pub fn capital(text: &str) -> String {
 }
 
 /// Why the contact and what lies between the arms differ, in one sentence; none where one of them is not known.
-pub fn why_they_differ(results: &Results) -> Option<String> {
+pub fn why_they_differ(results: &Results) -> Option<Line> {
     let answer = results.answer.as_ref()?;
-    let contact = micro(answer.contact.k_t_n_per_m.as_ref()?.mean);
-    let between = micro(answer.between_arms.k_n_per_m.as_ref()?.mean);
-    Some(match &answer.clamp {
-        Some(clamp) => format!(
-            "They differ because the clamps ({} N/µm) and the contact ({}) give way one after the other, in series: together {} N/µm are left.",
-            short(micro(clamp.k_n_per_m.mean)),
-            short(contact),
-            short(between)
-        ),
-        None => {
+    let contact = answer.contact.k_t_n_per_m.as_ref()?.mean;
+    let between = answer.between_arms.k_n_per_m.as_ref()?.mean;
+    let Some(clamp) = &answer.clamp else {
+        return Some(Line::words(
             "Nothing soft was found between the arms and the contact, so that both see the same stiffness."
-                .into()
-        }
-    })
+                .into(),
+        ));
+    };
+    let clamps = clamp.k_n_per_m.mean;
+    let [of_clamps, of_contact, of_both] = [clamps, contact, between].map(|k| short(micro(k)));
+    let text = format!(
+        "They differ because the clamps ({of_clamps} N/µm) and the contact ({of_contact}) give way one after the other, in series: together {of_both} N/µm are left."
+    );
+    Some(
+        Line::words(text)
+            .stiffness(clamps, &format!("{CLAMP}/mean"))
+            .stiffness(contact, &format!("{CONTACT}/mean"))
+            .stiffness(between, &format!("{BETWEEN}/mean")),
+    )
 }
 
 /// The answer's lines: what the terminal says first, and the head of the report.

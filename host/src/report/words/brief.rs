@@ -1,23 +1,15 @@
 //! The answer in a few lines, for those who will read no more: the first screen and the end of the terminal's output.
 
 use super::answer_sentences::{why_they_differ, with_interval};
+use super::line::{BETWEEN, CLAMP, CONTACT, Line, TRUTH, UNKNOWN};
 use super::number::{decimals, micro, short};
 use crate::results::{
     BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, Results, SAME_IN_ALL,
     SERIES_COMPLIANCE, UNCHANGED,
 };
 
-/// One line: what it is about, and what is said of it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Line {
-    /// What it is about; may be empty.
-    pub head: String,
-    /// What is said.
-    pub text: String,
-}
-
 fn line(head: &str, text: impl Into<String>) -> Line {
-    Line { head: head.into(), text: text.into() }
+    Line { head: head.into(), text: text.into(), numbers: Vec::new() }
 }
 
 /// On what was measured: a simulated rig is called so before anything else.
@@ -45,30 +37,38 @@ pub fn answer(results: &Results) -> Vec<Line> {
     let Some(answer) = &results.answer else { return Vec::new() };
     let own = &answer.contact;
     let mut lines = vec![match &own.k_t_n_per_m {
-        Some(k) => line("k_T of the contact:", format!("{}.", with_interval(k))),
-        None => line("k_T of the contact:", format!("not known. {}", own.why)),
+        Some(k) => line("k_T of the contact:", format!("{}.", with_interval(k))).interval(k, CONTACT),
+        None => line("k_T of the contact:", format!("{UNKNOWN} {}", own.why)),
     }];
     lines.push(match &answer.between_arms.k_n_per_m {
-        Some(k) => line("Between the arms:", format!("{}, which is not k_T.", with_interval(k))),
-        None => line("Between the arms:", format!("not known. {}", answer.between_arms.why)),
+        Some(k) => {
+            line("Between the arms:", format!("{}, which is not k_T.", with_interval(k))).interval(k, BETWEEN)
+        }
+        None => line("Between the arms:", format!("{UNKNOWN} {}", answer.between_arms.why)),
     });
     if let Some(clamp) = &answer.clamp {
-        lines.push(line(
-            "Clamps, in series with the contact:",
-            format!("{}.", with_interval(&clamp.k_n_per_m)),
-        ));
+        let k = &clamp.k_n_per_m;
+        lines.push(
+            line("Clamps, in series with the contact:", format!("{}.", with_interval(k))).interval(k, CLAMP),
+        );
     }
     if let Some(truth) = &answer.truth {
         let clamps =
             truth.clamps_k_n_per_m.map_or(String::new(), |k| format!(", clamps {}", short(micro(k))));
-        lines.push(line(
-            "SIMULATED rig, its truth:",
+        let told = line(
+            TRUTH,
             format!(
                 "contact {}{clamps}, between the arms {} N/µm.",
                 short(micro(truth.contact_k_t_n_per_m)),
                 short(micro(truth.between_arms_k_n_per_m))
             ),
-        ));
+        )
+        .stiffness(truth.contact_k_t_n_per_m, "/answer/truth/contact_k_t_n_per_m");
+        let told = match truth.clamps_k_n_per_m {
+            Some(k) => told.stiffness(k, "/answer/truth/clamps_k_n_per_m"),
+            None => told,
+        };
+        lines.push(told.stiffness(truth.between_arms_k_n_per_m, "/answer/truth/between_arms_k_n_per_m"));
     }
     lines
 }
@@ -112,7 +112,7 @@ pub fn terminal(results: &Results, after: usize) -> Vec<String> {
         lines.extend(found.into_iter().flatten());
     } else {
         lines.extend(answer.into_iter().map(|line| format!("{} {}", line.head, line.text)));
-        lines.extend(why_they_differ(results));
+        lines.extend(why_they_differ(results).map(|line| line.text));
     }
     if lines.len() == 1 {
         lines.push("No stiffness could be found from this file.".into());

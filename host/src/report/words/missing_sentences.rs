@@ -20,21 +20,22 @@ pub fn sentence(missing: &Missing) -> String {
         }
         Missing::NotInPlan(configuration) => format!("{configuration} is not in the plan."),
         Missing::NotMeasured { configuration, planned } => {
-            format!("{configuration} has not been measured: none of its {planned} cells has a kept hit.")
+            format!("{configuration} has not been measured: none of its {} has a kept hit.", cells(*planned))
         }
         Missing::CellsWithoutHit { configuration, absent, planned } => {
-            format!("{configuration}: {absent} of {planned} cells have no kept hit.")
+            format!("{configuration}: {absent} of {} without a kept hit.", cells(*planned))
         }
-        Missing::SingleHits { configuration, cells } => {
-            format!("{configuration}: {cells} cells have a single kept hit, so their coherence is not known.")
+        Missing::SingleHits { configuration, cells: single } => {
+            format!("{configuration}: {} with a single kept hit, of unknown coherence.", cells(*single))
         }
         Missing::ImpactsLeftOut { configuration, names } => left_out(*configuration, "impacts", names),
         Missing::ResponsesLeftOut { configuration, names } => {
             left_out(*configuration, "response locations", names)
         }
         Missing::ImportUnreadable { configuration, told } => format!("{configuration}: {told}."),
-        Missing::ImportUnused { configuration, file, cells } => format!(
-            "{configuration}: the FRFs imported from {file} are not used, because {cells} cells have hits of their own."
+        Missing::ImportUnused { configuration, file, cells: own } => format!(
+            "{configuration}: the FRFs imported from {file} are not used, because {} with hits of their own count.",
+            cells(*own)
         ),
         Missing::OtherLines(cell) => {
             of_cell(cell, "its signals at the contact have other lines than the other cells' and do not count there")
@@ -55,6 +56,18 @@ pub fn sentence(missing: &Missing) -> String {
                 .into()
         }
     }
+}
+
+/// `1 cell`, `12 cells`.
+fn cells(count: usize) -> String {
+    format!("{count} {}", if count == 1 { "cell" } else { "cells" })
+}
+
+/// Of a configuration whose FRFs came from elsewhere.
+pub fn imported(configuration: Structure, file: &str) -> String {
+    format!(
+        "{configuration}: its FRFs were imported from {file}: without hits there are no coherence and no loops."
+    )
 }
 
 fn of_cell(cell: &CellName, what: &str) -> String {

@@ -5,6 +5,7 @@ pub mod brief;
 pub(super) mod check_sentences;
 pub(super) mod comparison_sentences;
 pub(super) mod level_sentences;
+pub mod line;
 pub(super) mod missing_sentences;
 mod names;
 pub mod number;
@@ -12,5 +13,5 @@ pub mod side_by_side;
 mod summary;
 pub(super) mod warning_sentences;
 
-pub use names::{excitation, method, outcome, shape_name, slope, static_arm};
+pub use names::{TURNED_DEG, excitation, method, outcome, shape_name, slope, static_arm};
 pub use summary::{bootstrapped, impact_loops, levels_at_the_contact, shaker_loops, substructuring, summary};

@@ -7,6 +7,9 @@ use crate::results::{Excitation, Force, Hysteresis, Identified, OverCycles, Shap
 /// What the slope between the spots is called.
 pub const BETWEEN_SPOTS: &str = "slope between the spots";
 
+/// A loop whose Δx lags T by more is no line: the phase from which a steady loop is called an ellipse, °.
+pub const TURNED_DEG: f64 = 10.0;
+
 /// The slope that may be quoted for a loop, with its name: that of the stick part where it has one, k_eq otherwise.
 pub fn slope(loops: &Hysteresis) -> Option<(&'static str, OverCycles)> {
     let between = loops.slope_between_spots_n_per_m.map(|k| (BETWEEN_SPOTS, k));

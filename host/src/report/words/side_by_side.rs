@@ -4,22 +4,9 @@ use super::names::{BETWEEN_SPOTS, slope};
 use super::number::{band, count, decimals, short};
 use crate::results::{
     DIRECT, Excitation, Force, HIDDEN_RESONANCE, Hysteresis, MAIN_BAND, OverCycles, Results,
-    SERIES_COMPLIANCE, Shape,
+    SERIES_COMPLIANCE, Shape, SideBySide as Kind,
 };
 use crate::substructuring::{Dof, fit};
-
-/// One kind of stiffness.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Kind {
-    /// How it was found.
-    pub found: String,
-    /// Mean and scatter, N/m.
-    pub mean_n_per_m: f64,
-    /// See `mean_n_per_m`.
-    pub std_n_per_m: f64,
-    /// What it is, and what it may be used for.
-    pub meaning: String,
-}
 
 /// Which cycle of the decay stands for the later ones, as in the paper.
 const LATER_CYCLE: usize = 4;
@@ -127,11 +114,16 @@ fn shaker(results: &Results, force: Force) -> Vec<Kind> {
                 found: format!("{name}, shaker, {} Hz, {levels}", short(f)),
                 mean_n_per_m: mean,
                 std_n_per_m: std,
-                meaning: own.first().map_or(String::new(), |h| meaning(h, results)),
+                // one that slips tells what all of them are: slopes of stick parts
+                meaning: own.iter().max_by_key(|h| slips(h)).map_or(String::new(), |h| meaning(h, results)),
             });
         }
     }
     kinds
+}
+
+fn slips(row: &Hysteresis) -> bool {
+    matches!(row.shape, Shape::Microslip | Shape::GrossSlip)
 }
 
 fn meaning(row: &Hysteresis, results: &Results) -> String {
