@@ -12,7 +12,11 @@ mod advice;
 pub mod analyse;
 pub mod campaign;
 pub mod cli;
+#[cfg(feature = "dashboard")]
+pub mod dashboard;
 pub mod device;
 pub mod exchange;
+#[cfg(feature = "dashboard")]
+pub mod live;
 pub mod report;
 pub mod results;

@@ -122,6 +122,11 @@ impl Browser {
 
     /// Opens a file and waits until it is drawn.
     pub fn open(&mut self, file: &Path, look: Look) -> Page<'_> {
+        self.open_url(&format!("file://{}", file.canonicalize().unwrap().display()), look)
+    }
+
+    /// Opens an address and waits until it is drawn.
+    pub fn open_url(&mut self, url: &str, look: Look) -> Page<'_> {
         self.events.clear();
         let target = self.call(None, "Target.createTarget", json!({ "url": "about:blank" }))["targetId"]
             .as_str()
@@ -141,11 +146,8 @@ impl Browser {
             json!({ "features": [{ "name": "prefers-color-scheme", "value": light }] }),
         );
         page.call("Emulation.setScriptExecutionDisabled", json!({ "value": !look.scripts }));
-        page.call(
-            "Page.navigate",
-            json!({ "url": format!("file://{}", file.canonicalize().unwrap().display()) }),
-        );
-        page.until("document.readyState === 'complete'");
+        page.call("Page.navigate", json!({ "url": url }));
+        page.until("location.href !== 'about:blank' && document.readyState === 'complete'");
         page.call("Emulation.setFocusEmulationEnabled", json!({ "enabled": true }));
         page
     }

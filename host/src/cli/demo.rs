@@ -33,6 +33,9 @@ pub struct Demo {
     /// Print every method, check and loop too.
     #[arg(long)]
     details: bool,
+    #[cfg(feature = "dashboard")]
+    #[command(flatten)]
+    page: crate::cli::page::Page,
 }
 
 /// Notes in the file that tell one demo from another: key and value.
@@ -48,6 +51,8 @@ impl Demo {
         })?;
         let file = folder.join("campaign.jrig");
         let store = self.open(&file)?;
+        #[cfg(feature = "dashboard")]
+        let _page = self.page.start(&file)?;
         let again = self.again();
         let address = Address::Sim { rig: self.rig.clone() };
         let stop = interrupt::flag();

@@ -36,6 +36,10 @@ pub enum CliError {
     /// The analysis.
     #[error(transparent)]
     Analyse(#[from] AnalyseError),
+    /// The live page.
+    #[cfg(feature = "dashboard")]
+    #[error(transparent)]
+    Dashboard(#[from] crate::dashboard::DashboardError),
     /// A file that is read.
     #[error("{path}: {doing}: {source}; {}", advice::reading(source))]
     Read {

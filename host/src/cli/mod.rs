@@ -20,7 +20,11 @@ mod interrupt;
 mod measure;
 mod number;
 mod output;
+#[cfg(feature = "dashboard")]
+mod page;
 mod report;
+#[cfg(feature = "dashboard")]
+mod serve;
 mod shaker;
 
 use std::process::ExitCode;
@@ -54,6 +58,9 @@ enum Command {
     Analyse(analyse::Analyse),
     /// Make the report of a campaign file, and its figures as files.
     Report(report::Report),
+    /// Show a campaign in the browser.
+    #[cfg(feature = "dashboard")]
+    Serve(serve::Serve),
     /// Compare two campaigns.
     Compare(compare::Compare),
     /// Write everything that a campaign file holds for other programs.
@@ -95,6 +102,8 @@ impl Cli {
             Command::Shaker(command) => command.run(),
             Command::Analyse(command) => command.run(),
             Command::Report(command) => command.run(),
+            #[cfg(feature = "dashboard")]
+            Command::Serve(command) => command.run(),
             Command::Compare(command) => command.run(),
             Command::Export(command) => command.run(),
             Command::Frf(command) => command.run(),

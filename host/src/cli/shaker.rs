@@ -72,12 +72,17 @@ pub struct Shaker {
     /// Folder of the tables by which the controller's log lines are read (else JOINTRIG_LOG_TABLES).
     #[arg(long, value_name = "DIR")]
     log_tables: Option<PathBuf>,
+    #[cfg(feature = "dashboard")]
+    #[command(flatten)]
+    page: crate::cli::page::Page,
 }
 
 impl Shaker {
     pub fn run(self) -> Result<(), CliError> {
         let address: Address = self.device.parse()?;
         let mut store = Store::open(&self.file)?;
+        #[cfg(feature = "dashboard")]
+        let _page = self.page.start(&self.file)?;
         let plan = store.plan()?;
         let levels = self.levels(&plan)?;
         let moment = match self.when {

@@ -17,7 +17,7 @@ mod tables;
 pub mod words;
 
 pub use document::{compare, document};
-pub use page::{comparison_page, page};
+pub use page::{chart_style, comparison_page, figure_fragment, page, script};
 
 use crate::results::{Compared, Results};
 use std::fs::{self, File};
@@ -31,6 +31,11 @@ pub const REPORT_FILE: &str = "report.html";
 
 /// The folder of single figures.
 pub const FIGURES_FOLDER: &str = "figures";
+
+/// Every figure that these results have the data for.
+pub fn all_figures(results: &Results) -> Vec<figure::Figure> {
+    figures::all(results)
+}
 
 /// A file format of single figures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]

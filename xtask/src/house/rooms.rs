@@ -8,8 +8,16 @@ use std::collections::BTreeSet;
 /// The package whose rooms are looked at.
 const PACKAGE: &str = "jointrig";
 /// Its rooms, the lowest first. Rooms of one line know nothing of each other.
-const FLOORS: [&[&str]; 6] =
-    [&["device", "exchange"], &["campaign"], &["results"], &["analyse"], &["report"], &["cli"]];
+const FLOORS: [&[&str]; 6] = [
+    &["device", "exchange"],
+    &["campaign"],
+    &["results"],
+    &["analyse"],
+    &["report"],
+    &["live"],
+    &["dashboard"],
+    &["cli"],
+];
 
 /// Looks for arrows that run upwards or across; returns a remark.
 pub fn check(project: &Project) -> Result<String> {

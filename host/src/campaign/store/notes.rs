@@ -80,6 +80,29 @@ impl Store {
             .map_err(self.failed("writing notes"))
     }
 
+    /// The lines of the log behind line `after`, in order: id, time (RFC 3339, UTC), text.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn log_lines(&self, after: i64) -> Result<Vec<(i64, String, String)>, StoreError> {
+        self.all(
+            "SELECT id, utc, text FROM log WHERE id > ?1 ORDER BY id",
+            [after],
+            |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)),
+            "reading the log",
+        )
+    }
+
+    /// A number that changes whenever another connection, of this process or another, has written into the file.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn data_version(&self) -> Result<i64, StoreError> {
+        self.connection
+            .query_row("PRAGMA data_version", [], |row| row.get(0))
+            .map_err(self.failed("asking whether the file has changed"))
+    }
+
     /// Adds a line to the campaign's log.
     pub fn log(&self, text: &str) -> Result<(), StoreError> {
         write_log(&self.connection, text).map_err(self.failed("writing the log"))

@@ -44,6 +44,9 @@ pub struct Run {
     /// Folder of the tables by which the controller's log lines are read (else JOINTRIG_LOG_TABLES).
     #[arg(long, value_name = "DIR")]
     log_tables: Option<PathBuf>,
+    #[cfg(feature = "dashboard")]
+    #[command(flatten)]
+    page: crate::cli::page::Page,
 }
 
 impl Run {
@@ -52,6 +55,8 @@ impl Run {
         let mut store = Store::open(&self.file)?;
         self.settle_plan(&mut store)?;
         self.mention_shaker(&store)?;
+        #[cfg(feature = "dashboard")]
+        let _page = self.page.start(&self.file)?;
         let again = format!("jointrig campaign run {} --device {address}", self.file.display());
         let stop = interrupt::flag();
         let device = measure::Device { address: &address, seed: self.seed, log_tables: self.log_tables };

@@ -77,17 +77,18 @@ fn source(html: &mut Html, figure: &Figure) {
     html.raw("</p></details>");
 }
 
+/// How every role looks but for its colours, which the style sheet has: an object of the page's script.
+pub fn roles() -> String {
+    let looks = role::ALL.iter().map(|role| {
+        let (name, width, dash, opacity) = (role.name(), role.width(), role.dash(), role.opacity());
+        format!("\"{name}\":{{\"width\":{width},\"dash\":\"{dash}\",\"opacity\":{opacity}}}")
+    });
+    format!("{{{}}}", looks.collect::<Vec<_>>().join(","))
+}
+
 /// All figures as data; `<` cannot end the element.
 pub fn data<'a>(html: &mut Html, figures: impl Iterator<Item = &'a Figure>) {
-    html.raw("<script type=\"application/json\" id=\"figures\">{\"roles\":{");
-    for (i, role) in role::ALL.iter().enumerate() {
-        let comma = if i > 0 { "," } else { "" };
-        let (name, width, dash, opacity) = (role.name(), role.width(), role.dash(), role.opacity());
-        html.raw(&format!(
-            "{comma}\"{name}\":{{\"width\":{width},\"dash\":\"{dash}\",\"opacity\":{opacity}}}"
-        ));
-    }
-    html.raw("},\"figures\":[");
+    html.raw("<script type=\"application/json\" id=\"figures\">{\"figures\":[");
     for (i, figure) in figures.enumerate() {
         if i > 0 {
             html.raw(",");

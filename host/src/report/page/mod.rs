@@ -21,8 +21,8 @@ pub(super) use text::{Html, escaped};
 const STYLE: &str = include_str!("page.css");
 const CHARTS_STYLE: &str = include_str!("../../../vendor/uplot/uPlot.min.css");
 const CHARTS: &str = include_str!("../../../vendor/uplot/uPlot.iife.min.js");
-/// In the order in which they build on one another.
-const SCRIPTS: [&str; 8] = [
+/// What makes figures alive, in the order in which they build on one another.
+const FIGURE_SCRIPTS: [&str; 7] = [
     include_str!("ticks.js"),
     include_str!("marks.js"),
     include_str!("pens.js"),
@@ -30,8 +30,9 @@ const SCRIPTS: [&str; 8] = [
     include_str!("scene.js"),
     include_str!("arms.js"),
     include_str!("figure.js"),
-    include_str!("page.js"),
 ];
+/// The report as a whole.
+const PAGE_SCRIPT: &str = include_str!("page.js");
 
 /// The whole report as html.
 pub fn page(results: &Results) -> String {
@@ -55,8 +56,7 @@ fn shell<'a>(
     body: &str,
     figures: impl Iterator<Item = &'a Figure>,
 ) -> String {
-    let style = style();
-    let script = format!("{CHARTS}\n(()=>{{\"use strict\";\n{}}})();\n", SCRIPTS.concat());
+    let (style, script) = (chart_style(), script(PAGE_SCRIPT));
     let mut html = Html::default();
     html.raw("<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">");
     html.raw(&policy::meta(&style, &script));
@@ -72,8 +72,24 @@ fn shell<'a>(
     html.finish()
 }
 
+/// The script of a page whose figures are alive, with `own` behind what makes them so.
+pub fn script(own: &str) -> String {
+    format!(
+        "{CHARTS}\n(()=>{{\"use strict\";\n{}ROLES={};\n{own}}})();\n",
+        FIGURE_SCRIPTS.concat(),
+        figure_html::roles()
+    )
+}
+
+/// A figure as html: its panels as vectors, which a page's script replaces by charts that are alive.
+pub fn figure_fragment(figure: &Figure) -> String {
+    let mut html = Html::default();
+    figure_html::figure(&mut html, figure, 3);
+    html.finish()
+}
+
 /// The style sheet with the colours of the roles in light and dark.
-fn style() -> String {
+pub fn chart_style() -> String {
     let (light, dark) = (role::variables(false), role::variables(true));
     format!(
         "{CHARTS_STYLE}\n:root{{{light}}}\n@media(prefers-color-scheme:dark){{:root:not([data-light=light]){{{dark}}}}}\n:root[data-light=dark]{{{dark}}}\n\

@@ -1,6 +1,5 @@
 // The page as a whole: which figures there are, their buttons and keys, light and dark.
 const DATA=JSON.parse(document.getElementById('figures').textContent),FIGURES=DATA.figures;
-ROLES=DATA.roles;
 root.classList.add('scripted');
 function button(parent,text,title,act){
   const b=document.createElement('button');

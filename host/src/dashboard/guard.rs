@@ -1,0 +1,137 @@
+//! Who may ask. The page is on the loopback address, which every program of this machine and every web page that its browser has open can
+//! reach: a name that was pointed at it (DNS rebinding) is told by `Host`, another page by `Origin`, another user by the token.
+
+use std::io;
+
+use axum::http::{HeaderMap, StatusCode, header};
+
+/// 128 random bits, known to whoever was told the address.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Token(String);
+
+impl Token {
+    /// A new one.
+    ///
+    /// # Errors
+    /// The operating system has no random numbers.
+    pub fn random() -> io::Result<Self> {
+        let mut bytes = [0; 16];
+        getrandom::fill(&mut bytes).map_err(io::Error::other)?;
+        Ok(Self(format!("{:032x}", u128::from_le_bytes(bytes))))
+    }
+
+    /// As it stands in the address.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+
+    /// Whether that is it; it takes as long for every wrong one of the same length.
+    pub fn is(&self, other: &str) -> bool {
+        let differ = self.0.bytes().zip(other.bytes()).fold(0, |differ, (a, b)| differ | (a ^ b));
+        self.0.len() == other.len() && differ == 0
+    }
+}
+
+/// Why somebody is turned away.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// The request is for another host.
+    Host,
+    /// The request comes from a page that is not ours.
+    Origin,
+    /// The request lacks the token.
+    Token,
+}
+
+impl Refusal {
+    /// Its status.
+    pub fn status(self) -> StatusCode {
+        match self {
+            Self::Host => StatusCode::MISDIRECTED_REQUEST,
+            Self::Origin => StatusCode::FORBIDDEN,
+            Self::Token => StatusCode::UNAUTHORIZED,
+        }
+    }
+
+    /// What is wrong, and what to do.
+    pub fn words(self) -> [&'static str; 2] {
+        match self {
+            Self::Host => ["this server has no such name", "open the address that jointrig printed"],
+            Self::Origin => ["another page asked", "open the address that jointrig printed"],
+            Self::Token => [
+                "the token is missing or wrong",
+                "open the whole address that jointrig printed, with what follows the #",
+            ],
+        }
+    }
+}
+
+/// Whether a request is meant for this server, and comes from its own page or from no page at all.
+///
+/// # Errors
+/// Why not.
+pub fn from_here(headers: &HeaderMap, port: u16) -> Result<(), Refusal> {
+    let ours = ["127.0.0.1", "localhost"].map(|name| format!("{name}:{port}"));
+    let text = |name| headers.get(name).map(|value| value.to_str().unwrap_or_default());
+    if !text(header::HOST).is_some_and(|host| ours.iter().any(|own| own == host)) {
+        return Err(Refusal::Host);
+    }
+    match text(header::ORIGIN) {
+        Some(origin) if !ours.iter().any(|own| origin.strip_prefix("http://") == Some(own)) => {
+            Err(Refusal::Origin)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Whether a request carries the token.
+///
+/// # Errors
+/// It does not.
+pub fn has_token(headers: &HeaderMap, token: &Token) -> Result<(), Refusal> {
+    let given =
+        headers.get(header::AUTHORIZATION).and_then(|value| value.to_str().ok()?.strip_prefix("Bearer "));
+    if given.is_some_and(|given| token.is(given)) { Ok(()) } else { Err(Refusal::Token) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn headers(pairs: &[(header::HeaderName, &str)]) -> HeaderMap {
+        pairs.iter().map(|(name, value)| (name.clone(), value.parse().expect("a header"))).collect()
+    }
+
+    #[test]
+    fn names_and_pages_of_others_are_turned_away() {
+        let asked = |host: &str, origin: Option<&str>| {
+            let mut pairs = vec![(header::HOST, host)];
+            pairs.extend(origin.map(|origin| (header::ORIGIN, origin)));
+            from_here(&headers(&pairs), 4321)
+        };
+        assert_eq!(asked("127.0.0.1:4321", None), Ok(()));
+        assert_eq!(asked("localhost:4321", Some("http://localhost:4321")), Ok(()));
+        for host in ["rig.example:4321", "127.0.0.1", "127.0.0.1:4322", "127.0.0.1:43210", ""] {
+            assert_eq!(asked(host, None), Err(Refusal::Host), "{host}");
+        }
+        for origin in
+            ["http://rig.example", "https://localhost:4321", "null", "http://localhost:4321.example", ""]
+        {
+            assert_eq!(asked("localhost:4321", Some(origin)), Err(Refusal::Origin), "{origin}");
+        }
+        assert_eq!(from_here(&HeaderMap::new(), 4321), Err(Refusal::Host));
+    }
+
+    #[test]
+    fn only_the_whole_token_opens() {
+        let token = Token::random().expect("random numbers");
+        assert_eq!(token.as_str().len(), 32);
+        assert!(token.is(token.as_str()) && Token::random().expect("random numbers") != token);
+        let with = |value: &str| has_token(&headers(&[(header::AUTHORIZATION, value)]), &token);
+        assert_eq!(with(&format!("Bearer {}", token.as_str())), Ok(()));
+        for wrong in ["", "Bearer ", token.as_str(), &format!("Bearer {}0", token.as_str()), "Bearer 0"] {
+            assert_eq!(with(wrong), Err(Refusal::Token), "{wrong}");
+        }
+        assert_eq!(has_token(&HeaderMap::new(), &token), Err(Refusal::Token));
+    }
+}

@@ -1,0 +1,49 @@
+// What the server says: its messages put together into one state, and its answers to questions.
+const token=new URLSearchParams(location.hash.slice(1)).get('look')||sessionStorage.getItem('look');
+if(token)sessionStorage.setItem('look',token);
+// the secret stays out of the history and of what is copied from the address bar
+if(location.hash.startsWith('#look='))history.replaceState(null,'',location.pathname);
+const state={seq:null,whole:null,connected:false,refused:false,trouble:'',missed:0};
+const listeners=[];
+const onNews=f=>listeners.push(f);
+const tell=(kind,message)=>listeners.forEach(f=>f(kind,message));
+const cellOf=id=>state.whole.cells.find(c=>c.id===id);
+const nameOf=c=>`${c.configuration} ${c.impact}→${c.response}`;
+function takeIn(m){
+  state.seq=m.seq;
+  const w=state.whole;
+  if(m.kind==='snapshot'){state.whole=m;state.trouble=''}
+  else if(m.kind==='trouble')state.trouble=m.what;
+  else if(!w)return;
+  else if(m.kind==='judged'){w.hits.push(m.hit);replace(w.cells,m.cell,'id');w.progress=m.progress;state.trouble=''}
+  else if(m.kind==='cells'){for(const c of m.cells)replace(w.cells,c,'id');for(const h of m.hits)replace(w.hits,h,'record');w.progress=m.progress}
+  else if(m.kind==='estimate')w.estimate=m;
+  else return;
+  tell(m.kind,m);
+}
+function replace(list,item,key){const i=list.findIndex(o=>o[key]===item[key]);if(i>=0)list[i]=item}
+let wait=250;
+function connect(){
+  const socket=new WebSocket(`ws://${location.host}/socket`);
+  let alive=0,heard=false;
+  socket.onopen=()=>{
+    socket.send(JSON.stringify({token,after:state.seq}));
+    alive=setInterval(()=>socket.send(JSON.stringify({seen:state.seq})),3000);
+  };
+  socket.onmessage=e=>{
+    if(!heard){heard=true;wait=250;state.connected=true;tell('link')}
+    takeIn(JSON.parse(e.data));
+  };
+  socket.onclose=()=>{
+    clearInterval(alive);
+    state.refused=!heard&&state.seq===null;
+    state.connected=false;tell('link');
+    setTimeout(connect,wait);
+    wait=Math.min(2*wait,10000);
+  };
+}
+// an answer, or null where there are no data yet
+async function ask(path){
+  const answer=await fetch(path,{headers:{Authorization:'Bearer '+token}}).catch(()=>null);
+  return answer?.ok?answer.json():null;
+}

@@ -1,0 +1,99 @@
+// The strip, the verdict's banner, keys, sounds; which screen is shown.
+const $=id=>document.getElementById(id);
+root.classList.add('scripted');
+let screen=null,voice=null;
+for(const[i,s]of SCREENS.entries()){
+  s.button=el('button',{type:'button',title:`${s.title} (${i+1})`,on:{click:()=>go(s.key)}},s.title);
+  $('screens').append(s.button);
+}
+function go(key){
+  const s=SCREENS.find(s=>s.key===key);
+  if(!state.whole||!s)return;
+  if(screen!==s){
+    // a figure belongs to the screen that shows it
+    alive.clear();shownFigures.clear();
+    screen=s;
+    $('main').replaceChildren();
+    s.make($('main'));
+    for(const o of SCREENS)o.button.setAttribute('aria-current',o===s?'page':'false');
+  }
+  s.show('screen');
+}
+function strip(){
+  const w=state.whole;
+  if(!w){
+    $('what').textContent=state.refused?'The server lets nobody in without the whole address that jointrig printed.':'Connecting …';
+    return;
+  }
+  const p=w.progress;
+  $('banner').classList.toggle('simulated',w.simulated);
+  $('what').textContent=(w.simulated?'SIMULATED rig: ':'')+w.file;
+  $('where').textContent=state.connected?p.complete?'complete':p.next===null?'ended':'next '+nameOf(w.cells[p.next]):'connection lost, trying again';
+  $('kept').textContent=`${p.kept} of ${p.wanted} kept`;
+  const l=p.left;
+  $('left').textContent=l?`left: cell ${duration(l.cell_s)}, ${w.cells[p.next].configuration} ${duration(l.configuration_s)}, all ${duration(l.campaign_s)}, until ${new Date(Date.now()+1000*l.campaign_s).toLocaleTimeString([],{hour:'2-digit',minute:'2-digit'})}`:'';
+  $('link').textContent=(p.lost_scans?`${p.lost_scans} scans lost `:'')+(held?'picture held (space)':'');
+}
+// a refused hit stays to be seen until the next good one
+function banner(hit){
+  const v=$('verdict');
+  v.hidden=!hit||hit.kept;
+  if(v.hidden)return;
+  const c=cellOf(hit.cell);
+  v.dataset.verdict=hit.verdict;
+  v.replaceChildren(el('b',{'aria-hidden':'true',className:'sign'},signOf(hit.verdict)),el('span',{},`${c?nameOf(c)+', ':''}attempt ${hit.attempt+1}: ${hit.verdict}: ${hit.sentence}`));
+}
+function beep(hit){
+  if(!voice)return;
+  const tones=hit.kept?[880]:hit.verdict==='overload'?[330,330,330]:[330,330];
+  tones.forEach((f,i)=>{
+    const o=voice.createOscillator(),g=voice.createGain(),t=voice.currentTime+.16*i;
+    o.frequency.value=f;g.gain.setValueAtTime(.12,t);g.gain.exponentialRampToValueAtTime(1e-3,t+.13);
+    o.connect(g).connect(voice.destination);o.start(t);o.stop(t+.14);
+  });
+}
+function sound(){
+  voice=voice?(voice.close(),null):new AudioContext();
+  $('sound').setAttribute('aria-pressed',String(!!voice));
+  $('sound').textContent=voice?'sound on':'sound off';
+}
+$('sound').addEventListener('click',sound);
+$('help').addEventListener('click',()=>$('keys').showModal());
+$('light').addEventListener('click',()=>{
+  const dark=root.dataset.light?root.dataset.light==='dark':matchMedia('(prefers-color-scheme: dark)').matches;
+  root.dataset.light=dark?'light':'dark';
+  for(const charts of alive.values())for(const c of charts)if(c.plot)c.plot.redraw();
+});
+addEventListener('keydown',e=>{
+  if(e.ctrlKey||e.metaKey||e.altKey||e.target.closest('input,textarea'))return;
+  const n=+e.key;
+  if(n>=1&&n<=SCREENS.length){go(SCREENS[n-1].key);return}
+  const w=state.whole,at=w?w.cells.findIndex(c=>c.id===looked()):-1;
+  const act={
+    j:()=>{chosen=w.cells[Math.min(at+1,w.cells.length-1)]?.id??null;go('cell')},
+    k:()=>{chosen=w.cells[Math.max(at-1,0)]?.id??null;go('cell')},
+    f:()=>{chosen=null;screen?.show('screen');strip()},
+    m:sound,'?':()=>$('keys').showModal(),
+    ' ':()=>{held=!held;if(!held)screen?.show('screen');strip()},
+  }[e.key];
+  if(act&&w){act();e.preventDefault()}
+});
+// what came while nobody looked is drawn once, not message by message
+let due=false;
+function draw(kind){
+  if(due||held||document.hidden)return;
+  due=true;
+  requestAnimationFrame(()=>{due=false;if(!screen)go('now');else screen.show(kind)});
+}
+document.addEventListener('visibilitychange',()=>draw('screen'));
+onNews((kind,message)=>{
+  strip();
+  if(kind==='judged'){banner(message.hit);beep(message.hit)}
+  if(kind==='snapshot')banner(latest());
+  if(kind==='trouble'){const v=$('verdict');v.hidden=false;v.dataset.verdict='trouble';v.replaceChildren(el('b',{className:'sign','aria-hidden':'true'},'!'),el('span',{},message.what))}
+  if(kind!=='link'&&state.whole)draw(kind);
+});
+strip();
+if(token)connect();else{state.refused=true;strip()}
+// for the tests
+window.live={state,alive,go,looked};

@@ -1,0 +1,177 @@
+//! What can be asked for, and how it is answered.
+
+use std::sync::Arc;
+
+use axum::extract::{Path, Query, Request, State};
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use axum::{Json, Router};
+use serde::Deserialize;
+use serde_json::json;
+
+use super::guard::{Refusal, from_here, has_token};
+use super::{Shared, page, socket};
+use crate::campaign::store::Store;
+use crate::campaign::store::error::StoreError;
+use crate::live::figures;
+use crate::report::figure::{self, Figure};
+use crate::report::figure_fragment;
+
+/// What a page of ours may do: run our script, use our style, and ask this server.
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data: blob:; \
+    frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
+
+/// Everything that is served.
+pub fn router(shared: Arc<Shared>) -> Router {
+    let data = Router::new()
+        .route("/api/state", get(state))
+        .route("/api/figures/{name}", get(of_campaign))
+        .route("/api/records/{id}/{name}", get(of_record))
+        .route("/api/cells/{id}", get(of_cell))
+        .route("/api/log", get(log))
+        .layer(from_fn_with_state(shared.clone(), with_token));
+    Router::new()
+        .route("/", get(async || ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], page::HTML)))
+        .route(
+            "/live.css",
+            get(async || ([(header::CONTENT_TYPE, "text/css; charset=utf-8")], page::style())),
+        )
+        .route(
+            "/live.js",
+            get(async || ([(header::CONTENT_TYPE, "text/javascript; charset=utf-8")], page::script())),
+        )
+        .route("/socket", get(socket::socket))
+        .merge(data)
+        .fallback(async || Problem::missing("there is no such page"))
+        .layer(from_fn_with_state(shared.clone(), guarded))
+        .with_state(shared)
+}
+
+/// An answer that is none.
+struct Problem {
+    status: StatusCode,
+    what: String,
+    todo: &'static str,
+}
+
+impl Problem {
+    fn missing(what: &str) -> Self {
+        Self { status: StatusCode::NOT_FOUND, what: what.into(), todo: "go back to the page" }
+    }
+}
+
+impl From<Refusal> for Problem {
+    fn from(refusal: Refusal) -> Self {
+        let [what, todo] = refusal.words();
+        Self { status: refusal.status(), what: what.into(), todo }
+    }
+}
+
+impl From<StoreError> for Problem {
+    fn from(error: StoreError) -> Self {
+        Self { status: StatusCode::NOT_FOUND, what: error.to_string(), todo: "look at the campaign file" }
+    }
+}
+
+impl IntoResponse for Problem {
+    fn into_response(self) -> Response {
+        let body =
+            json!({ "error": { "what": self.what, "where": "the live page's server", "do": self.todo } });
+        (self.status, Json(body)).into_response()
+    }
+}
+
+async fn guarded(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
+    let mut response = match from_here(request.headers(), shared.port) {
+        Ok(()) => next.run(request).await,
+        Err(refusal) => Problem::from(refusal).into_response(),
+    };
+    for (name, value) in [
+        (header::CONTENT_SECURITY_POLICY, POLICY),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::REFERRER_POLICY, "no-referrer"),
+        (header::CACHE_CONTROL, "no-store"),
+    ] {
+        response.headers_mut().insert(name, HeaderValue::from_static(value));
+    }
+    response.headers_mut().insert("cross-origin-resource-policy", HeaderValue::from_static("same-origin"));
+    response
+}
+
+async fn with_token(
+    State(shared): State<Arc<Shared>>,
+    request: Request,
+    next: Next,
+) -> Result<Response, Problem> {
+    has_token(request.headers(), &shared.token)?;
+    Ok(next.run(request).await)
+}
+
+async fn state(State(shared): State<Arc<Shared>>) -> Response {
+    let whole = shared
+        .bus
+        .since(None)
+        .into_iter()
+        .next()
+        .map_or_else(String::new, |message| message.text.to_string());
+    ([(header::CONTENT_TYPE, "application/json")], whole).into_response()
+}
+
+/// A figure as data, and as the drawing that stands there until the data are alive.
+fn drawn(figure: Option<&Figure>) -> Result<Response, Problem> {
+    let figure = figure.ok_or_else(|| Problem::missing("there are no data for this figure yet"))?;
+    Ok(Json(json!({ "figure": figure, "html": figure_fragment(figure) })).into_response())
+}
+
+async fn of_campaign(
+    State(shared): State<Arc<Shared>>,
+    Path(name): Path<String>,
+) -> Result<Response, Problem> {
+    let all = shared.formed.figures();
+    drawn(all.iter().find(|figure| figure.name == name))
+}
+
+async fn of_record(
+    State(shared): State<Arc<Shared>>,
+    Path((id, name)): Path<(i64, String)>,
+) -> Result<Response, Problem> {
+    let store = Store::open_read_only(&shared.file)?;
+    let figure = match name.as_str() {
+        "hit" => figures::hit(&store, id)?,
+        "channels" => figures::channels(&store, id)?,
+        _ => return Err(Problem::missing("a record has the figures hit and channels")),
+    };
+    drawn(from_file(figure, &store, id)?.as_ref())
+}
+
+async fn of_cell(State(shared): State<Arc<Shared>>, Path(id): Path<i64>) -> Result<Response, Problem> {
+    let store = Store::open_read_only(&shared.file)?;
+    drawn(from_file(figures::cell(&store, id)?, &store, 0)?.as_ref())
+}
+
+/// The figure with what it was made from.
+fn from_file(figure: Option<Figure>, store: &Store, record: i64) -> Result<Option<Figure>, StoreError> {
+    let Some(mut figure) = figure else { return Ok(None) };
+    figure.from = figure::Source {
+        records: if record > 0 { vec![[record; 2]] } else { Vec::new() },
+        file: store.path().display().to_string(),
+        simulated: store.is_simulated()?,
+        version: env!("CARGO_PKG_VERSION").into(),
+    };
+    Ok(Some(figure))
+}
+
+#[derive(Deserialize)]
+struct After {
+    after: Option<i64>,
+}
+
+async fn log(State(shared): State<Arc<Shared>>, Query(asked): Query<After>) -> Result<Response, Problem> {
+    let store = Store::open_read_only(&shared.file)?;
+    let lines = store.log_lines(asked.after.unwrap_or(0))?;
+    let lines: Vec<_> =
+        lines.iter().map(|(id, utc, text)| json!({ "id": id, "utc": utc, "text": text })).collect();
+    Ok(Json(lines).into_response())
+}

@@ -1,0 +1,170 @@
+//! Sees what is new in a campaign file, whoever writes it.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::message::{CellCount, Counted, Hit, Judged, Left, Message, Progress, Snapshot, VERSION};
+use crate::campaign::plan::configuration_name;
+use crate::campaign::run::tally::Tally;
+use crate::campaign::store::Store;
+use crate::campaign::store::cell_table::CellRow;
+use crate::campaign::store::error::StoreError;
+use crate::campaign::store::record_row::{Damaged, RecordRow};
+
+/// Hits from whose times the pace is told.
+const PACE: usize = 40;
+
+/// An eye on a campaign file.
+pub struct Follower {
+    store: Store,
+    /// What SQLite says of the file's content: it changes with every commit of another connection.
+    version: i64,
+    seen: Snapshot,
+}
+
+impl Follower {
+    /// Opens the file and reads all of it but the samples.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn new(path: &Path) -> Result<Self, StoreError> {
+        let store = Store::open_read_only(path)?;
+        let version = store.data_version()?;
+        let seen = snapshot(&store)?;
+        Ok(Self { store, version, seen })
+    }
+
+    /// Everything so far.
+    pub fn whole(&self) -> Snapshot {
+        self.seen.clone()
+    }
+
+    /// What is new since the last look, in order; nothing where nobody has written.
+    ///
+    /// # Errors
+    /// The file cannot be read any more.
+    pub fn look(&mut self) -> Result<Vec<Message>, StoreError> {
+        let version = self.store.data_version()?;
+        if version == self.version {
+            return Ok(Vec::new());
+        }
+        let now = snapshot(&self.store)?;
+        let messages = difference(&self.seen, &now);
+        (self.version, self.seen) = (version, now);
+        Ok(messages)
+    }
+}
+
+/// What leads from one state to the next.
+fn difference(before: &Snapshot, now: &Snapshot) -> Vec<Message> {
+    // another plan was taken over, the first session began on a simulated rig, or records are gone: nothing that single messages could tell
+    let same_cells = before.cells.iter().map(|cell| cell.id).eq(now.cells.iter().map(|cell| cell.id));
+    let same_rig = (before.simulated, &before.plan) == (now.simulated, &now.plan);
+    if !same_cells || !same_rig || now.hits.len() < before.hits.len() {
+        return vec![Message::Snapshot(Box::new(now.clone()))];
+    }
+    let mut messages = Vec::new();
+    let last = before.hits.last().map_or(i64::MIN, |hit| hit.record);
+    let mut told: Vec<i64> = Vec::new();
+    for hit in now.hits.iter().filter(|hit| hit.record > last) {
+        let Some(cell) = now.cells.iter().find(|cell| cell.id == hit.cell) else { continue };
+        told.push(cell.id);
+        messages.push(Message::Judged(Box::new(Judged {
+            hit: hit.clone(),
+            cell: cell.clone(),
+            progress: now.progress.clone(),
+        })));
+    }
+    let changed =
+        before.cells.iter().zip(&now.cells).filter(|(old, new)| old != new && !told.contains(&new.id));
+    let cells: Vec<CellCount> = changed.map(|(_, new)| new.clone()).collect();
+    let overruled = before.hits.iter().zip(&now.hits).filter(|(old, new)| old != new);
+    let hits: Vec<Hit> = overruled.map(|(_, new)| new.clone()).collect();
+    if !cells.is_empty() || !hits.is_empty() || (messages.is_empty() && before.progress != now.progress) {
+        messages.push(Message::Cells(Counted { cells, hits, progress: now.progress.clone() }));
+    }
+    messages
+}
+
+fn snapshot(store: &Store) -> Result<Snapshot, StoreError> {
+    let (cells, records) = (store.cells()?, store.records()?);
+    let tally = Tally::new(&cells, &records);
+    let hits: Vec<Hit> = records.iter().flatten().map(hit).collect();
+    let link = store.link_counters()?;
+    Ok(Snapshot {
+        version: VERSION,
+        file: store.path().file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
+        plan: store.plan()?.name,
+        simulated: store.is_simulated()?,
+        progress: Progress {
+            kept: tally.kept(),
+            wanted: tally.wanted(),
+            complete: tally.complete(),
+            next: cells.iter().position(|row| tally.open(row.id)),
+            left: left(&cells, &tally, &records),
+            lost_scans: link.get("scans_lost").copied().unwrap_or(0),
+            recovered_scans: link.get("scans_recovered").copied().unwrap_or(0),
+        },
+        cells: cells.iter().map(|row| count(row, &tally)).collect(),
+        hits,
+        estimate: None,
+    })
+}
+
+fn count(row: &CellRow, tally: &Tally) -> CellCount {
+    let count = tally.cell(row.id);
+    CellCount {
+        id: row.id,
+        configuration: configuration_name(row.cell.configuration),
+        impact: row.cell.impact.clone(),
+        response: row.cell.response.clone(),
+        wanted: count.wanted,
+        kept: count.kept,
+        attempts: count.attempts,
+        refused: count.refused.iter().map(|(kind, n)| (kind.name(), *n)).collect::<BTreeMap<_, _>>(),
+        given_up: row.given_up.clone(),
+        settled: row.settled.clone(),
+    }
+}
+
+fn hit(record: &RecordRow) -> Hit {
+    let number = |value: f64| value.is_finite().then_some(value);
+    Hit {
+        record: record.id,
+        cell: record.cell,
+        attempt: record.attempt,
+        utc: record.utc.clone(),
+        verdict: record.standing().name(),
+        judged: record.overruled.map(|_| record.verdict.name()),
+        kept: record.kept(),
+        measure: number(record.measure),
+        limit: number(record.limit),
+        sentence: record.sentence.clone(),
+        peak_n: number(record.peak_n).unwrap_or(0.0),
+        pulse_us: record.pulse_us,
+    }
+}
+
+/// Time that is left at the pace of the last hits of one session; none before two good ones.
+fn left(cells: &[CellRow], tally: &Tally, records: &[Result<RecordRow, Damaged>]) -> Option<Left> {
+    let next = cells.iter().find(|row| tally.open(row.id))?;
+    let session = records.iter().rev().find_map(|record| record.as_ref().ok())?.session;
+    let own: Vec<&RecordRow> =
+        records.iter().rev().flatten().take_while(|record| record.session == session).take(PACE).collect();
+    let time = |record: &RecordRow| record.utc.parse::<jiff::Timestamp>().ok();
+    let span = time(own.first()?)?.duration_since(time(own.last()?)?).as_secs_f64();
+    let kept = own.iter().filter(|record| record.kept()).count();
+    if kept < 2 || span <= 0.0 {
+        return None;
+    }
+    let each = span / (own.len() - 1).max(1) as f64 * own.len() as f64 / kept as f64;
+    let hits = |of: &dyn Fn(&CellRow) -> bool| -> f64 {
+        let open = cells.iter().filter(|row| of(row) && tally.open(row.id)).map(|row| tally.cell(row.id));
+        each * open.map(|count| f64::from(count.wanted.saturating_sub(count.kept))).sum::<f64>()
+    };
+    Some(Left {
+        cell_s: hits(&|row| row.id == next.id),
+        configuration_s: hits(&|row| row.cell.configuration == next.cell.configuration),
+        campaign_s: hits(&|_| true),
+    })
+}

@@ -1,0 +1,138 @@
+//! What can be said so far: the very analysis of `jointrig analyse`, run anew on what is stored whenever there is more of it, on one thread
+//! beside the measuring. When the last hit is in, its numbers are those of `results.json`.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use super::bus::Bus;
+use super::message::{Estimate, Message};
+use crate::analyse::{AnalyseError, Wanted, analyse};
+use crate::campaign::store::Store;
+use crate::report::figure::Figure;
+use crate::report::{self, words::brief};
+use crate::results::Results;
+
+/// The analysis rests so many times as long as it took: a sixth of one core is the most that it takes from the measuring.
+const REST: u32 = 5;
+/// The shortest rest: nobody reads faster.
+const SHORTEST: Duration = Duration::from_secs(2);
+/// How often it looks whether there is more.
+const LOOK: Duration = Duration::from_millis(200);
+
+/// The newest analysis' figures.
+#[derive(Debug, Default)]
+pub struct Formed {
+    figures: std::sync::Mutex<Arc<Vec<Figure>>>,
+}
+
+impl Formed {
+    /// All figures that there is data for.
+    pub fn figures(&self) -> Arc<Vec<Figure>> {
+        self.figures.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clone()
+    }
+
+    fn set(&self, figures: Vec<Figure>) {
+        *self.figures.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Arc::new(figures);
+    }
+}
+
+/// Analyses the file as long as it grows, until `stop`.
+pub fn form(path: &Path, bus: &Bus, formed: &Formed, stop: &AtomicBool) {
+    // what runs side by side in an analysis runs one after the other here: the other cores are for the measuring
+    let alone = match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
+        Ok(alone) => alone,
+        Err(error) => {
+            log::error!("the page shows no estimate, because no thread can be had for it: {error}");
+            return;
+        }
+    };
+    let mut known = None;
+    let mut rest_until = Instant::now();
+    while !stop.load(Ordering::Relaxed) {
+        std::thread::sleep(LOOK);
+        if Instant::now() < rest_until {
+            continue;
+        }
+        let newest = match newest(path) {
+            Ok(newest) => newest,
+            Err(error) => {
+                log::warn!("the page's estimate waits: {error}");
+                rest_until = Instant::now() + SHORTEST;
+                continue;
+            }
+        };
+        if known == Some(newest) || newest.records == 0 {
+            continue;
+        }
+        known = Some(newest);
+        let begun = Instant::now();
+        let (estimate, figures) = alone.install(|| estimate(path, newest.last));
+        let took = begun.elapsed();
+        formed.set(figures);
+        bus.say(Message::Estimate(Box::new(Estimate { took_s: took.as_secs_f64(), ..estimate })));
+        rest_until = Instant::now() + (took * REST).max(SHORTEST);
+    }
+}
+
+/// What an analysis depends on: other numbers, other analysis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Newest {
+    records: usize,
+    levels: usize,
+    overruled: usize,
+    last: i64,
+}
+
+fn newest(path: &Path) -> Result<Newest, crate::campaign::store::error::StoreError> {
+    let store = Store::open_read_only(path)?;
+    let places = store.places()?;
+    Ok(Newest {
+        records: places.len(),
+        levels: store.levels()?.len(),
+        overruled: store.overrules()?.len(),
+        last: places.iter().map(|place| place.id).max().unwrap_or(0),
+    })
+}
+
+fn estimate(path: &Path, last: i64) -> (Estimate, Vec<Figure>) {
+    match results(path) {
+        Ok(results) => (of_results(&results, last), report::all_figures(&results)),
+        Err(error) => {
+            let missing = vec![error.to_string()];
+            let none = Estimate {
+                after_record: last,
+                hits: 0,
+                took_s: 0.0,
+                answer: None,
+                lines: Vec::new(),
+                missing,
+                figures: Vec::new(),
+            };
+            (none, Vec::new())
+        }
+    }
+}
+
+/// The document of what is stored, as `jointrig analyse` makes it; a simulated rig's truth joins it when all is found.
+fn results(path: &Path) -> Result<Results, AnalyseError> {
+    let store = Store::open_read_only(path)?;
+    let mut results = report::document(analyse(&store, Wanted::default(), &|_| {})?);
+    if let Some(answer) = &mut results.answer {
+        answer.truth = store.simulated_truth()?;
+    }
+    Ok(results)
+}
+
+fn of_results(results: &Results, last: i64) -> Estimate {
+    Estimate {
+        after_record: last,
+        hits: results.hits.iter().filter(|hit| hit.kept).count(),
+        took_s: 0.0,
+        answer: results.answer.clone(),
+        lines: brief::answer(results).into_iter().map(|line| [line.head, line.text]).collect(),
+        missing: results.missing.clone(),
+        figures: report::all_figures(results).iter().map(|figure| figure.name).collect(),
+    }
+}

@@ -1,0 +1,178 @@
+//! What a page is told, version 1. Units stand in the names; a page skips fields and kinds that it does not know.
+
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+use crate::results::Answer;
+
+/// Version of these messages.
+pub const VERSION: u32 = 1;
+
+/// One message.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Message {
+    /// All that there is to know, for a page that has just come or was left behind.
+    Snapshot(Box<Snapshot>),
+    /// A record was stored and judged.
+    Judged(Box<Judged>),
+    /// Cells whose count changed otherwise: dropped, kept, given up, settled.
+    Cells(Counted),
+    /// What the analysis says by now.
+    Estimate(Box<Estimate>),
+    /// The file cannot be read any more.
+    Trouble(Trouble),
+}
+
+/// All that there is to know.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Snapshot {
+    /// Version of the messages.
+    pub version: u32,
+    /// The campaign file.
+    pub file: String,
+    /// The plan's name.
+    pub plan: String,
+    /// Whether the rig is simulated.
+    pub simulated: bool,
+    /// Every cell of the plan, in the order in which it is measured.
+    pub cells: Vec<CellCount>,
+    /// How far it is.
+    pub progress: Progress,
+    /// Every hit, in order.
+    pub hits: Vec<Hit>,
+    /// What the analysis said last; none before it said anything.
+    pub estimate: Option<Estimate>,
+}
+
+/// How far a campaign is.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Progress {
+    /// Good hits that are there.
+    pub kept: u64,
+    /// Good hits wanted.
+    pub wanted: u64,
+    /// Whether every cell has what it wants, or enough.
+    pub complete: bool,
+    /// The cell that comes next: its place among the cells.
+    pub next: Option<usize>,
+    /// Good hits in that cell.
+    pub left: Option<Left>,
+    /// Scans that the link lost for good.
+    pub lost_scans: u64,
+    /// Scans that were sent again.
+    pub recovered_scans: u64,
+}
+
+/// Time that is left at the pace of the last hits, s.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Left {
+    /// In the cell.
+    pub cell_s: f64,
+    /// In its configuration.
+    pub configuration_s: f64,
+    /// In the campaign.
+    pub campaign_s: f64,
+}
+
+/// One cell's count.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CellCount {
+    /// Its id in the file.
+    pub id: i64,
+    /// `A`, `B` or `AJB`.
+    pub configuration: &'static str,
+    /// The impact.
+    pub impact: String,
+    /// The response.
+    pub response: String,
+    /// Good hits wanted.
+    pub wanted: u32,
+    /// Good hits there.
+    pub kept: u32,
+    /// Hits tried.
+    pub attempts: u32,
+    /// Refused hits by verdict.
+    pub refused: BTreeMap<&'static str, u32>,
+    /// Whether it was given up, with the reason.
+    pub given_up: Option<String>,
+    /// Whether it is done with fewer good hits than wanted, with the reason.
+    pub settled: Option<String>,
+}
+
+/// One hit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Hit {
+    /// The record's id.
+    pub record: i64,
+    /// The cell's id.
+    pub cell: i64,
+    /// Which attempt in that cell, from 0.
+    pub attempt: u32,
+    /// When.
+    pub utc: String,
+    /// The verdict that counts.
+    pub verdict: &'static str,
+    /// The judge's, where a person has overruled it.
+    pub judged: Option<&'static str>,
+    /// Whether analysis uses it.
+    pub kept: bool,
+    /// What was measured for the verdict; none where it is no number.
+    pub measure: Option<f64>,
+    /// The limit it was held against.
+    pub limit: Option<f64>,
+    /// Both in words.
+    pub sentence: String,
+    /// Peak force, N.
+    pub peak_n: f64,
+    /// The coil's pulse, µs.
+    pub pulse_us: u32,
+}
+
+/// A hit, and what it changes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Judged {
+    /// The hit.
+    pub hit: Hit,
+    /// Its cell's count.
+    pub cell: CellCount,
+    /// How far the campaign is.
+    pub progress: Progress,
+}
+
+/// Counts that changed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Counted {
+    /// The cells.
+    pub cells: Vec<CellCount>,
+    /// Hits whose verdict a person changed.
+    pub hits: Vec<Hit>,
+    /// How far the campaign is.
+    pub progress: Progress,
+}
+
+/// What the analysis says.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Estimate {
+    /// The last record that it knows.
+    pub after_record: i64,
+    /// Good hits in it.
+    pub hits: usize,
+    /// How long it took, s.
+    pub took_s: f64,
+    /// `answer` of `results.json`, as `analyse` gives it.
+    pub answer: Option<Answer>,
+    /// The same in words: what it is about, and what is said of it.
+    pub lines: Vec<[String; 2]>,
+    /// What is missing, and for what.
+    pub missing: Vec<String>,
+    /// Names of the figures that it has data for.
+    pub figures: Vec<&'static str>,
+}
+
+/// Why nothing more comes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Trouble {
+    /// What is wrong, where, and what to do.
+    pub what: String,
+}

@@ -1,0 +1,211 @@
+//! The live page: a campaign seen in a browser while it is measured, and everything that the server must turn away.
+#![allow(clippy::unwrap_used)]
+
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use jointrig_tests::browser::{Browser, Look, Page};
+use jointrig_tests::command::jointrig;
+use serde_json::Value;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// A page that is served. Dropping it ends the process.
+struct Served {
+    child: Child,
+    url: String,
+}
+
+impl Served {
+    fn of(file: &Path) -> Self {
+        let mut child =
+            jointrig().arg("serve").arg(file).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+        let mut url = String::new();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut url).unwrap();
+        Self { child, url: url.trim().into() }
+    }
+
+    fn port(&self) -> u16 {
+        let address = self.url.strip_prefix("http://127.0.0.1:").unwrap();
+        address.split('/').next().unwrap().parse().unwrap()
+    }
+
+    fn token(&self) -> &str {
+        self.url.split("#look=").nth(1).unwrap()
+    }
+
+    /// The status of an answer to a request with these headers, and its body.
+    fn asked(&self, path: &str, headers: &[(&str, &str)]) -> (u16, String) {
+        self.try_asking(path, headers).unwrap()
+    }
+
+    fn try_asking(&self, path: &str, headers: &[(&str, &str)]) -> std::io::Result<(u16, String)> {
+        let mut stream = TcpStream::connect(("127.0.0.1", self.port()))?;
+        stream.set_read_timeout(Some(Duration::from_secs(20)))?;
+        let lines: String = headers.iter().map(|(name, value)| format!("{name}: {value}\r\n")).collect();
+        write!(stream, "GET {path} HTTP/1.1\r\n{lines}Connection: close\r\n\r\n")?;
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer)?;
+        let status = answer.split(' ').nth(1).map_or(0, |status| status.parse().unwrap());
+        Ok((status, answer.split_once("\r\n\r\n").map_or_else(String::new, |(_, body)| body.into())))
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn done(command: &mut Command) {
+    let out = command.output().unwrap();
+    assert!(out.status.success(), "{command:?}: {}", String::from_utf8_lossy(&out.stderr));
+}
+
+/// A new campaign of a few cells on B and the assembly.
+fn campaign() -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, file) = (folder.path().join("plan.toml"), folder.path().join("campaign.jrig"));
+    std::fs::write(&plan, include_str!("../../docs/plans/contact.toml")).unwrap();
+    done(jointrig().args(["campaign", "new"]).arg(&file).arg("--plan").arg(&plan));
+    (folder, file)
+}
+
+/// The page as a picture, into the folder that JOINTRIG_PICTURES names.
+fn picture(page: &mut Page<'_>, name: &str) {
+    if let Some(folder) = std::env::var_os("JOINTRIG_PICTURES") {
+        let bytes = BASE64_STANDARD.decode(page.picture()).unwrap();
+        std::fs::write(Path::new(&folder).join(format!("{name}.png")), bytes).unwrap();
+    }
+}
+
+/// The same with every number as a real one: a browser writes 100.0 as 100.
+fn as_real(value: Value) -> Value {
+    match value {
+        Value::Number(number) => number.as_f64().into(),
+        Value::Array(all) => all.into_iter().map(as_real).collect(),
+        Value::Object(all) => all.into_iter().map(|(key, value)| (key, as_real(value))).collect(),
+        other => other,
+    }
+}
+
+const COMPLETE: &str = "!!live.state.whole && live.state.whole.progress.complete";
+
+#[test]
+fn a_campaign_is_seen_while_it_is_measured() {
+    let (folder, file) = campaign();
+    let server = Served::of(&file);
+    let mut browser = Browser::start();
+    let mut page = browser.open_url(&server.url, Look::DESK);
+    page.until(
+        "!!live.state.whole && document.getElementById('next')?.textContent.startsWith('Next: B BZ1')",
+    );
+    assert_eq!(page.eval("location.hash"), "", "the token stays out of the address");
+    let mut run = jointrig()
+        .args(["campaign", "run"])
+        .arg(&file)
+        .args(["--device", "sim:", "--yes"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    page.until("live.state.whole.hits.length > 8");
+    page.until("document.querySelectorAll('#main tbody tr').length > 0");
+    picture(&mut page, "now-running");
+    page.key("2");
+    page.until("document.querySelectorAll('.matrix .done').length > 2 && document.querySelectorAll('.matrix .coming').length === 1");
+    picture(&mut page, "matrix-running");
+    assert!(run.wait().unwrap().success());
+    page.until(COMPLETE);
+
+    // when the last hit is in, the estimate is that of `analyse`, digit for digit
+    page.until("live.state.whole.estimate?.after_record === live.state.whole.hits.at(-1).record");
+    let shown = page.eval("live.state.whole.estimate.answer");
+    done(jointrig().arg("analyse").arg(&file).arg("--out").arg(folder.path()));
+    let results = std::fs::read_to_string(folder.path().join("results.json")).unwrap();
+    let mut results: Value = serde_json::from_str(&results).unwrap();
+    assert!(results["answer"]["contact"]["k_t_n_per_m"]["mean"].is_f64());
+    assert_eq!(as_real(shown), as_real(results["answer"].take()));
+
+    let wide = |page: &mut Page<'_>| page.eval("document.documentElement.scrollWidth").as_u64().unwrap();
+    for (key, name, there) in [
+        ("1", "now", "document.querySelectorAll('figure.ready').length === 2"),
+        (
+            "2",
+            "matrix",
+            "document.querySelectorAll('.matrix .done').length === live.state.whole.cells.length",
+        ),
+        ("3", "cell", "document.querySelectorAll('figure.ready').length === 1"),
+        ("4", "stiffness", "document.querySelectorAll('figure.ready').length >= 2"),
+        ("5", "frfs", "document.querySelectorAll('figure.ready').length >= 2"),
+        ("6", "channels", "document.querySelectorAll('figure.ready').length === 1"),
+        ("7", "log", "document.querySelectorAll('tbody tr').length > 0"),
+    ] {
+        page.key(key);
+        page.until(there);
+        picture(&mut page, name);
+        assert!(wide(&mut page) <= 1440, "{name}: {} px wide", wide(&mut page));
+    }
+    // a cell by keys, and back to the newest
+    page.key("k");
+    page.until(
+        "live.looked() === live.state.whole.cells.at(-2).id && document.getElementById('cell-name') !== null",
+    );
+    page.key("f");
+    page.until("live.looked() === live.state.whole.hits.at(-1).cell");
+    assert_eq!(page.errors(), Vec::<String>::new());
+    drop(page);
+
+    let mut page = browser.open_url(&server.url, Look { dark: true, ..Look::HAND });
+    page.until(COMPLETE);
+    for (key, name) in [("1", "now-hand"), ("2", "matrix-hand"), ("4", "stiffness-hand"), ("7", "log-hand")] {
+        page.key(key);
+        page.until("document.querySelectorAll('#main *').length > 3");
+        picture(&mut page, name);
+        assert!(wide(&mut page) <= 400, "{name}: {} px wide", wide(&mut page));
+    }
+    assert_eq!(page.errors(), Vec::<String>::new());
+}
+
+#[test]
+fn strangers_are_turned_away() {
+    let (_folder, file) = campaign();
+    let server = Served::of(&file);
+    let host = format!("127.0.0.1:{}", server.port());
+    let token = format!("Bearer {}", server.token());
+    let status = |path: &str, headers: &[(&str, &str)]| server.asked(path, headers).0;
+    let (code, state) = server.asked("/api/state", &[("Host", &host), ("Authorization", &token)]);
+    assert!(code == 200 && state.contains("\"kind\":\"snapshot\""), "{code}: {state}");
+    assert_eq!(status("/", &[("Host", "rig.example")]), 421);
+    assert_eq!(status("/", &[("Host", &host), ("Origin", "http://rig.example")]), 403);
+    assert_eq!(status("/api/state", &[("Host", &host)]), 401);
+    assert_eq!(status("/api/state", &[("Host", &host), ("Authorization", "Bearer 0")]), 401);
+    assert_eq!(status("/api/records/99/hit", &[("Host", &host), ("Authorization", &token)]), 404);
+    assert_eq!(status("/nowhere", &[("Host", &host)]), 404);
+    // a head without an end, and one that is too long
+    let mut stream = TcpStream::connect(("127.0.0.1", server.port())).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+    write!(stream, "GET / HTTP/1.1\r\nHost: ").unwrap();
+    let mut rest = Vec::new();
+    // the server lets it go; an answer before that is as good
+    let _ = stream.read_to_end(&mut rest);
+    let mut stream = TcpStream::connect(("127.0.0.1", server.port())).unwrap();
+    let written = write!(stream, "GET / HTTP/1.1\r\nHost: {host}\r\nX-Long: {}\r\n\r\n", "x".repeat(40_000));
+    let mut answer = String::new();
+    // it is refused, or cut off in the middle
+    let read = stream.read_to_string(&mut answer);
+    assert!(written.is_err() || read.is_err() || answer.starts_with("HTTP/1.1 431"), "{answer}");
+    // forty who say nothing lock nobody out for longer than their time
+    let silent: Vec<TcpStream> =
+        (0..40).map(|_| TcpStream::connect(("127.0.0.1", server.port())).unwrap()).collect();
+    let within = Instant::now() + Duration::from_secs(15);
+    while server.try_asking("/", &[("Host", &host)]).map_or(0, |(status, _)| status) != 200 {
+        assert!(Instant::now() < within, "the silent ones still lock everyone out");
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    drop(silent);
+}
