@@ -43,7 +43,9 @@ pub fn allowed(results: &Value, origin: &Value) -> Vec<f64> {
         }
     }
     let factor = origin["factor"].as_f64().unwrap();
-    known.iter_mut().for_each(|k| *k *= factor);
+    for k in &mut known {
+        *k *= factor;
+    }
     known.sort_by(f64::total_cmp);
     known
 }
@@ -174,11 +176,8 @@ impl Held {
             of == "x" && (steps - steps.round()).abs() <= 1e-3 + 1e-5 * steps.abs()
         });
         let share = of == "x" && self.share && (0.0..=1.0).contains(&value);
-        let other = match of {
-            "y" => found("at") || found("values"),
-            "x" | "low" => found("at") || found("values"),
-            _ => false,
-        };
+        // the height of a level, places in space, and the values of a matrix or of strips
+        let other = of != "high" && (found("at") || found("values"));
         self.named(of) || found(of) || index || step || share || other
     }
 }

@@ -88,7 +88,7 @@ mod tests {
         let v: Vec<f64> =
             (0..x.len()).map(|i| if i == 0 { 0.0 } else { (x[i] - x[i - 1]) * fs_hz }).collect();
         let still = vec![0.0; v.len()];
-        let found = FirstCycle::of(fs_hz, [v, still], force_n).unwrap();
+        let found = FirstCycle::of(fs_hz, [v, still], force_n).expect("a decay of two modes");
         let [one, two] = [&found.decay[0], &found.decay[1]];
         assert!((one.phase_deg - two.phase_deg).abs() > 3.0, "{} {}", one.phase_deg, two.phase_deg);
         assert_eq!(found.phase_deg.to_bits(), one.phase_deg.to_bits());

@@ -50,8 +50,9 @@ pub fn unbroken(text: &str) -> String {
         if c != ' ' {
             out.push(c);
             // nor is a unit parted at its stroke
-            let unit =
-                c == '/' && matches!(before, 'N' | 'm') && text[i + 1..].starts_with(['µ', 'm', 'N', 'r']);
+            let above = || text[..i].rsplit(|c: char| !c.is_alphanumeric() && c != '_').next();
+            let below = text[i + c.len_utf8()..].starts_with(['µ', 'm', 'N', 'r']);
+            let unit = c == '/' && below && matches!(above(), Some("N" | "m" | "µm"));
             if unit {
                 out.push('\u{2060}');
             }
@@ -89,6 +90,7 @@ mod tests {
         );
         assert_eq!(unbroken("25…28"), "25…\u{2060}28");
         assert_eq!(unbroken("2 Next 3 A/Nothing"), "2 Next 3 A/Nothing");
+        assert_eq!(unbroken("/k_n_per_m/mean"), "/k_n_per_m/mean");
     }
 
     #[test]

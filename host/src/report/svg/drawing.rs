@@ -110,12 +110,15 @@ impl Drawing {
 
     /// A filled rectangle.
     pub fn fill(&mut self, area: Area, class: &str, opacity: f64) {
+        if area.width <= 0.0 || area.height <= 0.0 {
+            return;
+        }
         self.push(format_args!(
             "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" class=\"{class}\" fill-opacity=\"{opacity:.2}\"/>",
             px(area.left),
             px(area.top),
-            px(area.width.max(0.0)),
-            px(area.height.max(0.0))
+            px(area.width),
+            px(area.height)
         ));
     }
 
