@@ -125,7 +125,9 @@ fn watch(follower: &mut Follower, bus: &Bus, stop: &AtomicBool) {
         match follower.look() {
             Ok(messages) => {
                 trouble = None;
-                messages.into_iter().for_each(|message| bus.say(message));
+                for message in messages {
+                    bus.say(message);
+                }
             }
             Err(error) => {
                 let what = error.to_string();

@@ -18,6 +18,8 @@ use crate::results::Results;
 const REST: u32 = 5;
 /// The shortest rest: nobody reads faster.
 const SHORTEST: Duration = Duration::from_secs(2);
+/// Nothing new for so long: nobody is measuring whom it could disturb.
+const QUIET: Duration = Duration::from_secs(4);
 /// How often it looks whether there is more.
 const LOOK: Duration = Duration::from_millis(200);
 
@@ -48,22 +50,22 @@ pub fn form(path: &Path, bus: &Bus, formed: &Formed, stop: &AtomicBool) {
             return;
         }
     };
-    let mut known = None;
-    let mut rest_until = Instant::now();
+    let (mut known, mut seen) = (None, None);
+    let (mut rest_until, mut changed) = (Instant::now(), Instant::now());
     while !stop.load(Ordering::Relaxed) {
         std::thread::sleep(LOOK);
-        if Instant::now() < rest_until {
-            continue;
-        }
         let newest = match newest(path) {
             Ok(newest) => newest,
             Err(error) => {
-                log::warn!("the page's estimate waits: {error}");
-                rest_until = Instant::now() + SHORTEST;
+                log::debug!("the page's estimate waits: {error}");
                 continue;
             }
         };
-        if known == Some(newest) || newest.records == 0 {
+        if seen != Some(newest) {
+            (seen, changed) = (Some(newest), Instant::now());
+        }
+        let rests = Instant::now() < rest_until && changed.elapsed() < QUIET;
+        if rests || known == Some(newest) || newest.records == 0 {
             continue;
         }
         known = Some(newest);

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 /// The package whose rooms are looked at.
 const PACKAGE: &str = "jointrig";
 /// Its rooms, the lowest first. Rooms of one line know nothing of each other.
-const FLOORS: [&[&str]; 6] = [
+const FLOORS: [&[&str]; 8] = [
     &["device", "exchange"],
     &["campaign"],
     &["results"],

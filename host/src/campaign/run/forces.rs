@@ -74,7 +74,9 @@ mod tests {
             forces.learn(stored[stored.len() - 1]);
         }
         let mut resumed = Forces::new(&FORCE, 8_000);
-        stored.into_iter().for_each(|hit| resumed.learn(hit));
+        for hit in stored {
+            resumed.learn(hit);
+        }
         assert_eq!([0, 1].map(|kept| resumed.pulse_us(kept)), [0, 1].map(|kept| forces.pulse_us(kept)));
     }
 
