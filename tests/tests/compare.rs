@@ -18,10 +18,8 @@ fn measured(folder: &Path, k_t: f64, seed: u64) -> PathBuf {
     let (rig, file) = (folder.join(format!("rig-{seed}.toml")), folder.join(format!("contact-{seed}.jrig")));
     let contact = format!("name = \"own-{k_t}\"\n[contact]\nstiffness_n_per_m = [1.8e8, 2.6e8, {k_t}e6]\n");
     std::fs::write(&rig, contact).unwrap();
-    // records half as long tell enough, in half the time
     let plan = folder.join(format!("plan-{seed}.toml"));
-    let whole = include_str!("../../docs/plans/contact.toml");
-    std::fs::write(&plan, whole.replace("length_s = 2.0", "length_s = 1.0")).unwrap();
+    std::fs::write(&plan, include_str!("../../docs/plans/contact.toml")).unwrap();
     done(jointrig().args(["campaign", "new"]).arg(&file).arg("--plan").arg(&plan));
     let device = format!("sim:{}", rig.display());
     done(
@@ -62,7 +60,9 @@ fn a_softer_contact_is_told_from_the_same_one_measured_twice() {
     let (worn, printed) = compared(folder, &files[0], &files[2]);
     let [mean, low, high] = of_k_t(&worn);
     assert_eq!(worn["differ"], true, "{mean} {low}…{high}");
-    assert!(low <= -18.0 && (-18.0..0.0).contains(&high), "{mean}, 95 % {low}…{high}");
+    // one draw of twenty lies outside its 95 % interval, one of a thousand outside this
+    let near = |truth: f64| (mean - truth).abs() < 1.7 * 0.5 * (high - low);
+    assert!(near(-18.0) && high < 0.0, "{mean}, 95 % {low}…{high}");
     let verdict = worn["verdict"].as_str().unwrap();
     assert!(printed.contains(verdict) && verdict.contains("differ"), "{printed}");
     let page = std::fs::read_to_string(folder.join("compare.html")).unwrap();

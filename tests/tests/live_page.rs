@@ -3,6 +3,9 @@
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
+use jointrig::campaign::store::Store;
+use jointrig::campaign::store::record_row::RecordRow;
+use jointrig::campaign::verdict::Kind;
 use jointrig_tests::browser::{Browser, Look, Page};
 use jointrig_tests::command::jointrig;
 use serde_json::Value;
@@ -115,6 +118,10 @@ fn a_campaign_is_seen_while_it_is_measured() {
         .unwrap();
     page.until("live.state.whole.hits.length > 8");
     page.until("document.querySelectorAll('#main tbody tr').length > 0");
+    // the place of the next cell is lit, and no other
+    page.until("!!live.alive.get('place')");
+    let lit = page.eval("live.alive.get('place')[0].scene.spots.filter(s => s.name).map(s => s.name).sort()");
+    assert_eq!(lit.as_array().map(Vec::len), Some(2), "{lit}");
     picture(&mut page, "now-running");
     page.key("2");
     page.until("document.querySelectorAll('.matrix .done').length > 2 && document.querySelectorAll('.matrix .coming').length === 1");
@@ -169,6 +176,109 @@ fn a_campaign_is_seen_while_it_is_measured() {
         assert!(wide(&mut page) <= 400, "{name}: {} px wide", wide(&mut page));
     }
     assert_eq!(page.errors(), Vec::<String>::new());
+}
+
+/// What the server would say of a hit with this verdict, said by the test.
+#[test]
+fn every_verdict_has_a_sign_a_pattern_and_its_reason() {
+    let (_folder, file) = campaign();
+    let server = Served::of(&file);
+    let mut browser = Browser::start();
+    let mut page = browser.open_url(&server.url, Look::DESK);
+    page.until("!!live.state.whole && document.getElementById('next') !== null");
+    let mut looks = Vec::new();
+    for (record, kind) in (1..).zip(Kind::ALL) {
+        let (name, kept) = (kind.name(), kind == Kind::Good);
+        let say = format!("something <b>odd</b> about record {record}");
+        page.eval(&format!(
+            "(() => {{ const w = live.state.whole, cell = {{...w.cells[0], attempts: {record}, kept: {}, refused: {{'{name}': 1}}}};
+             live.takeIn({{kind: 'judged', seq: {record}, cell, progress: w.progress, hit: {{record: {record}, cell: cell.id, attempt: {record},
+             utc: '2026-01-01T00:00:00Z', verdict: '{name}', judged: null, kept: {kept}, measure: 1, limit: 2, sentence: '{say}', peak_n: 50, pulse_us: 3000}}}}) }})()",
+            u8::from(kept)
+        ));
+        let banner = page.eval(
+            "(() => { const v = document.getElementById('verdict'), s = getComputedStyle(v);
+             return [v.hidden, v.textContent, v.querySelector('.sign')?.textContent, s.backgroundImage + s.backgroundSize] })()",
+        );
+        assert_eq!(banner[0], kept, "{name}");
+        if !kept {
+            assert!(banner[1].as_str().unwrap().contains(&format!("{name}: {say}")), "{banner}");
+            looks.push((banner[2].clone(), banner[3].clone()));
+        }
+        page.until(&format!(
+            "document.querySelector('#main tbody')?.textContent.includes('record {record}')"
+        ));
+        page.key("2");
+        let cell = format!(
+            "document.querySelector('.matrix button').getAttribute('aria-label').includes('1 {name}')"
+        );
+        page.until(&cell);
+        page.key("1");
+    }
+    for (i, one) in looks.iter().enumerate() {
+        assert!(one.0.as_str().is_some_and(|sign| !sign.is_empty() && sign != "✕"), "{one:?}");
+        for other in &looks[..i] {
+            assert!(one.0 != other.0 && (one.1 != other.1), "{one:?} looks like {other:?}");
+        }
+    }
+    // nothing but that the file has no such records
+    let errors: Vec<String> =
+        page.errors().into_iter().filter(|error| !error.contains("/api/records/")).collect();
+    assert_eq!(errors, Vec::<String>::new());
+}
+
+/// What a run stored, with its scans counted from the first record on: when the stream begins is a matter of the process's start.
+fn stored(file: &Path) -> Vec<(i64, u64, u32, f64, String)> {
+    let records = Store::open_read_only(file).unwrap().records().unwrap();
+    let records: Vec<RecordRow> = records.into_iter().map(|record| record.unwrap()).collect();
+    let first = records[0].first_scan;
+    records.into_iter().map(|r| (r.cell, r.first_scan - first, r.crc, r.measure, r.sentence)).collect()
+}
+
+#[test]
+fn looking_changes_no_record() {
+    let new = || {
+        let folder = tempfile::tempdir().unwrap();
+        let (plan, file) = (folder.path().join("plan.toml"), folder.path().join("campaign.jrig"));
+        std::fs::write(&plan, include_str!("../../docs/plans/small.toml")).unwrap();
+        done(jointrig().args(["campaign", "new"]).arg(&file).arg("--plan").arg(&plan));
+        (folder, file)
+    };
+    let run = |file: &Path| {
+        let mut command = jointrig();
+        command.args(["campaign", "run"]).arg(file).args(["--device", "sim:", "--yes"]);
+        command
+    };
+    let (_alone, unseen) = new();
+    done(&mut run(&unseen));
+    let (_watched, seen) = new();
+    let mut command = run(&seen).arg("--serve").stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut said = BufReader::new(command.stderr.take().unwrap());
+    let mut line = String::new();
+    while !line.contains("live page: ") {
+        line.clear();
+        assert!(said.read_line(&mut line).unwrap() > 0, "no address");
+    }
+    let url = line.trim().split("live page: ").nth(1).unwrap().to_owned();
+    // a page that looks, one that never reads, and others that ask for the heaviest answer again and again
+    let server = Served { child: command, url };
+    let mut browser = Browser::start();
+    let mut page = browser.open_url(&server.url, Look::DESK);
+    let host = format!("127.0.0.1:{}", server.port());
+    let mut silent = TcpStream::connect(("127.0.0.1", server.port())).unwrap();
+    write!(silent, "GET /live.js HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
+    page.until("!!live.state.whole && live.state.whole.hits.length > 0");
+    let token = format!("Bearer {}", server.token());
+    let mut asked = 0;
+    while server.try_asking("/api/records/1/channels", &[("Host", &host), ("Authorization", &token)]).is_ok()
+    {
+        asked += 1;
+    }
+    assert!(asked > 3, "the run ended before anybody could look");
+    let mut rest = String::new();
+    said.read_to_string(&mut rest).unwrap();
+    drop(page);
+    assert_eq!(stored(&seen), stored(&unseen), "{rest}");
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::from_store::{AnalyseError, CampaignFile};
 use super::heard::Heard;
 use super::hit_counts::completeness;
 use crate::campaign::store::Store;
-use crate::results::{CellRow, Cells, Completeness, HitRow, Place, Source, rounded};
+use crate::results::{CellRow, Cells, Completeness, HitRow, Source, rounded};
 use crate::structure::Structure;
 
 impl CampaignFile {
@@ -47,26 +47,6 @@ impl CampaignFile {
         }
         source.link = store.link_counters()?;
         Ok(source)
-    }
-
-    /// Where hammer and vibrometer went, as the plan says.
-    pub(super) fn places(&self) -> Vec<Place> {
-        let geometry = &self.plan.geometry;
-        let responses = geometry.response.iter().map(toml::Spanned::get_ref).map(|p| Place {
-            name: p.name.clone(),
-            kind: "response",
-            grouping: p.grouping,
-            position_m: p.position_m,
-            direction: None,
-        });
-        let impacts = geometry.impact.iter().map(toml::Spanned::get_ref).map(|p| Place {
-            name: p.name.clone(),
-            kind: "impact",
-            grouping: p.grouping,
-            position_m: p.position_m,
-            direction: Some(p.direction),
-        });
-        responses.chain(impacts).collect()
     }
 
     /// Every cell of the plan, in its order, with how it was heard.

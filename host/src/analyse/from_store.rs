@@ -7,7 +7,7 @@ use super::cell::{
     Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel,
 };
 use super::findings::Findings;
-use super::plan_geometry::geometry;
+use super::plan_geometry::{geometry, places};
 use super::wanted::{Progress, Wanted};
 use crate::campaign::plan::{Plan, structure};
 use crate::campaign::run::shaking;
@@ -78,7 +78,7 @@ pub fn analyse(
     let (source, completeness) = (file.source(store)?, file.completeness());
     let found = analyse_measurements(&file, wanted, progress);
     let cells = Some(file.cell_rows(&found.heard));
-    Ok(Findings { source, completeness, cells, geometry: file.places(), hits: file.hit_rows(), ..found })
+    Ok(Findings { source, completeness, cells, geometry: places(&file.plan), hits: file.hit_rows(), ..found })
 }
 
 pub(super) struct PlannedCell {

@@ -52,6 +52,6 @@ pub use from_store::{AnalyseError, CampaignFile, analyse};
 pub use impact_loops::{ImpactLoops, SlopeIs};
 pub use level_stiffness::NoLevelStiffness;
 pub use missing::Missing;
-pub use plan_geometry::geometry;
+pub use plan_geometry::{geometry, places};
 pub use shaker_levels::RecordLoops;
 pub use wanted::{BANDS, Progress, Wanted};

@@ -1,6 +1,7 @@
 //! The geometry of a plan.
 
 use crate::campaign::plan::{ConfigurationPlan, Plan};
+use crate::results::Place;
 use crate::structure::Structure;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
 
@@ -48,4 +49,24 @@ pub fn geometry(plan: &Plan) -> Geometry {
         *geometry.points_mut(of_plan) = points;
     }
     geometry
+}
+
+/// Where hammer and vibrometer go, as the plan says: responses, then impacts.
+pub fn places(plan: &Plan) -> Vec<Place> {
+    let geometry = &plan.geometry;
+    let responses = geometry.response.iter().map(toml::Spanned::get_ref).map(|p| Place {
+        name: p.name.clone(),
+        kind: "response",
+        grouping: p.grouping,
+        position_m: p.position_m,
+        direction: None,
+    });
+    let impacts = geometry.impact.iter().map(toml::Spanned::get_ref).map(|p| Place {
+        name: p.name.clone(),
+        kind: "impact",
+        grouping: p.grouping,
+        position_m: p.position_m,
+        direction: Some(p.direction),
+    });
+    responses.chain(impacts).collect()
 }

@@ -29,7 +29,7 @@ pub fn router(shared: Arc<Shared>) -> Router {
         .route("/api/state", get(state))
         .route("/api/figures/{name}", get(of_campaign))
         .route("/api/records/{id}/{name}", get(of_record))
-        .route("/api/cells/{id}", get(of_cell))
+        .route("/api/cells/{id}/{name}", get(of_cell))
         .route("/api/log", get(log))
         .layer(from_fn_with_state(shared.clone(), with_token));
     Router::new()
@@ -146,9 +146,17 @@ async fn of_record(
     drawn(from_file(figure, &store, id)?.as_ref())
 }
 
-async fn of_cell(State(shared): State<Arc<Shared>>, Path(id): Path<i64>) -> Result<Response, Problem> {
+async fn of_cell(
+    State(shared): State<Arc<Shared>>,
+    Path((id, name)): Path<(i64, String)>,
+) -> Result<Response, Problem> {
     let store = Store::open_read_only(&shared.file)?;
-    drawn(from_file(figures::cell(&store, id)?, &store, 0)?.as_ref())
+    let figure = match name.as_str() {
+        "hits" => figures::cell(&store, id)?,
+        "place" => figures::place(&store, id)?,
+        _ => return Err(Problem::missing("a cell has the figures hits and place")),
+    };
+    drawn(from_file(figure, &store, 0)?.as_ref())
 }
 
 /// The figure with what it was made from.

@@ -1,12 +1,16 @@
-//! Figures of single records, for the page that watches a campaign: the hit, its channels, and all hits of a cell over one another.
+//! Figures of single records and cells, for the page that watches a campaign: a hit, its channels, all hits of a cell over one another, and where
+//! hammer and vibrometer go for it.
 
 use jointrig_protocol::channel::{Channel, Quantity, Role as Measures};
 
+use crate::analyse::places;
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
 use crate::campaign::store::record_row::RecordRow;
 use crate::device::channels::ChannelMap;
-use crate::report::figure::{Along, Axis, Figure, Height, Mark, Packed, Panel, Role, Shape};
+use crate::report;
+use crate::report::figure::{Along, Axis, Figure, Height, Mark, Panel, Role, Shape};
+use crate::results::Results;
 
 /// What is shown of a pulse before and after its peak, s.
 const PULSE_S: [f64; 2] = [-3e-3, 9e-3];
@@ -46,6 +50,42 @@ pub fn cell(store: &Store, cell: i64) -> Result<Option<Figure>, StoreError> {
     }
     let say = "Every hit of the cell, each around its own peak: what was kept, and what was refused.";
     Ok(Some(Figure::new("cell", "", "The cell's hits", say).with(pulses(&all, rate_hz))))
+}
+
+/// Where hammer and vibrometer go for a cell: its two places stand out of all others, which have no names.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn place(store: &Store, cell: i64) -> Result<Option<Figure>, StoreError> {
+    let Some(row) = store.cells()?.into_iter().find(|row| row.id == cell) else { return Ok(None) };
+    let results = Results { geometry: places(&store.plan()?), ..Results::default() };
+    let Some(mut figure) = report::all_figures(&results).into_iter().find(|figure| figure.name == "geometry")
+    else {
+        return Ok(None);
+    };
+    for mark in figure.panels.iter_mut().flat_map(|panel| &mut panel.marks) {
+        let Shape::Scene(scene) = &mut mark.shape else { continue };
+        for spot in &mut scene.spots {
+            let here = if spot.toward.is_some() { &row.cell.impact } else { &row.cell.response };
+            if spot.name == *here {
+                spot.role = Role::Next;
+            } else {
+                spot.name.clear();
+                spot.role = Role::Guide;
+            }
+        }
+        // what stands out is drawn last
+        scene.spots.sort_by_key(|spot| !spot.name.is_empty());
+    }
+    let (impact, response) = (&row.cell.impact, &row.cell.response);
+    Ok(Some(Figure {
+        name: "place",
+        number: "",
+        title: format!("Hammer at {impact}, vibrometer at {response}"),
+        say: "The arrow is the hammer's place and direction, the square is where the vibrometer looks. Drag or use the arrow keys to turn it; x, y and z look along an axis."
+            .into(),
+        ..figure
+    }))
 }
 
 /// Every channel of a record as the least and the largest value of each short stretch.
@@ -132,8 +172,8 @@ fn envelope(channel: &Channel, values: &[f64], rate_hz: f64) -> Option<Panel> {
     let x = Axis::linear("time", "s", [0.0, length_s]).linked("record-time");
     let y = Axis::linear(name, unit, [low - margin, high + margin]);
     let step = stretch as f64 / rate_hz;
-    let along = Along::Regular { first: 0.5 * step, step, count: ends.len() };
-    let [low, high] = [0, 1].map(|i| Packed::of(ends.iter().map(|own| own[i])));
-    let mark = Mark::new(Role::Group1, Shape::Ribbon { x: along, low, high });
+    // from the least to the largest value and on: a line through both fills what lies between
+    let along = Along::Regular { first: 0.25 * step, step: 0.5 * step, count: 2 * ends.len() };
+    let mark = Mark::line(Role::Group1, along, ends.into_iter().flatten());
     Some(Panel::new(x, y).titled(channel.name.as_str()).high(Height::Low).with(mark))
 }

@@ -235,7 +235,15 @@ impl Runner<'_> {
         if let Ok(accounts) = &accounts
             && walked.is_ok()
         {
-            let text = format!("{accounts:?}, {} unexplained", accounts.unexplained());
+            let text = format!(
+                "{} scans sent: {} received, {} sent again, {} lost, {} came twice, {} unexplained",
+                accounts.sent,
+                accounts.received,
+                accounts.recovered,
+                accounts.lost,
+                accounts.duplicates,
+                accounts.unexplained()
+            );
             log::info!("{text}");
             if accounts.unexplained() > 0 {
                 log::error!("scans are missing without a reason: {text}");

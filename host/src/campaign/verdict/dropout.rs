@@ -27,6 +27,9 @@ const QUIET_AFTER_PULSE_S: f64 = 0.001;
 /// Surroundings: this many differences, s of record for single samples.
 const SURROUNDINGS: usize = 512;
 
+/// Second differences of the other sign, as a part of the largest: a spike has a half, a step all of it, and a kink what noise makes.
+const KINK: f64 = 0.35;
+
 /// The strongest jump whose ratio exceeds `limit`.
 pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<Burst> {
     let step = quantum(x);
@@ -40,7 +43,7 @@ pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<B
             // the difference spans four blocks
             let (from, to) = (i * block, (i + 4) * block);
             let far = from >= settled || to <= pulse.start;
-            let near = block == 1 && from >= quiet;
+            let near = block == 1 && from >= quiet && !is_kink(x, i);
             let ratio = d / s;
             if (far || near) && ratio > limit && worst.as_ref().is_none_or(|w| ratio > w.ratio) {
                 worst = Some(Burst { sample: from + 2 * block, ratio });
@@ -48,6 +51,18 @@ pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<B
         }
     }
     worst
+}
+
+/// Whether the motion has a kink here and no more: a contact that stops to slide changes the force, and so the acceleration, at once. A kink's
+/// second differences have one sign, a step's have both alike, and those of a spike are −2 in the middle of 1 and 1.
+fn is_kink(x: &[f64], third: usize) -> bool {
+    let around = &x[third.saturating_sub(2)..(third + 6).min(x.len())];
+    let [mut up, mut down] = [0.0_f64; 2];
+    for w in around.windows(3) {
+        let bend = w[0] - 2.0 * w[1] + w[2];
+        (up, down) = (up.max(bend), down.max(-bend));
+    }
+    up.min(down) < KINK * up.max(down)
 }
 
 fn third_differences(x: &[f64], block: usize) -> Vec<f64> {
@@ -89,4 +104,42 @@ fn middle(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     let at = sorted.len() / 2;
     *sorted.select_nth_unstable_by(at, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FS: f64 = 51_200.0;
+
+    /// A decaying mode with a little noise, and something at 6 ms behind the pulse.
+    fn found(odd: impl Fn(usize) -> f64) -> Option<Burst> {
+        let pulse =
+            Pulse { peak_sample: 210, start: 200, end: 220, peak_n: 50.0, offset_n: 0.0, noise_n: 0.01 };
+        let mut seed = 3_u64;
+        let mut noise = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
+        };
+        let x: Vec<f64> = (0..8_000)
+            .map(|i| {
+                let t = i as f64 / FS;
+                (-30.0 * t).exp() * (1_200.0 * t).sin() + 1e-3 * noise() + odd(i)
+            })
+            .collect();
+        find(&x, FS, &pulse, 12.0)
+    }
+
+    #[test]
+    fn spikes_and_steps_are_found_and_kinks_are_motion() {
+        const AT: usize = 520;
+        assert!(found(|_| 0.0).is_none());
+        let spike = found(|i| if i == AT { 0.05 } else { 0.0 });
+        assert!(spike.is_some_and(|burst| burst.sample.abs_diff(AT) < 4));
+        assert!(found(|i| if i >= AT { 0.05 } else { 0.0 }).is_some());
+        // the contact stops to slide: from here on the acceleration is another one
+        assert!(found(|i| 0.05 * i.saturating_sub(AT) as f64).is_none());
+        let between = |i: usize| if i > AT { 0.05 * ((i - AT) as f64 - 0.4) } else { 0.0 };
+        assert!(found(between).is_none());
+    }
 }

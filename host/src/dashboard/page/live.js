@@ -96,4 +96,4 @@ onNews((kind,message)=>{
 strip();
 if(token)connect();else{state.refused=true;strip()}
 // for the tests
-window.live={state,alive,go,looked};
+window.live={state,alive,go,looked,takeIn};

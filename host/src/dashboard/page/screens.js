@@ -5,7 +5,8 @@ function el(tag,options={},...children){
   e.append(...children);
   return e;
 }
-const SIGNS={good:'✓','double hit':'≡',weak:'↓',overload:'⊓',noisy:'~',dropped:'–'};
+// one for each verdict, so that no colour is needed to tell them
+const SIGNS={good:'✓','double hit':'≡',overload:'⊓',noisy:'~',weak:'↓',strong:'↑',mistimed:'⧗',gap:'…',dropped:'–'};
 const signOf=v=>SIGNS[v]||'✕';
 const fixed=(v,n)=>v===null||v===undefined?'–':v.toFixed(n);
 function duration(s){
@@ -43,7 +44,8 @@ const SCREENS=[
     this.rows.replaceChildren(...(h?hitsOf(h.cell):[]).map(hitRow));
     if(h)picture(this.hit,`/api/records/${h.record}/hit`);
     this.answer.replaceChildren(...said(w.estimate));
-    if(w.estimate?.figures.includes('geometry'))picture(this.geometry,'/api/figures/geometry');
+    const place=n===null?h?.cell:w.cells[n].id;
+    if(place!==undefined)picture(this.geometry,`/api/cells/${place}/place`);
   }},
   {key:'matrix',title:'Matrix',make(m){
     m.append(el('p',{className:'say'},'Every cell: hits kept of those wanted. Choose one to see its hits.'));
@@ -88,7 +90,7 @@ const SCREENS=[
     this.head.textContent=nameOf(c);
     this.note.textContent=`${c.kept} of ${c.wanted} kept, ${c.attempts} tried.`+(c.given_up?' Given up: '+c.given_up+'.':'')+(c.settled?' Settled: '+c.settled+'.':'')+(chosen===null?' Follows the newest hit.':' Press f to follow the newest hit.');
     this.rows.replaceChildren(...own.map(hitRow));
-    if(own.length)picture(this.hits,`/api/cells/${id}?hits=${own.length}`);else{shownFigures.delete(this.hits);this.hits.replaceChildren(el('p',{className:'absent'},'No hits yet.'))}
+    if(own.length)picture(this.hits,`/api/cells/${id}/hits?${own.length}`);else{shownFigures.delete(this.hits);this.hits.replaceChildren(el('p',{className:'absent'},'No hits yet.'))}
   }},
   figureScreen('stiffness','Stiffness',['answer','budget','k-t-of-frequency','levels','joint-spectrum'],true),
   figureScreen('frfs','Driving points',['receptances','coherence','random-error'],false),
@@ -101,9 +103,16 @@ const SCREENS=[
     this.last=0;this.shown=0;
   },async show(){
     const lines=await ask('/api/log?after='+this.last)||[];
-    for(const l of lines){if(l.id<=this.last)continue;this.last=l.id;this.rows.prepend(el('tr',{},el('td',{},l.utc.slice(0,19).replace('T',' ')),el('td',{},l.text)))}
+    const put=(utc,text,refused)=>{
+      const when=utc.slice(0,19).replace('T',' '),row=el('tr',{className:refused?'refused':''},el('td',{},when),el('td',{className:'why'},text));
+      row.when=utc;
+      // the newest stands above
+      const below=[...this.rows.rows].find(r=>r.when<=utc);
+      this.rows.insertBefore(row,below||null);
+    };
+    for(const l of lines){if(l.id<=this.last)continue;this.last=l.id;put(l.utc,l.text,false)}
     const hits=state.whole.hits;
-    for(;this.shown<hits.length;this.shown++){const h=hits[this.shown];if(!h.kept)this.rows.prepend(el('tr',{className:'refused'},el('td',{},h.utc.slice(0,19).replace('T',' ')),el('td',{},`${nameOf(cellOf(h.cell)||{configuration:'',impact:'?',response:'?'})}, record ${h.record}: ${h.verdict}: ${h.sentence}`)))}
+    for(;this.shown<hits.length;this.shown++){const h=hits[this.shown];if(!h.kept)put(h.utc,`${nameOf(cellOf(h.cell)||{configuration:'',impact:'?',response:'?'})}, record ${h.record}: ${h.verdict}: ${h.sentence}`,true)}
     this.sift();
   },sift(){const t=this.filter.value.toLowerCase();for(const r of this.rows.rows)r.hidden=!!t&&!r.textContent.toLowerCase().includes(t)}},
 ];

@@ -99,6 +99,8 @@ roles! {
     Band = "band" "#b98900" "#e6b84c" "" 1.0;
     /// Where the hammer put too little force.
     Unusable = "unusable" "#777777" "#9a9a9a" "" 1.0;
+    /// Where hammer and vibrometer go next.
+    Next = "next" "#b0005e" "#ff7ab8" "" 2.4;
     /// A line to guide the eye.
     Guide = "guide" "#777777" "#9a9a9a" "3 3" 1.0;
 }
