@@ -1,7 +1,7 @@
 //! The live page: a campaign file in the browser while it is measured, and the way through it afterwards.
 //!
-//! It looks and does nothing else: no page arms the hammer, moves the shaker or writes into the file. [`server`] speaks HTTP on the loopback
-//! address alone, [`guard`] turns away whoever should not ask, [`routes`] answers, [`socket`] says what is new, [`page`] is what the browser gets.
+//! It looks and does nothing else: no page arms the hammer, moves the shaker or writes into the file. `server` speaks HTTP on the loopback
+//! address alone, `guard` turns away whoever should not ask, `routes` answers, `socket` says what is new, `page` is what the browser gets.
 //! All of them read what [`crate::live`] has to say, on threads of their own: a page that stalls costs nothing but its own picture.
 
 mod guard;
