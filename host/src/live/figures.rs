@@ -1,55 +1,42 @@
 //! Figures of single records and cells, for the page that watches a campaign: a hit, its channels, all hits of a cell over one another, and where
 //! hammer and vibrometer go for it.
 
-use jointrig_protocol::channel::{Channel, Quantity, Role as Measures};
+use jointrig_protocol::channel::{Channel, Quantity};
 
 use crate::analyse::places;
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
-use crate::campaign::store::record_row::RecordRow;
-use crate::device::channels::ChannelMap;
 use crate::report;
+use crate::report::cell_records::{Shown, close};
 use crate::report::figure::{Along, Axis, Figure, Height, Mark, Panel, Role, Shape};
 use crate::results::Results;
 
-/// What is shown of a pulse before and after its peak, s.
-const PULSE_S: [f64; 2] = [-3e-3, 9e-3];
 /// Points of an envelope: two for each pixel of a wide screen.
 const POINTS: usize = 1600;
 
-/// The force of a hit around its peak, and everything that was measured over the whole record.
+/// A hit: its force, and the response along each axis.
 ///
 /// # Errors
 /// The record is not there, or damaged.
 pub fn hit(store: &Store, record: i64) -> Result<Option<Figure>, StoreError> {
-    let row = store.record(record)?;
-    let map = store.channels(row.session)?;
-    let Some(force) = force(store, &row, &map)? else { return Ok(None) };
-    Ok(Some(
-        Figure::new("hit", "", "The hammer's force", "What the last hit did, around its peak.")
-            .with(pulses(&[(format!("record {record}"), row.kept(), force)], f64::from(map.rate_hz))),
-    ))
+    let shown = Shown::of(store, &store.record(record)?)?;
+    Ok(close(&format!("Record {record}"), shown.as_slice()))
 }
 
-/// All hits of a cell over one another.
+/// All hits of a cell over one another; damaged records are left out.
 ///
 /// # Errors
 /// The file cannot be read.
 pub fn cell(store: &Store, cell: i64) -> Result<Option<Figure>, StoreError> {
     let mut all = Vec::new();
-    let mut rate_hz = 0.0;
-    for row in store.records_of(cell)?.into_iter().flatten() {
-        let map = store.channels(row.session)?;
-        rate_hz = f64::from(map.rate_hz);
-        if let Some(force) = force(store, &row, &map)? {
-            all.push((format!("attempt {}", row.attempt + 1), row.kept(), force));
+    for row in store.records_of(cell)?.iter().flatten() {
+        match Shown::of(store, row) {
+            Ok(shown) => all.extend(shown),
+            Err(StoreError::Damaged { .. }) => {}
+            Err(error) => return Err(error),
         }
     }
-    if all.is_empty() {
-        return Ok(None);
-    }
-    let say = "Every hit of the cell, each around its own peak: what was kept, and what was refused.";
-    Ok(Some(Figure::new("cell", "", "The cell's hits", say).with(pulses(&all, rate_hz))))
+    Ok(close("The cell's hits", &all))
 }
 
 /// Where hammer and vibrometer go for a cell: its two places stand out of all others, which have no names.
@@ -114,38 +101,6 @@ pub fn channels(store: &Store, record: i64) -> Result<Option<Figure>, StoreError
         ));
     }
     Ok((!figure.panels.is_empty()).then_some(figure))
-}
-
-fn force(store: &Store, row: &RecordRow, map: &ChannelMap) -> Result<Option<Vec<f64>>, StoreError> {
-    let Some(place) = map.place(Measures::HammerForce) else { return Ok(None) };
-    if row.scans == 0 {
-        return Ok(None);
-    }
-    let samples = store.samples(row)?;
-    Ok(Some(map.to_si(place, samples.channel(place))))
-}
-
-fn pulses(all: &[(String, bool, Vec<f64>)], rate_hz: f64) -> Panel {
-    let largest = all.iter().flat_map(|(.., force)| force).fold(1.0_f64, |most, f| most.max(f.abs()));
-    let x = Axis::linear("time from the peak", "ms", PULSE_S.map(|s| 1e3 * s));
-    let mut panel =
-        Panel::new(x, Axis::linear("force", "N", [-0.1 * largest, 1.1 * largest])).high(Height::Low);
-    for (name, kept, force) in all {
-        let peak =
-            force.iter().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).map_or(0, |(i, _)| i);
-        let before = (-PULSE_S[0] * rate_hz) as usize;
-        let from = peak.saturating_sub(before);
-        let to = (peak + (PULSE_S[1] * rate_hz) as usize).min(force.len());
-        let first = 1e3 * (from as f64 - peak as f64) / rate_hz;
-        let along = Along::Regular { first, step: 1e3 / rate_hz, count: to - from };
-        // the force cell may be wired either way round: a hit is shown upwards
-        let sign = force[peak].signum();
-        let role = if *kept { Role::Force } else { Role::Refused };
-        panel
-            .marks
-            .push(Mark::line(role, along, force[from..to].iter().map(|f| sign * f)).named(name.clone()));
-    }
-    panel
 }
 
 fn envelope(channel: &Channel, values: &[f64], rate_hz: f64) -> Option<Panel> {

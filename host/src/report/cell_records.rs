@@ -1,7 +1,12 @@
 //! The raw records of one cell, one over the other: force, and the response along each axis, by time after the trigger.
 
-use super::figure::{Along, Axis, Figure, Height, Mark, Panel, Role};
+use jointrig_protocol::channel::Role as Measures;
+
+use super::figure::{Along, Axis, Figure, Height, Mark, Panel, Role, Source};
 use super::svg;
+use crate::campaign::store::Store;
+use crate::campaign::store::error::StoreError;
+use crate::campaign::store::record_row::RecordRow;
 
 /// The close view, ms after the trigger: pulse, rebound, and what the structure makes of it at first.
 const CLOSE_MS: [f64; 2] = [-1.0, 8.0];
@@ -26,6 +31,32 @@ pub struct Shown {
 }
 
 impl Shown {
+    /// A stored record; none where it holds no samples, or its session lacks the hammer's force or the response.
+    ///
+    /// # Errors
+    /// The record is damaged, or the file cannot be read.
+    pub fn of(store: &Store, record: &RecordRow) -> Result<Option<Self>, StoreError> {
+        if record.scans == 0 {
+            return Ok(None);
+        }
+        let channels = store.channels(record.session)?;
+        let (Some(force), Some(responses)) = (channels.place(Measures::HammerForce), channels.responses())
+        else {
+            return Ok(None);
+        };
+        let samples = store.samples(record)?;
+        let si = |place: usize| channels.to_si(place, samples.channel(place));
+        Ok(Some(Self {
+            record: record.id,
+            kept: record.kept(),
+            verdict: record.standing().name(),
+            rate_hz: f64::from(channels.rate_hz),
+            trigger: record.trigger_index,
+            force_n: si(force),
+            response_m_per_s: responses.map(si),
+        }))
+    }
+
     /// (name, unit, factor to it, samples) of each row of the figure.
     fn rows(&self) -> [(&'static str, &'static str, f64, &[f64]); 4] {
         let [x, y, z] = &self.response_m_per_s;
@@ -44,17 +75,28 @@ impl Shown {
 
 /// The figure as an SVG document of its own; none without records. Left the pulse, right the whole record.
 pub fn records(title: &str, shown: &[Shown]) -> Option<String> {
-    let first = shown.first()?;
     let whole = [
         shown.iter().map(|record| record.milliseconds(0)).fold(f64::INFINITY, f64::min),
         shown.iter().map(|record| record.milliseconds(record.force_n.len())).fold(0.0, f64::max),
     ];
+    Some(svg::file(&of_views(title, shown, &[CLOSE_MS, whole])?))
+}
+
+/// The pulse and what the structure makes of it at first; none without records.
+pub fn close(title: &str, shown: &[Shown]) -> Option<Figure> {
+    of_views(title, shown, &[CLOSE_MS])
+}
+
+/// A column for each view (ms after the trigger), a row for each signal.
+fn of_views(title: &str, shown: &[Shown], views: &[[f64; 2]]) -> Option<Figure> {
+    let first = shown.first()?;
     let mut figure =
-        Figure::new("records", "", title, "The records of one cell, one over the other").across(2);
-    figure.from.file = listed(shown);
+        Figure::new("records", "", title, "The records of one cell, one over the other").across(views.len());
+    figure.from =
+        Source { file: listed(shown), version: env!("CARGO_PKG_VERSION").into(), ..Source::default() };
     for row in 0..first.rows().len() {
         let (quantity, unit, factor, _) = first.rows()[row];
-        for range_ms in [CLOSE_MS, whole] {
+        for range_ms in views.iter().copied() {
             let y = Axis::linear(quantity, unit, span(shown, row, range_ms, factor));
             let mut panel =
                 Panel::new(Axis::linear("time after the trigger", "ms", range_ms), y).high(Height::Low);
@@ -75,7 +117,7 @@ pub fn records(title: &str, shown: &[Shown]) -> Option<String> {
             figure = figure.with(panel);
         }
     }
-    Some(svg::file(&figure))
+    Some(figure)
 }
 
 /// `kept: 7; refused: 8 (double hit)`.

@@ -14,7 +14,6 @@ use crate::campaign::store::record_row::{Damaged, RecordRow};
 use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::report::cell_records::{Shown, records};
-use jointrig_protocol::channel::Role;
 
 /// Show a cell: its records, their verdicts, and a figure.
 #[derive(Debug, Args)]
@@ -95,29 +94,12 @@ impl Show {
         rows: impl Iterator<Item = &'r RecordRow>,
     ) -> Result<Option<PathBuf>, CliError> {
         let mut shown = Vec::new();
-        for record in rows.filter(|record| record.scans > 0) {
-            let samples = match store.samples(record) {
-                Ok(samples) => samples,
-                Err(error @ StoreError::Damaged { .. }) => {
-                    eprintln!("{error}");
-                    continue;
-                }
+        for record in rows {
+            match Shown::of(store, record) {
+                Ok(one) => shown.extend(one),
+                Err(error @ StoreError::Damaged { .. }) => eprintln!("{error}"),
                 Err(error) => return Err(error.into()),
-            };
-            let channels = store.channels(record.session)?;
-            let (Some(force), Some(responses)) = (channels.place(Role::HammerForce), channels.responses())
-            else {
-                continue;
-            };
-            shown.push(Shown {
-                record: record.id,
-                kept: record.kept(),
-                verdict: record.standing().name(),
-                rate_hz: f64::from(channels.rate_hz),
-                trigger: record.trigger_index,
-                force_n: channels.to_si(force, samples.channel(force)),
-                response_m_per_s: responses.map(|place| channels.to_si(place, samples.channel(place))),
-            });
+            }
         }
         let cell = &row.cell;
         let name = configuration_name(cell.configuration);
