@@ -91,7 +91,8 @@ pub fn close(title: &str, shown: &[Shown]) -> Option<Figure> {
 fn of_views(title: &str, shown: &[Shown], views: &[[f64; 2]]) -> Option<Figure> {
     let first = shown.first()?;
     let mut figure =
-        Figure::new("records", "", title, "The records of one cell, one over the other").across(views.len());
+        Figure::new("records", "", title, "Force and response along each axis, every hit over the others.")
+            .across(views.len());
     figure.from =
         Source { file: listed(shown), version: env!("CARGO_PKG_VERSION").into(), ..Source::default() };
     for row in 0..first.rows().len() {
