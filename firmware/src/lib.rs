@@ -27,6 +27,7 @@ pub mod lock_in;
 pub mod lockstep;
 pub mod logs;
 pub mod memory;
+pub mod processor_fault;
 pub mod pulse;
 pub mod quiet;
 pub mod receive;

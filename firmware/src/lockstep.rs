@@ -111,6 +111,10 @@ pub const LOCAL_RESET: u32 = 4;
 pub const HELD: u32 = 8;
 /// For tests: the acquisition task must panic.
 pub const MUST_PANIC: u32 = 16;
+/// For tests: it must read where no memory is.
+pub const MUST_FAULT: u32 = 32;
+/// For tests: it must use up its stack.
+pub const MUST_OVERFLOW: u32 = 64;
 
 /// Words of an ask or a reply.
 pub const WORDS: usize = 10;

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use jointrig_firmware::ad7606b::trouble::Trouble;
-use jointrig_hil_sim::board::qemu::{ConverterFault, QemuBoard, QemuError};
+use jointrig_hil_sim::board::qemu::{ConverterFault, Faults, QemuBoard, QemuError};
 use jointrig_hil_sim::board::{Options, VirtualBoard};
 use jointrig_hil_sim::rig::RigConfig;
 use jointrig_protocol::answer::{self, Answer, Hammer, Refusal};
@@ -170,19 +170,39 @@ fn a_link_that_stalls_for_five_seconds_loses_what_is_reported_and_disarms() {
     assert_eq!((board.failure(), board.controls().coil_pulses_us().len()), (None, 0));
 }
 
-#[test]
-fn a_panic_in_a_task_ends_the_board_with_its_sentence() {
-    let Some((board, mut host)) = board(1) else { return };
+/// What the board says of its end after `fault`.
+fn end_of(fault: impl FnOnce(&Faults)) -> Option<String> {
+    let (board, mut host) = board(1)?;
     host.start();
-    board.faults().panic();
+    fault(board.faults());
     let mut link = host.into_link();
     let mut bytes = [0; 4096];
     while link.read(&mut bytes, Duration::from_secs(10)).is_ok_and(|count| count > 0) {}
     let error = link.read(&mut bytes, Duration::from_secs(10)).unwrap_err();
     assert_eq!(error.kind(), std::io::ErrorKind::BrokenPipe);
-    let sentence = board.failure().unwrap();
-    assert!(sentence.contains("the simulator asked for a panic"), "{sentence}");
     assert!(board.controls().coil_pulses_us().is_empty());
+    Some(board.failure().unwrap())
+}
+
+#[test]
+fn a_panic_in_a_task_ends_the_board_with_its_sentence() {
+    let Some(sentence) = end_of(Faults::panic) else { return };
+    assert!(sentence.contains("the simulator asked for a panic"), "{sentence}");
+}
+
+#[test]
+fn a_processor_fault_is_told_with_its_cause_and_address() {
+    let Some(sentence) = end_of(Faults::fault_processor) else { return };
+    assert!(
+        sentence.contains("processor fault at 0x10") && sentence.contains("bus error at 0x70000000"),
+        "{sentence}"
+    );
+}
+
+#[test]
+fn a_stack_that_overflows_is_told_and_overwrites_nothing() {
+    let Some(sentence) = end_of(Faults::overflow_stack) else { return };
+    assert!(sentence.contains("stack overflow"), "{sentence}");
 }
 
 #[test]

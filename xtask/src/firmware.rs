@@ -6,7 +6,7 @@
 use crate::consent::Consent;
 use crate::project::{Package, Project, TARGET};
 use crate::toolchain::Toolchain;
-use crate::{command, setup, size};
+use crate::{command, emulator, flat, setup, size};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 
@@ -49,12 +49,21 @@ pub fn check(project: &Project, toolchain: &Toolchain) -> Result<()> {
 
 /// Builds the boards, or the one named, prints the table of their sizes, and fails when one takes too much flash.
 pub fn build_boards(project: &Project, toolchain: &Toolchain, only: Option<&str>) -> Result<()> {
-    let mut sizes = Vec::new();
+    let (mut sizes, mut images) = (Vec::new(), Vec::new());
     for board in project.boards()?.iter().filter(|board| only.is_none_or(|name| board.name == name)) {
         let image = build_board(project, toolchain, &board.name)?;
         sizes.push((board.name.clone(), size::of_image(&image)?));
+        if board.name != emulator::BOARD {
+            images.push(flat::write(&image)?);
+        }
     }
     print!("\n{}", size::table(&sizes));
+    for (file, first) in images {
+        println!(
+            "{}, from {first:#010x} on: to be flashed without Rust (docs/first-light.md)",
+            file.display()
+        );
+    }
     size::enforce(&sizes)
 }
 

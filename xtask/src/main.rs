@@ -12,6 +12,7 @@ mod consent;
 mod emulator;
 mod firmware;
 mod flash;
+mod flat;
 mod house;
 mod jobs;
 mod lint;

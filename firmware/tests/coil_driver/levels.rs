@@ -35,9 +35,9 @@ fn a_pin_of_3_3_volts_drives_hct_and_would_not_drive_hc() {
 fn pull_downs_hold_against_every_leakage_and_load_no_pin() {
     const PULL_DOWN_OHM: f64 = 10e3;
     // an HCT input, a floating pin of the controller, 100 mm of trace: 1 µA each at the most
-    assert!(3e-6 * PULL_DOWN_OHM < 0.1 * HCT.low_v);
+    const { assert!(3e-6 * PULL_DOWN_OHM < 0.1 * HCT.low_v) };
     // a pin gives 8 mA with the levels above
-    assert!(PIN_HIGH_V / PULL_DOWN_OHM < 0.1 * 8e-3);
+    const { assert!(PIN_HIGH_V / PULL_DOWN_OHM < 0.1 * 8e-3) };
     // the MOSFET's gate: IRLZ44N, threshold 1 V at least, leakage 100 nA, its driver without supply 10 µA
-    assert!(10.1e-6 * PULL_DOWN_OHM < 0.2);
+    const { assert!(10.1e-6 * PULL_DOWN_OHM < 0.2) };
 }

@@ -25,8 +25,37 @@ fn panic(info: &PanicInfo) -> ! {
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     let mut sentence = String::<512>::new();
-    let _ = write!(sentence, "processor fault at {:#010x}, called from {:#010x}", frame.pc(), frame.lr());
+    let _ = write!(
+        sentence,
+        "processor fault at {:#010x}, called from {:#010x}: {}",
+        frame.pc(),
+        frame.lr(),
+        jointrig_board_fault::status()
+    );
     report(&sentence)
+}
+
+/// For tests: reads where no memory is.
+pub fn read_nowhere() {
+    // SAFETY: there is nothing to disturb; the read ends in the fault that is wanted.
+    let _ = unsafe { core::ptr::read_volatile(0x7000_0000 as *const u32) };
+}
+
+/// For tests: calls itself until little of the stack is left, then a function that needs more than that.
+#[inline(never)]
+pub fn recurse(depth: u32) -> u32 {
+    /// More than the frame of a fault, so that the handler can begin; less than what [`greedy`] takes.
+    const LEFT: usize = 6 * 1024;
+    let frame = core::hint::black_box([depth; 256]);
+    let here = (&raw const frame).addr();
+    let limit = cortex_m::register::msplim::read() as usize;
+    let deeper = if here - limit < LEFT { greedy(depth) } else { recurse(depth.wrapping_add(1)) };
+    core::hint::black_box(deeper) ^ frame[255]
+}
+
+#[inline(never)]
+fn greedy(seed: u32) -> u32 {
+    core::hint::black_box([seed; 4096])[4095]
 }
 
 /// The port itself may be what broke, so this goes straight to the memory and the pipe.

@@ -40,6 +40,7 @@ use semihosting::{eprintln, println, process};
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
+    jointrig_board_fault::limit_stack();
     // a command line that cannot be read is treated as none
     let words = args::<256>().ok();
     let mut words = words.as_ref().into_iter().flatten();

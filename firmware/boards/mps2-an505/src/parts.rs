@@ -9,15 +9,15 @@ use jointrig_firmware::ad7606b::trouble::Trouble;
 use jointrig_firmware::board::{self, Delivered, RanDry};
 use jointrig_firmware::lockstep::{
     BLOCK_AT, DELIVERY_BYTES, DRIVE_AT, DRIVE_FULL_SCALE_V, Delivery, EMERGENCY_STOP, HELD, INTERLOCK_CLOSED,
-    LOCAL_RESET, MUST_PANIC, NEVER, Op, RING_BYTES, TEXT_AT, TEXT_BYTES, TO_DEVICE_AT, TO_HOST_AT, from_text,
-    to_text,
+    LOCAL_RESET, MUST_FAULT, MUST_OVERFLOW, MUST_PANIC, NEVER, Op, RING_BYTES, TEXT_AT, TEXT_BYTES,
+    TO_DEVICE_AT, TO_HOST_AT, from_text, to_text,
 };
 use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, COIL_PULSE_CAP_US};
 use jointrig_protocol::request::Stage as Place;
 
 use crate::device::Shared;
-use crate::{memory, port, uart};
+use crate::{fault, memory, port, uart};
 
 /// The emulated board: a name for its parts.
 pub enum Emulated {}
@@ -73,7 +73,14 @@ impl board::Scans for Scans {
         })
         .await;
         self.blocks = self.blocks.wrapping_add(1);
-        assert!(port::with(|port| port.reply.inputs) & MUST_PANIC == 0, "the simulator asked for a panic");
+        let inputs = port::with(|port| port.reply.inputs);
+        assert!(inputs & MUST_PANIC == 0, "the simulator asked for a panic");
+        if inputs & MUST_FAULT != 0 {
+            fault::read_nowhere();
+        }
+        if inputs & MUST_OVERFLOW != 0 {
+            fault::recurse(inputs);
+        }
         let mut head = [0; DELIVERY_BYTES];
         memory::read(BLOCK_AT, &mut head);
         let delivery = Delivery::from_bytes(&head);

@@ -1,6 +1,7 @@
 //! Clocks: everything from the 16 MHz crystal, so that scans are timed by it.
 
 use embassy_stm32::Config;
+use embassy_stm32::pac;
 use embassy_stm32::rcc::{
     Hse, HseMode, LsConfig, Pll, PllDiv, PllMul, PllPreDiv, PllSource, Sysclk, VoltageScale, mux,
 };
@@ -24,4 +25,15 @@ pub fn config() -> Config {
     config.rcc.ls = LsConfig::default_lsi();
     config.rcc.mux.otghssel = mux::Otghssel::HSE;
     config
+}
+
+/// Turns on the instruction cache and the flash's prefetch: both are off after a reset (RM0456, "ICACHE control register" and "FLASH access control
+/// register"), and at 160 MHz the flash makes the core wait four cycles for each line.
+///
+/// The chip's number must have been read before: it lies in the flash's read-only area, which the cache must not fetch (RM0456, "ICACHE": accesses to
+/// OTP and read-only area through the cache end in a bus error).
+pub fn cache() {
+    // invalidated by hardware after a reset; turning it on while that lasts only delays it (RM0456, "ICACHE initialization")
+    pac::ICACHE.cr().modify(|w| w.set_en(true));
+    pac::FLASH.acr().modify(|w| w.set_prften(true));
 }

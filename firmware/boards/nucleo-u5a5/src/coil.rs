@@ -90,6 +90,8 @@ impl PulseTimer {
         timer.set_output_polarity(Channel::Ch1, OutputPolarity::ActiveHigh);
         timer.set_compare_value(Channel::Ch1, BEFORE_EDGE as u16);
         timer.set_max_compare_value(1);
+        // a core that has locked up breaks the pulse too, until the next reset (RM0456, "SYSCFG configuration register 2", CLL)
+        pac::SYSCFG.cfgr2().modify(|w| w.set_cll(true));
         timer.set_break_polarity(Bkp::ACTIVE_LOW);
         timer.set_break_filter(FilterValue::FDTS_DIV8_N6);
         timer.set_break_input_pin_enable(true);

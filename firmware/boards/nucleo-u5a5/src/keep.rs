@@ -133,5 +133,10 @@ fn panicked(info: &PanicInfo<'_>) -> ! {
 
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    end(format_args!("hard fault at {:#010x}, called from {:#010x}", frame.pc(), frame.lr()))
+    end(format_args!(
+        "hard fault at {:#010x} from {:#010x}: {}",
+        frame.pc(),
+        frame.lr(),
+        jointrig_board_fault::status()
+    ))
 }

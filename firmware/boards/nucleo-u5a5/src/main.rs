@@ -114,10 +114,14 @@ async fn watching(core: &'static Shared) {
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
+    jointrig_board_fault::limit_stack();
     // before anything else: what the last run left behind
     let last_panic = keep::take_panic();
     probe::start();
     let p = embassy_stm32::init(clocks::config());
+    // the chip's number lies where the cache must not read (clocks::cache)
+    let serial = channels::name(embassy_stm32::uid::uid_hex());
+    clocks::cache();
     let dog = watchdog::start(p.IWDG);
     let mut without_nonce = false;
     let start = keep::count_start(|| {
@@ -131,7 +135,7 @@ async fn main(spawner: Spawner) {
     let inputs = inputs::Switches::new(p.PF13, p.PF14, p.PF15, p.PF12);
     let facts = Facts {
         board: channels::name("nucleo-u5a5"),
-        serial: channels::name(embassy_stm32::uid::uid_hex()),
+        serial,
         target: channels::text(env!("JOINTRIG_TARGET")),
         build: jointrig_board_log::build_id(),
         scan_rate_hz: SCAN_RATE_HZ,

@@ -34,6 +34,8 @@ pub struct Faults {
     stall_from: AtomicU64,
     stall_scans: AtomicU64,
     panic: AtomicBool,
+    processor: AtomicBool,
+    stack: AtomicBool,
     converters: Mutex<Option<Converters>>,
 }
 
@@ -54,6 +56,24 @@ impl Faults {
     /// The acquisition task panics at its next block.
     pub fn panic(&self) {
         self.panic.store(true, Ordering::Release);
+    }
+
+    /// The acquisition task reads where no memory is, at its next block.
+    pub fn fault_processor(&self) {
+        self.processor.store(true, Ordering::Release);
+    }
+
+    /// The acquisition task uses up its stack, at its next block.
+    pub fn overflow_stack(&self) {
+        self.stack.store(true, Ordering::Release);
+    }
+
+    pub(super) fn must_fault(&self) -> bool {
+        self.processor.load(Ordering::Acquire)
+    }
+
+    pub(super) fn must_overflow(&self) -> bool {
+        self.stack.load(Ordering::Acquire)
     }
 
     pub(super) fn must_panic(&self) -> bool {

@@ -12,8 +12,8 @@ use std::time::Duration;
 use jointrig_firmware::board::{ByteSink, ByteSource, Coil, Drive, Inputs, Stage};
 use jointrig_firmware::lockstep::{
     Ask, BLOCK_AT, DELIVERY_BYTES, DRIVE_AT, EMERGENCY_STOP, HELD, INTERLOCK_CLOSED, LOCAL_RESET, LOG_AT,
-    MUST_PANIC, NEVER, Op, RING_BYTES, Reply, Setup, TEXT_AT, TEXT_BYTES, TO_DEVICE_AT, TO_HOST_AT,
-    from_text, to_text,
+    MUST_FAULT, MUST_OVERFLOW, MUST_PANIC, NEVER, Op, RING_BYTES, Reply, Setup, TEXT_AT, TEXT_BYTES,
+    TO_DEVICE_AT, TO_HOST_AT, from_text, to_text,
 };
 use jointrig_logs::Table;
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, scans_per_block};
@@ -246,7 +246,9 @@ impl Server {
             | bit(self.inputs.emergency_stop(), EMERGENCY_STOP)
             | bit(self.inputs.local_reset(), LOCAL_RESET)
             | bit(!self.free_running && !self.faults.let_run(self.produced, self.per_block), HELD)
-            | bit(self.faults.must_panic(), MUST_PANIC);
+            | bit(self.faults.must_panic(), MUST_PANIC)
+            | bit(self.faults.must_fault(), MUST_FAULT)
+            | bit(self.faults.must_overflow(), MUST_OVERFLOW);
     }
 
     /// Bytes from the board to the host; whether any could go.
