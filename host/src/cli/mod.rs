@@ -20,7 +20,6 @@ mod interrupt;
 mod measure;
 mod number;
 mod output;
-#[cfg(feature = "dashboard")]
 mod page;
 mod report;
 #[cfg(feature = "dashboard")]

@@ -24,7 +24,7 @@ pub struct Serve {
 impl Serve {
     pub fn run(self) -> Result<(), CliError> {
         let stop = interrupt::flag();
-        let dashboard = Dashboard::start(&self.file, self.port)?;
+        let dashboard = Dashboard::of_file(&self.file, self.port)?;
         output::lines([dashboard.url()])?;
         eprintln!(
             "Open this address in a browser of this machine. Ctrl-C ends the page; it changes nothing in the file."

@@ -72,7 +72,6 @@ pub struct Shaker {
     /// Folder of the tables by which the controller's log lines are read (else JOINTRIG_LOG_TABLES).
     #[arg(long, value_name = "DIR")]
     log_tables: Option<PathBuf>,
-    #[cfg(feature = "dashboard")]
     #[command(flatten)]
     page: crate::cli::page::Page,
 }
@@ -81,8 +80,7 @@ impl Shaker {
     pub fn run(self) -> Result<(), CliError> {
         let address: Address = self.device.parse()?;
         let mut store = Store::open(&self.file)?;
-        #[cfg(feature = "dashboard")]
-        let _page = self.page.start(&self.file)?;
+        let mut onlooker = self.page.start(Some(&self.file))?;
         let plan = store.plan()?;
         let levels = self.levels(&plan)?;
         let moment = match self.when {
@@ -92,6 +90,7 @@ impl Shaker {
         };
         let mut session = Session::open(address.open(self.seed)?, &address.to_string())?;
         session.look_for_log_tables(Tables::new(self.log_tables.clone()));
+        onlooker.tap.take().into_iter().for_each(|tap| session.watch(tap));
         let info = session.info()?;
         if info.drive_v > 0.0 && !info.stage {
             prompt(self.yes, levels.len())?;
@@ -105,6 +104,7 @@ impl Shaker {
             most_drive_v: self.max_drive,
             limits: Limits(self.limits.clone()),
             stop: interrupt::flag(),
+            watch: onlooker.watch.clone(),
         };
         let mut seen = Vec::new();
         let summary = shaking::run(&mut store, &mut session, &options, &mut |store, level, outcome| {

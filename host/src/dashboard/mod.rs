@@ -19,10 +19,14 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use crate::campaign::store::error::StoreError;
+use crate::device::tap::{Tap, View, tap};
 use crate::live::bus::Bus;
+use crate::live::eye::{Ear, Eye, eye};
 use crate::live::follow::Follower;
 use crate::live::forming::{Formed, form};
-use crate::live::message::{Message, Trouble};
+use crate::live::frames::Frames;
+use crate::live::message::{Can, Message, Trouble};
+use crate::live::watching::Watching;
 use guard::Token;
 
 /// How often the file is asked whether it has changed: a question to the operating system, a few microseconds.
@@ -51,54 +55,99 @@ pub enum DashboardError {
 
 /// What every part of the server shares.
 struct Shared {
-    file: PathBuf,
+    file: Option<PathBuf>,
     port: u16,
-    token: Token,
+    /// That of looking.
+    look: Token,
     bus: Arc<Bus>,
     formed: Arc<Formed>,
+    frames: Arc<Frames>,
+}
+
+impl Shared {
+    /// Whether this is a token of somebody who may look.
+    fn may_look(&self, token: &str) -> bool {
+        self.look.is(token)
+    }
+}
+
+/// What the measuring process hangs on its session and its runner, so that a page sees what is going on.
+pub struct Hooks {
+    /// For the stream.
+    pub tap: Tap,
+    /// For the runner.
+    pub eye: Arc<Eye>,
 }
 
 /// A page that is served as long as this lives.
 pub struct Dashboard {
     address: SocketAddr,
-    token: Token,
+    look: Token,
     stop: Arc<AtomicBool>,
     server: Option<JoinHandle<()>>,
 }
 
 impl Dashboard {
-    /// Serves the page of a campaign file on the loopback address; port 0 takes a free one.
+    /// Serves the page of a campaign file on the loopback address; port 0 takes a free one. It looks and does nothing else.
     ///
     /// # Errors
     /// The file cannot be read, or the port cannot be had.
-    pub fn start(file: &Path, port: u16) -> Result<Self, DashboardError> {
-        let mut follower = Follower::new(file)?;
+    pub fn of_file(file: &Path, port: u16) -> Result<Self, DashboardError> {
+        Self::start(Some(file), port, None)
+    }
+
+    /// Serves the page of a process that measures into `file`, or into none.
+    ///
+    /// # Errors
+    /// The file cannot be read, or the port cannot be had.
+    pub fn of_measuring(file: Option<&Path>, port: u16) -> Result<(Self, Hooks), DashboardError> {
+        let ((eye, ear), (tap, view)) = (eye(), tap());
+        let dashboard = Self::start(file, port, Some((ear, view)))?;
+        Ok((dashboard, Hooks { tap, eye: Arc::new(eye) }))
+    }
+
+    fn start(file: Option<&Path>, port: u16, measuring: Option<(Ear, View)>) -> Result<Self, DashboardError> {
+        let mut follower = file.map(Follower::new).transpose()?;
         let listener = std::net::TcpListener::bind(("127.0.0.1", port))
             .map_err(|source| DashboardError::Port { port, source })?;
         let address = listener.local_addr().map_err(DashboardError::System)?;
-        let token = Token::random().map_err(DashboardError::System)?;
-        let (bus, formed, stop) =
-            (Arc::<Bus>::default(), Arc::<Formed>::default(), Arc::<AtomicBool>::default());
-        bus.say(Message::Snapshot(Box::new(follower.whole())));
+        let look = Token::random().map_err(DashboardError::System)?;
+        let can = Can { stream: measuring.is_some(), ..Can::default() };
+        let (bus, formed, stop, frames) = (
+            Arc::new(Bus::new(can)),
+            Arc::<Formed>::default(),
+            Arc::<AtomicBool>::default(),
+            Arc::<Frames>::default(),
+        );
+        bus.say(Message::Snapshot(Box::new(follower.as_ref().map(Follower::whole).unwrap_or_default())));
 
-        let (to, ended) = (bus.clone(), stop.clone());
-        named("page: file", move || watch(&mut follower, &to, &ended))?;
-        let (to, shown, ended, path) = (bus.clone(), formed.clone(), stop.clone(), file.to_owned());
-        named("page: estimate", move || form(&path, &to, &shown, &ended))?;
-        let shared =
-            Shared { file: file.to_owned(), port: address.port(), token: token.clone(), bus, formed };
+        if let Some(mut follower) = follower.take() {
+            let (to, ended) = (bus.clone(), stop.clone());
+            named("page: file", move || watch(&mut follower, &to, &ended))?;
+        }
+        if let Some(path) = file.map(Path::to_owned) {
+            let (to, shown, ended) = (bus.clone(), formed.clone(), stop.clone());
+            named("page: estimate", move || form(&path, &to, &shown, &ended))?;
+        }
+        if let Some((ear, view)) = measuring {
+            let (bus, frames, file) = (bus.clone(), frames.clone(), file.map(Path::to_owned));
+            let (watching, ended) = (Watching { ear, view, bus, frames, file }, stop.clone());
+            named("page: stream", move || watching.watch(&ended))?;
+        }
+        let file = file.map(Path::to_owned);
+        let shared = Shared { file, port: address.port(), look: look.clone(), bus, formed, frames };
         let ended = stop.clone();
         let server = named("page: server", move || {
             if let Err(error) = server::serve(listener, shared, &ended) {
                 log::error!("the page is not served any more: {error}");
             }
         })?;
-        Ok(Self { address, token, stop, server: Some(server) })
+        Ok(Self { address, look, stop, server: Some(server) })
     }
 
     /// The address to look at. The secret stands behind the `#`, which a browser sends nowhere.
     pub fn url(&self) -> String {
-        format!("http://{}/#look={}", self.address, self.token.as_str())
+        format!("http://{}/#look={}", self.address, self.look.as_str())
     }
 }
 

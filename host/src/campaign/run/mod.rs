@@ -12,7 +12,7 @@ pub mod error;
 mod fit;
 mod forces;
 mod keeper;
-mod progress;
+pub mod progress;
 pub mod pulse;
 pub mod quiet;
 pub mod runner;

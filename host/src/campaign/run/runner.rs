@@ -16,7 +16,6 @@ use super::error::RunError;
 use super::fit::check_fit;
 use super::forces::Forces;
 use super::keeper::Keeper;
-use super::progress::Progress;
 use super::pulse::Hit;
 use super::shot::Shooter;
 use super::stage::Stage;
@@ -29,6 +28,7 @@ use crate::campaign::store::session_table::{Counters, SessionInfo};
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::judge::Judge;
 use crate::campaign::verdict::{Kind, Verdict};
+use crate::campaign::watch::{Seen, Watchers};
 use crate::device::channels::ChannelMap;
 use crate::device::recording::Recording;
 use crate::device::session::Session;
@@ -41,8 +41,8 @@ pub struct Options {
     pub stage: Stage,
     /// Answer every prompt with yes.
     pub yes: bool,
-    /// Show a progress bar on stderr.
-    pub progress: bool,
+    /// Who watches.
+    pub watch: Watchers,
     /// Set to end the run after the shot in hand.
     pub stop: Arc<AtomicBool>,
 }
@@ -100,7 +100,8 @@ pub fn run(
     session.set_load_cells([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])?;
     let (epoch, _) = session.start(channels.len())?;
     let shooter = Shooter::new(session, &plan, epoch, channels.len())?;
-    let progress = Progress::new(tally.wanted(), tally.kept(), options.progress);
+    options.watch.saw(&Seen::Stream(&channels));
+    options.watch.saw(&Seen::Begun { wanted: tally.wanted(), kept: tally.kept() });
     let block = jointrig_protocol::limits::scans_per_block(channels.len()).unwrap_or(1);
     let mut runner = Runner {
         plan: &plan,
@@ -117,7 +118,6 @@ pub fn run(
         keeper: Keeper::start(store),
         session_id: id,
         tally,
-        progress,
         hits: 0,
     };
     let walked = runner.walk();
@@ -140,7 +140,6 @@ pub(super) struct Runner<'a> {
     pub(super) keeper: Keeper,
     pub(super) session_id: i64,
     pub(super) tally: Tally,
-    pub(super) progress: Progress,
     pub(super) hits: u64,
 }
 
@@ -154,6 +153,10 @@ pub(super) enum Next {
 impl Runner<'_> {
     pub(super) fn stopped(&self) -> bool {
         self.options.stop.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn saw(&self, seen: &Seen<'_>) {
+        self.options.watch.saw(seen);
     }
 
     fn walk(&mut self) -> Result<(), RunError> {
@@ -200,7 +203,9 @@ impl Runner<'_> {
         let shot = recording.shot;
         self.forces.learn(Hit { pulse_us: shot.pulse_us, peak_n: verdict.peak_n });
         let attempt = self.tally.add(row.id, verdict.kind == Kind::Good);
-        self.progress.judged(&row.cell, &verdict, self.tally.kept(), self.left(row));
+        let (kept, left) = (self.tally.kept(), self.left(row));
+        self.saw(&Seen::Judged { row, verdict: &verdict, kept, left });
+        self.saw(&Seen::Link(self.session.accounts()));
         log::debug!("{:?} attempt {attempt}: {} ({})", row.cell, verdict.kind, verdict.sentence);
         self.keep_log()?;
         let (utc, utc_error_s) = self.clock.utc(recording.first_scan + recording.trigger_index as u64);
@@ -224,7 +229,7 @@ impl Runner<'_> {
 
     /// Ends stream and file; of two errors the first one counts.
     fn end(mut self, walked: Result<(), RunError>) -> Result<Summary, RunError> {
-        self.progress.finish();
+        self.saw(&Seen::Ended);
         let accounts = if walked.is_ok() {
             self.session.disarm().and_then(|()| self.session.finish())
         } else {

@@ -44,7 +44,6 @@ pub struct Run {
     /// Folder of the tables by which the controller's log lines are read (else JOINTRIG_LOG_TABLES).
     #[arg(long, value_name = "DIR")]
     log_tables: Option<PathBuf>,
-    #[cfg(feature = "dashboard")]
     #[command(flatten)]
     page: crate::cli::page::Page,
 }
@@ -55,13 +54,13 @@ impl Run {
         let mut store = Store::open(&self.file)?;
         self.settle_plan(&mut store)?;
         self.mention_shaker(&store)?;
-        #[cfg(feature = "dashboard")]
-        let _page = self.page.start(&self.file)?;
+        let mut onlooker = self.page.start(Some(&self.file))?;
         let again = format!("jointrig campaign run {} --device {address}", self.file.display());
         let stop = interrupt::flag();
         let device = measure::Device { address: &address, seed: self.seed, log_tables: self.log_tables };
+        let who = measure::Who { stage: self.stage, yes: self.yes, stop };
         let mut judge = Ringing { rings: self.bell };
-        let summary = measure::measure(store, device, self.stage, self.yes, stop, &again, &mut judge)?;
+        let summary = measure::measure(store, device, who, &mut onlooker, &again, &mut judge)?;
         if summary.interrupted {
             return Err(CliError::Bad("stopped before the campaign was complete".into()));
         }

@@ -17,7 +17,24 @@ function go(key){
     s.make($('main'));
     for(const o of SCREENS)o.button.setAttribute('aria-current',o===s?'page':'false');
   }
+  wantStream(s.key==='scope'&&state.whole.can.stream&&!document.hidden);
   s.show('screen');
+}
+// what is going on, in words
+function doing(w){
+  const s=w.now.state;
+  if(!s)return'';
+  const c=s.cell===null?null:cellOf(s.cell),hit=c?`${nameOf(c)}, ${s.kept+1} of ${c.wanted}: `:'',since=((Date.now()-s.since_unix_ms)/1000).toFixed(1);
+  return{
+    'moving':()=>hit+'hammer and laser move',
+    'move-by-hand':()=>`move hammer to ${c.impact}, laser to ${c.response} (${c.configuration})`,
+    'settling':()=>`${hit}settling, ${since} s`,
+    'recording':()=>hit+'recording',
+    'judging':()=>hit+'judging',
+    'shaking':()=>w.now.shaker?.settled?'shaking, settled':'shaking, on the way',
+    'watching':()=>'watching the channels',
+    'ended':()=>'measuring has ended',
+  }[s.what]?.()||'';
 }
 function strip(){
   const w=state.whole;
@@ -27,13 +44,20 @@ function strip(){
   }
   const p=w.progress;
   $('banner').classList.toggle('simulated',w.simulated);
-  $('what').textContent=(w.simulated?'SIMULATED rig: ':'')+w.file;
-  $('where').textContent=state.connected?p.complete?'complete':p.next===null?'ended':'next '+nameOf(w.cells[p.next]):'connection lost, trying again';
-  $('kept').textContent=`${p.kept} of ${p.wanted} kept`;
+  $('what').textContent=(w.simulated?'SIMULATED rig: ':'')+(w.file||'channels of the device');
+  $('where').textContent=state.connected?!w.cells.length?'':p.complete?'complete':p.next===null?'ended':'next '+nameOf(w.cells[p.next]):'connection lost, trying again';
+  $('doing').textContent=state.connected?doing(w):'';
+  $('kept').textContent=p.wanted?`${p.kept} of ${p.wanted} kept`:'';
   const l=p.left;
   $('left').textContent=l?`left: cell ${duration(l.cell_s)}, ${w.cells[p.next].configuration} ${duration(l.configuration_s)}, all ${duration(l.campaign_s)}, until ${new Date(Date.now()+1000*l.campaign_s).toLocaleTimeString([],{hour:'2-digit',minute:'2-digit'})}`:'';
-  $('link').textContent=(p.lost_scans?`${p.lost_scans} scans lost `:'')+(held?'picture held (space)':'');
+  const link=w.now.link||p,disk=w.now.disk;
+  $('link').textContent=[link.lost_scans&&`${link.lost_scans} scans lost`,link.recovered_scans&&`${link.recovered_scans} sent again`,disk&&`${room(disk.free_bytes)} free`,scope.missed&&`${scope.missed} frames missed`,held&&'picture held (space)'].filter(Boolean).join(', ');
+  shakerScreen.button.hidden=!(w.levels.length||w.now.shaker);
+  scopeScreen.button.textContent=w.can.stream?'Scope':'Channels';
 }
+const room=bytes=>bytes>=1e9?(bytes/1e9).toFixed(bytes<1e10?1:0)+' GB':(bytes/1e6).toFixed(0)+' MB';
+// time goes on between two messages
+setInterval(()=>{if(!document.hidden&&state.whole?.now.state?.what==='settling')strip()},200);
 // a refused hit stays to be seen until the next good one
 function banner(hit){
   const v=$('verdict');
@@ -83,17 +107,19 @@ let due=false;
 function draw(kind){
   if(due||held||document.hidden)return;
   due=true;
-  requestAnimationFrame(()=>{due=false;if(!screen)go('now');else screen.show(kind)});
+  requestAnimationFrame(()=>{due=false;if(!screen)go(state.whole.file?'now':'scope');else screen.show(kind)});
 }
-document.addEventListener('visibilitychange',()=>draw('screen'));
+document.addEventListener('visibilitychange',()=>{wantStream(screen?.key==='scope'&&!!state.whole?.can.stream&&!document.hidden);draw('screen')});
 onNews((kind,message)=>{
   strip();
   if(kind==='judged'){banner(message.hit);beep(message.hit)}
   if(kind==='snapshot')banner(latest());
   if(kind==='trouble'){const v=$('verdict');v.hidden=false;v.dataset.verdict='trouble';v.replaceChildren(el('b',{className:'sign','aria-hidden':'true'},'!'),el('span',{},message.what))}
-  if(kind!=='link'&&state.whole)draw(kind);
+  // what the strip alone shows, and news that the screen does not, cost no drawing
+  const own={signals:'scope',stream:'scope',shaker:'shaker',disk:'',state:'',link:''}[kind];
+  if(state.whole&&(own===undefined||own===screen?.key))draw(kind);
 });
 strip();
 if(token)connect();else{state.refused=true;strip()}
 // for the tests
-window.live={state,alive,go,looked,takeIn};
+window.live={state,alive,go,looked,takeIn,scope};

@@ -94,7 +94,7 @@ const SCREENS=[
   }},
   figureScreen('stiffness','Stiffness',['answer','budget','k-t-of-frequency','levels','joint-spectrum'],true),
   figureScreen('frfs','Driving points',['receptances','coherence','random-error'],false),
-  {key:'channels',title:'Channels',make(m){this.at=m.appendChild(el('div'))},show(){const h=latest();if(h)picture(this.at,`/api/records/${h.record}/channels`)}},
+  scopeScreen,
   {key:'log',title:'Log',make(m){
     this.filter=el('input',{type:'search',placeholder:'search',id:'log-search','aria-label':'search the log',on:{input:()=>this.sift()}});
     m.append(el('p',{},this.filter));
@@ -115,6 +115,7 @@ const SCREENS=[
     for(;this.shown<hits.length;this.shown++){const h=hits[this.shown];if(!h.kept)put(h.utc,`${nameOf(cellOf(h.cell)||{configuration:'',impact:'?',response:'?'})}, record ${h.record}: ${h.verdict}: ${h.sentence}`,true)}
     this.sift();
   },sift(){const t=this.filter.value.toLowerCase();for(const r of this.rows.rows)r.hidden=!!t&&!r.textContent.toLowerCase().includes(t)}},
+  shakerScreen,
 ];
 function figureScreen(key,title,names,words){
   return{key,title,make(m){

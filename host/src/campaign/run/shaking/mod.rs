@@ -28,6 +28,7 @@ use crate::campaign::store::Store;
 use crate::campaign::store::level_table::{LevelRow, NewLevel, Settled};
 use crate::campaign::store::session_table::SessionInfo;
 use crate::campaign::store::stored::Hex;
+use crate::campaign::watch::{Seen, Shaking};
 use crate::device::channels::ChannelMap;
 use crate::device::recording::by_channel;
 use crate::device::session::Session;
@@ -93,6 +94,7 @@ pub fn run(
         store.note_simulated(simulated)?;
     }
     let (epoch, _) = session.start(channels.len())?;
+    options.watch.saw(&Seen::Stream(&channels));
     if info.stage {
         assemble(session, &plan)?;
     }
@@ -108,7 +110,9 @@ pub fn run(
             Ok(Outcome::Known(row.clone()))
         } else {
             tell(store, level, None);
-            bench.measure(store, level)
+            let outcome = bench.measure(store, level);
+            bench.over(&outcome);
+            outcome
         };
         match outcome {
             Ok(outcome) => {
@@ -125,6 +129,7 @@ pub fn run(
     // of two errors the first one counts; a device that is gone rests by itself
     let rested = bench.come_to_rest();
     let ended = bench.session.finish();
+    options.watch.saw(&Seen::Ended);
     walked?;
     rested?;
     ended?;
@@ -184,6 +189,20 @@ impl Bench<'_> {
         f64::from(self.channels.rate_hz)
     }
 
+    /// Tells who watches how a level ended.
+    fn over(&self, outcome: &Result<Outcome, ShakeError>) {
+        let (recorded, say) = match outcome {
+            Ok(Outcome::Stored(row) | Outcome::Known(row)) => {
+                let level = row.level();
+                (true, format!("{level}: recorded at {}", level.held.show(row.reached)))
+            }
+            Ok(Outcome::Short(level, why)) => (false, format!("{level}: {why}")),
+            Err(error) => (false, error.to_string()),
+        };
+        self.options.watch.saw(&Seen::LevelOver { recorded, say: &say });
+        self.options.watch.saw(&Seen::Link(self.session.accounts()));
+    }
+
     /// Brings the level about, records and stores it, and comes to rest.
     fn measure(&mut self, store: &mut Store, level: &Level) -> Result<Outcome, ShakeError> {
         let taken = match self.take(level) {
@@ -224,6 +243,8 @@ impl Bench<'_> {
     fn take(&mut self, level: &Level) -> Result<Taken, ShakeError> {
         let options = self.options;
         let mut orders = Orders::new(self.channels, self.info, level, options);
+        let (limits, most_drive_v) = (options.limits.of(self.channels), orders.most_drive_v());
+        options.watch.saw(&Seen::Level { level, limits: &limits, most_drive_v });
         let before = self.session.expected()?;
         let begun = orders.begin(self.session)?;
         let meter = Meter::new(self.channels, level.held, level.frequency_hz);
@@ -242,10 +263,18 @@ impl Bench<'_> {
             }
             orders.go_on(self.session, at + window)?;
             let (codes, gaps) = self.session.cut(at..at + window)?;
-            if gaps.is_empty() {
-                amplitudes.push(meter.amplitude(&codes, self.channels.len()));
-            }
             at += window;
+            if gaps.is_empty() {
+                let amplitude = meter.amplitude(&codes, self.channels.len());
+                amplitudes.push(amplitude);
+                options.watch.saw(&Seen::Shaking(Shaking {
+                    at_s: (at - begun) as f64 / self.rate_hz(),
+                    amplitude,
+                    drive_v: f64::from(self.session.status()?.drive_v),
+                    settled: is_settled(&amplitudes, target),
+                    codes: &codes,
+                }));
+            }
             if level.end_hz.is_none() {
                 self.session.forget_before(at);
             }

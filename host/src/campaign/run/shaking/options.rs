@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 use jointrig_protocol::channel::Role;
 
 use crate::campaign::plan::level::{Level, Moment};
+use crate::campaign::watch::Watchers;
 use crate::device::channels::ChannelMap;
 
 /// Load cells and excitation stop the shaker at this part of their full scale. The vibrometers do not: they go beyond theirs for a moment
@@ -29,6 +30,8 @@ pub struct Options {
     pub limits: Limits,
     /// Set to come to rest and end.
     pub stop: Arc<AtomicBool>,
+    /// Who watches.
+    pub watch: Watchers,
 }
 
 /// Limits by channel name, SI units; those of a whole level.
