@@ -33,6 +33,7 @@ fn options(levels: Vec<Level>) -> Options {
         limits: Limits::default(),
         stop: Arc::new(AtomicBool::new(false)),
         watch: Watchers::default(),
+        edits: None,
     }
 }
 

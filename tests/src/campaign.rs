@@ -52,6 +52,8 @@ pub fn run(file: &Path, plan: &str, transport: Box<dyn Transport>) -> (Summary, 
         stage: Stage::Auto,
         yes: true,
         watch: Watchers::default(),
+        edits: None,
+        answers: None,
         stop: Arc::new(AtomicBool::new(false)),
     };
     let summary = runner::run(store, &mut session, &mut ByRecord, &options).unwrap();

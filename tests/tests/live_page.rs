@@ -1,89 +1,23 @@
 //! The live page: a campaign seen in a browser while it is measured, and everything that the server must turn away.
 #![allow(clippy::unwrap_used)]
 
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
 use jointrig::campaign::store::Store;
 use jointrig::campaign::store::record_row::RecordRow;
 use jointrig::campaign::verdict::Kind;
 use jointrig_tests::browser::{Browser, Look, Page};
 use jointrig_tests::command::jointrig;
+use jointrig_tests::live::{self, Served, done, picture};
 use serde_json::Value;
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// A page that is served. Dropping it ends the process.
-struct Served {
-    child: Child,
-    url: String,
-}
-
-impl Served {
-    fn of(file: &Path) -> Self {
-        let mut child =
-            jointrig().arg("serve").arg(file).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-        let mut url = String::new();
-        BufReader::new(child.stdout.take().unwrap()).read_line(&mut url).unwrap();
-        Self { child, url: url.trim().into() }
-    }
-
-    fn port(&self) -> u16 {
-        let address = self.url.strip_prefix("http://127.0.0.1:").unwrap();
-        address.split('/').next().unwrap().parse().unwrap()
-    }
-
-    fn token(&self) -> &str {
-        self.url.split("#look=").nth(1).unwrap()
-    }
-
-    /// The status of an answer to a request with these headers, and its body.
-    fn asked(&self, path: &str, headers: &[(&str, &str)]) -> (u16, String) {
-        self.try_asking(path, headers).unwrap()
-    }
-
-    fn try_asking(&self, path: &str, headers: &[(&str, &str)]) -> std::io::Result<(u16, String)> {
-        let mut stream = TcpStream::connect(("127.0.0.1", self.port()))?;
-        stream.set_read_timeout(Some(Duration::from_secs(20)))?;
-        let lines: Vec<String> = headers.iter().map(|(name, value)| format!("{name}: {value}\r\n")).collect();
-        write!(stream, "GET {path} HTTP/1.1\r\n{}Connection: close\r\n\r\n", lines.concat())?;
-        let mut answer = String::new();
-        stream.read_to_string(&mut answer)?;
-        let status = answer.split(' ').nth(1).map_or(0, |status| status.parse().unwrap());
-        Ok((status, answer.split_once("\r\n\r\n").map_or_else(String::new, |(_, body)| body.into())))
-    }
-}
-
-impl Drop for Served {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-fn done(command: &mut Command) {
-    let out = command.output().unwrap();
-    assert!(out.status.success(), "{command:?}: {}", String::from_utf8_lossy(&out.stderr));
-}
-
 /// A new campaign of a few cells on B and the assembly.
 fn campaign() -> (TempDir, PathBuf) {
-    let folder = tempfile::tempdir().unwrap();
-    let (plan, file) = (folder.path().join("plan.toml"), folder.path().join("campaign.jrig"));
-    std::fs::write(&plan, include_str!("../../docs/plans/contact.toml")).unwrap();
-    done(jointrig().args(["campaign", "new"]).arg(&file).arg("--plan").arg(&plan));
-    (folder, file)
-}
-
-/// The page as a picture, into the folder that JOINTRIG_PICTURES names.
-fn picture(page: &mut Page<'_>, name: &str) {
-    if let Some(folder) = std::env::var_os("JOINTRIG_PICTURES") {
-        let bytes = BASE64_STANDARD.decode(page.picture()).unwrap();
-        std::fs::write(Path::new(&folder).join(format!("{name}.png")), bytes).unwrap();
-    }
+    live::campaign(include_str!("../../docs/plans/contact.toml"))
 }
 
 /// The same with every number as a real one: a browser writes 100.0 as 100.
@@ -237,13 +171,7 @@ fn stored(file: &Path) -> Vec<(i64, u64, u32, f64, String)> {
 
 #[test]
 fn looking_changes_no_record() {
-    let new = || {
-        let folder = tempfile::tempdir().unwrap();
-        let (plan, file) = (folder.path().join("plan.toml"), folder.path().join("campaign.jrig"));
-        std::fs::write(&plan, include_str!("../../docs/plans/small.toml")).unwrap();
-        done(jointrig().args(["campaign", "new"]).arg(&file).arg("--plan").arg(&plan));
-        (folder, file)
-    };
+    let new = || live::campaign(include_str!("../../docs/plans/small.toml"));
     let run = |file: &Path| {
         let mut command = jointrig();
         command.args(["campaign", "run"]).arg(file).args(["--device", "sim:", "--yes"]);
@@ -252,33 +180,36 @@ fn looking_changes_no_record() {
     let (_alone, unseen) = new();
     done(&mut run(&unseen));
     let (_watched, seen) = new();
-    let mut command = run(&seen).arg("--serve").stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-    let mut said = BufReader::new(command.stderr.take().unwrap());
-    let mut line = String::new();
-    while !line.contains("live page: ") {
-        line.clear();
-        assert!(said.read_line(&mut line).unwrap() > 0, "no address");
-    }
-    let url = line.trim().split("live page: ").nth(1).unwrap().to_owned();
-    // a page that looks, one that never reads, and others that ask for the heaviest answer again and again
-    let server = Served { child: command, url };
+    let mut server = Served::beside(run(&seen).arg("--serve"));
+    // ten pages that look at everything, two that never read, and others that ask for the heaviest answer again and again
+    let listeners: Vec<_> = (0..9)
+        .map(|_| server.listener())
+        .map(|listener| std::thread::spawn(|| listener.to_the_end()))
+        .collect();
+    let deaf = server.listener();
     let mut browser = Browser::start();
     let mut page = browser.open_url(&server.url, Look::DESK);
     let host = format!("127.0.0.1:{}", server.port());
     let mut silent = TcpStream::connect(("127.0.0.1", server.port())).unwrap();
     write!(silent, "GET /live.js HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
     page.until("!!live.state.whole && live.state.whole.hits.length > 0");
+    page.key("6");
     let token = format!("Bearer {}", server.token());
     let mut asked = 0;
-    while server.try_asking("/api/records/1/channels", &[("Host", &host), ("Authorization", &token)]).is_ok()
-    {
+    let headers = [("Host", host.as_str()), ("Authorization", token.as_str())];
+    while server.try_asking("GET", "/api/records/1/channels", &headers, "").is_ok() {
         asked += 1;
     }
     assert!(asked > 3, "the run ended before anybody could look");
-    let mut rest = String::new();
-    said.read_to_string(&mut rest).unwrap();
-    drop(page);
+    drop((page, deaf));
+    for listener in listeners {
+        let heard = listener.join().unwrap();
+        assert!(heard.frames > 3 && heard.words.len() > 3, "{} frames", heard.frames);
+    }
+    let (status, rest) = server.wait();
+    assert!(status.success(), "{rest}");
     assert_eq!(stored(&seen), stored(&unseen), "{rest}");
+    assert!(!rest.contains("unexplained"), "{rest}");
 }
 
 #[test]
@@ -313,7 +244,7 @@ fn strangers_are_turned_away() {
     let silent: Vec<TcpStream> =
         (0..40).map(|_| TcpStream::connect(("127.0.0.1", server.port())).unwrap()).collect();
     let within = Instant::now() + Duration::from_secs(15);
-    while server.try_asking("/", &[("Host", &host)]).map_or(0, |(status, _)| status) != 200 {
+    while server.try_asking("GET", "/", &[("Host", &host)], "").map_or(0, |(status, _)| status) != 200 {
         assert!(Instant::now() < within, "the silent ones still lock everyone out");
         std::thread::sleep(Duration::from_millis(100));
     }

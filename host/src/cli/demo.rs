@@ -50,10 +50,10 @@ impl Demo {
         })?;
         let file = folder.join("campaign.jrig");
         let store = self.open(&file)?;
-        let mut onlooker = self.page.start(Some(&file))?;
+        let stop = interrupt::flag();
+        let mut onlooker = self.page.start(Some(&file), &stop, false)?;
         let again = self.again();
         let address = Address::Sim { rig: self.rig.clone() };
-        let stop = interrupt::flag();
         let device = measure::Device { address: &address, seed: self.seed, log_tables: None };
         let who = measure::Who { stage: Stage::Device, yes: true, stop };
         let summary = measure::measure(store, device, who, &mut onlooker, &again, &mut ByRecord)?;

@@ -50,7 +50,8 @@ pub fn measure(
     onlooker.tap.take().into_iter().for_each(|tap| session.watch(tap));
     let Who { stage, yes, stop } = who;
     let watch = onlooker.watch.clone().and(Arc::new(Progress::default()));
-    let options = Options { stage, yes, watch, stop };
+    let (edits, answers) = (onlooker.edits.take(), onlooker.answers.take());
+    let options = Options { stage, yes, watch, edits, answers, stop };
     let summary = runner::run(store, &mut session, judge, &options)?;
     tell(&path, &summary, again);
     tell_size(&path)?;

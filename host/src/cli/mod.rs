@@ -19,6 +19,8 @@ mod info;
 mod interrupt;
 mod measure;
 mod number;
+#[cfg(feature = "dashboard")]
+mod open_page;
 mod output;
 mod page;
 mod report;

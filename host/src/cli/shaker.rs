@@ -2,6 +2,7 @@
 
 use std::io::{BufRead, Write};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Args;
 use serde_json::{Value, json};
@@ -80,7 +81,8 @@ impl Shaker {
     pub fn run(self) -> Result<(), CliError> {
         let address: Address = self.device.parse()?;
         let mut store = Store::open(&self.file)?;
-        let mut onlooker = self.page.start(Some(&self.file))?;
+        let stop = Arc::default();
+        let mut onlooker = self.page.start(Some(&self.file), &stop, false)?;
         let plan = store.plan()?;
         let levels = self.levels(&plan)?;
         let moment = match self.when {
@@ -95,6 +97,7 @@ impl Shaker {
         if info.drive_v > 0.0 && !info.stage {
             prompt(self.yes, levels.len())?;
         }
+        interrupt::catch(&stop);
         eprintln!("{} levels, {} the hammer's cells; {CRITERION}", levels.len(), moment.name());
         let options = Options {
             levels,
@@ -103,8 +106,9 @@ impl Shaker {
             sweep_hz_per_s: self.rate,
             most_drive_v: self.max_drive,
             limits: Limits(self.limits.clone()),
-            stop: interrupt::flag(),
+            stop,
             watch: onlooker.watch.clone(),
+            edits: onlooker.edits.take(),
         };
         let mut seen = Vec::new();
         let summary = shaking::run(&mut store, &mut session, &options, &mut |store, level, outcome| {

@@ -41,6 +41,8 @@ pub enum Refusal {
     Origin,
     /// The request lacks the token.
     Token,
+    /// The token is one to look with.
+    LooksOnly,
 }
 
 impl Refusal {
@@ -48,7 +50,7 @@ impl Refusal {
     pub fn status(self) -> StatusCode {
         match self {
             Self::Host => StatusCode::MISDIRECTED_REQUEST,
-            Self::Origin => StatusCode::FORBIDDEN,
+            Self::Origin | Self::LooksOnly => StatusCode::FORBIDDEN,
             Self::Token => StatusCode::UNAUTHORIZED,
         }
     }
@@ -61,6 +63,10 @@ impl Refusal {
             Self::Token => [
                 "the token is missing or wrong",
                 "open the whole address that jointrig printed, with what follows the #",
+            ],
+            Self::LooksOnly => [
+                "this address is one to look",
+                "open the address to edit, which the measuring process printed",
             ],
         }
     }

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use axum::extract::{Path, Query, Request, State};
-use axum::http::{HeaderValue, StatusCode, header};
+use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
+use axum::http::{HeaderValue, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
@@ -12,7 +12,8 @@ use serde::Deserialize;
 use serde_json::json;
 
 use super::guard::{Refusal, from_here, token};
-use super::{Shared, page, socket};
+use super::problem::Problem;
+use super::{Shared, edit, page, socket};
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
 use crate::live::figures;
@@ -23,6 +24,9 @@ use crate::report::figure_fragment;
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data: blob:; \
     frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
+/// Bytes of what a page wants changed.
+const BODY: usize = 8 * 1024;
+
 /// Everything that is served.
 pub fn router(shared: Arc<Shared>) -> Router {
     let data = Router::new()
@@ -32,6 +36,9 @@ pub fn router(shared: Arc<Shared>) -> Router {
         .route("/api/now/shaker", get(of_shaker))
         .route("/api/log", get(log))
         .layer(from_fn_with_state(shared.clone(), with_token));
+    let edits = edit::routes()
+        .layer(DefaultBodyLimit::max(BODY))
+        .layer(from_fn_with_state(shared.clone(), with_edit_token));
     Router::new()
         .route("/", get(async || ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], page::HTML)))
         .route(
@@ -44,6 +51,7 @@ pub fn router(shared: Arc<Shared>) -> Router {
         )
         .route("/socket", get(socket::socket))
         .merge(data)
+        .merge(edits)
         .fallback(async || Problem::missing("there is no such page"))
         .layer(from_fn_with_state(shared.clone(), guarded))
         .with_state(shared)
@@ -54,40 +62,6 @@ impl Shared {
     fn store(&self) -> Result<Store, Problem> {
         let file = self.file.as_deref().ok_or_else(|| Problem::missing("no campaign is measured here"))?;
         Ok(Store::open_read_only(file)?)
-    }
-}
-
-/// An answer that is none.
-struct Problem {
-    status: StatusCode,
-    what: String,
-    todo: &'static str,
-}
-
-impl Problem {
-    fn missing(what: &str) -> Self {
-        Self { status: StatusCode::NOT_FOUND, what: what.into(), todo: "go back to the page" }
-    }
-}
-
-impl From<Refusal> for Problem {
-    fn from(refusal: Refusal) -> Self {
-        let [what, todo] = refusal.words();
-        Self { status: refusal.status(), what: what.into(), todo }
-    }
-}
-
-impl From<StoreError> for Problem {
-    fn from(error: StoreError) -> Self {
-        Self { status: StatusCode::NOT_FOUND, what: error.to_string(), todo: "look at the campaign file" }
-    }
-}
-
-impl IntoResponse for Problem {
-    fn into_response(self) -> Response {
-        let body =
-            json!({ "error": { "what": self.what, "where": "the live page's server", "do": self.todo } });
-        (self.status, Json(body)).into_response()
     }
 }
 
@@ -115,6 +89,19 @@ async fn with_token(
 ) -> Result<Response, Problem> {
     if !shared.may_look(token(request.headers())?) {
         return Err(Refusal::Token.into());
+    }
+    Ok(next.run(request).await)
+}
+
+async fn with_edit_token(
+    State(shared): State<Arc<Shared>>,
+    request: Request,
+    next: Next,
+) -> Result<Response, Problem> {
+    let given = token(request.headers())?;
+    if !shared.edit.as_ref().is_some_and(|edit| edit.is(given)) {
+        let refusal = if shared.look.is(given) { Refusal::LooksOnly } else { Refusal::Token };
+        return Err(refusal.into());
     }
     Ok(next.run(request).await)
 }

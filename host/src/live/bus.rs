@@ -58,12 +58,22 @@ impl Bus {
         let seq = {
             let mut state = self.inner();
             state.seq += 1;
-            let numbered = numbered(state.seq, &message);
+            let numbered = match message {
+                // what the file does not know is kept, and told with it
+                Message::Snapshot(_) => {
+                    state.whole.take_in(message);
+                    numbered(state.seq, &Message::Snapshot(Box::new(state.whole.clone())))
+                }
+                message => {
+                    let numbered = numbered(state.seq, &message);
+                    state.whole.take_in(message);
+                    numbered
+                }
+            };
             if state.recent.len() == KEPT {
                 state.recent.pop_front();
             }
             state.recent.push_back(numbered);
-            state.whole.take_in(message);
             state.seq
         };
         self.newest.send_replace(seq);
@@ -94,6 +104,11 @@ impl Bus {
     /// Whether the rig is simulated, as far as the file says.
     pub fn simulated(&self) -> bool {
         self.inner().whole.simulated
+    }
+
+    /// Whether anybody listens.
+    pub fn is_heard(&self) -> bool {
+        self.newest.receiver_count() > 0
     }
 
     /// Tells when there is something new: the number of the newest message.
@@ -200,6 +215,21 @@ mod tests {
         (0..KEPT as u64 + 10).for_each(|kept| bus.say(progress(kept)));
         assert_eq!(bus.since(Some(5)).len(), 1);
         assert_eq!(bus.since(Some(10)).len(), KEPT);
+    }
+
+    #[test]
+    fn a_new_whole_from_the_file_leaves_what_only_measuring_knows() {
+        let bus = Bus::new(Can { edit: true, ..Can::default() });
+        let link = crate::live::now::Link { lost_scans: 7, ..Default::default() };
+        bus.say(Message::Link(link));
+        bus.say(Message::Snapshot(Box::new(Snapshot { file: "new".into(), ..Snapshot::default() })));
+        // told to whoever was there, and to whoever comes later
+        for after in [Some(1), None] {
+            let text = bus.since(after)[0].text.to_string();
+            for part in ["\"file\":\"new\"", "\"lost_scans\":7", "\"edit\":true"] {
+                assert!(text.contains(part), "{text}");
+            }
+        }
     }
 
     #[test]

@@ -111,7 +111,7 @@ pub fn shaker(now: &Shaker) -> Option<Figure> {
         now.title.clone(),
         "Amplitude of every window of some whole cycles, the drive that brings it about, and the last cycle as a loop, raw.",
     )
-    .across(2)
+    .across(3)
     .with(amplitude)
     .with(drive);
     if let Some([x, force]) = &now.turn {

@@ -183,8 +183,6 @@ pub struct Disk {
 /// Who answers for hammer and laser.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Control {
-    /// What is asked; none while nothing is.
-    pub asks: Option<String>,
     /// The page that may answer, by the name that it gave itself.
     pub page: Option<String>,
 }

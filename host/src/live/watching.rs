@@ -58,9 +58,14 @@ impl Watching {
     pub fn watch(mut self, stop: &AtomicBool) {
         let mut known = Known { cycles: room(), ..Known::default() };
         let (mut tick, mut signals, mut disk) = (0_u32, Instant::now(), None::<Instant>);
-        while !stop.load(Ordering::Relaxed) {
+        loop {
             std::thread::sleep(FRAME);
+            // what was told before the end is told on
+            let last = stop.load(Ordering::Relaxed);
             self.hear(&mut known);
+            if last {
+                return;
+            }
             tick += 1;
             if self.frames.looked_at() || tick.is_multiple_of(SELDOM) {
                 // a stream brings a stretch every millisecond; where there is none, nothing is waited for

@@ -37,7 +37,14 @@ fn plan() -> String {
 }
 
 fn options() -> Options {
-    Options { stage: Stage::Auto, yes: true, watch: Watchers::default(), stop: Arc::default() }
+    Options {
+        stage: Stage::Auto,
+        yes: true,
+        watch: Watchers::default(),
+        edits: None,
+        answers: None,
+        stop: Arc::default(),
+    }
 }
 
 fn run_on(

@@ -2,12 +2,13 @@
 
 use jointrig_protocol::shot::Shot;
 
+use super::answers::Question;
 use super::directions::name;
 use super::error::RunError;
 use super::quiet;
 use super::runner::{Next, Runner, still};
 use super::shot::{Outcome, QuietLimits};
-use super::stage::{Moved, Stage};
+use super::stage::{Moved, Stage, Who};
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::codec;
 use crate::campaign::verdict::others::Others;
@@ -40,6 +41,10 @@ impl Runner<'_> {
         let mut quiet = quiet::unknown(self.channels);
         let mut setbacks = 0;
         while (self.tally.open(row.id) || !again.is_empty()) && !self.stopped() {
+            self.recount();
+            if again.is_empty() && !self.tally.open(row.id) {
+                break;
+            }
             if again.is_empty() && self.ended(row, &others)? {
                 break;
             }
@@ -154,7 +159,10 @@ impl Runner<'_> {
         let (standing, left) = (self.standing(row), self.left(row));
         self.saw(&Seen::Moving { row, standing, by_hand, left });
         let what = self.directions(row);
-        let moved = self.stage.go(self.session, &row.cell, attempt, &what, self.options.yes);
+        let question = Question { cell: row.id, attempt };
+        let elsewhere = self.options.answers.as_ref().map(|answers| (answers, question));
+        let who = Who { yes: self.options.yes, elsewhere };
+        let moved = self.stage.go(self.session, &row.cell, attempt, &what, &who);
         self.saw(&Seen::Moved);
         let moved = moved?;
         if let Moved::InPlace(at_scan) = moved {

@@ -6,12 +6,15 @@
 //! the next hit is the one that an undisturbed run would have made, to the last bit. A real structure is not struck in vain: it
 //! settles, and goes on.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
+use super::answers::Answers;
 use super::clock::ScanClock;
 use super::earlier::Earlier;
+use super::edits::{Edits, Recount};
 use super::error::RunError;
 use super::fit::check_fit;
 use super::forces::Forces;
@@ -43,6 +46,10 @@ pub struct Options {
     pub yes: bool,
     /// Who watches.
     pub watch: Watchers,
+    /// What persons elsewhere want changed in the file.
+    pub edits: Option<Edits>,
+    /// Answers to the stage's questions from elsewhere than the terminal.
+    pub answers: Option<Answers>,
     /// Set to end the run after the shot in hand.
     pub stop: Arc<AtomicBool>,
 }
@@ -115,9 +122,10 @@ pub fn run(
         shooter,
         forces,
         clock: ScanClock::new(f64::from(channels.rate_hz), block),
-        keeper: Keeper::start(store),
+        keeper: Keeper::start(store, options.edits.clone()),
         session_id: id,
         tally,
+        reopened: BTreeSet::new(),
         hits: 0,
     };
     let walked = runner.walk();
@@ -140,6 +148,8 @@ pub(super) struct Runner<'a> {
     pub(super) keeper: Keeper,
     pub(super) session_id: i64,
     pub(super) tally: Tally,
+    /// Cells that lost a good hit to a person in this run.
+    reopened: BTreeSet<i64>,
     pub(super) hits: u64,
 }
 
@@ -162,9 +172,17 @@ impl Runner<'_> {
     fn walk(&mut self) -> Result<(), RunError> {
         let cells = self.cells;
         let (mut at, mut back) = (0, false);
-        while let Some(row) = cells.get(at)
-            && !self.stopped()
-        {
+        while !self.stopped() {
+            self.recount();
+            let Some(row) = cells.get(at) else {
+                // a cell behind us that lost a hit to a person gets another one
+                let tally = &self.tally;
+                let lost = cells.iter().find(|row| self.reopened.contains(&row.id) && tally.open(row.id));
+                let Some(row) = lost else { break };
+                self.reopened.remove(&row.id);
+                self.cell(row)?;
+                continue;
+            };
             // a cell that somebody went back to is shown whatever its state
             if !self.tally.open(row.id) && !back {
                 at += 1;
@@ -182,6 +200,16 @@ impl Runner<'_> {
             };
         }
         Ok(())
+    }
+
+    /// Counts what persons elsewhere have overruled since.
+    pub(super) fn recount(&mut self) {
+        for Recount { cell, more } in self.keeper.recounts() {
+            self.tally.recount(cell, more);
+            if !more {
+                self.reopened.insert(cell);
+            }
+        }
     }
 
     /// Notes where the scan clock is.

@@ -1,8 +1,13 @@
 // What the server says: its messages put together into one state, and its answers to questions.
-const token=new URLSearchParams(location.hash.slice(1)).get('look')||sessionStorage.getItem('look');
-if(token)sessionStorage.setItem('look',token);
-// the secret stays out of the history and of what is copied from the address bar
-if(location.hash.startsWith('#look='))history.replaceState(null,'',location.pathname);
+const $=id=>document.getElementById(id);
+const given=new URLSearchParams(location.hash.slice(1)),edits=given.has('edit');
+if(given.has('look')||edits){
+  sessionStorage.setItem('token',given.get('edit')||given.get('look'));
+  sessionStorage.setItem('edits',edits?'1':'');
+  // the secret stays out of the history and of what is copied from the address bar
+  history.replaceState(null,'',location.pathname);
+}
+const token=sessionStorage.getItem('token'),mine={edits:sessionStorage.getItem('edits')==='1'};
 const state={seq:null,whole:null,connected:false,refused:false,trouble:'',missed:0};
 const listeners=[];
 const onNews=f=>listeners.push(f);

@@ -1,5 +1,4 @@
 // The strip, the verdict's banner, keys, sounds; which screen is shown.
-const $=id=>document.getElementById(id);
 root.classList.add('scripted');
 let screen=null,voice=null;
 for(const[i,s]of SCREENS.entries()){
@@ -8,7 +7,8 @@ for(const[i,s]of SCREENS.entries()){
 }
 function go(key){
   const s=SCREENS.find(s=>s.key===key);
-  if(!state.whole||!s)return;
+  // without a campaign there is the stream alone
+  if(!state.whole||!s||!state.whole.file&&s!==scopeScreen)return;
   if(screen!==s){
     // a figure belongs to the screen that shows it
     alive.clear();shownFigures.clear();
@@ -52,7 +52,9 @@ function strip(){
   $('left').textContent=l?`left: cell ${duration(l.cell_s)}, ${w.cells[p.next].configuration} ${duration(l.configuration_s)}, all ${duration(l.campaign_s)}, until ${new Date(Date.now()+1000*l.campaign_s).toLocaleTimeString([],{hour:'2-digit',minute:'2-digit'})}`:'';
   const link=w.now.link||p,disk=w.now.disk;
   $('link').textContent=[link.lost_scans&&`${link.lost_scans} scans lost`,link.recovered_scans&&`${link.recovered_scans} sent again`,disk&&`${room(disk.free_bytes)} free`,scope.missed&&`${scope.missed} frames missed`,held&&'picture held (space)'].filter(Boolean).join(', ');
+  $('write').hidden=$('end').hidden=!mayEdit();
   shakerScreen.button.hidden=!(w.levels.length||w.now.shaker);
+  for(const s of SCREENS)if(s!==shakerScreen)s.button.hidden=!w.file&&s!==scopeScreen;
   scopeScreen.button.textContent=w.can.stream?'Scope':'Channels';
 }
 const room=bytes=>bytes>=1e9?(bytes/1e9).toFixed(bytes<1e10?1:0)+' GB':(bytes/1e6).toFixed(0)+' MB';
@@ -82,6 +84,7 @@ function sound(){
   $('sound').textContent=voice?'sound on':'sound off';
 }
 $('sound').addEventListener('click',sound);
+$('write').addEventListener('click',noteDialog);
 $('help').addEventListener('click',()=>$('keys').showModal());
 $('light').addEventListener('click',()=>{
   const dark=root.dataset.light?root.dataset.light==='dark':matchMedia('(prefers-color-scheme: dark)').matches;
@@ -97,7 +100,9 @@ addEventListener('keydown',e=>{
     j:()=>{chosen=w.cells[Math.min(at+1,w.cells.length-1)]?.id??null;go('cell')},
     k:()=>{chosen=w.cells[Math.max(at-1,0)]?.id??null;go('cell')},
     f:()=>{chosen=null;screen?.show('screen');strip()},
-    m:sound,'?':()=>$('keys').showModal(),
+    m:sound,n:noteDialog,u:takeBack,
+    K:()=>mayEdit()&&latest()&&overrule(latest().record,'keep'),D:()=>mayEdit()&&latest()&&overrule(latest().record,'drop'),
+    '?':()=>$('keys').showModal(),
     ' ':()=>{held=!held;if(!held)screen?.show('screen');strip()},
   }[e.key];
   if(act&&w){act();e.preventDefault()}
@@ -116,10 +121,10 @@ onNews((kind,message)=>{
   if(kind==='snapshot')banner(latest());
   if(kind==='trouble'){const v=$('verdict');v.hidden=false;v.dataset.verdict='trouble';v.replaceChildren(el('b',{className:'sign','aria-hidden':'true'},'!'),el('span',{},message.what))}
   // what the strip alone shows, and news that the screen does not, cost no drawing
-  const own={signals:'scope',stream:'scope',shaker:'shaker',disk:'',state:'',link:''}[kind];
+  const own={signals:'scope',stream:'scope',shaker:'shaker',disk:'',state:'now',control:'now',link:''}[kind];
   if(state.whole&&(own===undefined||own===screen?.key))draw(kind);
 });
 strip();
 if(token)connect();else{state.refused=true;strip()}
 // for the tests
-window.live={state,alive,go,looked,takeIn,scope};
+window.live={state,alive,go,looked,takeIn,scope,me};

@@ -8,9 +8,10 @@ use crate::report;
 pub const HTML: &str = include_str!("live.html");
 
 /// In the order in which they build on one another.
-const SCRIPTS: [&str; 6] = [
+const SCRIPTS: [&str; 7] = [
     include_str!("link.js"),
     include_str!("picture.js"),
+    include_str!("edit.js"),
     include_str!("scope.js"),
     include_str!("shaker.js"),
     include_str!("screens.js"),

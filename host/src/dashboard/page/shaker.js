@@ -14,7 +14,7 @@ const shakerScreen={key:'shaker',title:'Shaker',make(m){
   this.guard.hidden=!s;this.figure.hidden=!s;
   if(s){
     const last=s.windows.at(-1);
-    this.head.textContent=s.title+': '+(s.over?s.over[0]?'✓ recorded':'✕ not recorded':s.settled?'✓ settled, recording':'⧗ on its way');
+    this.head.textContent=s.title+': '+(s.over?s.over[0]?'✓ recorded':'✕ not recorded':s.settled?'✓ settled, recording':'∿ on its way');
     // of a held drive the motion has no order
     const measured=s.held==='drive'?'displacement':s.held;
     this.note.textContent=s.over?s.over[1]:last?`${amountOf(measured,last[1])}${s.held==='drive'?'':` of ${amountOf(s.held,s.order)} ordered (${(100*last[1]/s.order).toFixed(1)} %)`}, drive ${last[2].toPrecision(3)} V of at most ${s.most_drive_v.toPrecision(3)} V, after ${last[0].toFixed(1)} s`:'The order is given.';

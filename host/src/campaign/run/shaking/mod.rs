@@ -102,6 +102,9 @@ pub fn run(
     let mut outcomes = Vec::new();
     let mut walked = Ok(());
     for level in &options.levels {
+        if let Some(edits) = &options.edits {
+            edits.work_off(store)?;
+        }
         if options.stop.load(Ordering::Relaxed) {
             break;
         }

@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 use jointrig_protocol::channel::Role;
 
 use crate::campaign::plan::level::{Level, Moment};
+use crate::campaign::run::edits::Edits;
 use crate::campaign::watch::Watchers;
 use crate::device::channels::ChannelMap;
 
@@ -32,6 +33,8 @@ pub struct Options {
     pub stop: Arc<AtomicBool>,
     /// Who watches.
     pub watch: Watchers,
+    /// What persons elsewhere want changed in the file; done between two levels.
+    pub edits: Option<Edits>,
 }
 
 /// Limits by channel name, SI units; those of a whole level.
