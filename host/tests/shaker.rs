@@ -8,7 +8,6 @@ use jointrig::campaign::plan::level::{Held, Level, Moment};
 use jointrig::campaign::run::shaking::{self, Limits, Options, Outcome, ShakeError, Shortfall, Summary};
 use jointrig::campaign::store::Store;
 use jointrig::campaign::store::level_table::LevelRow;
-use jointrig::campaign::watch::Watchers;
 use jointrig::device::address::Address;
 use jointrig::device::session::Session;
 use jointrig::exchange::read_hysteresis;
@@ -32,8 +31,6 @@ fn options(levels: Vec<Level>) -> Options {
         most_drive_v: None,
         limits: Limits::default(),
         stop: Arc::new(AtomicBool::new(false)),
-        watch: Watchers::default(),
-        edits: None,
     }
 }
 

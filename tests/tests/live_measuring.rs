@@ -22,6 +22,8 @@ fn the_stream_is_seen_as_it_comes() {
         "document.querySelectorAll('.trace canvas').length === live.state.whole.now.stream.channels.length",
     );
     assert_eq!(page.eval("document.getElementById('doing').textContent"), "watching the channels");
+    let what = page.eval("document.getElementById('what').textContent");
+    assert!(what.as_str().unwrap().starts_with("SIMULATED rig"), "{what}");
     // something is drawn in every trace, and every number stands there
     let drawn = page.eval(
         "[...document.querySelectorAll('.trace')].map(t => { const c = t.querySelector('canvas'),

@@ -2,8 +2,10 @@
 #![allow(clippy::unwrap_used)]
 
 use jointrig::campaign::store::Store;
-use jointrig::campaign::store::record_row::RecordRow;
-use jointrig::campaign::verdict::Kind;
+use jointrig::campaign::store::record_row::{NewRecord, RecordRow};
+use jointrig::campaign::store::session_table::Counters;
+use jointrig::campaign::verdict::{Kind, Verdict};
+use jointrig::device::recording::Recording;
 use jointrig_tests::browser::{Browser, Look, Page};
 use jointrig_tests::command::jointrig;
 use jointrig_tests::live::{self, Served, done, picture};
@@ -159,6 +161,63 @@ fn every_verdict_has_a_sign_a_pattern_and_its_reason() {
     let errors: Vec<String> =
         page.errors().into_iter().filter(|error| !error.contains("/api/records/")).collect();
     assert_eq!(errors, Vec::<String>::new());
+}
+
+/// Every verdict comes into the file, as a measuring process writes it, and is on the page within moments.
+#[test]
+fn a_stored_verdict_is_on_the_page_at_once() {
+    let (_folder, file) = live::campaign(include_str!("../../docs/plans/small.toml"));
+    done(jointrig().args(["campaign", "run"]).arg(&file).args(["--device", "sim:", "--yes"]));
+    let server = Served::of(&file);
+    let mut browser = Browser::start();
+    let mut page = browser.open_url(&server.url, Look::DESK);
+    page.until(COMPLETE);
+    page.key("2");
+    page.until("document.querySelector('.matrix button') !== null");
+    let store = Store::open(&file).unwrap();
+    let row = store.record(1).unwrap();
+    let samples = store.samples(&row).unwrap();
+    let mut slowest = Duration::ZERO;
+    for (n, kind) in (0..).zip(Kind::ALL.into_iter().rev()) {
+        let recording = Recording {
+            epoch: 1,
+            first_scan: 1_000_000 * u64::from(n),
+            trigger_index: row.trigger_index,
+            channels: row.channels,
+            codes: samples.codes.clone(),
+            gaps: Vec::new(),
+            shot: row.shot,
+        };
+        let sentence = format!("injected {}", kind.name());
+        let verdict = Verdict { kind, measure: 1.0, limit: 2.0, sentence, peak_n: 50.0, start_s: 0.005 };
+        let new = NewRecord {
+            cell: row.cell,
+            attempt: 50 + n,
+            session: row.session,
+            utc: row.utc.clone(),
+            utc_error_s: None,
+            recording,
+            verdict,
+        };
+        store.insert(&new, &Counters::default()).unwrap();
+        let stored = Instant::now();
+        let (name, good) = (kind.name(), kind == Kind::Good);
+        let seen = format!(
+            "live.state.whole.hits.at(-1).sentence === 'injected {name}' && document.getElementById('verdict').hidden === {good}
+             && ({good} || document.getElementById('verdict').textContent.includes('{name}: injected'))
+             && ({good} || document.querySelector('.matrix button').title.includes('{name}'))"
+        );
+        while page.eval(&seen) != Value::Bool(true) {
+            assert!(stored.elapsed() < Duration::from_secs(2), "{name}: not on the page");
+            std::thread::sleep(Duration::from_millis(4));
+        }
+        slowest = slowest.max(stored.elapsed());
+        if kind == Kind::DoubleHit {
+            picture(&mut page, "verdict-double-hit");
+        }
+    }
+    println!("banner and matrix at most {} ms after the record was stored", slowest.as_millis());
+    assert_eq!(page.errors(), Vec::<String>::new());
 }
 
 /// What a run stored, with its scans counted from the first record on: when the stream begins is a matter of the process's start.

@@ -40,8 +40,13 @@ pub struct Standing {
 /// What happened.
 #[derive(Clone, Copy, Debug)]
 pub enum Seen<'a> {
-    /// A stream of scans begins, of these channels.
-    Stream(&'a ChannelMap),
+    /// A stream of scans begins.
+    Stream {
+        /// Of these channels.
+        channels: &'a ChannelMap,
+        /// Whether the rig is simulated.
+        simulated: bool,
+    },
     /// A campaign begins or goes on: good hits wanted, and those that are there.
     Begun {
         /// Good hits wanted in all.

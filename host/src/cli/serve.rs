@@ -11,6 +11,7 @@ use super::error::CliError;
 use super::open_page::Opened;
 use super::page::Page;
 use super::{interrupt, output};
+use crate::campaign::store::simulated::is_simulated_board;
 use crate::campaign::watch::Seen;
 use crate::dashboard::Dashboard;
 use crate::device::address::Address;
@@ -78,7 +79,8 @@ fn show_channels(device: &str, page: Page) -> Result<(), CliError> {
     onlooker.tap.take().into_iter().for_each(|tap| session.watch(tap));
     let info = session.info()?;
     let channels = session.channels(&info)?;
-    onlooker.watch.saw(&Seen::Stream(&channels));
+    let simulated = is_simulated_board(&info.board);
+    onlooker.watch.saw(&Seen::Stream { channels: &channels, simulated });
     let (_, first) = session.start(channels.len())?;
     eprintln!("nothing is struck and nothing moves; Ctrl-C ends");
     let (begun, mut told) = (Instant::now(), Instant::now());

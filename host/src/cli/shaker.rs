@@ -12,7 +12,7 @@ use super::number::positive;
 use super::{interrupt, output};
 use crate::campaign::plan::Plan;
 use crate::campaign::plan::level::{Held, Level, Moment};
-use crate::campaign::run::shaking::{self, CRITERION, Limits, Options, Outcome, Summary};
+use crate::campaign::run::shaking::{self, CRITERION, Limits, Onlookers, Options, Outcome, Summary};
 use crate::campaign::store::Store;
 use crate::campaign::store::level_table::LevelRow;
 use crate::device::address::Address;
@@ -107,19 +107,24 @@ impl Shaker {
             most_drive_v: self.max_drive,
             limits: Limits(self.limits.clone()),
             stop,
-            watch: onlooker.watch.clone(),
-            edits: onlooker.edits.take(),
         };
+        let onlookers = Onlookers { watch: onlooker.watch.clone(), edits: onlooker.edits.take() };
         let mut seen = Vec::new();
-        let summary = shaking::run(&mut store, &mut session, &options, &mut |store, level, outcome| {
-            let Some(outcome) = outcome else {
-                eprint!("{level}: ");
-                return;
-            };
-            let (line, value) = told(store, outcome);
-            eprintln!("{line}");
-            seen.push(value);
-        });
+        let summary = shaking::run_watched(
+            &mut store,
+            &mut session,
+            &options,
+            &onlookers,
+            &mut |store, level, outcome| {
+                let Some(outcome) = outcome else {
+                    eprint!("{level}: ");
+                    return;
+                };
+                let (line, value) = told(store, outcome);
+                eprintln!("{line}");
+                seen.push(value);
+            },
+        );
         if summary.is_err() {
             eprintln!();
         }

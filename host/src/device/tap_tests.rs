@@ -46,7 +46,7 @@ fn mean_and_rms_follow_from_the_sums() {
 #[test]
 fn who_looks_late_sees_everything_coarser() {
     let (mut tap, mut view) = begun();
-    let all = 3 * MOST_STRETCHES as i32 * 4;
+    let all = 4 * 3 * 64;
     tap.fold(&scans(0..all));
     assert!(view.next(AT_ONCE).is_none());
     tap.fold(&scans(all..all + 16));

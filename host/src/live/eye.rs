@@ -20,8 +20,8 @@ const MOST_CODES: usize = 1 << 18;
 /// One thing that was told.
 #[derive(Clone, Debug)]
 pub enum Told {
-    /// A stream of these channels.
-    Stream(Arc<ChannelMap>),
+    /// A stream of these channels, and whether the rig is simulated.
+    Stream(Arc<ChannelMap>, bool),
     /// Hammer and laser go to a cell.
     Moving {
         /// The cell.
@@ -134,7 +134,9 @@ impl Eye {
 impl Watch for Eye {
     fn saw(&self, seen: &Seen<'_>) {
         match *seen {
-            Seen::Stream(channels) => self.tell(Told::Stream(Arc::new(channels.clone()))),
+            Seen::Stream { channels, simulated } => {
+                self.tell(Told::Stream(Arc::new(channels.clone()), simulated));
+            }
             Seen::Moving { row, standing, by_hand, .. } => self.tell(Told::Moving {
                 cell: row.id,
                 kept: standing.kept,

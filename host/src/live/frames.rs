@@ -114,7 +114,7 @@ mod tests {
         assert!(frames.after(0, 0).is_none());
         let (mut tap, mut view) = tap();
         tap.begin(2, 7, 1_000.0);
-        for n in 0..KEPT as i16 + 3 {
+        for n in 0..11_i16 {
             assert!(view.next(Duration::ZERO).is_none());
             tap.fold(&[n, -n]);
             frames.push(view.next(Duration::ZERO).expect("a stretch"), 1.5);

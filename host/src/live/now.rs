@@ -77,6 +77,8 @@ pub struct Link {
 /// What the stream consists of.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StreamInfo {
+    /// Whether the rig is simulated.
+    pub simulated: bool,
     /// Scans per second, Hz.
     pub rate_hz: u32,
     /// The channels in the order of the scan.
@@ -96,13 +98,17 @@ pub struct ChannelInfo {
 
 impl StreamInfo {
     /// Of these channels.
-    pub fn of(channels: &ChannelMap) -> Self {
+    pub fn of(channels: &ChannelMap, simulated: bool) -> Self {
         let channel = |channel: &jointrig_protocol::channel::Channel| ChannelInfo {
             name: channel.name.as_str().into(),
             unit: channel.quantity.unit(),
             units_per_code: channel.units_per_code(),
         };
-        Self { rate_hz: channels.rate_hz, channels: channels.channels.iter().map(channel).collect() }
+        Self {
+            simulated,
+            rate_hz: channels.rate_hz,
+            channels: channels.channels.iter().map(channel).collect(),
+        }
     }
 }
 

@@ -36,8 +36,11 @@ pub fn turn(channels: &ChannelMap, codes: &[i16], level: &Level) -> Option<[Vec<
     let force = &record.force_n[within];
     let mean = force.iter().sum::<f64>() / cycle as f64;
     let step = cycle.div_ceil(POINTS);
-    let x = x.iter().step_by(step).map(|x| 1e6 * x).collect();
-    Some([x, force.iter().step_by(step).map(|force| force - mean).collect()])
+    // back to where it began
+    let closed = |values: &[f64], of: &dyn Fn(f64) -> f64| -> Vec<f64> {
+        values.iter().step_by(step).chain(values.first()).map(|value| of(*value)).collect()
+    };
+    Some([closed(&x, &|x| 1e6 * x), closed(force, &|force| force - mean)])
 }
 
 #[cfg(test)]

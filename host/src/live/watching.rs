@@ -80,12 +80,16 @@ impl Watching {
             if signals.elapsed() >= SIGNALS {
                 signals = Instant::now();
                 let told = known.channels.as_ref().and_then(|channels| known.signals.told(channels));
-                told.into_iter().for_each(|told| self.bus.say(Message::Signals(told)));
+                if let Some(told) = told {
+                    self.bus.say(Message::Signals(told));
+                }
             }
             if disk.is_none_or(|before| before.elapsed() >= DISK) {
                 disk = Some(Instant::now());
                 let free = self.file.as_deref().and_then(free_bytes);
-                free.into_iter().for_each(|free_bytes| self.bus.say(Message::Disk(Disk { free_bytes })));
+                if let Some(free_bytes) = free {
+                    self.bus.say(Message::Disk(Disk { free_bytes }));
+                }
             }
         }
     }
@@ -100,8 +104,8 @@ impl Watching {
                 state = Some(State { what, since_unix_ms: unix_ms(), most_s, cell, kept, attempt });
             };
             match told {
-                Told::Stream(channels) => {
-                    self.bus.say(Message::Stream(StreamInfo::of(&channels)));
+                Told::Stream(channels, simulated) => {
+                    self.bus.say(Message::Stream(StreamInfo::of(&channels, simulated)));
                     known.signals = Sums::of(channels.len());
                     known.channels = Some(channels);
                     now(Doing::Watching, None, None);
@@ -158,8 +162,12 @@ impl Watching {
             own.windows.clear();
             own.turn = None;
         }
-        state.into_iter().for_each(|state| self.bus.say(Message::State(state)));
-        link.into_iter().for_each(|link| self.bus.say(Message::Link(link)));
+        if let Some(state) = state {
+            self.bus.say(Message::State(state));
+        }
+        if let Some(link) = link {
+            self.bus.say(Message::Link(link));
+        }
     }
 }
 
@@ -215,7 +223,7 @@ impl Known {
 #[derive(Default)]
 struct Sums {
     arrived: u64,
-    sums: Vec<(i64, u64)>,
+    both: Vec<(i64, u64)>,
     peaks: Vec<u16>,
     overloads: Vec<Option<f64>>,
     holes: u64,
@@ -224,7 +232,7 @@ struct Sums {
 impl Sums {
     fn of(channels: usize) -> Self {
         Self {
-            sums: vec![(0, 0); channels],
+            both: vec![(0, 0); channels],
             peaks: vec![0; channels],
             overloads: vec![None; channels],
             ..Self::default()
@@ -232,11 +240,11 @@ impl Sums {
     }
 
     fn add(&mut self, envelope: &Envelope) {
-        if envelope.channels != self.sums.len() {
+        if envelope.channels != self.both.len() {
             return;
         }
         self.arrived += envelope.arrived;
-        for (channel, own) in self.sums.iter_mut().enumerate() {
+        for (channel, own) in self.both.iter_mut().enumerate() {
             let (sum, squares) = envelope.sums(channel);
             *own = (own.0 + sum, own.1 + squares);
         }
@@ -258,7 +266,7 @@ impl Sums {
 
     /// What is to be told, after which it begins anew; none where nothing arrived.
     fn told(&mut self, channels: &ChannelMap) -> Option<Signals> {
-        if self.arrived == 0 || channels.len() != self.sums.len() {
+        if self.arrived == 0 || channels.len() != self.both.len() {
             return None;
         }
         let n = self.arrived as f64;
@@ -267,13 +275,13 @@ impl Sums {
             (*squares as f64 / n - mean * mean).max(0.0).sqrt() * channel.units_per_code().abs()
         };
         let told = Signals {
-            rms: self.sums.iter().zip(&channels.channels).map(rms).collect(),
+            rms: self.both.iter().zip(&channels.channels).map(rms).collect(),
             peak_codes: self.peaks.clone(),
             overload_unix_ms: self.overloads.clone(),
             holes: self.holes,
         };
         self.arrived = 0;
-        self.sums.fill((0, 0));
+        self.both.fill((0, 0));
         self.peaks.fill(0);
         Some(told)
     }

@@ -126,8 +126,8 @@ fn done(store: &Store, edit: Edit) -> Result<(Told, Option<Recount>), StoreError
     };
     let verdict = match wanted {
         Some(verdict) => verdict,
-        None => match before_last(store, record)? {
-            Some(before) => before.unwrap_or(row.verdict),
+        None => match before_last(store, record, row.verdict)? {
+            Some(before) => before,
             None => return Ok((Err(format!("record {record}: nobody has overruled its verdict")), None)),
         },
     };
@@ -143,10 +143,48 @@ fn done(store: &Store, edit: Edit) -> Result<(Told, Option<Recount>), StoreError
     Ok((Ok(format!("record {record}: {}, now {verdict}: {reason}", row.standing())), recount))
 }
 
-/// The verdict that counted before the last time a record was overruled: within, none where it was the judge's own.
-fn before_last(store: &Store, record: i64) -> Result<Option<Option<Kind>>, StoreError> {
+/// The verdict that counted before a record was overruled last; none where nobody has overruled `judged`.
+fn before_last(store: &Store, record: i64, judged: Kind) -> Result<Option<Kind>, StoreError> {
     let all = store.overrules()?;
     let mut own = all.iter().rev().filter(|overrule| overrule.record == record);
-    let Some(_) = own.next() else { return Ok(None) };
-    Ok(Some(own.next().and_then(|before| Kind::named(&before.verdict))))
+    if own.next().is_none() {
+        return Ok(None);
+    }
+    Ok(Some(own.next().and_then(|before| Kind::named(&before.verdict)).unwrap_or(judged)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::campaign::plan::SMALL;
+
+    #[test]
+    fn edits_wait_for_the_writer_and_no_more_than_a_few() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let store = Store::create(&folder.path().join("a.jrig"), SMALL, "small.toml").expect("created");
+        let (desk, edits) = edits();
+        let told = Arc::new(Mutex::new(Vec::new()));
+        let hand_in = |edit: Edit| {
+            let told = told.clone();
+            desk.hand_in(edit, move |what| told.lock().expect("whole").push(what))
+        };
+        for n in 0..QUEUE {
+            assert_eq!(hand_in(Edit::Note(format!("note {n}"))), Ok(()));
+        }
+        assert_eq!(hand_in(Edit::Note("one too many".into())), Err(NotTaken::Busy));
+        assert_eq!(edits.work_off(&store).expect("written"), []);
+        assert_eq!(told.lock().expect("whole").len(), QUEUE);
+        // what cannot be done is told, and ends nothing
+        for edit in
+            [Edit::Undo { record: 1 }, Edit::Overrule { record: 1, verdict: Kind::Good, reason: "x".into() }]
+        {
+            assert_eq!(hand_in(edit), Ok(()));
+        }
+        assert_eq!(edits.work_off(&store).expect("written"), []);
+        assert!(told.lock().expect("whole")[QUEUE..].iter().all(Result::is_err));
+        let lines = store.log_lines(0).expect("read");
+        assert_eq!(lines.iter().filter(|(_, _, text)| text.starts_with("note: note")).count(), QUEUE);
+        drop(edits);
+        assert_eq!(hand_in(Edit::Note("late".into())), Err(NotTaken::Over));
+    }
 }

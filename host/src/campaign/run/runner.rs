@@ -28,6 +28,7 @@ use crate::campaign::store::Store;
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::record_row::NewRecord;
 use crate::campaign::store::session_table::{Counters, SessionInfo};
+use crate::campaign::store::simulated::is_simulated_board;
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::judge::Judge;
 use crate::campaign::verdict::{Kind, Verdict};
@@ -107,7 +108,8 @@ pub fn run(
     session.set_load_cells([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])?;
     let (epoch, _) = session.start(channels.len())?;
     let shooter = Shooter::new(session, &plan, epoch, channels.len())?;
-    options.watch.saw(&Seen::Stream(&channels));
+    let simulated = is_simulated_board(&info.board);
+    options.watch.saw(&Seen::Stream { channels: &channels, simulated });
     options.watch.saw(&Seen::Begun { wanted: tally.wanted(), kept: tally.kept() });
     let block = jointrig_protocol::limits::scans_per_block(channels.len()).unwrap_or(1);
     let mut runner = Runner {

@@ -204,8 +204,9 @@ fn ask_both(what: &str, answers: &Answers, question: Question) -> Result<Key, St
         }
         match lines.recv_timeout(LISTEN) {
             Ok(line) => match understood(&line) {
-                Some(answer) => return answer.ok_or(StageError::Stopped),
-                None => eprint!("`{}` is none of these\n{QUESTION}", line.trim()),
+                Understood::Key(key) => return Ok(key),
+                Understood::Quit => return Err(StageError::Stopped),
+                Understood::Nothing => eprint!("`{}` is none of these\n{QUESTION}", line.trim()),
             },
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => std::thread::sleep(LISTEN),
@@ -213,15 +214,21 @@ fn ask_both(what: &str, answers: &Answers, question: Question) -> Result<Key, St
     }
 }
 
-/// What a line means: an answer, or within that none to quit.
-fn understood(line: &str) -> Option<Option<Key>> {
+/// What a line means.
+enum Understood {
+    Key(Key),
+    Quit,
+    Nothing,
+}
+
+fn understood(line: &str) -> Understood {
     match line.trim().to_ascii_lowercase().as_str() {
-        "" | "a" | "y" => Some(Some(Key::Accept)),
-        "r" => Some(Some(Key::Redo)),
-        "s" => Some(Some(Key::Skip)),
-        "b" => Some(Some(Key::Back)),
-        "q" => Some(None),
-        _ => None,
+        "" | "a" | "y" => Understood::Key(Key::Accept),
+        "r" => Understood::Key(Key::Redo),
+        "s" => Understood::Key(Key::Skip),
+        "b" => Understood::Key(Key::Back),
+        "q" => Understood::Quit,
+        _ => Understood::Nothing,
     }
 }
 
@@ -245,8 +252,9 @@ fn prompt(
             return Err(StageError::NobodyThere);
         }
         match understood(&line) {
-            Some(answer) => return answer.ok_or(StageError::Stopped),
-            None => {
+            Understood::Key(key) => return Ok(key),
+            Understood::Quit => return Err(StageError::Stopped),
+            Understood::Nothing => {
                 let _ = writeln!(screen, "`{}` is none of these", line.trim().to_ascii_lowercase());
             }
         }

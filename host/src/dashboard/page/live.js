@@ -42,9 +42,9 @@ function strip(){
     $('what').textContent=state.refused?'The server lets nobody in without the whole address that jointrig printed.':'Connecting …';
     return;
   }
-  const p=w.progress;
-  $('banner').classList.toggle('simulated',w.simulated);
-  $('what').textContent=(w.simulated?'SIMULATED rig: ':'')+(w.file||'channels of the device');
+  const p=w.progress,simulated=w.simulated||!!w.now.stream?.simulated;
+  $('banner').classList.toggle('simulated',simulated);
+  $('what').textContent=(simulated?'SIMULATED rig: ':'')+(w.file||'channels of the device');
   $('where').textContent=state.connected?!w.cells.length?'':p.complete?'complete':p.next===null?'ended':'next '+nameOf(w.cells[p.next]):'connection lost, trying again';
   $('doing').textContent=state.connected?doing(w):'';
   $('kept').textContent=p.wanted?`${p.kept} of ${p.wanted} kept`:'';

@@ -31,3 +31,7 @@ pub fn script() -> &'static str {
         LazyLock::new(|| report::script(&format!("{{\n{}}}\n", SCRIPTS.concat())));
     &SCRIPT
 }
+
+#[cfg(test)]
+#[path = "colour_tests.rs"]
+mod colour_tests;

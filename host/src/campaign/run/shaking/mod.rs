@@ -13,7 +13,7 @@ mod sweep;
 
 pub use error::{ShakeError, Shortfall};
 pub use meter::CRITERION;
-pub use options::{Limits, Options};
+pub use options::{Limits, Onlookers, Options};
 pub use signals::{Unusable, record};
 
 use std::sync::atomic::Ordering;
@@ -27,6 +27,7 @@ use crate::campaign::plan::level::Level;
 use crate::campaign::store::Store;
 use crate::campaign::store::level_table::{LevelRow, NewLevel, Settled};
 use crate::campaign::store::session_table::SessionInfo;
+use crate::campaign::store::simulated::is_simulated_board;
 use crate::campaign::store::stored::Hex;
 use crate::campaign::watch::{Seen, Shaking};
 use crate::device::channels::ChannelMap;
@@ -74,6 +75,20 @@ pub fn run(
     options: &Options,
     tell: &mut dyn FnMut(&Store, &Level, Option<&Outcome>),
 ) -> Result<Summary, ShakeError> {
+    run_watched(store, session, options, &Onlookers::default(), tell)
+}
+
+/// The same, and others look on.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_watched(
+    store: &mut Store,
+    session: &mut Session,
+    options: &Options,
+    onlookers: &Onlookers,
+    tell: &mut dyn FnMut(&Store, &Level, Option<&Outcome>),
+) -> Result<Summary, ShakeError> {
     let plan = store.plan()?;
     let info = session.info()?;
     let channels = session.channels(&info)?;
@@ -94,15 +109,17 @@ pub fn run(
         store.note_simulated(simulated)?;
     }
     let (epoch, _) = session.start(channels.len())?;
-    options.watch.saw(&Seen::Stream(&channels));
+    let simulated = is_simulated_board(&info.board);
+    onlookers.watch.saw(&Seen::Stream { channels: &channels, simulated });
     if info.stage {
         assemble(session, &plan)?;
     }
-    let mut bench = Bench { session, channels: &channels, info: &info, options, session_id: id, epoch };
+    let mut bench =
+        Bench { session, channels: &channels, info: &info, options, onlookers, session_id: id, epoch };
     let mut outcomes = Vec::new();
     let mut walked = Ok(());
     for level in &options.levels {
-        if let Some(edits) = &options.edits {
+        if let Some(edits) = &onlookers.edits {
             edits.work_off(store)?;
         }
         if options.stop.load(Ordering::Relaxed) {
@@ -132,7 +149,7 @@ pub fn run(
     // of two errors the first one counts; a device that is gone rests by itself
     let rested = bench.come_to_rest();
     let ended = bench.session.finish();
-    options.watch.saw(&Seen::Ended);
+    onlookers.watch.saw(&Seen::Ended);
     walked?;
     rested?;
     ended?;
@@ -176,6 +193,7 @@ struct Bench<'a> {
     channels: &'a ChannelMap,
     info: &'a Info,
     options: &'a Options,
+    onlookers: &'a Onlookers,
     session_id: i64,
     epoch: u32,
 }
@@ -202,8 +220,8 @@ impl Bench<'_> {
             Ok(Outcome::Short(level, why)) => (false, format!("{level}: {why}")),
             Err(error) => (false, error.to_string()),
         };
-        self.options.watch.saw(&Seen::LevelOver { recorded, say: &say });
-        self.options.watch.saw(&Seen::Link(self.session.accounts()));
+        self.onlookers.watch.saw(&Seen::LevelOver { recorded, say: &say });
+        self.onlookers.watch.saw(&Seen::Link(self.session.accounts()));
     }
 
     /// Brings the level about, records and stores it, and comes to rest.
@@ -244,10 +262,10 @@ impl Bench<'_> {
     }
 
     fn take(&mut self, level: &Level) -> Result<Taken, ShakeError> {
-        let options = self.options;
+        let (options, onlookers) = (self.options, self.onlookers);
         let mut orders = Orders::new(self.channels, self.info, level, options);
         let (limits, most_drive_v) = (options.limits.of(self.channels), orders.most_drive_v());
-        options.watch.saw(&Seen::Level { level, limits: &limits, most_drive_v });
+        onlookers.watch.saw(&Seen::Level { level, limits: &limits, most_drive_v });
         let before = self.session.expected()?;
         let begun = orders.begin(self.session)?;
         let meter = Meter::new(self.channels, level.held, level.frequency_hz);
@@ -270,7 +288,7 @@ impl Bench<'_> {
             if gaps.is_empty() {
                 let amplitude = meter.amplitude(&codes, self.channels.len());
                 amplitudes.push(amplitude);
-                options.watch.saw(&Seen::Shaking(Shaking {
+                onlookers.watch.saw(&Seen::Shaking(Shaking {
                     at_s: (at - begun) as f64 / self.rate_hz(),
                     amplitude,
                     drive_v: f64::from(self.session.status()?.drive_v),

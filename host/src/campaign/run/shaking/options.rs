@@ -31,6 +31,11 @@ pub struct Options {
     pub limits: Limits,
     /// Set to come to rest and end.
     pub stop: Arc<AtomicBool>,
+}
+
+/// Who looks on; nobody by default.
+#[derive(Clone, Debug, Default)]
+pub struct Onlookers {
     /// Who watches.
     pub watch: Watchers,
     /// What persons elsewhere want changed in the file; done between two levels.
