@@ -84,11 +84,7 @@ fn latency_shares_and_weight() {
 #[ignore = "a measurement: see the head of this file"]
 fn soak() {
     let length: u64 = std::env::var("JOINTRIG_SOAK_S").map_or(60, |text| text.parse().unwrap());
-    let (_folder, file) = campaign(
-        &include_str!("../../docs/plans/contact.toml")
-            .replace("wanted = 2", "wanted = 400")
-            .replace("most = 12", "most = 4000"),
-    );
+    let (_folder, file) = campaign(include_str!("../../docs/plans/paper.toml"));
     let mut command = jointrig();
     command.args(["campaign", "run"]).arg(&file).args(["--device", "sim:", "--yes", "--serve"]);
     let mut server = Served::beside(&mut command);
@@ -117,21 +113,25 @@ fn soak() {
         came
     });
     let begun = Instant::now();
-    let said = |page: &mut Page<'_>| {
+    // the analysis beside the measuring takes what `jointrig analyse` takes, and gives it back: the least is what stays
+    let said = |page: &mut Page<'_>, span: Duration| {
+        let (until, mut least, mut most) = (Instant::now() + span, f64::INFINITY, 0.0_f64);
+        while Instant::now() < until {
+            std::thread::sleep(Duration::from_millis(500));
+            let now = memory(server.id()).unwrap();
+            (least, most) = (least.min(now), most.max(now));
+        }
         let heap = page.metric("JSHeapUsedSize") / 1e6;
         let hits = page.eval("live.state.whole.hits.length");
         let missed = page.eval("live.scope.missed");
-        let whole = memory(server.id()).unwrap();
+        let at = begun.elapsed().as_secs();
         println!(
-            "{:4} s: process {whole:.1} MB, page's heap {heap:.1} MB, {hits} hits, {missed} frames missed",
-            begun.elapsed().as_secs()
+            "{at:4} s: process {least:.1} to {most:.1} MB, page's heap {heap:.1} MB, {hits} hits, {missed} frames missed"
         );
     };
-    std::thread::sleep(Duration::from_secs(10));
-    said(&mut page);
+    said(&mut page, Duration::from_secs(10));
     for _ in 0..4 {
-        std::thread::sleep(Duration::from_secs(length.saturating_sub(10)) / 4);
-        said(&mut page);
+        said(&mut page, Duration::from_secs(length.saturating_sub(10)) / 4);
     }
     over.store(true, Ordering::Relaxed);
     let came = restless.join().unwrap();
