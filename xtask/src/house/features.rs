@@ -17,7 +17,7 @@ const SERVER: [&str; 6] = ["axum", "hyper", "hyper-util", "tokio", "tokio-tungst
 pub fn check(project: &Project) -> Result<String> {
     let mut cargo = command::cargo(&project.root);
     cargo.args(["tree", "--package", PACKAGE, "--no-default-features", "--features", OTHERS]);
-    cargo.args(["--edges", "normal,build", "--target", "all", "--prefix", "none", "--locked"]);
+    cargo.args(["--edges", "normal,build", "--prefix", "none", "--locked"]);
     let tree = command::output(&mut cargo)?;
     let there = left(&tree);
     if there.is_empty() {
