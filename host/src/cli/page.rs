@@ -76,7 +76,7 @@ impl Page {
 
     /// Nobody looks on: this build has no page.
     #[cfg(not(feature = "dashboard"))]
-    #[allow(clippy::unnecessary_wraps, reason = "with a page it may fail")]
+    #[allow(clippy::unnecessary_wraps, clippy::unused_self, reason = "with a page it may fail")]
     pub fn start(
         self,
         _file: Option<&Path>,
