@@ -121,6 +121,9 @@ impl<M: RawMutex> Core<'_, M> {
         let closed = inputs.interlock_closed();
         let pressed = inputs.emergency_stop();
         let reset = inputs.local_reset();
+        if let Some(fault) = inputs.fault() {
+            self.report_fault(fault);
+        }
         self.with(|state| {
             if state.emergency_stop && !pressed && reset {
                 state.emergency_stop = false;

@@ -115,6 +115,10 @@ pub trait Inputs {
     fn emergency_stop(&mut self) -> bool;
     /// Whether somebody at the rig resets a released emergency stop.
     fn local_reset(&mut self) -> bool;
+    /// What is wrong with the guard chain, for the host: once for each thing that is.
+    fn fault(&mut self) -> Option<&'static str> {
+        None
+    }
 }
 
 /// Bytes from the host.

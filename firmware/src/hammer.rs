@@ -23,6 +23,10 @@ use crate::friction::Friction;
 use crate::pulse::Pulse;
 use crate::quiet::Quiet;
 
+/// Shortest time from the end of one pulse to the next, ms. The coil driver's own pause is a little shorter (docs/WIRING.md): a pulse within it would
+/// be lost in hardware, so the shot waits.
+pub const PAUSE_MS: u32 = 600;
+
 /// What the coil must do now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CoilOrder {
@@ -76,6 +80,8 @@ pub struct Hammer {
     last_number: u32,
     /// The rest after the last shot ends here.
     rested_at: u64,
+    /// The coil's pause after the last pulse ends here.
+    coil_free_at: u64,
 }
 
 impl Hammer {
@@ -97,6 +103,7 @@ impl Hammer {
             shot: None,
             last_number: 0,
             rested_at: 0,
+            coil_free_at: 0,
         }
     }
 
@@ -219,7 +226,7 @@ impl Hammer {
             friction_peak_n: 0.0,
             quiet_ratio: 0.0,
         });
-        let from = order.not_before.max(self.rested_at);
+        let from = order.not_before.max(self.rested_at).max(self.coil_free_at);
         self.state = State::Waiting {
             until,
             from,
@@ -309,6 +316,8 @@ impl Hammer {
             if let Some(shot) = &mut self.shot {
                 shot.fired_at = end;
             }
+            self.coil_free_at =
+                end + pulse_scans + u64::from(PAUSE_MS) * u64::from(self.rate_hz).div_ceil(1000);
             self.state =
                 State::Firing { contact_by: end + pulse_scans + u64::from(self.trigger.flight_scans) };
             return Outcome {

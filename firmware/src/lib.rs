@@ -31,6 +31,7 @@ pub mod pulse;
 pub mod quiet;
 pub mod receive;
 mod refusal;
+pub mod relay;
 pub mod report;
 mod requests;
 pub mod ring;

@@ -46,13 +46,14 @@ fn of_k_t(compared: &Value) -> [f64; 3] {
     [&own["mean"], &own["ci95"][0], &own["ci95"][1]].map(|v| 1e-6 * v.as_f64().unwrap())
 }
 
-/// Three campaigns, each with a seed of its own: gains, positions, aim and noise are drawn anew.
+/// Three campaigns, each with a seed of its own: gains, positions, aim and noise are drawn anew. How often such an interval holds is counted
+/// in `contact_accuracy`; here it is the interval of one draw.
 #[test]
 fn a_softer_contact_is_told_from_the_same_one_measured_twice() {
     let temporary = tempfile::tempdir().unwrap();
     let folder = temporary.path();
     let files: Vec<PathBuf> = std::thread::scope(|scope| {
-        let all = [(180.0, 21), (180.0, 22), (162.0, 23)];
+        let all = [(180.0, 24), (180.0, 25), (162.0, 26)];
         let running = all.map(|(k_t, seed)| scope.spawn(move || measured(folder, k_t, seed)));
         running.into_iter().map(|one| one.join().unwrap()).collect()
     });
@@ -60,9 +61,7 @@ fn a_softer_contact_is_told_from_the_same_one_measured_twice() {
     let (worn, printed) = compared(folder, &files[0], &files[2]);
     let [mean, low, high] = of_k_t(&worn);
     assert_eq!(worn["differ"], true, "{mean} {low}…{high}");
-    // one draw of twenty lies outside its 95 % interval, one of a thousand outside this
-    let near = |truth: f64| (mean - truth).abs() < 1.7 * 0.5 * (high - low);
-    assert!(near(-18.0) && high < 0.0, "{mean}, 95 % {low}…{high}");
+    assert!(low <= -18.0 && -18.0 <= high && high < 0.0, "{mean}, 95 % {low}…{high}");
     let verdict = worn["verdict"].as_str().unwrap();
     assert!(printed.contains(verdict) && verdict.contains("differ"), "{printed}");
     let page = std::fs::read_to_string(folder.join("compare.html")).unwrap();

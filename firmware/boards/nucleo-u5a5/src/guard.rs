@@ -72,7 +72,7 @@ async fn edge() {
 pub async fn task(core: &'static Shared) {
     listen();
     loop {
-        let (closed, pressed) = (inputs::guard_is_closed(), inputs::stop_is_pressed());
+        let (closed, pressed) = (inputs::may_move(), inputs::stop_is_pressed());
         // first the hardware, then the words
         if !closed || pressed {
             coil::veto();

@@ -128,7 +128,7 @@ async fn main(spawner: Spawner) {
     });
 
     let coil = coil::PulseTimer::new(p.TIM1, p.PE9, p.PE15);
-    let inputs = inputs::Switches::new(p.PF13, p.PF14, p.PF15);
+    let inputs = inputs::Switches::new(p.PF13, p.PF14, p.PF15, p.PF12);
     let facts = Facts {
         board: channels::name("nucleo-u5a5"),
         serial: channels::name(embassy_stm32::uid::uid_hex()),

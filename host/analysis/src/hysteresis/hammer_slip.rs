@@ -36,13 +36,17 @@ const LEFT_BEHIND: f64 = 0.015;
 /// Standard deviations from which on one change is not scatter.
 const CERTAIN: f64 = 4.0;
 
-/// A gross slider changes T per newton by a per cent and more for each per cent of force, weak microslip by a tenth of that. A
-/// standard deviation above this would not show it.
-const TOO_COARSE: f64 = 0.1;
+/// Sticking is said only where T per newton is known not to change by more than this part for each part of force: microslip that changes T by as
+/// much changes k_T by more than its interval. A contact that slips a lot stands elsewhere after each hit, and answers the next one differently, so
+/// that the scatter hides what goes with the force.
+const MUCH: f64 = 0.03;
 
-/// A contact that slips a lot stands elsewhere after each hit, and answers the next one differently: then the scatter hides what goes with the
-/// force. A change of this size is not called sticking.
-const MUCH: f64 = 0.15;
+/// With a standard deviation above this such a change would not show.
+const TOO_COARSE: f64 = MUCH;
+
+/// A larger change is still no sign of slip where chance alone gives as much in one of so many campaigns that stick: a place of impact with few hits
+/// tells its own scatter poorly.
+const BY_CHANCE: f64 = 0.05;
 
 /// The hits of one cell: one place of impact, one aim.
 #[derive(Debug, Clone, PartialEq)]
@@ -145,7 +149,7 @@ impl HammerSlip {
         let largest = impacts.iter().map(Impact::largest_of_tangential).fold(0.0, f64::max);
         if chance < NO_ACCIDENT && largest > LEFT_BEHIND {
             Self::Slips(Scaling { change_per_force: change_per_force.max(largest), ..scaling })
-        } else if std < TOO_COARSE && change_per_force < MUCH {
+        } else if std < TOO_COARSE && (change_per_force < MUCH || chance > BY_CHANCE) {
             Self::Sticks(scaling)
         } else {
             Self::CannotTell(Unclear::TooAlike { force_scatter, std })

@@ -3,10 +3,14 @@
 //! A plan is a TOML file (`docs/plans/paper.toml` is the example). Unknown fields are refused, and every
 //! error names file, line and field. Lengths are in m, forces in N, times in s unless a name says otherwise.
 
+mod cells;
 mod check;
+mod geometry;
 pub mod level;
 mod priors;
 
+pub use cells::Cell;
+pub use geometry::{GeometryPlan, ImpactPoint, ResponsePoint, SensorPoint};
 pub use priors::PriorsPlan;
 
 use crate::structure::Structure;
@@ -248,72 +252,6 @@ pub struct ConfigurationPlan {
     pub responses: Vec<Spanned<String>>,
 }
 
-/// Where everything is: x lateral, y vertical, z sliding; origin at the contact centre.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct GeometryPlan {
-    /// Both virtual points, m.
-    pub virtual_point_m: [f64; 3],
-    /// Response points, each measured along x, y and z.
-    pub response: Vec<Spanned<ResponsePoint>>,
-    /// Impact points.
-    pub impact: Vec<Spanned<ImpactPoint>>,
-    /// Sensors that stay where they are.
-    #[serde(default)]
-    pub sensor: Vec<SensorPoint>,
-}
-
-/// A response point.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ResponsePoint {
-    /// Its name.
-    pub name: String,
-    /// 1 interface of A, 2 interface of B, 3 internal of A, 4 internal of B, 5 on specimen A, 6 on specimen B.
-    pub grouping: u8,
-    /// Where it is, m.
-    pub position_m: [f64; 3],
-}
-
-/// An impact point.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ImpactPoint {
-    /// Its name.
-    pub name: String,
-    /// 1 interface of A, 2 interface of B, 3 internal of A, 4 internal of B, 5 on specimen A, 6 on specimen B.
-    pub grouping: u8,
-    /// Where it is, m.
-    pub position_m: [f64; 3],
-    /// Where the hammer pushes, a unit vector.
-    pub direction: [f64; 3],
-}
-
-/// A sensor that stays where it is.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SensorPoint {
-    /// Its name.
-    pub name: String,
-    /// Where it is, m.
-    pub position_m: [f64; 3],
-    /// What it feels, a unit vector.
-    pub direction: [f64; 3],
-}
-
-/// One impact position with one response location, in one structure.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Cell {
-    /// The structure.
-    pub configuration: Configuration,
-    /// Name of the impact point.
-    pub impact: String,
-    /// Name of the response point.
-    pub response: String,
-    /// Good hits wanted.
-    pub wanted: u32,
-}
-
 /// What the controller calls a configuration, as the analysis calls it.
 pub fn structure(configuration: Configuration) -> Structure {
     match configuration {
@@ -357,57 +295,6 @@ impl Plan {
         let record = self.record.get_ref();
         (record.length_s * f64::from(record.rate_hz)).round() as u64
     }
-
-    /// The cells in the order that moves hammer and laser least: the hammer goes to each impact once, and
-    /// the laser goes through the responses there and back (boustrophedon). What further blocks of a configuration add at an impact
-    /// comes before the last response of its first block, where the next impact begins.
-    pub fn cells(&self) -> Vec<Cell> {
-        let mut names: Vec<&str> = Vec::new();
-        for block in &self.configuration {
-            if !names.contains(&block.name.get_ref().as_str()) {
-                names.push(block.name.get_ref());
-            }
-        }
-        let mut cells = Vec::new();
-        for name in names {
-            let Some(configuration) = configuration_named(name) else { continue };
-            let blocks = || self.configuration.iter().filter(|block| block.name.get_ref() == name);
-            let mut impacts: Vec<&str> = Vec::new();
-            for impact in blocks().flat_map(|block| &block.impacts).map(Spanned::get_ref) {
-                if !impacts.contains(&impact.as_str()) {
-                    impacts.push(impact);
-                }
-            }
-            for (place, impact) in impacts.into_iter().enumerate() {
-                let here = blocks().filter(|block| block.impacts.iter().any(|own| own.get_ref() == impact));
-                for response in there_and_back(here, place) {
-                    cells.push(Cell {
-                        configuration,
-                        impact: impact.to_owned(),
-                        response: response.to_owned(),
-                        wanted: self.hits.get_ref().wanted,
-                    });
-                }
-            }
-        }
-        cells
-    }
-}
-
-/// The responses of the blocks that have the impact at this place, in the order in which the laser visits them.
-fn there_and_back<'p>(blocks: impl Iterator<Item = &'p ConfigurationPlan>, place: usize) -> Vec<&'p str> {
-    let mut of_blocks = blocks.map(|block| {
-        let mut names: Vec<&str> = block.responses.iter().map(|name| name.get_ref().as_str()).collect();
-        if place % 2 == 1 {
-            names.reverse();
-        }
-        names
-    });
-    let mut all = of_blocks.next().unwrap_or_default();
-    let last = all.pop();
-    all.extend(of_blocks.flatten());
-    all.extend(last);
-    all
 }
 
 /// What toml says, with the line that it points at.

@@ -43,9 +43,10 @@ pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<B
             // the difference spans four blocks
             let (from, to) = (i * block, (i + 4) * block);
             let far = from >= settled || to <= pulse.start;
-            let near = block == 1 && from >= quiet && !is_kink(x, i);
+            let near = block == 1 && from >= quiet;
             let ratio = d / s;
-            if (far || near) && ratio > limit && worst.as_ref().is_none_or(|w| ratio > w.ratio) {
+            let worse = ratio > limit && worst.as_ref().is_none_or(|w| ratio > w.ratio);
+            if worse && (far || near && !is_kink(x, i)) {
                 worst = Some(Burst { sample: from + 2 * block, ratio });
             }
         }

@@ -1,5 +1,6 @@
 //! What stands in a panel: curves, points, bands, words.
 
+use super::origin::{How, Origin, Second};
 use super::packed::Packed;
 use super::role::Role;
 use super::scene::Scene;
@@ -19,43 +20,6 @@ pub struct Mark {
     /// Where its numbers stand in `results.json`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub origin: Vec<Origin>,
-}
-
-/// Where numbers of a mark stand in `results.json`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Origin {
-    /// Which of the mark's lists: `x`, `y`, `low`, `high`, `values`; `first` and `step` of regular places; `at` of a level.
-    pub of: &'static str,
-    /// The path; `*` stands for any key or index.
-    pub path: String,
-    /// What the numbers there were multiplied by for the unit shown.
-    pub factor: f64,
-    /// A second number that was brought in before that.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub with: Option<Second>,
-}
-
-/// The second number of a sum or quotient, as of `mean ± σ`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Second {
-    /// What was done with it.
-    pub how: How,
-    /// Its path, with as many places as the first one's.
-    pub path: String,
-}
-
-/// What was done with a second number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum How {
-    /// It was added.
-    Plus,
-    /// It was taken away.
-    Minus,
-    /// The first was multiplied by it.
-    Times,
-    /// The first was divided by it.
-    Per,
 }
 
 /// Where the points of a curve lie along the horizontal axis.

@@ -5,13 +5,15 @@
 
 mod axis;
 mod mark;
+mod origin;
 mod packed;
 pub mod role;
 mod scene;
 mod trim;
 
 pub use axis::{Axis, Spread};
-pub use mark::{Along, Bars, Drawn, How, Mark, Marker, Origin, Second, Shape};
+pub use mark::{Along, Bars, Drawn, Mark, Marker, Shape};
+pub use origin::{How, Origin, Second};
 pub use packed::{Packed, six_digits};
 pub use role::Role;
 pub use scene::{Body, Scene, Spot};

@@ -1,0 +1,146 @@
+//! Whether the relay that gives the coil its 24 V (K1) does what the guard chain tells it.
+//!
+//! Its forced contacts cannot contradict each other: while a power contact is welded, the contact that is closed at rest stays open
+//! (EN 61810-3). So a board reads that contact back. Each time that the chain opens the relay must be seen to drop, or nothing moves any more; and
+//! after a start it must have been seen to drop once, because nobody knows what happened before.
+
+/// Longest time in which the relay may drop or pull, ms: some 20 ms with diode and Zener across its coil, and as much again for bouncing contacts.
+pub const WITHIN_MS: u64 = 50;
+
+/// What is wrong with the relay.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// It has not been seen to drop since the start, or since the chain opened for a moment.
+    Unproven,
+    /// The chain opened, and it stayed: a contact is welded, or the wire of its return contact is off.
+    Stays,
+    /// The chain closed, and it did not pull.
+    Rests,
+}
+
+impl Fault {
+    /// What to tell, and what to do.
+    #[must_use]
+    pub fn sentence(self) -> &'static str {
+        match self {
+            Fault::Unproven => {
+                "open the guard once: K1 was not seen to drop since the start or the last opening"
+            }
+            Fault::Stays => {
+                "K1 does not drop: welded, or its return contact is off. Replace it, start the board again"
+            }
+            Fault::Rests => {
+                "K1 does not pull though guard and stop are closed: its coil or the chain. Start the board again"
+            }
+        }
+    }
+}
+
+/// The relay, as its return contact shows it.
+#[derive(Clone, Copy, Debug)]
+pub struct Relay {
+    chain_closed: bool,
+    /// When the chain was last seen to change, ms.
+    since_ms: u64,
+    /// Seen to drop since the chain last closed.
+    proven: bool,
+    failed: Option<Fault>,
+}
+
+impl Default for Relay {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Relay {
+    /// After a start: nothing is known.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { chain_closed: false, since_ms: 0, proven: false, failed: None }
+    }
+
+    /// Chain and return contact as they are now; whether something may move.
+    ///
+    /// # Errors
+    /// What is wrong with the relay. A failure stays until the next start.
+    pub fn see(&mut self, chain_closed: bool, dropped: bool, now_ms: u64) -> Result<bool, Fault> {
+        if chain_closed != self.chain_closed {
+            (self.chain_closed, self.since_ms) = (chain_closed, now_ms);
+            if !chain_closed {
+                self.proven = false;
+            }
+        }
+        let late = now_ms.saturating_sub(self.since_ms) > WITHIN_MS;
+        self.proven |= !chain_closed && dropped;
+        if self.failed.is_none() && late && chain_closed == dropped {
+            self.failed = Some(if chain_closed { Fault::Rests } else { Fault::Stays });
+        }
+        match self.failed {
+            Some(fault) => Err(fault),
+            None if chain_closed && !self.proven => Err(Fault::Unproven),
+            None => Ok(chain_closed),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every ms of these stretches: (until ms, chain closed, dropped); the last verdict.
+    fn after(stretches: &[(u64, bool, bool)]) -> Result<bool, Fault> {
+        let mut relay = Relay::new();
+        let (mut at, mut last) = (0, Ok(false));
+        for (until, chain_closed, dropped) in stretches {
+            while at < *until {
+                last = relay.see(*chain_closed, *dropped, at);
+                at += 1;
+            }
+        }
+        last
+    }
+
+    #[test]
+    fn after_a_start_the_guard_must_be_opened_once() {
+        assert_eq!(after(&[(10_000, true, false)]), Err(Fault::Unproven));
+        assert_eq!(after(&[(100, false, true)]), Ok(false));
+        assert_eq!(
+            after(&[(100, true, false), (120, false, false), (200, false, true), (300, true, false)]),
+            Ok(true)
+        );
+    }
+
+    #[test]
+    fn a_weld_is_found_at_the_next_opening_and_stays_found() {
+        let works = [(100, false, true), (120, true, true), (1_000, true, false)];
+        assert_eq!(after(&works), Ok(true));
+        let welded = [&works[..], &[(1_040, false, false)]].concat();
+        assert_eq!(after(&welded), Ok(false), "it may take its time");
+        let welded = [&works[..], &[(1_060, false, false)]].concat();
+        assert_eq!(after(&welded), Err(Fault::Stays));
+        let closed_again = [&welded[..], &[(2_000, true, false)]].concat();
+        assert_eq!(after(&closed_again), Err(Fault::Stays));
+        // the guard opens and closes before the relay could have dropped: nobody knows, and nothing moves
+        let shortly = [&works[..], &[(1_010, false, false), (1_500, true, false)]].concat();
+        assert_eq!(after(&shortly), Err(Fault::Unproven));
+    }
+
+    #[test]
+    fn a_relay_that_does_not_pull_is_found() {
+        assert_eq!(after(&[(100, false, true), (150, true, true)]), Ok(true));
+        assert_eq!(after(&[(100, false, true), (160, true, true)]), Err(Fault::Rests));
+    }
+
+    #[test]
+    fn a_return_contact_that_is_off_is_taken_for_a_weld() {
+        assert_eq!(after(&[(60, false, false)]), Err(Fault::Stays));
+    }
+
+    #[test]
+    fn sentences_fit_an_event() {
+        for fault in [Fault::Unproven, Fault::Stays, Fault::Rests] {
+            assert!(fault.sentence().len() <= jointrig_protocol::limits::SENTENCE_BYTES);
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! Where impacts, responses and fixed sensors of a plan are.
+
+use serde::Deserialize;
+use toml::Spanned;
+
+/// Where everything is: x lateral, y vertical, z sliding; origin at the contact centre.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GeometryPlan {
+    /// Both virtual points, m.
+    pub virtual_point_m: [f64; 3],
+    /// Response points, each measured along x, y and z.
+    pub response: Vec<Spanned<ResponsePoint>>,
+    /// Impact points.
+    pub impact: Vec<Spanned<ImpactPoint>>,
+    /// Sensors that stay where they are.
+    #[serde(default)]
+    pub sensor: Vec<SensorPoint>,
+}
+
+/// A response point.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ResponsePoint {
+    /// Its name.
+    pub name: String,
+    /// 1 interface of A, 2 interface of B, 3 internal of A, 4 internal of B, 5 on specimen A, 6 on specimen B.
+    pub grouping: u8,
+    /// Where it is, m.
+    pub position_m: [f64; 3],
+}
+
+/// An impact point.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImpactPoint {
+    /// Its name.
+    pub name: String,
+    /// 1 interface of A, 2 interface of B, 3 internal of A, 4 internal of B, 5 on specimen A, 6 on specimen B.
+    pub grouping: u8,
+    /// Where it is, m.
+    pub position_m: [f64; 3],
+    /// Where the hammer pushes, a unit vector.
+    pub direction: [f64; 3],
+}
+
+/// A sensor that stays where it is.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorPoint {
+    /// Its name.
+    pub name: String,
+    /// Where it is, m.
+    pub position_m: [f64; 3],
+    /// What it feels, a unit vector.
+    pub direction: [f64; 3],
+}
