@@ -240,6 +240,14 @@ impl Page<'_> {
         }
     }
 
+    /// A counter of the browser's own, such as `TaskDuration` (s of the page's main thread).
+    pub fn metric(&mut self, name: &str) -> f64 {
+        self.call("Performance.enable", json!({}));
+        let metrics = self.call("Performance.getMetrics", json!({}));
+        let own = metrics["metrics"].as_array().unwrap().iter().find(|metric| metric["name"] == name);
+        own.unwrap()["value"].as_f64().unwrap()
+    }
+
     /// What the window shows, as a PNG file in base64.
     pub fn picture(&mut self) -> String {
         self.call("Page.captureScreenshot", json!({}))["data"].as_str().unwrap().to_owned()

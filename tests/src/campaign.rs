@@ -10,6 +10,7 @@ use jointrig::campaign::run::stage::Stage;
 use jointrig::campaign::store::Store;
 use jointrig::campaign::store::record_row::RecordRow;
 use jointrig::campaign::verdict::judge::ByRecord;
+use jointrig::campaign::watch::Watchers;
 use jointrig::device::session::Session;
 use jointrig::device::transport::Transport;
 
@@ -47,8 +48,14 @@ pub struct Kept {
 pub fn run(file: &Path, plan: &str, transport: Box<dyn Transport>) -> (Summary, Vec<Kept>) {
     let store = Store::create(file, plan, "test plan").unwrap();
     let mut session = Session::open(transport, "test").unwrap();
-    let options =
-        Options { stage: Stage::Auto, yes: true, progress: false, stop: Arc::new(AtomicBool::new(false)) };
+    let options = Options {
+        stage: Stage::Auto,
+        yes: true,
+        watch: Watchers::default(),
+        edits: None,
+        answers: None,
+        stop: Arc::new(AtomicBool::new(false)),
+    };
     let summary = runner::run(store, &mut session, &mut ByRecord, &options).unwrap();
     (summary, records(file))
 }

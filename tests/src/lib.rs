@@ -8,6 +8,7 @@ pub mod browser;
 pub mod campaign;
 pub mod command;
 pub mod drawn_campaigns;
+pub mod live;
 pub mod origins;
 pub mod rigs;
 pub mod slip_truth;

@@ -1,89 +1,25 @@
 //! The live page: a campaign seen in a browser while it is measured, and everything that the server must turn away.
 #![allow(clippy::unwrap_used)]
 
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
 use jointrig::campaign::store::Store;
-use jointrig::campaign::store::record_row::RecordRow;
-use jointrig::campaign::verdict::Kind;
+use jointrig::campaign::store::record_row::{NewRecord, RecordRow};
+use jointrig::campaign::store::session_table::Counters;
+use jointrig::campaign::verdict::{Kind, Verdict};
+use jointrig::device::recording::Recording;
 use jointrig_tests::browser::{Browser, Look, Page};
 use jointrig_tests::command::jointrig;
+use jointrig_tests::live::{self, Served, done, picture};
 use serde_json::Value;
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// A page that is served. Dropping it ends the process.
-struct Served {
-    child: Child,
-    url: String,
-}
-
-impl Served {
-    fn of(file: &Path) -> Self {
-        let mut child =
-            jointrig().arg("serve").arg(file).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-        let mut url = String::new();
-        BufReader::new(child.stdout.take().unwrap()).read_line(&mut url).unwrap();
-        Self { child, url: url.trim().into() }
-    }
-
-    fn port(&self) -> u16 {
-        let address = self.url.strip_prefix("http://127.0.0.1:").unwrap();
-        address.split('/').next().unwrap().parse().unwrap()
-    }
-
-    fn token(&self) -> &str {
-        self.url.split("#look=").nth(1).unwrap()
-    }
-
-    /// The status of an answer to a request with these headers, and its body.
-    fn asked(&self, path: &str, headers: &[(&str, &str)]) -> (u16, String) {
-        self.try_asking(path, headers).unwrap()
-    }
-
-    fn try_asking(&self, path: &str, headers: &[(&str, &str)]) -> std::io::Result<(u16, String)> {
-        let mut stream = TcpStream::connect(("127.0.0.1", self.port()))?;
-        stream.set_read_timeout(Some(Duration::from_secs(20)))?;
-        let lines: Vec<String> = headers.iter().map(|(name, value)| format!("{name}: {value}\r\n")).collect();
-        write!(stream, "GET {path} HTTP/1.1\r\n{}Connection: close\r\n\r\n", lines.concat())?;
-        let mut answer = String::new();
-        stream.read_to_string(&mut answer)?;
-        let status = answer.split(' ').nth(1).map_or(0, |status| status.parse().unwrap());
-        Ok((status, answer.split_once("\r\n\r\n").map_or_else(String::new, |(_, body)| body.into())))
-    }
-}
-
-impl Drop for Served {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-fn done(command: &mut Command) {
-    let out = command.output().unwrap();
-    assert!(out.status.success(), "{command:?}: {}", String::from_utf8_lossy(&out.stderr));
-}
-
 /// A new campaign of a few cells on B and the assembly.
 fn campaign() -> (TempDir, PathBuf) {
-    let folder = tempfile::tempdir().unwrap();
-    let (plan, file) = (folder.path().join("plan.toml"), folder.path().join("campaign.jrig"));
-    std::fs::write(&plan, include_str!("../../docs/plans/contact.toml")).unwrap();
-    done(jointrig().args(["campaign", "new"]).arg(&file).arg("--plan").arg(&plan));
-    (folder, file)
-}
-
-/// The page as a picture, into the folder that JOINTRIG_PICTURES names.
-fn picture(page: &mut Page<'_>, name: &str) {
-    if let Some(folder) = std::env::var_os("JOINTRIG_PICTURES") {
-        let bytes = BASE64_STANDARD.decode(page.picture()).unwrap();
-        std::fs::write(Path::new(&folder).join(format!("{name}.png")), bytes).unwrap();
-    }
+    live::campaign(include_str!("../../docs/plans/contact.toml"))
 }
 
 /// The same with every number as a real one: a browser writes 100.0 as 100.
@@ -227,6 +163,63 @@ fn every_verdict_has_a_sign_a_pattern_and_its_reason() {
     assert_eq!(errors, Vec::<String>::new());
 }
 
+/// Every verdict comes into the file, as a measuring process writes it, and is on the page within moments.
+#[test]
+fn a_stored_verdict_is_on_the_page_at_once() {
+    let (_folder, file) = live::campaign(include_str!("../../docs/plans/small.toml"));
+    done(jointrig().args(["campaign", "run"]).arg(&file).args(["--device", "sim:", "--yes"]));
+    let server = Served::of(&file);
+    let mut browser = Browser::start();
+    let mut page = browser.open_url(&server.url, Look::DESK);
+    page.until(COMPLETE);
+    page.key("2");
+    page.until("document.querySelector('.matrix button') !== null");
+    let store = Store::open(&file).unwrap();
+    let row = store.record(1).unwrap();
+    let samples = store.samples(&row).unwrap();
+    let mut slowest = Duration::ZERO;
+    for (n, kind) in (0..).zip(Kind::ALL.into_iter().rev()) {
+        let recording = Recording {
+            epoch: 1,
+            first_scan: 1_000_000 * u64::from(n),
+            trigger_index: row.trigger_index,
+            channels: row.channels,
+            codes: samples.codes.clone(),
+            gaps: Vec::new(),
+            shot: row.shot,
+        };
+        let sentence = format!("injected {}", kind.name());
+        let verdict = Verdict { kind, measure: 1.0, limit: 2.0, sentence, peak_n: 50.0, start_s: 0.005 };
+        let new = NewRecord {
+            cell: row.cell,
+            attempt: 50 + n,
+            session: row.session,
+            utc: row.utc.clone(),
+            utc_error_s: None,
+            recording,
+            verdict,
+        };
+        store.insert(&new, &Counters::default()).unwrap();
+        let stored = Instant::now();
+        let (name, good) = (kind.name(), kind == Kind::Good);
+        let seen = format!(
+            "live.state.whole.hits.at(-1).sentence === 'injected {name}' && document.getElementById('verdict').hidden === {good}
+             && ({good} || document.getElementById('verdict').textContent.includes('{name}: injected'))
+             && ({good} || document.querySelector('.matrix button').title.includes('{name}'))"
+        );
+        while page.eval(&seen) != Value::Bool(true) {
+            assert!(stored.elapsed() < Duration::from_secs(2), "{name}: not on the page");
+            std::thread::sleep(Duration::from_millis(4));
+        }
+        slowest = slowest.max(stored.elapsed());
+        if kind == Kind::DoubleHit {
+            picture(&mut page, "verdict-double-hit");
+        }
+    }
+    println!("banner and matrix at most {} ms after the record was stored", slowest.as_millis());
+    assert_eq!(page.errors(), Vec::<String>::new());
+}
+
 /// What a run stored, with its scans counted from the first record on: when the stream begins is a matter of the process's start.
 fn stored(file: &Path) -> Vec<(i64, u64, u32, f64, String)> {
     let records = Store::open_read_only(file).unwrap().records().unwrap();
@@ -237,13 +230,7 @@ fn stored(file: &Path) -> Vec<(i64, u64, u32, f64, String)> {
 
 #[test]
 fn looking_changes_no_record() {
-    let new = || {
-        let folder = tempfile::tempdir().unwrap();
-        let (plan, file) = (folder.path().join("plan.toml"), folder.path().join("campaign.jrig"));
-        std::fs::write(&plan, include_str!("../../docs/plans/small.toml")).unwrap();
-        done(jointrig().args(["campaign", "new"]).arg(&file).arg("--plan").arg(&plan));
-        (folder, file)
-    };
+    let new = || live::campaign(include_str!("../../docs/plans/small.toml"));
     let run = |file: &Path| {
         let mut command = jointrig();
         command.args(["campaign", "run"]).arg(file).args(["--device", "sim:", "--yes"]);
@@ -252,33 +239,36 @@ fn looking_changes_no_record() {
     let (_alone, unseen) = new();
     done(&mut run(&unseen));
     let (_watched, seen) = new();
-    let mut command = run(&seen).arg("--serve").stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-    let mut said = BufReader::new(command.stderr.take().unwrap());
-    let mut line = String::new();
-    while !line.contains("live page: ") {
-        line.clear();
-        assert!(said.read_line(&mut line).unwrap() > 0, "no address");
-    }
-    let url = line.trim().split("live page: ").nth(1).unwrap().to_owned();
-    // a page that looks, one that never reads, and others that ask for the heaviest answer again and again
-    let server = Served { child: command, url };
+    let mut server = Served::beside(run(&seen).arg("--serve"));
+    // ten pages that look at everything, two that never read, and others that ask for the heaviest answer again and again
+    let listeners: Vec<_> = (0..9)
+        .map(|_| server.listener())
+        .map(|listener| std::thread::spawn(|| listener.to_the_end()))
+        .collect();
+    let deaf = server.listener();
     let mut browser = Browser::start();
     let mut page = browser.open_url(&server.url, Look::DESK);
     let host = format!("127.0.0.1:{}", server.port());
     let mut silent = TcpStream::connect(("127.0.0.1", server.port())).unwrap();
     write!(silent, "GET /live.js HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
     page.until("!!live.state.whole && live.state.whole.hits.length > 0");
+    page.key("6");
     let token = format!("Bearer {}", server.token());
     let mut asked = 0;
-    while server.try_asking("/api/records/1/channels", &[("Host", &host), ("Authorization", &token)]).is_ok()
-    {
+    let headers = [("Host", host.as_str()), ("Authorization", token.as_str())];
+    while server.try_asking("GET", "/api/records/1/channels", &headers, "").is_ok() {
         asked += 1;
     }
     assert!(asked > 3, "the run ended before anybody could look");
-    let mut rest = String::new();
-    said.read_to_string(&mut rest).unwrap();
-    drop(page);
+    drop((page, deaf));
+    for listener in listeners {
+        let heard = listener.join().unwrap();
+        assert!(heard.frames > 3 && heard.words.len() > 3, "{} frames", heard.frames);
+    }
+    let (status, rest) = server.wait();
+    assert!(status.success(), "{rest}");
     assert_eq!(stored(&seen), stored(&unseen), "{rest}");
+    assert!(!rest.contains("unexplained"), "{rest}");
 }
 
 #[test]
@@ -313,7 +303,7 @@ fn strangers_are_turned_away() {
     let silent: Vec<TcpStream> =
         (0..40).map(|_| TcpStream::connect(("127.0.0.1", server.port())).unwrap()).collect();
     let within = Instant::now() + Duration::from_secs(15);
-    while server.try_asking("/", &[("Host", &host)]).map_or(0, |(status, _)| status) != 200 {
+    while server.try_asking("GET", "/", &[("Host", &host)], "").map_or(0, |(status, _)| status) != 200 {
         assert!(Instant::now() < within, "the silent ones still lock everyone out");
         std::thread::sleep(Duration::from_millis(100));
     }

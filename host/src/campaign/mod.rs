@@ -7,6 +7,7 @@
 //! | a verdict, the double-hit threshold | [`verdict`] |
 //! | what happens between two hits | [`run`]: `cell.rs` |
 //! | a level of the shaker | [`run::shaking`] |
+//! | what whoever watches is told | [`watch`] |
 //!
 //! [`run::runner::run`] walks the cells of the plan: hammer and laser are brought there ([`run::stage`]), shots are fired at repeatable
 //! scans ([`run::shot`]) with a pulse that finds the target force ([`run::pulse`]), each record is judged ([`verdict::judge`](mod@verdict::judge)) and stored on
@@ -17,3 +18,4 @@ pub mod run;
 pub mod sensor_check;
 pub mod store;
 pub mod verdict;
+pub mod watch;

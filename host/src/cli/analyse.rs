@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget};
 use super::error::CliError;
 use super::number::{not_negative, positive};
 use super::output;
-use crate::analyse::{self, KnownContact, Wanted};
+use crate::analyse::{KnownContact, Wanted};
 use crate::campaign::store::Store;
 use crate::report::{self, words};
 use crate::results::Results;
@@ -70,23 +70,18 @@ pub fn ending(found: &Results, folder: &Path) -> Result<(), CliError> {
     output::lines([last])
 }
 
-/// Analyses what the file holds.
+/// Analyses what the file holds, with a bar for whoever waits.
 pub fn analysed(store: &Store, wanted: Wanted) -> Result<Results, CliError> {
     let bar = if std::io::stderr().is_terminal() {
         ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr())
     } else {
         ProgressBar::hidden()
     };
-    let found = analyse::analyse(store, wanted, &|progress| {
+    let results = report::analysed(store, wanted, &|progress| {
         bar.set_length(progress.total as u64);
         bar.set_position(progress.done as u64);
     })?;
     bar.finish_and_clear();
-    let mut results = report::document(found);
-    // the truth joins the document when all is found: no estimator can see it
-    if let Some(answer) = &mut results.answer {
-        answer.truth = store.simulated_truth()?;
-    }
     Ok(results)
 }
 

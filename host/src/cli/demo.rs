@@ -33,7 +33,6 @@ pub struct Demo {
     /// Print every method, check and loop too.
     #[arg(long)]
     details: bool,
-    #[cfg(feature = "dashboard")]
     #[command(flatten)]
     page: crate::cli::page::Page,
 }
@@ -51,13 +50,13 @@ impl Demo {
         })?;
         let file = folder.join("campaign.jrig");
         let store = self.open(&file)?;
-        #[cfg(feature = "dashboard")]
-        let _page = self.page.start(&file)?;
+        let stop = interrupt::flag();
+        let mut onlooker = self.page.start(Some(&file), &stop, false)?;
         let again = self.again();
         let address = Address::Sim { rig: self.rig.clone() };
-        let stop = interrupt::flag();
         let device = measure::Device { address: &address, seed: self.seed, log_tables: None };
-        let summary = measure::measure(store, device, Stage::Device, true, stop, &again, &mut ByRecord)?;
+        let who = measure::Who { stage: Stage::Device, yes: true, stop };
+        let summary = measure::measure(store, device, who, &mut onlooker, &again, &mut ByRecord)?;
         if summary.interrupted {
             let file = file.display();
             eprintln!("`jointrig analyse {file} --out {}` works on what is there", folder.display());

@@ -5,7 +5,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A flag that Ctrl-C (or a polite kill) sets.
 pub fn flag() -> Arc<AtomicBool> {
-    let stop = Arc::new(AtomicBool::new(false));
+    let stop = Arc::default();
+    catch(&stop);
+    stop
+}
+
+/// Has Ctrl-C (or a polite kill) set this flag.
+pub fn catch(stop: &Arc<AtomicBool>) {
     let raised = stop.clone();
     let set = ctrlc::set_handler(move || {
         if raised.swap(true, Ordering::Relaxed) {
@@ -17,5 +23,4 @@ pub fn flag() -> Arc<AtomicBool> {
     if let Err(error) = set {
         log::warn!("Ctrl-C cannot be caught ({error}): it will end the program at once");
     }
-    stop
 }

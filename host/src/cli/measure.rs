@@ -5,6 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use super::error::CliError;
+use super::page::Onlooker;
+use crate::campaign::run::progress::Progress;
 use crate::campaign::run::runner::{self, Options, Summary};
 use crate::campaign::run::stage::Stage;
 use crate::campaign::store::Store;
@@ -22,13 +24,22 @@ pub struct Device<'a> {
     pub log_tables: Option<PathBuf>,
 }
 
+/// Who stands at the rig.
+pub struct Who {
+    /// Who moves hammer and laser.
+    pub stage: Stage,
+    /// Whether every prompt is answered with yes.
+    pub yes: bool,
+    /// Set to end after the shot in hand.
+    pub stop: Arc<AtomicBool>,
+}
+
 /// Runs what is left of the campaign in `store`. `again` is the command that resumes it.
 pub fn measure(
     store: Store,
     device: Device<'_>,
-    stage: Stage,
-    yes: bool,
-    stop: Arc<AtomicBool>,
+    who: Who,
+    onlooker: &mut Onlooker,
     again: &str,
     judge: &mut dyn Judge,
 ) -> Result<Summary, CliError> {
@@ -36,7 +47,11 @@ pub fn measure(
     let Device { address, seed, log_tables } = device;
     let mut session = Session::open(address.open(seed)?, &address.to_string())?;
     session.look_for_log_tables(Tables::new(log_tables));
-    let options = Options { stage, yes, progress: true, stop };
+    onlooker.tap.take().into_iter().for_each(|tap| session.watch(tap));
+    let Who { stage, yes, stop } = who;
+    let watch = onlooker.watch.clone().and(Arc::new(Progress::default()));
+    let (edits, answers) = (onlooker.edits.take(), onlooker.answers.take());
+    let options = Options { stage, yes, watch, edits, answers, stop };
     let summary = runner::run(store, &mut session, judge, &options)?;
     tell(&path, &summary, again);
     tell_size(&path)?;

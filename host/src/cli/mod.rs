@@ -19,8 +19,9 @@ mod info;
 mod interrupt;
 mod measure;
 mod number;
-mod output;
 #[cfg(feature = "dashboard")]
+mod open_page;
+mod output;
 mod page;
 mod report;
 #[cfg(feature = "dashboard")]

@@ -1,29 +1,88 @@
 //! `--serve`: the live page beside a command that measures.
 
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 
 use super::error::CliError;
-use crate::dashboard::Dashboard;
+#[cfg(feature = "dashboard")]
+use super::open_page::Opened;
+use crate::campaign::run::answers::Answers;
+use crate::campaign::run::edits::Edits;
+use crate::campaign::watch::Watchers;
+#[cfg(feature = "dashboard")]
+use crate::dashboard::{Dashboard, Measuring};
+use crate::device::tap::Tap;
 
 /// Whether a page shows what is measured.
 #[derive(Clone, Copy, Debug, Default, Args)]
 pub struct Page {
     /// Show a live page on this port of 127.0.0.1 meanwhile [default port: a free one].
+    #[cfg(feature = "dashboard")]
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0")]
-    serve: Option<u16>,
+    pub serve: Option<u16>,
+    /// Open the page in the browser.
+    #[cfg(feature = "dashboard")]
+    #[arg(long, requires = "serve")]
+    pub open: bool,
+}
+
+/// Who looks on while a command measures. Without a page nobody does.
+#[derive(Default)]
+pub struct Onlooker {
+    /// What it is told of the campaign.
+    pub watch: Watchers,
+    /// Its look at the stream.
+    pub tap: Option<Tap>,
+    /// What it wants changed in the file.
+    pub edits: Option<Edits>,
+    /// What it answers for hammer and laser.
+    pub answers: Option<Answers>,
+    #[cfg(feature = "dashboard")]
+    _page: Option<(Dashboard, Option<Opened>)>,
 }
 
 impl Page {
-    /// Serves the page of this file as long as the value lives, if it was asked for.
+    /// Serves the page of this file (or of a device's channels alone) as long as the value lives, if it was asked for. `stop` is set by a page that
+    /// wants to end after the shot in hand; `control` says whether a page may answer for hammer and laser.
     ///
     /// # Errors
     /// The port cannot be had: nothing is measured then.
-    pub fn start(self, file: &Path) -> Result<Option<Dashboard>, CliError> {
-        let Some(port) = self.serve else { return Ok(None) };
-        let page = Dashboard::start(file, port)?;
+    #[cfg(feature = "dashboard")]
+    pub fn start(
+        self,
+        file: Option<&Path>,
+        stop: &Arc<AtomicBool>,
+        control: bool,
+    ) -> Result<Onlooker, CliError> {
+        let Some(port) = self.serve else { return Ok(Onlooker::default()) };
+        let measuring = Measuring { file, stop: stop.clone(), control };
+        let (page, hooks) = Dashboard::of_measuring(&measuring, port)?;
         eprintln!("live page: {}", page.url());
-        Ok(Some(page))
+        if let Some(url) = page.edit_url() {
+            eprintln!("to take notes, keep and drop there: {url}");
+        }
+        let opened = self.open.then(|| Opened::new(&page.edit_url().unwrap_or_else(|| page.url()))).flatten();
+        Ok(Onlooker {
+            watch: Watchers::default().and(hooks.eye as Arc<_>),
+            tap: Some(hooks.tap),
+            edits: hooks.edits,
+            answers: hooks.answers,
+            _page: Some((page, opened)),
+        })
+    }
+
+    /// Nobody looks on: this build has no page.
+    #[cfg(not(feature = "dashboard"))]
+    #[allow(clippy::unnecessary_wraps, clippy::unused_self, reason = "with a page it may fail")]
+    pub fn start(
+        self,
+        _file: Option<&Path>,
+        _stop: &Arc<AtomicBool>,
+        _control: bool,
+    ) -> Result<Onlooker, CliError> {
+        Ok(Onlooker::default())
     }
 }

@@ -1,37 +1,106 @@
-//! `serve`: the live page of a campaign file.
+//! `serve`: the live page of a campaign file, of a device's channels, or of both while it measures.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 
+use super::campaign::run::Run;
 use super::error::CliError;
+use super::open_page::Opened;
+use super::page::Page;
 use super::{interrupt, output};
+use crate::campaign::store::simulated::is_simulated_board;
+use crate::campaign::watch::Seen;
 use crate::dashboard::Dashboard;
+use crate::device::address::Address;
+use crate::device::logs::Tables;
+use crate::device::session::Session;
 
-/// Show a campaign in the browser: while another process measures it, or afterwards. Looks and does nothing else.
+/// Between two words on the link.
+const LINK: Duration = Duration::from_secs(1);
+
+/// Show a campaign in the browser: while another process measures it, or afterwards. With --device too: measure it, as `campaign run` does.
+/// With --device alone: its channels, and nothing is struck.
 #[derive(Debug, Args)]
 pub struct Serve {
     /// The campaign file.
-    #[arg(value_name = "FILE.jrig")]
-    file: PathBuf,
+    #[arg(value_name = "FILE.jrig", required_unless_present = "device")]
+    file: Option<PathBuf>,
+    /// Device address, e.g. sim:, usb:, serial:/dev/ttyACM0, tcp:127.0.0.1:4000.
+    #[arg(long, value_name = "ADDR")]
+    device: Option<String>,
     /// Port on 127.0.0.1; 0 takes a free one.
     #[arg(long, value_name = "N", default_value_t = 0)]
     port: u16,
+    /// Open the page in the browser.
+    #[arg(long)]
+    open: bool,
+    /// While it measures: let a page answer for hammer and laser too. Whoever answers must see the rig.
+    #[arg(long, requires = "device", requires = "file")]
+    allow_control: bool,
 }
 
 impl Serve {
     pub fn run(self) -> Result<(), CliError> {
-        let stop = interrupt::flag();
-        let dashboard = Dashboard::start(&self.file, self.port)?;
-        output::lines([dashboard.url()])?;
-        eprintln!(
-            "Open this address in a browser of this machine. Ctrl-C ends the page; it changes nothing in the file."
-        );
-        while !stop.load(Ordering::Relaxed) {
-            std::thread::sleep(Duration::from_millis(100));
+        let page = Page { serve: Some(self.port), open: self.open };
+        match (self.file, self.device) {
+            (Some(file), Some(device)) => Run::with_page(file, device, page, self.allow_control).run(),
+            (Some(file), None) => show(&file, page),
+            (None, Some(device)) => show_channels(&device, page),
+            (None, None) => Err(CliError::Usage("say which FILE.jrig, or --device ADDR".into())),
         }
-        Ok(())
     }
+}
+
+/// A file alone.
+fn show(file: &Path, page: Page) -> Result<(), CliError> {
+    let stop = interrupt::flag();
+    let dashboard = Dashboard::of_file(file, page.serve.unwrap_or(0))?;
+    output::lines([dashboard.url()])?;
+    eprintln!(
+        "Open this address in a browser of this machine. Ctrl-C ends the page; it changes nothing in the file."
+    );
+    let _opened = page.open.then(|| Opened::new(&dashboard.url()));
+    while !stop.load(Ordering::Relaxed) {
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    Ok(())
+}
+
+/// A device alone: its stream is started and looked at.
+fn show_channels(device: &str, page: Page) -> Result<(), CliError> {
+    let address: Address = device.parse()?;
+    let stop = interrupt::flag();
+    let mut onlooker = page.start(None, &stop, false)?;
+    let mut session = Session::open(address.open(0)?, &address.to_string())?;
+    session.look_for_log_tables(Tables::new(None));
+    onlooker.tap.take().into_iter().for_each(|tap| session.watch(tap));
+    let info = session.info()?;
+    let channels = session.channels(&info)?;
+    let simulated = is_simulated_board(&info.board);
+    onlooker.watch.saw(&Seen::Stream { channels: &channels, simulated });
+    let (_, first) = session.start(channels.len())?;
+    eprintln!("nothing is struck and nothing moves; Ctrl-C ends");
+    let (begun, mut told) = (Instant::now(), Instant::now());
+    while !stop.load(Ordering::Relaxed) {
+        session.pump(Duration::from_millis(20))?;
+        let expected = session.expected()?;
+        session.forget_before(expected);
+        if session.simulated().is_some() {
+            // a simulated rig's time would run as fast as the machine can
+            let now = first + (begun.elapsed().as_secs_f64() * f64::from(channels.rate_hz)) as u64;
+            session.hold_acknowledgement(Some(now.saturating_sub(session.ring_scans() / 2).max(first)));
+        }
+        for line in session.log_lines() {
+            log::info!("controller: {line}");
+        }
+        if told.elapsed() >= LINK {
+            told = Instant::now();
+            onlooker.watch.saw(&Seen::Link(session.accounts()));
+        }
+    }
+    session.finish()?;
+    Ok(())
 }

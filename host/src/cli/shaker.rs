@@ -2,6 +2,7 @@
 
 use std::io::{BufRead, Write};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Args;
 use serde_json::{Value, json};
@@ -11,7 +12,7 @@ use super::number::positive;
 use super::{interrupt, output};
 use crate::campaign::plan::Plan;
 use crate::campaign::plan::level::{Held, Level, Moment};
-use crate::campaign::run::shaking::{self, CRITERION, Limits, Options, Outcome, Summary};
+use crate::campaign::run::shaking::{self, CRITERION, Limits, Onlookers, Options, Outcome, Summary};
 use crate::campaign::store::Store;
 use crate::campaign::store::level_table::LevelRow;
 use crate::device::address::Address;
@@ -72,7 +73,6 @@ pub struct Shaker {
     /// Folder of the tables by which the controller's log lines are read (else JOINTRIG_LOG_TABLES).
     #[arg(long, value_name = "DIR")]
     log_tables: Option<PathBuf>,
-    #[cfg(feature = "dashboard")]
     #[command(flatten)]
     page: crate::cli::page::Page,
 }
@@ -81,8 +81,8 @@ impl Shaker {
     pub fn run(self) -> Result<(), CliError> {
         let address: Address = self.device.parse()?;
         let mut store = Store::open(&self.file)?;
-        #[cfg(feature = "dashboard")]
-        let _page = self.page.start(&self.file)?;
+        let stop = Arc::default();
+        let mut onlooker = self.page.start(Some(&self.file), &stop, false)?;
         let plan = store.plan()?;
         let levels = self.levels(&plan)?;
         let moment = match self.when {
@@ -92,10 +92,12 @@ impl Shaker {
         };
         let mut session = Session::open(address.open(self.seed)?, &address.to_string())?;
         session.look_for_log_tables(Tables::new(self.log_tables.clone()));
+        onlooker.tap.take().into_iter().for_each(|tap| session.watch(tap));
         let info = session.info()?;
         if info.drive_v > 0.0 && !info.stage {
             prompt(self.yes, levels.len())?;
         }
+        interrupt::catch(&stop);
         eprintln!("{} levels, {} the hammer's cells; {CRITERION}", levels.len(), moment.name());
         let options = Options {
             levels,
@@ -104,18 +106,25 @@ impl Shaker {
             sweep_hz_per_s: self.rate,
             most_drive_v: self.max_drive,
             limits: Limits(self.limits.clone()),
-            stop: interrupt::flag(),
+            stop,
         };
+        let onlookers = Onlookers { watch: onlooker.watch.clone(), edits: onlooker.edits.take() };
         let mut seen = Vec::new();
-        let summary = shaking::run(&mut store, &mut session, &options, &mut |store, level, outcome| {
-            let Some(outcome) = outcome else {
-                eprint!("{level}: ");
-                return;
-            };
-            let (line, value) = told(store, outcome);
-            eprintln!("{line}");
-            seen.push(value);
-        });
+        let summary = shaking::run_watched(
+            &mut store,
+            &mut session,
+            &options,
+            &onlookers,
+            &mut |store, level, outcome| {
+                let Some(outcome) = outcome else {
+                    eprint!("{level}: ");
+                    return;
+                };
+                let (line, value) = told(store, outcome);
+                eprintln!("{line}");
+                seen.push(value);
+            },
+        );
         if summary.is_err() {
             eprintln!();
         }

@@ -41,6 +41,8 @@ pub enum Refusal {
     Origin,
     /// The request lacks the token.
     Token,
+    /// The token is one to look with.
+    LooksOnly,
 }
 
 impl Refusal {
@@ -48,7 +50,7 @@ impl Refusal {
     pub fn status(self) -> StatusCode {
         match self {
             Self::Host => StatusCode::MISDIRECTED_REQUEST,
-            Self::Origin => StatusCode::FORBIDDEN,
+            Self::Origin | Self::LooksOnly => StatusCode::FORBIDDEN,
             Self::Token => StatusCode::UNAUTHORIZED,
         }
     }
@@ -61,6 +63,10 @@ impl Refusal {
             Self::Token => [
                 "the token is missing or wrong",
                 "open the whole address that jointrig printed, with what follows the #",
+            ],
+            Self::LooksOnly => [
+                "this address is one to look",
+                "open the address to edit, which the measuring process printed",
             ],
         }
     }
@@ -84,14 +90,15 @@ pub fn from_here(headers: &HeaderMap, port: u16) -> Result<(), Refusal> {
     }
 }
 
-/// Whether a request carries the token.
+/// The token that a request carries.
 ///
 /// # Errors
-/// It does not.
-pub fn has_token(headers: &HeaderMap, token: &Token) -> Result<(), Refusal> {
-    let given =
-        headers.get(header::AUTHORIZATION).and_then(|value| value.to_str().ok()?.strip_prefix("Bearer "));
-    if given.is_some_and(|given| token.is(given)) { Ok(()) } else { Err(Refusal::Token) }
+/// It carries none.
+pub fn token(headers: &HeaderMap) -> Result<&str, Refusal> {
+    headers
+        .get(header::AUTHORIZATION)
+        .and_then(|value| value.to_str().ok()?.strip_prefix("Bearer "))
+        .ok_or(Refusal::Token)
 }
 
 #[cfg(test)]
@@ -127,11 +134,14 @@ mod tests {
         let token = Token::random().expect("random numbers");
         assert_eq!(token.as_str().len(), 32);
         assert!(token.is(token.as_str()) && Token::random().expect("random numbers") != token);
-        let with = |value: &str| has_token(&headers(&[(header::AUTHORIZATION, value)]), &token);
-        assert_eq!(with(&format!("Bearer {}", token.as_str())), Ok(()));
+        let with = |value: &str| {
+            let headers = headers(&[(header::AUTHORIZATION, value)]);
+            super::token(&headers).is_ok_and(|given| token.is(given))
+        };
+        assert!(with(&format!("Bearer {}", token.as_str())));
         for wrong in ["", "Bearer ", token.as_str(), &format!("Bearer {}0", token.as_str()), "Bearer 0"] {
-            assert_eq!(with(wrong), Err(Refusal::Token), "{wrong}");
+            assert!(!with(wrong), "{wrong}");
         }
-        assert_eq!(has_token(&HeaderMap::new(), &token), Err(Refusal::Token));
+        assert_eq!(super::token(&HeaderMap::new()), Err(Refusal::Token));
     }
 }

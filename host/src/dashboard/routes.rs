@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use axum::extract::{Path, Query, Request, State};
-use axum::http::{HeaderValue, StatusCode, header};
+use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
+use axum::http::{HeaderValue, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
@@ -11,8 +11,9 @@ use axum::{Json, Router};
 use serde::Deserialize;
 use serde_json::json;
 
-use super::guard::{Refusal, from_here, has_token};
-use super::{Shared, page, socket};
+use super::guard::{Refusal, from_here, token};
+use super::problem::Problem;
+use super::{Shared, edit, page, socket};
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
 use crate::live::figures;
@@ -23,15 +24,21 @@ use crate::report::figure_fragment;
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data: blob:; \
     frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
+/// Bytes of what a page wants changed.
+const BODY: usize = 8 * 1024;
+
 /// Everything that is served.
 pub fn router(shared: Arc<Shared>) -> Router {
     let data = Router::new()
         .route("/api/state", get(state))
         .route("/api/figures/{name}", get(of_campaign))
-        .route("/api/records/{id}/{name}", get(of_record))
-        .route("/api/cells/{id}/{name}", get(of_cell))
+        .route("/api/{of}/{id}/{name}", get(of_one))
+        .route("/api/now/shaker", get(of_shaker))
         .route("/api/log", get(log))
         .layer(from_fn_with_state(shared.clone(), with_token));
+    let edits = edit::routes()
+        .layer(DefaultBodyLimit::max(BODY))
+        .layer(from_fn_with_state(shared.clone(), with_edit_token));
     Router::new()
         .route("/", get(async || ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], page::HTML)))
         .route(
@@ -44,42 +51,17 @@ pub fn router(shared: Arc<Shared>) -> Router {
         )
         .route("/socket", get(socket::socket))
         .merge(data)
+        .merge(edits)
         .fallback(async || Problem::missing("there is no such page"))
         .layer(from_fn_with_state(shared.clone(), guarded))
         .with_state(shared)
 }
 
-/// An answer that is none.
-struct Problem {
-    status: StatusCode,
-    what: String,
-    todo: &'static str,
-}
-
-impl Problem {
-    fn missing(what: &str) -> Self {
-        Self { status: StatusCode::NOT_FOUND, what: what.into(), todo: "go back to the page" }
-    }
-}
-
-impl From<Refusal> for Problem {
-    fn from(refusal: Refusal) -> Self {
-        let [what, todo] = refusal.words();
-        Self { status: refusal.status(), what: what.into(), todo }
-    }
-}
-
-impl From<StoreError> for Problem {
-    fn from(error: StoreError) -> Self {
-        Self { status: StatusCode::NOT_FOUND, what: error.to_string(), todo: "look at the campaign file" }
-    }
-}
-
-impl IntoResponse for Problem {
-    fn into_response(self) -> Response {
-        let body =
-            json!({ "error": { "what": self.what, "where": "the live page's server", "do": self.todo } });
-        (self.status, Json(body)).into_response()
+impl Shared {
+    /// The campaign file, to read.
+    fn store(&self) -> Result<Store, Problem> {
+        let file = self.file.as_deref().ok_or_else(|| Problem::missing("no campaign is measured here"))?;
+        Ok(Store::open_read_only(file)?)
     }
 }
 
@@ -105,7 +87,22 @@ async fn with_token(
     request: Request,
     next: Next,
 ) -> Result<Response, Problem> {
-    has_token(request.headers(), &shared.token)?;
+    if !shared.may_look(token(request.headers())?) {
+        return Err(Refusal::Token.into());
+    }
+    Ok(next.run(request).await)
+}
+
+async fn with_edit_token(
+    State(shared): State<Arc<Shared>>,
+    request: Request,
+    next: Next,
+) -> Result<Response, Problem> {
+    let given = token(request.headers())?;
+    if !shared.edit.as_ref().is_some_and(|edit| edit.is(given)) {
+        let refusal = if shared.look.is(given) { Refusal::LooksOnly } else { Refusal::Token };
+        return Err(refusal.into());
+    }
     Ok(next.run(request).await)
 }
 
@@ -133,37 +130,47 @@ async fn of_campaign(
     drawn(all.iter().find(|figure| figure.name == name))
 }
 
-async fn of_record(
-    State(shared): State<Arc<Shared>>,
-    Path((id, name)): Path<(i64, String)>,
-) -> Result<Response, Problem> {
-    let store = Store::open_read_only(&shared.file)?;
-    let figure = match name.as_str() {
-        "hit" => figures::hit(&store, id)?,
-        "channels" => figures::channels(&store, id)?,
-        _ => return Err(Problem::missing("a record has the figures hit and channels")),
+/// The shaker's level as it is now.
+async fn of_shaker(State(shared): State<Arc<Shared>>) -> Result<Response, Problem> {
+    let figure = shared.bus.shaker().as_ref().and_then(figures::shaker);
+    let simulated = shared.bus.simulated();
+    let from = figure::Source {
+        file: shared.file.as_ref().map(|file| file.display().to_string()).unwrap_or_default(),
+        simulated,
+        version: env!("CARGO_PKG_VERSION").into(),
+        ..figure::Source::default()
     };
-    drawn(from_file(figure, &store, id)?.as_ref())
+    drawn(figure.map(|figure| Figure { from, ..figure }).as_ref())
 }
 
-async fn of_cell(
+/// Figures of a record or a cell, as the file has it now.
+async fn of_one(
     State(shared): State<Arc<Shared>>,
-    Path((id, name)): Path<(i64, String)>,
+    Path((of, id, name)): Path<(String, i64, String)>,
 ) -> Result<Response, Problem> {
-    let store = Store::open_read_only(&shared.file)?;
-    let figure = match name.as_str() {
-        "hits" => figures::cell(&store, id)?,
-        "place" => figures::place(&store, id)?,
-        _ => return Err(Problem::missing("a cell has the figures hits and place")),
+    let store = shared.store()?;
+    let (figure, record) = match (of.as_str(), name.as_str()) {
+        ("records", "hit") => (figures::hit(&store, id)?, Some(id)),
+        ("records", "channels") => (figures::channels(&store, id)?, Some(id)),
+        ("cells", "hits") => (figures::cell(&store, id)?, None),
+        ("cells", "place") => (figures::place(&store, id)?, None),
+        _ => {
+            let what = "records have the figures hit and channels, cells have hits and place";
+            return Err(Problem::missing(what));
+        }
     };
-    drawn(from_file(figure, &store, 0)?.as_ref())
+    drawn(from_file(figure, &store, record)?.as_ref())
 }
 
 /// The figure with what it was made from.
-fn from_file(figure: Option<Figure>, store: &Store, record: i64) -> Result<Option<Figure>, StoreError> {
+fn from_file(
+    figure: Option<Figure>,
+    store: &Store,
+    record: Option<i64>,
+) -> Result<Option<Figure>, StoreError> {
     let Some(mut figure) = figure else { return Ok(None) };
     figure.from = figure::Source {
-        records: if record > 0 { vec![[record; 2]] } else { Vec::new() },
+        records: record.map(|record| [record; 2]).into_iter().collect(),
         file: store.path().display().to_string(),
         simulated: store.is_simulated()?,
         version: env!("CARGO_PKG_VERSION").into(),
@@ -177,7 +184,7 @@ struct After {
 }
 
 async fn log(State(shared): State<Arc<Shared>>, Query(asked): Query<After>) -> Result<Response, Problem> {
-    let store = Store::open_read_only(&shared.file)?;
+    let store = shared.store()?;
     let lines = store.log_lines(asked.after.unwrap_or(0))?;
     let lines: Vec<_> =
         lines.iter().map(|(id, utc, text)| json!({ "id": id, "utc": utc, "text": text })).collect();

@@ -30,9 +30,11 @@ pub fn serve(listener: TcpListener, shared: Shared, stop: &AtomicBool) -> io::Re
     runtime.block_on(async {
         listener.set_nonblocking(true)?;
         let listener = tokio::net::TcpListener::from_std(listener)?;
-        let router = routes::router(Arc::new(shared));
+        let shared = Arc::new(shared);
+        let router = routes::router(shared.clone());
         let clients = Arc::new(Semaphore::new(CLIENTS));
         while !stop.load(Ordering::Relaxed) {
+            shared.end_lease();
             let Ok(accepted) = tokio::time::timeout(LOOK, listener.accept()).await else { continue };
             let (stream, _) = match accepted {
                 Ok(accepted) => accepted,

@@ -11,6 +11,7 @@ use jointrig_protocol::shot::{Phase, Shot};
 
 use super::logs::DeviceLog;
 use super::stream::Stream;
+use super::tap::Tap;
 
 /// Events that wait for somebody to read them; the oldest go first when nobody does.
 const EVENTS_KEPT: usize = 256;
@@ -24,6 +25,8 @@ pub struct Inbox {
     pub stream: Option<Stream>,
     /// The stream that was asked for and has not begun.
     pub starting: Option<Starting>,
+    /// Hung on the next stream.
+    pub tap: Option<Tap>,
     /// Answers in the order of arrival.
     pub answers: VecDeque<answer::Numbered>,
     /// Events that concern whoever uses the session.
@@ -52,6 +55,8 @@ pub struct Starting {
     pub channels: usize,
     /// Scans that the device can send again.
     pub ring_scans: u32,
+    /// Scans per second, Hz.
+    pub rate_hz: f64,
 }
 
 impl Inbox {
@@ -82,8 +87,10 @@ impl Inbox {
         if let Ok(Answer::Started { epoch, map, first_scan }) = answer.outcome
             && let Some(starting) = self.starting.take_if(|starting| starting.number == answer.number)
         {
-            let Starting { channels, ring_scans, .. } = starting;
-            self.stream = Some(Stream::new(epoch, map, first_scan, channels, ring_scans));
+            let Starting { channels, ring_scans, rate_hz, .. } = starting;
+            let mut stream = Stream::new(epoch, map, first_scan, channels, ring_scans);
+            stream.tapped(self.tap.take(), rate_hz);
+            self.stream = Some(stream);
         }
         self.answers.push_back(answer);
     }

@@ -2,7 +2,7 @@
 //!
 //! [`address::Address`] opens a [`transport::Transport`]; [`session::Session`] speaks the protocol over it and
 //! puts the stream of scans together again, whatever the link loses; [`recording::Recording`] is one
-//! impact cut from it.
+//! impact cut from it. Whoever wants to watch the stream itself hangs a [`tap`] on it.
 
 pub mod address;
 pub mod channels;
@@ -20,6 +20,7 @@ mod shaking;
 #[cfg(feature = "sim")]
 mod sim;
 pub mod stream;
+pub mod tap;
 mod tcp;
 pub mod transport;
 pub mod usb;

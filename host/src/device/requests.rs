@@ -12,6 +12,7 @@ use super::error::DeviceError;
 use super::inbox::Starting;
 use super::session::{Session, TRIES, patience};
 use super::stream::{Accounts, Stream};
+use super::tap::Tap;
 
 /// Longest wait for a first byte within one pump.
 const POLL: Duration = Duration::from_millis(20);
@@ -114,11 +115,18 @@ impl Session {
         }
     }
 
+    /// Lets somebody watch the next stream ([`Session::start`]).
+    pub fn watch(&mut self, tap: Tap) {
+        self.inbox.tap = Some(tap);
+    }
+
     /// Begins a new stream of scans of `channels` channels; returns its epoch and first scan.
     pub fn start(&mut self, channels: usize) -> Result<(u32, u64), DeviceError> {
-        self.inbox.stream = None;
-        let ring_scans = self.hello().ring_scans;
-        self.inbox.starting = Some(Starting { number: self.next_number, channels, ring_scans });
+        if let Some(tap) = self.inbox.stream.take().and_then(Stream::into_tap) {
+            self.inbox.tap = Some(tap);
+        }
+        let (ring_scans, rate_hz) = (self.hello().ring_scans, self.rate_hz);
+        self.inbox.starting = Some(Starting { number: self.next_number, channels, ring_scans, rate_hz });
         match self.ask(Request::Start)? {
             Answer::Started { epoch, first_scan, .. } => Ok((epoch, first_scan)),
             other => Err(self.wrong("start", &other)),

@@ -9,6 +9,8 @@ use std::ops::Range;
 
 use jointrig_protocol::block::{Block, RESENT};
 
+use super::tap::Tap;
+
 /// Where every scan of a stream went. In the end `sent = received + recovered + lost`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Accounts {
@@ -32,7 +34,6 @@ impl Accounts {
 }
 
 /// A stream being put together.
-#[derive(Debug)]
 pub struct Stream {
     epoch: u32,
     map: u8,
@@ -49,6 +50,7 @@ pub struct Stream {
     tape: Vec<i16>,
     tape_first: u64,
     accounts: Accounts,
+    tap: Option<Tap>,
 }
 
 #[derive(Debug)]
@@ -76,7 +78,21 @@ impl Stream {
             tape: Vec::new(),
             tape_first: first_scan,
             accounts: Accounts::default(),
+            tap: None,
         }
+    }
+
+    /// Lets somebody watch: every scan goes through `tap` too, `rate_hz` of them each second.
+    pub fn tapped(&mut self, tap: Option<Tap>, rate_hz: f64) {
+        self.tap = tap;
+        if let Some(tap) = &mut self.tap {
+            tap.begin(self.channels, self.expected, rate_hz);
+        }
+    }
+
+    /// The tap, for the next stream.
+    pub fn into_tap(self) -> Option<Tap> {
+        self.tap
     }
 
     /// The stream's epoch.
@@ -164,6 +180,9 @@ impl Stream {
         let skip = (self.expected - first) as usize * self.channels;
         let before = self.tape.len();
         self.tape.extend(codes.skip(skip));
+        if let Some(tap) = &mut self.tap {
+            tap.fold(&self.tape[before..]);
+        }
         let scans = ((self.tape.len() - before) / self.channels) as u64;
         self.expected += scans;
         if again {
@@ -202,6 +221,9 @@ impl Stream {
     fn skip_to(&mut self, end: u64) {
         let scans = end - self.expected;
         self.accounts.lost += scans;
+        if let Some(tap) = &mut self.tap {
+            tap.skip(scans);
+        }
         match self.lost.last_mut() {
             Some(last) if last.end == self.expected => last.end = end,
             _ => self.lost.push(self.expected..end),

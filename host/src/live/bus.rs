@@ -5,7 +5,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::watch;
 
-use super::message::{Message, Snapshot};
+use super::message::{Can, Message, Snapshot};
+use super::now::{Now, Shaker, State as Doing};
 
 /// Messages that are kept for a listener who is late; who is later still gets the whole.
 const KEPT: usize = 4096;
@@ -40,7 +41,14 @@ impl Default for Bus {
 }
 
 impl Bus {
-    fn state(&self) -> MutexGuard<'_, State> {
+    /// Of a server that can do this besides looking.
+    pub fn new(can: Can) -> Self {
+        let bus = Self::default();
+        bus.inner().whole.can = can;
+        bus
+    }
+
+    fn inner(&self) -> MutexGuard<'_, State> {
         // what a thread that panicked left is a whole number of messages
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -48,14 +56,24 @@ impl Bus {
     /// Says something, and keeps the whole up to date.
     pub fn say(&self, message: Message) {
         let seq = {
-            let mut state = self.state();
+            let mut state = self.inner();
             state.seq += 1;
-            let numbered = numbered(state.seq, &message);
+            let numbered = match message {
+                // what the file does not know is kept, and told with it
+                Message::Snapshot(_) => {
+                    state.whole.take_in(message);
+                    numbered(state.seq, &Message::Snapshot(Box::new(state.whole.clone())))
+                }
+                message => {
+                    let numbered = numbered(state.seq, &message);
+                    state.whole.take_in(message);
+                    numbered
+                }
+            };
             if state.recent.len() == KEPT {
                 state.recent.pop_front();
             }
             state.recent.push_back(numbered);
-            state.whole.take_in(message);
             state.seq
         };
         self.newest.send_replace(seq);
@@ -63,7 +81,7 @@ impl Bus {
 
     /// What follows the message `after`: single messages, or the whole where some of them are gone, or `after` is none.
     pub fn since(&self, after: Option<u64>) -> Vec<Numbered> {
-        let state = self.state();
+        let state = self.inner();
         let first = state.recent.front().map_or(state.seq + 1, |oldest| oldest.seq);
         match after {
             Some(after) if after + 1 >= first && after <= state.seq => {
@@ -71,6 +89,26 @@ impl Bus {
             }
             _ => vec![numbered(state.seq, &Message::Snapshot(Box::new(state.whole.clone())))],
         }
+    }
+
+    /// What is going on, as it was told last.
+    pub fn state(&self) -> Option<Doing> {
+        self.inner().whole.now.state.clone()
+    }
+
+    /// The shaker's level, as it was told last.
+    pub fn shaker(&self) -> Option<Shaker> {
+        self.inner().whole.now.shaker.clone()
+    }
+
+    /// Whether the rig is simulated, as far as the file says.
+    pub fn simulated(&self) -> bool {
+        self.inner().whole.simulated
+    }
+
+    /// Whether anybody listens.
+    pub fn is_heard(&self) -> bool {
+        self.newest.receiver_count() > 0
     }
 
     /// Tells when there is something new: the number of the newest message.
@@ -93,7 +131,8 @@ impl Snapshot {
         match message {
             Message::Snapshot(whole) => {
                 let estimate = whole.estimate.clone().or(self.estimate.take());
-                *self = Snapshot { estimate, ..*whole };
+                let (now, can) = (std::mem::take(&mut self.now), self.can);
+                *self = Snapshot { estimate, now, can, ..*whole };
             }
             Message::Judged(judged) => {
                 self.hits.push(judged.hit);
@@ -110,7 +149,7 @@ impl Snapshot {
                 self.progress = counted.progress;
             }
             Message::Estimate(estimate) => self.estimate = Some(*estimate),
-            Message::Trouble(_) => {}
+            other => self.now.take_in(other),
         }
     }
 
@@ -119,6 +158,25 @@ impl Snapshot {
             if let Some(own) = self.cells.iter_mut().find(|own| own.id == cell.id) {
                 *own = cell;
             }
+        }
+    }
+}
+
+impl Now {
+    /// As it is after a message.
+    fn take_in(&mut self, message: Message) {
+        match message {
+            Message::State(state) => self.state = Some(state),
+            Message::Link(link) => self.link = Some(link),
+            Message::Stream(stream) => self.stream = Some(stream),
+            Message::Signals(signals) => self.signals = Some(signals),
+            Message::Shaker(shaker) => match &mut self.shaker {
+                Some(own) => own.take_in(*shaker),
+                none => *none = Some(*shaker),
+            },
+            Message::Disk(disk) => self.disk = Some(disk),
+            Message::Control(control) => self.control = Some(control),
+            _ => {}
         }
     }
 }
@@ -157,6 +215,21 @@ mod tests {
         (0..KEPT as u64 + 10).for_each(|kept| bus.say(progress(kept)));
         assert_eq!(bus.since(Some(5)).len(), 1);
         assert_eq!(bus.since(Some(10)).len(), KEPT);
+    }
+
+    #[test]
+    fn a_new_whole_from_the_file_leaves_what_only_measuring_knows() {
+        let bus = Bus::new(Can { edit: true, ..Can::default() });
+        let link = crate::live::now::Link { lost_scans: 7, ..Default::default() };
+        bus.say(Message::Link(link));
+        bus.say(Message::Snapshot(Box::new(Snapshot { file: "new".into(), ..Snapshot::default() })));
+        // told to whoever was there, and to whoever comes later
+        for after in [Some(1), None] {
+            let text = bus.since(after)[0].text.to_string();
+            for part in ["\"file\":\"new\"", "\"lost_scans\":7", "\"edit\":true"] {
+                assert!(text.contains(part), "{text}");
+            }
+        }
     }
 
     #[test]

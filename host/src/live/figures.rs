@@ -6,6 +6,7 @@ use jointrig_protocol::channel::{Channel, Quantity};
 use crate::analyse::places;
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
+use crate::live::now::Shaker;
 use crate::report;
 use crate::report::cell_records::{Shown, close};
 use crate::report::figure::{Along, Axis, Figure, Height, Mark, Panel, Role, Shape};
@@ -73,6 +74,61 @@ pub fn place(store: &Store, cell: i64) -> Result<Option<Figure>, StoreError> {
             .into(),
         ..figure
     }))
+}
+
+/// A level of the shaker on its way: what is held against the order, the drive, and the last cycle as a loop. None before anything came.
+pub fn shaker(now: &Shaker) -> Option<Figure> {
+    let last = now.windows.last()?;
+    let time = || Axis::linear("time", "s", [0.0, last[0].max(1.0)]).linked("level-time");
+    let at = |column: usize, by: f64| -> Vec<f64> { now.windows.iter().map(|w| w[column] * by).collect() };
+    let top = |values: &[f64], least: f64| 1.08 * values.iter().copied().fold(least, f64::max);
+    let seconds = at(0, 1.0);
+    // of a held drive the motion has no order
+    let ordered = now.held != "drive";
+    let (quantity, unit, by) = match now.held {
+        "force" => ("force", "N", 1.0),
+        _ => ("relative displacement", "µm", 1e6),
+    };
+    let held = at(1, by);
+    let order = by * now.order;
+    let mut amplitude = Panel::new(
+        time(),
+        Axis::linear(quantity, unit, [0.0, top(&held, if ordered { 1.1 * order } else { 1e-9 })]),
+    )
+    .titled("amplitude of what is held");
+    if ordered {
+        amplitude = amplitude.with(Mark::level(Role::Guide, order).named("order"));
+    }
+    let amplitude = amplitude.with(Mark::line(Role::Relative, Along::of(&seconds), held).named("measured"));
+    let volts = at(2, 1.0);
+    let drive =
+        Panel::new(time(), Axis::linear("drive", "V", [0.0, top(&volts, 1e-3).min(1.08 * now.most_drive_v)]))
+            .titled("drive")
+            .with(Mark::line(Role::Measured, Along::of(&seconds), volts));
+    let mut figure = Figure::new(
+        "shaker-now",
+        "",
+        now.title.clone(),
+        "Amplitude of every window of some whole cycles, the drive that brings it about, and the last cycle as a loop, raw.",
+    )
+    .across(3)
+    .with(amplitude)
+    .with(drive);
+    if let Some([x, force]) = &now.turn {
+        let reach = |values: &[f64]| {
+            let most = values.iter().fold(1e-9_f64, |most, v| most.max(v.abs()));
+            [-1.1 * most, 1.1 * most]
+        };
+        let mut panel = Panel::new(
+            Axis::linear("relative displacement", "µm", reach(x)),
+            Axis::linear("force", "N", reach(force)),
+        )
+        .titled("the loop as it turns")
+        .high(Height::Square);
+        panel = panel.with(Mark::looped(Role::Loops, x.iter().copied(), force.iter().copied()));
+        figure = figure.with(panel);
+    }
+    Some(figure)
 }
 
 /// Every channel of a record as the least and the largest value of each short stretch.

@@ -3,12 +3,15 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::message::{CellCount, Counted, Hit, Judged, Left, Message, Progress, Snapshot, VERSION};
+use super::message::{
+    CellCount, Counted, Hit, Judged, Left, LevelDone, Message, Progress, Snapshot, VERSION,
+};
 use crate::campaign::plan::configuration_name;
 use crate::campaign::run::tally::Tally;
 use crate::campaign::store::Store;
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::error::StoreError;
+use crate::campaign::store::level_table::LevelRow;
 use crate::campaign::store::record_row::{Damaged, RecordRow};
 
 /// Hits from whose times the pace is told.
@@ -59,7 +62,8 @@ impl Follower {
 fn difference(before: &Snapshot, now: &Snapshot) -> Vec<Message> {
     // another plan was taken over, the first session began on a simulated rig, or records are gone: nothing that single messages could tell
     let same_cells = before.cells.iter().map(|cell| cell.id).eq(now.cells.iter().map(|cell| cell.id));
-    let same_rig = (before.simulated, &before.plan) == (now.simulated, &now.plan);
+    let same_rig =
+        (before.simulated, &before.plan, &before.levels) == (now.simulated, &now.plan, &now.levels);
     if !same_cells || !same_rig || now.hits.len() < before.hits.len() {
         return vec![Message::Snapshot(Box::new(now.clone()))];
     }
@@ -107,7 +111,8 @@ fn snapshot(store: &Store) -> Result<Snapshot, StoreError> {
         },
         cells: cells.iter().map(|row| count(row, &tally)).collect(),
         hits,
-        estimate: None,
+        levels: store.levels()?.iter().flatten().map(level).collect(),
+        ..Snapshot::default()
     })
 }
 
@@ -124,6 +129,20 @@ fn count(row: &CellRow, tally: &Tally) -> CellCount {
         refused: count.refused.iter().map(|(kind, n)| (kind.name(), *n)).collect::<BTreeMap<_, _>>(),
         given_up: row.given_up.clone(),
         settled: row.settled.clone(),
+    }
+}
+
+fn level(row: &LevelRow) -> LevelDone {
+    LevelDone {
+        id: row.id,
+        title: row.level().to_string(),
+        moment: row.moment.name(),
+        held: row.held.name(),
+        order: row.amplitude,
+        reached: row.reached,
+        overshoot: row.overshoot,
+        after_s: row.after_s,
+        drive_v: row.drive_v,
     }
 }
 

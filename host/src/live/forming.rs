@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use super::bus::Bus;
 use super::message::{Estimate, Message};
-use crate::analyse::{AnalyseError, Wanted, analyse};
+use crate::analyse::{AnalyseError, Wanted};
 use crate::campaign::store::Store;
 use crate::report::figure::Figure;
 use crate::report::{self, words::brief};
@@ -99,8 +99,14 @@ fn newest(path: &Path) -> Result<Newest, crate::campaign::store::error::StoreErr
 }
 
 fn estimate(path: &Path, last: i64) -> (Estimate, Vec<Figure>) {
-    match results(path) {
-        Ok(results) => (of_results(&results, last), report::all_figures(&results)),
+    let found = Store::open_read_only(path)
+        .map_err(AnalyseError::from)
+        .and_then(|store| report::analysed(&store, Wanted::default(), &|_| {}));
+    match found {
+        Ok(results) => {
+            let figures = report::all_figures(&results);
+            (of_results(&results, &figures, last), figures)
+        }
         Err(error) => {
             let missing = vec![error.to_string()];
             let none = Estimate {
@@ -117,17 +123,7 @@ fn estimate(path: &Path, last: i64) -> (Estimate, Vec<Figure>) {
     }
 }
 
-/// The document of what is stored, as `jointrig analyse` makes it; a simulated rig's truth joins it when all is found.
-fn results(path: &Path) -> Result<Results, AnalyseError> {
-    let store = Store::open_read_only(path)?;
-    let mut results = report::document(analyse(&store, Wanted::default(), &|_| {})?);
-    if let Some(answer) = &mut results.answer {
-        answer.truth = store.simulated_truth()?;
-    }
-    Ok(results)
-}
-
-fn of_results(results: &Results, last: i64) -> Estimate {
+fn of_results(results: &Results, figures: &[Figure], last: i64) -> Estimate {
     Estimate {
         after_record: last,
         hits: results.hits.iter().filter(|hit| hit.kept).count(),
@@ -135,6 +131,6 @@ fn of_results(results: &Results, last: i64) -> Estimate {
         answer: results.answer.clone(),
         lines: brief::answer(results).into_iter().map(|line| [line.head, line.text]).collect(),
         missing: results.missing.clone(),
-        figures: report::all_figures(results).iter().map(|figure| figure.name).collect(),
+        figures: figures.iter().map(|figure| figure.name).collect(),
     }
 }

@@ -3,6 +3,7 @@
 use serde::Serialize;
 use std::collections::BTreeMap;
 
+use super::now::{Control, Disk, Link, Now, Shaker, Signals, State, StreamInfo};
 use crate::results::Answer;
 
 /// Version of these messages.
@@ -22,6 +23,20 @@ pub enum Message {
     Estimate(Box<Estimate>),
     /// The file cannot be read any more.
     Trouble(Trouble),
+    /// What is going on.
+    State(State),
+    /// Where the stream's scans went.
+    Link(Link),
+    /// What the stream consists of.
+    Stream(StreamInfo),
+    /// How large the signals are.
+    Signals(Signals),
+    /// The shaker's level.
+    Shaker(Box<Shaker>),
+    /// Room for the campaign file.
+    Disk(Disk),
+    /// Who answers for hammer and laser.
+    Control(Control),
 }
 
 /// All that there is to know.
@@ -41,8 +56,48 @@ pub struct Snapshot {
     pub progress: Progress,
     /// Every hit, in order.
     pub hits: Vec<Hit>,
+    /// Every level of the shaker that is stored.
+    pub levels: Vec<LevelDone>,
     /// What the analysis said last; none before it said anything.
     pub estimate: Option<Estimate>,
+    /// What is told while something is measured in this process.
+    pub now: Now,
+    /// What this server can do besides looking.
+    pub can: Can,
+}
+
+/// What a server can do besides looking.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Can {
+    /// It sees the stream of a device.
+    pub stream: bool,
+    /// It takes notes, and overrules verdicts.
+    pub edit: bool,
+    /// It lets a page answer for hammer and laser.
+    pub control: bool,
+}
+
+/// A level of the shaker that is stored.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LevelDone {
+    /// Its id.
+    pub id: i64,
+    /// In words.
+    pub title: String,
+    /// `before` or `after` the hammer's cells.
+    pub moment: &'static str,
+    /// What is held: `displacement`, `force` or `drive`.
+    pub held: &'static str,
+    /// The order, m, N or V.
+    pub order: f64,
+    /// The amplitude over the record, m, N or V.
+    pub reached: f64,
+    /// Largest amplitude on the way, over the order.
+    pub overshoot: f64,
+    /// Time from the order to the record, s.
+    pub after_s: f64,
+    /// The drive then, V.
+    pub drive_v: f64,
 }
 
 /// How far a campaign is.

@@ -1,11 +1,21 @@
-//! What can be said of a campaign while it is measured. All of it is read from the campaign file, so that it is the same in the measuring
-//! process and beside it, and nothing here can slow the measuring: a reader of SQLite's write-ahead log blocks no writer.
+//! What can be said of a campaign while it is measured.
 //!
-//! [`follow`] sees what is new in the file, [`forming`] runs the analysis on what is there, [`bus`] numbers what both have to say and keeps
-//! it for whoever listens, [`message`] is its layout, [`figures`] draws single records.
+//! What is stored is read from the campaign file, so that it is the same in the measuring process and beside it; a reader of SQLite's
+//! write-ahead log blocks no writer. [`follow`] sees what is new in the file, [`forming`] runs the analysis on what is there, [`figures`] draws
+//! single records.
+//!
+//! What happens between two records is told by the measuring process itself: [`eye`] takes down what its thread says without ever waiting,
+//! [`watching`] hears that, looks at the stream through the tap, makes [`frames`] of it, and [`turning`] the shaker's loop.
+//!
+//! [`bus`] numbers what all of them have to say and keeps it for whoever listens; [`message`] and [`now`] are its layout.
 
 pub mod bus;
+pub mod eye;
 pub mod figures;
 pub mod follow;
 pub mod forming;
+pub mod frames;
 pub mod message;
+pub mod now;
+pub mod turning;
+pub mod watching;

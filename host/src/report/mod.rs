@@ -3,6 +3,7 @@
 //! The page is one self-contained html text: figures are inline SVG, nothing is fetched, it prints. Everything
 //! shown stands in [`Results`]; this room computes no result.
 
+mod analysed;
 pub mod cell_records;
 mod csv;
 mod document;
@@ -16,6 +17,7 @@ mod svg;
 mod tables;
 pub mod words;
 
+pub use analysed::analysed;
 pub use document::{compare, document};
 pub use page::{chart_style, comparison_page, figure_fragment, page, script};
 

@@ -17,6 +17,7 @@ use jointrig::campaign::store::record_row::RecordRow;
 use jointrig::campaign::verdict::judge::Judge;
 use jointrig::campaign::verdict::others::Others;
 use jointrig::campaign::verdict::{Kind, Verdict};
+use jointrig::campaign::watch::Watchers;
 use jointrig::device::channels::ChannelMap;
 use jointrig::device::logs::Tables;
 use jointrig::device::recording::Recording;
@@ -36,7 +37,14 @@ fn plan() -> String {
 }
 
 fn options() -> Options {
-    Options { stage: Stage::Auto, yes: true, progress: false, stop: Arc::default() }
+    Options {
+        stage: Stage::Auto,
+        yes: true,
+        watch: Watchers::default(),
+        edits: None,
+        answers: None,
+        stop: Arc::default(),
+    }
 }
 
 fn run_on(

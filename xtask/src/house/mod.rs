@@ -3,6 +3,7 @@
 mod circles;
 mod declarations;
 mod equations;
+mod features;
 mod graph;
 mod modules;
 mod pages;
@@ -16,12 +17,13 @@ use anyhow::{Result, bail};
 /// One law: its name, and its check, which returns a remark.
 type Law = (&'static str, fn(&Project) -> Result<String>);
 
-const LAWS: [Law; 6] = [
+const LAWS: [Law; 7] = [
     ("which crate uses which", graph::check),
     ("files in circles", circles::check),
     ("the host's rooms", rooms::check),
     ("equations", equations::check),
     ("licences, bans, sources", policy::check),
+    ("features", features::check),
     ("pages", pages::check),
 ];
 

@@ -2,16 +2,18 @@
 
 use jointrig_protocol::shot::Shot;
 
+use super::answers::Question;
 use super::directions::name;
 use super::error::RunError;
 use super::quiet;
 use super::runner::{Next, Runner, still};
 use super::shot::{Outcome, QuietLimits};
-use super::stage::{Moved, Stage};
+use super::stage::{Moved, Stage, Who};
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::codec;
 use crate::campaign::verdict::others::Others;
 use crate::campaign::verdict::{Kind, Verdict};
+use crate::campaign::watch::Seen;
 use crate::device::recording::Recording;
 
 /// Shots of one cell that may be cancelled or find no quiet, before the cell is given up.
@@ -39,6 +41,10 @@ impl Runner<'_> {
         let mut quiet = quiet::unknown(self.channels);
         let mut setbacks = 0;
         while (self.tally.open(row.id) || !again.is_empty()) && !self.stopped() {
+            self.recount();
+            if again.is_empty() && !self.tally.open(row.id) {
+                break;
+            }
             if again.is_empty() && self.ended(row, &others)? {
                 break;
             }
@@ -48,7 +54,10 @@ impl Runner<'_> {
                 |(_, _, pulse_us)| pulse_us,
             );
             self.mark()?;
-            let outcome = self.shooter.shoot(self.session, pulse_us, &quiet, &self.options.stop)?;
+            let (standing, most_s) = (self.standing(row), self.plan.settle.get_ref().bound_s);
+            self.saw(&Seen::Settling { row, standing, most_s });
+            let (stop, watch) = (&self.options.stop, &self.options.watch);
+            let outcome = self.shooter.shoot(self.session, pulse_us, &quiet, stop, watch)?;
             if let (Some((record, stored, _)), Some(crc)) = (known, crc_of(&outcome)) {
                 again.pop_front();
                 if crc == stored {
@@ -69,6 +78,7 @@ impl Runner<'_> {
                 Outcome::Recorded(recording) => {
                     setbacks = 0;
                     quiet = quiet::after(&recording, self.channels, self.plan.settle.get_ref(), 1.0);
+                    self.saw(&Seen::Judging);
                     let verdict = self.judge.judge(&row.cell, self.plan, self.channels, &recording, &others);
                     if verdict.kind == Kind::Good {
                         others.learn(self.plan, self.channels, recording.view());
@@ -134,7 +144,7 @@ impl Runner<'_> {
         };
         if kept >= hits.minimum && kept > 0 {
             self.tally.settle(row.id);
-            self.progress.say(&format!("{}: settled: {reason}", name(&row.cell)));
+            self.saw(&Seen::Remark(&format!("{}: settled: {reason}", name(&row.cell))));
             still(self.keeper.settle(row.id, &reason))?;
         } else {
             self.give_up(row, &format!("{reason}, at least {} needed", hits.minimum))?;
@@ -145,10 +155,16 @@ impl Runner<'_> {
     /// Brings hammer and laser to a cell. The acknowledgement is held meanwhile, so that the first shot is at a
     /// fixed distance from the scan at which they are in place.
     fn go(&mut self, row: &CellRow, attempt: u32) -> Result<Moved, RunError> {
-        self.progress.cell(&row.cell, self.left(row));
+        let by_hand = !matches!(self.stage, Stage::Device | Stage::Auto);
+        let (standing, left) = (self.standing(row), self.left(row));
+        self.saw(&Seen::Moving { row, standing, by_hand, left });
         let what = self.directions(row);
-        let (stage, session, yes) = (&self.stage, &mut *self.session, self.options.yes);
-        let moved = self.progress.aside(|| stage.go(session, &row.cell, attempt, &what, yes))?;
+        let question = Question { cell: row.id, attempt };
+        let elsewhere = self.options.answers.as_ref().map(|answers| (answers, question));
+        let who = Who { yes: self.options.yes, elsewhere };
+        let moved = self.stage.go(self.session, &row.cell, attempt, &what, &who);
+        self.saw(&Seen::Moved);
+        let moved = moved?;
         if let Moved::InPlace(at_scan) = moved {
             self.shooter.staged(at_scan);
         }
@@ -162,19 +178,19 @@ impl Runner<'_> {
              going on with this one",
             name(&row.cell)
         );
-        self.progress.say(&text);
+        self.saw(&Seen::Remark(&text));
         still(self.keeper.log(text))
     }
 
     fn give_up(&mut self, row: &CellRow, reason: &str) -> Result<(), RunError> {
         self.tally.give_up(row.id);
-        self.progress.say(&format!("{}: given up: {reason}", name(&row.cell)));
+        self.saw(&Seen::Remark(&format!("{}: given up: {reason}", name(&row.cell))));
         still(self.keeper.give_up(row.id, reason))
     }
 
     /// Notes a setback; returns whether it is worth trying again.
     fn set_back(&self, row: &CellRow, setbacks: u32, why: &str) -> Result<bool, RunError> {
-        self.progress.say(&format!("{}: {why}", name(&row.cell)));
+        self.saw(&Seen::Remark(&format!("{}: {why}", name(&row.cell))));
         still(self.keeper.log(format!("{}: {why}", name(&row.cell))))?;
         Ok(setbacks < SETBACKS)
     }

@@ -1,9 +1,9 @@
 //! What the person at the rig is told of a cell: what belongs where, and how much is left to do.
 
-use super::progress::Left;
 use super::runner::Runner;
 use crate::campaign::plan::{Cell, configuration_name};
 use crate::campaign::store::cell_table::CellRow;
+use crate::campaign::watch::{Left, Standing};
 
 impl Runner<'_> {
     /// What a person is told before a cell: what belongs where, and how far the cell is.
@@ -30,6 +30,11 @@ impl Runner<'_> {
             cell.impact,
             cell.response,
         )
+    }
+
+    /// How far a cell is.
+    pub(super) fn standing(&self, row: &CellRow) -> Standing {
+        Standing { kept: self.tally.kept_in(row.id), attempts: self.tally.attempts(row.id) }
     }
 
     /// Good hits that are still wanted here, in this structure, and in all.

@@ -3,9 +3,11 @@
 //! The queue is short, so that a slow disk slows the campaign instead of filling the memory, and the first
 //! error ends it: nothing is measured that cannot be kept.
 
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
+use super::edits::{Edits, Recount};
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
 use crate::campaign::store::record_row::NewRecord;
@@ -13,6 +15,9 @@ use crate::campaign::store::session_table::Counters;
 
 /// Records under way to the disk.
 const QUEUE: usize = 2;
+
+/// How often it looks whether a person wants something changed.
+const EDITS: Duration = Duration::from_millis(50);
 
 /// What is to be stored.
 enum Entry {
@@ -28,17 +33,26 @@ enum Entry {
 pub struct Keeper {
     queue: Option<SyncSender<Entry>>,
     thread: Option<JoinHandle<(Store, Result<(), StoreError>)>>,
+    recounts: Receiver<Recount>,
 }
 
 impl Keeper {
     /// Takes the store over until [`Keeper::finish`].
-    pub fn start(store: Store) -> Self {
-        let (queue, entries) = sync_channel(QUEUE);
+    pub fn start(store: Store, edits: Option<Edits>) -> Self {
+        let ((queue, entries), (to, recounts)) = (sync_channel(QUEUE), channel());
         let thread = std::thread::spawn(move || {
-            let kept = keep(&store, &entries);
+            let kept = match edits {
+                Some(edits) => keep_and_edit(&store, &entries, &edits, &to),
+                None => entries.iter().try_for_each(|entry| keep(&store, entry)),
+            };
             (store, kept)
         });
-        Self { queue: Some(queue), thread: Some(thread) }
+        Self { queue: Some(queue), thread: Some(thread), recounts }
+    }
+
+    /// Cells whose count persons have changed since this was asked last.
+    pub fn recounts(&self) -> Vec<Recount> {
+        self.recounts.try_iter().collect()
     }
 
     /// Stores a record, with the link's counters so far; waits only when the disk is two records behind. Returns whether the
@@ -109,20 +123,36 @@ impl Drop for Keeper {
     }
 }
 
-fn keep(store: &Store, entries: &Receiver<Entry>) -> Result<(), StoreError> {
-    for entry in entries {
-        match entry {
-            Entry::Record(record, counters) => {
-                store.insert(&record, &counters)?;
-            }
-            Entry::Settled { cell, reason } => store.settle(cell, &reason)?,
-            Entry::Redo { cell, reason } => {
-                store.redo(cell, &reason)?;
-            }
-            Entry::Link { session, counters } => store.note_link(session, &counters)?,
-            Entry::GivenUp { cell, reason } => store.give_up(cell, &reason)?,
-            Entry::Log(text) => store.log(&text)?,
+fn keep(store: &Store, entry: Entry) -> Result<(), StoreError> {
+    match entry {
+        Entry::Record(record, counters) => store.insert(&record, &counters).map(drop),
+        Entry::Settled { cell, reason } => store.settle(cell, &reason),
+        Entry::Redo { cell, reason } => store.redo(cell, &reason).map(drop),
+        Entry::Link { session, counters } => store.note_link(session, &counters),
+        Entry::GivenUp { cell, reason } => store.give_up(cell, &reason),
+        Entry::Log(text) => store.log(&text),
+    }
+}
+
+/// Keeps what comes, and in between does what persons want changed.
+fn keep_and_edit(
+    store: &Store,
+    entries: &Receiver<Entry>,
+    edits: &Edits,
+    recounts: &Sender<Recount>,
+) -> Result<(), StoreError> {
+    loop {
+        let next = entries.recv_timeout(EDITS);
+        let over = matches!(next, Err(RecvTimeoutError::Disconnected));
+        if let Ok(entry) = next {
+            keep(store, entry)?;
+        }
+        for recount in edits.work_off(store)? {
+            // a runner that has ended counts no more
+            let _ = recounts.send(recount);
+        }
+        if over {
+            return Ok(());
         }
     }
-    Ok(())
 }

@@ -2,17 +2,20 @@
 //!
 //! `runner.rs` walks the cells and keeps what comes, `cell.rs` brings one cell to its end, `shot.rs` fires once, `stage.rs` moves hammer and
 //! laser, `forces.rs` says how hard (by the closed loops of `pulse.rs`),
+//! `edits.rs` takes notes and overruled verdicts from elsewhere, `answers.rs` the stage's answers,
 //! `fit.rs` asks before all that whether the device fits the plan.
 
+pub mod answers;
 mod cell;
 mod clock;
 mod directions;
 mod earlier;
+pub mod edits;
 pub mod error;
 mod fit;
 mod forces;
 mod keeper;
-mod progress;
+pub mod progress;
 pub mod pulse;
 pub mod quiet;
 pub mod runner;

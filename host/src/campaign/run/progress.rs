@@ -1,56 +1,96 @@
 //! What the person at the rig sees while a campaign runs; always on stderr.
 
-use std::cell::Cell;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::campaign::plan::{Cell as PlanCell, configuration_name};
-use crate::campaign::verdict::Verdict;
-
-/// Good hits that are still wanted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Left {
-    /// In the cell.
-    pub cell: u64,
-    /// In its configuration.
-    pub configuration: u64,
-    /// In the campaign.
-    pub campaign: u64,
-}
+use crate::campaign::watch::{Left, Seen, Watch};
 
 /// A bar over the hits of the campaign, with the time that is left of cell, configuration and campaign.
+#[derive(Default)]
 pub struct Progress {
+    state: Mutex<Option<State>>,
+}
+
+/// What it shows, once the campaign has begun.
+struct State {
     bar: ProgressBar,
+    wanted: u64,
     /// Good hits that were there at the beginning.
     before: u64,
     begun: Instant,
-    /// Time that a person took to move things, s.
-    aside: Cell<Duration>,
+    /// Time that a person took to move things, and since when one does.
+    aside: Duration,
+    aside_since: Option<Instant>,
+}
+
+impl Watch for Progress {
+    fn saw(&self, seen: &Seen<'_>) {
+        let mut state = self.state();
+        if let Seen::Begun { wanted, kept } = *seen {
+            *state = Some(State::new(wanted, kept));
+            return;
+        }
+        let Some(state) = state.as_mut() else {
+            if let Seen::Remark(text) = seen {
+                log::warn!("{text}");
+            }
+            return;
+        };
+        match *seen {
+            Seen::Moving { row, by_hand, left, .. } => {
+                state.bar.set_message(format!("{}  {}", label(&row.cell), state.time_left(&row.cell, left)));
+                if by_hand {
+                    state.step_aside();
+                }
+            }
+            Seen::Moved => state.come_back(),
+            Seen::Judged { row, verdict, kept, left } => {
+                state.bar.set_position(kept);
+                let (time, label) = (state.time_left(&row.cell, left), label(&row.cell));
+                state.bar.set_message(format!("{label}  {time}  {}: {}", verdict.kind, verdict.sentence));
+            }
+            Seen::Remark(text) if state.bar.is_hidden() => log::warn!("{text}"),
+            Seen::Remark(text) => state.bar.println(text),
+            Seen::Ended => state.bar.finish_and_clear(),
+            _ => {}
+        }
+    }
 }
 
 impl Progress {
-    /// A bar over `wanted` hits, of which `kept` are there already; invisible unless `shown`.
-    pub fn new(wanted: u64, kept: u64, shown: bool) -> Self {
-        let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let bar = ProgressBar::with_draw_target(Some(wanted), target).with_position(kept);
-        if let Ok(style) = ProgressStyle::with_template("{bar:24} {pos}/{len} hits  {wide_msg}") {
-            bar.set_style(style);
+    fn state(&self) -> MutexGuard<'_, Option<State>> {
+        // a bar that a panic left half drawn is drawn anew
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl State {
+    fn new(wanted: u64, kept: u64) -> Self {
+        Self {
+            bar: bar(wanted, kept),
+            wanted,
+            before: kept,
+            begun: Instant::now(),
+            aside: Duration::ZERO,
+            aside_since: None,
         }
-        bar.enable_steady_tick(Duration::from_millis(250));
-        Self { bar, before: kept, begun: Instant::now(), aside: Cell::default() }
     }
 
-    /// Hammer and laser moved here.
-    pub fn cell(&self, cell: &PlanCell, left: Left) {
-        self.bar.set_message(format!("{}  {}", label(cell), self.time_left(cell, left)));
+    /// A prompt takes the bar's place.
+    fn step_aside(&mut self) {
+        self.aside_since = Some(Instant::now());
+        self.bar.finish_and_clear();
     }
 
-    /// A record was judged; `kept` good ones are there in all.
-    pub fn judged(&self, cell: &PlanCell, verdict: &Verdict, kept: u64, left: Left) {
-        self.bar.set_position(kept);
-        let (time, label) = (self.time_left(cell, left), label(cell));
-        self.bar.set_message(format!("{label}  {time}  {}: {}", verdict.kind, verdict.sentence));
+    fn come_back(&mut self) {
+        if let Some(since) = self.aside_since.take() {
+            self.aside += since.elapsed();
+            let message = self.bar.message();
+            self.bar = bar(self.wanted, self.bar.position()).with_message(message);
+        }
     }
 
     /// `left: cell 9 s, AJB 4 min, all 1 h 10 min`, from the time that a good hit took so far.
@@ -59,7 +99,7 @@ impl Progress {
         if good == 0 {
             return String::new();
         }
-        let each = self.begun.elapsed().saturating_sub(self.aside.get()).as_secs_f64() / good as f64;
+        let each = self.begun.elapsed().saturating_sub(self.aside).as_secs_f64() / good as f64;
         let time = |hits: u64| duration(each * hits as f64);
         let name = configuration_name(cell.configuration);
         format!(
@@ -69,28 +109,16 @@ impl Progress {
             time(left.campaign)
         )
     }
+}
 
-    /// Something worth a line of its own.
-    pub fn say(&self, text: &str) {
-        if self.bar.is_hidden() {
-            log::warn!("{text}");
-        } else {
-            self.bar.println(text);
-        }
+/// A bar over `wanted` hits, of which `kept` are there.
+fn bar(wanted: u64, kept: u64) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(wanted), ProgressDrawTarget::stderr()).with_position(kept);
+    if let Ok(style) = ProgressStyle::with_template("{bar:24} {pos}/{len} hits  {wide_msg}") {
+        bar.set_style(style);
     }
-
-    /// Runs `work` with the bar out of the way (prompts).
-    pub fn aside<T>(&self, work: impl FnOnce() -> T) -> T {
-        let begun = Instant::now();
-        let done = self.bar.suspend(work);
-        self.aside.set(self.aside.get() + begun.elapsed());
-        done
-    }
-
-    /// The end.
-    pub fn finish(&self) {
-        self.bar.finish_and_clear();
-    }
+    bar.enable_steady_tick(Duration::from_millis(250));
+    bar
 }
 
 /// A time as people say it.

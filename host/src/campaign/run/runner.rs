@@ -6,17 +6,19 @@
 //! the next hit is the one that an undisturbed run would have made, to the last bit. A real structure is not struck in vain: it
 //! settles, and goes on.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
+use super::answers::Answers;
 use super::clock::ScanClock;
 use super::earlier::Earlier;
+use super::edits::{Edits, Recount};
 use super::error::RunError;
 use super::fit::check_fit;
 use super::forces::Forces;
 use super::keeper::Keeper;
-use super::progress::Progress;
 use super::pulse::Hit;
 use super::shot::Shooter;
 use super::stage::Stage;
@@ -26,9 +28,11 @@ use crate::campaign::store::Store;
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::record_row::NewRecord;
 use crate::campaign::store::session_table::{Counters, SessionInfo};
+use crate::campaign::store::simulated::is_simulated_board;
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::judge::Judge;
 use crate::campaign::verdict::{Kind, Verdict};
+use crate::campaign::watch::{Seen, Watchers};
 use crate::device::channels::ChannelMap;
 use crate::device::recording::Recording;
 use crate::device::session::Session;
@@ -41,8 +45,12 @@ pub struct Options {
     pub stage: Stage,
     /// Answer every prompt with yes.
     pub yes: bool,
-    /// Show a progress bar on stderr.
-    pub progress: bool,
+    /// Who watches.
+    pub watch: Watchers,
+    /// What persons elsewhere want changed in the file.
+    pub edits: Option<Edits>,
+    /// Answers to the stage's questions from elsewhere than the terminal.
+    pub answers: Option<Answers>,
     /// Set to end the run after the shot in hand.
     pub stop: Arc<AtomicBool>,
 }
@@ -100,7 +108,9 @@ pub fn run(
     session.set_load_cells([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])?;
     let (epoch, _) = session.start(channels.len())?;
     let shooter = Shooter::new(session, &plan, epoch, channels.len())?;
-    let progress = Progress::new(tally.wanted(), tally.kept(), options.progress);
+    let simulated = is_simulated_board(&info.board);
+    options.watch.saw(&Seen::Stream { channels: &channels, simulated });
+    options.watch.saw(&Seen::Begun { wanted: tally.wanted(), kept: tally.kept() });
     let block = jointrig_protocol::limits::scans_per_block(channels.len()).unwrap_or(1);
     let mut runner = Runner {
         plan: &plan,
@@ -114,10 +124,10 @@ pub fn run(
         shooter,
         forces,
         clock: ScanClock::new(f64::from(channels.rate_hz), block),
-        keeper: Keeper::start(store),
+        keeper: Keeper::start(store, options.edits.clone()),
         session_id: id,
         tally,
-        progress,
+        reopened: BTreeSet::new(),
         hits: 0,
     };
     let walked = runner.walk();
@@ -140,7 +150,8 @@ pub(super) struct Runner<'a> {
     pub(super) keeper: Keeper,
     pub(super) session_id: i64,
     pub(super) tally: Tally,
-    pub(super) progress: Progress,
+    /// Cells that lost a good hit to a person in this run.
+    reopened: BTreeSet<i64>,
     pub(super) hits: u64,
 }
 
@@ -156,12 +167,24 @@ impl Runner<'_> {
         self.options.stop.load(Ordering::Relaxed)
     }
 
+    pub(super) fn saw(&self, seen: &Seen<'_>) {
+        self.options.watch.saw(seen);
+    }
+
     fn walk(&mut self) -> Result<(), RunError> {
         let cells = self.cells;
         let (mut at, mut back) = (0, false);
-        while let Some(row) = cells.get(at)
-            && !self.stopped()
-        {
+        while !self.stopped() {
+            self.recount();
+            let Some(row) = cells.get(at) else {
+                // a cell behind us that lost a hit to a person gets another one
+                let tally = &self.tally;
+                let lost = cells.iter().find(|row| self.reopened.contains(&row.id) && tally.open(row.id));
+                let Some(row) = lost else { break };
+                self.reopened.remove(&row.id);
+                self.cell(row)?;
+                continue;
+            };
             // a cell that somebody went back to is shown whatever its state
             if !self.tally.open(row.id) && !back {
                 at += 1;
@@ -179,6 +202,16 @@ impl Runner<'_> {
             };
         }
         Ok(())
+    }
+
+    /// Counts what persons elsewhere have overruled since.
+    pub(super) fn recount(&mut self) {
+        for Recount { cell, more } in self.keeper.recounts() {
+            self.tally.recount(cell, more);
+            if !more {
+                self.reopened.insert(cell);
+            }
+        }
     }
 
     /// Notes where the scan clock is.
@@ -200,7 +233,9 @@ impl Runner<'_> {
         let shot = recording.shot;
         self.forces.learn(Hit { pulse_us: shot.pulse_us, peak_n: verdict.peak_n });
         let attempt = self.tally.add(row.id, verdict.kind == Kind::Good);
-        self.progress.judged(&row.cell, &verdict, self.tally.kept(), self.left(row));
+        let (kept, left) = (self.tally.kept(), self.left(row));
+        self.saw(&Seen::Judged { row, verdict: &verdict, kept, left });
+        self.saw(&Seen::Link(self.session.accounts()));
         log::debug!("{:?} attempt {attempt}: {} ({})", row.cell, verdict.kind, verdict.sentence);
         self.keep_log()?;
         let (utc, utc_error_s) = self.clock.utc(recording.first_scan + recording.trigger_index as u64);
@@ -224,7 +259,7 @@ impl Runner<'_> {
 
     /// Ends stream and file; of two errors the first one counts.
     fn end(mut self, walked: Result<(), RunError>) -> Result<Summary, RunError> {
-        self.progress.finish();
+        self.saw(&Seen::Ended);
         let accounts = if walked.is_ok() {
             self.session.disarm().and_then(|()| self.session.finish())
         } else {

@@ -13,6 +13,7 @@ use jointrig_protocol::request::{Fire, Trigger};
 use jointrig_protocol::shot::{Phase, Shot};
 
 use crate::campaign::plan::Plan;
+use crate::campaign::watch::{Seen, Watchers};
 use crate::device::error::DeviceError;
 use crate::device::recording::{Recording, by_channel};
 use crate::device::session::Session;
@@ -107,6 +108,7 @@ impl Shooter {
         pulse_us: u32,
         quiet: &QuietLimits,
         stop: &AtomicBool,
+        watch: &Watchers,
     ) -> Result<Outcome, DeviceError> {
         self.number += 1;
         let not_before = self.ready_at;
@@ -161,6 +163,9 @@ impl Shooter {
             Phase::Cancelled => reach + rest,
             _ => shot.trigger + self.post.max(u64::from(self.trigger.listen_scans) + rest),
         };
+        if matches!(shot.phase, Phase::Listening | Phase::Done) {
+            watch.saw(&Seen::Recording);
+        }
         session.hold_acknowledgement(Some(decision));
         session.wait_for(decision)?;
         self.ready_at = decision + self.ring / 2 + MARGIN;

@@ -3,10 +3,13 @@
 use std::io::{BufRead, Write};
 use std::process::Command;
 use std::str::FromStr;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 use jointrig_protocol::request::Stage as StageRequest;
 
+use super::answers::{Answers, Key, Question};
 use crate::campaign::plan::{Cell, configuration_name};
 use crate::device::error::DeviceError;
 use crate::device::session::Session;
@@ -92,7 +95,7 @@ impl Stage {
     }
 
     /// Brings hammer and laser to `cell`, whose next attempt is `attempt`; `what` tells a person where they belong and how
-    /// far the cell is. In place, the acknowledgement is held at or before the scan that is returned. `yes` answers a prompt.
+    /// far the cell is. In place, the acknowledgement is held at or before the scan that is returned. `who` answers a prompt.
     ///
     /// # Errors
     /// They are not in place, and why.
@@ -102,7 +105,7 @@ impl Stage {
         cell: &Cell,
         attempt: u32,
         what: &str,
-        yes: bool,
+        who: &Who<'_>,
     ) -> Result<Moved, StageError> {
         match self {
             Self::Device | Self::Auto => {
@@ -112,7 +115,7 @@ impl Stage {
                 let request = StageRequest { configuration, impact, response, attempt };
                 return Ok(Moved::InPlace(session.stage(request)?));
             }
-            Self::Manual => match meanwhile(session, || ask(what, yes))? {
+            Self::Manual => match meanwhile(session, || who.ask(what))? {
                 Key::Accept => {}
                 Key::Redo => return Ok(Moved::Redo),
                 Key::Skip => return Ok(Moved::Skip),
@@ -146,17 +149,87 @@ fn meanwhile<T: Send>(
     })
 }
 
-/// What a person may answer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Key {
-    Accept,
-    Redo,
-    Skip,
-    Back,
+/// Who answers a prompt.
+pub struct Who<'a> {
+    /// Nobody is asked: everything is in place.
+    pub yes: bool,
+    /// Somebody elsewhere may answer too, and what the question is about.
+    pub elsewhere: Option<(&'a Answers, Question)>,
 }
 
-fn ask(what: &str, yes: bool) -> Result<Key, StageError> {
-    prompt(what, yes, &mut std::io::stdin().lock(), &mut std::io::stderr())
+/// How often somebody elsewhere is listened to.
+const LISTEN: Duration = Duration::from_millis(50);
+
+const QUESTION: &str = "Enter when in place; r redo this cell, s skip it, b back one cell, q quit: ";
+
+impl Who<'_> {
+    fn ask(&self, what: &str) -> Result<Key, StageError> {
+        match self.elsewhere {
+            Some((answers, question)) if !self.yes => ask_both(what, answers, question),
+            _ => prompt(what, self.yes, &mut std::io::stdin().lock(), &mut std::io::stderr()),
+        }
+    }
+}
+
+/// What is typed, line by line, read on a thread of its own: it waits for the keyboard while an answer may come from elsewhere.
+fn keyboard() -> &'static Mutex<Receiver<String>> {
+    static LINES: OnceLock<Mutex<Receiver<String>>> = OnceLock::new();
+    LINES.get_or_init(|| {
+        let (to, lines) = sync_channel(16);
+        std::thread::spawn(move || {
+            for line in std::io::stdin().lines().map_while(Result::ok) {
+                if to.send(line).is_err() {
+                    return;
+                }
+            }
+        });
+        Mutex::new(lines)
+    })
+}
+
+/// Asks at the terminal and elsewhere; the first answer counts. Where there is no terminal, elsewhere alone.
+fn ask_both(what: &str, answers: &Answers, question: Question) -> Result<Key, StageError> {
+    let lines = keyboard().lock().unwrap_or_else(PoisonError::into_inner);
+    // what was said before the question is no answer to it
+    answers.forget();
+    lines.try_iter().for_each(drop);
+    eprint!("\n{what}\n{QUESTION}");
+    loop {
+        if let Some(key) = answers.heard(question) {
+            eprintln!("answered on the page: {key:?}");
+            return Ok(key);
+        }
+        if answers.stopped() {
+            return Err(StageError::Stopped);
+        }
+        match lines.recv_timeout(LISTEN) {
+            Ok(line) => match understood(&line) {
+                Understood::Key(key) => return Ok(key),
+                Understood::Quit => return Err(StageError::Stopped),
+                Understood::Nothing => eprint!("`{}` is none of these\n{QUESTION}", line.trim()),
+            },
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => std::thread::sleep(LISTEN),
+        }
+    }
+}
+
+/// What a line means.
+enum Understood {
+    Key(Key),
+    Quit,
+    Nothing,
+}
+
+fn understood(line: &str) -> Understood {
+    match line.trim().to_ascii_lowercase().as_str() {
+        "" | "a" | "y" => Understood::Key(Key::Accept),
+        "r" => Understood::Key(Key::Redo),
+        "s" => Understood::Key(Key::Skip),
+        "b" => Understood::Key(Key::Back),
+        "q" => Understood::Quit,
+        _ => Understood::Nothing,
+    }
 }
 
 /// Asks until there is an answer that can be understood.
@@ -173,20 +246,16 @@ fn prompt(
         return Ok(Key::Accept);
     }
     loop {
-        let _ = write!(screen, "Enter when in place; r redo this cell, s skip it, b back one cell, q quit: ")
-            .and_then(|()| screen.flush());
+        let _ = write!(screen, "{QUESTION}").and_then(|()| screen.flush());
         let mut line = String::new();
         if !matches!(keys.read_line(&mut line), Ok(length) if length > 0) {
             return Err(StageError::NobodyThere);
         }
-        match line.trim().to_ascii_lowercase().as_str() {
-            "" | "a" | "y" => return Ok(Key::Accept),
-            "r" => return Ok(Key::Redo),
-            "s" => return Ok(Key::Skip),
-            "b" => return Ok(Key::Back),
-            "q" => return Err(StageError::Stopped),
-            other => {
-                let _ = writeln!(screen, "`{other}` is none of these");
+        match understood(&line) {
+            Understood::Key(key) => return Ok(key),
+            Understood::Quit => return Err(StageError::Stopped),
+            Understood::Nothing => {
+                let _ = writeln!(screen, "`{}` is none of these", line.trim().to_ascii_lowercase());
             }
         }
     }

@@ -89,6 +89,18 @@ impl Tally {
         count.attempts - 1
     }
 
+    /// A person overruled the verdict of a hit: one good hit more, or less. With less than it was settled with, a cell is open again.
+    pub fn recount(&mut self, id: i64, more: bool) {
+        let count = self.cells.entry(id).or_default();
+        if more {
+            count.kept += 1;
+        } else {
+            count.kept = count.kept.saturating_sub(1);
+            count.settled = false;
+            *count.refused.entry(Kind::Dropped).or_default() += 1;
+        }
+    }
+
     /// A cell is done with what it has.
     pub fn settle(&mut self, id: i64) {
         self.cells.entry(id).or_default().settled = true;

@@ -52,6 +52,11 @@ pub struct SimulatedTruth {
     pub slip_limit_n: Option<f64>,
 }
 
+/// Whether a board of this name measures a simulated rig.
+pub fn is_simulated_board(name: &str) -> bool {
+    [Info::VIRTUAL_BOARD, Info::EMULATED_BOARD].contains(&name)
+}
+
 impl Store {
     /// Notes which simulated rig the campaign is run on, and its truth; the last session's counts.
     pub(crate) fn note_simulated(&self, simulated: &Simulated) -> Result<(), StoreError> {
@@ -74,8 +79,7 @@ impl Store {
     /// # Errors
     /// The notes or sessions cannot be read.
     pub fn is_simulated(&self) -> Result<bool, StoreError> {
-        let simulated = [Info::VIRTUAL_BOARD, Info::EMULATED_BOARD];
-        let behind_a_wire = self.sessions()?.iter().any(|(_, info)| simulated.contains(&info.board.as_str()));
+        let behind_a_wire = self.sessions()?.iter().any(|(_, info)| is_simulated_board(&info.board));
         Ok(behind_a_wire || self.simulated_rig()?.is_some())
     }
 

@@ -5,7 +5,7 @@ mod check;
 mod judged;
 mod new;
 mod plan_file;
-mod run;
+pub mod run;
 mod show;
 mod status;
 mod verify;

@@ -12,6 +12,7 @@ use crate::campaign::verdict::others::Others;
 use crate::campaign::verdict::{Kind, Verdict};
 use crate::cli::campaign::plan_file;
 use crate::cli::error::CliError;
+use crate::cli::page::Page;
 use crate::cli::{interrupt, measure};
 use crate::device::address::Address;
 use crate::device::channels::ChannelMap;
@@ -44,28 +45,59 @@ pub struct Run {
     /// Folder of the tables by which the controller's log lines are read (else JOINTRIG_LOG_TABLES).
     #[arg(long, value_name = "DIR")]
     log_tables: Option<PathBuf>,
-    #[cfg(feature = "dashboard")]
     #[command(flatten)]
-    page: crate::cli::page::Page,
+    page: Page,
+    /// Let a page answer for hammer and laser too: in place, redo, skip, back. Whoever answers must see the rig.
+    #[cfg(feature = "dashboard")]
+    #[arg(long, requires = "serve")]
+    allow_control: bool,
 }
 
 impl Run {
+    /// The plain command with a page beside it.
+    #[cfg(feature = "dashboard")]
+    pub fn with_page(file: PathBuf, device: String, page: Page, allow_control: bool) -> Self {
+        Self {
+            file,
+            device,
+            stage: Stage::Auto,
+            yes: false,
+            plan: None,
+            bell: false,
+            seed: 1,
+            log_tables: None,
+            page,
+            allow_control,
+        }
+    }
+
     pub fn run(self) -> Result<(), CliError> {
         let address: Address = self.device.parse()?;
         let mut store = Store::open(&self.file)?;
         self.settle_plan(&mut store)?;
         self.mention_shaker(&store)?;
-        #[cfg(feature = "dashboard")]
-        let _page = self.page.start(&self.file)?;
-        let again = format!("jointrig campaign run {} --device {address}", self.file.display());
         let stop = interrupt::flag();
+        let mut onlooker = self.page.start(Some(&self.file), &stop, self.allows_control())?;
+        let again = format!("jointrig campaign run {} --device {address}", self.file.display());
         let device = measure::Device { address: &address, seed: self.seed, log_tables: self.log_tables };
+        let who = measure::Who { stage: self.stage, yes: self.yes, stop };
         let mut judge = Ringing { rings: self.bell };
-        let summary = measure::measure(store, device, self.stage, self.yes, stop, &again, &mut judge)?;
+        let summary = measure::measure(store, device, who, &mut onlooker, &again, &mut judge)?;
         if summary.interrupted {
             return Err(CliError::Bad("stopped before the campaign was complete".into()));
         }
         Ok(())
+    }
+
+    #[cfg(feature = "dashboard")]
+    fn allows_control(&self) -> bool {
+        self.allow_control
+    }
+
+    #[cfg(not(feature = "dashboard"))]
+    #[allow(clippy::unused_self, reason = "with a page it depends on the command line")]
+    fn allows_control(&self) -> bool {
+        false
     }
 
     /// The shaker's levels are a command of their own: says so as long as some of the plan's are missing.

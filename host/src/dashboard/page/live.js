@@ -1,5 +1,4 @@
 // The strip, the verdict's banner, keys, sounds; which screen is shown.
-const $=id=>document.getElementById(id);
 root.classList.add('scripted');
 let screen=null,voice=null;
 for(const[i,s]of SCREENS.entries()){
@@ -8,7 +7,8 @@ for(const[i,s]of SCREENS.entries()){
 }
 function go(key){
   const s=SCREENS.find(s=>s.key===key);
-  if(!state.whole||!s)return;
+  // without a campaign there is the stream alone
+  if(!state.whole||!s||!state.whole.file&&s!==scopeScreen)return;
   if(screen!==s){
     // a figure belongs to the screen that shows it
     alive.clear();shownFigures.clear();
@@ -17,7 +17,24 @@ function go(key){
     s.make($('main'));
     for(const o of SCREENS)o.button.setAttribute('aria-current',o===s?'page':'false');
   }
+  wantStream(s.key==='scope'&&state.whole.can.stream&&!document.hidden);
   s.show('screen');
+}
+// what is going on, in words
+function doing(w){
+  const s=w.now.state;
+  if(!s)return'';
+  const c=s.cell===null?null:cellOf(s.cell),hit=c?`${nameOf(c)}, ${s.kept+1} of ${c.wanted}: `:'',since=((Date.now()-s.since_unix_ms)/1000).toFixed(1);
+  return{
+    'moving':()=>hit+'hammer and laser move',
+    'move-by-hand':()=>`move hammer to ${c.impact}, laser to ${c.response} (${c.configuration})`,
+    'settling':()=>`${hit}settling, ${since} s`,
+    'recording':()=>hit+'recording',
+    'judging':()=>hit+'judging',
+    'shaking':()=>w.now.shaker?.settled?'shaking, settled':'shaking, on the way',
+    'watching':()=>'watching the channels',
+    'ended':()=>'measuring has ended',
+  }[s.what]?.()||'';
 }
 function strip(){
   const w=state.whole;
@@ -25,15 +42,24 @@ function strip(){
     $('what').textContent=state.refused?'The server lets nobody in without the whole address that jointrig printed.':'Connecting …';
     return;
   }
-  const p=w.progress;
-  $('banner').classList.toggle('simulated',w.simulated);
-  $('what').textContent=(w.simulated?'SIMULATED rig: ':'')+w.file;
-  $('where').textContent=state.connected?p.complete?'complete':p.next===null?'ended':'next '+nameOf(w.cells[p.next]):'connection lost, trying again';
-  $('kept').textContent=`${p.kept} of ${p.wanted} kept`;
+  const p=w.progress,simulated=w.simulated||!!w.now.stream?.simulated;
+  $('banner').classList.toggle('simulated',simulated);
+  $('what').textContent=(simulated?'SIMULATED rig: ':'')+(w.file||'channels of the device');
+  $('where').textContent=state.connected?!w.cells.length?'':p.complete?'complete':p.next===null?'ended':'next '+nameOf(w.cells[p.next]):'connection lost, trying again';
+  $('doing').textContent=state.connected?doing(w):'';
+  $('kept').textContent=p.wanted?`${p.kept} of ${p.wanted} kept`:'';
   const l=p.left;
   $('left').textContent=l?`left: cell ${duration(l.cell_s)}, ${w.cells[p.next].configuration} ${duration(l.configuration_s)}, all ${duration(l.campaign_s)}, until ${new Date(Date.now()+1000*l.campaign_s).toLocaleTimeString([],{hour:'2-digit',minute:'2-digit'})}`:'';
-  $('link').textContent=(p.lost_scans?`${p.lost_scans} scans lost `:'')+(held?'picture held (space)':'');
+  const link=w.now.link||p,disk=w.now.disk;
+  $('link').textContent=[link.lost_scans&&`${link.lost_scans} scans lost`,link.recovered_scans&&`${link.recovered_scans} sent again`,disk&&`${room(disk.free_bytes)} free`,scope.missed&&`${scope.missed} frames missed`,held&&'picture held (space)'].filter(Boolean).join(', ');
+  $('write').hidden=$('end').hidden=!mayEdit();
+  shakerScreen.button.hidden=!(w.levels.length||w.now.shaker);
+  for(const s of SCREENS)if(s!==shakerScreen)s.button.hidden=!w.file&&s!==scopeScreen;
+  scopeScreen.button.textContent=w.can.stream?'Scope':'Channels';
 }
+const room=bytes=>bytes>=1e9?(bytes/1e9).toFixed(bytes<1e10?1:0)+' GB':(bytes/1e6).toFixed(0)+' MB';
+// time goes on between two messages
+setInterval(()=>{if(!document.hidden&&state.whole?.now.state?.what==='settling')strip()},200);
 // a refused hit stays to be seen until the next good one
 function banner(hit){
   const v=$('verdict');
@@ -58,6 +84,7 @@ function sound(){
   $('sound').textContent=voice?'sound on':'sound off';
 }
 $('sound').addEventListener('click',sound);
+$('write').addEventListener('click',noteDialog);
 $('help').addEventListener('click',()=>$('keys').showModal());
 $('light').addEventListener('click',()=>{
   const dark=root.dataset.light?root.dataset.light==='dark':matchMedia('(prefers-color-scheme: dark)').matches;
@@ -73,7 +100,9 @@ addEventListener('keydown',e=>{
     j:()=>{chosen=w.cells[Math.min(at+1,w.cells.length-1)]?.id??null;go('cell')},
     k:()=>{chosen=w.cells[Math.max(at-1,0)]?.id??null;go('cell')},
     f:()=>{chosen=null;screen?.show('screen');strip()},
-    m:sound,'?':()=>$('keys').showModal(),
+    m:sound,n:noteDialog,u:takeBack,
+    K:()=>mayEdit()&&latest()&&overrule(latest().record,'keep'),D:()=>mayEdit()&&latest()&&overrule(latest().record,'drop'),
+    '?':()=>$('keys').showModal(),
     ' ':()=>{held=!held;if(!held)screen?.show('screen');strip()},
   }[e.key];
   if(act&&w){act();e.preventDefault()}
@@ -83,17 +112,19 @@ let due=false;
 function draw(kind){
   if(due||held||document.hidden)return;
   due=true;
-  requestAnimationFrame(()=>{due=false;if(!screen)go('now');else screen.show(kind)});
+  requestAnimationFrame(()=>{due=false;if(!screen)go(state.whole.file?'now':'scope');else screen.show(kind)});
 }
-document.addEventListener('visibilitychange',()=>draw('screen'));
+document.addEventListener('visibilitychange',()=>{wantStream(screen?.key==='scope'&&!!state.whole?.can.stream&&!document.hidden);draw('screen')});
 onNews((kind,message)=>{
   strip();
   if(kind==='judged'){banner(message.hit);beep(message.hit)}
   if(kind==='snapshot')banner(latest());
   if(kind==='trouble'){const v=$('verdict');v.hidden=false;v.dataset.verdict='trouble';v.replaceChildren(el('b',{className:'sign','aria-hidden':'true'},'!'),el('span',{},message.what))}
-  if(kind!=='link'&&state.whole)draw(kind);
+  // what the strip alone shows, and news that the screen does not, cost no drawing
+  const own={signals:'scope',stream:'scope',shaker:'shaker',disk:'',state:'now',control:'now',link:''}[kind];
+  if(state.whole&&(own===undefined||own===screen?.key))draw(kind);
 });
 strip();
 if(token)connect();else{state.refused=true;strip()}
 // for the tests
-window.live={state,alive,go,looked,takeIn};
+window.live={state,alive,go,looked,takeIn,scope,me};

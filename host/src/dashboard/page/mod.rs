@@ -8,9 +8,12 @@ use crate::report;
 pub const HTML: &str = include_str!("live.html");
 
 /// In the order in which they build on one another.
-const SCRIPTS: [&str; 4] = [
+const SCRIPTS: [&str; 7] = [
     include_str!("link.js"),
     include_str!("picture.js"),
+    include_str!("edit.js"),
+    include_str!("scope.js"),
+    include_str!("shaker.js"),
     include_str!("screens.js"),
     include_str!("live.js"),
 ];
@@ -28,3 +31,7 @@ pub fn script() -> &'static str {
         LazyLock::new(|| report::script(&format!("{{\n{}}}\n", SCRIPTS.concat())));
     &SCRIPT
 }
+
+#[cfg(test)]
+#[path = "colour_tests.rs"]
+mod colour_tests;

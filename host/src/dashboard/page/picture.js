@@ -21,15 +21,3 @@ function keepViews(name){
   const same=(a,b)=>a[0]===b[0]&&a[1]===b[1];
   return(alive.get(name)||[]).map(c=>c instanceof Chart&&!(same(c.view.x,c.panel.x.range)&&same(c.view.y,c.panel.y.range))?{x:c.view.x,y:c.view.y}:null);
 }
-function keysOf(element,figure){
-  element.addEventListener('keydown',e=>{
-    if(e.target.closest('button,a,summary')||e.ctrlKey||e.metaKey||e.altKey)return;
-    const charts=enliven(element,figure),first=charts[0];
-    if(first.key){if(first.key(e)){e.preventDefault();e.stopPropagation()}return}
-    const act={
-      '+':()=>first.zoom({x:zoomed(first.panel.x,first.view.x,.7)}),'-':()=>first.zoom({x:zoomed(first.panel.x,first.view.x,1/.7)}),
-      0:()=>charts.forEach(c=>c.whole()),ArrowRight:()=>first.step(e.shiftKey?20:1),ArrowLeft:()=>first.step(e.shiftKey?-20:-1),
-    }[e.key];
-    if(act){act();e.preventDefault();e.stopPropagation()}
-  });
-}

@@ -6,7 +6,7 @@ function el(tag,options={},...children){
   return e;
 }
 // one for each verdict, so that no colour is needed to tell them
-const SIGNS={good:'✓','double hit':'≡',overload:'⊓',noisy:'~',weak:'↓',strong:'↑',mistimed:'⧗',gap:'…',dropped:'–'};
+const SIGNS={good:'✓','double hit':'≡',overload:'⊓',noisy:'~',weak:'↓',strong:'↑',mistimed:'⇄',gap:'…',dropped:'–'};
 const signOf=v=>SIGNS[v]||'✕';
 const fixed=(v,n)=>v===null||v===undefined?'–':v.toFixed(n);
 function duration(s){
@@ -22,13 +22,14 @@ function hitRow(h){
   return el('tr',{className:h.kept?'kept':'refused'},
     el('td',{},String(h.record)),el('td',{},String(h.attempt+1)),
     el('td',{},el('b',{'aria-hidden':'true'},signOf(h.verdict)),' '+h.verdict+(h.judged?` (was ${h.judged})`:'')),
-    el('td',{},fixed(h.peak_n,1)+' N'),el('td',{},h.pulse_us+' µs'),el('td',{className:'why'},h.sentence));
+    el('td',{},fixed(h.peak_n,1)+' N'),el('td',{},h.pulse_us+' µs'),el('td',{className:'why'},h.sentence),...editCell(h));
 }
-const hitHead=()=>el('thead',{},el('tr',{},...['record','attempt','verdict','peak','pulse','why'].map(t=>el('th',{scope:'col'},t))));
+const hitHead=()=>el('thead',{},el('tr',{},...['record','attempt','verdict','peak','pulse','why',...(mine.edits?['']:[])].map(t=>el('th',{scope:'col'},t))));
 const said=e=>e?.lines.map(([head,text])=>el('p',{},el('b',{},head),' '+text))||[el('p',{className:'absent'},'The analysis has not said anything yet.')];
 const SCREENS=[
   {key:'now',title:'Now',make(m){
     this.next=m.appendChild(el('p',{className:'next',id:'next'}));
+    this.answers=m.appendChild(el('div',{id:'answers'}));
     const grid=m.appendChild(el('div',{className:'two'}));
     const left=grid.appendChild(el('div')),right=grid.appendChild(el('div'));
     this.hit=left.appendChild(el('div'));
@@ -39,8 +40,9 @@ const SCREENS=[
     this.answer=right.appendChild(el('div',{className:'found'}));
     this.geometry=right.appendChild(el('div'));
   },show(kind){
-    const w=state.whole,n=w.progress.next,h=latest();
+    const w=state.whole,s=w.now.state,at=s?.cell==null||s.what==='ended'?-1:w.cells.findIndex(c=>c.id===s.cell),n=at>=0?at:w.progress.next,h=latest();
     this.next.textContent=w.progress.complete?'The campaign is complete.':n===null?'No cell is open: the rest was given up.':`Next: ${nameOf(w.cells[n])}, hit ${w.cells[n].kept+1} of ${w.cells[n].wanted}`;
+    answersShown(this.answers);
     this.rows.replaceChildren(...(h?hitsOf(h.cell):[]).map(hitRow));
     if(h)picture(this.hit,`/api/records/${h.record}/hit`);
     this.answer.replaceChildren(...said(w.estimate));
@@ -94,7 +96,7 @@ const SCREENS=[
   }},
   figureScreen('stiffness','Stiffness',['answer','budget','k-t-of-frequency','levels','joint-spectrum'],true),
   figureScreen('frfs','Driving points',['receptances','coherence','random-error'],false),
-  {key:'channels',title:'Channels',make(m){this.at=m.appendChild(el('div'))},show(){const h=latest();if(h)picture(this.at,`/api/records/${h.record}/channels`)}},
+  scopeScreen,
   {key:'log',title:'Log',make(m){
     this.filter=el('input',{type:'search',placeholder:'search',id:'log-search','aria-label':'search the log',on:{input:()=>this.sift()}});
     m.append(el('p',{},this.filter));
@@ -115,6 +117,7 @@ const SCREENS=[
     for(;this.shown<hits.length;this.shown++){const h=hits[this.shown];if(!h.kept)put(h.utc,`${nameOf(cellOf(h.cell)||{configuration:'',impact:'?',response:'?'})}, record ${h.record}: ${h.verdict}: ${h.sentence}`,true)}
     this.sift();
   },sift(){const t=this.filter.value.toLowerCase();for(const r of this.rows.rows)r.hidden=!!t&&!r.textContent.toLowerCase().includes(t)}},
+  shakerScreen,
 ];
 function figureScreen(key,title,names,words){
   return{key,title,make(m){

@@ -80,6 +80,19 @@ function toggle(figure,element,name,alone){
   for(const c of charts){c.hidden=hidden;if(c.plot)c.plot.redraw()}
   for(const item of element.querySelectorAll('.legend li'))item.querySelector('button')?.setAttribute('aria-pressed',String(!hidden.has(item.dataset.name)));
 }
+// the keys of a figure that has the focus
+function keysOf(element,figure){
+  element.addEventListener('keydown',e=>{
+    if(e.target.closest('button,a,summary')||e.ctrlKey||e.metaKey||e.altKey)return;
+    const charts=enliven(element,figure),first=charts[0],taken=()=>{e.preventDefault();e.stopPropagation()};
+    if(first.key){if(first.key(e))taken();return}
+    const act={
+      '+':()=>first.zoom({x:zoomed(first.panel.x,first.view.x,.7)}),'-':()=>first.zoom({x:zoomed(first.panel.x,first.view.x,1/.7)}),
+      0:()=>charts.forEach(c=>c.whole()),ArrowRight:()=>first.step(e.shiftKey?20:1),ArrowLeft:()=>first.step(e.shiftKey?-20:-1),
+    }[e.key];
+    if(act){act();taken()}
+  });
+}
 // the view as an SVG text of its own, on light paper
 function svgOf(figure,element){
   const charts=enliven(element,figure),columns=figure.columns,W=1040,gap=16,width=(W-gap*(columns-1))/columns;
@@ -132,7 +145,7 @@ const scaleOf=(axis,[a,b],from,to)=>v=>{
 // what is in view, one line for each point, as report/csv.rs writes the whole
 function csvOf(figure,element){
   const charts=enliven(element,figure),lines=['panel,curve,horizontal,x,upright,y,low,high'];
-  const quoted=t=>{t=/^[=+@\t]/.test(t)?"'"+t:t;return/[",\n\r]/.test(t)?`"${t.replace(/"/g,'""')}"`:t},num=v=>v===undefined||!Number.isFinite(v)?'':sixDigits(v);
+  const quoted=t=>{t=/^[=+\-@\t]/.test(t)?"'"+t:t;return/[",\n\r]/.test(t)?`"${t.replace(/"/g,'""')}"`:t},num=v=>v===undefined||!Number.isFinite(v)?'':sixDigits(v);
   figure.panels.forEach((panel,i)=>{
     const chart=charts[i],[low,high]=chart instanceof Chart?chart.view.x:[-Infinity,Infinity],head=panel.title||String(i+1);
     for(const m of panel.marks){

@@ -51,16 +51,7 @@ for(const figure of FIGURES){
     b.addEventListener('click',()=>toggle(figure,element,item.dataset.name,false));
     b.addEventListener('dblclick',()=>toggle(figure,element,item.dataset.name,true));
   }
-  element.addEventListener('keydown',e=>{
-    if(e.target.closest('button,a,summary')||e.ctrlKey||e.metaKey||e.altKey)return;
-    const charts=enliven(element,figure),first=charts[0];
-    if(first.key){if(first.key(e))e.preventDefault();return}
-    const act={
-      '+':()=>first.zoom({x:zoomed(first.panel.x,first.view.x,.7)}),'-':()=>first.zoom({x:zoomed(first.panel.x,first.view.x,1/.7)}),
-      0:()=>charts.forEach(c=>c.whole()),ArrowRight:()=>first.step(e.shiftKey?20:1),ArrowLeft:()=>first.step(e.shiftKey?-20:-1),
-    }[e.key];
-    if(act){act();e.preventDefault()}
-  });
+  keysOf(element,figure);
 }
 const near=new IntersectionObserver(entries=>{
   for(const entry of entries)if(entry.isIntersecting){

@@ -13,7 +13,7 @@ mod sweep;
 
 pub use error::{ShakeError, Shortfall};
 pub use meter::CRITERION;
-pub use options::{Limits, Options};
+pub use options::{Limits, Onlookers, Options};
 pub use signals::{Unusable, record};
 
 use std::sync::atomic::Ordering;
@@ -27,7 +27,9 @@ use crate::campaign::plan::level::Level;
 use crate::campaign::store::Store;
 use crate::campaign::store::level_table::{LevelRow, NewLevel, Settled};
 use crate::campaign::store::session_table::SessionInfo;
+use crate::campaign::store::simulated::is_simulated_board;
 use crate::campaign::store::stored::Hex;
+use crate::campaign::watch::{Seen, Shaking};
 use crate::device::channels::ChannelMap;
 use crate::device::recording::by_channel;
 use crate::device::session::Session;
@@ -73,6 +75,20 @@ pub fn run(
     options: &Options,
     tell: &mut dyn FnMut(&Store, &Level, Option<&Outcome>),
 ) -> Result<Summary, ShakeError> {
+    run_watched(store, session, options, &Onlookers::default(), tell)
+}
+
+/// The same, and others look on.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_watched(
+    store: &mut Store,
+    session: &mut Session,
+    options: &Options,
+    onlookers: &Onlookers,
+    tell: &mut dyn FnMut(&Store, &Level, Option<&Outcome>),
+) -> Result<Summary, ShakeError> {
     let plan = store.plan()?;
     let info = session.info()?;
     let channels = session.channels(&info)?;
@@ -93,13 +109,19 @@ pub fn run(
         store.note_simulated(simulated)?;
     }
     let (epoch, _) = session.start(channels.len())?;
+    let simulated = is_simulated_board(&info.board);
+    onlookers.watch.saw(&Seen::Stream { channels: &channels, simulated });
     if info.stage {
         assemble(session, &plan)?;
     }
-    let mut bench = Bench { session, channels: &channels, info: &info, options, session_id: id, epoch };
+    let mut bench =
+        Bench { session, channels: &channels, info: &info, options, onlookers, session_id: id, epoch };
     let mut outcomes = Vec::new();
     let mut walked = Ok(());
     for level in &options.levels {
+        if let Some(edits) = &onlookers.edits {
+            edits.work_off(store)?;
+        }
         if options.stop.load(Ordering::Relaxed) {
             break;
         }
@@ -108,7 +130,9 @@ pub fn run(
             Ok(Outcome::Known(row.clone()))
         } else {
             tell(store, level, None);
-            bench.measure(store, level)
+            let outcome = bench.measure(store, level);
+            bench.over(&outcome);
+            outcome
         };
         match outcome {
             Ok(outcome) => {
@@ -125,6 +149,7 @@ pub fn run(
     // of two errors the first one counts; a device that is gone rests by itself
     let rested = bench.come_to_rest();
     let ended = bench.session.finish();
+    onlookers.watch.saw(&Seen::Ended);
     walked?;
     rested?;
     ended?;
@@ -168,6 +193,7 @@ struct Bench<'a> {
     channels: &'a ChannelMap,
     info: &'a Info,
     options: &'a Options,
+    onlookers: &'a Onlookers,
     session_id: i64,
     epoch: u32,
 }
@@ -182,6 +208,20 @@ struct Taken {
 impl Bench<'_> {
     fn rate_hz(&self) -> f64 {
         f64::from(self.channels.rate_hz)
+    }
+
+    /// Tells who watches how a level ended.
+    fn over(&self, outcome: &Result<Outcome, ShakeError>) {
+        let (recorded, say) = match outcome {
+            Ok(Outcome::Stored(row) | Outcome::Known(row)) => {
+                let level = row.level();
+                (true, format!("{level}: recorded at {}", level.held.show(row.reached)))
+            }
+            Ok(Outcome::Short(level, why)) => (false, format!("{level}: {why}")),
+            Err(error) => (false, error.to_string()),
+        };
+        self.onlookers.watch.saw(&Seen::LevelOver { recorded, say: &say });
+        self.onlookers.watch.saw(&Seen::Link(self.session.accounts()));
     }
 
     /// Brings the level about, records and stores it, and comes to rest.
@@ -222,8 +262,10 @@ impl Bench<'_> {
     }
 
     fn take(&mut self, level: &Level) -> Result<Taken, ShakeError> {
-        let options = self.options;
+        let (options, onlookers) = (self.options, self.onlookers);
         let mut orders = Orders::new(self.channels, self.info, level, options);
+        let (limits, most_drive_v) = (options.limits.of(self.channels), orders.most_drive_v());
+        onlookers.watch.saw(&Seen::Level { level, limits: &limits, most_drive_v });
         let before = self.session.expected()?;
         let begun = orders.begin(self.session)?;
         let meter = Meter::new(self.channels, level.held, level.frequency_hz);
@@ -242,10 +284,18 @@ impl Bench<'_> {
             }
             orders.go_on(self.session, at + window)?;
             let (codes, gaps) = self.session.cut(at..at + window)?;
-            if gaps.is_empty() {
-                amplitudes.push(meter.amplitude(&codes, self.channels.len()));
-            }
             at += window;
+            if gaps.is_empty() {
+                let amplitude = meter.amplitude(&codes, self.channels.len());
+                amplitudes.push(amplitude);
+                onlookers.watch.saw(&Seen::Shaking(Shaking {
+                    at_s: (at - begun) as f64 / self.rate_hz(),
+                    amplitude,
+                    drive_v: f64::from(self.session.status()?.drive_v),
+                    settled: is_settled(&amplitudes, target),
+                    codes: &codes,
+                }));
+            }
             if level.end_hz.is_none() {
                 self.session.forget_before(at);
             }

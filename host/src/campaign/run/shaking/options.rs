@@ -6,6 +6,8 @@ use std::sync::atomic::AtomicBool;
 use jointrig_protocol::channel::Role;
 
 use crate::campaign::plan::level::{Level, Moment};
+use crate::campaign::run::edits::Edits;
+use crate::campaign::watch::Watchers;
 use crate::device::channels::ChannelMap;
 
 /// Load cells and excitation stop the shaker at this part of their full scale. The vibrometers do not: they go beyond theirs for a moment
@@ -29,6 +31,15 @@ pub struct Options {
     pub limits: Limits,
     /// Set to come to rest and end.
     pub stop: Arc<AtomicBool>,
+}
+
+/// Who looks on; nobody by default.
+#[derive(Clone, Debug, Default)]
+pub struct Onlookers {
+    /// Who watches.
+    pub watch: Watchers,
+    /// What persons elsewhere want changed in the file; done between two levels.
+    pub edits: Option<Edits>,
 }
 
 /// Limits by channel name, SI units; those of a whole level.

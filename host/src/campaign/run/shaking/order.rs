@@ -67,6 +67,11 @@ impl Orders {
         Ok(now)
     }
 
+    /// The drive's largest amplitude, V.
+    pub fn most_drive_v(&self) -> f64 {
+        f64::from(self.order.amplitude_v)
+    }
+
     /// Scans per second.
     pub fn rate_hz(&self) -> f64 {
         f64::from(self.rate_hz)

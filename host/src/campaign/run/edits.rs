@@ -1,0 +1,190 @@
+//! What a person changes from elsewhere while a campaign is measured: notes, and verdicts that are overruled. The campaign file has one writer, so
+//! that what is wanted is handed to it and done between two records; the runner hears which cells it concerns.
+
+use std::fmt;
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::campaign::store::Store;
+use crate::campaign::store::error::StoreError;
+use crate::campaign::verdict::Kind;
+
+/// Edits that may wait.
+const QUEUE: usize = 16;
+
+/// What is wanted.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Edit {
+    /// A line in the campaign's log.
+    Note(String),
+    /// Another verdict for a record: [`Kind::Good`] keeps it, [`Kind::Dropped`] leaves it out.
+    Overrule {
+        /// Which record.
+        record: i64,
+        /// What it counts as from now on.
+        verdict: Kind,
+        /// Why.
+        reason: String,
+    },
+    /// The verdict that a record had before it was overruled last.
+    Undo {
+        /// Which record.
+        record: i64,
+    },
+}
+
+/// What became of it, for whoever wanted it: a sentence, or why not.
+pub type Told = Result<String, String>;
+
+/// What is wanted, and who is told what became of it.
+pub struct Request {
+    edit: Edit,
+    tell: Box<dyn FnOnce(Told) + Send>,
+}
+
+/// Why an edit is not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NotTaken {
+    /// Too many wait.
+    Busy,
+    /// Nothing is measured any more.
+    Over,
+}
+
+/// Where edits are handed in.
+#[derive(Clone)]
+pub struct Desk(SyncSender<Request>);
+
+/// Where they are taken up. Whoever writes the campaign file has it.
+#[derive(Clone)]
+pub struct Edits(Arc<Mutex<Receiver<Request>>>);
+
+/// Both ends.
+pub fn edits() -> (Desk, Edits) {
+    let (to, from) = sync_channel(QUEUE);
+    (Desk(to), Edits(Arc::new(Mutex::new(from))))
+}
+
+impl Desk {
+    /// Hands an edit in; `tell` hears what became of it, on the thread that writes.
+    ///
+    /// # Errors
+    /// It cannot be taken.
+    pub fn hand_in(&self, edit: Edit, tell: impl FnOnce(Told) + Send + 'static) -> Result<(), NotTaken> {
+        self.0.try_send(Request { edit, tell: Box::new(tell) }).map_err(|error| match error {
+            TrySendError::Full(_) => NotTaken::Busy,
+            TrySendError::Disconnected(_) => NotTaken::Over,
+        })
+    }
+}
+
+impl fmt::Debug for Edits {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("edits")
+    }
+}
+
+/// A cell whose count has changed: by how many good hits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Recount {
+    /// Its id.
+    pub cell: i64,
+    /// A good hit more, or less.
+    pub more: bool,
+}
+
+impl Edits {
+    /// Does what waits, and tells which cells it concerns.
+    ///
+    /// # Errors
+    /// The file cannot be written; what an edit itself is wrong about is told to whoever wanted it.
+    pub fn work_off(&self, store: &Store) -> Result<Vec<Recount>, StoreError> {
+        let queue = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut changed = Vec::new();
+        while let Ok(Request { edit, tell }) = queue.try_recv() {
+            let (told, recount) = done(store, edit)?;
+            changed.extend(recount);
+            tell(told);
+        }
+        Ok(changed)
+    }
+}
+
+/// Does one edit. A record that is not there, or has no samples, is the wish's fault; a file that cannot be written is everybody's.
+fn done(store: &Store, edit: Edit) -> Result<(Told, Option<Recount>), StoreError> {
+    let (record, wanted, reason) = match edit {
+        Edit::Note(text) => {
+            store.log(&format!("note: {text}"))?;
+            return Ok((Ok("noted".into()), None));
+        }
+        Edit::Overrule { record, verdict, reason } => (record, Some(verdict), reason),
+        Edit::Undo { record } => (record, None, "taken back".into()),
+    };
+    let row = match store.record(record) {
+        Ok(row) => row,
+        Err(error) => return Ok((Err(error.to_string()), None)),
+    };
+    let verdict = match wanted {
+        Some(verdict) => verdict,
+        None => match before_last(store, record, row.verdict)? {
+            Some(before) => before,
+            None => return Ok((Err(format!("record {record}: nobody has overruled its verdict")), None)),
+        },
+    };
+    if verdict == Kind::Good && row.scans == 0 {
+        return Ok((Err(format!("record {record} has no samples: the bolt did not arrive")), None));
+    }
+    if verdict == row.standing() {
+        return Ok((Ok(format!("record {record}: {verdict} already")), None));
+    }
+    store.overrule(record, verdict, &reason)?;
+    let (was, is) = (row.kept(), verdict == Kind::Good);
+    let recount = (was != is).then_some(Recount { cell: row.cell, more: is });
+    Ok((Ok(format!("record {record}: {}, now {verdict}: {reason}", row.standing())), recount))
+}
+
+/// The verdict that counted before a record was overruled last; none where nobody has overruled `judged`.
+fn before_last(store: &Store, record: i64, judged: Kind) -> Result<Option<Kind>, StoreError> {
+    let all = store.overrules()?;
+    let mut own = all.iter().rev().filter(|overrule| overrule.record == record);
+    if own.next().is_none() {
+        return Ok(None);
+    }
+    Ok(Some(own.next().and_then(|before| Kind::named(&before.verdict)).unwrap_or(judged)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::campaign::plan::SMALL;
+
+    #[test]
+    fn edits_wait_for_the_writer_and_no_more_than_a_few() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let store = Store::create(&folder.path().join("a.jrig"), SMALL, "small.toml").expect("created");
+        let (desk, edits) = edits();
+        let told = Arc::new(Mutex::new(Vec::new()));
+        let hand_in = |edit: Edit| {
+            let told = told.clone();
+            desk.hand_in(edit, move |what| told.lock().expect("whole").push(what))
+        };
+        for n in 0..QUEUE {
+            assert_eq!(hand_in(Edit::Note(format!("note {n}"))), Ok(()));
+        }
+        assert_eq!(hand_in(Edit::Note("one too many".into())), Err(NotTaken::Busy));
+        assert_eq!(edits.work_off(&store).expect("written"), []);
+        assert_eq!(told.lock().expect("whole").len(), QUEUE);
+        // what cannot be done is told, and ends nothing
+        for edit in
+            [Edit::Undo { record: 1 }, Edit::Overrule { record: 1, verdict: Kind::Good, reason: "x".into() }]
+        {
+            assert_eq!(hand_in(edit), Ok(()));
+        }
+        assert_eq!(edits.work_off(&store).expect("written"), []);
+        assert!(told.lock().expect("whole")[QUEUE..].iter().all(Result::is_err));
+        let lines = store.log_lines(0).expect("read");
+        assert_eq!(lines.iter().filter(|(_, _, text)| text.starts_with("note: note")).count(), QUEUE);
+        drop(edits);
+        assert_eq!(hand_in(Edit::Note("late".into())), Err(NotTaken::Over));
+    }
+}

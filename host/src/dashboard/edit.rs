@@ -1,0 +1,252 @@
+//! What a page may want changed: notes and verdicts, through the one writer of the campaign file; the end of measuring after the shot in hand; and,
+//! where `--allow-control` says so, the stage's answers. No page arms the hammer or moves the shaker.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use axum::extract::State;
+use axum::extract::rejection::JsonRejection;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+use axum::routing::post;
+use axum::{Json, Router};
+use serde::Deserialize;
+use serde_json::json;
+use tokio::sync::oneshot;
+
+use super::Shared;
+use super::problem::Problem;
+use crate::campaign::run::answers::{Answerer, Key, Question};
+use crate::campaign::run::edits::{Desk, Edit, NotTaken};
+use crate::campaign::verdict::Kind;
+use crate::live::message::Message;
+use crate::live::now::{Control, Doing};
+
+/// One page answers for so long after it was heard last.
+const LEASE: Duration = Duration::from_secs(10);
+/// An edit that is not done by then is done later: the shaker's levels are long.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// Longest note or reason, characters.
+const LONGEST: usize = 2_000;
+/// Longest name of a page, characters.
+const NAME: usize = 64;
+
+/// What the measuring process lets pages do.
+pub struct Doors {
+    /// Where edits are handed in.
+    pub desk: Option<Desk>,
+    /// Where the stage's answers are given.
+    pub answerer: Option<Answerer>,
+    /// Ends measuring after the shot in hand.
+    pub stop: Arc<AtomicBool>,
+    /// Which page may answer, and when it was heard last.
+    pub lease: Mutex<Option<(String, Instant)>>,
+}
+
+/// What can be wanted.
+pub fn routes() -> Router<Arc<Shared>> {
+    Router::new()
+        .route("/api/notes", post(note))
+        .route("/api/keep", post(keep))
+        .route("/api/drop", post(leave_out))
+        .route("/api/undo", post(undo))
+        .route("/api/stop", post(stop))
+        .route("/api/control", post(control))
+        .route("/api/stage", post(stage))
+}
+
+type Asked<T> = Result<Json<T>, JsonRejection>;
+
+/// What was asked, or why it cannot be read.
+fn read<T>(asked: Asked<T>) -> Result<T, Problem> {
+    match asked {
+        Ok(Json(asked)) => Ok(asked),
+        Err(wrong) => Err(Problem::new(wrong.status(), wrong.body_text(), "send what docs/live.md says")),
+    }
+}
+
+impl Shared {
+    fn doors(&self) -> Result<&Doors, Problem> {
+        self.doors.as_ref().ok_or_else(|| {
+            let what = "this server only looks: nothing is measured in its process";
+            Problem::new(StatusCode::FORBIDDEN, what, "use `jointrig campaign keep` and `campaign drop`")
+        })
+    }
+
+    /// Lets the page go that answers, when it was not heard for too long.
+    pub fn end_lease(&self) {
+        let Some(doors) = &self.doors else { return };
+        let mut lease = doors.lease.lock().unwrap_or_else(PoisonError::into_inner);
+        if lease.take_if(|(_, heard)| heard.elapsed() > LEASE).is_some() {
+            self.bus.say(Message::Control(Control { page: None }));
+        }
+    }
+}
+
+/// Hands an edit in, and waits a little for what becomes of it.
+async fn handed_in(shared: &Shared, edit: Edit) -> Result<Response, Problem> {
+    let doors = shared.doors()?;
+    let desk = doors.desk.as_ref().ok_or_else(|| Problem::missing("no campaign is measured here"))?;
+    let (to, told) = oneshot::channel();
+    let taken = desk.hand_in(edit, move |what| {
+        // a page that has gone need not know
+        let _ = to.send(what);
+    });
+    match taken {
+        Ok(()) => {}
+        Err(NotTaken::Busy) => {
+            let what = "too many changes wait already";
+            return Err(Problem::new(StatusCode::TOO_MANY_REQUESTS, what, "try again in a moment"));
+        }
+        Err(NotTaken::Over) => return Err(over()),
+    }
+    match tokio::time::timeout(PATIENCE, told).await {
+        Ok(Ok(Ok(done))) => Ok(Json(json!({ "done": done })).into_response()),
+        Ok(Ok(Err(wrong))) => Err(Problem::new(StatusCode::CONFLICT, wrong, "look at the log")),
+        Ok(Err(_)) => Err(over()),
+        Err(_) => {
+            let later = json!({ "later": "it is written when the file's writer comes to it" });
+            Ok((StatusCode::ACCEPTED, Json(later)).into_response())
+        }
+    }
+}
+
+fn over() -> Problem {
+    let what = "nothing is measured any more";
+    Problem::new(StatusCode::CONFLICT, what, "use `jointrig campaign keep` and `campaign drop`")
+}
+
+/// A text that is neither empty nor endless, in one line.
+fn text(given: &str) -> Result<String, Problem> {
+    let text = given.split_whitespace().collect::<Vec<_>>().join(" ");
+    if text.is_empty() || text.chars().count() > LONGEST {
+        let what = format!("a text has 1 to {LONGEST} characters");
+        return Err(Problem::new(StatusCode::UNPROCESSABLE_ENTITY, what, "write another one"));
+    }
+    Ok(text)
+}
+
+#[derive(Deserialize)]
+struct Note {
+    text: String,
+}
+
+async fn note(State(shared): State<Arc<Shared>>, asked: Asked<Note>) -> Result<Response, Problem> {
+    let note = text(&read(asked)?.text)?;
+    handed_in(&shared, Edit::Note(note)).await
+}
+
+#[derive(Deserialize)]
+struct Overrule {
+    record: i64,
+    reason: Option<String>,
+}
+
+async fn overrule(
+    shared: &Shared,
+    asked: Asked<Overrule>,
+    verdict: Kind,
+    otherwise: &str,
+) -> Result<Response, Problem> {
+    let Overrule { record, reason } = read(asked)?;
+    let reason = reason.as_deref().map_or_else(|| Ok(otherwise.to_owned()), text)?;
+    handed_in(shared, Edit::Overrule { record, verdict, reason }).await
+}
+
+async fn keep(State(shared): State<Arc<Shared>>, asked: Asked<Overrule>) -> Result<Response, Problem> {
+    overrule(&shared, asked, Kind::Good, "a person kept it on the live page").await
+}
+
+async fn leave_out(State(shared): State<Arc<Shared>>, asked: Asked<Overrule>) -> Result<Response, Problem> {
+    overrule(&shared, asked, Kind::Dropped, "a person dropped it on the live page").await
+}
+
+async fn undo(State(shared): State<Arc<Shared>>, asked: Asked<Overrule>) -> Result<Response, Problem> {
+    let Overrule { record, .. } = read(asked)?;
+    handed_in(&shared, Edit::Undo { record }).await
+}
+
+async fn stop(State(shared): State<Arc<Shared>>) -> Result<Response, Problem> {
+    shared.doors()?.stop.store(true, Ordering::Relaxed);
+    let done = "measuring ends after the shot in hand; this is no emergency stop";
+    Ok(Json(json!({ "done": done })).into_response())
+}
+
+#[derive(Deserialize)]
+struct Hold {
+    page: String,
+    hold: bool,
+}
+
+async fn control(State(shared): State<Arc<Shared>>, asked: Asked<Hold>) -> Result<Response, Problem> {
+    let Hold { page, hold } = read(asked)?;
+    let doors = shared.doors()?;
+    allowed(doors)?;
+    if page.is_empty() || page.chars().count() > NAME {
+        let what = format!("a page's name has 1 to {NAME} characters");
+        return Err(Problem::new(StatusCode::UNPROCESSABLE_ENTITY, what, "choose another one"));
+    }
+    let mut lease = doors.lease.lock().unwrap_or_else(PoisonError::into_inner);
+    let other = lease.as_ref().is_some_and(|(holder, heard)| *holder != page && heard.elapsed() <= LEASE);
+    if other {
+        return Err(elsewhere());
+    }
+    let now = hold.then(|| (page, Instant::now()));
+    let changed = now.as_ref().map(|(page, _)| page) != lease.as_ref().map(|(page, _)| page);
+    *lease = now;
+    if changed {
+        let page = lease.as_ref().map(|(page, _)| page.clone());
+        shared.bus.say(Message::Control(Control { page }));
+    }
+    Ok(Json(json!({ "done": if hold { "this page answers" } else { "no page answers" } })).into_response())
+}
+
+fn allowed(doors: &Doors) -> Result<&Answerer, Problem> {
+    doors.answerer.as_ref().ok_or_else(|| {
+        let what = "no page may answer for hammer and laser";
+        Problem::new(StatusCode::FORBIDDEN, what, "answer at the terminal, or measure with --allow-control")
+    })
+}
+
+fn elsewhere() -> Problem {
+    Problem::new(StatusCode::CONFLICT, "another page answers", "let go there, or wait ten seconds")
+}
+
+#[derive(Deserialize)]
+struct StageAnswer {
+    page: String,
+    cell: i64,
+    attempt: u32,
+    answer: String,
+}
+
+async fn stage(State(shared): State<Arc<Shared>>, asked: Asked<StageAnswer>) -> Result<Response, Problem> {
+    let StageAnswer { page, cell, attempt, answer } = read(asked)?;
+    let doors = shared.doors()?;
+    let answerer = allowed(doors)?;
+    let key = match answer.as_str() {
+        "in place" => Key::Accept,
+        "redo" => Key::Redo,
+        "skip" => Key::Skip,
+        "back" => Key::Back,
+        _ => {
+            let what = format!("`{answer}` is no answer");
+            let todo = "send `in place`, `redo`, `skip` or `back`";
+            return Err(Problem::new(StatusCode::UNPROCESSABLE_ENTITY, what, todo));
+        }
+    };
+    {
+        let lease = doors.lease.lock().unwrap_or_else(PoisonError::into_inner);
+        if !lease.as_ref().is_some_and(|(holder, heard)| *holder == page && heard.elapsed() <= LEASE) {
+            return Err(elsewhere());
+        }
+    }
+    let asks = shared.bus.state().filter(|state| state.what == Doing::MoveByHand);
+    let current = asks.is_some_and(|state| state.cell == Some(cell) && state.attempt == attempt);
+    if !(current && answerer.give(Question { cell, attempt }, key)) {
+        let what = "this is not what is asked now";
+        return Err(Problem::new(StatusCode::CONFLICT, what, "look at what the page asks, and answer that"));
+    }
+    Ok(Json(json!({ "done": answer })).into_response())
+}

@@ -1,0 +1,49 @@
+//! An answer that is none: what is wrong, where, and what to do.
+
+use axum::Json;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+use serde_json::json;
+
+use super::guard::Refusal;
+use crate::campaign::store::error::StoreError;
+
+/// Why there is no answer.
+pub struct Problem {
+    status: StatusCode,
+    what: String,
+    todo: &'static str,
+}
+
+impl Problem {
+    /// With this status.
+    pub fn new(status: StatusCode, what: impl Into<String>, todo: &'static str) -> Self {
+        Self { status, what: what.into(), todo }
+    }
+
+    /// There is no such thing.
+    pub fn missing(what: &str) -> Self {
+        Self::new(StatusCode::NOT_FOUND, what, "go back to the page")
+    }
+}
+
+impl From<Refusal> for Problem {
+    fn from(refusal: Refusal) -> Self {
+        let [what, todo] = refusal.words();
+        Self::new(refusal.status(), what, todo)
+    }
+}
+
+impl From<StoreError> for Problem {
+    fn from(error: StoreError) -> Self {
+        Self::new(StatusCode::NOT_FOUND, error.to_string(), "look at the campaign file")
+    }
+}
+
+impl IntoResponse for Problem {
+    fn into_response(self) -> Response {
+        let body =
+            json!({ "error": { "what": self.what, "where": "the live page's server", "do": self.todo } });
+        (self.status, Json(body)).into_response()
+    }
+}

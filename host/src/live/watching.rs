@@ -1,0 +1,307 @@
+//! What happens between two records, on a thread of its own: hears what the watcher took down, looks at the stream through the tap, and tells
+//! both to the pages.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use super::bus::Bus;
+use super::eye::{Ear, Told, room};
+use super::frames::Frames;
+use super::message::Message;
+use super::now::{Disk, Doing, Limit, Link, Shaker, Signals, State, StreamInfo};
+use super::turning::turn;
+use crate::campaign::plan::level::Level;
+use crate::device::channels::ChannelMap;
+use crate::device::tap::{Envelope, NOTHING, View};
+
+/// Time between two frames: thirty in a second.
+const FRAME: Duration = Duration::from_millis(33);
+
+/// Frames between two looks at the stream while no page does.
+const SELDOM: u32 = 15;
+
+/// Time between two words on how large the signals are.
+const SIGNALS: Duration = Duration::from_millis(500);
+
+/// Time between two looks at the disk.
+const DISK: Duration = Duration::from_secs(10);
+
+/// Whoever hears and looks.
+pub struct Watching {
+    /// What the watcher took down.
+    pub ear: Ear,
+    /// The stream.
+    pub view: View,
+    /// Who is told.
+    pub bus: Arc<Bus>,
+    /// Where the stream's frames go.
+    pub frames: Arc<Frames>,
+    /// The campaign file, whose disk may run full.
+    pub file: Option<PathBuf>,
+}
+
+/// What is known so far.
+#[derive(Default)]
+struct Known {
+    channels: Option<Arc<ChannelMap>>,
+    level: Option<Level>,
+    shaker: Option<Shaker>,
+    levels: u64,
+    signals: Sums,
+    cycles: Vec<i16>,
+}
+
+impl Watching {
+    /// Tells what there is to tell, until `stop`.
+    pub fn watch(mut self, stop: &AtomicBool) {
+        let mut known = Known { cycles: room(), ..Known::default() };
+        let (mut tick, mut signals, mut disk) = (0_u32, Instant::now(), None::<Instant>);
+        loop {
+            std::thread::sleep(FRAME);
+            // what was told before the end is told on
+            let last = stop.load(Ordering::Relaxed);
+            self.hear(&mut known);
+            if last {
+                return;
+            }
+            tick += 1;
+            if self.frames.looked_at() || tick.is_multiple_of(SELDOM) {
+                // a stream brings a stretch every millisecond; where there is none, nothing is waited for
+                let patience = if known.channels.is_some() { FRAME } else { Duration::ZERO };
+                if let Some(envelope) = self.view.next(patience) {
+                    known.signals.add(envelope);
+                    if self.frames.looked_at() {
+                        self.frames.push(envelope, unix_ms());
+                    }
+                }
+            }
+            if signals.elapsed() >= SIGNALS {
+                signals = Instant::now();
+                let told = known.channels.as_ref().and_then(|channels| known.signals.told(channels));
+                if let Some(told) = told {
+                    self.bus.say(Message::Signals(told));
+                }
+            }
+            if disk.is_none_or(|before| before.elapsed() >= DISK) {
+                disk = Some(Instant::now());
+                let free = self.file.as_deref().and_then(free_bytes);
+                if let Some(free_bytes) = free {
+                    self.bus.say(Message::Disk(Disk { free_bytes }));
+                }
+            }
+        }
+    }
+
+    /// Tells what was taken down since: of everything that replaces itself, the last.
+    fn hear(&self, known: &mut Known) {
+        let (mut state, mut link) = (None, None);
+        let mut shaker = false;
+        for told in self.ear.queue.try_iter() {
+            let mut now = |what, most_s, at: Option<(i64, u32, u32)>| {
+                let (cell, kept, attempt) = at.map_or((None, 0, 0), |(cell, kept, n)| (Some(cell), kept, n));
+                state = Some(State { what, since_unix_ms: unix_ms(), most_s, cell, kept, attempt });
+            };
+            match told {
+                Told::Stream(channels, simulated) => {
+                    self.bus.say(Message::Stream(StreamInfo::of(&channels, simulated)));
+                    known.signals = Sums::of(channels.len());
+                    known.channels = Some(channels);
+                    now(Doing::Watching, None, None);
+                }
+                Told::Moving { cell, kept, attempt, by_hand } => {
+                    let what = if by_hand { Doing::MoveByHand } else { Doing::Moving };
+                    now(what, None, Some((cell, kept, attempt)));
+                }
+                Told::Settling { cell, kept, attempt, most_s } => {
+                    now(Doing::Settling, Some(most_s), Some((cell, kept, attempt)));
+                }
+                // the cell is that of the state before
+                Told::Recording | Told::Judging => {
+                    let what = if matches!(told, Told::Judging) { Doing::Judging } else { Doing::Recording };
+                    let before = state.take().or_else(|| self.bus.state());
+                    state =
+                        before.map(|before| State { what, since_unix_ms: unix_ms(), most_s: None, ..before });
+                }
+                Told::Link(accounts) => {
+                    link = Some(Link {
+                        lost_scans: accounts.lost,
+                        recovered_scans: accounts.recovered,
+                        received_scans: accounts.received,
+                    });
+                }
+                Told::Level { level, limits, most_drive_v } => {
+                    known.begin(level, &limits, most_drive_v);
+                    now(Doing::Shaking, None, None);
+                    shaker = true;
+                }
+                Told::Window(window, settled) => {
+                    if let Some(own) = &mut known.shaker {
+                        own.windows.push(window);
+                        own.settled = settled;
+                        shaker = true;
+                    }
+                }
+                Told::LevelOver(recorded, say) => {
+                    if let Some(own) = &mut known.shaker {
+                        own.over = Some((recorded, say));
+                        shaker = true;
+                    }
+                }
+                Told::Ended => now(Doing::Ended, None, None),
+            }
+        }
+        if self.ear.cycles(&mut known.cycles) {
+            known.turn();
+            shaker = true;
+        }
+        if shaker && let Some(own) = &mut known.shaker {
+            self.bus.say(Message::Shaker(Box::new(own.clone())));
+            // what was told is not told again
+            own.windows.clear();
+            own.turn = None;
+        }
+        if let Some(state) = state {
+            self.bus.say(Message::State(state));
+        }
+        if let Some(link) = link {
+            self.bus.say(Message::Link(link));
+        }
+    }
+}
+
+impl Known {
+    fn begin(&mut self, level: Level, limits: &[f64], most_drive_v: f64) {
+        self.levels += 1;
+        let channels = self.channels.iter().flat_map(|map| &map.channels).zip(limits);
+        self.level = Some(level);
+        self.shaker = Some(Shaker {
+            level: self.levels,
+            title: level.to_string(),
+            frequency_hz: level.frequency_hz,
+            held: level.held.name(),
+            order: level.amplitude,
+            most_drive_v,
+            settled: false,
+            over: None,
+            windows: Vec::new(),
+            turn: None,
+            limits: channels
+                .filter(|(_, limit)| **limit > 0.0)
+                .map(|(channel, limit)| Limit {
+                    channel: channel.name.as_str().into(),
+                    unit: channel.quantity.unit(),
+                    limit: *limit,
+                    largest: 0.0,
+                })
+                .collect(),
+        });
+    }
+
+    /// What the newest cycles say.
+    fn turn(&mut self) {
+        let (Some(channels), Some(level), Some(shaker)) = (&self.channels, &self.level, &mut self.shaker)
+        else {
+            return;
+        };
+        shaker.turn = turn(channels, &self.cycles, level).or(shaker.turn.take());
+        for limit in &mut shaker.limits {
+            let Some(place) = channels.channels.iter().position(|own| own.name.as_str() == limit.channel)
+            else {
+                continue;
+            };
+            let codes = self.cycles.iter().skip(place).step_by(channels.len());
+            let most = codes.map(|code| code.unsigned_abs()).max().unwrap_or(0);
+            let si = f64::from(most) * channels.channels[place].units_per_code().abs();
+            limit.largest = limit.largest.max(si);
+        }
+    }
+}
+
+/// How large the signals were since they were told last.
+#[derive(Default)]
+struct Sums {
+    arrived: u64,
+    both: Vec<(i64, u64)>,
+    peaks: Vec<u16>,
+    overloads: Vec<Option<f64>>,
+    holes: u64,
+}
+
+impl Sums {
+    fn of(channels: usize) -> Self {
+        Self {
+            both: vec![(0, 0); channels],
+            peaks: vec![0; channels],
+            overloads: vec![None; channels],
+            ..Self::default()
+        }
+    }
+
+    fn add(&mut self, envelope: &Envelope) {
+        if envelope.channels != self.both.len() {
+            return;
+        }
+        self.arrived += envelope.arrived;
+        for (channel, own) in self.both.iter_mut().enumerate() {
+            let (sum, squares) = envelope.sums(channel);
+            *own = (own.0 + sum, own.1 + squares);
+        }
+        let now = unix_ms();
+        for stretch in envelope.ends().chunks_exact(envelope.channels) {
+            self.holes += u64::from(stretch.iter().all(|ends| *ends == NOTHING));
+            for (channel, [least, most]) in stretch.iter().enumerate() {
+                if least > most {
+                    continue;
+                }
+                let peak = least.unsigned_abs().max(most.unsigned_abs());
+                self.peaks[channel] = self.peaks[channel].max(peak);
+                if *least == i16::MIN || *most == i16::MAX {
+                    self.overloads[channel] = Some(now);
+                }
+            }
+        }
+    }
+
+    /// What is to be told, after which it begins anew; none where nothing arrived.
+    fn told(&mut self, channels: &ChannelMap) -> Option<Signals> {
+        if self.arrived == 0 || channels.len() != self.both.len() {
+            return None;
+        }
+        let n = self.arrived as f64;
+        let rms = |((sum, squares), channel): (&(i64, u64), &jointrig_protocol::channel::Channel)| {
+            let mean = *sum as f64 / n;
+            (*squares as f64 / n - mean * mean).max(0.0).sqrt() * channel.units_per_code().abs()
+        };
+        let told = Signals {
+            rms: self.both.iter().zip(&channels.channels).map(rms).collect(),
+            peak_codes: self.peaks.clone(),
+            overload_unix_ms: self.overloads.clone(),
+            holes: self.holes,
+        };
+        self.arrived = 0;
+        self.both.fill((0, 0));
+        self.peaks.fill(0);
+        Some(told)
+    }
+}
+
+/// Now, ms since 1970.
+fn unix_ms() -> f64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64() * 1e3)
+}
+
+/// Free bytes where this file lies; none where the system does not say.
+fn free_bytes(file: &std::path::Path) -> Option<u64> {
+    #[cfg(unix)]
+    {
+        let disk = rustix::fs::statvfs(file).ok()?;
+        Some(disk.f_bavail.saturating_mul(disk.f_frsize))
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = file;
+        None
+    }
+}

@@ -1,0 +1,89 @@
+//! Being watched costs the measuring thread no memory: neither the tap on the stream nor the live page's watcher asks for any.
+//!
+//! One test in a program of its own: the allocator that counts is everybody's.
+#![cfg(feature = "dashboard")]
+#![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
+
+use jointrig::campaign::plan::SMALL;
+use jointrig::campaign::store::Store;
+use jointrig::campaign::watch::{Seen, Shaking, Standing, Watch};
+use jointrig::device::stream::Accounts;
+use jointrig::device::tap::tap;
+use jointrig::live::eye::{eye, room};
+use peak_alloc::PeakAlloc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+#[global_allocator]
+static MEMORY: PeakAlloc = PeakAlloc;
+
+/// The most that was allocated at one time while `work` ran, beyond what was there before: one byte that was asked for and given back counts.
+fn allocated(work: impl FnOnce()) -> usize {
+    let before = MEMORY.current_usage();
+    MEMORY.reset_peak_usage();
+    work();
+    MEMORY.peak_usage().saturating_sub(before)
+}
+
+#[test]
+fn watching_allocates_nothing_on_the_measuring_thread() {
+    assert!(allocated(|| drop(std::hint::black_box(vec![0_u8; 64]))) >= 64, "the allocator counts");
+
+    // ten channels, blocks of 24 scans, ten seconds; a page takes an envelope whenever there is one, on its own thread
+    let (mut tap, mut view) = tap();
+    tap.begin(10, 0, 51_200.0);
+    let block: Vec<i16> = (0..240).map(|n| n * 7 - 800).collect();
+    let over = AtomicBool::new(false);
+    let (looks, used) = std::thread::scope(|scope| {
+        let looks = scope.spawn(|| {
+            let mut looks = 0_u64;
+            while !over.load(Ordering::Relaxed) {
+                looks += u64::from(view.next(Duration::from_millis(1)).is_some());
+            }
+            looks
+        });
+        // until the other thread has begun, it still allocates
+        std::thread::sleep(Duration::from_millis(50));
+        let used = allocated(|| {
+            for n in 0..21_333 {
+                tap.fold(&block);
+                if n % 1_000 == 0 {
+                    tap.skip(100);
+                }
+            }
+        });
+        over.store(true, Ordering::Relaxed);
+        (looks.join().unwrap(), used)
+    });
+    assert!(looks > 0, "nobody looked");
+    assert_eq!(used, 0, "bytes for the tap");
+
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::create(&folder.path().join("a.jrig"), SMALL, "small.toml").unwrap();
+    let cells = store.cells().unwrap();
+    let (eye, ear) = eye();
+    let mut cycles = room();
+    let codes = vec![1_i16; 51_200];
+    let used = allocated(|| {
+        for attempts in 0..5_000 {
+            let (row, standing) = (&cells[0], Standing { kept: 1, attempts });
+            eye.saw(&Seen::Settling { row, standing, most_s: 25.0 });
+            eye.saw(&Seen::Recording);
+            eye.saw(&Seen::Judging);
+            eye.saw(&Seen::Link(Accounts::default()));
+            eye.saw(&Seen::Shaking(Shaking {
+                at_s: 0.1,
+                amplitude: 1e-7,
+                drive_v: 0.1,
+                settled: false,
+                codes: &codes,
+            }));
+            // sometimes somebody hears, mostly nobody: the queue is full
+            if attempts % 100 == 0 {
+                assert!(ear.cycles(&mut cycles) && ear.queue.try_recv().is_ok());
+            }
+        }
+    });
+    assert_eq!(used, 0, "bytes for the watcher");
+    assert_eq!(cycles.len(), codes.len());
+}
