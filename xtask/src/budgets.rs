@@ -4,7 +4,7 @@
 //! instruction. Instructions are not cycles, and another compiler counts differently: the limits leave room for that.
 
 use crate::consent::Consent;
-use crate::project::Project;
+use crate::project::{EMULATED_BOARD, Project};
 use crate::toolchain::Toolchain;
 use crate::{emulator, firmware, setup, size};
 use anyhow::{Context, Result, bail};
@@ -108,7 +108,7 @@ pub fn check(project: &Project, toolchain: &Toolchain) -> Result<String> {
 }
 
 fn measure(project: &Project, toolchain: &Toolchain) -> Result<Figures> {
-    let image = firmware::build_board(project, toolchain, emulator::BOARD)?;
+    let image = firmware::build_board(project, toolchain, EMULATED_BOARD)?;
     let listen = || emulator::listen(&image, "bench", true);
     let (first, second) = std::thread::scope(|scope| {
         let other = scope.spawn(listen);

@@ -1,16 +1,13 @@
 //! QEMU: the same processor core as the rig's controller, without the rig.
 
 use crate::consent::Consent;
-use crate::project::Project;
+use crate::project::{EMULATED_BOARD, Project};
 use crate::qemu::PROGRAM;
 use crate::{command, firmware, setup};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::path::Path;
 use std::process::Command;
-
-/// The emulated board: QEMU's machine `mps2-an505` (Cortex-M33) and our package are named alike.
-pub const BOARD: &str = "mps2-an505";
 
 /// Options of `cargo xtask qemu`.
 #[derive(Args, Debug, Default)]
@@ -28,12 +25,12 @@ pub struct Options {
 
 /// Builds the emulated board's image and runs it; QEMU's exit code, which is the image's, decides.
 pub fn run(project: &Project, options: &Options) -> Result<()> {
-    if firmware::board(project, BOARD)?.is_none() {
-        bail!("there is no board image to run: firmware/boards/{BOARD} does not exist yet");
+    if firmware::board(project, EMULATED_BOARD)?.is_none() {
+        bail!("there is no board image to run: firmware/boards/{EMULATED_BOARD} does not exist yet");
     }
     let consent = Consent::new(false);
     let toolchain = setup::everything(project, consent)?;
-    let image = firmware::build_board(project, &toolchain, BOARD)?;
+    let image = firmware::build_board(project, &toolchain, EMULATED_BOARD)?;
     let mut qemu = Command::new(PROGRAM);
     qemu.args(arguments(&image, options)?);
     command::run(&mut qemu).context("the emulated board did not end well")
@@ -58,7 +55,7 @@ fn arguments(image: &Path, options: &Options) -> Result<Vec<String>> {
         semihosting.push_str(&argument.replace(',', ",,"));
     }
     let mut arguments: Vec<String> =
-        ["-M", BOARD, "-display", "none", "-monitor", "none"].map(String::from).into();
+        ["-M", EMULATED_BOARD, "-display", "none", "-monitor", "none"].map(String::from).into();
     if !options.extra.iter().any(|argument| argument == "-serial") {
         arguments.extend(["-serial", "null"].map(String::from));
     }

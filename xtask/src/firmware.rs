@@ -4,9 +4,9 @@
 //! boards' chip features exclude each other.
 
 use crate::consent::Consent;
-use crate::project::{Package, Project, TARGET};
+use crate::project::{EMULATED_BOARD, Package, Project, TARGET};
 use crate::toolchain::Toolchain;
-use crate::{command, emulator, flat, setup, size};
+use crate::{command, flat, setup, size};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 
@@ -53,7 +53,7 @@ pub fn build_boards(project: &Project, toolchain: &Toolchain, only: Option<&str>
     for board in project.boards()?.iter().filter(|board| only.is_none_or(|name| board.name == name)) {
         let image = build_board(project, toolchain, &board.name)?;
         sizes.push((board.name.clone(), size::of_image(&image)?));
-        if board.name != emulator::BOARD {
+        if board.name != EMULATED_BOARD {
             images.push(flat::write(&image)?);
         }
     }

@@ -11,6 +11,9 @@ use std::path::{Path, PathBuf};
 /// The Cortex-M33 with its floating-point unit: the rig's controller and the emulated board.
 pub const TARGET: &str = "thumbv8m.main-none-eabihf";
 
+/// The emulated board: QEMU's machine `mps2-an505` (Cortex-M33) and our package are named alike.
+pub const EMULATED_BOARD: &str = "mps2-an505";
+
 /// The repository as xtask sees it.
 pub struct Project {
     /// The folder of the root `Cargo.toml`.

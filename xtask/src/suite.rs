@@ -2,7 +2,7 @@
 
 use crate::consent::Consent;
 use crate::firmware;
-use crate::project::Project;
+use crate::project::{EMULATED_BOARD, Project};
 use crate::tests_run::{self, Scope};
 use crate::toolchain::Toolchain;
 use crate::{budgets, command, emulator, house, lint, setup};
@@ -239,11 +239,11 @@ fn boards(run: &mut Run) -> Result<String> {
 
 fn emulated(run: &mut Run) -> Result<String> {
     let (project, toolchain) = (run.project, run.toolchain()?);
-    if firmware::board(project, emulator::BOARD)?.is_none() {
-        println!("  firmware/boards/{} does not exist yet", emulator::BOARD);
+    if firmware::board(project, EMULATED_BOARD)?.is_none() {
+        println!("  firmware/boards/{EMULATED_BOARD} does not exist yet");
         return Ok("no image yet".to_owned());
     }
-    let image = firmware::build_board(project, toolchain, emulator::BOARD)?;
+    let image = firmware::build_board(project, toolchain, EMULATED_BOARD)?;
     print!("{}", emulator::listen(&image, "golden", false)?);
     let counts = tests_run::run_in_emulator(project, &image)?;
     let cost = budgets::check(project, toolchain)?;
