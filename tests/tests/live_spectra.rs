@@ -29,8 +29,9 @@ fn frf_is_the_analysis_one(page: &mut Page<'_>, store: &Store) {
         *Structure::ALL.iter().find(|s| s.name() == configuration_name(cell.configuration)).unwrap();
     let file = CampaignFile::open(store, KnownContact::default()).unwrap();
     let frf = file.measured(structure, [10.0, 1000.0]).0.unwrap().to_receptance().unwrap();
-    let direction = store.plan().unwrap().geometry.impact.iter().map(|p| p.get_ref().clone());
-    let direction = direction.into_iter().find(|p| p.name == cell.impact).unwrap().direction;
+    let plan = store.plan().unwrap();
+    let mut impacts = plan.geometry.impact.iter().map(|impact| impact.get_ref());
+    let direction = impacts.find(|p| p.name == cell.impact).unwrap().direction;
     let axis =
         ["x", "y", "z"][(0..3).max_by(|a, b| direction[*a].abs().total_cmp(&direction[*b].abs())).unwrap()];
     let output = frf.outputs().iter().position(|o| *o == format!("{}:{axis}", cell.response)).unwrap();
@@ -84,7 +85,7 @@ fn spectra_and_numbers_are_those_of_the_file() {
     let server = Served::of(&file);
     let mut browser = Browser::start();
     let mut page = browser.open_url(&server.url, Look::DESK);
-    page.until("document.querySelectorAll('figure.ready').length === 4 && live.state.whole.estimate");
+    page.until("document.querySelectorAll('figure.ready').length === 4 && !!live.state.whole.estimate");
     picture(&mut page, "spectra-now");
     frf_is_the_analysis_one(&mut page, &store);
     force_is_the_pulse(&mut page, &store);
@@ -136,7 +137,7 @@ fn spectra_and_numbers_are_those_of_the_file() {
     drop(page);
 
     let mut page = browser.open_url(&server.url, Look { dark: true, ..Look::HAND });
-    page.until("document.querySelectorAll('figure.ready').length > 0 && live.state.whole.estimate");
+    page.until("document.querySelectorAll('figure.ready').length > 0 && !!live.state.whole.estimate");
     for (key, name) in [("1", "spectra-now-hand"), ("2", "matrix-number-hand")] {
         page.key(key);
         if key == "2" {
