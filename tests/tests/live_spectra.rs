@@ -87,6 +87,8 @@ fn spectra_and_numbers_are_those_of_the_file() {
     let mut page = browser.open_url(&server.url, Look::DESK);
     page.until("document.querySelectorAll('figure.ready').length === 4 && !!live.state.whole.estimate");
     picture(&mut page, "spectra-now");
+    page.eval("document.getElementById('fig-force-spectrum').scrollIntoView()");
+    picture(&mut page, "spectra-now-force");
     frf_is_the_analysis_one(&mut page, &store);
     force_is_the_pulse(&mut page, &store);
 
@@ -147,6 +149,9 @@ fn spectra_and_numbers_are_those_of_the_file() {
             );
         } else {
             page.until("live.alive.has('cell-frf') && live.alive.has('force-spectrum')");
+            page.eval("document.getElementById('fig-force-spectrum').scrollIntoView()");
+            picture(&mut page, "spectra-now-hand-force");
+            page.eval("document.getElementById('fig-cell-frf').scrollIntoView()");
         }
         picture(&mut page, name);
         let wide = page.eval("document.documentElement.scrollWidth").as_u64().unwrap();

@@ -51,15 +51,15 @@ pub fn of_cells(
 
 /// The value of the point at this place of the plan.
 fn point(figure: &Figure, configuration: &str, place: usize) -> Option<f64> {
-    let own = figure.panels.iter().flat_map(|panel| &panel.marks).filter(|mark| mark.name == configuration);
-    own.filter_map(|mark| match &mark.shape {
+    let mut own =
+        figure.panels.iter().flat_map(|panel| &panel.marks).filter(|mark| mark.name == configuration);
+    own.find_map(|mark| match &mark.shape {
         Shape::Points { x, y, .. } => {
             let at = x.0.iter().position(|x| f64::from(*x) == place as f64)?;
             y.0.get(at).map(|y| f64::from(*y))
         }
         _ => None,
     })
-    .next()
 }
 
 /// The median of a strip over the main band.
