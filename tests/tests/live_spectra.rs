@@ -30,8 +30,8 @@ fn frf_is_the_analysis_one(page: &mut Page<'_>, store: &Store) {
     let file = CampaignFile::open(store, KnownContact::default()).unwrap();
     let frf = file.measured(structure, [10.0, 1000.0]).0.unwrap().to_receptance().unwrap();
     let plan = store.plan().unwrap();
-    let mut impacts = plan.geometry.impact.iter().map(|impact| impact.get_ref());
-    let direction = impacts.find(|p| p.name == cell.impact).unwrap().direction;
+    let hit = plan.geometry.impact.iter().find(|p| p.get_ref().name == cell.impact).unwrap();
+    let direction = hit.get_ref().direction;
     let axis =
         ["x", "y", "z"][(0..3).max_by(|a, b| direction[*a].abs().total_cmp(&direction[*b].abs())).unwrap()];
     let output = frf.outputs().iter().position(|o| *o == format!("{}:{axis}", cell.response)).unwrap();
