@@ -76,7 +76,7 @@ fn a_campaign_is_seen_while_it_is_measured() {
 
     let wide = |page: &mut Page<'_>| page.eval("document.documentElement.scrollWidth").as_u64().unwrap();
     for (key, name, there) in [
-        ("1", "now", "document.querySelectorAll('figure.ready').length === 2"),
+        ("1", "now", "document.querySelectorAll('figure.ready').length === 4"),
         (
             "2",
             "matrix",

@@ -24,6 +24,7 @@ use crate::campaign::run::answers::{Answers, answers};
 use crate::campaign::run::edits::{Edits, edits};
 use crate::campaign::store::error::StoreError;
 use crate::device::tap::{Tap, View, tap};
+use crate::live::averaging::Averages;
 use crate::live::bus::Bus;
 use crate::live::eye::{Ear, Eye, eye};
 use crate::live::follow::Follower;
@@ -72,6 +73,8 @@ struct Shared {
     doors: Option<Doors>,
     bus: Arc<Bus>,
     formed: Arc<Formed>,
+    /// The FRF of the cell that is measured.
+    averages: Averages,
     frames: Arc<Frames>,
 }
 
@@ -180,7 +183,9 @@ impl Dashboard {
         let file = file.map(Path::to_owned);
         let told = bus.clone();
         let (port, look_token, edit_token) = (address.port(), look.clone(), edit.clone());
-        let shared = Shared { file, port, look: look_token, edit: edit_token, doors, bus, formed, frames };
+        let averages = Averages::default();
+        let shared =
+            Shared { file, port, look: look_token, edit: edit_token, doors, bus, formed, averages, frames };
         let ended = gone.clone();
         let server = named("page: server", move || {
             if let Err(error) = server::serve(listener, shared, &ended) {

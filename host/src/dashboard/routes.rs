@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
-use axum::http::{HeaderValue, header};
+use axum::http::{HeaderValue, StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
@@ -16,7 +16,7 @@ use super::problem::Problem;
 use super::{Shared, edit, page, socket};
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
-use crate::live::figures;
+use crate::live::{figures, numbers, spectra_figures};
 use crate::report::figure::{self, Figure};
 use crate::report::figure_fragment;
 
@@ -33,6 +33,7 @@ pub fn router(shared: Arc<Shared>) -> Router {
         .route("/api/state", get(state))
         .route("/api/figures/{name}", get(of_campaign))
         .route("/api/{of}/{id}/{name}", get(of_one))
+        .route("/api/matrix", get(matrix))
         .route("/api/now/shaker", get(of_shaker))
         .route("/api/log", get(log))
         .layer(from_fn_with_state(shared.clone(), with_token));
@@ -148,18 +149,35 @@ async fn of_one(
     State(shared): State<Arc<Shared>>,
     Path((of, id, name)): Path<(String, i64, String)>,
 ) -> Result<Response, Problem> {
+    // a cell's spectra take longest: the page's other words do not wait for them
+    let made = tokio::task::spawn_blocking(move || one(&shared, &of, id, &name)).await;
+    let broken =
+        |_| Problem::new(StatusCode::INTERNAL_SERVER_ERROR, "the figure could not be made", "report this");
+    drawn(made.map_err(broken)??.as_ref())
+}
+
+fn one(shared: &Shared, of: &str, id: i64, name: &str) -> Result<Option<Figure>, Problem> {
     let store = shared.store()?;
-    let (figure, record) = match (of.as_str(), name.as_str()) {
+    let (figure, record) = match (of, name) {
         ("records", "hit") => (figures::hit(&store, id)?, Some(id)),
         ("records", "channels") => (figures::channels(&store, id)?, Some(id)),
+        ("records", "force") => (spectra_figures::force(&store, id)?, Some(id)),
+        ("cells", "frf") => (spectra_figures::frf(&shared.averages, &store, id)?, None),
         ("cells", "hits") => (figures::cell(&store, id)?, None),
         ("cells", "place") => (figures::place(&store, id)?, None),
         _ => {
-            let what = "records have the figures hit and channels, cells have hits and place";
+            let what = "records have the figures hit, force and channels, cells have hits, frf and place";
             return Err(Problem::missing(what));
         }
     };
-    drawn(from_file(figure, &store, record)?.as_ref())
+    Ok(from_file(figure, &store, record)?)
+}
+
+/// A number of every cell for each view of the matrix.
+async fn matrix(State(shared): State<Arc<Shared>>) -> Result<Response, Problem> {
+    let store = shared.store()?;
+    let numbers = numbers::of_cells(&store.cells()?, &store.records()?, &shared.formed.figures());
+    Ok(Json(numbers).into_response())
 }
 
 /// The figure with what it was made from.

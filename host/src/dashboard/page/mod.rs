@@ -8,12 +8,13 @@ use crate::report;
 pub const HTML: &str = include_str!("live.html");
 
 /// In the order in which they build on one another.
-const SCRIPTS: [&str; 7] = [
+const SCRIPTS: [&str; 8] = [
     include_str!("link.js"),
     include_str!("picture.js"),
     include_str!("edit.js"),
     include_str!("scope.js"),
     include_str!("shaker.js"),
+    include_str!("matrix.js"),
     include_str!("screens.js"),
     include_str!("live.js"),
 ];

@@ -33,52 +33,30 @@ const SCREENS=[
     const grid=m.appendChild(el('div',{className:'two'}));
     const left=grid.appendChild(el('div')),right=grid.appendChild(el('div'));
     this.hit=left.appendChild(el('div'));
+    this.force=left.appendChild(el('div'));
     left.append(el('h2',{},'Hits of this cell'));
     this.rows=el('tbody');
     left.append(el('div',{className:'scroll'},el('table',{},hitHead(),this.rows)));
     right.append(el('h2',{},'So far'));
     this.answer=right.appendChild(el('div',{className:'found'}));
+    this.frf=right.appendChild(el('div'));
     this.geometry=right.appendChild(el('div'));
   },show(kind){
     const w=state.whole,s=w.now.state,at=s?.cell==null||s.what==='ended'?-1:w.cells.findIndex(c=>c.id===s.cell),n=at>=0?at:w.progress.next,h=latest();
     this.next.textContent=w.progress.complete?'The campaign is complete.':n===null?'No cell is open: the rest was given up.':`Next: ${nameOf(w.cells[n])}, hit ${w.cells[n].kept+1} of ${w.cells[n].wanted}`;
     answersShown(this.answers);
     this.rows.replaceChildren(...(h?hitsOf(h.cell):[]).map(hitRow));
-    if(h)picture(this.hit,`/api/records/${h.record}/hit`);
+    if(h){
+      picture(this.hit,`/api/records/${h.record}/hit`);
+      picture(this.force,`/api/records/${h.record}/force`);
+      // it changes with every hit that is kept or dropped
+      picture(this.frf,`/api/cells/${h.cell}/frf?${hitsOf(h.cell).filter(o=>o.kept).map(o=>o.record).join('.')}`);
+    }
     this.answer.replaceChildren(...said(w.estimate));
     const place=n===null?h?.cell:w.cells[n].id;
     if(place!==undefined)picture(this.geometry,`/api/cells/${place}/place`);
   }},
-  {key:'matrix',title:'Matrix',make(m){
-    m.append(el('p',{className:'say'},'Every cell: hits kept of those wanted. Choose one to see its hits.'));
-    this.tables=m.appendChild(el('div'));
-    this.cells=new Map();this.ids=null;
-  },show(){
-    const w=state.whole,ids=w.cells.map(c=>c.id).join();
-    if(this.ids!==ids){
-      this.ids=ids;this.cells.clear();this.tables.replaceChildren();
-      for(const conf of new Set(w.cells.map(c=>c.configuration))){
-        const own=w.cells.filter(c=>c.configuration===conf),impacts=[...new Set(own.map(c=>c.impact))],responses=[...new Set(own.map(c=>c.response))];
-        const body=el('tbody');
-        for(const r of responses)body.append(el('tr',{},el('th',{scope:'row'},r),...impacts.map(i=>{
-          const c=own.find(c=>c.impact===i&&c.response===r),td=el('td');
-          if(c){const b=el('button',{type:'button',on:{click:()=>{chosen=c.id;go('cell')}}});td.append(b);this.cells.set(c.id,b)}
-          return td;
-        })));
-        this.tables.append(el('h2',{},conf),el('div',{className:'scroll'},el('table',{className:'matrix'},el('thead',{},el('tr',{},el('th',{},''),...impacts.map(i=>el('th',{scope:'col'},i)))),body)));
-      }
-    }
-    const next=w.progress.next===null?null:w.cells[w.progress.next].id;
-    for(const c of w.cells){
-      const b=this.cells.get(c.id),refused=Object.entries(c.refused).map(([v,n])=>`${n} ${v}`).join(', ');
-      if(!b)continue;
-      b.textContent=c.given_up?'✕':`${c.kept}/${c.wanted}`;
-      b.className=c.given_up?'given-up':c.kept>=c.wanted||c.settled?'done':c.attempts?'begun':'open';
-      if(c.id===next)b.classList.add('coming');
-      const why=[nameOf(c)+`: ${c.kept} of ${c.wanted} kept`,refused&&'refused: '+refused,c.given_up&&'given up: '+c.given_up,c.settled&&'settled: '+c.settled].filter(Boolean).join('; ');
-      b.title=why;b.setAttribute('aria-label',why);
-    }
-  }},
+  matrixScreen,
   {key:'cell',title:'Cell',make(m){
     this.head=m.appendChild(el('h2',{id:'cell-name'}));
     this.note=m.appendChild(el('p',{className:'say'}));

@@ -1,0 +1,142 @@
+//! Spectra of single hits, and the average of a cell's kept hits as it grows: one hit is read at a time, and each only once.
+
+use jointrig_protocol::channel::Quantity;
+use std::sync::{Mutex, PoisonError};
+
+use crate::campaign::plan::Plan;
+use crate::campaign::store::Store;
+use crate::campaign::store::error::StoreError;
+use crate::campaign::store::record_row::RecordRow;
+use crate::report::cell_records::Shown;
+use crate::spectra::{
+    CrossSpectra, FrfSettings, ImpactRecords, MotionQuantity, SpectraError, Windowing, estimate,
+};
+
+/// The newest hits that are averaged. Plans ask for some ten; this bounds the time of a cell that was hit for hours.
+const MOST_HITS: usize = 64;
+
+/// Time before the trigger that is transformed, s: that of the analysis, so that its FRFs are the same. The force window begins 1 ms
+/// before the pulse.
+const LEAD_S: f64 = 1.25e-3;
+
+/// The lines that are shown, Hz: those that the analysis uses.
+pub const LINES_HZ: [f64; 2] = [10.0, 1000.0];
+
+/// Why a hit has no spectra.
+#[derive(Debug, thiserror::Error)]
+pub enum NoSpectra {
+    /// It is not there, or the file cannot be read.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// It has no pulse, or does not fit to the others.
+    #[error(transparent)]
+    Spectra(#[from] SpectraError),
+    /// No force, or no response along three axes.
+    #[error("its session has no channel for the hammer's force, or none for the response along x, y and z")]
+    NoChannel,
+    /// The response is no motion.
+    #[error("the vibrometer's channels measure no motion")]
+    NoMotion,
+}
+
+/// Spectra of one hit: force, and the response along x, y and z as a displacement, m.
+///
+/// # Errors
+/// It cannot be read, or has no pulse.
+pub fn of_hit(store: &Store, plan: &Plan, row: &RecordRow) -> Result<CrossSpectra, NoSpectra> {
+    let shown = Shown::of(store, row)?.ok_or(NoSpectra::NoChannel)?;
+    let channels = store.channels(row.session)?;
+    let (Some(force), Some(places)) =
+        (channels.place(jointrig_protocol::channel::Role::HammerForce), channels.responses())
+    else {
+        return Err(NoSpectra::NoChannel);
+    };
+    let quantity = match channels.channels[places[0]].quantity {
+        Quantity::Velocity => MotionQuantity::Velocity,
+        Quantity::Displacement => MotionQuantity::Displacement,
+        Quantity::Acceleration => MotionQuantity::Acceleration,
+        Quantity::Force | Quantity::Voltage => return Err(NoSpectra::NoMotion),
+    };
+    let from = shown.trigger.saturating_sub((LEAD_S * shown.rate_hz).ceil() as usize);
+    let length = plan.post_trigger_scans() as usize;
+    let cut = |signal: &[f64]| -> Vec<f64> {
+        signal[from.min(signal.len())..(from + length).min(signal.len())].to_vec()
+    };
+    let records = ImpactRecords {
+        fs_hz: shown.rate_hz,
+        force_n: vec![cut(&shown.force_n)],
+        response: vec![shown.response_m_per_s.iter().map(|signal| cut(signal)).collect()],
+        quantity,
+    };
+    let delay = |place: usize| f64::from(channels.channels[place].delay_ns) * 1e-9;
+    let settings = FrfSettings {
+        windowing: Windowing { sigma_per_s: plan.window.exponential_per_s, ..Windowing::default() },
+        delay_s: places.map(|place| delay(place) - delay(force)).to_vec(),
+        ..FrfSettings::default()
+    };
+    Ok(estimate(&records, &[true], &settings)?.converted(quantity, MotionQuantity::Displacement))
+}
+
+/// The average of a cell's kept hits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Average {
+    /// The records that were asked for, the oldest first.
+    pub(super) records: Vec<i64>,
+    /// Their spectra at [`LINES_HZ`]; none before the first hit that can be used.
+    pub spectra: Option<CrossSpectra>,
+    /// What is said of records that cannot be used.
+    pub left_out: Vec<String>,
+}
+
+impl Average {
+    fn add(&mut self, store: &Store, plan: &Plan, row: &RecordRow) -> Result<(), StoreError> {
+        let added = of_hit(store, plan, row).and_then(|hit| {
+            let hit = hit.band(LINES_HZ[0], LINES_HZ[1]);
+            match &mut self.spectra {
+                Some(sum) => sum.add(&hit)?,
+                none => *none = Some(hit),
+            }
+            Ok(())
+        });
+        self.records.push(row.id);
+        match added {
+            Err(NoSpectra::Store(error)) if !matches!(error, StoreError::Damaged { .. }) => Err(error),
+            Err(error) => {
+                self.left_out.push(format!("record {}: {error}", row.id));
+                Ok(())
+            }
+            Ok(()) => Ok(()),
+        }
+    }
+}
+
+/// The average that was asked for last: the next hit of that cell is added to it.
+#[derive(Debug, Default)]
+pub struct Averages {
+    last: Mutex<Option<Average>>,
+}
+
+impl Averages {
+    /// The average of the newest kept hits of a cell.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn of_cell(&self, store: &Store, cell: i64) -> Result<Average, StoreError> {
+        let kept: Vec<RecordRow> =
+            store.records_of(cell)?.into_iter().flatten().filter(RecordRow::kept).collect();
+        let kept = &kept[kept.len().saturating_sub(MOST_HITS)..];
+        // whoever panicked left none or a whole one
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = last
+            .take()
+            .filter(|known| kept.iter().map(|row| row.id).collect::<Vec<_>>().starts_with(&known.records));
+        let mut average =
+            known.unwrap_or(Average { records: Vec::new(), spectra: None, left_out: Vec::new() });
+        let plan = store.plan()?;
+        for row in &kept[average.records.len()..] {
+            average.add(store, &plan, row)?;
+        }
+        *last = Some(average.clone());
+        Ok(average)
+    }
+}
