@@ -30,7 +30,7 @@ use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 /// Scans kept before the trigger: the force window begins 1 ms before the pulse, which is 51 scans at 51.2 kHz.
-const LEAD_S: f64 = 1.25e-3;
+pub const LEAD_S: f64 = 1.25e-3;
 
 /// Why a campaign file cannot be analysed, or a cell of it not be read.
 #[derive(Debug, thiserror::Error)]

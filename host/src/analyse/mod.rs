@@ -42,13 +42,14 @@ mod shaker_levels_tests;
 mod specimen_curves;
 mod wanted;
 
+pub use averages::LINES_HZ;
 pub use campaign::analyse_measurements;
 pub use cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel};
 pub use contact_stage::Contact;
 pub use findings::{ConfigurationFindings, Findings, ImportedFrom, Settings};
 pub use fits::{Fit, NoFit, fits};
 pub use from_frfs::{Row, Substructured};
-pub use from_store::{AnalyseError, CampaignFile, analyse};
+pub use from_store::{AnalyseError, CampaignFile, LEAD_S, analyse};
 pub use impact_loops::{ImpactLoops, SlopeIs};
 pub use level_stiffness::NoLevelStiffness;
 pub use missing::Missing;

@@ -127,7 +127,8 @@ async fn of_campaign(
     State(shared): State<Arc<Shared>>,
     Path(name): Path<String>,
 ) -> Result<Response, Problem> {
-    let all = shared.formed.figures();
+    let found = shared.formed.found();
+    let all = &found.figures;
     drawn(all.iter().find(|figure| figure.name == name))
 }
 
@@ -176,7 +177,7 @@ fn one(shared: &Shared, of: &str, id: i64, name: &str) -> Result<Option<Figure>,
 /// A number of every cell for each view of the matrix.
 async fn matrix(State(shared): State<Arc<Shared>>) -> Result<Response, Problem> {
     let store = shared.store()?;
-    let numbers = numbers::of_cells(&store.cells()?, &store.records()?, &shared.formed.figures());
+    let numbers = numbers::of_cells(&store.cells()?, &store.records()?, shared.formed.found().cells.as_ref());
     Ok(Json(numbers).into_response())
 }
 

@@ -3,6 +3,7 @@
 use jointrig_protocol::channel::Quantity;
 use std::sync::{Mutex, PoisonError};
 
+use crate::analyse::{LEAD_S, LINES_HZ};
 use crate::campaign::plan::Plan;
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
@@ -14,13 +15,6 @@ use crate::spectra::{
 
 /// The newest hits that are averaged. Plans ask for some ten; this bounds the time of a cell that was hit for hours.
 const MOST_HITS: usize = 64;
-
-/// Time before the trigger that is transformed, s: that of the analysis, so that its FRFs are the same. The force window begins 1 ms
-/// before the pulse.
-const LEAD_S: f64 = 1.25e-3;
-
-/// The lines that are shown, Hz: those that the analysis uses.
-pub const LINES_HZ: [f64; 2] = [10.0, 1000.0];
 
 /// Why a hit has no spectra.
 #[derive(Debug, thiserror::Error)]
@@ -82,7 +76,7 @@ pub fn of_hit(store: &Store, plan: &Plan, row: &RecordRow) -> Result<CrossSpectr
 pub struct Average {
     /// The records that were asked for, the oldest first.
     pub(super) records: Vec<i64>,
-    /// Their spectra at [`LINES_HZ`]; none before the first hit that can be used.
+    /// Their spectra at the analysis' lines; none before the first hit that can be used.
     pub spectra: Option<CrossSpectra>,
     /// What is said of records that cannot be used.
     pub left_out: Vec<String>,

@@ -12,7 +12,7 @@ use crate::analyse::{AnalyseError, Wanted};
 use crate::campaign::store::Store;
 use crate::report::figure::Figure;
 use crate::report::{self, words::brief};
-use crate::results::Results;
+use crate::results::{Cells, Results};
 
 /// The analysis rests so many times as long as it took: a sixth of one core is the most that it takes from the measuring.
 const REST: u32 = 5;
@@ -23,20 +23,29 @@ const QUIET: Duration = Duration::from_secs(4);
 /// How often it looks whether there is more.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// The newest analysis' figures.
+/// What the newest analysis found, as far as others than the page's estimate ask for it.
+#[derive(Debug, Default)]
+pub struct Found {
+    /// All figures that there is data for.
+    pub figures: Vec<Figure>,
+    /// How every cell was heard.
+    pub cells: Option<Cells>,
+}
+
+/// The newest analysis.
 #[derive(Debug, Default)]
 pub struct Formed {
-    figures: std::sync::Mutex<Arc<Vec<Figure>>>,
+    found: std::sync::Mutex<Arc<Found>>,
 }
 
 impl Formed {
-    /// All figures that there is data for.
-    pub fn figures(&self) -> Arc<Vec<Figure>> {
-        self.figures.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clone()
+    /// What it found.
+    pub fn found(&self) -> Arc<Found> {
+        self.found.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clone()
     }
 
-    fn set(&self, figures: Vec<Figure>) {
-        *self.figures.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Arc::new(figures);
+    fn set(&self, found: Found) {
+        *self.found.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Arc::new(found);
     }
 }
 
@@ -70,9 +79,9 @@ pub fn form(path: &Path, bus: &Bus, formed: &Formed, stop: &AtomicBool) {
         }
         known = Some(newest);
         let begun = Instant::now();
-        let (estimate, figures) = alone.install(|| estimate(path, newest.last));
+        let (estimate, found) = alone.install(|| estimate(path, newest.last));
         let took = begun.elapsed();
-        formed.set(figures);
+        formed.set(found);
         bus.say(Message::Estimate(Box::new(Estimate { took_s: took.as_secs_f64(), ..estimate })));
         rest_until = Instant::now() + (took * REST).max(SHORTEST);
     }
@@ -98,14 +107,14 @@ fn newest(path: &Path) -> Result<Newest, crate::campaign::store::error::StoreErr
     })
 }
 
-fn estimate(path: &Path, last: i64) -> (Estimate, Vec<Figure>) {
+fn estimate(path: &Path, last: i64) -> (Estimate, Found) {
     let found = Store::open_read_only(path)
         .map_err(AnalyseError::from)
         .and_then(|store| report::analysed(&store, Wanted::default(), &|_| {}));
     match found {
         Ok(results) => {
             let figures = report::all_figures(&results);
-            (of_results(&results, &figures, last), figures)
+            (of_results(&results, &figures, last), Found { figures, cells: results.cells })
         }
         Err(error) => {
             let missing = vec![error.to_string()];
@@ -118,7 +127,7 @@ fn estimate(path: &Path, last: i64) -> (Estimate, Vec<Figure>) {
                 missing,
                 figures: Vec::new(),
             };
-            (none, Vec::new())
+            (none, Found::default())
         }
     }
 }

@@ -5,9 +5,7 @@ use serde::Serialize;
 use crate::campaign::plan::configuration_name;
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::record_row::{Damaged, RecordRow};
-use crate::report::cell_strip;
-use crate::report::figure::{Figure, Shape};
-use crate::results::MAIN_BAND;
+use crate::results::{self, Cells, MAIN_BAND};
 
 /// A cell's numbers; none where there is none yet.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -18,66 +16,48 @@ pub struct CellNumbers {
     pub force_n: Option<f64>,
     /// Good hits in that mean.
     pub hits: usize,
-    /// Random error of its FRF as the report's figure has it, %: median over the main band.
+    /// Random error of its FRF, %: median over the main band.
     pub random_error_percent: Option<f64>,
-    /// Coherence as the report's figure has it: median over the main band.
+    /// Coherence: median over the main band.
     pub coherence: Option<f64>,
 }
 
-/// Of every cell, in the plan's order. Errors and coherence are those of the last analysis, whose `figures` these are.
+/// Of every cell, in the plan's order; `found` is what the last analysis heard of them.
 pub fn of_cells(
     cells: &[CellRow],
     records: &[Result<RecordRow, Damaged>],
-    figures: &[Figure],
+    found: Option<&Cells>,
 ) -> Vec<CellNumbers> {
-    let named = |name: &str| figures.iter().find(|figure| figure.name == name);
-    let (errors, coherences) = (named("random-error"), named("coherence"));
-    let of_cell = |(place, row): (usize, &CellRow)| {
+    let of_cell = |row: &CellRow| {
         let kept = records.iter().flatten().filter(|record| record.cell == row.id && record.kept());
         let peaks: Vec<f64> = kept.map(|record| record.peak_n).filter(|peak| *peak > 0.0).collect();
         let mean = peaks.iter().sum::<f64>() / peaks.len() as f64;
-        let name = configuration_name(row.cell.configuration);
-        let strip = cell_strip(&row.cell.impact, &row.cell.response);
+        let heard = found.and_then(|found| {
+            let name = configuration_name(row.cell.configuration);
+            let is_it = |own: &&results::CellRow| {
+                own.configuration == name
+                    && own.impact == row.cell.impact
+                    && own.response == row.cell.response
+            };
+            Some((found, found.cells.iter().find(is_it)?))
+        });
         CellNumbers {
             cell: row.id,
             force_n: (!peaks.is_empty()).then_some(mean),
             hits: peaks.len(),
-            random_error_percent: errors.and_then(|figure| point(figure, name, place)),
-            coherence: coherences.and_then(|figure| median(figure, name, &strip)),
+            random_error_percent: heard.and_then(|(_, own)| Some(100.0 * own.random_error?)),
+            coherence: heard.and_then(|(found, own)| median(&found.frequency_hz, &own.coherence)),
         }
     };
-    cells.iter().enumerate().map(of_cell).collect()
+    cells.iter().map(of_cell).collect()
 }
 
-/// The value of the point at this place of the plan.
-fn point(figure: &Figure, configuration: &str, place: usize) -> Option<f64> {
-    let mut own =
-        figure.panels.iter().flat_map(|panel| &panel.marks).filter(|mark| mark.name == configuration);
-    own.find_map(|mark| match &mark.shape {
-        Shape::Points { x, y, .. } => {
-            let at = x.0.iter().position(|x| f64::from(*x) == place as f64)?;
-            y.0.get(at).map(|y| f64::from(*y))
-        }
-        _ => None,
-    })
-}
-
-/// The median of a strip over the main band.
-fn median(figure: &Figure, configuration: &str, strip: &str) -> Option<f64> {
-    let own = figure
-        .panels
-        .iter()
-        .find(|panel| panel.title.strip_prefix(configuration).is_some_and(|rest| rest.starts_with(':')))?;
-    own.marks.iter().find_map(|mark| {
-        let Shape::Strips { x, values, says } = &mark.shape else { return None };
-        let row = says.iter().position(|name| name == strip)?;
-        let values = values.0.chunks_exact(x.0.len().max(1)).nth(row)?;
-        let inside =
-            x.0.iter().zip(values).filter(|(f, v)| MAIN_BAND.contains(f64::from(**f)) && v.is_finite());
-        let mut inside: Vec<f64> = inside.map(|(_, v)| f64::from(*v)).collect();
-        inside.sort_by(f64::total_cmp);
-        inside.get(inside.len() / 2).copied()
-    })
+/// The median over the main band.
+fn median(frequency_hz: &[f64], coherence: &[f64]) -> Option<f64> {
+    let inside = frequency_hz.iter().zip(coherence).filter(|(f, c)| MAIN_BAND.contains(**f) && c.is_finite());
+    let mut inside: Vec<f64> = inside.map(|(_, c)| *c).collect();
+    inside.sort_by(f64::total_cmp);
+    inside.get(inside.len() / 2).copied()
 }
 
 #[cfg(test)]
@@ -85,7 +65,6 @@ mod tests {
     use super::*;
     use crate::campaign::plan::Plan;
     use crate::campaign::store::Store;
-    use crate::results::{self, Cells, Results};
     use std::collections::BTreeMap;
 
     #[test]
@@ -108,8 +87,7 @@ mod tests {
             random_error: (n != 2).then(|| 1e-3 * (n + 1) as f64),
         });
         let cells_found = Cells { frequency_hz: vec![100.0, 400.0, 900.0], cells: rows.collect() };
-        let results = Results { cells: Some(cells_found), ..Results::default() };
-        let numbers = of_cells(&cells, &[], &crate::report::all_figures(&results));
+        let numbers = of_cells(&cells, &[], Some(&cells_found));
         for (n, (own, row)) in numbers.iter().zip(&cells).enumerate() {
             assert_eq!((own.cell, own.force_n, own.hits), (row.id, None, 0));
             if n == 2 {
@@ -121,7 +99,7 @@ mod tests {
             assert!((error - 0.1 * (n + 1) as f64).abs() < 1e-5, "{own:?}");
             assert!((coherence - 0.9 - 1e-3 * n as f64).abs() < 1e-5, "{own:?}");
         }
-        let nothing = of_cells(&cells, &[], &[]);
+        let nothing = of_cells(&cells, &[], None);
         assert!(nothing.iter().all(|own| own.random_error_percent.is_none() && own.coherence.is_none()));
     }
 }

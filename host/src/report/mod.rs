@@ -19,7 +19,6 @@ pub mod words;
 
 pub use analysed::analysed;
 pub use document::{compare, document};
-pub use figures::cell_strip;
 pub use page::{chart_style, comparison_page, figure_fragment, page, script};
 
 use crate::results::{Compared, Results};

@@ -21,11 +21,6 @@ pub fn coherence(results: &Results) -> Option<Figure> {
     (!figure.panels.is_empty() && range[0] < range[1]).then_some(figure)
 }
 
-/// What a cell's strip is called.
-pub fn strip(impact: &str, response: &str) -> String {
-    format!("{impact} seen at {response}")
-}
-
 fn panel(cells: &Cells, configuration: &str, range: [f64; 2]) -> Option<Panel> {
     let lines = cells.frequency_hz.len();
     let own: Vec<&CellRow> = cells
@@ -39,7 +34,7 @@ fn panel(cells: &Cells, configuration: &str, range: [f64; 2]) -> Option<Panel> {
     let shape = Shape::Strips {
         x: Packed::of(cells.frequency_hz.iter().copied()),
         values: Packed::of(own.iter().flat_map(|c| c.coherence.iter().copied())),
-        says: own.iter().map(|c| strip(&c.impact, &c.response)).collect(),
+        says: own.iter().map(|c| format!("{} seen at {}", c.impact, c.response)).collect(),
     };
     let mark = Mark::new(Role::Refused, shape)
         .named("coherence below 0.99")

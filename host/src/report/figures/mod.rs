@@ -28,8 +28,6 @@ mod shaker_loops;
 mod specimens;
 mod usable_bands;
 
-pub use coherence::strip as cell_strip;
-
 use super::figure::{Figure, Panel, Source};
 use crate::results::Results;
 
