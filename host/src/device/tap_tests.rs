@@ -100,11 +100,13 @@ fn nothing_is_seen_twice_and_nothing_is_left_out() {
     };
     look(&mut view);
     let mut tap = folds.join().expect("folds");
-    // what was in the making when nobody folded any more
-    while tap.over != 0 || tap.making.stretches > 0 {
-        tap.fold(&[1]);
-    }
+    // what was in the making when nobody folded any more: a look asks for it, and the next whole stretch hands it over
     look(&mut view);
+    while tap.over != 0 || tap.making.stretches > 0 {
+        let rest = tap.making.scans_per_stretch - tap.over;
+        tap.fold(&vec![1; rest as usize]);
+        look(&mut view);
+    }
     assert_eq!(next, sum as u64, "each scan holds a one");
     assert!(next >= 140_000);
 }
