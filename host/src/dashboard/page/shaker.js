@@ -24,5 +24,5 @@ const shakerScreen={key:'shaker',title:'Shaker',make(m){
     this.limits.replaceChildren(...s.limits.map(l=>el('tr',{className:l.largest>=l.limit?'refused':''},el('td',{},l.channel),el('td',{},inUnit(l.largest,l.unit)),el('td',{},inUnit(l.limit,l.unit)),el('td',{},el('meter',{min:0,max:1,high:.8,value:Math.min(1,l.largest/l.limit)}),` ${(100*l.largest/l.limit).toFixed(0)} %`))));
   }else{this.head.textContent=w.levels.length?'The shaker is at rest.':'No level of the shaker was measured.';this.note.textContent=''}
   this.done.hidden=!w.levels.length;
-  this.rows.replaceChildren(...w.levels.map(l=>el('tr',{},el('td',{},l.title),el('td',{},l.moment),el('td',{},amountOf(l.held,l.reached)),el('td',{},(100*l.overshoot).toFixed(0)+' %'),el('td',{},l.after_s.toFixed(1)+' s'),el('td',{},l.drive_v.toPrecision(3)+' V'))));
+  this.rows.replaceChildren(...w.levels.map(l=>el('tr',{},el('td',{},l.title),el('td',{},l.moment),el('td',{},amountOf(l.held,l.reached)),el('td',{},Math.max(0,100*(l.overshoot-1)).toFixed(1)+' %'),el('td',{},l.after_s.toFixed(1)+' s'),el('td',{},l.drive_v.toPrecision(3)+' V'))));
 }};
