@@ -10,7 +10,7 @@ use jointrig::results::Results;
 use jointrig_hil_sim::rig::RigConfig;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A campaign on a drawn rig: the rig's number, how it is drawn, and the seed of what the campaign draws itself.
 #[derive(Clone, Copy, Debug)]
@@ -79,16 +79,18 @@ pub fn campaigns<T: Send>(
     like: Drawn,
     each: impl Fn(DrawnCampaign) -> T + Sync,
 ) -> Vec<T> {
-    let (next, all) = (AtomicU64::new(0), Mutex::new(Vec::new()));
+    let one = |i| DrawnCampaign { number: first + i / seeds, seed: i % seeds, like };
+    each_of(&(0..rigs * seeds).map(one).collect::<Vec<_>>(), each)
+}
+
+/// These campaigns, two at a time, each told to `each`; in the order of their end.
+pub fn each_of<T: Send>(wanted: &[DrawnCampaign], each: impl Fn(DrawnCampaign) -> T + Sync) -> Vec<T> {
+    let (next, all) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     std::thread::scope(|scope| {
         for _ in 0..2 {
             scope.spawn(|| {
-                loop {
-                    let i = next.fetch_add(1, Ordering::Relaxed);
-                    if i >= rigs * seeds {
-                        break;
-                    }
-                    let one = each(DrawnCampaign { number: first + i / seeds, seed: i % seeds, like });
+                while let Some(campaign) = wanted.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let one = each(*campaign);
                     all.lock().unwrap().push(one);
                 }
             });

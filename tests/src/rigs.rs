@@ -123,7 +123,6 @@ fn scale(bushing: &mut Bushing, factor: f64) {
 
 /// The plan for such a rig: `contact.toml` with its points T1–T6 where it has them, and what is known of its errors.
 pub fn contact_plan(rig: &RigConfig) -> String {
-    let errors = &rig.errors;
     let mut plan = jointrig::campaign::plan::CONTACT.to_owned();
     if !rig.clamp_b.rigid {
         let points: Vec<&ResponsePoint> =
@@ -145,6 +144,12 @@ pub fn contact_plan(rig: &RigConfig) -> String {
             .replace("responses = [\"B1\"", &format!("responses = [{names}\"B1\""))
             .replace("response = [\n", &format!("response = [\n{rows}"));
     }
+    with_priors(&plan, rig)
+}
+
+/// A plan with what is known of the rig's errors.
+pub fn with_priors(plan: &str, rig: &RigConfig) -> String {
+    let errors = &rig.errors;
     format!(
         "{plan}\n[priors]\nposition_m = {:?}\naim_m = {:?}\nhammer_angle_rad = {:?}\nspot_m = {:?}\nspecimen_point_m = {:?}\ngain = {:?}\n\
          hammer_gain = {:?}\nskew_s = {:?}\n",

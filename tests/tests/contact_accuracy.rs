@@ -5,7 +5,7 @@
 use jointrig::campaign::store::Store;
 use jointrig::contact::Interval;
 use jointrig::results::Results;
-use jointrig_tests::drawn_campaigns::{self, DrawnCampaign, count, found};
+use jointrig_tests::drawn_campaigns::{DrawnCampaign, campaigns, count, each_of, found};
 use jointrig_tests::rigs::{Drawn, contact_plan};
 use jointrig_tests::slip_truth::slid;
 use std::path::Path;
@@ -54,26 +54,24 @@ fn row(campaign: DrawnCampaign, results: Results) -> Row {
     }
 }
 
-/// Several campaigns, told as they end.
-fn campaigns(first: u64, rigs: u64, seeds: u64, like: Drawn) -> Vec<Row> {
-    drawn_campaigns::campaigns(first, rigs, seeds, like, |campaign| {
-        let row = row(campaign, campaign.results(contact_plan, |_, _, _| {}));
-        let own = row.stiffness;
-        let told = match own.found {
-            Some([k, low, high]) => format!(
-                "{:6.1} [{:6.1}, {:6.1}]  {:+5.1} % {}",
-                1e-6 * k,
-                1e-6 * low,
-                1e-6 * high,
-                100.0 * (k / own.truth - 1.0),
-                if own.covers() { "" } else { "MISSED" }
-            ),
-            None => row.why.clone(),
-        };
-        let (rig, seed, truth) = (campaign.number, campaign.seed, 1e-6 * own.truth);
-        println!("rig {rig:2} seed {seed}: truth {truth:6.1}, found {told}");
-        row
-    })
+/// A campaign, told when it ends.
+fn told(campaign: DrawnCampaign) -> Row {
+    let row = row(campaign, campaign.results(contact_plan, |_, _, _| {}));
+    let own = row.stiffness;
+    let told = match own.found {
+        Some([k, low, high]) => format!(
+            "{:6.1} [{:6.1}, {:6.1}]  {:+5.1} % {}",
+            1e-6 * k,
+            1e-6 * low,
+            1e-6 * high,
+            100.0 * (k / own.truth - 1.0),
+            if own.covers() { "" } else { "MISSED" }
+        ),
+        None => row.why.clone(),
+    };
+    let (rig, seed, truth) = (campaign.number, campaign.seed, 1e-6 * own.truth);
+    println!("rig {rig:2} seed {seed}: truth {truth:6.1}, found {told}");
+    row
 }
 
 /// What a table's line says of them.
@@ -150,20 +148,40 @@ fn the_contacts_own_stiffness_is_found_on_rigs_that_nobody_tuned_for() {
     assert!(rms < 0.06 && half < 0.15, "{rows:?}");
 }
 
+/// Hits of some 50 N against 15 N of friction.
+const MAY_SLIP: Drawn = Drawn { slip_limit_n: Some(15.0), stiffest_n_per_m: 300e6, errors: 1.0, gain: 0.005 };
+
+/// The first of the rigs from number `first` on that slip under the hammer, and the first that stick: `each` of either.
+fn slipping_and_stuck(first: u64, each: usize) -> [Vec<DrawnCampaign>; 2] {
+    let [mut slipping, mut stuck] = [Vec::new(), Vec::new()];
+    for number in first.. {
+        let campaign = DrawnCampaign { number, seed: 0, like: MAY_SLIP };
+        let slid = slid(&campaign);
+        let kind = if slid.iter().any(|hit| hit.path > 0.0) { &mut slipping } else { &mut stuck };
+        if kind.len() < each {
+            kind.push(campaign);
+            let paths: Vec<String> = slid.iter().map(|hit| format!("{:.3}", hit.path)).collect();
+            println!("rig {number}: slides {} of its elastic travel", paths.join(", "));
+        }
+        if slipping.len() + stuck.len() == 2 * each {
+            break;
+        }
+    }
+    [slipping, stuck]
+}
+
 #[test]
 #[ignore = "prints docs/accuracy.md's table of slipping contacts: half an hour"]
 fn a_contact_that_may_slip_has_its_stuck_stiffness_or_none() {
-    let (first, rigs) = (count("FIRST", 400), count("RIGS", 50));
-    // hits of some 50 N against 15 N of friction
-    let like = Drawn { slip_limit_n: Some(15.0), ..Drawn::default() };
-    let rows = campaigns(first, rigs, 1, like);
-    let slide = |row: &Row| {
-        let slid = slid(&DrawnCampaign { number: row.rig, seed: 0, like });
-        let paths: Vec<String> = slid.iter().map(|hit| format!("{:.3}", hit.path)).collect();
-        println!("rig {}: slid {} of its elastic travel, called {:?}", row.rig, paths.join(", "), row.slips);
-        slid.iter().any(|hit| hit.path > 0.0)
-    };
-    let (slipping, stuck): (Vec<&Row>, Vec<&Row>) = rows.iter().partition(|row| slide(row));
+    let kinds = slipping_and_stuck(count("FIRST", 400), count("EACH", 25) as usize);
+    let slipping_rigs: Vec<u64> = kinds[0].iter().map(|campaign| campaign.number).collect();
+    let rows = each_of(&kinds.concat(), |campaign| {
+        let row = told(campaign);
+        println!("rig {}: called {:?}", row.rig, row.slips);
+        row
+    });
+    let (slipping, stuck): (Vec<&Row>, Vec<&Row>) =
+        rows.iter().partition(|row| slipping_rigs.contains(&row.rig));
     println!(
         "| contacts that | campaigns | called slipping | called stuck | not told | no k_T | the stuck k_T | another |"
     );
@@ -208,7 +226,7 @@ fn accuracy_of_the_contacts_own_stiffness() {
     }
     let mut lines = Vec::new();
     for (name, first, like) in tables {
-        lines.push((name, campaigns(first, rigs, seeds, like)));
+        lines.push((name, campaigns(first, rigs, seeds, like, told)));
         println!("| errors | campaigns | covered | rms error | half width (median) | no answer |");
         for (name, rows) in &lines {
             table(name, rows);

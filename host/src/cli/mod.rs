@@ -4,6 +4,8 @@
 //! to stderr. An error is one to a few lines: what, where, what to do.
 
 mod analyse;
+#[cfg(feature = "dashboard")]
+mod analyse_for_page;
 mod campaign;
 mod compare;
 mod completions;
@@ -62,6 +64,10 @@ enum Command {
     /// Show a campaign in the browser.
     #[cfg(feature = "dashboard")]
     Serve(serve::Serve),
+    /// Analyse a campaign for the live page of another process.
+    #[cfg(feature = "dashboard")]
+    #[command(name = crate::live::forming::COMMAND, hide = true)]
+    AnalyseForPage(analyse_for_page::AnalyseForPage),
     /// Compare two campaigns.
     Compare(compare::Compare),
     /// Write everything that a campaign file holds for other programs.
@@ -105,6 +111,8 @@ impl Cli {
             Command::Report(command) => command.run(),
             #[cfg(feature = "dashboard")]
             Command::Serve(command) => command.run(),
+            #[cfg(feature = "dashboard")]
+            Command::AnalyseForPage(command) => command.run(),
             Command::Compare(command) => command.run(),
             Command::Export(command) => command.run(),
             Command::Frf(command) => command.run(),

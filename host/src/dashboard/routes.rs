@@ -16,9 +16,9 @@ use super::problem::Problem;
 use super::{Shared, edit, page, socket};
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
+use crate::live::found::drawn;
 use crate::live::{figures, numbers, spectra_figures};
 use crate::report::figure::{self, Figure};
-use crate::report::figure_fragment;
 
 /// What a page of ours may do: run our script, use our style, and ask this server.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data: blob:; \
@@ -117,19 +117,17 @@ async fn state(State(shared): State<Arc<Shared>>) -> Response {
     ([(header::CONTENT_TYPE, "application/json")], whole).into_response()
 }
 
-/// A figure as data, and as the drawing that stands there until the data are alive.
-fn drawn(figure: Option<&Figure>) -> Result<Response, Problem> {
-    let figure = figure.ok_or_else(|| Problem::missing("there are no data for this figure yet"))?;
-    Ok(Json(json!({ "figure": figure, "html": figure_fragment(figure) })).into_response())
+/// A figure's text as the page gets it.
+fn sent(text: Option<String>) -> Result<Response, Problem> {
+    let text = text.ok_or_else(|| Problem::missing("there are no data for this figure yet"))?;
+    Ok(([(header::CONTENT_TYPE, "application/json")], text).into_response())
 }
 
 async fn of_campaign(
     State(shared): State<Arc<Shared>>,
     Path(name): Path<String>,
 ) -> Result<Response, Problem> {
-    let found = shared.formed.found();
-    let all = &found.figures;
-    drawn(all.iter().find(|figure| figure.name == name))
+    sent(shared.formed.found().figures.get(&name).cloned())
 }
 
 /// The shaker's level as it is now.
@@ -142,7 +140,7 @@ async fn of_shaker(State(shared): State<Arc<Shared>>) -> Result<Response, Proble
         version: env!("CARGO_PKG_VERSION").into(),
         ..figure::Source::default()
     };
-    drawn(figure.map(|figure| Figure { from, ..figure }).as_ref())
+    sent(figure.map(|figure| drawn(&Figure { from, ..figure })))
 }
 
 /// Figures of a record or a cell, as the file has it now.
@@ -154,7 +152,7 @@ async fn of_one(
     let made = tokio::task::spawn_blocking(move || one(&shared, &of, id, &name)).await;
     let broken =
         |_| Problem::new(StatusCode::INTERNAL_SERVER_ERROR, "the figure could not be made", "report this");
-    drawn(made.map_err(broken)??.as_ref())
+    sent(made.map_err(broken)??.as_ref().map(drawn))
 }
 
 fn one(shared: &Shared, of: &str, id: i64, name: &str) -> Result<Option<Figure>, Problem> {

@@ -1,18 +1,17 @@
-//! What can be said so far: the very analysis of `jointrig analyse`, run anew on what is stored whenever there is more of it, on one thread
-//! beside the measuring. When the last hit is in, its numbers are those of `results.json`.
+//! What can be said so far: the very analysis of `jointrig analyse`, run anew on what is stored whenever there is more of it, by a process of
+//! its own beside the measuring. When the last hit is in, its numbers are those of `results.json`.
 
+use std::io::{self, Read as _};
 use std::path::Path;
+use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use super::bus::Bus;
-use super::message::{Estimate, Message};
-use crate::analyse::{AnalyseError, Wanted};
+use super::found::Found;
+use super::message::Message;
 use crate::campaign::store::Store;
-use crate::report::figure::Figure;
-use crate::report::{self, words::brief};
-use crate::results::{Cells, Results};
 
 /// The analysis rests so many times as long as it took: a sixth of one core is the most that it takes from the measuring.
 const REST: u32 = 5;
@@ -20,17 +19,10 @@ const REST: u32 = 5;
 const SHORTEST: Duration = Duration::from_secs(2);
 /// Nothing new for so long: nobody is measuring whom it could disturb.
 const QUIET: Duration = Duration::from_secs(4);
+/// The hidden subcommand of the process that analyses.
+pub const COMMAND: &str = "analyse-for-page";
 /// How often it looks whether there is more.
 const LOOK: Duration = Duration::from_millis(200);
-
-/// What the newest analysis found, as far as others than the page's estimate ask for it.
-#[derive(Debug, Default)]
-pub struct Found {
-    /// All figures that there is data for.
-    pub figures: Vec<Figure>,
-    /// How every cell was heard.
-    pub cells: Option<Cells>,
-}
 
 /// The newest analysis.
 #[derive(Debug, Default)]
@@ -49,16 +41,8 @@ impl Formed {
     }
 }
 
-/// Analyses the file as long as it grows, until `stop`.
+/// Has the file analysed as long as it grows, until `stop`.
 pub fn form(path: &Path, bus: &Bus, formed: &Formed, stop: &AtomicBool) {
-    // what runs side by side in an analysis runs one after the other here: the other cores are for the measuring
-    let alone = match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
-        Ok(alone) => alone,
-        Err(error) => {
-            log::error!("the page shows no estimate, because no thread can be had for it: {error}");
-            return;
-        }
-    };
     let (mut known, mut seen) = (None, None);
     let (mut rest_until, mut changed) = (Instant::now(), Instant::now());
     while !stop.load(Ordering::Relaxed) {
@@ -79,12 +63,54 @@ pub fn form(path: &Path, bus: &Bus, formed: &Formed, stop: &AtomicBool) {
         }
         known = Some(newest);
         let begun = Instant::now();
-        let (estimate, found) = alone.install(|| estimate(path, newest.last));
+        let mut found = analysed_elsewhere(path, newest.last)
+            .unwrap_or_else(|why| Found::none(newest.last, format!("no estimate is made: {why}")));
         let took = begun.elapsed();
+        found.estimate.took_s = took.as_secs_f64();
+        bus.say(Message::Estimate(Box::new(found.estimate.clone())));
         formed.set(found);
-        bus.say(Message::Estimate(Box::new(Estimate { took_s: took.as_secs_f64(), ..estimate })));
         rest_until = Instant::now() + (took * REST).max(SHORTEST);
     }
+}
+
+/// Has a process of this very program analyse the file.
+fn analysed_elsewhere(path: &Path, last: i64) -> io::Result<Found> {
+    // the program as it was started, even if its file was replaced meanwhile
+    let itself = Path::new("/proc/self/exe");
+    let program = if itself.exists() { itself.to_owned() } else { std::env::current_exe()? };
+    let mut child = Command::new(program)
+        .arg(COMMAND)
+        .arg(path)
+        .arg(last.to_string())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()?;
+    // it ends when this end of its input is closed: with this process, whatever ends that
+    let alive = child.stdin.take();
+    let mut text = String::new();
+    let read = child.stdout.take().map_or(Ok(0), |mut out| out.read_to_string(&mut text));
+    let status = child.wait()?;
+    drop(alive);
+    read?;
+    if !status.success() {
+        return Err(io::Error::other(format!("the analysis ended with {status}")));
+    }
+    Ok(serde_json::from_str(&text)?)
+}
+
+/// The process that analyses: prints what it found of the file, and ends early when its input is closed.
+///
+/// # Errors
+/// The result cannot be written.
+pub fn analyse_for_another(path: &Path, last: i64, out: &mut impl io::Write) -> io::Result<()> {
+    // the other cores are for the measuring
+    rayon::ThreadPoolBuilder::new().num_threads(1).build_global().map_err(io::Error::other)?;
+    std::thread::Builder::new().name("wanted still".into()).spawn(|| {
+        let _ = io::copy(&mut io::stdin(), &mut io::sink());
+        std::process::exit(0);
+    })?;
+    serde_json::to_writer(&mut *out, &Found::of(path, last))?;
+    out.flush()
 }
 
 /// What an analysis depends on: other numbers, other analysis.
@@ -105,41 +131,4 @@ fn newest(path: &Path) -> Result<Newest, crate::campaign::store::error::StoreErr
         overruled: store.overrules()?.len(),
         last: places.iter().map(|place| place.id).max().unwrap_or(0),
     })
-}
-
-fn estimate(path: &Path, last: i64) -> (Estimate, Found) {
-    let found = Store::open_read_only(path)
-        .map_err(AnalyseError::from)
-        .and_then(|store| report::analysed(&store, Wanted::default(), &|_| {}));
-    match found {
-        Ok(results) => {
-            let figures = report::all_figures(&results);
-            (of_results(&results, &figures, last), Found { figures, cells: results.cells })
-        }
-        Err(error) => {
-            let missing = vec![error.to_string()];
-            let none = Estimate {
-                after_record: last,
-                hits: 0,
-                took_s: 0.0,
-                answer: None,
-                lines: Vec::new(),
-                missing,
-                figures: Vec::new(),
-            };
-            (none, Found::default())
-        }
-    }
-}
-
-fn of_results(results: &Results, figures: &[Figure], last: i64) -> Estimate {
-    Estimate {
-        after_record: last,
-        hits: results.hits.iter().filter(|hit| hit.kept).count(),
-        took_s: 0.0,
-        answer: results.answer.clone(),
-        lines: brief::answer(results).into_iter().map(|line| [line.head, line.text]).collect(),
-        missing: results.missing.clone(),
-        figures: figures.iter().map(|figure| figure.name).collect(),
-    }
 }

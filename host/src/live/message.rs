@@ -1,10 +1,9 @@
 //! What a page is told, version 1. Units stand in the names; a page skips fields and kinds that it does not know.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 use super::now::{Control, Disk, Link, Now, Shaker, Signals, State, StreamInfo};
-use crate::results::Answer;
 
 /// Version of these messages.
 pub const VERSION: u32 = 1;
@@ -207,7 +206,7 @@ pub struct Counted {
 }
 
 /// What the analysis says.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// The last record that it knows.
     pub after_record: i64,
@@ -216,13 +215,13 @@ pub struct Estimate {
     /// How long it took, s.
     pub took_s: f64,
     /// `answer` of `results.json`, as `analyse` gives it.
-    pub answer: Option<Answer>,
+    pub answer: serde_json::Value,
     /// The same in words: what it is about, and what is said of it.
     pub lines: Vec<[String; 2]>,
     /// What is missing, and for what.
     pub missing: Vec<String>,
     /// Names of the figures that it has data for.
-    pub figures: Vec<&'static str>,
+    pub figures: Vec<String>,
 }
 
 /// Why nothing more comes.

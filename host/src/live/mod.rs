@@ -1,7 +1,7 @@
 //! What can be said of a campaign while it is measured.
 //!
 //! What is stored is read from the campaign file, so that it is the same in the measuring process and beside it; a reader of SQLite's
-//! write-ahead log blocks no writer. [`follow`] sees what is new in the file, [`forming`] runs the analysis on what is there, [`figures`] draws
+//! write-ahead log blocks no writer. [`follow`] sees what is new in the file, [`forming`] has what is there analysed and gets what was [`found`], [`figures`] draws
 //! single records, [`averaging`] and [`spectra_figures`] their spectra, [`numbers`] has a number for each cell.
 //!
 //! What happens between two records is told by the measuring process itself: [`eye`] takes down what its thread says without ever waiting,
@@ -15,6 +15,7 @@ pub mod eye;
 pub mod figures;
 pub mod follow;
 pub mod forming;
+pub mod found;
 pub mod frames;
 pub mod message;
 pub mod now;

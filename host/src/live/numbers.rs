@@ -1,11 +1,11 @@
 //! A number of every cell for the matrix: how hard it was hit, how far noise alone moves its FRF, how much of the response the force explains.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::campaign::plan::configuration_name;
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::record_row::{Damaged, RecordRow};
-use crate::results::{self, Cells, MAIN_BAND};
+use crate::results::{Cells, MAIN_BAND};
 
 /// A cell's numbers; none where there is none yet.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -22,31 +22,50 @@ pub struct CellNumbers {
     pub coherence: Option<f64>,
 }
 
+/// What an analysis heard of a cell.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CellHeard {
+    configuration: String,
+    impact: String,
+    response: String,
+    /// Random error of its FRF, relative: median over the main band.
+    random_error: Option<f64>,
+    /// Coherence: median over the main band.
+    coherence: Option<f64>,
+}
+
+/// What the results say of every cell, in short.
+pub fn heard(found: &Cells) -> Vec<CellHeard> {
+    let one = found.cells.iter().map(|cell| CellHeard {
+        configuration: cell.configuration.clone(),
+        impact: cell.impact.clone(),
+        response: cell.response.clone(),
+        random_error: cell.random_error,
+        coherence: median(&found.frequency_hz, &cell.coherence),
+    });
+    one.collect()
+}
+
 /// Of every cell, in the plan's order; `found` is what the last analysis heard of them.
 pub fn of_cells(
     cells: &[CellRow],
     records: &[Result<RecordRow, Damaged>],
-    found: Option<&Cells>,
+    found: &[CellHeard],
 ) -> Vec<CellNumbers> {
     let of_cell = |row: &CellRow| {
         let kept = records.iter().flatten().filter(|record| record.cell == row.id && record.kept());
         let peaks: Vec<f64> = kept.map(|record| record.peak_n).filter(|peak| *peak > 0.0).collect();
         let mean = peaks.iter().sum::<f64>() / peaks.len() as f64;
-        let heard = found.and_then(|found| {
-            let name = configuration_name(row.cell.configuration);
-            let is_it = |own: &&results::CellRow| {
-                own.configuration == name
-                    && own.impact == row.cell.impact
-                    && own.response == row.cell.response
-            };
-            Some((found, found.cells.iter().find(is_it)?))
+        let name = configuration_name(row.cell.configuration);
+        let heard = found.iter().find(|own| {
+            own.configuration == name && own.impact == row.cell.impact && own.response == row.cell.response
         });
         CellNumbers {
             cell: row.id,
             force_n: (!peaks.is_empty()).then_some(mean),
             hits: peaks.len(),
-            random_error_percent: heard.and_then(|(_, own)| Some(100.0 * own.random_error?)),
-            coherence: heard.and_then(|(found, own)| median(&found.frequency_hz, &own.coherence)),
+            random_error_percent: heard.and_then(|own| Some(100.0 * own.random_error?)),
+            coherence: heard.and_then(|own| own.coherence),
         }
     };
     cells.iter().map(of_cell).collect()
@@ -65,6 +84,7 @@ mod tests {
     use super::*;
     use crate::campaign::plan::Plan;
     use crate::campaign::store::Store;
+    use crate::results;
     use std::collections::BTreeMap;
 
     #[test]
@@ -87,7 +107,7 @@ mod tests {
             random_error: (n != 2).then(|| 1e-3 * (n + 1) as f64),
         });
         let cells_found = Cells { frequency_hz: vec![100.0, 400.0, 900.0], cells: rows.collect() };
-        let numbers = of_cells(&cells, &[], Some(&cells_found));
+        let numbers = of_cells(&cells, &[], &heard(&cells_found));
         for (n, (own, row)) in numbers.iter().zip(&cells).enumerate() {
             assert_eq!((own.cell, own.force_n, own.hits), (row.id, None, 0));
             if n == 2 {
@@ -99,7 +119,7 @@ mod tests {
             assert!((error - 0.1 * (n + 1) as f64).abs() < 1e-5, "{own:?}");
             assert!((coherence - 0.9 - 1e-3 * n as f64).abs() < 1e-5, "{own:?}");
         }
-        let nothing = of_cells(&cells, &[], None);
+        let nothing = of_cells(&cells, &[], &[]);
         assert!(nothing.iter().all(|own| own.random_error_percent.is_none() && own.coherence.is_none()));
     }
 }

@@ -1,0 +1,50 @@
+//! How well the stiffness between the arms is found, through the whole chain: plan, firmware, rig, records, spectra, virtual points, estimate.
+//! The truth is that of the rig's parameters.
+#![allow(clippy::unwrap_used)]
+
+use jointrig::campaign::plan::DEMO;
+use jointrig_hil_sim::rig::RigConfig;
+use jointrig_tests::drawn_campaigns::{campaigns, count};
+use jointrig_tests::rigs::{Drawn, with_priors};
+
+/// The paper's cells, three hits each.
+fn plan(rig: &RigConfig) -> String {
+    with_priors(DEMO, rig)
+}
+
+#[test]
+#[ignore = "prints docs/accuracy.md's table of the stiffness between the arms over campaigns: half an hour"]
+fn accuracy_of_the_stiffness_between_the_arms() {
+    let (first, rigs, seeds) = (count("FIRST", 700), count("RIGS", 24), count("SEEDS", 1));
+    println!("| rig | seed | truth | found | 95 % | basis |\n|---|---|---|---|---|---|");
+    let all = campaigns(first, rigs, seeds, Drawn::default(), |drawn| {
+        let truth = drawn.rig().truth().between_arms_k_n_per_m;
+        let arms = drawn.results(plan, |_, _, _| {}).answer.unwrap().between_arms;
+        let row = format!("| {} | {} | {:.2} |", drawn.number, drawn.seed, 1e-6 * truth);
+        let Some(k) = arms.k_n_per_m else {
+            println!("{row} – | {} | {} |", arms.why, arms.basis);
+            return None;
+        };
+        let [low, high] = k.ci95;
+        let covers = (low..=high).contains(&truth);
+        let [mean, low, high] = [k.mean, low, high].map(|k| 1e-6 * k);
+        let missed = if covers { "" } else { ", missed" };
+        println!("{row} {mean:.2} | {low:.2}…{high:.2}{missed} | {} |", arms.basis);
+        Some((mean * 1e6 / truth - 1.0, 0.5 * (high - low) / mean, covers))
+    });
+    let found: Vec<_> = all.iter().flatten().collect();
+    let covered = found.iter().filter(|(.., covers)| *covers).count();
+    let [n, mean] = [found.len() as f64, found.iter().map(|(error, ..)| error).sum::<f64>()];
+    let rms = (found.iter().map(|(error, ..)| error * error).sum::<f64>() / n).sqrt();
+    let mut half: Vec<f64> = found.iter().map(|(_, half, _)| *half).collect();
+    half.sort_by(f64::total_cmp);
+    println!(
+        "covered {covered} of {n}, {} without an answer; mean error {:+.1} %, rms error {:.1} %, median half width {:.1} %",
+        all.len() - found.len(),
+        100.0 * mean / n,
+        100.0 * rms,
+        100.0 * half[half.len() / 2]
+    );
+    assert!(100 * covered >= 93 * found.len(), "{covered} of {n} covered");
+    assert!(2 * found.len() >= all.len(), "an answer for most of these rigs");
+}
