@@ -1,13 +1,17 @@
 //! Campaigns on a scripted device: complete, interrupted, over a bad link, with a device that dies or starts anew.
 
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::channel;
+use std::time::Duration;
 
 use crate::by_summary::ByShotSummary;
 use crate::fake::Fake;
 use crate::faulty::{Faults, Faulty};
 use jointrig::campaign::plan::SMALL;
 use jointrig::campaign::plan::{Cell, Plan};
+use jointrig::campaign::run::edits::{Desk, Edit, edits};
 use jointrig::campaign::run::error::RunError;
 use jointrig::campaign::run::runner::{Options, Summary, run};
 use jointrig::campaign::run::stage::Stage;
@@ -25,7 +29,6 @@ use jointrig::device::session::Session;
 use jointrig::device::transport::Transport;
 use jointrig_logs::example::{WARNING, image, line};
 use jointrig_logs::file_name;
-use std::path::Path;
 
 fn plan() -> String {
     SMALL
@@ -166,6 +169,59 @@ fn an_interrupted_campaign_resumes_to_the_same_records() {
     }
     assert_eq!(kept, 14);
     assert!(content(&whole) == content(&parts));
+}
+
+/// Judges as usual when all before is stored, drops a good hit of the first cell once there are three, and notes how many it is given.
+struct DropsOne {
+    desk: Option<Desk>,
+    path: PathBuf,
+    judged: usize,
+    given: Vec<usize>,
+}
+
+impl Judge for DropsOne {
+    fn judge(
+        &mut self,
+        cell: &Cell,
+        plan: &Plan,
+        channels: &ChannelMap,
+        recording: &Recording,
+        others: &Others,
+    ) -> Verdict {
+        let store = Store::open_read_only(&self.path).unwrap();
+        while store.places().unwrap().len() < self.judged {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        self.judged += 1;
+        self.given.push(others.hits());
+        if others.hits() == 3
+            && let Some(desk) = self.desk.take()
+        {
+            let good = rows(&store).into_iter().find(RecordRow::kept).unwrap();
+            let edit = Edit::Overrule { record: good.id, verdict: Kind::Dropped, reason: "test".into() };
+            let (tell, told) = channel();
+            desk.hand_in(edit, move |outcome| tell.send(outcome).unwrap()).unwrap();
+            told.recv().unwrap().unwrap();
+        }
+        ByShotSummary.judge(cell, plan, channels, recording, others)
+    }
+}
+
+#[test]
+fn a_hit_dropped_meanwhile_is_no_measure_for_those_after_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = plan().replace("wanted = 2", "wanted = 8").replace("most = 8", "most = 30");
+    let path = create(&folder, "a.jrig", &text);
+    let (desk, edits) = edits();
+    let options = Options { edits: Some(edits), ..options() };
+    let mut judge = DropsOne { desk: Some(desk), path: path.clone(), judged: 0, given: Vec::new() };
+    run_on(&path, Fake::default(), &options, &mut judge).unwrap();
+    let store = Store::open_read_only(&path).unwrap();
+    let first = store.cells().unwrap()[0].id;
+    let of_first: Vec<RecordRow> = rows(&store).into_iter().filter(|row| row.cell == first).collect();
+    assert_eq!(of_first.iter().filter(|row| row.kept()).count(), 8, "another one in its place");
+    // the last one wanted is judged by the seven others that count; with the dropped one they would be eight
+    assert_eq!(judge.given[of_first.len() - 1], 7, "{:?}", &judge.given[..of_first.len()]);
 }
 
 #[test]

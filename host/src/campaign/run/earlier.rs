@@ -40,22 +40,47 @@ impl Earlier {
         plan: &Plan,
         channels: &ChannelMap,
     ) -> Result<(Others, VecDeque<RecordRow>), StoreError> {
-        let mut others = Others::default();
-        let Some(records) = self.records.get(&cell) else { return Ok((others, VecDeque::new())) };
+        let Some(records) = self.records.get(&cell) else {
+            return Ok((Others::default(), VecDeque::new()));
+        };
         // the writer is on a thread of its own; a cell's earlier records are in the file since before it began
         let store = Store::open_read_only(&self.path)?;
-        let kept = |record: &&RecordRow| record.kept() && record.channels == channels.len();
-        for record in records.iter().flatten().filter(kept) {
-            match store.samples(record) {
-                Ok(samples) => others.learn(plan, channels, samples.view()),
-                Err(error @ StoreError::Damaged { .. }) => log::warn!("{error}"),
-                Err(error) => return Err(error),
-            }
-        }
+        let (others, _) = learnt(&store, records, plan, channels)?;
         let mut again: Vec<RecordRow> = records.iter().flatten().cloned().collect();
         again.sort_by_key(|record| record.attempt);
         let whole =
             again.len() == records.len() && again.iter().zip(0..).all(|(record, n)| record.attempt == n);
         Ok((others, if whole { again.into() } else { VecDeque::new() }))
     }
+
+    /// What the good records of a cell that are in the file by now have in common, and how many they are.
+    pub(super) fn others_now(
+        &self,
+        cell: i64,
+        plan: &Plan,
+        channels: &ChannelMap,
+    ) -> Result<(Others, u32), StoreError> {
+        let store = Store::open_read_only(&self.path)?;
+        learnt(&store, &store.records_of(cell)?, plan, channels)
+    }
+}
+
+/// What the good ones of these records have in common, and how many they are.
+fn learnt(
+    store: &Store,
+    records: &[Result<RecordRow, Damaged>],
+    plan: &Plan,
+    channels: &ChannelMap,
+) -> Result<(Others, u32), StoreError> {
+    let (mut others, mut hits) = (Others::default(), 0);
+    let kept = |record: &&RecordRow| record.kept() && record.channels == channels.len();
+    for record in records.iter().flatten().filter(kept) {
+        hits += 1;
+        match store.samples(record) {
+            Ok(samples) => others.learn(plan, channels, samples.view()),
+            Err(error @ StoreError::Damaged { .. }) => log::warn!("{error}"),
+            Err(error) => return Err(error),
+        }
+    }
+    Ok((others, hits))
 }

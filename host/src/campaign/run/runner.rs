@@ -175,7 +175,7 @@ impl Runner<'_> {
         let cells = self.cells;
         let (mut at, mut back) = (0, false);
         while !self.stopped() {
-            self.recount();
+            self.recount(None);
             let Some(row) = cells.get(at) else {
                 // a cell behind us that lost a hit to a person gets another one
                 let tally = &self.tally;
@@ -204,14 +204,17 @@ impl Runner<'_> {
         Ok(())
     }
 
-    /// Counts what persons elsewhere have overruled since.
-    pub(super) fn recount(&mut self) {
+    /// Counts what persons elsewhere have overruled since; returns whether it concerns this cell.
+    pub(super) fn recount(&mut self, concerned: Option<i64>) -> bool {
+        let mut it_does = false;
         for Recount { cell, more } in self.keeper.recounts() {
             self.tally.recount(cell, more);
             if !more {
                 self.reopened.insert(cell);
             }
+            it_does |= concerned == Some(cell);
         }
+        it_does
     }
 
     /// Notes where the scan clock is.

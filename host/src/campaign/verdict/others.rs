@@ -33,6 +33,11 @@ impl Others {
         }
     }
 
+    /// How many there are.
+    pub fn hits(&self) -> usize {
+        self.noise.len()
+    }
+
     /// How noisy the channel at `place` usually is, in its unit: the median; none of a few records.
     pub fn usual_noise(&self, place: usize) -> Option<f64> {
         if self.noise.len() < FEW {
