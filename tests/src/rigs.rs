@@ -64,11 +64,12 @@ pub fn drawn(number: u64, drawn: Drawn) -> RigConfig {
         let specimen: Vec<ResponsePoint> = rig
             .responses
             .iter()
-            .filter(|point| point.body == BodyName::SpecimenA)
+            .filter(|point| point.body == BodyName::SpecimenA && point.sigma_m.is_none())
             .map(|point| ResponsePoint {
                 name: point.name.replace('S', "T"),
                 body: BodyName::SpecimenB,
                 position_m: [point.position_m[0], -point.position_m[1], point.position_m[2]],
+                sigma_m: None,
                 speckle: false,
             })
             .collect();
@@ -100,6 +101,9 @@ pub fn drawn(number: u64, drawn: Drawn) -> RigConfig {
     rig.sensors.ldv_b.floor *= floor;
     rig.sensors.load_cells.noise_n *= between(0.5, 2.0);
 
+    for point in &mut rig.responses {
+        point.sigma_m.iter_mut().for_each(|sigma_m| *sigma_m *= drawn.errors);
+    }
     let errors = &mut rig.errors;
     for error in [
         &mut errors.position_m,
@@ -162,6 +166,30 @@ pub fn with_priors(plan: &str, rig: &RigConfig) -> String {
         errors.hammer_gain,
         errors.skew_s
     )
+}
+
+/// The same plan with the two marks N1 and N2 beside the contact, placed as carefully as the spots.
+pub fn near_plan(rig: &RigConfig) -> String {
+    let near: Vec<&ResponsePoint> = rig.responses.iter().filter(|point| point.sigma_m.is_some()).collect();
+    let names: Vec<String> = near.iter().map(|point| format!("\"{}\", ", point.name)).collect();
+    let rows: Vec<String> = near
+        .iter()
+        .map(|p| {
+            let ([x, y, z], sigma_m) = (p.position_m, p.sigma_m.unwrap());
+            format!(
+                "    {{ name = \"{}\", grouping = 5, position_m = [{x:?}, {y:?}, {z:?}], sigma_m = {sigma_m:?} }},\n",
+                p.name
+            )
+        })
+        .collect();
+    contact_plan(rig)
+        .replace("\"S1\", \"S2\"", &format!("{}\"S1\", \"S2\"", names.concat()))
+        .replace("response = [\n", &format!("response = [\n{}", rows.concat()))
+}
+
+/// As many cells as in `contact.toml`: N1 and N2 in place of S5 and S6.
+pub fn near_instead_plan(rig: &RigConfig) -> String {
+    near_plan(rig).replace(", \"S5\", \"S6\"", "")
 }
 
 /// Frequencies of the shaker's levels on such a rig, Hz.

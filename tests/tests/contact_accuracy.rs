@@ -5,8 +5,9 @@
 use jointrig::campaign::store::Store;
 use jointrig::contact::Interval;
 use jointrig::results::Results;
+use jointrig_hil_sim::rig::RigConfig;
 use jointrig_tests::drawn_campaigns::{DrawnCampaign, campaigns, count, each_of, found};
-use jointrig_tests::rigs::{Drawn, contact_plan};
+use jointrig_tests::rigs::{Drawn, contact_plan, near_instead_plan, near_plan};
 use jointrig_tests::slip_truth::slid;
 use std::path::Path;
 
@@ -27,6 +28,9 @@ impl Estimate {
         self.found.is_none_or(|[_, low, high]| low <= self.truth && self.truth <= high)
     }
 }
+
+/// The plan for a rig.
+type Plan = fn(&RigConfig) -> String;
 
 /// One campaign's answers beside the truth.
 #[derive(Debug, Clone)]
@@ -54,9 +58,14 @@ fn row(campaign: DrawnCampaign, results: Results) -> Row {
     }
 }
 
-/// A campaign, told when it ends.
+/// A campaign with `contact.toml`, told when it ends.
 fn told(campaign: DrawnCampaign) -> Row {
-    let row = row(campaign, campaign.results(contact_plan, |_, _, _| {}));
+    told_of(campaign, contact_plan)
+}
+
+/// A campaign, told when it ends.
+fn told_of(campaign: DrawnCampaign, plan: Plan) -> Row {
+    let row = row(campaign, campaign.results(plan, |_, _, _| {}));
     let own = row.stiffness;
     let told = match own.found {
         Some([k, low, high]) => format!(
@@ -205,6 +214,25 @@ fn a_contact_that_may_slip_has_its_stuck_stiffness_or_none() {
     // nothing but the stuck stiffness may be called k_T
     let other = rows.iter().filter(|row| !row.stiffness.covers()).count();
     assert!(20 * other <= rows.len().max(20), "{rows:?}");
+}
+
+#[test]
+#[ignore = "prints docs/accuracy.md's table of marks beside the contact: half an hour"]
+fn marks_beside_the_contact() {
+    let (first, rigs, seeds) = (count("FIRST", 100), count("RIGS", 12), count("SEEDS", 1));
+    let like = Drawn { errors: 0.5, gain: 0.0, ..Drawn::default() };
+    let plans: [(&str, Plan); 3] = [
+        ("`contact.toml`: S1–S6, 63 cells", contact_plan),
+        ("S1–S6, N1, N2: 71 cells", near_plan),
+        ("S1–S4, N1, N2: 63 cells", near_instead_plan),
+    ];
+    let plans = plans.iter().enumerate().filter(|(n, _)| count("PLAN", *n as u64) == *n as u64);
+    for (_, (name, plan)) in plans {
+        println!("{name}");
+        let rows = campaigns(first, rigs, seeds, like, |campaign| told_of(campaign, *plan));
+        println!("| points | campaigns | covered | rms error | half width (median) | no answer |");
+        table(name, &rows);
+    }
 }
 
 #[test]

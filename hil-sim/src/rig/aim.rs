@@ -47,6 +47,8 @@ impl Aim {
         } else {
             (errors.position_m, errors.aim_m)
         };
+        let own_m = response.sigma_m.filter(|_| !errors.none);
+        let seen_sigma_m = own_m.unwrap_or(seen_sigma_m);
         let seen_m =
             shifted(shifted(response.position_m, seen_sigma_m, &mut seen_point), aim_m, &mut response_aim);
         let mut hammer = stream(seed, &["hammer angle", hit]);

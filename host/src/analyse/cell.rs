@@ -143,6 +143,11 @@ pub trait Measurements: Sync {
         ContactPriors::default()
     }
 
+    /// How well the place of this response point is known, standard deviation along each axis, m; none where the priors of its kind hold.
+    fn point_sigma_m(&self, _point: &str) -> Option<f64> {
+        None
+    }
+
     /// The kept hits of a cell; none if it was not measured.
     ///
     /// # Errors

@@ -62,6 +62,7 @@ pub fn cells<'a, M: Measurements>(
             impact_grouping: impact.grouping,
             point: &point.name,
             point_m: point.position_m,
+            point_sigma_m: measurements.point_sigma_m(&point.name),
             point_grouping: point.grouping,
             spectra,
             quantity: measurements.quantity(),

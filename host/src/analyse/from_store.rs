@@ -306,6 +306,11 @@ impl Measurements for CampaignFile {
         self.plan.priors.as_ref().map_or_else(ContactPriors::default, |priors| priors.get_ref().known())
     }
 
+    fn point_sigma_m(&self, point: &str) -> Option<f64> {
+        let mut points = self.plan.geometry.response.iter().map(toml::Spanned::get_ref);
+        points.find(|own| own.name == point)?.sigma_m
+    }
+
     fn shaker_levels(&self) -> (Vec<ShakerLevel>, Vec<String>) {
         let (mut levels, mut complaints) = (Vec::new(), Vec::new());
         let read = self.with_reader(|store| {

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use serde::Serialize;
 use tokio::sync::watch;
 
 use super::message::{Can, Message, Snapshot};
@@ -117,12 +118,17 @@ impl Bus {
     }
 }
 
+/// A message with its number, as it is written.
+#[derive(Serialize)]
+struct Written<'a> {
+    seq: u64,
+    #[serde(flatten)]
+    message: &'a Message,
+}
+
 fn numbered(seq: u64, message: &Message) -> Numbered {
-    let mut value = serde_json::to_value(message).unwrap_or_default();
-    if let Some(object) = value.as_object_mut() {
-        object.insert("seq".into(), seq.into());
-    }
-    Numbered { seq, text: value.to_string().into() }
+    let text = serde_json::to_string(&Written { seq, message }).unwrap_or_default();
+    Numbered { seq, text: text.into() }
 }
 
 impl Snapshot {

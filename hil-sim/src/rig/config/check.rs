@@ -124,6 +124,9 @@ fn points(config: &RigConfig) -> Result<(), RigError> {
     }
     for (index, point) in config.responses.iter().enumerate() {
         finite(&format!("responses[{index}].position_m"), &point.position_m)?;
+        if let Some(sigma_m) = point.sigma_m {
+            not_negative(&format!("responses[{index}].sigma_m"), sigma_m)?;
+        }
         if config.responses[..index].iter().any(|earlier| earlier.name == point.name) {
             return Err(bad(
                 &format!("responses[{index}].name"),

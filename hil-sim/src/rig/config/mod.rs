@@ -254,6 +254,9 @@ pub struct ResponsePoint {
     pub body: BodyName,
     /// Nominal position (m).
     pub position_m: [f64; 3],
+    /// How well it is placed, standard deviation along each axis (m); without it, as `errors` says of its kind.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_m: Option<f64>,
     /// Polluted by speckle noise.
     #[serde(default)]
     pub speckle: bool,

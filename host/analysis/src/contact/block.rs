@@ -140,6 +140,7 @@ pub fn blocks(input: &Input<'_>, parameters: &mut Parameters) -> Result<Vec<Bloc
                     Group::ArmB => (input.priors.positions.position_m, Cause::ArmPoints),
                     _ => (input.priors.specimen_point_m, Cause::SpecimenPoints),
                 };
+                let sigma = cell.point_sigma_m.unwrap_or(sigma);
                 let at = relative(cell.point_m, input.contact_m);
                 parameters.add(["x", "y", "z"].into_iter().zip(at).map(|(axis, start)| {
                     Parameter::new(format!("{axis} of point {}", cell.point), start, sigma, cause)

@@ -28,6 +28,8 @@ pub struct ContactCell<'a> {
     pub point: &'a str,
     /// Where it is, m.
     pub point_m: [f64; 3],
+    /// How well that is known, standard deviation along each axis, m; none where [`super::ContactPriors`] say it of its kind.
+    pub point_sigma_m: Option<f64>,
     /// What it is for: arm B's interface, or a specimen.
     pub point_grouping: Grouping,
     /// The point's motion along x, y and z, then the velocity of the spots on A and B along z (m/s), then the load cells' sum (N); with

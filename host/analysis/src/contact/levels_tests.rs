@@ -152,6 +152,7 @@ fn input(cells: &[Cell], hammer_angle_rad: f64) -> Input<'_> {
             impact_grouping,
             point: NAMES[own.point],
             point_m: if on_arm { ARM[own.point] } else { SPECIMEN[own.point - 3] },
+            point_sigma_m: None,
             point_grouping: if on_arm { Grouping::InterfaceB } else { Grouping::SpecimenA },
             spectra: &own.spectra,
             quantity: MotionQuantity::Velocity,

@@ -166,6 +166,7 @@ fn of(cell: &Cell) -> ContactCell<'_> {
         },
         point: NAMES[cell.point],
         point_m: if cell.on_specimen { SPECIMEN[cell.point - 3] } else { ARM[cell.point] },
+        point_sigma_m: None,
         point_grouping: if cell.on_specimen { Grouping::SpecimenA } else { Grouping::InterfaceB },
         spectra: &cell.spectra,
         quantity: MotionQuantity::Velocity,

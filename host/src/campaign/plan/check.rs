@@ -5,6 +5,7 @@ use std::collections::HashSet;
 use jointrig_protocol::limits::{ARM_VALID_CAP_MS, COIL_PULSE_CAP_US, NAME_BYTES, SHAKE_SCANS_PER_CYCLE};
 use toml::Spanned;
 
+use super::geometry::ResponsePoint;
 use super::{Plan, configuration_named};
 
 /// No contact is shaken further than this, m: a plan in µm is caught here.
@@ -205,6 +206,14 @@ impl Plan {
             }
             if !seen.insert(name) {
                 return Err((at, format!("geometry: the name `{name}` stands twice")));
+            }
+        }
+        for point in &self.geometry.response {
+            let ResponsePoint { name, sigma_m, .. } = point.get_ref();
+            if sigma_m.is_some_and(|sigma_m| !(sigma_m >= 0.0 && sigma_m.is_finite())) {
+                let what =
+                    format!("geometry: sigma_m of `{name}` must be a standard deviation in m: 0 or more");
+                return Err((point.span().start, what));
             }
         }
         for point in &self.geometry.impact {

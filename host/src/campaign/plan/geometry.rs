@@ -28,6 +28,8 @@ pub struct ResponsePoint {
     pub grouping: u8,
     /// Where it is, m.
     pub position_m: [f64; 3],
+    /// How well that is known, standard deviation along each axis, m; without it, as `[priors]` says of its kind.
+    pub sigma_m: Option<f64>,
 }
 
 /// An impact point.

@@ -88,6 +88,11 @@ fn errors_point_at_line_and_field() {
         ("name = \"B\"", "name = \"C\"", "must be A, B or AJB"),
         ("direction = [0, -1, 0]", "direction = [0, -2, 0]", "length 1"),
         ("{ name = \"A2\", grouping = 1", "{ name = \"A2\", grouping = 7", "must be 1 to 6"),
+        (
+            "{ name = \"A2\", grouping = 1",
+            "{ name = \"A2\", sigma_m = -1e-5, grouping = 1",
+            "sigma_m of `A2`",
+        ),
         ("pulse_us = 3500", "pulse_us = 9000", "pulse_bounds_us"),
         ("noise_ratio = 3.0", "noise_ratio = 0.5", "limits.noise_ratio"),
         ("weak_n = 30.0", "weak_n = 80.0", "limits: 0 < weak_n < strong_n"),
