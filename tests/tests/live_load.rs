@@ -86,8 +86,8 @@ fn soak() {
     let hours: f64 = std::env::var("JOINTRIG_SOAK_H").map_or(0.5, |text| text.parse().unwrap());
     // the paper's campaign has eight good hits in a cell and takes less than four hours
     let plan = include_str!("../../docs/plans/paper.toml")
-        .replace("wanted = 8\n", "wanted = 24\n")
-        .replace("most = 24\n", "most = 72\n");
+        .replace("wanted = 8\n", "wanted = 40\n")
+        .replace("most = 24\n", "most = 120\n");
     let (_folder, file) = campaign(&plan);
     let mut command = jointrig();
     command.args(["campaign", "run"]).arg(&file).args(["--device", "sim:", "--yes", "--serve"]);

@@ -22,6 +22,10 @@ pub struct Follower {
     store: Store,
     /// What SQLite says of the file's content: it changes with every commit of another connection.
     version: i64,
+    /// Every record without its samples, as it was read last.
+    records: Vec<Result<RecordRow, Damaged>>,
+    /// Verdicts that persons had overruled by then.
+    overruled: usize,
     seen: Snapshot,
 }
 
@@ -33,8 +37,9 @@ impl Follower {
     pub fn new(path: &Path) -> Result<Self, StoreError> {
         let store = Store::open_read_only(path)?;
         let version = store.data_version()?;
-        let seen = snapshot(&store)?;
-        Ok(Self { store, version, seen })
+        let (records, overruled) = (store.records()?, store.overrules()?.len());
+        let seen = Snapshot { hits: hits(&records), ..all_but_hits(&store, &records)? };
+        Ok(Self { store, version, records, overruled, seen })
     }
 
     /// Everything so far.
@@ -51,26 +56,56 @@ impl Follower {
         if version == self.version {
             return Ok(Vec::new());
         }
-        let now = snapshot(&self.store)?;
-        let messages = difference(&self.seen, &now);
-        (self.version, self.seen) = (version, now);
-        Ok(messages)
+        let last = self.records.last().map_or(i64::MIN, |record| match record {
+            Ok(record) => record.id,
+            Err(damaged) => damaged.place.id,
+        });
+        let overruled = self.store.overrules()?.len();
+        let (new, known) = self.store.records_after(last)?;
+        let messages = if overruled == self.overruled && known == self.records.len() {
+            // hours of hits stay as they were: only what came is read
+            let new_hits = hits(&new);
+            self.records.extend(new);
+            let now = all_but_hits(&self.store, &self.records)?;
+            let messages = if same_campaign(&self.seen, &now) {
+                Some(difference(&self.seen, &now, &new_hits, Vec::new()))
+            } else {
+                None
+            };
+            let mut all = std::mem::take(&mut self.seen.hits);
+            all.extend(new_hits);
+            self.seen = Snapshot { hits: all, ..now };
+            messages
+        } else {
+            self.records = self.store.records()?;
+            let now = Snapshot { hits: hits(&self.records), ..all_but_hits(&self.store, &self.records)? };
+            let before = std::mem::replace(&mut self.seen, now);
+            let now = &self.seen;
+            // records that are gone are nothing that single messages could tell
+            (same_campaign(&before, now) && now.hits.len() >= before.hits.len()).then(|| {
+                let last = before.hits.last().map_or(i64::MIN, |hit| hit.record);
+                let new_hits: Vec<Hit> = now.hits.iter().filter(|hit| hit.record > last).cloned().collect();
+                let other = before.hits.iter().zip(&now.hits).filter(|(old, new)| old != new);
+                difference(&before, now, &new_hits, other.map(|(_, new)| new.clone()).collect())
+            })
+        };
+        (self.version, self.overruled) = (version, overruled);
+        Ok(messages.unwrap_or_else(|| vec![Message::Snapshot(Box::new(self.seen.clone()))]))
     }
 }
 
-/// What leads from one state to the next.
-fn difference(before: &Snapshot, now: &Snapshot) -> Vec<Message> {
-    // another plan was taken over, the first session began on a simulated rig, or records are gone: nothing that single messages could tell
-    let same_cells = before.cells.iter().map(|cell| cell.id).eq(now.cells.iter().map(|cell| cell.id));
-    let same_rig =
-        (before.simulated, &before.plan, &before.levels) == (now.simulated, &now.plan, &now.levels);
-    if !same_cells || !same_rig || now.hits.len() < before.hits.len() {
-        return vec![Message::Snapshot(Box::new(now.clone()))];
-    }
+/// Whether single messages can tell what is new: no other plan was taken over, no first session began on a simulated rig, no level was
+/// added.
+fn same_campaign(before: &Snapshot, now: &Snapshot) -> bool {
+    before.cells.iter().map(|cell| cell.id).eq(now.cells.iter().map(|cell| cell.id))
+        && (before.simulated, &before.plan, &before.levels) == (now.simulated, &now.plan, &now.levels)
+}
+
+/// What leads from one state to the next, with the hits that came and those that count otherwise than before.
+fn difference(before: &Snapshot, now: &Snapshot, new: &[Hit], overruled: Vec<Hit>) -> Vec<Message> {
     let mut messages = Vec::new();
-    let last = before.hits.last().map_or(i64::MIN, |hit| hit.record);
     let mut told: Vec<i64> = Vec::new();
-    for hit in now.hits.iter().filter(|hit| hit.record > last) {
+    for hit in new {
         let Some(cell) = now.cells.iter().find(|cell| cell.id == hit.cell) else { continue };
         told.push(cell.id);
         messages.push(Message::Judged(Box::new(Judged {
@@ -82,18 +117,20 @@ fn difference(before: &Snapshot, now: &Snapshot) -> Vec<Message> {
     let changed =
         before.cells.iter().zip(&now.cells).filter(|(old, new)| old != new && !told.contains(&new.id));
     let cells: Vec<CellCount> = changed.map(|(_, new)| new.clone()).collect();
-    let overruled = before.hits.iter().zip(&now.hits).filter(|(old, new)| old != new);
-    let hits: Vec<Hit> = overruled.map(|(_, new)| new.clone()).collect();
-    if !cells.is_empty() || !hits.is_empty() || (messages.is_empty() && before.progress != now.progress) {
-        messages.push(Message::Cells(Counted { cells, hits, progress: now.progress.clone() }));
+    if !cells.is_empty() || !overruled.is_empty() || (messages.is_empty() && before.progress != now.progress)
+    {
+        messages.push(Message::Cells(Counted { cells, hits: overruled, progress: now.progress.clone() }));
     }
     messages
 }
 
-fn snapshot(store: &Store) -> Result<Snapshot, StoreError> {
-    let (cells, records) = (store.cells()?, store.records()?);
-    let tally = Tally::new(&cells, &records);
-    let hits: Vec<Hit> = records.iter().flatten().map(hit).collect();
+fn hits(records: &[Result<RecordRow, Damaged>]) -> Vec<Hit> {
+    records.iter().flatten().map(hit).collect()
+}
+
+fn all_but_hits(store: &Store, records: &[Result<RecordRow, Damaged>]) -> Result<Snapshot, StoreError> {
+    let cells = store.cells()?;
+    let tally = Tally::new(&cells, records);
     let link = store.link_counters()?;
     Ok(Snapshot {
         version: VERSION,
@@ -105,12 +142,11 @@ fn snapshot(store: &Store) -> Result<Snapshot, StoreError> {
             wanted: tally.wanted(),
             complete: tally.complete(),
             next: cells.iter().position(|row| tally.open(row.id)),
-            left: left(&cells, &tally, &records),
+            left: left(&cells, &tally, records),
             lost_scans: link.get("scans_lost").copied().unwrap_or(0),
             recovered_scans: link.get("scans_recovered").copied().unwrap_or(0),
         },
         cells: cells.iter().map(|row| count(row, &tally)).collect(),
-        hits,
         levels: store.levels()?.iter().flatten().map(level).collect(),
         ..Snapshot::default()
     })

@@ -4,5 +4,6 @@
 mod by_summary;
 mod fake;
 mod faulty;
+mod following;
 mod runner;
 mod session;

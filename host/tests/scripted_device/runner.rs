@@ -30,7 +30,7 @@ use jointrig::device::transport::Transport;
 use jointrig_logs::example::{WARNING, image, line};
 use jointrig_logs::file_name;
 
-fn plan() -> String {
+pub fn plan() -> String {
     SMALL
         .replace("length_s = 2.0", "length_s = 0.1")
         .replace("listen_s = 0.15", "listen_s = 0.02")
@@ -39,7 +39,7 @@ fn plan() -> String {
         .replace("pulse_bounds_us = [2500, 6000]", "pulse_bounds_us = [500, 8000]")
 }
 
-fn options() -> Options {
+pub fn options() -> Options {
     Options {
         stage: Stage::Auto,
         yes: true,
@@ -50,7 +50,7 @@ fn options() -> Options {
     }
 }
 
-fn run_on(
+pub fn run_on(
     path: &Path,
     transport: impl Transport + 'static,
     options: &Options,
@@ -61,7 +61,7 @@ fn run_on(
     run(store, &mut session, judge, options)
 }
 
-fn create(folder: &tempfile::TempDir, name: &str, text: &str) -> std::path::PathBuf {
+pub fn create(folder: &tempfile::TempDir, name: &str, text: &str) -> std::path::PathBuf {
     let path = folder.path().join(name);
     Store::create(&path, text, "test.toml").expect("created").close().expect("closed");
     path

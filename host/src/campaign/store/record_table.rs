@@ -41,6 +41,13 @@ impl Store {
         Ok(self.places()?.into_iter().map(|place| self.record_at(place)).collect())
     }
 
+    /// Those after record `last` without their samples, in order of measurement; and how many there are up to it.
+    pub fn records_after(&self, last: i64) -> Result<(Vec<Result<RecordRow, Damaged>>, usize), StoreError> {
+        let (before, after): (Vec<Place>, Vec<Place>) =
+            self.places()?.into_iter().partition(|place| place.id <= last);
+        Ok((after.into_iter().map(|place| self.record_at(place)).collect(), before.len()))
+    }
+
     /// The records of one cell without their samples, in order of measurement.
     pub fn records_of(&self, cell: i64) -> Result<Vec<Result<RecordRow, Damaged>>, StoreError> {
         let own = self.places()?.into_iter().filter(|place| place.cell == cell);
