@@ -5,7 +5,8 @@ import numpy as np
 from pcodec import standalone
 
 def codes(blob, channels, scans, crc32):
-    """Raw codes (channel, scan) as int16. SI value = code * units_per_volt * range_v / 32768 (table `channels`)."""
+    """Raw codes (channel, scan) as int16. SI value = code * units_per_volt * range_v / 32768 (table `channels`,
+    and what a row of `calibrations` says instead)."""
     out, at = np.empty((channels if scans else 0, scans), "<i2"), 0
     for row in out:
         size, = struct.unpack_from("<I", blob, at)

@@ -14,10 +14,12 @@ use tungstenite::{Message, WebSocket};
 use crate::browser::Page;
 use crate::command::jointrig;
 
-/// Runs a command that must succeed.
-pub fn done(command: &mut Command) {
+/// Runs a command that must succeed; what it prints.
+#[allow(clippy::must_use_candidate, reason = "most commands are run for what they do")]
+pub fn done(command: &mut Command) -> String {
     let out = command.output().unwrap();
     assert!(out.status.success(), "{command:?}: {}", String::from_utf8_lossy(&out.stderr));
+    String::from_utf8(out.stdout).unwrap()
 }
 
 /// A new campaign file of this plan in a folder of its own.

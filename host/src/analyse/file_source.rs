@@ -4,7 +4,7 @@ use super::from_store::{AnalyseError, CampaignFile};
 use super::heard::Heard;
 use super::hit_counts::completeness;
 use crate::campaign::store::Store;
-use crate::results::{CellRow, Cells, Completeness, HitRow, Source, rounded};
+use crate::results::{Calibrated, CellRow, Cells, Completeness, HitRow, Source, rounded};
 use crate::structure::Structure;
 
 impl CampaignFile {
@@ -46,6 +46,7 @@ impl CampaignFile {
             source.settings.insert("seed".into(), seed.into());
         }
         source.link = store.link_counters()?;
+        source.calibrations = calibrated(store)?;
         Ok(source)
     }
 
@@ -108,4 +109,37 @@ impl CampaignFile {
             })
             .collect()
     }
+}
+
+/// What every calibration changed, in the order in which they were entered: against the first session for which it counts.
+fn calibrated(store: &Store) -> Result<Vec<Calibrated>, AnalyseError> {
+    let (sessions, all) = (store.sessions()?, store.calibrations()?);
+    let mut rows = Vec::new();
+    for (n, own) in all.iter().enumerate() {
+        // one that counts from a session on that never came changed nothing
+        let Some((session, _)) = sessions.iter().find(|(id, _)| *id >= own.from_session) else { continue };
+        let map = store.channels_as_measured(*session)?;
+        let Some(channel) = map.channels.iter().find(|channel| channel.name == own.channel.as_str()) else {
+            continue;
+        };
+        let mut before = channel.clone();
+        let earlier =
+            all[..n].iter().filter(|old| old.channel == own.channel && old.from_session <= *session);
+        earlier.for_each(|old| old.apply(&mut before));
+        let mut now = before.clone();
+        own.apply(&mut now);
+        let sensor = [own.model.clone(), own.serial.clone(), own.calibrated.clone()];
+        rows.push(Calibrated {
+            utc: own.utc.clone(),
+            from_session: own.from_session,
+            channel: own.channel.clone(),
+            unit: channel.quantity.unit().into(),
+            sensitivity_v: [&before, &now].map(|c| rounded(1.0 / f64::from(c.units_per_volt), 7)),
+            delay_s: [&before, &now].map(|c| 1e-9 * f64::from(c.delay_ns)),
+            uncertainty: own.uncertainty,
+            sensor: sensor.into_iter().flatten().collect(),
+            reason: own.reason.clone(),
+        });
+    }
+    Ok(rows)
 }

@@ -23,4 +23,5 @@ pub mod stream;
 pub mod tap;
 mod tcp;
 pub mod transport;
+mod units;
 pub mod usb;

@@ -13,6 +13,7 @@ use super::inbox::Starting;
 use super::session::{Session, TRIES, patience};
 use super::stream::{Accounts, Stream};
 use super::tap::Tap;
+use super::units::Units;
 
 /// Longest wait for a first byte within one pump.
 const POLL: Duration = Duration::from_millis(20);
@@ -105,6 +106,12 @@ impl Session {
             }
         }
         Ok(ChannelMap { id: 0, rate_hz: info.scan_rate_hz, channels })
+    }
+
+    /// From now on orders and shots are in the units of these channels, whatever sensitivities the device was built with; `device` is
+    /// what it says of them itself ([`Session::channels`]).
+    pub fn calibrate(&mut self, device: &ChannelMap, calibrated: &ChannelMap) {
+        self.units = Units::new(device, calibrated);
     }
 
     /// How the device is.
@@ -219,12 +226,12 @@ impl Session {
 
     /// How the force pulse is recognised.
     pub fn set_trigger(&mut self, trigger: Trigger) -> Result<(), DeviceError> {
-        self.ask_done(Request::Trigger(trigger))
+        self.ask_done(Request::Trigger(self.units.trigger(trigger)))
     }
 
     /// The load cells' 3 × 3 calibration matrix, row-major, dimensionless.
     pub fn set_load_cells(&mut self, matrix: [f32; 9]) -> Result<(), DeviceError> {
-        self.ask_done(Request::LoadCells { matrix })
+        self.ask_done(Request::LoadCells { matrix: self.units.load_cells(matrix) })
     }
 
     /// Allows one shot within `valid_ms` of the device's time.
@@ -239,7 +246,7 @@ impl Session {
 
     /// One shot of the hammer.
     pub fn fire(&mut self, fire: Fire) -> Result<(), DeviceError> {
-        match self.ask(Request::Fire(fire))? {
+        match self.ask(Request::Fire(self.units.fire(fire)))? {
             Answer::Scheduled { .. } => Ok(()),
             other => Err(self.wrong("fire", &other)),
         }

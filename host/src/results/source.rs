@@ -20,6 +20,9 @@ pub struct Source {
     /// The device as it named itself: name, firmware, schema.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub device: BTreeMap<String, String>,
+    /// Calibrations that were entered beside what device and plan say, in that order; the last one of a channel counts.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub calibrations: Vec<Calibrated>,
     /// Settings of the analysis, by name with unit: windows, lines, virtual points.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub settings: BTreeMap<String, serde_json::Value>,
@@ -29,6 +32,29 @@ pub struct Source {
     /// Counters of the link between device and host over the whole campaign.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub link: BTreeMap<String, u64>,
+}
+
+/// A channel that was calibrated otherwise than it had been.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Calibrated {
+    /// When it was entered, RFC 3339.
+    pub utc: String,
+    /// The first session for which it counts.
+    pub from_session: i64,
+    /// The channel.
+    pub channel: String,
+    /// The unit of what it measures.
+    pub unit: String,
+    /// Sensitivity before and since then, V per unit, with the sign.
+    pub sensitivity_v: [f64; 2],
+    /// Delay before and since then, s.
+    pub delay_s: [f64; 2],
+    /// Relative standard uncertainty of the sensitivity.
+    pub uncertainty: Option<f64>,
+    /// The sensor: model, serial number, date of calibration, as far as they are stated.
+    pub sensor: Vec<String>,
+    /// Why it was entered.
+    pub reason: String,
 }
 
 /// A program and its version.

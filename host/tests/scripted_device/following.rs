@@ -1,13 +1,14 @@
 //! What an eye on the campaign file tells bit by bit is what one that comes late reads at once.
 #![cfg(feature = "dashboard")]
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use crate::by_summary::ByShotSummary;
 use crate::fake::Fake;
 use crate::runner::{create, options, plan, run_on};
 use jointrig::campaign::plan::{Cell, Plan};
 use jointrig::campaign::store::Store;
+use jointrig::campaign::store::record_row::RecordRow;
 use jointrig::campaign::verdict::judge::Judge;
 use jointrig::campaign::verdict::others::Others;
 use jointrig::campaign::verdict::{Kind, Verdict};
@@ -56,7 +57,7 @@ fn whole(bus: &Bus) -> Value {
 }
 
 /// As somebody sees it who comes now.
-fn at_once(path: &PathBuf) -> Value {
+fn at_once(path: &Path) -> Value {
     let bus = Bus::default();
     bus.say(Message::Snapshot(Box::new(Follower::new(path).unwrap().whole())));
     whole(&bus)
@@ -76,7 +77,7 @@ fn what_is_told_bit_by_bit_is_the_whole() {
 
     // a verdict overruled afterwards, and taken back
     let store = Store::open(&path).unwrap();
-    let good = store.records().unwrap().into_iter().flatten().find(|record| record.kept()).unwrap();
+    let good = store.records().unwrap().into_iter().flatten().find(RecordRow::kept).unwrap();
     for verdict in [Kind::Dropped, Kind::Good] {
         store.overrule(good.id, verdict, "test").unwrap();
         let before = whole(&looks.bus);

@@ -6,6 +6,7 @@ use jointrig_protocol::limits::{ARM_VALID_CAP_MS, COIL_PULSE_CAP_US, NAME_BYTES,
 use toml::Spanned;
 
 use super::geometry::ResponsePoint;
+use super::sensor::check_sensors;
 use super::{Plan, configuration_named};
 
 /// No contact is shaken further than this, m: a plan in µm is caught here.
@@ -79,7 +80,7 @@ impl Plan {
         self.check_shaker()?;
         self.check_contact()?;
         self.check_priors()?;
-        self.check_sensors()?;
+        check_sensors(&self.channel)?;
         self.check_geometry()?;
         self.check_configurations()
     }
@@ -157,32 +158,6 @@ impl Plan {
         wrong.map_or(Ok(()), |name| {
             Err((priors.span().start, format!("priors.{name} is a standard deviation: zero or more")))
         })
-    }
-
-    fn check_sensors(&self) -> Result<(), Wrong> {
-        let mut seen = HashSet::new();
-        for channel in &self.channel {
-            let (at, sensor) = (channel.span().start, channel.get_ref());
-            let name = &sensor.name;
-            let positive = |value: Option<f64>| value.is_none_or(|value| value > 0.0 && value.is_finite());
-            let what = if !seen.insert(name) {
-                format!("channel: `{name}` stands twice")
-            } else if !positive(sensor.sensitivity_v) || !positive(sensor.range) {
-                format!("channel `{name}`: sensitivity_v and range must be over 0 (the sign is its polarity)")
-            } else if sensor.polarity.is_some_and(|sign| sign.abs() != 1) {
-                format!("channel `{name}`: polarity must be 1 or -1")
-            } else if sensor
-                .calibrated
-                .as_ref()
-                .is_some_and(|date| date.parse::<jiff::civil::Date>().is_err())
-            {
-                format!("channel `{name}`: calibrated must be a date, YYYY-MM-DD")
-            } else {
-                continue;
-            };
-            return Err((at, what));
-        }
-        Ok(())
     }
 
     fn check_geometry(&self) -> Result<(), Wrong> {

@@ -8,10 +8,12 @@ mod check;
 mod geometry;
 pub mod level;
 mod priors;
+mod sensor;
 
 pub use cells::Cell;
 pub use geometry::{GeometryPlan, ImpactPoint, ResponsePoint, SensorPoint};
 pub use priors::PriorsPlan;
+pub use sensor::{CalibrationFile, SensorPlan};
 
 use crate::structure::Structure;
 use jointrig_protocol::request::Configuration;
@@ -218,26 +220,6 @@ pub struct Enough {
     pub random_error: f64,
     /// The band that counts, Hz.
     pub band_hz: [f64; 2],
-}
-
-/// What is behind a channel of the device. What is given is held against what the device says.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SensorPlan {
-    /// The channel's name on the device.
-    pub name: String,
-    /// The sensor's model.
-    pub model: Option<String>,
-    /// Its serial number.
-    pub serial: Option<String>,
-    /// When it was calibrated, YYYY-MM-DD.
-    pub calibrated: Option<String>,
-    /// V per SI unit, without sign.
-    pub sensitivity_v: Option<f64>,
-    /// 1, or -1 where a positive quantity gives a negative voltage.
-    pub polarity: Option<i8>,
-    /// Full scale in SI units.
-    pub range: Option<f64>,
 }
 
 /// Cells of one structure: every impact is combined with every response.

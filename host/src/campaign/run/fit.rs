@@ -4,10 +4,20 @@ use jointrig_protocol::channel::Role;
 
 use super::error::RunError;
 use crate::campaign::plan::Plan;
+use crate::campaign::store::calibration_table::Calibration;
 use crate::device::channels::ChannelMap;
 
+/// A sensitivity that differs by more than this factor from what the device says is another sensor's, or a slip of the pen.
+const ANOTHER_SENSOR: f64 = 1.25;
+
+/// The channels as the plan calibrates them, with a sentence for each that the device describes otherwise.
+///
 /// Refuses a device of another rate, without the channels of a hit, or with other sensors than the plan's.
-pub(super) fn check_fit(address: &str, plan: &Plan, channels: &ChannelMap) -> Result<(), RunError> {
+pub(super) fn fitted(
+    address: &str,
+    plan: &Plan,
+    channels: &ChannelMap,
+) -> Result<(ChannelMap, Vec<String>), RunError> {
     let unfit = |what: String| Err(RunError::Unfit { address: address.into(), what });
     let wanted = plan.record.get_ref().rate_hz;
     if channels.rate_hz != wanted {
@@ -19,29 +29,48 @@ pub(super) fn check_fit(address: &str, plan: &Plan, channels: &ChannelMap) -> Re
     if channels.place(Role::HammerForce).is_none() || channels.responses().is_none() {
         return unfit("it needs a hammer force and the vibrometer's three axes among its channels".into());
     }
+    with_sensors(plan, channels).or_else(unfit)
+}
+
+/// The channels with the sensors that the plan names, and a sentence for each that the device describes otherwise; or why they do not
+/// fit.
+pub(super) fn with_sensors(plan: &Plan, channels: &ChannelMap) -> Result<(ChannelMap, Vec<String>), String> {
+    let (mut map, mut remarks) = (channels.clone(), Vec::new());
     for sensor in plan.channel.iter().map(toml::Spanned::get_ref) {
         let name = &sensor.name;
-        let Some(channel) = channels.channels.iter().find(|channel| channel.name == name.as_str()) else {
-            return unfit(format!("it has no channel `{name}` (channel.name)"));
+        let Some(channel) = map.channels.iter_mut().find(|channel| channel.name == name.as_str()) else {
+            return Err(format!("it has no channel `{name}` (channel.name)"));
         };
-        let scale = f64::from(channel.units_per_volt);
-        let differ =
-            |given: Option<f64>, found: f64| given.is_some_and(|given| (found / given - 1.0).abs() > 0.01);
-        let range = f64::from(channel.range_v) * scale.abs();
-        if differ(sensor.sensitivity_v, 1.0 / scale.abs()) {
-            return unfit(format!(
-                "its channel `{name}` has {:.6} V per {unit} (channel.sensitivity_v)",
-                1.0 / scale.abs(),
-                unit = channel.quantity.unit()
+        let (unit, says) = (channel.quantity.unit(), 1.0 / f64::from(channel.units_per_volt).abs());
+        if sensor.sensitivity_v.is_some_and(|given| (given / says).ln().abs() > ANOTHER_SENSOR.ln()) {
+            return Err(format!("its channel `{name}` has {says:.6} V per {unit} (channel.sensitivity_v)"));
+        }
+        if sensor.polarity.is_some_and(|sign| f32::from(sign) * channel.units_per_volt < 0.0) {
+            return Err(format!("its channel `{name}` has the other sign (channel.polarity)"));
+        }
+        let device = channel.clone();
+        Calibration::of_sensor(sensor).apply(channel);
+        let range = f64::from(channel.range_v) * f64::from(channel.units_per_volt).abs();
+        // the range of a certificate is rounded
+        if sensor.range.is_some_and(|given| (range / given - 1.0).abs() > 0.01) {
+            return Err(format!("its channel `{name}` ends at {range:.6} {unit} (channel.range)"));
+        }
+        if *channel != device {
+            let is = 1.0 / f64::from(channel.units_per_volt).abs();
+            remarks.push(format!(
+                "channel `{name}`: the plan's {is:.6} V per {unit} and {} ns count, not the device's {says:.6} V and {} ns",
+                channel.delay_ns, device.delay_ns
             ));
         }
-        if sensor.polarity.is_some_and(|sign| f64::from(sign) * scale < 0.0) {
-            return unfit(format!("its channel `{name}` has the other sign (channel.polarity)"));
-        }
-        if differ(sensor.range, range) {
-            let unit = channel.quantity.unit();
-            return unfit(format!("its channel `{name}` ends at {range:.6} {unit} (channel.range)"));
-        }
     }
-    Ok(())
+    Ok((map, remarks))
+}
+
+/// Refuses a hammer whose force the device sees with the other sign than it has: it would wait for every hit in vain.
+pub(super) fn same_sign(device: &ChannelMap, calibrated: &ChannelMap) -> Result<(), String> {
+    let sign = |map: &ChannelMap| Some(map.channels[map.place(Role::HammerForce)?].units_per_volt.signum());
+    if sign(device) == sign(calibrated) {
+        return Ok(());
+    }
+    Err("its hammer's force has the other sign than the calibration says, and no hit would be found: turn it at the amplifier".into())
 }

@@ -16,7 +16,7 @@ use super::clock::ScanClock;
 use super::earlier::Earlier;
 use super::edits::{Edits, Recount};
 use super::error::RunError;
-use super::fit::check_fit;
+use super::fit::{fitted, same_sign};
 use super::forces::Forces;
 use super::keeper::Keeper;
 use super::pulse::Hit;
@@ -84,8 +84,8 @@ pub fn run(
 ) -> Result<Summary, RunError> {
     let plan = store.plan()?;
     let info = session.info()?;
-    let channels = session.channels(&info)?;
-    check_fit(session.address(), &plan, &channels)?;
+    let device = session.channels(&info)?;
+    let (planned, remarks) = fitted(session.address(), &plan, &device)?;
     let noted = SessionInfo {
         address: session.address().into(),
         board: info.board.as_str().into(),
@@ -95,7 +95,21 @@ pub fn run(
         build: Hex(info.build),
         schema_hash: Hex(session.hello().schema),
     };
-    let id = store.begin_session(&noted, &channels)?;
+    let id = store.begin_session(&noted, &planned)?;
+    let channels = store.calibrated(id, planned)?;
+    let unfit = |what| RunError::Unfit { address: session.address().into(), what };
+    same_sign(&device, &channels).map_err(unfit)?;
+    let unknown = |name: &str| channels.channels.iter().all(|channel| channel.name != name);
+    let calibrations = store.calibrations()?;
+    let without = calibrations.iter().filter(|own| unknown(&own.channel));
+    let without = without.map(|own| {
+        format!("the device has no channel `{}`, which the file's calibration names", own.channel)
+    });
+    for remark in remarks.into_iter().chain(without) {
+        store.log(&remark)?;
+        options.watch.saw(&Seen::Remark(&remark));
+    }
+    session.calibrate(&device, &channels);
     if let Some(simulated) = session.simulated() {
         store.note_simulated(simulated)?;
     }

@@ -11,6 +11,7 @@
 //! `overrules.rs`, `cell_table.rs`, `session_table.rs` (sessions, channels, sensors), `level_table.rs`, `frf_table.rs`, `notes.rs` (plans, log).
 
 mod backup;
+pub mod calibration_table;
 pub mod cell_table;
 pub mod codec;
 pub mod error;

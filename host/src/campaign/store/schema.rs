@@ -7,6 +7,9 @@
 
 use std::path::Path;
 
+use rusqlite::Connection;
+
+use super::calibration_table::Calibration;
 use super::cell_table::{CellColumns, write_cell};
 use super::error::{StoreError, sqlite};
 use super::frf_table::FrfColumns;
@@ -26,11 +29,12 @@ CREATE TABLE links (session INTEGER PRIMARY KEY REFERENCES sessions(id), counter
 ";
 
 /// Tables whose rows stay as they were stored, and what their triggers call a row.
-const APPEND_ONLY: [(&str, &str); 4] = [
+const APPEND_ONLY: [(&str, &str); 5] = [
     ("records", "a raw record is"),
     ("seals", "a record''s seal is"),
     ("frfs", "imported FRFs are"),
     ("levels", "a raw record is"),
+    ("calibrations", "a calibration is"),
 ];
 
 impl Store {
@@ -60,6 +64,23 @@ impl Store {
     }
 }
 
+/// The SQL that adds the table of calibrations to a file that was made before there were any; empty where it is there.
+pub(super) fn missing_calibrations(connection: &Connection) -> rusqlite::Result<String> {
+    let there = connection.table_exists(None, "calibrations")?;
+    Ok(if there { String::new() } else { create::<Calibration>() + &stay(APPEND_ONLY[4]) })
+}
+
+/// The triggers that keep the rows of a table as they were stored.
+fn stay((table, row): (&str, &str)) -> String {
+    let one = |(name, event, done): (&str, &str, &str)| {
+        format!(
+            "CREATE TRIGGER {table}_{name} BEFORE {event} ON {table}\n\
+             BEGIN SELECT RAISE(ABORT, '{row} never {done}'); END;\n"
+        )
+    };
+    [("stay", "UPDATE", "changed"), ("remain", "DELETE", "deleted")].map(one).concat()
+}
+
 /// The SQL that makes an empty file.
 fn tables() -> String {
     let tables = [
@@ -68,6 +89,7 @@ fn tables() -> String {
         create::<SessionInfo>(),
         create::<ChannelColumns>(),
         create::<Sensor>(),
+        create::<Calibration>(),
         create::<CellColumns>(),
         create::<RecordRow>(),
         create::<Overrule>(),
@@ -76,13 +98,5 @@ fn tables() -> String {
         create::<LevelRow>(),
     ]
     .concat();
-    let triggers = APPEND_ONLY.iter().flat_map(|(table, row)| {
-        [("stay", "UPDATE", "changed"), ("remain", "DELETE", "deleted")].map(|(name, event, done)| {
-            format!(
-                "CREATE TRIGGER {table}_{name} BEFORE {event} ON {table}\n\
-                 BEGIN SELECT RAISE(ABORT, '{row} never {done}'); END;\n"
-            )
-        })
-    });
-    tables + &triggers.collect::<String>()
+    tables + &APPEND_ONLY.map(stay).concat()
 }

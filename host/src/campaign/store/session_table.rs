@@ -135,8 +135,13 @@ impl Store {
         Ok(session)
     }
 
-    /// The channels of one session.
+    /// The channels of one session, as they are calibrated by now.
     pub fn channels(&self, session: i64) -> Result<ChannelMap, StoreError> {
+        self.calibrated(session, self.channels_as_measured(session)?)
+    }
+
+    /// The channels of one session with the scales that it was measured with.
+    pub fn channels_as_measured(&self, session: i64) -> Result<ChannelMap, StoreError> {
         let rate_hz = self
             .connection
             .query_row("SELECT rate_hz FROM sessions WHERE id = ?1", [session], |row| row.get(0))

@@ -102,7 +102,7 @@ macro_rules! plain {
         })+
     };
 }
-plain!(i64, u32, u8, f64, f32, String, Vec<u8>, Option<f64>, Option<String>, Option<Vec<u8>>);
+plain!(i64, u32, u8, f64, f32, String, Vec<u8>, Option<f64>, Option<i64>, Option<String>, Option<Vec<u8>>);
 
 /// Numbers that SQLite would have to sign.
 macro_rules! unsigned {

@@ -1,6 +1,7 @@
-//! `campaign new | run | status | show | drop | keep | check | verify | backup`.
+//! `campaign new | run | status | show | drop | keep | calibrate | check | verify | backup`.
 
 mod backup;
+mod calibrate;
 mod check;
 mod judged;
 mod new;
@@ -35,6 +36,8 @@ enum Command {
     Drop(judged::Overrule),
     /// Take records into the analysis, whatever their verdict.
     Keep(judged::Overrule),
+    /// Say what the sensors are calibrated to, also after the campaign; results are computed anew with it.
+    Calibrate(calibrate::Calibrate),
     /// Check the sign of every channel, and hammer against vibrometer on a known mass.
     Check(check::Check),
     /// Check every record's checksum; exits with 1 on any damage.
@@ -52,6 +55,7 @@ impl Campaign {
             Command::Show(command) => command.run(),
             Command::Drop(command) => command.drop(),
             Command::Keep(command) => command.keep(),
+            Command::Calibrate(command) => command.run(),
             Command::Check(command) => command.run(),
             Command::Verify(command) => command.run(),
             Command::Backup(command) => command.run(),

@@ -10,7 +10,7 @@ use crate::campaign::store::Store;
 use crate::campaign::verdict::judge::{ByRecord, Judge};
 use crate::campaign::verdict::others::Others;
 use crate::campaign::verdict::{Kind, Verdict};
-use crate::cli::campaign::plan_file;
+use crate::cli::campaign::{calibrate, plan_file};
 use crate::cli::error::CliError;
 use crate::cli::page::Page;
 use crate::cli::{interrupt, measure};
@@ -36,6 +36,9 @@ pub struct Run {
     /// Go on with this edited plan from now on.
     #[arg(long, value_name = "PLAN.toml")]
     plan: Option<PathBuf>,
+    /// The laboratory's sensors: they count in this session and those after it, instead of what device and plan say.
+    #[arg(long, value_name = "LAB.toml")]
+    calibration: Option<PathBuf>,
     /// Ring the terminal's bell at every verdict, twice at a refusal.
     #[arg(long)]
     bell: bool,
@@ -63,6 +66,7 @@ impl Run {
             stage: Stage::Auto,
             yes: false,
             plan: None,
+            calibration: None,
             bell: false,
             seed: 1,
             log_tables: None,
@@ -75,6 +79,10 @@ impl Run {
         let address: Address = self.device.parse()?;
         let mut store = Store::open(&self.file)?;
         self.settle_plan(&mut store)?;
+        if let Some(path) = &self.calibration {
+            let reason = format!("`campaign run --calibration {}`", path.display());
+            store.calibrate(&calibrate::read(path)?, store.next_session()?, &reason)?;
+        }
         self.mention_shaker(&store)?;
         let stop = interrupt::flag();
         let mut onlooker = self.page.start(Some(&self.file), &stop, self.allows_control())?;

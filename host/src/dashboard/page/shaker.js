@@ -7,7 +7,7 @@ const shakerScreen={key:'shaker',title:'Shaker',make(m){
   this.limits=el('tbody');
   this.guard=m.appendChild(el('div',{},el('h2',{},'What stops the shaker'),el('div',{className:'scroll'},el('table',{},el('thead',{},el('tr',{},...['channel','largest so far','limit','of the limit'].map(t=>el('th',{scope:'col'},t)))),this.limits))));
   this.rows=el('tbody');
-  this.done=m.appendChild(el('div',{},el('h2',{},'Stored levels'),el('div',{className:'scroll'},el('table',{},el('thead',{},el('tr',{},...['level','when','reached','at most','after','drive'].map(t=>el('th',{scope:'col'},t)))),this.rows))));
+  this.done=m.appendChild(el('div',{},el('h2',{},'Stored levels'),el('div',{className:'scroll'},el('table',{},el('thead',{},el('tr',{},...['level','when','reached','overshoot','after','drive'].map(t=>el('th',{scope:'col'},t)))),this.rows))));
   this.answers=m.appendChild(el('div'));
 },show(){
   const w=state.whole,s=w.now.shaker;

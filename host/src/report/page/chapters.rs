@@ -60,6 +60,9 @@ pub fn all(html: &mut Html, results: &Results, drawn: &Drawn<'_>) {
     }
     html.raw("<section id=\"source\"><h2>Where it comes from</h2>");
     html.raw(&tables::provenance(results));
+    if let Some(table) = tables::calibrations(results) {
+        html.raw(&table);
+    }
     html.raw("</section><section id=\"glossary\"><h2>Words</h2>");
     glossary_html::list(html);
     html.raw("</section>");

@@ -13,7 +13,7 @@ pub use differences::differences;
 pub use interface::virtual_points;
 pub use joint::{joint, refusals};
 pub use loops::{decay, hysteresis, side_by_side, static_arm};
-pub use provenance::{completeness, provenance};
+pub use provenance::{calibrations, completeness, provenance};
 pub use recommended::recommended;
 
 use super::page::escaped;

@@ -1,8 +1,8 @@
 //! What was measured, and where everything comes from.
 
-use super::{Table, key, number, words};
+use super::{Table, UNKNOWN, key, number, words};
 use crate::report::page::escaped as escape;
-use crate::report::words::number::count;
+use crate::report::words::number::{count, decimals, short};
 use crate::results::Results;
 use std::fmt::Write;
 
@@ -42,6 +42,53 @@ pub fn completeness(results: &Results) -> Option<String> {
         table.row(cells);
     }
     Some(table.finish())
+}
+
+/// What was calibrated otherwise than device and plan say, and why; none where nothing was.
+pub fn calibrations(results: &Results) -> Option<String> {
+    let all = &results.source.calibrations;
+    if all.is_empty() {
+        return None;
+    }
+    let heads = [
+        "channel",
+        "entered",
+        "why",
+        "sensor",
+        "from session",
+        "V per unit before",
+        "V per unit since",
+        "ns before",
+        "ns since",
+        "uncertainty",
+    ];
+    let mut table =
+        Table::new(4, "Calibrations entered in the campaign file; the last one of a channel counts", &heads);
+    for (i, own) in all.iter().enumerate() {
+        let at = |field: &str| format!("/source/calibrations/{i}/{field}");
+        let volts = |n: usize| number(Some(precise(own.sensitivity_v[n])), at(&format!("sensitivity_v/{n}")));
+        let late = |n: usize| words(decimals(1e9 * own.delay_s[n], 0));
+        table.row([
+            words(format!("{} ({})", own.channel, own.unit)),
+            words(own.utc.clone()),
+            words(own.reason.clone()),
+            words(own.sensor.join(", ")),
+            number(Some(own.from_session.to_string()), at("from_session")),
+            volts(0),
+            volts(1),
+            late(0),
+            late(1),
+            own.uncertainty
+                .map_or_else(|| words(UNKNOWN), |part| words(format!("{} %", short(100.0 * part)))),
+        ]);
+    }
+    Some(table.finish())
+}
+
+/// With five significant digits, as certificates have them.
+fn precise(value: f64) -> String {
+    let places = 4 - value.abs().log10().floor().clamp(-10.0, 4.0) as i32;
+    decimals(value, places.unsigned_abs() as usize)
 }
 
 /// Where everything comes from: file, device, settings, records, link.

@@ -91,8 +91,11 @@ pub fn run_watched(
 ) -> Result<Summary, ShakeError> {
     let plan = store.plan()?;
     let info = session.info()?;
-    let channels = session.channels(&info)?;
+    let device = session.channels(&info)?;
     let address = session.address().to_owned();
+    let (planned, remarks) = super::fit::with_sensors(&plan, &device)
+        .map_err(|what| ShakeError::Unfit { address: address.clone(), what })?;
+    let channels = store.calibrated(store.next_session()?, planned.clone())?;
     error::check_fit(&address, &info, &channels, options)?;
     let noted = SessionInfo {
         address,
@@ -104,7 +107,9 @@ pub fn run_watched(
         schema_hash: Hex(session.hello().schema),
     };
     let known = store.levels()?;
-    let id = store.begin_session(&noted, &channels)?;
+    let id = store.begin_session(&noted, &planned)?;
+    remarks.iter().try_for_each(|remark| store.log(remark))?;
+    session.calibrate(&device, &channels);
     if let Some(simulated) = session.simulated() {
         store.note_simulated(simulated)?;
     }

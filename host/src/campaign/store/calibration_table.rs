@@ -1,0 +1,136 @@
+//! Calibrations in the campaign file: what a person said of the sensors after the device and the plan had spoken.
+//!
+//! Raw codes, and the scales that a session was measured with, stay as they are. A calibration is a row of its own, and the last one that says
+//! something of a channel counts, in every session from the one that it names on.
+
+use std::cmp::max;
+
+use jointrig_protocol::channel::Channel;
+
+use super::Store;
+use super::error::StoreError;
+use super::notes::utc_now;
+use super::table::{Row, table};
+use crate::campaign::plan::SensorPlan;
+use crate::device::channels::ChannelMap;
+
+table! {
+    /// What a channel's sensor is calibrated to; none leaves what was known before.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct Calibration {
+        "calibrations" {
+            "id INTEGER PRIMARY KEY",
+            /// When it was entered, RFC 3339.
+            utc: String = "utc TEXT NOT NULL",
+            /// The first session for which it counts.
+            from_session: i64 = "from_session INTEGER NOT NULL",
+            /// The channel's name.
+            channel: String = "channel TEXT NOT NULL",
+            /// V per SI unit, without sign.
+            sensitivity_v: Option<f64> = "sensitivity_v REAL",
+            /// 1 or -1.
+            polarity: Option<i64> = "polarity INTEGER",
+            /// By how much the signal is late, s.
+            delay_s: Option<f64> = "delay_s REAL",
+            /// Relative standard uncertainty of the sensitivity.
+            uncertainty: Option<f64> = "uncertainty REAL",
+            /// The sensor's model.
+            model: Option<String> = "model TEXT",
+            /// Its serial number.
+            serial: Option<String> = "serial TEXT",
+            /// When it was calibrated, YYYY-MM-DD.
+            calibrated: Option<String> = "calibrated TEXT",
+            /// Why it was entered.
+            reason: String = "reason TEXT NOT NULL",
+        }
+    }
+}
+
+impl Calibration {
+    /// What is stated of a sensor; when, why and from when on are left open.
+    pub fn of_sensor(sensor: &SensorPlan) -> Self {
+        Self {
+            utc: String::new(),
+            from_session: 0,
+            channel: sensor.name.clone(),
+            sensitivity_v: sensor.sensitivity_v,
+            polarity: sensor.polarity.map(i64::from),
+            delay_s: sensor.delay_s,
+            uncertainty: sensor.uncertainty,
+            model: sensor.model.clone(),
+            serial: sensor.serial.clone(),
+            calibrated: sensor.calibrated.clone(),
+            reason: String::new(),
+        }
+    }
+
+    /// A channel as it is calibrated by this.
+    pub fn apply(&self, channel: &mut Channel) {
+        if self.sensitivity_v.is_some() || self.polarity.is_some() {
+            let now = f64::from(channel.units_per_volt);
+            let sign = self.polarity.map_or(now.signum(), |polarity| polarity as f64);
+            channel.units_per_volt = (sign * self.sensitivity_v.map_or(now.abs(), f64::recip)) as f32;
+        }
+        if let Some(delay_s) = self.delay_s {
+            // up to 1 s of whole nanoseconds
+            channel.delay_ns = (delay_s * 1e9).round() as u32;
+        }
+    }
+}
+
+impl Store {
+    /// Enters calibrations, for every session from `from_session` on. Results are computed with them from then on; verdicts stay as they were
+    /// given.
+    pub fn calibrate(
+        &self,
+        sensors: &[SensorPlan],
+        from_session: i64,
+        reason: &str,
+    ) -> Result<(), StoreError> {
+        let write = || {
+            let transaction = self.connection.unchecked_transaction()?;
+            // a file from before there were calibrations
+            transaction.execute_batch(&super::schema::missing_calibrations(&transaction)?)?;
+            for sensor in sensors {
+                let row = Calibration {
+                    utc: utc_now(),
+                    from_session,
+                    reason: reason.to_owned(),
+                    ..Calibration::of_sensor(sensor)
+                };
+                row.insert(&transaction, &[])?;
+            }
+            transaction.commit()
+        };
+        write().map_err(self.failed("entering calibrations"))
+    }
+
+    /// Every calibration that was entered, in that order.
+    pub fn calibrations(&self) -> Result<Vec<Calibration>, StoreError> {
+        let there = self.connection.table_exists(None, "calibrations");
+        if !there.map_err(self.failed("looking for calibrations"))? {
+            return Ok(Vec::new());
+        }
+        let sql = format!("SELECT {} FROM calibrations ORDER BY id", Calibration::list());
+        self.all(&sql, [], Calibration::read, "reading calibrations")
+    }
+
+    /// The channels of a session as they are calibrated by now.
+    pub fn calibrated(&self, session: i64, mut map: ChannelMap) -> Result<ChannelMap, StoreError> {
+        for calibration in self.calibrations()? {
+            if calibration.from_session > session {
+                continue;
+            }
+            let own = |channel: &&mut Channel| channel.name == calibration.channel.as_str();
+            if let Some(channel) = map.channels.iter_mut().find(own) {
+                calibration.apply(channel);
+            }
+        }
+        Ok(map)
+    }
+
+    /// The id that the next session will have.
+    pub fn next_session(&self) -> Result<i64, StoreError> {
+        Ok(self.sessions()?.iter().fold(0, |last, (id, _)| max(last, *id)) + 1)
+    }
+}
