@@ -172,6 +172,19 @@ impl Page<'_> {
         self.browser.call(Some(&session), method, params)
     }
 
+    /// Has another tab in front of it, or comes to the front again.
+    pub fn hide(&mut self, hidden: bool) {
+        self.call("Emulation.setFocusEmulationEnabled", json!({ "enabled": !hidden }));
+        let front = if hidden {
+            let blank = json!({ "url": "about:blank" });
+            self.browser.call(None, "Target.createTarget", blank)["targetId"].as_str().unwrap().to_owned()
+        } else {
+            self.target.clone()
+        };
+        self.browser.call(None, "Target.activateTarget", json!({ "targetId": front }));
+        self.until(&format!("document.hidden === {hidden}"));
+    }
+
     /// Another size of the window, px.
     pub fn resize(&mut self, width: u32, height: u32) {
         let metrics = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": false });

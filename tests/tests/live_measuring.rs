@@ -48,6 +48,16 @@ fn the_stream_is_seen_as_it_comes() {
         page.eval("document.getElementById('link').textContent").as_str().unwrap().contains("frames missed")
     );
     picture(&mut page, "scope-missed");
+    // behind another tab it draws nothing, asks for nothing, and goes on where the stream is when it is in front again
+    page.hide(true);
+    std::thread::sleep(Duration::from_millis(300));
+    let (drawn, received) = (page.eval("live.scope.drawn"), page.eval("live.scope.received"));
+    std::thread::sleep(Duration::from_secs(1));
+    assert_eq!(page.eval("live.scope.drawn"), drawn, "drawn for nobody");
+    let more = page.eval("live.scope.received").as_u64().unwrap() - received.as_u64().unwrap();
+    assert!(more <= 3, "{more} frames came for nobody");
+    page.hide(false);
+    page.until(&format!("live.scope.drawn > {drawn} + 10"));
     assert_eq!(page.errors(), Vec::<String>::new());
     drop(page);
     let mut page = browser.open_url(&server.url, Look { dark: true, ..Look::HAND });

@@ -1,5 +1,5 @@
 // The stream as it comes: least and largest value of each channel in each short stretch, the newest at the right edge.
-const scope={capacity:4096,length:0,next:0,first:null,end:0,missed:0,span:4,channels:0,late:[],drawn:0,pending:null};
+const scope={capacity:4096,length:0,next:0,first:null,end:0,missed:0,span:4,channels:0,late:[],received:0,drawn:0,pending:null};
 const NOTHING=[32767,-32768];
 function roomFor(channels){
   Object.assign(scope,{channels,length:0,next:0,first:new Float64Array(scope.capacity),scans:new Float64Array(scope.capacity),codes:new Int16Array(2*scope.capacity*channels),end:0});
@@ -9,7 +9,7 @@ function takeFrame(v){
   if(v.byteLength<32||v.getUint8(0)!==1||v.getUint8(1)!==1)return;
   const channels=v.getUint16(2,true),stretches=v.getUint32(4,true),first=Number(v.getBigUint64(8,true)),per=v.getUint32(16,true);
   if(channels!==scope.channels||first<scope.end)roomFor(channels);
-  scope.missed=v.getUint32(20,true);scope.pending=v.getFloat64(24,true);
+  scope.received++;scope.missed=v.getUint32(20,true);scope.pending=v.getFloat64(24,true);
   const codes=new Int16Array(v.buffer,32);
   for(let s=0;s<stretches;s++){
     const at=scope.next;
