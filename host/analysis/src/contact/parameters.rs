@@ -32,8 +32,8 @@ const SENSORS: [&str; 5] = [
     "the 3-D vibrometer along y",
     "the 3-D vibrometer along z",
 ];
-/// The load cells' springs make T a form of z_B, θ_x and θ_y of its own: what its gain is wrong by goes into theirs, and T's own factor
-/// and delay are held.
+/// The load cells' springs make T a form of z_B, θ_x and θ_y of its own, so that most of what its gain and delay are wrong by may go into
+/// theirs. The priors alone hold them then: at this at least, so that no combination of them is left open where they are stated as exact.
 const LOAD_CELL_GAIN: f64 = 1e-3;
 /// Of its delay, s.
 const LOAD_CELL_SKEW_S: f64 = 1e-7;
@@ -83,8 +83,8 @@ impl Parameters {
         let named = |name: &str, start, sigma, cause| Parameter::new(name.to_owned(), start, sigma, cause);
         let free = |name: &str, start| named(name, start, f64::INFINITY, Cause::Noise);
         let mut all = vec![free("1/k_T", compliance_m_per_n), free("c_T/k_T", 0.0)];
-        all.push(named("the load cells' gain", 1.0, LOAD_CELL_GAIN, Cause::Gains));
-        all.push(named("the load cells' delay", 0.0, LOAD_CELL_SKEW_S, Cause::Skew));
+        all.push(named("the load cells' gain", 1.0, priors.gain.max(LOAD_CELL_GAIN), Cause::Gains));
+        all.push(named("the load cells' delay", 0.0, priors.skew_s.max(LOAD_CELL_SKEW_S), Cause::Skew));
         all.extend((2..FORM_TERMS).map(|_| free("the force's form", 0.0)));
         for lever in [1.0, SPECIMEN_M, SPECIMEN_M] {
             all.push(named("specimen B's inertia", 0.0, SPECIMEN_KG * lever, Cause::Noise));
