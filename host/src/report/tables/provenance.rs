@@ -1,6 +1,6 @@
 //! What was measured, and where everything comes from.
 
-use super::{Table, UNKNOWN, key, number, words};
+use super::{Table, key, number, words};
 use crate::report::page::escaped as escape;
 use crate::report::words::number::{count, decimals, short};
 use crate::results::Results;
@@ -67,10 +67,10 @@ pub fn calibrations(results: &Results) -> Option<String> {
     for (i, own) in all.iter().enumerate() {
         let at = |field: &str| format!("/source/calibrations/{i}/{field}");
         let volts = |n: usize| number(Some(precise(own.sensitivity_v[n])), at(&format!("sensitivity_v/{n}")));
-        let late = |n: usize| words(decimals(1e9 * own.delay_s[n], 0));
+        let late = |n: usize| number(Some(decimals(1e9 * own.delay_s[n], 0)), at(&format!("delay_s/{n}")));
         table.row([
             words(format!("{} ({})", own.channel, own.unit)),
-            words(own.utc.clone()),
+            words(own.utc.get(..19).unwrap_or(&own.utc).replace('T', " ") + " UTC"),
             words(own.reason.clone()),
             words(own.sensor.join(", ")),
             number(Some(own.from_session.to_string()), at("from_session")),
@@ -78,8 +78,7 @@ pub fn calibrations(results: &Results) -> Option<String> {
             volts(1),
             late(0),
             late(1),
-            own.uncertainty
-                .map_or_else(|| words(UNKNOWN), |part| words(format!("{} %", short(100.0 * part)))),
+            number(own.uncertainty.map(|part| format!("{} %", short(100.0 * part))), at("uncertainty")),
         ]);
     }
     Some(table.finish())
