@@ -63,8 +63,8 @@ pub const NEVER: u64 = u64::MAX;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Op {
-    /// It has started and needs its [`Setup`]; the argument is the number of golden vectors that agree,
-    /// or 0 when one differs.
+    /// It has started and needs its [`Setup`]; the argument is the low word of its
+    /// [`schema::HASH`](jointrig_protocol::schema::HASH).
     Start = 1,
     /// All tasks wait: for a block, an alarm, bytes, or room for bytes. With an argument of 1 bytes come and go by
     /// the UART, which the simulator does not see: it answers soon, whatever has come.

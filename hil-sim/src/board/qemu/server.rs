@@ -17,7 +17,7 @@ use jointrig_firmware::lockstep::{
 };
 use jointrig_logs::Table;
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, scans_per_block};
-use jointrig_protocol::{golden, request};
+use jointrig_protocol::{request, schema};
 use serde::Serialize;
 
 use super::Faults;
@@ -129,8 +129,8 @@ impl Server {
         if Op::from_word(ask.op) != Some(Op::Start) {
             return Err("it does not begin as this simulator's firmware does: build both anew".into());
         }
-        if ask.argument as usize != golden::COMMITTED.len() {
-            return Err("its frames differ from the golden vectors: build both anew".into());
+        if ask.argument != schema::HASH as u32 {
+            return Err("its protocol differs from this simulator's: build both anew".into());
         }
         self.put_text(&self.setup.clone())?;
         self.set_inputs();

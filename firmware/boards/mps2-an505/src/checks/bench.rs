@@ -23,7 +23,9 @@ use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, MAX_CHANNELS};
 use jointrig_protocol::request::{Configuration, Control, Fire, Numbered, Request, Shake, Stage, Trigger};
 use semihosting::{eprintln, println, process};
 
-use crate::{counter, device, memory, port, stack};
+use mps2_an505::{device, memory, port};
+
+use crate::{counter, stack};
 
 const RATE_HZ: u32 = 51_200;
 const PER_BLOCK: u64 = 15;
