@@ -9,6 +9,7 @@
 
 mod bench;
 mod counter;
+mod script;
 mod stack;
 
 use core::hint::black_box;
