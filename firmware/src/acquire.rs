@@ -6,6 +6,7 @@
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_time::Instant;
+use jointrig_hot::range;
 use jointrig_protocol::block::{OVER_RANGE, TRIGGER};
 use jointrig_protocol::event::{Event, Loss, Reason};
 use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
@@ -14,6 +15,11 @@ use crate::Core;
 use crate::board::{Coil, Delivered, Drive, Inputs, Scans};
 use crate::hammer::{CoilOrder, Scanned};
 use crate::ring::Range;
+use crate::state::State;
+
+/// Blocks for which the link is woken: a wake-up costs a tenth of what a block does, and nothing is in such haste. What is left over
+/// goes with the next look of [`crate::watch`], a tenth of a second later.
+const BLOCKS_PER_WAKE: u64 = 4;
 
 /// Runs for ever.
 pub async fn acquire<M: RawMutex, S: Scans, C: Coil, D: Drive, I: Inputs>(
@@ -32,14 +38,12 @@ pub async fn acquire<M: RawMutex, S: Scans, C: Coil, D: Drive, I: Inputs>(
         let delivered = scans.next(&mut samples.0).await;
         core.watch_inputs(inputs);
         let given = core.take(delivered, &samples.0, &mut codes);
-        let (coil_order, drive_off) =
-            core.with(|state| (state.coil.take(), core::mem::take(&mut state.drive_off)));
-        match coil_order {
+        match given.coil {
             Some(CoilOrder::Pulse(width_us)) => coil.pulse(width_us.min(coil.cap_us())),
             Some(CoilOrder::Off) => coil.off(),
             None => {}
         }
-        if drive_off {
+        if given.drive_off {
             drive.rest();
         } else if given.codes > 0 && drive.play(&codes[..given.codes]).is_err() {
             core.with(|state| {
@@ -50,16 +54,25 @@ pub async fn acquire<M: RawMutex, S: Scans, C: Coil, D: Drive, I: Inputs>(
             // a drive that has just taken codes takes their end
             let _ = drive.play(&[]);
         }
-        core.to_send.signal(());
+        if given.send {
+            core.to_send.signal(());
+        }
     }
 }
 
-/// What a block has yielded for the drive.
+/// What a block has yielded.
 #[derive(Clone, Copy, Default)]
 struct Given {
+    /// Codes for the drive.
     codes: usize,
     /// The shaker is at rest after these.
     last: bool,
+    /// An order for the coil, from here or from elsewhere.
+    coil: Option<CoilOrder>,
+    /// The drive must rest at once.
+    drive_off: bool,
+    /// The link is to be woken.
+    send: bool,
 }
 
 /// Words are copied faster than bytes.
@@ -87,19 +100,6 @@ impl Scanned for InHand<'_> {
     }
 }
 
-/// Whether any code is at the end of the converter's range.
-fn over_range(codes: &[[u8; 2]]) -> bool {
-    // sign and next bit differ in every code beyond half of the range: two codes at a time tell the usual
-    // block, which needs no closer look
-    let (words, rest) = codes.as_flattened().as_chunks::<4>();
-    let large = words.iter().fold(0, |large, word| {
-        let word = u32::from_le_bytes(*word);
-        large | (word ^ (word << 1))
-    }) & 0x8000_8000;
-    (large != 0 || !rest.is_empty())
-        && codes.iter().any(|pair| matches!(i16::from_le_bytes(*pair), i16::MAX | i16::MIN))
-}
-
 impl<M: RawMutex> Core<'_, M> {
     /// A front end that can be held waits here: without a stream, and half a ring ahead of the host.
     async fn wait_until_it_may_run(&self) {
@@ -111,6 +111,8 @@ impl<M: RawMutex> Core<'_, M> {
             if runs {
                 return;
             }
+            // whatever is left of what was delivered
+            self.to_send.signal(());
             self.may_run.wait().await;
         }
     }
@@ -137,69 +139,69 @@ impl<M: RawMutex> Core<'_, M> {
     fn take(&self, delivered: Delivered, samples: &[u8; BLOCK_SAMPLE_BYTES], codes: &mut [i16]) -> Given {
         let channels = self.facts.channels.len();
         let (pairs, _) = samples.as_chunks::<2>();
-        let count = (usize::from(delivered.scans) * channels).min(pairs.len() / channels * channels);
-        let pairs = &pairs[..count];
-        let over = over_range(pairs);
+        let pairs = &pairs[..(usize::from(delivered.scans) * channels).min(pairs.len())];
+        let over = delivered.loud && range::is_over(pairs);
         self.with(|state| {
-            state.last_block = Instant::now();
-            if delivered.missed > 0 {
-                // whatever was to move was to move by what these scans would have shown
-                state.bring_to_rest(Reason::FrontEnd);
-                state.counters.scans_missed += u64::from(delivered.missed);
-                if state.streaming {
-                    // what waited to be sent may still hold an unreported loss of its own
-                    state.report_loss(Loss::LinkSlow);
-                    let range = Range { first_scan: state.next_scan, scans: u64::from(delivered.missed) };
-                    state.ring.report(range);
-                    state.report_loss(Loss::FrontEnd);
-                }
-                state.next_scan += u64::from(delivered.missed);
-            }
-            let block = InHand { first_scan: state.next_scan, channels, samples: pairs };
-            let scans = block.scans();
-            if scans == 0 {
-                return Given::default();
-            }
-            let outcome = state.hammer.block(&block, state.friction.as_ref());
-            if let Some(friction) = &state.friction {
-                state.friction_n = friction.mean_of(scans, |scan, channel| block.code(scan, channel));
-            }
-            let flags = if over { OVER_RANGE } else { 0 } | if outcome.trigger { TRIGGER } else { 0 };
-            if state.streaming {
-                let dropped = state.ring.push(state.next_scan, flags, scans as u8, samples);
-                state.counters.scans_dropped += dropped;
-                state.counters.scans_produced += scans as u64;
-            }
-            let moves = state.shaker.moves();
-            if moves {
-                let events = state.shaker.block(&block, &mut codes[..scans]);
-                state.tell_of_shaker(events.into_iter().flatten());
-            }
-            state.next_scan += scans as u64;
-            state.tell(&outcome);
-            Given { codes: if moves { scans } else { 0 }, last: moves && !state.shaker.moves() }
+            let given = state.take(delivered, channels, pairs, over, samples, codes);
+            let send = state.ring.unsent() >= BLOCKS_PER_WAKE || state.has_words();
+            Given { coil: state.coil.take(), drive_off: core::mem::take(&mut state.drive_off), send, ..given }
         })
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+impl State<'_> {
+    /// Takes a block that was delivered after so many were missed; `pairs` are its codes, whole scans.
+    fn take(
+        &mut self,
+        delivered: Delivered,
+        channels: usize,
+        pairs: &[[u8; 2]],
+        over: bool,
+        samples: &[u8; BLOCK_SAMPLE_BYTES],
+        codes: &mut [i16],
+    ) -> Given {
+        self.last_block = Instant::now();
+        if delivered.missed > 0 {
+            self.miss(delivered.missed);
+        }
+        let block = InHand { first_scan: self.next_scan, channels, samples: pairs };
+        let scans = block.scans();
+        if scans == 0 {
+            return Given::default();
+        }
+        let outcome = self.hammer.block(&block, self.friction.as_ref());
+        let flags = if over { OVER_RANGE } else { 0 } | if outcome.trigger { TRIGGER } else { 0 };
+        if self.streaming {
+            let dropped = self.ring.push(self.next_scan, flags, scans as u8, samples);
+            self.counters.scans_dropped += dropped;
+            self.counters.scans_produced += scans as u64;
+        } else if let Some(friction) = &self.friction {
+            // of a stream, the ring has the last block
+            self.friction_n = friction.mean_of(pairs, channels);
+        }
+        let moves = self.shaker.moves();
+        if moves {
+            let events = self.shaker.block(&block, &mut codes[..scans]);
+            self.tell_of_shaker(events.into_iter().flatten());
+        }
+        self.next_scan += scans as u64;
+        self.tell(&outcome);
+        let last = moves && !self.shaker.moves();
+        Given { codes: if moves { scans } else { 0 }, last, ..Given::default() }
+    }
 
-    #[test]
-    fn both_ends_of_the_range_are_seen_wherever_they_stand() {
-        for end in [i16::MIN, i16::MAX] {
-            for count in 1..=9 {
-                for at in 0..count {
-                    let mut codes = [[0x34, 0x12]; 9];
-                    assert!(!over_range(&codes[..count]));
-                    codes[at] = end.to_le_bytes();
-                    assert!(over_range(&codes[..count]), "{end} at {at} of {count}");
-                }
-            }
+    /// Scans that the front end did not deliver: the clock went on.
+    #[inline(never)]
+    fn miss(&mut self, missed: u32) {
+        // whatever was to move was to move by what these scans would have shown
+        self.bring_to_rest(Reason::FrontEnd);
+        self.counters.scans_missed += u64::from(missed);
+        if self.streaming {
+            // what waited to be sent may still hold an unreported loss of its own
+            self.report_loss(Loss::LinkSlow);
+            self.ring.report(Range { first_scan: self.next_scan, scans: u64::from(missed) });
+            self.report_loss(Loss::FrontEnd);
         }
-        for near in [i16::MIN + 1, i16::MAX - 1, i16::MAX / 2 + 1, -1, 0] {
-            assert!(!over_range(&[near.to_le_bytes(); 8]));
-        }
+        self.next_scan += u64::from(missed);
     }
 }

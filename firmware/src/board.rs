@@ -38,6 +38,8 @@ pub struct Delivered {
     pub scans: u8,
     /// Scans that were lost between the last block and this one.
     pub missed: u32,
+    /// Whether any code may be beyond half of the converters' range; if not, none is looked at for its end.
+    pub loud: bool,
 }
 
 /// The converters, sampling all channels on one edge of a hardware timer.

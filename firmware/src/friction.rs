@@ -4,6 +4,7 @@
 //! is the sum of the three. Since T is linear in the readings, the sum of the matrix's columns is formed
 //! once, and each scan costs three multiplications.
 
+use jointrig_hot::column;
 use jointrig_protocol::channel::{Channel, Role};
 use nalgebra::{Matrix3, RowVector3, Vector3};
 
@@ -30,7 +31,7 @@ impl Friction {
         for i in 0..CELLS {
             let (place, channel) = cells.next()?;
             places[i] = place;
-            newtons_per_code[i] = channel.units_per_code() as f32;
+            newtons_per_code[i] = channel.units_per_code_f32();
         }
         if cells.next().is_some() {
             return None;
@@ -45,10 +46,10 @@ impl Friction {
         self.weights = RowVector3::repeat(1.0) * matrix * Matrix3::from_diagonal(&self.newtons_per_code);
     }
 
-    /// The mean of T over some scans, N: since T is linear in the codes, they are summed as they are.
-    pub fn mean_of(&self, scans: usize, code: impl Fn(usize, usize) -> i16) -> f32 {
-        let sums = self.places.map(|place| (0..scans).map(|scan| i32::from(code(scan, place))).sum::<i32>());
-        (self.weights * Vector3::from(sums.map(|sum| sum as f32))).x / scans as f32
+    /// The mean of T over some scans of so many channels, N: since T is linear in the codes, they are summed as they are.
+    pub fn mean_of(&self, codes: &[[u8; 2]], channels: usize) -> f32 {
+        let sums = self.places.map(|place| column::sum(codes, channels, place) as f32);
+        (self.weights * Vector3::from(sums)).x * channels as f32 / codes.len() as f32
     }
 
     /// T of one scan, N.

@@ -91,8 +91,8 @@ impl Hammer {
         Self {
             rate_hz,
             cap_us: cap_us.min(COIL_PULSE_CAP_US),
-            force: force.map(|place| (place, channels[place].units_per_code() as f32)),
-            units_per_code: channels.iter().map(|channel| channel.units_per_code().abs() as f32).collect(),
+            force: force.map(|place| (place, channels[place].units_per_code_f32())),
+            units_per_code: channels.iter().map(|channel| channel.units_per_code_f32().abs()).collect(),
             trigger: Trigger {
                 level_n: 1.0,
                 flight_scans: rate_hz / 10,

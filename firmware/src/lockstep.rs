@@ -12,7 +12,7 @@
 //! | [`ASK_AT`] | 64 | board | [`Ask`] |
 //! | [`REPLY_AT`] | 64 | simulator | [`Reply`] |
 //! | [`TEXT_AT`] | 4096 | whoever has the turn | [`Setup`], a stage order and its refusal, a last sentence |
-//! | [`BLOCK_AT`] | 492 | simulator | a [`Delivery`], then the block |
+//! | [`BLOCK_AT`] | 896 | simulator | a [`Delivery`], then the words of both converters |
 //! | [`DRIVE_AT`] | 480 | board | codes for the shaker's drive |
 //! | [`TO_DEVICE_AT`] | 64 Ki | simulator | bytes for the board, a ring |
 //! | [`TO_HOST_AT`] | 64 Ki | board | bytes for the host, a ring |
@@ -20,6 +20,7 @@
 //!
 //! Heads and tails count bytes since the start, modulo 2³²; everything is little-endian.
 
+use crate::ad7606b::alignment::{Clock, Moment};
 use crate::ad7606b::trouble::Trouble;
 use heapless::Vec;
 use jointrig_protocol::channel::{Channel, Name};
@@ -31,7 +32,7 @@ pub const BASE: usize = 0x8000_0000;
 /// Its size: QEMU insists on exactly this much.
 pub const BYTES: usize = 16 << 20;
 /// Changes with this layout, so that an image and a simulator of different sources refuse each other.
-pub const MAGIC: u32 = 0x4A52_4C04;
+pub const MAGIC: u32 = 0x4A52_4C05;
 /// Where [`MAGIC`] stands.
 pub const MAGIC_AT: usize = 0;
 /// Where the board's words stand.
@@ -63,8 +64,8 @@ pub const NEVER: u64 = u64::MAX;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Op {
-    /// It has started and needs its [`Setup`]; the argument is the number of golden vectors that agree,
-    /// or 0 when one differs.
+    /// It has started and needs its [`Setup`]; the argument is the low word of its
+    /// [`schema::HASH`](jointrig_protocol::schema::HASH).
     Start = 1,
     /// All tasks wait: for a block, an alarm, bytes, or room for bytes. With an argument of 1 bytes come and go by
     /// the UART, which the simulator does not see: it answers soon, whatever has come.
@@ -81,6 +82,8 @@ pub enum Op {
     Play = 7,
     /// The shaker's drive to rest.
     Rest = 8,
+    /// Both converters' rings start anew with the next scan; the reply's length is that scan's number since the start.
+    Join = 9,
 }
 
 impl Op {
@@ -96,6 +99,7 @@ impl Op {
             6 => Self::Panic,
             7 => Self::Play,
             8 => Self::Rest,
+            9 => Self::Join,
             _ => return None,
         })
     }
@@ -249,17 +253,24 @@ const fn joined(low: u32, high: u32) -> u64 {
 }
 
 /// Bytes of a [`Delivery`].
-pub const DELIVERY_BYTES: usize = 12;
+pub const DELIVERY_BYTES: usize = 32;
 
-/// What stands before a block.
+/// Counts of the emulated converters' timer in a period: as many parts as the phases of a [`Moment`] need to tell apart.
+pub const CLOCK: Clock = Clock { settled: 1, read_from: 10, read_by: 15 };
+/// Blocks in each of the emulated converters' rings, as on the wired board.
+pub const RING_BLOCKS: u32 = 8;
+
+/// What stands before a block: after it come the words of both converters, the first's and then the second's, little-endian.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Delivery {
-    /// Scans that were lost before the block.
-    pub missed: u32,
-    /// Scans in the block.
+    /// Scans of which words stand behind it.
     pub scans: u32,
-    /// What went wrong, if anything.
+    /// What went wrong, if anything: nothing is there then.
     pub trouble: Option<Trouble>,
+    /// Periods of the clock that have begun since the start.
+    pub periods: u32,
+    /// What the board reads off when it has the block, and again until it can tell: the phase of every second look is a quiet one.
+    pub moment: Moment,
 }
 
 impl Delivery {
@@ -272,29 +283,33 @@ impl Delivery {
             Some(Trouble::Crc) => 2,
             Some(Trouble::Overrun) => 3,
             Some(Trouble::Dma) => 4,
-            Some(Trouble::Slipped(_)) => 5,
+            // the board finds out by itself
+            Some(Trouble::Slipped(..)) => 5,
         };
+        let [first, second] = self.moment.words;
+        let words =
+            [self.scans, trouble, self.periods, self.moment.periods, self.moment.phase, first, second, 0];
         let mut bytes = [0; DELIVERY_BYTES];
-        for (place, word) in bytes.as_chunks_mut().0.iter_mut().zip([self.missed, self.scans, trouble]) {
+        for (place, word) in bytes.as_chunks_mut().0.iter_mut().zip(words) {
             *place = u32::to_le_bytes(word);
         }
         bytes
     }
 
-    /// From memory. What slipped is what is missing; the emulated converters are silent from the start.
+    /// From memory. The emulated converters are silent from the start.
     #[must_use]
     pub fn from_bytes(bytes: &[u8; DELIVERY_BYTES]) -> Self {
         let word = |place: usize| bytes.as_chunks().0.get(place).map_or(0, |word| u32::from_le_bytes(*word));
-        let missed = word(0);
-        let trouble = match word(2) {
+        let trouble = match word(1) {
             1 => Some(Trouble::Silent(0, 0)),
             2 => Some(Trouble::Crc),
             3 => Some(Trouble::Overrun),
             4 => Some(Trouble::Dma),
-            5 => Some(Trouble::Slipped(missed)),
+            5 => Some(Trouble::Slipped(0, 0)),
             _ => None,
         };
-        Self { missed, scans: word(1), trouble }
+        let moment = Moment { periods: word(3), phase: word(4), words: [word(5), word(6)] };
+        Self { scans: word(0), trouble, periods: word(2), moment }
     }
 }
 
@@ -342,8 +357,9 @@ mod tests {
         assert_eq!(Ask::from_words(&ask.to_words()), ask);
         assert_eq!(Op::from_word(ask.op), Some(Op::Stage));
         assert_eq!(Op::from_word(0), None);
-        for trouble in [None, Some(Trouble::Silent(0, 0)), Some(Trouble::Crc), Some(Trouble::Slipped(30))] {
-            let delivery = Delivery { missed: 30, scans: 24, trouble };
+        for trouble in [None, Some(Trouble::Silent(0, 0)), Some(Trouble::Crc), Some(Trouble::Slipped(0, 0))] {
+            let moment = Moment { periods: 7, phase: 16, words: [207, 216] };
+            let delivery = Delivery { scans: 24, trouble, periods: 8, moment };
             assert_eq!(Delivery::from_bytes(&delivery.to_bytes()), delivery);
         }
         let reply = Reply {

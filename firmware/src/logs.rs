@@ -10,6 +10,7 @@
 //! [`Counters::logs_dropped`]: jointrig_protocol::answer::Counters::logs_dropped
 
 use core::cell::RefCell;
+use core::sync::atomic::{AtomicBool, Ordering};
 
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::RawMutex;
@@ -26,7 +27,10 @@ const WAITING_BYTES: usize = 2_048;
 const END: u8 = 0;
 
 /// Lines between a board's logger and its link.
-pub struct Tap<M: RawMutex>(Mutex<M, RefCell<Waiting>>);
+pub struct Tap<M: RawMutex> {
+    waits: AtomicBool,
+    lines: Mutex<M, RefCell<Waiting>>,
+}
 
 struct Waiting {
     bytes: Deque<u8, WAITING_BYTES>,
@@ -43,7 +47,10 @@ impl<M: RawMutex> Tap<M> {
     /// Nothing waits.
     #[must_use]
     pub const fn new() -> Self {
-        Self(Mutex::new(RefCell::new(Waiting { bytes: Deque::new(), dropped: 0 })))
+        Self {
+            waits: AtomicBool::new(false),
+            lines: Mutex::new(RefCell::new(Waiting { bytes: Deque::new(), dropped: 0 })),
+        }
     }
 
     /// Takes an encoded line, its zero included, or drops all of it: when there is no room for it, when it is
@@ -51,7 +58,7 @@ impl<M: RawMutex> Tap<M> {
     ///
     /// Whoever calls this from an interrupt needs an `M` that allows it.
     pub fn push(&self, line: &[u8]) {
-        self.0.lock(|waiting| {
+        self.lines.lock(|waiting| {
             let mut waiting = waiting.borrow_mut();
             let room = waiting.bytes.capacity() - waiting.bytes.len();
             if line.len() > LINE_BYTES.min(room) || line.last() != Some(&END) {
@@ -60,19 +67,26 @@ impl<M: RawMutex> Tap<M> {
             }
             // there is room: that was looked at
             waiting.bytes.extend(line.iter().copied());
+            self.waits.store(true, Ordering::Relaxed);
         });
+    }
+
+    /// Whether a line waits: asked after every frame, and cheaper than looking.
+    #[must_use]
+    pub fn waits(&self) -> bool {
+        self.waits.load(Ordering::Relaxed)
     }
 
     /// Lines dropped since the start.
     #[must_use]
     pub fn dropped(&self) -> u32 {
-        self.0.lock(|waiting| waiting.borrow().dropped)
+        self.lines.lock(|waiting| waiting.borrow().dropped)
     }
 
     /// Moves as many whole lines as fit into `room`; how many bytes they are, or `None` when nothing waits.
     #[must_use]
     pub fn take(&self, room: &mut [u8]) -> Option<usize> {
-        self.0.lock(|waiting| {
+        self.lines.lock(|waiting| {
             let bytes = &mut waiting.borrow_mut().bytes;
             let mut whole = 0;
             for (place, (byte, to)) in bytes.iter().zip(room.iter_mut()).enumerate() {
@@ -84,6 +98,7 @@ impl<M: RawMutex> Tap<M> {
             for _ in 0..whole {
                 bytes.pop_front();
             }
+            self.waits.store(!bytes.is_empty(), Ordering::Relaxed);
             (whole > 0).then_some(whole)
         })
     }

@@ -69,13 +69,14 @@ impl<M: RawMutex> Core<'_, M> {
             self.with(|state| state.counters.frames_bad += 1);
             return;
         };
-        let ours = Hello::device(theirs.session, self.facts.boot, self.ring_scans());
+        let ours = Hello::device(theirs.session, self.facts.boot, 0);
         let agreed = theirs.role == Role::Host && ours.check(&theirs).is_ok();
         self.with(|state| {
             state.hello_due = Some(theirs.session);
             if agreed && state.session == Some(theirs.session) {
                 return;
             }
+            state.packets = agreed && theirs.packets;
             state.bring_to_rest(Reason::StreamEnded);
             state.streaming = false;
             state.answers.clear();
@@ -111,12 +112,14 @@ impl<M: RawMutex> Core<'_, M> {
             // before the handshake nothing is done and nothing is promised
             return;
         }
-        let Ok(request) = postcard::from_bytes::<request::Numbered>(payload) else {
-            // its number may still be read: postcard writes it first
-            if let Ok((number, _)) = postcard::take_from_bytes::<u32>(payload) {
-                self.answer(Numbered { number, outcome: Err(Refusal::Unreadable) });
+        let request = match request::Numbered::read(payload) {
+            Ok(request) => request,
+            Err(unreadable) => {
+                if let Some(number) = unreadable.0 {
+                    self.answer(Numbered { number, outcome: Err(Refusal::Unreadable) });
+                }
+                return;
             }
-            return;
         };
         let answer = match self.with(|state| state.memory.look_up(request.number)) {
             Seen::Before(answer) => answer,

@@ -66,6 +66,7 @@ impl<M: RawMutex> Core<'_, M> {
     }
 
     fn status(&self) -> Status {
+        let channels = self.facts.channels.len();
         self.with(|state| Status {
             epoch: state.epoch,
             streaming: state.streaming,
@@ -75,7 +76,7 @@ impl<M: RawMutex> Core<'_, M> {
             armed_for_ms: state.hammer.armed_for_ms(state.next_scan),
             interlock_closed: state.interlock_closed,
             emergency_stop: state.emergency_stop,
-            friction_n: state.friction_n,
+            friction_n: state.friction_of_last_block(channels),
             shot: state.hammer.shot(),
             shaker: state.shaker.state(),
             drive_v: state.shaker.amplitude_v(),

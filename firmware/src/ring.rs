@@ -47,6 +47,8 @@ pub struct Ring<'a> {
     head: u64,
     /// Sequence number of the oldest block held.
     tail: u64,
+    /// Its slot.
+    tail_place: usize,
     /// Sequence number of the next block to send.
     cursor: u64,
     unreported: Option<Range>,
@@ -57,13 +59,23 @@ pub struct Ring<'a> {
 impl<'a> Ring<'a> {
     /// An empty ring for scans of this many bytes.
     pub fn new(slots: &'a mut [Slot], bytes_per_scan: usize) -> Self {
-        Self { slots, bytes_per_scan, epoch: 0, head: 0, tail: 0, cursor: 0, unreported: None, gap: false }
+        Self {
+            slots,
+            bytes_per_scan,
+            epoch: 0,
+            head: 0,
+            tail: 0,
+            tail_place: 0,
+            cursor: 0,
+            unreported: None,
+            gap: false,
+        }
     }
 
     /// Forgets everything and begins a stream.
     pub fn restart(&mut self, epoch: u32) {
         self.epoch = epoch;
-        self.tail = self.head;
+        (self.tail, self.tail_place) = (self.head, self.place(self.head));
         self.cursor = self.head;
         self.unreported = None;
         self.gap = false;
@@ -79,8 +91,20 @@ impl<'a> Ring<'a> {
         (self.tail < self.head).then(|| self.slot(self.tail).first_scan)
     }
 
+    /// Samples of the block that entered last, whole scans.
+    pub fn newest(&self) -> Option<&[u8]> {
+        (self.tail < self.head).then(|| self.out(self.head - 1, 0).samples)
+    }
+
+    /// The slot of a block that is held, or of the next one.
+    fn place(&self, sequence: u64) -> usize {
+        // the difference is below the length, or equal to it: no division, of which there would be two for each block
+        let place = self.tail_place + (sequence - self.tail) as usize;
+        if place >= self.slots.len() { place - self.slots.len() } else { place }
+    }
+
     fn slot(&self, sequence: u64) -> &Slot {
-        &self.slots[(sequence % self.slots.len() as u64) as usize]
+        &self.slots[self.place(sequence)]
     }
 
     /// Puts a block in; the oldest leaves when the ring is full. Returns the scans that left unsent.
@@ -94,9 +118,9 @@ impl<'a> Ring<'a> {
                 dropped = range.scans;
                 self.report(range);
             }
-            self.tail += 1;
+            (self.tail, self.tail_place) = (self.tail + 1, self.place(self.tail + 1));
         }
-        let at = (self.head % self.slots.len() as u64) as usize;
+        let at = self.place(self.head);
         let slot = &mut self.slots[at];
         slot.first_scan = first_scan;
         slot.flags = flags;
@@ -127,6 +151,11 @@ impl<'a> Ring<'a> {
     /// Whether a loss waits to be reported.
     pub fn has_loss(&self) -> bool {
         self.unreported.is_some()
+    }
+
+    /// Blocks that have not been sent.
+    pub fn unsent(&self) -> u64 {
+        self.head - self.cursor
     }
 
     /// The next block that has not been sent; the cursor moves on.

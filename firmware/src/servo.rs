@@ -117,7 +117,7 @@ impl Servo {
     pub fn new(channels: &[Channel], rate_hz: u32, control: Control, step: u32, most_v: f32) -> Option<Self> {
         let find = |role: Role| {
             let place = channels.iter().take(MAX_CHANNELS).position(|channel| channel.role == role)?;
-            Some((place as u8, channels[place].units_per_code() as f32))
+            Some((place as u8, channels[place].units_per_code_f32()))
         };
         let mut terms = Vec::new();
         let (target, gain) = match control {

@@ -60,7 +60,7 @@ impl<'a> Shaker<'a> {
             channels,
             rate_hz,
             full_scale_v,
-            units_per_code: channels.iter().map(|channel| channel.units_per_code().abs() as f32).collect(),
+            units_per_code: channels.iter().map(|channel| channel.units_per_code_f32().abs()).collect(),
             state: State::Resting,
             angle: 0,
             step: 0,

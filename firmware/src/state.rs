@@ -7,7 +7,7 @@ use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::Instant;
 use heapless::{Deque, String};
-use jointrig_protocol::answer::{self, Counters, Info, Refusal};
+use jointrig_protocol::answer::{self, Counters, Info, Refusal, Reset};
 use jointrig_protocol::channel::{Channel, Name};
 use jointrig_protocol::event::{self, Event, Loss, Reason};
 use jointrig_protocol::limits;
@@ -48,6 +48,8 @@ pub struct Facts<'a> {
     pub stage: bool,
     /// Full scale of the shaker's drive, V; 0 without a shaker.
     pub drive_v: f32,
+    /// Why the device started.
+    pub reset: Reset,
     /// Tells this start from all others: one more than the last start's, or a number that none had. Its low 16 bits
     /// are the upper ones of the first stream's epoch.
     pub boot: u32,
@@ -75,6 +77,8 @@ pub(crate) struct State<'a> {
     /// The session agreed on, if any.
     pub session: Option<u32>,
     pub hello_due: Option<u32>,
+    /// The host reads packets, and is sent them.
+    pub packets: bool,
     pub answers: Deque<answer::Numbered, ANSWERS>,
     pub events: Deque<event::Numbered, EVENTS>,
     pub next_event: u32,
@@ -117,6 +121,7 @@ impl<'a, M: RawMutex> Core<'a, M> {
             memory: Memory::new(),
             session: None,
             hello_due: None,
+            packets: false,
             answers: Deque::new(),
             events: Deque::new(),
             next_event: 0,
@@ -197,6 +202,7 @@ impl<'a, M: RawMutex> Core<'a, M> {
             coil_cap_us: self.facts.coil_cap_us,
             stage: self.facts.stage,
             drive_v: self.facts.drive_v,
+            reset: self.facts.reset,
         }
     }
 }
@@ -212,10 +218,18 @@ impl State<'_> {
     }
 
     /// Says what came of a step of the hammer, and keeps its order for the coil.
+    #[inline]
     pub fn tell(&mut self, outcome: &Outcome) {
         if outcome.coil.is_some() {
             self.coil = outcome.coil;
         }
+        if outcome.shot.is_some() || outcome.disarmed.is_some() {
+            self.tell_of_hammer(outcome);
+        }
+    }
+
+    #[inline(never)]
+    fn tell_of_hammer(&mut self, outcome: &Outcome) {
         if let Some(shot) = outcome.shot {
             info!("shot {} is {:?}", shot.number, shot.phase);
             self.say(Event::Shot(shot));
@@ -303,6 +317,16 @@ impl State<'_> {
         // whatever states the machines believe in
         self.coil = Some(CoilOrder::Off);
         self.drive_off = true;
+    }
+
+    /// Mean of T over the last block, N.
+    pub fn friction_of_last_block(&mut self, channels: usize) -> f32 {
+        if self.streaming
+            && let (Some(friction), Some(samples)) = (&self.friction, self.ring.newest())
+        {
+            self.friction_n = friction.mean_of(samples.as_chunks().0, channels);
+        }
+        self.friction_n
     }
 
     /// Queues the report of scans that were lost, if any.

@@ -22,6 +22,7 @@ fn armed<'a>(channels: &'a [Channel], slots: &'a mut [Slot]) -> Core<'a, NoopRaw
         coil_cap_us: 8_000,
         stage: false,
         drive_v: 0.0,
+        reset: jointrig_protocol::answer::Reset::Power,
         boot: 1,
     };
     let core = Core::new(facts, slots);

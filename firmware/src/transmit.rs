@@ -12,64 +12,123 @@ use jointrig_protocol::hello::Hello;
 
 use crate::Core;
 use crate::board::ByteSink;
+use crate::logs::Tap;
 use crate::ring::Out;
 use crate::state::State;
 
 /// Runs for ever.
 pub async fn transmit<M: RawMutex, S: ByteSink>(core: &Core<'_, M>, sink: &mut S) -> ! {
     let mut writer = Writer::new(Kind::Hello);
+    // whether what was sent last ended with a zero, as COBS needs it before the next frame
+    let mut ended = true;
+    let mut more = true;
     loop {
-        match core.next_frame(&mut writer) {
-            Some(payload) => {
-                // every frame that is built here fits: the golden vectors hold the largest of each kind
-                if let Ok(frame) = writer.seal(payload) {
-                    sink.write(frame).await;
-                }
-            }
-            None => core.to_send.wait().await,
+        if !core::mem::replace(&mut more, true) {
+            core.to_send.wait().await;
+        }
+        let Some(next) = core.next_frame(&mut writer) else {
+            more = false;
+            continue;
+        };
+        more = next.more;
+        if !next.packet && !core::mem::replace(&mut ended, true) {
+            sink.write(&[0]).await;
+        }
+        let sealed = if next.packet { writer.seal_packet(next.payload) } else { writer.seal(next.payload) };
+        // every frame that is built here fits: the golden vectors hold the largest of each kind
+        if let Ok(frame) = sealed {
+            sink.write(frame).await;
+            ended = !next.packet;
         }
     }
 }
 
+/// A frame that was written and is not sealed yet.
+struct Next {
+    /// Bytes of its payload.
+    payload: usize,
+    /// It goes as a packet, not in COBS.
+    packet: bool,
+    /// Something else may wait behind it.
+    more: bool,
+}
+
 impl<M: RawMutex> Core<'_, M> {
     /// Writes the most urgent payload; its length, or `None` when there is nothing to send.
-    fn next_frame(&self, writer: &mut Writer) -> Option<usize> {
-        let ring_scans = self.ring_scans();
+    fn next_frame(&self, writer: &mut Writer) -> Option<Next> {
         self.with(|state| {
             if let Some(session) = state.hello_due.take() {
-                writer.restart(Kind::Hello);
-                let bytes = Hello::device(session, self.facts.boot, ring_scans).to_bytes();
-                writer.payload_mut()[..bytes.len()].copy_from_slice(&bytes);
-                return Some(bytes.len());
+                let payload = state.write_hello(session, self.facts.boot, writer);
+                return Some(Next { payload, packet: false, more: true });
             }
             state.session?;
-            while let Some(answer) = state.answers.pop_front() {
-                if let Some(length) = write_value(writer, Kind::Answer, &answer) {
-                    return Some(length);
-                }
-            }
-            if state.ring.has_loss() {
-                state.report_loss(Loss::LinkSlow);
-            }
-            while let Some(event) = state.events.pop_front() {
-                if let Some(length) = write_value(writer, Kind::Event, &event) {
-                    return Some(length);
-                }
-                state.counters.events_dropped += 1;
-            }
-            state.resent_block(writer).or_else(|| state.new_block(writer)).or_else(|| self.log_lines(writer))
+            let payload = state.next_payload(writer).or_else(|| self.log_lines(writer))?;
+            // the newest block is the last thing in a stream that keeps up
+            let more = state.is_behind() || self.logs.is_some_and(Tap::waits);
+            Some(Next { payload, packet: state.packets, more })
         })
     }
 
     /// Lines wait until the next look, a tenth of a second at most: none is worth a wake-up of its own.
     fn log_lines(&self, writer: &mut Writer) -> Option<usize> {
-        let length = self.logs?.take(writer.payload_mut())?;
+        let length = self.logs.filter(|tap| tap.waits())?.take(writer.payload_mut())?;
         writer.restart(Kind::Log);
         Some(length)
     }
 }
 
 impl State<'_> {
+    fn write_hello(&self, session: u32, boot: u32, writer: &mut Writer) -> usize {
+        writer.restart(Kind::Hello);
+        let device = Hello::device(session, boot, self.ring.capacity_scans());
+        let bytes = Hello { packets: self.packets, ..device }.to_bytes();
+        writer.payload_mut()[..bytes.len()].copy_from_slice(&bytes);
+        bytes.len()
+    }
+
+    /// Whether anything but log lines waits.
+    fn is_behind(&self) -> bool {
+        self.ring.unsent() > 0 || self.has_words() || !self.resends.is_empty()
+    }
+
+    /// Whether answers, events or a report of a loss wait.
+    pub fn has_words(&self) -> bool {
+        !self.answers.is_empty() || !self.events.is_empty() || self.ring.has_loss()
+    }
+
+    /// What is most urgent of all but log lines.
+    fn next_payload(&mut self, writer: &mut Writer) -> Option<usize> {
+        if self.has_words()
+            && let Some(length) = self.next_word(writer)
+        {
+            return Some(length);
+        }
+        if self.resends.is_empty() { self.new_block(writer) } else { self.resent_block(writer) }
+    }
+
+    /// The next answer or event.
+    #[inline(never)]
+    fn next_word(&mut self, writer: &mut Writer) -> Option<usize> {
+        while let Some(answer) = self.answers.pop_front() {
+            writer.restart(Kind::Answer);
+            if let Ok(length) = answer.write(writer.payload_mut()) {
+                return Some(length);
+            }
+        }
+        if self.ring.has_loss() {
+            self.report_loss(Loss::LinkSlow);
+        }
+        while let Some(event) = self.events.pop_front() {
+            writer.restart(Kind::Event);
+            if let Ok(length) = event.write(writer.payload_mut()) {
+                return Some(length);
+            }
+            self.counters.events_dropped += 1;
+        }
+        None
+    }
+
+    #[inline(never)]
     fn resent_block(&mut self, writer: &mut Writer) -> Option<usize> {
         while let Some(range) = self.resends.front_mut() {
             let end = range.first_scan + range.scans;
@@ -88,7 +147,7 @@ impl State<'_> {
                 _ => drop(self.resends.pop_front()),
             }
         }
-        None
+        self.new_block(writer)
     }
 
     fn new_block(&mut self, writer: &mut Writer) -> Option<usize> {
@@ -98,15 +157,11 @@ impl State<'_> {
     }
 }
 
-fn write_value<T: serde::Serialize>(writer: &mut Writer, kind: Kind, value: &T) -> Option<usize> {
-    writer.restart(kind);
-    postcard::to_slice(value, writer.payload_mut()).ok().map(|used| used.len())
-}
-
 fn write_block(writer: &mut Writer, out: &Out<'_>) -> usize {
     writer.restart(Kind::Samples);
-    let payload = writer.payload_mut();
-    payload[..HEADER_PAYLOAD].copy_from_slice(&out.header.to_bytes());
-    payload[HEADER_PAYLOAD..HEADER_PAYLOAD + out.samples.len()].copy_from_slice(out.samples);
-    HEADER_PAYLOAD + out.samples.len()
+    let (head, samples) = writer.payload_mut().split_at_mut(HEADER_PAYLOAD);
+    head.copy_from_slice(&out.header.to_bytes());
+    let length = out.samples.len().min(samples.len());
+    samples[..length].copy_from_slice(&out.samples[..length]);
+    HEADER_PAYLOAD + length
 }

@@ -22,7 +22,7 @@ use jointrig_firmware::ring::Slot;
 use jointrig_firmware::usb::{Buffers, Speed, build};
 use jointrig_firmware::{Core, Facts, acquire, receive, transmit};
 
-use jointrig_protocol::answer::{self, Answer};
+use jointrig_protocol::answer::{self, Answer, Reset};
 use jointrig_protocol::block::{Block, RESENT};
 use jointrig_protocol::channel::{Channel, Quantity, Role};
 use jointrig_protocol::event::{self, Event};
@@ -51,7 +51,7 @@ impl Scans for OnDemand<'_> {
         self.block = (self.block + 1) % 30_000;
         // one block at a time, as the timer would have it
         yield_now().await;
-        Delivered { scans: SCANS as u8, missed: 0 }
+        Delivered { scans: SCANS as u8, missed: 0, loud: true }
     }
 }
 
@@ -109,6 +109,7 @@ fn run<F: Future<Output = ()>>(speed: Speed, scenario: impl FnOnce(Session) -> F
             coil_cap_us: 8_000,
             stage: false,
             drive_v: 0.0,
+            reset: Reset::Power,
             boot: 1,
         };
         let mut slots = vec![Slot::EMPTY; SECOND];

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use jointrig_firmware::ad7606b::trouble::Trouble;
-use jointrig_hil_sim::board::qemu::{ConverterFault, Faults, QemuBoard, QemuError};
+use jointrig_hil_sim::board::qemu::{ConverterFault, Faults, QemuBoard, QemuError, Slip};
 use jointrig_hil_sim::board::{Options, VirtualBoard};
 use jointrig_hil_sim::rig::RigConfig;
 use jointrig_protocol::answer::{self, Answer, Hammer, Refusal};
@@ -47,6 +47,11 @@ fn the_binary_gives_the_native_boards_records_sample_for_sample() {
     let natively = SmallHost::new(link).three_shots(false);
     assert_eq!(in_qemu, natively);
     assert_eq!(emulated.controls().coil_pulses_us(), native.controls().coil_pulses_us());
+    let Some(image) = image() else { return };
+    let (_board, link) = QemuBoard::start(&image, None, 11).unwrap();
+    let mut host = SmallHost::reading(link, true);
+    assert!(host.hello.unwrap().packets);
+    assert_eq!(host.three_shots(false), natively, "packets carry the same");
     let Some((_other, mut host)) = board(12) else { return };
     assert_ne!(host.three_shots(false), natively, "another seed is another run");
 }
@@ -321,4 +326,51 @@ fn the_uart_is_a_link_too() {
     drop(board);
     // QEMU made it
     let _ = std::fs::remove_file(socket);
+}
+
+/// Converters that fall out of step, in every way and with a program that looks late: nothing that was skewed is ever sent.
+#[test]
+fn converters_out_of_step_are_found_before_anything_is_sent() {
+    let options = Options { seed: 7, ..Options::default() };
+    let (_native, link) = VirtualBoard::start_with(&RigConfig::default(), &options).unwrap();
+    let mut host = SmallHost::new(link);
+    let end = 150_000;
+    let undisturbed = {
+        host.start();
+        host.until("three seconds", |host| host.next_scan >= end);
+        host.codes
+    };
+    let from = 90_007;
+    let lags = [[9, 0], [0, 9], [-9, 0], [0, -9], [9, 9], [-9, 9], [18, 0], [0, 45], [1, 0], [0, -1], [4, 0]];
+    for (number, lags) in lags.into_iter().enumerate() {
+        let Some((board, mut host)) = board(7) else { return };
+        let late = [0, 1, 5, 23, 24, 70, 120, 170, 400, 2, 0][number];
+        board.faults().break_converters(ConverterFault::Slips(Slip { lags, late }), from, 240);
+        host.start();
+        let mut before = Vec::new();
+        host.until("the stream's end", |host| {
+            if host.gaps.is_empty() {
+                before.clone_from(&host.codes);
+            }
+            host.latest >= end
+        });
+        let told = |event: &&Event| matches!(event, Event::Fault(text) if text.contains("out of step") || text.contains("too late"));
+        assert_eq!(host.events.iter().filter(told).count(), 1, "{lags:?}, {late}: {:?}", host.events);
+        let &[(first, gap_end)] = &host.gaps[..] else { panic!("{lags:?}: {:?}", host.gaps) };
+        // the block with the slip, and what went by until the program looked
+        assert!((first..gap_end).contains(&from), "{lags:?}: {first} to {gap_end}");
+        assert!(
+            from - first < 24 && gap_end - from <= u64::from(late) + 3 * 24,
+            "{lags:?}: {first} to {gap_end}"
+        );
+        let channels = host.channels;
+        assert!(
+            before.len() > 60_000 * channels && before[..] == undisturbed[..before.len()],
+            "{lags:?}: before it"
+        );
+        let after = (end - gap_end) as usize * channels;
+        let due = &undisturbed[gap_end as usize * channels..];
+        assert!(host.codes[..after] == due[..after], "{lags:?}: after it");
+        assert_eq!(board.failure(), None);
+    }
 }

@@ -5,6 +5,7 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::channel::{Channel, Name};
+use crate::frame::FrameError;
 use crate::limits::SENTENCE_BYTES;
 use crate::shot::Shot;
 
@@ -15,6 +16,16 @@ pub struct Numbered {
     pub number: u32,
     /// What came of it.
     pub outcome: Result<Answer, Refusal>,
+}
+
+impl Numbered {
+    /// Writes it as a frame's payload; its length. Not generic, so that its code is this crate's and not each caller's.
+    ///
+    /// # Errors
+    /// [`FrameError::TooLong`] when it does not fit.
+    pub fn write(&self, payload: &mut [u8]) -> Result<usize, FrameError> {
+        postcard::to_slice(self, payload).map(|used| used.len()).map_err(|_| FrameError::TooLong)
+    }
 }
 
 /// What was asked for. Variants only ever grow at the end.
@@ -161,6 +172,40 @@ pub struct Info {
     pub stage: bool,
     /// Full scale of the shaker's drive, V; 0 without a shaker.
     pub drive_v: f32,
+    /// Why it started last.
+    pub reset: Reset,
+}
+
+/// Why a device started.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Reset {
+    /// It does not say.
+    #[default]
+    Unknown,
+    /// Power came.
+    Power,
+    /// The button, or a debugger's reset line.
+    Pin,
+    /// Its program, after a panic or a fault, or a debugger.
+    Software,
+    /// A watchdog: its program hung.
+    Watchdog,
+    /// Its supply was too low for a moment.
+    Brownout,
+}
+
+impl core::fmt::Display for Reset {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Unknown => "unknown",
+            Self::Power => "power came",
+            Self::Pin => "its reset button or a debugger",
+            Self::Software => "its own program, after a panic or fault, or a debugger",
+            Self::Watchdog => "the watchdog: its program hung",
+            Self::Brownout => "its supply was too low for a moment",
+        })
+    }
 }
 
 impl Info {

@@ -45,6 +45,7 @@ pub struct Header {
 impl Header {
     /// The 15 payload bytes.
     #[must_use]
+    #[inline]
     pub fn to_bytes(&self) -> [u8; HEADER_PAYLOAD] {
         let mut out = [0; HEADER_PAYLOAD];
         out[0] = self.flags;

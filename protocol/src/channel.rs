@@ -94,4 +94,11 @@ impl Channel {
     pub fn units_per_code(&self) -> f64 {
         f64::from(self.units_per_volt) * f64::from(self.range_v) / 32_768.0
     }
+
+    /// The same, for a controller that has no double precision: equal to [`Channel::units_per_code`] rounded once, because the
+    /// division only moves the exponent.
+    #[must_use]
+    pub fn units_per_code_f32(&self) -> f32 {
+        self.units_per_volt * self.range_v / 32_768.0
+    }
 }

@@ -6,6 +6,7 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::answer::Counters;
+use crate::frame::FrameError;
 use crate::limits::SENTENCE_BYTES;
 use crate::shot::Shot;
 
@@ -18,6 +19,16 @@ pub struct Numbered {
     pub at_scan: u64,
     /// What happened.
     pub event: Event,
+}
+
+impl Numbered {
+    /// Writes it as a frame's payload; its length. Not generic, so that its code is this crate's and not each caller's.
+    ///
+    /// # Errors
+    /// [`FrameError::TooLong`] when it does not fit.
+    pub fn write(&self, payload: &mut [u8]) -> Result<usize, FrameError> {
+        postcard::to_slice(self, payload).map(|used| used.len()).map_err(|_| FrameError::TooLong)
+    }
 }
 
 /// What happened. Variants only ever grow at the end.

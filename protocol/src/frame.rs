@@ -1,12 +1,17 @@
 //! Frames: kind, payload, CRC-32 (ISO-HDLC, little-endian), in COBS, ended by zero.
 //!
+//! That is how they cross a stream of bytes. Where a link keeps packets apart, a device may send the same content behind a
+//! head instead ([`crate::packet`]): COBS costs a controller more than the CRC.
+//!
 //! [`encode`] writes one; [`Accumulator`] finds them in a stream of any bytes at all. Whatever arrives,
 //! the accumulator uses bounded memory, does work proportional to the bytes it is given, and is back in
 //! step at the next zero byte. An oversized frame latches until that zero: its tail is never parsed
 //! as a frame of its own.
 
-use crate::limits::{CRC_BYTES, MAX_FRAME, MAX_WIRE};
-use crate::seal::{checksum, stuff};
+use jointrig_hot::cobs::stuff;
+use jointrig_hot::crc32::checksum;
+
+use crate::limits::{CRC_BYTES, HEAD_BYTES, MAX_FRAME, MAX_PACKET, MAX_WIRE, WORD};
 
 /// What a frame carries. Kinds only ever grow at the end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,6 +90,26 @@ pub struct Frame<'a> {
     pub payload: &'a [u8],
 }
 
+impl<'a> Frame<'a> {
+    /// Kind, payload and CRC as they are without any encoding.
+    pub(crate) fn from_plain(plain: &'a [u8]) -> Result<Self, FrameError> {
+        let (content, crc) = plain.split_last_chunk::<CRC_BYTES>().ok_or(FrameError::Malformed)?;
+        let (kind, payload) = content.split_first().ok_or(FrameError::Malformed)?;
+        if checksum(content) != u32::from_le_bytes(*crc) {
+            return Err(FrameError::Crc);
+        }
+        let kind = Kind::from_byte(*kind).ok_or(FrameError::UnknownKind(*kind))?;
+        Ok(Frame { kind, payload })
+    }
+}
+
+/// Four bytes before a packet: its frame's length and, so that a reader that is out of step finds its way, the length's complement.
+#[inline]
+pub(crate) const fn head(length: usize) -> [u8; HEAD_BYTES] {
+    let [low, high] = (length as u16).to_le_bytes();
+    [low, high, !low, !high]
+}
+
 /// A frame on its way to the wire: content is written in place, then sealed.
 ///
 /// ```
@@ -96,8 +121,8 @@ pub struct Frame<'a> {
 /// ```
 #[repr(C, align(4))]
 pub struct Writer {
-    // first and aligned: a block's samples begin 16 bytes on, and are copied by words
-    plain: [u8; MAX_FRAME],
+    /// A packet's head, and the frame. Aligned: a block's samples begin 20 bytes on, and are copied by words.
+    packet: [u8; MAX_PACKET],
     wire: [u8; MAX_WIRE],
 }
 
@@ -105,19 +130,21 @@ impl Writer {
     /// An empty frame of this kind.
     #[must_use]
     pub const fn new(kind: Kind) -> Self {
-        let mut plain = [0; MAX_FRAME];
-        plain[0] = kind as u8;
-        Self { plain, wire: [0; MAX_WIRE] }
+        let mut packet = [0; MAX_PACKET];
+        packet[HEAD_BYTES] = kind as u8;
+        Self { packet, wire: [0; MAX_WIRE] }
     }
 
     /// Starts anew with another kind, keeping the memory.
+    #[inline]
     pub fn restart(&mut self, kind: Kind) {
-        self.plain[0] = kind as u8;
+        self.packet[HEAD_BYTES] = kind as u8;
     }
 
     /// Where the payload goes: `MAX_FRAME − 5` bytes.
+    #[inline]
     pub fn payload_mut(&mut self) -> &mut [u8] {
-        &mut self.plain[1..MAX_FRAME - CRC_BYTES]
+        &mut self.packet[HEAD_BYTES + 1..MAX_PACKET - CRC_BYTES]
     }
 
     /// Adds the CRC over kind and the first `payload` bytes, and encodes.
@@ -125,14 +152,32 @@ impl Writer {
     /// # Errors
     /// [`FrameError::TooLong`] when `payload` is more than fits.
     pub fn seal(&mut self, payload: usize) -> Result<&[u8], FrameError> {
-        let end = 1 + payload;
-        if end + CRC_BYTES > MAX_FRAME {
-            return Err(FrameError::TooLong);
-        }
-        let crc = checksum(&self.plain[..end]).to_le_bytes();
-        self.plain[end..end + CRC_BYTES].copy_from_slice(&crc);
-        let length = stuff(&self.plain[..end + CRC_BYTES], &mut self.wire).ok_or(FrameError::TooLong)?;
+        let end = self.add_crc(payload)?;
+        let length = stuff(&self.packet[HEAD_BYTES..end], &mut self.wire).ok_or(FrameError::TooLong)?;
         Ok(&self.wire[..length])
+    }
+
+    /// The same as a packet ([`crate::packet`]): head, kind, payload, CRC.
+    ///
+    /// # Errors
+    /// [`FrameError::TooLong`] when `payload` is more than fits.
+    #[inline]
+    pub fn seal_packet(&mut self, payload: usize) -> Result<&[u8], FrameError> {
+        let end = self.add_crc(payload)?;
+        self.packet[..HEAD_BYTES].copy_from_slice(&head(end - HEAD_BYTES));
+        let whole = end.next_multiple_of(WORD);
+        self.packet[end..whole].fill(0);
+        Ok(&self.packet[..whole])
+    }
+
+    /// Writes the CRC over kind and payload behind them; where that ends.
+    #[inline]
+    fn add_crc(&mut self, payload: usize) -> Result<usize, FrameError> {
+        let end = HEAD_BYTES + 1 + payload;
+        let room = self.packet.get_mut(HEAD_BYTES..end + CRC_BYTES).ok_or(FrameError::TooLong)?;
+        let (content, crc) = room.split_at_mut(1 + payload);
+        crc.copy_from_slice(&checksum(content).to_le_bytes());
+        Ok(end + CRC_BYTES)
     }
 
     /// Writes a postcard value as the payload, and seals.
@@ -218,13 +263,6 @@ impl Accumulator {
 
     fn decode(bytes: &mut [u8]) -> Result<Frame<'_>, FrameError> {
         let length = cobs::decode_in_place(bytes).map_err(|_| FrameError::Malformed)?;
-        let plain = &bytes[..length];
-        let (content, crc) = plain.split_last_chunk::<CRC_BYTES>().ok_or(FrameError::Malformed)?;
-        let (kind, payload) = content.split_first().ok_or(FrameError::Malformed)?;
-        if checksum(content) != u32::from_le_bytes(*crc) {
-            return Err(FrameError::Crc);
-        }
-        let kind = Kind::from_byte(*kind).ok_or(FrameError::UnknownKind(*kind))?;
-        Ok(Frame { kind, payload })
+        Frame::from_plain(&bytes[..length])
     }
 }

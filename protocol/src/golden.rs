@@ -7,7 +7,7 @@
 use heapless::{String, Vec};
 
 use crate::acknowledge::Acknowledge;
-use crate::answer::{self, Answer, Counters, Hammer, Info, Refusal, Shaker, Status};
+use crate::answer::{self, Answer, Counters, Hammer, Info, Refusal, Reset, Shaker, Status};
 use crate::block::{Header, OVER_RANGE, TRIGGER};
 use crate::channel::{Axis, Channel, Quantity, Role};
 use crate::event::{self, Event, Loss, Reason};
@@ -45,6 +45,9 @@ golden!(
     short_samples,
     acknowledge,
     log,
+    hello_packets,
+    samples_packet,
+    status_packet,
 );
 
 fn text<const N: usize>(value: &str) -> String<N> {
@@ -80,6 +83,23 @@ const COUNTERS: Counters = Counters {
     logs_dropped: 3,
 };
 
+const STATUS: Status = Status {
+    epoch: 3,
+    streaming: true,
+    next_scan: 5_000_102_720,
+    oldest_scan: 5_000_038_720,
+    hammer: Hammer::HoldOff,
+    armed_for_ms: 0,
+    interlock_closed: true,
+    emergency_stop: false,
+    friction_n: -1.5,
+    shot: Some(SHOT),
+    shaker: Shaker::Resting,
+    drive_v: 0.0,
+    controlled: 0.0,
+    counters: COUNTERS,
+};
+
 /// Builds every vector and hands its name and wire bytes to `each`, in the order of [`COMMITTED`].
 ///
 /// # Errors
@@ -109,6 +129,7 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
                 coil_cap_us: 8_000,
                 stage: false,
                 drive_v: 10.0,
+                reset: Reset::Watchdog,
             })),
         ),
         (
@@ -123,25 +144,7 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
                 bits: 16,
             })),
         ),
-        (
-            "status",
-            Ok(Answer::Status(Status {
-                epoch: 3,
-                streaming: true,
-                next_scan: 5_000_102_720,
-                oldest_scan: 5_000_038_720,
-                hammer: Hammer::HoldOff,
-                armed_for_ms: 0,
-                interlock_closed: true,
-                emergency_stop: false,
-                friction_n: -1.5,
-                shot: Some(SHOT),
-                shaker: Shaker::Resting,
-                drive_v: 0.0,
-                controlled: 0.0,
-                counters: COUNTERS,
-            })),
-        ),
+        ("status", Ok(Answer::Status(STATUS))),
         ("started", Ok(Answer::Started { epoch: 3, map: 1, first_scan: 0 })),
         ("refused", Err(Refusal::Gone { oldest: 5_000_038_720 })),
     ];
@@ -222,19 +225,11 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
     }
     debug_assert!(Reason::Asked != Reason::Expired);
 
-    // a full block of 15 scans of 16 channels (every byte value appears, zeros among them), and a short one
+    // a full block of 15 scans of 16 channels, and a short one
     for (name, scans, channels) in [("samples", 15_u8, 16_usize), ("short_samples", 3, 10)] {
         frame.restart(Kind::Samples);
-        let header =
-            Header { flags: TRIGGER | OVER_RANGE, map: 1, scans, epoch: 3, first_scan: 5_000_000_310 };
-        let room = frame.payload_mut();
-        let (head, samples) = room.split_at_mut(crate::block::HEADER_PAYLOAD);
-        head.copy_from_slice(&header.to_bytes());
-        let used = usize::from(scans) * channels * 2;
-        for (i, pair) in samples[..used].as_chunks_mut::<2>().0.iter_mut().enumerate() {
-            *pair = (i as u16).wrapping_mul(273).wrapping_add(33_536).to_le_bytes();
-        }
-        each(name, frame.seal(crate::block::HEADER_PAYLOAD + used)?);
+        let used = block_of(&mut frame, scans, channels);
+        each(name, frame.seal(used)?);
     }
 
     frame.restart(Kind::Acknowledge);
@@ -245,7 +240,39 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
     frame.restart(Kind::Log);
     frame.payload_mut()[..4].copy_from_slice(&[0, 1, 0, 255]);
     each("log", frame.seal(4)?);
+
+    packets(&mut frame, each)
+}
+
+/// The other encoding: a Hello that announces packets, and two of them.
+fn packets(frame: &mut Writer, mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
+    let hello =
+        Hello { schema: 0x0123_4567_89ab_cdef, packets: true, ..Hello::device(78, 3, 64_000) }.to_bytes();
+    frame.restart(Kind::Hello);
+    frame.payload_mut()[..hello.len()].copy_from_slice(&hello);
+    each("hello_packets", frame.seal(hello.len())?);
+
+    frame.restart(Kind::Samples);
+    let used = block_of(frame, 15, 16);
+    each("samples_packet", frame.seal_packet(used)?);
+
+    frame.restart(Kind::Answer);
+    let answer = answer::Numbered { number: 5, outcome: Ok(Answer::Status(STATUS)) };
+    let used = answer.write(frame.payload_mut()).map_err(|_| FrameError::TooLong)?;
+    each("status_packet", frame.seal_packet(used)?);
     Ok(())
+}
+
+/// Writes a block in which every byte value appears, zeros among them; its length.
+fn block_of(frame: &mut Writer, scans: u8, channels: usize) -> usize {
+    let header = Header { flags: TRIGGER | OVER_RANGE, map: 1, scans, epoch: 3, first_scan: 5_000_000_310 };
+    let (head, samples) = frame.payload_mut().split_at_mut(crate::block::HEADER_PAYLOAD);
+    head.copy_from_slice(&header.to_bytes());
+    let used = usize::from(scans) * channels * 2;
+    for (i, pair) in samples[..used].as_chunks_mut::<2>().0.iter_mut().enumerate() {
+        *pair = (i as u16).wrapping_mul(273).wrapping_add(33_536).to_le_bytes();
+    }
+    crate::block::HEADER_PAYLOAD + used
 }
 
 /// Compares every vector with its committed bytes; the name of the first that differs, if any.

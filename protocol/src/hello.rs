@@ -13,7 +13,12 @@
 //! | 24 | 4 | boot: the device's count of its own starts (0 from a host) |
 //! | 28 | 4 | ring: scans the device can send again (0 from a host) |
 //!
-//! Later versions may append; a reader takes the first 32 bytes. A session starts with a host's Hello
+//! Later versions may append; a reader takes the first 32 bytes. Appended is one byte so far:
+//!
+//! | 32 | 1 | bit 0: a host reads packets ([`crate::packet`]); a device sends packets in this session, this Hello excepted |
+//! |---|---|---|
+//!
+//! A session starts with a host's Hello
 //! carrying a new session number; the device forgets answers to earlier sessions' requests.
 
 use crate::{limits, schema};
@@ -23,6 +28,12 @@ pub const MAGIC: [u8; 4] = *b"JRIG";
 
 /// Length of the frozen part.
 pub const BYTES: usize = limits::HELLO_BYTES;
+
+/// Length with what is appended.
+pub const LONG_BYTES: usize = BYTES + 1;
+
+/// Bit 0 of the byte behind the frozen part.
+const PACKETS: u8 = 1;
 
 /// Who speaks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,6 +65,8 @@ pub struct Hello {
     pub boot: u32,
     /// Scans that the device can send again.
     pub ring_scans: u32,
+    /// A host: it reads packets. A device: it sends them.
+    pub packets: bool,
 }
 
 /// Why two ends cannot talk.
@@ -105,6 +118,7 @@ impl Hello {
             session,
             boot: 0,
             ring_scans: 0,
+            packets: false,
         }
     }
 
@@ -114,10 +128,10 @@ impl Hello {
         Self { role: Role::Device, boot, ring_scans, ..Self::host(session) }
     }
 
-    /// The 32 frozen bytes.
+    /// The 32 frozen bytes, and what is appended.
     #[must_use]
-    pub fn to_bytes(&self) -> [u8; BYTES] {
-        let mut out = [0; BYTES];
+    pub fn to_bytes(&self) -> [u8; LONG_BYTES] {
+        let mut out = [0; LONG_BYTES];
         out[0..4].copy_from_slice(&MAGIC);
         out[4..6].copy_from_slice(&self.major.to_le_bytes());
         out[6..8].copy_from_slice(&self.minor.to_le_bytes());
@@ -128,10 +142,12 @@ impl Hello {
         out[20..24].copy_from_slice(&self.session.to_le_bytes());
         out[24..28].copy_from_slice(&self.boot.to_le_bytes());
         out[28..32].copy_from_slice(&self.ring_scans.to_le_bytes());
+        out[32] = if self.packets { PACKETS } else { 0 };
         out
     }
 
-    /// Reads the frozen part; what later versions appended is ignored.
+    /// Reads the frozen part and what is known of the rest; what later versions appended is ignored, and so may be what earlier ones
+    /// did not have.
     ///
     /// # Errors
     /// [`Mismatch::NotHello`] when it is too short, has another magic, or an unknown role.
@@ -155,6 +171,7 @@ impl Hello {
             session: u32::from_le_bytes([b[20], b[21], b[22], b[23]]),
             boot: u32::from_le_bytes([b[24], b[25], b[26], b[27]]),
             ring_scans: u32::from_le_bytes([b[28], b[29], b[30], b[31]]),
+            packets: bytes.get(BYTES).is_some_and(|bits| bits & PACKETS != 0),
         })
     }
 
@@ -198,8 +215,12 @@ mod tests {
     fn appended_bytes_of_later_versions_are_ignored() {
         let device = Hello::device(1, 2, 3);
         let mut long = [0xAA; BYTES + 9];
-        long[..BYTES].copy_from_slice(&device.to_bytes());
+        long[..LONG_BYTES].copy_from_slice(&device.to_bytes());
         assert_eq!(Hello::from_bytes(&long), Ok(device));
+        assert_eq!(Hello::from_bytes(&long[..BYTES]), Ok(device), "earlier versions end here");
         assert_eq!(Hello::from_bytes(&long[..BYTES - 1]), Err(Mismatch::NotHello));
+        let packets = Hello { packets: true, ..device };
+        assert_eq!(Hello::from_bytes(&packets.to_bytes()), Ok(packets));
+        assert_eq!(Hello::from_bytes(&packets.to_bytes()[..BYTES]), Ok(device));
     }
 }

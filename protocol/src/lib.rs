@@ -1,7 +1,7 @@
 //! The contract between the rig's controller and its host.
 //!
 //! Everything that crosses the link is a *frame*: one kind byte, a payload, a CRC-32, wrapped in
-//! COBS and ended by a zero byte ([`frame`]). Three layouts are fixed, little-endian and written by
+//! COBS and ended by a zero byte ([`frame`]), or behind its length where a link keeps packets apart ([`packet`]). Three layouts are fixed, little-endian and written by
 //! hand because they are hot or must never change: [`hello::Hello`] (frozen for ever),
 //! [`block::Block`] (samples) and [`acknowledge::Acknowledge`]. All else is postcard:
 //! [`request::Request`], [`answer::Answer`], [`event::Event`].
@@ -21,8 +21,8 @@ pub mod frame;
 pub mod golden;
 pub mod hello;
 pub mod limits;
+pub mod packet;
 pub mod request;
 pub mod schema;
-mod seal;
 pub mod shot;
 pub mod usb;

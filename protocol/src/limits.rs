@@ -22,6 +22,15 @@ pub const MAX_FRAME: usize = BLOCK_HEADER_BYTES + BLOCK_SAMPLE_BYTES + CRC_BYTES
 /// 503 < 512, so that one frame is one short high-speed bulk packet and never needs a zero-length one.
 pub const MAX_WIRE: usize = MAX_FRAME + MAX_FRAME.div_ceil(254) + 1;
 
+/// Bytes before a frame that goes as a packet ([`crate::packet`]).
+pub const HEAD_BYTES: usize = 4;
+
+/// A packet is a whole number of these.
+pub const WORD: usize = 4;
+
+/// Longest packet: 504 < 512, so that it is one short high-speed bulk packet too.
+pub const MAX_PACKET: usize = HEAD_BYTES + MAX_FRAME;
+
 /// Longest name of a channel, point or board, in bytes of UTF-8.
 pub const NAME_BYTES: usize = 24;
 
@@ -65,6 +74,8 @@ mod tests {
     fn a_full_block_is_one_short_high_speed_packet() {
         assert_eq!(MAX_FRAME, 500);
         assert_eq!(MAX_WIRE, 503);
+        assert_eq!(MAX_PACKET, 504);
+        assert_eq!(MAX_PACKET % WORD, 0);
         assert_eq!(scans_per_block(16), Some(15));
         assert_eq!(scans_per_block(10), Some(24));
         assert_eq!(scans_per_block(0), None);

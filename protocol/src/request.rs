@@ -17,6 +17,21 @@ pub struct Numbered {
     pub request: Request,
 }
 
+impl Numbered {
+    /// Reads a frame's payload. Not generic, so that its code is this crate's and not each caller's.
+    ///
+    /// # Errors
+    /// [`Unreadable`], with the number where that can be read: postcard writes it first.
+    pub fn read(payload: &[u8]) -> Result<Self, Unreadable> {
+        postcard::from_bytes(payload)
+            .map_err(|_| Unreadable(postcard::take_from_bytes(payload).ok().map(|(number, _)| number)))
+    }
+}
+
+/// A request of which at most the number can be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unreadable(pub Option<u32>);
+
 /// What is asked. Variants only ever grow at the end.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Request {

@@ -31,8 +31,9 @@ pub const LAYOUT: &[u64] = &[
     limits::HELLO_BYTES as u64,
     acknowledge::BYTES as u64,
     block::HEADER_PAYLOAD as u64,
-    // revision of the hand-written layouts in `block`, `acknowledge` and `frame`
-    1,
+    limits::HEAD_BYTES as u64,
+    // revision of the hand-written layouts in `block`, `acknowledge`, `frame`, `packet` and behind the frozen part of `hello`
+    2,
 ];
 
 /// Hash of all of it.

@@ -15,6 +15,9 @@ pub struct Options {
     /// Count instructions instead of following the clock: counts are the same in every run.
     #[arg(long)]
     icount: bool,
+    /// Run the image of golden vectors and benchmark instead of the board's.
+    #[arg(long)]
+    checks: bool,
     /// An argument for the image itself, read by it through semihosting; may be repeated.
     #[arg(long = "arg", value_name = "TEXT")]
     image_arguments: Vec<String>,
@@ -30,7 +33,11 @@ pub fn run(project: &Project, options: &Options) -> Result<()> {
     }
     let consent = Consent::new(false);
     let toolchain = setup::everything(project, consent)?;
-    let image = firmware::build_board(project, &toolchain, EMULATED_BOARD)?;
+    let image = if options.checks {
+        firmware::build_checks(project, &toolchain)?
+    } else {
+        firmware::build_board(project, &toolchain, EMULATED_BOARD)?
+    };
     let mut qemu = Command::new(PROGRAM);
     qemu.args(arguments(&image, options)?);
     command::run(&mut qemu).context("the emulated board did not end well")
@@ -38,7 +45,7 @@ pub fn run(project: &Project, options: &Options) -> Result<()> {
 
 /// Runs an image with one argument and returns what it says.
 pub fn listen(image: &Path, argument: &str, icount: bool) -> Result<String> {
-    let options = Options { icount, image_arguments: vec![argument.to_owned()], extra: Vec::new() };
+    let options = Options { icount, image_arguments: vec![argument.to_owned()], ..Options::default() };
     let mut qemu = Command::new(PROGRAM);
     qemu.args(arguments(image, &options)?);
     println!("  $ {}", command::line(&qemu));
@@ -88,6 +95,7 @@ mod tests {
             icount: true,
             image_arguments: vec!["bench".into(), "1,2".into()],
             extra: vec!["-serial".into(), "pty".into()],
+            ..Options::default()
         };
         let line = arguments(Path::new("i"), &options).expect("UTF-8").join(" ");
         assert!(

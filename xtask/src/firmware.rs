@@ -4,7 +4,7 @@
 //! boards' chip features exclude each other.
 
 use crate::consent::Consent;
-use crate::project::{EMULATED_BOARD, Package, Project, TARGET};
+use crate::project::{EMULATED_BOARD, EMULATED_CHECKS, Package, Project, TARGET};
 use crate::toolchain::Toolchain;
 use crate::{command, flat, setup, size};
 use anyhow::{Context, Result, bail};
@@ -69,16 +69,20 @@ pub fn build_boards(project: &Project, toolchain: &Toolchain, only: Option<&str>
 
 /// Builds one board's image and returns its path.
 pub fn build_board(project: &Project, toolchain: &Toolchain, name: &str) -> Result<PathBuf> {
-    let missing = || format!("no board is called {name} in firmware/boards");
+    build_binary(project, toolchain, name, name)
+}
+
+/// Builds the image of the emulated board that has the golden vectors and the benchmark, and returns its path.
+pub fn build_checks(project: &Project, toolchain: &Toolchain) -> Result<PathBuf> {
+    build_binary(project, toolchain, EMULATED_BOARD, EMULATED_CHECKS)
+}
+
+/// Builds one binary of a board; the board itself is the one of its name.
+fn build_binary(project: &Project, toolchain: &Toolchain, name: &str, binary: &str) -> Result<PathBuf> {
+    let missing = || format!("no board is called {name} in firmware/boards, with a binary {binary}");
     let folder = project.boards_root().with_context(missing)?;
     let board = board(project, name)?.with_context(missing)?;
-    // One image per board: the binary named as the board, or the only one there is.
-    let binary = board
-        .binaries
-        .iter()
-        .find(|binary| *binary == name)
-        .or(board.binaries.first())
-        .with_context(missing)?;
+    let binary = board.binaries.iter().find(|known| *known == binary).with_context(missing)?;
     let mut cargo = command::cargo(&folder);
     toolchain.apply(&mut cargo, project);
     cargo.args(["build", "--release", "--target", TARGET, "--package", name, "--bin", binary]);

@@ -14,6 +14,12 @@ pub const TARGET: &str = "thumbv8m.main-none-eabihf";
 /// The emulated board: QEMU's machine `mps2-an505` (Cortex-M33) and our package are named alike.
 pub const EMULATED_BOARD: &str = "mps2-an505";
 
+/// The rig's controller.
+pub const WIRED_BOARD: &str = "nucleo-u5a5";
+
+/// The emulated board's other image: golden vectors and benchmark.
+pub const EMULATED_CHECKS: &str = "mps2-checks";
+
 /// The repository as xtask sees it.
 pub struct Project {
     /// The folder of the root `Cargo.toml`.

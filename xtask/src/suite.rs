@@ -243,8 +243,9 @@ fn emulated(run: &mut Run) -> Result<String> {
         println!("  firmware/boards/{EMULATED_BOARD} does not exist yet");
         return Ok("no image yet".to_owned());
     }
+    let checks = firmware::build_checks(project, toolchain)?;
+    print!("{}", emulator::listen(&checks, "golden", false)?);
     let image = firmware::build_board(project, toolchain, EMULATED_BOARD)?;
-    print!("{}", emulator::listen(&image, "golden", false)?);
     let counts = tests_run::run_in_emulator(project, &image)?;
     let cost = budgets::check(project, toolchain)?;
     Ok(format!("{counts}; {cost}"))

@@ -4,7 +4,7 @@
 //! carries V1…V8, two carry V1…V4 and V5…V8, and so on. With the CRC on, each line ends with 16 bits over the
 //! data of that line alone (AD7606B Rev. 0, "Interface CRC Checksum").
 
-use crc::{Algorithm, Crc, Table};
+use crc::{Algorithm, Crc, NoTable};
 
 use super::CHANNELS;
 use super::part::{Lines, Part};
@@ -30,7 +30,8 @@ const DATA_CRC: Algorithm<u16> = Algorithm {
     check: 0x2E8F,
     residue: 0,
 };
-const DATA: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&DATA_CRC);
+/// Bit by bit: it is for the few conversions of a set-up. What runs with every scan is [`jointrig_hot::pair`].
+const DATA: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&DATA_CRC);
 
 /// The CRC over a line's data.
 #[must_use]
@@ -112,23 +113,6 @@ impl Layout {
     }
 }
 
-/// Words of one 16-bit chip on one line: eight codes and the CRC.
-pub const CHIP_WORDS: usize = CHANNELS + 1;
-
-/// Checks the words that one 16-bit chip sent on one line.
-///
-/// # Errors
-/// [`CrcMismatch`].
-pub fn check_words(words: &[u16; CHIP_WORDS]) -> Result<(), CrcMismatch> {
-    let [codes @ .., sent] = words;
-    let mut digest = DATA.digest();
-    for code in codes {
-        digest.update(&code.to_be_bytes());
-    }
-    let due = digest.finalize();
-    if *sent == due { Ok(()) } else { Err(CrcMismatch { sent: *sent, due }) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::part::{AD7606B, AD7606C_18};
@@ -161,15 +145,5 @@ mod tests {
         assert_eq!(codes, [131_071, -131_072, 1, -1]);
         assert_eq!(Layout::new(&AD7606C_18, Lines::Four, true), None);
         assert_eq!(Layout::new(&AD7606B, Lines::Eight, true), None);
-    }
-
-    #[test]
-    fn words_and_bytes_agree() {
-        let mut words = [1_u16, 0x8000, 0xFFFF, 4, 5, 6, 7, 0x7FFF, 0];
-        let bytes: [u8; 16] = core::array::from_fn(|i| words[i / 2].to_be_bytes()[i % 2]);
-        words[8] = data_crc(&bytes);
-        assert_eq!(check_words(&words), Ok(()));
-        words[3] ^= 1;
-        assert!(check_words(&words).is_err());
     }
 }

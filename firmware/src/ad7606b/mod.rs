@@ -3,7 +3,7 @@
 //!
 //! The driver stands on embedded-hal's traits, so that the same code talks to the chip and to the model
 //! of it that the tests use. Setting up is its business, and so is the meaning of what the chip clocks
-//! out; moving sixteen channels at 51.2 kHz is a board's, by DMA, and [`pair`] makes scans of the words.
+//! out; moving sixteen channels at 51.2 kHz is a board's, by DMA, and [`reader`] makes scans of the words.
 //!
 //! The chip has two faces on one serial port. In *ADC mode* a frame of CS clocks out the last
 //! conversion while SDI is low. A frame whose SDI says "read a register" leads into *register mode*, where
@@ -17,14 +17,16 @@
 //! | [`registers`] | addresses and bits |
 //! | [`frames`] | what comes out of the DOUT lines, and its CRC |
 //! | [`converter`] | one chip: reset, identity, settings, diagnostics, single conversions |
-//! | [`pair`] | two chips: sixteen channels per scan, and scans that went missing |
+//! | [`alignment`] | two chips: whether what they sent is in step with their clock |
+//! | [`reader`] | two chips: sixteen channels per scan, and scans that went missing |
 
+pub mod alignment;
 pub mod converter;
 pub mod error;
 pub mod frames;
-pub mod pair;
 pub mod part;
 pub mod range;
+pub mod reader;
 pub mod registers;
 pub mod trouble;
 

@@ -9,8 +9,8 @@ pub enum Trouble {
     Silent(u32, u32),
     /// A scan's CRC is wrong.
     Crc,
-    /// Conversions whose end was not seen.
-    Slipped(u32),
+    /// The converters are out of step with their clock: words by which each is behind it, negative when ahead (9 are a scan).
+    Slipped(i32, i32),
     /// The reader was too late for the rings.
     Overrun,
     /// The DMA reported an error.
@@ -25,7 +25,10 @@ impl fmt::Display for Trouble {
                 "BUSY stuck, or no read-out: after {first} and {second} blocks of converters 1 and 2"
             ),
             Self::Crc => f.write_str("converter data: wrong CRC"),
-            Self::Slipped(scans) => write!(f, "{scans} conversions were never read"),
+            Self::Slipped(first, second) => write!(
+                f,
+                "out of step with CONVST: converters 1 and 2 lag by {first} and {second} words (9 are a scan)"
+            ),
             Self::Overrun => f.write_str("acquisition was too late for its rings"),
             Self::Dma => f.write_str("DMA error while reading the converters"),
         }

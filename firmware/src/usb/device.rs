@@ -9,7 +9,7 @@ use embassy_usb::driver::Driver;
 use embassy_usb::msos::{
     CompatibleIdFeatureDescriptor, PropertyData, RegistryPropertyFeatureDescriptor, windows_version,
 };
-use embassy_usb::{Builder, Config, UsbDevice};
+use embassy_usb::{Builder, Config, Handler, UsbDevice};
 use jointrig_protocol::usb::{INTERFACE_CLASS, PRODUCT, PRODUCT_ID, VENDOR_ID};
 
 use super::link::{Bulk, Choice, Sink, Source};
@@ -48,6 +48,18 @@ pub struct Buffers<'d> {
     control: [u8; 128],
     serial_port: State<'d>,
     choice: Choice,
+    suspension: Option<Suspension<'d>>,
+}
+
+/// Tells the link that the bus was suspended.
+struct Suspension<'d>(&'d Choice);
+
+impl Handler for Suspension<'_> {
+    fn suspended(&mut self, suspended: bool) {
+        if suspended {
+            self.0.suspended.signal(());
+        }
+    }
 }
 
 impl Default for Buffers<'_> {
@@ -69,7 +81,9 @@ impl Buffers<'_> {
             choice: Choice {
                 active: AtomicU8::new(0),
                 changed: Signal::<CriticalSectionRawMutex, ()>::new(),
+                suspended: Signal::<CriticalSectionRawMutex, ()>::new(),
             },
+            suspension: None,
         }
     }
 }
@@ -96,7 +110,8 @@ pub fn build<'d, D: Driver<'d>>(
     config.product = Some(PRODUCT);
     config.serial_number = Some(serial);
     config.max_power = 500;
-    let Buffers { config: configuration, bos, msos, control, serial_port, choice } = buffers;
+    let Buffers { config: configuration, bos, msos, control, serial_port, choice, suspension } = buffers;
+    let choice: &Choice = choice;
     let mut builder = Builder::new(driver, config, configuration, bos, msos, control);
     builder.msos_descriptor(windows_version::WIN8_1, VENDOR_CODE);
 
@@ -114,7 +129,7 @@ pub fn build<'d, D: Driver<'d>>(
     };
     let (sender, receiver) = CdcAcmClass::new(&mut builder, serial_port, packet).split();
 
-    let choice: &Choice = choice;
+    builder.handler(suspension.insert(Suspension(choice)));
     Usb {
         device: builder.build(),
         source: Source::new(Bulk(out), receiver, choice),

@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
-use embassy_futures::select::{Either, select};
+use embassy_futures::select::{Either, Either3, select, select3};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_usb::class::cdc_acm::{Receiver, Sender};
@@ -26,6 +26,8 @@ pub(super) struct Choice {
     pub(super) active: AtomicU8,
     /// It has changed.
     pub(super) changed: Signal<CriticalSectionRawMutex, ()>,
+    /// The bus was suspended.
+    pub(super) suspended: Signal<CriticalSectionRawMutex, ()>,
 }
 
 impl Choice {
@@ -184,9 +186,19 @@ impl<'d, D: Driver<'d>> ByteSource for Source<'d, D> {
             return self.hand_over(held, buffer);
         }
         loop {
-            let (way, came) = match select(self.vendor.next(), self.serial_port.next()).await {
-                Either::First(came) => (Way::Vendor, came),
-                Either::Second(came) => (Way::SerialPort, came),
+            let came =
+                select3(self.vendor.next(), self.serial_port.next(), self.choice.suspended.wait()).await;
+            let (way, came) = match came {
+                Either3::First(came) => (Way::Vendor, came),
+                Either3::Second(came) => (Way::SerialPort, came),
+                Either3::Third(()) => {
+                    // a host that sleeps, or whose cable was pulled, takes back no order: as good as cut
+                    if self.choice.get().is_none() {
+                        continue;
+                    }
+                    self.choice.set(None);
+                    return 0;
+                }
             };
             let before = self.choice.get();
             let Some(to) = came else {

@@ -10,7 +10,7 @@
 //!
 //! A host that does not read makes [`Sink::write`](crate::board::ByteSink::write) wait: blocks then gather in
 //! the ring, and what leaves it unsent is reported as lost. A bus reset or an unplugged cable ends
-//! whatever is on its way.
+//! whatever is on its way, and so does a bus that is suspended: everything that moves comes to rest.
 //!
 //! embassy-usb builds descriptors once, for one packet size. A board that comes up at full speed drops what
 //! [`build`] made and builds anew with [`Speed::Full`]; nothing of a session is lost by it, because all of that is

@@ -120,6 +120,21 @@ impl Host {
         self.0.until(|wires| wires.events.is_empty().then_some(())).await;
     }
 
+    /// Lets the bus sleep.
+    pub async fn suspend(&self) {
+        self.tell_of(Event::Suspend).await;
+    }
+
+    /// Wakes the bus.
+    pub async fn resume(&self) {
+        self.tell_of(Event::Resume).await;
+    }
+
+    async fn tell_of(&self, event: Event) {
+        self.0.with(|wires| wires.events.push_back(event));
+        self.0.until(|wires| wires.events.is_empty().then_some(())).await;
+    }
+
     /// Pulls the cable.
     pub async fn unplug(&self) {
         self.0.with(|wires| wires.events.push_back(Event::PowerRemoved));

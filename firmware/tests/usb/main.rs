@@ -12,8 +12,8 @@ use embassy_futures::select::{Either, select, select3};
 use embassy_futures::{block_on, yield_now};
 use jointrig_firmware::board::{ByteSink, ByteSource};
 use jointrig_firmware::usb::{Buffers, INTERFACE_GUID, Speed, VENDOR_CODE, build};
-use jointrig_protocol::frame::Accumulator;
 use jointrig_protocol::golden;
+use jointrig_protocol::packet::Reader;
 use jointrig_protocol::usb::{PRODUCT, PRODUCT_ID, VENDOR_ID};
 
 use bus::{Bus, Device};
@@ -180,9 +180,9 @@ fn golden_vectors_cross(speed: Speed, way: fn(&host::Found) -> Interface) {
         settle().await;
         let heard = seen.bytes();
         assert_eq!(heard, frames.concat());
-        let (mut accumulator, mut rest, mut whole) = (Accumulator::new(), &heard[..], 0);
+        let (mut reader, mut rest, mut whole) = (Reader::new(), &heard[..], 0);
         while !rest.is_empty() {
-            let (used, frame) = accumulator.feed(rest);
+            let (used, frame) = reader.feed(rest);
             whole += usize::from(matches!(frame, Some(Ok(_))));
             rest = &rest[used..];
         }
@@ -358,4 +358,24 @@ fn a_small_buffer_gets_a_packet_in_parts() {
     };
     block_on(select(usb.device.run(), pin!(test)));
     assert_eq!(got, b"0123456789");
+}
+
+#[test]
+fn a_suspended_bus_is_a_cut_link() {
+    run(Speed::High, &[], async |host, seen| {
+        let vendor = host.enumerate().await.vendor();
+        // before anybody has spoken there is nothing to cut
+        host.suspend().await;
+        host.resume().await;
+        host.put(vendor.out, &[1, 2, 3]).await.unwrap();
+        settle().await;
+        assert_eq!((seen.bytes(), seen.cuts()), (vec![1, 2, 3], 0));
+        host.suspend().await;
+        settle().await;
+        assert_eq!(seen.cuts(), 1);
+        host.resume().await;
+        host.put(vendor.out, &[4]).await.unwrap();
+        settle().await;
+        assert_eq!((seen.bytes(), seen.cuts()), (vec![1, 2, 3, 4], 1));
+    });
 }

@@ -20,7 +20,7 @@ use heapless::String as Text;
 use jointrig_firmware::board::Drive;
 use jointrig_firmware::ring::Slot;
 use jointrig_firmware::{Core, Facts};
-use jointrig_protocol::answer::Info;
+use jointrig_protocol::answer::{Info, Reset};
 use jointrig_protocol::limits::{COIL_PULSE_CAP_US, scans_per_block};
 
 use crate::executor::{Poller, Polling, Woken, jump};
@@ -128,6 +128,7 @@ fn run(rig: Rig, options: &Options, link: &DeviceEnd, controls: &Arc<Controls>) 
         coil_cap_us: COIL_PULSE_CAP_US,
         stage: true,
         drive_v: drive.full_scale_v(),
+        reset: Reset::Power,
         boot: options.boot,
     };
     let core: Rc<Core<'static, NoopRawMutex>> =

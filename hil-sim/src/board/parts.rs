@@ -197,7 +197,7 @@ impl Scans for VirtualScans {
                 block,
             );
         }
-        Delivered { scans: self.per_block as u8, missed: (lost * self.per_block as u64) as u32 }
+        Delivered { scans: self.per_block as u8, missed: (lost * self.per_block as u64) as u32, loud: true }
     }
 }
 

@@ -10,9 +10,10 @@ use jointrig_protocol::acknowledge::Acknowledge;
 use jointrig_protocol::answer::{self, Answer, Refusal, Status};
 use jointrig_protocol::block::Block;
 use jointrig_protocol::event::{self, Event};
-use jointrig_protocol::frame::{Accumulator, Kind, encode};
+use jointrig_protocol::frame::{Kind, encode};
 use jointrig_protocol::hello::Hello;
 use jointrig_protocol::limits::MAX_WIRE;
+use jointrig_protocol::packet::Reader;
 use jointrig_protocol::request::{self, Configuration, Fire, Request, Stage};
 use jointrig_protocol::shot::{Phase, Shot};
 
@@ -25,7 +26,7 @@ const LENGTH: u64 = 20_480;
 
 pub struct SmallHost {
     link: HostEnd,
-    accumulator: Accumulator,
+    reader: Reader,
     number: u32,
     pub hello: Option<Hello>,
     answers: Vec<answer::Numbered>,
@@ -47,11 +48,16 @@ pub struct SmallHost {
 }
 
 impl SmallHost {
-    /// Shakes hands.
+    /// Shakes hands, and reads COBS.
     pub fn new(link: HostEnd) -> Self {
+        Self::reading(link, false)
+    }
+
+    /// Shakes hands, and reads packets if told so.
+    pub fn reading(link: HostEnd, packets: bool) -> Self {
         let mut host = Self {
             link,
-            accumulator: Accumulator::new(),
+            reader: Reader::new(),
             number: 0,
             hello: None,
             answers: Vec::new(),
@@ -66,7 +72,7 @@ impl SmallHost {
             gaps: Vec::new(),
             shooting: false,
         };
-        host.send(Kind::Hello, &Hello::host(99).to_bytes());
+        host.send(Kind::Hello, &Hello { packets, ..Hello::host(99) }.to_bytes());
         host.until("a Hello", |host| host.hello.is_some());
         host
     }
@@ -97,7 +103,7 @@ impl SmallHost {
         let mut rest = &bytes[..count];
         let before = self.next_scan;
         while !rest.is_empty() {
-            let (used, frame) = self.accumulator.feed(rest);
+            let (used, frame) = self.reader.feed(rest);
             rest = &rest[used..];
             let Some(frame) = frame else { continue };
             let frame = frame.unwrap();

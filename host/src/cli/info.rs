@@ -8,8 +8,17 @@ use serde_json::json;
 use super::error::CliError;
 use super::output;
 use crate::device::address::Address;
+use crate::device::error::flash_file;
 use crate::device::logs::Tables;
 use crate::device::session::Session;
+
+/// This program's version.
+const HOST_VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// Whether firmware and program are of one release.
+fn fits(firmware: &str) -> bool {
+    firmware == HOST_VERSION
+}
 
 /// Show a device: handshake, channels, firmware version, counters.
 #[derive(Debug, Args)]
@@ -62,6 +71,8 @@ impl Info {
                 "coil_cap_us": info.coil_cap_us,
                 "stage": info.stage,
                 "drive_v": info.drive_v,
+                "reset": info.reset,
+                "fits": fits(&info.version),
                 "channels": channels,
                 "shaker": format!("{:?}", status.shaker),
                 "hammer": format!("{:?}", status.hammer),
@@ -74,6 +85,7 @@ impl Info {
         let mut text = vec![
             format!("{} (serial number {}) at {}", info.board, info.serial, self.device),
             format!("  firmware {} for {}, build {:016x}", info.version, info.target, info.build),
+            format!("  started by {}", info.reset),
             format!("  protocol {}.{}, schema {:016x}", hello.major, hello.minor, hello.schema),
             format!(
                 "  {} scans per second, {:.1} s of them can be sent again",
@@ -98,6 +110,12 @@ impl Info {
                 channel.role
             )
         }));
+        if !fits(&info.version) {
+            text.push(format!(
+                "  this program is {HOST_VERSION} and speaks the same protocol; its own firmware is flashed from {}",
+                flash_file(&self.device)
+            ));
+        }
         let counters = status.counters;
         text.push(format!(
             "  counters: {} frames in, {} bad; scans produced {}, sent {}, resent {}, dropped {}, missed {}; log lines dropped {}",

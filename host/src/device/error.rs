@@ -9,6 +9,15 @@ use jointrig_protocol::hello::Mismatch;
 pub(super) const INSTALL_UDEV_RULE: &str = "install docs/udev/70-jointrig.rules (`sudo cp` it to /etc/udev/rules.d, \
      then `sudo udevadm control --reload && sudo udevadm trigger`)";
 
+/// The file whose firmware belongs to this program, for the device at an address.
+pub fn flash_file(address: &str) -> &'static str {
+    if address.starts_with("qemu:") {
+        "the image mps2-an505, which `cargo xtask firmware` of this program's sources builds"
+    } else {
+        "nucleo-u5a5.bin, which `cargo xtask firmware` of this program's sources makes; how: docs/first-light.md, \"The board alone\""
+    }
+}
+
 /// Why a device could not be reached or used.
 #[derive(Debug, thiserror::Error)]
 pub enum DeviceError {
@@ -64,7 +73,7 @@ pub enum DeviceError {
         tries: u32,
     },
     /// The versions do not fit.
-    #[error("{address}: {mismatch}")]
+    #[error("{address}: {mismatch} ({})", flash_file(address))]
     Version {
         /// Which device.
         address: String,

@@ -3,7 +3,8 @@
 use std::io;
 use std::time::Duration;
 
-use jointrig_protocol::frame::{Accumulator, Frame, FrameError, Kind, Writer};
+use jointrig_protocol::frame::{Frame, FrameError, Kind, Writer};
+use jointrig_protocol::packet::Reader;
 
 use super::transport::Transport;
 
@@ -13,7 +14,7 @@ const READ_BYTES: usize = 65_536;
 /// A transport that speaks frames.
 pub struct Link {
     transport: Box<dyn Transport>,
-    accumulator: Accumulator,
+    reader: Reader,
     writer: Writer,
     bytes: Vec<u8>,
     frames: u64,
@@ -25,7 +26,7 @@ impl Link {
     pub fn new(transport: Box<dyn Transport>) -> Self {
         Self {
             transport,
-            accumulator: Accumulator::new(),
+            reader: Reader::new(),
             writer: Writer::new(Kind::Hello),
             bytes: vec![0; READ_BYTES],
             frames: 0,
@@ -49,7 +50,7 @@ impl Link {
         let got = self.transport.read(&mut self.bytes, timeout)?;
         let mut rest = &self.bytes[..got];
         while !rest.is_empty() {
-            let (used, found) = self.accumulator.feed(rest);
+            let (used, found) = self.reader.feed(rest);
             rest = &rest[used..];
             match found {
                 Some(Ok(frame)) => {

@@ -67,6 +67,10 @@ impl Transport for Qemu {
         self.link.read(buf, timeout).map_err(|error| self.explained(error))
     }
 
+    fn keeps_packets(&self) -> bool {
+        true
+    }
+
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.link.write_all(bytes).map_err(|error| self.explained(error))
     }

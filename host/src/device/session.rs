@@ -91,12 +91,13 @@ impl Session {
         let now = Instant::now();
         let log = DeviceLog::of(address, transport.image());
         let simulated = transport.simulated();
+        let packets = transport.keeps_packets();
         let mut session = Self {
             link: Link::new(transport),
             inbox: Inbox::with_log(log),
             address: address.into(),
             simulated,
-            hello: Hello::host(nonce()),
+            hello: Hello { packets, ..Hello::host(nonce()) },
             next_number: 1,
             waiting: None,
             reply: None,

@@ -51,6 +51,10 @@ impl Transport for Sim {
         self.link.read(buf, timeout)
     }
 
+    fn keeps_packets(&self) -> bool {
+        true
+    }
+
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.link.write_all(bytes)
     }

@@ -20,6 +20,12 @@ pub trait Transport: Send {
     /// The device or its cable is gone.
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()>;
 
+    /// Whether what the device sends arrives in the packets in which it was sent. A device may then leave byte stuffing out
+    /// ([`jointrig_protocol::packet`]).
+    fn keeps_packets(&self) -> bool {
+        false
+    }
+
     /// The image that the device at the other end was started with, where that is known: its log strings
     /// are in it.
     fn image(&self) -> Option<&Path> {
@@ -51,6 +57,10 @@ impl<T: Transport + ?Sized> Transport for Box<T> {
 
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
         (**self).write_all(bytes)
+    }
+
+    fn keeps_packets(&self) -> bool {
+        (**self).keeps_packets()
     }
 
     fn image(&self) -> Option<&Path> {

@@ -10,7 +10,7 @@ use std::ops::Range;
 use std::time::Duration;
 
 use jointrig_protocol::acknowledge::Acknowledge;
-use jointrig_protocol::answer::{self, Answer, Counters, Hammer, Info, Refusal, Shaker, Status};
+use jointrig_protocol::answer::{self, Answer, Counters, Hammer, Info, Refusal, Reset, Shaker, Status};
 use jointrig_protocol::block::{GAP, Header, RESENT};
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
 use jointrig_protocol::event::{self, Event, Loss};
@@ -190,6 +190,7 @@ impl Fake {
                 coil_cap_us: 8_000,
                 stage: self.stage_known,
                 drive_v: 0.0,
+                reset: Reset::Power,
             }),
             Request::Channel { index } => {
                 let role = *ROLES.get(usize::from(index)).ok_or(Refusal::NoSuchChannel)?;

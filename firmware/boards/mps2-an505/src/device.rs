@@ -5,7 +5,7 @@ use jointrig_firmware::board::{self, Board};
 use jointrig_firmware::lockstep::Setup;
 use jointrig_firmware::ring::Slot;
 use jointrig_firmware::{Core, Facts};
-use jointrig_protocol::answer::Info;
+use jointrig_protocol::answer::{Info, Reset};
 use jointrig_protocol::channel::{Channel, Name};
 use jointrig_protocol::limits::{COIL_PULSE_CAP_US, MAX_CHANNELS, scans_per_block};
 use static_cell::{ConstStaticCell, StaticCell};
@@ -37,12 +37,13 @@ pub fn run(setup: &Setup) -> ! {
         coil_cap_us: COIL_PULSE_CAP_US,
         stage: true,
         drive_v: board::Drive::full_scale_v(&Drive),
+        reset: Reset::Power,
         boot: setup.boot,
     };
     let slots = (setup.slots as usize).clamp(1, SLOTS);
     let core: &'static Shared =
         CORE.init(Core::new(facts, &mut MEMORY.take()[..slots]).with_logs(&jointrig_board_log::TAP));
-    let scans = Scans::new(core, per_block, setup.scan_rate_hz);
+    let scans = Scans::new(core, per_block, channels.len(), setup.scan_rate_hz);
     executor::run(|spawner| {
         const ONCE: &str = "each task is made once";
         spawner.spawn(acquire(core, scans).expect(ONCE));
@@ -54,7 +55,8 @@ pub fn run(setup: &Setup) -> ! {
 
 #[embassy_executor::task]
 async fn acquire(core: &'static Shared, mut scans: Scans) {
-    jointrig_firmware::acquire::acquire(core, &mut scans, &mut Coil, &mut Drive, &mut Inputs).await;
+    jointrig_firmware::acquire::acquire(core, &mut scans, &mut Coil, &mut Drive, &mut Inputs::default())
+        .await;
 }
 
 #[embassy_executor::task]

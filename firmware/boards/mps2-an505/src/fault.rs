@@ -35,15 +35,26 @@ unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     report(&sentence)
 }
 
+/// For tests: ends in a fault of the processor, by the stack or by a read.
+#[cold]
+#[inline(never)]
+pub fn end_by(overflow: bool) {
+    if overflow {
+        recurse(1);
+    } else {
+        read_nowhere();
+    }
+}
+
 /// For tests: reads where no memory is.
-pub fn read_nowhere() {
+fn read_nowhere() {
     // SAFETY: there is nothing to disturb; the read ends in the fault that is wanted.
     let _ = unsafe { core::ptr::read_volatile(0x7000_0000 as *const u32) };
 }
 
 /// For tests: calls itself until little of the stack is left, then a function that needs more than that.
 #[inline(never)]
-pub fn recurse(depth: u32) -> u32 {
+fn recurse(depth: u32) -> u32 {
     /// More than the frame of a fault, so that the handler can begin; less than what [`greedy`] takes.
     const LEFT: usize = 6 * 1024;
     let frame = core::hint::black_box([depth; 256]);

@@ -22,6 +22,13 @@ pub fn read(at: usize, out: &mut [u8]) {
     unsafe { ptr::copy_nonoverlapping((BASE + at) as *const u8, out.as_mut_ptr(), out.len()) }
 }
 
+/// What the simulator has written, where it is: valid until this side gives up its turn.
+pub fn look<R>(at: usize, length: usize, f: impl FnOnce(&[u8]) -> R) -> R {
+    assert!(at <= BYTES && length <= BYTES - at, "outside the shared memory");
+    // SAFETY: as in `read`; `f` takes no turn, so that nobody writes while the bytes are borrowed.
+    f(unsafe { core::slice::from_raw_parts((BASE + at) as *const u8, length) })
+}
+
 /// Copies bytes in.
 pub fn write(at: usize, bytes: &[u8]) {
     assert!(at <= BYTES && bytes.len() <= BYTES - at, "outside the shared memory");

@@ -5,19 +5,25 @@ use core::task::Poll;
 
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use heapless::String;
+use jointrig_firmware::ad7606b::alignment::Alignment;
+use jointrig_firmware::ad7606b::reader::Reader;
 use jointrig_firmware::ad7606b::trouble::Trouble;
 use jointrig_firmware::board::{self, Delivered, RanDry};
 use jointrig_firmware::lockstep::{
-    BLOCK_AT, DELIVERY_BYTES, DRIVE_AT, DRIVE_FULL_SCALE_V, Delivery, EMERGENCY_STOP, HELD, INTERLOCK_CLOSED,
-    LOCAL_RESET, MUST_FAULT, MUST_OVERFLOW, MUST_PANIC, NEVER, Op, RING_BYTES, TEXT_AT, TEXT_BYTES,
-    TO_DEVICE_AT, TO_HOST_AT, from_text, to_text,
+    BLOCK_AT, CLOCK, DELIVERY_BYTES, DRIVE_AT, DRIVE_FULL_SCALE_V, Delivery, EMERGENCY_STOP, HELD,
+    INTERLOCK_CLOSED, LOCAL_RESET, MUST_FAULT, MUST_OVERFLOW, MUST_PANIC, NEVER, Op, RING_BLOCKS, RING_BYTES,
+    TEXT_AT, TEXT_BYTES, TO_DEVICE_AT, TO_HOST_AT, from_text, to_text,
 };
+use jointrig_hot::pair::CHIP_BYTES;
 use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, COIL_PULSE_CAP_US};
 use jointrig_protocol::request::Stage as Place;
 
 use crate::device::Shared;
 use crate::{fault, memory, port, uart};
+
+/// Most scans of a block: those of ten channels, the fewest that take two chips and a half.
+const MOST_SCANS: usize = 24;
 
 /// The emulated board: a name for its parts.
 pub enum Emulated {}
@@ -33,21 +39,52 @@ impl board::Board for Emulated {
     type Stage = Stage;
 }
 
-/// Converters whose blocks the simulator delivers.
+/// Converters whose words the simulator delivers.
 pub struct Scans {
     core: &'static Shared,
-    per_block: u64,
-    rate_hz: u64,
-    taken: u64,
+    reader: Reader,
+    per_block: usize,
+    rate_hz: u32,
+    /// The instant at which the block that is due is complete: µs, and a part of one more in parts of the scan rate.
+    due: (u64, u32),
     blocks: u32,
+    /// The rings are to be started.
+    join: bool,
     last_report: Option<Trouble>,
 }
 
 impl Scans {
-    /// Converters that deliver so many scans a block.
-    pub fn new(core: &'static Shared, per_block: usize, rate_hz: u32) -> Self {
-        let (per_block, rate_hz) = (per_block as u64, u64::from(rate_hz));
-        Self { core, per_block, rate_hz, taken: 0, blocks: 0, last_report: None }
+    /// Converters that deliver so many scans a block, of so many channels.
+    pub fn new(core: &'static Shared, per_block: usize, channels: usize, rate_hz: u32) -> Self {
+        let alignment = Alignment { clock: CLOCK, block_scans: per_block as u32, blocks: RING_BLOCKS };
+        let reader = Reader::new(alignment, channels, 0);
+        Self { core, reader, per_block, rate_hz, due: (0, 0), blocks: 0, join: true, last_report: None }
+    }
+
+    /// Waits until the simulator has delivered.
+    async fn delivered(&mut self) -> u32 {
+        let at_us = self.due.0 + u64::from(self.due.1 > 0);
+        poll_fn(|context| {
+            port::with(|port| {
+                if port.reply.blocks != self.blocks {
+                    port.ask.block_us = NEVER;
+                    self.blocks = self.blocks.wrapping_add(1);
+                    return Poll::Ready(port.reply.inputs);
+                }
+                port.ask.block_us = at_us;
+                port.block.register(context.waker());
+                Poll::Pending
+            })
+        })
+        .await
+    }
+
+    fn report(&mut self, trouble: Trouble) {
+        self.join = true;
+        if self.last_report != Some(trouble) {
+            self.last_report = Some(trouble);
+            self.core.report_fault(trouble);
+        }
     }
 }
 
@@ -57,43 +94,47 @@ impl board::Scans for Scans {
     }
 
     async fn next(&mut self, block: &mut [u8; BLOCK_SAMPLE_BYTES]) -> Delivered {
-        self.taken += self.per_block;
-        // the instant of the block's last scan, rounded up to the clock's microsecond
-        let at_us = (self.taken * 1_000_000).div_ceil(self.rate_hz);
-        poll_fn(|context| {
-            port::with(|port| {
-                if port.reply.blocks != self.blocks {
-                    port.ask.block_us = NEVER;
-                    return Poll::Ready(());
-                }
-                port.ask.block_us = at_us;
-                port.block.register(context.waker());
-                Poll::Pending
-            })
-        })
-        .await;
-        self.blocks = self.blocks.wrapping_add(1);
-        let inputs = port::with(|port| port.reply.inputs);
-        assert!(inputs & MUST_PANIC == 0, "the simulator asked for a panic");
-        if inputs & MUST_FAULT != 0 {
-            fault::read_nowhere();
+        if core::mem::take(&mut self.join) {
+            let first = port::turn(Op::Join, 0).length;
+            self.reader.start(first);
+            let parts = u64::from(first) * 1_000_000;
+            let rate_hz = u64::from(self.rate_hz);
+            self.due = (parts / rate_hz, (parts % rate_hz) as u32);
         }
-        if inputs & MUST_OVERFLOW != 0 {
-            fault::recurse(inputs);
+        let parts = self.due.1 + self.per_block as u32 * 1_000_000;
+        self.due = (self.due.0 + u64::from(parts / self.rate_hz), parts % self.rate_hz);
+        let inputs = self.delivered().await;
+        assert!(inputs & MUST_PANIC == 0, "the simulator asked for a panic");
+        if inputs & (MUST_FAULT | MUST_OVERFLOW) != 0 {
+            fault::end_by(inputs & MUST_OVERFLOW != 0);
         }
         let mut head = [0; DELIVERY_BYTES];
         memory::read(BLOCK_AT, &mut head);
         let delivery = Delivery::from_bytes(&head);
-        memory::read(BLOCK_AT + DELIVERY_BYTES, block);
-        if self.last_report != delivery.trouble {
-            self.last_report = delivery.trouble;
-            if let Some(trouble) = delivery.trouble {
-                self.core.report_fault(trouble);
+        if let Some(trouble) = delivery.trouble {
+            self.report(trouble);
+            return self.reader.nothing(delivery.periods);
+        }
+        let scans = (delivery.scans as usize).min(MOST_SCANS);
+        let reader = &mut self.reader;
+        let taken = memory::look(BLOCK_AT + DELIVERY_BYTES, 2 * scans * CHIP_BYTES, |bytes| {
+            let (first, second) = bytes.as_chunks().0.split_at(scans);
+            reader.take([first, second], || delivery.moment, block)
+        });
+        match taken {
+            Ok((delivered, None)) => {
+                self.last_report = None;
+                delivered
+            }
+            Ok((delivered, Some(trouble))) => {
+                self.report(trouble);
+                delivered
+            }
+            Err(trouble) => {
+                self.report(trouble);
+                self.reader.nothing(delivery.periods)
             }
         }
-        // the clock of the conversions went on while some were lost
-        self.taken = self.taken - self.per_block + u64::from(delivery.scans) + u64::from(delivery.missed);
-        Delivered { scans: delivery.scans as u8, missed: delivery.missed }
     }
 }
 
@@ -137,30 +178,27 @@ impl board::Drive for Drive {
     }
 }
 
-/// Guard and emergency stop of the simulated rig.
-pub struct Inputs;
-
-impl Inputs {
-    fn bit(bit: u32) -> bool {
-        port::with(|port| port.reply.inputs & bit != 0)
-    }
-}
+/// Guard and emergency stop of the simulated rig, as they were when the guard was last looked at.
+#[derive(Default)]
+pub struct Inputs(u32);
 
 impl board::Inputs for Inputs {
     fn interlock_closed(&mut self) -> bool {
-        Self::bit(INTERLOCK_CLOSED)
+        self.0 = port::with(|port| {
+            let inputs = port.reply.inputs;
+            // a turn of the key counts once
+            port.reply.inputs &= !LOCAL_RESET;
+            inputs
+        });
+        self.0 & INTERLOCK_CLOSED != 0
     }
 
     fn emergency_stop(&mut self) -> bool {
-        Self::bit(EMERGENCY_STOP)
+        self.0 & EMERGENCY_STOP != 0
     }
 
     fn local_reset(&mut self) -> bool {
-        port::with(|port| {
-            let turned = port.reply.inputs & LOCAL_RESET != 0;
-            port.reply.inputs &= !LOCAL_RESET;
-            turned
-        })
+        self.0 & LOCAL_RESET != 0
     }
 }
 

@@ -6,7 +6,7 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::waitqueue::WakerRegistration;
 use jointrig_firmware::lockstep::{Ask, Op, Reply, Setup, TEXT_AT, TEXT_BYTES, from_text};
-use jointrig_protocol::golden;
+use jointrig_protocol::schema;
 use semihosting::io::{Read, Stdin, Stdout, Write, stdin, stdout};
 use semihosting::{eprintln, process};
 
@@ -72,22 +72,25 @@ pub fn turn(op: Op, argument: u32) -> Reply {
 
 /// All tasks wait: lets time go on, and wakes those whose event has come.
 pub fn idle(alarm_us: u64) {
-    with(|port| port.ask.alarm_us = alarm_us);
-    let before = with(|port| port.reply);
+    let server = SERVER.lock(Cell::get);
     let by_uart = crate::uart::is_link();
-    let reply = turn(Op::Idle, u32::from(by_uart));
-    crate::time::set(reply.now_us);
-    with(|port| {
-        if reply.blocks != before.blocks {
+    let now_us = with(|port| {
+        let (blocks, cuts, to_host_tail) = (port.reply.blocks, port.reply.cuts, port.reply.to_host_tail);
+        port.ask.alarm_us = alarm_us;
+        (port.ask.op, port.ask.argument) = (Op::Idle as u32, u32::from(by_uart));
+        port.reply = server(&port.ask);
+        if port.reply.blocks != blocks {
             port.block.wake();
         }
-        if by_uart || reply.to_device_head != port.ask.to_device_tail || reply.cuts != before.cuts {
+        if by_uart || port.reply.to_device_head != port.ask.to_device_tail || port.reply.cuts != cuts {
             port.bytes.wake();
         }
-        if by_uart || reply.to_host_tail != before.to_host_tail {
+        if by_uart || port.reply.to_host_tail != to_host_tail {
             port.room.wake();
         }
+        port.reply.now_us
     });
+    crate::time::set(now_us);
 }
 
 /// Serves by the simulator: a byte on the standard output rings, a byte on the standard input answers.
@@ -114,8 +117,7 @@ pub fn simulator(ask: &Ask) -> Reply {
 
 /// Introduces the board and hears what it is to be.
 pub fn set_up() -> Setup {
-    let agreeing = golden::check().unwrap_or(0);
-    let reply = turn(Op::Start, agreeing as u32);
+    let reply = turn(Op::Start, schema::HASH as u32);
     let mut text = [0; TEXT_BYTES];
     let used = (reply.length as usize).min(text.len());
     memory::read(TEXT_AT, &mut text[..used]);

@@ -58,21 +58,24 @@ struct Shared {
     _apart: u32,
     eraser: UnsafeCell<Item>,
     rest: u32,
-    words: UnsafeCell<[u32; RING as usize]>,
 }
+
+/// The ring's words. Zeros until the drive starts, which writes rest everywhere first: so they take no flash.
+#[repr(C, align(64))]
+struct Ringed(UnsafeCell<[u32; RING as usize]>);
+
+// SAFETY: as for `Shared`.
+unsafe impl Sync for Ringed {}
+
+static WORDS: Ringed = Ringed(UnsafeCell::new([0; RING as usize]));
 
 // SAFETY: the items are written only while both channels are off, and read only by the DMA. The words are touched
 // by the DMA and, through volatile accesses inside critical sections, by `In`; each is a `u32` of which any value
 // may be played, and the accesses of both sides are whole words.
 unsafe impl Sync for Shared {}
 
-static SHARED: Shared = Shared {
-    player: UnsafeCell::new([0; 3]),
-    _apart: 0,
-    eraser: UnsafeCell::new([0; 3]),
-    rest: REST,
-    words: UnsafeCell::new([REST; RING as usize]),
-};
+static SHARED: Shared =
+    Shared { player: UnsafeCell::new([0; 3]), _apart: 0, eraser: UnsafeCell::new([0; 3]), rest: REST };
 
 /// Whoever stopped everything has muted the drive; only [`Drive::rest`] lets it play again.
 static MUTED: AtomicBool = AtomicBool::new(false);
@@ -83,12 +86,12 @@ struct In<'a>(#[allow(dead_code, reason = "proves the section")] critical_sectio
 impl Words for In<'_> {
     fn get(&self, place: usize) -> u32 {
         // SAFETY: in bounds by the remainder; see `Shared`.
-        unsafe { SHARED.words.get().cast::<u32>().add(place % RING as usize).read_volatile() }
+        unsafe { WORDS.0.get().cast::<u32>().add(place % RING as usize).read_volatile() }
     }
 
     fn set(&mut self, place: usize, word: u32) {
         // SAFETY: as above.
-        unsafe { SHARED.words.get().cast::<u32>().add(place % RING as usize).write_volatile(word) }
+        unsafe { WORDS.0.get().cast::<u32>().add(place % RING as usize).write_volatile(word) }
     }
 }
 
@@ -184,7 +187,7 @@ impl ShakerDrive {
 
 /// Ring to DAC, a word for each of the DAC's requests, round and round.
 fn prepare_player(request: u8) {
-    let ring = SHARED.words.get() as u32;
+    let ring = WORDS.0.get() as u32;
     let item = SHARED.player.get();
     let link = dma::link(item as u32, Carries::Source);
     // SAFETY: both channels are off, so that the DMA does not read the item; nobody else does.
@@ -212,7 +215,7 @@ fn prepare_player(request: u8) {
 /// Rest to ring, a word for each of TIM2's updates, [`TRAIL`] words behind the player: the first time only to
 /// the ring's end.
 fn prepare_eraser(request: u8) {
-    let ring = SHARED.words.get() as u32;
+    let ring = WORDS.0.get() as u32;
     let item = SHARED.eraser.get();
     let link = dma::link(item as u32, Carries::Destination);
     // SAFETY: as for the player.

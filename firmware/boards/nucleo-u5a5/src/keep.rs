@@ -12,6 +12,7 @@ use cortex_m::peripheral::SCB;
 use cortex_m_rt::{ExceptionFrame, exception};
 use embassy_stm32::pac;
 use heapless::String;
+use jointrig_protocol::answer::Reset;
 use jointrig_protocol::limits::SENTENCE_BYTES;
 
 /// Marks a record as one of ours ("JRIG").
@@ -33,6 +34,12 @@ struct Starts {
     /// Drawn when power came.
     first: u32,
     sum: u32,
+}
+
+impl Starts {
+    fn due_sum(&self) -> u32 {
+        !(self.count ^ self.first.rotate_left(16)) ^ MAGIC
+    }
 }
 
 /// Which start this is.
@@ -74,17 +81,43 @@ pub fn take_panic() -> Option<String<SENTENCE_BYTES>> {
     String::try_from(text).ok()
 }
 
+/// Why this start is, once: the flags are cleared, so that the next start tells its own (RM0456, "RCC control/status register",
+/// `RCC_CSR`). A watchdog and a reset by software pull the pin too, so the pin alone counts only without them.
+pub fn take_reset() -> Reset {
+    let flags = pac::RCC.csr().read();
+    pac::RCC.csr().modify(|w| w.set_rmvf(true));
+    if flags.iwdgrstf() || flags.wwdgrstf() {
+        Reset::Watchdog
+    } else if flags.sftrstf() {
+        Reset::Software
+    } else if flags.borrstf() {
+        // set by power coming and by a supply that sags: the count of starts outlives the second only
+        if has_counted() { Reset::Brownout } else { Reset::Power }
+    } else if flags.pinrstf() {
+        Reset::Pin
+    } else {
+        Reset::Unknown
+    }
+}
+
+/// Whether what is kept of earlier starts is whole.
+fn has_counted() -> bool {
+    // SAFETY: as in `count_start`, which is called later.
+    let before = unsafe { addr_of!(STARTS).cast::<Starts>().read_volatile() };
+    before.sum == before.due_sum()
+}
+
 /// Counts this start; `draw` gives the first number after power came.
 pub fn count_start(draw: impl FnOnce() -> u32) -> Start {
-    let sum = |count: u32, first: u32| !(count ^ first.rotate_left(16)) ^ MAGIC;
     // SAFETY: called once in `main` before any task runs, and no interrupt uses it; any bytes are a `Starts`.
     let before = unsafe { addr_of!(STARTS).cast::<Starts>().read_volatile() };
-    let (count, first) = if before.sum == sum(before.count, before.first) {
+    let (count, first) = if before.sum == before.due_sum() {
         (before.count.wrapping_add(1), before.first)
     } else {
         (1, draw())
     };
-    let now = Starts { count, first, sum: sum(count, first) };
+    let mut now = Starts { count, first, sum: 0 };
+    now.sum = now.due_sum();
     // SAFETY: as above.
     unsafe { addr_of_mut!(STARTS).cast::<Starts>().write_volatile(now) };
     Start { count, boot: first.wrapping_add(count).wrapping_sub(1) }
@@ -124,7 +157,9 @@ fn panicked(info: &PanicInfo<'_>) -> ! {
     match info.location() {
         // the end of a long path says more than its beginning
         Some(at) => {
-            let file = at.file().rsplit('/').next().unwrap_or_default();
+            let file = at.file();
+            let from = file.bytes().rposition(|byte| byte == b'/').map_or(0, |slash| slash + 1);
+            let file = file.get(from..).unwrap_or(file);
             end(format_args!("{file}:{}: {}", at.line(), info.message()))
         }
         None => end(format_args!("{}", info.message())),

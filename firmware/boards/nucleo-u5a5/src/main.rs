@@ -10,6 +10,7 @@
 //! | sampling instants | TIM2 drives CONVST of both converters |
 //! | counting them | TIM5 counts TIM2's periods, so that a scan that never came is known to be missing |
 //! | reading 16 channels | the end of BUSY starts SPI1 and SPI2, GPDMA writes rings ([`rings`]) |
+//! | making SPI1 and SPI2 ready for it | TIM2 asks GPDMA to switch them off and on ([`restart`]) |
 //! | the beginning of a coil pulse | TIM2 starts TIM1 ([`coil`]) |
 //! | its end | TIM1 in one-pulse mode; its longest period is the cap |
 //! | the shaker's codes | TIM2 asks for each; the DMA brings them, and rest behind them ([`drive`]) |
@@ -33,6 +34,7 @@ mod keep;
 mod lights;
 mod nonce;
 mod probe;
+mod restart;
 mod rings;
 mod scans;
 mod usb;
@@ -117,6 +119,7 @@ async fn main(spawner: Spawner) {
     jointrig_board_fault::limit_stack();
     // before anything else: what the last run left behind
     let last_panic = keep::take_panic();
+    let reset = keep::take_reset();
     probe::start();
     let p = embassy_stm32::init(clocks::config());
     // the chip's number lies where the cache must not read (clocks::cache)
@@ -143,6 +146,7 @@ async fn main(spawner: Spawner) {
         coil_cap_us: coil.cap_us(),
         stage: NoStage::PRESENT,
         drive_v: drive::FULL_SCALE_V,
+        reset,
         boot: start.boot,
     };
     let core: &'static Shared = CORE.init(Core::new(facts, RING.take()).with_logs(&jointrig_board_log::TAP));

@@ -1,7 +1,8 @@
 //! Log lines for a debug probe, over RTT: what `cargo xtask flash` shows.
 //!
-//! Without a probe, and with one that is too slow, a line that finds no room is left out whole. probe-rs
-//! may turn this into waiting while it is attached.
+//! Without a probe, and with one that is too slow, a line that finds no room is left out whole. A probe's program may ask
+//! the controller to wait instead, by a word in the channel's memory: that is undone before each line, because the wait
+//! would be one with interrupts off.
 
 use core::cell::RefCell;
 
@@ -21,6 +22,7 @@ pub fn start() {
 fn put(line: &[u8]) {
     critical_section::with(|free| {
         if let Some(channel) = CHANNEL.borrow_ref_mut(free).as_mut() {
+            channel.set_mode(NoBlockSkip);
             channel.write(line);
         }
     });

@@ -2,9 +2,10 @@
 //! to a ring by GPDMA, block after block, round and round.
 //!
 //! The port works in its autonomous mode (RM0456, "SPI autonomous mode"): an edge of EXTI line 4 or 9 starts a transfer
-//! of [`CHIP_WORDS`] words, with the select pin driven by the port. The DMA follows a closed list of blocks
-//! ([`BLOCKS`]) and interrupts once per block, every 0.29 ms; what an interrupt does is count. A reader that is more
-//! than [`BLOCKS`] − 2 blocks late (1.7 ms) has lost some and finds out ([`Ring::read`]).
+//! of nine words, with the select pin driven by the port. Before each conversion a second DMA channel switches the port off
+//! and on, without which it would start no further transfer ([`crate::restart`]). The first follows a closed list of blocks
+//! ([`BLOCKS`]) and interrupts once per block, every 0.29 ms; what an interrupt does is count, and nothing but waking rests on
+//! that: whether a block is whole, in step and not overwritten says the channel's own address ([`Ring::position`]).
 //!
 //! embassy-stm32 0.6.0 has a ring of its own; this one is smaller, never moves, and does not share its known
 //! faults.
@@ -19,18 +20,31 @@ use embassy_stm32::pac::gpdma::regs::{ChBr1, ChLlr};
 use embassy_stm32::pac::gpdma::vals::{Ap, Dreq, Dw, Prio};
 use embassy_stm32::pac::spi::Spi;
 use embassy_stm32::pac::spi::vals::{Comm, Cpha, Cpol, Fthlv, Master, Mbr, Ssom, Trigpol};
-use embassy_stm32::pac::{EXTI, GPDMA1, SPI1, SPI2, TIM5};
+use embassy_stm32::pac::{EXTI, GPDMA1, SPI1, SPI2};
 use embassy_sync::waitqueue::AtomicWaker;
-use jointrig_firmware::ad7606b::frames::CHIP_WORDS;
+use jointrig_firmware::ad7606b::alignment::SCAN_WORDS;
+use jointrig_hot::pair::CHIP_BYTES;
 
-use crate::BLOCK_SCANS;
 use crate::dma::{self, Carries};
+use crate::{BLOCK_SCANS, restart};
 
 /// Blocks in each ring.
 pub const BLOCKS: u32 = 8;
+/// Words of a ring.
+const RING_WORDS: u32 = BLOCKS * BLOCK_SCANS as u32 * SCAN_WORDS;
 
 /// One block of one chip.
-pub type Block = [[u16; CHIP_WORDS]; BLOCK_SCANS];
+pub type Block = [[u8; CHIP_BYTES]; BLOCK_SCANS];
+
+/// The blocks of both rings: apart from all else, so that they are zeros and take no flash.
+#[repr(C, align(4))]
+struct Memory(UnsafeCell<[Block; BLOCKS as usize]>);
+
+// SAFETY: written only by the DMA; whoever reads finds out afterwards whether it wrote meanwhile.
+unsafe impl Sync for Memory {}
+
+static MEMORY: [Memory; 2] =
+    [const { Memory(UnsafeCell::new([[[0; CHIP_BYTES]; BLOCK_SCANS]; BLOCKS as usize])) }; 2];
 
 /// What the DMA loads to go on with the next block: byte count, destination, and the item after it.
 type Item = [u32; 3];
@@ -38,6 +52,11 @@ type Item = [u32; 3];
 /// Aligned to more than its size, so that it never crosses a 64 kB page, within which its addresses are.
 #[repr(C, align(128))]
 struct Items(UnsafeCell<[Item; BLOCKS as usize]>);
+
+// SAFETY: written only while the channel is off, and read only by the DMA.
+unsafe impl Sync for Items {}
+
+static ITEMS: [Items; 2] = [const { Items(UnsafeCell::new([[0; 3]; BLOCKS as usize])) }; 2];
 
 /// One chip's ring.
 pub struct Ring {
@@ -47,18 +66,10 @@ pub struct Ring {
     trigger: u8,
     /// BUSY's pin: EXTI line, and port (A is 0).
     busy: (usize, u8),
-    items: Items,
-    blocks: UnsafeCell<[Block; BLOCKS as usize]>,
-    /// Blocks written since the start.
+    /// Blocks written since the start, as far as interrupts have told.
     written: AtomicU32,
-    /// What TIM5 had counted when the last of them was complete.
-    edges: AtomicU32,
     failed: AtomicBool,
 }
-
-// SAFETY: `items` is written only while the channel is off, and read only by the DMA. `blocks` is written only by the
-// DMA and read only by `read`, which reads no block that is being written and checks afterwards that none was.
-unsafe impl Sync for Ring {}
 
 /// Channels 1 to 8: BUSY on PE4.
 pub static FIRST: Ring = Ring::new(SPI1, 0, 4, (4, 4));
@@ -69,21 +80,13 @@ static ARRIVED: AtomicWaker = AtomicWaker::new();
 
 impl Ring {
     const fn new(port: Spi, channel: usize, trigger: u8, busy: (usize, u8)) -> Self {
-        Self {
-            port,
-            channel,
-            trigger,
-            busy,
-            items: Items(UnsafeCell::new([[0; 3]; BLOCKS as usize])),
-            blocks: UnsafeCell::new([[[0; CHIP_WORDS]; BLOCK_SCANS]; BLOCKS as usize]),
-            written: AtomicU32::new(0),
-            edges: AtomicU32::new(0),
-            failed: AtomicBool::new(false),
-        }
+        Self { port, channel, trigger, busy, written: AtomicU32::new(0), failed: AtomicBool::new(false) }
     }
 
     /// Stops port and DMA.
     pub fn stop(&self) {
+        // first whoever switches the port on again
+        restart::stop(self.channel);
         self.port.cr1().modify(|w| w.set_spe(false));
         self.port.autocr().modify(|w| w.set_trigen(false));
         dma::stop(self.channel);
@@ -96,21 +99,22 @@ impl Ring {
         self.failed.store(false, Ordering::Relaxed);
         self.start_channel(request);
         self.start_port();
+        restart::start(self.channel, self.port);
     }
 
     fn start_channel(&'static self, request: u8) {
-        let items = self.items.0.get() as u32;
+        let items = ITEMS[self.channel].0.get() as u32;
         let link = |to: u32| dma::link(items + to * size_of::<Item>() as u32, Carries::Destination).0;
         let mut count = ChBr1(0);
         count.set_bndt(size_of::<Block>() as u16);
-        let first = self.blocks.get() as u32;
+        let first = MEMORY[self.channel].0.get() as u32;
         let list: [Item; BLOCKS as usize] = core::array::from_fn(|i| {
             let i = i as u32;
             [count.0, first + i * size_of::<Block>() as u32, link((i + 1) % BLOCKS)]
         });
         // SAFETY: `stop` has just reset the channel, so that the DMA does not read the list, and nobody else
         // ever does.
-        unsafe { self.items.0.get().write_volatile(list) };
+        unsafe { ITEMS[self.channel].0.get().write_volatile(list) };
         fence(Ordering::SeqCst);
 
         let channel = GPDMA1.ch(self.channel);
@@ -153,13 +157,17 @@ impl Ring {
             w.set_comm(Comm::RECEIVER);
             w.set_master(Master::MASTER);
             w.set_cpol(Cpol::IDLE_HIGH);
-            w.set_cpha(Cpha::FIRST_EDGE);
+            // The converter puts a bit out on a rising edge, and the next falling one comes before it is valid: it is taken with the
+            // rising edge after that, which puts the next one out (timing in firmware/tests/front_end/timing.rs).
+            w.set_cpha(Cpha::SECOND_EDGE);
+            // the pins stay driven while the port is off (RM0456, SPI_CFG2, AFCNTR)
+            w.set_afcntr(true);
             // the port drives select: low with the transfer's first clock, high after its last
             w.set_ssoe(true);
             w.set_ssom(Ssom::ASSERTED);
             w.set_mssi(2);
         });
-        port.cr2().write(|w| w.set_tsize(CHIP_WORDS as u16));
+        port.cr2().write(|w| w.set_tsize(SCAN_WORDS as u16));
         port.ifcr().write(|w| {
             w.set_eotc(true);
             w.set_txtfc(true);
@@ -182,24 +190,27 @@ impl Ring {
         port.cr1().modify(|w| w.set_spe(true));
     }
 
-    /// Reads block `number`, counted from the start. `None` when it has not come, or is gone already.
-    pub fn read(&self, number: u32) -> Option<Block> {
-        // the newest complete block down to the oldest that the DMA will not touch while this reads
-        let whole = |written: u32| (1..BLOCKS).contains(&written.wrapping_sub(number));
-        if !whole(self.written.load(Ordering::Acquire)) {
-            return None;
-        }
-        // SAFETY: in bounds by the remainder; `whole` says that the DMA writes another block now, and the volatile read
-        // keeps the compiler from believing that memory does not change.
-        let block =
-            unsafe { self.blocks.get().cast::<Block>().add((number % BLOCKS) as usize).read_volatile() };
+    /// Block `number`, counted from the start, where it lies. The DMA may write there: only the ring's position, read off
+    /// afterwards, tells that it did not.
+    pub fn block(&self, number: u32) -> &'static Block {
         compiler_fence(Ordering::Acquire);
-        whole(self.written.load(Ordering::Acquire)).then_some(block)
+        // SAFETY: in bounds by the remainder. What is read while the DMA writes is bytes of no meaning, which the reader throws away:
+        // it asks for the position afterwards, through a volatile register behind a fence.
+        unsafe { &*MEMORY[self.channel].0.get().cast::<Block>().add((number % BLOCKS) as usize) }
     }
 
-    /// Blocks written since the start, and TIM5's count when the last was complete.
-    pub fn progress(&self) -> (u32, u32) {
-        critical_section::with(|_| (self.written.load(Ordering::Relaxed), self.edges.load(Ordering::Relaxed)))
+    /// How far the ring is filled, words from its beginning: the address that the DMA writes next (RM0456, "GPDMA channel x
+    /// destination address register").
+    pub fn position(&self) -> u32 {
+        compiler_fence(Ordering::AcqRel);
+        let filled = GPDMA1.ch(self.channel).dar().read().wrapping_sub(MEMORY[self.channel].0.get() as u32);
+        // behind the last block, until the list's first is loaded, it is the ring's end
+        filled / 2 % RING_WORDS
+    }
+
+    /// Blocks written since the start, as far as interrupts have told.
+    pub fn progress(&self) -> u32 {
+        self.written.load(Ordering::Relaxed)
     }
 
     /// Whether the DMA has given up.
@@ -220,7 +231,6 @@ impl Ring {
         }
         if status.tcf() {
             channel.fcr().write(|w| w.set_tcf(true));
-            self.edges.store(TIM5.cnt().read(), Ordering::Relaxed);
             self.written.fetch_add(1, Ordering::Release);
         }
         ARRIVED.wake();

@@ -9,7 +9,7 @@ use core::mem::forget;
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{Level, Output, OutputType, Speed};
-use embassy_stm32::pac::TIM5;
+use embassy_stm32::pac::{TIM2, TIM5};
 use embassy_stm32::peripherals;
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::{
@@ -18,15 +18,17 @@ use embassy_stm32::timer::low_level::{
 use embassy_stm32::timer::simple_pwm::PwmPin;
 use embassy_stm32::timer::{Ch1, Channel};
 use embassy_time::{Duration, Timer, with_timeout};
-use jointrig_firmware::ad7606b::pair::{PAIR_BYTES, Slip, join};
+use jointrig_firmware::ad7606b::alignment::{Alignment, Clock, Moment};
+use jointrig_firmware::ad7606b::part::AD7606B;
+use jointrig_firmware::ad7606b::reader::Reader;
 use jointrig_firmware::ad7606b::trouble::Trouble;
 use jointrig_firmware::board::{Delivered, Scans};
-use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
+use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, MAX_CHANNELS};
 
-use crate::chips::{self, Chips};
+use crate::chips::{self, Chips, SETTINGS};
 use crate::lights::{FAULT, SCANNING};
-use crate::rings::{self, FIRST, SECOND};
-use crate::{BLOCK_SCANS, SCAN_RATE_HZ, Shared, watchdog};
+use crate::rings::{self, BLOCKS, FIRST, SECOND};
+use crate::{BLOCK_SCANS, SCAN_RATE_HZ, Shared, restart, watchdog};
 use core::sync::atomic::Ordering;
 
 /// Counts of the timers per second.
@@ -78,13 +80,7 @@ pub struct Converters {
     convst_pin: Peri<'static, peripherals::PA0>,
     _edges: Counter<'static, peripherals::TIM5>,
     next: Next,
-    /// The block that is due.
-    block: u32,
-    /// TIM5's count at the start of the rings.
-    started_at: u32,
-    /// Up to where scans have been delivered or reported missing, in TIM5's count.
-    accounted: u32,
-    slips: [Slip; 2],
+    reader: Reader,
     last_report: Option<Fault>,
 }
 
@@ -119,10 +115,7 @@ impl Converters {
             convst_pin,
             _edges: edges,
             next: Next::SetUp,
-            block: 0,
-            started_at: 0,
-            accounted: TIM5.cnt().read(),
-            slips: [Slip::default(); 2],
+            reader: Reader::new(alignment(), MAX_CHANNELS, TIM5.cnt().read()),
             last_report: None,
         }
     }
@@ -148,51 +141,33 @@ impl Converters {
         self.chips.second.ready_for_ring();
         FIRST.start(self.chips.first.request());
         SECOND.start(self.chips.second.request());
-        self.block = 0;
-        self.slips = [Slip::default(); 2];
-        self.started_at = critical_section::with(|_| {
+        self.reader.start(critical_section::with(|_| {
             // wait for the end of a period (20 µs at most): there is a µs between its end and CONVST's edge
             let before = TIM5.cnt().read();
             while TIM5.cnt().read() == before {}
             self.convst.enable_channel(Channel::Ch1, true);
             before.wrapping_add(1)
-        });
+        }));
         self.next = Next::Read;
     }
 
     /// The block that is due, as far as it is good.
     async fn read(&mut self, block: &mut [u8; BLOCK_SAMPLE_BYTES]) -> Result<Delivered, Trouble> {
-        if with_timeout(PATIENCE, rings::arrived(self.block)).await.is_err() {
-            return Err(Trouble::Silent(FIRST.progress().0, SECOND.progress().0));
+        let due = self.reader.due();
+        if with_timeout(PATIENCE, rings::arrived(due)).await.is_err() {
+            return Err(Trouble::Silent(FIRST.progress(), SECOND.progress()));
         }
-        if FIRST.has_failed() || SECOND.has_failed() {
+        if FIRST.has_failed() || SECOND.has_failed() || !restart::works(0) || !restart::works(1) {
             return Err(Trouble::Dma);
         }
-        for (ring, slip) in [&FIRST, &SECOND].into_iter().zip(&mut self.slips) {
-            let (blocks, edges) = ring.progress();
-            // the period of the last scan has begun when its block is complete: its edge is counted
-            let read = blocks.wrapping_mul(BLOCK_SCANS as u32);
-            let begun = edges.wrapping_sub(self.started_at).wrapping_add(1);
-            match slip.block(begun, read) {
-                0 => {}
-                missing => return Err(Trouble::Slipped(missing)),
-            }
-        }
-        let (Some(first), Some(second)) = (FIRST.read(self.block), SECOND.read(self.block)) else {
-            return Err(Trouble::Overrun);
-        };
-        let joined = join(&first, &second, block.as_chunks_mut::<PAIR_BYTES>().0);
-        let from = self.started_at.wrapping_add(self.block.wrapping_mul(BLOCK_SCANS as u32));
-        let missed = from.wrapping_sub(self.accounted);
-        self.accounted = from.wrapping_add(joined.scans as u32);
-        self.block = self.block.wrapping_add(1);
-        if joined.crc_wrong {
-            self.report(Trouble::Crc.into());
+        let (delivered, trouble) = self.reader.take([FIRST.block(due), SECOND.block(due)], look, block)?;
+        if let Some(trouble) = trouble {
+            self.report(trouble.into());
         } else {
             SCANNING.store(true, Ordering::Relaxed);
             FAULT.store(false, Ordering::Relaxed);
         }
-        Ok(Delivered { scans: joined.scans as u8, missed })
+        Ok(delivered)
     }
 
     /// Remembers the remedy and reports the fault, unless it is the one reported last.
@@ -201,20 +176,38 @@ impl Converters {
         FAULT.store(true, Ordering::Relaxed);
         self.next = match fault {
             Fault::SetUp(..) | Fault::Running(Trouble::Silent(..) | Trouble::Dma) => Next::SetUp,
-            Fault::Running(Trouble::Crc | Trouble::Slipped(_) | Trouble::Overrun) => Next::Join,
+            Fault::Running(Trouble::Crc | Trouble::Slipped(..) | Trouble::Overrun) => Next::Join,
         };
         if self.last_report.as_ref() != Some(&fault) {
             self.core.report_fault(&fault);
             self.last_report = Some(fault);
         }
     }
+}
 
-    /// Nothing to deliver; what has gone by since the last delivery is missing.
-    fn nothing(&mut self) -> Delivered {
-        let now = TIM5.cnt().read();
-        let missed = now.wrapping_sub(self.accounted);
-        self.accounted = now;
-        Delivered { scans: 0, missed }
+/// When the converters are read within a period, in counts of TIM2, and the rings.
+fn alignment() -> Alignment {
+    let from_edge = |ns: u32| CONVST_LOW + ns * (TIMER_HZ / 1_000_000) / 1_000;
+    let clock = Clock {
+        // TIM5 hears of TIM2's update through a synchroniser of some cycles (RM0456, "Timer synchronization")
+        settled: 32,
+        // no averaging ends within half of its longest time
+        read_from: from_edge(AD7606B.conversion_us(SETTINGS.oversampling) * 500),
+        // the longest averaging, 144 bits of 25 ns, two idle clocks before and after, and 1 µs for trigger and DMA
+        read_by: from_edge(AD7606B.conversion_us(SETTINGS.oversampling) * 1_000 + 148 * 25 + 1_000),
+    };
+    Alignment { clock, block_scans: BLOCK_SCANS as u32, blocks: BLOCKS }
+}
+
+/// Clock and rings as they are now. Twice the same count of periods around the rest says that all of it is of one period.
+fn look() -> Moment {
+    loop {
+        let periods = TIM5.cnt().read();
+        let phase = TIM2.cnt().read();
+        let words = [FIRST.position(), SECOND.position()];
+        if TIM5.cnt().read() == periods {
+            return Moment { periods, phase, words };
+        }
     }
 }
 
@@ -227,7 +220,7 @@ impl Scans for Converters {
                 Err(fault) => {
                     self.report(fault);
                     Timer::after(RETRY).await;
-                    return self.nothing();
+                    return self.reader.nothing(TIM5.cnt().read());
                 }
             }
         }
@@ -238,7 +231,7 @@ impl Scans for Converters {
             Ok(delivered) => delivered,
             Err(trouble) => {
                 self.report(trouble.into());
-                self.nothing()
+                self.reader.nothing(TIM5.cnt().read())
             }
         }
     }

@@ -18,7 +18,8 @@ pub type Sink = usb::Sink<'static, Driver<'static, USB_OTG_HS>>;
 
 /// Packets that wait for their readers: two bulk endpoints, the control endpoint.
 const RECEIVED_BYTES: usize = 2 * 512 + 64 + 64;
-/// Between two signs of life.
+/// Between two signs of life. 400 frames of high speed and 50 of full speed: no multiple of the 16 384 after which their number
+/// comes round.
 const BEAT: Duration = Duration::from_millis(50);
 /// Between two looks at the speed.
 const LOOK: Duration = Duration::from_millis(10);
@@ -84,9 +85,19 @@ async fn other_than(speed: Speed) {
     }
 }
 
+/// Beats while the bus makes progress, or has no host to make any with: on a bus that runs the number of the frame moves every
+/// millisecond (USB 2.0, 5.3.3), whatever the host reads. A core that is configured and stands still is one that hangs.
 async fn beat() -> ! {
+    let mut before = None;
     loop {
-        watchdog::LINK.beat();
+        let otg = pac::USB_OTG_HS;
+        let state = otg.dsts().read();
+        let without_host = otg.dcfg().read().dad() == 0 || state.suspsts();
+        let frame = state.fnsof();
+        if without_host || before != Some(frame) {
+            watchdog::LINK.beat();
+        }
+        before = Some(frame);
         Timer::after(BEAT).await;
     }
 }

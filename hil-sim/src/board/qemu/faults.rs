@@ -4,7 +4,9 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use jointrig_firmware::ad7606b::trouble::Trouble;
-use jointrig_firmware::lockstep::{Delivery, NEVER};
+use jointrig_firmware::lockstep::NEVER;
+
+use super::front_end::Slip;
 
 /// What the converters do wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,6 +15,8 @@ pub enum ConverterFault {
     Noticed(Trouble),
     /// Nothing is delivered, and nobody on the board says anything: it waits.
     Hung,
+    /// The converters fall out of step with their clock, and go on sending.
+    Slips(Slip),
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -114,26 +118,36 @@ impl Faults {
         if !broken.covers(first_scan) {
             return due_us;
         }
-        let blocks = lost_blocks(&broken, first_scan, per_block);
+        // the board hears of the end of it, and not of the first block after it
+        let blocks = lost_blocks(&broken, first_scan, per_block) - 1;
         due_us + (blocks * per_block as u64 * 1_000_000).div_ceil(u64::from(rate_hz))
     }
 
-    /// The delivery after so many scans.
-    pub(super) fn delivery(&self, produced: u64, per_block: usize) -> Delivery {
-        let whole = Delivery { missed: 0, scans: per_block as u32, trouble: None };
-        match self.converters() {
-            Some(broken) if broken.covers(produced) => match broken.fault {
-                ConverterFault::Noticed(trouble) => {
-                    Delivery { missed: per_block as u32, scans: 0, trouble: Some(trouble) }
-                }
-                ConverterFault::Hung => {
-                    let blocks = lost_blocks(&broken, produced, per_block);
-                    Delivery { missed: (blocks * per_block as u64) as u32, ..whole }
-                }
-            },
-            _ => whole,
+    /// What the converters do with the block that begins with scan `first`.
+    pub(super) fn of_block(&self, first: u64, per_block: usize) -> Happening {
+        let Some(broken) = self.converters() else { return Happening::Sent(Slip::default(), 0) };
+        let here = first..first + per_block as u64;
+        match broken.fault {
+            ConverterFault::Noticed(trouble) if broken.covers(first) => Happening::Noticed(trouble),
+            ConverterFault::Hung if broken.covers(first) => {
+                Happening::StoodStill(lost_blocks(&broken, first, per_block))
+            }
+            ConverterFault::Slips(slip) if here.contains(&broken.from_scan) => {
+                Happening::Sent(slip, (broken.from_scan - first) as usize)
+            }
+            _ => Happening::Sent(Slip::default(), 0),
         }
     }
+}
+
+/// What became of a block.
+pub(super) enum Happening {
+    /// It was sent, with a slip at one of its scans.
+    Sent(Slip, usize),
+    /// So many blocks went by, and nothing was sent.
+    StoodStill(u64),
+    /// The board itself says what is wrong.
+    Noticed(Trouble),
 }
 
 /// Blocks from `first_scan` on that do not come.

@@ -6,6 +6,7 @@
 //! board's, block for block, whatever the machine is doing. To the host it is a [`HostEnd`] like any other.
 
 mod faults;
+mod front_end;
 mod process;
 mod server;
 pub mod shared_ram;
@@ -20,6 +21,7 @@ use crate::board::{Controls, Options};
 use crate::link::{DeviceEnd, HostEnd, pair};
 use crate::rig::{Rig, RigConfig, RigError};
 pub use faults::{ConverterFault, Faults};
+pub use front_end::Slip;
 use jointrig_logs::Table;
 use process::Emulator;
 use server::Server;

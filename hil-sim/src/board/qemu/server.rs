@@ -11,16 +11,18 @@ use std::time::Duration;
 
 use jointrig_firmware::board::{ByteSink, ByteSource, Coil, Drive, Inputs, Stage};
 use jointrig_firmware::lockstep::{
-    Ask, BLOCK_AT, DELIVERY_BYTES, DRIVE_AT, EMERGENCY_STOP, HELD, INTERLOCK_CLOSED, LOCAL_RESET, LOG_AT,
-    MUST_FAULT, MUST_OVERFLOW, MUST_PANIC, NEVER, Op, RING_BYTES, Reply, Setup, TEXT_AT, TEXT_BYTES,
+    Ask, BLOCK_AT, DELIVERY_BYTES, DRIVE_AT, Delivery, EMERGENCY_STOP, HELD, INTERLOCK_CLOSED, LOCAL_RESET,
+    LOG_AT, MUST_FAULT, MUST_OVERFLOW, MUST_PANIC, NEVER, Op, RING_BYTES, Reply, Setup, TEXT_AT, TEXT_BYTES,
     TO_DEVICE_AT, TO_HOST_AT, from_text, to_text,
 };
 use jointrig_logs::Table;
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, scans_per_block};
-use jointrig_protocol::{golden, request};
+use jointrig_protocol::{request, schema};
 use serde::Serialize;
 
 use super::Faults;
+use super::faults::Happening;
+use super::front_end::FrontEnd;
 use super::process::Pipes;
 use super::shared_ram::SharedRam;
 use crate::board::drive::VirtualDrive;
@@ -61,6 +63,7 @@ pub struct Server {
     ram: SharedRam,
     setup: Setup,
     per_block: usize,
+    front_end: FrontEnd,
     free_running: bool,
     reply: Reply,
     /// Scans since the start, lost ones among them.
@@ -107,6 +110,7 @@ impl Server {
             ram,
             setup,
             per_block,
+            front_end: FrontEnd::new(per_block, channels.len()),
             free_running: options.free_running,
             reply: Reply { inputs: INTERLOCK_CLOSED, ..Reply::default() },
             produced: 0,
@@ -129,8 +133,8 @@ impl Server {
         if Op::from_word(ask.op) != Some(Op::Start) {
             return Err("it does not begin as this simulator's firmware does: build both anew".into());
         }
-        if ask.argument as usize != golden::COMMITTED.len() {
-            return Err("its frames differ from the golden vectors: build both anew".into());
+        if ask.argument != schema::HASH as u32 {
+            return Err("its protocol differs from this simulator's: build both anew".into());
         }
         self.put_text(&self.setup.clone())?;
         self.set_inputs();
@@ -152,6 +156,10 @@ impl Server {
                 Some(Op::Off) => self.coil.off(),
                 Some(Op::Play) => self.play(ask.argument).map_err(|error| broken(&error))?,
                 Some(Op::Rest) => self.drive.rest(),
+                Some(Op::Join) => {
+                    self.front_end.join(self.produced);
+                    self.reply.length = self.produced as u32;
+                }
                 Some(Op::Stage) => self.go(ask.argument)?,
                 Some(Op::Panic) => {
                     let text = self.ram.text(ask.argument).map_err(|error| broken(&error))?;
@@ -217,27 +225,44 @@ impl Server {
         }
         self.reply.now_us = self.reply.now_us.max(next);
         if block_us <= self.reply.now_us {
-            let delivery = self.faults.delivery(self.produced, self.per_block);
-            let (channels, per_block) = (self.setup.channels.len(), self.per_block);
-            let mut samples = [0; BLOCK_SAMPLE_BYTES];
-            // what is lost has happened all the same
-            for _ in 0..delivery.missed as usize / per_block + usize::from(delivery.scans > 0) {
-                fill(
-                    &mut self.rig.borrow_mut(),
-                    &self.drive,
-                    &self.controls,
-                    channels,
-                    per_block,
-                    &mut samples,
-                );
-            }
+            let first = self.produced;
+            let (delivery, words) = match self.faults.of_block(first, self.per_block) {
+                Happening::Sent(slip, at) => {
+                    let codes = self.convert(self.front_end.blocks_for(&slip));
+                    self.front_end.deliver(first, &codes, &slip, at)
+                }
+                Happening::StoodStill(blocks) => {
+                    // what is lost has happened all the same
+                    self.convert(blocks as usize);
+                    self.front_end.stood_still(first, self.produced - first)
+                }
+                Happening::Noticed(trouble) => {
+                    self.convert(1);
+                    let periods = self.produced as u32;
+                    (Delivery { trouble: Some(trouble), periods, ..Delivery::default() }, Vec::new())
+                }
+            };
             self.ram.write(BLOCK_AT, &delivery.to_bytes())?;
-            self.ram.write(BLOCK_AT + DELIVERY_BYTES, &samples)?;
-            self.produced += u64::from(delivery.missed + delivery.scans);
+            self.ram.write(BLOCK_AT + DELIVERY_BYTES, &words)?;
             self.reply.blocks += 1;
             self.set_inputs();
         }
         Ok(())
+    }
+
+    /// Lets the rig go on by so many blocks; their codes, scan by scan.
+    fn convert(&mut self, blocks: usize) -> Vec<i16> {
+        let (channels, per_block) = (self.setup.channels.len(), self.per_block);
+        let mut codes = Vec::with_capacity(blocks * per_block * channels);
+        for _ in 0..blocks {
+            let mut samples = [0; BLOCK_SAMPLE_BYTES];
+            let mut rig = self.rig.borrow_mut();
+            fill(&mut rig, &self.drive, &self.controls, channels, per_block, &mut samples);
+            let pairs = &samples.as_chunks().0[..per_block * channels];
+            codes.extend(pairs.iter().map(|pair| i16::from_le_bytes(*pair)));
+        }
+        self.produced += (blocks * per_block) as u64;
+        codes
     }
 
     fn set_inputs(&mut self) {

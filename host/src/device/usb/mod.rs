@@ -131,6 +131,10 @@ impl Transport for Usb {
         self.queue.read(buf, timeout)
     }
 
+    fn keeps_packets(&self) -> bool {
+        true
+    }
+
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
         // a zero ends every frame, so that no empty packet has to end a transfer of whole packets
         match self.out.transfer_blocking(bytes.to_vec().into(), WRITE_PATIENCE).status {

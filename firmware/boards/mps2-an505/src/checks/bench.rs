@@ -10,22 +10,26 @@ use core::hint::black_box;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use heapless::Vec;
+use jointrig_firmware::ad7606b::alignment::{Moment, SCAN_WORDS};
 use jointrig_firmware::lockstep::{
-    Ask, BLOCK_AT, DELIVERY_BYTES, Delivery, INTERLOCK_CLOSED, Op, RING_BYTES, Reply, Setup, TO_DEVICE_AT,
-    to_text,
+    Ask, BLOCK_AT, CLOCK, DELIVERY_BYTES, Delivery, INTERLOCK_CLOSED, Op, RING_BLOCKS, RING_BYTES, Reply,
+    Setup, TO_DEVICE_AT, to_text,
 };
+use jointrig_hot::pair::{CHANNELS, CHIP_BYTES, data_crc, join};
 use jointrig_protocol::acknowledge::Acknowledge;
 use jointrig_protocol::block::HEADER_PAYLOAD;
-use jointrig_protocol::channel::{Axis, Channel, Name, Quantity, Role};
+use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
 use jointrig_protocol::frame::{Accumulator, Kind, Writer};
 use jointrig_protocol::hello::Hello;
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, MAX_CHANNELS};
-use jointrig_protocol::request::{Configuration, Control, Fire, Numbered, Request, Shake, Stage, Trigger};
+use jointrig_protocol::request::{Numbered, Request};
 use semihosting::{eprintln, println, process};
 
-use crate::{counter, device, memory, port, stack};
+use mps2_an505::{device, memory, port};
 
-const RATE_HZ: u32 = 51_200;
+use crate::script::{RATE_HZ, Step, VENDOR, step, text};
+use crate::{counter, stack};
+
 const PER_BLOCK: u64 = 15;
 /// A host acknowledges every so many blocks.
 const ACKNOWLEDGE_EVERY: u32 = 8;
@@ -33,91 +37,6 @@ const ACKNOWLEDGE_EVERY: u32 = 8;
 const NOISES: usize = 16;
 /// The force channel's code during contact: well above any trigger.
 const HIT: i16 = 8_000;
-
-/// One step of the script.
-enum Step {
-    /// The handshake.
-    Greet,
-    /// One request.
-    Ask(&'static str, Request),
-    /// Blocks of noise; the figure is per scan.
-    Stream(&'static str, u32),
-    /// One block whose force channel shows contact.
-    Contact(&'static str),
-    /// One block with the guard open.
-    Guard(&'static str),
-}
-
-/// The script, by number.
-fn step(number: usize) -> Option<Step> {
-    let fire = |number, watched: usize| {
-        let mut quiet_limits = Vec::new();
-        for channel in 0..MAX_CHANNELS {
-            // far below the noise's own motion, so that the structure is never quiet
-            let _ = quiet_limits.push(if (1..=watched).contains(&channel) { 1e-12 } else { 0.0 });
-        }
-        let quiet_window = if watched == 0 { 0 } else { 256 };
-        let order = Fire {
-            number,
-            pulse_us: 3_000,
-            not_before: 0,
-            quiet_limits,
-            quiet_window,
-            quiet_patience: u32::MAX,
-        };
-        Request::Fire(order)
-    };
-    let trigger = Trigger { level_n: 1.0, flight_scans: 51_200, listen_scans: 3_800, hold_off_scans: 256 };
-    let place =
-        Stage { configuration: Configuration::Ajb, impact: text("AZ3"), response: text("B4"), attempt: 2 };
-    let arm = Request::Arm { valid_ms: 60_000 };
-    let mut limits = Vec::new();
-    for limit in [0.0, 0.0, 0.0, 0.0, 0.5, 0.5] {
-        let _ = limits.push(limit);
-    }
-    let shake = Shake {
-        step: Shake::step_of(200.0, RATE_HZ),
-        control: Control::Drive,
-        amplitude_v: 5.0,
-        slew_v_per_s: 100.0,
-        valid_ms: 60_000,
-        limits,
-    };
-    Some(match number {
-        0 => Step::Greet,
-        1 => Step::Ask("info", Request::Info),
-        2 => Step::Ask("channel", Request::Channel { index: 3 }),
-        3 => Step::Ask("status", Request::Status),
-        4 => Step::Ask("trigger", Request::Trigger(trigger)),
-        5 => Step::Ask("load_cells", Request::LoadCells { matrix: [1.0; 9] }),
-        6 => Step::Ask("stage", Request::Stage(place)),
-        7 => Step::Ask("start", Request::Start),
-        8 => Step::Stream("scan.steady", 3_414),
-        9 => Step::Ask("arm", arm),
-        10 => Step::Ask("fire", fire(1, 3)),
-        11 => Step::Stream("scan.waiting", 1_024),
-        12 => Step::Ask("disarm", Request::Disarm),
-        13 => Step::Ask("shake", Request::Shake(shake)),
-        14 => Step::Stream("scan.shaking", 1_024),
-        15 => Step::Ask("rest", Request::Rest),
-        // the ramp down, and the noise of the blocks after it
-        16 => Step::Stream("", 256),
-        17 | 27 => Step::Ask("", arm),
-        18 => Step::Ask("", fire(2, 0)),
-        19 | 29 => Step::Stream("", 1),
-        20 => Step::Stream("scan.flight", 64),
-        21 => Step::Contact("block.contact"),
-        22 => Step::Stream("scan.listening", 256),
-        23 => Step::Ask("resend", Request::Resend { epoch: 0, first_scan: 49_000, scans: 15 }),
-        24 => Step::Ask("stop", Request::Stop),
-        25 => Step::Ask("", Request::Start),
-        26 => Step::Stream("", 64),
-        28 => Step::Ask("", fire(3, 0)),
-        30 => Step::Guard("block.guard"),
-        31 => Step::Ask("emergency_stop", Request::EmergencyStop),
-        _ => return None,
-    })
-}
 
 /// What one figure counts.
 type Figure = (&'static str, u64);
@@ -132,7 +51,8 @@ struct Bench {
     worst_block: u64,
     released: u32,
     reply: Reply,
-    noise: [[u8; BLOCK_SAMPLE_BYTES]; NOISES],
+    /// Blocks as the two converters send them.
+    chips: [[[u8; CHIP_BYTES]; 2 * PER_BLOCK as usize]; NOISES],
     figures: Vec<Figure, 48>,
     writer: Writer,
 }
@@ -157,7 +77,7 @@ static BENCH: Mutex<CriticalSectionRawMutex, RefCell<Bench>> = Mutex::new(RefCel
         ran_dry: 0,
         cuts: 0,
     },
-    noise: [[0; BLOCK_SAMPLE_BYTES]; NOISES],
+    chips: [[[0; CHIP_BYTES]; 2 * PER_BLOCK as usize]; NOISES],
     figures: Vec::new(),
     writer: Writer::new(Kind::Hello),
 }));
@@ -188,17 +108,24 @@ impl Bench {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             i32::from((state >> 26) as u8) - 32
         };
-        for block in &mut self.noise {
-            for pair in block.as_chunks_mut::<2>().0 {
-                *pair = ((uniform() + uniform()) as i16).to_le_bytes();
-            }
+        for chip in self.chips.as_flattened_mut() {
+            let codes = core::array::from_fn(|_| (uniform() + uniform()) as i16);
+            *chip = sent(&codes);
         }
-        let noise = self.noise[0];
+        let mut noise = [0; BLOCK_SAMPLE_BYTES];
+        let [chips, ..] = self.chips;
+        let (first, second) = chips.split_at(PER_BLOCK as usize);
+        self.count("part.join", || {
+            black_box(join(black_box(first), black_box(second), MAX_CHANNELS, black_box(&mut noise)));
+        });
         let mut copy = [0; BLOCK_SAMPLE_BYTES];
         self.count("part.copy_480", || black_box(&mut copy).copy_from_slice(black_box(&noise)));
         let mut writer = Writer::new(Kind::Samples);
         writer.payload_mut()[HEADER_PAYLOAD..HEADER_PAYLOAD + noise.len()].copy_from_slice(&noise);
         let full = HEADER_PAYLOAD + noise.len();
+        self.count("frame.seal_packet", || {
+            let _ = black_box(black_box(&mut writer).seal_packet(full));
+        });
         self.count("frame.seal", || {
             let _ = black_box(black_box(&mut writer).seal(full));
         });
@@ -244,6 +171,7 @@ impl Bench {
             Some(Op::Pulse) => self.note_coil("latency.coil_on"),
             Some(Op::Off) => self.note_coil("latency.coil_off"),
             Some(Op::Stage | Op::Play | Op::Rest) => {}
+            Some(Op::Join) => self.reply.length = self.blocks * PER_BLOCK as u32,
             Some(Op::Start | Op::Panic) | None => broken("an unknown wish"),
         }
         self.reply
@@ -272,8 +200,8 @@ impl Bench {
         self.spent = 0;
         self.since_block = 0;
         match next {
-            Step::Greet => {
-                let hello = Hello::host(7).to_bytes();
+            Step::Greet(session) => {
+                let hello = Hello { packets: session == VENDOR, ..Hello::host(session) }.to_bytes();
                 self.say(Kind::Hello, &hello);
             }
             Step::Ask(_, mut request) => {
@@ -295,8 +223,9 @@ impl Bench {
                 self.left = 1;
                 self.stream(ask);
                 // every fourth scan from the third on shows force
+                let hit = sent(&[HIT, 0, 0, 0, 0, 0, 0, 0]);
                 for scan in (2..PER_BLOCK as usize).step_by(4) {
-                    memory::write(BLOCK_AT + DELIVERY_BYTES + scan * 2 * MAX_CHANNELS, &HIT.to_le_bytes());
+                    memory::write(BLOCK_AT + DELIVERY_BYTES + scan * CHIP_BYTES, &hit);
                 }
             }
             Step::Guard(_) => {
@@ -321,7 +250,8 @@ impl Bench {
                 self.note(name, counter::instructions(spent).div_ceil(scans));
             }
             Some(Step::Contact(name) | Step::Guard(name)) => self.note(name, counter::instructions(spent)),
-            Some(Step::Greet) => self.note("greet", counter::instructions(spent)),
+            Some(Step::Greet(VENDOR)) => self.note("greet", counter::instructions(spent)),
+            Some(Step::Greet(_)) => {}
             None => {}
         }
     }
@@ -335,12 +265,18 @@ impl Bench {
         self.reply.now_us = ask.block_us;
         self.since_block = 0;
         self.left -= 1;
-        memory::write(BLOCK_AT, &Delivery { scans: PER_BLOCK as u32, ..Delivery::default() }.to_bytes());
-        memory::write(BLOCK_AT + DELIVERY_BYTES, &self.noise[self.blocks as usize % NOISES]);
+        memory::write(BLOCK_AT + DELIVERY_BYTES, self.chips[self.blocks as usize % NOISES].as_flattened());
         self.blocks += 1;
+        let periods = self.blocks * PER_BLOCK as u32 - 1;
+        let words = (periods + 1) * SCAN_WORDS % (RING_BLOCKS * PER_BLOCK as u32 * SCAN_WORDS);
+        let moment = Moment { periods, phase: CLOCK.read_by, words: [words; 2] };
+        let delivery = Delivery { scans: PER_BLOCK as u32, trouble: None, periods, moment };
+        memory::write(BLOCK_AT, &delivery.to_bytes());
         self.reply.blocks = self.blocks;
         if self.blocks.is_multiple_of(ACKNOWLEDGE_EVERY) {
-            let epoch = if self.step <= 25 { 1 << 16 } else { (1 << 16) + 1 };
+            // the first stream of boot 1, the second, the third
+            let stream = u32::from(self.step > 25) + u32::from(self.step > 33);
+            let epoch = (1 << 16) + stream;
             let next_scan = u64::from(self.blocks - 1) * PER_BLOCK;
             self.say(Kind::Acknowledge, &Acknowledge { epoch, next_scan }.to_bytes());
         }
@@ -365,6 +301,16 @@ impl Bench {
     }
 }
 
+/// A scan of one converter, as it sends it.
+fn sent(codes: &[i16; CHANNELS]) -> [u8; CHIP_BYTES] {
+    let mut bytes = [0; CHIP_BYTES];
+    let words = codes.iter().copied().chain([data_crc(codes).cast_signed()]);
+    for (place, word) in bytes.as_chunks_mut().0.iter_mut().zip(words) {
+        *place = word.to_le_bytes();
+    }
+    bytes
+}
+
 /// Sixteen channels with all roles that cost something.
 fn set_up() -> Setup {
     let channel = |index: usize| Channel {
@@ -385,10 +331,6 @@ fn set_up() -> Setup {
     };
     let channels = (0..MAX_CHANNELS).map(channel).collect();
     Setup { serial: text("bench"), scan_rate_hz: RATE_HZ, boot: 1, slots: 3_414, channels }
-}
-
-fn text(value: &str) -> Name {
-    Name::try_from(value).unwrap_or_default()
 }
 
 fn broken(why: &str) -> ! {

@@ -1,0 +1,89 @@
+//! From blocks of two rings to scans: proven, joined, and with a count of those that are missing before them.
+
+use jointrig_hot::pair::{CHIP_BYTES, join};
+
+use super::alignment::{Alignment, Moment, Verdict};
+use super::trouble::Trouble;
+use crate::board::Delivered;
+
+/// Looks at a moment before a read-out that never ends counts as one that does not come: one takes a few µs.
+const LOOKS: u32 = 1_000;
+
+/// Reads two rings, block by block.
+#[derive(Clone, Copy, Debug)]
+pub struct Reader {
+    alignment: Alignment,
+    /// Channels of a scan.
+    channels: usize,
+    /// The block that is due.
+    block: u32,
+    /// The clock's count of periods at the rings' start.
+    started_at: u32,
+    /// Up to where scans have been delivered or reported missing, in that count.
+    accounted: u32,
+}
+
+impl Reader {
+    /// Nothing is read before [`Reader::start`]; scans are missing from `now` on, in the clock's count of periods.
+    #[must_use]
+    pub fn new(alignment: Alignment, channels: usize, now: u32) -> Self {
+        Self { alignment, channels, block: 0, started_at: now, accounted: now }
+    }
+
+    /// The rings were started, empty, and their first scan is that of period `at`.
+    pub fn start(&mut self, at: u32) {
+        (self.block, self.started_at) = (0, at);
+    }
+
+    /// The block that is due.
+    #[must_use]
+    pub fn due(&self) -> u32 {
+        self.block
+    }
+
+    /// Takes the block that is due from the rings' own memory; `look` reads a moment off, with the clock's own count of periods. It is
+    /// called after the block was read, so that a block is proven not to have been overwritten meanwhile. Good scans are
+    /// written to `scans`, which hold nothing of worth after an error.
+    ///
+    /// A wrong CRC ends the block there, and is told besides.
+    ///
+    /// # Errors
+    /// [`Trouble::Slipped`] or [`Trouble::Overrun`]: nothing of the block can be trusted, and the rings must be started anew.
+    pub fn take(
+        &mut self,
+        [first, second]: [&[[u8; CHIP_BYTES]]; 2],
+        mut look: impl FnMut() -> Moment,
+        scans: &mut [u8],
+    ) -> Result<(Delivered, Option<Trouble>), Trouble> {
+        let joined = join(first, second, self.channels, scans);
+        self.prove(&mut look)?;
+        let good = joined.scans as u32;
+        let from = self.started_at.wrapping_add(self.block.wrapping_mul(self.alignment.block_scans));
+        let missed = from.wrapping_sub(self.accounted);
+        self.accounted = from.wrapping_add(good);
+        self.block = self.block.wrapping_add(1);
+        let trouble = (good < self.alignment.block_scans).then_some(Trouble::Crc);
+        Ok((Delivered { scans: good as u8, missed, loud: joined.loud }, trouble))
+    }
+
+    fn prove(&self, look: &mut impl FnMut() -> Moment) -> Result<(), Trouble> {
+        for _ in 0..LOOKS {
+            let seen = look();
+            let moment = Moment { periods: seen.periods.wrapping_sub(self.started_at), ..seen };
+            match self.alignment.judge(self.block, &moment) {
+                Verdict::Proven => return Ok(()),
+                Verdict::Again => {}
+                Verdict::Slipped([first, second]) => return Err(Trouble::Slipped(first, second)),
+                Verdict::Late => return Err(Trouble::Overrun),
+            }
+        }
+        Err(Trouble::Overrun)
+    }
+
+    /// Nothing can be delivered; what has gone by until `now` is missing.
+    pub fn nothing(&mut self, now: u32) -> Delivered {
+        let missed = now.wrapping_sub(self.accounted);
+        self.accounted = now;
+        Delivered { scans: 0, missed, loud: false }
+    }
+}
