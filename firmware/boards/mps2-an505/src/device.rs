@@ -20,6 +20,9 @@ const SLOTS: usize = 3_414;
 pub type Shared = Core<'static, <Emulated as Board>::Mutex>;
 
 /// Runs the firmware for ever.
+///
+/// # Panics
+/// A set-up without channels, or a second call.
 pub fn run(setup: &Setup) -> ! {
     static MEMORY: ConstStaticCell<[Slot; SLOTS]> = ConstStaticCell::new([Slot::EMPTY; SLOTS]);
     static CHANNELS: StaticCell<Vec<Channel, MAX_CHANNELS>> = StaticCell::new();

@@ -14,6 +14,9 @@ pub fn is_served() -> bool {
 }
 
 /// Copies bytes out.
+///
+/// # Panics
+/// Outside the shared memory.
 pub fn read(at: usize, out: &mut [u8]) {
     assert!(at <= BYTES && out.len() <= BYTES - at, "outside the shared memory");
     // SAFETY: the range lies within the 16 MB at BASE, which is plain memory of this machine, aligned for
@@ -23,6 +26,9 @@ pub fn read(at: usize, out: &mut [u8]) {
 }
 
 /// What the simulator has written, where it is: valid until this side gives up its turn.
+///
+/// # Panics
+/// Outside the shared memory.
 pub fn look<R>(at: usize, length: usize, f: impl FnOnce(&[u8]) -> R) -> R {
     assert!(at <= BYTES && length <= BYTES - at, "outside the shared memory");
     // SAFETY: as in `read`; `f` takes no turn, so that nobody writes while the bytes are borrowed.
@@ -30,6 +36,9 @@ pub fn look<R>(at: usize, length: usize, f: impl FnOnce(&[u8]) -> R) -> R {
 }
 
 /// Copies bytes in.
+///
+/// # Panics
+/// Outside the shared memory.
 pub fn write(at: usize, bytes: &[u8]) {
     assert!(at <= BYTES && bytes.len() <= BYTES - at, "outside the shared memory");
     // SAFETY: as in `read`; nobody else writes during this core's turn.

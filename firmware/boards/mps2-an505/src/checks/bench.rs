@@ -251,8 +251,7 @@ impl Bench {
             }
             Some(Step::Contact(name) | Step::Guard(name)) => self.note(name, counter::instructions(spent)),
             Some(Step::Greet(VENDOR)) => self.note("greet", counter::instructions(spent)),
-            Some(Step::Greet(_)) => {}
-            None => {}
+            Some(Step::Greet(_)) | None => {}
         }
     }
 

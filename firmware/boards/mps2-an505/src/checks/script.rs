@@ -87,14 +87,13 @@ pub fn step(number: usize) -> Option<Step> {
         22 => Step::Stream("scan.listening", 256),
         23 => Step::Ask("resend", Request::Resend { epoch: 0, first_scan: 49_000, scans: 15 }),
         24 => Step::Ask("stop", Request::Stop),
-        25 => Step::Ask("", Request::Start),
+        25 | 33 => Step::Ask("", Request::Start),
         26 => Step::Stream("", 64),
         28 => Step::Ask("", fire(3, 0)),
         30 => Step::Guard("block.guard"),
         31 => Step::Ask("emergency_stop", Request::EmergencyStop),
         // the same over a stream of bytes
         32 => Step::Greet(VENDOR + 1),
-        33 => Step::Ask("", Request::Start),
         34 => Step::Stream("scan.stuffed", 1_024),
         _ => return None,
     })
