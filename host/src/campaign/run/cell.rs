@@ -40,11 +40,11 @@ impl Runner<'_> {
         }
         let mut quiet = quiet::unknown(self.channels);
         let mut setbacks = 0;
-        let mut overruled = false;
         while (self.tally.open(row.id) || !again.is_empty()) && !self.stopped() {
-            overruled |= self.recount(Some(row.id));
-            if overruled && let Some(now) = self.others_now(row)? {
-                (others, overruled) = (now, false);
+            if self.recount(Some(row.id)) {
+                // a person overruled one of this cell's hits: what the good ones have in common is another
+                still(self.keeper.catch_up())?;
+                others = self.earlier.others_now(row.id, self.plan, self.channels)?;
             }
             if again.is_empty() && !self.tally.open(row.id) {
                 break;
@@ -126,12 +126,6 @@ impl Runner<'_> {
             }
         }
         Ok(Next::On)
-    }
-
-    /// What the cell's good hits have in common after a person overruled one of them; none as long as some of them are not stored yet.
-    fn others_now(&self, row: &CellRow) -> Result<Option<Others>, RunError> {
-        let (others, hits) = self.earlier.others_now(row.id, self.plan, self.channels)?;
-        Ok((hits >= self.tally.kept_in(row.id)).then_some(others))
     }
 
     /// Ends a cell whose attempts run out, or whose FRFs are good enough; returns whether it did.

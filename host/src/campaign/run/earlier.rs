@@ -45,7 +45,7 @@ impl Earlier {
         };
         // the writer is on a thread of its own; a cell's earlier records are in the file since before it began
         let store = Store::open_read_only(&self.path)?;
-        let (others, _) = learnt(&store, records, plan, channels)?;
+        let others = learnt(&store, records, plan, channels)?;
         let mut again: Vec<RecordRow> = records.iter().flatten().cloned().collect();
         again.sort_by_key(|record| record.attempt);
         let whole =
@@ -53,34 +53,33 @@ impl Earlier {
         Ok((others, if whole { again.into() } else { VecDeque::new() }))
     }
 
-    /// What the good records of a cell that are in the file by now have in common, and how many they are.
+    /// What the good records of a cell that are in the file by now have in common.
     pub(super) fn others_now(
         &self,
         cell: i64,
         plan: &Plan,
         channels: &ChannelMap,
-    ) -> Result<(Others, u32), StoreError> {
+    ) -> Result<Others, StoreError> {
         let store = Store::open_read_only(&self.path)?;
         learnt(&store, &store.records_of(cell)?, plan, channels)
     }
 }
 
-/// What the good ones of these records have in common, and how many they are.
+/// What the good ones of these records have in common.
 fn learnt(
     store: &Store,
     records: &[Result<RecordRow, Damaged>],
     plan: &Plan,
     channels: &ChannelMap,
-) -> Result<(Others, u32), StoreError> {
-    let (mut others, mut hits) = (Others::default(), 0);
+) -> Result<Others, StoreError> {
+    let mut others = Others::default();
     let kept = |record: &&RecordRow| record.kept() && record.channels == channels.len();
     for record in records.iter().flatten().filter(kept) {
-        hits += 1;
         match store.samples(record) {
             Ok(samples) => others.learn(plan, channels, samples.view()),
             Err(error @ StoreError::Damaged { .. }) => log::warn!("{error}"),
             Err(error) => return Err(error),
         }
     }
-    Ok((others, hits))
+    Ok(others)
 }

@@ -22,11 +22,25 @@ const EDITS: Duration = Duration::from_millis(50);
 /// What is to be stored.
 enum Entry {
     Record(Box<NewRecord>, Counters),
-    GivenUp { cell: i64, reason: String },
-    Settled { cell: i64, reason: String },
-    Redo { cell: i64, reason: String },
-    Link { session: i64, counters: Counters },
+    GivenUp {
+        cell: i64,
+        reason: String,
+    },
+    Settled {
+        cell: i64,
+        reason: String,
+    },
+    Redo {
+        cell: i64,
+        reason: String,
+    },
+    Link {
+        session: i64,
+        counters: Counters,
+    },
     Log(String),
+    /// Somebody waits until all before this is stored.
+    Waited(SyncSender<()>),
 }
 
 /// The thread that stores.
@@ -92,6 +106,13 @@ impl Keeper {
         self.send(Entry::Log(text))
     }
 
+    /// Waits until all that was handed over is in the file. Returns as [`Keeper::record`] does.
+    #[must_use]
+    pub fn catch_up(&self) -> bool {
+        let (to, done) = sync_channel(1);
+        self.send(Entry::Waited(to)) && done.recv().is_ok()
+    }
+
     fn send(&self, entry: Entry) -> bool {
         self.queue.as_ref().is_some_and(|queue| queue.send(entry).is_ok())
     }
@@ -131,6 +152,11 @@ fn keep(store: &Store, entry: Entry) -> Result<(), StoreError> {
         Entry::Link { session, counters } => store.note_link(session, &counters),
         Entry::GivenUp { cell, reason } => store.give_up(cell, &reason),
         Entry::Log(text) => store.log(&text),
+        Entry::Waited(by) => {
+            // who waited may have ended
+            let _ = by.send(());
+            Ok(())
+        }
     }
 }
 

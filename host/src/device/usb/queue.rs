@@ -111,8 +111,9 @@ mod tests {
     use super::*;
     use std::collections::VecDeque;
 
-    use jointrig_protocol::frame::{Accumulator, Kind};
+    use jointrig_protocol::frame::Kind;
     use jointrig_protocol::golden;
+    use jointrig_protocol::packet::Reader;
     use proptest::prelude::*;
 
     /// An endpoint that brings what it was given, one transfer after another, and then nothing.
@@ -204,14 +205,14 @@ mod tests {
             }
             transfers.extend(wire.make_contiguous().chunks(TRANSFER_BYTES).map(|rest| (rest.to_vec(), Ok(()))));
             let mut queue = Queue::new(Script::of(transfers));
-            let mut accumulator = Accumulator::new();
+            let mut reader = Reader::new();
             let mut kinds: Vec<Kind> = Vec::new();
             let mut buf = vec![0; portion];
             loop {
                 let got = queue.read(&mut buf, PATIENCE).expect("no failure");
                 let mut rest = &buf[..got];
                 while !rest.is_empty() {
-                    let (used, found) = accumulator.feed(rest);
+                    let (used, found) = reader.feed(rest);
                     rest = &rest[used..];
                     kinds.extend(found.map(|frame| frame.expect("undamaged").kind));
                 }
