@@ -11,7 +11,7 @@ use libfuzzer_sys::fuzz_target;
 use std::hint::black_box;
 
 fn payload(bytes: &[u8]) {
-    black_box((Hello::from_bytes(bytes), Acknowledge::from_bytes(bytes)));
+    let _ = black_box((Hello::from_bytes(bytes), Acknowledge::from_bytes(bytes)));
     let _ = black_box(postcard::from_bytes::<request::Numbered>(bytes));
 }
 
