@@ -131,18 +131,7 @@ pub fn contact_plan(rig: &RigConfig) -> String {
     if !rig.clamp_b.rigid {
         let points: Vec<&ResponsePoint> =
             rig.responses.iter().filter(|point| point.body == BodyName::SpecimenB).collect();
-        let names: Vec<String> = points.iter().map(|point| format!("\"{}\", ", point.name)).collect();
-        let rows: Vec<String> = points
-            .iter()
-            .map(|p| {
-                let [x, y, z] = p.position_m;
-                format!(
-                    "    {{ name = \"{}\", grouping = 6, position_m = [{x:?}, {y:?}, {z:?}] }},\n",
-                    p.name
-                )
-            })
-            .collect();
-        let (names, rows) = (names.concat(), rows.concat());
+        let (names, rows) = (names(&points), rows(&points, 6));
         plan = plan
             .replace("responses = [\"S1\"", &format!("responses = [{names}\"S1\""))
             .replace("responses = [\"B1\"", &format!("responses = [{names}\"B1\""))
@@ -171,20 +160,27 @@ pub fn with_priors(plan: &str, rig: &RigConfig) -> String {
 /// The same plan with the two marks N1 and N2 beside the contact, placed as carefully as the spots.
 pub fn near_plan(rig: &RigConfig) -> String {
     let near: Vec<&ResponsePoint> = rig.responses.iter().filter(|point| point.sigma_m.is_some()).collect();
-    let names: Vec<String> = near.iter().map(|point| format!("\"{}\", ", point.name)).collect();
-    let rows: Vec<String> = near
-        .iter()
-        .map(|p| {
-            let ([x, y, z], sigma_m) = (p.position_m, p.sigma_m.unwrap());
-            format!(
-                "    {{ name = \"{}\", grouping = 5, position_m = [{x:?}, {y:?}, {z:?}], sigma_m = {sigma_m:?} }},\n",
-                p.name
-            )
-        })
-        .collect();
     contact_plan(rig)
-        .replace("\"S1\", \"S2\"", &format!("{}\"S1\", \"S2\"", names.concat()))
-        .replace("response = [\n", &format!("response = [\n{}", rows.concat()))
+        .replace("\"S1\", \"S2\"", &format!("{}\"S1\", \"S2\"", names(&near)))
+        .replace("response = [\n", &format!("response = [\n{}", rows(&near, 5)))
+}
+
+/// Names as in a plan's list, each with what separates it from the next.
+fn names(points: &[&ResponsePoint]) -> String {
+    points.iter().map(|point| format!("\"{}\", ", point.name)).collect::<Vec<_>>().concat()
+}
+
+/// The same points as rows of a plan's geometry.
+fn rows(points: &[&ResponsePoint], grouping: u8) -> String {
+    let row = |p: &&ResponsePoint| {
+        let [x, y, z] = p.position_m;
+        let sigma_m = p.sigma_m.map(|sigma_m| format!(", sigma_m = {sigma_m:?}")).unwrap_or_default();
+        format!(
+            "    {{ name = \"{}\", grouping = {grouping}, position_m = [{x:?}, {y:?}, {z:?}]{sigma_m} }},\n",
+            p.name
+        )
+    };
+    points.iter().map(row).collect::<Vec<_>>().concat()
 }
 
 /// As many cells as in `contact.toml`: N1 and N2 in place of S5 and S6.

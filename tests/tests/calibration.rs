@@ -10,6 +10,7 @@ use jointrig_tests::drawn_campaigns::found;
 use jointrig_tests::live::{campaign, done};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// A hash over all raw codes, and every scale that the sessions were measured with.
 fn measured(file: &Path) -> (u64, Vec<f32>) {
@@ -135,4 +136,33 @@ fn a_laboratorys_file_counts_while_it_is_measured() {
         let device = f64::from(record.shot.peak_n);
         assert!((device / record.peak_n - 1.0).abs() < 0.02, "{device} and {}", record.peak_n);
     }
+}
+
+#[test]
+fn nothing_moves_where_the_device_sees_another_sign() {
+    let (folder, file) = campaign(SMALL);
+    done(jointrig().args(["campaign", "run"]).arg(&file).args(["--device", "sim:", "--yes"]));
+    let map = Store::open_read_only(&file).unwrap().channels(1).unwrap();
+    let turned = |name: &str| {
+        let channel = map.channels.iter().find(|channel| channel.name == name).unwrap();
+        let path = folder.path().join("turned.toml");
+        let polarity = -channel.units_per_volt.signum() as i8;
+        std::fs::write(&path, format!("[[channel]]\nname = {name:?}\npolarity = {polarity}\n")).unwrap();
+        calibrate(&file, &path, "turned");
+    };
+    let refused = |command: &mut Command, name: &str| {
+        let out = command.output().unwrap();
+        let said = String::from_utf8(out.stderr).unwrap();
+        assert!(
+            !out.status.success() && said.contains(&format!("channel `{name}` has the other sign")),
+            "{said}"
+        );
+        let sessions = Store::open_read_only(&file).unwrap().sessions().unwrap();
+        assert_eq!(sessions.len(), 1, "what is refused is no session");
+    };
+    turned("ldv_a");
+    let level = ["--device", "sim:", "--freq", "150", "--amplitude", "2e-7"];
+    refused(jointrig().arg("shaker").arg(&file).args(level), "ldv_a");
+    turned("force");
+    refused(jointrig().args(["campaign", "run"]).arg(&file).args(["--device", "sim:", "--yes"]), "force");
 }

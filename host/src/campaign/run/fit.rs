@@ -66,11 +66,16 @@ pub(super) fn with_sensors(plan: &Plan, channels: &ChannelMap) -> Result<(Channe
     Ok((map, remarks))
 }
 
-/// Refuses a hammer whose force the device sees with the other sign than it has: it would wait for every hit in vain.
-pub(super) fn same_sign(device: &ChannelMap, calibrated: &ChannelMap) -> Result<(), String> {
-    let sign = |map: &ChannelMap| Some(map.channels[map.place(Role::HammerForce)?].units_per_volt.signum());
-    if sign(device) == sign(calibrated) {
-        return Ok(());
-    }
-    Err("its hammer's force has the other sign than the calibration says, and no hit would be found: turn it at the amplifier".into())
+/// Refuses a device that sees one of these with the other sign than it has: it finds hits in a force, and holds the shaker's amplitude by
+/// the difference of two motions, with the signs that it was built with.
+pub(super) fn same_sign(device: &ChannelMap, calibrated: &ChannelMap, roles: &[Role]) -> Result<(), String> {
+    let turned = |role: &&Role| {
+        let sign = |map: &ChannelMap| Some(map.channels[map.place(**role)?].units_per_volt.signum());
+        sign(device) != sign(calibrated)
+    };
+    let Some(place) = roles.iter().find(turned).and_then(|role| device.place(*role)) else { return Ok(()) };
+    Err(format!(
+        "its channel `{}` has the other sign than the calibration says, and the device acts on it: turn it at the amplifier",
+        device.channels[place].name
+    ))
 }

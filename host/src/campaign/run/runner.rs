@@ -11,6 +11,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
+use jointrig_protocol::channel::Role;
+
 use super::answers::Answers;
 use super::clock::ScanClock;
 use super::earlier::Earlier;
@@ -86,6 +88,9 @@ pub fn run(
     let info = session.info()?;
     let device = session.channels(&info)?;
     let (planned, remarks) = fitted(session.address(), &plan, &device)?;
+    let channels = store.calibrated(store.next_session()?, planned.clone())?;
+    same_sign(&device, &channels, &[Role::HammerForce])
+        .map_err(|what| RunError::Unfit { address: session.address().into(), what })?;
     let noted = SessionInfo {
         address: session.address().into(),
         board: info.board.as_str().into(),
@@ -96,9 +101,6 @@ pub fn run(
         schema_hash: Hex(session.hello().schema),
     };
     let id = store.begin_session(&noted, &planned)?;
-    let channels = store.calibrated(id, planned)?;
-    let unfit = |what| RunError::Unfit { address: session.address().into(), what };
-    same_sign(&device, &channels).map_err(unfit)?;
     let unknown = |name: &str| channels.channels.iter().all(|channel| channel.name != name);
     let calibrations = store.calibrations()?;
     let without = calibrations.iter().filter(|own| unknown(&own.channel));

@@ -22,6 +22,7 @@ use jointrig_protocol::answer::Info;
 use jointrig_protocol::channel::Role;
 use jointrig_protocol::request::{Configuration, Stage as StageRequest};
 
+use super::fit::{same_sign, with_sensors};
 use crate::campaign::plan::Plan;
 use crate::campaign::plan::level::Level;
 use crate::campaign::store::Store;
@@ -93,9 +94,10 @@ pub fn run_watched(
     let info = session.info()?;
     let device = session.channels(&info)?;
     let address = session.address().to_owned();
-    let (planned, remarks) = super::fit::with_sensors(&plan, &device)
-        .map_err(|what| ShakeError::Unfit { address: address.clone(), what })?;
+    let unfit = |what| ShakeError::Unfit { address: address.clone(), what };
+    let (planned, remarks) = with_sensors(&plan, &device).map_err(unfit)?;
     let channels = store.calibrated(store.next_session()?, planned.clone())?;
+    same_sign(&device, &channels, &[Role::SpecimenA, Role::SpecimenB, Role::Excitation]).map_err(unfit)?;
     error::check_fit(&address, &info, &channels, options)?;
     let noted = SessionInfo {
         address,
