@@ -12,8 +12,11 @@ use nalgebra::{DMatrix, DVector};
 
 /// Steps at most.
 const STEPS: usize = 60;
-/// The compliance moves less than this part of its standard deviation: done.
+/// The compliance moves less than this part of its standard deviation, and all parameters together lower the cost by less than this: done. One
+/// step alone can leave the compliance where it belongs by chance, and others, which it follows later, many standard deviations away.
 const SETTLED: f64 = 0.01;
+/// Steps that leave the compliance where it is, after which what is left of the cost is that of the shifts' motion, which is always a pass old.
+const AT_REST: usize = 4;
 /// A cost may rise by this part between passes: the shifts' motion is that of the pass before.
 const SLACK: f64 = 1e-3;
 /// A step damped by no more than this is the whole step.
@@ -80,6 +83,18 @@ pub fn solve(
     Ok(Solution { p: here.p, certainty, bins: here.bins, shared, chi_square })
 }
 
+/// Where a search from `p` on ends, with the noise as it stands, and whether it came to rest.
+#[cfg(test)]
+pub fn settled_from(
+    blocks: &[Block],
+    parameters: &Parameters,
+    sigma_per_s: f64,
+    p: Vec<f64>,
+) -> Result<(Vec<f64>, bool), ContactError> {
+    let shared = shared_by_lines(sigma_per_s, distance_hz(blocks));
+    Posterior { blocks, parameters, shared }.settle(p).map(|(place, settled)| (place.p, settled))
+}
+
 impl Posterior<'_> {
     /// Steps from `p` to the nearest minimum. The shifts' motion is that of the last place taken, so that a place's cost is not that of the
     /// next one's motion: where a step seems to lead uphill, the place it left is asked again. And whether it is there: before the noise is
@@ -90,11 +105,17 @@ impl Posterior<'_> {
         motion = motions(self.blocks, &here.bins);
         let mut stale = true;
         let mut damping = 1e-9;
+        let mut at_rest = 0;
         for _ in 0..STEPS {
             let (information, gradient) = self.normal(&here);
             let (step, sigma) = newton(&information, &gradient, damping)?;
             if damping <= HARDLY_DAMPED && step[COMPLIANCE].abs() <= SETTLED * sigma {
-                return Ok((here, true));
+                at_rest += 1;
+                if -0.5 * gradient.dot(&step) <= SETTLED || at_rest >= AT_REST {
+                    return Ok((here, true));
+                }
+            } else {
+                at_rest = 0;
             }
             let next = here.p.iter().zip(step.iter()).map(|(at, step)| at + step).collect();
             let next = self.place(next, &motion)?;

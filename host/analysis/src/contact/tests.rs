@@ -235,6 +235,26 @@ fn the_interval_is_what_repeated_measurements_scatter_by() {
 }
 
 #[test]
+fn a_search_rests_when_all_parameters_do_and_not_the_compliance_alone() {
+    let cells = measured(World { noise_m_per_s: 5e-7, ..QUIET });
+    let mut input = input(&cells);
+    input.priors = ContactPriors { skew_s: 2e-6, gain: 5e-3, ..input.priors };
+    let Fit { parameters, blocks, solution } = fit(&input).expect("all is there");
+    let sigma = |at: usize| solution.certainty.covariance[(at, at)].sqrt();
+    // the load cells' gain and delay, and the spot on A
+    for at in [parameters::FORM, parameters::FORM + 1, parameters::SPOTS] {
+        let mut away = solution.p.clone();
+        away[at] += 9.0 * sigma(at);
+        let (p, settled) = solver::settled_from(&blocks, &parameters, SIGMA_PER_S, away).expect("a minimum");
+        assert!(settled);
+        for other in [at, parameters::COMPLIANCE] {
+            let left = (p[other] - solution.p[other]).abs() / sigma(other);
+            assert!(left < 0.2, "parameter {other} is {left} standard deviations off, from {at} moved");
+        }
+    }
+}
+
+#[test]
 fn a_point_that_is_millimetres_off_is_doubted() {
     let cells = measured(World { misplaced_m: 4e-3, ..QUIET });
     let found = stiffness(&input(&cells)).expect("a fit, if a bad one");
