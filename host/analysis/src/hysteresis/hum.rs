@@ -6,6 +6,7 @@
 use super::finding::LoopFinding;
 use super::record::{HysteresisRecord, RelativeMotion};
 use num_complex::Complex;
+use realfft::RealFftPlanner;
 use std::f64::consts::TAU;
 
 /// The mains of the world, Hz.
@@ -23,8 +24,12 @@ const LONGEST_S: f64 = 4.0;
 /// Widths of a line (1/duration) that a Blackman-Harris window needs to tell two lines apart.
 const APART: f64 = 5.0;
 
-/// A line stands out above the median of its surroundings by this factor: noise alone does once in 10¹⁰ lines.
-const STANDS_OUT: f64 = 6.0;
+/// A line stands out if its power is this many times the mean of its surroundings: noise alone does once in 10⁷ lines
+/// (F distribution of 2 and 4 `SURROUNDINGS` / 2 degrees of freedom; the window correlates neighbours in pairs).
+const STANDS_OUT: f64 = 25.0;
+
+/// Lines on each side that tell what the surroundings are.
+const SURROUNDINGS: usize = 24;
 
 /// Less than this part of the fundamental moves nothing that matters.
 const MATTERS: f64 = 2e-3;
@@ -59,6 +64,12 @@ pub(super) fn at_the_loop(record: &HysteresisRecord, frequency_hz: f64) -> Optio
 /// The strongest multiple of the mains that stands free, over the fundamental; 0 if none stands out.
 fn part(signal: &[f64], fs_hz: f64, frequency_hz: f64, mains_hz: f64) -> f64 {
     let line_hz = fs_hz / signal.len() as f64;
+    let fft = RealFftPlanner::new().plan_fft_forward(signal.len());
+    let mut spectrum = fft.make_output_vec();
+    // lengths are the plan's own, so that nothing can fail
+    if fft.process(&mut signal.to_vec(), &mut spectrum).is_err() {
+        return 0.0;
+    }
     let amplitude = |f: f64| {
         let step = Complex::from_polar(1.0, -TAU * f / fs_hz);
         let mut wheel = Complex::new(1.0, 0.0);
@@ -81,11 +92,15 @@ fn part(signal: &[f64], fs_hz: f64, frequency_hz: f64, mains_hz: f64) -> f64 {
             // the mains are a little off: the largest of the lines nearby
             let reach = (WANDER * f / line_hz).ceil() as i32;
             let here = (-reach..=reach).map(|o| amplitude(f + f64::from(o) * line_hz)).fold(0.0, f64::max);
-            let mut around: Vec<f64> = [-8.0, -7.0, -6.0, -5.0, 5.0, 6.0, 7.0, 8.0]
-                .map(|o| amplitude(f + (o + f64::from(reach) * f64::signum(o)) * line_hz))
-                .to_vec();
-            around.sort_by(f64::total_cmp);
-            (here > STANDS_OUT * around[around.len() / 2]).then_some(here / fundamental)
+            let next = APART as i32 + reach;
+            let beside = (next..next + SURROUNDINGS as i32).flat_map(|o| [-o, o]);
+            let around: Vec<f64> = beside
+                .map(|o| f + f64::from(o) * line_hz)
+                .filter(|f| *f > APART * line_hz && free(f))
+                .filter_map(|f| spectrum.get((f / line_hz).round() as usize).map(Complex::norm_sqr))
+                .collect();
+            let mean = around.iter().sum::<f64>() / around.len() as f64;
+            (here * here > STANDS_OUT * mean).then_some(here / fundamental)
         })
         .fold(0.0, f64::max)
 }
@@ -103,4 +118,41 @@ fn windowed(x: &[f64]) -> Vec<f64> {
             (v - mean) * window
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    const FS_HZ: f64 = 51_200.0;
+
+    /// 0.6 s of 200 Hz in noise, with this part of hum at 150 Hz.
+    fn in_noise(seed: u64, hum: f64) -> Vec<f64> {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let signal: Vec<f64> = (0..30_721)
+            .map(|i| {
+                let turns = TAU * f64::from(i) / FS_HZ;
+                let noise: f64 = StandardNormal.sample(&mut rng);
+                (200.0 * turns).sin() + hum * (150.0 * turns).sin() + 0.15 * noise
+            })
+            .collect();
+        windowed(&signal)
+    }
+
+    #[test]
+    fn noise_is_no_hum_and_hum_is_found_in_it() {
+        for seed in 0..100 {
+            for mains in MAINS_HZ {
+                let found = part(&in_noise(seed, 0.0), FS_HZ, 200.0, mains);
+                assert!(found == 0.0, "seed {seed}: {found} at {mains} Hz");
+            }
+        }
+        for seed in 0..20 {
+            let found = part(&in_noise(seed, 0.02), FS_HZ, 200.0, 50.0);
+            assert!((found - 0.02).abs() < 0.005, "seed {seed}: {found}");
+        }
+    }
 }
