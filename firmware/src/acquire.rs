@@ -31,6 +31,8 @@ pub async fn acquire<M: RawMutex, S: Scans, C: Coil, D: Drive, I: Inputs>(
 ) -> ! {
     let mut samples = Aligned([0; BLOCK_SAMPLE_BYTES]);
     let mut codes = [0; BLOCK_SAMPLE_BYTES / 2];
+    // a host may ask before there is a stream
+    core.watch_inputs(inputs);
     loop {
         if scans.can_be_held() {
             core.wait_until_it_may_run().await;
@@ -126,6 +128,9 @@ impl<M: RawMutex> Core<'_, M> {
         if let Some(fault) = inputs.fault() {
             self.report_fault(fault);
         }
+        if let Some(slow) = inputs.slow() {
+            self.with(|state| state.take_slow(slow));
+        }
         self.with(|state| {
             if state.emergency_stop && !pressed && reset {
                 state.emergency_stop = false;
@@ -169,8 +174,10 @@ impl State<'_> {
         if scans == 0 {
             return Given::default();
         }
-        let outcome = self.hammer.block(&block, self.friction.as_ref());
-        let flags = if over { OVER_RANGE } else { 0 } | if outcome.trigger { TRIGGER } else { 0 };
+        // at rest there is no outcome, not even one of 80 bytes that says so
+        let outcome = (!self.hammer.is_disarmed()).then(|| self.hammer.block(&block, self.friction.as_ref()));
+        let trigger = outcome.as_ref().is_some_and(|outcome| outcome.trigger);
+        let flags = if over { OVER_RANGE } else { 0 } | if trigger { TRIGGER } else { 0 };
         if self.streaming {
             let dropped = self.ring.push(self.next_scan, flags, scans as u8, samples);
             self.counters.scans_dropped += dropped;
@@ -185,7 +192,9 @@ impl State<'_> {
             self.tell_of_shaker(events.into_iter().flatten());
         }
         self.next_scan += scans as u64;
-        self.tell(&outcome);
+        if let Some(outcome) = &outcome {
+            self.tell(outcome);
+        }
         let last = moves && !self.shaker.moves();
         Given { codes: if moves { scans } else { 0 }, last, ..Given::default() }
     }

@@ -8,6 +8,7 @@ use embassy_sync::blocking_mutex::raw::RawMutex;
 use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
 use jointrig_protocol::request::Stage as Place;
+use jointrig_protocol::slow::Slow;
 
 /// The parts of one board.
 pub trait Board {
@@ -119,6 +120,11 @@ pub trait Inputs {
     fn local_reset(&mut self) -> bool;
     /// What is wrong with the guard chain, for the host: once for each thing that is.
     fn fault(&mut self) -> Option<&'static str> {
+        None
+    }
+    /// The specimen's temperature and the bias of sensors that are fed with a constant current, when they were measured since this was
+    /// asked last: some ten times a second. None on a board that has neither.
+    fn slow(&mut self) -> Option<Slow> {
         None
     }
 }

@@ -18,6 +18,8 @@ pub struct Friction {
     places: [usize; CELLS],
     /// N per code of each cell.
     newtons_per_code: Vector3<f32>,
+    /// Sums of the calibration matrix's columns.
+    columns: RowVector3<f32>,
     /// N per code of each cell, through the calibration.
     weights: RowVector3<f32>,
 }
@@ -36,14 +38,28 @@ impl Friction {
         if cells.next().is_some() {
             return None;
         }
-        let mut friction = Self { places, newtons_per_code, weights: RowVector3::zeros() };
+        let mut friction =
+            Self { places, newtons_per_code, columns: RowVector3::repeat(1.0), weights: RowVector3::zeros() };
         friction.calibrate(&Matrix3::identity());
         Some(friction)
     }
 
     /// Takes a calibration matrix: forces = matrix × readings.
     pub fn calibrate(&mut self, matrix: &Matrix3<f32>) {
-        self.weights = RowVector3::repeat(1.0) * matrix * Matrix3::from_diagonal(&self.newtons_per_code);
+        self.columns = RowVector3::repeat(1.0) * matrix;
+        self.weigh();
+    }
+
+    /// Takes other scales; the matrix stays.
+    pub(crate) fn judge_by(&mut self, scales: &[f32]) {
+        for (newtons_per_code, place) in self.newtons_per_code.iter_mut().zip(self.places) {
+            *newtons_per_code = scales[place];
+        }
+        self.weigh();
+    }
+
+    fn weigh(&mut self) {
+        self.weights = self.columns.component_mul(&self.newtons_per_code.transpose());
     }
 
     /// The mean of T over some scans of so many channels, N: since T is linear in the codes, they are summed as they are.

@@ -11,17 +11,18 @@
 //! acquisition task carries out. One arming allows one shot. The pulse's length is bounded here, again by
 //! the board's cap, and a last time by the hardware.
 
-use heapless::Vec;
 use jointrig_protocol::answer::{self, Refusal};
 use jointrig_protocol::channel::{Channel, Role};
 use jointrig_protocol::event::Reason;
-use jointrig_protocol::limits::{ARM_VALID_CAP_MS, COIL_PULSE_CAP_US, MAX_CHANNELS};
+use jointrig_protocol::limits::{ARM_VALID_CAP_MS, COIL_PULSE_CAP_US};
 use jointrig_protocol::request::{Fire, Trigger};
 use jointrig_protocol::shot::{Phase, Shot};
 
 use crate::friction::Friction;
 use crate::pulse::Pulse;
 use crate::quiet::Quiet;
+use crate::scales::{UnitsPerCode, as_built};
+use crate::scan_time::{ms_of_scans, scans_in_ms};
 
 /// Shortest time from the end of one pulse to the next, ms. The coil driver's own pause is a little shorter (docs/WIRING.md): a pulse within it would
 /// be lost in hardware, so the shot waits.
@@ -72,8 +73,8 @@ enum State {
 pub struct Hammer {
     rate_hz: u32,
     cap_us: u32,
-    force: Option<(usize, f32)>,
-    units_per_code: Vec<f32, MAX_CHANNELS>,
+    force: Option<usize>,
+    units_per_code: UnitsPerCode,
     trigger: Trigger,
     state: State,
     shot: Option<Shot>,
@@ -91,8 +92,8 @@ impl Hammer {
         Self {
             rate_hz,
             cap_us: cap_us.min(COIL_PULSE_CAP_US),
-            force: force.map(|place| (place, channels[place].units_per_code_f32())),
-            units_per_code: channels.iter().map(|channel| channel.units_per_code_f32().abs()).collect(),
+            force,
+            units_per_code: as_built(channels),
             trigger: Trigger {
                 level_n: 1.0,
                 flight_scans: rate_hz / 10,
@@ -107,6 +108,11 @@ impl Hammer {
         }
     }
 
+    /// Judges by these scales from now on.
+    pub(crate) fn judge_by(&mut self, scales: &UnitsPerCode) {
+        self.units_per_code.clone_from(scales);
+    }
+
     /// What it does, in the protocol's words.
     pub fn state(&self) -> answer::Hammer {
         match self.state {
@@ -119,11 +125,22 @@ impl Hammer {
         }
     }
 
+    /// The place of the force that it is judged by.
+    pub fn force_channel(&self) -> Option<usize> {
+        self.force
+    }
+
+    /// Whether a block is nothing to it: it is disarmed, and nothing is followed.
+    #[inline]
+    pub fn is_disarmed(&self) -> bool {
+        matches!(self.state, State::Disarmed)
+    }
+
     /// Remaining arming, ms.
     pub fn armed_for_ms(&self, now: u64) -> u32 {
         match self.state {
             State::Armed { until } | State::Waiting { until, .. } => {
-                (until.saturating_sub(now) * 1000 / u64::from(self.rate_hz)) as u32
+                ms_of_scans(until.saturating_sub(now), self.rate_hz)
             }
             _ => 0,
         }
@@ -178,7 +195,7 @@ impl Hammer {
         match self.state {
             // the rest after a shot does not forbid arming: the next shot waits for its end
             State::Disarmed | State::Armed { .. } | State::HoldOff { .. } => {
-                let until = now + u64::from(valid_ms) * u64::from(self.rate_hz) / 1000;
+                let until = now + scans_in_ms(valid_ms, self.rate_hz);
                 self.state = State::Armed { until };
                 Ok(())
             }
@@ -211,7 +228,8 @@ impl Hammer {
             ));
         }
         self.last_number = order.number;
-        let limits = order.quiet_limits.iter().zip(&self.units_per_code).map(|(limit, unit)| limit / unit);
+        let limits =
+            order.quiet_limits.iter().zip(&self.units_per_code).map(|(limit, unit)| limit / unit.abs());
         let quiet = Quiet::new(limits, order.quiet_window);
         self.shot = Some(Shot {
             number: order.number,
@@ -312,7 +330,8 @@ impl Hammer {
         }
         if calm {
             let pulse_us = self.shot.map_or(0, |shot| shot.pulse_us);
-            let pulse_scans = u64::from(pulse_us) * u64::from(self.rate_hz) / 1_000_000 + 1;
+            // at most 8 ms, so that the product has 32 bits up to 536 kHz
+            let pulse_scans = u64::from(pulse_us * self.rate_hz / 1_000_000) + 1;
             if let Some(shot) = &mut self.shot {
                 shot.fired_at = end;
             }
@@ -342,7 +361,8 @@ impl Hammer {
 
     fn follow(&mut self, block: &impl Scanned, friction: Option<&Friction>) -> Outcome {
         let mut outcome = Outcome::default();
-        let Some((place, newtons_per_code)) = self.force else { return outcome };
+        let Some(place) = self.force else { return outcome };
+        let newtons_per_code = self.units_per_code[place];
         for scan in 0..block.scans() {
             let now = block.first_scan() + scan as u64;
             let force = f32::from(block.code(scan, place)) * newtons_per_code;

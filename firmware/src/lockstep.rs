@@ -49,6 +49,12 @@ pub const BLOCK_AT: usize = 0x2000;
 pub const DRIVE_FULL_SCALE_V: f32 = 10.0;
 /// Where codes for the shaker's drive stand, each of 16 bits.
 pub const DRIVE_AT: usize = 0x3000;
+/// Where slow values stand ([`Slow`](jointrig_protocol::slow::Slow) in postcard), behind their length as a word.
+pub const SLOW_AT: usize = 0x5000;
+/// The longest of them.
+pub const SLOW_BYTES: usize = 0x100;
+/// Slow values have been measured; it counts once, with the next block.
+pub const SLOW_MEASURED: u32 = 128;
 /// Where the ring of bytes for the board begins.
 pub const TO_DEVICE_AT: usize = 0x1_0000;
 /// Where the ring of bytes for the host begins.

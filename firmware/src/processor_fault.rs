@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use crate::sentence::{Sentence, Tell};
+
 /// The status registers as they were when the fault handler began.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Status {
@@ -35,16 +37,22 @@ const WORDS: [(u32, &str); 16] = [
 const MMFAR_VALID: u32 = 1 << 7;
 const BFAR_VALID: u32 = 1 << 15;
 
+impl Tell for Status {
+    fn tell(&self, to: &mut Sentence) {
+        let word = WORDS.iter().find(|(bit, _)| self.cfsr & (1 << bit) != 0);
+        to.text(word.map_or("cause unknown", |(_, word)| word));
+        if self.cfsr & BFAR_VALID != 0 {
+            to.text(" at ").hex(self.bfar, 8);
+        } else if self.cfsr & MMFAR_VALID != 0 {
+            to.text(" at ").hex(self.mmfar, 8);
+        }
+        to.text(" (CFSR ").hex(self.cfsr, 1).text(")");
+    }
+}
+
 impl fmt::Display for Status {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let word = WORDS.iter().find(|(bit, _)| self.cfsr & (1 << bit) != 0);
-        write!(f, "{}", word.map_or("cause unknown", |(_, word)| word))?;
-        if self.cfsr & BFAR_VALID != 0 {
-            write!(f, " at {:#010x}", self.bfar)?;
-        } else if self.cfsr & MMFAR_VALID != 0 {
-            write!(f, " at {:#010x}", self.mmfar)?;
-        }
-        write!(f, " (CFSR {:#x})", self.cfsr)
+        Sentence::of(self).fmt(f)
     }
 }
 

@@ -26,9 +26,7 @@ pub async fn receive<M: RawMutex, S: ByteSource, P: Stage>(
         let read = source.read(&mut bytes).await;
         if read == 0 {
             accumulator = Accumulator::new();
-            // whoever gave the orders cannot take them back any more
-            core.with(|state| state.bring_to_rest(Reason::LinkLost));
-            core.to_send.signal(());
+            core.link_is_cut();
             continue;
         }
         let mut rest = &bytes[..read];
@@ -45,6 +43,13 @@ pub async fn receive<M: RawMutex, S: ByteSource, P: Stage>(
 }
 
 impl<M: RawMutex> Core<'_, M> {
+    /// The link is cut: whoever gave orders cannot take them back any more, and everything that moves comes to rest. For a board that
+    /// notices by other means than the source of its bytes.
+    pub fn link_is_cut(&self) {
+        self.with(|state| state.bring_to_rest(Reason::LinkLost));
+        self.to_send.signal(());
+    }
+
     /// One good frame from the host.
     fn hear(&self, frame: &Frame<'_>, stage: &mut impl Stage) {
         self.with(|state| {
@@ -83,6 +88,7 @@ impl<M: RawMutex> Core<'_, M> {
             state.resends.clear();
             state.memory = Memory::new();
             state.hammer.forget();
+            state.forget_scales(self.facts.channels);
             state.session = agreed.then_some(theirs.session);
             if agreed {
                 info!("session {}", theirs.session);

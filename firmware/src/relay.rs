@@ -4,8 +4,8 @@
 //! (EN 61810-3). So a board reads that contact back. Each time that the chain opens the relay must be seen to drop, or nothing moves any more; and
 //! after a start it must have been seen to drop once, because nobody knows what happened before.
 
-/// Longest time in which the relay may drop or pull, ms: some 20 ms with diode and Zener across its coil, and as much again for bouncing contacts.
-pub const WITHIN_MS: u64 = 50;
+/// Longest time in which the relay may drop or pull, µs: some 20 ms with diode and Zener across its coil, and as much again for bouncing contacts.
+pub const WITHIN_US: u64 = 50_000;
 
 /// What is wrong with the relay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,8 +40,8 @@ impl Fault {
 #[derive(Clone, Copy, Debug)]
 pub struct Relay {
     chain_closed: bool,
-    /// When the chain was last seen to change, ms.
-    since_ms: u64,
+    /// When the chain was last seen to change, µs.
+    since_us: u64,
     /// Seen to drop since the chain last closed.
     proven: bool,
     failed: Option<Fault>,
@@ -57,21 +57,21 @@ impl Relay {
     /// After a start: nothing is known.
     #[must_use]
     pub const fn new() -> Self {
-        Self { chain_closed: false, since_ms: 0, proven: false, failed: None }
+        Self { chain_closed: false, since_us: 0, proven: false, failed: None }
     }
 
     /// Chain and return contact as they are now; whether something may move.
     ///
     /// # Errors
     /// What is wrong with the relay. A failure stays until the next start.
-    pub fn see(&mut self, chain_closed: bool, dropped: bool, now_ms: u64) -> Result<bool, Fault> {
+    pub fn see(&mut self, chain_closed: bool, dropped: bool, now_us: u64) -> Result<bool, Fault> {
         if chain_closed != self.chain_closed {
-            (self.chain_closed, self.since_ms) = (chain_closed, now_ms);
+            (self.chain_closed, self.since_us) = (chain_closed, now_us);
             if !chain_closed {
                 self.proven = false;
             }
         }
-        let late = now_ms.saturating_sub(self.since_ms) > WITHIN_MS;
+        let late = now_us.saturating_sub(self.since_us) > WITHIN_US;
         self.proven |= !chain_closed && dropped;
         if self.failed.is_none() && late && chain_closed == dropped {
             self.failed = Some(if chain_closed { Fault::Rests } else { Fault::Stays });
@@ -94,7 +94,7 @@ mod tests {
         let (mut at, mut last) = (0, Ok(false));
         for (until, chain_closed, dropped) in stretches {
             while at < *until {
-                last = relay.see(*chain_closed, *dropped, at);
+                last = relay.see(*chain_closed, *dropped, 1000 * at);
                 at += 1;
             }
         }

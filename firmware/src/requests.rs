@@ -62,6 +62,10 @@ impl<M: RawMutex> Core<'_, M> {
                 state.tell_of_shaker(stops);
                 Ok(Answer::Done)
             }),
+            Request::Scales { units_per_volt } => self
+                .with(|state| state.take_scales(self.facts.channels, units_per_volt))
+                .map(|()| Answer::Done),
+            Request::Slow => Ok(Answer::Slow(self.with(|state| state.slow.clone()))),
         }
     }
 

@@ -3,6 +3,8 @@
 //! Blocks enter with increasing first scans. A cursor says what has been sent; what leaves the ring
 //! unsent is counted as dropped and kept as a range until it has been reported.
 
+#![expect(clippy::inline_always, reason = "built for size, each would be a call or three for every block")]
+
 use jointrig_protocol::block::{GAP, Header};
 use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
 
@@ -97,12 +99,14 @@ impl<'a> Ring<'a> {
     }
 
     /// The slot of a block that is held, or of the next one.
+    #[inline(always)]
     fn place(&self, sequence: u64) -> usize {
         // the difference is below the length, or equal to it: no division, of which there would be two for each block
         let place = self.tail_place + (sequence - self.tail) as usize;
         if place >= self.slots.len() { place - self.slots.len() } else { place }
     }
 
+    #[inline(always)]
     fn slot(&self, sequence: u64) -> &Slot {
         &self.slots[self.place(sequence)]
     }
@@ -192,6 +196,7 @@ impl<'a> Ring<'a> {
         Some((self.out(sequence, flag), end))
     }
 
+    #[inline(always)]
     fn out(&self, sequence: u64, flag: u8) -> Out<'_> {
         let slot = self.slot(sequence);
         Out {

@@ -19,7 +19,6 @@
 
 use heapless::Vec;
 use jointrig_protocol::channel::{Channel, Role};
-use jointrig_protocol::limits::MAX_CHANNELS;
 use jointrig_protocol::request::Control;
 #[allow(unused_imports, reason = "core has no powf; where std is linked its own is taken")]
 use micromath::F32Ext;
@@ -82,6 +81,14 @@ pub enum Trouble {
     Weak,
 }
 
+/// What measures: the channels, and the scale of each.
+pub struct Gauges<'a> {
+    /// Which serves for what.
+    pub channels: &'a [Channel],
+    /// SI units per code, with its sign, in the same order.
+    pub units_per_code: &'a [f32],
+}
+
 /// The controller of one order.
 pub struct Servo {
     terms: Vec<Term, 2>,
@@ -114,10 +121,10 @@ struct Steep {
 
 impl Servo {
     /// For the channels of this device; `None` when they do not measure what is to be controlled, or when nothing is.
-    pub fn new(channels: &[Channel], rate_hz: u32, control: Control, step: u32, most_v: f32) -> Option<Self> {
+    pub fn new(gauges: &Gauges<'_>, rate_hz: u32, control: Control, step: u32, most_v: f32) -> Option<Self> {
         let find = |role: Role| {
-            let place = channels.iter().take(MAX_CHANNELS).position(|channel| channel.role == role)?;
-            Some((place as u8, channels[place].units_per_code_f32()))
+            let place = gauges.channels.iter().position(|channel| channel.role == role)?;
+            Some((place as u8, *gauges.units_per_code.get(place)?))
         };
         let mut terms = Vec::new();
         let (target, gain) = match control {

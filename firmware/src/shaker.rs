@@ -18,7 +18,9 @@ use jointrig_protocol::limits::{MAX_CHANNELS, SHAKE_RAMP_MS, SHAKE_SCANS_PER_CYC
 use jointrig_protocol::request::{Control, Shake};
 
 use crate::hammer::Scanned;
-use crate::servo::{Servo, Trouble};
+use crate::scales::{UnitsPerCode, as_built};
+use crate::scan_time::scans_in_ms;
+use crate::servo::{Gauges, Servo, Trouble};
 use crate::sine::sine;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,7 +42,7 @@ pub struct Shaker<'a> {
     channels: &'a [Channel],
     rate_hz: u32,
     full_scale_v: f32,
-    units_per_code: Vec<f32, MAX_CHANNELS>,
+    units_per_code: UnitsPerCode,
     state: State,
     /// The angle of the next scan, in parts of 2³² of a turn.
     angle: u32,
@@ -60,7 +62,7 @@ impl<'a> Shaker<'a> {
             channels,
             rate_hz,
             full_scale_v,
-            units_per_code: channels.iter().map(|channel| channel.units_per_code_f32().abs()).collect(),
+            units_per_code: as_built(channels),
             state: State::Resting,
             angle: 0,
             step: 0,
@@ -70,6 +72,11 @@ impl<'a> Shaker<'a> {
             bounds: Vec::new(),
             servo: None,
         }
+    }
+
+    /// Judges by these scales from the next order on.
+    pub(crate) fn judge_by(&mut self, scales: &UnitsPerCode) {
+        self.units_per_code.clone_from(scales);
     }
 
     /// What it does, in the protocol's words.
@@ -139,7 +146,8 @@ impl<'a> Shaker<'a> {
         if !(target.is_finite() && (target > 0.0 || order.control == Control::Drive)) {
             return refuse("the controlled amplitude must be above 0");
         }
-        let mut servo = Servo::new(self.channels, self.rate_hz, order.control, order.step, order.amplitude_v);
+        let gauges = Gauges { channels: self.channels, units_per_code: &self.units_per_code };
+        let mut servo = Servo::new(&gauges, self.rate_hz, order.control, order.step, order.amplitude_v);
         if servo.is_none() && order.control != Control::Drive {
             return Err(Refusal::Unsupported);
         }
@@ -162,13 +170,12 @@ impl<'a> Shaker<'a> {
         self.servo = servo;
         self.slew_v = order.slew_v_per_s / self.rate_hz as f32;
         self.bounds = self.bounds_of(&order.limits);
-        self.state =
-            State::Running { until: now + u64::from(order.valid_ms) * u64::from(self.rate_hz) / 1000 };
+        self.state = State::Running { until: now + scans_in_ms(order.valid_ms, self.rate_hz) };
         Ok(was_resting.then_some(Event::ShakerRuns))
     }
 
     fn bounds_of(&self, limits: &[f32]) -> Vec<Bound, MAX_CHANNELS> {
-        let codes = limits.iter().zip(&self.units_per_code).map(|(limit, unit)| limit / unit);
+        let codes = limits.iter().zip(&self.units_per_code).map(|(limit, unit)| limit / unit.abs());
         let bounds = codes.enumerate().filter(|(_, code)| *code > 0.0);
         // a limit beyond the converter's range saturates to its end, which is never exceeded
         bounds.map(|(channel, code)| Bound { channel: channel as u8, code: code as u16 }).collect()

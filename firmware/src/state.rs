@@ -8,9 +8,10 @@ use embassy_sync::signal::Signal;
 use embassy_time::Instant;
 use heapless::{Deque, String};
 use jointrig_protocol::answer::{self, Counters, Info, Refusal, Reset};
-use jointrig_protocol::channel::{Channel, Name};
+use jointrig_protocol::channel::{Channel, Name, Role};
 use jointrig_protocol::event::{self, Event, Loss, Reason};
 use jointrig_protocol::limits;
+use jointrig_protocol::slow::Slow;
 
 use crate::fmt::{info, warning};
 use crate::friction::Friction;
@@ -99,6 +100,12 @@ pub(crate) struct State<'a> {
     pub coil: Option<CoilOrder>,
     /// The drive must rest at once.
     pub drive_off: bool,
+    /// Temperature and sensor supplies as they were measured last.
+    pub slow: Slow,
+    /// The channel of the excitation's force.
+    pub excitation: Option<usize>,
+    /// The session has brought scales of its own.
+    pub scales_told: bool,
 }
 
 impl<'a, M: RawMutex> Core<'a, M> {
@@ -139,6 +146,9 @@ impl<'a, M: RawMutex> Core<'a, M> {
             emergency_stop: false,
             coil: None,
             drive_off: false,
+            slow: Slow::default(),
+            excitation: facts.channels.iter().position(|channel| channel.role == Role::Excitation),
+            scales_told: false,
         };
         Self {
             facts,
@@ -263,14 +273,14 @@ impl State<'_> {
     /// Whether the hammer may be armed, or fired.
     pub fn may_strike(&self) -> Result<(), Refusal> {
         self.may_move()?;
-        if self.shaker.moves() { Err(Refusal::ShakerRuns) } else { Ok(()) }
+        if self.shaker.moves() { Err(Refusal::ShakerRuns) } else { self.is_fed(self.hammer.force_channel()) }
     }
 
     /// Whether the shaker may run.
     pub fn may_shake(&self) -> Result<(), Refusal> {
         self.may_move()?;
         match self.hammer.state() {
-            answer::Hammer::Disarmed | answer::Hammer::HoldOff => Ok(()),
+            answer::Hammer::Disarmed | answer::Hammer::HoldOff => self.is_fed(self.excitation),
             _ => Err(Refusal::HammerArmed),
         }
     }

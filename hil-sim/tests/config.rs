@@ -127,6 +127,7 @@ fn contacts_that_cannot_be_are_refused_with_their_field() {
         ("iwan.elements = 0", "contact.iwan.elements", "1 to 1000"),
         ("iwan.spread = 1.5", "contact.iwan.spread", "between 0 and 1"),
         ("stiffness_n_per_m = [1e8, 1e8, 0.0]", "contact.stiffness_n_per_m", "kz"),
+        ("stiffness_n_per_m = [1e8, 1e8, 180.0]", "contact.stiffness_n_per_m", "180e6 for 180 N/µm"),
     ] {
         let error = complaint(&format!("[contact]\nlaw = \"iwan\"\n{lines}\n"));
         assert!(error.contains(field) && error.contains("line 3") && error.contains(words), "{error}");

@@ -3,12 +3,13 @@
 
 mod support;
 
-use jointrig_hil_sim::board::VirtualBoard;
-use jointrig_hil_sim::rig::config::ContactLaw;
+use jointrig_hil_sim::board::{Options, VirtualBoard};
+use jointrig_hil_sim::rig::config::{ContactLaw, Errors};
 use jointrig_hil_sim::rig::{Rig, RigConfig};
-use jointrig_protocol::answer::Answer;
+use jointrig_protocol::answer::{Answer, Refusal};
 use jointrig_protocol::event::{Event, Reason};
-use jointrig_protocol::request::{Control, Request, Shake};
+use jointrig_protocol::request::{Configuration, Control, Request, Shake};
+use jointrig_protocol::shot::Phase;
 use support::SmallHost;
 
 const JENKINS: &str = include_str!("../rigs/jenkins.toml");
@@ -73,6 +74,118 @@ fn the_specimens_move_as_far_as_was_ordered() {
         assert!((measured - 1.0).abs() < 0.02, "{measured}");
         assert!(!host.events.iter().any(|event| matches!(event, Event::ShakerStops(_))));
     }
+}
+
+/// Amplitudes (m) of the specimens' relative displacement and of specimen A's own, in the last `scans` scans, whole cycles of
+/// `frequency_hz`; `volts` is what the two vibrometers give over what their scales say.
+fn true_motions_m(host: &SmallHost, frequency_hz: f64, scans: usize, volts: [f64; 2]) -> [f64; 2] {
+    let rig = Rig::new(&RigConfig::default(), 1).unwrap();
+    let unit = [0, 1].map(|at: usize| {
+        let channel = &rig.channels()[LDV[at]];
+        channel.units_per_volt * f64::from(channel.polarity) * channel.range_v / 32_768.0 / volts[at]
+    });
+    let codes = &host.codes[host.codes.len() - scans * host.channels..];
+    let mut sums = [[0.0; 2]; 2];
+    for (i, scan) in codes.chunks(host.channels).enumerate() {
+        let [a, b] = [0, 1].map(|at: usize| f64::from(scan[LDV[at]]) * unit[at]);
+        let angle = std::f64::consts::TAU * frequency_hz * i as f64 / f64::from(RATE);
+        for (sum, velocity) in sums.iter_mut().zip([a - b, a]) {
+            sum[0] += velocity * angle.cos();
+            sum[1] += velocity * angle.sin();
+        }
+    }
+    sums.map(|[re, im]| 2.0 * re.hypot(im) / scans as f64 / (std::f64::consts::TAU * frequency_hz))
+}
+
+#[test]
+fn vibrometers_calibrated_apart_leave_no_common_motion_in_what_is_held() {
+    let (frequency_hz, amplitude_m) = (100.0, 2e-7_f32);
+    let held = |volts: [f64; 2], told: Option<[f64; 2]>| {
+        let mut config = RigConfig::default();
+        config.errors = Errors { none: true, ..config.errors }.acting();
+        config.errors.none = false;
+        // a joint so stiff that the specimens move together, and little apart
+        config.contact.stiffness_n_per_m[2] *= 20.0;
+        config.errors.volts = [("ldv_a".into(), volts[0]), ("ldv_b".into(), volts[1])].into();
+        let (_board, link) =
+            VirtualBoard::start_with(&config, &Options { seed: 4, ..Options::default() }).unwrap();
+        let mut host = SmallHost::new(link);
+        if let Some(told) = told {
+            let mut units_per_volt: heapless::Vec<f32, 16> = (0..host.channels as u8)
+                .map(|index| match host.ask(Request::Channel { index }) {
+                    Ok(Answer::Channel(channel)) => channel.units_per_volt,
+                    other => panic!("no channel but {other:?}"),
+                })
+                .collect();
+            for (place, volts) in LDV.into_iter().zip(told) {
+                units_per_volt[place] /= volts as f32;
+            }
+            assert_eq!(host.ask(Request::Scales { units_per_volt }), Ok(Answer::Done));
+        }
+        host.start();
+        let shake = order(frequency_hz, Control::Displacement { amplitude_m });
+        assert_eq!(host.ask(Request::Shake(shake)), Ok(Answer::Done));
+        host.go_on(7 * u64::from(RATE));
+        let [relative, own] = true_motions_m(&host, frequency_hz, RATE as usize, volts);
+        (relative / f64::from(amplitude_m), own / relative)
+    };
+    let apart = [1.03, 0.97];
+    let (ratio, common) = held(apart, Some(apart));
+    assert!(common > 5.0, "the specimens move together {common} times as far as apart");
+    assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
+    let (untold, _) = held(apart, None);
+    assert!((untold - 1.0).abs() > 0.1, "by its own scales the device is off: {untold}");
+    // a sensor that is turned
+    let (turned, _) = held([1.0, -1.0], Some([1.0, -1.0]));
+    assert!((turned - 1.0).abs() < 0.02, "{turned}");
+}
+
+#[test]
+fn scales_are_checked_and_forgotten_with_the_session() {
+    let (_board, link) = VirtualBoard::start(None, 4).unwrap();
+    let mut host = SmallHost::new(link);
+    let built_in: Vec<f32> = (0..host.channels as u8)
+        .map(|index| match host.ask(Request::Channel { index }) {
+            Ok(Answer::Channel(channel)) => channel.units_per_volt,
+            other => panic!("no channel but {other:?}"),
+        })
+        .collect();
+    let scales = |factor: f32| Request::Scales {
+        units_per_volt: built_in.iter().map(|scale| scale * factor).collect(),
+    };
+    for wrong in [0.0, f32::NAN, f32::INFINITY, 1e-3, 1e3] {
+        assert!(matches!(host.ask(scales(wrong)), Err(Refusal::OutOfBounds(_))), "{wrong}");
+    }
+    // by half the newtons a volt the same force reads half as many
+    let peak = |host: &mut SmallHost, number: u32| {
+        let from = host.stage(Configuration::Ajb, "AZ3", "B3", 0);
+        let lead = host.lead();
+        let shot = host.shoot(SmallHost::order(number, support::PULSE_US, from + lead));
+        assert_eq!(shot.phase, Phase::Done);
+        shot.peak_n
+    };
+    host.start();
+    let own = peak(&mut host, 1);
+    assert_eq!(host.ask(scales(0.5)), Ok(Answer::Done));
+    let half = peak(&mut host, 2);
+    assert!((half / own - 0.5).abs() < 0.05, "{half} N and {own} N");
+    // neither while the hammer is armed nor while the shaker moves
+    assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
+    assert_eq!(host.ask(scales(1.0)), Err(Refusal::HammerArmed));
+    assert_eq!(host.ask(Request::Disarm), Ok(Answer::Done));
+    let shake = order(100.0, Control::Drive);
+    assert_eq!(host.ask(Request::Shake(Shake { amplitude_v: 0.01, ..shake })), Ok(Answer::Done));
+    assert_eq!(host.ask(scales(1.0)), Err(Refusal::ShakerRuns));
+    assert_eq!(host.ask(Request::EmergencyStop), Ok(Answer::Done));
+
+    let (board, link) = VirtualBoard::start(None, 4).unwrap();
+    let mut first = SmallHost::new(link);
+    assert_eq!(first.ask(scales(0.5)), Ok(Answer::Done));
+    let mut second = SmallHost::again(first, 100);
+    second.start();
+    let after = peak(&mut second, 1);
+    assert!((after / own - 1.0).abs() < 0.05, "{after} N and {own} N: forgotten with the session");
+    drop(board);
 }
 
 #[test]

@@ -1,6 +1,7 @@
-//! What to do about an error of the file system: the half of a message that the operating system leaves out.
+//! What to do next: the half of a message that the operating system leaves out, and paths as a command takes them.
 
 use std::io::{Error, ErrorKind};
+use std::path::Path;
 
 /// For a file that is read.
 pub(crate) fn reading(error: &Error) -> &'static str {
@@ -30,4 +31,11 @@ pub(crate) fn writing(error: &Error) -> &'static str {
         }
         _ => "is the disk whole and connected?",
     }
+}
+
+/// A path as a shell takes it: quoted where it must be.
+pub fn quoted(path: &Path) -> String {
+    let text = path.to_string_lossy();
+    // only a path with a byte of zero cannot be quoted, and no file has one
+    shlex::try_quote(&text).map_or_else(|_| text.to_string(), |quoted| quoted.to_string())
 }

@@ -30,6 +30,7 @@ fn options(levels: Vec<Level>) -> Options {
         sweep_hz_per_s: 40.0,
         most_drive_v: None,
         limits: Limits::default(),
+        new_structure: false,
         stop: Arc::new(AtomicBool::new(false)),
     }
 }

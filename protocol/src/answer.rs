@@ -8,6 +8,7 @@ use crate::channel::{Channel, Name};
 use crate::frame::FrameError;
 use crate::limits::SENTENCE_BYTES;
 use crate::shot::Shot;
+use crate::slow::{Slow, SupplyFault};
 
 /// The answer to the request of the same number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
@@ -65,6 +66,8 @@ pub enum Answer {
         /// The first scan for which that holds.
         at_scan: u64,
     },
+    /// Slow values.
+    Slow(Slow),
 }
 
 /// Why a request was not carried out. Variants only ever grow at the end.
@@ -116,6 +119,13 @@ pub enum Refusal {
     Stage(String<SENTENCE_BYTES>),
     /// The hammer is armed, or has a shot in hand.
     HammerArmed,
+    /// The constant-current supply of the channel that this needs finds no sensor.
+    Supply {
+        /// The channel's place in the scan.
+        channel: u8,
+        /// What it finds.
+        fault: SupplyFault,
+    },
 }
 
 impl core::fmt::Display for Refusal {
@@ -141,6 +151,9 @@ impl core::fmt::Display for Refusal {
             Self::ShotRepeated { last } => write!(f, "this shot number was used before (last: {last})"),
             Self::OutOfBounds(what) | Self::Stage(what) => f.write_str(what),
             Self::HammerArmed => f.write_str("the hammer is armed; disarm it before using the shaker"),
+            Self::Supply { channel, fault } => {
+                write!(f, "the sensor of channel {channel} (from 0) is not there: {fault}")
+            }
         }
     }
 }

@@ -45,15 +45,13 @@ pub struct Header {
 impl Header {
     /// The 15 payload bytes.
     #[must_use]
-    #[inline]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "built for size it would be a call for every block")]
     pub fn to_bytes(&self) -> [u8; HEADER_PAYLOAD] {
-        let mut out = [0; HEADER_PAYLOAD];
-        out[0] = self.flags;
-        out[1] = self.map;
-        out[2] = self.scans;
-        out[3..7].copy_from_slice(&self.epoch.to_le_bytes());
-        out[7..15].copy_from_slice(&self.first_scan.to_le_bytes());
-        out
+        // not by copies of slices: built for size, each of those is three calls, and this is done for every block
+        let [a, b, c, d] = self.epoch.to_le_bytes();
+        let [e, f, g, h, i, j, k, l] = self.first_scan.to_le_bytes();
+        [self.flags, self.map, self.scans, a, b, c, d, e, f, g, h, i, j, k, l]
     }
 }
 

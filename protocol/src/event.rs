@@ -100,6 +100,11 @@ pub enum Reason {
     RanDry,
     /// The front end lost scans, or none came for [`crate::limits::SCAN_SILENCE_MS`]: nothing moves blindly.
     FrontEnd,
+    /// The sensor that this needs is not there: the supply of its channel finds an open cable or a short.
+    Supply {
+        /// Place in the scan, from 0.
+        channel: u8,
+    },
 }
 
 /// Why scans were lost.

@@ -15,6 +15,7 @@ use crate::frame::{FrameError, Kind, Writer};
 use crate::hello::{Hello, Role as HelloRole};
 use crate::request::{self, Configuration, Control, Fire, Request, Shake, Stage, Trigger};
 use crate::shot::{Phase, Shot};
+use crate::slow::{Slow, Supply};
 
 macro_rules! golden {
     ($($name:ident),* $(,)?) => {
@@ -32,11 +33,13 @@ golden!(
     status,
     started,
     refused,
+    slow,
     fire,
     shake,
     stage,
     trigger,
     resend,
+    scales,
     shot_event,
     shaker_event,
     lost_event,
@@ -148,10 +151,15 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
         ("started", Ok(Answer::Started { epoch: 3, map: 1, first_scan: 0 })),
         ("refused", Err(Refusal::Gone { oldest: 5_000_038_720 })),
     ];
+    let mut supplies = Vec::new();
+    let _ = supplies.push(Supply { channel: 0, bias_v: 11.5 });
     frame.restart(Kind::Answer);
     for (number, (name, outcome)) in answers.into_iter().enumerate() {
         each(name, frame.seal_value(&answer::Numbered { number: number as u32, outcome })?);
     }
+
+    let slow = Slow { temperature_c: Some(22.25), supplies };
+    each("slow", frame.seal_value(&answer::Numbered { number: 6, outcome: Ok(Answer::Slow(slow)) })?);
 
     let mut quiet_limits = Vec::new();
     for limit in [0.0, 2.5e-6, 2.5e-6] {
@@ -161,6 +169,10 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
     let mut shake_limits = Vec::new();
     for limit in [0.0, 0.0, 0.02] {
         let _ = shake_limits.push(limit);
+    }
+    let mut units_per_volt = Vec::new();
+    for scale in [44.643, 0.00515, -0.00485] {
+        let _ = units_per_volt.push(scale);
     }
     let requests = [
         (
@@ -204,6 +216,7 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
             }),
         ),
         ("resend", Request::Resend { epoch: 3, first_scan: 5_000_000_000, scans: 48 }),
+        ("scales", Request::Scales { units_per_volt }),
     ];
     frame.restart(Kind::Request);
     for (number, (name, request)) in requests.into_iter().enumerate() {

@@ -25,4 +25,5 @@ pub mod packet;
 pub mod request;
 pub mod schema;
 pub mod shot;
+pub mod slow;
 pub mod usb;

@@ -57,6 +57,10 @@ pub const SHAKE_RAMP_MS: u32 = 50;
 /// The shaker's highest frequency, as a part of the scan rate: so many scans make one cycle at least.
 pub const SHAKE_SCANS_PER_CYCLE: u32 = 10;
 
+/// By how much a session's scale may differ from the one that a device was built with, as a factor: all ranges that a vibrometer's
+/// decoder or an amplifier's knob has lie within it, and a slip between V and mV does not.
+pub const SCALE_FACTOR_CAP: u32 = 100;
+
 /// A host that has not been heard for this long is gone: the hammer disarms (ms of the device's time).
 pub const LINK_SILENCE_MS: u32 = 1_000;
 

@@ -81,6 +81,17 @@ pub enum Request {
     Shake(Shake),
     /// Bring the shaker to rest, over a ramp. → `Done`
     Rest,
+    /// By which scales the device judges trigger, quiet, limits and amplitudes in this session, instead of those that it was built
+    /// with. What it says of its channels ([`Request::Channel`]) stays, and so do the samples. → `Done`
+    ///
+    /// Refused while the hammer is armed or the shaker moves. Forgotten when the session ends. Since protocol 1.1.
+    Scales {
+        /// SI units per volt, sign included, of every channel in order; each not zero, and within a factor of
+        /// [`crate::limits::SCALE_FACTOR_CAP`] of what it was built with.
+        units_per_volt: Vec<f32, MAX_CHANNELS>,
+    },
+    /// Temperature and sensor supplies as they were measured last. → [`crate::answer::Answer::Slow`]. Since protocol 1.1.
+    Slow,
 }
 
 /// How the force pulse is recognised.

@@ -199,9 +199,9 @@ impl Page<'_> {
         answer["result"]["value"].take()
     }
 
-    /// Waits until the expression is true.
+    /// Waits until the expression is true. On a machine with much else to do an analysis alone takes half a minute.
     pub fn until(&mut self, expression: &str) {
-        let end = Instant::now() + Duration::from_secs(30);
+        let end = Instant::now() + Duration::from_mins(2);
         while self.eval(expression) != Value::Bool(true) {
             assert!(Instant::now() < end, "never came true: {expression}");
             std::thread::sleep(Duration::from_millis(20));

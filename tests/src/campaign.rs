@@ -17,11 +17,21 @@ use jointrig::device::transport::Transport;
 /// A plan of few cells: the geometry and limits of the demo's plan, other cells and hits.
 #[must_use]
 pub fn plan(wanted: u32, cells: &[(&str, &[&str], &[&str])]) -> String {
-    let whole = include_str!("../../docs/plans/demo.toml");
+    let demo = include_str!("../../docs/plans/demo.toml");
+    with_cells(&demo.replace("wanted = 3", &format!("wanted = {wanted}")), cells)
+}
+
+/// A cut of the small plan: all that it says, but for these cells.
+#[must_use]
+pub fn small_plan(cells: &[(&str, &[&str], &[&str])]) -> String {
+    with_cells(include_str!("../../docs/plans/small.toml"), cells)
+}
+
+/// The plan `whole` with other cells.
+fn with_cells(whole: &str, cells: &[(&str, &[&str], &[&str])]) -> String {
     let (head, rest) = whole.split_once("[[configuration]]").unwrap();
     let geometry = &rest[rest.find("[geometry").or_else(|| rest.find("[[geometry")).unwrap()..];
-    let head = head.replace("wanted = 3", &format!("wanted = {wanted}"));
-    let mut text = head;
+    let mut text = head.to_owned();
     for (name, impacts, responses) in cells {
         // writing to a string cannot fail
         writeln!(
@@ -51,6 +61,7 @@ pub fn run(file: &Path, plan: &str, transport: Box<dyn Transport>) -> (Summary, 
     let options = Options {
         stage: Stage::Auto,
         yes: true,
+        new_structure: false,
         watch: Watchers::default(),
         edits: None,
         answers: None,

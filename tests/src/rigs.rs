@@ -25,7 +25,8 @@ impl Default for Drawn {
     }
 }
 
-/// The rig of this number. A third of them has a clamp on side B too, and six points T1–T6 on specimen B.
+/// The rig of this number. A third of them has a clamp on side B too, and on specimen B six points T1–T6 and the marks M1 and M2: the
+/// points and marks of specimen A, mirrored.
 ///
 /// Contacts of 60 N/µm and up, clamps × 0.3…3, local yaw modes some 100…350 Hz, arms × 0.6…2, rods, load cells, suspensions, damping,
 /// and floors × 0.3…3: each drawn by itself.
@@ -64,13 +65,13 @@ pub fn drawn(number: u64, drawn: Drawn) -> RigConfig {
         let specimen: Vec<ResponsePoint> = rig
             .responses
             .iter()
-            .filter(|point| point.body == BodyName::SpecimenA && point.sigma_m.is_none())
+            .filter(|point| point.body == BodyName::SpecimenA)
             .map(|point| ResponsePoint {
-                name: point.name.replace('S', "T"),
+                name: point.name.replace('S', "T").replace('N', "M"),
                 body: BodyName::SpecimenB,
                 position_m: [point.position_m[0], -point.position_m[1], point.position_m[2]],
-                sigma_m: None,
                 speckle: false,
+                ..*point
             })
             .collect();
         rig.responses.extend(specimen);
@@ -129,9 +130,12 @@ fn scale(bushing: &mut Bushing, factor: f64) {
 pub fn contact_plan(rig: &RigConfig) -> String {
     let mut plan = jointrig::campaign::plan::CONTACT.to_owned();
     if !rig.clamp_b.rigid {
-        let points: Vec<&ResponsePoint> =
-            rig.responses.iter().filter(|point| point.body == BodyName::SpecimenB).collect();
-        let (names, rows) = (names(&points), rows(&points, 6));
+        let points: Vec<&ResponsePoint> = rig
+            .responses
+            .iter()
+            .filter(|point| point.body == BodyName::SpecimenB && point.sigma_m.is_none())
+            .collect();
+        let (names, rows) = (names(&points), rows(&points));
         plan = plan
             .replace("responses = [\"S1\"", &format!("responses = [{names}\"S1\""))
             .replace("responses = [\"B1\"", &format!("responses = [{names}\"B1\""))
@@ -157,12 +161,12 @@ pub fn with_priors(plan: &str, rig: &RigConfig) -> String {
     )
 }
 
-/// The same plan with the two marks N1 and N2 beside the contact, placed as carefully as the spots.
+/// The same plan with two marks beside the contact on each specimen that has points, placed as carefully as the spots: N1 and N2, M1 and M2.
 pub fn near_plan(rig: &RigConfig) -> String {
     let near: Vec<&ResponsePoint> = rig.responses.iter().filter(|point| point.sigma_m.is_some()).collect();
     contact_plan(rig)
         .replace("\"S1\", \"S2\"", &format!("{}\"S1\", \"S2\"", names(&near)))
-        .replace("response = [\n", &format!("response = [\n{}", rows(&near, 5)))
+        .replace("response = [\n", &format!("response = [\n{}", rows(&near)))
 }
 
 /// Names as in a plan's list, each with what separates it from the next.
@@ -170,10 +174,11 @@ fn names(points: &[&ResponsePoint]) -> String {
     points.iter().map(|point| format!("\"{}\", ", point.name)).collect::<Vec<_>>().concat()
 }
 
-/// The same points as rows of a plan's geometry.
-fn rows(points: &[&ResponsePoint], grouping: u8) -> String {
+/// The same points, on specimens, as rows of a plan's geometry.
+fn rows(points: &[&ResponsePoint]) -> String {
     let row = |p: &&ResponsePoint| {
         let [x, y, z] = p.position_m;
+        let grouping = if p.body == BodyName::SpecimenB { 6 } else { 5 };
         let sigma_m = p.sigma_m.map(|sigma_m| format!(", sigma_m = {sigma_m:?}")).unwrap_or_default();
         format!(
             "    {{ name = \"{}\", grouping = {grouping}, position_m = [{x:?}, {y:?}, {z:?}]{sigma_m} }},\n",

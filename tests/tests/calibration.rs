@@ -8,9 +8,9 @@ use jointrig::device::channels::ChannelMap;
 use jointrig_tests::command::jointrig;
 use jointrig_tests::drawn_campaigns::found;
 use jointrig_tests::live::{campaign, done};
+use std::fmt::Write as _;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 /// A hash over all raw codes, and every scale that the sessions were measured with.
 fn measured(file: &Path) -> (u64, Vec<f32>) {
@@ -138,31 +138,63 @@ fn a_laboratorys_file_counts_while_it_is_measured() {
     }
 }
 
+/// A rig on `sim:` whose sensors give these volts over what the device was built for; a laboratory's file that says so.
+fn another_rig(folder: &Path, map: &ChannelMap, volts: &[(&str, f64)]) -> (String, PathBuf) {
+    let mut rig = "[surroundings]\ntemperature_c = 31.5\n[errors]\nnone = false\n[errors.volts]\n".to_owned();
+    let mut laboratory = String::new();
+    for (name, volts) in volts {
+        let channel = map.channels.iter().find(|channel| channel.name == *name).unwrap();
+        let scale = f64::from(channel.units_per_volt) / volts;
+        writeln!(rig, "{name} = {volts:?}").unwrap();
+        writeln!(
+            laboratory,
+            "[[channel]]\nname = {name:?}\nsensitivity_v = {:?}\npolarity = {}",
+            1.0 / scale.abs(),
+            scale.signum() as i8
+        )
+        .unwrap();
+    }
+    let (at, lab) = (folder.join("other-rig.toml"), folder.join("other-lab.toml"));
+    std::fs::write(&at, rig).unwrap();
+    std::fs::write(&lab, laboratory).unwrap();
+    (format!("sim:{}", at.display()), lab)
+}
+
 #[test]
-fn nothing_moves_where_the_device_sees_another_sign() {
+fn the_device_acts_by_the_calibrated_scales_and_signs() {
+    let map = {
+        let (_folder, plain) = campaign(SMALL);
+        done(jointrig().args(["campaign", "run"]).arg(&plain).args(["--device", "sim:", "--yes"]));
+        Store::open_read_only(&plain).unwrap().channels(1).unwrap()
+    };
     let (folder, file) = campaign(SMALL);
-    done(jointrig().args(["campaign", "run"]).arg(&file).args(["--device", "sim:", "--yes"]));
-    let map = Store::open_read_only(&file).unwrap().channels(1).unwrap();
-    let turned = |name: &str| {
-        let channel = map.channels.iter().find(|channel| channel.name == name).unwrap();
-        let path = folder.path().join("turned.toml");
-        let polarity = -channel.units_per_volt.signum() as i8;
-        std::fs::write(&path, format!("[[channel]]\nname = {name:?}\npolarity = {polarity}\n")).unwrap();
-        calibrate(&file, &path, "turned");
-    };
-    let refused = |command: &mut Command, name: &str| {
-        let out = command.output().unwrap();
-        let said = String::from_utf8(out.stderr).unwrap();
-        assert!(
-            !out.status.success() && said.contains(&format!("channel `{name}` has the other sign")),
-            "{said}"
-        );
-        let sessions = Store::open_read_only(&file).unwrap().sessions().unwrap();
-        assert_eq!(sessions.len(), 1, "what is refused is no session");
-    };
-    turned("ldv_a");
-    let level = ["--device", "sim:", "--freq", "150", "--amplitude", "2e-7"];
-    refused(jointrig().arg("shaker").arg(&file).args(level), "ldv_a");
-    turned("force");
-    refused(jointrig().args(["campaign", "run"]).arg(&file).args(["--device", "sim:", "--yes"]), "force");
+    // the hammer's cell is turned, and the vibrometers are 3 % off, each its own way
+    let volts = [("force", -1.0), ("ldv_a", 1.03), ("ldv_b", 0.97)];
+    let (rig, laboratory) = another_rig(folder.path(), &map, &volts);
+    let device = ["--device", &rig, "--yes"];
+    done(jointrig().args(["campaign", "run"]).arg(&file).args(device).arg("--calibration").arg(&laboratory));
+    let store = Store::open_read_only(&file).unwrap();
+    let good = store.records().unwrap().into_iter().flatten().filter(RecordRow::kept).count();
+    assert!(good >= 14, "a turned cell whose sign is told is hit like any other: {good}");
+    drop(store);
+
+    let level = ["--freq", "100", "--amplitude", "2e-7"];
+    done(jointrig().arg("shaker").arg(&file).args(device).args(level));
+    let store = Store::open_read_only(&file).unwrap();
+    let rows: Vec<_> = store.levels().unwrap().into_iter().flatten().collect();
+    let held = rows[0].settled().reached;
+    assert!((held / 2e-7 - 1.0).abs() < 0.02, "{held} m by the calibrated scales");
+    // and the specimen's temperature is kept with it
+    let celsius: Vec<f64> = store.temperatures().unwrap().iter().map(|row| row.celsius).collect();
+    assert!(celsius.len() >= 3 && celsius.iter().all(|celsius| (celsius - 31.5).abs() < 1e-3), "{celsius:?}");
+    let out = folder.path().join("out");
+    done(jointrig().arg("analyse").arg(&file).arg("--out").arg(&out));
+    let results: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(out.join("results.json")).unwrap()).unwrap();
+    assert_eq!(results["source"]["temperature_c"], serde_json::json!([31.5, 31.5, 31.5]));
+    let page = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.contains("temperature of the specimen"));
+    // what the device said of itself stays in the session
+    let as_measured = store.channels_as_measured(1).unwrap();
+    assert!(as_measured.channels.iter().zip(&map.channels).all(|(now, then)| now == then));
 }

@@ -222,9 +222,9 @@ fn marks_beside_the_contact() {
     let (first, rigs, seeds) = (count("FIRST", 100), count("RIGS", 12), count("SEEDS", 1));
     let like = Drawn { errors: 0.5, gain: 0.0, ..Drawn::default() };
     let plans: [(&str, Plan); 3] = [
-        ("`contact.toml`: S1–S6, 63 cells", contact_plan),
-        ("S1–S6, N1, N2: 71 cells", near_plan),
-        ("S1–S4, N1, N2: 63 cells", near_instead_plan),
+        ("`contact.toml`: S1–S6; T1–T6 where B has a clamp", contact_plan),
+        ("S1–S6 and N1, N2; T1–T6 and M1, M2 where B has a clamp", near_plan),
+        ("S5 and S6 left out of these", near_instead_plan),
     ];
     let plans = plans.iter().enumerate().filter(|(n, _)| count("PLAN", *n as u64) == *n as u64);
     for (_, (name, plan)) in plans {

@@ -83,6 +83,7 @@ fn shake(file: &Path, address: &Address, seed: u64) {
         sweep_hz_per_s: 20.0,
         most_drive_v: None,
         limits: Limits::default(),
+        new_structure: false,
         stop: Arc::new(AtomicBool::new(false)),
     };
     for level in planned.frequencies_hz.iter().flat_map(|f| each(*f)).map(level) {

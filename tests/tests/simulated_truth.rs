@@ -31,7 +31,10 @@ fn a_campaign_on_sim_keeps_the_rigs_truth() {
     measure(&file, address.open(11).unwrap());
 
     let store = Store::open_read_only(&file).unwrap();
-    assert_eq!(store.simulated_rig().unwrap(), Some(SimulatedRig { name: "tilted".into(), seed: 11 }));
+    let SimulatedRig { name, seed, parameters } = store.simulated_rig().unwrap().unwrap();
+    assert_eq!((name.as_str(), seed), ("tilted", 11));
+    // of SHA-256, in base64
+    assert_eq!(parameters.unwrap().len(), 44);
     let (kept, truth) =
         (store.simulated_truth().unwrap().unwrap(), RigConfig::from_toml(RIG).unwrap().truth());
     assert_eq!(kept.contact_k_t_n_per_m, 1.1e8);

@@ -16,7 +16,7 @@ pub const EMULATED_FLASH: u64 = 80_000;
 
 /// Bytes of flash that a wired board's image may take, with its chip's support and USB: it then also fits the smaller controllers of
 /// the same family.
-pub const WIRED_FLASH: u64 = 96 << 10;
+pub const WIRED_FLASH: u64 = 96_000;
 
 /// What the image of a board may take.
 pub fn limit(board: &str) -> u64 {
@@ -173,7 +173,7 @@ mod tests {
         let over = Sizes { data: 5, ..limit };
         assert!(enforce(&[("a".into(), limit)]).is_ok(), "the limit itself is allowed");
         let message = enforce(&[("a".into(), limit), ("b".into(), over)]).expect_err("over").to_string();
-        assert!(message.contains("b takes 98305 bytes, allowed 98304"), "{message}");
+        assert!(message.contains("b takes 96001 bytes, allowed 96000"), "{message}");
         assert!(!message.contains("a takes"), "{message}");
     }
 }

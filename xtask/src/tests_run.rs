@@ -119,7 +119,7 @@ const IN_EMULATOR: &str = "qemu";
 /// Runs the tests of the emulated board.
 pub fn run_in_emulator(project: &Project, image: &Path) -> Result<Counts> {
     let mut cargo = command::cargo(&project.root);
-    cargo.env(IMAGE, image);
+    cargo.env(IMAGE, image).envs(programs(project)?);
     // `--workspace`, so that the dependencies have the features they were built with
     cargo.args(["test", "--release", "--workspace", "--test", IN_EMULATOR]);
     let (counts, success) = watched(&mut cargo, &mut std::io::stdout())?;

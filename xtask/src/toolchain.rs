@@ -64,6 +64,7 @@ impl Toolchain {
     /// Makes a cargo command compile with this toolchain, into the firmware's own target directory.
     pub fn apply(&self, command: &mut Command, project: &Project) {
         command.env("CARGO_TARGET_DIR", project.firmware_target());
+        command.env("CARGO_ENCODED_RUSTFLAGS", short_paths(&project.root).join("\x1f"));
         if let Self::Private { sysroot } = self {
             command.env("RUSTC", sysroot::wrapper(sysroot));
             // They would be rustup's, and check a compiler of another version.
@@ -88,6 +89,20 @@ impl Toolchain {
         };
         command
     }
+}
+
+/// Sources are named from their package or the repository on. A panic keeps a file's name and line, so that every path stands in
+/// the flash, and an image would be larger the deeper the folder in which somebody builds it.
+fn short_paths(root: &Path) -> Vec<String> {
+    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.or_else(|| std::env::home_dir().map(|home| home.join(".cargo")));
+    // a folder for each registry; none before the first download, and then the paths are long for one build
+    let registries = home.and_then(|home| std::fs::read_dir(home.join("registry/src")).ok());
+    let folders = registries.into_iter().flatten().flatten().map(|entry| entry.path());
+    folders
+        .chain([root.to_path_buf()])
+        .map(|folder| format!("--remap-path-prefix={}/=", folder.display()))
+        .collect()
 }
 
 /// One way to the target, in the order they are tried.

@@ -4,6 +4,7 @@ use core::fmt;
 
 use super::frames::CrcMismatch;
 use super::range::Range;
+use crate::sentence::{Sentence, Tell};
 
 /// Why the converter cannot be used. `S` is the serial port's error, `P` the pins'.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,33 +72,45 @@ pub enum Error<S, P> {
     },
 }
 
-impl<S: fmt::Debug, P: fmt::Debug> fmt::Display for Error<S, P> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl<S, P> Tell for Error<S, P> {
+    fn tell(&self, to: &mut Sentence) {
         match self {
-            Self::Spi(error) => write!(f, "serial port: {error:?}"),
-            Self::Pin(error) => write!(f, "pin: {error:?}"),
+            Self::Spi(_) => to.text("the serial port failed"),
+            Self::Pin(_) => to.text("a pin failed"),
             Self::NotReset { status } => {
-                write!(f, "not reset (status {status:#04x}): check RESET and OS pins")
+                to.text("not reset (status ").hex((*status).into(), 2).text("): check RESET and OS pins")
             }
             Self::Identity { found, part } => {
-                write!(f, "ID {found:#04x} is no {part}: check supply, SDI, DOUTA, CS")
+                to.text("ID ").hex((*found).into(), 2).text(" is no ").text(part);
+                to.text(": check supply, SDI, DOUTA, CS")
             }
-            Self::RegisterCrc { address } => write!(f, "register {address:#04x}: wrong CRC in the answer"),
+            Self::RegisterCrc { address } => {
+                to.text("register ").hex((*address).into(), 2).text(": wrong CRC in the answer")
+            }
             Self::Readback { address, wrote, holds } => {
-                write!(f, "register {address:#04x}: wrote {wrote:#04x}, holds {holds:#04x}")
+                to.text("register ").hex((*address).into(), 2).text(": wrote ").hex((*wrote).into(), 2);
+                to.text(", holds ").hex((*holds).into(), 2)
             }
-            // not as a number: formatting floats costs 12 kB of flash
-            Self::NoRange { range, part } => write!(f, "{part} has no range {range:?}"),
-            Self::NoLayout { part } => write!(f, "{part} cannot send on so many lines"),
-            Self::BusyStuck { after_us } => write!(f, "BUSY still high after {after_us} us"),
+            Self::NoRange { range, part } => {
+                to.text(part).text(" has no range of code ").number(range.code().into())
+            }
+            Self::NoLayout { part } => to.text(part).text(" cannot send on so many lines"),
+            Self::BusyStuck { after_us } => to.text("BUSY still high after ").number(*after_us).text(" us"),
             Self::Data(CrcMismatch { sent, due }) => {
-                write!(f, "data CRC {sent:#06x} where {due:#06x} is due")
+                to.text("data CRC ").hex((*sent).into(), 4).text(" where ").hex((*due).into(), 4);
+                to.text(" is due")
             }
             Self::Pattern { channel, found } => {
-                write!(f, "test pattern of V{}: {found:#06x}", channel + 1)
+                to.text("test pattern of V").number(*channel as u32 + 1).text(": ").hex((*found).into(), 4)
             }
-            Self::Digital { bits } => write!(f, "digital error {bits:#04x}"),
-        }
+            Self::Digital { bits } => to.text("digital error ").hex((*bits).into(), 2),
+        };
+    }
+}
+
+impl<S, P> fmt::Display for Error<S, P> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        Sentence::of(self).fmt(f)
     }
 }
 

@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use crate::sentence::{Sentence, Tell};
+
 /// A front end's trouble. The scans that it cost are reported as a lost range besides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trouble {
@@ -17,20 +19,26 @@ pub enum Trouble {
     Dma,
 }
 
+impl Tell for Trouble {
+    fn tell(&self, to: &mut Sentence) {
+        match self {
+            Self::Silent(first, second) => {
+                to.text("BUSY stuck, or no read-out: after ").number(*first).text(" and ").number(*second);
+                to.text(" blocks of converters 1 and 2")
+            }
+            Self::Crc => to.text("converter data: wrong CRC"),
+            Self::Slipped(first, second) => {
+                to.text("out of step with CONVST: converters 1 and 2 lag by ").signed(*first);
+                to.text(" and ").signed(*second).text(" words (9 are a scan)")
+            }
+            Self::Overrun => to.text("acquisition was too late for its rings"),
+            Self::Dma => to.text("DMA error while reading the converters"),
+        };
+    }
+}
+
 impl fmt::Display for Trouble {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Silent(first, second) => write!(
-                f,
-                "BUSY stuck, or no read-out: after {first} and {second} blocks of converters 1 and 2"
-            ),
-            Self::Crc => f.write_str("converter data: wrong CRC"),
-            Self::Slipped(first, second) => write!(
-                f,
-                "out of step with CONVST: converters 1 and 2 lag by {first} and {second} words (9 are a scan)"
-            ),
-            Self::Overrun => f.write_str("acquisition was too late for its rings"),
-            Self::Dma => f.write_str("DMA error while reading the converters"),
-        }
+        Sentence::of(self).fmt(f)
     }
 }

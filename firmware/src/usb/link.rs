@@ -1,5 +1,7 @@
 //! Frames over the two interfaces: which one is spoken on, and what happens when the bus goes away.
 
+use core::future::poll_fn;
+use core::pin::pin;
 use core::sync::atomic::{AtomicU8, Ordering};
 
 use embassy_futures::select::{Either, Either3, select, select3};
@@ -113,12 +115,14 @@ impl<'d, D: Driver<'d>> Outgoing for Sender<'d, D> {
 struct Inlet<P> {
     pipe: P,
     enabled: bool,
+    /// Nothing was waited for since it was enabled.
+    fresh: bool,
     bytes: [u8; PACKET],
 }
 
 impl<P: Incoming> Inlet<P> {
     fn new(pipe: P) -> Self {
-        Self { pipe, enabled: false, bytes: [0; PACKET] }
+        Self { pipe, enabled: false, fresh: false, bytes: [0; PACKET] }
     }
 
     /// The length of the next packet that is not empty, or `None` once when the way was cut. It may be dropped
@@ -128,8 +132,17 @@ impl<P: Incoming> Inlet<P> {
             if !self.enabled {
                 self.pipe.enabled().await;
                 self.enabled = true;
+                self.fresh = true;
             }
-            match self.pipe.packet(&mut self.bytes).await {
+            let (fresh, mut reading) = (&mut self.fresh, pin!(self.pipe.packet(&mut self.bytes)));
+            let came = poll_fn(|context| {
+                let came = reading.as_mut().poll(context);
+                *fresh &= came.is_ready();
+                came
+            });
+            match came.await {
+                // It waited since before the cut: no order of it may be carried out.
+                Ok(_) if self.fresh => {}
                 Ok(0) => {}
                 Ok(length) => return Some(length),
                 Err(_) => {

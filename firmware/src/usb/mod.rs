@@ -18,6 +18,7 @@
 
 mod device;
 mod link;
+pub mod mended;
 
 pub use device::{Buffers, INTERFACE_GUID, Speed, Usb, VENDOR_CODE, build};
 pub use link::{Sink, Source};

@@ -12,6 +12,8 @@ use embassy_usb_driver::{
     Unsupported,
 };
 
+use jointrig_firmware::usb::mended::Registers;
+
 /// One endpoint of one direction: a FIFO of one packet, as the hardware has.
 #[derive(Default)]
 pub struct End {
@@ -31,8 +33,29 @@ pub struct Control {
     pub status: Option<bool>,
 }
 
+/// What is done to the registers around the driver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mend {
+    SuspendForgotten,
+    Data0(EndpointAddress),
+}
+
+impl Registers for Bus {
+    fn forget_suspend(&mut self) {
+        self.with(|wires| {
+            wires.mends.push(Mend::SuspendForgotten);
+            wires.events.retain(|event| *event != Event::Suspend);
+        });
+    }
+
+    fn begin_with_data0(&mut self, endpoint: EndpointAddress) {
+        self.with(|wires| wires.mends.push(Mend::Data0(endpoint)));
+    }
+}
+
 #[derive(Default)]
 pub struct Wires {
+    pub mends: Vec<Mend>,
     pub out: [End; 8],
     pub into: [End; 8],
     pub events: VecDeque<Event>,
@@ -167,7 +190,9 @@ impl driver::Bus for DeviceBus {
             let end = wires.end(address);
             end.enabled = enabled;
             end.halted = false;
-            end.packet = None;
+            if address.is_in() {
+                end.packet = None;
+            }
         });
     }
 

@@ -111,10 +111,9 @@ impl Host {
     pub async fn reset(&self) {
         self.0.with(|wires| {
             wires.address = 0;
-            for end in wires.ends() {
-                end.enabled = false;
-                end.packet = None;
-            }
+            // what has come waits in the driver; what was to go is gone
+            wires.ends().for_each(|end| end.enabled = false);
+            wires.into.iter_mut().for_each(|end| end.packet = None);
             wires.events.push_back(Event::Reset);
         });
         self.0.until(|wires| wires.events.is_empty().then_some(())).await;

@@ -11,12 +11,14 @@ use embassy_futures::join::join;
 use embassy_futures::select::{Either, select, select3};
 use embassy_futures::{block_on, yield_now};
 use jointrig_firmware::board::{ByteSink, ByteSource};
+use jointrig_firmware::usb::mended::Mended;
 use jointrig_firmware::usb::{Buffers, INTERFACE_GUID, Speed, VENDOR_CODE, build};
 use jointrig_protocol::golden;
 use jointrig_protocol::packet::Reader;
 use jointrig_protocol::usb::{PRODUCT, PRODUCT_ID, VENDOR_ID};
 
-use bus::{Bus, Device};
+use bus::{Bus, Device, Mend};
+use embassy_usb_driver::{EndpointAddress, Event};
 use host::{Host, Interface, Stall};
 
 /// What the device has heard: bytes, or `None` where its source reported a cut.
@@ -32,7 +34,8 @@ fn run<F: Future<Output = ()>>(
     let seen: &'static Seen = Box::leak(Box::default());
     let device = async {
         let mut buffers = Buffers::new();
-        let mut usb = build(Device(bus.clone()), &mut buffers, "0042", speed);
+        let driver = Mended::new(Device(bus.clone()), bus.clone());
+        let mut usb = build(driver, &mut buffers, "0042", speed);
         let hearing = async {
             let mut bytes = [0; 512];
             loop {
@@ -354,7 +357,8 @@ fn a_small_buffer_gets_a_packet_in_parts() {
                 got.extend_from_slice(&bytes[..length]);
             }
         };
-        join(sending, reading).await;
+        // as on a board, the device looks before a host can have sent
+        join(reading, sending).await;
     };
     block_on(select(usb.device.run(), pin!(test)));
     assert_eq!(got, b"0123456789");
@@ -377,5 +381,53 @@ fn a_suspended_bus_is_a_cut_link() {
         host.put(vendor.out, &[4]).await.unwrap();
         settle().await;
         assert_eq!((seen.bytes(), seen.cuts()), (vec![1, 2, 3, 4], 1));
+    });
+}
+
+#[test]
+fn a_packet_from_before_a_reset_is_no_order_after_it() {
+    run(Speed::High, &[], async |host, seen| {
+        let way = host.enumerate().await.vendor();
+        host.put(way.out, b"first").await.unwrap();
+        settle().await;
+        // it arrives together with the reset, and waits in the driver until the endpoint is enabled again
+        host.put(way.out, b"stale").await.unwrap();
+        host.reset().await;
+        let way = host.enumerate().await.vendor();
+        settle().await;
+        host.put(way.out, b"fresh").await.unwrap();
+        settle().await;
+        assert_eq!(*seen.heard.borrow(), [Some(b"first".to_vec()), None, Some(b"fresh".to_vec())]);
+    });
+}
+
+#[test]
+fn toggles_begin_anew_and_an_old_suspend_is_forgotten() {
+    run(Speed::High, &[], async |host, seen| {
+        let way = host.enumerate().await.vendor();
+        let ends = [way.out, way.into].map(EndpointAddress::from);
+        let mends = |host: &Host| host.0.with(|wires| std::mem::take(&mut wires.mends));
+        let told = mends(&host);
+        assert_eq!(
+            told.first(),
+            Some(&Mend::SuspendForgotten),
+            "with the reset that enumeration begins with"
+        );
+        assert!(ends.iter().all(|end| told.contains(&Mend::Data0(*end))), "{told:?}");
+        // a halt that is cleared
+        host.tell(0x02, 3, 0, u16::from(way.into), &[]).await.unwrap();
+        assert_eq!(mends(&host), [], "a halt alone");
+        host.tell(0x02, 1, 0, u16::from(way.into), &[]).await.unwrap();
+        assert_eq!(mends(&host), [Mend::Data0(ends[1])]);
+        // a suspend that was latched before a reset, and is told with it: the link goes on
+        host.put(way.out, b"a").await.unwrap();
+        settle().await;
+        host.0.with(|wires| wires.events.extend([Event::Reset, Event::Suspend]));
+        settle().await;
+        let way = host.enumerate().await.vendor();
+        host.put(way.out, b"b").await.unwrap();
+        settle().await;
+        assert_eq!(*seen.heard.borrow(), [Some(b"a".to_vec()), None, Some(b"b".to_vec())]);
+        assert!(mends(&host).contains(&Mend::SuspendForgotten));
     });
 }

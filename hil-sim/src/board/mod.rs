@@ -162,7 +162,7 @@ fn futures(
     controls: &Arc<Controls>,
 ) -> Vec<Pin<Box<dyn Future<Output = ()>>>> {
     let mut coil = VirtualCoil::new(rig, controls);
-    let mut inputs = VirtualInputs::new(controls);
+    let mut inputs = VirtualInputs::new(controls, rig);
     let mut stage = VirtualStage::new(rig);
     let (mut source, mut sink) = (link.clone(), link.clone());
     let (a, b, c, d) = (Rc::clone(core), Rc::clone(core), Rc::clone(core), Rc::clone(core));

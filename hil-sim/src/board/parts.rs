@@ -12,9 +12,12 @@ use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, COIL_PULSE_CAP_US};
 use jointrig_protocol::request;
+use jointrig_protocol::slow::{Slow, Supply};
 
 use super::drive::VirtualDrive;
 use crate::link::DeviceEnd;
+use crate::rig::channels::{EXCITATION, FORCE};
+use crate::rig::config::Cable;
 use crate::rig::{self, Configuration, JointState, Measured, Rig, RigError, config};
 
 /// The native virtual board.
@@ -43,6 +46,8 @@ pub struct Controls {
     watches_joint: AtomicBool,
     /// Scans that the converters are to lose: the first, and how many.
     lost: Mutex<(u64, u64)>,
+    /// Cables that were changed since the start: the hammer's force cell, the shaker's.
+    cables: Mutex<[Option<Cable>; 2]>,
     seen: Mutex<Seen>,
 }
 
@@ -94,6 +99,16 @@ impl Controls {
     /// board's have faults of their own.
     pub fn lose_scans(&self, from_scan: u64, scans: u64) {
         *self.lost.lock().unwrap_or_else(PoisonError::into_inner) = (from_scan, scans);
+    }
+
+    /// Changes what the supply of the hammer's force cell finds.
+    pub fn set_force_cable(&self, cable: Cable) {
+        self.cables.lock().unwrap_or_else(PoisonError::into_inner)[0] = Some(cable);
+    }
+
+    /// Changes what the supply of the shaker's force cell finds.
+    pub fn set_excitation_cable(&self, cable: Cable) {
+        self.cables.lock().unwrap_or_else(PoisonError::into_inner)[1] = Some(cable);
     }
 
     /// How many blocks are lost if the next one begins with `scan`.
@@ -270,26 +285,60 @@ impl Coil for VirtualCoil {
     }
 }
 
-/// Guard and emergency stop.
-pub struct VirtualInputs(Arc<Controls>);
+/// Guard, emergency stop, and what is measured slowly.
+pub struct VirtualInputs {
+    controls: Arc<Controls>,
+    rig: Rc<RefCell<Rig>>,
+    /// Blocks until the slow values are measured again.
+    blocks_left: u32,
+}
+
+/// Slow values are measured ten times a second, as on the wired board: so many blocks, of 24 scans at 51.2 kHz.
+const SLOW_BLOCKS: u32 = 213;
 
 impl VirtualInputs {
-    pub(super) fn new(controls: &Arc<Controls>) -> Self {
-        Self(Arc::clone(controls))
+    pub(super) fn new(controls: &Arc<Controls>, rig: &Rc<RefCell<Rig>>) -> Self {
+        Self { controls: Arc::clone(controls), rig: Rc::clone(rig), blocks_left: 0 }
+    }
+
+    /// Slow values as they are now.
+    pub(super) fn measured(&self) -> Slow {
+        let (rig, seen) = (self.rig.borrow(), self.controls.seen());
+        let around = &rig.config().surroundings;
+        let seconds = seen.scans as f64 / f64::from(rig.scan_rate_hz());
+        let changed = *self.controls.cables.lock().unwrap_or_else(PoisonError::into_inner);
+        let cables = [(FORCE, around.force_cable), (EXCITATION, around.excitation_cable)];
+        let supplies = cables.into_iter().zip(changed).map(|((place, cable), changed)| Supply {
+            channel: place as u8,
+            bias_v: changed.unwrap_or(cable).bias_v(),
+        });
+        Slow {
+            temperature_c: Some((around.temperature_c + around.warming_k_per_s * seconds) as f32),
+            supplies: supplies.collect(),
+        }
     }
 }
 
 impl Inputs for VirtualInputs {
+    fn slow(&mut self) -> Option<Slow> {
+        if self.blocks_left > 0 {
+            self.blocks_left -= 1;
+            return None;
+        }
+        self.blocks_left = SLOW_BLOCKS;
+        Some(self.measured())
+    }
+
     fn interlock_closed(&mut self) -> bool {
-        !self.0.guard_open.load(Ordering::Acquire)
+        !self.controls.guard_open.load(Ordering::Acquire)
     }
 
     fn emergency_stop(&mut self) -> bool {
-        self.0.pressed.load(Ordering::Acquire)
+        self.controls.pressed.load(Ordering::Acquire)
     }
 
     fn local_reset(&mut self) -> bool {
-        self.0.reset.swap(false, Ordering::AcqRel)
+        self.controls.reset.swap(false, Ordering::AcqRel)
     }
 }
 

@@ -33,7 +33,8 @@ impl Flaws {
                 _ if is_gauged(at) => errors.gain,
                 _ => 0.0,
             };
-            1.0 + sigma * draw(&["gain", channels[at].name])
+            let stated = errors.volts.get(channels[at].name).copied().unwrap_or(1.0);
+            stated * (1.0 + sigma * draw(&["gain", channels[at].name]))
         });
         let skews_s = std::array::from_fn(|at| {
             if at == FORCE { 0.0 } else { errors.skew_s * draw(&["skew", channels[at].name]) }

@@ -14,7 +14,7 @@
 
 mod aim;
 mod body;
-mod channels;
+pub(crate) mod channels;
 pub mod config;
 mod configuration;
 mod error;

@@ -53,8 +53,17 @@ impl SmallHost {
         Self::reading(link, false)
     }
 
+    /// Shakes hands over the link of an earlier host, in a session of its own.
+    pub fn again(earlier: Self, session: u32) -> Self {
+        Self::in_session(earlier.link, false, session)
+    }
+
     /// Shakes hands, and reads packets if told so.
     pub fn reading(link: HostEnd, packets: bool) -> Self {
+        Self::in_session(link, packets, 99)
+    }
+
+    fn in_session(link: HostEnd, packets: bool, session: u32) -> Self {
         let mut host = Self {
             link,
             reader: Reader::new(),
@@ -72,7 +81,7 @@ impl SmallHost {
             gaps: Vec::new(),
             shooting: false,
         };
-        host.send(Kind::Hello, &Hello { packets, ..Hello::host(99) }.to_bytes());
+        host.send(Kind::Hello, &Hello { packets, ..Hello::host(session) }.to_bytes());
         host.until("a Hello", |host| host.hello.is_some());
         host
     }

@@ -30,7 +30,7 @@ impl CampaignFile {
             }
         }
         let (text, plan_file) = store.plan_text()?;
-        source.settings.insert("plan".into(), self.plan.name.clone().into());
+        source.settings.insert("plan".into(), self.plan.name.get_ref().clone().into());
         source.settings.insert("plan_file".into(), plan_file.into());
         source
             .settings
@@ -47,6 +47,8 @@ impl CampaignFile {
         }
         source.link = store.link_counters()?;
         source.calibrations = calibrated(store)?;
+        source.structure_changes = store.structure_changes()?;
+        source.temperature_c = temperature_c(store)?;
         Ok(source)
     }
 
@@ -109,6 +111,16 @@ impl CampaignFile {
             })
             .collect()
     }
+}
+
+/// Least, mean and largest temperature, °C; none where none was measured.
+fn temperature_c(store: &Store) -> Result<Option<[f64; 3]>, AnalyseError> {
+    let all: Vec<f64> = store.temperatures()?.iter().map(|row| row.celsius).collect();
+    let (least, most) = all.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), celsius| {
+        (least.min(*celsius), most.max(*celsius))
+    });
+    let mean = all.iter().sum::<f64>() / all.len() as f64;
+    Ok((!all.is_empty()).then(|| [least, mean, most].map(|celsius| rounded(celsius, 4))))
 }
 
 /// What every calibration changed, in the order in which they were entered: against the first session for which it counts.

@@ -274,7 +274,7 @@ impl Measurements for CampaignFile {
     }
 
     fn sigma_per_s(&self) -> f64 {
-        self.plan.window.exponential_per_s
+        self.plan.window.get_ref().exponential_per_s
     }
 
     fn quantity(&self) -> MotionQuantity {
@@ -298,7 +298,15 @@ impl Measurements for CampaignFile {
     }
 
     fn spots_m(&self) -> Option<[[f64; 3]; 2]> {
-        let at = |name: &str| self.plan.geometry.sensor.iter().find(|s| s.name == name).map(|s| s.position_m);
+        let at = |name: &str| {
+            self.plan
+                .geometry
+                .sensor
+                .iter()
+                .map(toml::Spanned::get_ref)
+                .find(|s| s.name == name)
+                .map(|s| s.position_m)
+        };
         Some([at("LDV_A")?, at("LDV_B")?])
     }
 

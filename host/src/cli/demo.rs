@@ -7,6 +7,7 @@ use clap::Args;
 use super::analyse::analyse_into;
 use super::error::CliError;
 use super::{interrupt, measure, output};
+use crate::advice::quoted;
 use crate::analyse::Wanted;
 use crate::campaign::plan;
 use crate::campaign::run::stage::Stage;
@@ -55,11 +56,11 @@ impl Demo {
         let again = self.again();
         let address = Address::Sim { rig: self.rig.clone() };
         let device = measure::Device { address: &address, seed: self.seed, log_tables: None };
-        let who = measure::Who { stage: Stage::Device, yes: true, stop };
+        let who = measure::Who { stage: Stage::Device, yes: true, new_structure: false, stop };
         let summary = measure::measure(store, device, who, &mut onlooker, &again, &mut ByRecord)?;
         if summary.interrupted {
-            let file = file.display();
-            eprintln!("`jointrig analyse {file} --out {}` works on what is there", folder.display());
+            let (file, folder) = (quoted(&file), quoted(folder));
+            eprintln!("`jointrig analyse {file} --out {folder}` works on what is there");
             return Err(CliError::Bad("stopped before the campaign was complete".into()));
         }
         let store = Store::open_read_only(&file)?;

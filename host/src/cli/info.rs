@@ -3,11 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use jointrig_protocol::slow::{Slow, Supply};
 use serde_json::json;
 
 use super::error::CliError;
 use super::output;
 use crate::device::address::Address;
+use crate::device::channels::ChannelMap;
 use crate::device::error::flash_file;
 use crate::device::logs::Tables;
 use crate::device::session::Session;
@@ -18,6 +20,20 @@ const HOST_VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Whether firmware and program are of one release.
 fn fits(firmware: &str) -> bool {
     firmware == HOST_VERSION
+}
+
+/// The channel that a supply feeds.
+fn name_of(supply: Supply, map: &ChannelMap) -> &str {
+    map.channels.get(usize::from(supply.channel)).map_or("?", |channel| channel.name.as_str())
+}
+
+/// The supplies for a program.
+fn supplies(slow: &Slow, map: &ChannelMap) -> Vec<serde_json::Value> {
+    let one = |supply: &Supply| {
+        let fault = supply.fault().map(|fault| format!("{fault:?}").to_lowercase());
+        json!({ "channel": name_of(*supply, map), "bias_v": supply.bias_v, "fault": fault })
+    };
+    slow.supplies.iter().map(one).collect()
 }
 
 /// Show a device: handshake, channels, firmware version, counters.
@@ -43,6 +59,7 @@ impl Info {
         let map = session.channels(&info)?;
         let status = session.status()?;
         let hello = *session.hello();
+        let slow = session.slow()?.unwrap_or_default();
         if self.json {
             let channels: Vec<_> = (map.channels.iter().zip(0..))
                 .map(|(channel, place)| {
@@ -79,6 +96,8 @@ impl Info {
                 "interlock_closed": status.interlock_closed,
                 "emergency_stop": status.emergency_stop,
                 "streaming": status.streaming,
+                "temperature_c": slow.temperature_c,
+                "supplies": supplies(&slow, &map),
                 "counters": status.counters,
             }));
         }
@@ -109,6 +128,15 @@ impl Info {
                 channel.quantity.unit(),
                 channel.role
             )
+        }));
+        text.extend(slow.temperature_c.map(|celsius| format!("  specimen: {celsius:.1} °C")));
+        text.extend(slow.supplies.iter().map(|supply| {
+            let name = name_of(*supply, &map);
+            let bias = supply.bias_v;
+            match supply.fault() {
+                None => format!("  supply of `{name}`: {bias:.1} V of bias, a sensor is there"),
+                Some(fault) => format!("  supply of `{name}`: {bias:.1} V of bias: {fault}"),
+            }
         }));
         if !fits(&info.version) {
             text.push(format!(

@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::error::CliError;
 use super::page::Onlooker;
+use crate::advice::quoted;
 use crate::campaign::run::progress::Progress;
 use crate::campaign::run::runner::{self, Options, Summary};
 use crate::campaign::run::stage::Stage;
@@ -30,6 +31,8 @@ pub struct Who {
     pub stage: Stage,
     /// Whether every prompt is answered with yes.
     pub yes: bool,
+    /// Whether another structure than that of the file's records is accepted.
+    pub new_structure: bool,
     /// Set to end after the shot in hand.
     pub stop: Arc<AtomicBool>,
 }
@@ -48,10 +51,10 @@ pub fn measure(
     let mut session = Session::open(address.open(seed)?, &address.to_string())?;
     session.look_for_log_tables(Tables::new(log_tables));
     onlooker.tap.take().into_iter().for_each(|tap| session.watch(tap));
-    let Who { stage, yes, stop } = who;
+    let Who { stage, yes, new_structure, stop } = who;
     let watch = onlooker.watch.clone().and(Arc::new(Progress::default()));
     let (edits, answers) = (onlooker.edits.take(), onlooker.answers.take());
-    let options = Options { stage, yes, watch, edits, answers, stop };
+    let options = Options { stage, yes, new_structure, watch, edits, answers, stop };
     let summary = runner::run(store, &mut session, judge, &options)?;
     tell(&path, &summary, again);
     tell_size(&path)?;
@@ -77,7 +80,7 @@ fn tell(path: &Path, summary: &Summary, again: &str) {
     let Summary { kept, wanted, hits, given_up, accounts, .. } = summary;
     eprintln!("{}: {kept} of {wanted} good hits kept ({hits} struck in this run)", path.display());
     if *given_up > 0 {
-        eprintln!("{given_up} cells were given up: `jointrig campaign status {}` says why", path.display());
+        eprintln!("{given_up} cells were given up: `jointrig campaign status {}` says why", quoted(path));
     }
     if accounts.lost > 0 || accounts.unexplained() > 0 {
         eprintln!(

@@ -25,6 +25,7 @@ mod number;
 mod open_page;
 mod output;
 mod page;
+mod plan;
 mod report;
 #[cfg(feature = "dashboard")]
 mod serve;
@@ -55,6 +56,8 @@ enum Command {
     Info(info::Info),
     /// Impact campaigns.
     Campaign(campaign::Campaign),
+    /// Plans: write one to begin with, and see what is wrong with it.
+    Plan(plan::Plan),
     /// Measure levels of the shaker into a campaign file.
     Shaker(shaker::Shaker),
     /// Analyse a campaign file: results.json and report.html.
@@ -106,6 +109,7 @@ impl Cli {
             Command::Devices(command) => command.run(),
             Command::Info(command) => command.run(),
             Command::Campaign(command) => command.run(),
+            Command::Plan(command) => command.run(),
             Command::Shaker(command) => command.run(),
             Command::Analyse(command) => command.run(),
             Command::Report(command) => command.run(),
@@ -162,6 +166,8 @@ mod tests {
             "info --device usb: --log-tables tables",
             "campaign run p.jrig --device usb:0042 --log-tables tables",
             "campaign new p.jrig --paper",
+            "plan new plan.toml --template small",
+            "plan check plan.toml --picture g.png",
             "campaign new p.jrig --plan plan.toml",
             "campaign run p.jrig --device sim: --stage exec:move.sh --yes",
             "campaign status p.jrig --json",

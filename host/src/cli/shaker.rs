@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 use super::error::CliError;
 use super::number::positive;
 use super::{interrupt, output};
+use crate::advice;
 use crate::campaign::plan::Plan;
 use crate::campaign::plan::level::{Held, Level, Moment};
 use crate::campaign::run::shaking::{self, CRITERION, Limits, Onlookers, Options, Outcome, Summary};
@@ -64,6 +65,9 @@ pub struct Shaker {
     /// Answer every prompt with yes.
     #[arg(long)]
     yes: bool,
+    /// Go on even where the device tells of another structure than that of the file's records; the report says so.
+    #[arg(long)]
+    new_structure: bool,
     /// Print what was measured as one JSON document.
     #[arg(long)]
     json: bool,
@@ -106,6 +110,7 @@ impl Shaker {
             sweep_hz_per_s: self.rate,
             most_drive_v: self.max_drive,
             limits: Limits(self.limits.clone()),
+            new_structure: self.new_structure,
             stop,
         };
         let onlookers = Onlookers { watch: onlooker.watch.clone(), edits: onlooker.edits.take() };
@@ -178,7 +183,7 @@ impl Shaker {
         let count = |which: fn(&Outcome) -> bool| summary.outcomes.iter().filter(|o| which(o)).count();
         let (stored, known) =
             (count(|o| matches!(o, Outcome::Stored(_))), count(|o| matches!(o, Outcome::Known(_))));
-        let path = self.file.display();
+        let path = advice::quoted(&self.file);
         eprintln!("{path}: {stored} levels recorded, {known} were there; the shaker is at rest");
         if summary.interrupted && summary.outcomes.len() < options.levels.len() {
             return Err(CliError::Bad("stopped; the same command goes on from here".into()));

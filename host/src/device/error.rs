@@ -130,6 +130,21 @@ pub enum DeviceError {
         /// Which device.
         address: String,
     },
+    /// The device's firmware is older than what is asked of it.
+    #[error(
+        "{address} speaks protocol {}.{}, in which it cannot {what}: flash firmware of protocol {}.{} or newer ({})",
+        speaks.0, speaks.1, needs.0, needs.1, flash_file(address)
+    )]
+    TooOld {
+        /// Which device.
+        address: String,
+        /// Major and minor of its protocol.
+        speaks: (u16, u16),
+        /// The first that can.
+        needs: (u16, u16),
+        /// What it cannot.
+        what: &'static str,
+    },
     /// The channels do not serve the purpose.
     #[error("{address}: {what}")]
     Channels {

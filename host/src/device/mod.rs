@@ -23,5 +23,4 @@ pub mod stream;
 pub mod tap;
 mod tcp;
 pub mod transport;
-mod units;
 pub mod usb;

@@ -5,7 +5,9 @@ use std::time::{Duration, Instant};
 
 use jointrig_protocol::answer::{Answer, Info, Status};
 use jointrig_protocol::frame::Kind;
+use jointrig_protocol::limits::MAX_CHANNELS;
 use jointrig_protocol::request::{Fire, Numbered, Request, Stage, Trigger};
+use jointrig_protocol::slow::Slow;
 
 use super::channels::ChannelMap;
 use super::error::DeviceError;
@@ -13,7 +15,12 @@ use super::inbox::Starting;
 use super::session::{Session, TRIES, patience};
 use super::stream::{Accounts, Stream};
 use super::tap::Tap;
-use super::units::Units;
+
+/// The minor of the protocol since which a device can be told scales.
+const SCALES_SINCE: u16 = 1;
+
+/// The minor of the protocol since which a device can be asked for slow values.
+const SLOW_SINCE: u16 = 1;
 
 /// Longest wait for a first byte within one pump.
 const POLL: Duration = Duration::from_millis(20);
@@ -38,6 +45,8 @@ fn name(request: &Request) -> &'static str {
         Request::EmergencyStop => "emergency stop",
         Request::Shake(_) => "shake",
         Request::Rest => "rest",
+        Request::Scales { .. } => "scales",
+        Request::Slow => "slow",
     }
 }
 
@@ -108,10 +117,29 @@ impl Session {
         Ok(ChannelMap { id: 0, rate_hz: info.scan_rate_hz, channels })
     }
 
-    /// From now on orders and shots are in the units of these channels, whatever sensitivities the device was built with; `device` is
-    /// what it says of them itself ([`Session::channels`]).
-    pub fn calibrate(&mut self, device: &ChannelMap, calibrated: &ChannelMap) {
-        self.units = Units::new(device, calibrated);
+    /// From now on the device judges trigger, quiet, limits and amplitudes by the scales of these channels, whatever sensitivities it was
+    /// built with; `device` is what it says of them itself ([`Session::channels`]). It forgets them with the session.
+    ///
+    /// # Errors
+    /// It cannot be told so ([`DeviceError::TooOld`]), or refuses: a scale is more than a factor of 100 away from the one built in.
+    pub fn calibrate(&mut self, device: &ChannelMap, calibrated: &ChannelMap) -> Result<(), DeviceError> {
+        fn scales(map: &ChannelMap) -> impl Iterator<Item = f32> {
+            // no device has more channels than a request has scales
+            map.channels.iter().take(MAX_CHANNELS).map(|channel| channel.units_per_volt)
+        }
+        if scales(device).eq(scales(calibrated)) && !self.scaled {
+            return Ok(());
+        }
+        if self.hello.minor < SCALES_SINCE {
+            return Err(DeviceError::TooOld {
+                address: self.address.clone(),
+                speaks: (self.hello.major, self.hello.minor),
+                needs: (self.hello.major, SCALES_SINCE),
+                what: "be told how its sensors are calibrated, and acts on what it was built with",
+            });
+        }
+        self.scaled = true;
+        self.ask_done(Request::Scales { units_per_volt: scales(calibrated).collect() })
     }
 
     /// How the device is.
@@ -120,6 +148,23 @@ impl Session {
             Answer::Status(status) => Ok(status),
             other => Err(self.wrong("status", &other)),
         }
+    }
+
+    /// What the device measures slowly: the specimen's temperature, the supplies of its sensors. None on a device that knows of no such thing
+    /// (protocol 1.0).
+    pub fn slow(&mut self) -> Result<Option<Slow>, DeviceError> {
+        if self.hello.minor < SLOW_SINCE {
+            return Ok(None);
+        }
+        match self.ask(Request::Slow)? {
+            Answer::Slow(slow) => Ok(Some(slow)),
+            other => Err(self.wrong("slow", &other)),
+        }
+    }
+
+    /// The specimen's temperature, °C, where the device measures it.
+    pub fn temperature_c(&mut self) -> Result<Option<f64>, DeviceError> {
+        Ok(self.slow()?.and_then(|slow| slow.temperature_c).map(f64::from))
     }
 
     /// Lets somebody watch the next stream ([`Session::start`]).
@@ -226,12 +271,12 @@ impl Session {
 
     /// How the force pulse is recognised.
     pub fn set_trigger(&mut self, trigger: Trigger) -> Result<(), DeviceError> {
-        self.ask_done(Request::Trigger(self.units.trigger(trigger)))
+        self.ask_done(Request::Trigger(trigger))
     }
 
     /// The load cells' 3 × 3 calibration matrix, row-major, dimensionless.
     pub fn set_load_cells(&mut self, matrix: [f32; 9]) -> Result<(), DeviceError> {
-        self.ask_done(Request::LoadCells { matrix: self.units.load_cells(matrix) })
+        self.ask_done(Request::LoadCells { matrix })
     }
 
     /// Allows one shot within `valid_ms` of the device's time.
@@ -246,7 +291,7 @@ impl Session {
 
     /// One shot of the hammer.
     pub fn fire(&mut self, fire: Fire) -> Result<(), DeviceError> {
-        match self.ask(Request::Fire(self.units.fire(fire)))? {
+        match self.ask(Request::Fire(fire))? {
             Answer::Scheduled { .. } => Ok(()),
             other => Err(self.wrong("fire", &other)),
         }

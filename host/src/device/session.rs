@@ -31,7 +31,6 @@ use super::link::Link;
 use super::logs::{DeviceLog, Tables};
 use super::stream::{Accounts, Stream};
 use super::transport::{Simulated, Transport};
-use super::units::Units;
 
 /// The line counts as idle when nothing arrived for this long.
 const IDLE: Duration = Duration::from_millis(20);
@@ -68,8 +67,8 @@ pub struct Session {
     pub(super) reply: Option<answer::Numbered>,
     pub(super) rate_hz: f64,
     pub(super) ended: bool,
-    /// A value in the device's own units over the true one, channel by channel; 1 where nobody calibrated it otherwise.
-    pub(super) units: Units,
+    /// Whether the device was told other scales than its own.
+    pub(super) scaled: bool,
     /// Whether the shaker may be moving at this session's order.
     pub(super) shakes: bool,
     errand: Option<Errand>,
@@ -103,7 +102,7 @@ impl Session {
             reply: None,
             rate_hz: 51_200.0,
             ended: false,
-            units: Units::default(),
+            scaled: false,
             shakes: false,
             errand: None,
             resend_tries: (0, 0),
@@ -181,7 +180,7 @@ impl Session {
 
     /// The newest word on the last shot.
     pub fn shot(&self) -> Option<Shot> {
-        self.inbox.shot.map(|shot| self.units.true_shot(shot))
+        self.inbox.shot
     }
 
     /// Where every scan of the stream went so far.

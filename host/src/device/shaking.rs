@@ -19,7 +19,7 @@ impl Session {
     pub fn shake(&mut self, order: Shake) -> Result<(), DeviceError> {
         // before it is answered: an answer that is lost leaves a shaker that moves
         self.shakes = true;
-        self.ask_done(Request::Shake(self.units.shake(order)))
+        self.ask_done(Request::Shake(order))
     }
 
     /// Has the shaker come to rest, over a ramp. [`Session::shaker_rests`] says when it has.

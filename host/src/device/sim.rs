@@ -7,9 +7,12 @@ use std::io;
 use std::path::Path;
 use std::time::Duration;
 
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD;
 use jointrig_hil_sim::board::{Options, VirtualBoard};
 use jointrig_hil_sim::link::HostEnd;
 use jointrig_hil_sim::rig::RigConfig;
+use sha2::{Digest, Sha256};
 
 use super::error::DeviceError;
 use super::transport::{Simulated, Transport};
@@ -42,7 +45,9 @@ impl Sim {
         let (board, link) =
             VirtualBoard::start_with(&config, &options).map_err(|error| open(error.to_string()))?;
         let truth = serde_json::to_value(config.truth()).map_err(|error| open(error.to_string()))?;
-        Ok(Self { link, simulated: Simulated { rig: config.name, seed, truth }, _board: board })
+        let parameters = BASE64_STANDARD.encode(Sha256::digest(config.to_toml().as_bytes()));
+        let simulated = Simulated { rig: config.name, seed, parameters, truth };
+        Ok(Self { link, simulated, _board: board })
     }
 }
 

@@ -46,6 +46,8 @@ pub struct Simulated {
     pub rig: String,
     /// Its seed.
     pub seed: u64,
+    /// SHA-256 of all its parameters, in base64.
+    pub parameters: String,
     /// What an ideal measurement of it would find, as JSON.
     pub truth: serde_json::Value,
 }

@@ -64,7 +64,7 @@ pub fn of_hit(store: &Store, plan: &Plan, row: &RecordRow) -> Result<CrossSpectr
     };
     let delay = |place: usize| f64::from(channels.channels[place].delay_ns) * 1e-9;
     let settings = FrfSettings {
-        windowing: Windowing { sigma_per_s: plan.window.exponential_per_s, ..Windowing::default() },
+        windowing: Windowing { sigma_per_s: plan.window.get_ref().exponential_per_s, ..Windowing::default() },
         delay_s: places.map(|place| delay(place) - delay(force)).to_vec(),
         ..FrfSettings::default()
     };

@@ -135,7 +135,7 @@ fn all_but_hits(store: &Store, records: &[Result<RecordRow, Damaged>]) -> Result
     Ok(Snapshot {
         version: VERSION,
         file: store.path().file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
-        plan: store.plan()?.name,
+        plan: store.plan()?.name.into_inner(),
         simulated: store.is_simulated()?,
         progress: Progress {
             kept: tally.kept(),

@@ -21,7 +21,7 @@ pub use analysed::analysed;
 pub use document::{compare, document};
 pub use page::{chart_style, comparison_page, figure_fragment, page, script};
 
-use crate::results::{Compared, Results};
+use crate::results::{Compared, Place, Results};
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::Path;
@@ -49,6 +49,26 @@ pub enum Format {
     Png,
     /// Numbers.
     Csv,
+}
+
+impl Format {
+    /// How names of its files end.
+    fn ending(self) -> &'static str {
+        match self {
+            Format::Svg => "svg",
+            #[cfg(feature = "png")]
+            Format::Png => "png",
+            Format::Csv => "csv",
+        }
+    }
+}
+
+/// Where hammer and vibrometer are to go, as the plan called `plan` says; none without any place.
+pub fn planned_places(places: &[Place], plan: &str) -> Option<figure::Figure> {
+    let figure = figures::geometry(places)?;
+    let version = env!("CARGO_PKG_VERSION").into();
+    let from = figure::Source { file: plan.into(), version, ..figure::Source::default() };
+    Some(figure::Figure { number: "", title: "Where hammer and vibrometer go".into(), from, ..figure })
 }
 
 /// Writes `results.json`, `report.html` and the figures in these formats into `folder`, which is made if it is not there. Each file
@@ -88,16 +108,24 @@ fn write_figures(figures: &[figure::Figure], folder: &Path, formats: &[Format]) 
     fs::create_dir_all(folder)?;
     for figure in figures {
         for format in formats {
-            let (ending, content) = match format {
-                Format::Svg => ("svg", svg::file(figure).into_bytes()),
-                #[cfg(feature = "png")]
-                Format::Png => ("png", png::png(&svg::file(figure)).map_err(io::Error::other)?),
-                Format::Csv => ("csv", csv::csv(figure).into_bytes()),
-            };
-            replace(&folder.join(format!("{}.{ending}", figure.name)), &content)?;
+            write_figure(figure, *format, &folder.join(format!("{}.{}", figure.name, format.ending())))?;
         }
     }
     Ok(())
+}
+
+/// Writes one figure, as [`write`](fn@write) does.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_figure(figure: &figure::Figure, format: Format, path: &Path) -> io::Result<()> {
+    let content = match format {
+        Format::Svg => svg::file(figure).into_bytes(),
+        #[cfg(feature = "png")]
+        Format::Png => png::png(&svg::file(figure)).map_err(io::Error::other)?,
+        Format::Csv => csv::csv(figure).into_bytes(),
+    };
+    replace(path, &content)
 }
 
 /// The labels of an axis' ticks, the empty ones of minor ticks included: for the test that holds the page's twin to them. `length` in px.

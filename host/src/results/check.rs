@@ -15,6 +15,8 @@ pub const UNCHANGED: &str = "contact-unchanged";
 pub const INTERFACE_MODES: &str = "interface-modes";
 /// Name of the check on n_i against n_c.
 pub const INTERNALS: &str = "internals";
+/// Name of the check on records of one structure only.
+pub const ONE_STRUCTURE: &str = "one-structure";
 /// Name of the check on A and B being the same structures in all configurations.
 pub const SAME_IN_ALL: &str = "same-in-all-configurations";
 /// Name of the check whether A and B, coupled by the joint found, are the measured assembly.

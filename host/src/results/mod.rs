@@ -25,8 +25,8 @@ pub use crate::substructuring::averaged::Averaged;
 pub use crate::substructuring::joint_over_bands::BandStatistic as Statistics;
 pub use answer::{Answer, Basis, BetweenArms, Clamp, ContactAnswer, Slip};
 pub use check::{
-    BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, SAME_IN_ALL,
-    SERIES_COMPLIANCE, UNCHANGED,
+    BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, ONE_STRUCTURE,
+    SAME_IN_ALL, SERIES_COMPLIANCE, UNCHANGED,
 };
 pub use compared::{Compared, Difference};
 pub use completeness::Completeness;

@@ -23,6 +23,12 @@ pub struct Source {
     /// Calibrations that were entered beside what device and plan say, in that order; the last one of a channel counts.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub calibrations: Vec<Calibrated>,
+    /// What told that the structure was another one than before, each time that it was accepted.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub structure_changes: Vec<String>,
+    /// The specimen's temperature as the controller measured it: least, mean and largest over all sessions, °C.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature_c: Option<[f64; 3]>,
     /// Settings of the analysis, by name with unit: windows, lines, virtual points.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub settings: BTreeMap<String, serde_json::Value>,

@@ -18,6 +18,7 @@ use jointrig_protocol::frame::{Accumulator, Kind, Writer};
 use jointrig_protocol::hello::Hello;
 use jointrig_protocol::request::{Fire, Numbered, Request, Stage};
 use jointrig_protocol::shot::{Phase, Shot};
+use jointrig_protocol::slow::Slow;
 
 use jointrig::device::transport::Transport;
 
@@ -206,6 +207,7 @@ impl Fake {
                 })
             }
             Request::Shake(_) | Request::Rest => return Err(Refusal::Unsupported),
+            Request::Slow => Answer::Slow(Slow::default()),
             Request::Status => Answer::Status(Status {
                 epoch: self.epoch,
                 streaming: self.streaming,
@@ -275,9 +277,11 @@ impl Fake {
                 self.attempt = attempt;
                 Answer::Staged { at_scan: self.next_scan }
             }
-            Request::Trigger(_) | Request::LoadCells { .. } | Request::Disarm | Request::EmergencyStop => {
-                Answer::Done
-            }
+            Request::Trigger(_)
+            | Request::LoadCells { .. }
+            | Request::Scales { .. }
+            | Request::Disarm
+            | Request::EmergencyStop => Answer::Done,
         })
     }
 

@@ -152,3 +152,25 @@ fn refusals_say_who_and_why() {
     let said = session.fire(fire).expect_err("not armed").to_string();
     assert!(said.contains("fake:") && said.contains("not armed"), "{said}");
 }
+
+#[test]
+fn a_controller_of_an_older_protocol_is_not_told_scales_and_is_asked_for_nothing_slow() {
+    let older = |fake: &mut Fake| fake.hello = Hello { minor: 0, schema: 1, ..fake.hello };
+    let mut session = open(Fake::scripted(older));
+    assert_eq!(session.slow().expect("nothing is asked"), None);
+    let info = session.info().expect("info");
+    let device = session.channels(&info).expect("channels");
+    session.calibrate(&device, &device).expect("what is not calibrated needs no telling");
+    let mut calibrated = device.clone();
+    calibrated.channels[0].units_per_volt *= 1.03;
+    let refused = session.calibrate(&device, &calibrated).expect_err("it cannot be told").to_string();
+    assert!(
+        refused.contains("speaks protocol 1.0") && refused.contains("flash firmware of protocol 1.1"),
+        "{refused}"
+    );
+    // one that can is told, and told again when the first scales count once more
+    let mut session = open(Fake::default());
+    session.info().expect("info");
+    session.calibrate(&device, &calibrated).expect("told");
+    session.calibrate(&device, &device).expect("told again");
+}

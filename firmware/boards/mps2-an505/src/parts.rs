@@ -12,12 +12,13 @@ use jointrig_firmware::board::{self, Delivered, RanDry};
 use jointrig_firmware::lockstep::{
     BLOCK_AT, CLOCK, DELIVERY_BYTES, DRIVE_AT, DRIVE_FULL_SCALE_V, Delivery, EMERGENCY_STOP, HELD,
     INTERLOCK_CLOSED, LOCAL_RESET, MUST_FAULT, MUST_OVERFLOW, MUST_PANIC, NEVER, Op, RING_BLOCKS, RING_BYTES,
-    TEXT_AT, TEXT_BYTES, TO_DEVICE_AT, TO_HOST_AT, from_text, to_text,
+    SLOW_AT, SLOW_BYTES, SLOW_MEASURED, TEXT_AT, TEXT_BYTES, TO_DEVICE_AT, TO_HOST_AT, from_text, to_text,
 };
 use jointrig_hot::pair::CHIP_BYTES;
 use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, COIL_PULSE_CAP_US};
 use jointrig_protocol::request::Stage as Place;
+use jointrig_protocol::slow::Slow;
 
 use crate::device::Shared;
 use crate::{fault, memory, port, uart};
@@ -83,7 +84,7 @@ impl Scans {
         self.join = true;
         if self.last_report != Some(trouble) {
             self.last_report = Some(trouble);
-            self.core.report_fault(trouble);
+            self.core.report_fault(&trouble);
         }
     }
 }
@@ -186,11 +187,21 @@ impl board::Inputs for Inputs {
     fn interlock_closed(&mut self) -> bool {
         self.0 = port::with(|port| {
             let inputs = port.reply.inputs;
-            // a turn of the key counts once
-            port.reply.inputs &= !LOCAL_RESET;
+            // a turn of the key counts once, as do slow values
+            port.reply.inputs &= !(LOCAL_RESET | SLOW_MEASURED);
             inputs
         });
         self.0 & INTERLOCK_CLOSED != 0
+    }
+
+    fn slow(&mut self) -> Option<Slow> {
+        if self.0 & SLOW_MEASURED == 0 {
+            return None;
+        }
+        let mut length = [0; 4];
+        memory::read(SLOW_AT, &mut length);
+        let used = (u32::from_le_bytes(length) as usize).min(SLOW_BYTES);
+        memory::look(SLOW_AT + length.len(), used, |bytes| from_text(bytes))
     }
 
     fn emergency_stop(&mut self) -> bool {

@@ -11,6 +11,11 @@ use crate::chips::SETTINGS;
 /// One input: name, role, quantity, SI units per volt (sign included), delay of the sensor's electronics in ns.
 type Input = (&'static str, Role, Quantity, f32, u32);
 
+/// Place of the hammer's force.
+pub const FORCE: u8 = 0;
+/// Place of the shaker's force.
+pub const EXCITATION: u8 = 9;
+
 /// What the rig has; the six inputs behind it are free.
 const INPUTS: [Input; MAX_CHANNELS] = [
     ("force", Role::HammerForce, Quantity::Force, 44.643, 0),

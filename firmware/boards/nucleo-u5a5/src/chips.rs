@@ -13,7 +13,8 @@ use embassy_stm32::peripherals::{
 use embassy_stm32::spi::mode::Master;
 use embassy_stm32::spi::{self, Config, Instance, MODE_2, MisoPin, MosiPin, RxDma, SckPin, Spi};
 use embassy_stm32::time::Hertz;
-use embassy_time::Delay;
+use embassy_time::{Duration, Timer, block_for};
+use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::ErrorType as PinErrorType;
 use embedded_hal::spi::{ErrorType as SpiErrorType, Operation, SpiBus, SpiDevice};
 use jointrig_firmware::ad7606b::part::{AD7606B, Lines, Oversampling};
@@ -82,6 +83,21 @@ pub struct Chips {
     pub second: Second,
 }
 
+/// Waits whole µs. embassy's own divides ns by 64 bits, which costs a kilobyte.
+struct Pause;
+
+impl DelayNs for Pause {
+    fn delay_ns(&mut self, ns: u32) {
+        block_for(Duration::from_micros(ns.div_ceil(1000).into()));
+    }
+}
+
+impl embedded_hal_async::delay::DelayNs for Pause {
+    async fn delay_ns(&mut self, ns: u32) {
+        Timer::after_micros(ns.div_ceil(1000).into()).await;
+    }
+}
+
 /// A port that frames each access with a select pin.
 struct Framed<'a> {
     bus: Spi<'a, Blocking, Master>,
@@ -101,7 +117,7 @@ impl SpiDevice for Framed<'_> {
             Operation::Transfer(into, from) => SpiBus::transfer(&mut self.bus, into, from),
             Operation::TransferInPlace(bytes) => SpiBus::transfer_in_place(&mut self.bus, bytes),
             Operation::DelayNs(ns) => {
-                embedded_hal::delay::DelayNs::delay_ns(&mut Delay, *ns);
+                DelayNs::delay_ns(&mut Pause, *ns);
                 Ok(())
             }
         });
@@ -151,6 +167,25 @@ impl embedded_hal_async::digital::Wait for Asked<'_> {
     }
 }
 
+/// As [`Chip::set_up`], for either chip: so that its code is there once.
+async fn set_up(
+    port: Framed<'_>,
+    reset: Output<'_>,
+    busy: Input<'_>,
+    convst: &mut Output<'_>,
+) -> Result<(), Fault> {
+    let mut busy = Asked(busy);
+    let mut converter = Converter::new(port, reset, &AD7606B);
+    converter.reset(&mut Pause)?;
+    converter.configure(&SETTINGS)?;
+    converter.self_test(convst, &mut busy, &mut Pause).await?;
+    converter.watch_inputs(0xFF, OPEN_AFTER)?;
+    let (_, reset) = converter.into_adc_mode()?;
+    // RESET must stay low, driven, while the converter works
+    forget(reset);
+    Ok(())
+}
+
 impl<Port, Clock, Sdi, Dout, Select, Reset, Busy, Dma> Chip<Port, Clock, Sdi, Dout, Select, Reset, Busy, Dma>
 where
     Port: Instance,
@@ -179,16 +214,8 @@ where
         );
         let select = Output::new(self.select.reborrow(), Level::High, Speed::High);
         let reset = Output::new(self.reset.reborrow(), Level::Low, Speed::Low);
-        let mut busy = Asked(Input::new(self.busy.reborrow(), Pull::Down));
-        let mut converter = Converter::new(Framed { bus, select }, reset, &AD7606B);
-        converter.reset(&mut Delay)?;
-        converter.configure(&SETTINGS)?;
-        converter.self_test(convst, &mut busy, &mut Delay).await?;
-        converter.watch_inputs(0xFF, OPEN_AFTER)?;
-        let (_, reset) = converter.into_adc_mode()?;
-        // RESET must stay low, driven, while the converter works
-        forget(reset);
-        Ok(())
+        let busy = Input::new(self.busy.reborrow(), Pull::Down);
+        set_up(Framed { bus, select }, reset, busy, convst).await
     }
 
     /// Gives the pins the functions they have while the rings are filled: the port selects and clocks by itself, and

@@ -14,6 +14,7 @@ use embassy_stm32::peripherals::{PF12, PF13, PF14, PF15};
 use embassy_time::Instant;
 use jointrig_firmware::board::Inputs;
 use jointrig_firmware::relay::{Fault, Relay};
+use jointrig_protocol::slow::Slow;
 
 /// Whether K1 was seen to do what it is told; whoever takes the pins' word for the guard asks this too.
 static RELAY_IS_SOUND: AtomicBool = AtomicBool::new(false);
@@ -71,7 +72,7 @@ impl Inputs for Switches {
     fn interlock_closed(&mut self) -> bool {
         // stop and guard are in series before K1's coil
         let chain_closed = guard_is_closed() && !stop_is_pressed();
-        let seen = self.relay.see(chain_closed, self.dropped.is_high(), Instant::now().as_millis());
+        let seen = self.relay.see(chain_closed, self.dropped.is_high(), Instant::now().as_micros());
         RELAY_IS_SOUND.store(seen.is_ok(), Ordering::Relaxed);
         if seen.err() != self.told {
             self.told = seen.err();
@@ -82,6 +83,10 @@ impl Inputs for Switches {
 
     fn fault(&mut self) -> Option<&'static str> {
         self.to_tell.take().map(Fault::sentence)
+    }
+
+    fn slow(&mut self) -> Option<Slow> {
+        crate::slow::take()
     }
 
     fn emergency_stop(&mut self) -> bool {

@@ -3,7 +3,6 @@
 //! Both lie in RAM that start-up code does not touch. After a power cut they are noise, which a check value
 //! tells from a record; after a watchdog's or our own reset they are what was written.
 
-use core::fmt::{self, Write};
 use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
 use core::ptr::{addr_of, addr_of_mut};
@@ -12,9 +11,12 @@ use cortex_m::peripheral::SCB;
 use cortex_m_rt::{ExceptionFrame, exception};
 use embassy_stm32::pac;
 use heapless::String;
+use jointrig_firmware::sentence::{Sentence, Tell};
 use jointrig_protocol::answer::Reset;
 use jointrig_protocol::limits::SENTENCE_BYTES;
 
+/// Characters of a file's path that a panic keeps: package, version and file of all that are built in.
+const MOST_OF_A_PATH: usize = 60;
 /// Marks a record as one of ours ("JRIG").
 const MAGIC: u32 = 0x4A52_4947;
 
@@ -123,28 +125,13 @@ pub fn count_start(draw: impl FnOnce() -> u32) -> Start {
     Start { count, boot: first.wrapping_add(count).wrapping_sub(1) }
 }
 
-/// Writes what fits and leaves the rest.
-struct Cut<'a>(&'a mut Record);
-
-impl Write for Cut<'_> {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        for c in text.chars() {
-            let at = self.0.length as usize;
-            let Some(room) = self.0.text.get_mut(at..at + c.len_utf8()) else { return Err(fmt::Error) };
-            c.encode_utf8(room);
-            self.0.length += c.len_utf8() as u32;
-        }
-        Ok(())
-    }
-}
-
 /// Coil off, words kept, reset.
-fn end(what: fmt::Arguments<'_>) -> ! {
+fn end(what: &Sentence) -> ! {
     cortex_m::interrupt::disable();
     pac::TIM1.bdtr().modify(|w| w.set_moe(false));
-    let mut record = Record { magic: MAGIC, length: 0, text: [0; SENTENCE_BYTES], sum: 0 };
-    // cut where it is full
-    let _ = Cut(&mut record).write_fmt(what);
+    let text = what.as_str().as_bytes();
+    let mut record = Record { magic: MAGIC, length: text.len() as u32, text: [0; SENTENCE_BYTES], sum: 0 };
+    record.text.iter_mut().zip(text).for_each(|(place, byte)| *place = *byte);
     record.sum = record.sum_of();
     // SAFETY: interrupts are off and nothing returns from here, so that nobody else uses the record.
     unsafe { addr_of_mut!(RECORD).cast::<Record>().write_volatile(record) };
@@ -152,26 +139,24 @@ fn end(what: fmt::Arguments<'_>) -> ! {
     SCB::sys_reset()
 }
 
+/// File and line, and the message where it needs no formatting: the code that formats numbers would cost 5 kB of flash, and the line says
+/// which number was meant.
 #[panic_handler]
 fn panicked(info: &PanicInfo<'_>) -> ! {
-    match info.location() {
+    let mut sentence = Sentence::default();
+    if let Some(at) = info.location() {
         // the end of a long path says more than its beginning
-        Some(at) => {
-            let file = at.file();
-            let from = file.bytes().rposition(|byte| byte == b'/').map_or(0, |slash| slash + 1);
-            let file = file.get(from..).unwrap_or(file);
-            end(format_args!("{file}:{}: {}", at.line(), info.message()))
-        }
-        None => end(format_args!("{}", info.message())),
+        let file = at.file();
+        let from = file.len().saturating_sub(MOST_OF_A_PATH);
+        sentence.text(file.get(from..).unwrap_or(file)).text(":").number(at.line()).text(": ");
     }
+    end(sentence.text(info.message().as_str().unwrap_or("a panic whose message has numbers")))
 }
 
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    end(format_args!(
-        "hard fault at {:#010x} from {:#010x}: {}",
-        frame.pc(),
-        frame.lr(),
-        jointrig_board_fault::status()
-    ))
+    let mut sentence = Sentence::default();
+    sentence.text("hard fault at ").hex(frame.pc(), 8).text(" from ").hex(frame.lr(), 8).text(": ");
+    jointrig_board_fault::status().tell(&mut sentence);
+    end(&sentence)
 }

@@ -22,6 +22,7 @@
 #![no_std]
 #![no_main]
 
+mod adc;
 mod channels;
 mod chips;
 mod clocks;
@@ -37,6 +38,7 @@ mod probe;
 mod restart;
 mod rings;
 mod scans;
+mod slow;
 mod usb;
 mod watchdog;
 
@@ -193,6 +195,7 @@ async fn main(spawner: Spawner) {
     spawner.spawn(defmt::unwrap!(watching(core)));
     spawner.spawn(defmt::unwrap!(usb::task(core, p.USB_OTG_HS, p.PA12, p.PA11)));
     spawner.spawn(defmt::unwrap!(watchdog::task(dog)));
+    spawner.spawn(defmt::unwrap!(slow::task(p.ADC1, (p.PC0, p.PC1, p.PC2, p.PC3))));
     spawner.spawn(defmt::unwrap!(lights::task(p.PC7, p.PB7, p.PG2)));
     defmt::info!("jointrig on nucleo-u5a5, start {}, boot {:#010x}", start.count, start.boot);
 }

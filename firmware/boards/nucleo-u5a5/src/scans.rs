@@ -4,7 +4,6 @@
 //! before it. The remedy depends on what went wrong: rings that lost step are emptied and joined anew; converters
 //! that fell silent are reset, set up and tested again, over and over, with a report each time the trouble changes.
 
-use core::fmt;
 use core::mem::forget;
 
 use embassy_stm32::Peri;
@@ -23,6 +22,7 @@ use jointrig_firmware::ad7606b::part::AD7606B;
 use jointrig_firmware::ad7606b::reader::Reader;
 use jointrig_firmware::ad7606b::trouble::Trouble;
 use jointrig_firmware::board::{Delivered, Scans};
+use jointrig_firmware::sentence::{Sentence, Tell};
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, MAX_CHANNELS};
 
 use crate::chips::{self, Chips, SETTINGS};
@@ -49,11 +49,13 @@ enum Fault {
     Running(Trouble),
 }
 
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl Tell for Fault {
+    fn tell(&self, to: &mut Sentence) {
         match self {
-            Self::SetUp(number, fault) => write!(f, "converter {number}: {fault}"),
-            Self::Running(trouble) => trouble.fmt(f),
+            Self::SetUp(number, fault) => {
+                fault.tell(to.text("converter ").number((*number).into()).text(": "));
+            }
+            Self::Running(trouble) => trouble.tell(to),
         }
     }
 }

@@ -12,8 +12,8 @@ use std::time::Duration;
 use jointrig_firmware::board::{ByteSink, ByteSource, Coil, Drive, Inputs, Stage};
 use jointrig_firmware::lockstep::{
     Ask, BLOCK_AT, DELIVERY_BYTES, DRIVE_AT, Delivery, EMERGENCY_STOP, HELD, INTERLOCK_CLOSED, LOCAL_RESET,
-    LOG_AT, MUST_FAULT, MUST_OVERFLOW, MUST_PANIC, NEVER, Op, RING_BYTES, Reply, Setup, TEXT_AT, TEXT_BYTES,
-    TO_DEVICE_AT, TO_HOST_AT, from_text, to_text,
+    LOG_AT, MUST_FAULT, MUST_OVERFLOW, MUST_PANIC, NEVER, Op, RING_BYTES, Reply, SLOW_AT, SLOW_BYTES,
+    SLOW_MEASURED, Setup, TEXT_AT, TEXT_BYTES, TO_DEVICE_AT, TO_HOST_AT, from_text, to_text,
 };
 use jointrig_logs::Table;
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, scans_per_block};
@@ -99,7 +99,7 @@ impl Server {
         Self {
             coil: VirtualCoil::new(&rig, controls),
             drive: VirtualDrive::default(),
-            inputs: VirtualInputs::new(controls),
+            inputs: VirtualInputs::new(controls, &rig),
             stage: VirtualStage::new(&rig),
             faults: Arc::clone(faults),
             controls: Arc::clone(controls),
@@ -138,6 +138,7 @@ impl Server {
         }
         self.put_text(&self.setup.clone())?;
         self.set_inputs();
+        self.put_slow()?;
         self.answer()
     }
 
@@ -246,6 +247,7 @@ impl Server {
             self.ram.write(BLOCK_AT + DELIVERY_BYTES, &words)?;
             self.reply.blocks += 1;
             self.set_inputs();
+            self.put_slow().map_err(io::Error::other)?;
         }
         Ok(())
     }
@@ -263,6 +265,20 @@ impl Server {
         }
         self.produced += (blocks * per_block) as u64;
         codes
+    }
+
+    /// Puts slow values where the board finds them, when they were measured.
+    fn put_slow(&mut self) -> Result<(), Ended> {
+        let Some(slow) = self.inputs.slow() else { return Ok(()) };
+        let mut buffer = [0; SLOW_BYTES];
+        let text = to_text(&slow, &mut buffer).ok_or("slow values do not fit the shared memory")?;
+        let length = (text.len() as u32).to_le_bytes();
+        self.ram
+            .write(SLOW_AT, &length)
+            .and_then(|()| self.ram.write(SLOW_AT + length.len(), text))
+            .map_err(|error| broken(&error))?;
+        self.reply.inputs |= SLOW_MEASURED;
+        Ok(())
     }
 
     fn set_inputs(&mut self) {

@@ -1,10 +1,13 @@
 //! Values that no rig can have.
 
 use super::{Bushing, ContactLaw, RigConfig, RigidBody};
+use crate::rig::channels::channels;
 use crate::rig::error::RigError;
 
 /// Steps into which a scan may be divided in slip.
 const MOST_SLIP_STEPS: f64 = 1000.0;
+/// A contact that is softer than this is one in N/µm or N/mm, N/m.
+const SOFTEST_N_PER_M: f64 = 1e4;
 /// Elements of an Iwan contact: more would only cost time.
 const MOST_ELEMENTS: u32 = 1000;
 
@@ -45,6 +48,9 @@ pub fn check(config: &RigConfig) -> Result<(), RigError> {
     points(config)?;
     hammer(config)?;
     sensors(config)?;
+    let surroundings = &config.surroundings;
+    finite("surroundings.temperature_c", &[surroundings.temperature_c])?;
+    finite("surroundings.warming_k_per_s", &[surroundings.warming_k_per_s])?;
     errors(config)
 }
 
@@ -62,6 +68,15 @@ fn errors(config: &RigConfig) -> Result<(), RigError> {
         ("errors.load_cell_cross_talk", errors.load_cell_cross_talk),
     ] {
         not_negative(field, value)?;
+    }
+    let channels = channels(&config.sensors).map(|channel| channel.name);
+    for (name, volts) in &errors.volts {
+        if !channels.contains(&name.as_str()) {
+            return Err(bad(&format!("errors.volts.{name}"), "is no channel of the rig"));
+        }
+        if !volts.is_finite() || *volts == 0.0 {
+            return Err(bad(&format!("errors.volts.{name}"), "must be a number, and not zero"));
+        }
     }
     if errors.skew_s * f64::from(config.scan_rate_hz) > 1e3 {
         return Err(bad("errors.skew_s", "is more than 1000 scans: give it in seconds"));
@@ -88,6 +103,13 @@ fn errors(config: &RigConfig) -> Result<(), RigError> {
 fn contact(config: &RigConfig) -> Result<(), RigError> {
     let contact = &config.contact;
     bushing("contact", &contact.bushing())?;
+    if let Some(soft) =
+        contact.stiffness_n_per_m.iter().find(|k| (f64::MIN_POSITIVE..SOFTEST_N_PER_M).contains(*k))
+    {
+        let reason =
+            format!("is {soft} N/m, softer than any contact of solids: it is in N/m, 180e6 for 180 N/µm");
+        return Err(bad("contact.stiffness_n_per_m", &reason));
+    }
     not_negative("contact.friction_coefficient", contact.friction_coefficient)?;
     normal_load(contact.normal_load_n)?;
     positive("contact.slip_step_s", contact.slip_step_s)?;

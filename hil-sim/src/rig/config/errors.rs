@@ -1,8 +1,10 @@
 //! What nobody at the rig knows: errors of places, angles and sensors.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
-/// Standard deviations, drawn from the rig's seed; the last two are no draws but a law.
+/// Standard deviations, drawn from the rig's seed; the last three are no draws but stated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Errors {
@@ -30,6 +32,9 @@ pub struct Errors {
     pub normal_load_variation: f64,
     /// x₀ of that (m).
     pub normal_load_reference_m: f64,
+    /// What channels give over what their scale says, by name, on top of what is drawn; negative where a sensor is turned.
+    #[serde(default)]
+    pub volts: BTreeMap<String, f64>,
 }
 
 impl Errors {
@@ -52,6 +57,7 @@ impl Errors {
             load_cell_cross_talk: 0.0,
             normal_load_variation: 0.0,
             normal_load_reference_m: self.normal_load_reference_m,
+            volts: BTreeMap::new(),
         }
     }
 

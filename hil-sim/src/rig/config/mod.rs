@@ -7,11 +7,13 @@ mod check;
 mod document;
 mod errors;
 mod sensors;
+mod surroundings;
 
 pub use super::body::BodyName;
 pub(crate) use check::normal_load;
 pub use errors::Errors;
 pub use sensors::{Excitation, ForceSensor, LoadCells, Sensors, SpeckleNoise, SpotVibrometer, Vibrometer};
+pub use surroundings::{Cable, Surroundings};
 
 use serde::{Deserialize, Serialize};
 
@@ -60,6 +62,8 @@ pub struct RigConfig {
     pub hammer: Hammer,
     /// Scales, noise and delays of the channels.
     pub sensors: Sensors,
+    /// Temperature and cables.
+    pub surroundings: Surroundings,
     /// What nobody at the rig knows: errors of places, angles and sensors.
     pub errors: Errors,
 }

@@ -5,6 +5,7 @@ use std::collections::HashSet;
 use jointrig_protocol::limits::{ARM_VALID_CAP_MS, COIL_PULSE_CAP_US, NAME_BYTES, SHAKE_SCANS_PER_CYCLE};
 use toml::Spanned;
 
+use super::faults::Faults;
 use super::geometry::ResponsePoint;
 use super::sensor::check_sensors;
 use super::{Plan, configuration_named};
@@ -12,47 +13,43 @@ use super::{Plan, configuration_named};
 /// No contact is shaken further than this, m: a plan in µm is caught here.
 const LARGEST_AMPLITUDE_M: f64 = 1e-3;
 
-/// Where in the text something is wrong, and what.
-type Wrong = (usize, String);
-
 impl Plan {
-    pub(super) fn check(&self) -> Result<(), Wrong> {
-        let require =
-            |good: bool, at: usize, what: &str| if good { Ok(()) } else { Err((at, what.to_owned())) };
+    pub(super) fn check(&self, faults: &mut Faults) {
+        let mut require = |good: bool, at: usize, what: &str| faults.unless(good, at, what);
         require(
             *self.version.get_ref() == 1,
             self.version.span().start,
             "version: this program reads version 1",
-        )?;
+        );
         let (record, at) = (self.record.get_ref(), self.record.span().start);
-        require((1..=1_000_000).contains(&record.rate_hz), at, "record.rate_hz must be 1 to 1000000")?;
+        require((1..=1_000_000).contains(&record.rate_hz), at, "record.rate_hz must be 1 to 1000000");
         require(
             record.length_s > 0.0 && record.length_s <= 60.0,
             at,
             "record.length_s must be over 0 and at most 60",
-        )?;
-        require(record.pre_trigger_scans <= 10_000, at, "record.pre_trigger_scans must be at most 10000")?;
+        );
+        require(record.pre_trigger_scans <= 10_000, at, "record.pre_trigger_scans must be at most 10000");
         let (hits, at) = (self.hits.get_ref(), self.hits.span().start);
-        require(hits.wanted > 0, at, "hits.wanted must be at least 1")?;
+        require(hits.wanted > 0, at, "hits.wanted must be at least 1");
         require(
             hits.minimum <= hits.wanted && hits.wanted <= hits.most,
             at,
             "hits: minimum <= wanted <= most must hold",
-        )?;
+        );
         let (force, at) = (self.force.get_ref(), self.force.span().start);
-        require(force.target_n > 0.0, at, "force.target_n must be over 0")?;
+        require(force.target_n > 0.0, at, "force.target_n must be over 0");
         require(
             force.tolerance > 0.0 && force.tolerance < 1.0,
             at,
             "force.tolerance must lie between 0 and 1",
-        )?;
+        );
         require(
             force.softer.is_none_or(|part| {
                 part < 1.0 && part * force.target_n * (1.0 - force.tolerance) > self.limits.get_ref().weak_n
             }),
             at,
             "force.softer must be below 1, and its hits must stay above limits.weak_n",
-        )?;
+        );
         let [shortest, longest] = force.pulse_bounds_us;
         require(
             shortest > 0
@@ -61,31 +58,31 @@ impl Plan {
                 && longest <= COIL_PULSE_CAP_US,
             at,
             "force: 0 < pulse_bounds_us[0] <= pulse_us <= pulse_bounds_us[1] <= 8000 must hold",
-        )?;
+        );
         let (trigger, at) = (self.trigger.get_ref(), self.trigger.span().start);
         let bounded = |value: f64| (0.0..=1.0).contains(&value);
-        require(trigger.level_n > 0.0, at, "trigger.level_n must be over 0")?;
+        require(trigger.level_n > 0.0, at, "trigger.level_n must be over 0");
         require(
             bounded(trigger.flight_s) && bounded(trigger.listen_s) && bounded(trigger.hold_off_s),
             at,
             "trigger: flight_s, listen_s and hold_off_s must lie between 0 and 1",
-        )?;
+        );
         let (settle, at) = (self.settle.get_ref(), self.settle.span().start);
         require(
             settle.bound_s > 0.0 && settle.bound_s < f64::from(ARM_VALID_CAP_MS) / 1000.0 - 5.0,
             at,
             "settle.bound_s must lie between 0 and 55",
-        )?;
-        self.check_limits()?;
-        self.check_shaker()?;
-        self.check_contact()?;
-        self.check_priors()?;
-        check_sensors(&self.channel)?;
-        self.check_geometry()?;
-        self.check_configurations()
+        );
+        self.check_limits(faults);
+        self.check_shaker(faults);
+        self.check_contact(faults);
+        self.check_priors(faults);
+        check_sensors(&self.channel, faults);
+        self.check_geometry(faults);
+        self.check_configurations(faults);
     }
 
-    fn check_limits(&self) -> Result<(), Wrong> {
+    fn check_limits(&self, faults: &mut Faults) {
         let (limits, at) = (self.limits.get_ref(), self.limits.span().start);
         for (good, what) in [
             (
@@ -102,65 +99,72 @@ impl Plan {
             ),
             (limits.noise_ratio > 1.0, "limits.noise_ratio must be over 1"),
         ] {
-            if !good {
-                return Err((at, what.to_owned()));
-            }
+            faults.unless(good, at, what);
         }
-        let Some(enough) = &self.enough else { return Ok(()) };
+        let Some(enough) = &self.enough else { return };
         let (wanted, at) = (enough.get_ref(), enough.span().start);
         let [low, high] = wanted.band_hz;
-        if !(wanted.random_error > 0.0 && wanted.random_error < 1.0) {
-            Err((at, "enough.random_error must lie between 0 and 1".into()))
-        } else if !(0.0 <= low && low < high && high <= f64::from(self.record.get_ref().rate_hz) / 2.0) {
-            Err((at, "enough.band_hz must be [low, high], at most half of record.rate_hz".into()))
-        } else {
-            Ok(())
-        }
+        faults.unless(
+            wanted.random_error > 0.0 && wanted.random_error < 1.0,
+            at,
+            "enough.random_error must lie between 0 and 1",
+        );
+        faults.unless(
+            0.0 <= low && low < high && high <= f64::from(self.record.get_ref().rate_hz) / 2.0,
+            at,
+            "enough.band_hz must be [low, high], at most half of record.rate_hz",
+        );
     }
 
-    fn check_shaker(&self) -> Result<(), Wrong> {
-        let Some(shaker) = &self.shaker else { return Ok(()) };
+    fn check_shaker(&self, faults: &mut Faults) {
+        let Some(shaker) = &self.shaker else { return };
         let (levels, at) = (shaker.get_ref(), shaker.span().start);
         // the device refuses more than a tenth of the scan rate
         let highest = f64::from(self.record.get_ref().rate_hz) / f64::from(SHAKE_SCANS_PER_CYCLE);
         let within = |values: &[f64], most: f64| {
             !values.is_empty() && values.iter().all(|value| *value > 0.0 && *value <= most)
         };
-        if !within(&levels.frequencies_hz, highest) {
-            Err((at, format!("shaker.frequencies_hz must be over 0 and at most {highest}, one or more")))
-        } else if within(&levels.amplitudes_m, LARGEST_AMPLITUDE_M) {
-            Ok(())
-        } else {
-            Err((
-                at,
-                format!("shaker.amplitudes_m must be over 0 and at most {LARGEST_AMPLITUDE_M}, one or more"),
-            ))
-        }
+        faults.unless(
+            within(&levels.frequencies_hz, highest),
+            at,
+            format!("shaker.frequencies_hz must be over 0 and at most {highest}, one or more"),
+        );
+        faults.unless(
+            within(&levels.amplitudes_m, LARGEST_AMPLITUDE_M),
+            at,
+            format!("shaker.amplitudes_m must be over 0 and at most {LARGEST_AMPLITUDE_M}, one or more"),
+        );
     }
 
-    fn check_contact(&self) -> Result<(), Wrong> {
-        let Some(contact) = &self.contact else { return Ok(()) };
+    fn check_contact(&self, faults: &mut Faults) {
+        let Some(contact) = &self.contact else { return };
         let (known, at) = (contact.get_ref(), contact.span().start);
         let within =
             |value: Option<f64>, least: f64| value.is_none_or(|value| value.is_finite() && value >= least);
-        if !(within(known.normal_load_n, f64::MIN_POSITIVE) && within(known.effective_mass_kg, 0.0)) {
-            Err((at, "contact: normal_load_n must be over 0, effective_mass_kg not negative".into()))
-        } else if within(known.parallel_path, 0.0) && known.parallel_path.is_none_or(|path| path < 1.0) {
-            Ok(())
-        } else {
-            Err((at, "contact.parallel_path is a ratio of stiffness, from 0 to 1".into()))
+        faults.unless(
+            within(known.normal_load_n, f64::MIN_POSITIVE) && within(known.effective_mass_kg, 0.0),
+            at,
+            "contact: normal_load_n must be over 0, effective_mass_kg not negative",
+        );
+        faults.unless(
+            within(known.parallel_path, 0.0) && known.parallel_path.is_none_or(|path| path < 1.0),
+            at,
+            "contact.parallel_path is a ratio of stiffness, from 0 to 1",
+        );
+    }
+
+    fn check_priors(&self, faults: &mut Faults) {
+        let Some(priors) = &self.priors else { return };
+        for (name, value) in priors.get_ref().stated() {
+            faults.unless(
+                value.is_none_or(|v| v >= 0.0 && v.is_finite()),
+                priors.span().start,
+                format!("priors.{name} is a standard deviation: zero or more"),
+            );
         }
     }
 
-    fn check_priors(&self) -> Result<(), Wrong> {
-        let Some(priors) = &self.priors else { return Ok(()) };
-        let wrong = priors.get_ref().wrong();
-        wrong.map_or(Ok(()), |name| {
-            Err((priors.span().start, format!("priors.{name} is a standard deviation: zero or more")))
-        })
-    }
-
-    fn check_geometry(&self) -> Result<(), Wrong> {
+    fn check_geometry(&self, faults: &mut Faults) {
         let mut seen = HashSet::new();
         let responses = self
             .geometry
@@ -173,83 +177,87 @@ impl Plan {
             .iter()
             .map(|point| (point.span().start, &point.get_ref().name, point.get_ref().grouping));
         for (at, name, grouping) in responses.chain(impacts) {
-            if name.is_empty() || name.len() > NAME_BYTES {
-                return Err((at, format!("geometry: name `{name}` must have 1 to {NAME_BYTES} bytes")));
-            }
-            if !(1..=6).contains(&grouping) {
-                return Err((at, format!("geometry: grouping of `{name}` must be 1 to 6")));
-            }
-            if !seen.insert(name) {
-                return Err((at, format!("geometry: the name `{name}` stands twice")));
-            }
+            faults.unless(
+                !name.is_empty() && name.len() <= NAME_BYTES,
+                at,
+                format!("geometry: name `{name}` must have 1 to {NAME_BYTES} bytes"),
+            );
+            faults.unless(
+                (1..=6).contains(&grouping),
+                at,
+                format!("geometry: grouping of `{name}` must be 1 to 6"),
+            );
+            faults.unless(seen.insert(name), at, format!("geometry: the name `{name}` stands twice"));
         }
         for point in &self.geometry.response {
             let ResponsePoint { name, sigma_m, .. } = point.get_ref();
-            if sigma_m.is_some_and(|sigma_m| !(sigma_m >= 0.0 && sigma_m.is_finite())) {
-                let what =
-                    format!("geometry: sigma_m of `{name}` must be a standard deviation in m: 0 or more");
-                return Err((point.span().start, what));
-            }
+            faults.unless(
+                sigma_m.is_none_or(|sigma_m| sigma_m >= 0.0 && sigma_m.is_finite()),
+                point.span().start,
+                format!("geometry: sigma_m of `{name}` must be a standard deviation in m: 0 or more"),
+            );
         }
         for point in &self.geometry.impact {
             let [x, y, z] = point.get_ref().direction;
-            if ((x * x + y * y + z * z).sqrt() - 1.0).abs() > 1e-3 {
-                let name = &point.get_ref().name;
-                return Err((
-                    point.span().start,
-                    format!("geometry: direction of `{name}` must have length 1"),
-                ));
-            }
+            faults.unless(
+                ((x * x + y * y + z * z).sqrt() - 1.0).abs() <= 1e-3,
+                point.span().start,
+                format!("geometry: direction of `{}` must have length 1", point.get_ref().name),
+            );
         }
-        Ok(())
     }
 
-    fn check_configurations(&self) -> Result<(), Wrong> {
-        if self.configuration.is_empty() {
-            return Err((0, "configuration: there must be at least one".into()));
-        }
+    fn check_configurations(&self, faults: &mut Faults) {
+        faults.unless(!self.configuration.is_empty(), 0, "configuration: there must be at least one");
         let mut seen = HashSet::new();
         for structure in &self.configuration {
             let (name, at) = (structure.name.get_ref(), structure.name.span().start);
-            if configuration_named(name).is_none() {
-                return Err((at, format!("configuration.name `{name}` must be A, B or AJB")));
-            }
-            if structure.impacts.is_empty() || structure.responses.is_empty() {
-                return Err((at, format!("configuration `{name}` needs impacts and responses")));
-            }
+            faults.unless(
+                configuration_named(name).is_some(),
+                at,
+                format!("configuration.name `{name}` must be A, B or AJB"),
+            );
+            faults.unless(
+                !structure.impacts.is_empty() && !structure.responses.is_empty(),
+                at,
+                format!("configuration `{name}` needs impacts and responses"),
+            );
             let known: HashSet<&str> =
                 self.geometry.impact.iter().map(|point| &*point.get_ref().name).collect();
-            check_names(&structure.impacts, &known, "impacts")?;
+            check_names(&structure.impacts, &known, "impacts", faults);
             let known: HashSet<&str> =
                 self.geometry.response.iter().map(|point| &*point.get_ref().name).collect();
-            check_names(&structure.responses, &known, "responses")?;
-            for impact in &structure.impacts {
-                for response in &structure.responses {
-                    let cell = (name, impact.get_ref(), response.get_ref());
-                    if !seen.insert(cell) {
-                        let (impact, response) = (cell.1, cell.2);
-                        return Err((
-                            at,
-                            format!("configuration `{name}`: the cell {impact} × {response} stands twice"),
-                        ));
-                    }
+            check_names(&structure.responses, &known, "responses", faults);
+            // a name that stands twice in one list is told there
+            let (impacts, responses) = (once(&structure.impacts), once(&structure.responses));
+            for impact in &impacts {
+                for response in &responses {
+                    faults.unless(
+                        seen.insert((name, *impact, *response)),
+                        at,
+                        format!("configuration `{name}`: the cell {impact} × {response} stands twice"),
+                    );
                 }
             }
         }
-        Ok(())
     }
 }
 
-fn check_names(names: &[Spanned<String>], known: &HashSet<&str>, field: &str) -> Result<(), Wrong> {
+/// Each name once.
+fn once(names: &[Spanned<String>]) -> Vec<&String> {
+    let mut seen = HashSet::new();
+    names.iter().map(Spanned::get_ref).filter(|name| seen.insert(*name)).collect()
+}
+
+fn check_names(names: &[Spanned<String>], known: &HashSet<&str>, field: &str, faults: &mut Faults) {
     let mut seen = HashSet::new();
     for name in names {
         let (at, name) = (name.span().start, name.get_ref());
-        if !known.contains(name.as_str()) {
-            return Err((at, format!("configuration.{field}: the geometry has no point `{name}`")));
-        }
-        if !seen.insert(name) {
-            return Err((at, format!("configuration.{field}: `{name}` stands twice")));
-        }
+        faults.unless(
+            known.contains(name.as_str()),
+            at,
+            format!("configuration.{field}: the geometry has no point `{name}`"),
+        );
+        faults.unless(seen.insert(name), at, format!("configuration.{field}: `{name}` stands twice"));
     }
-    Ok(())
 }

@@ -15,7 +15,7 @@ pub struct GeometryPlan {
     pub impact: Vec<Spanned<ImpactPoint>>,
     /// Sensors that stay where they are.
     #[serde(default)]
-    pub sensor: Vec<SensorPoint>,
+    pub sensor: Vec<Spanned<SensorPoint>>,
 }
 
 /// A response point.

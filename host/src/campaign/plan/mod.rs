@@ -3,11 +3,14 @@
 //! A plan is a TOML file (`docs/plans/paper.toml` is the example). Unknown fields are refused, and every
 //! error names file, line and field. Lengths are in m, forces in N, times in s unless a name says otherwise.
 
+mod answers;
 mod cells;
 mod check;
+mod faults;
 mod geometry;
 pub mod level;
 mod priors;
+mod sense;
 mod sensor;
 
 pub use cells::Cell;
@@ -33,7 +36,10 @@ pub const SMALL: &str = include_str!("../../../../docs/plans/small.toml");
 
 /// What is wrong with a plan, and where.
 #[derive(Debug, thiserror::Error)]
-#[error("{source_name}:{line}: {what} (docs/campaigns.md explains every field)")]
+#[error(
+    "{source_name}:{line}: {what} (docs/campaigns.md explains every field{})",
+    if *more == 0 { String::new() } else { format!("; `jointrig plan check` tells {more} more") }
+)]
 pub struct PlanError {
     /// The file.
     pub source_name: String,
@@ -41,6 +47,21 @@ pub struct PlanError {
     pub line: usize,
     /// What is wrong, with the field's name.
     pub what: String,
+    /// How much else is wrong.
+    pub more: usize,
+}
+
+/// What names must have.
+const PRINTABLE: &str = "one printable character or more, and no others";
+
+/// Whether a name shows as what it is, wherever it is printed.
+fn printable(name: &str) -> bool {
+    !name.trim().is_empty() && !name.chars().any(|c| c.is_control() || directs(c))
+}
+
+/// Characters that turn the direction of what stands after them.
+fn directs(c: char) -> bool {
+    matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 /// A checked plan.
@@ -50,7 +71,7 @@ pub struct Plan {
     /// Version of the plan's format: 1.
     pub version: Spanned<u32>,
     /// Name of the plan.
-    pub name: String,
+    pub name: Spanned<String>,
     /// How a record is cut.
     pub record: Spanned<RecordPlan>,
     /// How many hits.
@@ -64,7 +85,7 @@ pub struct Plan {
     /// How long the hammer waits between hits.
     pub settle: Spanned<Settle>,
     /// How the FRFs are to be windowed.
-    pub window: Window,
+    pub window: Spanned<Window>,
     /// When a cell's FRFs are good enough to stop before all wanted hits; never, without it.
     pub enough: Option<Spanned<Enough>>,
     /// The shaker's levels before and after the campaign; none, without it.
@@ -195,7 +216,7 @@ impl ShakerPlan {
         format!(
             "the plan's {} levels of the shaker, before and after the cells: `jointrig shaker {} --device ADDR` measures them",
             self.levels(),
-            file.display()
+            crate::advice::quoted(file)
         )
     }
 }
@@ -256,22 +277,6 @@ pub fn configuration_named(name: &str) -> Option<Configuration> {
 }
 
 impl Plan {
-    /// Reads and checks a plan; `source_name` is what errors call it.
-    ///
-    /// # Errors
-    /// The first thing that is wrong, with line and field.
-    pub fn parse(text: &str, source_name: &str) -> Result<Self, PlanError> {
-        let error = |at: usize, what: String| PlanError {
-            source_name: source_name.into(),
-            line: 1 + text.get(..at).unwrap_or(text).matches('\n').count(),
-            what,
-        };
-        let plan: Self = toml::from_str(text)
-            .map_err(|wrong| error(wrong.span().map_or(0, |span| span.start), field(text, &wrong)))?;
-        plan.check().map_err(|(at, what)| error(at, what))?;
-        Ok(plan)
-    }
-
     /// Samples of a record from the trigger on.
     pub fn post_trigger_scans(&self) -> u64 {
         let record = self.record.get_ref();

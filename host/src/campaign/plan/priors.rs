@@ -46,8 +46,8 @@ impl PriorsPlan {
         known
     }
 
-    /// The first that is no standard deviation.
-    pub fn wrong(&self) -> Option<&'static str> {
+    /// What is stated, by name.
+    pub fn stated(&self) -> [(&'static str, Option<f64>); 8] {
         [
             ("position_m", self.position_m),
             ("aim_m", self.aim_m),
@@ -58,7 +58,5 @@ impl PriorsPlan {
             ("hammer_gain", self.hammer_gain),
             ("skew_s", self.skew_s),
         ]
-        .into_iter()
-        .find_map(|(name, value)| value.is_some_and(|v| !(v >= 0.0 && v.is_finite())).then_some(name))
     }
 }

@@ -5,7 +5,8 @@ use std::collections::HashSet;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{PlanError, field};
+use super::PlanError;
+use super::faults::{Faults, first, read};
 
 /// What is behind a channel of the device.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
@@ -45,20 +46,12 @@ impl CalibrationFile {
     /// # Errors
     /// It is no such file, or what it says of a sensor cannot be.
     pub fn parse(text: &str, source_name: &str) -> Result<Self, PlanError> {
-        let error = |at: usize, what: String| PlanError {
-            source_name: source_name.into(),
-            line: 1 + text.get(..at).unwrap_or(text).matches('\n').count(),
-            what,
-        };
-        let file: Self = toml::from_str(text)
-            .map_err(|wrong| error(wrong.span().map_or(0, |span| span.start), field(text, &wrong)))?;
-        check_sensors(&file.channel).map_err(|(at, what)| error(at, what))?;
-        Ok(file)
+        read(text, source_name, |file: &Self, faults| check_sensors(&file.channel, faults)).map_err(first)
     }
 }
 
 /// What is wrong with a sensor, and where.
-pub(super) fn check_sensors(channels: &[Spanned<SensorPlan>]) -> Result<(), (usize, String)> {
+pub(super) fn check_sensors(channels: &[Spanned<SensorPlan>], faults: &mut Faults) {
     let mut seen = HashSet::new();
     for channel in channels {
         let (at, sensor) = (channel.span().start, channel.get_ref());
@@ -79,7 +72,6 @@ pub(super) fn check_sensors(channels: &[Spanned<SensorPlan>]) -> Result<(), (usi
         } else {
             continue;
         };
-        return Err((at, what));
+        faults.unless(false, at, what);
     }
-    Ok(())
 }

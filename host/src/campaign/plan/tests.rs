@@ -134,3 +134,71 @@ fn what_may_be_left_out_is_checked_where_it_stands() {
         assert!(said.contains(word), "{said}");
     }
 }
+
+#[test]
+fn what_no_plan_can_mean_is_refused_for_a_new_campaign_and_read_in_an_old_one() {
+    for (from, to, word) in [
+        ("[-0.02, 0.02, 0.03]", "[-20.0, 20.0, 30.0]", "in m, not in mm"),
+        ("virtual_point_m = [0.0, 0.0, 0.0]", "virtual_point_m = [0.0, nan, 0.0]", "virtual_point_m"),
+        ("exponential_per_s = 2.3", "exponential_per_s = -2.3", "window.exponential_per_s"),
+        ("exponential_per_s = 2.3", "exponential_per_s = 1e308", "window.exponential_per_s"),
+        ("level_n = 3.0", "level_n = inf", "trigger.level_n"),
+        ("level_n = 3.0", "level_n = 80.0", "trigger.level_n"),
+        ("window_samples = 128", "window_samples = 0", "settle.window_samples"),
+        ("quiet_relative = 0.003", "quiet_relative = 3.0", "settle.quiet_relative"),
+        ("target_n = 50.0", "target_n = 25.0", "every hit is refused"),
+        ("strong_n = 75.0", "strong_n = inf", "strong_n"),
+        ("name = \"small\"", "name = \"\"", "name must have"),
+        ("name = \"small\"", "name = \"\\u001b[2J\"", "name must have"),
+        ("name = \"A2\"", "name = \"A/2\"", "files are named after it"),
+        ("name = \"LC1\"", "name = \"\\u202eLC1\"", "must have one printable"),
+    ] {
+        assert!(SMALL.contains(from), "{from}");
+        let text = SMALL
+            .replace(from, to)
+            .replace("\"A2\"]", &format!("\"{}\"]", if to.contains("A/2") { "A/2" } else { "A2" }));
+        let said = Plan::parse_new(&text, "my.toml").expect_err(to).to_string();
+        assert!(said.contains(word), "{to}: {said}");
+        assert!(Plan::parse(&text, "my.toml").is_ok(), "{to}: a file that was made with it cannot be read");
+    }
+    for (priors, word) in [
+        ("position_m = 0.5", "it is in m"),
+        ("hammer_angle_rad = 2.0", "it is in rad"),
+        ("gain = 1.0", "0.01 for 1 %"),
+        ("skew_s = 2.0", "it is in s"),
+    ] {
+        let said = Plan::parse_new(&format!("{SMALL}\n[priors]\n{priors}\n"), "my.toml").expect_err(priors);
+        assert!(said.to_string().contains(word), "{said}");
+    }
+    for text in [PAPER, DEMO, SMALL, CONTACT, PAPER_CONTACT] {
+        Plan::parse_new(text, "plan").expect("a good plan");
+    }
+}
+
+#[test]
+fn everything_that_is_wrong_is_told_at_once_by_line() {
+    let text = SMALL
+        .replace("rate_hz = 51200", "rate_hz = 0\nrate = 3")
+        .replace("wanted = 2", "wanted = 2\nwnated = 3")
+        .replace("impacts = [\"BZ1\"]", "impacts = [\"BZ7\"]")
+        .replace("direction = [0, -1, 0]", "direction = [0, -2, 0]");
+    let all = Plan::parse_all(&text, "my.toml").expect_err("five faults");
+    let said: Vec<String> = all.iter().map(ToString::to_string).collect();
+    let line = |word: &str| 1 + text.lines().position(|line| line.contains(word)).expect("it is there");
+    assert_eq!(all.len(), 5, "{said:#?}");
+    for (fault, (at, word)) in all.iter().zip([
+        ("[record]", "record.rate_hz"),
+        ("rate = 3", "unknown field `rate`"),
+        ("wnated", "unknown field `wnated`"),
+        ("BZ7", "no point `BZ7`"),
+        ("[0, -2, 0]", "length 1"),
+    ]) {
+        assert!(fault.line == line(at) && fault.what.contains(word), "{at}: {fault}");
+    }
+    let first = Plan::parse_new(&text, "my.toml").expect_err("five faults").to_string();
+    assert!(first.contains("`jointrig plan check` tells 4 more"), "{first}");
+    // a value of the wrong kind hides what only a whole plan shows
+    let unreadable = text.replace("version = 1", "version = \"one\"");
+    let all = Plan::parse_all(&unreadable, "my.toml").expect_err("it cannot be read");
+    assert_eq!((all.len(), all[0].line), (3, line("version")), "{all:?}");
+}

@@ -24,6 +24,9 @@ pub enum RunError {
         /// What does not fit, and what to do.
         what: String,
     },
+    /// The file's records are of another structure.
+    #[error("{0}")]
+    AnotherStructure(String),
     /// The thread that stores records ended without saying why.
     #[error("records can no longer be stored; run the same command again")]
     KeeperGone,

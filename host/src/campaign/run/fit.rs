@@ -65,17 +65,3 @@ pub(super) fn with_sensors(plan: &Plan, channels: &ChannelMap) -> Result<(Channe
     }
     Ok((map, remarks))
 }
-
-/// Refuses a device that sees one of these with the other sign than it has: it finds hits in a force, and holds the shaker's amplitude by
-/// the difference of two motions, with the signs that it was built with.
-pub(super) fn same_sign(device: &ChannelMap, calibrated: &ChannelMap, roles: &[Role]) -> Result<(), String> {
-    let turned = |role: &&Role| {
-        let sign = |map: &ChannelMap| Some(map.channels[map.place(**role)?].units_per_volt.signum());
-        sign(device) != sign(calibrated)
-    };
-    let Some(place) = roles.iter().find(turned).and_then(|role| device.place(*role)) else { return Ok(()) };
-    Err(format!(
-        "its channel `{}` has the other sign than the calibration says, and the device acts on it: turn it at the amplifier",
-        device.channels[place].name
-    ))
-}

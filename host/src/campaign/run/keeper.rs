@@ -39,6 +39,10 @@ enum Entry {
         counters: Counters,
     },
     Log(String),
+    Temperature {
+        session: i64,
+        celsius: f64,
+    },
     /// Somebody waits until all before this is stored.
     Waited(SyncSender<()>),
 }
@@ -106,6 +110,12 @@ impl Keeper {
         self.send(Entry::Log(text))
     }
 
+    /// Notes the specimen's temperature, °C. Returns as [`Keeper::record`] does.
+    #[must_use]
+    pub fn temperature(&self, session: i64, celsius: f64) -> bool {
+        self.send(Entry::Temperature { session, celsius })
+    }
+
     /// Waits until all that was handed over is in the file. Returns as [`Keeper::record`] does.
     #[must_use]
     pub fn catch_up(&self) -> bool {
@@ -152,6 +162,7 @@ fn keep(store: &Store, entry: Entry) -> Result<(), StoreError> {
         Entry::Link { session, counters } => store.note_link(session, &counters),
         Entry::GivenUp { cell, reason } => store.give_up(cell, &reason),
         Entry::Log(text) => store.log(&text),
+        Entry::Temperature { session, celsius } => store.note_temperature(session, celsius),
         Entry::Waited(by) => {
             // who waited may have ended
             let _ = by.send(());

@@ -22,4 +22,5 @@ pub mod runner;
 pub mod shaking;
 pub mod shot;
 pub mod stage;
+mod structure;
 pub mod tally;

@@ -11,19 +11,18 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use jointrig_protocol::channel::Role;
-
 use super::answers::Answers;
 use super::clock::ScanClock;
 use super::earlier::Earlier;
 use super::edits::{Edits, Recount};
 use super::error::RunError;
-use super::fit::{fitted, same_sign};
+use super::fit::fitted;
 use super::forces::Forces;
 use super::keeper::Keeper;
 use super::pulse::Hit;
 use super::shot::Shooter;
 use super::stage::Stage;
+use super::structure::same_or_accepted;
 use super::tally::Tally;
 use crate::campaign::plan::Plan;
 use crate::campaign::store::Store;
@@ -47,6 +46,8 @@ pub struct Options {
     pub stage: Stage,
     /// Answer every prompt with yes.
     pub yes: bool,
+    /// Go on even where device or rig tell that it is another structure than that of the file's records.
+    pub new_structure: bool,
     /// Who watches.
     pub watch: Watchers,
     /// What persons elsewhere want changed in the file.
@@ -89,8 +90,14 @@ pub fn run(
     let device = session.channels(&info)?;
     let (planned, remarks) = fitted(session.address(), &plan, &device)?;
     let channels = store.calibrated(store.next_session()?, planned.clone())?;
-    same_sign(&device, &channels, &[Role::HammerForce])
-        .map_err(|what| RunError::Unfit { address: session.address().into(), what })?;
+    let changed = same_or_accepted(
+        &store,
+        &info,
+        session.simulated(),
+        options.new_structure,
+        RunError::AnotherStructure,
+    )?;
+    session.calibrate(&device, &channels)?;
     let noted = SessionInfo {
         address: session.address().into(),
         board: info.board.as_str().into(),
@@ -101,6 +108,7 @@ pub fn run(
         schema_hash: Hex(session.hello().schema),
     };
     let id = store.begin_session(&noted, &planned)?;
+    changed.iter().try_for_each(|what| store.note_another_structure(what))?;
     let unknown = |name: &str| channels.channels.iter().all(|channel| channel.name != name);
     let calibrations = store.calibrations()?;
     let without = calibrations.iter().filter(|own| unknown(&own.channel));
@@ -111,7 +119,6 @@ pub fn run(
         store.log(&remark)?;
         options.watch.saw(&Seen::Remark(&remark));
     }
-    session.calibrate(&device, &channels);
     if let Some(simulated) = session.simulated() {
         store.note_simulated(simulated)?;
     }
@@ -149,6 +156,9 @@ pub fn run(
     let walked = runner.walk();
     runner.end(walked)
 }
+
+/// Hits between two notes of the temperature: some minutes, in which a laboratory's changes by less than it matters.
+const HITS_PER_TEMPERATURE: u64 = 100;
 
 /// A run under way.
 pub(super) struct Runner<'a> {
@@ -248,6 +258,9 @@ impl Runner<'_> {
         verdict: Verdict,
     ) -> Result<(), RunError> {
         self.mark()?;
+        if self.hits.is_multiple_of(HITS_PER_TEMPERATURE) {
+            self.keep_temperature()?;
+        }
         self.hits += 1;
         let shot = recording.shot;
         self.forces.learn(Hit { pulse_us: shot.pulse_us, peak_n: verdict.peak_n });
@@ -270,6 +283,14 @@ impl Runner<'_> {
         still(self.keeper.record(record, counters(self.session)))
     }
 
+    /// Keeps the specimen's temperature, where the device measures it.
+    fn keep_temperature(&mut self) -> Result<(), RunError> {
+        match self.session.temperature_c()? {
+            Some(celsius) => still(self.keeper.temperature(self.session_id, celsius)),
+            None => Ok(()),
+        }
+    }
+
     /// Keeps what the controller has logged.
     pub(super) fn keep_log(&mut self) -> Result<(), RunError> {
         let lines = self.session.log_lines();
@@ -279,6 +300,7 @@ impl Runner<'_> {
     /// Ends stream and file; of two errors the first one counts.
     fn end(mut self, walked: Result<(), RunError>) -> Result<Summary, RunError> {
         self.saw(&Seen::Ended);
+        let walked = walked.and_then(|()| if self.hits > 0 { self.keep_temperature() } else { Ok(()) });
         let accounts = if walked.is_ok() {
             self.session.disarm().and_then(|()| self.session.finish())
         } else {

@@ -30,6 +30,7 @@ mod share;
 pub mod simulated;
 pub mod stored;
 mod table;
+pub mod temperature_table;
 pub mod verify;
 
 use std::cmp::Ordering;

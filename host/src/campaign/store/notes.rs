@@ -50,7 +50,31 @@ pub(super) fn write_log(connection: &Connection, text: &str) -> rusqlite::Result
     LogLine { utc: utc_now(), text: text.into() }.insert(connection, &[])
 }
 
+/// The key under which accepted changes of the structure stand: a JSON list of sentences.
+const STRUCTURES: &str = "structure_changes";
+
 impl Store {
+    /// Notes that the campaign goes on on another structure, and what told so.
+    pub(crate) fn note_another_structure(&self, what: &str) -> Result<(), StoreError> {
+        let mut all = self.structure_changes()?;
+        all.push(format!("{}: {what}", utc_now()));
+        let text = serde_json::to_string(&all).map_err(|error| self.content(error.to_string()))?;
+        self.set_meta(STRUCTURES, &text)?;
+        self.log(&format!("another structure was accepted: {what}"))
+    }
+
+    /// What told that the structure was another one than before, each time that it was accepted.
+    ///
+    /// # Errors
+    /// The note cannot be read.
+    pub fn structure_changes(&self) -> Result<Vec<String>, StoreError> {
+        let read = |text: String| {
+            serde_json::from_str(&text)
+                .map_err(|error| self.content(format!("the note {STRUCTURES}: {error}")))
+        };
+        Ok(self.meta(STRUCTURES)?.map(read).transpose()?.unwrap_or_default())
+    }
+
     /// The plan.
     pub fn plan(&self) -> Result<Plan, StoreError> {
         let (text, source) = self.plan_text()?;

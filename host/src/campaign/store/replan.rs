@@ -16,7 +16,7 @@ impl Store {
     /// # Errors
     /// The plan is wrong, or what was measured already would not fit it.
     pub fn take_over(&mut self, text: &str, source: &str) -> Result<(), StoreError> {
-        let (new, old) = (Plan::parse(text, source)?, self.plan()?);
+        let (new, old) = (Plan::parse_new(text, source)?, self.plan()?);
         let refuse = |what: String| {
             Err(StoreError::PlanChange { path: self.path.clone(), source_name: source.into(), what })
         };

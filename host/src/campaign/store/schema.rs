@@ -19,6 +19,7 @@ use super::overrules::Overrule;
 use super::record_row::RecordRow;
 use super::session_table::{ChannelColumns, Sensor, SessionInfo};
 use super::table::create;
+use super::temperature_table::TemperatureRow;
 use super::{APPLICATION_ID, Store, VERSION};
 use crate::campaign::plan::Plan;
 
@@ -43,7 +44,7 @@ impl Store {
     /// # Errors
     /// The file exists, cannot be written, or the plan is wrong.
     pub fn create(path: &Path, text: &str, source: &str) -> Result<Self, StoreError> {
-        let plan = Plan::parse(text, source)?;
+        let plan = Plan::parse_new(text, source)?;
         let mut store = Self::empty(path)?;
         store.fill(&plan, text, source).map_err(|error| sqlite(path, "creating", error))?;
         Ok(store)
@@ -96,6 +97,7 @@ fn tables() -> String {
         create::<LogLine>(),
         create::<FrfColumns>(),
         create::<LevelRow>(),
+        create::<TemperatureRow>(),
     ]
     .concat();
     tables + &APPEND_ONLY.map(stay).concat()

@@ -85,6 +85,11 @@ table! {
     }
 }
 
+impl SessionInfo {
+    /// What stands for the board of records that came from a file.
+    pub const IMPORTED: &str = "imported";
+}
+
 /// Counters of a link by name.
 pub type Counters = BTreeMap<String, u64>;
 

@@ -21,6 +21,9 @@ pub struct SimulatedRig {
     pub name: String,
     /// Its seed.
     pub seed: u64,
+    /// SHA-256 of all its parameters, in base64; none in files from before it was noted.
+    #[serde(default)]
+    pub parameters: Option<String>,
 }
 
 /// How the contact answers.
@@ -60,7 +63,11 @@ pub fn is_simulated_board(name: &str) -> bool {
 impl Store {
     /// Notes which simulated rig the campaign is run on, and its truth; the last session's counts.
     pub(crate) fn note_simulated(&self, simulated: &Simulated) -> Result<(), StoreError> {
-        let rig = SimulatedRig { name: simulated.rig.clone(), seed: simulated.seed };
+        let rig = SimulatedRig {
+            name: simulated.rig.clone(),
+            seed: simulated.seed,
+            parameters: Some(simulated.parameters.clone()),
+        };
         let rig = serde_json::to_string(&rig).map_err(|error| self.content(error.to_string()))?;
         self.set_meta(RIG, &rig)?;
         self.set_meta(TRUTH, &simulated.truth.to_string())

@@ -5,6 +5,7 @@
 //! means remove smooth motion; blocks of 1, 4, 8 and 16 samples make steps stand out of noise. Each difference is compared
 //! with the median of its surroundings, so that neither the level of noise nor a decaying mode counts.
 
+use super::motion::{LOOKED_AT, is_motion};
 use crate::spectra::Pulse;
 
 /// The strongest jump found.
@@ -27,9 +28,6 @@ const QUIET_AFTER_PULSE_S: f64 = 0.001;
 /// Surroundings: this many differences, s of record for single samples.
 const SURROUNDINGS: usize = 512;
 
-/// Second differences of the other sign, as a part of the largest: a spike has a half, a step all of it, and a kink what noise makes.
-const KINK: f64 = 0.35;
-
 /// The strongest jump whose ratio exceeds `limit`.
 pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<Burst> {
     let step = quantum(x);
@@ -46,7 +44,7 @@ pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<B
             let near = block == 1 && from >= quiet;
             let ratio = d / s;
             let worse = ratio > limit && worst.as_ref().is_none_or(|w| ratio > w.ratio);
-            if worse && (far || near && !is_kink(x, i)) {
+            if worse && (far || near && !moves(x, i)) {
                 worst = Some(Burst { sample: from + 2 * block, ratio });
             }
         }
@@ -54,16 +52,11 @@ pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<B
     worst
 }
 
-/// Whether the motion has a kink here and no more: a contact that stops to slide changes the force, and so the acceleration, at once. A kink's
-/// second differences have one sign, a step's have both alike, and those of a spike are −2 in the middle of 1 and 1.
-fn is_kink(x: &[f64], third: usize) -> bool {
-    let around = &x[third.saturating_sub(2)..(third + 6).min(x.len())];
-    let [mut up, mut down] = [0.0_f64; 2];
-    for w in around.windows(3) {
-        let bend = w[0] - 2.0 * w[1] + w[2];
-        (up, down) = (up.max(bend), down.max(-bend));
-    }
-    up.min(down) < KINK * up.max(down)
+/// Whether the structure itself moves so where this third difference is.
+fn moves(x: &[f64], third: usize) -> bool {
+    // it spans four samples
+    let from = (third + 2).saturating_sub(LOOKED_AT / 2);
+    x.get(from..from + LOOKED_AT).is_some_and(is_motion)
 }
 
 fn third_differences(x: &[f64], block: usize) -> Vec<f64> {
@@ -132,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn spikes_and_steps_are_found_and_kinks_are_motion() {
+    fn spikes_and_steps_are_found_and_what_a_contact_does_is_motion() {
         const AT: usize = 520;
         assert!(found(|_| 0.0).is_none());
         let spike = found(|i| if i == AT { 0.05 } else { 0.0 });
@@ -142,5 +135,10 @@ mod tests {
         assert!(found(|i| 0.05 * i.saturating_sub(AT) as f64).is_none());
         let between = |i: usize| if i > AT { 0.05 * ((i - AT) as f64 - 0.4) } else { 0.0 };
         assert!(found(between).is_none());
+        // the force changes at once
+        assert!(found(|i| 0.02 * (i.saturating_sub(AT) as f64).powi(2).min(400.0)).is_none());
+        // a spike that the filter before the converter has spread
+        let spread = |i: usize| [0.2, 1.0, 0.2].get(i.wrapping_sub(AT)).map_or(0.0, |part| 0.08 * part);
+        assert!(found(spread).is_some());
     }
 }

@@ -71,7 +71,8 @@ impl Others {
         let si = |place: usize| channels.to_si(place, codes.channel(place));
         let force_n = si(force);
         let Some(pulse) = Pulse::locate(&force_n) else { return };
-        let window = Windowing { sigma_per_s: plan.window.exponential_per_s, ..Windowing::default() };
+        let window =
+            Windowing { sigma_per_s: plan.window.get_ref().exponential_per_s, ..Windowing::default() };
         let origin_s = pulse.start as f64 / fs_hz;
         let average =
             self.average.get_or_insert_with(|| SpectraAverage::new(fs_hz, force_n.len(), responses.len()));

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use crate::advice::quoted;
 use crate::campaign::plan::{CalibrationFile, SensorPlan};
 use crate::campaign::store::Store;
 use crate::cli::error::CliError;
@@ -60,7 +61,7 @@ impl Calibrate {
                 unit = new.quantity.unit()
             ));
         }
-        let file = self.file.display().to_string();
+        let file = quoted(&self.file);
         said.push(format!("next: jointrig analyse {file} --out DIR"));
         store.close()?;
         output::lines(said)

@@ -5,7 +5,6 @@ mod calibrate;
 mod check;
 mod judged;
 mod new;
-mod plan_file;
 pub mod run;
 mod show;
 mod status;

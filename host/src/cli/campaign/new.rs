@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use crate::advice::quoted;
 use crate::campaign::plan;
 use crate::campaign::store::Store;
-use crate::cli::campaign::plan_file;
 use crate::cli::error::CliError;
+use crate::cli::plan::file as plan_file;
 
 /// Create a campaign file from a plan.
 #[derive(Debug, Args)]
@@ -32,7 +33,7 @@ impl New {
         let store = Store::create(&self.file, &text, &name)?;
         let cells = store.cells()?;
         let hits: u32 = cells.iter().map(|row| row.cell.wanted).sum();
-        let path = self.file.display();
+        let path = quoted(&self.file);
         eprintln!("{path}: {} cells, {hits} hits wanted", cells.len());
         if let Some(shaker) = &store.plan()?.shaker {
             eprintln!("{}", shaker.get_ref().remark(&self.file));

@@ -4,15 +4,17 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use crate::advice::quoted;
 use crate::campaign::plan::{Cell, Plan};
 use crate::campaign::run::stage::Stage;
 use crate::campaign::store::Store;
 use crate::campaign::verdict::judge::{ByRecord, Judge};
 use crate::campaign::verdict::others::Others;
 use crate::campaign::verdict::{Kind, Verdict};
-use crate::cli::campaign::{calibrate, plan_file};
+use crate::cli::campaign::calibrate;
 use crate::cli::error::CliError;
 use crate::cli::page::Page;
+use crate::cli::plan::file as plan_file;
 use crate::cli::{interrupt, measure};
 use crate::device::address::Address;
 use crate::device::channels::ChannelMap;
@@ -20,6 +22,7 @@ use crate::device::recording::Recording;
 
 /// Measure what is left of a campaign.
 #[derive(Debug, Args)]
+#[allow(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub struct Run {
     /// The campaign file.
     #[arg(value_name = "FILE.jrig")]
@@ -39,6 +42,9 @@ pub struct Run {
     /// The laboratory's sensors: they count in this session and those after it, instead of what device and plan say.
     #[arg(long, value_name = "LAB.toml")]
     calibration: Option<PathBuf>,
+    /// Go on even where the device tells of another structure than that of the file's records; the report says so.
+    #[arg(long)]
+    new_structure: bool,
     /// Ring the terminal's bell at every verdict, twice at a refusal.
     #[arg(long)]
     bell: bool,
@@ -65,6 +71,7 @@ impl Run {
             device,
             stage: Stage::Auto,
             yes: false,
+            new_structure: false,
             plan: None,
             calibration: None,
             bell: false,
@@ -86,9 +93,9 @@ impl Run {
         self.mention_shaker(&store)?;
         let stop = interrupt::flag();
         let mut onlooker = self.page.start(Some(&self.file), &stop, self.allows_control())?;
-        let again = format!("jointrig campaign run {} --device {address}", self.file.display());
+        let again = format!("jointrig campaign run {} --device {address}", quoted(&self.file));
         let device = measure::Device { address: &address, seed: self.seed, log_tables: self.log_tables };
-        let who = measure::Who { stage: self.stage, yes: self.yes, stop };
+        let who = measure::Who { stage: self.stage, yes: self.yes, new_structure: self.new_structure, stop };
         let mut judge = Ringing { rings: self.bell };
         let summary = measure::measure(store, device, who, &mut onlooker, &again, &mut judge)?;
         if summary.interrupted {

@@ -105,7 +105,7 @@ fn session(file: &Path) -> SessionInfo {
     let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
     SessionInfo {
         address: format!("file:{name}"),
-        board: "imported".into(),
+        board: SessionInfo::IMPORTED.into(),
         serial: String::new(),
         firmware_version: String::new(),
         target: String::new(),

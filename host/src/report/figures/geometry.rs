@@ -7,8 +7,12 @@ use crate::results::{Place, Results};
 const ROOM_M: f64 = 0.004;
 
 /// Every place of the plan, and the arms as boxes around those that lie on their interfaces.
-pub fn geometry(results: &Results) -> Option<Figure> {
-    let places = &results.geometry;
+pub fn of_results(results: &Results) -> Option<Figure> {
+    geometry(&results.geometry)
+}
+
+/// Of places alone.
+pub fn geometry(places: &[Place]) -> Option<Figure> {
     if places.is_empty() {
         return None;
     }

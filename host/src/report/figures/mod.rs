@@ -28,6 +28,8 @@ mod shaker_loops;
 mod specimens;
 mod usable_bands;
 
+pub use geometry::geometry;
+
 use super::figure::{Figure, Panel, Source};
 use crate::results::Results;
 
@@ -80,7 +82,7 @@ pub const ALL: &[Entry] = &[
     entry(Chapter::Answer, "The answer", "an identified stiffness", answer::answer),
     entry(Chapter::SideBySide, "Every method side by side", ALL_THREE, comparison::comparison),
     entry(Chapter::SideBySide, "What makes the interval of k_T", "an identified k_T", budget::budget),
-    entry(Chapter::Measured, "Where hammer and vibrometer went", CAMPAIGN, geometry::geometry),
+    entry(Chapter::Measured, "Where hammer and vibrometer went", CAMPAIGN, geometry::of_results),
     entry(Chapter::Measured, "Every cell", CAMPAIGN, cells::cells),
     entry(Chapter::Measured, "Coherence of every cell", "two hits or more in a cell", coherence::coherence),
     entry(

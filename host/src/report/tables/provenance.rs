@@ -98,6 +98,11 @@ pub fn provenance(results: &Results) -> String {
         ("computed by".into(), format!("{} {}", source.software.name, source.software.version)),
     ];
     rows.extend(source.started.iter().map(|s| ("campaign begun".into(), s.clone())));
+    rows.extend(source.temperature_c.map(|[least, mean, most]| {
+        let value = |celsius| decimals(celsius, 1);
+        let text = format!("{} °C on average, {} to {} °C", value(mean), value(least), value(most));
+        ("temperature of the specimen".into(), text)
+    }));
     rows.extend(source.device.iter().map(|(k, v)| (format!("device: {}", spaced(k)), v.clone())));
     rows.extend(source.settings.iter().map(|(k, v)| {
         let text = v.as_str().map_or_else(|| v.to_string(), str::to_owned);

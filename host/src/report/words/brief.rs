@@ -4,8 +4,8 @@ use super::answer_sentences::{why_they_differ, with_interval};
 use super::line::{BETWEEN, CLAMP, CONTACT, Line, TRUTH, UNKNOWN};
 use super::number::{decimals, micro, short};
 use crate::results::{
-    BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, Results, SAME_IN_ALL,
-    SERIES_COMPLIANCE, UNCHANGED,
+    BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, ONE_STRUCTURE, Results,
+    SAME_IN_ALL, SERIES_COMPLIANCE, UNCHANGED,
 };
 
 fn line(head: &str, text: impl Into<String>) -> Line {
@@ -87,6 +87,7 @@ pub fn failed(check: &Check) -> String {
         UNCHANGED => "The contact is not the same after the hits as before.".into(),
         INTERFACE_MODES => "Six rigid motions do not describe what couples the parts.".into(),
         INTERNALS => "The points away from the interface do not suffice for every method.".into(),
+        ONE_STRUCTURE => "The device told of another structure during the campaign.".into(),
         SAME_IN_ALL => "A or B is not the same alone as in the assembly.".into(),
         BACK_COUPLING => {
             format!("A and B, joined by the stiffness found, do not give the measured assembly{at}.")

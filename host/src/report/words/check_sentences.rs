@@ -10,8 +10,8 @@ use crate::hysteresis::compliance::ImaginaryPeak;
 use crate::hysteresis::hammer_slip::{HammerSlip, Unclear};
 use crate::hysteresis::phase_split::{PhaseSplit, Specimen};
 use crate::results::{
-    BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, SAME_IN_ALL,
-    SERIES_COMPLIANCE, UNCHANGED,
+    BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, ONE_STRUCTURE,
+    SAME_IN_ALL, SERIES_COMPLIANCE, UNCHANGED,
 };
 use crate::substructuring::cmif::Cmif;
 use crate::substructuring::explained::BEYOND;
@@ -20,6 +20,7 @@ use crate::substructuring::identify::Internals;
 /// All that were made.
 pub fn all(found: &Findings) -> Vec<Check> {
     let mut checks = Vec::new();
+    checks.extend(one_structure(&found.source.structure_changes));
     if let Some(of_frfs) = &found.substructured {
         checks.extend(of_frfs.cmif.as_ref().ok().map(interface_modes));
         checks.extend(of_frfs.internals.as_ref().map(internals));
@@ -33,6 +34,15 @@ pub fn all(found: &Findings) -> Vec<Check> {
         checks.extend(contact.change.as_ref().map(contact_change));
     }
     checks
+}
+
+/// That records of several structures were put together, where somebody accepted that.
+fn one_structure(changes: &[String]) -> Option<Check> {
+    let meaning = format!(
+        "The campaign went on where the device told of another structure, because --new-structure was given ({}). If it was another one, nothing here is that of either.",
+        changes.join("; ")
+    );
+    (!changes.is_empty()).then(|| Check::new(ONE_STRUCTURE, Some(false), meaning))
 }
 
 /// Which set of modes the CMIF suggests, and whether rigid motions are enough at all.

@@ -54,6 +54,9 @@ pub enum Shortfall {
 /// Why the run ended.
 #[derive(Debug, thiserror::Error)]
 pub enum ShakeError {
+    /// The file's records are of another structure.
+    #[error("{0}")]
+    AnotherStructure(String),
     /// The campaign file.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -168,6 +171,10 @@ pub fn in_words(reason: Option<Reason>, channels: &ChannelMap, limit: impl Fn(u8
             "the device did not hear this program for a second: is the machine overloaded?".into()
         }
         Some(Reason::Expired) => "its order expired before it was renewed: is the machine overloaded?".into(),
+        Some(Reason::Supply { channel }) => {
+            let name = channels.channels.get(usize::from(channel)).map_or("?", |channel| &channel.name);
+            format!("the sensor of channel `{name}` is not there any more: its cable is open or shorted")
+        }
         Some(Reason::FrontEnd) => "the converters lost scans; see the controller's log".into(),
         Some(Reason::RanDry) => "its drive was not fed in time; see the controller's log".into(),
         Some(Reason::StreamEnded) => "the stream ended".into(),

@@ -22,7 +22,8 @@ use jointrig_protocol::answer::Info;
 use jointrig_protocol::channel::Role;
 use jointrig_protocol::request::{Configuration, Stage as StageRequest};
 
-use super::fit::{same_sign, with_sensors};
+use super::fit::with_sensors;
+use super::structure::same_or_accepted;
 use crate::campaign::plan::Plan;
 use crate::campaign::plan::level::Level;
 use crate::campaign::store::Store;
@@ -97,8 +98,11 @@ pub fn run_watched(
     let unfit = |what| ShakeError::Unfit { address: address.clone(), what };
     let (planned, remarks) = with_sensors(&plan, &device).map_err(unfit)?;
     let channels = store.calibrated(store.next_session()?, planned.clone())?;
-    same_sign(&device, &channels, &[Role::SpecimenA, Role::SpecimenB, Role::Excitation]).map_err(unfit)?;
     error::check_fit(&address, &info, &channels, options)?;
+    let accepted = options.new_structure;
+    let changed =
+        same_or_accepted(store, &info, session.simulated(), accepted, ShakeError::AnotherStructure)?;
+    session.calibrate(&device, &channels)?;
     let noted = SessionInfo {
         address,
         board: info.board.as_str().into(),
@@ -110,8 +114,8 @@ pub fn run_watched(
     };
     let known = store.levels()?;
     let id = store.begin_session(&noted, &planned)?;
+    changed.iter().try_for_each(|what| store.note_another_structure(what))?;
     remarks.iter().try_for_each(|remark| store.log(remark))?;
-    session.calibrate(&device, &channels);
     if let Some(simulated) = session.simulated() {
         store.note_simulated(simulated)?;
     }
@@ -138,6 +142,11 @@ pub fn run_watched(
         } else {
             tell(store, level, None);
             let outcome = bench.measure(store, level);
+            if outcome.is_ok()
+                && let Some(celsius) = bench.session.temperature_c()?
+            {
+                store.note_temperature(id, celsius)?;
+            }
             bench.over(&outcome);
             outcome
         };
@@ -340,6 +349,7 @@ impl Bench<'_> {
     /// Comes to rest, and waits until the structure does so too.
     fn come_to_rest(&mut self) -> Result<(), ShakeError> {
         self.session.rest()?;
+        self.session.hold_acknowledgement(None);
         let pause = (PAUSE_S * self.rate_hz()) as u64;
         let until = self.session.status()?.next_scan + 20 * pause;
         loop {

@@ -29,6 +29,8 @@ pub struct Options {
     pub most_drive_v: Option<f64>,
     /// What stops the shaker.
     pub limits: Limits,
+    /// Go on even where device or rig tell that it is another structure than that of the file's records.
+    pub new_structure: bool,
     /// Set to come to rest and end.
     pub stop: Arc<AtomicBool>,
 }

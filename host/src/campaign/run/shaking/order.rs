@@ -83,12 +83,17 @@ impl Orders {
         self.renew(session)
     }
 
-    /// Waits for `scan`, and keeps the order alive meanwhile.
+    /// Waits for `scan`, and keeps the order alive meanwhile. It is renewed by what has arrived and not by what was looked at, so that a
+    /// program that lags behind does not let it expire; a virtual board waits for such a program.
     ///
     /// # Errors
     /// The user interrupts, the shaker stopped, or the device is gone.
     pub fn go_on(&mut self, session: &mut Session, scan: u64) -> Result<(), ShakeError> {
+        session.hold_acknowledgement(Some(scan));
         loop {
+            if session.expected()? >= self.renew_at {
+                self.renew(session)?;
+            }
             let next = scan.min(self.renew_at);
             let stop = &self.stop;
             if session.wait_until(next, |_| stop.load(Ordering::Relaxed))? {
@@ -100,7 +105,6 @@ impl Orders {
             if next == scan {
                 return Ok(());
             }
-            self.renew(session)?;
         }
     }
 

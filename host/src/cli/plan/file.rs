@@ -30,7 +30,7 @@ struct PeekGeometry {
 ///
 /// # Errors
 /// The plan or the workbook cannot be read, or the workbook describes what no plan can hold.
-pub(super) fn read(path: &Path) -> Result<String, CliError> {
+pub fn read(path: &Path) -> Result<String, CliError> {
     let text = std::fs::read_to_string(path).map_err(|source| CliError::Read {
         path: path.into(),
         doing: "reading the plan",

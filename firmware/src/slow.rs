@@ -1,0 +1,73 @@
+//! From a slow converter's voltages to temperature and bias, as docs/WIRING.md draws the circuits.
+
+#[allow(unused_imports, reason = "core has no square root; where std is linked its own is taken")]
+use micromath::F32Ext;
+
+/// The resistor from the reference to the Pt1000, Ω.
+const SERIES_OHM: f32 = 2_200.0;
+/// Platinum, IEC 60751: R = R₀ (1 + A t + B t²) above 0 °C, and 0.1 K off at −40 °C, where a third term begins.
+const R0_OHM: f32 = 1_000.0;
+/// See [`R0_OHM`], 1/K.
+const A: f32 = 3.9083e-3;
+/// See [`R0_OHM`], 1/K².
+const B: f32 = -5.775e-7;
+/// Temperatures that a specimen in a laboratory can have; beyond them the sensor is off or shorted.
+const BELIEVED_C: core::ops::Range<f32> = -50.0..150.0;
+
+/// Temperature of a Pt1000 to ground, behind its series resistor from the converter's own reference: `part` is the voltage at the sensor over
+/// the reference. °C; none where no sensor can be.
+#[must_use]
+pub fn pt1000_c(part: f32) -> Option<f32> {
+    if !(part > 0.0 && part < 1.0) {
+        return None;
+    }
+    let ohm = SERIES_OHM * part / (1.0 - part);
+    // t = (−A + √(A² − 4 B (1 − R/R₀))) / 2 B, written so that no digits cancel
+    let constant = 1.0 - ohm / R0_OHM;
+    let square = A * A - 4.0 * B * constant;
+    let temperature_c = -2.0 * constant / (A + root(square)?);
+    BELIEVED_C.contains(&temperature_c).then_some(temperature_c)
+}
+
+/// micromath's root is good to some per cent; two steps of Newton's make 1e-6 of it.
+fn root(square: f32) -> Option<f32> {
+    if square.is_nan() || square <= 0.0 {
+        return None;
+    }
+    let mut root = square.sqrt();
+    for _ in 0..2 {
+        root = 0.5 * (root + square / root);
+    }
+    Some(root)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The part of the reference at a resistance, Ω.
+    fn part(ohm: f32) -> f32 {
+        ohm / (ohm + SERIES_OHM)
+    }
+
+    #[test]
+    fn the_tables_of_iec_60751_come_back() {
+        for (celsius, ohm) in
+            [(0.0, 1000.0), (20.0, 1077.94), (25.0, 1097.35), (50.0, 1193.97), (100.0, 1385.06)]
+        {
+            let told = pt1000_c(part(ohm)).expect("a sensor");
+            assert!((told - celsius).abs() < 0.02, "{ohm} ohm is {told} C, not {celsius}");
+        }
+        assert!(
+            (pt1000_c(part(842.7)).expect("a sensor") + 40.0).abs() < 0.15,
+            "below zero a third term is left out"
+        );
+    }
+
+    #[test]
+    fn no_sensor_is_no_temperature() {
+        for part in [0.0, 1e-4, 0.999, 1.0, -0.1, f32::NAN] {
+            assert_eq!(pt1000_c(part), None, "{part}");
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! Everything that is wrong with a plan, in the order in which it stands there.
+
+use serde::de::DeserializeOwned;
+
+use super::{Plan, PlanError, field};
+
+/// Unknown fields that are told at once, at most: more are another kind of file.
+const MOST_UNKNOWN: usize = 50;
+
+/// What is wrong, and where in the text.
+#[derive(Debug, Default)]
+pub(super) struct Faults(Vec<(usize, String)>);
+
+impl Faults {
+    /// Notes that something is wrong, unless it is `good`.
+    pub fn unless(&mut self, good: bool, at: usize, what: impl Into<String>) {
+        if !good {
+            self.0.push((at, what.into()));
+        }
+    }
+
+    /// By place, as errors of the text called `source_name`.
+    fn told(mut self, text: &str, source_name: &str) -> Vec<PlanError> {
+        self.0.sort_by_key(|(at, _)| *at);
+        let error = |(at, what): (usize, String)| PlanError {
+            source_name: source_name.into(),
+            line: 1 + text.get(..at).unwrap_or(text).matches('\n').count(),
+            what,
+            more: 0,
+        };
+        self.0.into_iter().map(error).collect()
+    }
+}
+
+impl Plan {
+    /// Reads a plan that a campaign was made of: what was accepted once is not refused when its file is opened again. `source_name` is what
+    /// errors call it.
+    ///
+    /// # Errors
+    /// The first thing that is wrong, with line and field.
+    pub fn parse(text: &str, source_name: &str) -> Result<Self, PlanError> {
+        read(text, source_name, Self::check).map_err(first)
+    }
+
+    /// Reads a plan for a new campaign: everything must also be such that it can be meant.
+    ///
+    /// # Errors
+    /// The first thing that is wrong, with line and field, and how much more there is.
+    pub fn parse_new(text: &str, source_name: &str) -> Result<Self, PlanError> {
+        Self::parse_all(text, source_name).map_err(first)
+    }
+
+    /// As [`Plan::parse_new`].
+    ///
+    /// # Errors
+    /// All that is wrong. A value of the wrong kind, or a field that is missing, hides what a reader would find after it.
+    pub fn parse_all(text: &str, source_name: &str) -> Result<Self, Vec<PlanError>> {
+        read(text, source_name, |plan: &Self, faults| {
+            plan.check(faults);
+            plan.check_sense(faults);
+        })
+    }
+}
+
+/// Reads a TOML document and has it checked.
+///
+/// # Errors
+/// All that is wrong.
+pub(super) fn read<T: DeserializeOwned>(
+    text: &str,
+    source_name: &str,
+    check: impl FnOnce(&T, &mut Faults),
+) -> Result<T, Vec<PlanError>> {
+    let mut faults = Faults::default();
+    let mut readable = text.to_owned();
+    let document = loop {
+        match toml::from_str::<T>(&readable) {
+            Ok(document) => break Some(document),
+            Err(wrong) => {
+                let at = wrong.span().map_or(0, |span| span.start);
+                // a field that is missing beside one that is unknown is the same one, misspelt
+                let misspelt = wrong.message().starts_with("missing field") && !faults.0.is_empty();
+                faults.unless(misspelt, at, field(text, &wrong));
+                let unknown = wrong.message().starts_with("unknown field");
+                if !unknown || faults.0.len() > MOST_UNKNOWN || !blank_line(&mut readable, at) {
+                    break None;
+                }
+            }
+        }
+    };
+    if let Some(document) = &document {
+        check(document, &mut faults);
+    }
+    match document {
+        Some(document) if faults.0.is_empty() => Ok(document),
+        _ => Err(faults.told(text, source_name)),
+    }
+}
+
+/// Takes the line of a key and its value out, so that what comes after it can be read; whether it is one.
+fn blank_line(text: &mut String, at: usize) -> bool {
+    let from = text[..at].rfind('\n').map_or(0, |end| end + 1);
+    let to = text[at..].find('\n').map_or(text.len(), |length| at + length);
+    let line = &text[from..to];
+    // a point's table in one line loses the field, not the point
+    let alone = line.split_once('=').is_some_and(|(key, _)| !key.contains(['{', '[', '#']));
+    if alone {
+        let spaces = " ".repeat(line.len());
+        text.replace_range(from..to, &spaces);
+    }
+    alone
+}
+
+/// The first of them, which says how many more there are.
+pub(super) fn first(mut all: Vec<PlanError>) -> PlanError {
+    let more = all.len() - 1;
+    let mut first = all.swap_remove(0);
+    first.more = more;
+    first
+}

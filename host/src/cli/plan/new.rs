@@ -1,0 +1,67 @@
+//! `plan new`: a plan to begin with.
+
+use std::fs::OpenOptions;
+use std::io::{ErrorKind, Write as _};
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use crate::advice::quoted;
+use crate::campaign::plan;
+use crate::cli::error::CliError;
+
+/// Write a plan to begin with.
+#[derive(Debug, Args)]
+pub struct New {
+    /// The plan's file, which must not exist yet.
+    #[arg(value_name = "PLAN.toml")]
+    file: PathBuf,
+    /// What the plan is to answer.
+    #[arg(long, value_enum, default_value = "contact")]
+    template: Template,
+}
+
+/// The plans to begin with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Template {
+    /// The contact's own k_T: 63 cells of two hits.
+    Contact,
+    /// The paper's campaign, the stiffness between the arms: 252 cells of eight hits.
+    Paper,
+    /// Both: 276 cells.
+    PaperContact,
+    /// A few cells, to try a rig.
+    Small,
+}
+
+impl Template {
+    fn text(self) -> &'static str {
+        match self {
+            Template::Contact => plan::CONTACT,
+            Template::Paper => plan::PAPER,
+            Template::PaperContact => plan::PAPER_CONTACT,
+            Template::Small => plan::SMALL,
+        }
+    }
+}
+
+impl New {
+    pub fn run(self) -> Result<(), CliError> {
+        let path = &self.file;
+        let failed = |source: std::io::Error| {
+            if source.kind() == ErrorKind::AlreadyExists {
+                return CliError::Bad(format!(
+                    "{} exists already: choose another name, or edit it",
+                    path.display()
+                ));
+            }
+            CliError::File { path: path.clone(), doing: "writing the plan", source }
+        };
+        let mut file = OpenOptions::new().write(true).create_new(true).open(path).map_err(failed)?;
+        file.write_all(self.template.text().as_bytes()).map_err(failed)?;
+        let path = quoted(path);
+        eprintln!("{path}: edit it, above all [geometry]");
+        eprintln!("next: jointrig plan check {path}");
+        Ok(())
+    }
+}

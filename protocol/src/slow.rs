@@ -1,0 +1,85 @@
+//! What changes slowly and is in no scan: the specimen's temperature, and the bias of sensors that are fed with a constant current.
+
+use heapless::Vec;
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+/// Most inputs of a board that feed a sensor with a constant current (IEPE).
+pub const MAX_SUPPLIES: usize = 2;
+
+/// Below this bias a supply works into a short, V: an IEPE sensor's amplifier stands at 8 to 14 V, and none below 5 V (not checked
+/// against each sensor's manual; the figures are those that such sensors have in common).
+pub const SHORT_BELOW_V: f32 = 3.0;
+
+/// Above this bias a supply of 24 V finds nothing to feed, V: without a current it stands at 22 V or more, and a sensor that is at the
+/// end of its range swings to 19 V (14 V of bias and 5 V of signal).
+pub const OPEN_ABOVE_V: f32 = 20.0;
+
+/// Slow values as they were measured last.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Slow {
+    /// Temperature at the specimen, °C; none without a sensor.
+    pub temperature_c: Option<f32>,
+    /// Every constant-current supply of the board.
+    pub supplies: Vec<Supply, MAX_SUPPLIES>,
+}
+
+/// A constant-current supply, and what it feeds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Supply {
+    /// The channel behind it: its place in the scan.
+    pub channel: u8,
+    /// Mean voltage at its socket, V.
+    pub bias_v: f32,
+}
+
+impl Supply {
+    /// What is wrong with what it feeds, if anything.
+    #[must_use]
+    pub fn fault(&self) -> Option<SupplyFault> {
+        if self.bias_v > OPEN_ABOVE_V {
+            Some(SupplyFault::Open)
+        } else if self.bias_v >= SHORT_BELOW_V {
+            None
+        } else {
+            // what is no number is no sensor either
+            Some(SupplyFault::Short)
+        }
+    }
+}
+
+/// What a supply finds instead of a sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum SupplyFault {
+    /// No current flows: the cable is open, or nothing is plugged in.
+    Open,
+    /// No voltage stands: the cable or the sensor is shorted.
+    Short,
+}
+
+impl core::fmt::Display for SupplyFault {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Open => "its cable is open, or no sensor is plugged in",
+            Self::Short => "its cable or sensor is shorted",
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bias_tells_a_sensor_from_a_fault() {
+        let fault = |bias_v| Supply { channel: 0, bias_v }.fault();
+        for bias_v in [7.0, 11.0, 14.0, 19.0] {
+            assert_eq!(fault(bias_v), None, "{bias_v} V");
+        }
+        assert_eq!(fault(22.3), Some(SupplyFault::Open));
+        for bias_v in [0.0, 0.4, -1.0, f32::NAN] {
+            assert_eq!(fault(bias_v), Some(SupplyFault::Short), "{bias_v} V");
+        }
+    }
+}
