@@ -25,11 +25,11 @@ const LONGEST_S: f64 = 4.0;
 const APART: f64 = 5.0;
 
 /// A line stands out if its power is this many times the mean of its surroundings: noise alone does once in 10⁷ lines
-/// (F distribution of 2 and 4 `SURROUNDINGS` / 2 degrees of freedom; the window correlates neighbours in pairs).
+/// (F distribution of 2 and 2 `SURROUNDINGS` degrees of freedom; the window correlates neighbours in pairs).
 const STANDS_OUT: f64 = 25.0;
 
 /// Lines on each side that tell what the surroundings are.
-const SURROUNDINGS: usize = 24;
+const SURROUNDINGS: i32 = 24;
 
 /// Less than this part of the fundamental moves nothing that matters.
 const MATTERS: f64 = 2e-3;
@@ -93,7 +93,7 @@ fn part(signal: &[f64], fs_hz: f64, frequency_hz: f64, mains_hz: f64) -> f64 {
             let reach = (WANDER * f / line_hz).ceil() as i32;
             let here = (-reach..=reach).map(|o| amplitude(f + f64::from(o) * line_hz)).fold(0.0, f64::max);
             let next = APART as i32 + reach;
-            let beside = (next..next + SURROUNDINGS as i32).flat_map(|o| [-o, o]);
+            let beside = (next..next + SURROUNDINGS).flat_map(|o| [-o, o]);
             let around: Vec<f64> = beside
                 .map(|o| f + f64::from(o) * line_hz)
                 .filter(|f| *f > APART * line_hz && free(f))
