@@ -59,9 +59,9 @@ static ALONE: Mutex<()> = Mutex::new(());
 
 /// What two runs of one seed cannot share, brought to what they must share.
 ///
-/// Scans are counted from the start of the stream, and the host's first order comes some scans later: how many, the
-/// computer's scheduler decides. From there on the runner orders by scan, so that, counted from the first record, all scans
-/// must be the same. The time of day and its error come from the host's clock. All else stays as it is, and so does each
+/// Scans are counted from the start of the stream, and each cell is staged some scans later: how many, the computer's scheduler
+/// decides. From there on the runner orders by scan, so that, counted from the cell's first record, all scans must be the same. The
+/// time of day and its error come from the host's clock. All else stays as it is, and so does each
 /// column that is still to come.
 fn comparable(mut stored: Stored, origin: u64) -> Stored {
     let row = &mut stored.row;
@@ -75,10 +75,17 @@ fn comparable(mut stored: Stored, origin: u64) -> Stored {
     stored
 }
 
-/// All of a campaign as it must be the same; scans count from the first record's first.
+/// All of a campaign as it must be the same; scans count from the first scan of each cell's first record.
 fn comparables(stored: Vec<Stored>) -> Vec<Stored> {
-    let origin = stored[0].row.first_scan;
-    stored.into_iter().map(|stored| comparable(stored, origin)).collect()
+    let mut origin = (0, 0);
+    let from = |stored: Stored| {
+        let row = &stored.row;
+        if origin.0 != row.cell {
+            origin = (row.cell, row.first_scan);
+        }
+        comparable(stored, origin.1)
+    };
+    stored.into_iter().map(from).collect()
 }
 
 /// How much too large the controller's square root may be: where there is no `std`, it is micromath's, which halves the
