@@ -1,14 +1,13 @@
 //! `analyse`: results and report from a campaign file alone.
 
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressDrawTarget};
 
 use super::error::CliError;
 use super::number::{not_negative, positive};
 use super::output;
+use super::waiting::Waiting;
 use crate::analyse::{KnownContact, Wanted};
 use crate::campaign::store::Store;
 use crate::report::{self, words};
@@ -53,35 +52,33 @@ impl Analyse {
         };
         let found = analyse_into(&store, Wanted { replicates: self.bootstrap, known }, &self.out, &[])?;
         if self.json {
-            return output::json(&found);
+            output::json(&found)?;
+        } else {
+            if self.details {
+                output::lines(words::summary(&found))?;
+                output::lines([String::new()])?;
+            }
+            ending(&found, &self.out)?;
         }
-        if self.details {
-            output::lines(words::summary(&found))?;
-            output::lines([String::new()])?;
-        }
-        ending(&found, &self.out)
+        must_hold_something(&found)
     }
 }
 
 /// The answer in a few lines, and where the report is.
 pub fn ending(found: &Results, folder: &Path) -> Result<(), CliError> {
-    let last = format!("Open {} for figures and tables.", folder.join(report::REPORT_FILE).display());
     output::lines(words::brief::terminal(found, 1))?;
-    output::lines([last])
+    output::lines([where_to_look(folder)])
+}
+
+/// The last line of whatever wrote a report.
+pub fn where_to_look(folder: &Path) -> String {
+    format!("Open {} for figures and tables.", folder.join(report::REPORT_FILE).display())
 }
 
 /// Analyses what the file holds, with a bar for whoever waits.
 pub fn analysed(store: &Store, wanted: Wanted) -> Result<Results, CliError> {
-    let bar = if std::io::stderr().is_terminal() {
-        ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr())
-    } else {
-        ProgressBar::hidden()
-    };
-    let results = report::analysed(store, wanted, &|progress| {
-        bar.set_length(progress.total as u64);
-        bar.set_position(progress.done as u64);
-    })?;
-    bar.finish_and_clear();
+    let waiting = Waiting::of("analysing");
+    let results = report::analysed(store, wanted, &|progress| waiting.at(progress.done, progress.total))?;
     Ok(results)
 }
 
@@ -93,10 +90,32 @@ pub fn analyse_into(
     formats: &[report::Format],
 ) -> Result<Results, CliError> {
     let results = analysed(store, wanted)?;
-    report::write(&results, folder, formats).map_err(|source| CliError::File {
+    write_into(&results, folder, formats)?;
+    Ok(results)
+}
+
+/// Writes `results.json`, `report.html` and the figures asked for into `folder`.
+pub fn write_into(results: &Results, folder: &Path, formats: &[report::Format]) -> Result<(), CliError> {
+    report::write(results, folder, formats).map_err(|source| CliError::File {
         path: folder.into(),
         doing: "writing results and report",
         source,
-    })?;
-    Ok(results)
+    })
+}
+
+/// Nothing was found at all: what a script must not take for a result.
+pub fn must_hold_something(found: &Results) -> Result<(), CliError> {
+    let answered = found.answer.as_ref().is_some_and(|answer| {
+        answer.contact.k_t_n_per_m.is_some()
+            || answer.between_arms.k_n_per_m.is_some()
+            || answer.clamp.is_some()
+    });
+    if answered || !found.joint.is_empty() || !found.recommended.is_empty() || !found.hysteresis.is_empty() {
+        return Ok(());
+    }
+    Err(CliError::Bad(format!(
+        "{}: no stiffness could be found from this file: {}",
+        found.source.file,
+        found.missing.first().map_or("it holds no good hits and no levels", String::as_str)
+    )))
 }

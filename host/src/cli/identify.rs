@@ -6,12 +6,13 @@ use std::str::FromStr;
 
 use clap::Args;
 
+use super::analyse::{where_to_look, write_into};
 use super::error::CliError;
 use super::output;
 use crate::analyse::{BANDS, Findings, Fit, Missing, NoFit, Substructured, fits};
 use crate::exchange::{PositionsError, read_frf_file, read_positions};
 use crate::report::{document, words};
-use crate::results::{Results, Source};
+use crate::results::{Joint, Results, Source};
 use crate::structure::Structure;
 use crate::substructuring::averaged::{Priors, averaged};
 use crate::substructuring::fit;
@@ -19,7 +20,8 @@ use crate::substructuring::{Band, Dof, Frf, Geometry, IdmSet, Method, identify};
 
 /// Identify a joint from FRFs of A, B and the assembly, measured anywhere.
 ///
-/// Prints what could be identified; exits with 1 and the reason when anything that was asked for had to be refused.
+/// The first line is the number; what could not be applied to these files comes after. Exits with 1 and the reasons when nothing was
+/// identified, or when a method or a set of modes that was named gave nothing.
 #[derive(Debug, Args)]
 pub struct Identify {
     /// FRFs of substructure A alone: .npz, or a universal file (58 or 58b; .uff, .unv).
@@ -62,6 +64,9 @@ pub struct Identify {
     /// For `fit`: how much A and B alone may differ from A and B in the assembly (standard deviation), as a fraction of their admittance.
     #[arg(long, value_name = "FRACTION", default_value_t = fit::Options::default().mounting, value_parser = not_negative)]
     mounting_error: f64,
+    /// Folder for results.json and report.html.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
     /// Print results.json on stdout instead of a summary.
     #[arg(long)]
     json: bool,
@@ -102,13 +107,40 @@ impl Identify {
             found.fits = self.fits([a, b, ajb], &geometry, &idms, &bands);
         }
         let results = document(found);
-        let printed =
-            if self.json { output::json(&results) } else { output::lines(words::summary(&results)) };
-        printed?;
-        match refusals(&results) {
-            Some(reasons) => Err(CliError::Bad(reasons)),
-            None => Ok(()),
+        if let Some(folder) = &self.out {
+            write_into(&results, folder, &[])?;
         }
+        if self.json {
+            output::json(&results)?;
+        } else {
+            output::lines(words::headline::between_the_arms(&results))?;
+            output::lines(words::summary(&results))?;
+            output::lines(self.out.iter().map(|folder| where_to_look(folder)))?;
+        }
+        self.found_what_was_asked(&results)
+    }
+
+    /// Whether every method and every set of modes that was named gave a row, and whether any row is a number.
+    fn found_what_was_asked(&self, results: &Results) -> Result<(), CliError> {
+        let of_method =
+            |row: &Joint, asked: &Option<Asked>| asked.is_none_or(|asked| row.method == asked.name());
+        let of_set = |row: &Joint, set: &Option<IdmSet>| set.is_none_or(|set| row.modes == set.dofs());
+        let methods: Vec<Option<Asked>> = any_or(self.methods.iter().copied());
+        let sets: Vec<Option<IdmSet>> = any_or(self.idms.iter().flat_map(|sets| sets.0.iter().copied()));
+        let there = |method: &Option<Asked>, set: &Option<IdmSet>| {
+            results.joint.iter().any(|row| of_method(row, method) && of_set(row, set))
+        };
+        let all = methods.iter().all(|method| sets.iter().all(|set| there(method, set)));
+        let is_number = |row: &Joint| row.identified() || row.sliding_stiffness().is_none();
+        let recommended = results.recommended.iter().any(|r| r.joint.values().any(|dof| dof.identified));
+        if all && (recommended || results.joint.iter().any(is_number)) {
+            return Ok(());
+        }
+        Err(CliError::Bad(refusals(results).unwrap_or_else(|| {
+            "nothing was identified: scatter or noise is larger than every value (the rows above say by how much); average more hits, \
+             or choose another --band"
+                .into()
+        })))
     }
 
     fn priors(&self) -> Priors {
@@ -160,6 +192,21 @@ enum Asked {
     ByLine(Method),
     /// Maximum likelihood over all lines.
     Fit,
+}
+
+impl Asked {
+    fn name(self) -> &'static str {
+        match self {
+            Self::ByLine(method) => method.name(),
+            Self::Fit => fit::NAME,
+        }
+    }
+}
+
+/// What was named, or the one wish for anything.
+fn any_or<T>(named: impl Iterator<Item = T>) -> Vec<Option<T>> {
+    let named: Vec<Option<T>> = named.map(Some).collect();
+    if named.is_empty() { vec![None] } else { named }
 }
 
 impl FromStr for Asked {

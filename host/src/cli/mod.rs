@@ -30,6 +30,7 @@ mod report;
 #[cfg(feature = "dashboard")]
 mod serve;
 mod shaker;
+mod waiting;
 
 use std::process::ExitCode;
 

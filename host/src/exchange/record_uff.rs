@@ -3,7 +3,7 @@
 //! A function whose ordinate is a force begins a hit; the motions that follow it, up to the next force, are its responses. Responses
 //! along x, y and z (directions ±1, ±2, ±3) are put in this order, one along a negative axis is turned; others stay as they stand.
 
-use super::uff::{Abscissa, Contents, Function, Values, kind, quantity, read};
+use super::uff::{Abscissa, Contents, Dof, Function, Values, kind, quantity, read};
 use super::{FrfUffError, NpzError, frf_file, read_impacts};
 use crate::spectra::{ImpactRecords, MotionQuantity};
 use std::path::Path;
@@ -37,13 +37,82 @@ pub fn read_record_file(path: &Path) -> Result<(ImpactRecords, Vec<String>), Rec
     Ok(from_contents(&read(&bytes)).map_err(|reason| FrfUffError::Content { path: path.into(), reason })?)
 }
 
+/// Records of one place of impact and one sensor, with the names that the labels give them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LabelledRecords {
+    /// Where the hammer struck: the force's own entity, or its node.
+    pub impact: String,
+    /// Where the sensor was.
+    pub response: String,
+    /// The hits.
+    pub records: ImpactRecords,
+}
+
+/// A hit: its force first, then its responses.
+type Hit<'c> = Vec<(&'c Function, &'c [f64])>;
+
 /// The records among what was read of a file.
 ///
 /// # Errors
 /// The reason in words.
 pub fn from_contents(contents: &Contents) -> Result<(ImpactRecords, Vec<String>), String> {
+    let (hits, warnings) = hits(contents)?;
+    Ok((records(&hits)?, warnings))
+}
+
+/// The same, apart by place of impact and by sensor, as the labels name them: one hit that several sensors heard fills as many rows.
+///
+/// # Errors
+/// The reason in words, also where a label names neither entity nor node.
+pub fn by_label(contents: &Contents) -> Result<(Vec<LabelledRecords>, Vec<String>), String> {
+    let (hits, warnings) = hits(contents)?;
+    let mut rows: Vec<(String, String, Vec<Hit<'_>>)> = Vec::new();
+    for (number, hit) in hits.iter().enumerate() {
+        let force = hit[0];
+        let of_hit = rows.len();
+        let impact = name_of(&force.0.response)
+            .ok_or_else(|| format!("the force of hit {number} names neither entity nor node"))?;
+        let mut own: Vec<(String, Hit<'_>)> = Vec::new();
+        for response in &hit[1..] {
+            let name = name_of(&response.0.response)
+                .ok_or_else(|| format!("a response of hit {number} names neither entity nor node"))?;
+            match own.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, functions)) => functions.push(*response),
+                None => own.push((name, vec![force, *response])),
+            }
+        }
+        for (response, functions) in own {
+            match rows[..of_hit].iter_mut().find(|row| row.0 == impact && row.1 == response) {
+                Some((.., hits)) => hits.push(functions),
+                None => rows.push((impact.clone(), response, vec![functions])),
+            }
+        }
+    }
+    let labelled = rows.into_iter().map(|(impact, response, hits)| {
+        let records = records(&hits).map_err(|what| format!("{impact} to {response}: {what}"))?;
+        Ok(LabelledRecords { impact, response, records })
+    });
+    Ok((labelled.collect::<Result<_, String>>()?, warnings))
+}
+
+/// Whether there is a force over time among the contents: impact records, and not FRFs.
+pub fn holds_records(contents: &Contents) -> bool {
+    let is_force = |f: &Function| f.kind == kind::TIME && f.axes[1].quantity == quantity::FORCE;
+    contents.functions().any(is_force)
+}
+
+/// What a label calls its place.
+fn name_of(dof: &Dof) -> Option<String> {
+    match dof.entity.trim() {
+        "" | "NONE" if dof.node == 0 => None,
+        "" | "NONE" => Some(dof.node.to_string()),
+        entity => Some(entity.into()),
+    }
+}
+
+fn hits(contents: &Contents) -> Result<(Vec<Hit<'_>>, Vec<String>), String> {
     let warnings: Vec<String> = contents.faults.iter().map(|f| format!("{f}; left out")).collect();
-    let mut hits: Vec<Vec<(&Function, &[f64])>> = Vec::new();
+    let mut hits: Vec<Hit<'_>> = Vec::new();
     for function in contents.functions() {
         let (kind::TIME, Values::Real(values)) = (function.kind, &function.values) else { continue };
         match (function.axes[1].quantity, hits.last_mut()) {
@@ -56,11 +125,19 @@ pub fn from_contents(contents: &Contents) -> Result<(ImpactRecords, Vec<String>)
             }
         }
     }
-    let Some((first, samples)) = hits.first().and_then(|hit| hit.first()) else {
+    if hits.is_empty() {
         let why = warnings.first().map_or_else(String::new, |w| format!(" ({w})"));
         return Err(format!(
             "there is no force over time in it (data set 58 of function type 1 with an ordinate of type 13){why}: give an npz of impact records, or a universal file with time responses"
         ));
+    }
+    Ok((hits, warnings))
+}
+
+/// Hits that one force and the same responses describe.
+fn records(hits: &[Hit<'_>]) -> Result<ImpactRecords, String> {
+    let Some((first, samples)) = hits.first().and_then(|hit| hit.first()) else {
+        return Err("there is no hit".into());
     };
     let Abscissa::Even { step, .. } = first.abscissa else {
         return Err("the force is not evenly sampled: resample it".into());
@@ -71,7 +148,7 @@ pub fn from_contents(contents: &Contents) -> Result<(ImpactRecords, Vec<String>)
     }
     let whole = (rate_hz - rate_hz.round()).abs() <= WHOLE_HZ * rate_hz;
     let fs_hz = if whole { rate_hz.round() } else { rate_hz };
-    let motion = motion(&hits)?;
+    let motion = motion(hits)?;
     let channels = hits[0].len() - 1;
     let mut records = ImpactRecords { fs_hz, force_n: Vec::new(), response: Vec::new(), quantity: motion };
     for (number, hit) in hits.iter().enumerate() {
@@ -89,11 +166,11 @@ pub fn from_contents(contents: &Contents) -> Result<(ImpactRecords, Vec<String>)
         records.force_n.push(hit[0].1.to_vec());
         records.response.push(responses(&hit[1..]));
     }
-    Ok((records, warnings))
+    Ok(records)
 }
 
 /// The one quantity that all responses measure.
-fn motion(hits: &[Vec<(&Function, &[f64])>]) -> Result<MotionQuantity, String> {
+fn motion(hits: &[Hit<'_>]) -> Result<MotionQuantity, String> {
     let mut found: Vec<i64> = Vec::new();
     for (function, _) in hits.iter().flat_map(|hit| &hit[1..]) {
         let quantity = function.axes[1].quantity;
@@ -148,6 +225,35 @@ mod tests {
         write_records(&path, &records(), "A1", "AZ1").expect("written");
         let (found, warnings) = read_record_file(&path).expect("read");
         assert_eq!((found, warnings), (records(), Vec::new()));
+    }
+
+    #[test]
+    fn one_hit_that_two_sensors_heard_fills_two_rows() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("row.uff");
+        write_records(&path, &records(), "A1", "AZ1").expect("written");
+        let mut contents = read(&std::fs::read(&path).expect("there"));
+        // behind each hit's responses, those of a second sensor that knows its node only
+        let mut sets = Vec::new();
+        for set in contents.sets.drain(..) {
+            let DataSet::Function(function) = set else {
+                sets.push(set);
+                continue;
+            };
+            let mut other = function.clone();
+            other.response = Dof { entity: String::new(), node: 7, direction: function.response.direction };
+            let is_force = function.axes[1].quantity == quantity::FORCE;
+            sets.push(DataSet::Function(function));
+            if !is_force {
+                sets.push(DataSet::Function(other));
+            }
+        }
+        contents.sets = sets;
+        assert!(holds_records(&contents));
+        let (rows, _) = by_label(&contents).expect("read");
+        let names: Vec<_> = rows.iter().map(|row| (&*row.impact, &*row.response)).collect();
+        assert_eq!(names, [("AZ1", "A1"), ("AZ1", "7")]);
+        assert_eq!((&rows[0].records, &rows[1].records), (&records(), &records()));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! FRFs and records as text with commas: one row for each line or sample, one heading for each column.
 
+use crate::advice;
 use crate::frf::Frf;
 use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 use crate::spectra::ImpactRecords;
@@ -7,10 +8,10 @@ use std::path::{Path, PathBuf};
 
 /// A table that cannot be written.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: cannot be written: {source}", path.display())]
+#[error("{}: cannot be written: {source}; {}", path.display(), advice::writing(source))]
 pub struct TableError {
     path: PathBuf,
-    source: csv::Error,
+    source: std::io::Error,
 }
 
 /// `frequency_hz`, and for each pair `OUTPUT/INPUT re`, `… im`, `… coherence`. A missing value is empty.
@@ -93,7 +94,14 @@ fn write(
             rows(&mut out)?;
             Ok(out.flush()?)
         })
-        .map_err(|source| TableError { path: path.into(), source })
+        .map_err(|error| {
+            // as the operating system said it, or there is no telling what to do
+            let source = match error.into_kind() {
+                csv::ErrorKind::Io(source) => source,
+                other => std::io::Error::other(format!("{other:?}")),
+            };
+            TableError { path: path.into(), source }
+        })
 }
 
 #[cfg(test)]

@@ -8,15 +8,43 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use crate::campaign::plan::{Cell as PlanCell, configuration_name};
 use crate::campaign::watch::{Left, Seen, Watch};
 
-/// A bar over the hits of the campaign, with the time that is left of cell, configuration and campaign.
+/// A bar over the hits of the campaign, with the time that is left of cell, configuration and campaign; without a terminal, a line of it
+/// every ten seconds.
 #[derive(Default)]
 pub struct Progress {
     state: Mutex<Option<State>>,
 }
 
+/// Says when it is time for another line where there is no terminal.
+pub struct Pace {
+    last: Mutex<Instant>,
+}
+
+/// Without a terminal, a line so often.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+
+impl Default for Pace {
+    fn default() -> Self {
+        Self { last: Mutex::new(Instant::now()) }
+    }
+}
+
+impl Pace {
+    /// Whether ten seconds have passed since the beginning, or since this was true last.
+    pub fn is_due(&self) -> bool {
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        let due = last.elapsed() >= LINE_EVERY;
+        if due {
+            *last = Instant::now();
+        }
+        due
+    }
+}
+
 /// What it shows, once the campaign has begun.
 struct State {
     bar: ProgressBar,
+    pace: Pace,
     wanted: u64,
     /// Good hits that were there at the beginning.
     before: u64,
@@ -50,6 +78,9 @@ impl Watch for Progress {
             Seen::Judged { row, verdict, kept, left } => {
                 state.bar.set_position(kept);
                 let (time, label) = (state.time_left(&row.cell, left), label(&row.cell));
+                if state.bar.is_hidden() && state.pace.is_due() {
+                    eprintln!("{kept} of {} hits  {label}  {time}", state.wanted);
+                }
                 state.bar.set_message(format!("{label}  {time}  {}: {}", verdict.kind, verdict.sentence));
             }
             Seen::Remark(text) if state.bar.is_hidden() => log::warn!("{text}"),
@@ -71,6 +102,7 @@ impl State {
     fn new(wanted: u64, kept: u64) -> Self {
         Self {
             bar: bar(wanted, kept),
+            pace: Pace::default(),
             wanted,
             before: kept,
             begun: Instant::now(),

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use rusqlite::Connection;
 
-use super::Store;
 use super::error::{StoreError, sqlite};
+use super::{Store, WRITTEN};
 
 impl Store {
     /// Copies everything that is accepted so far to `to`, checks the copy record by record, and only then gives it its
@@ -41,6 +41,7 @@ impl Store {
             // all pages in one step: a reader's view of one moment, which a writer does not disturb
             backup.step(-1).map_err(failed)?;
         }
+        copy.execute("DELETE FROM meta WHERE key = ?1", [WRITTEN]).map_err(failed)?;
         copy.pragma_update(None, "journal_mode", "DELETE").map_err(failed)?;
         copy.close().map_err(|(_, error)| failed(error))?;
         let copy = Self::open_read_only(to)?;

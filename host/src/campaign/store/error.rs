@@ -1,9 +1,12 @@
 //! What can go wrong with a campaign file, and what to do.
 
+use std::fs::File;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use rusqlite::ErrorCode;
 
+use crate::advice;
 use crate::campaign::plan::PlanError;
 
 /// What can go wrong with a campaign file.
@@ -20,6 +23,20 @@ pub enum StoreError {
     Missing {
         /// The file.
         path: PathBuf,
+    },
+    /// A folder, where a file is wanted.
+    #[error("{path} is a folder: {}", holding(path))]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// It cannot be read.
+    #[error("{path} cannot be read: {source}; {}", advice::reading(source))]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
     },
     /// Some other file.
     #[error("{path} is not a campaign file: give the .jrig file that `jointrig campaign new` made")]
@@ -131,6 +148,39 @@ pub enum StoreError {
         hint: &'static str,
     },
 }
+
+/// What is there, a file, and may be read; SQLite's own words for all else say neither what nor why.
+pub(super) fn refuse_what_is_no_file(path: &Path) -> Result<(), StoreError> {
+    match std::fs::metadata(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => Err(StoreError::Missing { path: path.into() }),
+        Ok(there) if there.is_dir() => Err(StoreError::Folder { path: path.into() }),
+        Ok(there) if !there.is_file() => Err(StoreError::Foreign { path: path.into() }),
+        _ => File::open(path)
+            .map(|_| ())
+            .map_err(|source| StoreError::Unreadable { path: path.into(), source }),
+    }
+}
+
+/// The campaign files of a folder, for somebody who named the folder.
+fn holding(folder: &Path) -> String {
+    let names = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut files: Vec<String> = names
+        .filter(|path| path.extension().is_some_and(|ending| ending == "jrig"))
+        .map(|path| advice::quoted(&path))
+        .collect();
+    files.sort();
+    match files.len() {
+        0 => "it holds no campaign file (.jrig)".into(),
+        1 => format!("give the campaign file {}", files[0]),
+        n if n > MOST_NAMED => {
+            format!("give one of its {n} campaign files, for example {}", files[..MOST_NAMED].join(", "))
+        }
+        _ => format!("give one of its campaign files: {}", files.join(", ")),
+    }
+}
+
+/// Files that are named in a message.
+const MOST_NAMED: usize = 5;
 
 /// SQLite's error with what was being done and, where it is known, what to do.
 pub(super) fn sqlite(path: &Path, doing: &'static str, source: rusqlite::Error) -> StoreError {

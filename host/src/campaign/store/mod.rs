@@ -58,6 +58,8 @@ pub struct Store {
     path: PathBuf,
     /// Held as long as it is open for writing; let go after the connection.
     lock: Option<WriteLock>,
+    /// Whether everything is in the one file.
+    tidy: bool,
 }
 
 impl Store {
@@ -71,7 +73,7 @@ impl Store {
         let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE;
         let connection =
             Connection::open_with_flags(path, flags).map_err(|error| sqlite(path, "creating", error))?;
-        let store = Self { connection, path: path.into(), lock };
+        let store = Self { connection, path: path.into(), lock, tidy: false };
         store.begin_writing()?;
         Ok(store)
     }
@@ -81,14 +83,13 @@ impl Store {
     /// # Errors
     /// It is not there, not ours, of another version, in use, on a network share, or cannot be written.
     pub fn open(path: &Path) -> Result<Self, StoreError> {
-        if !path.exists() {
-            return Err(StoreError::Missing { path: path.into() });
-        }
+        error::refuse_what_is_no_file(path)?;
         share::refuse(path)?;
         let lock = WriteLock::take(path)?;
         let mut store = Self::connect(path, path, OpenFlags::SQLITE_OPEN_READ_WRITE)?;
-        store.lock = Some(lock);
+        (store.lock, store.tidy) = (Some(lock), false);
         store.begin_writing()?;
+        store.mark_written()?;
         Ok(store)
     }
 
@@ -98,12 +99,10 @@ impl Store {
     /// # Errors
     /// It is not there, not ours or of another version; it was not closed in order and cannot be recovered where it is.
     pub fn open_read_only(path: &Path) -> Result<Self, StoreError> {
-        if !path.exists() {
-            return Err(StoreError::Missing { path: path.into() });
-        }
+        error::refuse_what_is_no_file(path)?;
         let flags = OpenFlags::SQLITE_OPEN_READ_ONLY;
-        let waiting = std::fs::metadata(log_of(path)).is_ok_and(|log| log.len() > 0);
-        Self::connect(path, path, flags).or_else(|error| match error {
+        let waiting = has_log(path);
+        let opened = Self::connect(path, path, flags).or_else(|error| match error {
             StoreError::Sqlite { .. } if waiting => Err(StoreError::Unfinished { path: path.into() }),
             // where no shared memory can be created, nobody can be writing either
             StoreError::Sqlite { .. } => {
@@ -113,7 +112,13 @@ impl Store {
                 Self::connect(path, &name, flags | OpenFlags::SQLITE_OPEN_URI)
             }
             other => Err(other),
-        })
+        });
+        if let Ok(store) = &opened
+            && let Some(what) = store.lacks_its_log()?
+        {
+            log::warn!("{}: {what}", path.display());
+        }
+        opened
     }
 
     fn connect(path: &Path, name: &Path, flags: OpenFlags) -> Result<Self, StoreError> {
@@ -133,7 +138,7 @@ impl Store {
         match found.cmp(&VERSION) {
             Ordering::Greater => Err(StoreError::Newer { path: path.into(), found, known: VERSION }),
             Ordering::Less => Err(StoreError::Older { path: path.into(), found, known: VERSION }),
-            Ordering::Equal => Ok(Self { connection, path: path.into(), lock: None }),
+            Ordering::Equal => Ok(Self { connection, path: path.into(), lock: None, tidy: true }),
         }
     }
 
@@ -174,20 +179,68 @@ impl Store {
         run().map_err(self.failed(doing))
     }
 
-    /// Writes everything into the one file and closes it.
-    pub fn close(self) -> Result<(), StoreError> {
-        let Self { connection, path, lock, .. } = self;
-        if lock.is_some() {
-            connection
-                .query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))
-                .map_err(|error| sqlite(&path, "closing", error))?;
-            // somebody who reads keeps it in WAL mode, in which it is as safe: the next writer's close will do
-            if let Err(error) = connection.pragma_update(None, "journal_mode", "DELETE") {
-                log::debug!("{}: still in WAL mode: {error}", path.display());
-            }
-        }
-        connection.close().map_err(|(_, error)| sqlite(&path, "closing", error))
+    /// Notes in the file itself that it is being written: a copy of it alone, without its log, can then be told from a whole file.
+    fn mark_written(&self) -> Result<(), StoreError> {
+        self.set_meta(WRITTEN, &notes::utc_now())?;
+        self.connection
+            .query_row("PRAGMA wal_checkpoint(PASSIVE)", [], |_| Ok(()))
+            .map_err(self.failed("opening for writing"))
     }
+
+    /// What is wrong if this was being written when it was copied, and its log was left behind.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn lacks_its_log(&self) -> Result<Option<String>, StoreError> {
+        if self.lock.is_some() || has_log(&self.path) {
+            return Ok(None);
+        }
+        Ok(self.meta(WRITTEN)?.map(|since| {
+            let log = log_of(&self.path);
+            format!(
+                "it was being written (since {since}), and its log {} is not beside it: if this is a copy, the last records are \
+                 missing. Copy the log too, or use `jointrig campaign backup`, which copies a campaign that runs",
+                log.display()
+            )
+        }))
+    }
+
+    /// Writes everything into the one file and closes it.
+    pub fn close(mut self) -> Result<(), StoreError> {
+        self.put_in_order()
+    }
+
+    fn put_in_order(&mut self) -> Result<(), StoreError> {
+        if self.tidy {
+            return Ok(());
+        }
+        self.tidy = true;
+        let failed = self.failed("closing");
+        self.connection.execute("DELETE FROM meta WHERE key = ?1", [WRITTEN]).map_err(&failed)?;
+        self.connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(())).map_err(&failed)?;
+        // somebody who reads keeps it in WAL mode, in which it is as safe: the next writer's close will do
+        if let Err(error) = self.connection.pragma_update(None, "journal_mode", "DELETE") {
+            log::debug!("{}: still in WAL mode: {error}", self.path.display());
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Store {
+    /// Whoever returns early leaves a file in order too, as far as the disk lets it.
+    fn drop(&mut self) {
+        if let Err(error) = self.put_in_order() {
+            log::debug!("{error}");
+        }
+    }
+}
+
+/// The note that the file is being written, and since when.
+const WRITTEN: &str = "written_since";
+
+/// Whether a log with something in it lies beside the file.
+fn has_log(path: &Path) -> bool {
+    std::fs::metadata(log_of(path)).is_ok_and(|log| log.len() > 0)
 }
 
 /// SQLite's write-ahead log of a file.

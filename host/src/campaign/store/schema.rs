@@ -47,6 +47,7 @@ impl Store {
         let plan = Plan::parse_new(text, source)?;
         let mut store = Self::empty(path)?;
         store.fill(&plan, text, source).map_err(|error| sqlite(path, "creating", error))?;
+        store.mark_written()?;
         Ok(store)
     }
 

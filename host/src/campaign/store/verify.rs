@@ -16,7 +16,7 @@ impl Store {
     /// Checks the file's structure and every record's checksum; what is damaged is named.
     pub fn verify(&self) -> Result<Vec<Damage>, StoreError> {
         let of_file = |what: String| Damage { record: None, what };
-        let mut damage = Vec::new();
+        let mut damage: Vec<Damage> = self.lacks_its_log()?.map(of_file).into_iter().collect();
         match self.all("PRAGMA integrity_check", [], |row| row.get::<_, String>(0), "checking") {
             Ok(said) if said == ["ok"] => {}
             Ok(said) => damage.extend(said.into_iter().map(of_file)),

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Value, json};
 
+use crate::advice;
 use crate::campaign::plan::configuration_name;
 use crate::campaign::store::Store;
 use crate::campaign::store::cell_table::CellRow;
@@ -42,11 +43,13 @@ impl Show {
         let row = find(&cells, &self.cell)?;
         let records = store.records_of(row.id)?;
         let overrules = if records.is_empty() { Vec::new() } else { store.overrules()? };
-        let figure = if self.no_figure || records.is_empty() {
-            None
+        let drawn = if self.no_figure || records.is_empty() {
+            Ok(None)
         } else {
-            self.draw(&store, row, records.iter().flatten())?
+            self.draw(&store, row, records.iter().flatten())
         };
+        // a figure that cannot be written costs nobody the list
+        let figure = drawn.as_ref().ok().and_then(Option::as_ref);
         if self.json {
             let records: Vec<Value> = records
                 .iter()
@@ -57,7 +60,7 @@ impl Show {
                     }
                 })
                 .collect();
-            return output::json(&json!({
+            output::json(&json!({
                 "configuration": configuration_name(row.cell.configuration),
                 "impact": row.cell.impact,
                 "response": row.cell.response,
@@ -66,7 +69,8 @@ impl Show {
                 "settled": row.settled,
                 "records": records,
                 "figure": figure,
-            }));
+            }))?;
+            return drawn.map(|_| ());
         }
         let mut lines =
             vec![format!("{}: {} records, {} good hits wanted", self.cell, records.len(), row.cell.wanted)];
@@ -83,7 +87,8 @@ impl Show {
             }));
         }
         lines.extend(figure.iter().map(|path| format!("figure: {}", path.display())));
-        output::lines(lines)
+        output::lines(lines)?;
+        drawn.map(|_| ())
     }
 
     /// Draws what can be read; a damaged record is in the list only.
@@ -109,10 +114,12 @@ impl Show {
             let stem = self.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             PathBuf::from(format!("{stem}-{name}-{}-{}.svg", cell.impact, cell.response))
         });
-        std::fs::write(&path, figure).map_err(|source| CliError::File {
-            path: path.clone(),
-            doing: "writing the figure",
-            source,
+        std::fs::write(&path, figure).map_err(|source| {
+            let advice = advice::writing(&source);
+            CliError::Bad(format!(
+                "{}: writing the figure: {source}; {advice}, name another place with --figure FILE.svg, or leave it out with --no-figure",
+                path.display()
+            ))
         })?;
         Ok(Some(path))
     }

@@ -10,6 +10,7 @@ use nalgebra::DMatrix;
 
 use super::analyse::analyse_into;
 use super::error::CliError;
+use super::waiting::Waiting;
 use super::{frf, output};
 use crate::analyse::{self, CampaignFile, KnownContact, Wanted};
 use crate::campaign::plan::configuration_name;
@@ -125,7 +126,10 @@ impl Export {
     /// One file for each cell that was hit.
     fn write_all_records(&self, store: &Store, folder: &Path) -> Result<(), CliError> {
         let rows = store.records()?;
-        for cell in store.cells()? {
+        let cells = store.cells()?;
+        let waiting = Waiting::of("writing records, by cell");
+        for (done, cell) in cells.iter().enumerate() {
+            waiting.at(done, cells.len());
             let own: Vec<&RecordRow> =
                 rows.iter().flatten().filter(|r| r.cell == cell.id && r.scans > 0).collect();
             let Some(records) = self.records(store, &own)? else { continue };

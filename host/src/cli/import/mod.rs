@@ -1,5 +1,7 @@
 //! `import`: FRFs and impact records from elsewhere.
 
+mod folder;
+mod names;
 mod quantised;
 mod records;
 
@@ -16,6 +18,7 @@ use crate::campaign::verdict::Kind;
 use crate::exchange::{read_frf_file, write_frf};
 use crate::frf::Frf;
 use crate::substructuring::geometry::Configuration as Points;
+use folder::Wishes;
 use records::CellName;
 
 /// Bring FRFs or impact records from elsewhere into jointrig's own files.
@@ -24,16 +27,20 @@ use records::CellName;
 /// --configuration: they stand in for that configuration, as if it had been measured here. Impact records of one impact position
 /// and one response location along x, y, z (npz, or time responses in a universal file) go into a cell of a campaign file
 /// with --impact and --response too, where every hit is judged like a measured one.
+///
+/// A folder goes into a campaign file with --into alone: files called CONFIGURATION_IMPACT_RESPONSE are cells, files called CONFIGURATION
+/// hold FRFs, and universal files may name impact and response in their labels; a table (--names) says it for all others. It adds to what
+/// is there; what is there already is not stored twice, so that the command may be repeated.
 #[derive(Debug, Args)]
 pub struct Import {
-    /// An npz or universal file.
-    #[arg(value_name = "FILE")]
+    /// An npz or universal file, or a folder of them.
+    #[arg(value_name = "FILE|DIR")]
     file: PathBuf,
     /// FRFs: the npz file to write.
     #[arg(long, value_name = "FILE.npz", conflicts_with = "into", required_unless_present = "into")]
     out: Option<PathBuf>,
     /// The campaign file that they go into (`jointrig campaign new` makes one).
-    #[arg(long, value_name = "FILE.jrig", requires = "configuration")]
+    #[arg(long, value_name = "FILE.jrig")]
     into: Option<PathBuf>,
     /// The configuration that was measured (A, B or AJB).
     #[arg(long, value_name = "NAME", requires = "into")]
@@ -44,6 +51,12 @@ pub struct Import {
     /// Records: the response location's name in the plan.
     #[arg(long, value_name = "NAME", requires_all = ["into", "impact"])]
     response: Option<String>,
+    /// Folder: a csv table with the columns file, configuration, impact, response.
+    #[arg(long, value_name = "TABLE.csv", requires = "into")]
+    names: Option<PathBuf>,
+    /// Drop what came from a file of the same name before, and FRFs that are there; the file keeps both, and says so.
+    #[arg(long, requires = "into")]
+    replace: bool,
 }
 
 fn bad(error: impl std::fmt::Display) -> CliError {
@@ -52,72 +65,101 @@ fn bad(error: impl std::fmt::Display) -> CliError {
 
 impl Import {
     pub fn run(self) -> Result<(), CliError> {
+        let replace = self.replace;
         match (&self.out, &self.into, &self.configuration, &self.impact, &self.response) {
+            (None, Some(into), configuration, None, None) if self.file.is_dir() => {
+                let (configuration, names) = (configuration.as_deref(), self.names.as_deref());
+                folder::import(&self.file, into, &Wishes { configuration, names, replace })
+            }
             (Some(out), ..) => self.convert(out),
             (None, Some(into), Some(configuration), Some(impact), Some(response)) => {
-                records::import(&self.file, into, &CellName { configuration, impact, response })
+                records::import(&self.file, into, &CellName { configuration, impact, response }, replace)
             }
-            (None, Some(into), Some(configuration), ..) => self.frfs(into, configuration),
+            (None, Some(into), Some(configuration), ..) => {
+                let store = Store::open(into)?;
+                let name = self.file.file_name().unwrap_or(self.file.as_os_str()).to_string_lossy();
+                let told = frfs(&store, &Frfs { file: &self.file, name: &name, configuration, replace })?;
+                store.close()?;
+                output::lines(told)
+            }
             _ => Err(CliError::Usage(
                 "give --out FILE.npz for an FRF file, or --into FILE.jrig with --configuration (and for records --impact \
-                 and --response)"
+                 and --response); a folder needs --into alone"
                     .into(),
             )),
         }
     }
 
-    fn read(&self) -> Result<Frf, CliError> {
-        let (frf, warnings) = read_frf_file(&self.file).map_err(bad)?;
-        for warning in &warnings {
-            eprintln!("{}: {warning}", self.file.display());
-        }
-        Ok(frf)
-    }
-
     fn convert(&self, out: &Path) -> Result<(), CliError> {
-        let frf = self.read()?;
+        let frf = read(&self.file)?;
         write_frf(out, &frf, &[]).map_err(bad)?;
         output::lines([format!("{}: {}", out.display(), described(&frf))])
     }
+}
 
-    /// FRFs of a whole configuration into a campaign file.
-    fn frfs(&self, into: &Path, name: &str) -> Result<(), CliError> {
-        let configuration = configuration_named(name).ok_or_else(|| {
-            CliError::Usage(format!(
-                "there is no configuration `{name}`: A, B or AJB (which is A joined to B)"
-            ))
-        })?;
-        let frf = self.read()?;
-        let store = Store::open(into)?;
-        let geometry = analyse::geometry(&store.plan()?);
-        let points = geometry.points(structure(configuration));
-        check_names(&self.file, &frf, name, points).map_err(CliError::Bad)?;
-        let cells = store.cells()?;
-        let own = |id: i64| {
-            cells.iter().any(|row| row.id == id && configuration_name(row.cell.configuration) == name)
-        };
-        let kept =
-            store.records()?.iter().flatten().filter(|r| own(r.cell) && r.verdict == Kind::Good).count();
-        if kept > 0 {
+fn read(file: &Path) -> Result<Frf, CliError> {
+    let (frf, warnings) = read_frf_file(file).map_err(bad)?;
+    for warning in &warnings {
+        eprintln!("{}: {warning}", file.display());
+    }
+    Ok(frf)
+}
+
+/// FRFs of a whole configuration.
+struct Frfs<'f> {
+    file: &'f Path,
+    /// What the file is called in the campaign file.
+    name: &'f str,
+    configuration: &'f str,
+    /// Whether they may count instead of others.
+    replace: bool,
+}
+
+/// Takes them into a campaign file; what is to be said of it.
+fn frfs(store: &Store, from: &Frfs<'_>) -> Result<Vec<String>, CliError> {
+    let into = store.path().display();
+    let name = from.configuration;
+    let configuration = configuration_named(name).ok_or_else(|| {
+        CliError::Usage(format!("there is no configuration `{name}`: A, B or AJB (which is A joined to B)"))
+    })?;
+    let frf = read(from.file)?;
+    let geometry = analyse::geometry(&store.plan()?);
+    let points = geometry.points(structure(configuration));
+    check_names(from.file, &frf, name, points).map_err(CliError::Bad)?;
+    let cells = store.cells()?;
+    let own =
+        |id: i64| cells.iter().any(|row| row.id == id && configuration_name(row.cell.configuration) == name);
+    let kept = store.records()?.iter().flatten().filter(|r| own(r.cell) && r.verdict == Kind::Good).count();
+    if kept > 0 {
+        return Err(CliError::Bad(format!(
+            "{into}: {name} has {kept} good hits of its own, which FRFs would stand beside: import into a campaign that has none there"
+        )));
+    }
+    match store.frf(name)? {
+        Some(there) if there.frf == frf => {
+            return Ok(vec![format!(
+                "{into}: {name}: the same FRFs are there already, from {}",
+                there.source
+            )]);
+        }
+        Some(there) if !from.replace => {
             return Err(CliError::Bad(format!(
-                "{}: {name} has {kept} good hits of its own, which FRFs would stand beside: import into a campaign that has \
-                 none there",
-                into.display()
+                "{into}: {name} has other FRFs already, from {} ({}): --replace has these count instead",
+                there.source, there.utc
             )));
         }
-        let source = self.file.file_name().unwrap_or(self.file.as_os_str()).to_string_lossy();
-        store.insert_frf(configuration, &source, &frf)?;
-        store.log(&format!("imported FRFs of {name} from {}", self.file.display()))?;
-        store.close()?;
-        let mut told = vec![format!("{}: {name}: {}", into.display(), described(&frf))];
-        if frf.variance().is_none() {
-            told.push(
-                "the file tells no variance of its values: what is identified from them has no interval from their noise"
-                    .into(),
-            );
-        }
-        output::lines(told)
+        _ => {}
     }
+    store.insert_frf(configuration, from.name, &frf)?;
+    store.log(&format!("imported FRFs of {name} from {}", from.file.display()))?;
+    let mut told = vec![format!("{into}: {name}: {}", described(&frf))];
+    if frf.variance().is_none() {
+        told.push(
+            "the file tells no variance of its values: what is identified from them has no interval from their noise"
+                .into(),
+        );
+    }
+    Ok(told)
 }
 
 /// Names that the plan does not have are a mistake; points of the plan that were not measured are said.

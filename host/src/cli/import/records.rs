@@ -2,14 +2,17 @@
 
 use std::path::Path;
 
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD;
 use jointrig_protocol::shot::{Phase, Shot};
+use sha2::{Digest, Sha256};
 
 use super::bad;
 use super::quantised::quantised;
 use crate::campaign::plan::{Cell, configuration_name};
 use crate::campaign::store::Store;
 use crate::campaign::store::notes::utc_now;
-use crate::campaign::store::record_row::NewRecord;
+use crate::campaign::store::record_row::{NewRecord, RecordRow};
 use crate::campaign::store::session_table::{Counters, SessionInfo};
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::Kind;
@@ -19,7 +22,7 @@ use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::device::recording::Recording;
 use crate::exchange::record_uff::read_record_file;
-use crate::spectra::Pulse;
+use crate::spectra::{ImpactRecords, Pulse};
 
 /// The cell that the records belong to.
 pub(super) struct CellName<'n> {
@@ -28,57 +31,158 @@ pub(super) struct CellName<'n> {
     pub(super) response: &'n str,
 }
 
-pub(super) fn import(file: &Path, into: &Path, name: &CellName<'_>) -> Result<(), CliError> {
+/// Where records come from.
+pub(super) struct Origin {
+    /// What the file is called in the campaign file.
+    name: String,
+    /// What tells its content from any other.
+    digest: String,
+    pub(super) bytes: Vec<u8>,
+}
+
+impl Origin {
+    pub(super) fn of(path: &Path, name: &str) -> Result<Self, CliError> {
+        let bytes = std::fs::read(path).map_err(|source| CliError::Read {
+            path: path.into(),
+            doing: "reading a file to import",
+            source,
+        })?;
+        let digest = format!("sha256:{}", BASE64_STANDARD.encode(Sha256::digest(&bytes)));
+        Ok(Self { name: name.into(), digest, bytes })
+    }
+
+    fn address(&self) -> String {
+        format!("file:{}", self.name)
+    }
+}
+
+/// What came of records.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Brought {
+    pub(super) cells: usize,
+    pub(super) hits: usize,
+    pub(super) kept: usize,
+    /// Hits that an earlier import of the same file had stored.
+    pub(super) already: usize,
+}
+
+impl Brought {
+    pub(super) fn add(&mut self, other: Brought) {
+        self.cells += other.cells;
+        self.hits += other.hits;
+        self.kept += other.kept;
+        self.already += other.already;
+    }
+}
+
+/// One file, for the user's eyes.
+pub(super) fn import(file: &Path, into: &Path, name: &CellName<'_>, replace: bool) -> Result<(), CliError> {
     let (records, warnings) = read_record_file(file).map_err(bad)?;
     for warning in &warnings {
         eprintln!("{}: {warning}", file.display());
     }
     let mut store = Store::open(into)?;
-    let plan = store.plan()?;
-    let (id, cell, attempt) = find(&store, name)?;
-    let (map, codes) = quantised(&records).map_err(|reason| bad(format!("{}: {reason}", file.display())))?;
-    let recordings: Vec<Recording> = codes
-        .into_iter()
-        .zip(&records.force_n)
-        .enumerate()
-        .map(|(hit, (codes, force_n))| {
-            let no_pulse = || bad(format!("{}: hit {hit} has no force pulse: take it out", file.display()));
-            Ok(recording(hit, codes, map.len(), &Pulse::locate(force_n).ok_or_else(no_pulse)?))
-        })
-        .collect::<Result<_, CliError>>()?;
-    let session = store.begin_session(&session(file), &map)?;
-    let (mut kept, mut others) = (0, Others::default());
-    let hits = recordings.len();
-    for (hit, recording) in recordings.into_iter().enumerate() {
-        let verdict = ByRecord.judge(&cell, &plan, &map, &recording, &others);
-        if verdict.kind == Kind::Good {
-            others.learn(&plan, &map, recording.view());
-            kept += 1;
-        }
-        eprintln!("hit {hit}: {} ({})", verdict.kind, verdict.sentence);
-        let record = NewRecord {
-            cell: id,
-            attempt: attempt + hit as u32,
-            session,
-            utc: utc_now(),
-            // when it was measured is not known here
-            utc_error_s: None,
-            recording,
-            verdict,
-        };
-        store.insert(&record, &Counters::default())?;
+    let called = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
+    let origin = Origin::of(file, &called)?;
+    let Brought { hits, kept, already, .. } =
+        bring(&mut store, &origin, name, &records, replace, &mut |line| eprintln!("{line}"))?;
+    store.log(&format!("imported {hits} hits from {}", file.display()))?;
+    store.close()?;
+    let mut lines = vec![format!("{}: {kept} of {hits} hits are good", into.display())];
+    if already > 0 {
+        lines.push(format!("{already} of them were there already, from an earlier import of the same file"));
     }
+    let (map, _) = quantised(&records).map_err(|reason| bad(format!("{}: {reason}", file.display())))?;
     let rounding: Vec<String> = map
         .channels
         .iter()
         .map(|c| format!("{} {:.1e} {}", c.name, 0.5 * c.units_per_code().abs(), c.quantity.unit()))
         .collect();
-    store.log(&format!("imported {hits} hits from {}", file.display()))?;
-    store.close()?;
-    output::lines([
-        format!("{}: {kept} of {hits} hits are good", into.display()),
-        format!("stored in 16 bits, rounded by at most: {}", rounding.join(", ")),
-    ])
+    lines.push(format!("stored in 16 bits, rounded by at most: {}", rounding.join(", ")));
+    output::lines(lines)
+}
+
+/// Judges the hits like measured ones and stores those that are not there yet; tells each verdict.
+///
+/// # Errors
+/// There is no such cell, a hit has no pulse, or hits of another file of this name are there and shall not be replaced.
+pub(super) fn bring(
+    store: &mut Store,
+    origin: &Origin,
+    name: &CellName<'_>,
+    records: &ImpactRecords,
+    replace: bool,
+    tell: &mut dyn FnMut(String),
+) -> Result<Brought, CliError> {
+    let plan = store.plan()?;
+    let (id, cell, attempt) = find(store, name)?;
+    let (map, codes) = quantised(records).map_err(|reason| bad(format!("{}: {reason}", origin.name)))?;
+    let recordings: Vec<Recording> = codes
+        .into_iter()
+        .zip(&records.force_n)
+        .enumerate()
+        .map(|(hit, (codes, force_n))| {
+            let no_pulse = || bad(format!("{}: hit {hit} has no force pulse: take it out", origin.name));
+            Ok(recording(hit, codes, map.len(), &Pulse::locate(force_n).ok_or_else(no_pulse)?))
+        })
+        .collect::<Result<_, CliError>>()?;
+    let there = already_there(store, origin, id, replace)?;
+    let missing = (0..recordings.len() as u32).any(|hit| !there.contains(&hit));
+    let session = missing.then(|| store.begin_session(&session(origin), &map)).transpose()?;
+    let mut brought = Brought { cells: 1, hits: recordings.len(), kept: 0, already: there.len() };
+    let mut others = Others::default();
+    for (hit, recording) in (0..).zip(recordings) {
+        let verdict = ByRecord.judge(&cell, &plan, &map, &recording, &others);
+        if verdict.kind == Kind::Good {
+            others.learn(&plan, &map, recording.view());
+            brought.kept += 1;
+        }
+        tell(format!("hit {hit}: {} ({})", verdict.kind, verdict.sentence));
+        if let (Some(session), false) = (session, there.contains(&hit)) {
+            let record = NewRecord {
+                cell: id,
+                attempt: attempt + hit,
+                session,
+                utc: utc_now(),
+                // when it was measured is not known here
+                utc_error_s: None,
+                recording,
+                verdict,
+            };
+            store.insert(&record, &Counters::default())?;
+        }
+    }
+    Ok(brought)
+}
+
+/// The hits of this very file that the cell has; those of another file of the same name are dropped, or refused.
+fn already_there(store: &Store, origin: &Origin, cell: i64, replace: bool) -> Result<Vec<u32>, CliError> {
+    let sessions = store.sessions()?;
+    let imported = |row: &RecordRow| {
+        let own = sessions.iter().find(|(id, _)| *id == row.session).map(|(_, info)| info);
+        own.filter(|info| info.board == SessionInfo::IMPORTED)
+    };
+    let rows: Vec<RecordRow> = store.records_of(cell)?.into_iter().flatten().collect();
+    let (mut same, mut older) = (Vec::new(), Vec::new());
+    for row in &rows {
+        match imported(row) {
+            Some(info) if info.serial == origin.digest => same.push(row.shot.number),
+            Some(info) if info.address == origin.address() && row.kept() => older.push(row.id),
+            _ => {}
+        }
+    }
+    if !older.is_empty() && !replace {
+        return Err(bad(format!(
+            "{}: {} good hits of this cell came from another file `{}` before: --replace drops those and takes these instead",
+            store.path().display(),
+            older.len(),
+            origin.name
+        )));
+    }
+    for record in older {
+        store.overrule(record, Kind::Dropped, &format!("replaced by {} ({})", origin.name, origin.digest))?;
+    }
+    Ok(same)
 }
 
 /// The cell's id, the cell, and the first attempt that is free in it.
@@ -101,12 +205,11 @@ fn find(store: &Store, name: &CellName<'_>) -> Result<(i64, Cell, u32), CliError
     Ok((row.id, row.cell, attempts.unwrap_or(0)))
 }
 
-fn session(file: &Path) -> SessionInfo {
-    let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
+fn session(origin: &Origin) -> SessionInfo {
     SessionInfo {
-        address: format!("file:{name}"),
+        address: origin.address(),
         board: SessionInfo::IMPORTED.into(),
-        serial: String::new(),
+        serial: origin.digest.clone(),
         firmware_version: String::new(),
         target: String::new(),
         build: Hex(0),

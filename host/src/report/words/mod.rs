@@ -4,6 +4,7 @@ pub(super) mod answer_sentences;
 pub mod brief;
 pub(super) mod check_sentences;
 pub(super) mod comparison_sentences;
+pub mod headline;
 pub(super) mod level_sentences;
 pub mod line;
 pub(super) mod missing_sentences;

@@ -1,0 +1,170 @@
+//! Which file is which: from a table, from the file's name as `export` gives it, or from the labels in a universal file.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::bad;
+use crate::campaign::plan::{configuration_name, configuration_named};
+use crate::campaign::store::cell_table::CellRow;
+use crate::cli::error::CliError;
+use crate::exchange::{frf_file, record_uff, uff};
+
+/// What a file holds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Named {
+    /// FRFs of a configuration.
+    Frfs(String),
+    /// Records of one cell.
+    Cell { configuration: String, impact: String, response: String },
+    /// Records of a configuration, whose labels name the cells.
+    Labelled(String),
+}
+
+/// A file and what it holds.
+pub(super) struct Source {
+    pub(super) path: PathBuf,
+    /// What it is called in the campaign file: its path inside the folder.
+    pub(super) name: String,
+    pub(super) holds: Named,
+}
+
+/// A row of the table.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Row {
+    file: String,
+    configuration: String,
+    #[serde(default)]
+    impact: String,
+    #[serde(default)]
+    response: String,
+}
+
+/// Endings of files that can be read.
+const ENDINGS: [&str; 4] = ["npz", "uff", "unv", "uf"];
+
+/// Every file that the table names.
+pub(super) fn from_table(folder: &Path, table: &Path) -> Result<Vec<Source>, CliError> {
+    let told = |error: csv::Error| {
+        bad(format!(
+            "{}: {error}; a table of names has the columns file, configuration, impact, response, the last two empty for FRFs and \
+             for universal files whose labels name impact and response",
+            table.display()
+        ))
+    };
+    let mut rows = csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(table).map_err(told)?;
+    let mut sources = Vec::new();
+    for row in rows.deserialize::<Row>() {
+        let Row { file, configuration, impact, response } = row.map_err(told)?;
+        let path = folder.join(&file);
+        if !path.is_file() {
+            return Err(bad(format!("{}: there is no file {}", table.display(), path.display())));
+        }
+        let holds = match (impact.is_empty(), response.is_empty()) {
+            (false, false) => Named::Cell { configuration, impact, response },
+            (true, true) => with_labels_or_frfs(&path, configuration)?,
+            _ => {
+                return Err(bad(format!(
+                    "{}: {file} has one of impact and response: give both or none",
+                    table.display()
+                )));
+            }
+        };
+        sources.push(Source { path, name: file, holds });
+    }
+    Ok(sources)
+}
+
+/// Every readable file of the folder and those in it, named by `configuration` where neither its name nor its folder tells one.
+///
+/// # Errors
+/// A folder cannot be read, or files have no name: all of them are listed.
+pub(super) fn from_folder(
+    folder: &Path,
+    cells: &[CellRow],
+    configuration: Option<&str>,
+) -> Result<(Vec<Source>, Vec<PathBuf>), CliError> {
+    let (mut sources, mut left_out, mut unnamed) = (Vec::new(), Vec::new(), Vec::new());
+    for path in files(folder)? {
+        let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        if !ending.is_some_and(|ending| ENDINGS.contains(&&*ending)) {
+            left_out.push(path);
+            continue;
+        }
+        let name = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned();
+        match named(&path, folder, cells, configuration)? {
+            Some(holds) => sources.push(Source { path, name, holds }),
+            None => unnamed.push(name),
+        }
+    }
+    if !unnamed.is_empty() {
+        return Err(bad(format!(
+            "{}: it is not clear what these files hold: {}. Call them CONFIGURATION_IMPACT_RESPONSE (one cell each), CONFIGURATION (FRFs), \
+             put universal files whose labels name impact and response into a folder named after the configuration, say --configuration, or \
+             give --names TABLE.csv with the columns file, configuration, impact, response",
+            folder.display(),
+            unnamed.join(", ")
+        )));
+    }
+    if sources.is_empty() {
+        return Err(bad(format!("{}: it holds no .npz, .uff or .unv file", folder.display())));
+    }
+    Ok((sources, left_out))
+}
+
+fn named(
+    path: &Path,
+    folder: &Path,
+    cells: &[CellRow],
+    configuration: Option<&str>,
+) -> Result<Option<Named>, CliError> {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    // names of points may have an underscore themselves
+    let called = |row: &&CellRow| {
+        let cell = &row.cell;
+        format!("{}_{}_{}", configuration_name(cell.configuration), cell.impact, cell.response) == *stem
+    };
+    if let Some(row) = cells.iter().find(called) {
+        let (impact, response) = (row.cell.impact.clone(), row.cell.response.clone());
+        let configuration = configuration_name(row.cell.configuration).into();
+        return Ok(Some(Named::Cell { configuration, impact, response }));
+    }
+    let above = path.parent().filter(|above| *above != folder).and_then(Path::file_name);
+    let above = above.map(|name| name.to_string_lossy().into_owned());
+    let known = |name: &str| configuration_named(name).map(|found| configuration_name(found).to_owned());
+    let told = known(&stem)
+        .or_else(|| above.as_deref().and_then(known))
+        .or_else(|| configuration.map(str::to_owned));
+    told.map(|configuration| with_labels_or_frfs(path, configuration)).transpose()
+}
+
+/// A universal file with forces over time holds records; everything else is taken for FRFs.
+fn with_labels_or_frfs(path: &Path, configuration: String) -> Result<Named, CliError> {
+    if frf_file::is_npz(path).map_err(bad)? {
+        return Ok(Named::Frfs(configuration));
+    }
+    let bytes = std::fs::read(path).map_err(|source| CliError::Read {
+        path: path.into(),
+        doing: "reading a file to import",
+        source,
+    })?;
+    let records = record_uff::holds_records(&uff::read(&bytes));
+    Ok(if records { Named::Labelled(configuration) } else { Named::Frfs(configuration) })
+}
+
+/// All files, in order of their names.
+fn files(folder: &Path) -> Result<Vec<PathBuf>, CliError> {
+    let failed = |source| CliError::Read { path: folder.into(), doing: "reading the folder", source };
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        if path.is_dir() {
+            found.extend(files(&path)?);
+        } else {
+            found.push(path);
+        }
+    }
+    found.sort();
+    Ok(found)
+}

@@ -1,0 +1,126 @@
+//! A folder of records from elsewhere in one command, which may be repeated.
+#![allow(clippy::unwrap_used)]
+
+use jointrig::campaign::plan::SMALL;
+use jointrig::campaign::store::Store;
+use jointrig::exchange::{read_impacts, write_impacts};
+use jointrig_tests::command::jointrig;
+use jointrig_tests::live::{campaign, done};
+use serde_json::Value;
+use std::path::Path;
+use std::process::Command;
+
+fn import(folder: &Path, into: &Path, more: &[&str]) -> Command {
+    let mut command = jointrig();
+    command.arg("import").arg(folder).arg("--into").arg(into).args(more);
+    command
+}
+
+fn refused(mut command: Command) -> String {
+    let out = command.output().unwrap();
+    assert_eq!(out.status.code(), Some(1), "{command:?}");
+    String::from_utf8(out.stderr).unwrap()
+}
+
+fn kept(file: &Path) -> Vec<Value> {
+    let status = done(jointrig().args(["campaign", "status", "--json"]).arg(file));
+    let status: Value = serde_json::from_str(&status).unwrap();
+    let cells = status["cells"].as_array().unwrap().iter();
+    cells
+        .map(|cell| {
+            serde_json::json!([cell["configuration"], cell["impact"], cell["response"], cell["kept"]])
+        })
+        .collect()
+}
+
+fn records(file: &Path) -> usize {
+    Store::open_read_only(file).unwrap().places().unwrap().len()
+}
+
+#[test]
+fn what_was_exported_is_imported_again_by_names_or_labels() {
+    let (folder, measured) = campaign(SMALL);
+    done(jointrig().args(["campaign", "run", "--yes", "--device", "sim:"]).arg(&measured));
+    let at = |name: &str| folder.path().join(name);
+    for format in ["npz", "uff58"] {
+        done(jointrig().args(["export", "--format", format]).arg(&measured).arg("--out").arg(at(format)));
+    }
+    let (_npz, by_name) = campaign(SMALL);
+    let told = done(&mut import(&at("npz/records"), &by_name, &[]));
+    assert!(told.contains("cells"), "{told}");
+    assert_eq!(kept(&by_name), kept(&measured));
+    let first = records(&by_name);
+    // again: nothing is stored twice
+    let told = done(&mut import(&at("npz/records"), &by_name, &[]));
+    assert!(told.contains("were there already"), "{told}");
+    assert_eq!(records(&by_name), first);
+
+    // names that say nothing, in folders that name the configuration: the labels tell the rest
+    for (number, entry) in std::fs::read_dir(at("uff58/records")).unwrap().enumerate() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        let configuration = name.split('_').next().unwrap();
+        let place = at("daq").join(configuration);
+        std::fs::create_dir_all(&place).unwrap();
+        std::fs::copy(&path, place.join(format!("measurement {number}.uff"))).unwrap();
+    }
+    let (_uff, by_label) = campaign(SMALL);
+    done(&mut import(&at("daq"), &by_label, &[]));
+    assert_eq!(kept(&by_label), kept(&measured));
+    assert_eq!(records(&by_label), first);
+    assert!(done(jointrig().args(["campaign", "verify"]).arg(&by_label)).contains("all whole"));
+}
+
+/// Three hits with three axes, in a file of this name.
+fn hits(path: &Path, gain: f64) {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host/tests/data/impacts/good.npz");
+    let mut records = read_impacts(&data).unwrap();
+    for hit in &mut records.response {
+        hit[0].iter_mut().for_each(|v| *v *= gain);
+        *hit = vec![hit[0].clone(); 3];
+    }
+    write_impacts(path, &records).unwrap();
+}
+
+#[test]
+fn nothing_is_overwritten_unasked_and_nothing_stored_of_files_without_a_name() {
+    let (folder, file) = campaign(SMALL);
+    let cell = folder.path().join("cells");
+    std::fs::create_dir(&cell).unwrap();
+    hits(&cell.join("A_AZ1_A1.npz"), 1.0);
+    hits(&cell.join("somewhere.npz"), 1.0);
+    hits(&cell.join("else.npz"), 1.0);
+    std::fs::write(cell.join("notes.txt"), "Tuesday").unwrap();
+    let said = refused(import(&cell, &file, &[]));
+    assert!(said.contains("else.npz, somewhere.npz") && said.contains("--names"), "{said}");
+    assert_eq!(records(&file), 0);
+
+    let table = folder.path().join("names.csv");
+    std::fs::write(&table, "file,configuration,impact,response\nsomewhere.npz,A,AZ1,A2\nelse.npz,A,AZ1,A1\n")
+        .unwrap();
+    let names = ["--names", table.to_str().unwrap()];
+    done(&mut import(&cell, &file, &names));
+    assert_eq!(records(&file), 6);
+    // another content under the same name
+    hits(&cell.join("else.npz"), 1.1);
+    let said = refused(import(&cell, &file, &names));
+    assert!(said.contains("--replace") && said.contains("1 of 2 files are stored"), "{said}");
+    assert_eq!(records(&file), 6);
+    done(&mut import(&cell, &file, &[&names[..], &["--replace"]].concat()));
+    assert_eq!(records(&file), 9);
+    let of_cell = |response: &str| {
+        kept(&file).into_iter().find(|cell| cell[2] == response && cell[0] == "A").unwrap()[3].clone()
+    };
+    assert_eq!((of_cell("A1"), of_cell("A2")), (3.into(), 3.into()), "dropped ones stay and do not count");
+    let shown = done(jointrig().args(["campaign", "show", "--no-figure"]).arg(&file).arg("A/AZ1/A1"));
+    assert!(shown.contains("replaced by else.npz"), "{shown}");
+
+    // hits of a file of another name are added to what is there
+    std::fs::remove_file(cell.join("somewhere.npz")).unwrap();
+    std::fs::remove_file(cell.join("else.npz")).unwrap();
+    hits(&cell.join("A_AZ1_A1.npz"), 0.9);
+    done(&mut import(&cell, &file, &[]));
+    assert_eq!(of_cell("A1"), 6);
+    let missing = refused(import(&cell, &file, &names));
+    assert!(missing.contains("there is no file"), "{missing}");
+}
