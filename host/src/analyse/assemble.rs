@@ -122,16 +122,14 @@ fn measured(
             if y.lines() != first.lines() {
                 continue;
             }
-            // 0 times a value is left out, so that an axis that is not needed cannot spoil the others
-            let axes: Vec<usize> = (0..3).filter(|axis| channel.direction[*axis] != 0.0).collect();
-            let along = |axis: &usize| channel.direction[*axis];
+            let axis = component(points, *c);
+            if axis >= y.outputs() {
+                continue;
+            }
             for line in 0..first.lines() {
-                lines[line][(row, column)] = axes.iter().map(|axis| y.h1(line, *axis) * along(axis)).sum();
-                variance[line][(row, column)] =
-                    axes.iter().map(|axis| y.variance(line, *axis) * along(axis).powi(2)).sum();
-                if let [axis] = axes[..] {
-                    coherence[line][(row, column)] = y.coherence(line, axis);
-                }
+                lines[line][(row, column)] = y.h1(line, axis);
+                variance[line][(row, column)] = y.variance(line, axis);
+                coherence[line][(row, column)] = y.coherence(line, axis);
             }
         }
     }
@@ -146,6 +144,17 @@ fn measured(
     );
     let whole = frf.and_then(|frf| frf.with_variance(variance)?.with_coherence(coherence));
     Some(whole.expect("the geometry's names differ, and there is one matrix for each line of the first cell"))
+}
+
+/// Which of its location's channels this one is: records hold them in the geometry's order.
+fn component(points: &Configuration, channel: usize) -> usize {
+    let name = &points.channels[channel].name;
+    points.channels[..channel].iter().filter(|before| before.name == *name).count()
+}
+
+/// The same of one of its channels.
+pub fn component_of(points: &Configuration, channel: &Point) -> usize {
+    points.channels.iter().position(|own| own == channel).map_or(0, |place| component(points, place))
 }
 
 /// The cell of this impact and response location.

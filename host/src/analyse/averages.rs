@@ -20,7 +20,7 @@ pub struct CellAverage {
     pub name: CellName,
     /// The records averaged.
     pub records: Vec<i64>,
-    /// The response along x, y and z.
+    /// The response, along each of its channels.
     pub spectra: CrossSpectra,
     /// Auto-spectrum of the force up to half the sampling rate, N² s²: means of [`FORCE_LINES`] lines each. All lines of all cells
     /// would be most of what an analysis remembers.
@@ -58,6 +58,7 @@ pub fn average(
     lines_hz: [f64; 2],
 ) -> Result<CellAverage, SpectraError> {
     let measured = cell.hits.iter().all(|h| h.contact.is_some());
+    let axes = cell.hits.first().map_or(0, |hit| hit.response.len());
     let (contact, damped) = (asked.contact && measured, asked.damped && measured);
     let records: Vec<i64> = cell.hits.iter().map(|h| h.record).collect();
     let mut alike: Vec<(Vec<f64>, ImpactRecords)> = Vec::new();
@@ -82,10 +83,10 @@ pub fn average(
     Ok(CellAverage {
         name,
         records,
-        spectra: kept.of_outputs(0..3),
+        spectra: kept.of_outputs(0..axes),
         force_spectrum,
         step_hz,
-        contact: contact.then(|| kept.of_outputs(3..6)),
+        contact: contact.then(|| kept.of_outputs(axes..axes + 3)),
         damped,
         light,
     })
@@ -109,9 +110,9 @@ fn summed(alike: &[(Vec<f64>, ImpactRecords)], sigma_per_s: f64) -> Result<Cross
     all.ok_or(SpectraError::NoHits)
 }
 
-/// How late the responses are, the force, and the responses: x, y, z, and with `contact` v_A, v_B and T.
+/// How late the responses are, the force, and the responses: the location's channels, and with `contact` v_A, v_B and T.
 fn signals(hit: Hit, contact: bool) -> (Vec<f64>, Vec<f64>, Vec<Vec<f64>>) {
-    let (mut delay_s, mut outputs) = (hit.response_delay_s.to_vec(), Vec::from(hit.response));
+    let (mut delay_s, mut outputs) = (hit.response_delay_s, hit.response);
     if let (true, Some(c)) = (contact, hit.contact) {
         let ContactDelays { specimen_a, specimen_b, load_cells } = c.delay_s;
         delay_s.extend([specimen_a, specimen_b, load_cells]);

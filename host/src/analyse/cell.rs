@@ -48,10 +48,10 @@ pub struct Hit {
     pub record: i64,
     /// Hammer force, N.
     pub force_n: Vec<f64>,
-    /// Scanning vibrometer along x, y, z at the response location, SI.
-    pub response: [Vec<f64>; 3],
+    /// The channels at the response location, SI: the scanning vibrometer's x, y and z, or as the plan's axes say.
+    pub response: Vec<Vec<f64>>,
     /// How late these are against the hammer's force, s.
-    pub response_delay_s: [f64; 3],
+    pub response_delay_s: Vec<f64>,
     /// The signals at the contact, where the rig has them.
     pub contact: Option<ContactSignals>,
 }

@@ -1,5 +1,6 @@
 //! Which FRFs the report shows: a driving point and a transfer of every configuration.
 
+use super::assemble::component_of;
 use super::averages::CellAverage;
 use crate::frf::Frf;
 use crate::results::{FrfCurve, NoiseFloor, Role, rounded};
@@ -22,7 +23,7 @@ pub fn of_cells(
 ) -> Vec<FrfCurve> {
     let chosen = choose(points, &|impact, channel| find(cells, impact, channel).is_some());
     let curve = |(role, impact, channel): (Role, &Point, &Point)| {
-        Some(of_cell(configuration, (role, impact, channel), find(cells, impact, channel)?, quantity))
+        Some(of_cell(points, configuration, (role, impact, channel), find(cells, impact, channel)?, quantity))
     };
     chosen.into_iter().filter_map(curve).collect()
 }
@@ -42,7 +43,8 @@ pub fn noise_floor(
     }
     let order = quantity.order_of_s();
     let lines = || 0..y.lines();
-    let magnitude = |l: usize| (y.h1(l, 2) * y.s(l).powi(-order)).norm();
+    let axis = component_of(points, channel).min(y.outputs().saturating_sub(1));
+    let magnitude = |l: usize| (y.h1(l, axis) * y.s(l).powi(-order)).norm();
     let frequency_hz = y.frequency_hz();
     let first_hz = frequency_hz.first().copied().unwrap_or(0.0);
     Some(NoiseFloor {
@@ -53,13 +55,14 @@ pub fn noise_floor(
         step_hz: frequency_hz.get(1).map_or(0.0, |second| second - first_hz),
         magnitude_m_per_n: lines().map(|l| rounded(magnitude(l), 5)).collect(),
         noise_m_per_n: lines()
-            .map(|l| rounded(y.variance(l, 2).sqrt() * y.s(l).norm().powi(-order), 5))
+            .map(|l| rounded(y.variance(l, axis).sqrt() * y.s(l).norm().powi(-order), 5))
             .collect(),
         dynamic_stiffness_n_per_m: lines().map(|l| rounded(1.0 / magnitude(l), 5)).collect(),
     })
 }
 
 fn of_cell(
+    points: &Configuration,
     configuration: Structure,
     pair: (Role, &Point, &Point),
     cell: &CellAverage,
@@ -67,9 +70,12 @@ fn of_cell(
 ) -> FrfCurve {
     let order = quantity.order_of_s();
     let y = &cell.spectra;
-    let receptance = (0..y.lines()).map(|line| y.h1(line, 2) * y.s(line).powi(-order));
+    let axis = component_of(points, pair.2).min(y.outputs().saturating_sub(1));
+    // the channel counts along its own direction
+    let sign = pair.2.direction[2].signum();
+    let receptance = (0..y.lines()).map(|line| y.h1(line, axis) * y.s(line).powi(-order) * sign);
     let several = cell.records.len() > 1;
-    let coherence = (0..y.lines()).filter(|_| several).map(|line| y.coherence(line, 2));
+    let coherence = (0..y.lines()).filter(|_| several).map(|line| y.coherence(line, axis));
     FrfCurve {
         hits: cell.records.len(),
         coherence: coherence.map(|c| rounded(if c.is_finite() { c } else { 0.0 }, 5)).collect(),
@@ -149,7 +155,7 @@ pub fn arms(
         points.channels.iter().filter(measured).find_map(|channel| {
             let own = |c: &&CellAverage| c.name.impact == impact && c.name.response == channel.name;
             let cell = cells.iter().filter(|c| c.name.configuration == Structure::Ajb).find(own)?;
-            Some(of_cell(Structure::Ajb, (role, hit, channel), cell, quantity))
+            Some(of_cell(points, Structure::Ajb, (role, hit, channel), cell, quantity))
         })
     };
     let both = [arm(Role::ArmA, Grouping::InterfaceA), arm(Role::ArmB, Grouping::InterfaceB)];

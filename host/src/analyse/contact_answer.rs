@@ -15,7 +15,10 @@ pub fn reads(geometry: &Geometry, name: &CellName) -> bool {
         return false;
     }
     let points = geometry.points(name.configuration);
-    let served = points.channels.iter().any(|p| p.name == name.response && contact::serves(p.grouping));
+    let mut own = points.channels.iter().filter(|p| p.name == name.response);
+    // the contact's own signals and the lasers are along z, and the estimator takes the motion along x, y and z
+    let usual = own.clone().map(|p| p.direction).eq([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+    let served = usual && own.any(|p| contact::serves(p.grouping));
     let hit = points.impacts.iter().find(|p| p.name == name.impact);
     served
         && hit.is_some_and(|p| match name.configuration {

@@ -38,6 +38,12 @@ impl CampaignFile {
         source
             .settings
             .insert("virtual_point_m".into(), serde_json::json!(self.plan.geometry.virtual_point_m));
+        if let Some(names) = self.plan.own_names() {
+            source.settings.insert("structure".into(), names.into());
+        }
+        if !self.plan.slides_along_z() {
+            source.settings.insert("sliding_direction".into(), serde_json::json!(self.plan.sliding()));
+        }
         // which simulated rig it was, and what it was seeded with
         if let Some(rig) = store.simulated_rig()? {
             source.settings.insert("rig".into(), rig.name.into());

@@ -189,7 +189,7 @@ impl CampaignFile {
         };
         let delay = |place: usize| f64::from(map.channels[place].delay_ns) * 1e-9;
         let force = map.place(Role::HammerForce).ok_or(missing("the hammer's force"))?;
-        let responses = map.responses().ok_or(missing("the response along x, y and z"))?;
+        let responses = map.responses().ok_or(missing("the response"))?;
         let late = |place: usize| delay(place) - delay(force);
         let (a, b, cells) =
             (map.place(Role::SpecimenA), map.place(Role::SpecimenB), map.places(Role::LoadCell));
@@ -217,8 +217,8 @@ impl CampaignFile {
         let hit = Hit {
             record: record.id,
             force_n: signal(force),
-            response: responses.map(signal),
-            response_delay_s: responses.map(late),
+            response: responses.iter().map(|place| signal(*place)).collect(),
+            response_delay_s: responses.iter().map(|place| late(*place)).collect(),
             contact,
         };
         Ok((hit, rate))

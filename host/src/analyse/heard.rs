@@ -3,7 +3,7 @@
 use super::averages::CellAverage;
 use super::cell::CellName;
 use crate::results::{MAIN_BAND, rounded};
-use crate::substructuring::geometry::Geometry;
+use crate::substructuring::geometry::{Geometry, Point};
 
 /// Lines at which coherence is told: enough to see every dip, few enough to show all cells.
 const SHOWN_LINES: usize = 140;
@@ -50,14 +50,7 @@ pub fn heard(geometry: &Geometry, cells: &[CellAverage]) -> Heard {
 
 fn one(geometry: &Geometry, cell: &CellAverage) -> HeardCell {
     let y = &cell.spectra;
-    let axis = geometry
-        .points(cell.name.configuration)
-        .impacts
-        .iter()
-        .find(|p| p.name == cell.name.impact)
-        .map_or(2, |p| {
-            (0..3).max_by(|a, b| p.direction[*a].abs().total_cmp(&p.direction[*b].abs())).unwrap_or(2)
-        });
+    let axis = along_the_hit(geometry, &cell.name).min(y.outputs().saturating_sub(1));
     let several = y.hits() > 1;
     let value = |line: usize| y.coherence(line, axis).clamp(0.0, 1.0);
     let lines = if several { shown(y.frequency_hz()) } else { Vec::new() };
@@ -70,6 +63,15 @@ fn one(geometry: &Geometry, cell: &CellAverage) -> HeardCell {
         coherence: lines.into_iter().map(|l| rounded(value(l), 3)).collect(),
         random_error: errors.get(errors.len() / 2).map(|e| rounded(*e, 4)),
     }
+}
+
+/// The channel of the cell's location that feels most of the hit's direction.
+fn along_the_hit(geometry: &Geometry, name: &CellName) -> usize {
+    let points = geometry.points(name.configuration);
+    let Some(hit) = points.impacts.iter().find(|p| p.name == name.impact) else { return 0 };
+    let felt = |p: &Point| (0..3).map(|i| p.direction[i] * hit.direction[i]).sum::<f64>().abs();
+    let own = points.channels.iter().filter(|p| p.name == name.response).enumerate();
+    own.max_by(|a, b| felt(a.1).total_cmp(&felt(b.1))).map_or(0, |(place, _)| place)
 }
 
 #[cfg(test)]

@@ -22,8 +22,10 @@ pub fn of(
     let interface = |p: &&Point| matches!(p.grouping, Grouping::InterfaceA | Grouping::InterfaceB);
     let channels: Vec<&Point> =
         points.channels.iter().filter(interface).filter(|p| p.name == name.response).collect();
+    // a location's channels stand in the records as they stand here
+    let all = cell.hits.iter().all(|hit| hit.response.len() == channels.len());
     let there = points.impacts.iter().filter(interface).any(|p| p.name == name.impact);
-    if name.configuration != Structure::Ajb || channels.is_empty() || !there || cell.hits.len() < 2 {
+    if name.configuration != Structure::Ajb || channels.is_empty() || !all || !there || cell.hits.len() < 2 {
         return Ok(None);
     }
     let (mut auto, mut cross) = (Vec::<Vec<f64>>::new(), Vec::<Vec<Vec<Complex<f64>>>>::new());
@@ -31,12 +33,12 @@ pub fn of(
         let one = ImpactRecords {
             fs_hz: cell.fs_hz,
             force_n: vec![hit.force_n.clone()],
-            response: vec![hit.response.to_vec()],
+            response: vec![hit.response.clone()],
             quantity,
         };
         let settings = FrfSettings {
             windowing: Windowing { sigma_per_s, ..Windowing::default() },
-            delay_s: hit.response_delay_s.to_vec(),
+            delay_s: hit.response_delay_s.clone(),
             ..FrfSettings::default()
         };
         let y = estimate(&one, &[true], &settings)?.band(MAIN_BAND.low_hz, MAIN_BAND.high_hz);
@@ -44,8 +46,8 @@ pub fn of(
         cross.resize(y.lines(), vec![Vec::new(); channels.len()]);
         for l in 0..y.lines() {
             auto[l].push(y.force(l));
-            for (of_channel, channel) in cross[l].iter_mut().zip(&channels) {
-                of_channel.push((0..3).map(|axis| y.cross(l, axis) * channel.direction[axis]).sum());
+            for (axis, of_channel) in cross[l].iter_mut().enumerate() {
+                of_channel.push(y.cross(l, axis));
             }
         }
     }

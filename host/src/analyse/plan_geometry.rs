@@ -1,20 +1,22 @@
 //! The geometry of a plan.
 
-use crate::campaign::plan::{ConfigurationPlan, Plan};
+use crate::campaign::plan::{ConfigurationPlan, Plan, turned};
 use crate::results::Place;
 use crate::structure::Structure;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
 
-/// The plan's points in the shape that substructuring knows: every response along x, y and z. Blocks of one configuration add up.
+/// The plan's points in the shape that substructuring knows, in the interface's coordinates, whose z is the sliding direction: a channel
+/// for each axis of a response, in the order in which records hold them. Blocks of one configuration add up.
 pub fn geometry(plan: &Plan) -> Geometry {
-    const AXES: [(&str, [f64; 3]); 3] =
-        [("x", [1.0, 0.0, 0.0]), ("y", [0.0, 1.0, 0.0]), ("z", [0.0, 0.0, 1.0])];
+    let rows = plan.to_interface();
+    // where z slides, not even rounding may move anything
+    let to_interface = |v: [f64; 3]| if plan.slides_along_z() { v } else { turned(&rows, v) };
     let mut geometry = Geometry {
         a: Configuration::default(),
         b: Configuration::default(),
         ajb: Configuration::default(),
-        virtual_point_a_m: plan.geometry.virtual_point_m,
-        virtual_point_b_m: plan.geometry.virtual_point_m,
+        virtual_point_a_m: to_interface(plan.geometry.virtual_point_m),
+        virtual_point_b_m: to_interface(plan.geometry.virtual_point_m),
     };
     for of_plan in Structure::ALL {
         let blocks = || plan.configuration.iter().filter(|block| block.name.get_ref() == of_plan.name());
@@ -25,12 +27,12 @@ pub fn geometry(plan: &Plan) -> Geometry {
         for response in plan.geometry.response.iter().map(toml::Spanned::get_ref) {
             let Ok(grouping) = Grouping::try_from(response.grouping) else { continue };
             if named(|block| &block.responses, &response.name) {
-                points.channels.extend(AXES.map(|(axis, direction)| Point {
+                points.channels.extend(response.axes().into_iter().map(|(description, axis)| Point {
                     name: response.name.clone(),
-                    description: format!("{}:{axis}", response.name),
+                    description,
                     grouping,
-                    position_m: response.position_m,
-                    direction,
+                    position_m: to_interface(response.position_m),
+                    direction: to_interface(axis),
                 }));
             }
         }
@@ -41,8 +43,8 @@ pub fn geometry(plan: &Plan) -> Geometry {
                     name: impact.name.clone(),
                     description: impact.name.clone(),
                     grouping,
-                    position_m: impact.position_m,
-                    direction: impact.direction,
+                    position_m: to_interface(impact.position_m),
+                    direction: to_interface(impact.direction),
                 });
             }
         }

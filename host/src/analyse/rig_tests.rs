@@ -233,8 +233,8 @@ impl Measurements for Rig {
                 Hit {
                     record: i64::try_from(10 * place.unwrap_or_default() + i).expect("small") + own_records,
                     force_n: scaled(&unit.force),
-                    response,
-                    response_delay_s: [0.0; 3],
+                    response: response.to_vec(),
+                    response_delay_s: vec![0.0; 3],
                     contact,
                 }
             })

@@ -247,7 +247,7 @@ fn momentum_ratio(hit: &Hit, mass_kg: f64) -> Option<f64> {
         force.get(start.saturating_sub(margin)..end + margin)?.iter().map(|f| f - offset_n).sum::<f64>()
             / rate;
     let mut change = 0.0;
-    for (axis, place) in hit.map.responses()?.into_iter().enumerate() {
+    for (axis, place) in hit.map.responses().filter(|axes| axes.len() == 3)?.into_iter().enumerate() {
         let (signal, channel) = (&hit.signals[place], &hit.map.channels[place]);
         if channel.quantity != Quantity::Velocity {
             return None;

@@ -34,10 +34,12 @@ impl ChannelMap {
         (0..self.len()).filter(|place| self.channels[*place].role == role).collect()
     }
 
-    /// Places of the vibrometer's three axes x, y, z at the aimed point, when all are there.
-    pub fn responses(&self) -> Option<[usize; 3]> {
+    /// Places of the channels at the aimed point: the vibrometer's x, y and z, or as many of them as a sensor from elsewhere has; none
+    /// without the first.
+    pub fn responses(&self) -> Option<Vec<usize>> {
         let at = |axis| self.place(Role::Response(axis));
-        Some([at(Axis::X)?, at(Axis::Y)?, at(Axis::Z)?])
+        let there: Vec<usize> = [Axis::X, Axis::Y, Axis::Z].into_iter().map_while(at).collect();
+        (!there.is_empty()).then_some(there)
     }
 
     /// The codes of the channel at `place` in SI units ([`jointrig_protocol::channel::Quantity::unit`]).

@@ -25,8 +25,8 @@ pub enum NoSpectra {
     /// It has no pulse, or does not fit to the others.
     #[error(transparent)]
     Spectra(#[from] SpectraError),
-    /// No force, or no response along three axes.
-    #[error("its session has no channel for the hammer's force, or none for the response along x, y and z")]
+    /// No force, or no response.
+    #[error("its session has no channel for the hammer's force, or none for the response")]
     NoChannel,
     /// The response is no motion.
     #[error("the vibrometer's channels measure no motion")]
@@ -59,13 +59,13 @@ pub fn of_hit(store: &Store, plan: &Plan, row: &RecordRow) -> Result<CrossSpectr
     let records = ImpactRecords {
         fs_hz: shown.rate_hz,
         force_n: vec![cut(&shown.force_n)],
-        response: vec![shown.response_m_per_s.iter().map(|signal| cut(signal)).collect()],
+        response: vec![shown.response.iter().map(|signal| cut(signal)).collect()],
         quantity,
     };
     let delay = |place: usize| f64::from(channels.channels[place].delay_ns) * 1e-9;
     let settings = FrfSettings {
         windowing: Windowing { sigma_per_s: plan.window.get_ref().exponential_per_s, ..Windowing::default() },
-        delay_s: places.map(|place| delay(place) - delay(force)).to_vec(),
+        delay_s: places.iter().map(|place| delay(*place) - delay(force)).collect(),
         ..FrfSettings::default()
     };
     Ok(estimate(&records, &[true], &settings)?.converted(quantity, MotionQuantity::Displacement))

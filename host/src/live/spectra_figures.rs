@@ -1,7 +1,7 @@
 //! What the last hit excited, and the FRF of its cell as it forms.
 
 use super::averaging::{Average, Averages, NoSpectra, of_hit};
-use crate::campaign::plan::Plan;
+use crate::campaign::plan::{Cell as PlanCell, Plan};
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
 use crate::report::figure::{Along, Axis, Figure, Height, Mark, Packed, Panel, Role, Shape, Spread};
@@ -71,17 +71,21 @@ fn of_force(record: i64, hit: &CrossSpectra) -> Option<Figure> {
 pub fn frf(averages: &Averages, store: &Store, cell: i64) -> Result<Option<Figure>, StoreError> {
     let Some(row) = store.cells()?.into_iter().find(|row| row.id == cell) else { return Ok(None) };
     let average = averages.of_cell(store, cell)?;
-    let axis = own_axis(&store.plan()?, &row.cell.impact);
+    let axis = own_axis(&store.plan()?, &row.cell);
     let name = crate::campaign::plan::configuration_name(row.cell.configuration);
     let title = format!("FRF of {name} {}→{}", row.cell.impact, row.cell.response);
     Ok(of_average(&title, &average, axis))
 }
 
-/// The axis next to the hammer's direction: that along which the report tells coherence and random error.
-fn own_axis(plan: &Plan, impact: &str) -> usize {
-    let direction = plan.geometry.impact.iter().map(toml::Spanned::get_ref).find(|p| p.name == impact);
-    let longest = |d: [f64; 3]| (0..3).max_by(|a, b| d[*a].abs().total_cmp(&d[*b].abs()));
-    direction.and_then(|p| longest(p.direction)).unwrap_or(2)
+/// The channel of the cell's location that feels most of the hit's direction: that along which the report tells coherence and random error.
+fn own_axis(plan: &Plan, cell: &PlanCell) -> usize {
+    let geometry = &plan.geometry;
+    let hit = geometry.impact.iter().map(toml::Spanned::get_ref).find(|p| p.name == cell.impact);
+    let place = geometry.response.iter().map(toml::Spanned::get_ref).find(|p| p.name == cell.response);
+    let (Some(hit), Some(place)) = (hit, place) else { return 0 };
+    let felt = |axis: [f64; 3]| (0..3).map(|i| axis[i] * hit.direction[i]).sum::<f64>().abs();
+    let axes = place.axes().into_iter().enumerate();
+    axes.max_by(|a, b| felt(a.1.1).total_cmp(&felt(b.1.1))).map_or(0, |(number, _)| number)
 }
 
 fn of_average(title: &str, average: &Average, axis: usize) -> Option<Figure> {

@@ -1,6 +1,6 @@
 //! The raw records of one cell, one over the other: force, and the response along each axis, by time after the trigger.
 
-use jointrig_protocol::channel::Role as Measures;
+use jointrig_protocol::channel::{Quantity, Role as Measures};
 
 use super::figure::{Along, Axis, Figure, Height, Mark, Panel, Role, Source};
 use super::svg;
@@ -26,8 +26,10 @@ pub struct Shown {
     pub trigger: usize,
     /// Force, N.
     pub force_n: Vec<f64>,
-    /// Response along x, y and z, m/s.
-    pub response_m_per_s: [Vec<f64>; 3],
+    /// What the response measures.
+    pub quantity: Quantity,
+    /// The response's channels, SI.
+    pub response: Vec<Vec<f64>>,
 }
 
 impl Shown {
@@ -53,19 +55,24 @@ impl Shown {
             rate_hz: f64::from(channels.rate_hz),
             trigger: record.trigger_index,
             force_n: si(force),
-            response_m_per_s: responses.map(si),
+            quantity: channels.channels[responses[0]].quantity,
+            response: responses.into_iter().map(si).collect(),
         }))
     }
 
     /// (name, unit, factor to it, samples) of each row of the figure.
-    fn rows(&self) -> [(&'static str, &'static str, f64, &[f64]); 4] {
-        let [x, y, z] = &self.response_m_per_s;
-        [
-            ("force", "N", 1.0, &self.force_n),
-            ("x", "mm/s", 1e3, x),
-            ("y", "mm/s", 1e3, y),
-            ("z", "mm/s", 1e3, z),
-        ]
+    fn rows(&self) -> Vec<(&'static str, &'static str, f64, &[f64])> {
+        let (unit, factor) = match self.quantity {
+            Quantity::Velocity => ("mm/s", 1e3),
+            Quantity::Displacement => ("µm", 1e6),
+            Quantity::Acceleration => ("m/s²", 1.0),
+            Quantity::Force => ("N", 1.0),
+            Quantity::Voltage => ("V", 1.0),
+        };
+        let force = ("force", "N", 1.0, self.force_n.as_slice());
+        let axes = ["x", "y", "z"].into_iter().zip(&self.response);
+        let responses = axes.map(|(axis, signal)| (axis, unit, factor, signal.as_slice()));
+        std::iter::once(force).chain(responses).collect()
     }
 
     fn milliseconds(&self, sample: usize) -> f64 {
@@ -107,7 +114,7 @@ fn of_views(title: &str, shown: &[Shown], views: &[[f64; 2]]) -> Option<Figure> 
                     if record.kept { (Role::Group1, "kept") } else { (Role::Refused, "refused") };
                 let step = 1e3 / record.rate_hz;
                 let from = ((range_ms[0] - record.milliseconds(0)) / step).floor().max(0.0) as usize;
-                let samples = record.rows()[row].3;
+                let Some((.., samples)) = record.rows().get(row).copied() else { continue };
                 let to = (((range_ms[1] - record.milliseconds(0)) / step).ceil().max(0.0) as usize + 1)
                     .min(samples.len());
                 let from = from.min(to);
@@ -138,7 +145,9 @@ fn listed(shown: &[Shown]) -> String {
 fn span(shown: &[Shown], row: usize, range_ms: [f64; 2], factor: f64) -> [f64; 2] {
     let mut range = [f64::INFINITY, f64::NEG_INFINITY];
     for record in shown {
-        for (i, value) in record.rows()[row].3.iter().enumerate() {
+        let rows = record.rows();
+        let Some((.., samples)) = rows.get(row) else { continue };
+        for (i, value) in samples.iter().enumerate() {
             if (range_ms[0]..=range_ms[1]).contains(&record.milliseconds(i)) {
                 range = [range[0].min(value * factor), range[1].max(value * factor)];
             }
@@ -161,7 +170,8 @@ mod tests {
             rate_hz: 51_200.0,
             trigger: 256,
             force_n: (0..4_096).map(|i| if (256..276).contains(&i) { 50.0 } else { 0.0 }).collect(),
-            response_m_per_s: [(); 3].map(|()| (0..4_096).map(|i| 1e-3 * f64::from(i).sin()).collect()),
+            quantity: Quantity::Velocity,
+            response: vec![(0..4_096).map(|i| 1e-3 * f64::from(i).sin()).collect(); 3],
         };
         let text =
             records("AJB <1>", &[record(7, true, "good"), record(8, false, "double hit")]).expect("drawn");

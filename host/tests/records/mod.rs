@@ -171,8 +171,10 @@ impl Measurements for Assembly {
             .map(|h| Hit {
                 record: i64::try_from(h).expect("few hits") + 1,
                 force_n: self.signal(|l| self.force[l], config.sensors.force.noise_n, &mut stream),
-                response: [0, 1, 2].map(|axis| self.signal(|l| responses[axis][l], floor, &mut stream)),
-                response_delay_s: [0.0; 3],
+                response: (0..3)
+                    .map(|axis| self.signal(|l| responses[axis][l], floor, &mut stream))
+                    .collect(),
+                response_delay_s: vec![0.0; 3],
                 contact: Some(ContactSignals {
                     delay_s: ContactDelays::default(),
                     specimen_a_m_per_s: self.signal(|l| spots[0][l], spot_floor, &mut stream),

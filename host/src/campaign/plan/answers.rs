@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use jointrig_protocol::request::Configuration;
 use toml::Spanned;
 
-use super::{ConfigurationPlan, Plan, configuration_name, configuration_named};
+use super::{ConfigurationPlan, Plan, configuration_name, configuration_named, turned};
 
 /// Points that tell how a rigid body moves, and impacts that tell how it answers.
 const BODY: usize = 3;
@@ -94,7 +94,7 @@ impl Plan {
     fn hit_along_z<'p>(&self, block: &'p ConfigurationPlan, groupings: &[u8]) -> Vec<&'p str> {
         let along = |name: &str| {
             let mut points = self.geometry.impact.iter().map(Spanned::get_ref);
-            points.any(|p| p.name == name && p.direction[2].abs() > ALONG_Z)
+            points.any(|p| p.name == name && turned(&self.to_interface(), p.direction)[2].abs() > ALONG_Z)
         };
         let names = block.impacts.iter().map(|name| name.get_ref().as_str());
         names.filter(|name| along(name) && self.impact_is(name, groupings)).collect()

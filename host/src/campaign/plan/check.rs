@@ -5,10 +5,10 @@ use std::collections::HashSet;
 use jointrig_protocol::limits::{ARM_VALID_CAP_MS, COIL_PULSE_CAP_US, NAME_BYTES, SHAKE_SCANS_PER_CYCLE};
 use toml::Spanned;
 
+use super::Plan;
 use super::faults::Faults;
 use super::geometry::ResponsePoint;
 use super::sensor::check_sensors;
-use super::{Plan, configuration_named};
 
 /// No contact is shaken further than this, m: a plan in µm is caught here.
 const LARGEST_AMPLITUDE_M: f64 = 1e-3;
@@ -73,6 +73,7 @@ impl Plan {
             at,
             "settle.bound_s must lie between 0 and 55",
         );
+        self.check_structure(faults);
         self.check_limits(faults);
         self.check_shaker(faults);
         self.check_contact(faults);
@@ -191,6 +192,14 @@ impl Plan {
         }
         for point in &self.geometry.response {
             let ResponsePoint { name, sigma_m, .. } = point.get_ref();
+            let axes = point.get_ref().axes();
+            let length = |[x, y, z]: [f64; 3]| (x * x + y * y + z * z).sqrt();
+            faults.unless(
+                (1..=3).contains(&axes.len())
+                    && axes.iter().all(|(_, axis)| (length(*axis) - 1.0).abs() <= 1e-3),
+                point.span().start,
+                format!("geometry: axes of `{name}` must be one, two or three directions of length 1"),
+            );
             faults.unless(
                 sigma_m.is_none_or(|sigma_m| sigma_m >= 0.0 && sigma_m.is_finite()),
                 point.span().start,
@@ -213,9 +222,11 @@ impl Plan {
         for structure in &self.configuration {
             let (name, at) = (structure.name.get_ref(), structure.name.span().start);
             faults.unless(
-                configuration_named(name).is_some(),
+                self.configuration(name).is_some(),
                 at,
-                format!("configuration.name `{name}` must be A, B or AJB"),
+                format!(
+                    "configuration.name `{name}` must be A, B or AJB, or one of the names in [structure]"
+                ),
             );
             faults.unless(
                 !structure.impacts.is_empty() && !structure.responses.is_empty(),

@@ -39,7 +39,7 @@ impl Plan {
     /// # Errors
     /// The first thing that is wrong, with line and field.
     pub fn parse(text: &str, source_name: &str) -> Result<Self, PlanError> {
-        read(text, source_name, Self::check).map_err(first)
+        read(text, source_name, Self::check).map(Self::with_usual_names).map_err(first)
     }
 
     /// Reads a plan for a new campaign: everything must also be such that it can be meant.
@@ -59,6 +59,7 @@ impl Plan {
             plan.check(faults);
             plan.check_sense(faults);
         })
+        .map(Self::with_usual_names)
     }
 }
 

@@ -3,13 +3,13 @@
 use serde::Deserialize;
 use toml::Spanned;
 
-/// Where everything is: x lateral, y vertical, z sliding; origin at the contact centre.
+/// Where everything is: x lateral, y vertical, z sliding (or as `[structure]` says); origin at the contact centre.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GeometryPlan {
     /// Both virtual points, m.
     pub virtual_point_m: [f64; 3],
-    /// Response points, each measured along x, y and z.
+    /// Response points, each measured along x, y and z or along axes of its own.
     pub response: Vec<Spanned<ResponsePoint>>,
     /// Impact points.
     pub impact: Vec<Spanned<ImpactPoint>>,
@@ -30,6 +30,23 @@ pub struct ResponsePoint {
     pub position_m: [f64; 3],
     /// How well that is known, standard deviation along each axis, m; without it, as `[priors]` says of its kind.
     pub sigma_m: Option<f64>,
+    /// What each channel of the sensor feels, one to three unit vectors; along x, y and z without it. Records hold the channels in this
+    /// order.
+    pub axes: Option<Vec<[f64; 3]>>,
+}
+
+impl ResponsePoint {
+    /// The channels' names and directions: `A1:x`, `A1:y`, `A1:z`; with axes of its own `A1` where it is one, else `A1:1`, `A1:2`, …
+    pub fn axes(&self) -> Vec<(String, [f64; 3])> {
+        let name = &self.name;
+        match &self.axes {
+            None => [("x", [1.0, 0.0, 0.0]), ("y", [0.0, 1.0, 0.0]), ("z", [0.0, 0.0, 1.0])]
+                .map(|(axis, direction)| (format!("{name}:{axis}"), direction))
+                .to_vec(),
+            Some(axes) if axes.len() == 1 => vec![(name.clone(), axes[0])],
+            Some(axes) => (1..).zip(axes).map(|(number, axis)| (format!("{name}:{number}"), *axis)).collect(),
+        }
+    }
 }
 
 /// An impact point.

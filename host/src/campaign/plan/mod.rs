@@ -12,11 +12,13 @@ pub mod level;
 mod priors;
 mod sense;
 mod sensor;
+mod structure;
 
 pub use cells::Cell;
 pub use geometry::{GeometryPlan, ImpactPoint, ResponsePoint, SensorPoint};
 pub use priors::PriorsPlan;
 pub use sensor::{CalibrationFile, SensorPlan};
+pub use structure::{StructurePlan, turned};
 
 use crate::structure::Structure;
 use jointrig_protocol::request::Configuration;
@@ -72,6 +74,8 @@ pub struct Plan {
     pub version: Spanned<u32>,
     /// Name of the plan.
     pub name: Spanned<String>,
+    /// What the structures are called, and the sliding direction; A, B, AJB and z without it.
+    pub structure: Option<Spanned<StructurePlan>>,
     /// How a record is cut.
     pub record: Spanned<RecordPlan>,
     /// How many hits.
@@ -247,7 +251,7 @@ pub struct Enough {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConfigurationPlan {
-    /// `A`, `B` or `AJB`.
+    /// `A`, `B` or `AJB`, or what `[structure]` calls it.
     pub name: Spanned<String>,
     /// Names of impact points.
     pub impacts: Vec<Spanned<String>>,
@@ -271,9 +275,7 @@ pub fn configuration_name(configuration: Configuration) -> &'static str {
 
 /// The configuration of that name.
 pub fn configuration_named(name: &str) -> Option<Configuration> {
-    [Configuration::A, Configuration::B, Configuration::Ajb]
-        .into_iter()
-        .find(|c| configuration_name(*c) == name)
+    structure::ALL.into_iter().find(|c| configuration_name(*c) == name)
 }
 
 impl Plan {

@@ -26,7 +26,8 @@ pub(super) fn fitted(
             channels.rate_hz
         ));
     }
-    if channels.place(Role::HammerForce).is_none() || channels.responses().is_none() {
+    if channels.place(Role::HammerForce).is_none() || channels.responses().is_none_or(|axes| axes.len() != 3)
+    {
         return unfit("it needs a hammer force and the vibrometer's three axes among its channels".into());
     }
     with_sensors(plan, channels).or_else(unfit)

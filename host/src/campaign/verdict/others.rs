@@ -77,7 +77,7 @@ impl Others {
         let average =
             self.average.get_or_insert_with(|| SpectraAverage::new(fs_hz, force_n.len(), responses.len()));
         let decay = window.decay(fs_hz, force_n.len());
-        let responses = responses.map(si);
+        let responses: Vec<Vec<f64>> = responses.into_iter().map(si).collect();
         let added = average.add_with(
             |out| window.force_into(&force_n, &decay, origin_s, out),
             |axis, out| window.response_into(&responses[axis], &decay, origin_s, out),

@@ -149,7 +149,7 @@ impl Export {
             // scales belong to the session: one cell may have several
             let map = store.channels(row.session)?;
             let (Some(force), Some(axes)) = (map.place(Role::HammerForce), map.responses()) else {
-                return wrong("has no hammer force or not all of x, y, z");
+                return wrong("has no hammer force or no response");
             };
             let fs_hz = f64::from(map.rate_hz);
             let quantity = match map.channels[axes[0]].quantity {
@@ -170,7 +170,9 @@ impl Export {
             }
             let samples = store.samples(row)?;
             records.force_n.push(map.to_si(force, samples.channel(force)));
-            records.response.push(axes.map(|place| map.to_si(place, samples.channel(place))).to_vec());
+            records
+                .response
+                .push(axes.iter().map(|place| map.to_si(*place, samples.channel(*place))).collect());
         }
         Ok(out)
     }

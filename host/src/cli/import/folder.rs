@@ -25,10 +25,10 @@ pub(super) struct Wishes<'w> {
 /// Before anything is stored: a file without a name. Later: a file that cannot be read or does not fit; what came before it is stored.
 pub(super) fn import(folder: &Path, into: &Path, wishes: &Wishes<'_>) -> Result<(), CliError> {
     let mut store = Store::open(into)?;
-    let cells = store.cells()?;
+    let plan = store.plan()?;
     let (sources, left_out) = match wishes.names {
         Some(table) => (from_table(folder, table)?, Vec::new()),
-        None => from_folder(folder, &cells, wishes.configuration)?,
+        None => from_folder(folder, &plan, wishes.configuration)?,
     };
     for path in &left_out {
         eprintln!("{}: left out, it is neither .npz nor a universal file", path.display());
@@ -45,7 +45,7 @@ pub(super) fn import(folder: &Path, into: &Path, wishes: &Wishes<'_>) -> Result<
             other => other,
         };
         match one(&mut store, source, wishes.replace).map_err(told)? {
-            Some(brought) => all.add(brought),
+            Some(brought) => all.add(&brought),
             None => matrices += 1,
         }
     }
@@ -102,7 +102,7 @@ fn one(store: &mut Store, source: &Source, replace: bool) -> Result<Option<Broug
             let mut all = Brought::default();
             for row in rows {
                 let cell = CellName { configuration, impact: &row.impact, response: &row.response };
-                all.add(bring(store, &origin, &cell, &row.records, replace, &mut |_| {})?);
+                all.add(&bring(store, &origin, &cell, &row.records, replace, &mut |_| {})?);
             }
             Ok(Some(all))
         }

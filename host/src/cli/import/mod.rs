@@ -12,7 +12,7 @@ use clap::Args;
 use super::error::CliError;
 use super::output;
 use crate::analyse;
-use crate::campaign::plan::{configuration_name, configuration_named, structure};
+use crate::campaign::plan::{configuration_name, structure};
 use crate::campaign::store::Store;
 use crate::campaign::verdict::Kind;
 use crate::exchange::{read_frf_file, write_frf};
@@ -118,12 +118,17 @@ struct Frfs<'f> {
 /// Takes them into a campaign file; what is to be said of it.
 fn frfs(store: &Store, from: &Frfs<'_>) -> Result<Vec<String>, CliError> {
     let into = store.path().display();
-    let name = from.configuration;
-    let configuration = configuration_named(name).ok_or_else(|| {
-        CliError::Usage(format!("there is no configuration `{name}`: A, B or AJB (which is A joined to B)"))
+    let plan = store.plan()?;
+    let configuration = plan.configuration(from.configuration).ok_or_else(|| {
+        CliError::Usage(format!(
+            "there is no configuration `{}`: A, B or AJB (which is A joined to B){}",
+            from.configuration,
+            plan.own_names().map_or(String::new(), |names| format!("; {names}"))
+        ))
     })?;
+    let name = configuration_name(configuration);
     let frf = read(from.file)?;
-    let geometry = analyse::geometry(&store.plan()?);
+    let geometry = analyse::geometry(&plan);
     let points = geometry.points(structure(configuration));
     check_names(from.file, &frf, name, points).map_err(CliError::Bad)?;
     let cells = store.cells()?;

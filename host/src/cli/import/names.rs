@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::bad;
-use crate::campaign::plan::{configuration_name, configuration_named};
-use crate::campaign::store::cell_table::CellRow;
+use crate::campaign::plan::{Cell, Plan, configuration_name};
 use crate::cli::error::CliError;
 use crate::exchange::{frf_file, record_uff, uff};
 
@@ -82,7 +81,7 @@ pub(super) fn from_table(folder: &Path, table: &Path) -> Result<Vec<Source>, Cli
 /// A folder cannot be read, or files have no name: all of them are listed.
 pub(super) fn from_folder(
     folder: &Path,
-    cells: &[CellRow],
+    plan: &Plan,
     configuration: Option<&str>,
 ) -> Result<(Vec<Source>, Vec<PathBuf>), CliError> {
     let (mut sources, mut left_out, mut unnamed) = (Vec::new(), Vec::new(), Vec::new());
@@ -93,7 +92,7 @@ pub(super) fn from_folder(
             continue;
         }
         let name = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned();
-        match named(&path, folder, cells, configuration)? {
+        match named(&path, folder, plan, configuration)? {
             Some(holds) => sources.push(Source { path, name, holds }),
             None => unnamed.push(name),
         }
@@ -116,23 +115,26 @@ pub(super) fn from_folder(
 fn named(
     path: &Path,
     folder: &Path,
-    cells: &[CellRow],
+    plan: &Plan,
     configuration: Option<&str>,
 ) -> Result<Option<Named>, CliError> {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     // names of points may have an underscore themselves
-    let called = |row: &&CellRow| {
-        let cell = &row.cell;
-        format!("{}_{}_{}", configuration_name(cell.configuration), cell.impact, cell.response) == *stem
+    let called = |cell: &Cell| {
+        [configuration_name(cell.configuration), plan.called(cell.configuration)]
+            .into_iter()
+            .any(|name| format!("{name}_{}_{}", cell.impact, cell.response) == *stem)
     };
-    if let Some(row) = cells.iter().find(called) {
-        let (impact, response) = (row.cell.impact.clone(), row.cell.response.clone());
-        let configuration = configuration_name(row.cell.configuration).into();
-        return Ok(Some(Named::Cell { configuration, impact, response }));
+    if let Some(Cell { configuration, impact, response, .. }) = plan.cells().into_iter().find(called) {
+        return Ok(Some(Named::Cell {
+            configuration: configuration_name(configuration).into(),
+            impact,
+            response,
+        }));
     }
     let above = path.parent().filter(|above| *above != folder).and_then(Path::file_name);
     let above = above.map(|name| name.to_string_lossy().into_owned());
-    let known = |name: &str| configuration_named(name).map(|found| configuration_name(found).to_owned());
+    let known = |name: &str| plan.configuration(name).map(|found| configuration_name(found).to_owned());
     let told = known(&stem)
         .or_else(|| above.as_deref().and_then(known))
         .or_else(|| configuration.map(str::to_owned));

@@ -9,15 +9,16 @@ use crate::spectra::{ImpactRecords, MotionQuantity};
 const TOP_CODE: f64 = 32_000.0;
 
 /// The records as 16-bit codes, channel after channel for each hit, with the scales that belong to them.
-pub(super) fn quantised(records: &ImpactRecords) -> Result<(ChannelMap, Vec<Vec<i16>>), String> {
+pub(super) fn quantised(records: &ImpactRecords, axes: usize) -> Result<(ChannelMap, Vec<Vec<i16>>), String> {
     let rate_hz = records.fs_hz.round();
     if !(1.0..=f64::from(u32::MAX)).contains(&rate_hz) || (rate_hz - records.fs_hz).abs() > 1e-6 * rate_hz {
         return Err(format!("the sampling rate of {} Hz is no whole number: resample", records.fs_hz));
     }
     let channels = records.response.first().map_or(0, Vec::len);
-    if channels != 3 {
+    if channels != axes {
         return Err(format!(
-            "there are {channels} responses, and a cell needs the three axes x, y, z of one location: average other records with `jointrig frf` and import the FRFs"
+            "there are {channels} responses, and the plan says that the location has {axes} (three axes x, y, z, or `axes` of its own in \
+             [[geometry.response]]): change the plan, or average the records with `jointrig frf` and import the FRFs"
         ));
     }
     let quantity = match records.quantity {
@@ -35,7 +36,7 @@ pub(super) fn quantised(records: &ImpactRecords) -> Result<(ChannelMap, Vec<Vec<
         if place == 0 { &records.force_n[hit] } else { &records.response[hit][place - 1] }
     };
     let mut map = ChannelMap { id: 0, rate_hz: rate_hz as u32, channels: Vec::new() };
-    for (place, (name, role, quantity)) in kinds.into_iter().enumerate() {
+    for (place, (name, role, quantity)) in kinds.into_iter().take(1 + axes).enumerate() {
         let mut largest = 0.0f64;
         for hit in 0..records.force_n.len() {
             if let Some(sample) = signal(hit, place).iter().position(|v| !v.is_finite()) {
@@ -81,7 +82,7 @@ mod tests {
             response: vec![vec![vec![1e-6, -2e-3, 0.0], vec![0.0; 3], vec![1.0, 2.0, 3.0]]; 2],
             quantity: MotionQuantity::Velocity,
         };
-        let (map, codes) = quantised(&records).expect("three axes");
+        let (map, codes) = quantised(&records, 3).expect("three axes");
         for (place, wanted) in
             [(0, &records.force_n[0]), (1, &records.response[0][0]), (3, &records.response[0][2])]
         {
@@ -92,6 +93,6 @@ mod tests {
             }
         }
         let two = ImpactRecords { response: vec![vec![vec![0.0; 3]; 2]; 2], ..records };
-        assert!(quantised(&two).expect_err("two axes").contains("x, y, z"));
+        assert!(quantised(&two, 3).expect_err("two axes").contains("x, y, z"));
     }
 }

@@ -20,6 +20,7 @@ use crate::campaign::verdict::judge::{ByRecord, Judge};
 use crate::campaign::verdict::others::Others;
 use crate::cli::error::CliError;
 use crate::cli::output;
+use crate::device::channels::ChannelMap;
 use crate::device::recording::Recording;
 use crate::exchange::record_uff::read_record_file;
 use crate::spectra::{ImpactRecords, Pulse};
@@ -57,17 +58,19 @@ impl Origin {
 }
 
 /// What came of records.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Brought {
     pub(super) cells: usize,
     pub(super) hits: usize,
     pub(super) kept: usize,
     /// Hits that an earlier import of the same file had stored.
     pub(super) already: usize,
+    /// How the last ones are stored.
+    map: Option<ChannelMap>,
 }
 
 impl Brought {
-    pub(super) fn add(&mut self, other: Brought) {
+    pub(super) fn add(&mut self, other: &Brought) {
         self.cells += other.cells;
         self.hits += other.hits;
         self.kept += other.kept;
@@ -84,7 +87,7 @@ pub(super) fn import(file: &Path, into: &Path, name: &CellName<'_>, replace: boo
     let mut store = Store::open(into)?;
     let called = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
     let origin = Origin::of(file, &called)?;
-    let Brought { hits, kept, already, .. } =
+    let Brought { hits, kept, already, map, .. } =
         bring(&mut store, &origin, name, &records, replace, &mut |line| eprintln!("{line}"))?;
     store.log(&format!("imported {hits} hits from {}", file.display()))?;
     store.close()?;
@@ -92,10 +95,9 @@ pub(super) fn import(file: &Path, into: &Path, name: &CellName<'_>, replace: boo
     if already > 0 {
         lines.push(format!("{already} of them were there already, from an earlier import of the same file"));
     }
-    let (map, _) = quantised(&records).map_err(|reason| bad(format!("{}: {reason}", file.display())))?;
     let rounding: Vec<String> = map
-        .channels
         .iter()
+        .flat_map(|map| &map.channels)
         .map(|c| format!("{} {:.1e} {}", c.name, 0.5 * c.units_per_code().abs(), c.quantity.unit()))
         .collect();
     lines.push(format!("stored in 16 bits, rounded by at most: {}", rounding.join(", ")));
@@ -116,7 +118,10 @@ pub(super) fn bring(
 ) -> Result<Brought, CliError> {
     let plan = store.plan()?;
     let (id, cell, attempt) = find(store, name)?;
-    let (map, codes) = quantised(records).map_err(|reason| bad(format!("{}: {reason}", origin.name)))?;
+    let place = plan.geometry.response.iter().map(toml::Spanned::get_ref).find(|p| p.name == cell.response);
+    let axes = place.map_or(3, |place| place.axes().len());
+    let (map, codes) =
+        quantised(records, axes).map_err(|reason| bad(format!("{}: {reason}", origin.name)))?;
     let recordings: Vec<Recording> = codes
         .into_iter()
         .zip(&records.force_n)
@@ -129,7 +134,7 @@ pub(super) fn bring(
     let there = already_there(store, origin, id, replace)?;
     let missing = (0..recordings.len() as u32).any(|hit| !there.contains(&hit));
     let session = missing.then(|| store.begin_session(&session(origin), &map)).transpose()?;
-    let mut brought = Brought { cells: 1, hits: recordings.len(), kept: 0, already: there.len() };
+    let mut brought = Brought { cells: 1, hits: recordings.len(), kept: 0, already: there.len(), map: None };
     let mut others = Others::default();
     for (hit, recording) in (0..).zip(recordings) {
         let verdict = ByRecord.judge(&cell, &plan, &map, &recording, &others);
@@ -152,7 +157,7 @@ pub(super) fn bring(
             store.insert(&record, &Counters::default())?;
         }
     }
-    Ok(brought)
+    Ok(Brought { map: Some(map), ..brought })
 }
 
 /// The hits of this very file that the cell has; those of another file of the same name are dropped, or refused.
@@ -187,7 +192,11 @@ fn already_there(store: &Store, origin: &Origin, cell: i64, replace: bool) -> Re
 
 /// The cell's id, the cell, and the first attempt that is free in it.
 fn find(store: &Store, name: &CellName<'_>) -> Result<(i64, Cell, u32), CliError> {
-    let wanted = [name.configuration, name.impact, name.response];
+    let configuration = store
+        .plan()?
+        .configuration(name.configuration)
+        .map_or(name.configuration, |own| configuration_name(own));
+    let wanted = [configuration, name.impact, name.response];
     let found = store.cells()?.into_iter().find(|row| {
         let Cell { configuration, impact, response, .. } = &row.cell;
         [configuration_name(*configuration), impact, response] == wanted

@@ -3,6 +3,7 @@
 use super::answer_sentences::{why_they_differ, with_interval};
 use super::line::{BETWEEN, CLAMP, CONTACT, Line, TRUTH, UNKNOWN};
 use super::number::{decimals, micro, short};
+use crate::campaign::store::session_table::SessionInfo;
 use crate::results::{
     BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, ONE_STRUCTURE, Results,
     SAME_IN_ALL, SERIES_COMPLIANCE, UNCHANGED,
@@ -12,8 +13,26 @@ fn line(head: &str, text: impl Into<String>) -> Line {
     Line { head: head.into(), text: text.into(), numbers: Vec::new() }
 }
 
-/// On what was measured: a simulated rig is called so before anything else.
+/// On what was measured: a simulated rig is called so before anything else. What the structures are called follows, and where z points,
+/// where that is not as usual.
 pub fn on_what(results: &Results) -> String {
+    let settings = &results.source.settings;
+    let names = settings.get("structure").and_then(|names| names.as_str()).map(str::to_owned);
+    let sliding =
+        settings.get("sliding_direction").and_then(|direction| direction.as_array()).map(|direction| {
+            let parts: Vec<String> = direction
+                .iter()
+                .filter_map(serde_json::Value::as_f64)
+                .map(|part| decimals(part, 2))
+                .collect();
+            format!("z is the sliding direction ({}) of the plan", parts.join(", "))
+        });
+    let told: Vec<String> = names.into_iter().chain(sliding).collect();
+    let on = measured_on(results);
+    if told.is_empty() { on } else { format!("{on}; {}", told.join("; ")) }
+}
+
+fn measured_on(results: &Results) -> String {
     let source = &results.source;
     let file = &source.file;
     let seed = source.settings.get("seed").map_or(String::new(), |seed| {
@@ -26,6 +45,7 @@ pub fn on_what(results: &Results) -> String {
     }
     let of = |key: &str| source.device.get(key).map(String::as_str);
     match (of("board"), of("serial")) {
+        (Some(SessionInfo::IMPORTED), _) => format!("From imported records: {file}"),
         (Some(board), Some(serial)) => format!("Measured by {board}, serial number {serial}: {file}"),
         (Some(board), None) => format!("Measured by {board}: {file}"),
         _ => format!("From {file}"),
