@@ -6,6 +6,7 @@
 
 #[cfg(test)]
 mod any_bytes_tests;
+pub mod channel_records;
 pub mod frf_file;
 pub mod frf_npz;
 pub mod frf_uff;

@@ -82,7 +82,19 @@ pub fn write_loop(path: &Path, record: &HysteresisRecord) -> Result<(), TableErr
 /// # Errors
 /// [`TableError`].
 pub fn write_rows(path: &Path, rows: &[Vec<String>]) -> Result<(), TableError> {
-    write(path, |out| rows.iter().try_for_each(|row| out.write_record(row)))
+    write_rows_of(path, rows.iter())
+}
+
+/// The same of rows that are made one by one.
+///
+/// # Errors
+/// [`TableError`].
+pub fn write_rows_of<R>(path: &Path, mut rows: impl Iterator<Item = R>) -> Result<(), TableError>
+where
+    R: IntoIterator,
+    R::Item: AsRef<[u8]>,
+{
+    write(path, |out| rows.try_for_each(|row| out.write_record(row)))
 }
 
 fn write(

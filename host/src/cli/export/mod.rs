@@ -1,32 +1,31 @@
 //! `export`: what a campaign file holds, in forms that other programs read.
 
 mod levels;
+mod records;
+mod tables;
 
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use jointrig_protocol::channel::{Quantity, Role};
 use nalgebra::DMatrix;
 
 use super::analyse::analyse_into;
 use super::error::CliError;
-use super::waiting::Waiting;
 use super::{frf, output};
 use crate::analyse::{self, CampaignFile, KnownContact, Wanted};
-use crate::campaign::plan::configuration_name;
 use crate::campaign::store::Store;
-use crate::campaign::store::record_row::RecordRow;
 use crate::exchange::positions_output::write_positions;
-use crate::exchange::{tables_output, uff_output, write_frf, write_impacts};
+use crate::exchange::{tables_output, uff_output, write_frf};
 use crate::frf::Frf;
-use crate::spectra::{ImpactRecords, MotionQuantity};
 use crate::structure::Structure;
 use crate::substructuring::geometry::Configuration;
 
 /// Write everything that a campaign file holds for other programs.
 ///
 /// DIR/geometry: csv tables in the form of the pyFBS workbook. DIR/frf: one file for each configuration, H1 of the good hits
-/// with coherence and variance, or what was imported. DIR/records: one file for each cell with all its hits. DIR/levels: one file for each
+/// with coherence and variance, or what was imported. DIR/records: one file for each cell with force and response of the hits that count
+/// (--all: of every hit); DIR/channels: the same with all other channels. DIR/records.csv: every record with verdict, standing, when and why
+/// it was overruled, and its place in these files; DIR/channels.csv and calibrations.csv: scales, delays, sensors. DIR/levels: one file for each
 /// level of the shaker (velocities of both specimens and the load cells' sum, in step; npz as `jointrig hysteresis` reads it) and
 /// levels.csv, which says what was ordered and reached. DIR/results.json and report.html.
 #[derive(Debug, Args)]
@@ -46,6 +45,9 @@ pub struct Export {
     /// Leave the time records out (they are the bulk).
     #[arg(long)]
     without_records: bool,
+    /// Write the time records of refused and dropped hits too, not only of those that count.
+    #[arg(long, conflicts_with = "without_records")]
+    all: bool,
 }
 
 /// Forms of FRFs and records.
@@ -87,9 +89,8 @@ impl Export {
         let plan = store.plan()?;
         let geometry = analyse::geometry(&plan);
         write_positions(&folders[0], &geometry, "Velocity").map_err(bad)?;
-        if !self.without_records {
-            self.write_all_records(&store, &folders[2])?;
-        }
+        let written = if self.without_records { Vec::new() } else { self.write_records(&store)? };
+        tables::write(&store, &self.out, &written)?;
         let file = CampaignFile::open(&store, KnownContact::default())?;
         let mut told = Vec::new();
         for structure in Structure::ALL {
@@ -121,76 +122,6 @@ impl Export {
         analyse_into(&store, Wanted::default(), &self.out, &[])?;
         told.push(format!("geometry, results.json and report.html are in {}", self.out.display()));
         output::lines(told)
-    }
-
-    /// One file for each cell that was hit.
-    fn write_all_records(&self, store: &Store, folder: &Path) -> Result<(), CliError> {
-        let rows = store.records()?;
-        let cells = store.cells()?;
-        let waiting = Waiting::of("writing records, by cell");
-        for (done, cell) in cells.iter().enumerate() {
-            waiting.at(done, cells.len());
-            let own: Vec<&RecordRow> =
-                rows.iter().flatten().filter(|r| r.cell == cell.id && r.scans > 0).collect();
-            let Some(records) = self.records(store, &own)? else { continue };
-            let name = configuration_name(cell.cell.configuration);
-            let stem = folder.join(format!("{name}_{}_{}", cell.cell.impact, cell.cell.response));
-            self.write_records(&stem, &records, &cell.cell.response, &cell.cell.impact)?;
-        }
-        Ok(())
-    }
-
-    /// All records of a cell in SI, as they were measured; none when it has none.
-    fn records(&self, store: &Store, rows: &[&RecordRow]) -> Result<Option<ImpactRecords>, CliError> {
-        let mut out: Option<ImpactRecords> = None;
-        for row in rows {
-            let wrong =
-                |what: &str| Err(CliError::Bad(format!("{}: record {} {what}", self.file.display(), row.id)));
-            // scales belong to the session: one cell may have several
-            let map = store.channels(row.session)?;
-            let (Some(force), Some(axes)) = (map.place(Role::HammerForce), map.responses()) else {
-                return wrong("has no hammer force or no response");
-            };
-            let fs_hz = f64::from(map.rate_hz);
-            let quantity = match map.channels[axes[0]].quantity {
-                Quantity::Displacement => MotionQuantity::Displacement,
-                Quantity::Acceleration => MotionQuantity::Acceleration,
-                _ => MotionQuantity::Velocity,
-            };
-            let records = out.get_or_insert_with(|| ImpactRecords {
-                fs_hz,
-                force_n: Vec::new(),
-                response: Vec::new(),
-                quantity,
-            });
-            if (records.fs_hz, records.quantity) != (fs_hz, quantity) {
-                return wrong(
-                    "has another sampling rate or quantity than those of its cell before it: export --without-records",
-                );
-            }
-            let samples = store.samples(row)?;
-            records.force_n.push(map.to_si(force, samples.channel(force)));
-            records
-                .response
-                .push(axes.iter().map(|place| map.to_si(*place, samples.channel(*place))).collect());
-        }
-        Ok(out)
-    }
-
-    fn write_records(
-        &self,
-        stem: &Path,
-        records: &ImpactRecords,
-        response: &str,
-        impact: &str,
-    ) -> Result<(), CliError> {
-        // a name may have dots: the extension is put behind it
-        let path = PathBuf::from(format!("{}.{}", stem.display(), self.format.extension()));
-        match self.format {
-            Format::Npz => write_impacts(&path, records).map_err(bad),
-            Format::Uff58 => uff_output::write_records(&path, records, response, impact).map_err(bad),
-            Format::Csv => tables_output::write_records(&path, records).map_err(bad),
-        }
     }
 
     fn write_frf(&self, path: &Path, frf: &Frf, points: &Configuration) -> Result<(), CliError> {

@@ -1,0 +1,142 @@
+//! The impact records for other programs: a file of force and response for each cell, one of its other channels, and a table of all.
+
+use std::path::{Path, PathBuf};
+
+use jointrig_protocol::channel::{Quantity, Role};
+
+use super::{Export, Format, bad};
+use crate::campaign::plan::configuration_name;
+use crate::campaign::store::Store;
+use crate::campaign::store::cell_table::CellRow;
+use crate::campaign::store::record_row::RecordRow;
+use crate::cli::error::CliError;
+use crate::cli::waiting::Waiting;
+use crate::exchange::channel_records::{self, ChannelRecords};
+use crate::exchange::{tables_output, uff_output, write_impacts};
+use crate::spectra::{ImpactRecords, MotionQuantity};
+
+/// A record in a file of its cell.
+pub(super) struct Written {
+    pub(super) record: i64,
+    pub(super) file: String,
+    /// Which hit of the file it is, from 0.
+    pub(super) hit: usize,
+}
+
+/// Force and response of a cell's hits, and what else was measured.
+struct OfCell {
+    impacts: ImpactRecords,
+    others: Option<ChannelRecords>,
+}
+
+impl Export {
+    /// One file for each cell with hits that count, or with any where all are wanted, and where each record went.
+    pub(super) fn write_records(&self, store: &Store) -> Result<Vec<Written>, CliError> {
+        let [folder, others] = ["records", "channels"].map(|name| self.out.join(name));
+        let (rows, cells) = (store.records()?, store.cells()?);
+        let waiting = Waiting::of("writing records, by cell");
+        let mut written = Vec::new();
+        for (done, cell) in cells.iter().enumerate() {
+            waiting.at(done, cells.len());
+            let counts = |row: &&RecordRow| row.scans > 0 && (self.all || row.kept());
+            let own: Vec<&RecordRow> =
+                rows.iter().flatten().filter(|row| row.cell == cell.id).filter(counts).collect();
+            let Some(of_cell) = self.of_cell(store, &own)? else { continue };
+            // a name may have dots: the extension is put behind it
+            let name = format!("{}.{}", stem(cell), self.format.extension());
+            self.write_impacts(&folder.join(&name), &of_cell.impacts, cell)?;
+            if let Some(all) = &of_cell.others {
+                self.write_others(&others, &name, all)?;
+            }
+            written.extend(own.iter().enumerate().map(|(hit, row)| Written {
+                record: row.id,
+                file: format!("records/{name}"),
+                hit,
+            }));
+        }
+        Ok(written)
+    }
+
+    /// All records of a cell in SI, as they were measured; none when it has none.
+    fn of_cell(&self, store: &Store, rows: &[&RecordRow]) -> Result<Option<OfCell>, CliError> {
+        let mut out: Option<OfCell> = None;
+        for row in rows {
+            let wrong =
+                |what: &str| Err(CliError::Bad(format!("{}: record {} {what}", self.file.display(), row.id)));
+            // scales belong to the session: one cell may have several
+            let map = store.channels(row.session)?;
+            let (Some(force), Some(axes)) = (map.place(Role::HammerForce), map.responses()) else {
+                return wrong("has no hammer force or no response");
+            };
+            let fs_hz = f64::from(map.rate_hz);
+            let quantity = match map.channels[axes[0]].quantity {
+                Quantity::Displacement => MotionQuantity::Displacement,
+                Quantity::Acceleration => MotionQuantity::Acceleration,
+                _ => MotionQuantity::Velocity,
+            };
+            let further: Vec<usize> =
+                (0..map.len()).filter(|place| *place != force && !axes.contains(place)).collect();
+            let names: Vec<String> = further.iter().map(|p| map.channels[*p].name.to_string()).collect();
+            let quantities: Vec<Quantity> = further.iter().map(|p| map.channels[*p].quantity).collect();
+            let cell = out.get_or_insert_with(|| OfCell {
+                impacts: ImpactRecords { fs_hz, force_n: Vec::new(), response: Vec::new(), quantity },
+                others: (!names.is_empty()).then(|| ChannelRecords {
+                    fs_hz,
+                    names: names.clone(),
+                    quantities: quantities.clone(),
+                    delay_s: Vec::new(),
+                    records: Vec::new(),
+                    signals: Vec::new(),
+                }),
+            });
+            let same = cell
+                .others
+                .as_ref()
+                .map_or(names.is_empty(), |all| (&all.names, &all.quantities) == (&names, &quantities));
+            if (cell.impacts.fs_hz, cell.impacts.quantity) != (fs_hz, quantity) || !same {
+                return wrong(
+                    "has another sampling rate, quantity or set of channels than those of its cell before it: export --without-records",
+                );
+            }
+            let samples = store.samples(row)?;
+            let si = |place: &usize| map.to_si(*place, samples.channel(*place));
+            cell.impacts.force_n.push(si(&force));
+            cell.impacts.response.push(axes.iter().map(si).collect());
+            if let Some(all) = &mut cell.others {
+                let late = |place: &usize| f64::from(map.channels[*place].delay_ns) * 1e-9;
+                all.delay_s.push(further.iter().map(late).collect());
+                all.records.push(row.id);
+                all.signals.push(further.iter().map(si).collect());
+            }
+        }
+        Ok(out)
+    }
+
+    fn write_impacts(&self, path: &Path, records: &ImpactRecords, cell: &CellRow) -> Result<(), CliError> {
+        let (impact, response) = (&cell.cell.impact, &cell.cell.response);
+        match self.format {
+            Format::Npz => write_impacts(path, records).map_err(bad),
+            Format::Uff58 => uff_output::write_records(path, records, response, impact).map_err(bad),
+            Format::Csv => tables_output::write_records(path, records).map_err(bad),
+        }
+    }
+
+    fn write_others(&self, folder: &Path, name: &str, all: &ChannelRecords) -> Result<(), CliError> {
+        std::fs::create_dir_all(folder).map_err(|source| CliError::File {
+            path: folder.into(),
+            doing: "making the folder",
+            source,
+        })?;
+        let path: PathBuf = folder.join(name);
+        match self.format {
+            Format::Npz => channel_records::write_npz(&path, all).map_err(bad),
+            Format::Uff58 => channel_records::write_uff_file(&path, all).map_err(bad),
+            Format::Csv => channel_records::write_csv(&path, all).map_err(bad),
+        }
+    }
+}
+
+fn stem(cell: &CellRow) -> String {
+    let name = configuration_name(cell.cell.configuration);
+    format!("{name}_{}_{}", cell.cell.impact, cell.cell.response)
+}
