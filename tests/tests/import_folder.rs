@@ -3,7 +3,7 @@
 
 use jointrig::campaign::plan::SMALL;
 use jointrig::campaign::store::Store;
-use jointrig::exchange::{read_impacts, write_impacts};
+use jointrig::exchange::{read_frf, read_impacts, write_impacts};
 use jointrig_tests::command::jointrig;
 use jointrig_tests::live::{campaign, done};
 use serde_json::Value;
@@ -64,6 +64,21 @@ fn what_was_exported_is_imported_again_by_names_or_labels() {
         std::fs::create_dir_all(&place).unwrap();
         std::fs::copy(&path, place.join(format!("measurement {number}.uff"))).unwrap();
     }
+    // the same files as a matrix of FRFs
+    let matrix = at("A.npz");
+    let told =
+        done(jointrig().arg("frf").arg(at("daq/A")).arg("--out").arg(&matrix).args(["--band", "20:1000"]));
+    assert!(told.contains("mobility of 6 outputs, 1 inputs"), "{told}");
+    let (ours, exported) = (read_frf(&matrix).unwrap(), read_frf(&at("npz/frf/A.npz")).unwrap());
+    let (row, line) = (ours.outputs().iter().position(|name| name == "A1:z").unwrap(), 400);
+    let there = exported.outputs().iter().position(|name| name == "A1:z").unwrap();
+    // the export cuts its records, so that its lines are a little apart from ours
+    let same = exported.frequency_hz().iter().position(|f| *f >= ours.frequency_hz()[line]).unwrap();
+    let ratio = ours.lines()[line][(row, 0)].norm() / exported.lines()[same][(there, 0)].norm();
+    assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+    let (_frf, of_frfs) = campaign(SMALL);
+    done(jointrig().arg("import").arg(&matrix).arg("--into").arg(&of_frfs).args(["--configuration", "A"]));
+
     let (_uff, by_label) = campaign(SMALL);
     done(&mut import(&at("daq"), &by_label, &[]));
     assert_eq!(kept(&by_label), kept(&measured));

@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
 use super::error::CliError;
+use super::frf_matrix::{Wishes, average};
 use super::output;
 use crate::campaign::verdict::{Kind, Limits, Verdict, judge_all};
 use crate::exchange::npz::Array;
@@ -22,10 +23,12 @@ use crate::substructuring::Band;
 /// RECORDS is an npz that holds `fs` (Hz), `force` (hit, sample) in N, `response` (hit, channel, sample) in SI and `quantity`
 /// (velocity, acceleration or displacement), or a universal file of time responses, each hit's force first. FRFs are on s = sigma + i 2 pi f: the exponential window's damping is part of s,
 /// not an error of the result.
+///
+/// A folder of universal files becomes one matrix (--out): their labels name impacts and sensors.
 #[derive(Debug, Args)]
 pub struct Frf {
-    /// The records.
-    #[arg(value_name = "RECORDS")]
+    /// The records, or a folder of universal files.
+    #[arg(value_name = "RECORDS|DIR")]
     records: PathBuf,
     /// Print verdicts, settings and the usable band as one JSON document.
     #[arg(long)]
@@ -109,6 +112,9 @@ pub(super) fn band(text: &str) -> Result<(f64, f64), String> {
 impl Frf {
     pub fn run(self) -> Result<(), CliError> {
         self.check()?;
+        if self.records.is_dir() {
+            return self.of_folder();
+        }
         let (records, warnings) =
             read_record_file(&self.records).map_err(|e| CliError::Bad(e.to_string()))?;
         for warning in &warnings {
@@ -160,6 +166,17 @@ impl Frf {
             ));
         }
         output::lines(self.words(&verdicts, &found, excited))
+    }
+
+    fn of_folder(&self) -> Result<(), CliError> {
+        let alone = !self.json && self.outputs.is_empty() && self.delay.is_empty();
+        let (Some(out), true) = (&self.out, alone) else {
+            return Err(CliError::Usage(
+                "a folder becomes a matrix of FRFs: give --out FILE.npz, and neither --json nor --outputs nor --delay".into(),
+            ));
+        };
+        let quantity = self.quantity.map(MotionQuantity::from);
+        average(&self.records, out, &Wishes { settings: &self.settings(), quantity, band: self.band })
     }
 
     /// What cannot be meant.

@@ -14,6 +14,7 @@ mod devices;
 mod error;
 mod export;
 mod frf;
+mod frf_matrix;
 mod hysteresis;
 mod identify;
 mod import;

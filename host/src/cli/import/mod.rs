@@ -59,6 +59,8 @@ pub struct Import {
     replace: bool,
 }
 
+pub(super) use names::universal_files;
+
 fn bad(error: impl std::fmt::Display) -> CliError {
     CliError::Bad(error.to_string())
 }

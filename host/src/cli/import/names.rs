@@ -155,6 +155,19 @@ fn with_labels_or_frfs(path: &Path, configuration: String) -> Result<Named, CliE
     Ok(if records { Named::Labelled(configuration) } else { Named::Frfs(configuration) })
 }
 
+/// The universal files of a folder and those in it.
+pub(in crate::cli) fn universal_files(folder: &Path) -> Result<Vec<PathBuf>, CliError> {
+    let universal = |path: &PathBuf| {
+        let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        ending.is_some_and(|ending| ENDINGS[1..].contains(&&*ending))
+    };
+    let found: Vec<PathBuf> = files(folder)?.into_iter().filter(universal).collect();
+    if found.is_empty() {
+        return Err(bad(format!("{}: it holds no universal file (.uff, .unv)", folder.display())));
+    }
+    Ok(found)
+}
+
 /// All files, in order of their names.
 fn files(folder: &Path) -> Result<Vec<PathBuf>, CliError> {
     let failed = |source| CliError::Read { path: folder.into(), doing: "reading the folder", source };

@@ -1,0 +1,145 @@
+//! `frf` of a folder: universal files whose labels name impacts and sensors become one matrix of FRFs, as `import` and `identify` take it.
+
+use std::path::Path;
+
+use nalgebra::DMatrix;
+use num_complex::Complex;
+
+use super::error::CliError;
+use super::import::universal_files;
+use super::output;
+use super::waiting::Waiting;
+use crate::campaign::verdict::{Kind, Limits, judge_all};
+use crate::exchange::record_uff::{LabelledRecords, by_label};
+use crate::exchange::{uff, write_frf};
+use crate::frf::Frf;
+use crate::spectra::{CrossSpectra, FrfSettings, MotionQuantity, estimate};
+
+/// How the records become FRFs.
+pub(super) struct Wishes<'w> {
+    pub(super) settings: &'w FrfSettings,
+    /// None: as measured.
+    pub(super) quantity: Option<MotionQuantity>,
+    /// Lines to give, Hz.
+    pub(super) band: Option<(f64, f64)>,
+}
+
+/// One place of impact with one sensor.
+struct Pair {
+    impact: String,
+    response: String,
+    spectra: CrossSpectra,
+}
+
+/// Averages the good hits of every file in `folder` and writes the matrix to `out`.
+///
+/// # Errors
+/// A file that cannot be read, names that are missing, records that do not fit together.
+pub(super) fn average(folder: &Path, out: &Path, wishes: &Wishes<'_>) -> Result<(), CliError> {
+    let bad = |what: String| CliError::Bad(what);
+    let files = universal_files(folder)?;
+    let waiting = Waiting::of("averaging files");
+    let (mut pairs, mut told, mut quantity) = (Vec::<Pair>::new(), Vec::new(), wishes.quantity);
+    for (done, path) in files.iter().enumerate() {
+        waiting.at(done, files.len());
+        let wrong = |what: String| bad(format!("{}: {what}", path.display()));
+        let bytes = std::fs::read(path).map_err(|source| CliError::Read {
+            path: path.clone(),
+            doing: "reading records",
+            source,
+        })?;
+        let (rows, warnings) = by_label(&uff::read(&bytes)).map_err(wrong)?;
+        warnings
+            .iter()
+            .map(|warning| format!("{}: {warning}", path.display()))
+            .for_each(|line| told.push(line));
+        for LabelledRecords { impact, response, records } in rows {
+            if pairs.iter().any(|pair| (&pair.impact, &pair.response) == (&impact, &response)) {
+                return Err(wrong(format!("{impact} to {response} stands in an earlier file too")));
+            }
+            let verdicts = judge_all(&records, &Limits::default(), None);
+            let used: Vec<bool> = verdicts.iter().map(|v| v.kind == Kind::Good).collect();
+            let good = used.iter().filter(|good| **good).count();
+            if good < used.len() {
+                told.push(format!("{impact} to {response}: {good} of {} hits are good", used.len()));
+            }
+            if good == 0 {
+                continue;
+            }
+            let of = |what: String| wrong(format!("{impact} to {response}: {what}"));
+            let found = estimate(&records, &used, wishes.settings).map_err(|error| of(error.to_string()))?;
+            let wanted = *quantity.get_or_insert(records.quantity);
+            let mut spectra = found.converted(records.quantity, wanted);
+            if let Some((low, high)) = wishes.band {
+                spectra = spectra.band(low, high);
+            }
+            if spectra.lines() == 0 {
+                return Err(CliError::Usage("--band holds no line: widen it".into()));
+            }
+            if pairs.first().is_some_and(|first| first.spectra.frequency_hz() != spectra.frequency_hz()) {
+                return Err(of("it has other frequency lines than the files before it: records must be of one length and rate".into()));
+            }
+            pairs.push(Pair { impact, response, spectra });
+        }
+    }
+    drop(waiting);
+    let (Some(first), Some(quantity)) = (pairs.first(), quantity) else {
+        return Err(bad(format!("{}: no hit is good, so there is nothing to average", folder.display())));
+    };
+    let lines = first.spectra.lines();
+    let frf = matrix(&pairs, quantity)?;
+    write_frf(out, &frf, &[]).map_err(|error| bad(error.to_string()))?;
+    let (rows, columns) = (frf.outputs().len(), frf.inputs().len());
+    told.push(format!(
+        "{}: {} of {rows} outputs, {columns} inputs, {lines} lines",
+        out.display(),
+        quantity.frf_name()
+    ));
+    output::lines(told)
+}
+
+/// The outputs are called `NAME:x`, `NAME:y`, `NAME:z` where a sensor has three channels, `NAME` where it has one, else `NAME:1`, `NAME:2`.
+fn outputs_of(pair: &Pair) -> Vec<String> {
+    let name = &pair.response;
+    match pair.spectra.outputs() {
+        1 => vec![name.clone()],
+        3 => ["x", "y", "z"].map(|axis| format!("{name}:{axis}")).to_vec(),
+        channels => (1..=channels).map(|channel| format!("{name}:{channel}")).collect(),
+    }
+}
+
+/// All pairs in one matrix; what was not measured is not a number.
+fn matrix(pairs: &[Pair], quantity: MotionQuantity) -> Result<Frf, CliError> {
+    let (mut outputs, mut inputs) = (Vec::<String>::new(), Vec::<String>::new());
+    for pair in pairs {
+        if !inputs.contains(&pair.impact) {
+            inputs.push(pair.impact.clone());
+        }
+        for name in outputs_of(pair) {
+            if !outputs.contains(&name) {
+                outputs.push(name);
+            }
+        }
+    }
+    let first = &pairs[0].spectra;
+    let hole = || vec![DMatrix::from_element(outputs.len(), inputs.len(), f64::NAN); first.lines()];
+    let (mut variance, mut coherence) = (hole(), hole());
+    let nowhere = Complex::new(f64::NAN, f64::NAN);
+    let mut values = vec![DMatrix::from_element(outputs.len(), inputs.len(), nowhere); first.lines()];
+    for pair in pairs {
+        let y = &pair.spectra;
+        let column = inputs.iter().position(|name| *name == pair.impact).unwrap_or(0);
+        for (channel, name) in outputs_of(pair).iter().enumerate() {
+            let at = (outputs.iter().position(|own| own == name).unwrap_or(0), column);
+            for line in 0..y.lines() {
+                values[line][at] = y.h1(line, channel);
+                variance[line][at] = y.variance(line, channel);
+                coherence[line][at] = y.coherence(line, channel);
+            }
+        }
+    }
+    let whole =
+        Frf::new(first.frequency_hz().to_vec(), first.sigma_per_s(), quantity, outputs, inputs, values);
+    let whole = whole.and_then(|frf| frf.with_variance(variance)?.with_coherence(coherence));
+    whole.map_err(|error| CliError::Bad(error.to_string()))
+}
