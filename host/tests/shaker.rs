@@ -305,6 +305,37 @@ fn microslip_softens_the_loop_with_amplitude_as_its_law_says() {
     assert!(before < 0.65 * 180e6);
 }
 
+/// 139 N/µm between the spots at 100 Hz, an ellipse at 200 Hz, and a contact of 180 N/µm: nobody may take one for the other.
+#[test]
+fn a_records_loop_is_never_called_the_contacts_own_stiffness() {
+    let bench = Bench::new();
+    bench.run(&bench.exact("default"), &options(vec![step(100.0, 1e-7), step(200.0, 1e-7)])).unwrap();
+    let folder = path(&bench).with_extension("exported");
+    let jointrig = || std::process::Command::new(env!("CARGO_BIN_EXE_jointrig"));
+    assert!(
+        jointrig()
+            .arg("export")
+            .arg(path(&bench))
+            .args(["--format", "npz", "--out"])
+            .arg(&folder)
+            .status()
+            .unwrap()
+            .success()
+    );
+    for level in ["level_1.npz", "level_2.npz"] {
+        let record = folder.join("levels").join(level);
+        let said =
+            String::from_utf8(jointrig().arg("hysteresis").arg(&record).output().unwrap().stdout).unwrap();
+        assert!(
+            said.contains("between the spots") && !said.contains("own") && !said.contains("k_T"),
+            "{said}"
+        );
+        let out = jointrig().arg("hysteresis").arg(&record).arg("--json").output().unwrap();
+        let found: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+        assert!(found["hysteresis"][0]["k_t_n_per_m"].is_null(), "{found}");
+    }
+}
+
 #[test]
 fn exported_levels_say_the_same_to_other_programs() {
     let bench = Bench::new();

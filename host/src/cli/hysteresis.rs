@@ -8,10 +8,10 @@ use super::error::CliError;
 use super::number::{not_negative, positive};
 use super::output;
 use crate::analyse::{Findings, RecordLoops};
-use crate::exchange::read_hysteresis;
+use crate::exchange::{is_beside_the_contact, read_hysteresis};
 use crate::hysteresis::{Correction, HysteresisRecord, analyse};
 use crate::report::{document, words};
-use crate::results::Source;
+use crate::results::{Hysteresis, Source};
 
 /// Loops of a time record measured anywhere: stiffness, energy, shape, friction.
 ///
@@ -53,8 +53,12 @@ impl Loops {
             raw: found(&record)?,
             corrected: correction.map(|correction| found(&correction.applied(&record))).transpose()?,
         };
-        let results =
+        let mut results =
             document(Findings { source: self.source(&record), record: Some(loops), ..Findings::default() });
+        if is_beside_the_contact(&self.record).map_err(|error| CliError::Bad(error.to_string()))? {
+            // its slope is that of whatever lies between the spots
+            results.hysteresis = results.hysteresis.into_iter().map(Hysteresis::between_spots).collect();
+        }
         if self.json { output::json(&results) } else { output::lines(words::summary(&results)) }
     }
 

@@ -29,4 +29,6 @@ pub use frf_npz::{Extra, read_frf, write_frf};
 pub use frf_uff::FrfUffError;
 pub use npz::NpzError;
 pub use positions::{PositionsError, read_positions};
-pub use record_npz::{read_hysteresis, read_impacts, write_hysteresis, write_impacts};
+pub use record_npz::{
+    is_beside_the_contact, read_hysteresis, read_impacts, write_hysteresis, write_impacts, write_level,
+};

@@ -74,7 +74,8 @@ pub fn write_impacts(path: &Path, records: &ImpactRecords) -> Result<(), NpzErro
 }
 
 /// Reads a hysteresis record: `fs`, `velocity_a` and `velocity_b` (m/s) or `displacement_a` and `displacement_b` (m), `force` (N)
-/// or `load_cells` (cell, sample; summed), optional `excitation` (Hz) and `normal_load` (N).
+/// or `load_cells` (cell, sample; summed), optional `excitation` (Hz) and `normal_load` (N). The motions are taken for the contact's own, unless
+/// `measured` says "beside the contact" ([`is_beside_the_contact`]).
 ///
 /// # Errors
 /// [`NpzError`] naming the array that is missing or does not fit.
@@ -145,7 +146,38 @@ pub fn read_hysteresis(path: &Path) -> Result<HysteresisRecord, NpzError> {
 /// # Errors
 /// [`NpzError::Write`].
 pub fn write_hysteresis(path: &Path, record: &HysteresisRecord) -> Result<(), NpzError> {
+    write_loop(path, record, None)
+}
+
+/// The same of a rig's level, whose motions are those of spots beside the contact: the array `measured` says so.
+///
+/// # Errors
+/// [`NpzError::Write`].
+pub fn write_level(path: &Path, record: &HysteresisRecord) -> Result<(), NpzError> {
+    write_loop(path, record, Some(BESIDE))
+}
+
+/// Whether a file says of its motions that they are not the contact's own.
+///
+/// # Errors
+/// [`NpzError`] where it cannot be read, or says what nobody knows.
+pub fn is_beside_the_contact(path: &Path) -> Result<bool, NpzError> {
+    let mut file = NpzFile::open(path)?;
+    if !file.has("measured") {
+        return Ok(false);
+    }
+    let word = file.word("measured", BESIDE)?;
+    if word == BESIDE { Ok(true) } else { Err(file.unexpected("measured", &format!("is `{word}`"), BESIDE)) }
+}
+
+/// Where the motions of a level were measured.
+const BESIDE: &str = "beside the contact";
+
+fn write_loop(path: &Path, record: &HysteresisRecord, measured: Option<&str>) -> Result<(), NpzError> {
     let mut out = NpzOutput::create(path)?;
+    if let Some(measured) = measured {
+        out.text("measured", &[], &[measured.into()])?;
+    }
     out.real("fs", &[], &[record.fs_hz])?;
     let (names, a, b) = match &record.motion {
         RelativeMotion::Velocity { a_m_per_s, b_m_per_s } => {

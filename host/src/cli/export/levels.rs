@@ -7,7 +7,7 @@ use crate::campaign::run::shaking;
 use crate::campaign::store::Store;
 use crate::campaign::store::level_table::{DamagedLevel, LevelRow};
 use crate::cli::error::CliError;
-use crate::exchange::{tables_output, uff_output, write_hysteresis};
+use crate::exchange::{tables_output, uff_output, write_level};
 use crate::hysteresis::HysteresisRecord;
 
 /// Columns of `levels.csv`.
@@ -80,7 +80,7 @@ fn record(store: &Store, row: &LevelRow) -> Result<HysteresisRecord, CliError> {
 
 fn one(path: &Path, format: Format, record: &HysteresisRecord, level: i64) -> Result<(), CliError> {
     match format {
-        Format::Npz => write_hysteresis(path, record).map_err(bad),
+        Format::Npz => write_level(path, record).map_err(bad),
         Format::Uff58 => uff_output::write_loop(path, record, level).map_err(bad),
         Format::Csv => tables_output::write_loop(path, record).map_err(bad),
     }

@@ -94,6 +94,7 @@ pub fn shaker_loops(results: &Results) -> Option<String> {
         values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     match values.len() {
         0 if rows.is_empty() => None,
+        0 if rows.len() == 1 => Some("The shaker's loop gives no slope between the spots.".into()),
         0 => Some(format!("None of the shaker's {} loops gives a slope between the spots.", rows.len())),
         1 => {
             Some(format!("The shaker's loop gives a slope between the spots of {} N/µm{aside}.", short(low)))
