@@ -20,6 +20,7 @@ mod locks;
 mod packages;
 mod parity;
 mod project;
+mod python;
 mod qemu;
 mod setup;
 mod size;
@@ -76,6 +77,8 @@ enum Task {
         #[arg(long)]
         detach: bool,
     },
+    /// Build the Python wheel, install it into an empty environment, and test it there.
+    Python,
     /// Compare spectra, universal files and virtual points with pyFRF, pyuff and pyFBS: numbers, or times.
     Parity(parity::Options),
     /// Run every benchmark of the workspace.
@@ -109,6 +112,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Qemu(options) => emulator::run(&project, &options),
         Task::Budgets => budgets::command(&project),
         Task::Flash { detach } => flash::run(&project, detach),
+        Task::Python => python::run(&project).map(|remark| println!("{remark}")),
         Task::Parity(options) => parity::run(&project, &options),
         Task::Bench { extra } => bench::run(&project, &extra),
     }

@@ -5,7 +5,7 @@ use crate::firmware;
 use crate::project::{EMULATED_BOARD, Project};
 use crate::tests_run::{self, Scope};
 use crate::toolchain::Toolchain;
-use crate::{budgets, command, emulator, house, lint, setup};
+use crate::{budgets, command, emulator, house, lint, python, setup};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::fmt::Write;
@@ -45,7 +45,7 @@ struct Step {
 }
 
 /// The plan. The cheap steps come first, so that a slip shows early.
-const STEPS: [Step; 9] = [
+const STEPS: [Step; 10] = [
     Step {
         name: "setup",
         purpose: "the microcontroller target and QEMU are available",
@@ -72,6 +72,12 @@ const STEPS: [Step; 9] = [
         purpose: "unit, property and whole-system tests, and the examples",
         slow: false,
         action: tests,
+    },
+    Step {
+        name: "python",
+        purpose: "the Python wheel, from an empty environment",
+        slow: true,
+        action: wheel,
     },
     Step { name: "docs", purpose: "the documentation builds without warnings", slow: true, action: docs },
     Step { name: "boards", purpose: "the board images, and their sizes", slow: true, action: boards },
@@ -217,6 +223,10 @@ fn build(run: &mut Run) -> Result<String> {
 fn tests(run: &mut Run) -> Result<String> {
     let counts = tests_run::run(run.project, run.scope(), &run.options.extra)?;
     Ok(counts.to_string())
+}
+
+fn wheel(run: &mut Run) -> Result<String> {
+    python::run(run.project)
 }
 
 fn docs(run: &mut Run) -> Result<String> {

@@ -171,9 +171,11 @@ impl Frf {
     fn of_folder(&self) -> Result<(), CliError> {
         let alone = !self.json && self.outputs.is_empty() && self.delay.is_empty();
         let (Some(out), true) = (&self.out, alone) else {
-            return Err(CliError::Usage(
-                "a folder becomes a matrix of FRFs: give --out FILE.npz, and neither --json nor --outputs nor --delay".into(),
-            ));
+            return Err(CliError::Bad(format!(
+                "{}: this is a folder: name a file in it, or give --out FILE.npz, and neither --json nor --outputs nor --delay, for a matrix \
+                 of FRFs of all its universal files",
+                self.records.display()
+            )));
         };
         let quantity = self.quantity.map(MotionQuantity::from);
         average(&self.records, out, &Wishes { settings: &self.settings(), quantity, band: self.band })

@@ -20,6 +20,7 @@ mod identify;
 mod import;
 mod info;
 mod interrupt;
+mod man;
 mod measure;
 mod number;
 #[cfg(feature = "dashboard")]
@@ -87,6 +88,8 @@ enum Command {
     Identify(identify::Identify),
     /// Print completions for a shell.
     Completions(completions::Completions),
+    /// Print the manual page, or write one for each command.
+    Man(man::Man),
 }
 
 /// Reads the command line, does what it says, and returns the exit code.
@@ -129,6 +132,7 @@ impl Cli {
                 command.run();
                 Ok(())
             }
+            Command::Man(command) => command.run(),
         }
     }
 }
@@ -186,6 +190,9 @@ mod tests {
             "compare p.jrig q.jrig --out d --json",
             "identify --a A.npz --b B.npz --ajb AJB.npz --geometry p.xlsx --method internal,inverse --idms 4,6 --band 300:600 --json",
             "completions bash",
+            "man --out pages",
+            "import DIR --into c.jrig --names names.csv --replace",
+            "identify --a A.npz --b B.npz --ajb AJB.npz --geometry p.xlsx --out report",
             "frf records.npz --json",
             "hysteresis record.npz --json",
             "hysteresis record.npz --effective-mass 1.56 --parallel-path 0.0133 --normal-load 300",

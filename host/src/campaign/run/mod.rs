@@ -22,5 +22,6 @@ pub mod runner;
 pub mod shaking;
 pub mod shot;
 pub mod stage;
+pub mod status;
 mod structure;
 pub mod tally;

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use serde_json::{Map, Value, json};
 
 use crate::campaign::plan::configuration_name;
+use crate::campaign::run::status::{document, refusals};
 use crate::campaign::run::tally::{Count, Tally};
 use crate::campaign::store::Store;
 use crate::campaign::store::cell_table::CellRow;
@@ -26,24 +26,12 @@ pub struct Status {
 impl Status {
     pub fn run(self) -> Result<(), CliError> {
         let store = Store::open_read_only(&self.file)?;
+        if self.json {
+            return output::json(&document(&store)?);
+        }
         let (cells, records) = (store.cells()?, store.records()?);
         let tally = Tally::new(&cells, &records);
         let frfs = store.frf_rows()?;
-        if self.json {
-            let frfs: Vec<Value> = frfs
-                .iter()
-                .map(|row| json!({ "configuration": row.configuration, "file": row.source, "imported": row.utc }))
-                .collect();
-            let cells: Vec<Value> = cells.iter().map(|row| cell_json(row, &tally.cell(row.id))).collect();
-            return output::json(&json!({
-                "wanted": tally.wanted(),
-                "kept": tally.kept(),
-                "complete": tally.complete(),
-                "records": records.len(),
-                "imported_frf": frfs,
-                "cells": cells,
-            }));
-        }
         let (stored, raw) = store.sample_bytes()?;
         let size = std::fs::metadata(&self.file).map_or(0, |file| file.len());
         let started = cells.iter().filter(|row| tally.attempts(row.id) > 0);
@@ -70,26 +58,6 @@ impl Status {
             },
         ])
     }
-}
-
-fn refusals(count: &Count) -> impl Iterator<Item = (&'static str, u32)> + '_ {
-    count.refused.iter().map(|(kind, number)| (kind.name(), *number))
-}
-
-fn cell_json(row: &CellRow, count: &Count) -> Value {
-    let refused: Map<String, Value> =
-        refusals(count).map(|(kind, number)| (kind.into(), number.into())).collect();
-    json!({
-        "configuration": configuration_name(row.cell.configuration),
-        "impact": row.cell.impact,
-        "response": row.cell.response,
-        "wanted": count.wanted,
-        "kept": count.kept,
-        "refused": refused,
-        "given_up": row.given_up,
-        "settled": row.settled,
-        "damaged": count.damaged,
-    })
 }
 
 fn cell_line(row: &CellRow, count: &Count) -> String {

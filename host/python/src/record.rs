@@ -1,0 +1,191 @@
+//! One firing of the hammer.
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+
+use jointrig::campaign::plan::{Cell, configuration_name};
+use jointrig::campaign::store::Store;
+use jointrig::campaign::store::error::StoreError;
+use jointrig::campaign::store::record_row::RecordRow;
+use jointrig::device::channels::ChannelMap;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+
+use crate::raised;
+
+/// One firing of the hammer: what was measured, and what was made of it.
+#[pyclass(module = "jointrig._native", frozen)]
+pub struct Record {
+    path: PathBuf,
+    row: RecordRow,
+    cell: Cell,
+}
+
+impl Record {
+    /// All that can be read, in the order in which they were measured.
+    pub fn all(store: &Store) -> Result<Vec<Self>, StoreError> {
+        let cells: HashMap<i64, Cell> = store.cells()?.into_iter().map(|row| (row.id, row.cell)).collect();
+        let path = store.path().to_owned();
+        let of = |row: RecordRow| {
+            let cell = cells.get(&row.cell)?.clone();
+            Some(Self { path: path.clone(), row, cell })
+        };
+        Ok(store.records()?.into_iter().flatten().filter_map(of).collect())
+    }
+
+    fn map(&self, py: Python<'_>, store: &Store) -> PyResult<ChannelMap> {
+        store.channels(self.row.session).map_err(|error| raised::file(py, &error))
+    }
+
+    /// The file, its channels, and the place of one of them.
+    fn channel(&self, py: Python<'_>, name: &str) -> PyResult<(Store, ChannelMap, usize)> {
+        let store = Store::open_read_only(&self.path).map_err(|error| raised::file(py, &error))?;
+        let map = self.map(py, &store)?;
+        let place = map.channels.iter().position(|channel| channel.name == name);
+        if let Some(place) = place {
+            return Ok((store, map, place));
+        }
+        let known: Vec<&str> = map.channels.iter().map(|channel| channel.name.as_str()).collect();
+        let sentence = format!("record {} has no channel `{name}`: {}", self.row.id, known.join(", "));
+        Err(raised::refused(py, &sentence))
+    }
+}
+
+#[pymethods]
+impl Record {
+    /// Its number in the file.
+    #[getter]
+    fn id(&self) -> i64 {
+        self.row.id
+    }
+
+    /// `A`, `B` or `AJB`.
+    #[getter]
+    pub fn configuration(&self) -> &'static str {
+        configuration_name(self.cell.configuration)
+    }
+
+    /// Name of the impact point.
+    #[getter]
+    pub fn impact(&self) -> &str {
+        &self.cell.impact
+    }
+
+    /// Name of the response location.
+    #[getter]
+    pub fn response(&self) -> &str {
+        &self.cell.response
+    }
+
+    /// Which attempt at its cell, from 0.
+    #[getter]
+    fn attempt(&self) -> u32 {
+        self.row.attempt
+    }
+
+    /// The verdict at the time.
+    #[getter]
+    fn verdict(&self) -> &'static str {
+        self.row.verdict.name()
+    }
+
+    /// The verdict that counts: a person's, where there is one.
+    #[getter]
+    fn standing(&self) -> &'static str {
+        self.row.standing().name()
+    }
+
+    /// Whether the analysis uses it.
+    #[getter]
+    pub fn kept(&self) -> bool {
+        self.row.kept()
+    }
+
+    /// What was measured for the verdict.
+    #[getter]
+    fn measure(&self) -> f64 {
+        self.row.measure
+    }
+
+    /// The limit that it was held against.
+    #[getter]
+    fn limit(&self) -> f64 {
+        self.row.limit
+    }
+
+    /// Both in words.
+    #[getter]
+    fn sentence(&self) -> &str {
+        &self.row.sentence
+    }
+
+    /// When the trigger was, RFC 3339, UTC.
+    #[getter]
+    fn utc(&self) -> &str {
+        &self.row.utc
+    }
+
+    /// Peak of the band-limited force, N.
+    #[getter]
+    fn peak_n(&self) -> f64 {
+        self.row.peak_n
+    }
+
+    /// Index of the trigger among the samples.
+    #[getter]
+    fn trigger_index(&self) -> usize {
+        self.row.trigger_index
+    }
+
+    /// Sampling rate, Hz.
+    #[getter]
+    fn fs_hz(&self, py: Python<'_>) -> PyResult<f64> {
+        let store = Store::open_read_only(&self.path).map_err(|error| raised::file(py, &error))?;
+        Ok(f64::from(self.map(py, &store)?.rate_hz))
+    }
+
+    /// Names of the channels, in the order of `codes`.
+    #[getter]
+    fn channels(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        let store = Store::open_read_only(&self.path).map_err(|error| raised::file(py, &error))?;
+        Ok(self.map(py, &store)?.channels.iter().map(|channel| channel.name.to_string()).collect())
+    }
+
+    /// (channel, sample) int16: the codes as they were measured.
+    #[getter]
+    fn codes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i16>>> {
+        let read = py.detach(|| {
+            let store = Store::open_read_only(&self.path)?;
+            let samples = store.samples(&self.row)?;
+            Ok((samples.codes, [self.row.channels, self.row.scans]))
+        });
+        let (codes, shape) = read.map_err(|error: StoreError| raised::file(py, &error))?;
+        codes.into_pyarray(py).reshape(shape)
+    }
+
+    /// (sample,) float64 in SI: one channel by its name, as measured; [`Record::delay_s`] says by how much it is late.
+    fn signal<'py>(&self, py: Python<'py>, channel: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (store, map, place) = self.channel(py, channel)?;
+        let read = py.detach(move || Ok(map.to_si(place, store.samples(&self.row)?.channel(place))));
+        let signal = read.map_err(|error: StoreError| raised::file(py, &error))?;
+        Ok(signal.into_pyarray(py))
+    }
+
+    /// By how much a channel is late, s.
+    fn delay_s(&self, py: Python<'_>, channel: &str) -> PyResult<f64> {
+        let (_, map, place) = self.channel(py, channel)?;
+        Ok(f64::from(map.channels[place].delay_ns) * 1e-9)
+    }
+
+    /// The SI unit of a channel.
+    fn unit(&self, py: Python<'_>, channel: &str) -> PyResult<&'static str> {
+        let (_, map, place) = self.channel(py, channel)?;
+        Ok(map.channels[place].quantity.unit())
+    }
+
+    fn __repr__(&self) -> String {
+        let (id, of) = (self.row.id, self.configuration());
+        let (impact, response) = (&self.cell.impact, &self.cell.response);
+        format!("Record {id}, {of} {impact} to {response}: {} ({})", self.standing(), self.row.sentence)
+    }
+}

@@ -1,0 +1,112 @@
+//! Arrays from anywhere: FRFs of impact records, and loops.
+
+use jointrig::analyse::{Findings, RecordLoops};
+use jointrig::campaign::verdict::{Kind, Limits, judge_all};
+use jointrig::hysteresis::{HysteresisRecord, RelativeMotion, analyse};
+use jointrig::report::document;
+use jointrig::results::Source;
+use jointrig::spectra::{CrossSpectra, FrfSettings, ImpactRecords, MotionQuantity, estimate};
+use nalgebra::DMatrix;
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use pyo3::prelude::*;
+
+use crate::frf::Frf;
+use crate::{in_the_process_that_loaded_this, raised, values};
+
+/// FRFs of the good hits of impact records, with the verdict on every hit: (Frf, verdicts).
+#[pyfunction]
+#[pyo3(signature = (*, fs_hz, force_n, response, quantity))]
+pub fn frf<'py>(
+    py: Python<'py>,
+    fs_hz: f64,
+    force_n: PyReadonlyArray2<'py, f64>,
+    response: PyReadonlyArray3<'py, f64>,
+    quantity: &str,
+) -> PyResult<(Frf, Vec<&'static str>)> {
+    in_the_process_that_loaded_this(py)?;
+    let Some(motion) = MotionQuantity::from_name(quantity) else {
+        let sentence = format!("quantity is `{quantity}`: velocity, acceleration or displacement is needed");
+        return Err(raised::refused(py, &sentence));
+    };
+    if !(fs_hz.is_finite() && fs_hz > 0.0) {
+        return Err(raised::refused(py, &format!("fs_hz is {fs_hz}: a positive number is needed")));
+    }
+    let (force, motions) = (force_n.as_array(), response.as_array());
+    let ([hits, samples], [own_hits, channels, own_samples]) =
+        ([force.shape()[0], force.shape()[1]], [motions.shape()[0], motions.shape()[1], motions.shape()[2]]);
+    if hits == 0 || samples == 0 || channels == 0 || (hits, samples) != (own_hits, own_samples) {
+        return Err(raised::refused(
+            py,
+            &format!(
+                "force_n has shape ({hits}, {samples}) and response ({own_hits}, {channels}, {own_samples}): (hit, sample) and \
+                 (hit, channel, sample) are needed, with one hit, channel and sample at least"
+            ),
+        ));
+    }
+    let records = ImpactRecords {
+        fs_hz,
+        force_n: force.rows().into_iter().map(|hit| hit.to_vec()).collect(),
+        response: motions
+            .outer_iter()
+            .map(|hit| hit.rows().into_iter().map(|row| row.to_vec()).collect())
+            .collect(),
+        quantity: motion,
+    };
+    let all = records.force_n.iter().chain(records.response.iter().flatten());
+    if all.flatten().any(|value| !value.is_finite()) {
+        return Err(raised::data(py, "a sample is not a number: take its hit out"));
+    }
+    let found = py.detach(|| {
+        let verdicts = judge_all(&records, &Limits::default(), None);
+        let used: Vec<bool> = verdicts.iter().map(|verdict| verdict.kind == Kind::Good).collect();
+        if !used.contains(&true) {
+            let why: Vec<String> = verdicts.iter().map(|verdict| verdict.sentence.clone()).collect();
+            return Err(format!("no hit is good, so there is nothing to average: {}", why.join("; ")));
+        }
+        let spectra =
+            estimate(&records, &used, &FrfSettings::default()).map_err(|error| error.to_string())?;
+        let outputs = (1..=channels).map(|channel| format!("response {channel}")).collect();
+        let frf = spectra.to_matrix(motion, outputs, "impact".into()).map_err(|error| error.to_string())?;
+        let column = |rows: Vec<Vec<f64>>| -> Vec<_> {
+            rows.into_iter().map(|row| DMatrix::from_column_slice(row.len(), 1, &row)).collect()
+        };
+        let whole = frf
+            .with_variance(column(spectra.rows(CrossSpectra::variance)))
+            .and_then(|frf| frf.with_coherence(column(spectra.rows(CrossSpectra::coherence))));
+        Ok((whole.map_err(|error| error.to_string())?, verdicts.iter().map(|v| v.kind.name()).collect()))
+    });
+    let (frf, verdicts) = found.map_err(|what: String| raised::refused(py, &what))?;
+    Ok((Frf::of(frf), verdicts))
+}
+
+/// Loops of a time record, as `jointrig hysteresis --json` tells them.
+#[pyfunction]
+#[pyo3(signature = (*, fs_hz, velocity_a, velocity_b, force_n, excitation_hz=None, normal_load_n=None))]
+pub fn hysteresis<'py>(
+    py: Python<'py>,
+    fs_hz: f64,
+    velocity_a: PyReadonlyArray1<'py, f64>,
+    velocity_b: PyReadonlyArray1<'py, f64>,
+    force_n: PyReadonlyArray1<'py, f64>,
+    excitation_hz: Option<f64>,
+    normal_load_n: Option<f64>,
+) -> PyResult<Bound<'py, PyAny>> {
+    in_the_process_that_loaded_this(py)?;
+    let signal = |array: &PyReadonlyArray1<'py, f64>| array.as_array().to_vec();
+    let record = HysteresisRecord {
+        fs_hz,
+        motion: RelativeMotion::Velocity { a_m_per_s: signal(&velocity_a), b_m_per_s: signal(&velocity_b) },
+        force_n: signal(&force_n),
+        excitation_hz,
+        normal_load_n,
+    };
+    let found = py.detach(|| {
+        let raw = analyse(&record).map_err(|error| error.to_string())?;
+        let loops = RecordLoops { level: None, own: None, raw, corrected: None };
+        let source = Source { kind: "record".into(), ..Source::default() };
+        document(Findings { source, record: Some(loops), ..Findings::default() })
+            .to_json()
+            .map_err(|e| e.to_string())
+    });
+    values(py, &found.map_err(|what| raised::refused(py, &what))?)
+}

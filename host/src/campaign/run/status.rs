@@ -1,0 +1,59 @@
+//! How far a campaign is, as `campaign status --json` tells it.
+
+use serde_json::{Map, Value, json};
+
+use super::tally::{Count, Tally};
+use crate::campaign::plan::configuration_name;
+use crate::campaign::store::Store;
+use crate::campaign::store::cell_table::CellRow;
+use crate::campaign::store::error::StoreError;
+
+/// Per cell what is wanted, kept and refused, and why; and the FRFs that came from elsewhere.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn document(store: &Store) -> Result<Value, StoreError> {
+    let (cells, records) = (store.cells()?, store.records()?);
+    let tally = Tally::new(&cells, &records);
+    let frf = |row: &crate::campaign::store::frf_table::FrfRow| json!({ "configuration": row.configuration, "file": row.source, "imported": row.utc });
+    let frfs: Vec<Value> = store.frf_rows()?.iter().map(frf).collect();
+    let all: Vec<Value> = cells.iter().map(|row| of_cell(row, &tally.cell(row.id))).collect();
+    Ok(json!({
+        "wanted": tally.wanted(),
+        "kept": tally.kept(),
+        "complete": tally.complete(),
+        "records": records.len(),
+        "imported_frf": frfs,
+        "cells": all,
+    }))
+}
+
+/// Good hits that count, and those that are wanted.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn counts(store: &Store) -> Result<(u64, u64), StoreError> {
+    let tally = Tally::new(&store.cells()?, &store.records()?);
+    Ok((tally.kept(), tally.wanted()))
+}
+
+/// How many hits of a cell were refused, by verdict.
+pub fn refusals(count: &Count) -> impl Iterator<Item = (&'static str, u32)> + '_ {
+    count.refused.iter().map(|(kind, number)| (kind.name(), *number))
+}
+
+fn of_cell(row: &CellRow, count: &Count) -> Value {
+    let refused: Map<String, Value> =
+        refusals(count).map(|(kind, number)| (kind.into(), number.into())).collect();
+    json!({
+        "configuration": configuration_name(row.cell.configuration),
+        "impact": row.cell.impact,
+        "response": row.cell.response,
+        "wanted": count.wanted,
+        "kept": count.kept,
+        "refused": refused,
+        "given_up": row.given_up,
+        "settled": row.settled,
+        "damaged": count.damaged,
+    })
+}
