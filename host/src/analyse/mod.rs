@@ -33,6 +33,7 @@ mod imported;
 mod level_stiffness;
 mod missing;
 mod plan_geometry;
+mod question;
 mod recommended;
 #[cfg(test)]
 mod rig_tests;
@@ -54,5 +55,6 @@ pub use impact_loops::{ImpactLoops, SlopeIs};
 pub use level_stiffness::NoLevelStiffness;
 pub use missing::Missing;
 pub use plan_geometry::{geometry, places};
+pub use question::{Asked, IdmSets, Question, QuestionError};
 pub use shaker_levels::RecordLoops;
 pub use wanted::{BANDS, Progress, Wanted};

@@ -60,7 +60,7 @@ impl Analyse {
             }
             ending(&found, &self.out)?;
         }
-        must_hold_something(&found)
+        report::must_hold_something(&found).map_err(CliError::Bad)
     }
 }
 
@@ -101,21 +101,4 @@ pub fn write_into(results: &Results, folder: &Path, formats: &[report::Format]) 
         doing: "writing results and report",
         source,
     })
-}
-
-/// Nothing was found at all: what a script must not take for a result.
-pub fn must_hold_something(found: &Results) -> Result<(), CliError> {
-    let answered = found.answer.as_ref().is_some_and(|answer| {
-        answer.contact.k_t_n_per_m.is_some()
-            || answer.between_arms.k_n_per_m.is_some()
-            || answer.clamp.is_some()
-    });
-    if answered || !found.joint.is_empty() || !found.recommended.is_empty() || !found.hysteresis.is_empty() {
-        return Ok(());
-    }
-    Err(CliError::Bad(format!(
-        "{}: no stiffness could be found from this file: {}",
-        found.source.file,
-        found.missing.first().map_or("it holds no good hits and no levels", String::as_str)
-    )))
 }

@@ -1,6 +1,5 @@
 //! `identify`: the joint's stiffness from FRF matrices measured anywhere.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -9,14 +8,13 @@ use clap::Args;
 use super::analyse::{where_to_look, write_into};
 use super::error::CliError;
 use super::output;
-use crate::analyse::{BANDS, Findings, Fit, Missing, NoFit, Substructured, fits};
-use crate::exchange::{PositionsError, read_frf_file, read_positions};
+use crate::analyse::{Asked, IdmSets, Question};
+use crate::exchange::{read_frf_file, read_geometry};
 use crate::report::{document, words};
-use crate::results::{Joint, Results, Source};
-use crate::structure::Structure;
-use crate::substructuring::averaged::{Priors, averaged};
+use crate::results::Source;
+use crate::substructuring::averaged::Priors;
 use crate::substructuring::fit;
-use crate::substructuring::{Band, Dof, Frf, Geometry, IdmSet, Method, identify};
+use crate::substructuring::{Band, Frf};
 
 /// Identify a joint from FRFs of A, B and the assembly, measured anywhere.
 ///
@@ -75,37 +73,12 @@ pub struct Identify {
 impl Identify {
     pub fn run(self) -> Result<(), CliError> {
         let [a, b, ajb] = [read(&self.a)?, read(&self.b)?, read(&self.ajb)?];
-        let (geometry, notes) = read_geometry(&self.geometry)?;
+        let (geometry, notes) = read_geometry(&self.geometry).map_err(bad)?;
         for note in notes {
             eprintln!("jointrig: {note}");
         }
-        let methods: Vec<Method> = if self.methods.is_empty() {
-            Method::ALL.to_vec()
-        } else {
-            self.methods
-                .iter()
-                .filter_map(|m| if let Asked::ByLine(m) = m { Some(*m) } else { None })
-                .collect()
-        };
-        let asked = self.idms.iter().flat_map(|sets| sets.0.iter().copied());
-        let idms: Vec<IdmSet> = if self.idms.is_empty() { IdmSet::ALL.to_vec() } else { asked.collect() };
-        let bands = if self.bands.is_empty() { default_bands(&ajb)? } else { self.bands.clone() };
-        let mut found = Findings { source: self.source(), ..Findings::default() };
-        if !methods.is_empty() {
-            let identified = identify(&a, &b, &ajb, &geometry, &methods, &idms, &bands).map_err(bad)?;
-            let of_frfs = Substructured::of([&a, &b, &ajb], &geometry, &self.priors(), identified);
-            found.missing.extend(of_frfs.cmif.as_ref().err().cloned().map(Missing::Cmif));
-            found.substructured = Some(of_frfs);
-        }
-        // the estimates with an interval need whole rigid motions
-        if idms.contains(&IdmSet::Six) && methods.contains(&Method::Inverse) {
-            let of = |band| averaged(&ajb, &geometry, IdmSet::Six, band, &self.priors());
-            // where it cannot be had, the reason is among the refusals of `inverse` already
-            found.recommended = bands.iter().filter_map(|band| of(*band).ok()).collect();
-        }
-        if self.methods.contains(&Asked::Fit) {
-            found.fits = self.fits([a, b, ajb], &geometry, &idms, &bands);
-        }
+        let question = self.question();
+        let found = question.answered(self.source(), [a, b, ajb], &geometry).map_err(bad)?;
         let results = document(found);
         if let Some(folder) = &self.out {
             write_into(&results, folder, &[])?;
@@ -117,58 +90,23 @@ impl Identify {
             output::lines(words::summary(&results))?;
             output::lines(self.out.iter().map(|folder| where_to_look(folder)))?;
         }
-        self.found_what_was_asked(&results)
+        question.was_answered(&results).map_err(CliError::Bad)
     }
 
-    /// Whether every method and every set of modes that was named gave a row, and whether any row is a number.
-    fn found_what_was_asked(&self, results: &Results) -> Result<(), CliError> {
-        let of_method =
-            |row: &Joint, asked: &Option<Asked>| asked.is_none_or(|asked| row.method == asked.name());
-        let of_set = |row: &Joint, set: &Option<IdmSet>| set.is_none_or(|set| row.modes == set.dofs());
-        let methods: Vec<Option<Asked>> = any_or(self.methods.iter().copied());
-        let sets: Vec<Option<IdmSet>> = any_or(self.idms.iter().flat_map(|sets| sets.0.iter().copied()));
-        let there = |method: &Option<Asked>, set: &Option<IdmSet>| {
-            results.joint.iter().any(|row| of_method(row, method) && of_set(row, set))
-        };
-        let all = methods.iter().all(|method| sets.iter().all(|set| there(method, set)));
-        let is_number = |row: &Joint| row.identified() || row.sliding_stiffness().is_none();
-        let recommended = results.recommended.iter().any(|r| r.joint.values().any(|dof| dof.identified));
-        if all && (recommended || results.joint.iter().any(is_number)) {
-            return Ok(());
-        }
-        Err(CliError::Bad(refusals(results).unwrap_or_else(|| {
-            "nothing was identified: scatter or noise is larger than every value (the rows above say by how much); average more hits, \
-             or choose another --band"
-                .into()
-        })))
-    }
-
-    fn priors(&self) -> Priors {
-        Priors { position_m: self.position_error, aim_m: self.aim_error, hammer_angle_rad: self.angle_error }
-    }
-
-    /// The fit with each set of modes over each band.
-    fn fits(&self, frfs: [Frf; 3], geometry: &Geometry, idms: &[IdmSet], bands: &[Band]) -> Vec<Fit> {
-        let shape = if self.full_joint { fit::Shape::Full } else { fit::Shape::Diagonal };
-        let options = fit::Options {
-            priors: self.priors(),
-            shape,
+    fn question(&self) -> Question {
+        Question {
+            methods: self.methods.clone(),
+            idms: self.idms.iter().flat_map(|sets| sets.0.iter().copied()).collect(),
+            bands: self.bands.clone(),
+            priors: Priors {
+                position_m: self.position_error,
+                aim_m: self.aim_error,
+                hammer_angle_rad: self.angle_error,
+            },
+            full_joint: self.full_joint,
+            noise: self.noise,
             mounting: self.mounting_error,
-            ..fit::Options::default()
-        };
-        let mut known = Vec::new();
-        for (name, frf) in Structure::ALL.into_iter().zip(frfs) {
-            known.push(match self.noise {
-                _ if frf.variance().is_some() => frf,
-                Some(fraction) => frf.with_relative_noise(fraction),
-                None => {
-                    let refused =
-                        |set: &IdmSet| Fit { idms: *set, outcome: Err(NoFit::FileWithoutVariance(name)) };
-                    return idms.iter().map(refused).collect();
-                }
-            });
         }
-        fits([&known[0], &known[1], &known[2]], geometry, idms, bands, &options)
     }
 
     fn source(&self) -> Source {
@@ -185,113 +123,8 @@ impl Identify {
     }
 }
 
-/// A method as it may be asked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Asked {
-    /// One that works line by line.
-    ByLine(Method),
-    /// Maximum likelihood over all lines.
-    Fit,
-}
-
-impl Asked {
-    fn name(self) -> &'static str {
-        match self {
-            Self::ByLine(method) => method.name(),
-            Self::Fit => fit::NAME,
-        }
-    }
-}
-
-/// What was named, or the one wish for anything.
-fn any_or<T>(named: impl Iterator<Item = T>) -> Vec<Option<T>> {
-    let named: Vec<Option<T>> = named.map(Some).collect();
-    if named.is_empty() { vec![None] } else { named }
-}
-
-impl FromStr for Asked {
-    type Err = String;
-    fn from_str(name: &str) -> Result<Self, String> {
-        if name == fit::NAME {
-            return Ok(Asked::Fit);
-        }
-        name.parse().map(Asked::ByLine).map_err(|reason: String| format!("{reason}, {}", fit::NAME))
-    }
-}
-
-/// One line for each reason, with the methods it stopped.
-fn refusals(results: &Results) -> Option<String> {
-    let mut by_reason: BTreeMap<&str, Vec<String>> = BTreeMap::new();
-    for r in &results.refused {
-        by_reason.entry(&r.reason).or_default().push(format!("{} with {} IDMs", r.method, r.idms));
-    }
-    let lines: Vec<String> =
-        by_reason.iter().map(|(reason, who)| format!("refused {}: {reason}", who.join(", "))).collect();
-    (!lines.is_empty()).then(|| lines.join("\n"))
-}
-
-/// The default bands that hold a line of the files.
-fn default_bands(frf: &Frf) -> Result<Vec<Band>, CliError> {
-    let bands: Vec<Band> =
-        BANDS.into_iter().filter(|band| frf.frequency_hz().iter().any(|f| band.contains(*f))).collect();
-    if bands.is_empty() {
-        let (first, last) = (frf.frequency_hz().first(), frf.frequency_hz().last());
-        return Err(CliError::Bad(format!(
-            "none of the default bands holds a line of the files, which cover {first:?} to {last:?} Hz: give --band LO:HI"
-        )));
-    }
-    Ok(bands)
-}
-
-/// The geometry, and what a reader must know about it.
-fn read_geometry(path: &Path) -> Result<(Geometry, Vec<String>), CliError> {
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
-        let text = std::fs::read_to_string(path).map_err(|source| CliError::Read {
-            path: path.into(),
-            doing: "reading the geometry",
-            source,
-        })?;
-        let geometry: Geometry =
-            toml::from_str(&text).map_err(|e| {
-                let line = e.span().map_or(1, |at| 1 + text[..at.start].matches('\n').count());
-                CliError::Bad(format!(
-                    "{}, line {line}: {}; a geometry has `a`, `b` and `ajb`, each with `channels` and `impacts`, and both \
-                     virtual points (docs/coming-from-pyfbs.md)",
-                    path.display(),
-                    e.message()
-                ))
-            })?;
-        return Ok((geometry, Vec::new()));
-    }
-    let positions = read_positions(path).map_err(|e: PositionsError| bad(e))?;
-    Ok((positions.geometry, positions.warnings))
-}
-
 fn bad(error: impl std::fmt::Display) -> CliError {
     CliError::Bad(error.to_string())
-}
-
-/// What one `--idms` asks for: the paper's sets by their sizes, or one set by its modes.
-#[derive(Debug, Clone, PartialEq)]
-struct IdmSets(Vec<IdmSet>);
-
-impl FromStr for IdmSets {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        let words: Vec<&str> = text.split(',').map(str::trim).collect();
-        let sizes: Result<Vec<usize>, _> = words.iter().map(|w| w.parse()).collect();
-        if let Ok(sizes) = sizes {
-            let set = |count| {
-                IdmSet::from_count(count).ok_or_else(|| {
-                    format!("there is no set of {count} modes: 2, 4 or 6, or name the modes (x,z,ry)")
-                })
-            };
-            return sizes.into_iter().map(set).collect::<Result<_, _>>().map(IdmSets);
-        }
-        let modes: Vec<Dof> = words.iter().map(|w| w.parse()).collect::<Result<_, _>>()?;
-        let set = IdmSet::of(&modes).ok_or_else(|| format!("`{text}` names a mode twice"))?;
-        Ok(IdmSets(vec![set]))
-    }
 }
 
 /// FRFs from an npz or a universal file; what was left out is said.
@@ -326,18 +159,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bands_and_sets_are_read_or_refused_in_words() {
+    fn bands_are_read_or_refused_in_words() {
         assert_eq!(band("300:600"), Ok(Band { low_hz: 300.0, high_hz: 600.0 }));
         for wrong in ["300", "600:300", "a:b", "300:inf", "-1:5"] {
             assert!(band(wrong).is_err(), "{wrong}");
         }
-        assert_eq!("4".parse(), Ok(IdmSets(vec![IdmSet::Four])));
-        assert_eq!("2, 6".parse(), Ok(IdmSets(vec![IdmSet::Two, IdmSet::Six])));
-        let chosen = IdmSet::of(&[Dof::X, Dof::Z, Dof::Ry]).expect("three modes");
-        assert_eq!("x,z,ry".parse(), Ok(IdmSets(vec![chosen])));
-        assert!("3".parse::<IdmSets>().is_err_and(|e| e.contains("2, 4 or 6")));
-        assert!("x,q".parse::<IdmSets>().is_err_and(|e| e.contains("`q`")));
-        assert!("x,x".parse::<IdmSets>().is_err_and(|e| e.contains("twice")));
         assert!(not_negative("-0.1").is_err() && not_negative("5e-4").is_ok());
     }
 }

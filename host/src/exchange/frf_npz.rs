@@ -62,6 +62,7 @@ pub fn read_frf(path: &Path) -> Result<Frf, NpzError> {
         }
         whole =
             whole.with_variance(by_line(&array, rows, columns)).map_err(|e| file.content(e.to_string()))?;
+        whole.check_variance().map_err(|e| file.content(e.to_string()))?;
     }
     if file.has("coherence")
         && let Ok(array) = file.real("coherence", "the coherence of each value")

@@ -10,6 +10,7 @@ pub mod channel_records;
 pub mod frf_file;
 pub mod frf_npz;
 pub mod frf_uff;
+pub mod geometry_file;
 pub mod npz;
 pub mod npz_output;
 pub mod positions;
@@ -27,6 +28,7 @@ pub use jointrig_uff as uff;
 pub use frf_file::{FrfFileError, read_frf_file};
 pub use frf_npz::{Extra, read_frf, write_frf};
 pub use frf_uff::FrfUffError;
+pub use geometry_file::{GeometryFileError, read_geometry};
 pub use npz::NpzError;
 pub use positions::{PositionsError, read_positions};
 pub use record_npz::{

@@ -20,3 +20,23 @@ pub fn analysed(
     }
     Ok(results)
 }
+
+/// Whether anything at all was found: nothing must not be taken for a result.
+///
+/// # Errors
+/// The first reason, in words.
+pub fn must_hold_something(found: &Results) -> Result<(), String> {
+    let answered = found.answer.as_ref().is_some_and(|answer| {
+        answer.contact.k_t_n_per_m.is_some()
+            || answer.between_arms.k_n_per_m.is_some()
+            || answer.clamp.is_some()
+    });
+    if answered || !found.joint.is_empty() || !found.recommended.is_empty() || !found.hysteresis.is_empty() {
+        return Ok(());
+    }
+    Err(format!(
+        "{}: no stiffness could be found from this file: {}",
+        found.source.file,
+        found.missing.first().map_or("it holds no good hits and no levels", String::as_str)
+    ))
+}

@@ -17,7 +17,7 @@ mod svg;
 mod tables;
 pub mod words;
 
-pub use analysed::analysed;
+pub use analysed::{analysed, must_hold_something};
 pub use document::{compare, document};
 pub use page::{chart_style, comparison_page, figure_fragment, page, script};
 
@@ -112,6 +112,18 @@ fn write_figures(figures: &[figure::Figure], folder: &Path, formats: &[Format]) 
         }
     }
     Ok(())
+}
+
+/// A figure for a notebook: an SVG in the reader's light or dark.
+pub fn notebook_figure(figure: &figure::Figure) -> String {
+    svg::notebook(figure)
+}
+
+/// A matrix of FRFs over frequency, at most six pairs of it; none without a line above 0 Hz.
+pub fn frf_figure(frf: &crate::frf::Frf, title: &str) -> Option<figure::Figure> {
+    let version = env!("CARGO_PKG_VERSION").into();
+    let from = figure::Source { file: title.into(), version, ..figure::Source::default() };
+    Some(figure::Figure { from, ..figures::frf_matrix(frf)? })
 }
 
 /// Writes one figure, as [`write`](fn@write) does.

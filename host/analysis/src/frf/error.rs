@@ -91,6 +91,20 @@ pub enum FrfError {
         /// The line, Hz.
         frequency_hz: f64,
     },
+    /// A variance is below zero.
+    #[error(
+        "the variance of the FRF from `{input}` to `{output}` is {variance} at {frequency_hz} Hz: a variance is zero or more, NaN where it is not known"
+    )]
+    NegativeVariance {
+        /// The row's name.
+        output: String,
+        /// The column's name.
+        input: String,
+        /// The line, Hz.
+        frequency_hz: f64,
+        /// What was given.
+        variance: f64,
+    },
     /// A line at s = 0 cannot be divided by s.
     #[error("line {line} is at s = 0: a {} has no receptance there; cut the line out", quantity.frf_name())]
     DivisionByZero {

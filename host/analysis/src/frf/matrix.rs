@@ -194,6 +194,21 @@ impl Frf {
         Ok(())
     }
 
+    /// Refuses a variance below zero, naming the first.
+    ///
+    /// # Errors
+    /// [`FrfError::NegativeVariance`].
+    pub fn check_variance(&self) -> Result<(), FrfError> {
+        for (own, &frequency_hz) in self.variance().into_iter().flatten().zip(&self.frequency_hz) {
+            let Some(at) = own.iter().position(|variance| *variance < 0.0) else { continue };
+            // nalgebra keeps columns together
+            let (row, column) = (at % own.nrows(), at / own.nrows());
+            let (output, input) = (self.outputs[row].clone(), self.inputs[column].clone());
+            return Err(FrfError::NegativeVariance { output, input, frequency_hz, variance: own[at] });
+        }
+        Ok(())
+    }
+
     /// The Laplace variable s = σ + i2πf of a line, 1/s.
     pub fn s(&self, line: usize) -> Complex<f64> {
         Complex::new(self.sigma_per_s, TAU * self.frequency_hz[line])
@@ -360,6 +375,24 @@ mod tests {
         });
         let text = y.check_finite().expect_err("a NaN").to_string();
         assert!(text.contains("`g`") && text.contains("`a`") && text.contains("300"));
+    }
+
+    #[test]
+    fn a_negative_variance_is_named_by_cell_and_line_and_an_unknown_one_is_none() {
+        let with = |value| {
+            let mut variance = vec![DMatrix::from_element(2, 2, 1.0); 3];
+            variance[1][(1, 0)] = value;
+            small(MotionQuantity::Velocity)
+                .with_variance(variance)
+                .expect("one for each value")
+                .check_variance()
+        };
+        let text = with(-0.5).expect_err("negative").to_string();
+        assert!(
+            text.contains("`f`") && text.contains("`b`") && text.contains("200 Hz") && text.contains("-0.5"),
+            "{text}"
+        );
+        assert!(with(0.0).is_ok() && with(f64::NAN).is_ok());
     }
 
     #[test]

@@ -12,6 +12,7 @@ mod comparison;
 mod consistency;
 mod contact_loop;
 mod decay_loops;
+mod frf_matrix;
 mod geometry;
 mod impacts;
 mod interface_modes;
@@ -28,6 +29,7 @@ mod shaker_loops;
 mod specimens;
 mod usable_bands;
 
+pub use frf_matrix::frf_matrix;
 pub use geometry::geometry;
 
 use super::figure::{Figure, Panel, Source};

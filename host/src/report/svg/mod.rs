@@ -25,8 +25,27 @@ const STYLE: &str = "text{fill:#333;stroke:none;font-family:system-ui,\"Segoe UI
     .tick{font-size:12px}.legend{font-size:12.5px}.label{font-size:13px}.title{font-size:14px;font-weight:600}.heading{font-size:17px;font-weight:600}\
     .paper{fill:#fff}.frame{stroke:#888}.grid{stroke:#e4e4e4}.none{fill:none}.s-paper{stroke:#fff}";
 
+/// What is other on dark paper.
+const DARK: &str =
+    "text{fill:#ccc}.paper{fill:#16181b}.frame{stroke:#777}.grid{stroke:#33363b}.s-paper{stroke:#16181b}";
+
 /// The figure as an SVG file of its own, on light paper.
 pub fn file(figure: &Figure) -> String {
+    with_style(figure, "", &format!("{STYLE}{}", role::plain_classes()))
+}
+
+/// The same for a notebook: on the reader's paper, light or dark, and with a style that stays within the drawing.
+pub fn notebook(figure: &Figure) -> String {
+    let id = format!("jointrig-{}", figure.name);
+    let [light, dark] = [false, true].map(role::variables);
+    let style = format!(
+        "#{id}{{{light}{STYLE}{}}}@media(prefers-color-scheme:dark){{#{id}{{{dark}{DARK}}}}}",
+        role::classes()
+    );
+    with_style(figure, &format!(" id=\"{id}\""), &style)
+}
+
+fn with_style(figure: &Figure, id: &str, style: &str) -> String {
     let columns = figure.columns.max(1);
     let width = (WIDTH - GAP * (columns as f64 - 1.0)) / columns as f64;
     let mut parts = String::new();
@@ -47,11 +66,10 @@ pub fn file(figure: &Figure) -> String {
     }
     let simulated = if figure.from.simulated { "SIMULATED rig. " } else { "" };
     format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {top:.0}\" width=\"{WIDTH}\" height=\"{top:.0}\" role=\"img\" aria-label=\"{}\">\
-         <style>{STYLE}{}</style><rect width=\"100%\" height=\"100%\" class=\"paper\"/><text x=\"8\" y=\"22\" class=\"heading\">{}</text>\
+        "<svg xmlns=\"http://www.w3.org/2000/svg\"{id} viewBox=\"0 0 {WIDTH} {top:.0}\" width=\"{WIDTH}\" height=\"{top:.0}\" role=\"img\" aria-label=\"{}\">\
+         <style>{style}</style><rect width=\"100%\" height=\"100%\" class=\"paper\"/><text x=\"8\" y=\"22\" class=\"heading\">{}</text>\
          <text x=\"8\" y=\"42\" class=\"tick\">{simulated}{}, jointrig {}</text>{parts}</svg>\n",
         escape(&figure.say),
-        role::plain_classes(),
         escape(&figure.heading()),
         escape(&figure.from.file),
         escape(&figure.from.version),

@@ -2,9 +2,20 @@
 
 use super::answer_sentences::with_interval;
 use super::number::{band, stiffness};
+use super::{brief, summary};
 use crate::contact::Interval;
 use crate::results::{Joint, Results, headline_rank};
 use crate::substructuring::{Dof, fit};
+
+/// All that was found in one line: the answer of a campaign, else the first number of anything else.
+pub fn of(results: &Results) -> String {
+    let answer = brief::answer(results).into_iter().next();
+    answer
+        .map(|line| format!("{} {}", line.head, line.text))
+        .or_else(|| between_the_arms(results))
+        .or_else(|| summary::summary(results).into_iter().next())
+        .unwrap_or_else(|| "no stiffness was found".into())
+}
 
 /// The stiffness along the sliding direction, by the best of what was found: the fit where it was asked for, then the recommended
 /// estimate, then single methods. None where no method identified it.
