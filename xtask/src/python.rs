@@ -1,80 +1,104 @@
-//! `cargo xtask python`: the wheel is built, installed into an empty environment, and tested from there, not from the tree.
+//! `cargo xtask python`: the wheel is built, installed into empty environments, and tested from there, not from the tree.
 //!
 //! Python and its packages are this check's alone, in folders under `target/`; no part of jointrig needs them.
 
 use crate::command;
 use crate::project::Project;
 use anyhow::{Context, Result, bail};
+use std::collections::BTreeMap;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Oldest Python that the wheel is made for.
 const OLDEST: (u32, u32) = (3, 10);
 
-/// What builds the wheel, and what tests it.
+/// Newest that is looked for by its name.
+const NEWEST: u32 = 20;
+
+/// Bytes of the wheel, at most.
+const WHEEL: u64 = 5_000_000;
+
+/// What builds the wheel, and what tests it where nothing else is installed.
 const TOOLS: [&str; 1] = ["maturin>=1.9,<2"];
-const TESTS: [&str; 3] = ["numpy", "pytest", "mypy"];
+const ALONE: [&str; 2] = ["numpy", "pytest"];
+
+/// What the wheel is used with: the packages that notebooks import beside it, engines that read the columns, and a scheduler.
+const OTHERS: [&str; 13] = [
+    "numpy",
+    "pytest",
+    "mypy",
+    "matplotlib",
+    "pandas",
+    "scipy",
+    "openpyxl",
+    "tqdm",
+    "pyFRF==1.5.0",
+    "pyuff==2.5.8",
+    "duckdb",
+    "polars",
+    "dask[distributed]",
+];
+
+/// pyFBS without its 3D views, which take a gigabyte.
+const WITHOUT_WHAT_THEY_NEED: [&str; 1] = ["pyFBS==1.0.7"];
 
 /// Builds and tests the wheel; a remark on it, or why it was left out.
 pub fn run(project: &Project) -> Result<String> {
-    let Some(system) = ["python3", "python"].into_iter().find_map(command::find_program) else {
-        return Ok(left_out("there is no Python"));
+    let found = interpreters();
+    let (Some((oldest, first)), Some((newest, last))) = (found.first_key_value(), found.last_key_value())
+    else {
+        return Ok(left_out(&format!("there is no Python {}.{} or newer", OLDEST.0, OLDEST.1)));
     };
-    let Some((major, minor)) = version(&system) else {
-        return Ok(left_out("python3 does not tell its version"));
-    };
-    if (major, minor) < OLDEST {
-        return Ok(left_out(&format!("Python {major}.{minor} is older than {}.{}", OLDEST.0, OLDEST.1)));
-    }
     let folder = project.target.join("python");
-    let Ok(tools) = environment(&system, &folder.join("tools"), &TOOLS) else {
+    let Ok(tools) = environment(last, &folder.join("tools"), &TOOLS) else {
         return Ok(left_out(
             "no environment with maturin can be made (on Debian: python3-venv; pip needs its registry)",
         ));
     };
-    let wheels = folder.join("wheels");
-    if wheels.is_dir() {
-        std::fs::remove_dir_all(&wheels).context("old wheels cannot be removed")?;
+    let wheel = build(project, &folder, &tools, last)?;
+    let bytes = fs::metadata(&wheel)?.len();
+    if bytes > WHEEL {
+        bail!("the wheel has {bytes} bytes, and {WHEEL} are allowed");
     }
-    let mut maturin = Command::new(tools.with_file_name("maturin"));
-    maturin.current_dir(project.root.join("host/python"));
-    maturin.args(["build", "--release", "--locked", "--quiet", "--out"]).arg(&wheels);
-    maturin.arg("--interpreter").arg(&system).env("CARGO_TARGET_DIR", &project.target);
-    command::run(&mut maturin).context("the wheel cannot be built")?;
-    let wheel = std::fs::read_dir(&wheels)?
-        .flatten()
-        .map(|entry| entry.path())
-        .next()
-        .context("there is no wheel")?;
-    let bytes = std::fs::metadata(&wheel)?.len();
-    if bytes > 5_000_000 {
-        bail!("the wheel has {bytes} bytes, and 5 MB are allowed");
+    let tests = Tests { project, folder: &folder, wheel: &wheel };
+    let mut versions = vec![format!("{}.{}", oldest.0, oldest.1)];
+    tests.alone(first, "oldest")?;
+    if oldest == newest {
+        println!("LEFT OUT: the wheel is tested with Python {} alone: no other is here", versions[0]);
+    } else {
+        versions.push(format!("{}.{}", newest.0, newest.1));
+        tests.alone(last, "newest")?;
     }
-    // a fresh one each time: what an older wheel left behind must not help
-    let fresh = folder.join("fresh");
-    if fresh.is_dir() {
-        std::fs::remove_dir_all(&fresh).context("the old environment cannot be removed")?;
-    }
-    let python = environment(&system, &fresh, &TESTS)?;
-    command::run(Command::new(&python).args(["-m", "pip", "install", "--quiet", "--no-deps"]).arg(&wheel))?;
-    let tests = project.root.join("host/python/tests");
-    let mut pytest = Command::new(&python);
-    pytest.args(["-m", "pytest", "-q", "-p", "no:cacheprovider"]).arg(&tests).current_dir(&folder);
-    pytest.env(
-        "JOINTRIG_BIN",
-        project.target.join("release").join(format!("jointrig{}", std::env::consts::EXE_SUFFIX)),
-    );
-    pytest.env("PYTHONDONTWRITEBYTECODE", "1");
-    command::run(&mut pytest).context("the wheel failed its tests")?;
-    let mut mypy = Command::new(&python);
-    mypy.args(["-m", "mypy", "--strict", "--cache-dir"]).arg(folder.join("mypy")).current_dir(&tests);
-    command::run(mypy.args(["test_lab.py", "test_signals.py"])).context("the stubs do not fit the tests")?;
-    Ok(format!("a wheel of {:.1} MB, tested with Python {major}.{minor}", bytes as f64 / 1e6))
+    tests.with_others(last)?;
+    Ok(format!("a wheel of {:.1} MB, tested with Python {}", bytes as f64 / 1e6, versions.join(" and ")))
 }
 
 fn left_out(why: &str) -> String {
     println!("LEFT OUT: the Python wheel was neither built nor tested: {why}");
     format!("LEFT OUT: {why}")
+}
+
+/// Each version of Python that the wheel is made for, once: by its name on the path, and where pyenv keeps them.
+fn interpreters() -> BTreeMap<(u32, u32), PathBuf> {
+    let named = (OLDEST.1..NEWEST).map(|minor| format!("python3.{minor}"));
+    let mut candidates: Vec<PathBuf> = ["python3".to_owned(), "python".to_owned()]
+        .into_iter()
+        .chain(named)
+        .filter_map(|name| command::find_program(&name))
+        .collect();
+    let root = std::env::var_os("PYENV_ROOT")
+        .map(PathBuf::from)
+        .or_else(|| std::env::home_dir().map(|home| home.join(".pyenv")));
+    let kept = root.and_then(|root| fs::read_dir(root.join("versions")).ok());
+    candidates.extend(kept.into_iter().flatten().flatten().map(|entry| entry.path().join("bin/python3")));
+    let mut found = BTreeMap::new();
+    for path in candidates {
+        if let Some(version) = version(&path).filter(|version| *version >= OLDEST) {
+            found.entry(version).or_insert(path);
+        }
+    }
+    found
 }
 
 fn version(python: &Path) -> Option<(u32, u32)> {
@@ -86,6 +110,75 @@ fn version(python: &Path) -> Option<(u32, u32)> {
     Some((major.parse().ok()?, minor.parse().ok()?))
 }
 
+/// The wheel, one for all versions of Python.
+fn build(project: &Project, folder: &Path, tools: &Path, interpreter: &Path) -> Result<PathBuf> {
+    let wheels = folder.join("wheels");
+    if wheels.is_dir() {
+        fs::remove_dir_all(&wheels).context("old wheels cannot be removed")?;
+    }
+    let mut maturin = Command::new(tools.with_file_name("maturin"));
+    maturin.current_dir(project.root.join("host/python"));
+    maturin.args(["build", "--release", "--locked", "--quiet", "--out"]).arg(&wheels);
+    maturin.arg("--interpreter").arg(interpreter).env("CARGO_TARGET_DIR", &project.target);
+    command::run(&mut maturin).context("the wheel cannot be built")?;
+    let built = fs::read_dir(&wheels)?.flatten().map(|entry| entry.path()).next();
+    built.context("there is no wheel")
+}
+
+/// Tests of a wheel.
+struct Tests<'a> {
+    project: &'a Project,
+    folder: &'a Path,
+    wheel: &'a Path,
+}
+
+impl Tests<'_> {
+    /// With numpy alone, in a fresh environment: what an older wheel or another package left behind must not help.
+    fn alone(&self, system: &Path, name: &str) -> Result<()> {
+        let fresh = self.folder.join(name);
+        if fresh.is_dir() {
+            fs::remove_dir_all(&fresh).context("the old environment cannot be removed")?;
+        }
+        let python = environment(system, &fresh, &ALONE)?;
+        self.install(&python)?;
+        self.pytest(&python, &["--ignore=with_others"])
+    }
+
+    /// With the packages that people use beside it, and the stubs. This environment is kept: it takes half a gigabyte.
+    fn with_others(&self, system: &Path) -> Result<()> {
+        let python = environment(system, &self.folder.join("others"), &OTHERS)?;
+        pip(&python, &["install", "--quiet", "--no-deps"], &WITHOUT_WHAT_THEY_NEED)?;
+        pip(&python, &["uninstall", "--quiet", "--yes"], &["jointrig"])?;
+        self.install(&python)?;
+        self.pytest(&python, &["with_others"])?;
+        let cache = self.folder.join("mypy");
+        let mut mypy = Command::new(&python);
+        mypy.args(["-m", "mypy", "--strict", "--cache-dir"]).arg(&cache).current_dir(self.tests());
+        command::run(mypy.args(["test_lab.py", "test_signals.py", "test_identify.py"]))
+            .context("the stubs do not fit the tests")?;
+        let mut stubs = Command::new(&python);
+        stubs.args(["-m", "mypy.stubtest", "jointrig._native"]).current_dir(self.folder);
+        command::run(&mut stubs).context("the stubs are not those of the module")
+    }
+
+    fn tests(&self) -> PathBuf {
+        self.project.root.join("host/python/tests")
+    }
+
+    fn install(&self, python: &Path) -> Result<()> {
+        pip(python, &["install", "--quiet", "--no-deps"], &[self.wheel])
+    }
+
+    fn pytest(&self, python: &Path, which: &[&str]) -> Result<()> {
+        let mut pytest = Command::new(python);
+        pytest.args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "--durations=5"]).args(which);
+        pytest.current_dir(self.tests()).env("PYTHONDONTWRITEBYTECODE", "1");
+        let command = format!("jointrig{}", std::env::consts::EXE_SUFFIX);
+        pytest.env("JOINTRIG_BIN", self.project.target.join("release").join(command));
+        command::run(&mut pytest).context("the wheel failed its tests")
+    }
+}
+
 /// The interpreter of an environment that has these packages; made where it is not there.
 fn environment(system: &Path, folder: &Path, packages: &[&str]) -> Result<PathBuf> {
     let interpreter = folder.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
@@ -93,7 +186,13 @@ fn environment(system: &Path, folder: &Path, packages: &[&str]) -> Result<PathBu
         command::run(Command::new(system).args(["-m", "venv"]).arg(folder))
             .context("the environment cannot be made: on Debian, install python3-venv")?;
     }
-    command::run(Command::new(&interpreter).args(["-m", "pip", "install", "--quiet"]).args(packages))
-        .context("the packages cannot be installed")?;
+    pip(&interpreter, &["install", "--quiet"], packages)?;
     Ok(interpreter)
+}
+
+fn pip<T: AsRef<std::ffi::OsStr>>(python: &Path, how: &[&str], packages: &[T]) -> Result<()> {
+    command::run(
+        Command::new(python).args(["-m", "pip", "--disable-pip-version-check"]).args(how).args(packages),
+    )
+    .context("the packages cannot be installed")
 }

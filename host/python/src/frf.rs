@@ -2,8 +2,12 @@
 
 use std::path::PathBuf;
 
-use jointrig::exchange::write_frf;
-use numpy::{Complex64, IntoPyArray, PyArray1, PyArray3, PyArrayMethods};
+use jointrig::exchange::{read_frf_file, write_frf};
+use jointrig::frf::MotionQuantity;
+use jointrig::report;
+use nalgebra::DMatrix;
+use numpy::ndarray::ArrayView3;
+use numpy::{Complex64, IntoPyArray, PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray3};
 use pyo3::prelude::*;
 
 use crate::raised;
@@ -12,12 +16,15 @@ use crate::raised;
 #[pyclass(module = "jointrig._native", frozen)]
 pub struct Frf {
     frf: jointrig::frf::Frf,
-    frequency_hz: Vec<f64>,
 }
 
 impl Frf {
     pub fn of(frf: jointrig::frf::Frf) -> Self {
-        Self { frequency_hz: frf.frequency_hz().to_vec(), frf }
+        Self { frf }
+    }
+
+    pub fn matrix(&self) -> &jointrig::frf::Frf {
+        &self.frf
     }
 
     fn shape(&self) -> [usize; 3] {
@@ -37,12 +44,64 @@ impl Frf {
     }
 }
 
+/// One matrix a line.
+fn lines<T: nalgebra::Scalar>(values: ArrayView3<'_, T>) -> Vec<DMatrix<T>> {
+    let [_, outputs, inputs] = [values.shape()[0], values.shape()[1], values.shape()[2]];
+    values
+        .outer_iter()
+        .map(|line| DMatrix::from_row_iterator(outputs, inputs, line.iter().cloned()))
+        .collect()
+}
+
 #[pymethods]
 impl Frf {
+    #[new]
+    #[pyo3(signature = (*, frequency_hz, frf, quantity, outputs, inputs, sigma_per_s=0.0, variance=None, coherence=None))]
+    #[allow(clippy::too_many_arguments, reason = "Python names each of them")]
+    fn new(
+        py: Python<'_>,
+        frequency_hz: PyReadonlyArray1<'_, f64>,
+        frf: PyReadonlyArray3<'_, Complex64>,
+        quantity: &str,
+        outputs: Vec<String>,
+        inputs: Vec<String>,
+        sigma_per_s: f64,
+        variance: Option<PyReadonlyArray3<'_, f64>>,
+        coherence: Option<PyReadonlyArray3<'_, f64>>,
+    ) -> PyResult<Self> {
+        let refused = |sentence: &str| raised::refused(py, sentence);
+        let Some(quantity) = MotionQuantity::from_frf_name(quantity) else {
+            return Err(refused(&format!(
+                "quantity is `{quantity}`: receptance, mobility or accelerance is needed"
+            )));
+        };
+        let frequency_hz = frequency_hz.as_array().to_vec();
+        let values = lines(frf.as_array().map(|v| nalgebra::Complex::new(v.re, v.im)).view());
+        let made = jointrig::frf::Frf::new(frequency_hz, sigma_per_s, quantity, outputs, inputs, values)
+            .and_then(|frf| match &variance {
+                Some(own) => frf.with_variance(lines(own.as_array())),
+                None => Ok(frf),
+            })
+            .and_then(|frf| match &coherence {
+                Some(own) => frf.with_coherence(lines(own.as_array())),
+                None => Ok(frf),
+            });
+        let whole = made.and_then(|frf| frf.check_variance().map(|()| frf));
+        whole.map(Self::of).map_err(|error| refused(&error.to_string()))
+    }
+
+    /// The FRFs of an npz or a universal file, and what was left out of it.
+    #[staticmethod]
+    fn read(py: Python<'_>, path: PathBuf) -> PyResult<(Self, Vec<String>)> {
+        let read = py.detach(|| read_frf_file(&path));
+        let (frf, notes) = read.map_err(|error| raised::reading(py, &path, &error.to_string()))?;
+        Ok((Self::of(frf), notes.iter().map(ToString::to_string).collect()))
+    }
+
     /// (line,) float64, Hz.
     #[getter]
     fn frequency_hz<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.frequency_hz.clone().into_pyarray(py)
+        self.frf.frequency_hz().to_vec().into_pyarray(py)
     }
 
     /// (line, output, input) complex128 in SI per N, on s = sigma + i 2 pi f.
@@ -94,14 +153,47 @@ impl Frf {
         self.frf.sigma_per_s()
     }
 
+    /// The same as receptances, m/N: divided by s once or twice.
+    fn to_receptance(&self, py: Python<'_>) -> PyResult<Self> {
+        self.frf.to_receptance().map(Self::of).map_err(|error| raised::refused(py, &error.to_string()))
+    }
+
+    /// The lines from `low_hz` to `high_hz`, ends included.
+    fn band(&self, low_hz: f64, high_hz: f64) -> Self {
+        Self::of(self.frf.band(low_hz, high_hz))
+    }
+
+    /// The rows and columns with these names, in this order.
+    fn select(&self, py: Python<'_>, outputs: Vec<String>, inputs: Vec<String>) -> PyResult<Self> {
+        let chosen = self.frf.select(&outputs, &inputs);
+        chosen.map(Self::of).map_err(|error| raised::refused(py, &error.to_string()))
+    }
+
     /// Writes an npz that `identify` and `import` take.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         py.detach(|| write_frf(&path, &self.frf, &[]))
-            .map_err(|error| raised::writing(py, &error.to_string()))
+            .map_err(|error| raised::reading(py, &path, &error.to_string()))
+    }
+
+    fn to_pyfbs<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("jointrig._others")?.call_method1("to_pyfbs", (slf,))
+    }
+
+    fn to_dataframe<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("jointrig._others")?.call_method1("to_dataframe", (slf,))
+    }
+
+    fn _repr_svg_(&self) -> Option<String> {
+        report::frf_figure(&self.frf, "FRFs").as_ref().map(report::notebook_figure)
     }
 
     fn __repr__(&self) -> String {
         let [lines, outputs, inputs] = self.shape();
-        format!("Frf: {} of {outputs} outputs, {inputs} inputs, {lines} lines", self.quantity())
+        let hz = self.frf.frequency_hz();
+        let over = match (hz.first(), hz.last()) {
+            (Some(first), Some(last)) => format!(" from {first} to {last} Hz"),
+            _ => String::new(),
+        };
+        format!("Frf: {} of {outputs} outputs, {inputs} inputs, {lines} lines{over}", self.quantity())
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use jointrig::analyse::{AnalyseError, CampaignFile, KnownContact, Wanted};
+use jointrig::analyse::{self, AnalyseError, CampaignFile, KnownContact, Wanted};
 use jointrig::campaign::plan::structure;
 use jointrig::campaign::run::status;
 use jointrig::campaign::store::Store;
@@ -10,12 +10,11 @@ use jointrig::campaign::store::error::StoreError;
 use jointrig::report;
 use pyo3::prelude::*;
 
+use crate::analysis::Analysis;
 use crate::frf::Frf;
+use crate::interruptible::{self, Stopped};
 use crate::record::Record;
 use crate::{in_the_process_that_loaded_this, raised, values};
-
-/// Lines of FRFs, Hz, as the command exports them.
-const BAND_HZ: (f64, f64) = (10.0, 1000.0);
 
 /// A campaign file, read only; it may be measured meanwhile. Holds a path and no connection, so that it can be pickled.
 #[pyclass(module = "jointrig._native", frozen)]
@@ -27,7 +26,8 @@ pub struct Lab {
 impl Lab {
     #[new]
     fn new(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        py.detach(|| Store::open_read_only(&path).map(drop)).map_err(|error| raised::file(py, &error))?;
+        py.detach(|| Store::open_read_only(&path).map(drop))
+            .map_err(|error| raised::file(py, &path, &error))?;
         Ok(Self { path })
     }
 
@@ -44,6 +44,14 @@ impl Lab {
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let (kept, wanted) = self.read(py, status::counts)?;
         Ok(format!("Lab({:?}): {kept} of {wanted} good hits", self.path.display().to_string()))
+    }
+
+    /// Where the plan sends hammer and vibrometer.
+    fn _repr_svg_(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        let plan = self.read(py, Store::plan)?;
+        let name = self.path.file_name().unwrap_or_default().to_string_lossy();
+        let figure = report::planned_places(&analyse::places(&plan), &name);
+        Ok(figure.as_ref().map(report::notebook_figure))
     }
 
     /// What `jointrig campaign status --json` says.
@@ -73,18 +81,19 @@ impl Lab {
         Ok(all.into_iter().filter(of).collect())
     }
 
-    /// H1 of a configuration's good hits, or the FRFs that were imported for it.
-    #[pyo3(signature = (configuration, *, band_hz=BAND_HZ))]
+    /// H1 of a configuration's good hits, or the FRFs that were imported for it; lines of `band_hz`, (low, high), 10 Hz to 1 kHz.
+    #[pyo3(signature = (configuration, *, band_hz=(10.0, 1000.0)))]
     fn frf(&self, py: Python<'_>, configuration: &str, band_hz: (f64, f64)) -> PyResult<Frf> {
         in_the_process_that_loaded_this(py)?;
-        let Some(known) = self.read(py, Store::plan)?.configuration(configuration) else {
+        let plan = self.read(py, Store::plan)?;
+        let Some(known) = plan.configuration(configuration) else {
             return Err(raised::refused(
                 py,
                 &format!("there is no configuration `{configuration}`: A, B or AJB"),
             ));
         };
         let of = structure(known);
-        let (measured, complaints) = self.computed(py, |store| {
+        let (measured, complaints) = self.computed(py, move |store, _| {
             let (measured, complaints) =
                 CampaignFile::open(store, KnownContact::default())?.measured(of, [band_hz.0, band_hz.1]);
             let imported =
@@ -97,37 +106,37 @@ impl Lab {
         })
     }
 
-    /// `results.json` as Python's values; `progress(done, total)` is called now and then.
+    /// What `jointrig analyse` finds; `progress(done, total)` is called now and then.
     #[pyo3(signature = (progress=None, *, bootstrap=0))]
-    fn analyse<'py>(
-        &self,
-        py: Python<'py>,
-        progress: Option<Py<PyAny>>,
-        bootstrap: usize,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    fn analyse(&self, py: Python<'_>, progress: Option<Py<PyAny>>, bootstrap: usize) -> PyResult<Analysis> {
         in_the_process_that_loaded_this(py)?;
         let wanted = Wanted { replicates: bootstrap, known: KnownContact::default() };
-        let tell = |now: jointrig::analyse::Progress| {
-            if let Some(progress) = &progress {
-                Python::attach(|py| {
-                    // whoever watches does not stop the work: what it raises is printed and not thrown
-                    if let Err(error) = progress.call1(py, (now.done, now.total)) {
-                        error.print(py);
-                    }
-                });
-            }
-        };
-        let found = self.computed(py, |store| report::analysed(store, wanted, &tell))?;
-        let text = found.to_json().map_err(|error| raised::data(py, &error.to_string()))?;
-        values(py, &text)
+        let found = self.computed(py, move |store, stopped| {
+            let tell = |now: analyse::Progress| {
+                stopped.end_here_if_so();
+                if let Some(progress) = &progress {
+                    Python::attach(|py| {
+                        // whoever watches does not stop the work: what it raises is printed and not thrown
+                        if let Err(error) = progress.call1(py, (now.done, now.total)) {
+                            error.print(py);
+                        }
+                    });
+                }
+            };
+            report::analysed(store, wanted, &tell)
+        })?;
+        report::must_hold_something(&found).map_err(|sentence| raised::refused(py, &sentence))?;
+        Ok(Analysis::of(found))
     }
 
     /// Writes results.json and report.html into `folder`.
     fn report(&self, py: Python<'_>, folder: PathBuf) -> PyResult<()> {
         in_the_process_that_loaded_this(py)?;
-        let found = self.computed(py, |store| report::analysed(store, Wanted::default(), &|_| {}))?;
+        let found = self.computed(py, |store, stopped| {
+            report::analysed(store, Wanted::default(), &|_| stopped.end_here_if_so())
+        })?;
         py.detach(|| report::write(&found, &folder, &[]))
-            .map_err(|error| raised::writing(py, &format!("{}: {error}", folder.display())))
+            .map_err(|error| raised::writing(py, &folder, &error))
     }
 }
 
@@ -139,16 +148,17 @@ impl Lab {
         work: impl FnOnce(&Store) -> Result<T, StoreError> + Send,
     ) -> PyResult<T> {
         let found = py.detach(|| work(&Store::open_read_only(&self.path)?));
-        found.map_err(|error| raised::file(py, &error))
+        found.map_err(|error| raised::file(py, &self.path, &error))
     }
 
-    /// The same of an analysis.
-    fn computed<T: Send>(
+    /// The same of long work, which Ctrl-C ends.
+    fn computed<T: Send + 'static>(
         &self,
         py: Python<'_>,
-        work: impl FnOnce(&Store) -> Result<T, AnalyseError> + Send,
+        work: impl FnOnce(&Store, &Stopped) -> Result<T, AnalyseError> + Send + 'static,
     ) -> PyResult<T> {
-        let found = py.detach(|| work(&Store::open_read_only(&self.path)?));
-        found.map_err(|error| raised::analysis(py, &error))
+        let path = self.path.clone();
+        let found = interruptible::run(py, move |stopped| work(&Store::open_read_only(&path)?, stopped))?;
+        found.map_err(|error| raised::analysis(py, &self.path, &error))
     }
 }

@@ -1,49 +1,80 @@
 //! What is raised: the command's own sentences, as classes that Python code can tell apart (`jointrig._errors`).
 
+use std::io;
+use std::path::Path;
+
 use jointrig::analyse::AnalyseError;
 use jointrig::campaign::store::error::StoreError;
 use pyo3::prelude::*;
 
-fn raised(py: Python<'_>, class: &str, sentence: &str) -> PyErr {
+/// An error of this class: the sentence, the place, and whether the sentence ends with what to do.
+fn raised(py: Python<'_>, class: &str, sentence: &str, place: Option<&Path>, with_advice: bool) -> PyErr {
+    let place = place.map(|path| path.display().to_string());
     let made = py
         .import("jointrig._errors")
         .and_then(|module| module.getattr(class))
-        .and_then(|class| class.call1((sentence,)));
+        .and_then(|class| class.call1((sentence, place, with_advice)));
     match made {
         Ok(error) => PyErr::from_value(error),
         Err(error) => error,
     }
 }
 
-/// The file cannot be read.
-pub fn file(py: Python<'_>, error: &StoreError) -> PyErr {
+/// The file at `place` cannot be read.
+pub fn file(py: Python<'_>, place: &Path, error: &StoreError) -> PyErr {
+    let sentence = error.to_string();
     match error {
-        StoreError::Damaged { .. } | StoreError::Content { .. } | StoreError::Plan(_) => {
-            data(py, &error.to_string())
+        StoreError::Content { .. } | StoreError::Plan(_) => {
+            raised(py, "DataError", &sentence, Some(place), false)
         }
-        other => raised(py, "FileError", &other.to_string()),
+        StoreError::Damaged { .. } => raised(py, "DataError", &sentence, Some(place), true),
+        StoreError::Exists { .. }
+        | StoreError::Missing { .. }
+        | StoreError::Folder { .. }
+        | StoreError::Unreadable { .. }
+        | StoreError::Foreign { .. }
+        | StoreError::Newer { .. }
+        | StoreError::Older { .. }
+        | StoreError::Busy { .. }
+        | StoreError::Lock { .. }
+        | StoreError::Share { .. }
+        | StoreError::Unfinished { .. } => raised(py, "FileError", &sentence, Some(place), true),
+        _ => raised(py, "FileError", &sentence, Some(place), false),
     }
 }
 
-/// A file cannot be written.
-pub fn writing(py: Python<'_>, sentence: &str) -> PyErr {
-    raised(py, "FileError", sentence)
+/// A file that is no campaign cannot be read.
+pub fn reading(py: Python<'_>, place: &Path, sentence: &str) -> PyErr {
+    raised(py, "FileError", sentence, Some(place), false)
+}
+
+/// A file or folder cannot be written.
+pub fn writing(py: Python<'_>, place: &Path, error: &io::Error) -> PyErr {
+    let sentence =
+        format!("{}: {error}; choose a folder that exists and that you may write to", place.display());
+    raised(py, "FileError", &sentence, Some(place), true)
 }
 
 /// What was asked for cannot be done with what is there.
 pub fn refused(py: Python<'_>, sentence: &str) -> PyErr {
-    raised(py, "Refused", sentence)
+    raised(py, "Refused", sentence, None, false)
 }
 
 /// The numbers make no sense.
 pub fn data(py: Python<'_>, sentence: &str) -> PyErr {
-    raised(py, "DataError", sentence)
+    raised(py, "DataError", sentence, None, false)
 }
 
-/// The analysis cannot be done.
-pub fn analysis(py: Python<'_>, error: &AnalyseError) -> PyErr {
+/// A fault of jointrig.
+pub fn panicked(py: Python<'_>, told: &str) -> PyErr {
+    let sentence = format!("jointrig has a fault ({told}): report it with what you called");
+    raised(py, "Error", &sentence, None, true)
+}
+
+/// The analysis of the file at `place` cannot be done.
+pub fn analysis(py: Python<'_>, place: &Path, error: &AnalyseError) -> PyErr {
     match error {
-        AnalyseError::Store(error) => file(py, error),
-        other => refused(py, &other.to_string()),
+        AnalyseError::Store(error) => file(py, place, error),
+        other => raised(py, "Refused", &other.to_string(), Some(place), false),
     }
 }

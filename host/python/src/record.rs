@@ -34,12 +34,13 @@ impl Record {
     }
 
     fn map(&self, py: Python<'_>, store: &Store) -> PyResult<ChannelMap> {
-        store.channels(self.row.session).map_err(|error| raised::file(py, &error))
+        store.channels(self.row.session).map_err(|error| raised::file(py, &self.path, &error))
     }
 
     /// The file, its channels, and the place of one of them.
     fn channel(&self, py: Python<'_>, name: &str) -> PyResult<(Store, ChannelMap, usize)> {
-        let store = Store::open_read_only(&self.path).map_err(|error| raised::file(py, &error))?;
+        let store =
+            Store::open_read_only(&self.path).map_err(|error| raised::file(py, &self.path, &error))?;
         let map = self.map(py, &store)?;
         let place = map.channels.iter().position(|channel| channel.name == name);
         if let Some(place) = place {
@@ -140,14 +141,16 @@ impl Record {
     /// Sampling rate, Hz.
     #[getter]
     fn fs_hz(&self, py: Python<'_>) -> PyResult<f64> {
-        let store = Store::open_read_only(&self.path).map_err(|error| raised::file(py, &error))?;
+        let store =
+            Store::open_read_only(&self.path).map_err(|error| raised::file(py, &self.path, &error))?;
         Ok(f64::from(self.map(py, &store)?.rate_hz))
     }
 
     /// Names of the channels, in the order of `codes`.
     #[getter]
     fn channels(&self, py: Python<'_>) -> PyResult<Vec<String>> {
-        let store = Store::open_read_only(&self.path).map_err(|error| raised::file(py, &error))?;
+        let store =
+            Store::open_read_only(&self.path).map_err(|error| raised::file(py, &self.path, &error))?;
         Ok(self.map(py, &store)?.channels.iter().map(|channel| channel.name.to_string()).collect())
     }
 
@@ -159,7 +162,7 @@ impl Record {
             let samples = store.samples(&self.row)?;
             Ok((samples.codes, [self.row.channels, self.row.scans]))
         });
-        let (codes, shape) = read.map_err(|error: StoreError| raised::file(py, &error))?;
+        let (codes, shape) = read.map_err(|error: StoreError| raised::file(py, &self.path, &error))?;
         codes.into_pyarray(py).reshape(shape)
     }
 
@@ -167,7 +170,7 @@ impl Record {
     fn signal<'py>(&self, py: Python<'py>, channel: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (store, map, place) = self.channel(py, channel)?;
         let read = py.detach(move || Ok(map.to_si(place, store.samples(&self.row)?.channel(place))));
-        let signal = read.map_err(|error: StoreError| raised::file(py, &error))?;
+        let signal = read.map_err(|error: StoreError| raised::file(py, &self.path, &error))?;
         Ok(signal.into_pyarray(py))
     }
 

@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 JOINTRIG = os.environ["JOINTRIG_BIN"]
+# FRFs and records that the command's own tests use
+DATA = Path(__file__).parents[2] / "tests" / "data"
 
 
 def command(*arguments: object, code: int = 0) -> subprocess.CompletedProcess[str]:

@@ -1,6 +1,7 @@
 """Arrays from anywhere: any shape, type and order gives the answer of a contiguous copy, or a refusal."""
 
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -59,6 +60,8 @@ def test_order_and_type_of_arrays_change_nothing() -> None:
         (lambda f, r: (f[:0], r[:0]), "has shape"),
         (lambda f, r: (f, r[:, :0]), "has shape"),
         (lambda f, r: (f * np.nan, r), "not a number"),
+        (lambda f, r: (f * 1j, r), "complex128, and real"),
+        (lambda f, r: (f.astype(str), r), "real numbers are needed"),
         (lambda f, r: (f * 0, r), "no hit is good"),
     ],
 )
@@ -66,8 +69,12 @@ def test_what_makes_no_sense_is_refused_in_words(change, said: str) -> None:  # 
     force, motion = change(*hits())
     with pytest.raises(jr.Error, match=said):
         jr.frf(fs_hz=FS, force_n=force, response=motion, quantity="velocity")
+
+
+def test_a_quantity_that_is_none_is_refused() -> None:
+    force, motion = hits()
     with pytest.raises(jr.Refused, match="quantity is `speed`"):
-        jr.frf(fs_hz=FS, force_n=force if force.ndim == 2 else hits()[0], response=motion, quantity="speed")
+        jr.frf(fs_hz=FS, force_n=force, response=motion, quantity="speed")
 
 
 def test_a_loop_has_its_stiffness_and_its_refusals() -> None:
@@ -78,9 +85,108 @@ def test_a_loop_has_its_stiffness_and_its_refusals() -> None:
     found = jr.hysteresis(
         fs_hz=FS, velocity_a=velocity, velocity_b=0 * t, force_n=k * x + 0.01 * rng.standard_normal(len(t)), excitation_hz=160.0
     )
-    (loop,) = found["hysteresis"]
+    (loop,) = found.results["hysteresis"]
     assert loop["shape"] == "stuck" and abs(loop["k_t_n_per_m"]["mean"] / k - 1) < 0.01
     with pytest.raises(jr.Refused):
         jr.hysteresis(fs_hz=FS, velocity_a=velocity[:10], velocity_b=t[:10], force_n=t[:10])
     with pytest.raises(jr.Refused, match="velocity_a has 2 axes"):
         jr.hysteresis(fs_hz=FS, velocity_a=[velocity], velocity_b=t, force_n=t)
+
+
+def test_estimators_lie_in_their_order_and_names_and_window_are_taken() -> None:
+    force, motion = hits()
+    arguments = {"fs_hz": FS, "force_n": force, "response": motion, "quantity": "velocity"}
+    h1, h2, hv = (np.abs(jr.frf(**arguments, estimator=e)[0].frf[1:]) for e in ("H1", "H2", "Hv"))  # type: ignore[arg-type]
+    assert (h1 <= h2 * (1 + 1e-12)).all() and np.allclose(hv, np.sqrt(h1 * h2), rtol=1e-9)
+    y, _ = jr.frf(**arguments, sigma_per_s=0.0, outputs=["A1:x"], input="AZ1", delay_s=[1e-4])  # type: ignore[arg-type]
+    on_time, _ = jr.frf(**arguments, sigma_per_s=0.0)  # type: ignore[arg-type]
+    assert (y.sigma_per_s, y.outputs, y.inputs) == (0.0, ["A1:x"], ["AZ1"])
+    turned = np.exp(2j * np.pi * y.frequency_hz * 1e-4)[:, None, None]
+    assert np.allclose(y.frf, on_time.frf * turned, rtol=1e-9)
+    with pytest.raises(jr.Refused, match="estimator is `H3`"):
+        jr.frf(**arguments, estimator="H3")  # type: ignore[arg-type]
+    with pytest.raises(jr.Refused):
+        jr.frf(**arguments, outputs=["a", "b"])  # type: ignore[arg-type]
+
+
+def some_frf(**changed: object) -> jr.Frf:
+    """Two lines, two outputs, one input, and what a test changes of it."""
+    arguments: dict[str, object] = {
+        "frequency_hz": [10.0, 20.0],
+        "frf": np.arange(4.0).reshape(2, 2, 1) * (1 + 2j),
+        "quantity": "mobility",
+        "outputs": ["A1:x", "A1:y"],
+        "inputs": ["AZ1"],
+    }
+    return jr.make_frf(**(arguments | changed))  # type: ignore[arg-type]
+
+
+def test_frfs_from_arrays_are_what_they_were(tmp_path: Path) -> None:
+    values = np.arange(4.0).reshape(2, 2, 1) * (1 + 2j)
+    y = some_frf(sigma_per_s=3.0, variance=np.ones((2, 2, 1)), coherence=np.full((2, 2, 1), 0.5))
+    assert np.array_equal(y.frf, values) and y.sigma_per_s == 3.0
+    assert y.variance is not None and (y.variance == 1).all() and y.coherence is not None and (y.coherence == 0.5).all()
+    y.save(tmp_path / "y.npz")
+    again = jr.read_frf(tmp_path / "y.npz")
+    assert np.array_equal(again.frf, values) and again.outputs == y.outputs and again.quantity == "mobility"
+    s = 3.0 + 2j * np.pi * y.frequency_hz
+    assert np.allclose(y.to_receptance().frf, values / s[:, None, None], rtol=1e-14)
+    assert y.band(15.0, 25.0).frequency_hz.tolist() == [20.0]
+    assert np.array_equal(y.select(["A1:y"], ["AZ1"]).frf, values[:, 1:])
+    with pytest.raises(jr.Refused, match="nothing"):
+        y.select(["nothing"], ["AZ1"])
+    frequency, accelerance = y.to_pyfbs()
+    assert np.allclose(accelerance, values * s[:, None, None], rtol=1e-14) and frequency.tolist() == [10.0, 20.0]
+    assert "2 outputs, 1 inputs, 2 lines" in repr(y)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"frf": np.zeros((2, 2))},
+        {"frf": np.zeros((3, 2, 1))},
+        {"frf": np.zeros((2, 2, 2))},
+        {"frf": np.array([["x"]])},
+        {"frequency_hz": [20.0, 10.0]},
+        {"frequency_hz": []},
+        {"frequency_hz": [np.nan, 10.0]},
+        {"quantity": "compliance"},
+        {"outputs": ["A1:x"]},
+        {"outputs": ["A1:x", "A1:x"]},
+        {"variance": np.ones((2, 2, 2))},
+        {"variance": -np.ones((2, 2, 1))},
+        {"coherence": np.ones((1, 2, 1))},
+        {"sigma_per_s": float("nan")},
+    ],
+)
+def test_arrays_that_make_no_frfs_are_refused(changed: dict[str, object]) -> None:
+    with pytest.raises(jr.Error):
+        some_frf(**changed)
+
+
+def test_any_shape_and_order_agrees_with_a_contiguous_copy_or_is_refused() -> None:
+    rng = np.random.default_rng(11)
+    agreed = refused = 0
+    for _ in range(400):
+        lines, outputs, inputs = rng.integers(0, 4, 3)
+        shape = [int(n) for n in (lines, outputs, inputs)]
+        if rng.random() < 0.2:
+            shape = shape[: rng.integers(1, 4)]
+        values = rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
+        seen = [values, np.asfortranarray(values), np.repeat(values, 2, axis=0)[::2], values[::-1][::-1]][rng.integers(4)]
+        seen = seen.astype(["c16", "c8", ">c16"][rng.integers(3)])
+        arguments = {
+            "frequency_hz": 10.0 * np.arange(1, lines + 1),
+            "outputs": [f"o{n}" for n in range(outputs)],
+            "inputs": [f"i{n}" for n in range(inputs)],
+        }
+        try:
+            y = some_frf(frf=seen, **arguments)
+        except jr.Refused:
+            refused += 1
+            with pytest.raises(jr.Refused):
+                some_frf(frf=np.ascontiguousarray(seen, dtype=complex), **arguments)
+        else:
+            agreed += 1
+            assert np.array_equal(y.frf, np.ascontiguousarray(seen, dtype=complex))
+    assert agreed > 50 and refused > 20

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __version__: str
+__all__ = ["__version__", "Lab", "Record", "Frf", "Analysis", "frf", "identify", "hysteresis"]
 
 @final
 class Lab:
@@ -22,11 +23,11 @@ class Lab:
         response: str | None = None,
         kept: bool | None = None,
     ) -> list[Record]: ...
-    def frf(self, configuration: str, *, band_hz: tuple[float, float] = (10.0, 1000.0)) -> Frf: ...
-    def analyse(
-        self, progress: Callable[[int, int], object] | None = None, *, bootstrap: int = 0
-    ) -> dict[str, Any]: ...
+    def frf(self, configuration: str, *, band_hz: tuple[float, float] = ...) -> Frf: ...
+    def analyse(self, progress: Callable[[int, int], object] | None = None, *, bootstrap: int = 0) -> Analysis: ...
     def report(self, folder: str | os.PathLike[str]) -> None: ...
+    def _repr_svg_(self) -> str | None: ...
+    def __reduce__(self) -> tuple[type[Lab], tuple[Path]]: ...
 
 @final
 class Record:
@@ -70,6 +71,20 @@ class Record:
 
 @final
 class Frf:
+    def __new__(
+        cls,
+        *,
+        frequency_hz: NDArray[np.float64],
+        frf: NDArray[np.complex128],
+        quantity: str,
+        outputs: list[str],
+        inputs: list[str],
+        sigma_per_s: float = 0.0,
+        variance: NDArray[np.float64] | None = None,
+        coherence: NDArray[np.float64] | None = None,
+    ) -> Frf: ...
+    @staticmethod
+    def read(path: str | os.PathLike[str]) -> tuple[Frf, list[str]]: ...
     @property
     def frequency_hz(self) -> NDArray[np.float64]: ...
     @property
@@ -86,11 +101,52 @@ class Frf:
     def quantity(self) -> str: ...
     @property
     def sigma_per_s(self) -> float: ...
+    def to_receptance(self) -> Frf: ...
+    def band(self, low_hz: float, high_hz: float) -> Frf: ...
+    def select(self, outputs: list[str], inputs: list[str]) -> Frf: ...
     def save(self, path: str | os.PathLike[str]) -> None: ...
+    def to_pyfbs(self) -> tuple[NDArray[np.float64], NDArray[np.complex128]]: ...
+    def to_dataframe(self) -> Any: ...
+    def _repr_svg_(self) -> str | None: ...
+
+@final
+class Analysis:
+    @property
+    def results(self) -> dict[str, Any]: ...
+    @property
+    def figures(self) -> list[str]: ...
+    def svg(self, figure: str) -> str: ...
+    def report(self, folder: str | os.PathLike[str]) -> None: ...
+    def _repr_svg_(self) -> str | None: ...
 
 def frf(
-    *, fs_hz: float, force_n: NDArray[np.float64], response: NDArray[np.float64], quantity: str
+    *,
+    fs_hz: float,
+    force_n: NDArray[np.float64],
+    response: NDArray[np.float64],
+    quantity: str,
+    estimator: str = "H1",
+    sigma_per_s: float | None = None,
+    delay_s: list[float] | None = None,
+    outputs: list[str] | None = None,
+    input: str = "impact",
 ) -> tuple[Frf, list[str]]: ...
+def identify(
+    *,
+    a: Frf,
+    b: Frf,
+    ajb: Frf,
+    geometry: str | os.PathLike[str],
+    method: list[str],
+    idms: list[str],
+    band_hz: list[tuple[float, float]],
+    position_error_m: float | None = None,
+    aim_error_m: float | None = None,
+    angle_error_rad: float | None = None,
+    mounting_error: float | None = None,
+    full_joint: bool = False,
+    noise: float | None = None,
+) -> tuple[Analysis, list[str]]: ...
 def hysteresis(
     *,
     fs_hz: float,
@@ -99,4 +155,4 @@ def hysteresis(
     force_n: NDArray[np.float64],
     excitation_hz: float | None = None,
     normal_load_n: float | None = None,
-) -> dict[str, Any]: ...
+) -> Analysis: ...

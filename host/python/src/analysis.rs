@@ -1,0 +1,63 @@
+//! What an analysis found: the document of `results.json`, its report and its figures.
+
+use std::path::PathBuf;
+
+use jointrig::report;
+use jointrig::report::words::headline;
+use jointrig::results::Results;
+use pyo3::prelude::*;
+
+use crate::{raised, values};
+
+/// What an analysis found.
+#[pyclass(module = "jointrig._native", frozen)]
+pub struct Analysis {
+    found: Results,
+}
+
+impl Analysis {
+    pub fn of(found: Results) -> Self {
+        Self { found }
+    }
+}
+
+#[pymethods]
+impl Analysis {
+    /// The dict of `results.json`.
+    #[getter]
+    fn results<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let text = self.found.to_json().map_err(|error| raised::data(py, &error.to_string()))?;
+        values(py, &text)
+    }
+
+    /// Names of the figures that there are data for, in the order of the report.
+    #[getter]
+    fn figures(&self) -> Vec<&'static str> {
+        report::all_figures(&self.found).iter().map(|figure| figure.name).collect()
+    }
+
+    /// A figure of the report as the text of an SVG, light or dark as the reader's paper is.
+    fn svg(&self, py: Python<'_>, figure: &str) -> PyResult<String> {
+        let all = report::all_figures(&self.found);
+        all.iter().find(|own| own.name == figure).map(report::notebook_figure).ok_or_else(|| {
+            let names: Vec<&str> = all.iter().map(|own| own.name).collect();
+            raised::refused(py, &format!("there is no figure `{figure}`: {}", names.join(", ")))
+        })
+    }
+
+    /// Writes `results.json` and `report.html` into `folder`, which is made if it is not there.
+    fn report(&self, py: Python<'_>, folder: PathBuf) -> PyResult<()> {
+        py.detach(|| report::write(&self.found, &folder, &[]))
+            .map_err(|error| raised::writing(py, &folder, &error))
+    }
+
+    fn _repr_svg_(&self) -> Option<String> {
+        report::all_figures(&self.found).first().map(report::notebook_figure)
+    }
+
+    fn __repr__(&self) -> String {
+        let source = &self.found.source.file;
+        let of = if source.is_empty() { String::new() } else { format!(" of {source}") };
+        format!("Analysis{of}: {}", headline::of(&self.found))
+    }
+}
