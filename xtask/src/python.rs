@@ -56,6 +56,10 @@ pub fn run(project: &Project) -> Result<String> {
             "no environment with maturin can be made (on Debian: python3-venv; pip needs its registry)",
         ));
     };
+    // as the tests build it: other features would compile everything once more
+    let mut cargo = command::cargo(&project.root);
+    cargo.args(["build", "--release", "--workspace", "--bin", "jointrig"]);
+    command::run(&mut cargo).context("the command that the wheel is compared with does not compile")?;
     let wheel = build(project, &folder, &tools, last)?;
     let bytes = fs::metadata(&wheel)?.len();
     if bytes > WHEEL {

@@ -2,7 +2,8 @@
 //!
 //! [`npz`] and [`npz_output`] are the array layer; [`frf_npz`] and [`record_npz`] say which arrays make an FRF matrix, impact records or a
 //! hysteresis record; [`positions`] reads the pyFBS workbook, as xlsx or as a folder of csv tables; [`uff`] is the universal file,
-//! [`frf_uff`] says which of its functions make an FRF matrix, [`frf_file`] takes either form.
+//! [`frf_uff`] says which of its functions make an FRF matrix, [`frf_file`] takes either form. A [`typed_table::Table`] becomes text with commas, or,
+//! with the feature `parquet`, columns for engines.
 
 #[cfg(test)]
 mod any_bytes_tests;
@@ -13,6 +14,8 @@ pub mod frf_uff;
 pub mod geometry_file;
 pub mod npz;
 pub mod npz_output;
+#[cfg(feature = "parquet")]
+pub mod parquet;
 pub mod positions;
 pub mod positions_output;
 pub mod record_npz;
@@ -21,6 +24,7 @@ pub mod record_uff;
 mod round_trip_tests;
 mod tables;
 pub mod tables_output;
+pub mod typed_table;
 pub mod uff_output;
 
 pub use jointrig_uff as uff;

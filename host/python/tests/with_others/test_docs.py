@@ -7,15 +7,21 @@ import subprocess
 import sys
 from pathlib import Path
 
-from conftest import DATA
+import duckdb
+
+from conftest import DATA, command
 
 DOCS = Path(__file__).parents[4] / "docs"
 
 
+def fenced(page: str, language: str) -> list[str]:
+    found = re.findall(rf"^```{language}\n(.*?)^```", (DOCS / page).read_text(), re.M | re.S)
+    assert found, f"{page} has no {language}"
+    return found
+
+
 def blocks(page: str) -> str:
-    found = re.findall(r"^```python\n(.*?)^```", (DOCS / page).read_text(), re.M | re.S)
-    assert found, f"{page} has no code"
-    return "\n".join(found)
+    return "\n".join(fenced(page, "python"))
 
 
 def run(code: str, folder: Path) -> str:
@@ -34,3 +40,14 @@ def test_the_manual(lab_file: Path, tmp_path: Path) -> None:
     assert (tmp_path / "frf.png").stat().st_size > 10_000
     assert (tmp_path / "results" / "report.html").exists() and (tmp_path / "receptance.npz").exists()
     assert "['good', 'good', 'good']" in told and "gone.jrig" in told
+
+
+def test_the_queries_on_columns(lab_file: Path, tmp_path: Path, monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    command("export", lab_file, "--format", "parquet", "--out", tmp_path / "columns")
+    monkeypatch.chdir(tmp_path)
+    peaks, verdicts, frf = (duckdb.sql(query).fetchall() for query in fenced("columns.md", "sql"))
+    assert len(peaks) == 126 and all(5 < peak < 500 for _, peak in peaks)
+    assert verdicts[0][:2] == ("good", 126) and verdicts[0][2]
+    assert len(frf) > 1000 and all(magnitude > 0 for _, magnitude, _ in frf)
+    told = run(blocks("columns.md"), tmp_path)
+    assert "AZ1" in told and "peak_n" in told

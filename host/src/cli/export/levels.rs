@@ -2,31 +2,32 @@
 
 use std::path::Path;
 
-use super::{Format, bad};
+use super::{Format, bad, make_folder};
 use crate::campaign::run::shaking;
 use crate::campaign::store::Store;
 use crate::campaign::store::level_table::{DamagedLevel, LevelRow};
 use crate::cli::error::CliError;
+use crate::exchange::typed_table::{Kind, Table, Value};
 use crate::exchange::{tables_output, uff_output, write_level};
 use crate::hysteresis::HysteresisRecord;
 
-/// Columns of `levels.csv`.
-const COLUMNS: [&str; 15] = [
-    "level",
-    "when",
-    "utc",
-    "frequency_hz",
-    "end_hz",
-    "control",
-    "amplitude",
-    "reached",
-    "overshoot",
-    "settled_after_s",
-    "drive_v",
-    "seconds",
-    "lost_samples",
-    "damage",
-    "file",
+/// One row for each level.
+const COLUMNS: [(&str, Kind); 15] = [
+    ("level", Kind::Whole),
+    ("when", Kind::Text),
+    ("utc", Kind::Utc),
+    ("frequency_hz", Kind::Real),
+    ("end_hz", Kind::Real),
+    ("control", Kind::Text),
+    ("amplitude", Kind::Real),
+    ("reached", Kind::Real),
+    ("overshoot", Kind::Real),
+    ("settled_after_s", Kind::Real),
+    ("drive_v", Kind::Real),
+    ("seconds", Kind::Real),
+    ("lost_samples", Kind::Whole),
+    ("damage", Kind::Text),
+    ("file", Kind::Text),
 ];
 
 /// Writes `levels.csv` and, if they are wanted, the records into `folder`; how many levels there are. What is damaged or has lost samples
@@ -37,45 +38,46 @@ pub(super) fn write(
     format: Format,
     with_records: bool,
 ) -> Result<usize, CliError> {
-    let levels = store.levels()?;
-    if levels.is_empty() {
+    if store.levels()?.is_empty() {
         return Ok(0);
     }
-    std::fs::create_dir_all(folder).map_err(|source| CliError::File {
-        path: folder.into(),
-        doing: "making the folder",
-        source,
+    make_folder(folder)?;
+    let table = table(store, |row| {
+        if !(with_records && row.whole()) {
+            return Ok(None);
+        }
+        let name = format!("level_{}.{}", row.id, format.extension());
+        one(&folder.join(&name), format, &record(store, row)?, row.id)?;
+        Ok(Some(name))
     })?;
-    let plan = store.plan()?;
-    let load = plan.contact.as_ref().and_then(|contact| contact.get_ref().normal_load_n);
-    let mut table = vec![COLUMNS.map(String::from).to_vec()];
-    for level in &levels {
-        let row = match level {
-            Ok(row) => row,
-            Err(damaged) => {
-                table.push(damaged_line(damaged));
-                continue;
-            }
-        };
-        let file = if with_records && row.whole() {
-            let name = format!("level_{}.{}", row.id, format.extension());
-            let record = HysteresisRecord { normal_load_n: load, ..record(store, row)? };
-            one(&folder.join(&name), format, &record, row.id)?;
-            name
-        } else {
-            String::new()
-        };
-        table.push(line(row, f64::from(store.channels(row.session)?.rate_hz), file));
-    }
-    tables_output::write_rows(&folder.join("levels.csv"), &table).map_err(bad)?;
-    Ok(levels.len())
+    table.write_csv(&folder.join("levels.csv")).map_err(bad)?;
+    Ok(table.rows().len())
 }
 
-fn record(store: &Store, row: &LevelRow) -> Result<HysteresisRecord, CliError> {
+/// What was ordered and reached, level by level; `file` is where the samples of each went.
+pub(super) fn table(
+    store: &Store,
+    mut file: impl FnMut(&LevelRow) -> Result<Option<String>, CliError>,
+) -> Result<Table, CliError> {
+    let mut table = Table::new(&COLUMNS);
+    for level in &store.levels()? {
+        table.push(match level {
+            Ok(row) => line(row, f64::from(store.channels(row.session)?.rate_hz), file(row)?),
+            Err(damaged) => damaged_line(damaged),
+        });
+    }
+    Ok(table)
+}
+
+/// The velocities and the force of a level, in step.
+pub(super) fn record(store: &Store, row: &LevelRow) -> Result<HysteresisRecord, CliError> {
     let channels = store.channels(row.session)?;
     let samples = store.level_samples(row)?;
-    shaking::record(&channels, &samples, &row.level())
-        .map_err(|what| CliError::Bad(format!("the shaker's level {} ({}): {what}", row.id, row.level())))
+    let plan = store.plan()?;
+    let normal_load_n = plan.contact.as_ref().and_then(|contact| contact.get_ref().normal_load_n);
+    let record = shaking::record(&channels, &samples, &row.level())
+        .map_err(|what| CliError::Bad(format!("the shaker's level {} ({}): {what}", row.id, row.level())))?;
+    Ok(HysteresisRecord { normal_load_n, ..record })
 }
 
 fn one(path: &Path, format: Format, record: &HysteresisRecord, level: i64) -> Result<(), CliError> {
@@ -87,31 +89,30 @@ fn one(path: &Path, format: Format, record: &HysteresisRecord, level: i64) -> Re
 }
 
 /// Of a damaged level only its number and what is wrong can be told.
-fn damaged_line(damaged: &DamagedLevel) -> Vec<String> {
-    let mut line = vec![String::new(); COLUMNS.len()];
-    line[0] = damaged.id.to_string();
-    line[COLUMNS.len() - 2].clone_from(&damaged.what);
+fn damaged_line(damaged: &DamagedLevel) -> Vec<Value> {
+    let mut line = vec![Value::Missing; COLUMNS.len()];
+    line[0] = damaged.id.into();
+    line[COLUMNS.len() - 2] = damaged.what.as_str().into();
     line
 }
 
-fn line(row: &LevelRow, rate_hz: f64, file: String) -> Vec<String> {
+fn line(row: &LevelRow, rate_hz: f64, file: Option<String>) -> Vec<Value> {
     let (level, settled) = (row.level(), row.settled());
-    let lost: usize = row.gaps.iter().map(std::ops::Range::len).sum();
     vec![
-        row.id.to_string(),
+        row.id.into(),
         row.moment.name().into(),
-        row.utc.clone(),
-        level.frequency_hz.to_string(),
-        level.end_hz.map_or(String::new(), |end| end.to_string()),
+        row.utc.as_str().into(),
+        level.frequency_hz.into(),
+        level.end_hz.into(),
         level.held.name().into(),
-        level.amplitude.to_string(),
-        settled.reached.to_string(),
-        settled.overshoot.to_string(),
-        settled.after_s.to_string(),
-        settled.drive_v.to_string(),
-        (row.scans as f64 / rate_hz).to_string(),
-        lost.to_string(),
-        String::new(),
-        file,
+        level.amplitude.into(),
+        settled.reached.into(),
+        settled.overshoot.into(),
+        settled.after_s.into(),
+        settled.drive_v.into(),
+        (row.scans as f64 / rate_hz).into(),
+        row.gaps.iter().map(std::ops::Range::len).sum::<usize>().into(),
+        Value::Missing,
+        file.into(),
     ]
 }

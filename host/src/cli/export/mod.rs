@@ -1,5 +1,9 @@
 //! `export`: what a campaign file holds, in forms that other programs read.
 
+#[cfg(feature = "parquet")]
+mod columns;
+#[cfg(feature = "parquet")]
+mod estimates;
 mod levels;
 mod records;
 mod tables;
@@ -14,6 +18,7 @@ use super::error::CliError;
 use super::{frf, output};
 use crate::analyse::{self, CampaignFile, KnownContact, Wanted};
 use crate::campaign::store::Store;
+use crate::campaign::store::record_row::RecordRow;
 use crate::exchange::positions_output::write_positions;
 use crate::exchange::{tables_output, uff_output, write_frf};
 use crate::frf::Frf;
@@ -28,14 +33,27 @@ use crate::substructuring::geometry::Configuration;
 /// it was overruled, and its place in these files; DIR/channels.csv and calibrations.csv: scales, delays, sensors. DIR/levels: one file for each
 /// level of the shaker (velocities of both specimens and the load cells' sum, in step; npz as `jointrig hysteresis` reads it) and
 /// levels.csv, which says what was ordered and reached. DIR/results.json and report.html.
+///
+/// --format parquet: columns for engines such as DuckDB, Polars and Spark. The tables are Parquet files, frf.parquet has a row for each line,
+/// estimates.parquet one for each stiffness, and DIR/samples a row for each sample, the channels side by side. docs/columns.md has the queries.
 #[derive(Debug, Args)]
 pub struct Export {
+    /// Form of FRFs and records.
+    #[arg(long, value_enum)]
+    format: Form,
+    /// Parquet: write samples in SI, 32 bit floats, instead of the converter's codes.
+    #[arg(long)]
+    si: bool,
+    #[command(flatten)]
+    what: What,
+}
+
+/// What is exported, and where to.
+#[derive(Debug, Args)]
+struct What {
     /// The campaign file.
     #[arg(value_name = "FILE.jrig")]
     file: PathBuf,
-    /// Form of FRFs and records.
-    #[arg(long, value_enum)]
-    format: Format,
     /// Folder for all of it; made when it is not there.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -50,14 +68,54 @@ pub struct Export {
     all: bool,
 }
 
-/// Forms of FRFs and records.
+impl What {
+    /// The records whose samples are written.
+    fn counts(&self, row: &RecordRow) -> bool {
+        row.scans > 0 && (self.all || row.kept())
+    }
+
+    /// The FRFs of each structure that has any, and what a reader must know of them.
+    fn frfs(&self, store: &Store) -> Result<Frfs, CliError> {
+        let file = CampaignFile::open(store, KnownContact::default())?;
+        let (mut found, mut told) = (Vec::new(), Vec::new());
+        for structure in Structure::ALL {
+            let (measured, complaints) = file.measured(structure, [self.band.0, self.band.1]);
+            told.extend(complaints);
+            let imported = if measured.is_none() {
+                store.frf(structure.name())?.map(|found| imported(found.frf))
+            } else {
+                None
+            };
+            found.extend(measured.or(imported).map(|frf| (structure, frf)));
+        }
+        if found.is_empty() {
+            told.push("no good hit is in the file yet: there are no FRFs to export".into());
+        }
+        Ok((found, told))
+    }
+}
+
+/// FRFs by structure, and remarks on them.
+type Frfs = (Vec<(Structure, Frf)>, Vec<String>);
+
+/// Forms that can be asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
+enum Form {
     /// Universal files with data sets 58b, 2411, 151 and 164.
     Uff58,
     /// numpy archives.
     Npz,
     /// Text with commas.
+    Csv,
+    /// Columns for engines.
+    Parquet,
+}
+
+/// Forms in which each cell has files of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Uff58,
+    Npz,
     Csv,
 }
 
@@ -71,56 +129,87 @@ impl Format {
     }
 }
 
+/// A file for each cell.
+struct Files<'a> {
+    what: &'a What,
+    format: Format,
+}
+
+fn make_folder(folder: &Path) -> Result<(), CliError> {
+    std::fs::create_dir_all(folder).map_err(|source| CliError::File {
+        path: folder.into(),
+        doing: "making the folder",
+        source,
+    })
+}
+
 fn bad(error: impl std::fmt::Display) -> CliError {
     CliError::Bad(error.to_string())
 }
 
 impl Export {
     pub fn run(self) -> Result<(), CliError> {
-        let store = Store::open_read_only(&self.file)?;
-        let folders = ["geometry", "frf", "records"].map(|name| self.out.join(name));
-        for folder in &folders[..if self.without_records { 2 } else { 3 }] {
-            std::fs::create_dir_all(folder).map_err(|source| CliError::File {
-                path: folder.clone(),
-                doing: "making the folder",
-                source,
-            })?;
+        let Some(format) = self.form()? else { return self.columns() };
+        Files { what: &self.what, format }.write()
+    }
+
+    /// None for columns.
+    fn form(&self) -> Result<Option<Format>, CliError> {
+        let format = match self.format {
+            Form::Uff58 => Format::Uff58,
+            Form::Npz => Format::Npz,
+            Form::Csv => Format::Csv,
+            Form::Parquet => return Ok(None),
+        };
+        if self.si {
+            return Err(CliError::Usage(
+                "--si is for --format parquet: the other forms are in SI already".into(),
+            ));
+        }
+        Ok(Some(format))
+    }
+
+    #[cfg(feature = "parquet")]
+    fn columns(&self) -> Result<(), CliError> {
+        columns::Columns { what: &self.what, si: self.si }.write()
+    }
+
+    #[cfg(not(feature = "parquet"))]
+    fn columns(&self) -> Result<(), CliError> {
+        let (how, file) = ("cargo install --path host --features parquet", self.what.file.display());
+        Err(CliError::Usage(format!(
+            "{file}: this jointrig was built without Parquet; build it with it: `{how}`"
+        )))
+    }
+}
+
+impl Files<'_> {
+    fn write(&self) -> Result<(), CliError> {
+        let What { file, out, without_records, .. } = self.what;
+        let store = Store::open_read_only(file)?;
+        let folders = ["geometry", "frf", "records"].map(|name| out.join(name));
+        for folder in &folders[..if *without_records { 2 } else { 3 }] {
+            make_folder(folder)?;
         }
         let plan = store.plan()?;
         let geometry = analyse::geometry(&plan);
         write_positions(&folders[0], &geometry, "Velocity").map_err(bad)?;
-        let written = if self.without_records { Vec::new() } else { self.write_records(&store)? };
-        tables::write(&store, &self.out, &written)?;
-        let file = CampaignFile::open(&store, KnownContact::default())?;
-        let mut told = Vec::new();
-        for structure in Structure::ALL {
-            let (name, points) = (structure.name(), geometry.points(structure));
-            let (measured, complaints) = file.measured(structure, [self.band.0, self.band.1]);
-            told.extend(complaints);
-            let imported =
-                if measured.is_none() { store.frf(name)?.map(|found| imported(found.frf)) } else { None };
-            if let Some(measured) = measured.or(imported) {
-                let path = folders[1].join(name).with_extension(self.format.extension());
-                self.write_frf(&path, &measured, points)?;
-                told.push(format!(
-                    "{}: {} outputs, {} inputs, {} lines",
-                    path.display(),
-                    measured.outputs().len(),
-                    measured.inputs().len(),
-                    measured.lines().len()
-                ));
-            }
+        let written = if *without_records { Vec::new() } else { self.write_records(&store)? };
+        tables::write(&store, out, &written)?;
+        let (found, mut told) = self.what.frfs(&store)?;
+        for (structure, frf) in found {
+            let path = folders[1].join(structure.name()).with_extension(self.format.extension());
+            self.write_frf(&path, &frf, geometry.points(structure))?;
+            let (outputs, inputs, lines) = (frf.outputs().len(), frf.inputs().len(), frf.lines().len());
+            told.push(format!("{}: {outputs} outputs, {inputs} inputs, {lines} lines", path.display()));
         }
-        if told.is_empty() {
-            told.push("no good hit is in the file yet: there are no FRFs to export".into());
-        }
-        let folder = self.out.join("levels");
-        let levels = levels::write(&store, &folder, self.format, !self.without_records)?;
+        let folder = out.join("levels");
+        let levels = levels::write(&store, &folder, self.format, !without_records)?;
         if levels > 0 {
             told.push(format!("{}: {levels} levels of the shaker", folder.display()));
         }
-        analyse_into(&store, Wanted::default(), &self.out, &[])?;
-        told.push(format!("geometry, results.json and report.html are in {}", self.out.display()));
+        analyse_into(&store, Wanted::default(), out, &[])?;
+        told.push(format!("geometry, results.json and report.html are in {}", out.display()));
         output::lines(told)
     }
 

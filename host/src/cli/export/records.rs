@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use jointrig_protocol::channel::{Quantity, Role};
 
-use super::{Export, Format, bad};
+use super::{Files, Format, bad, make_folder};
 use crate::campaign::plan::configuration_name;
 use crate::campaign::store::Store;
 use crate::campaign::store::cell_table::CellRow;
@@ -29,18 +29,17 @@ struct OfCell {
     others: Option<ChannelRecords>,
 }
 
-impl Export {
+impl Files<'_> {
     /// One file for each cell with hits that count, or with any where all are wanted, and where each record went.
     pub(super) fn write_records(&self, store: &Store) -> Result<Vec<Written>, CliError> {
-        let [folder, others] = ["records", "channels"].map(|name| self.out.join(name));
+        let [folder, others] = ["records", "channels"].map(|name| self.what.out.join(name));
         let (rows, cells) = (store.records()?, store.cells()?);
         let waiting = Waiting::of("writing records, by cell");
         let mut written = Vec::new();
         for (done, cell) in cells.iter().enumerate() {
             waiting.at(done, cells.len());
-            let counts = |row: &&RecordRow| row.scans > 0 && (self.all || row.kept());
             let own: Vec<&RecordRow> =
-                rows.iter().flatten().filter(|row| row.cell == cell.id).filter(counts).collect();
+                rows.iter().flatten().filter(|row| row.cell == cell.id && self.what.counts(row)).collect();
             let Some(of_cell) = self.of_cell(store, &own)? else { continue };
             // a name may have dots: the extension is put behind it
             let name = format!("{}.{}", stem(cell), self.format.extension());
@@ -61,8 +60,9 @@ impl Export {
     fn of_cell(&self, store: &Store, rows: &[&RecordRow]) -> Result<Option<OfCell>, CliError> {
         let mut out: Option<OfCell> = None;
         for row in rows {
-            let wrong =
-                |what: &str| Err(CliError::Bad(format!("{}: record {} {what}", self.file.display(), row.id)));
+            let wrong = |what: &str| {
+                Err(CliError::Bad(format!("{}: record {} {what}", self.what.file.display(), row.id)))
+            };
             // scales belong to the session: one cell may have several
             let map = store.channels(row.session)?;
             let (Some(force), Some(axes)) = (map.place(Role::HammerForce), map.responses()) else {
@@ -122,11 +122,7 @@ impl Export {
     }
 
     fn write_others(&self, folder: &Path, name: &str, all: &ChannelRecords) -> Result<(), CliError> {
-        std::fs::create_dir_all(folder).map_err(|source| CliError::File {
-            path: folder.into(),
-            doing: "making the folder",
-            source,
-        })?;
+        make_folder(folder)?;
         let path: PathBuf = folder.join(name);
         match self.format {
             Format::Npz => channel_records::write_npz(&path, all).map_err(bad),

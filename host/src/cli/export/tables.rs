@@ -6,193 +6,240 @@ use std::path::Path;
 
 use super::bad;
 use super::records::Written;
-use crate::campaign::plan::configuration_name;
+use crate::campaign::plan::{Cell, configuration_name};
 use crate::campaign::store::Store;
+use crate::campaign::store::overrules::Overrule;
 use crate::campaign::store::record_row::{Damaged, RecordRow};
+use crate::campaign::store::session_table::Sensor;
 use crate::cli::error::CliError;
-use crate::exchange::tables_output::write_rows;
+use crate::exchange::typed_table::{Kind, Table, Value};
 
-/// Columns of `records.csv`.
-const RECORDS: [&str; 23] = [
-    "record",
-    "configuration",
-    "impact",
-    "response",
-    "attempt",
-    "session",
-    "utc",
-    "utc_error_s",
-    "verdict",
-    "measure",
-    "limit",
-    "sentence",
-    "standing",
-    "overruled_utc",
-    "overruled_reason",
-    "peak_n",
-    "pulse_us",
-    "samples",
-    "trigger_index",
-    "lost_samples",
-    "damage",
-    "file",
-    "hit",
+/// One row for each record.
+const RECORDS: [(&str, Kind); 24] = [
+    ("record", Kind::Whole),
+    ("configuration", Kind::Text),
+    ("impact", Kind::Text),
+    ("response", Kind::Text),
+    ("attempt", Kind::Whole),
+    ("session", Kind::Whole),
+    ("utc", Kind::Utc),
+    ("utc_error_s", Kind::Real),
+    ("verdict", Kind::Text),
+    ("measure", Kind::Real),
+    ("limit", Kind::Real),
+    ("sentence", Kind::Text),
+    ("standing", Kind::Text),
+    ("overruled_utc", Kind::Utc),
+    ("overruled_reason", Kind::Text),
+    ("peak_n", Kind::Real),
+    ("pulse_us", Kind::Whole),
+    ("samples", Kind::Whole),
+    ("trigger_index", Kind::Whole),
+    ("lost_samples", Kind::Whole),
+    ("crc32", Kind::Whole),
+    ("damage", Kind::Text),
+    ("file", Kind::Text),
+    ("hit", Kind::Whole),
 ];
 
-/// Columns of `channels.csv`.
-const CHANNELS: [&str; 14] = [
-    "session",
-    "place",
-    "channel",
-    "role",
-    "unit",
-    "rate_hz",
-    "units_per_volt",
-    "units_per_volt_as_measured",
-    "range_v",
-    "bits",
-    "delay_s",
-    "model",
-    "serial",
-    "calibrated",
+/// One row for each cell.
+#[cfg(feature = "parquet")]
+const CELLS: [(&str, Kind); 7] = [
+    ("cell", Kind::Whole),
+    ("configuration", Kind::Text),
+    ("impact", Kind::Text),
+    ("response", Kind::Text),
+    ("wanted", Kind::Whole),
+    ("given_up", Kind::Text),
+    ("settled", Kind::Text),
 ];
 
-/// Columns of `calibrations.csv`.
-const CALIBRATIONS: [&str; 11] = [
-    "utc",
-    "from_session",
-    "channel",
-    "sensitivity_v",
-    "polarity",
-    "delay_s",
-    "uncertainty",
-    "model",
-    "serial",
-    "calibrated",
-    "reason",
+/// One row for each time that a person overruled a verdict.
+#[cfg(feature = "parquet")]
+const OVERRULES: [(&str, Kind); 4] =
+    [("record", Kind::Whole), ("utc", Kind::Utc), ("verdict", Kind::Text), ("reason", Kind::Text)];
+
+/// One row for each channel of each session.
+const CHANNELS: [(&str, Kind); 15] = [
+    ("session", Kind::Whole),
+    ("place", Kind::Whole),
+    ("channel", Kind::Text),
+    ("role", Kind::Text),
+    ("unit", Kind::Text),
+    ("rate_hz", Kind::Whole),
+    ("units_per_code", Kind::Real),
+    ("units_per_volt", Kind::Real),
+    ("units_per_volt_as_measured", Kind::Real),
+    ("range_v", Kind::Real),
+    ("bits", Kind::Whole),
+    ("delay_s", Kind::Real),
+    ("model", Kind::Text),
+    ("serial", Kind::Text),
+    ("calibrated", Kind::Text),
 ];
 
-/// Writes `records.csv`, `channels.csv` and, where there are any, `calibrations.csv`.
-pub(super) fn write(store: &Store, folder: &Path, written: &[Written]) -> Result<(), CliError> {
-    records(store, &folder.join("records.csv"), written)?;
-    channels(store, &folder.join("channels.csv"))?;
-    let entered = store.calibrations()?;
-    if entered.is_empty() {
-        return Ok(());
+/// One row for each calibration.
+const CALIBRATIONS: [(&str, Kind); 11] = [
+    ("utc", Kind::Utc),
+    ("from_session", Kind::Whole),
+    ("channel", Kind::Text),
+    ("sensitivity_v", Kind::Real),
+    ("polarity", Kind::Whole),
+    ("delay_s", Kind::Real),
+    ("uncertainty", Kind::Real),
+    ("model", Kind::Text),
+    ("serial", Kind::Text),
+    ("calibrated", Kind::Text),
+    ("reason", Kind::Text),
+];
+
+/// Every cell.
+#[cfg(feature = "parquet")]
+pub(super) fn cells(store: &Store) -> Result<Table, CliError> {
+    let mut table = Table::new(&CELLS);
+    for row in store.cells()? {
+        table.push(vec![
+            row.id.into(),
+            configuration_name(row.cell.configuration).into(),
+            row.cell.impact.into(),
+            row.cell.response.into(),
+            row.cell.wanted.into(),
+            row.given_up.into(),
+            row.settled.into(),
+        ]);
     }
-    let number = |value: Option<f64>| value.map_or(String::new(), |value| value.to_string());
-    let text = |value: &Option<String>| value.clone().unwrap_or_default();
-    let rows = entered.iter().map(|row| {
-        vec![
-            row.utc.clone(),
-            row.from_session.to_string(),
-            row.channel.clone(),
-            number(row.sensitivity_v),
-            row.polarity.map_or(String::new(), |sign| sign.to_string()),
-            number(row.delay_s),
-            number(row.uncertainty),
-            text(&row.model),
-            text(&row.serial),
-            text(&row.calibrated),
-            row.reason.clone(),
-        ]
-    });
-    let rows: Vec<Vec<String>> = std::iter::once(heading(&CALIBRATIONS)).chain(rows).collect();
-    write_rows(&folder.join("calibrations.csv"), &rows).map_err(bad)
+    Ok(table)
 }
 
-fn heading(names: &[&str]) -> Vec<String> {
-    names.iter().map(|name| (*name).to_owned()).collect()
+/// Every time that a person overruled a verdict, in order.
+#[cfg(feature = "parquet")]
+pub(super) fn overrules(store: &Store) -> Result<Table, CliError> {
+    let mut table = Table::new(&OVERRULES);
+    for row in store.overrules()? {
+        table.push(vec![row.record.into(), row.utc.into(), row.verdict.into(), row.reason.into()]);
+    }
+    Ok(table)
 }
 
-fn records(store: &Store, path: &Path, written: &[Written]) -> Result<(), CliError> {
-    let cells: HashMap<i64, _> = store.cells()?.into_iter().map(|row| (row.id, row.cell)).collect();
+/// Every calibration that was entered.
+pub(super) fn calibrations(store: &Store) -> Result<Table, CliError> {
+    let mut table = Table::new(&CALIBRATIONS);
+    for row in store.calibrations()? {
+        table.push(vec![
+            row.utc.into(),
+            row.from_session.into(),
+            row.channel.into(),
+            row.sensitivity_v.into(),
+            row.polarity.into(),
+            row.delay_s.into(),
+            row.uncertainty.into(),
+            row.model.into(),
+            row.serial.into(),
+            row.calibrated.into(),
+            row.reason.into(),
+        ]);
+    }
+    Ok(table)
+}
+
+/// Every record, with the file that holds its samples.
+pub(super) fn records(store: &Store, written: &[Written]) -> Result<Table, CliError> {
+    let cells: HashMap<i64, Cell> = store.cells()?.into_iter().map(|row| (row.id, row.cell)).collect();
     let places: HashMap<i64, &Written> = written.iter().map(|one| (one.record, one)).collect();
     let overrules = store.overrules()?;
-    let mut rows = vec![heading(&RECORDS)];
+    let mut table = Table::new(&RECORDS);
     for record in store.records()? {
         let (id, cell, attempt) = match &record {
             Ok(row) => (row.id, row.cell, row.attempt),
             Err(Damaged { place, .. }) => (place.id, place.cell, place.attempt),
         };
         let cell = cells.get(&cell);
-        let named = |of: fn(&crate::campaign::plan::Cell) -> String| cell.map_or(String::new(), of);
-        let mut line = vec![
-            id.to_string(),
-            named(|cell| configuration_name(cell.configuration).into()),
-            named(|cell| cell.impact.clone()),
-            named(|cell| cell.response.clone()),
-            attempt.to_string(),
+        let mut line: Vec<Value> = vec![
+            id.into(),
+            cell.map(|cell| configuration_name(cell.configuration)).into(),
+            cell.map(|cell| cell.impact.clone()).into(),
+            cell.map(|cell| cell.response.clone()).into(),
+            attempt.into(),
         ];
         match &record {
             Ok(row) => {
                 // the last one counts
                 let last = overrules.iter().rfind(|overrule| overrule.record == id);
-                line.extend(of_record(row));
-                line.extend([
-                    last.map_or(String::new(), |one| one.utc.clone()),
-                    last.map_or(String::new(), |one| one.reason.clone()),
-                    row.peak_n.to_string(),
-                    row.pulse_us.to_string(),
-                    row.scans.to_string(),
-                    row.trigger_index.to_string(),
-                    row.gaps.iter().map(std::ops::Range::len).sum::<usize>().to_string(),
-                    String::new(),
-                ]);
+                line.extend(of_record(row, last));
             }
             Err(Damaged { what, .. }) => {
-                line.resize(RECORDS.len() - 3, String::new());
-                line.push(what.clone());
+                line.resize(RECORDS.len() - 3, Value::Missing);
+                line.push(what.as_str().into());
             }
         }
         let place = places.get(&id);
-        line.push(place.map_or(String::new(), |one| one.file.clone()));
-        line.push(place.map_or(String::new(), |one| one.hit.to_string()));
-        rows.push(line);
+        line.push(place.map(|one| one.file.clone()).into());
+        line.push(place.map(|one| one.hit).into());
+        table.push(line);
     }
-    write_rows(path, &rows).map_err(bad)
+    Ok(table)
 }
 
-fn of_record(row: &RecordRow) -> [String; 8] {
+fn of_record(row: &RecordRow, overruled: Option<&Overrule>) -> [Value; 17] {
     [
-        row.session.to_string(),
-        row.utc.clone(),
-        row.utc_error_s.map_or(String::new(), |error| error.to_string()),
+        row.session.into(),
+        row.utc.as_str().into(),
+        row.utc_error_s.into(),
         row.verdict.name().into(),
-        row.measure.to_string(),
-        row.limit.to_string(),
-        row.sentence.clone(),
+        row.measure.into(),
+        row.limit.into(),
+        row.sentence.as_str().into(),
         row.standing().name().into(),
+        overruled.map(|one| one.utc.as_str()).into(),
+        overruled.map(|one| one.reason.as_str()).into(),
+        row.peak_n.into(),
+        row.pulse_us.into(),
+        row.scans.into(),
+        row.trigger_index.into(),
+        row.gaps.iter().map(std::ops::Range::len).sum::<usize>().into(),
+        row.crc.into(),
+        Value::Missing,
     ]
 }
 
-fn channels(store: &Store, path: &Path) -> Result<(), CliError> {
-    let mut rows = vec![heading(&CHANNELS)];
+/// Every channel of every session, with its scale.
+pub(super) fn channels(store: &Store) -> Result<Table, CliError> {
+    let mut table = Table::new(&CHANNELS);
     for (session, _) in store.sessions()? {
         let (now, then, sensors) =
             (store.channels(session)?, store.channels_as_measured(session)?, store.sensors(session)?);
         for (place, channel) in now.channels.iter().enumerate() {
             let sensor = sensors.get(place);
-            let known = |of: fn(&crate::campaign::store::session_table::Sensor) -> &Option<String>| {
-                sensor.and_then(|sensor| of(sensor).clone()).unwrap_or_default()
-            };
-            rows.push(vec![
-                session.to_string(),
-                place.to_string(),
-                channel.name.to_string(),
-                format!("{:?}", channel.role),
+            let known = |of: fn(&Sensor) -> &Option<String>| sensor.and_then(|sensor| of(sensor).clone());
+            table.push(vec![
+                session.into(),
+                place.into(),
+                channel.name.to_string().into(),
+                format!("{:?}", channel.role).into(),
                 channel.quantity.unit().into(),
-                now.rate_hz.to_string(),
-                channel.units_per_volt.to_string(),
-                then.channels[place].units_per_volt.to_string(),
-                channel.range_v.to_string(),
-                channel.bits.to_string(),
-                (f64::from(channel.delay_ns) * 1e-9).to_string(),
-                known(|sensor| &sensor.model),
-                known(|sensor| &sensor.serial),
-                known(|sensor| &sensor.calibrated),
+                now.rate_hz.into(),
+                channel.units_per_code().into(),
+                channel.units_per_volt.into(),
+                then.channels[place].units_per_volt.into(),
+                channel.range_v.into(),
+                channel.bits.into(),
+                (f64::from(channel.delay_ns) * 1e-9).into(),
+                known(|sensor| &sensor.model).into(),
+                known(|sensor| &sensor.serial).into(),
+                known(|sensor| &sensor.calibrated).into(),
             ]);
         }
     }
-    write_rows(path, &rows).map_err(bad)
+    Ok(table)
+}
+
+/// Writes `records.csv`, `channels.csv` and, where there are any, `calibrations.csv`.
+pub(super) fn write(store: &Store, folder: &Path, written: &[Written]) -> Result<(), CliError> {
+    records(store, written)?.write_csv(&folder.join("records.csv")).map_err(bad)?;
+    channels(store)?.write_csv(&folder.join("channels.csv")).map_err(bad)?;
+    let entered = calibrations(store)?;
+    if entered.rows().is_empty() {
+        return Ok(());
+    }
+    entered.write_csv(&folder.join("calibrations.csv")).map_err(bad)
 }

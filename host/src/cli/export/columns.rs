@@ -1,0 +1,320 @@
+//! The campaign as columns for engines: a Parquet file for each table, and samples in files of sixty-four records.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+use serde_json::json;
+
+use super::records::Written as Place;
+use super::{What, bad, estimates, levels, make_folder, tables};
+use crate::analyse::{self, Wanted};
+use crate::campaign::plan::{Cell, configuration_name};
+use crate::campaign::store::Store;
+use crate::campaign::store::record_row::RecordRow;
+use crate::cli::analyse::analyse_into;
+use crate::cli::error::CliError;
+use crate::cli::output;
+use crate::cli::waiting::Waiting;
+use crate::device::channels::ChannelMap;
+use crate::exchange::parquet::{ParquetFile, Stored, Values, Written, write_table};
+use crate::exchange::positions_output::write_positions;
+use crate::exchange::typed_table::{Kind, Table};
+use crate::frf::Frf;
+use crate::hysteresis::RelativeMotion;
+use crate::structure::Structure;
+
+/// Records in a file of samples: some hundred megabytes, one row group each.
+const RECORDS_A_FILE: usize = 64;
+
+/// The version of this layout.
+const LAYOUT: u32 = 1;
+
+/// Columns of `frf.parquet`: one row for each line of each FRF that was measured.
+const FRF: [(&str, Stored); 10] = [
+    ("configuration", Stored::Of(Kind::Text)),
+    ("output", Stored::Of(Kind::Text)),
+    ("input", Stored::Of(Kind::Text)),
+    ("quantity", Stored::Of(Kind::Text)),
+    ("sigma_per_s", Stored::Of(Kind::Real)),
+    ("frequency_hz", Stored::Of(Kind::Real)),
+    ("re", Stored::Of(Kind::Real)),
+    ("im", Stored::Of(Kind::Real)),
+    ("coherence", Stored::Of(Kind::Real)),
+    ("variance", Stored::Of(Kind::Real)),
+];
+
+/// An export in columns.
+pub(super) struct Columns<'a> {
+    pub(super) what: &'a What,
+    /// Whether samples are written in SI.
+    pub(super) si: bool,
+}
+
+/// Records that share a file.
+struct Part<'a> {
+    /// From the export's folder.
+    file: String,
+    configuration: &'static str,
+    /// Names of the channels.
+    channels: Vec<String>,
+    records: Vec<&'a RecordRow>,
+}
+
+impl Columns<'_> {
+    pub(super) fn write(&self) -> Result<(), CliError> {
+        let What { file, out, without_records, .. } = self.what;
+        let store = Store::open_read_only(file)?;
+        for name in ["campaign.json", "samples"] {
+            if out.join(name).exists() {
+                let there = out.join(name);
+                let what = format!(
+                    "{}: an export is in this folder already; remove it, or name another",
+                    there.display()
+                );
+                return Err(CliError::Bad(what));
+            }
+        }
+        make_folder(out)?;
+        let geometry = analyse::geometry(&store.plan()?);
+        make_folder(&out.join("geometry"))?;
+        write_positions(&out.join("geometry"), &geometry, "Velocity").map_err(bad)?;
+        let mut files: BTreeMap<String, Written> = BTreeMap::new();
+        let rows: Vec<RecordRow> = store.records()?.into_iter().flatten().collect();
+        let parts = if *without_records { Vec::new() } else { self.parts(&store, &rows)? };
+        files.extend(self.write_samples(&parts)?);
+        let places = parts.iter().flat_map(|part| {
+            let place =
+                |(hit, row): (usize, &&RecordRow)| Place { record: row.id, file: part.file.clone(), hit };
+            part.records.iter().enumerate().map(place).collect::<Vec<_>>()
+        });
+        let levels = self.write_levels(&store, &mut files)?;
+        let (frfs, mut told) = self.what.frfs(&store)?;
+        files.insert("frf.parquet".into(), write_frfs(&out.join("frf.parquet"), &frfs)?);
+        let results = analyse_into(&store, Wanted::default(), out, &[])?;
+        let tables = [
+            ("records.parquet", tables::records(&store, &places.collect::<Vec<_>>())?),
+            ("cells.parquet", tables::cells(&store)?),
+            ("channels.parquet", tables::channels(&store)?),
+            ("calibrations.parquet", tables::calibrations(&store)?),
+            ("overrules.parquet", tables::overrules(&store)?),
+            ("levels.parquet", levels),
+            ("estimates.parquet", estimates::table(&results)),
+        ];
+        for (name, table) in tables {
+            files.insert(name.into(), write_table(&out.join(name), &table, &[]).map_err(bad)?);
+        }
+        self.write_campaign(&store, &files)?;
+        let bytes: u64 = files.values().map(|file| file.bytes).sum();
+        told.push(format!("{}: {} files, {:.1} MB", out.display(), files.len(), bytes as f64 / 1e6));
+        told.push(format!("geometry, results.json and report.html are in {}", out.display()));
+        output::lines(told)
+    }
+
+    /// Which records share a file: of one configuration, with the same channels, in the order in which they were measured.
+    fn parts<'r>(&self, store: &Store, rows: &'r [RecordRow]) -> Result<Vec<Part<'r>>, CliError> {
+        let cells: BTreeMap<i64, Cell> = store.cells()?.into_iter().map(|row| (row.id, row.cell)).collect();
+        let mut kinds: BTreeMap<i64, Vec<String>> = BTreeMap::new();
+        let mut together: BTreeMap<(&'static str, Vec<String>), Vec<&RecordRow>> = BTreeMap::new();
+        for row in rows.iter().filter(|row| self.what.counts(row)) {
+            let Some(cell) = cells.get(&row.cell) else { continue };
+            let channels = match kinds.get(&row.session) {
+                Some(known) => known.clone(),
+                None => kinds.entry(row.session).or_insert(names(&store.channels(row.session)?)).clone(),
+            };
+            together.entry((configuration_name(cell.configuration), channels)).or_default().push(row);
+        }
+        let mut count: BTreeMap<&str, usize> = BTreeMap::new();
+        let mut parts = Vec::new();
+        for ((configuration, channels), records) in together {
+            for records in records.chunks(RECORDS_A_FILE) {
+                let number = count.entry(configuration).or_default();
+                let file = format!("samples/configuration={configuration}/part-{number:04}.parquet");
+                parts.push(Part {
+                    file,
+                    configuration,
+                    channels: channels.clone(),
+                    records: records.to_vec(),
+                });
+                *number += 1;
+            }
+        }
+        Ok(parts)
+    }
+
+    fn write_samples(&self, parts: &[Part<'_>]) -> Result<Vec<(String, Written)>, CliError> {
+        for part in parts {
+            make_folder(&self.what.out.join(format!("samples/configuration={}", part.configuration)))?;
+        }
+        let (waiting, done) = (Waiting::of("writing samples, by record"), AtomicUsize::new(0));
+        let all = parts.iter().map(|part| part.records.len()).sum();
+        let tell = || waiting.at(done.fetch_add(1, Ordering::Relaxed) + 1, all);
+        let one = |part: &Part<'_>| Ok((part.file.clone(), self.write_part(part, &tell)?));
+        parts.par_iter().map(one).collect()
+    }
+
+    fn write_part(&self, part: &Part<'_>, tell: &dyn Fn()) -> Result<Written, CliError> {
+        // a connection belongs to its thread
+        let store = Store::open_read_only(&self.what.file)?;
+        let mut maps: BTreeMap<i64, ChannelMap> = BTreeMap::new();
+        for row in &part.records {
+            maps.insert(row.session, store.channels(row.session)?);
+        }
+        let of_channel = if self.si { Stored::Single } else { Stored::Code };
+        let mut columns = vec![("record", Stored::Id), ("scan", Stored::Index)];
+        columns.extend(part.channels.iter().map(|name| (name.as_str(), of_channel)));
+        let notes = [("jointrig.channels", scales(&maps).to_string())];
+        let mut file = ParquetFile::create(&self.what.out.join(&part.file), &columns, &notes).map_err(bad)?;
+        for row in &part.records {
+            let samples = store.samples(row)?;
+            let scans = i32::try_from(row.scans).map_err(|_| too_long(row))?;
+            let mut values = vec![Values::Id(vec![row.id; row.scans]), Values::Whole((0..scans).collect())];
+            for place in 0..part.channels.len() {
+                let codes = samples.channel(place);
+                values.push(if self.si {
+                    let si = maps[&row.session].to_si(place, codes);
+                    Values::Single(si.into_iter().map(|value| value as f32).collect())
+                } else {
+                    Values::Whole(codes.iter().map(|code| i32::from(*code)).collect())
+                });
+            }
+            file.write(&values).map_err(bad)?;
+            tell();
+        }
+        file.finish().map_err(bad)
+    }
+
+    /// The table of the shaker's levels; the samples of each that is whole go into a file of their own.
+    fn write_levels(&self, store: &Store, files: &mut BTreeMap<String, Written>) -> Result<Table, CliError> {
+        levels::table(store, |row| {
+            if self.what.without_records || !row.whole() {
+                return Ok(None);
+            }
+            make_folder(&self.what.out.join("levels"))?;
+            let name = format!("levels/level_{}.parquet", row.id);
+            let record = levels::record(store, row)?;
+            let (names, a, b) = match &record.motion {
+                RelativeMotion::Velocity { a_m_per_s, b_m_per_s } => {
+                    (["velocity_a_m_per_s", "velocity_b_m_per_s"], a_m_per_s, b_m_per_s)
+                }
+                RelativeMotion::Displacement { a_m, b_m } => {
+                    (["displacement_a_m", "displacement_b_m"], a_m, b_m)
+                }
+            };
+            let real = Stored::Of(Kind::Real);
+            let columns = [("time_s", real), (names[0], real), (names[1], real), ("force_n", real)];
+            let time: Vec<f64> = (0..record.force_n.len()).map(|i| i as f64 / record.fs_hz).collect();
+            let values = [&time, a, b, &record.force_n].map(|all| known(all));
+            let path = self.what.out.join(&name);
+            let mut file = ParquetFile::create(&path, &columns, &[]).map_err(bad)?;
+            file.write(&values).map_err(bad)?;
+            files.insert(name.clone(), file.finish().map_err(bad)?);
+            Ok(Some(name))
+        })
+    }
+
+    /// What the folder is, written last: where it is missing, the export did not end.
+    fn write_campaign(&self, store: &Store, files: &BTreeMap<String, Written>) -> Result<(), CliError> {
+        let (plan, source) = store.plan_text()?;
+        let sessions: Vec<_> = store
+            .sessions()?
+            .into_iter()
+            .map(|(id, info)| {
+                json!({
+                    "session": id, "address": info.address, "board": info.board, "serial": info.serial,
+                    "firmware_version": info.firmware_version,
+                })
+            })
+            .collect();
+        let files: serde_json::Map<_, _> = files
+            .iter()
+            .map(|(name, file)| {
+                (name.clone(), json!({ "rows": file.rows, "bytes": file.bytes, "sha256": file.sha256 }))
+            })
+            .collect();
+        let document = json!({
+            "layout": LAYOUT,
+            "jointrig": env!("CARGO_PKG_VERSION"),
+            "campaign": self.what.file.file_name().unwrap_or_default().to_string_lossy(),
+            "samples": if self.si { "si" } else { "codes" },
+            "plan": { "text": plan, "source": source },
+            "sessions": sessions,
+            "files": files,
+        });
+        let path = self.what.out.join("campaign.json");
+        let written = serde_json::to_string_pretty(&document)
+            .map_err(std::io::Error::other)
+            .and_then(|text| std::fs::write(&path, text + "\n"));
+        written.map_err(|source| CliError::File { path, doing: "writing what the folder holds", source })
+    }
+}
+
+fn names(map: &ChannelMap) -> Vec<String> {
+    map.channels.iter().map(|channel| channel.name.to_string()).collect()
+}
+
+fn too_long(row: &RecordRow) -> CliError {
+    CliError::Bad(format!("record {} has {} samples, more than can be counted in 32 bits", row.id, row.scans))
+}
+
+/// What a reader of codes needs: SI value = code × units_per_code, by session.
+fn scales(maps: &BTreeMap<i64, ChannelMap>) -> serde_json::Value {
+    let of_session = |(session, map): (&i64, &ChannelMap)| {
+        let channels: Vec<_> = map
+            .channels
+            .iter()
+            .map(|channel| {
+                json!({
+                    "channel": channel.name.as_str(), "unit": channel.quantity.unit(),
+                    "units_per_code": channel.units_per_code(), "delay_s": f64::from(channel.delay_ns) * 1e-9,
+                })
+            })
+            .collect();
+        json!({ "session": session, "rate_hz": map.rate_hz, "channels": channels })
+    };
+    maps.iter().map(of_session).collect()
+}
+
+fn known(all: &[f64]) -> Values {
+    Values::MaybeReal(all.iter().map(|value| (!value.is_nan()).then_some(*value)).collect())
+}
+
+/// A row for each line of each FRF, one group of rows for each impact; what was not measured is left out.
+fn write_frfs(path: &Path, frfs: &[(Structure, Frf)]) -> Result<Written, CliError> {
+    let mut file = ParquetFile::create(path, &FRF, &[]).map_err(bad)?;
+    for (structure, frf) in frfs {
+        for input in 0..frf.inputs().len() {
+            let measured: Vec<(usize, usize)> = (0..frf.outputs().len())
+                .flat_map(|output| (0..frf.lines().len()).map(move |line| (output, line)))
+                .filter(|(output, line)| frf.lines()[*line][(*output, input)].re.is_finite())
+                .collect();
+            if measured.is_empty() {
+                continue;
+            }
+            let text = |of: &dyn Fn(usize) -> String| {
+                Values::MaybeText(measured.iter().map(|(output, _)| Some(of(*output))).collect())
+            };
+            let real = |of: &dyn Fn(usize, usize) -> f64| {
+                known(&measured.iter().map(|(output, line)| of(*output, *line)).collect::<Vec<_>>())
+            };
+            let beside = |all: Option<&[nalgebra::DMatrix<f64>]>, output: usize, line: usize| {
+                all.map_or(f64::NAN, |all| all[line][(output, input)])
+            };
+            file.write(&[
+                text(&|_| structure.name().into()),
+                text(&|output| frf.outputs()[output].clone()),
+                text(&|_| frf.inputs()[input].clone()),
+                text(&|_| frf.quantity().frf_name().into()),
+                real(&|_, _| frf.sigma_per_s()),
+                real(&|_, line| frf.frequency_hz()[line]),
+                real(&|output, line| frf.lines()[line][(output, input)].re),
+                real(&|output, line| frf.lines()[line][(output, input)].im),
+                real(&|output, line| beside(frf.coherence(), output, line)),
+                real(&|output, line| beside(frf.variance(), output, line)),
+            ])
+            .map_err(bad)?;
+        }
+    }
+    file.finish().map_err(bad)
+}

@@ -1,0 +1,352 @@
+//! Columns for engines (DuckDB, Polars, Spark): Parquet files, compressed with zstd.
+//!
+//! A file has its name only when it is whole. The same content gives the same bytes, with the same version of jointrig.
+
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use parquet::basic::{Compression, Encoding, LogicalType, Repetition, TimeUnit, Type as Physical, ZstdLevel};
+use parquet::column::writer::ColumnWriter;
+use parquet::data_type::ByteArray;
+use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::{ColumnPath, Type};
+use sha2::{Digest, Sha256};
+
+use super::typed_table::{Kind, Table, Value};
+use crate::advice;
+
+/// Level of compression: 9 gains nothing on hits, and takes three times as long.
+const ZSTD: i32 = 3;
+
+/// Rows of a table that are written together.
+const ROWS_AT_ONCE: usize = 65_536;
+
+/// A Parquet file that cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum ParquetFileError {
+    /// What the operating system said.
+    #[error("{}: cannot be written: {source}; {}", path.display(), advice::writing(source))]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// What the library said.
+    #[error("{}: cannot be written as Parquet: {what}; report it with the campaign file", path.display())]
+    Library {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        what: String,
+    },
+}
+
+/// How a column is stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stored {
+    /// Codes of a converter: 16 bits, differences packed.
+    Code,
+    /// A rising index: 32 bits, differences packed.
+    Index,
+    /// Numbers that repeat: 64 bits, in a dictionary.
+    Id,
+    /// SI values: 32 bits, bytes of one place together.
+    Single,
+    /// Of a table, where any value may be missing.
+    Of(Kind),
+}
+
+/// Values of one column in a group of rows.
+#[derive(Debug, Clone)]
+pub enum Values {
+    /// For [`Stored::Code`] and [`Stored::Index`].
+    Whole(Vec<i32>),
+    /// For [`Stored::Id`].
+    Id(Vec<i64>),
+    /// For [`Stored::Single`].
+    Single(Vec<f32>),
+    /// For [`Stored::Of`]: whole numbers, and times in microseconds since 1970.
+    MaybeWhole(Vec<Option<i64>>),
+    /// For [`Stored::Of`].
+    MaybeReal(Vec<Option<f64>>),
+    /// For [`Stored::Of`].
+    MaybeText(Vec<Option<String>>),
+}
+
+/// What became of a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Written {
+    /// Rows.
+    pub rows: u64,
+    /// Bytes.
+    pub bytes: u64,
+    /// SHA-256 of them, hexadecimal.
+    pub sha256: String,
+}
+
+/// A file that is being written; it vanishes when it is not finished.
+pub struct ParquetFile {
+    path: PathBuf,
+    beside: PathBuf,
+    /// None once it is finished.
+    writer: Option<SerializedFileWriter<Summed>>,
+    rows: u64,
+}
+
+impl ParquetFile {
+    /// Begins a file with these columns, and words that explain it.
+    ///
+    /// # Errors
+    /// [`ParquetFileError`].
+    pub fn create(
+        path: &Path,
+        columns: &[(&str, Stored)],
+        notes: &[(&str, String)],
+    ) -> Result<Self, ParquetFileError> {
+        let beside = path.with_added_extension(format!("{}.part", std::process::id()));
+        let failed = |source| ParquetFileError::Write { path: path.into(), source };
+        let file = File::create(&beside).map_err(failed)?;
+        let out = Summed { file: BufWriter::new(file), sum: Sha256::new(), bytes: 0 };
+        let made = schema(columns).and_then(|schema| {
+            SerializedFileWriter::new(out, Arc::new(schema), Arc::new(properties(columns, notes)))
+        });
+        let mut whole = Self { path: path.into(), beside, writer: None, rows: 0 };
+        whole.writer = Some(made.map_err(|error| whole.failed(error))?);
+        Ok(whole)
+    }
+
+    /// Adds a group of rows: values of each column, in order.
+    ///
+    /// # Errors
+    /// [`ParquetFileError`].
+    pub fn write(&mut self, columns: &[Values]) -> Result<(), ParquetFileError> {
+        let Some(writer) = self.writer.as_mut() else { return Ok(()) };
+        match group(writer, columns) {
+            Ok(rows) => {
+                self.rows += rows;
+                Ok(())
+            }
+            Err(error) => Err(self.failed(error)),
+        }
+    }
+
+    /// Gives it its name.
+    ///
+    /// # Errors
+    /// [`ParquetFileError`].
+    pub fn finish(mut self) -> Result<Written, ParquetFileError> {
+        let ended = self.writer.take().map(|writer| -> Result<Summed, ParquetError> {
+            let mut out = writer.into_inner()?;
+            out.flush()?;
+            out.file.get_ref().sync_all()?;
+            Ok(out)
+        });
+        let out = match ended {
+            Some(Ok(out)) => out,
+            Some(Err(error)) => return Err(self.failed(error)),
+            None => return Err(self.failed(ParquetError::General("it is finished already".into()))),
+        };
+        std::fs::rename(&self.beside, &self.path)
+            .map_err(|source| ParquetFileError::Write { path: self.path.clone(), source })?;
+        let Summed { sum, bytes, .. } = out;
+        Ok(Written { rows: self.rows, bytes, sha256: hexadecimal(&sum.finalize()) })
+    }
+
+    fn failed(&self, error: ParquetError) -> ParquetFileError {
+        let path = self.path.clone();
+        match error {
+            ParquetError::External(source) => match source.downcast::<std::io::Error>() {
+                Ok(source) => ParquetFileError::Write { path, source: *source },
+                Err(other) => ParquetFileError::Library { path, what: other.to_string() },
+            },
+            other => ParquetFileError::Library { path, what: other.to_string() },
+        }
+    }
+}
+
+impl Drop for ParquetFile {
+    fn drop(&mut self) {
+        // it has its name by now, or nobody shall find it
+        let _ = std::fs::remove_file(&self.beside);
+    }
+}
+
+/// Writes a table.
+///
+/// # Errors
+/// [`ParquetFileError`].
+pub fn write_table(
+    path: &Path,
+    table: &Table,
+    notes: &[(&str, String)],
+) -> Result<Written, ParquetFileError> {
+    let columns: Vec<(&str, Stored)> =
+        table.columns().iter().map(|(name, kind)| (*name, Stored::Of(*kind))).collect();
+    let mut file = ParquetFile::create(path, &columns, notes)?;
+    for rows in table.rows().chunks(ROWS_AT_ONCE) {
+        let of = |(place, (_, kind)): (usize, &(&str, Kind))| {
+            values(*kind, rows.iter().map(|row| &row[place])).ok_or_else(|| ParquetFileError::Library {
+                path: path.into(),
+                what: format!("column {place} holds what it should not"),
+            })
+        };
+        let columns: Result<Vec<Values>, _> = table.columns().iter().enumerate().map(of).collect();
+        file.write(&columns?)?;
+    }
+    file.finish()
+}
+
+/// A column of a table; none where a value is of another kind.
+fn values<'a>(kind: Kind, of: impl Iterator<Item = &'a Value>) -> Option<Values> {
+    Some(match kind {
+        Kind::Whole => Values::MaybeWhole(
+            of.map(|value| match value {
+                Value::Whole(value) => Some(Some(*value)),
+                Value::Missing => Some(None),
+                _ => None,
+            })
+            .collect::<Option<_>>()?,
+        ),
+        Kind::Utc => Values::MaybeWhole(
+            of.map(|value| match value {
+                Value::Text(text) => Some(Some(text.parse::<jiff::Timestamp>().ok()?.as_microsecond())),
+                Value::Missing => Some(None),
+                _ => None,
+            })
+            .collect::<Option<_>>()?,
+        ),
+        Kind::Real => Values::MaybeReal(
+            of.map(|value| match value {
+                Value::Real(value) => Some((!value.is_nan()).then_some(*value)),
+                Value::Missing => Some(None),
+                _ => None,
+            })
+            .collect::<Option<_>>()?,
+        ),
+        Kind::Text => Values::MaybeText(
+            of.map(|value| match value {
+                Value::Text(text) => Some(Some(text.clone())),
+                Value::Missing => Some(None),
+                _ => None,
+            })
+            .collect::<Option<_>>()?,
+        ),
+    })
+}
+
+fn schema(columns: &[(&str, Stored)]) -> Result<Type, ParquetError> {
+    let field = |(name, stored): &(&str, Stored)| {
+        let (physical, logical) = match stored {
+            Stored::Code => (Physical::INT32, Some(LogicalType::integer(16, true))),
+            Stored::Index => (Physical::INT32, None),
+            Stored::Id | Stored::Of(Kind::Whole) => (Physical::INT64, None),
+            Stored::Single => (Physical::FLOAT, None),
+            Stored::Of(Kind::Real) => (Physical::DOUBLE, None),
+            Stored::Of(Kind::Text) => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+            Stored::Of(Kind::Utc) => (Physical::INT64, Some(LogicalType::timestamp(true, TimeUnit::MICROS))),
+        };
+        let repetition =
+            if matches!(stored, Stored::Of(_)) { Repetition::OPTIONAL } else { Repetition::REQUIRED };
+        Type::primitive_type_builder(name, physical)
+            .with_repetition(repetition)
+            .with_logical_type(logical)
+            .build()
+            .map(Arc::new)
+    };
+    let fields = columns.iter().map(field).collect::<Result<Vec<_>, _>>()?;
+    Type::group_type_builder("jointrig").with_fields(fields).build()
+}
+
+fn properties(columns: &[(&str, Stored)], notes: &[(&str, String)]) -> WriterProperties {
+    let level = ZstdLevel::try_new(ZSTD).unwrap_or_default();
+    let notes = notes.iter().map(|(key, value)| KeyValue::new((*key).to_owned(), value.clone())).collect();
+    let mut properties = WriterProperties::builder()
+        .set_created_by(format!("jointrig {}", env!("CARGO_PKG_VERSION")))
+        .set_key_value_metadata(Some(notes))
+        .set_compression(Compression::ZSTD(level))
+        .set_statistics_enabled(EnabledStatistics::Chunk)
+        .set_max_row_group_row_count(None);
+    for (name, stored) in columns {
+        let path = || ColumnPath::from(*name);
+        let encoding = match stored {
+            Stored::Code | Stored::Index => Encoding::DELTA_BINARY_PACKED,
+            Stored::Single => Encoding::BYTE_STREAM_SPLIT,
+            Stored::Id | Stored::Of(_) => continue,
+        };
+        properties =
+            properties.set_column_dictionary_enabled(path(), false).set_column_encoding(path(), encoding);
+    }
+    properties.build()
+}
+
+/// Writes a group of rows; how many there are.
+fn group(writer: &mut SerializedFileWriter<Summed>, columns: &[Values]) -> Result<u64, ParquetError> {
+    let mut group = writer.next_row_group()?;
+    for values in columns {
+        let Some(mut column) = group.next_column()? else {
+            return Err(ParquetError::General("there are more values than columns".into()));
+        };
+        match (column.untyped(), values) {
+            (ColumnWriter::Int32ColumnWriter(out), Values::Whole(all)) => out.write_batch(all, None, None)?,
+            (ColumnWriter::Int64ColumnWriter(out), Values::Id(all)) => out.write_batch(all, None, None)?,
+            (ColumnWriter::FloatColumnWriter(out), Values::Single(all)) => {
+                out.write_batch(all, None, None)?
+            }
+            (ColumnWriter::Int64ColumnWriter(out), Values::MaybeWhole(all)) => {
+                let there: Vec<i64> = all.iter().flatten().copied().collect();
+                out.write_batch(&there, Some(&levels(all)), None)?
+            }
+            (ColumnWriter::DoubleColumnWriter(out), Values::MaybeReal(all)) => {
+                let there: Vec<f64> = all.iter().flatten().copied().collect();
+                out.write_batch(&there, Some(&levels(all)), None)?
+            }
+            (ColumnWriter::ByteArrayColumnWriter(out), Values::MaybeText(all)) => {
+                let there: Vec<ByteArray> = all.iter().flatten().map(|text| text.as_str().into()).collect();
+                out.write_batch(&there, Some(&levels(all)), None)?
+            }
+            _ => return Err(ParquetError::General("values of another type than their column".into())),
+        };
+        column.close()?;
+    }
+    Ok(group.close()?.num_rows().unsigned_abs())
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        // a String takes any text
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+/// 1 where there is a value.
+fn levels<T>(all: &[Option<T>]) -> Vec<i16> {
+    all.iter().map(|value| i16::from(value.is_some())).collect()
+}
+
+/// A file whose bytes are added up on their way.
+struct Summed {
+    file: BufWriter<File>,
+    sum: Sha256,
+    bytes: u64,
+}
+
+impl Write for Summed {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let written = self.file.write(bytes)?;
+        self.sum.update(&bytes[..written]);
+        self.bytes += written as u64;
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.file.flush()
+    }
+}

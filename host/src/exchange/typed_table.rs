@@ -1,0 +1,128 @@
+//! A table whose columns have types: text with commas for people and spreadsheets, Parquet for engines.
+
+use std::path::Path;
+
+use super::tables_output::{TableError, write_rows_of};
+
+/// What a column holds. Any value may be missing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Whole numbers.
+    Whole,
+    /// Numbers.
+    Real,
+    /// Words.
+    Text,
+    /// Times, RFC 3339.
+    Utc,
+}
+
+/// One value.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// None, or not known.
+    Missing,
+    /// A whole number.
+    Whole(i64),
+    /// A number; NaN counts as missing.
+    Real(f64),
+    /// A word or a time.
+    Text(String),
+}
+
+impl Value {
+    /// As it stands in a text; empty where it is missing.
+    fn text(&self) -> String {
+        match self {
+            Value::Missing => String::new(),
+            Value::Real(value) if value.is_nan() => String::new(),
+            Value::Whole(value) => value.to_string(),
+            Value::Real(value) => value.to_string(),
+            Value::Text(value) => value.clone(),
+        }
+    }
+}
+
+macro_rules! value_of {
+    ($($from:ty => $kind:ident),*) => {
+        $(impl From<$from> for Value {
+            fn from(value: $from) -> Self {
+                Value::$kind(value.into())
+            }
+        })*
+    };
+}
+value_of!(i64 => Whole, u32 => Whole, i8 => Whole, u8 => Whole, f64 => Real, f32 => Real, String => Text, &str => Text);
+
+impl From<usize> for Value {
+    fn from(value: usize) -> Self {
+        // no count here comes near 2^63
+        Value::Whole(i64::try_from(value).unwrap_or(i64::MAX))
+    }
+}
+
+impl<T: Into<Value>> From<Option<T>> for Value {
+    fn from(value: Option<T>) -> Self {
+        value.map_or(Value::Missing, Into::into)
+    }
+}
+
+/// Rows under typed columns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    columns: &'static [(&'static str, Kind)],
+    rows: Vec<Vec<Value>>,
+}
+
+impl Table {
+    /// Without a row.
+    pub fn new(columns: &'static [(&'static str, Kind)]) -> Self {
+        Self { columns, rows: Vec::new() }
+    }
+
+    /// Adds a row.
+    ///
+    /// # Panics
+    /// Where it has not one value for each column: a fault of the caller, not of what is exported.
+    pub fn push(&mut self, row: Vec<Value>) {
+        assert_eq!(row.len(), self.columns.len(), "one value for each of {:?}", self.columns);
+        self.rows.push(row);
+    }
+
+    /// Names and kinds of the columns.
+    pub fn columns(&self) -> &'static [(&'static str, Kind)] {
+        self.columns
+    }
+
+    /// The rows.
+    pub fn rows(&self) -> &[Vec<Value>] {
+        &self.rows
+    }
+
+    /// Writes it as text with commas, the names first; a missing value is empty.
+    ///
+    /// # Errors
+    /// [`TableError`].
+    pub fn write_csv(&self, path: &Path) -> Result<(), TableError> {
+        let heading = self.columns.iter().map(|(name, _)| (*name).to_owned()).collect::<Vec<_>>();
+        let rows = self.rows.iter().map(|row| row.iter().map(Value::text).collect::<Vec<_>>());
+        write_rows_of(path, std::iter::once(heading).chain(rows))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn missing_values_are_empty_and_numbers_come_back() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("table.csv");
+        let mut table = Table::new(&[("a", Kind::Whole), ("b", Kind::Real), ("c", Kind::Text)]);
+        table.push(vec![(-3_i64).into(), 0.1_f64.into(), "x, \"y\"".into()]);
+        table.push(vec![Value::Missing, f64::NAN.into(), None::<String>.into()]);
+        table.write_csv(&path).expect("written");
+        let text = std::fs::read_to_string(&path).expect("a file");
+        assert_eq!(text, "a,b,c\n-3,0.1,\"x, \"\"y\"\"\"\n,,\n");
+    }
+}
