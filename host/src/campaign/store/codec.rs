@@ -8,7 +8,7 @@
 //!
 //! The CRC-32 (zlib's) runs over the codes as little-endian i16, channel after channel.
 
-use pco::standalone::{simple_compress, simple_decompress};
+use pco::standalone::{simple_compress, simple_decompress_into};
 use pco::{ChunkConfig, DeltaSpec, ModeSpec};
 
 /// Vibration is mostly noise over a slow ring-down: second differences and no other mode are as small as
@@ -72,18 +72,17 @@ pub fn encode(codes: &[i16], channels: usize) -> Result<Vec<u8>, CodecError> {
 /// # Errors
 /// The blob is damaged.
 pub fn decode(blob: &[u8], channels: usize, scans: usize, stored: u32) -> Result<Vec<i16>, CodecError> {
-    let mut codes = Vec::with_capacity(channels * scans);
-    let mut rest = blob;
     // a shot without contact has no samples, and no chunks either
-    for _ in 0..if scans == 0 { 0 } else { channels } {
+    let mut codes = vec![0; channels * scans];
+    let mut rest = blob;
+    for channel in codes.chunks_exact_mut(scans.max(1)) {
         let (length, after) = rest.split_first_chunk::<4>().ok_or(CodecError::Shape)?;
         let (chunk, after) =
             after.split_at_checked(u32::from_le_bytes(*length) as usize).ok_or(CodecError::Shape)?;
-        let channel = simple_decompress::<i16>(chunk)?;
-        if channel.len() != scans {
+        let read = simple_decompress_into(chunk, channel)?;
+        if !read.finished || read.n_processed != scans {
             return Err(CodecError::Shape);
         }
-        codes.extend(channel);
         rest = after;
     }
     let found = checksum(&codes);
@@ -129,6 +128,10 @@ mod tests {
                 assert_eq!(read, codes);
             }
         }
+        // chunks that are longer or shorter than the row says
+        assert!(matches!(decode(&blob, 3, 999, crc), Err(CodecError::Shape)));
+        assert!(matches!(decode(&blob, 3, 1_001, crc), Err(CodecError::Shape)));
+        assert!(matches!(decode(&blob, 2, 1_000, crc), Err(CodecError::Shape)));
         let empty = encode(&[], 10).expect("nothing");
         assert!(decode(&empty, 10, 0, 0).expect("nothing").is_empty());
     }
