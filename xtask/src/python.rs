@@ -24,7 +24,7 @@ const TOOLS: [&str; 1] = ["maturin>=1.9,<2"];
 const ALONE: [&str; 2] = ["numpy", "pytest"];
 
 /// What the wheel is used with: the packages that notebooks import beside it, engines that read the columns, and a scheduler.
-const OTHERS: [&str; 13] = [
+const OTHERS: [&str; 15] = [
     "numpy",
     "pytest",
     "mypy",
@@ -38,6 +38,8 @@ const OTHERS: [&str; 13] = [
     "duckdb",
     "polars",
     "dask[distributed]",
+    "nbclient",
+    "ipykernel",
 ];
 
 /// pyFBS without its 3D views, which take a gigabyte.

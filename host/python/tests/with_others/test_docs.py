@@ -42,6 +42,17 @@ def test_the_manual(lab_file: Path, tmp_path: Path) -> None:
     assert "['good', 'good', 'good']" in told and "gone.jrig" in told
 
 
+def test_the_page_for_users_of_pyfbs(tmp_path: Path) -> None:
+    for name in ("A", "B", "AJB"):
+        shutil.copy(DATA / "frf_rigid" / f"{name}.npz", tmp_path)
+    shutil.copy(DATA / "positions" / "positions.xlsx", tmp_path)
+    told = run("\n".join(fenced("coming-from-pyfbs.md", "python")), tmp_path).splitlines()
+    sensors, impacts = map(float, told[0].split())
+    # a rigid clamp: sensors and impacts fit the virtual point's motions
+    assert sensors > 0.999 and impacts > 0.999
+    assert abs(float(re.findall(r"'mean': ([0-9.e+]+)", told[1])[0]) / 180e6 - 1) < 1e-5
+
+
 def test_the_queries_on_columns(lab_file: Path, tmp_path: Path, monkeypatch) -> None:  # type: ignore[no-untyped-def]
     command("export", lab_file, "--format", "parquet", "--out", tmp_path / "columns")
     monkeypatch.chdir(tmp_path)
