@@ -10,7 +10,8 @@
 
 use super::config::{Errors, ImpactPoint, ResponsePoint};
 use super::key::{Stream, normal, stream};
-use super::probe::{AXES, Probe, normalized};
+use super::probe::{AXES, Probe};
+use super::unit_vector::normalized;
 
 /// One cell's true geometry.
 #[derive(Debug, Clone, PartialEq)]

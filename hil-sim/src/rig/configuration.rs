@@ -2,16 +2,19 @@
 
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
+
 use super::body::BodyName;
 
 /// A configuration of the rig.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Configuration {
     /// Moving mass, arm A and its specimen; specimen B removed.
     A,
     /// Arm B with its specimen; specimen A removed.
     B,
     /// Both, joined by the contact.
+    #[serde(rename = "AJB")]
     Ajb,
 }
 
@@ -28,8 +31,8 @@ impl Configuration {
         }
     }
 
-    /// Whether `body` is there.
-    pub fn has(self, body: BodyName) -> bool {
+    /// Whether `body` of the paper's rig is there.
+    pub(super) fn has(self, body: BodyName) -> bool {
         let of_b = matches!(body, BodyName::ArmB | BodyName::SpecimenB);
         match self {
             Self::A => !of_b,

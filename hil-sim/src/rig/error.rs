@@ -39,7 +39,7 @@ pub enum RigError {
     #[error("a point sits on {body}, which configuration {configuration} does not have")]
     MissingBody {
         /// The body.
-        body: &'static str,
+        body: String,
         /// The configuration.
         configuration: Configuration,
     },

@@ -32,6 +32,7 @@ pub mod state_space;
 pub mod stepper;
 pub mod structure;
 mod truth;
+mod unit_vector;
 
 pub use aim::Aim;
 pub use channels::{CHANNELS, Channel, Measured};

@@ -28,6 +28,8 @@ pub enum Stepping {
 #[derive(Debug, Clone)]
 pub(super) struct Plant {
     structure: Structure,
+    /// The bodies that the contact joins.
+    joined: [BodyName; 2],
     space: StateSpace,
     way: Way,
     period_s: f64,
@@ -60,7 +62,7 @@ impl Plant {
                 Err(reason) => exponential(Some(reason)),
             },
         };
-        Ok(Self { structure, space, way, period_s })
+        Ok(Self { structure, joined: config.joined(), space, way, period_s })
     }
 
     /// A stepper at rest that sees and pushes where `aim` and the true `spots` say, and the sliders of its joint if it can slip.
@@ -72,7 +74,7 @@ impl Plant {
         channels: &[Channel; CHANNELS],
     ) -> Result<(Stepper, Option<Slipping>), RigError> {
         let missing = |probe: &Probe| RigError::MissingBody {
-            body: probe.body.as_str(),
+            body: probe.body.to_string(),
             configuration: self.structure.configuration(),
         };
         let velocity = |probe: &Probe| self.structure.row(probe).map(|row| self.space.velocity(&row));
@@ -80,11 +82,12 @@ impl Plant {
         let [x, y, z] = &aim.response;
         let seen = |probe| velocity(probe).ok_or_else(|| missing(probe));
         let spot = |spot| velocity(&Probe::along_z(spot)).unwrap_or_else(nothing);
-        // A load cell's signal is its spring force kz · z on arm B.
+        // A load cell's signal is its spring force kz · z on the body that it holds.
         let cell = |index: usize| {
             let it = &config.load_cells[index];
-            let probe = Probe { body: BodyName::ArmB, position_m: it.position_m, direction: AXES[2] };
-            let row = self.structure.row(&probe).map(|row| self.space.displacement(&row));
+            let probe = |body| Probe { body, position_m: it.position_m, direction: AXES[2] };
+            let row = config.load_cells_on().and_then(|body| self.structure.row(&probe(body)));
+            let row = row.map(|row| self.space.displacement(&row));
             row.unwrap_or_else(nothing) * it.stiffness_n_per_m[2]
         };
         let hit = self.structure.row(&aim.impact).ok_or_else(|| missing(&aim.impact))?;
@@ -146,11 +149,13 @@ impl Plant {
         })
     }
 
-    /// Row of the structure that reads specimen A's motion less B's along z at the contact; `None` outside the assembly.
+    /// Row of the structure that reads specimen A's motion less B's along the sliding direction at the contact; `None` outside the assembly.
     fn relative(&self, contact: &Contact) -> Option<DVector<f64>> {
-        let at =
-            |body| self.structure.row(&Probe { body, position_m: contact.position_m, direction: AXES[2] });
-        Some(at(BodyName::SpecimenA)? - at(BodyName::SpecimenB)?)
+        let at = |body| {
+            self.structure.row(&Probe { body, position_m: contact.position_m, direction: contact.sliding() })
+        };
+        let [a, b] = self.joined;
+        Some(at(a)? - at(b)?)
     }
 
     /// The joint now; `None` outside the assembly.

@@ -1,6 +1,7 @@
 //! A direction at a point of a body: where something is measured or pushed.
 
 use super::config::{BodyName, ImpactPoint, ResponsePoint, RigConfig, Spot};
+use super::unit_vector::normalized;
 use super::{Configuration, RigError};
 
 /// Unit vectors of the axes.
@@ -44,7 +45,7 @@ impl RigConfig {
     /// # Errors
     /// [`RigError::UnknownPoint`] listing the names that would do.
     pub fn response(&self, configuration: Configuration, name: &str) -> Result<&ResponsePoint, RigError> {
-        let there = || self.responses.iter().filter(|point| configuration.has(point.body));
+        let there = || self.responses.iter().filter(|point| self.has(configuration, point.body));
         there().find(|point| point.name == name).ok_or_else(|| RigError::UnknownPoint {
             kind: "response",
             name: name.to_owned(),
@@ -58,7 +59,7 @@ impl RigConfig {
     /// # Errors
     /// [`RigError::UnknownPoint`] listing the names that would do.
     pub fn impact(&self, configuration: Configuration, name: &str) -> Result<&ImpactPoint, RigError> {
-        let there = || self.impacts.iter().filter(|point| configuration.has(point.body));
+        let there = || self.impacts.iter().filter(|point| self.has(configuration, point.body));
         there().find(|point| point.name == name).ok_or_else(|| RigError::UnknownPoint {
             kind: "impact",
             name: name.to_owned(),
@@ -66,13 +67,4 @@ impl RigConfig {
             valid: there().map(|point| point.name.clone()).collect(),
         })
     }
-}
-
-/// `v` at length one; `v` must not be zero.
-pub(super) fn normalized(v: [f64; 3]) -> [f64; 3] {
-    // The largest component goes first, so that neither tiny nor huge vectors leave the range of their squares.
-    let largest = v.iter().fold(0.0_f64, |largest, c| largest.max(c.abs()));
-    let v = v.map(|c| c / largest);
-    let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
-    v.map(|c| c / length)
 }

@@ -4,12 +4,14 @@
 //! D = [I, −skew(r − cg); 0, I]. A bushing between two bodies adds Dᵀ diag(k) D to K and Dᵀ diag(β k) D to C with
 //! D = [−D₁, D₂]; ground is a zero row. Six degrees of freedom per body: 18 in A, 6 in B, 24 in AJB. With a rigid clamp A the
 //! specimen is lumped onto arm A: six fewer in A and AJB. With a clamp B that gives, specimen B is a body of its own: six more in B and
-//! AJB. Arm B's figures are those with its specimen, so that a clamp B that hardly gives is as good as a rigid one.
+//! AJB. Arm B's figures are those with its specimen, so that a clamp B that hardly gives is as good as a rigid one. A rig with a structure
+//! of its own has the bodies and springs that it names.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6};
 use num_complex::Complex;
 
-use super::config::{BodyName, Bushing, RigConfig, RigidBody};
+use super::config::{BodyName, Bushing, OwnStructure, RigConfig, RigidBody};
+use super::unit_vector::normalized;
 use super::{Configuration, Probe, Quantity, RigError};
 
 /// M, C and K of one configuration, SI, in the bodies' own coordinates (m and rad).
@@ -30,6 +32,52 @@ pub struct Structure {
 impl Structure {
     /// Assembles `configuration` of the rig.
     pub fn new(config: &RigConfig, configuration: Configuration) -> Self {
+        match &config.structure {
+            Some(own) => Self::of_its_own(config, own, configuration),
+            None => Self::of_the_paper(config, configuration),
+        }
+    }
+
+    /// Any bodies and springs.
+    fn of_its_own(config: &RigConfig, own: &OwnStructure, configuration: Configuration) -> Self {
+        let bodies: Vec<_> = own.bodies.iter().filter(|body| config.has(configuration, body.name)).collect();
+        let mut structure = Self::empty(
+            configuration,
+            bodies.iter().map(|body| (body.name, body.cg_m)).collect(),
+            // nothing is lumped onto another body
+            [false, false],
+        );
+        for (index, body) in bodies.iter().enumerate() {
+            let mut block = structure.mass.fixed_view_mut::<6, 6>(6 * index, 6 * index);
+            block.copy_from(&body_mass(&body.rigid()));
+        }
+        for spring in own.springs.iter().filter(|spring| spring.present.contains(&configuration)) {
+            let ends = spring.ends();
+            let there = |end: &Option<BodyName>| end.is_none_or(|body| config.has(configuration, body));
+            if ends.iter().all(there) {
+                structure.connect_along(ends[0], ends[1], &spring.bushing(), spring.axes);
+            }
+        }
+        if configuration == Configuration::Ajb {
+            let [a, b] = own.joint;
+            structure.connect_along(Some(a), Some(b), &config.contact.bushing(), config.contact.axes);
+        }
+        if let Some(held) = own.load_cells_on.filter(|body| config.has(configuration, *body)) {
+            for cell in &config.load_cells {
+                structure.connect(None, Some(held), cell);
+            }
+        }
+        structure
+    }
+
+    fn empty(configuration: Configuration, bodies: Vec<(BodyName, [f64; 3])>, rigid: [bool; 2]) -> Self {
+        let n = 6 * bodies.len();
+        let zeros = || DMatrix::zeros(n, n);
+        Self { configuration, bodies, rigid, mass: zeros(), damping: zeros(), stiffness: zeros() }
+    }
+
+    /// The paper's bodies in a row.
+    fn of_the_paper(config: &RigConfig, configuration: Configuration) -> Self {
         let bodies = &config.bodies;
         let rigid = [config.clamp.rigid, config.clamp_b.rigid];
         let lumped = |name| match name {
@@ -47,15 +95,8 @@ impl Structure {
         .into_iter()
         .filter(|(name, _)| configuration.has(*name) && !lumped(*name))
         .collect();
-        let n = 6 * present.len();
-        let mut structure = Self {
-            configuration,
-            bodies: present.iter().map(|(name, body)| (*name, body.cg_m)).collect(),
-            rigid,
-            mass: DMatrix::zeros(n, n),
-            damping: DMatrix::zeros(n, n),
-            stiffness: DMatrix::zeros(n, n),
-        };
+        let there = present.iter().map(|(name, body)| (*name, body.cg_m)).collect();
+        let mut structure = Self::empty(configuration, there, rigid);
         for (index, (_, body)) in present.iter().enumerate() {
             let mut block = structure.mass.fixed_view_mut::<6, 6>(6 * index, 6 * index);
             block.copy_from(&body_mass(body));
@@ -84,32 +125,33 @@ impl Structure {
         let in_a = configuration == Configuration::A;
         if configuration != Configuration::B {
             for spring in &config.leaf_springs {
-                self.connect(None, BodyName::Mass, spring);
+                self.connect(None, Some(BodyName::Mass), spring);
             }
-            self.connect(Some(BodyName::Mass), BodyName::ArmA, &config.knife_edge);
+            self.connect(Some(BodyName::Mass), Some(BodyName::ArmA), &config.knife_edge);
             for tether in [&config.wire, &config.push_rod_a] {
                 if if in_a { tether.in_a } else { tether.in_ajb } {
-                    self.connect(None, BodyName::ArmA, &tether.bushing);
+                    self.connect(None, Some(BodyName::ArmA), &tether.bushing);
                 }
             }
             if !config.clamp.rigid {
                 let clamp = if in_a { &config.clamp.free } else { &config.clamp.loaded };
-                self.connect(Some(BodyName::ArmA), BodyName::SpecimenA, clamp);
+                self.connect(Some(BodyName::ArmA), Some(BodyName::SpecimenA), clamp);
             }
         }
         if configuration == Configuration::Ajb {
-            self.connect(Some(BodyName::SpecimenA), BodyName::SpecimenB, &config.contact.bushing());
+            let (ends, contact) = (config.joined().map(Some), &config.contact);
+            self.connect_along(ends[0], ends[1], &contact.bushing(), contact.axes);
         }
         if configuration != Configuration::A {
             if !config.clamp_b.rigid {
                 let alone = configuration == Configuration::B;
                 let clamp = if alone { &config.clamp_b.free } else { &config.clamp_b.loaded };
-                self.connect(Some(BodyName::ArmB), BodyName::SpecimenB, clamp);
+                self.connect(Some(BodyName::ArmB), Some(BodyName::SpecimenB), clamp);
             }
             for cell in &config.load_cells {
-                self.connect(None, BodyName::ArmB, cell);
+                self.connect(None, Some(BodyName::ArmB), cell);
             }
-            self.connect(None, BodyName::ArmB, &config.lower_push_rod);
+            self.connect(None, Some(BodyName::ArmB), &config.lower_push_rod);
         }
     }
 
@@ -133,12 +175,23 @@ impl Structure {
         Some((6 * index, self.bodies[index].1))
     }
 
-    fn connect(&mut self, from: Option<BodyName>, to: BodyName, bushing: &Bushing) {
+    fn connect(&mut self, from: Option<BodyName>, to: Option<BodyName>, bushing: &Bushing) {
+        self.connect_along(from, to, bushing, None);
+    }
+
+    /// The same of a bushing with axes of its own.
+    fn connect_along(
+        &mut self,
+        from: Option<BodyName>,
+        to: Option<BodyName>,
+        bushing: &Bushing,
+        axes: Option<[[f64; 3]; 3]>,
+    ) {
         let mut relative = DMatrix::zeros(6, self.order());
-        for (body, sign) in [(from, -1.0), (Some(to), 1.0)] {
+        for (body, sign) in [(from, -1.0), (to, 1.0)] {
             if let Some((at, cg)) = body.and_then(|body| self.find(body)) {
                 let mut block = relative.fixed_view_mut::<6, 6>(0, at);
-                block += sign * rigid_motion(bushing.position_m, cg);
+                block += sign * turned(axes) * rigid_motion(bushing.position_m, cg);
             }
         }
         let [kx, ky, kz] = bushing.stiffness_n_per_m;
@@ -200,7 +253,7 @@ impl Structure {
 
     fn rows(&self, probes: &[Probe]) -> Result<Vec<DVector<f64>>, RigError> {
         let missing = |probe: &Probe| RigError::MissingBody {
-            body: probe.body.as_str(),
+            body: probe.body.to_string(),
             configuration: self.configuration,
         };
         probes.iter().map(|probe| self.row(probe).ok_or_else(|| missing(probe))).collect()
@@ -238,6 +291,19 @@ pub(super) fn rigid_motion(at: [f64; 3], cg: [f64; 3]) -> Matrix6<f64> {
     let mut motion = Matrix6::identity();
     motion.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew);
     motion
+}
+
+/// What turns translations and rotations into these axes.
+pub(super) fn turned(axes: Option<[[f64; 3]; 3]>) -> Matrix6<f64> {
+    let mut turn = Matrix6::identity();
+    if let Some(axes) = axes {
+        // a person writes four digits of them
+        let unit = axes.map(normalized);
+        let rows = Matrix3::from_fn(|row, column| unit[row][column]);
+        turn.fixed_view_mut::<3, 3>(0, 0).copy_from(&rows);
+        turn.fixed_view_mut::<3, 3>(3, 3).copy_from(&rows);
+    }
+    turn
 }
 
 fn body_mass(body: &RigidBody) -> Matrix6<f64> {

@@ -1,6 +1,6 @@
 //! Values that no rig can have.
 
-use super::{Bushing, ContactLaw, RigConfig, RigidBody};
+use super::{BodyName, Bushing, ContactLaw, OwnBody, OwnStructure, RigConfig, RigidBody, Side};
 use crate::rig::channels::channels;
 use crate::rig::error::RigError;
 
@@ -37,6 +37,10 @@ pub fn check(config: &RigConfig) -> Result<(), RigError> {
             "must be less than arm B's, which is stated with its specimen",
         ));
     }
+    if let Some(own) = &config.structure {
+        own_structure(own)?;
+        own_points(config, own)?;
+    }
     contact(config)?;
     if config.load_cells.len() != 3 {
         return Err(bad("load_cells", &format!("must be three, not {}", config.load_cells.len())));
@@ -52,6 +56,80 @@ pub fn check(config: &RigConfig) -> Result<(), RigError> {
     finite("surroundings.temperature_c", &[surroundings.temperature_c])?;
     finite("surroundings.warming_k_per_s", &[surroundings.warming_k_per_s])?;
     errors(config)
+}
+
+fn own_structure(own: &OwnStructure) -> Result<(), RigError> {
+    for (index, it) in own.bodies.iter().enumerate() {
+        let field = format!("structure.bodies[{index}]");
+        if it.name.as_str() == "ground" {
+            return Err(bad(
+                &format!("{field}.name"),
+                "is ground, which holds the springs that no body does",
+            ));
+        }
+        if own.bodies[..index].iter().any(|earlier| earlier.name == it.name) {
+            return Err(bad(
+                &format!("{field}.name"),
+                &format!("{:?} is already a body; names must differ", it.name.as_str()),
+            ));
+        }
+        body(&field, &it.rigid())?;
+    }
+    for (index, it) in own.springs.iter().enumerate() {
+        let field = format!("structure.springs[{index}]");
+        bushing(&field, &it.bushing())?;
+        axes(&format!("{field}.axes"), it.axes)?;
+        let ends = it.ends();
+        for end in ends.into_iter().flatten() {
+            known(own, &format!("{field}.between"), end)?;
+        }
+        if ends[0] == ends[1] {
+            return Err(bad(
+                &format!("{field}.between"),
+                "has one body twice: name two, or `ground` and one",
+            ));
+        }
+        if it.present.is_empty() {
+            return Err(bad(&format!("{field}.in"), "is empty: name A, B or AJB, or leave it out for all"));
+        }
+    }
+    for (field, pair) in [("structure.joint", own.joint), ("structure.arms", own.arms)] {
+        for (name, side) in pair.into_iter().zip([Side::A, Side::B]) {
+            if known(own, field, name)?.of != side {
+                return Err(bad(
+                    field,
+                    &format!(
+                        "has {name} for {side:?}, to which it does not belong: first A's body, then B's"
+                    ),
+                ));
+            }
+        }
+    }
+    if let Some(held) = own.load_cells_on {
+        known(own, "structure.load_cells_on", held)?;
+    }
+    Ok(())
+}
+
+/// Everything that is measured or pushed sits on a body that is there.
+fn own_points(config: &RigConfig, own: &OwnStructure) -> Result<(), RigError> {
+    for (index, point) in config.responses.iter().enumerate() {
+        known(own, &format!("responses[{index}].body"), point.body)?;
+    }
+    for (index, point) in config.impacts.iter().enumerate() {
+        known(own, &format!("impacts[{index}].body"), point.body)?;
+    }
+    known(own, "spots.ldv_a.body", config.spots.ldv_a.body)?;
+    known(own, "spots.ldv_b.body", config.spots.ldv_b.body)?;
+    known(own, "shaker.body", config.shaker.body)?;
+    Ok(())
+}
+
+fn known<'o>(own: &'o OwnStructure, field: &str, name: BodyName) -> Result<&'o OwnBody, RigError> {
+    own.body(name).ok_or_else(|| {
+        let names: Vec<&str> = own.bodies.iter().map(|body| body.name.as_str()).collect();
+        bad(field, &format!("names {name}, which is no body of [structure]: {}", names.join(", ")))
+    })
 }
 
 fn errors(config: &RigConfig) -> Result<(), RigError> {
@@ -103,6 +181,7 @@ fn errors(config: &RigConfig) -> Result<(), RigError> {
 fn contact(config: &RigConfig) -> Result<(), RigError> {
     let contact = &config.contact;
     bushing("contact", &contact.bushing())?;
+    axes("contact.axes", contact.axes)?;
     if let Some(soft) =
         contact.stiffness_n_per_m.iter().find(|k| (f64::MIN_POSITIVE..SOFTEST_N_PER_M).contains(*k))
     {
@@ -297,6 +376,20 @@ fn bushing(field: &str, bushing: &Bushing) -> Result<(), RigError> {
         }
     }
     Ok(())
+}
+
+fn axes(field: &str, axes: Option<[[f64; 3]; 3]>) -> Result<(), RigError> {
+    let Some([x, y, z]) = axes else { return Ok(()) };
+    let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let off = [dot(x, x) - 1.0, dot(y, y) - 1.0, dot(z, z) - 1.0, dot(x, y), dot(y, z), dot(z, x)];
+    // four digits are what a person writes
+    if off.iter().all(|off| off.abs() < 1e-3) {
+        return Ok(());
+    }
+    Err(bad(
+        field,
+        "must be three unit vectors at right angles: x, y and z of this spring in the rig's coordinates",
+    ))
 }
 
 fn bad(field: &str, reason: &str) -> RigError {

@@ -7,12 +7,24 @@ use toml::de::{DeTable, DeValue};
 use super::{DEFAULT_TOML, RigConfig};
 use crate::rig::error::RigError;
 
+/// What a structure of a rig's own stands instead of.
+pub(super) const PAPERS_OWN: [&str; 8] =
+    ["bodies", "leaf_springs", "knife_edge", "wire", "push_rod_a", "clamp", "clamp_b", "lower_push_rod"];
+
 /// Merges `text` into the default and checks the result.
 pub fn read(text: &str) -> Result<RigConfig, RigError> {
     let user = DeTable::parse(text).map_err(|error| document_error(&error, text))?;
     let mut merged =
         DeTable::parse(DEFAULT_TOML).expect("rigs/default.toml is TOML: it is embedded and a test reads it");
     merge(merged.get_mut(), user.get_ref().clone());
+    if user.get_ref().contains_key("structure")
+        && let Some(field) = PAPERS_OWN.into_iter().find(|field| user.get_ref().contains_key(*field))
+    {
+        let line = locate(user.get_ref(), field).map(|offset| line_of(text, offset));
+        let reason =
+            "describes the paper's rig, and [structure] another one: take one of them out".to_owned();
+        return Err(RigError::Field { field: field.to_owned(), reason, line });
+    }
     // Only the user's text can be wrong here, so every span is a span of it.
     let config = RigConfig::deserialize(toml::Deserializer::from(merged))
         .map_err(|error| document_error(&error, text))?;

@@ -6,18 +6,22 @@
 mod check;
 mod document;
 mod errors;
+mod own_structure;
 mod sensors;
 mod surroundings;
 
-pub use super::body::BodyName;
+pub use super::body::{BodyName, OwnName};
 pub(crate) use check::normal_load;
 pub use errors::Errors;
+pub use own_structure::{OwnBody, OwnStructure, Side, Spring};
 pub use sensors::{Excitation, ForceSensor, LoadCells, Sensors, SpeckleNoise, SpotVibrometer, Vibrometer};
 pub use surroundings::{Cable, Surroundings};
 
 use serde::{Deserialize, Serialize};
 
+use super::Configuration;
 use super::error::RigError;
+use super::unit_vector::normalized;
 
 /// The built-in default rig, as text.
 pub const DEFAULT_TOML: &str = include_str!("../../../rigs/default.toml");
@@ -30,6 +34,9 @@ pub struct RigConfig {
     pub name: String,
     /// Scans per second (Hz).
     pub scan_rate_hz: u32,
+    /// Bodies and springs of its own, instead of those that follow up to the load cells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub structure: Option<OwnStructure>,
     /// The rigid bodies.
     pub bodies: Bodies,
     /// Ground to moving mass.
@@ -83,7 +90,34 @@ impl RigConfig {
     /// # Panics
     /// Never: every field has a TOML form.
     pub fn to_toml(&self) -> String {
-        toml::to_string(self).expect("every field of RigConfig has a TOML form")
+        let written = "every field of RigConfig has a TOML form";
+        if self.structure.is_none() {
+            return toml::to_string(self).expect(written);
+        }
+        let mut table = toml::Table::try_from(self).expect(written);
+        // they describe another rig
+        table.retain(|field, _| !document::PAPERS_OWN.contains(&field));
+        table.to_string()
+    }
+
+    /// Whether `body` is there in `configuration`.
+    pub fn has(&self, configuration: Configuration, body: BodyName) -> bool {
+        let Some(own) = &self.structure else { return configuration.has(body) };
+        own.body(body).is_some_and(|body| match configuration {
+            Configuration::A => body.of == Side::A,
+            Configuration::B => body.of == Side::B,
+            Configuration::Ajb => true,
+        })
+    }
+
+    /// The bodies that the contact joins: of A, then of B.
+    pub fn joined(&self) -> [BodyName; 2] {
+        self.structure.as_ref().map_or([BodyName::SpecimenA, BodyName::SpecimenB], |own| own.joint)
+    }
+
+    /// The body that the load cells hold; none without load cells.
+    pub fn load_cells_on(&self) -> Option<BodyName> {
+        self.structure.as_ref().map_or(Some(BodyName::ArmB), |own| own.load_cells_on)
     }
 
     /// Checks every value, as [`RigConfig::from_toml`] does; for rigs that were changed in code.
@@ -225,6 +259,9 @@ pub struct Contact {
     pub slip_step_s: f64,
     /// The distribution of an Iwan contact.
     pub iwan: Iwan,
+    /// What x, y and z are at the contact, of which z slides: unit vectors at right angles; the rig's own, where nothing is said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axes: Option<[[f64; 3]; 3]>,
 }
 
 impl Contact {
@@ -235,6 +272,11 @@ impl Contact {
             ContactLaw::Jenkins => vec![1.0],
             ContactLaw::Iwan => self.iwan.shares(),
         }
+    }
+
+    /// Unit vector along which it slides.
+    pub fn sliding(&self) -> [f64; 3] {
+        self.axes.map_or([0.0, 0.0, 1.0], |axes| normalized(axes[2]))
     }
 
     /// The stuck contact's spring and dashpot.
