@@ -128,7 +128,7 @@ fn what_cannot_be_is_refused_with_its_field_and_line() {
         ("between = [\"ground\", \"frame\"]", "between = [\"ground\", \"flame\"]", "names flame"),
         ("name = \"tip_b\"", "name = \"tip_a\"", "is already a body"),
         ("name = \"tip_b\"", "name = \"a name that is far too long for a body\"", "more than 24 bytes"),
-        ("mass_kg = 0.05", "mass_kg = -0.05", "greater than zero"),
+        ("mass_kg = 0.012", "mass_kg = -0.012", "greater than zero"),
         ("[contact]", "[clamp]\nrigid = true\n\n[contact]", "take one of them out"),
         (
             "axes = [[0.7071, -0.7071, 0.0]",

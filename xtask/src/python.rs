@@ -21,12 +21,13 @@ const WHEEL: u64 = 5_000_000;
 
 /// What builds the wheel, and what tests it where nothing else is installed.
 const TOOLS: [&str; 1] = ["maturin>=1.9,<2"];
-const ALONE: [&str; 2] = ["numpy", "pytest"];
+const ALONE: [&str; 3] = ["numpy", "pytest", "pytest-xdist"];
 
 /// What the wheel is used with: the packages that notebooks import beside it, engines that read the columns, and a scheduler.
-const OTHERS: [&str; 15] = [
+const OTHERS: [&str; 16] = [
     "numpy",
     "pytest",
+    "pytest-xdist",
     "mypy",
     "matplotlib",
     "pandas",
@@ -178,6 +179,8 @@ impl Tests<'_> {
     fn pytest(&self, python: &Path, which: &[&str]) -> Result<()> {
         let mut pytest = Command::new(python);
         pytest.args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "--durations=5"]).args(which);
+        // a file at a time on each core: tests of one file share the campaigns that they measure
+        pytest.args(["-n", "auto", "--dist", "loadfile"]);
         pytest.current_dir(self.tests()).env("PYTHONDONTWRITEBYTECODE", "1");
         let command = format!("jointrig{}", std::env::consts::EXE_SUFFIX);
         pytest.env("JOINTRIG_BIN", self.project.target.join("release").join(command));
