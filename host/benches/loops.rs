@@ -79,7 +79,8 @@ fn run() -> Outcome<()> {
 
 /// Loops of the raw and of the corrected force.
 fn both(map: &ChannelMap, samples: &Samples, level: &Level) -> Outcome<[LoopAnalysis; 2]> {
-    let raw = record(map, samples, level)?;
+    let cells: Vec<(usize, f64)> = map.places(Role::LoadCell).into_iter().map(|place| (place, 1.0)).collect();
+    let raw = record(map, &cells, samples, level)?;
     let correction = Correction { effective_mass_kg: MASS_KG, parallel_path: PATH };
     Ok([analyse(&raw)?, analyse_corrected(&raw, &correction)?])
 }

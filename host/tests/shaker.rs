@@ -293,7 +293,13 @@ fn microslip_softens_the_loop_with_amplitude_as_its_law_says() {
     let mut before = f64::INFINITY;
     for row in rows_of(&bench) {
         let channels = store.channels(row.session).unwrap();
-        let record = shaking::record(&channels, &store.level_samples(&row).unwrap(), &row.level()).unwrap();
+        let record = shaking::record(
+            &channels,
+            &store.plan().unwrap().load_cells(&channels),
+            &store.level_samples(&row).unwrap(),
+            &row.level(),
+        )
+        .unwrap();
         let found = jointrig::hysteresis::analyse(&record).unwrap();
         let (k, law) = (found.k_eq_n_per_m.mean, iwan(&found.loop_displacement_m));
         println!("{} {:?}: {k:.4e} for {law:.4e}", row.level(), found.shape);

@@ -192,13 +192,13 @@ impl CampaignFile {
         let responses = map.responses().ok_or(missing("the response"))?;
         let late = |place: usize| delay(place) - delay(force);
         let (a, b, cells) =
-            (map.place(Role::SpecimenA), map.place(Role::SpecimenB), map.places(Role::LoadCell));
+            (map.place(Role::SpecimenA), map.place(Role::SpecimenB), self.plan.load_cells(map));
         let is_velocity = |place: usize| map.channels[place].quantity == Quantity::Velocity;
         let contact = match (a, b) {
             (Some(a), Some(b)) if is_velocity(a) && is_velocity(b) && !cells.is_empty() => {
                 let mut tangential_n = vec![0.0; signal(a).len()];
-                for place in &cells {
-                    tangential_n.iter_mut().zip(signal(*place)).for_each(|(sum, v)| *sum += v);
+                for (place, part) in &cells {
+                    tangential_n.iter_mut().zip(signal(*place)).for_each(|(sum, v)| *sum += part * v);
                 }
                 Some(ContactSignals {
                     specimen_a_m_per_s: signal(a),
@@ -208,7 +208,7 @@ impl CampaignFile {
                     delay_s: ContactDelays {
                         specimen_a: late(a),
                         specimen_b: late(b),
-                        load_cells: late(cells[0]),
+                        load_cells: late(cells[0].0),
                     },
                 })
             }
@@ -260,7 +260,8 @@ impl CampaignFile {
         }
         let channels = self.channels.get(&row.session).ok_or("its session is missing")?;
         let samples = store.level_samples(row).map_err(|error| error.to_string())?;
-        let record = shaking::record(channels, &samples, &row.level()).map_err(|error| error.to_string())?;
+        let record = shaking::record(channels, &self.plan.load_cells(channels), &samples, &row.level())
+            .map_err(|error| error.to_string())?;
         let record = HysteresisRecord { normal_load_n: self.known.normal_load_n, ..record };
         Ok(ShakerLevel { id: row.id, moment: row.moment, level: row.level(), record })
     }

@@ -97,6 +97,12 @@ pub fn polarity(store: &Store) -> Result<Vec<Polarity>, StoreError> {
             let own = hit.map.channels.iter().position(|other| other.name == channel.name);
             let sign = match (channel.role, axis) {
                 (Role::Response(_), Some(axis)) => own.and_then(|own| power_sign(&hit, own, axis)),
+                (Role::LoadCell, _) => {
+                    let part = plan.sliding_part(&channel.name);
+                    own.and_then(|own| early_sign(&hit, own, axis))
+                        .filter(|_| part != 0.0)
+                        .map(|sign| sign * part.signum())
+                }
                 _ => own.and_then(|own| early_sign(&hit, own, axis)),
             };
             if let Some(sign) = sign {

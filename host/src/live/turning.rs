@@ -7,6 +7,7 @@ use crate::device::channels::ChannelMap;
 use crate::device::recording::by_channel;
 use crate::hysteresis::RelativeMotion;
 use crate::hysteresis::integration::closed_cycle;
+use jointrig_protocol::channel::Role;
 
 /// Points of a loop on the screen.
 const POINTS: usize = 180;
@@ -24,7 +25,10 @@ pub fn turn(channels: &ChannelMap, codes: &[i16], level: &Level) -> Option<[Vec<
     }
     let from = scans - cycle - 2 * spare;
     let samples = Samples { codes: by_channel(&codes[from * count..scans * count], count), channels: count };
-    let record = record(channels, &samples, level).ok()?;
+    // as they read: the stream does not tell which way a cell was mounted
+    let cells: Vec<(usize, f64)> =
+        channels.places(Role::LoadCell).into_iter().map(|place| (place, 1.0)).collect();
+    let record = record(channels, &cells, &samples, level).ok()?;
     let RelativeMotion::Velocity { a_m_per_s, b_m_per_s } = &record.motion else { return None };
     let length = a_m_per_s.len().min(b_m_per_s.len()).min(record.force_n.len());
     let from = length.checked_sub(cycle + spare)?;
@@ -47,7 +51,7 @@ pub fn turn(channels: &ChannelMap, codes: &[i16], level: &Level) -> Option<[Vec<
 mod tests {
     use super::*;
     use crate::campaign::plan::level::Held;
-    use jointrig_protocol::channel::{Channel, Quantity, Role};
+    use jointrig_protocol::channel::{Channel, Quantity};
     use std::f64::consts::TAU;
 
     #[test]

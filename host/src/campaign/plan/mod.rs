@@ -9,6 +9,7 @@ mod check;
 mod faults;
 mod geometry;
 pub mod level;
+mod load_cells;
 mod priors;
 mod sense;
 mod sensor;

@@ -75,7 +75,7 @@ pub(super) fn record(store: &Store, row: &LevelRow) -> Result<HysteresisRecord, 
     let samples = store.level_samples(row)?;
     let plan = store.plan()?;
     let normal_load_n = plan.contact.as_ref().and_then(|contact| contact.get_ref().normal_load_n);
-    let record = shaking::record(&channels, &samples, &row.level())
+    let record = shaking::record(&channels, &plan.load_cells(&channels), &samples, &row.level())
         .map_err(|what| CliError::Bad(format!("the shaker's level {} ({}): {what}", row.id, row.level())))?;
     Ok(HysteresisRecord { normal_load_n, ..record })
 }

@@ -14,11 +14,16 @@ use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 #[error("its session has no {0}")]
 pub struct Unusable(&'static str);
 
-/// v_A, v_B and the load cells' sum, in step with one another.
+/// v_A, v_B and the load cells' sum, in step with one another; `cells` are [`Plan::load_cells`](crate::campaign::plan::Plan::load_cells).
 ///
 /// # Errors
 /// A channel is missing.
-pub fn record(channels: &ChannelMap, samples: &Samples, level: &Level) -> Result<HysteresisRecord, Unusable> {
+pub fn record(
+    channels: &ChannelMap,
+    cells: &[(usize, f64)],
+    samples: &Samples,
+    level: &Level,
+) -> Result<HysteresisRecord, Unusable> {
     let velocity = |role: Role, name: &'static str| {
         channels
             .place(role)
@@ -27,11 +32,10 @@ pub fn record(channels: &ChannelMap, samples: &Samples, level: &Level) -> Result
     };
     let a = velocity(Role::SpecimenA, "velocity of specimen A")?;
     let b = velocity(Role::SpecimenB, "velocity of specimen B")?;
-    let cells = channels.places(Role::LoadCell);
-    let first = *cells.first().ok_or(Unusable("load cell"))?;
+    let (first, _) = *cells.first().ok_or(Unusable("load cell along the sliding direction"))?;
     let late = |place: usize| f64::from(channels.channels[place].delay_ns) * 1e-9;
     let fs_hz = f64::from(channels.rate_hz);
-    let signals = [&[a][..], &[b], &cells].map(|places| sum(channels, samples, places));
+    let signals = [&[(a, 1.0)][..], &[(b, 1.0)], cells].map(|places| sum(channels, samples, places));
     // one amplifier: the cells are alike
     let [a_m_per_s, b_m_per_s, force_n] = in_step(signals, [late(a), late(b), late(first)], fs_hz);
     Ok(HysteresisRecord {
@@ -46,14 +50,14 @@ pub fn record(channels: &ChannelMap, samples: &Samples, level: &Level) -> Result
 /// Samples that are converted at once, so that a sum of channels stays in the core's cache.
 const CHUNK: usize = 1 << 14;
 
-/// The sum of these channels in SI units, on all cores.
-fn sum(channels: &ChannelMap, samples: &Samples, places: &[usize]) -> Vec<f64> {
-    let Some(first) = places.first() else { return Vec::new() };
+/// The sum of these channels in SI units, each with its factor, on all cores.
+fn sum(channels: &ChannelMap, samples: &Samples, places: &[(usize, f64)]) -> Vec<f64> {
+    let Some((first, _)) = places.first() else { return Vec::new() };
     let mut sum = vec![0.0; samples.channel(*first).len()];
     sum.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, sum)| {
-        for place in places {
+        for (place, part) in places {
             let Some(channel) = channels.channels.get(*place) else { continue };
-            let scale = channel.units_per_code();
+            let scale = channel.units_per_code() * part;
             let codes = &samples.channel(*place)[chunk * CHUNK..];
             sum.iter_mut().zip(codes).for_each(|(sum, code)| *sum += f64::from(*code) * scale);
         }

@@ -1,0 +1,76 @@
+//! What the load cells say of the force along the sliding direction.
+
+use jointrig_protocol::channel::Role;
+
+use super::Plan;
+use crate::device::channels::ChannelMap;
+
+/// A cell that feels less than this part of the force along the sliding direction is not there for it.
+const FEELS: f64 = 1e-3;
+
+impl Plan {
+    /// The load cells that feel the sliding direction: place in the map, and by what its reading is multiplied in their sum. A cell's
+    /// direction is that of the plan's sensor of its name (`LC1` is the channel `lc_1`); the sliding direction without one.
+    pub fn load_cells(&self, map: &ChannelMap) -> Vec<(usize, f64)> {
+        let places = map.places(Role::LoadCell).into_iter();
+        places
+            .map(|place| (place, self.sliding_part(&map.channels[place].name)))
+            .filter(|(_, part)| part.abs() > FEELS)
+            .collect()
+    }
+
+    /// Cosine between what the sensor of this channel feels and the sliding direction; 1 for a channel that the plan does not name.
+    pub fn sliding_part(&self, channel: &str) -> f64 {
+        let named = |name: &str| letters(name).eq(letters(channel));
+        let mut sensors = self.geometry.sensor.iter().map(toml::Spanned::get_ref);
+        sensors.find(|sensor| named(&sensor.name)).map_or(1.0, |sensor| {
+            let (own, sliding) = (sensor.direction, self.sliding());
+            let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+            dot(own, sliding) / (dot(own, own) * dot(sliding, sliding)).sqrt()
+        })
+    }
+}
+
+/// Letters and digits of a name, small.
+fn letters(name: &str) -> impl Iterator<Item = char> {
+    name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::campaign::plan::CONTACT;
+    use jointrig_protocol::channel::{Channel, Quantity};
+
+    fn map() -> ChannelMap {
+        let channel = |name: &str| Channel {
+            name: name.parse().expect("a short name"),
+            role: Role::LoadCell,
+            quantity: Quantity::Force,
+            units_per_volt: 1.0,
+            range_v: 10.0,
+            bits: 16,
+            delay_ns: 0,
+        };
+        let channels = ["lc_1", "lc_2", "lc_3", "lc_4"].map(channel).to_vec();
+        ChannelMap { id: 0, rate_hz: 51_200, channels }
+    }
+
+    #[test]
+    fn each_cell_adds_what_it_feels_along_the_sliding_direction() {
+        let plan = |old: &str, new: &str| {
+            assert!(CONTACT.contains(old), "{old}");
+            Plan::parse(&CONTACT.replace(old, new), "plan.toml").expect("a plan")
+        };
+        let cells = plan("LC1", "LC1").load_cells(&map());
+        // the fourth is not in the plan
+        assert_eq!(cells, [(0, 1.0), (1, 1.0), (2, 1.0), (3, 1.0)]);
+        let lc1 = "{ name = \"LC1\", position_m = [-0.035, -0.015, -0.15], direction = [0, 0, 1] }";
+        let turned = plan(lc1, &lc1.replace("[0, 0, 1]", "[0, 0, -1]"));
+        assert_eq!(turned.load_cells(&map())[0], (0, -1.0));
+        let inclined = plan(lc1, &lc1.replace("[0, 0, 1]", "[0, 0.6, 0.8]"));
+        assert!((inclined.load_cells(&map())[0].1 - 0.8).abs() < 1e-12);
+        let across = plan(lc1, &lc1.replace("[0, 0, 1]", "[0, 1, 0]"));
+        assert_eq!(across.load_cells(&map()).iter().map(|cell| cell.0).collect::<Vec<_>>(), [1, 2, 3]);
+    }
+}

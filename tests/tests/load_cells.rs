@@ -1,0 +1,83 @@
+//! A load cell that is mounted the other way round, and a plan that says so.
+#![allow(clippy::unwrap_used)]
+
+use jointrig::campaign::plan::CONTACT;
+use jointrig_tests::command::jointrig;
+use jointrig_tests::live::done;
+use serde_json::Value;
+use std::path::Path;
+
+const LC3: &str = "{ name = \"LC3\", position_m = [0.0, -0.065, -0.15], direction = [0, 0, 1] }";
+
+/// Forty-two hits of a second, with the third cell felt along `direction`.
+fn plan(direction: &str) -> String {
+    let mut text = CONTACT.to_owned();
+    for (old, new) in [
+        ("\"BZ3\", \"BY1\", \"BY2\", \"BY3\", \"BX1\", \"BX2\", \"BX3\"]", "\"BZ3\"]"),
+        ("impacts = [\"AZ1\", \"AZ2\", \"AZ3\", \"I_MZ\"]", "impacts = [\"AZ1\", \"AZ3\"]"),
+        ("[\"S1\", \"S2\", \"S3\", \"S4\", \"S5\", \"S6\",", "[\"S1\", \"S3\", \"S5\","),
+        ("length_s = 2.0", "length_s = 1.0"),
+        ("exponential_per_s = 2.3", "exponential_per_s = 4.6"),
+        (LC3, &LC3.replace("[0, 0, 1]", direction)),
+    ] {
+        assert!(text.contains(old), "{old}");
+        text = text.replace(old, new);
+    }
+    text
+}
+
+/// What is found on a rig with this plan, and what is said of the channels' signs.
+fn found(folder: &Path, rig: &str, plan: &str) -> (Value, String) {
+    let at = |name: &str| folder.join(name);
+    std::fs::create_dir_all(folder).unwrap();
+    std::fs::write(at("rig.toml"), rig).unwrap();
+    std::fs::write(at("plan.toml"), plan).unwrap();
+    done(jointrig().args(["campaign", "new"]).arg(at("lab.jrig")).arg("--plan").arg(at("plan.toml")));
+    let address = format!("sim:{}", at("rig.toml").display());
+    done(jointrig().args(["campaign", "run", "--yes", "--device", &address]).arg(at("lab.jrig")));
+    done(jointrig().arg("shaker").arg(at("lab.jrig")).args([
+        "--yes",
+        "--device",
+        &address,
+        "--freq",
+        "250",
+        "--amplitude",
+        "1e-7",
+    ]));
+    done(jointrig().arg("analyse").arg(at("lab.jrig")).arg("--out").arg(at("out")));
+    let signs = String::from_utf8(
+        jointrig().args(["campaign", "check"]).arg(at("lab.jrig")).output().unwrap().stdout,
+    )
+    .unwrap();
+    (serde_json::from_slice(&std::fs::read(at("out/results.json")).unwrap()).unwrap(), signs)
+}
+
+fn k_t(results: &Value) -> Option<f64> {
+    results["answer"]["contact"]["k_t_n_per_m"]["mean"].as_f64()
+}
+
+/// Slope of the shaker's loop with the raw force.
+fn slope(results: &Value) -> f64 {
+    let rows = results["hysteresis"].as_array().unwrap();
+    let level = rows.iter().find(|row| row["kind"] == "shaker" && row["force"] == "raw");
+    level.unwrap()["k_eq_n_per_m"]["mean"].as_f64().unwrap()
+}
+
+#[test]
+fn a_cell_that_is_mounted_the_other_way_round_changes_nothing_if_the_plan_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let turned = "[errors.volts]\nlc_3 = -1.0\n";
+    let (usual, _) = found(&folder.path().join("usual"), "", &plan("[0, 0, 1]"));
+    let (said, signs) = found(&folder.path().join("said"), turned, &plan("[0, 0, -1]"));
+    let (unsaid, complaint) = found(&folder.path().join("unsaid"), turned, &plan("[0, 0, 1]"));
+    // the cell's noise is not turned with it
+    let k = k_t(&usual).unwrap();
+    assert!((k_t(&said).unwrap() / k - 1.0).abs() < 0.003, "{:?} and {k}", k_t(&said));
+    assert!((slope(&said) / slope(&usual) - 1.0).abs() < 1e-3, "{} and {}", slope(&said), slope(&usual));
+    // what its direction is worth: a third of the force with the wrong sign. The contact's own k_T calibrates the sum with hits on B alone,
+    // and does not need it
+    assert!((slope(&unsaid) / slope(&usual) - 1.0).abs() > 0.2, "{}", slope(&unsaid));
+    let about = |text: &str| text.lines().find(|line| line.contains("lc_3")).unwrap_or_default().to_owned();
+    assert!(about(&signs).contains("right"), "{signs}");
+    assert!(about(&complaint).contains("TURNED"), "{complaint}");
+}
