@@ -225,6 +225,7 @@ fn values<'a>(kind: Kind, of: impl Iterator<Item = &'a Value>) -> Option<Values>
         Kind::Real => Values::MaybeReal(
             of.map(|value| match value {
                 Value::Real(value) => Some((!value.is_nan()).then_some(*value)),
+                Value::Single(value) => Some((!value.is_nan()).then_some(f64::from(*value))),
                 Value::Missing => Some(None),
                 _ => None,
             })

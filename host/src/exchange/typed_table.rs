@@ -26,6 +26,8 @@ pub enum Value {
     Whole(i64),
     /// A number; NaN counts as missing.
     Real(f64),
+    /// A number that is stored in 32 bits: as text it has no more digits than that. NaN counts as missing.
+    Single(f32),
     /// A word or a time.
     Text(String),
 }
@@ -36,8 +38,10 @@ impl Value {
         match self {
             Value::Missing => String::new(),
             Value::Real(value) if value.is_nan() => String::new(),
+            Value::Single(value) if value.is_nan() => String::new(),
             Value::Whole(value) => value.to_string(),
             Value::Real(value) => value.to_string(),
+            Value::Single(value) => value.to_string(),
             Value::Text(value) => value.clone(),
         }
     }
@@ -52,7 +56,7 @@ macro_rules! value_of {
         })*
     };
 }
-value_of!(i64 => Whole, u32 => Whole, i8 => Whole, u8 => Whole, f64 => Real, f32 => Real, String => Text, &str => Text);
+value_of!(i64 => Whole, u32 => Whole, i8 => Whole, u8 => Whole, f64 => Real, f32 => Single, String => Text, &str => Text);
 
 impl From<usize> for Value {
     fn from(value: usize) -> Self {
@@ -121,8 +125,9 @@ mod tests {
         let mut table = Table::new(&[("a", Kind::Whole), ("b", Kind::Real), ("c", Kind::Text)]);
         table.push(vec![(-3_i64).into(), 0.1_f64.into(), "x, \"y\"".into()]);
         table.push(vec![Value::Missing, f64::NAN.into(), None::<String>.into()]);
+        table.push(vec![7_u32.into(), 0.025_f32.into(), Value::Missing]);
         table.write_csv(&path).expect("written");
         let text = std::fs::read_to_string(&path).expect("a file");
-        assert_eq!(text, "a,b,c\n-3,0.1,\"x, \"\"y\"\"\"\n,,\n");
+        assert_eq!(text, "a,b,c\n-3,0.1,\"x, \"\"y\"\"\"\n,,\n7,0.025,\n");
     }
 }

@@ -42,6 +42,8 @@ pub struct Fake {
     pub reach_us: u32,
     /// Peak force per µs of pulse beyond reach, N.
     pub newtons_per_us: f32,
+    /// Longest pulse of its coil, µs.
+    pub coil_cap_us: u32,
     /// After this many requests the cable is pulled.
     pub dies_after: Option<u32>,
     /// Payloads of log frames, one sent before each answer, from the beginning again after the last.
@@ -77,6 +79,7 @@ impl Default for Fake {
             drops: 0..0,
             reach_us: 1_000,
             newtons_per_us: 0.025,
+            coil_cap_us: 8_000,
             dies_after: None,
             says: Vec::new(),
             restarts_after: None,
@@ -188,7 +191,7 @@ impl Fake {
                 channels: ROLES.len() as u8,
                 scan_rate_hz: RATE,
                 ring_scans: RING,
-                coil_cap_us: 8_000,
+                coil_cap_us: self.coil_cap_us,
                 stage: self.stage_known,
                 drive_v: 0.0,
                 reset: Reset::Power,

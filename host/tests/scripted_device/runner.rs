@@ -357,3 +357,20 @@ fn a_person_may_move_hammer_and_laser() {
     let summary = run_on(&path, fake, &options(), &mut ByShotSummary).expect("runs");
     assert_eq!(summary.kept, 14);
 }
+
+#[test]
+fn a_coil_whose_pulses_are_too_short_for_the_plan_is_refused_before_anything_moves() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = create(&folder, "c.jrig", &plan());
+    let device = Fake::scripted(|fake| fake.coil_cap_us = 400);
+    let refused = run_on(&path, device, &options(), &mut ByShotSummary).expect_err("500 µs is the shortest");
+    let said = refused.to_string();
+    assert!(said.contains("at most 400 µs") && said.contains("pulse_bounds_us"), "{said}");
+    assert!(Store::open_read_only(&path).expect("opens").records().expect("rows").is_empty());
+    // a cap between the plan's bounds is kept to
+    let device = Fake::scripted(|fake| fake.coil_cap_us = 2_500);
+    let summary = run_on(&path, device, &options(), &mut ByShotSummary).expect("runs");
+    assert!(summary.hits > 0);
+    let store = Store::open_read_only(&path).expect("opens");
+    assert!(rows(&store).iter().all(|row| row.shot.pulse_us <= 2_500));
+}

@@ -12,11 +12,12 @@ const ANOTHER_SENSOR: f64 = 1.25;
 
 /// The channels as the plan calibrates them, with a sentence for each that the device describes otherwise.
 ///
-/// Refuses a device of another rate, without the channels of a hit, or with other sensors than the plan's.
+/// `coil_cap_us` is the device's longest pulse. Refuses a device of another rate, with too short a pulse, without the channels of a hit, or with other sensors than the plan's.
 pub(super) fn fitted(
     address: &str,
     plan: &Plan,
     channels: &ChannelMap,
+    coil_cap_us: u32,
 ) -> Result<(ChannelMap, Vec<String>), RunError> {
     let unfit = |what: String| Err(RunError::Unfit { address: address.into(), what });
     let wanted = plan.record.get_ref().rate_hz;
@@ -24,6 +25,12 @@ pub(super) fn fitted(
         return unfit(format!(
             "it measures at {} Hz, the plan says {wanted} Hz (record.rate_hz)",
             channels.rate_hz
+        ));
+    }
+    let [shortest, _] = plan.force.get_ref().pulse_bounds_us;
+    if coil_cap_us < shortest {
+        return unfit(format!(
+            "its coil is driven for at most {coil_cap_us} µs, and the plan's shortest pulse is {shortest} µs (force.pulse_bounds_us)"
         ));
     }
     if channels.place(Role::HammerForce).is_none() || channels.responses().is_none_or(|axes| axes.len() != 3)

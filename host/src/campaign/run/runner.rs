@@ -88,7 +88,7 @@ pub fn run(
     let plan = store.plan()?;
     let info = session.info()?;
     let device = session.channels(&info)?;
-    let (planned, remarks) = fitted(session.address(), &plan, &device)?;
+    let (planned, remarks) = fitted(session.address(), &plan, &device, info.coil_cap_us)?;
     let channels = store.calibrated(store.next_session()?, planned.clone())?;
     let changed = same_or_accepted(
         &store,
