@@ -204,8 +204,7 @@ fn build(distribution: &Distribution, partial: &Path, folder: &Path) -> Result<(
     let own = distribution.sysroot.join("lib/rustlib").join(host).join("lib");
     symlink(&own, host_folder.join("lib")).with_context(|| format!("could not link to {}", own.display()))?;
 
-    let script = format!("#!/bin/sh\nexec {RUSTC} --sysroot {} \"$@\"\n", shell_quoted(folder)?);
-    write(&wrapper(partial), &script)?;
+    write(&wrapper(partial), &script(folder)?)?;
     fs::set_permissions(wrapper(partial), fs::Permissions::from_mode(0o755))
         .with_context(|| format!("could not make {} executable", wrapper(partial).display()))?;
     fs::remove_dir_all(&package).with_context(|| format!("could not remove {}", package.display()))
@@ -252,8 +251,16 @@ fn find_linker(distribution: &Distribution) -> Result<Option<PathBuf>> {
     Ok(candidates.into_iter().find(|candidate| command::is_executable(candidate)))
 }
 
+/// Whether everything is there, and meant for this place: the wrapper names its folder, so one that was moved is built anew.
 fn is_whole(folder: &Path) -> bool {
-    command::is_executable(&wrapper(folder)) && has_core(&libraries(folder))
+    let meant =
+        fs::read_to_string(wrapper(folder)).ok().is_some_and(|own| script(folder).is_ok_and(|s| s == own));
+    meant && command::is_executable(&wrapper(folder)) && has_core(&libraries(folder))
+}
+
+/// The wrapper that makes the compiler use `folder`.
+fn script(folder: &Path) -> Result<String> {
+    Ok(format!("#!/bin/sh\nexec {RUSTC} --sysroot {} \"$@\"\n", shell_quoted(folder)?))
 }
 
 /// The script in a sysroot that stands in for `rustc`.
@@ -329,6 +336,19 @@ mod tests {
         assert!(!has_core(folder.path()));
         fs::write(folder.path().join("libcore-123.rlib"), "").expect("a writable folder");
         assert!(has_core(folder.path()));
+    }
+
+    #[test]
+    fn a_sysroot_that_was_moved_is_not_taken_for_a_whole_one() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let (here, there) = (folder.path().join("it's here"), folder.path().join("there"));
+        write(&libraries(&here).join("libcore-123.rlib"), "").expect("a writable folder");
+        write(&wrapper(&here), &script(&here).expect("a path in UTF-8")).expect("a writable folder");
+        assert!(!is_whole(&here), "the wrapper is no program yet");
+        fs::set_permissions(wrapper(&here), fs::Permissions::from_mode(0o755)).expect("our own file");
+        assert!(is_whole(&here));
+        fs::rename(&here, &there).expect("a writable folder");
+        assert!(!is_whole(&there) && !is_whole(&here));
     }
 
     #[test]
