@@ -70,7 +70,12 @@ impl Structure {
         structure
     }
 
-    fn empty(configuration: Configuration, bodies: Vec<(BodyName, [f64; 3])>, rigid: [bool; 2]) -> Self {
+    /// Bodies without mass, by name and centre, joined by nothing.
+    pub(super) fn empty(
+        configuration: Configuration,
+        bodies: Vec<(BodyName, [f64; 3])>,
+        rigid: [bool; 2],
+    ) -> Self {
         let n = 6 * bodies.len();
         let zeros = || DMatrix::zeros(n, n);
         Self { configuration, bodies, rigid, mass: zeros(), damping: zeros(), stiffness: zeros() }
@@ -179,8 +184,8 @@ impl Structure {
         self.connect_along(from, to, bushing, None);
     }
 
-    /// The same of a bushing with axes of its own.
-    fn connect_along(
+    /// The same of a bushing with axes of its own. A body that is not there holds like the ground.
+    pub(super) fn connect_along(
         &mut self,
         from: Option<BodyName>,
         to: Option<BodyName>,
@@ -285,7 +290,7 @@ pub fn exact_frf(
 }
 
 /// Motion of point `at` (translation, rotation) from that of the body's centre of gravity.
-pub(super) fn rigid_motion(at: [f64; 3], cg: [f64; 3]) -> Matrix6<f64> {
+fn rigid_motion(at: [f64; 3], cg: [f64; 3]) -> Matrix6<f64> {
     let r = [at[0] - cg[0], at[1] - cg[1], at[2] - cg[2]];
     let skew = Matrix3::new(0.0, -r[2], r[1], r[2], 0.0, -r[0], -r[1], r[0], 0.0);
     let mut motion = Matrix6::identity();

@@ -38,7 +38,7 @@ pub enum Side {
     B,
 }
 
-/// A rigid body of a substructure.
+/// A rigid body of a substructure. (Its fields are a [`RigidBody`]'s once more: serde refuses unknown fields only where none is flattened.)
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OwnBody {
@@ -70,7 +70,8 @@ impl OwnBody {
     }
 }
 
-/// A spring and dashpot for all six relative motions, between two bodies or from the ground (`ground`) to one.
+/// A spring and dashpot for all six relative motions, between two bodies or from the ground (`ground`) to one. (Its fields are a
+/// [`Bushing`]'s, for the same reason.)
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spring {
