@@ -10,6 +10,7 @@ mod chromium;
 mod command;
 mod consent;
 mod emulator;
+mod environment;
 mod firmware;
 mod flash;
 mod flat;

@@ -3,6 +3,7 @@
 //! Python and its packages are this check's alone, in folders under `target/`; no part of jointrig needs them.
 
 use crate::command;
+use crate::environment::{self, environment, pip};
 use crate::project::Project;
 use anyhow::{Context, Result, bail};
 use std::collections::BTreeMap;
@@ -23,28 +24,18 @@ const WHEEL: u64 = 5_000_000;
 const TOOLS: [&str; 1] = ["maturin>=1.9,<2"];
 const ALONE: [&str; 3] = ["numpy", "pytest", "pytest-xdist"];
 
-/// What the wheel is used with: the packages that notebooks import beside it, engines that read the columns, and a scheduler.
-const OTHERS: [&str; 16] = [
-    "numpy",
+/// What the wheel is used with beside its peers: what notebooks import, engines that read the columns, and a scheduler.
+const OTHERS: [&str; 9] = [
     "pytest",
     "pytest-xdist",
     "mypy",
     "matplotlib",
-    "pandas",
-    "scipy",
-    "openpyxl",
-    "tqdm",
-    "pyFRF==1.5.0",
-    "pyuff==2.5.8",
     "duckdb",
     "polars",
     "dask[distributed]",
     "nbclient",
     "ipykernel",
 ];
-
-/// pyFBS without its 3D views, which take a gigabyte.
-const WITHOUT_WHAT_THEY_NEED: [&str; 1] = ["pyFBS==1.0.7"];
 
 /// Builds and tests the wheel; a remark on it, or why it was left out.
 pub fn run(project: &Project) -> Result<String> {
@@ -154,7 +145,7 @@ impl Tests<'_> {
     /// With the packages that people use beside it, and the stubs. This environment is kept: it takes half a gigabyte.
     fn with_others(&self, system: &Path) -> Result<()> {
         let python = environment(system, &self.folder.join("others"), &OTHERS)?;
-        pip(&python, &["install", "--quiet", "--no-deps"], &WITHOUT_WHAT_THEY_NEED)?;
+        environment::with_peers(&python)?;
         pip(&python, &["uninstall", "--quiet", "--yes"], &["jointrig"])?;
         self.install(&python)?;
         self.pytest(&python, &["with_others"])?;
@@ -186,22 +177,4 @@ impl Tests<'_> {
         pytest.env("JOINTRIG_BIN", self.project.target.join("release").join(command));
         command::run(&mut pytest).context("the wheel failed its tests")
     }
-}
-
-/// The interpreter of an environment that has these packages; made where it is not there.
-fn environment(system: &Path, folder: &Path, packages: &[&str]) -> Result<PathBuf> {
-    let interpreter = folder.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
-    if !interpreter.is_file() {
-        command::run(Command::new(system).args(["-m", "venv"]).arg(folder))
-            .context("the environment cannot be made: on Debian, install python3-venv")?;
-    }
-    pip(&interpreter, &["install", "--quiet"], packages)?;
-    Ok(interpreter)
-}
-
-fn pip<T: AsRef<std::ffi::OsStr>>(python: &Path, how: &[&str], packages: &[T]) -> Result<()> {
-    command::run(
-        Command::new(python).args(["-m", "pip", "--disable-pip-version-check"]).args(how).args(packages),
-    )
-    .context("the packages cannot be installed")
 }

@@ -37,21 +37,23 @@ pub fn identify(
 ) -> PyResult<(Analysis, Vec<String>)> {
     in_the_process_that_loaded_this(py)?;
     let refused = |sentence: String| raised::refused(py, &sentence);
-    let usual = Question::default();
-    let errors = [
-        ("position_error_m", position_error_m, usual.priors.position_m),
-        ("aim_error_m", aim_error_m, usual.priors.aim_m),
-        ("angle_error_rad", angle_error_rad, usual.priors.hammer_angle_rad),
-        ("mounting_error", mounting_error, usual.mounting),
-        ("noise", noise, 0.0),
-    ];
-    for (name, given, _) in errors {
+    for (name, given) in [
+        ("position_error_m", position_error_m),
+        ("aim_error_m", aim_error_m),
+        ("angle_error_rad", angle_error_rad),
+        ("mounting_error", mounting_error),
+        ("noise", noise),
+    ] {
         if given.is_some_and(|value| !(value.is_finite() && value >= 0.0)) {
             return Err(refused(format!("{name}: a standard deviation is a number, zero or more")));
         }
     }
-    let [position_m, aim_m, hammer_angle_rad, mounting, _] =
-        errors.map(|(_, given, usual)| given.unwrap_or(usual));
+    let usual = Question::default();
+    let priors = Priors {
+        position_m: position_error_m.unwrap_or(usual.priors.position_m),
+        aim_m: aim_error_m.unwrap_or(usual.priors.aim_m),
+        hammer_angle_rad: angle_error_rad.unwrap_or(usual.priors.hammer_angle_rad),
+    };
     let methods = method.iter().map(|name| name.parse::<Asked>());
     let sets = idms.iter().map(|words| words.parse::<IdmSets>());
     let bands = band_hz.into_iter().map(|(low_hz, high_hz)| {
@@ -71,10 +73,10 @@ pub fn identify(
             .flat_map(|set| set.0)
             .collect(),
         bands: bands.collect::<Result<_, _>>().map_err(refused)?,
-        priors: Priors { position_m, aim_m, hammer_angle_rad },
+        priors,
         full_joint,
         noise,
-        mounting,
+        mounting: mounting_error.unwrap_or(usual.mounting),
     };
     let (geometry, notes) = py
         .detach(|| read_geometry(&geometry))

@@ -82,8 +82,9 @@ pub fn frf<'py>(
             return Err(format!("no hit is good, so there is nothing to average: {}", why.join("; ")));
         }
         let spectra = estimate(&records, &used, &settings).map_err(|error| error.to_string())?;
-        let (hz, values) = (spectra.frequency_hz().to_vec(), columns(spectra.rows(value)));
-        let whole = jointrig::frf::Frf::new(hz, spectra.sigma_per_s(), motion, outputs, vec![input], values)
+        let whole = spectra
+            .to_matrix(motion, outputs, input)
+            .and_then(|h1| h1.with_values(columns(spectra.rows(value))))
             .and_then(|frf| frf.with_variance(columns(spectra.rows(CrossSpectra::variance))))
             .and_then(|frf| frf.with_coherence(columns(spectra.rows(CrossSpectra::coherence))));
         Ok((whole.map_err(|error| error.to_string())?, verdicts.iter().map(|v| v.kind.name()).collect()))

@@ -81,6 +81,7 @@ pub fn polarity(store: &Store) -> Result<Vec<Polarity>, StoreError> {
     let rows = kept(store, |_| true)?;
     let Some(last) = rows.last() else { return Ok(Vec::new()) };
     let map = store.channels(last.session)?;
+    let cells = plan.load_cells(&map);
     let mut found = Vec::new();
     for (place, channel) in map.channels.iter().enumerate() {
         let axis = match channel.role {
@@ -88,6 +89,12 @@ pub fn polarity(store: &Store) -> Result<Vec<Polarity>, StoreError> {
             Role::Response(axis) => Some(index(axis)),
             Role::SpecimenA | Role::SpecimenB | Role::LoadCell => Some(2),
             _ => continue,
+        };
+        // which way a load cell is mounted is the plan's to say; one across the sliding direction tells nothing
+        let sense = match cells.iter().find(|(cell, _)| *cell == place) {
+            Some((_, part)) => part.signum(),
+            None if channel.role == Role::LoadCell => continue,
+            None => 1.0,
         };
         let mut candidates = candidates(store, &plan, &rows, channel, axis)?;
         candidates.truncate(HITS);
@@ -97,16 +104,10 @@ pub fn polarity(store: &Store) -> Result<Vec<Polarity>, StoreError> {
             let own = hit.map.channels.iter().position(|other| other.name == channel.name);
             let sign = match (channel.role, axis) {
                 (Role::Response(_), Some(axis)) => own.and_then(|own| power_sign(&hit, own, axis)),
-                (Role::LoadCell, _) => {
-                    let part = plan.sliding_part(&channel.name);
-                    own.and_then(|own| early_sign(&hit, own, axis))
-                        .filter(|_| part != 0.0)
-                        .map(|sign| sign * part.signum())
-                }
                 _ => own.and_then(|own| early_sign(&hit, own, axis)),
             };
             if let Some(sign) = sign {
-                signs.push(sign);
+                signs.push(sense * sign);
                 records.push(hit.record);
             }
         }

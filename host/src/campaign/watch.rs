@@ -103,6 +103,8 @@ pub enum Seen<'a> {
         limits: &'a [f64],
         /// The drive's largest amplitude, V.
         most_drive_v: f64,
+        /// The load cells whose sum is T: place in the scan, and by what each is multiplied.
+        load_cells: &'a [(usize, f64)],
     },
     /// A piece of a level on its way: some whole cycles.
     Shaking(Shaking<'a>),

@@ -94,10 +94,19 @@ pub struct Written {
 /// A file that is being written; it vanishes when it is not finished.
 pub struct ParquetFile {
     path: PathBuf,
-    beside: PathBuf,
-    /// None once it is finished.
-    writer: Option<SerializedFileWriter<Summed>>,
+    beside: Beside,
+    writer: SerializedFileWriter<Summed>,
     rows: u64,
+}
+
+/// The name of a file until it is whole. Nobody shall find what has it afterwards.
+struct Beside(PathBuf);
+
+impl Drop for Beside {
+    fn drop(&mut self) {
+        // a whole one has its own name by now
+        let _ = std::fs::remove_file(&self.0);
+    }
 }
 
 impl ParquetFile {
@@ -110,16 +119,15 @@ impl ParquetFile {
         columns: &[(&str, Stored)],
         notes: &[(&str, String)],
     ) -> Result<Self, ParquetFileError> {
-        let beside = path.with_added_extension(format!("{}.part", std::process::id()));
+        let beside = Beside(path.with_added_extension(format!("{}.part", std::process::id())));
         let failed = |source| ParquetFileError::Write { path: path.into(), source };
-        let file = File::create(&beside).map_err(failed)?;
+        let file = File::create(&beside.0).map_err(failed)?;
         let out = Summed { file: BufWriter::new(file), sum: Sha256::new(), bytes: 0 };
         let made = schema(columns).and_then(|schema| {
             SerializedFileWriter::new(out, Arc::new(schema), Arc::new(properties(columns, notes)))
         });
-        let mut whole = Self { path: path.into(), beside, writer: None, rows: 0 };
-        whole.writer = Some(made.map_err(|error| whole.failed(error))?);
-        Ok(whole)
+        let writer = made.map_err(|error| failed_with(path, error))?;
+        Ok(Self { path: path.into(), beside, writer, rows: 0 })
     }
 
     /// Adds a group of rows: values of each column, in order.
@@ -127,54 +135,36 @@ impl ParquetFile {
     /// # Errors
     /// [`ParquetFileError`].
     pub fn write(&mut self, columns: &[Values]) -> Result<(), ParquetFileError> {
-        let Some(writer) = self.writer.as_mut() else { return Ok(()) };
-        match group(writer, columns) {
-            Ok(rows) => {
-                self.rows += rows;
-                Ok(())
-            }
-            Err(error) => Err(self.failed(error)),
-        }
+        self.rows += group(&mut self.writer, columns).map_err(|error| failed_with(&self.path, error))?;
+        Ok(())
     }
 
     /// Gives it its name.
     ///
     /// # Errors
     /// [`ParquetFileError`].
-    pub fn finish(mut self) -> Result<Written, ParquetFileError> {
-        let ended = self.writer.take().map(|writer| -> Result<Summed, ParquetError> {
+    pub fn finish(self) -> Result<Written, ParquetFileError> {
+        let Self { path, beside, writer, rows } = self;
+        let ended = || -> Result<Summed, ParquetError> {
             let mut out = writer.into_inner()?;
             out.flush()?;
             out.file.get_ref().sync_all()?;
+            std::fs::rename(&beside.0, &path)?;
             Ok(out)
-        });
-        let out = match ended {
-            Some(Ok(out)) => out,
-            Some(Err(error)) => return Err(self.failed(error)),
-            None => return Err(self.failed(ParquetError::General("it is finished already".into()))),
         };
-        std::fs::rename(&self.beside, &self.path)
-            .map_err(|source| ParquetFileError::Write { path: self.path.clone(), source })?;
-        let Summed { sum, bytes, .. } = out;
-        Ok(Written { rows: self.rows, bytes, sha256: hexadecimal(&sum.finalize()) })
-    }
-
-    fn failed(&self, error: ParquetError) -> ParquetFileError {
-        let path = self.path.clone();
-        match error {
-            ParquetError::External(source) => match source.downcast::<std::io::Error>() {
-                Ok(source) => ParquetFileError::Write { path, source: *source },
-                Err(other) => ParquetFileError::Library { path, what: other.to_string() },
-            },
-            other => ParquetFileError::Library { path, what: other.to_string() },
-        }
+        let Summed { sum, bytes, .. } = ended().map_err(|error| failed_with(&path, error))?;
+        Ok(Written { rows, bytes, sha256: hexadecimal(&sum.finalize()) })
     }
 }
 
-impl Drop for ParquetFile {
-    fn drop(&mut self) {
-        // it has its name by now, or nobody shall find it
-        let _ = std::fs::remove_file(&self.beside);
+fn failed_with(path: &Path, error: ParquetError) -> ParquetFileError {
+    let path = path.to_owned();
+    match error {
+        ParquetError::External(source) => match source.downcast::<std::io::Error>() {
+            Ok(source) => ParquetFileError::Write { path, source: *source },
+            Err(other) => ParquetFileError::Library { path, what: other.to_string() },
+        },
+        other => ParquetFileError::Library { path, what: other.to_string() },
     }
 }
 
@@ -206,40 +196,32 @@ pub fn write_table(
 /// A column of a table; none where a value is of another kind.
 fn values<'a>(kind: Kind, of: impl Iterator<Item = &'a Value>) -> Option<Values> {
     Some(match kind {
-        Kind::Whole => Values::MaybeWhole(
-            of.map(|value| match value {
-                Value::Whole(value) => Some(Some(*value)),
-                Value::Missing => Some(None),
-                _ => None,
-            })
-            .collect::<Option<_>>()?,
-        ),
-        Kind::Utc => Values::MaybeWhole(
-            of.map(|value| match value {
-                Value::Text(text) => Some(Some(text.parse::<jiff::Timestamp>().ok()?.as_microsecond())),
-                Value::Missing => Some(None),
-                _ => None,
-            })
-            .collect::<Option<_>>()?,
-        ),
-        Kind::Real => Values::MaybeReal(
-            of.map(|value| match value {
-                Value::Real(value) => Some((!value.is_nan()).then_some(*value)),
-                Value::Single(value) => Some((!value.is_nan()).then_some(f64::from(*value))),
-                Value::Missing => Some(None),
-                _ => None,
-            })
-            .collect::<Option<_>>()?,
-        ),
-        Kind::Text => Values::MaybeText(
-            of.map(|value| match value {
-                Value::Text(text) => Some(Some(text.clone())),
-                Value::Missing => Some(None),
-                _ => None,
-            })
-            .collect::<Option<_>>()?,
-        ),
+        Kind::Whole => Values::MaybeWhole(column(of, |value| match value {
+            Value::Whole(value) => Some(Some(*value)),
+            _ => None,
+        })?),
+        Kind::Utc => Values::MaybeWhole(column(of, |value| match value {
+            Value::Text(text) => Some(Some(text.parse::<jiff::Timestamp>().ok()?.as_microsecond())),
+            _ => None,
+        })?),
+        Kind::Real => Values::MaybeReal(column(of, |value| match value {
+            Value::Real(value) => Some((!value.is_nan()).then_some(*value)),
+            Value::Single(value) => Some((!value.is_nan()).then_some(f64::from(*value))),
+            _ => None,
+        })?),
+        Kind::Text => Values::MaybeText(column(of, |value| match value {
+            Value::Text(text) => Some(Some(text.clone())),
+            _ => None,
+        })?),
     })
+}
+
+/// Each value as `known` takes it; a missing one is none in any column.
+fn column<'a, T>(
+    of: impl Iterator<Item = &'a Value>,
+    known: impl Fn(&Value) -> Option<Option<T>>,
+) -> Option<Vec<Option<T>>> {
+    of.map(|value| if *value == Value::Missing { Some(None) } else { known(value) }).collect()
 }
 
 fn schema(columns: &[(&str, Stored)]) -> Result<Type, ParquetError> {

@@ -62,19 +62,26 @@ pub fn write_records(path: &Path, records: &ImpactRecords) -> Result<(), TableEr
 /// # Errors
 /// [`TableError`].
 pub fn write_loop(path: &Path, record: &HysteresisRecord) -> Result<(), TableError> {
-    let (names, a, b) = match &record.motion {
-        RelativeMotion::Velocity { a_m_per_s, b_m_per_s } => {
-            (["velocity_a_m_per_s", "velocity_b_m_per_s"], a_m_per_s, b_m_per_s)
-        }
-        RelativeMotion::Displacement { a_m, b_m } => (["displacement_a_m", "displacement_b_m"], a_m, b_m),
-    };
+    let signals = loop_signals(record);
     write(path, |out| {
-        out.write_record(["time_s", names[0], names[1], "force_n"])?;
-        for (i, ((a, b), f)) in a.iter().zip(b).zip(&record.force_n).enumerate() {
+        out.write_record(std::iter::once("time_s").chain(signals.map(|(name, _)| name)))?;
+        let [a, b, force] = signals.map(|(_, signal)| signal);
+        for (i, ((a, b), f)) in a.iter().zip(b).zip(force).enumerate() {
             out.write_record([i as f64 / record.fs_hz, *a, *b, *f].map(|value| value.to_string()))?;
         }
         Ok(())
     })
+}
+
+/// The signals of a loop, under the names that they have as columns.
+pub fn loop_signals(record: &HysteresisRecord) -> [(&'static str, &[f64]); 3] {
+    let [a, b]: [(&str, &[f64]); 2] = match &record.motion {
+        RelativeMotion::Velocity { a_m_per_s, b_m_per_s } => {
+            [("velocity_a_m_per_s", a_m_per_s), ("velocity_b_m_per_s", b_m_per_s)]
+        }
+        RelativeMotion::Displacement { a_m, b_m } => [("displacement_a_m", a_m), ("displacement_b_m", b_m)],
+    };
+    [a, b, ("force_n", &record.force_n)]
 }
 
 /// Rows as they are, the heading first.

@@ -58,6 +58,8 @@ pub enum Told {
         limits: Vec<f64>,
         /// The drive's largest amplitude, V.
         most_drive_v: f64,
+        /// The load cells whose sum is T: place in the scan, and by what each is multiplied.
+        load_cells: Vec<(usize, f64)>,
     },
     /// A piece of it: time (s), amplitude, drive (V), and whether it has settled.
     Window([f64; 3], bool),
@@ -152,8 +154,9 @@ impl Watch for Eye {
             Seen::Recording => self.tell(Told::Recording),
             Seen::Judging => self.tell(Told::Judging),
             Seen::Link(accounts) => self.tell(Told::Link(accounts)),
-            Seen::Level { level, limits, most_drive_v } => {
-                self.tell(Told::Level { level: *level, limits: limits.to_vec(), most_drive_v });
+            Seen::Level { level, limits, most_drive_v, load_cells } => {
+                let (limits, load_cells) = (limits.to_vec(), load_cells.to_vec());
+                self.tell(Told::Level { level: *level, limits, most_drive_v, load_cells });
             }
             Seen::Shaking(shaking) => {
                 self.keep(shaking.codes);

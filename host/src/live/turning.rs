@@ -7,14 +7,18 @@ use crate::device::channels::ChannelMap;
 use crate::device::recording::by_channel;
 use crate::hysteresis::RelativeMotion;
 use crate::hysteresis::integration::closed_cycle;
-use jointrig_protocol::channel::Role;
 
 /// Points of a loop on the screen.
 const POINTS: usize = 180;
 
 /// Relative displacement (µm) and force (N) over the last whole cycle in these codes (scan after scan); none where a channel or a cycle is
 /// missing, or the frequency is being swept.
-pub fn turn(channels: &ChannelMap, codes: &[i16], level: &Level) -> Option<[Vec<f64>; 2]> {
+pub fn turn(
+    channels: &ChannelMap,
+    load_cells: &[(usize, f64)],
+    codes: &[i16],
+    level: &Level,
+) -> Option<[Vec<f64>; 2]> {
     let count = channels.len();
     let cycle = (f64::from(channels.rate_hz) / level.frequency_hz).round() as usize;
     let scans = codes.len().checked_div(count)?;
@@ -25,10 +29,7 @@ pub fn turn(channels: &ChannelMap, codes: &[i16], level: &Level) -> Option<[Vec<
     }
     let from = scans - cycle - 2 * spare;
     let samples = Samples { codes: by_channel(&codes[from * count..scans * count], count), channels: count };
-    // as they read: the stream does not tell which way a cell was mounted
-    let cells: Vec<(usize, f64)> =
-        channels.places(Role::LoadCell).into_iter().map(|place| (place, 1.0)).collect();
-    let record = record(channels, &cells, &samples, level).ok()?;
+    let record = record(channels, load_cells, &samples, level).ok()?;
     let RelativeMotion::Velocity { a_m_per_s, b_m_per_s } = &record.motion else { return None };
     let length = a_m_per_s.len().min(b_m_per_s.len()).min(record.force_n.len());
     let from = length.checked_sub(cycle + spare)?;
@@ -51,7 +52,7 @@ pub fn turn(channels: &ChannelMap, codes: &[i16], level: &Level) -> Option<[Vec<
 mod tests {
     use super::*;
     use crate::campaign::plan::level::Held;
-    use jointrig_protocol::channel::{Channel, Quantity};
+    use jointrig_protocol::channel::{Channel, Quantity, Role};
     use std::f64::consts::TAU;
 
     #[test]
@@ -89,7 +90,7 @@ mod tests {
                 ]
             })
             .collect();
-        let [x, force] = turn(&channels, &codes, &level).expect("whole cycles");
+        let [x, force] = turn(&channels, &[(2, 1.0)], &codes, &level).expect("whole cycles");
         assert_eq!(x.len(), force.len());
         let most = |all: &[f64]| all.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
         assert!((most(&x) - 2.0).abs() < 0.02, "{}", most(&x));
@@ -97,7 +98,7 @@ mod tests {
         // where x is largest the force is the elastic part, where it is zero the rest
         let middle = x.iter().zip(&force).min_by(|a, b| a.0.abs().total_cmp(&b.0.abs())).expect("points");
         assert!((middle.1.abs() - 5.0).abs() < 1.5, "{middle:?}");
-        assert_eq!(turn(&channels, &codes[..3 * 512], &level), None, "not a cycle and its ends");
-        assert_eq!(turn(&channels, &codes, &Level { end_hz: Some(200.0), ..level }), None);
+        assert_eq!(turn(&channels, &[(2, 1.0)], &codes[..3 * 512], &level), None, "not a cycle and its ends");
+        assert_eq!(turn(&channels, &[(2, 1.0)], &codes, &Level { end_hz: Some(200.0), ..level }), None);
     }
 }

@@ -47,6 +47,7 @@ pub struct Watching {
 struct Known {
     channels: Option<Arc<ChannelMap>>,
     level: Option<Level>,
+    load_cells: Vec<(usize, f64)>,
     shaker: Option<Shaker>,
     levels: u64,
     signals: Sums,
@@ -131,7 +132,8 @@ impl Watching {
                         received_scans: accounts.received,
                     });
                 }
-                Told::Level { level, limits, most_drive_v } => {
+                Told::Level { level, limits, most_drive_v, load_cells } => {
+                    known.load_cells = load_cells;
                     known.begin(level, &limits, most_drive_v);
                     now(Doing::Shaking, None, None);
                     shaker = true;
@@ -205,7 +207,7 @@ impl Known {
         else {
             return;
         };
-        shaker.turn = turn(channels, &self.cycles, level).or(shaker.turn.take());
+        shaker.turn = turn(channels, &self.load_cells, &self.cycles, level).or(shaker.turn.take());
         for limit in &mut shaker.limits {
             let Some(place) = channels.channels.iter().position(|own| own.name.as_str() == limit.channel)
             else {

@@ -79,8 +79,8 @@ pub fn planned_places(places: &[Place], plan: &str) -> Option<figure::Figure> {
 pub fn write(results: &Results, folder: &Path, formats: &[Format]) -> io::Result<()> {
     fs::create_dir_all(folder)?;
     let json = results.to_json().map_err(io::Error::other)?;
-    replace(&folder.join(RESULTS_FILE), json.as_bytes())?;
-    replace(&folder.join(REPORT_FILE), page(results).as_bytes())?;
+    write_whole(&folder.join(RESULTS_FILE), json.as_bytes())?;
+    write_whole(&folder.join(REPORT_FILE), page(results).as_bytes())?;
     if formats.is_empty() {
         return Ok(());
     }
@@ -100,8 +100,8 @@ pub fn write_comparison(compared: &Compared, both: [&Results; 2], folder: &Path)
     fs::create_dir_all(folder)?;
     let mut json = serde_json::to_string(compared).map_err(io::Error::other)?;
     json.push('\n');
-    replace(&folder.join(COMPARED_FILE), json.as_bytes())?;
-    replace(&folder.join(COMPARISON_FILE), comparison_page(compared, both).as_bytes())
+    write_whole(&folder.join(COMPARED_FILE), json.as_bytes())?;
+    write_whole(&folder.join(COMPARISON_FILE), comparison_page(compared, both).as_bytes())
 }
 
 fn write_figures(figures: &[figure::Figure], folder: &Path, formats: &[Format]) -> io::Result<()> {
@@ -137,7 +137,7 @@ pub fn write_figure(figure: &figure::Figure, format: Format, path: &Path) -> io:
         Format::Png => png::png(&svg::file(figure)).map_err(io::Error::other)?,
         Format::Csv => csv::csv(figure).into_bytes(),
     };
-    replace(path, &content)
+    write_whole(path, &content)
 }
 
 /// The labels of an axis' ticks, the empty ones of minor ticks included: for the test that holds the page's twin to them. `length` in px.
@@ -151,7 +151,11 @@ pub fn axis_labels(logarithmic: bool, range: [f64; 2], length: f64, upright: boo
     scale.ticks(lie).into_iter().map(|tick| tick.label).collect()
 }
 
-fn replace(place: &Path, content: &[u8]) -> io::Result<()> {
+/// Writes a file that has its name only when it is whole.
+///
+/// # Errors
+/// It cannot be written; nothing is left of it then, and what had the name before still has it.
+pub fn write_whole(place: &Path, content: &[u8]) -> io::Result<()> {
     let beside = place.with_added_extension(format!("{}.part", std::process::id()));
     let written = File::create(&beside)
         .and_then(|mut file| file.write_all(content).and_then(|()| file.sync_all()))

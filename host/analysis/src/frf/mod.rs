@@ -1,5 +1,6 @@
 //! Frequency response functions: one complex matrix per line, what its values are, and their noise.
 
+mod checks;
 mod error;
 mod matrix;
 pub mod noise;

@@ -3,6 +3,7 @@
 use jointrig_protocol::channel::Role;
 
 use super::Plan;
+use super::structure::{dot, unit};
 use crate::device::channels::ChannelMap;
 
 /// A cell that feels less than this part of the force along the sliding direction is not there for it.
@@ -20,14 +21,11 @@ impl Plan {
     }
 
     /// Cosine between what the sensor of this channel feels and the sliding direction; 1 for a channel that the plan does not name.
-    pub fn sliding_part(&self, channel: &str) -> f64 {
+    fn sliding_part(&self, channel: &str) -> f64 {
         let named = |name: &str| letters(name).eq(letters(channel));
         let mut sensors = self.geometry.sensor.iter().map(toml::Spanned::get_ref);
-        sensors.find(|sensor| named(&sensor.name)).map_or(1.0, |sensor| {
-            let (own, sliding) = (sensor.direction, self.sliding());
-            let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-            dot(own, sliding) / (dot(own, own) * dot(sliding, sliding)).sqrt()
-        })
+        let own = sensors.find(|sensor| named(&sensor.name));
+        own.map_or(1.0, |sensor| dot(unit(sensor.direction), unit(self.sliding())))
     }
 }
 

@@ -2,6 +2,7 @@
 //! can still be read.
 
 use super::faults::Faults;
+use super::structure::dot;
 use super::{PRINTABLE, Plan, printable};
 
 /// No rig is larger, m: coordinates in mm are caught here.
@@ -120,6 +121,15 @@ impl Plan {
         }
         for sensor in &geometry.sensor {
             place(sensor.span().start, &sensor.get_ref().name, sensor.get_ref().position_m);
+        }
+        for sensor in &geometry.sensor {
+            let (sensor, at) = (sensor.get_ref(), sensor.span().start);
+            let length = dot(sensor.direction, sensor.direction).sqrt();
+            faults.unless(
+                (length - 1.0).abs() <= 1e-3,
+                at,
+                format!("geometry: direction of `{}` must have length 1", sensor.name),
+            );
         }
         for point in &geometry.response {
             let (point, at) = (point.get_ref(), point.span().start);

@@ -152,6 +152,7 @@ fn what_no_plan_can_mean_is_refused_for_a_new_campaign_and_read_in_an_old_one() 
         ("name = \"small\"", "name = \"\\u001b[2J\"", "name must have"),
         ("name = \"A2\"", "name = \"A/2\"", "files are named after it"),
         ("name = \"LC1\"", "name = \"\\u202eLC1\"", "must have one printable"),
+        ("direction = [0, 0, 1]", "direction = [0, 0, 2]", "direction of `LDV_A` must have length 1"),
     ] {
         assert!(SMALL.contains(from), "{from}");
         let text = SMALL

@@ -20,9 +20,10 @@ use crate::cli::waiting::Waiting;
 use crate::device::channels::ChannelMap;
 use crate::exchange::parquet::{ParquetFile, Stored, Values, Written, write_table};
 use crate::exchange::positions_output::write_positions;
+use crate::exchange::tables_output::loop_signals;
 use crate::exchange::typed_table::{Kind, Table};
 use crate::frf::Frf;
-use crate::hysteresis::RelativeMotion;
+use crate::report;
 use crate::structure::Structure;
 
 /// Records in a file of samples: some hundred megabytes, one row group each.
@@ -58,8 +59,15 @@ struct Part<'a> {
     file: String,
     configuration: &'static str,
     /// Names of the channels.
-    channels: Vec<String>,
-    records: Vec<&'a RecordRow>,
+    channels: Vec<&'a str>,
+    records: Vec<Sampled<'a>>,
+}
+
+/// A record, and what its channels are.
+#[derive(Clone, Copy)]
+struct Sampled<'a> {
+    row: &'a RecordRow,
+    map: &'a ChannelMap,
 }
 
 impl Columns<'_> {
@@ -82,11 +90,15 @@ impl Columns<'_> {
         write_positions(&out.join("geometry"), &geometry, "Velocity").map_err(bad)?;
         let mut files: BTreeMap<String, Written> = BTreeMap::new();
         let rows: Vec<RecordRow> = store.records()?.into_iter().flatten().collect();
-        let parts = if *without_records { Vec::new() } else { self.parts(&store, &rows)? };
+        let mut maps: BTreeMap<i64, ChannelMap> = BTreeMap::new();
+        for (session, _) in store.sessions()? {
+            maps.insert(session, store.channels(session)?);
+        }
+        let parts = if *without_records { Vec::new() } else { self.parts(&store, &rows, &maps)? };
         files.extend(self.write_samples(&parts)?);
         let places = parts.iter().flat_map(|part| {
             let place =
-                |(hit, row): (usize, &&RecordRow)| Place { record: row.id, file: part.file.clone(), hit };
+                |(hit, one): (usize, &Sampled)| Place { record: one.row.id, file: part.file.clone(), hit };
             part.records.iter().enumerate().map(place).collect::<Vec<_>>()
         });
         let levels = self.write_levels(&store, &mut files)?;
@@ -113,17 +125,20 @@ impl Columns<'_> {
     }
 
     /// Which records share a file: of one configuration, with the same channels, in the order in which they were measured.
-    fn parts<'r>(&self, store: &Store, rows: &'r [RecordRow]) -> Result<Vec<Part<'r>>, CliError> {
+    fn parts<'r>(
+        &self,
+        store: &Store,
+        rows: &'r [RecordRow],
+        maps: &'r BTreeMap<i64, ChannelMap>,
+    ) -> Result<Vec<Part<'r>>, CliError> {
         let cells: BTreeMap<i64, Cell> = store.cells()?.into_iter().map(|row| (row.id, row.cell)).collect();
-        let mut kinds: BTreeMap<i64, Vec<String>> = BTreeMap::new();
-        let mut together: BTreeMap<(&'static str, Vec<String>), Vec<&RecordRow>> = BTreeMap::new();
+        let mut together: BTreeMap<(&'static str, Vec<&str>), Vec<Sampled<'_>>> = BTreeMap::new();
         for row in rows.iter().filter(|row| self.what.counts(row)) {
-            let Some(cell) = cells.get(&row.cell) else { continue };
-            let channels = match kinds.get(&row.session) {
-                Some(known) => known.clone(),
-                None => kinds.entry(row.session).or_insert(names(&store.channels(row.session)?)).clone(),
-            };
-            together.entry((configuration_name(cell.configuration), channels)).or_default().push(row);
+            // neither can be missing: the file refers to both by foreign keys
+            let (Some(cell), Some(map)) = (cells.get(&row.cell), maps.get(&row.session)) else { continue };
+            let channels = map.channels.iter().map(|channel| channel.name.as_str()).collect();
+            let of = (configuration_name(cell.configuration), channels);
+            together.entry(of).or_default().push(Sampled { row, map });
         }
         let mut count: BTreeMap<&str, usize> = BTreeMap::new();
         let mut parts = Vec::new();
@@ -157,23 +172,19 @@ impl Columns<'_> {
     fn write_part(&self, part: &Part<'_>, tell: &dyn Fn()) -> Result<Written, CliError> {
         // a connection belongs to its thread
         let store = Store::open_read_only(&self.what.file)?;
-        let mut maps: BTreeMap<i64, ChannelMap> = BTreeMap::new();
-        for row in &part.records {
-            maps.insert(row.session, store.channels(row.session)?);
-        }
         let of_channel = if self.si { Stored::Single } else { Stored::Code };
         let mut columns = vec![("record", Stored::Id), ("scan", Stored::Index)];
-        columns.extend(part.channels.iter().map(|name| (name.as_str(), of_channel)));
-        let notes = [("jointrig.channels", scales(&maps).to_string())];
+        columns.extend(part.channels.iter().map(|name| (*name, of_channel)));
+        let notes = [("jointrig.channels", scales(&part.records).to_string())];
         let mut file = ParquetFile::create(&self.what.out.join(&part.file), &columns, &notes).map_err(bad)?;
-        for row in &part.records {
+        for Sampled { row, map } in &part.records {
             let samples = store.samples(row)?;
             let scans = i32::try_from(row.scans).map_err(|_| too_long(row))?;
             let mut values = vec![Values::Id(vec![row.id; row.scans]), Values::Whole((0..scans).collect())];
             for place in 0..part.channels.len() {
                 let codes = samples.channel(place);
                 values.push(if self.si {
-                    let si = maps[&row.session].to_si(place, codes);
+                    let si = map.to_si(place, codes);
                     Values::Single(si.into_iter().map(|value| value as f32).collect())
                 } else {
                     Values::Whole(codes.iter().map(|code| i32::from(*code)).collect())
@@ -194,20 +205,13 @@ impl Columns<'_> {
             make_folder(&self.what.out.join("levels"))?;
             let name = format!("levels/level_{}.parquet", row.id);
             let record = levels::record(store, row)?;
-            let (names, a, b) = match &record.motion {
-                RelativeMotion::Velocity { a_m_per_s, b_m_per_s } => {
-                    (["velocity_a_m_per_s", "velocity_b_m_per_s"], a_m_per_s, b_m_per_s)
-                }
-                RelativeMotion::Displacement { a_m, b_m } => {
-                    (["displacement_a_m", "displacement_b_m"], a_m, b_m)
-                }
-            };
-            let real = Stored::Of(Kind::Real);
-            let columns = [("time_s", real), (names[0], real), (names[1], real), ("force_n", real)];
-            let time: Vec<f64> = (0..record.force_n.len()).map(|i| i as f64 / record.fs_hz).collect();
-            let values = [&time, a, b, &record.force_n].map(|all| known(all));
-            let path = self.what.out.join(&name);
-            let mut file = ParquetFile::create(&path, &columns, &[]).map_err(bad)?;
+            let time_s: Vec<f64> = (0..record.force_n.len()).map(|i| i as f64 / record.fs_hz).collect();
+            let signals = loop_signals(&record);
+            let all = || std::iter::once(("time_s", &time_s[..])).chain(signals);
+            let columns: Vec<(&str, Stored)> =
+                all().map(|(name, _)| (name, Stored::Of(Kind::Real))).collect();
+            let values: Vec<Values> = all().map(|(_, signal)| known(signal)).collect();
+            let mut file = ParquetFile::create(&self.what.out.join(&name), &columns, &[]).map_err(bad)?;
             file.write(&values).map_err(bad)?;
             files.insert(name.clone(), file.finish().map_err(bad)?);
             Ok(Some(name))
@@ -245,13 +249,9 @@ impl Columns<'_> {
         let path = self.what.out.join("campaign.json");
         let written = serde_json::to_string_pretty(&document)
             .map_err(std::io::Error::other)
-            .and_then(|text| std::fs::write(&path, text + "\n"));
+            .and_then(|text| report::write_whole(&path, (text + "\n").as_bytes()));
         written.map_err(|source| CliError::File { path, doing: "writing what the folder holds", source })
     }
-}
-
-fn names(map: &ChannelMap) -> Vec<String> {
-    map.channels.iter().map(|channel| channel.name.to_string()).collect()
 }
 
 fn too_long(row: &RecordRow) -> CliError {
@@ -259,8 +259,9 @@ fn too_long(row: &RecordRow) -> CliError {
 }
 
 /// What a reader of codes needs: SI value = code × units_per_code, by session.
-fn scales(maps: &BTreeMap<i64, ChannelMap>) -> serde_json::Value {
-    let of_session = |(session, map): (&i64, &ChannelMap)| {
+fn scales(records: &[Sampled<'_>]) -> serde_json::Value {
+    let maps: BTreeMap<i64, &ChannelMap> = records.iter().map(|one| (one.row.session, one.map)).collect();
+    let of_session = |(session, map): (i64, &ChannelMap)| {
         let channels: Vec<_> = map
             .channels
             .iter()
@@ -273,7 +274,7 @@ fn scales(maps: &BTreeMap<i64, ChannelMap>) -> serde_json::Value {
             .collect();
         json!({ "session": session, "rate_hz": map.rate_hz, "channels": channels })
     };
-    maps.iter().map(of_session).collect()
+    maps.into_iter().map(of_session).collect()
 }
 
 fn known(all: &[f64]) -> Values {

@@ -125,8 +125,10 @@ pub fn run_watched(
     if info.stage {
         assemble(session, &plan)?;
     }
-    let mut bench =
-        Bench { session, channels: &channels, info: &info, options, onlookers, session_id: id, epoch };
+    let load_cells = plan.load_cells(&channels);
+    let info = &info;
+    let channels = &channels;
+    let mut bench = Bench { session, channels, load_cells, info, options, onlookers, session_id: id, epoch };
     let mut outcomes = Vec::new();
     let mut walked = Ok(());
     for level in &options.levels {
@@ -207,6 +209,7 @@ fn assemble(session: &mut Session, plan: &Plan) -> Result<(), ShakeError> {
 struct Bench<'a> {
     session: &'a mut Session,
     channels: &'a ChannelMap,
+    load_cells: Vec<(usize, f64)>,
     info: &'a Info,
     options: &'a Options,
     onlookers: &'a Onlookers,
@@ -281,7 +284,8 @@ impl Bench<'_> {
         let (options, onlookers) = (self.options, self.onlookers);
         let mut orders = Orders::new(self.channels, self.info, level, options);
         let (limits, most_drive_v) = (options.limits.of(self.channels), orders.most_drive_v());
-        onlookers.watch.saw(&Seen::Level { level, limits: &limits, most_drive_v });
+        let load_cells = &self.load_cells;
+        onlookers.watch.saw(&Seen::Level { level, limits: &limits, most_drive_v, load_cells });
         let before = self.session.expected()?;
         let begun = orders.begin(self.session)?;
         let meter = Meter::new(self.channels, level.held, level.frequency_hz);
