@@ -10,7 +10,7 @@ use jointrig_hil_sim::rig::modal::modes;
 use jointrig_hil_sim::rig::state_space::StateSpace;
 use jointrig_hil_sim::rig::stepper::{Aimed, ModalStepper, ScanForces, Span};
 use jointrig_hil_sim::rig::structure::Structure;
-use jointrig_hil_sim::rig::{Configuration, Probe, RigConfig};
+use jointrig_hil_sim::rig::{Configuration, FixedRows, Probe, RigConfig};
 use nalgebra::DVector;
 
 #[test]
@@ -50,6 +50,7 @@ fn a_hit_on_az3_is_the_reference_record_but_for_its_noise() {
         // Finer than anything compared below.
         steps: [1e-9; 8],
         joint: None,
+        fixed: FixedRows::default(),
     };
     let period_s = 1.0 / 51_200.0;
     let mut stepper = ModalStepper::new(&Arc::new(modes(&space).unwrap()), &aimed, period_s);

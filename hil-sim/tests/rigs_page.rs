@@ -8,6 +8,8 @@ const PAGE: &str = include_str!("../../docs/rigs.md");
 const DEFAULT: &str = include_str!("../rigs/default.toml");
 /// With a structure of its own.
 const OWN: &str = include_str!("../rigs/clamped-tips.toml");
+/// With a hammer by hand, and vibrometers that stay.
+const BY_HAND: &str = include_str!("../rigs/by-hand.toml");
 
 /// Every field, with dots between its tables; lists of tables are one.
 fn fields(path: &str, value: &Value, found: &mut BTreeSet<String>) {
@@ -51,6 +53,7 @@ fn the_page_and_the_rig_have_the_same_fields() {
     fields("", &toml::from_str(DEFAULT).unwrap(), &mut known);
     assert!(known.len() > 100, "{}", known.len());
     fields("", &toml::from_str(OWN).unwrap(), &mut known);
+    fields("", &toml::from_str(BY_HAND).unwrap(), &mut known);
     // what that example does without: every spring in all configurations, and no load cell
     known.extend(["structure.springs.in", "structure.load_cells_on"].map(String::from));
     let patterns = patterns();

@@ -32,7 +32,7 @@ fn a_rig_may_move_to_another_thread() {
 #[test]
 fn channels_are_what_the_wiring_says() {
     let rig = Rig::new(&RigConfig::default(), 1).unwrap();
-    let names: Vec<&str> = rig.channels().iter().map(|channel| channel.name).collect();
+    let names: Vec<&str> = rig.channels().iter().map(|channel| channel.name.as_str()).collect();
     assert_eq!(
         names,
         ["force", "vib_x", "vib_y", "vib_z", "ldv_a", "ldv_b", "lc_1", "lc_2", "lc_3", "excitation"]

@@ -10,5 +10,6 @@ pub mod command;
 pub mod drawn_campaigns;
 pub mod live;
 pub mod origins;
+pub mod own_plan;
 pub mod rigs;
 pub mod slip_truth;

@@ -57,7 +57,7 @@ fn frf_is_the_analysis_one(page: &mut Page<'_>, store: &Store) {
 /// At the lowest frequencies the force's spectrum is the pulse's area.
 fn force_is_the_pulse(page: &mut Page<'_>, store: &Store) {
     let last = store.records().unwrap().into_iter().flatten().last().unwrap();
-    let shown = Shown::of(store, &last).unwrap().unwrap();
+    let shown = Shown::of(store, last.cell, &last).unwrap().unwrap();
     let around = shown.trigger - 100..shown.trigger + 200;
     let rest = shown.force_n[..100].iter().sum::<f64>() / 100.0;
     let area_mn_s = 1e3 * shown.force_n[around].iter().map(|f| f - rest).sum::<f64>() / shown.rate_hz;

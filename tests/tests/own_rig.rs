@@ -1,66 +1,17 @@
 //! A plan without any of the paper's names, measured on a simulated rig with a structure of its own.
 #![allow(clippy::unwrap_used)]
 
-use jointrig::campaign::plan::SMALL;
-use jointrig_hil_sim::rig::config::{RigConfig, Side};
+use jointrig_hil_sim::rig::RigConfig;
 use jointrig_tests::command::jointrig;
 use jointrig_tests::live::done;
+use jointrig_tests::own_plan::plan;
 use serde_json::Value;
-use std::fmt::Write;
 
 const RIG: &str = include_str!("../../hil-sim/rigs/clamped-tips.toml");
 
 /// Clamps and contact hold at one point along the same axes: stiffnesses in series, N/m.
 fn in_series() -> f64 {
     1.0 / (1.0 / 90e6 + 1.0 / 120e6 + 1.0 / 200e6)
-}
-
-/// Every point of the rig in cells of its own names.
-fn plan(rig: &RigConfig) -> String {
-    let own = rig.structure.as_ref().unwrap();
-    let head = SMALL.split_once("[[configuration]]").unwrap().0;
-    let mut text = head.replace("name = \"small\"", "name = \"clamped tips\"");
-    text = text
-        .replace("length_s = 2.0", "length_s = 1.0")
-        .replace("exponential_per_s = 2.3", "exponential_per_s = 4.6");
-    writeln!(
-        text,
-        "[structure]\na = \"frame\"\nb = \"base\"\nassembly = \"both\"\nsliding = [0.7071, 0.7071, 0.0]\n"
-    )
-    .unwrap();
-    for (name, side) in [("frame", Some(Side::A)), ("base", Some(Side::B)), ("both", None)] {
-        let on = |body| side.is_none_or(|side| own.body(body).unwrap().of == side);
-        let impacts: Vec<&str> =
-            rig.impacts.iter().filter(|point| on(point.body)).map(|point| point.name.as_str()).collect();
-        let responses: Vec<&str> =
-            rig.responses.iter().filter(|point| on(point.body)).map(|point| point.name.as_str()).collect();
-        writeln!(
-            text,
-            "[[configuration]]\nname = {name:?}\nimpacts = {impacts:?}\nresponses = {responses:?}\n"
-        )
-        .unwrap();
-    }
-    let group = |body| if own.body(body).unwrap().of == Side::A { 1 } else { 2 };
-    text += "[geometry]\nvirtual_point_m = [0.0, 0.0, 0.0]\n";
-    for point in &rig.responses {
-        let (name, at) = (&point.name, point.position_m);
-        writeln!(
-            text,
-            "[[geometry.response]]\nname = {name:?}\ngrouping = {}\nposition_m = {at:?}",
-            group(point.body)
-        )
-        .unwrap();
-    }
-    for point in &rig.impacts {
-        let (name, at, along) = (&point.name, point.position_m, point.direction);
-        writeln!(
-            text,
-            "[[geometry.impact]]\nname = {name:?}\ngrouping = {}\nposition_m = {at:?}\ndirection = {along:?}",
-            group(point.body)
-        )
-        .unwrap();
-    }
-    text
 }
 
 #[test]

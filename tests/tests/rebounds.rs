@@ -36,8 +36,8 @@ fn map(channels: &[rig::Channel]) -> ChannelMap {
         _ => Role::LoadCell,
     };
     let channels = channels.iter().map(|channel| Channel {
-        name: channel.name.try_into().unwrap(),
-        role: role(channel.name),
+        name: channel.name.as_str().try_into().unwrap(),
+        role: role(&channel.name),
         quantity: match channel.quantity {
             Measured::Force => Quantity::Force,
             Measured::Velocity => Quantity::Velocity,

@@ -131,7 +131,7 @@ impl Controls {
 /// The rig's channels in the protocol's words. They live as long as the program: a firmware's channel
 /// table is constant, and a program makes a handful of boards.
 pub(super) fn describe(channels: &[rig::Channel]) -> &'static [Channel] {
-    let cell_or_other = |channel: &rig::Channel| match channel.name {
+    let cell_or_other = |channel: &rig::Channel| match channel.name.as_str() {
         "force" => Role::HammerForce,
         "ldv_a" => Role::SpecimenA,
         "ldv_b" => Role::SpecimenB,
@@ -143,7 +143,7 @@ pub(super) fn describe(channels: &[rig::Channel]) -> &'static [Channel] {
         _ => Role::Auxiliary,
     };
     let described = channels.iter().map(|channel| Channel {
-        name: super::name(channel.name),
+        name: super::name(&channel.name),
         role: cell_or_other(channel),
         quantity: match channel.quantity {
             Measured::Force => Quantity::Force,

@@ -32,8 +32,8 @@ pub enum Measured {
 /// One channel of the rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
-    /// Its name: `force`, `vib_x` … `excitation`.
-    pub name: &'static str,
+    /// Its name: `force`, `vib_x` … `excitation`, or as the rig calls a vibrometer of its own.
+    pub name: String,
     /// What it measures.
     pub quantity: Measured,
     /// `N` or `m/s`.
@@ -59,8 +59,8 @@ impl Channel {
 
 /// The ten channels in order.
 pub fn channels(sensors: &config::Sensors) -> [Channel; CHANNELS] {
-    let channel = |name, quantity, units_per_volt, delay_s, polarity, axis| Channel {
-        name,
+    let channel = |name: &str, quantity, units_per_volt, delay_s, polarity, axis| Channel {
+        name: name.to_owned(),
         quantity,
         unit: if quantity == Measured::Force { "N" } else { "m/s" },
         units_per_volt,

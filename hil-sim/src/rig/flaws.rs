@@ -5,6 +5,7 @@
 use super::aim::shifted;
 use super::channels::{CHANNELS, Channel, FORCE, LOAD_CELLS, is_gauged};
 use super::config::{RigConfig, Spot, Spots};
+use super::fixed::{self, FixedFlaw};
 use super::key::{normal, stream};
 
 /// One campaign's flaws.
@@ -18,6 +19,8 @@ pub struct Flaws {
     pub skews_s: [f64; CHANNELS],
     /// Whole scans by which all channels alike come late, so that none need come before its cause.
     pub latency_scans: u32,
+    /// What is wrong with the vibrometers that stay.
+    pub fixed: Vec<FixedFlaw>,
     /// Part of the force of each load cell (column) that each other one (row) reads; the diagonal is nothing.
     pub cross_talk: [[f64; 3]; 3],
 }
@@ -33,13 +36,14 @@ impl Flaws {
                 _ if is_gauged(at) => errors.gain,
                 _ => 0.0,
             };
-            let stated = errors.volts.get(channels[at].name).copied().unwrap_or(1.0);
-            stated * (1.0 + sigma * draw(&["gain", channels[at].name]))
+            let stated = errors.volts.get(&channels[at].name).copied().unwrap_or(1.0);
+            stated * (1.0 + sigma * draw(&["gain", &channels[at].name]))
         });
         let skews_s = std::array::from_fn(|at| {
-            if at == FORCE { 0.0 } else { errors.skew_s * draw(&["skew", channels[at].name]) }
+            if at == FORCE { 0.0 } else { errors.skew_s * draw(&["skew", &channels[at].name]) }
         });
-        let name = |cell: usize| channels[LOAD_CELLS[cell]].name;
+        let fixed = fixed::flaws(seed, config);
+        let name = |cell: usize| channels[LOAD_CELLS[cell]].name.as_str();
         let cross_talk = std::array::from_fn(|reads: usize| {
             std::array::from_fn(|of: usize| {
                 let words = ["cross-talk", name(reads), name(of)];
@@ -61,7 +65,11 @@ impl Flaws {
             },
             gains,
             skews_s,
-            latency_scans: latency_scans(&skews_s, f64::from(config.scan_rate_hz)),
+            latency_scans: latency_scans(
+                skews_s.iter().copied().chain(fixed.iter().map(|own| own.skew_s)),
+                f64::from(config.scan_rate_hz),
+            ),
+            fixed,
             cross_talk,
         }
     }
@@ -69,10 +77,10 @@ impl Flaws {
 
 /// One scan more than the earliest channel is early, so that the interpolating cubic has a sample on either side; none where
 /// no channel is skewed.
-fn latency_scans(skews_s: &[f64; CHANNELS], rate_hz: f64) -> u32 {
-    if skews_s.iter().all(|skew| *skew == 0.0) {
+fn latency_scans(mut skews_s: impl Iterator<Item = f64> + Clone, rate_hz: f64) -> u32 {
+    if skews_s.clone().all(|skew| skew == 0.0) {
         return 0;
     }
-    let earliest = skews_s.iter().fold(0.0_f64, |earliest, skew| earliest.min(*skew));
+    let earliest = skews_s.by_ref().fold(0.0_f64, f64::min);
     1 + (-earliest * rate_hz).ceil() as u32
 }

@@ -1,4 +1,4 @@
-//! The friction rig: 24 degrees of freedom (30 with a clamp on side B), a hammer, a shaker and ten channels.
+//! The friction rig: 24 degrees of freedom (30 with a clamp on side B), a hammer, a shaker and ten channels or more.
 //!
 //! Axes: x lateral, y vertical (normal load), z horizontal (sliding); origin at the contact's centre; SI units.
 //! One [`Rig`] is one device. It advances by whole scans: [`Rig::scan`] moves structure, bolt and shaker on by one scan period
@@ -15,9 +15,12 @@
 mod aim;
 mod body;
 pub(crate) mod channels;
+mod code;
 pub mod config;
 mod configuration;
+mod delay_line;
 mod error;
+mod fixed;
 mod flaws;
 pub mod force;
 pub mod hammer;
@@ -39,6 +42,7 @@ pub use channels::{CHANNELS, Channel, Measured};
 pub use config::RigConfig;
 pub use configuration::{Configuration, Quantity};
 pub use error::RigError;
+pub use fixed::{FixedFlaw, FixedRows};
 pub use flaws::Flaws;
 pub use hammer::{Hit, Mishap};
 pub use joint_state::JointState;
@@ -47,6 +51,7 @@ pub use structure::exact_frf;
 pub use truth::Truth;
 
 use channels::{EXCITATION, FIRST_SIGNAL, FORCE};
+use fixed::FixedSensors;
 use force::ForceSegment;
 use key::stream;
 use plant::Plant;
@@ -60,7 +65,8 @@ pub struct Rig {
     config: RigConfig,
     seed: u64,
     period_s: f64,
-    channels: [Channel; CHANNELS],
+    /// The ten, then the vibrometers that stay.
+    channels: Vec<Channel>,
     flaws: Flaws,
     plants: [Plant; 3],
     configuration: Configuration,
@@ -72,6 +78,7 @@ pub struct Rig {
     /// The joint's sliders, if it can slip and is there.
     slipping: Option<Slipping>,
     sensors: Sensors,
+    fixed: FixedSensors,
     /// Hammer forces still to come or acting, on the clock below.
     pending: Vec<ForceSegment>,
     /// Scans since the last stage or fire.
@@ -100,16 +107,17 @@ impl Rig {
         let period_s = 1.0 / f64::from(config.scan_rate_hz);
         let plant = |configuration| Plant::new(config, configuration, stepping, period_s);
         let plants = [plant(Configuration::A)?, plant(Configuration::B)?, plant(Configuration::Ajb)?];
-        let channels = channels::channels(&config.sensors);
-        let flaws = Flaws::new(seed, config, &channels);
+        let ten = channels::channels(&config.sensors);
+        let flaws = Flaws::new(seed, config, &ten);
+        let sensors = Sensors::new(config, &ten, &flaws, None, stream(seed, &["at rest"]));
+        let fixed = FixedSensors::new(config, &flaws.fixed, flaws.latency_scans, stream(seed, &["at rest"]));
+        let channels: Vec<Channel> = ten.into_iter().chain(fixed::channels(config)).collect();
         let configuration = Configuration::Ajb;
         // check() has seen at least one of each.
         let (impact, response) = (&config.impacts[0], &config.responses[0]);
         let words = [configuration.as_str(), &impact.name, &response.name];
         let aim = Aim::new(seed, words, &config.errors, impact, response);
-        let (stepper, slipping) =
-            plants[configuration as usize].aimed(config, &flaws.spots, &aim, &channels)?;
-        let sensors = Sensors::new(config, &channels, &flaws, None, stream(seed, &words));
+        let (stepper, slipping) = plants[configuration as usize].aimed(config, &flaws, &aim, &channels)?;
         let mut rig = Self {
             seed,
             period_s,
@@ -122,6 +130,7 @@ impl Rig {
             stepper,
             slipping,
             sensors,
+            fixed,
             channels,
             flaws,
             pending: Vec::new(),
@@ -142,7 +151,7 @@ impl Rig {
         self.config.scan_rate_hz
     }
 
-    /// The ten channels, in the order of the codes.
+    /// The ten channels, then the vibrometers that stay, in the order of the codes.
     pub fn channels(&self) -> &[Channel] {
         &self.channels
     }
@@ -184,7 +193,7 @@ impl Rig {
         let words = [configuration.as_str(), impact, response];
         let aim = Aim::new(self.seed, words, &self.config.errors, hit, seen);
         let plant = &self.plants[configuration as usize];
-        let (stepper, slipping) = plant.aimed(&self.config, &self.flaws.spots, &aim, &self.channels)?;
+        let (stepper, slipping) = plant.aimed(&self.config, &self.flaws, &aim, &self.channels)?;
         let speckle = seen.speckle;
         self.aim = aim;
         self.stepper = stepper;
@@ -195,7 +204,10 @@ impl Rig {
         self.attempt = attempt;
         let idle = self.shot(attempt, "idle");
         let speckle = speckle.then(|| self.shot(attempt, "idle speckle"));
-        self.sensors = Sensors::new(&self.config, &self.channels, &self.flaws, speckle, idle);
+        let ten = channels::channels(&self.config.sensors);
+        self.sensors = Sensors::new(&self.config, &ten, &self.flaws, speckle, idle);
+        let idle = self.shot(attempt, "idle fixed");
+        self.fixed = FixedSensors::new(&self.config, &self.flaws.fixed, self.flaws.latency_scans, idle);
         self.pending.clear();
         self.scans = 0;
         self.drive_v = 0.0;
@@ -221,6 +233,7 @@ impl Rig {
         let hit = hammer::strike(&self.config.hammer, pulse_s, attempt, &mut self.shot(attempt, "hit"));
         self.pending.extend_from_slice(&hit.contacts);
         self.sensors.restart(self.shot(attempt, "shot"), self.shot(attempt, "shot speckle"));
+        self.fixed.restart(self.shot(attempt, "shot fixed"));
         self.scans = 0;
         self.coil_pulses_s.push(pulse_s);
         self.last_hit = Some(hit);
@@ -273,6 +286,11 @@ impl Rig {
     /// Advances exactly one scan period and samples: one code per channel, in order. A shorter slice takes the first
     /// channels, a longer one keeps its tail.
     pub fn scan(&mut self, codes: &mut [i16]) {
+        if let Some(hand) = self.config.hammer.hand
+            && self.scans == (hand.every_s * f64::from(self.config.scan_rate_hz)).round() as u64
+        {
+            self.fire(hand.pulse_s);
+        }
         let (from_s, to_s) = (self.time_s(self.scans), self.time_s(self.scans + 1));
         self.scans += 1;
         let shaker_n = self.drive_v * self.config.shaker.gain_n_per_v;
@@ -288,6 +306,10 @@ impl Rig {
             self.pending.retain(|segment| segment.end_s > to_s);
         }
         self.sensors.convert(self.truth, codes);
+        if self.channels.len() > CHANNELS {
+            let stepper = &self.stepper;
+            self.fixed.convert(|into| stepper.fixed(into), codes.get_mut(CHANNELS..).unwrap_or_default());
+        }
     }
 
     fn time_s(&self, scans: u64) -> f64 {

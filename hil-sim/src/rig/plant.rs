@@ -5,7 +5,9 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::channels::{CHANNELS, Channel, FIRST_SIGNAL};
-use super::config::{BodyName, Contact, ContactLaw, RigConfig, Spots};
+use super::config::{BodyName, Contact, ContactLaw, RigConfig};
+use super::fixed::FixedRows;
+use super::flaws::Flaws;
 use super::modal::{ModalError, Mode, modes};
 use super::probe::{AXES, Probe};
 use super::sliders::Sliders;
@@ -65,13 +67,13 @@ impl Plant {
         Ok(Self { structure, joined: config.joined(), space, way, period_s })
     }
 
-    /// A stepper at rest that sees and pushes where `aim` and the true `spots` say, and the sliders of its joint if it can slip.
+    /// A stepper at rest that sees and pushes where `aim` and the `flaws` say, and the sliders of its joint if it can slip.
     pub(super) fn aimed(
         &self,
         config: &RigConfig,
-        spots: &Spots,
+        flaws: &Flaws,
         aim: &Aim,
-        channels: &[Channel; CHANNELS],
+        channels: &[Channel],
     ) -> Result<(Stepper, Option<Slipping>), RigError> {
         let missing = |probe: &Probe| RigError::MissingBody {
             body: probe.body.to_string(),
@@ -98,8 +100,8 @@ impl Plant {
                 seen(x)?,
                 seen(y)?,
                 seen(z)?,
-                spot(&spots.ldv_a),
-                spot(&spots.ldv_b),
+                spot(&flaws.spots.ldv_a),
+                spot(&flaws.spots.ldv_b),
                 cell(0),
                 cell(1),
                 cell(2),
@@ -109,6 +111,10 @@ impl Plant {
             shaker: self.structure.row(&pushed).map_or_else(nothing, |row| self.space.input(&row)),
             steps: std::array::from_fn(|signal| channels[FIRST_SIGNAL + signal].step()),
             joint: self.joint(&config.contact),
+            fixed: FixedRows {
+                rows: flaws.fixed.iter().map(|own| velocity(&own.probe).unwrap_or_else(nothing)).collect(),
+                steps: channels[CHANNELS..].iter().map(Channel::step).collect(),
+            },
         };
         let stepper = match &self.way {
             Way::Modal(modes) => Stepper::Modal(Box::new(ModalStepper::new(modes, &aimed, self.period_s))),

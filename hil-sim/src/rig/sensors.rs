@@ -9,7 +9,9 @@ use std::f64::consts::PI;
 use num_complex::Complex;
 
 use super::channels::{CHANNELS, Channel, LOAD_CELLS, VIBROMETER};
+use super::code::code;
 use super::config::{self, Hammer, RigConfig};
+use super::delay_line::DelayLine;
 use super::flaws::Flaws;
 use super::force::ForceSegment;
 use super::hammer::nominal_width_s;
@@ -128,17 +130,6 @@ impl Sensors {
     }
 }
 
-/// Rounded to the nearest code, saturating.
-#[inline]
-fn code(exact: f64) -> i16 {
-    // At 1.5 · 2^52 an f64's last place is one, so the sum rounds and its low bits are the integer: unlike a cast, this needs
-    // no branch and ten of them run side by side. The comparisons send what is not a number to the lower end.
-    const ONES_PLACE: f64 = 6_755_399_441_055_744.0;
-    let above = if exact > -32768.0 { exact } else { -32768.0 };
-    let within = if above < 32767.0 { above } else { 32767.0 };
-    (within + ONES_PLACE).to_bits() as i16
-}
-
 /// The hammer's force cell: reads f + g s²/(s² + 2s/τ + …) f, one light mode above the band.
 ///
 /// It scales with the hit and has no static error. g makes the slope with which a half-sine of nominal width sets in start a
@@ -184,42 +175,6 @@ impl ForceCell {
             self.z = Complex::ZERO;
         }
         force_n + self.gain * (force_n + 2.0 * (self.residue * self.z).re)
-    }
-}
-
-/// A signal that comes late: the last samples, read between them by the cubic through the four around.
-#[derive(Debug, Clone)]
-struct DelayLine {
-    past: Vec<f64>,
-    at: usize,
-    /// First of the four samples used, in scans ago, and their weights.
-    first: usize,
-    weights: [f64; 4],
-}
-
-impl DelayLine {
-    fn new(delay_scans: f64) -> Self {
-        // The cubic is best in its middle interval; a delay below one scan has no newer sample than the present one.
-        let first = (delay_scans.floor() as usize).saturating_sub(1);
-        let d = delay_scans - first as f64;
-        let mut weights = [1.0; 4];
-        for (i, weight) in weights.iter_mut().enumerate() {
-            for j in (0..4).filter(|j| *j != i) {
-                *weight *= (d - j as f64) / (i as f64 - j as f64);
-            }
-        }
-        // A power of two, so that going round is a mask and no division.
-        Self { past: vec![0.0; (first + 4).next_power_of_two()], at: 0, first, weights }
-    }
-
-    #[inline]
-    fn pass(&mut self, value: f64) -> f64 {
-        let mask = self.past.len() - 1;
-        self.past[self.at & mask] = value;
-        let newest = self.at.wrapping_sub(self.first);
-        let late = (0..4).map(|i| self.weights[i] * self.past[newest.wrapping_sub(i) & mask]).sum();
-        self.at = self.at.wrapping_add(1);
-        late
     }
 }
 

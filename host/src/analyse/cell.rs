@@ -46,6 +46,8 @@ pub struct ContactDelays {
 pub struct Hit {
     /// The record's id in the campaign file.
     pub record: i64,
+    /// Whether it was struck for another cell, whose row it fills.
+    pub of_row: bool,
     /// Hammer force, N.
     pub force_n: Vec<f64>,
     /// The channels at the response location, SI: the scanning vibrometer's x, y and z, or as the plan's axes say.

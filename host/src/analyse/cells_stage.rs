@@ -74,7 +74,7 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
     let moves_contact = counts_for_contact(geometry, name);
     if moves_contact {
         for hit in &cell.hits {
-            let Some(signals) = &hit.contact else { continue };
+            let Some(signals) = hit.contact.as_ref().filter(|_| !hit.of_row) else { continue };
             found.at_contact.extend(hammer_slip::of_hit(name, cell.fs_hz, hit));
             match impact_loops::of_hit(hit.record, &name.impact, cell.fs_hz, signals, signals.delay_s) {
                 Ok(one) => found.loops.push(one),
@@ -91,8 +91,10 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
             Err(error) => found.missing.push(records(error.to_string())),
         }
     }
+    // what the contact did under a hit is told by the cell that was struck, once
+    let struck = cell.hits.iter().any(|hit| !hit.of_row);
     let asked = Asked {
-        contact: moves_contact || drives_the_cells(geometry, name),
+        contact: struck && (moves_contact || drives_the_cells(geometry, name)),
         damped: contact_answer::reads(geometry, name),
     };
     match average(name.clone(), cell, sigma_per_s, quantity, asked, LINES_HZ) {

@@ -111,7 +111,8 @@ impl CampaignFile {
                 let own = self.cells.iter().filter(|c| c.name.configuration == name).map(|cell| {
                     let count = self.tally.cell(cell.id);
                     let refused = count.refused.iter().map(|(kind, n)| (kind.name(), *n as usize)).collect();
-                    (count.wanted as usize, count.kept as usize, refused)
+                    let hits = (count.wanted as usize, count.kept as usize, refused);
+                    (cell.lead.is_none(), hits)
                 });
                 completeness(name.name(), own)
             })

@@ -13,10 +13,12 @@ use crate::campaign::plan::{Plan, structure};
 use crate::campaign::run::shaking;
 use crate::campaign::run::tally::Tally;
 use crate::campaign::store::Store;
+use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::error::StoreError;
 use crate::campaign::store::frf_table::ImportedFrf;
 use crate::campaign::store::level_table::LevelRow;
 use crate::campaign::store::record_row::{Damaged, RecordRow};
+use crate::campaign::store::rows::{Rows, places as response_places};
 use crate::contact::ContactPriors;
 use crate::device::channels::ChannelMap;
 use crate::hysteresis::HysteresisRecord;
@@ -83,7 +85,10 @@ pub fn analyse(
 
 pub(super) struct PlannedCell {
     pub(super) id: i64,
+    /// The cell whose hits fill this one, where it is not struck itself.
+    pub(super) lead: Option<i64>,
     pub(super) name: CellName,
+    row: CellRow,
     given_up: Option<String>,
 }
 
@@ -116,17 +121,25 @@ impl CampaignFile {
             effective_mass_kg: known.effective_mass_kg.or(planned.effective_mass_kg),
         };
         let (rows, all) = (store.cells()?, store.records()?);
-        let tally = Tally::new(&rows, &all);
+        let shared = Rows::new(&plan, &rows);
+        let tally = Tally::new(&rows, shared.clone(), &all);
+        let given_up: HashMap<i64, Option<String>> =
+            rows.iter().map(|row| (row.id, row.given_up.clone())).collect();
         let cells = rows
             .into_iter()
-            .map(|row| PlannedCell {
-                id: row.id,
-                name: CellName {
-                    configuration: structure(row.cell.configuration),
-                    impact: row.cell.impact,
-                    response: row.cell.response,
-                },
-                given_up: row.given_up,
+            .map(|row| {
+                let lead = shared.lead(row.id);
+                PlannedCell {
+                    id: row.id,
+                    lead,
+                    name: CellName {
+                        configuration: structure(row.cell.configuration),
+                        impact: row.cell.impact.clone(),
+                        response: row.cell.response.clone(),
+                    },
+                    given_up: given_up.get(&lead.unwrap_or(row.id)).cloned().flatten(),
+                    row,
+                }
             })
             .collect();
         let mut records: HashMap<i64, Vec<Result<RecordRow, Damaged>>> = HashMap::new();
@@ -141,7 +154,7 @@ impl CampaignFile {
         Ok(CampaignFile {
             path: store.path().into(),
             geometry: geometry(&plan),
-            quantity: response_quantity(channels.values())?,
+            quantity: response_quantity(&plan, channels.values())?,
             known,
             plan,
             cells,
@@ -152,8 +165,10 @@ impl CampaignFile {
         })
     }
 
-    fn records_of(&self, cell: i64) -> &[Result<RecordRow, Damaged>] {
-        self.records.get(&cell).map_or(&[], Vec::as_slice)
+    /// The records that count for a cell: its own, and those of the cell whose hits fill it.
+    fn records_for(&self, cell: &PlannedCell) -> impl Iterator<Item = &Result<RecordRow, Damaged>> {
+        let struck = [Some(cell.id), cell.lead].into_iter().flatten();
+        struck.filter_map(|id| self.records.get(&id)).flatten()
     }
 
     /// Runs `work` with a connection of its own.
@@ -173,8 +188,8 @@ impl CampaignFile {
         result
     }
 
-    /// A record's signals, and its sampling rate, Hz.
-    fn hit(&self, store: &Store, record: &RecordRow) -> Result<(Hit, f64), AnalyseError> {
+    /// A record's signals for a cell, and its sampling rate, Hz.
+    fn hit(&self, store: &Store, cell: &CellRow, record: &RecordRow) -> Result<(Hit, f64), AnalyseError> {
         let missing = |role| AnalyseError::NoChannel { record: record.id, role };
         let map = self.channels.get(&record.session).ok_or(missing("anything"))?;
         let samples = store.samples(record)?;
@@ -189,7 +204,7 @@ impl CampaignFile {
         };
         let delay = |place: usize| f64::from(map.channels[place].delay_ns) * 1e-9;
         let force = map.place(Role::HammerForce).ok_or(missing("the hammer's force"))?;
-        let responses = map.responses().ok_or(missing("the response"))?;
+        let responses = response_places(&self.plan, cell, record, map).ok_or(missing("the response"))?;
         let late = |place: usize| delay(place) - delay(force);
         let (a, b, cells) =
             (map.place(Role::SpecimenA), map.place(Role::SpecimenB), self.plan.load_cells(map));
@@ -216,6 +231,7 @@ impl CampaignFile {
         };
         let hit = Hit {
             record: record.id,
+            of_row: record.cell != cell.id,
             force_n: signal(force),
             response: responses.iter().map(|place| signal(*place)).collect(),
             response_delay_s: responses.iter().map(|place| late(*place)).collect(),
@@ -351,7 +367,7 @@ impl Measurements for CampaignFile {
         let Some(planned) = self.cells.iter().find(|c| c.name == *cell) else { return Ok(Cell::default()) };
         self.with_reader(|store| {
             let mut whole = Cell::default();
-            for record in self.records_of(planned.id) {
+            for record in self.records_for(planned) {
                 let record = match record {
                     Ok(record) if record.kept() => record,
                     Ok(_) => continue,
@@ -362,7 +378,7 @@ impl Measurements for CampaignFile {
                         continue;
                     }
                 };
-                match self.hit(store, record) {
+                match self.hit(store, &planned.row, record) {
                     Ok((hit, rate)) if whole.hits.is_empty() || whole.fs_hz == rate => {
                         whole.fs_hz = rate;
                         whole.hits.push(hit);
@@ -382,12 +398,18 @@ impl Measurements for CampaignFile {
     }
 }
 
-fn response_quantity<'a>(maps: impl Iterator<Item = &'a ChannelMap>) -> Result<MotionQuantity, AnalyseError> {
+fn response_quantity<'a>(
+    plan: &Plan,
+    maps: impl Iterator<Item = &'a ChannelMap>,
+) -> Result<MotionQuantity, AnalyseError> {
     let mut found: Vec<Quantity> = Vec::new();
     for map in maps {
-        for channel in map.channels.iter().filter(|c| matches!(c.role, Role::Response(_))) {
-            if !found.contains(&channel.quantity) {
-                found.push(channel.quantity);
+        // a vibrometer that comes to no point of the plan does not count
+        let points = plan.geometry.response.iter().map(toml::Spanned::get_ref);
+        for place in points.filter_map(|point| plan.response_places(&point.name, map)).flatten() {
+            let quantity = map.channels[place].quantity;
+            if !found.contains(&quantity) {
+                found.push(quantity);
             }
         }
     }

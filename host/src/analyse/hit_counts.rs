@@ -2,17 +2,20 @@
 
 use crate::results::Completeness;
 
-/// From counts per cell: (wanted, kept, refused by verdict).
+/// From counts per cell: whether it is struck itself or filled by the hits of another, and (wanted, kept, refused by verdict).
 pub fn completeness<'a>(
     name: &str,
-    cells: impl IntoIterator<Item = (usize, usize, Vec<(&'a str, usize)>)>,
+    cells: impl IntoIterator<Item = (bool, (usize, usize, Vec<(&'a str, usize)>))>,
 ) -> Completeness {
     let mut sum = Completeness { configuration: name.into(), ..Completeness::default() };
-    for (wanted, kept, refused) in cells {
+    for (struck, (wanted, kept, refused)) in cells {
         sum.cells += 1;
+        sum.cells_complete += usize::from(kept >= wanted);
+        if !struck {
+            continue;
+        }
         sum.wanted += wanted;
         sum.kept += kept;
-        sum.cells_complete += usize::from(kept >= wanted);
         for (verdict, count) in refused {
             *sum.refused.entry(verdict.to_owned()).or_default() += count;
         }

@@ -232,6 +232,7 @@ impl Measurements for Rig {
                 });
                 Hit {
                     record: i64::try_from(10 * place.unwrap_or_default() + i).expect("small") + own_records,
+                    of_row: false,
                     force_n: scaled(&unit.force),
                     response: response.to_vec(),
                     response_delay_s: vec![0.0; 3],

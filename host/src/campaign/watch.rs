@@ -75,6 +75,8 @@ pub enum Seen<'a> {
         standing: Standing,
         /// The longest that it waits, s of the device.
         most_s: f64,
+        /// Whether a person strikes, who is waited for.
+        by_hand: bool,
     },
     /// The hammer has struck, and its record comes in.
     Recording,

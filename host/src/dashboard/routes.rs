@@ -175,7 +175,12 @@ fn one(shared: &Shared, of: &str, id: i64, name: &str) -> Result<Option<Figure>,
 /// A number of every cell for each view of the matrix.
 async fn matrix(State(shared): State<Arc<Shared>>) -> Result<Response, Problem> {
     let store = shared.store()?;
-    let numbers = numbers::of_cells(&store.cells()?, &store.records()?, shared.formed.found().cells.as_ref());
+    let numbers = numbers::of_cells(
+        &store.cells()?,
+        &store.rows()?,
+        &store.records()?,
+        shared.formed.found().cells.as_ref(),
+    );
     Ok(Json(numbers).into_response())
 }
 

@@ -42,6 +42,11 @@ impl ChannelMap {
         (!there.is_empty()).then_some(there)
     }
 
+    /// Place of the channel of that name.
+    pub fn named(&self, name: &str) -> Option<usize> {
+        self.channels.iter().position(|channel| channel.name == name)
+    }
+
     /// The codes of the channel at `place` in SI units ([`jointrig_protocol::channel::Quantity::unit`]).
     /// A place outside the map gives nothing.
     pub fn to_si(&self, place: usize, codes: &[i16]) -> Vec<f64> {

@@ -1,6 +1,6 @@
 //! Spectra of single hits, and the average of a cell's kept hits as it grows: one hit is read at a time, and each only once.
 
-use jointrig_protocol::channel::Quantity;
+use jointrig_protocol::channel::{Quantity, Role};
 use std::sync::{Mutex, PoisonError};
 
 use crate::analyse::{LEAD_S, LINES_HZ};
@@ -33,16 +33,15 @@ pub enum NoSpectra {
     NoMotion,
 }
 
-/// Spectra of one hit: force, and the response along x, y and z as a displacement, m.
+/// Spectra of one hit, as that of a cell: force, and the response's channels as displacements, m.
 ///
 /// # Errors
 /// It cannot be read, or has no pulse.
-pub fn of_hit(store: &Store, plan: &Plan, row: &RecordRow) -> Result<CrossSpectra, NoSpectra> {
-    let shown = Shown::of(store, row)?.ok_or(NoSpectra::NoChannel)?;
+pub fn of_hit(store: &Store, plan: &Plan, cell: i64, row: &RecordRow) -> Result<CrossSpectra, NoSpectra> {
+    let shown = Shown::of(store, cell, row)?.ok_or(NoSpectra::NoChannel)?;
     let channels = store.channels(row.session)?;
-    let (Some(force), Some(places)) =
-        (channels.place(jointrig_protocol::channel::Role::HammerForce), channels.responses())
-    else {
+    let places = store.response_places(cell, row, &channels)?;
+    let (Some(force), Some(places)) = (channels.place(Role::HammerForce), places) else {
         return Err(NoSpectra::NoChannel);
     };
     let quantity = match channels.channels[places[0]].quantity {
@@ -74,6 +73,8 @@ pub fn of_hit(store: &Store, plan: &Plan, row: &RecordRow) -> Result<CrossSpectr
 /// The average of a cell's kept hits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Average {
+    /// The cell.
+    pub(super) cell: i64,
     /// The records that were asked for, the oldest first.
     pub(super) records: Vec<i64>,
     /// Their spectra at the analysis' lines; none before the first hit that can be used.
@@ -83,8 +84,8 @@ pub struct Average {
 }
 
 impl Average {
-    fn add(&mut self, store: &Store, plan: &Plan, row: &RecordRow) -> Result<(), StoreError> {
-        let added = of_hit(store, plan, row).and_then(|hit| {
+    fn add(&mut self, store: &Store, plan: &Plan, cell: i64, row: &RecordRow) -> Result<(), StoreError> {
+        let added = of_hit(store, plan, cell, row).and_then(|hit| {
             let hit = hit.band(LINES_HZ[0], LINES_HZ[1]);
             match &mut self.spectra {
                 Some(sum) => sum.add(&hit)?,
@@ -117,18 +118,19 @@ impl Averages {
     /// The file cannot be read.
     pub fn of_cell(&self, store: &Store, cell: i64) -> Result<Average, StoreError> {
         let kept: Vec<RecordRow> =
-            store.records_of(cell)?.into_iter().flatten().filter(RecordRow::kept).collect();
+            store.records_for(cell)?.into_iter().flatten().filter(RecordRow::kept).collect();
         let kept = &kept[kept.len().saturating_sub(MOST_HITS)..];
         // whoever panicked left none or a whole one
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
         let known = last
             .take()
+            .filter(|known| known.cell == cell)
             .filter(|known| kept.iter().map(|row| row.id).collect::<Vec<_>>().starts_with(&known.records));
         let mut average =
-            known.unwrap_or(Average { records: Vec::new(), spectra: None, left_out: Vec::new() });
+            known.unwrap_or(Average { cell, records: Vec::new(), spectra: None, left_out: Vec::new() });
         let plan = store.plan()?;
         for row in &kept[average.records.len()..] {
-            average.add(store, &plan, row)?;
+            average.add(store, &plan, cell, row)?;
         }
         *last = Some(average.clone());
         Ok(average)

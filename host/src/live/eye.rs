@@ -43,6 +43,8 @@ pub enum Told {
         attempt: u32,
         /// At most so long, s of the device.
         most_s: f64,
+        /// Whether a person strikes.
+        by_hand: bool,
     },
     /// A record comes in.
     Recording,
@@ -145,11 +147,12 @@ impl Watch for Eye {
                 attempt: standing.attempts,
                 by_hand,
             }),
-            Seen::Settling { row, standing, most_s } => self.tell(Told::Settling {
+            Seen::Settling { row, standing, most_s, by_hand } => self.tell(Told::Settling {
                 cell: row.id,
                 kept: standing.kept,
                 attempt: standing.attempts,
                 most_s,
+                by_hand,
             }),
             Seen::Recording => self.tell(Told::Recording),
             Seen::Judging => self.tell(Told::Judging),

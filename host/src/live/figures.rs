@@ -20,7 +20,8 @@ const POINTS: usize = 1600;
 /// # Errors
 /// The record is not there, or damaged.
 pub fn hit(store: &Store, record: i64) -> Result<Option<Figure>, StoreError> {
-    let shown = Shown::of(store, &store.record(record)?)?;
+    let row = store.record(record)?;
+    let shown = Shown::of(store, row.cell, &row)?;
     Ok(close(&format!("Record {record}"), shown.as_slice()))
 }
 
@@ -30,8 +31,8 @@ pub fn hit(store: &Store, record: i64) -> Result<Option<Figure>, StoreError> {
 /// The file cannot be read.
 pub fn cell(store: &Store, cell: i64) -> Result<Option<Figure>, StoreError> {
     let mut all = Vec::new();
-    for row in store.records_of(cell)?.iter().flatten() {
-        match Shown::of(store, row) {
+    for row in store.records_for(cell)?.iter().flatten() {
+        match Shown::of(store, cell, row) {
             Ok(shown) => all.extend(shown),
             Err(StoreError::Damaged { .. }) => {}
             Err(error) => return Err(error),

@@ -130,7 +130,7 @@ fn hits(records: &[Result<RecordRow, Damaged>]) -> Vec<Hit> {
 
 fn all_but_hits(store: &Store, records: &[Result<RecordRow, Damaged>]) -> Result<Snapshot, StoreError> {
     let cells = store.cells()?;
-    let tally = Tally::new(&cells, records);
+    let tally = Tally::new(&cells, store.rows()?, records);
     let link = store.link_counters()?;
     Ok(Snapshot {
         version: VERSION,

@@ -51,6 +51,8 @@ pub enum Doing {
     MoveByHand,
     /// The structure comes to rest.
     Settling,
+    /// A person is to strike.
+    StrikeByHand,
     /// A hit's record comes in.
     Recording,
     /// It is looked at.

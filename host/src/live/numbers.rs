@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::campaign::plan::configuration_name;
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::record_row::{Damaged, RecordRow};
+use crate::campaign::store::rows::Rows;
 use crate::results::{Cells, MAIN_BAND};
 
 /// A cell's numbers; none where there is none yet.
@@ -49,11 +50,13 @@ pub fn heard(found: &Cells) -> Vec<CellHeard> {
 /// Of every cell, in the plan's order; `found` is what the last analysis heard of them.
 pub fn of_cells(
     cells: &[CellRow],
+    rows: &Rows,
     records: &[Result<RecordRow, Damaged>],
     found: &[CellHeard],
 ) -> Vec<CellNumbers> {
     let of_cell = |row: &CellRow| {
-        let kept = records.iter().flatten().filter(|record| record.cell == row.id && record.kept());
+        let counts = |record: &&RecordRow| [Some(row.id), rows.lead(row.id)].contains(&Some(record.cell));
+        let kept = records.iter().flatten().filter(counts).filter(|record| record.kept());
         let peaks: Vec<f64> = kept.map(|record| record.peak_n).filter(|peak| *peak > 0.0).collect();
         let mean = peaks.iter().sum::<f64>() / peaks.len() as f64;
         let name = configuration_name(row.cell.configuration);
@@ -107,7 +110,7 @@ mod tests {
             random_error: (n != 2).then(|| 1e-3 * (n + 1) as f64),
         });
         let cells_found = Cells { frequency_hz: vec![100.0, 400.0, 900.0], cells: rows.collect() };
-        let numbers = of_cells(&cells, &[], &heard(&cells_found));
+        let numbers = of_cells(&cells, &Rows::default(), &[], &heard(&cells_found));
         for (n, (own, row)) in numbers.iter().zip(&cells).enumerate() {
             assert_eq!((own.cell, own.force_n, own.hits), (row.id, None, 0));
             if n == 2 {
@@ -119,7 +122,7 @@ mod tests {
             assert!((error - 0.1 * (n + 1) as f64).abs() < 1e-5, "{own:?}");
             assert!((coherence - 0.9 - 1e-3 * n as f64).abs() < 1e-5, "{own:?}");
         }
-        let nothing = of_cells(&cells, &[], &[]);
+        let nothing = of_cells(&cells, &Rows::default(), &[], &[]);
         assert!(nothing.iter().all(|own| own.random_error_percent.is_none() && own.coherence.is_none()));
     }
 }

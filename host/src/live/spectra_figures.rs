@@ -21,7 +21,8 @@ const LOWEST: f64 = 1e-5;
 /// # Errors
 /// The record is not there or damaged.
 pub fn force(store: &Store, record: i64) -> Result<Option<Figure>, StoreError> {
-    match of_hit(store, &store.plan()?, &store.record(record)?) {
+    let row = store.record(record)?;
+    match of_hit(store, &store.plan()?, row.cell, &row) {
         Ok(hit) => Ok(of_force(record, &hit)),
         Err(NoSpectra::Store(error)) => Err(error),
         // a hit without a pulse has no spectrum to show; its verdict says why

@@ -39,7 +39,7 @@ fn average(gains: &[f64]) -> Average {
     for one in all {
         spectra.as_mut().expect("the first").add(&one).expect("alike");
     }
-    Average { records: Vec::new(), spectra, left_out: vec!["record 9: it is damaged".into()] }
+    Average { cell: 1, records: Vec::new(), spectra, left_out: vec!["record 9: it is damaged".into()] }
 }
 
 #[test]

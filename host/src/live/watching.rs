@@ -115,8 +115,9 @@ impl Watching {
                     let what = if by_hand { Doing::MoveByHand } else { Doing::Moving };
                     now(what, None, Some((cell, kept, attempt)));
                 }
-                Told::Settling { cell, kept, attempt, most_s } => {
-                    now(Doing::Settling, Some(most_s), Some((cell, kept, attempt)));
+                Told::Settling { cell, kept, attempt, most_s, by_hand } => {
+                    let what = if by_hand { Doing::StrikeByHand } else { Doing::Settling };
+                    now(what, Some(most_s), Some((cell, kept, attempt)));
                 }
                 // the cell is that of the state before
                 Told::Recording | Told::Judging => {

@@ -33,17 +33,17 @@ pub struct Shown {
 }
 
 impl Shown {
-    /// A stored record; none where it holds no samples, or its session lacks the hammer's force or the response.
+    /// A stored record as that of a cell; none where it holds no samples, or its session lacks the hammer's force or the response.
     ///
     /// # Errors
     /// The record is damaged, or the file cannot be read.
-    pub fn of(store: &Store, record: &RecordRow) -> Result<Option<Self>, StoreError> {
+    pub fn of(store: &Store, cell: i64, record: &RecordRow) -> Result<Option<Self>, StoreError> {
         if record.scans == 0 {
             return Ok(None);
         }
         let channels = store.channels(record.session)?;
-        let (Some(force), Some(responses)) = (channels.place(Measures::HammerForce), channels.responses())
-        else {
+        let responses = store.response_places(cell, record, &channels)?;
+        let (Some(force), Some(responses)) = (channels.place(Measures::HammerForce), responses) else {
             return Ok(None);
         };
         let samples = store.samples(record)?;

@@ -170,6 +170,7 @@ impl Measurements for Assembly {
         let hits = (0..HITS)
             .map(|h| Hit {
                 record: i64::try_from(h).expect("few hits") + 1,
+                of_row: false,
                 force_n: self.signal(|l| self.force[l], config.sensors.force.noise_n, &mut stream),
                 response: (0..3)
                     .map(|axis| self.signal(|l| responses[axis][l], floor, &mut stream))

@@ -268,7 +268,7 @@ fn attempts_that_run_out_settle_a_cell_with_enough_good_hits() {
     let first = cells[0].settled.clone().expect("not all of its eight hits were good");
     assert!(first.contains("of 8 good after 8 hits"), "{first}");
     assert_eq!(summary.given_up, 0);
-    assert!(Tally::new(&cells, &records).complete());
+    assert!(Tally::new(&cells, store.rows().expect("rows"), &records).complete());
     assert!(cells[1..].iter().all(|cell| cell.settled.is_none()));
 }
 

@@ -1,5 +1,6 @@
 //! Values that no rig can have.
 
+use super::check_fixed::check_fixed;
 use super::check_structure::check_structure;
 use super::values::{axes, bad, body, bushing, finite, fraction, not_negative, positive, range};
 use super::{ContactLaw, RigConfig};
@@ -74,9 +75,10 @@ fn errors(config: &RigConfig) -> Result<(), RigError> {
     ] {
         not_negative(field, value)?;
     }
-    let channels = channels(&config.sensors).map(|channel| channel.name);
+    let mut channels: Vec<String> = channels(&config.sensors).map(|channel| channel.name).into();
+    channels.extend(config.sensors.fixed.iter().map(|own| own.name.clone()));
     for (name, volts) in &errors.volts {
-        if !channels.contains(&name.as_str()) {
+        if !channels.contains(name) {
             return Err(bad(&format!("errors.volts.{name}"), "is no channel of the rig"));
         }
         if !volts.is_finite() || *volts == 0.0 {
@@ -196,6 +198,10 @@ fn hammer(config: &RigConfig) -> Result<(), RigError> {
     positive("hammer.warming_attempts", hammer.warming_attempts)?;
     not_negative("hammer.speed_scatter", hammer.speed_scatter)?;
     not_negative("hammer.width_scatter", hammer.width_scatter)?;
+    if let Some(hand) = &hammer.hand {
+        positive("hammer.hand.every_s", hand.every_s)?;
+        positive("hammer.hand.pulse_s", hand.pulse_s)?;
+    }
     let mishaps = &hammer.mishaps;
     fraction("hammer.mishaps.double_hit", mishaps.double_hit)?;
     fraction("hammer.mishaps.weak", mishaps.weak)?;
@@ -213,6 +219,7 @@ fn hammer(config: &RigConfig) -> Result<(), RigError> {
 }
 
 fn sensors(config: &RigConfig) -> Result<(), RigError> {
+    check_fixed(config)?;
     let sensors = &config.sensors;
     let rate_hz = f64::from(config.scan_rate_hz);
     positive("sensors.range_v", sensors.range_v)?;

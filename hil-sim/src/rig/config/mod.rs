@@ -4,6 +4,7 @@
 //! copy. A user's file states any subset: its tables merge into the default's, its lists replace the default's lists.
 
 mod check;
+mod check_fixed;
 mod check_structure;
 mod contact;
 mod document;
@@ -18,7 +19,9 @@ pub(crate) use check::normal_load;
 pub use contact::{Contact, ContactLaw, Iwan};
 pub use errors::Errors;
 pub use own_structure::{OwnBody, OwnStructure, Side, Spring};
-pub use sensors::{Excitation, ForceSensor, LoadCells, Sensors, SpeckleNoise, SpotVibrometer, Vibrometer};
+pub use sensors::{
+    Excitation, FixedVibrometer, ForceSensor, LoadCells, Sensors, SpeckleNoise, SpotVibrometer, Vibrometer,
+};
 pub use surroundings::{Cable, Surroundings};
 
 use serde::{Deserialize, Serialize};
@@ -302,6 +305,19 @@ pub struct Hammer {
     pub width_scatter: f64,
     /// What goes wrong now and then.
     pub mishaps: Mishaps,
+    /// Somebody strikes with it again and again, whatever the device orders; nobody does without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hand: Option<Hand>,
+}
+
+/// A person with the hammer, as hard as a coil pulse would strike.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hand {
+    /// From the staging to the first hit, and from hit to hit (s).
+    pub every_s: f64,
+    /// The pulse (s).
+    pub pulse_s: f64,
 }
 
 /// Chances per attempt (at most one happens), and ranges drawn from evenly.

@@ -20,6 +20,35 @@ pub struct Sensors {
     pub load_cells: LoadCells,
     /// The shaker's force cell.
     pub excitation: Excitation,
+    /// Vibrometers that stay at a point; none in the default rig.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fixed: Vec<FixedVibrometer>,
+}
+
+/// A vibrometer that stays at a response point: one channel along one direction.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FixedVibrometer {
+    /// Its channel's name.
+    pub name: String,
+    /// The response point at which it looks.
+    pub response: String,
+    /// What it feels (any length; sign included).
+    pub direction: [f64; 3],
+    /// m/s per V.
+    pub units_per_volt: f64,
+    /// White noise floor ((m/s)/√Hz) up to half the scan rate.
+    pub floor: f64,
+    /// How late the signal is (s).
+    #[serde(default)]
+    pub delay_s: f64,
+    /// 1 or −1.
+    #[serde(default = "upright")]
+    pub polarity: i8,
+}
+
+fn upright() -> i8 {
+    1
 }
 
 /// The hammer's force cell.

@@ -20,6 +20,7 @@ pub struct ExponentialStepper {
     /// Effect of a whole scan of a sine of the keyed Ω (its bits), as [`forced`] gives it.
     whole_scans: Vec<(u64, DMatrix<f64>)>,
     joint: Option<Jointed>,
+    fixed: Vec<DVector<f64>>,
     kept: DVector<f64>,
 }
 
@@ -64,6 +65,7 @@ impl ExponentialStepper {
             shaker,
             whole_scans: Vec::new(),
             joint: aimed.joint.as_ref().map(|joint| Jointed::new(a, joint, &aimed.shaker, period_s)),
+            fixed: aimed.fixed.rows.clone(),
             kept: DVector::zeros(order),
         }
     }
@@ -129,6 +131,13 @@ impl ExponentialStepper {
     pub fn signals(&self) -> [f64; SIGNALS] {
         let seen = &self.rows * &self.x;
         std::array::from_fn(|signal| seen[signal])
+    }
+
+    /// What the vibrometers that stay see now.
+    pub fn fixed(&self, into: &mut [f64]) {
+        for (signal, row) in into.iter_mut().zip(&self.fixed) {
+            *signal = row.dot(&self.x);
+        }
     }
 
     /// The state x (2n).

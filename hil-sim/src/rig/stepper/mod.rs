@@ -15,6 +15,7 @@ pub use slipping::Slipping;
 
 use nalgebra::DVector;
 
+use super::fixed::FixedRows;
 use super::force::ForceSegment;
 
 /// Signals of the structure: vibrometer x, y, z, the two spots (m/s), the three load cells (N).
@@ -33,6 +34,8 @@ pub struct Aimed {
     pub steps: [f64; SIGNALS],
     /// The joint, if it can slip.
     pub joint: Option<Joint>,
+    /// What the vibrometers that stay see.
+    pub fixed: FixedRows,
 }
 
 /// Where a joint that can slip is seen and pushed, in state coordinates (2n).
@@ -130,6 +133,11 @@ impl Stepper {
     #[inline]
     pub fn signals(&self) -> [f64; SIGNALS] {
         either!(self, stepper => stepper.signals())
+    }
+
+    /// What the vibrometers that stay see now.
+    pub fn fixed(&self, into: &mut [f64]) {
+        either!(self, stepper => stepper.fixed(into));
     }
 
     /// The state x (2n).

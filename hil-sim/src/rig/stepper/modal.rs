@@ -91,6 +91,8 @@ pub struct ModalStepper {
     hammer: Vec<Complex<f64>>,
     /// Reads y of the joint: Σ re · re + im · im.
     joint: Parts,
+    /// Reads what the vibrometers that stay see.
+    fixed: Vec<Parts>,
     negligible: Vec<f64>,
     active: usize,
     /// As it was: `z` and `active`.
@@ -118,6 +120,12 @@ impl ModalStepper {
                 .iter()
                 .map(|mode| joint.map_or(Complex::ZERO, |joint| read(mode, &joint.row).conj()))
                 .collect(),
+            fixed: aimed
+                .fixed
+                .rows
+                .iter()
+                .map(|row| modes.iter().map(|mode| read(mode, row).conj()).collect())
+                .collect(),
             negligible: Vec::with_capacity(count),
             active: 0,
             kept: (Parts::zeros(count), 0),
@@ -127,7 +135,11 @@ impl ModalStepper {
             let seen = aimed.rows.each_ref().map(|row| read(mode, row));
             stepper.rows_re.push(seen.map(|c| c.re));
             stepper.rows_im.push(seen.map(|c| -c.im));
-            let steps = seen.iter().zip(aimed.steps).map(|(c, step)| c.norm() / step).fold(0.0, f64::max);
+            let fixed = &aimed.fixed;
+            let of_fixed =
+                fixed.rows.iter().zip(&fixed.steps).map(|(row, step)| read(mode, row).norm() / step);
+            let steps = seen.iter().zip(aimed.steps).map(|(c, step)| c.norm() / step);
+            let steps = steps.chain(of_fixed).fold(0.0, f64::max);
             // A mode that no signal sees may go at any size; the floor keeps 0/0 away.
             stepper.negligible.push((NEGLIGIBLE_STEPS / steps.max(1e-30)).powi(2));
         }
@@ -242,6 +254,13 @@ impl ModalStepper {
             }
         }
         std::array::from_fn(|signal| even[signal] + odd[signal])
+    }
+
+    /// What the vibrometers that stay see now.
+    pub fn fixed(&self, into: &mut [f64]) {
+        for (signal, row) in into.iter_mut().zip(&self.fixed) {
+            *signal = read_parts(row, &self.z, self.active);
+        }
     }
 
     /// The state x (2n).

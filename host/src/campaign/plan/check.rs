@@ -52,10 +52,11 @@ impl Plan {
         );
         let [shortest, longest] = force.pulse_bounds_us;
         require(
-            shortest > 0
-                && shortest <= force.pulse_us
-                && force.pulse_us <= longest
-                && longest <= COIL_PULSE_CAP_US,
+            self.by_hand().is_some()
+                || shortest > 0
+                    && shortest <= force.pulse_us
+                    && force.pulse_us <= longest
+                    && longest <= COIL_PULSE_CAP_US,
             at,
             "force: 0 < pulse_bounds_us[0] <= pulse_us <= pulse_bounds_us[1] <= 8000 must hold",
         );
@@ -73,6 +74,7 @@ impl Plan {
             at,
             "settle.bound_s must lie between 0 and 55",
         );
+        self.check_hammer(faults);
         self.check_structure(faults);
         self.check_limits(faults);
         self.check_shaker(faults);
@@ -206,6 +208,7 @@ impl Plan {
                 format!("geometry: sigma_m of `{name}` must be a standard deviation in m: 0 or more"),
             );
         }
+        self.check_own_channels(faults);
         for point in &self.geometry.impact {
             let [x, y, z] = point.get_ref().direction;
             faults.unless(
@@ -213,6 +216,31 @@ impl Plan {
                 point.span().start,
                 format!("geometry: direction of `{}` must have length 1", point.get_ref().name),
             );
+        }
+    }
+
+    /// A sensor that stays has a channel for each axis, and no two sensors have the same one.
+    fn check_own_channels(&self, faults: &mut Faults) {
+        let mut taken = HashSet::new();
+        for point in &self.geometry.response {
+            let (at, own) = (point.span().start, point.get_ref());
+            let (name, Some(channels)) = (&own.name, &own.channels) else { continue };
+            let axes = own.axes().len();
+            faults.unless(
+                channels.len() == axes,
+                at,
+                format!(
+                    "geometry: channels of `{name}` must be {axes}, one for each axis, not {}",
+                    channels.len()
+                ),
+            );
+            for channel in channels {
+                faults.unless(
+                    taken.insert(channel),
+                    at,
+                    format!("geometry: channels of `{name}`: `{channel}` stands twice; a channel is at one point only"),
+                );
+            }
         }
     }
 

@@ -33,6 +33,9 @@ pub struct ResponsePoint {
     /// What each channel of the sensor feels, one to three unit vectors; along x, y and z without it. Records hold the channels in this
     /// order.
     pub axes: Option<Vec<[f64; 3]>>,
+    /// Names of the device's channels on which a sensor that stays here is, one for each axis: every hit is measured by all such sensors
+    /// at once. Without it, the vibrometer comes here.
+    pub channels: Option<Vec<String>>,
 }
 
 impl ResponsePoint {

@@ -8,15 +8,18 @@ mod cells;
 mod check;
 mod faults;
 mod geometry;
+mod hammer;
 pub mod level;
 mod load_cells;
 mod priors;
+mod response_channels;
 mod sense;
 mod sensor;
 mod structure;
 
 pub use cells::Cell;
 pub use geometry::{GeometryPlan, ImpactPoint, ResponsePoint, SensorPoint};
+pub use hammer::{HammerPlan, Swung};
 pub use priors::PriorsPlan;
 pub use sensor::{CalibrationFile, SensorPlan};
 pub use structure::{StructurePlan, turned};
@@ -81,6 +84,8 @@ pub struct Plan {
     pub record: Spanned<RecordPlan>,
     /// How many hits.
     pub hits: Spanned<Hits>,
+    /// Who swings the hammer; the device's coil, without it.
+    pub hammer: Option<Spanned<HammerPlan>>,
     /// How hard.
     pub force: Spanned<Force>,
     /// How the device recognises a hit.
@@ -142,9 +147,11 @@ pub struct Force {
     pub softer: Option<f64>,
     /// Part of the target within which the pulse is left alone.
     pub tolerance: f64,
-    /// First coil pulse, µs.
+    /// First coil pulse, µs; a hammer by hand needs none.
+    #[serde(default)]
     pub pulse_us: u32,
-    /// Shortest and longest coil pulse to try, µs.
+    /// Shortest and longest coil pulse to try, µs; a hammer by hand needs none.
+    #[serde(default)]
     pub pulse_bounds_us: [u32; 2],
 }
 

@@ -112,6 +112,34 @@ fn errors_point_at_line_and_field() {
 }
 
 #[test]
+fn sensors_that_stay_and_a_hammer_by_hand() {
+    let of = |from: &str, to: &str| {
+        assert!(SMALL.contains(from), "{from}");
+        Plan::parse_new(&SMALL.replacen(from, to, 1), "my.toml")
+    };
+    let point = |channels: &str| format!("{{ name = \"A2\", channels = {channels}, grouping = 1");
+    let stays = of("{ name = \"A2\", grouping = 1", &point("[\"a\", \"b\", \"c\"]")).expect("good");
+    assert_eq!(stays.own_channels("A2").map(<[String]>::len), Some(3));
+    assert_eq!(stays.own_channels("B1"), None);
+    for (channels, word) in
+        [("[\"a\"]", "must be 3, one for each axis, not 1"), ("[\"a\", \"b\", \"a\"]", "`a` stands twice")]
+    {
+        let said = of("{ name = \"A2\", grouping = 1", &point(channels)).expect_err(channels).to_string();
+        assert!(said.contains(word), "{said}");
+    }
+    assert_eq!(of("[force]", "[force]").expect("good").by_hand(), None);
+    assert_eq!(of("[force]", "[hammer]\nby = \"hand\"\n[force]").expect("good").by_hand(), Some(600.0));
+    // no pulse is needed then, and no second force can be asked for
+    let pulses = "pulse_us = 3500\npulse_bounds_us = [2500, 6000]";
+    assert!(of(pulses, "").expect_err("a coil").to_string().contains("pulse_bounds_us"));
+    let hand = |more: &str| of(pulses, &format!("{more}\n[hammer]\nby = \"hand\""));
+    assert!(hand("").is_ok());
+    assert!(hand("softer = 0.7").expect_err("softer").to_string().contains("force.softer needs the coil"));
+    let said = of("[force]", "[hammer]\nby = \"hand\"\npatience_s = 0.0\n[force]").expect_err("no patience");
+    assert!(said.to_string().contains("hammer.patience_s"), "{said}");
+}
+
+#[test]
 fn what_may_be_left_out_is_checked_where_it_stands() {
     let with = |more: &str| Plan::parse(&format!("{SMALL}\n{more}\n"), "my.toml");
     let good = "[enough]\nrandom_error = 0.02\nband_hz = [100, 800]\n[[channel]]\nname = \"force\"\nserial = \"1\"\n\

@@ -3,6 +3,7 @@
 use jointrig_protocol::shot::Shot;
 
 use super::answers::Question;
+use super::by_hand;
 use super::directions::name;
 use super::error::RunError;
 use super::quiet;
@@ -22,8 +23,10 @@ const SETBACKS: u32 = 4;
 impl Runner<'_> {
     /// Brings one cell to its end: enough good hits, or a reason why not.
     pub(super) fn cell(&mut self, row: &CellRow) -> Result<Next, RunError> {
-        let (mut others, mut again) = self.earlier.of(row.id, self.plan, self.channels)?;
-        if self.stage != Stage::Device {
+        let responses = self.responses(row);
+        let (mut others, mut again) = self.earlier.of(row.id, &responses, self.plan, self.channels)?;
+        // nobody repeats a hit by hand
+        if self.stage != Stage::Device || self.plan.by_hand().is_some() {
             again.clear();
         }
         let attempt = if again.is_empty() { self.tally.attempts(row.id) } else { 0 };
@@ -44,7 +47,7 @@ impl Runner<'_> {
             if self.recount(Some(row.id)) {
                 // a person overruled one of this cell's hits: what the good ones have in common is another
                 still(self.keeper.catch_up())?;
-                others = self.earlier.others_now(row.id, self.plan, self.channels)?;
+                others = self.earlier.others_now(row.id, &responses, self.plan, self.channels)?;
             }
             if again.is_empty() && !self.tally.open(row.id) {
                 break;
@@ -58,10 +61,18 @@ impl Runner<'_> {
                 |(_, _, pulse_us)| pulse_us,
             );
             self.mark()?;
-            let (standing, most_s) = (self.standing(row), self.plan.settle.get_ref().bound_s);
-            self.saw(&Seen::Settling { row, standing, most_s });
+            let by_hand = self.plan.by_hand();
+            let most_s = by_hand.unwrap_or(self.plan.settle.get_ref().bound_s);
+            let standing = self.standing(row);
+            self.saw(&Seen::Settling { row, standing, most_s, by_hand: by_hand.is_some() });
             let (stop, watch) = (&self.options.stop, &self.options.watch);
-            let outcome = self.shooter.shoot(self.session, pulse_us, &quiet, stop, watch)?;
+            let outcome = match by_hand {
+                Some(patience_s) => {
+                    let channels = self.channels;
+                    self.shooter.await_hand(self.session, channels, patience_s, &quiet, stop, watch)?
+                }
+                None => self.shooter.shoot(self.session, pulse_us, &quiet, stop, watch)?,
+            };
             if let (Some((record, stored, _)), Some(crc)) = (known, crc_of(&outcome)) {
                 again.pop_front();
                 if crc == stored {
@@ -81,13 +92,34 @@ impl Runner<'_> {
             match outcome {
                 Outcome::Recorded(recording) => {
                     setbacks = 0;
-                    quiet = quiet::after(&recording, self.channels, self.plan.settle.get_ref(), 1.0);
+                    let allowance = if by_hand.is_some() { by_hand::ALLOWANCE } else { 1.0 };
+                    quiet = quiet::after(&recording, self.channels, self.plan.settle.get_ref(), allowance);
                     self.saw(&Seen::Judging);
                     let verdict = self.judge.judge(&row.cell, self.plan, self.channels, &recording, &others);
                     if verdict.kind == Kind::Good {
                         others.learn(self.plan, self.channels, recording.view());
                     }
                     self.keep(row, *recording, verdict)?;
+                }
+                Outcome::TooEarly { recording, place, ratio } => {
+                    let name = &self.channels.channels[place].name;
+                    let sentence = format!(
+                        "struck before the structure was at rest: {name} still moved {ratio:.1} times as much as it may"
+                    );
+                    let judged = self.judge.judge(&row.cell, self.plan, self.channels, &recording, &others);
+                    let verdict =
+                        Verdict { kind: Kind::Noisy, measure: ratio, limit: 1.0, sentence, ..judged };
+                    quiet = quiet::after(
+                        &recording,
+                        self.channels,
+                        self.plan.settle.get_ref(),
+                        by_hand::ALLOWANCE,
+                    );
+                    self.keep(row, *recording, verdict)?;
+                }
+                Outcome::NobodyStruck => {
+                    // whoever went for lunch finds the cell as it was
+                    return Err(RunError::NobodyStruck { cell: name(&row.cell), seconds: most_s });
                 }
                 Outcome::Missed(shot) => {
                     let limit = self.plan.limits.get_ref().weak_n;
@@ -126,6 +158,15 @@ impl Runner<'_> {
             }
         }
         Ok(Next::On)
+    }
+
+    /// Places of the channels that measure when this cell is struck: its own, and those of the cells that its hits fill.
+    fn responses(&self, row: &CellRow) -> Vec<usize> {
+        let measured = std::iter::once(row).chain(self.filled.get(&row.id).into_iter().flatten());
+        measured
+            .filter_map(|row| self.plan.response_places(&row.cell.response, self.channels))
+            .flatten()
+            .collect()
     }
 
     /// Ends a cell whose attempts run out, or whose FRFs are good enough; returns whether it did.

@@ -37,15 +37,16 @@ impl Earlier {
     pub(super) fn of(
         &self,
         cell: i64,
+        responses: &[usize],
         plan: &Plan,
         channels: &ChannelMap,
     ) -> Result<(Others, VecDeque<RecordRow>), StoreError> {
         let Some(records) = self.records.get(&cell) else {
-            return Ok((Others::default(), VecDeque::new()));
+            return Ok((Others::of(responses.into()), VecDeque::new()));
         };
         // the writer is on a thread of its own; a cell's earlier records are in the file since before it began
         let store = Store::open_read_only(&self.path)?;
-        let others = learnt(&store, records, plan, channels)?;
+        let others = learnt(&store, records, responses, plan, channels)?;
         let mut again: Vec<RecordRow> = records.iter().flatten().cloned().collect();
         again.sort_by_key(|record| record.attempt);
         let whole =
@@ -57,11 +58,12 @@ impl Earlier {
     pub(super) fn others_now(
         &self,
         cell: i64,
+        responses: &[usize],
         plan: &Plan,
         channels: &ChannelMap,
     ) -> Result<Others, StoreError> {
         let store = Store::open_read_only(&self.path)?;
-        learnt(&store, &store.records_of(cell)?, plan, channels)
+        learnt(&store, &store.records_of(cell)?, responses, plan, channels)
     }
 }
 
@@ -69,10 +71,11 @@ impl Earlier {
 fn learnt(
     store: &Store,
     records: &[Result<RecordRow, Damaged>],
+    responses: &[usize],
     plan: &Plan,
     channels: &ChannelMap,
 ) -> Result<Others, StoreError> {
-    let mut others = Others::default();
+    let mut others = Others::of(responses.into());
     let kept = |record: &&RecordRow| record.kept() && record.channels == channels.len();
     for record in records.iter().flatten().filter(kept) {
         match store.samples(record) {

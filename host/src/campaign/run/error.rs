@@ -30,6 +30,16 @@ pub enum RunError {
     /// The thread that stores records ended without saying why.
     #[error("records can no longer be stored; run the same command again")]
     KeeperGone,
+    /// The hammer is a person's, and nobody struck.
+    #[error(
+        "{cell}: nobody struck within {seconds} s (hammer.patience_s); run the same command again to go on"
+    )]
+    NobodyStruck {
+        /// Where.
+        cell: String,
+        /// How long somebody was waited for, s.
+        seconds: f64,
+    },
     /// The rig is not safe to strike.
     #[error("{0}; nothing accepted is lost: run the same command again")]
     Unsafe(&'static str),

@@ -1,6 +1,6 @@
 //! Does the device fit the plan? Asked before anything moves.
 
-use jointrig_protocol::channel::Role;
+use jointrig_protocol::channel::{Quantity, Role};
 
 use super::error::RunError;
 use crate::campaign::plan::Plan;
@@ -28,16 +28,58 @@ pub(super) fn fitted(
         ));
     }
     let [shortest, _] = plan.force.get_ref().pulse_bounds_us;
-    if coil_cap_us < shortest {
+    if plan.by_hand().is_none() && coil_cap_us < shortest {
         return unfit(format!(
             "its coil is driven for at most {coil_cap_us} µs, and the plan's shortest pulse is {shortest} µs (force.pulse_bounds_us)"
         ));
     }
-    if channels.place(Role::HammerForce).is_none() || channels.responses().is_none_or(|axes| axes.len() != 3)
-    {
-        return unfit("it needs a hammer force and the vibrometer's three axes among its channels".into());
+    if channels.place(Role::HammerForce).is_none() {
+        return unfit("it needs a hammer force among its channels".into());
+    }
+    if let Err(what) = measured_at_every_point(plan, channels) {
+        return unfit(what);
     }
     with_sensors(plan, channels).or_else(unfit)
+}
+
+/// Whether something measures at each response point: a sensor of its own, or the vibrometer that comes to it.
+fn measured_at_every_point(plan: &Plan, channels: &ChannelMap) -> Result<(), String> {
+    let points = plan.geometry.response.iter().map(toml::Spanned::get_ref);
+    for point in points.filter(|point| plan.is_measured(&point.name)) {
+        let Some(own) = &point.channels else {
+            if channels.responses().is_none_or(|axes| axes.len() != 3) {
+                return Err(format!(
+                    "the vibrometer is to come to `{}`, and its three axes are not among the device's channels (a sensor that stays there \
+                     is named in geometry.response.channels)",
+                    point.name
+                ));
+            }
+            continue;
+        };
+        for name in own {
+            let Some(place) = channels.named(name) else {
+                let there: Vec<&str> =
+                    channels.channels.iter().map(|channel| channel.name.as_str()).collect();
+                return Err(format!(
+                    "it has no channel `{name}`, where the sensor at `{}` is to be (geometry.response.channels); it has {}",
+                    point.name,
+                    there.join(", ")
+                ));
+            };
+            let channel = &channels.channels[place];
+            if !matches!(
+                channel.quantity,
+                Quantity::Velocity | Quantity::Acceleration | Quantity::Displacement
+            ) || !matches!(channel.role, Role::Auxiliary | Role::Response(_))
+            {
+                return Err(format!(
+                    "its channel `{name}` measures something else than the motion at `{}` (geometry.response.channels)",
+                    point.name
+                ));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The channels with the sensors that the plan names, and a sentence for each that the device describes otherwise; or why they do not

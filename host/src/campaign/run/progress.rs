@@ -75,6 +75,10 @@ impl Watch for Progress {
                 }
             }
             Seen::Moved => state.come_back(),
+            Seen::Settling { row, standing, by_hand: true, .. } => {
+                let (kept, wanted) = (standing.kept, row.cell.wanted);
+                state.bar.set_message(format!("{}  strike now: {kept} of {wanted} good", label(&row.cell)));
+            }
             Seen::Judged { row, verdict, kept, left } => {
                 state.bar.set_position(kept);
                 let (time, label) = (state.time_left(&row.cell, left), label(&row.cell));

@@ -1,5 +1,7 @@
 //! How quiet the structure must be before the next hit, from how it moved after the last one.
 
+use std::f64::consts::PI;
+
 use jointrig_protocol::channel::Quantity;
 
 use super::shot::QuietLimits;
@@ -9,16 +11,18 @@ use crate::device::recording::Recording;
 
 /// The motion right after a hit is judged from here on (s after the trigger), when the pulse is over …
 const FROM_S: f64 = 0.002;
-/// … for this long, s: two periods of the slowest mode that matters.
+/// … for this long, s: so many periods of the slowest mode that matters.
 const FOR_S: f64 = 0.075;
+const PERIODS: f64 = 2.0;
 
 /// Limits for the first hit of a cell: nothing is known, everything is allowed.
 pub fn unknown(channels: &ChannelMap) -> QuietLimits {
     vec![0.0; channels.len()]
 }
 
-/// Limits after `recording`: for each velocity channel a part of its rms right after the hit, at least the floor;
-/// `allowance` (1 or more) loosens them. Other channels are left out.
+/// Limits after `recording`: for each channel of a velocity or an acceleration a part of its rms right after the hit, at least the floor;
+/// `allowance` (1 or more) loosens them. Other channels are left out. As an acceleration, the floor is that of the slowest mode that
+/// matters.
 pub fn after(recording: &Recording, channels: &ChannelMap, settle: &Settle, allowance: f64) -> QuietLimits {
     let rate = f64::from(channels.rate_hz);
     let from = recording.trigger_index + (FROM_S * rate) as usize;
@@ -28,14 +32,16 @@ pub fn after(recording: &Recording, channels: &ChannelMap, settle: &Settle, allo
         .iter()
         .enumerate()
         .map(|(place, channel)| {
-            if channel.quantity != Quantity::Velocity {
-                return 0.0;
-            }
+            let floor = match channel.quantity {
+                Quantity::Velocity => settle.quiet_floor_m_per_s,
+                Quantity::Acceleration => settle.quiet_floor_m_per_s * 2.0 * PI * PERIODS / FOR_S,
+                Quantity::Displacement | Quantity::Force | Quantity::Voltage => return 0.0,
+            };
             let codes = recording.channel(place);
             let window = codes.get(from.min(codes.len())..to.min(codes.len())).unwrap_or(&[]);
             let power: f64 = window.iter().map(|code| f64::from(*code).powi(2)).sum();
             let rms = (power / window.len().max(1) as f64).sqrt() * channel.units_per_code().abs();
-            (allowance * (settle.quiet_relative * rms).max(settle.quiet_floor_m_per_s)) as f32
+            (allowance * (settle.quiet_relative * rms).max(floor)) as f32
         })
         .collect()
 }

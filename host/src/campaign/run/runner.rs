@@ -6,7 +6,7 @@
 //! the next hit is the one that an undisturbed run would have made, to the last bit. A real structure is not struck in vain: it
 //! settles, and goes on.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -28,6 +28,7 @@ use crate::campaign::plan::Plan;
 use crate::campaign::store::Store;
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::record_row::NewRecord;
+use crate::campaign::store::rows::Rows;
 use crate::campaign::store::session_table::{Counters, SessionInfo};
 use crate::campaign::store::simulated::is_simulated_board;
 use crate::campaign::store::stored::Hex;
@@ -122,8 +123,18 @@ pub fn run(
     if let Some(simulated) = session.simulated() {
         store.note_simulated(simulated)?;
     }
-    let (cells, records) = (store.cells()?, store.records()?);
-    let tally = Tally::new(&cells, &records);
+    let (mut cells, records) = (store.cells()?, store.records()?);
+    let rows = Rows::new(&plan, &cells);
+    let tally = Tally::new(&cells, rows.clone(), &records);
+    // what the hits of another cell fill is not gone to
+    let mut filled: HashMap<i64, Vec<CellRow>> = HashMap::new();
+    cells.retain(|row| match rows.lead(row.id) {
+        Some(lead) => {
+            filled.entry(lead).or_default().push(row.clone());
+            false
+        }
+        None => true,
+    });
     let mut forces = Forces::new(plan.force.get_ref(), info.coil_cap_us);
     for record in records.iter().flatten() {
         forces.learn(Hit { pulse_us: record.shot.pulse_us, peak_n: record.peak_n });
@@ -139,6 +150,7 @@ pub fn run(
         plan: &plan,
         channels: &channels,
         cells: &cells,
+        filled,
         earlier: Earlier::new(store.path(), records),
         stage: options.stage.clone().decided(info.stage),
         options,
@@ -164,7 +176,10 @@ const HITS_PER_TEMPERATURE: u64 = 100;
 pub(super) struct Runner<'a> {
     pub(super) plan: &'a Plan,
     pub(super) channels: &'a ChannelMap,
+    /// Those that are struck.
     pub(super) cells: &'a [CellRow],
+    /// Those that the hits of one of them fill, by its id.
+    pub(super) filled: HashMap<i64, Vec<CellRow>>,
     pub(super) earlier: Earlier,
     pub(super) stage: Stage,
     pub(super) options: &'a Options,
@@ -263,7 +278,9 @@ impl Runner<'_> {
         }
         self.hits += 1;
         let shot = recording.shot;
-        self.forces.learn(Hit { pulse_us: shot.pulse_us, peak_n: verdict.peak_n });
+        if self.plan.by_hand().is_none() {
+            self.forces.learn(Hit { pulse_us: shot.pulse_us, peak_n: verdict.peak_n });
+        }
         let attempt = self.tally.add(row.id, verdict.kind == Kind::Good);
         let (kept, left) = (self.tally.kept(), self.left(row));
         self.saw(&Seen::Judged { row, verdict: &verdict, kept, left });

@@ -22,7 +22,7 @@ use crate::device::session::Session;
 const MARGIN: u64 = 1_024;
 
 /// Steps in which the acknowledgement follows a shot that is not decided yet, per ring.
-const STEPS_PER_RING: u64 = 8;
+pub(super) const STEPS_PER_RING: u64 = 8;
 
 /// A shot's end is known at the latest this many steps after it.
 const STEPS_TO_KNOW: u64 = 3;
@@ -38,6 +38,17 @@ pub enum Outcome {
     NotQuiet(Shot),
     /// The device took the shot back (arming expired, link lost, interlock, emergency stop).
     Cancelled(Shot),
+    /// Somebody struck before the structure was at rest after the hit before.
+    TooEarly {
+        /// What was measured.
+        recording: Box<Recording>,
+        /// The channel that moved most.
+        place: usize,
+        /// How much more it moved than it may.
+        ratio: f64,
+    },
+    /// Nobody struck in time.
+    NobodyStruck,
     /// The user asked to stop; the shot was taken back.
     Interrupted,
 }
@@ -47,17 +58,17 @@ pub type QuietLimits = Vec<f32>;
 
 /// Fires one shot after the other on a running stream.
 pub struct Shooter {
-    ring: u64,
-    channels: usize,
+    pub(super) ring: u64,
+    pub(super) channels: usize,
     epoch: u32,
-    pre: u64,
-    post: u64,
-    rate_hz: f64,
-    trigger: Trigger,
+    pub(super) pre: u64,
+    pub(super) post: u64,
+    pub(super) rate_hz: f64,
+    pub(super) trigger: Trigger,
     window: u16,
     patience: u64,
-    number: u32,
-    ready_at: u64,
+    pub(super) number: u32,
+    pub(super) ready_at: u64,
 }
 
 impl Shooter {
@@ -173,19 +184,24 @@ impl Shooter {
             Phase::Missed => Outcome::Missed(shot),
             Phase::NotQuiet => Outcome::NotQuiet(shot),
             Phase::Cancelled => Outcome::Cancelled(shot),
-            _ => Outcome::Recorded(Box::new(self.collect(session, &shot)?)),
+            _ => Outcome::Recorded(Box::new(self.collect_shot(session, &shot)?)),
         };
         session.forget_before(decision.saturating_sub(self.pre));
         Ok(outcome)
     }
 
     /// Cuts the record of `shot`, whose last scan has arrived, and gets its final summary.
-    fn collect(&self, session: &mut Session, shot: &Shot) -> Result<Recording, DeviceError> {
+    fn collect_shot(&self, session: &mut Session, shot: &Shot) -> Result<Recording, DeviceError> {
         let is_final = |known: &Shot| known.number == shot.number && known.phase == Phase::Done;
         let summary = match session.shot().filter(is_final) {
             Some(known) => known,
             None => session.status()?.shot.filter(is_final).unwrap_or(*shot),
         };
+        self.collect(session, &Shot { trigger: shot.trigger, ..summary })
+    }
+
+    /// Cuts the record of a hit whose last scan has arrived.
+    pub(super) fn collect(&self, session: &Session, shot: &Shot) -> Result<Recording, DeviceError> {
         let first_scan = shot.trigger.saturating_sub(self.pre);
         let (codes, gaps) = session.cut(first_scan..shot.trigger + self.post)?;
         Ok(Recording {
@@ -195,7 +211,7 @@ impl Shooter {
             channels: self.channels,
             codes: by_channel(&codes, self.channels),
             gaps,
-            shot: summary,
+            shot: *shot,
         })
     }
 
@@ -214,7 +230,7 @@ fn is_decided(shot: &Shot) -> bool {
     }
 }
 
-fn no_shot(number: u32, pulse_us: u32) -> Shot {
+pub(super) fn no_shot(number: u32, pulse_us: u32) -> Shot {
     Shot {
         number,
         phase: Phase::Waiting,

@@ -14,7 +14,7 @@ use crate::campaign::store::error::StoreError;
 /// The file cannot be read.
 pub fn document(store: &Store) -> Result<Value, StoreError> {
     let (cells, records) = (store.cells()?, store.records()?);
-    let tally = Tally::new(&cells, &records);
+    let tally = Tally::new(&cells, store.rows()?, &records);
     let frf = |row: &crate::campaign::store::frf_table::FrfRow| json!({ "configuration": row.configuration, "file": row.source, "imported": row.utc });
     let frfs: Vec<Value> = store.frf_rows()?.iter().map(frf).collect();
     let all: Vec<Value> = cells.iter().map(|row| of_cell(row, &tally.cell(row.id))).collect();
@@ -33,7 +33,7 @@ pub fn document(store: &Store) -> Result<Value, StoreError> {
 /// # Errors
 /// The file cannot be read.
 pub fn counts(store: &Store) -> Result<(u64, u64), StoreError> {
-    let tally = Tally::new(&store.cells()?, &store.records()?);
+    let tally = Tally::new(&store.cells()?, store.rows()?, &store.records()?);
     Ok((tally.kept(), tally.wanted()))
 }
 

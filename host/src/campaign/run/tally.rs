@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::record_row::{Damaged, RecordRow};
+use crate::campaign::store::rows::Rows;
 use crate::campaign::verdict::Kind;
 
 /// How far one cell is.
@@ -36,29 +37,49 @@ impl Count {
 #[derive(Clone, Debug, Default)]
 pub struct Tally {
     cells: HashMap<i64, Count>,
+    rows: Rows,
 }
 
 impl Tally {
-    /// Counts what a file holds.
-    pub fn new(cells: &[CellRow], records: &[Result<RecordRow, Damaged>]) -> Self {
+    /// Counts what a file holds. A hit that fills a row of cells counts in each of them, and once in all.
+    pub fn new(cells: &[CellRow], rows: Rows, records: &[Result<RecordRow, Damaged>]) -> Self {
+        let ended: HashMap<i64, (bool, bool)> =
+            cells.iter().map(|row| (row.id, (row.given_up.is_some(), row.settled.is_some()))).collect();
         let mut counts: HashMap<i64, Count> = cells
             .iter()
             .map(|row| {
-                let (given_up, settled) = (row.given_up.is_some(), row.settled.is_some());
+                let of = rows.lead(row.id).unwrap_or(row.id);
+                let (given_up, settled) = ended.get(&of).copied().unwrap_or_default();
                 (row.id, Count { wanted: row.cell.wanted, given_up, settled, ..Count::default() })
             })
             .collect();
         for record in records {
             let place = record.as_ref().map_or_else(|damaged| damaged.place, RecordRow::place);
-            let count = counts.entry(place.cell).or_default();
-            count.attempts = count.attempts.max(place.attempt + 1);
-            match record {
-                Err(_) => count.damaged += 1,
-                Ok(record) if record.kept() => count.kept += 1,
-                Ok(record) => *count.refused.entry(record.standing()).or_default() += 1,
+            for cell in rows.filled(place.cell) {
+                let count = counts.entry(cell).or_default();
+                if cell == place.cell {
+                    count.attempts = count.attempts.max(place.attempt + 1);
+                }
+                match record {
+                    Err(_) => count.damaged += 1,
+                    Ok(record) if record.kept() => count.kept += 1,
+                    Ok(record) => *count.refused.entry(record.standing()).or_default() += 1,
+                }
             }
         }
-        Self { cells: counts }
+        Self { cells: counts, rows }
+    }
+
+    /// The counts of every cell that a hit in this one fills.
+    fn filled(&mut self, id: i64, change: impl Fn(&mut Count)) {
+        for cell in self.rows.filled(id) {
+            change(self.cells.entry(cell).or_default());
+        }
+    }
+
+    /// The cells that are struck themselves.
+    fn struck(&self) -> impl Iterator<Item = &Count> {
+        self.cells.iter().filter(|(id, _)| self.rows.lead(**id).is_none()).map(|(_, count)| count)
     }
 
     /// One cell's count.
@@ -83,54 +104,56 @@ impl Tally {
 
     /// Counts one more hit; returns its attempt number.
     pub fn add(&mut self, id: i64, good: bool) -> u32 {
-        let count = self.cells.entry(id).or_default();
-        count.attempts += 1;
-        count.kept += u32::from(good);
-        count.attempts - 1
+        let attempt = self.attempts(id);
+        self.filled(id, |count| count.kept += u32::from(good));
+        self.cells.entry(id).or_default().attempts = attempt + 1;
+        attempt
     }
 
     /// A person overruled the verdict of a hit: one good hit more, or less. With less than it was settled with, a cell is open again.
     pub fn recount(&mut self, id: i64, more: bool) {
-        let count = self.cells.entry(id).or_default();
-        if more {
-            count.kept += 1;
-        } else {
-            count.kept = count.kept.saturating_sub(1);
-            count.settled = false;
-            *count.refused.entry(Kind::Dropped).or_default() += 1;
-        }
+        self.filled(id, |count| {
+            if more {
+                count.kept += 1;
+            } else {
+                count.kept = count.kept.saturating_sub(1);
+                count.settled = false;
+                *count.refused.entry(Kind::Dropped).or_default() += 1;
+            }
+        });
     }
 
     /// A cell is done with what it has.
     pub fn settle(&mut self, id: i64) {
-        self.cells.entry(id).or_default().settled = true;
+        self.filled(id, |count| count.settled = true);
     }
 
     /// A cell is struck anew: its good records count no more.
     pub fn redo(&mut self, id: i64) {
-        let count = self.cells.entry(id).or_default();
-        *count.refused.entry(Kind::Dropped).or_default() += count.kept;
-        (count.kept, count.settled, count.given_up) = (0, false, false);
+        self.filled(id, |count| {
+            *count.refused.entry(Kind::Dropped).or_default() += count.kept;
+            (count.kept, count.settled, count.given_up) = (0, false, false);
+        });
     }
 
     /// Gives a cell up.
     pub fn give_up(&mut self, id: i64) {
-        self.cells.entry(id).or_default().given_up = true;
+        self.filled(id, |count| count.given_up = true);
     }
 
     /// Good hits wanted in all.
     pub fn wanted(&self) -> u64 {
-        self.cells.values().map(|count| u64::from(count.wanted)).sum()
+        self.struck().map(|count| u64::from(count.wanted)).sum()
     }
 
     /// Good hits there in all, those beyond a cell's wish not counted.
     pub fn kept(&self) -> u64 {
-        self.cells.values().map(|count| u64::from(count.kept.min(count.wanted))).sum()
+        self.struck().map(|count| u64::from(count.kept.min(count.wanted))).sum()
     }
 
     /// Cells given up.
     pub fn given_up(&self) -> u64 {
-        self.cells.values().filter(|count| count.given_up).count() as u64
+        self.struck().filter(|count| count.given_up).count() as u64
     }
 
     /// Whether every cell has what it wants, or enough.

@@ -24,6 +24,7 @@ pub mod record_row;
 mod record_table;
 mod replan;
 mod row_seal;
+pub mod rows;
 mod schema;
 pub mod session_table;
 mod share;

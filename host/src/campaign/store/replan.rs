@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use super::Store;
-use super::cell_table::write_cell;
+use super::cell_table::{CellRow, write_cell};
 use super::error::{StoreError, sqlite};
 use super::notes::{write_log, write_plan};
 use crate::campaign::plan::{Cell, Plan, configuration_name};
@@ -21,7 +21,9 @@ impl Store {
             Err(StoreError::PlanChange { path: self.path.clone(), source_name: source.into(), what })
         };
         let rows = self.cells()?;
-        let measured: HashSet<i64> = self.places()?.iter().map(|place| place.cell).collect();
+        let struck: HashSet<i64> = self.places()?.iter().map(|place| place.cell).collect();
+        let shared = self.rows()?;
+        let measured: HashSet<i64> = struck.iter().flat_map(|cell| shared.filled(*cell)).collect();
         if !measured.is_empty() && new.record.get_ref() != old.record.get_ref() {
             return refuse(
                 "[record] must stay as it is, because records were measured with it; create a new campaign"
@@ -43,6 +45,11 @@ impl Store {
                 ));
             }
         }
+        if let Some(name) = filled_late(&new, &cells, &rows, &measured) {
+            return refuse(format!(
+                "the cell {name} would be filled by hits that were measured without its sensor; give the impact another name for it"
+            ));
+        }
         let path = self.path.clone();
         let mut write = || {
             let transaction = self.connection.transaction()?;
@@ -60,6 +67,22 @@ impl Store {
         };
         write().map_err(|error| sqlite(&path, "taking over the plan", error))
     }
+}
+
+/// A new cell whose response has a sensor of its own, in a row that was struck before.
+fn filled_late(plan: &Plan, cells: &[Cell], rows: &[CellRow], measured: &HashSet<i64>) -> Option<String> {
+    let fixed = |cell: &Cell| plan.own_channels(&cell.response).is_some();
+    let struck = |cell: &Cell| {
+        rows.iter().any(|row| {
+            let own = &row.cell;
+            measured.contains(&row.id)
+                && fixed(own)
+                && (own.configuration, &own.impact) == (cell.configuration, &cell.impact)
+        })
+    };
+    let new = |cell: &&Cell| fixed(cell) && !rows.iter().any(|row| same(&row.cell, cell));
+    let found = cells.iter().filter(new).find(|cell| struck(cell))?;
+    Some(format!("{}/{}/{}", configuration_name(found.configuration), found.impact, found.response))
 }
 
 fn same(one: &Cell, other: &Cell) -> bool {

@@ -20,11 +20,18 @@ const ROUNDING: f64 = 0.29;
 /// The good records of one cell so far.
 #[derive(Default)]
 pub struct Others {
+    /// Places of the channels whose FRFs are followed.
+    responses: Vec<usize>,
     noise: Vec<Vec<f64>>,
     average: Option<SpectraAverage>,
 }
 
 impl Others {
+    /// None yet; the FRFs of the channels at these places will be followed.
+    pub fn of(responses: Vec<usize>) -> Self {
+        Self { responses, ..Self::default() }
+    }
+
     /// Learns from a good record. The FRFs are followed only where the plan asks when they are good enough.
     pub fn learn(&mut self, plan: &Plan, channels: &ChannelMap, codes: Codes<'_>) {
         self.noise.push(channel_noise(channels, codes));
@@ -64,9 +71,7 @@ impl Others {
     }
 
     fn add_to_average(&mut self, plan: &Plan, channels: &ChannelMap, codes: Codes<'_>) {
-        let (Some(force), Some(responses)) = (channels.place(Role::HammerForce), channels.responses()) else {
-            return;
-        };
+        let Some(force) = channels.place(Role::HammerForce) else { return };
         let fs_hz = f64::from(channels.rate_hz);
         let si = |place: usize| channels.to_si(place, codes.channel(place));
         let force_n = si(force);
@@ -74,10 +79,10 @@ impl Others {
         let window =
             Windowing { sigma_per_s: plan.window.get_ref().exponential_per_s, ..Windowing::default() };
         let origin_s = pulse.start as f64 / fs_hz;
+        let responses: Vec<Vec<f64>> = self.responses.iter().copied().map(si).collect();
         let average =
             self.average.get_or_insert_with(|| SpectraAverage::new(fs_hz, force_n.len(), responses.len()));
         let decay = window.decay(fs_hz, force_n.len());
-        let responses: Vec<Vec<f64>> = responses.into_iter().map(si).collect();
         let added = average.add_with(
             |out| window.force_into(&force_n, &decay, origin_s, out),
             |axis, out| window.response_into(&responses[axis], &decay, origin_s, out),
@@ -88,10 +93,10 @@ impl Others {
     }
 }
 
-/// Noise of every channel in its unit; 0 for those that measure no velocity.
+/// Noise of every channel in its unit; 0 for those that measure neither velocity nor acceleration.
 pub fn channel_noise(channels: &ChannelMap, codes: Codes<'_>) -> Vec<f64> {
     let of = |(place, channel): (usize, &jointrig_protocol::channel::Channel)| {
-        if channel.quantity == Quantity::Velocity {
+        if matches!(channel.quantity, Quantity::Velocity | Quantity::Acceleration) {
             noise_codes(codes.channel(place)) * channel.units_per_code().abs()
         } else {
             0.0

@@ -31,11 +31,10 @@ impl New {
             Some(path) => (plan_file::read(path)?, path.display().to_string()),
         };
         let store = Store::create(&self.file, &text, &name)?;
-        let cells = store.cells()?;
-        let hits: u32 = cells.iter().map(|row| row.cell.wanted).sum();
+        let (plan, cells) = (store.plan()?, store.cells()?);
         let path = quoted(&self.file);
-        eprintln!("{path}: {} cells, {hits} hits wanted", cells.len());
-        if let Some(shaker) = &store.plan()?.shaker {
+        eprintln!("{path}: {} cells, {} hits wanted", cells.len(), plan.hits_wanted());
+        if let Some(shaker) = &plan.shaker {
             eprintln!("{}", shaker.get_ref().remark(&self.file));
         }
         eprintln!("next: jointrig campaign run {path} --device sim:");

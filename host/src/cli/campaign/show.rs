@@ -41,7 +41,7 @@ impl Show {
         let store = Store::open_read_only(&self.file)?;
         let cells = store.cells()?;
         let row = find(&cells, &self.cell)?;
-        let records = store.records_of(row.id)?;
+        let records = store.records_for(row.id)?;
         let overrules = if records.is_empty() { Vec::new() } else { store.overrules()? };
         let drawn = if self.no_figure || records.is_empty() {
             Ok(None)
@@ -100,7 +100,7 @@ impl Show {
     ) -> Result<Option<PathBuf>, CliError> {
         let mut shown = Vec::new();
         for record in rows {
-            match Shown::of(store, record) {
+            match Shown::of(store, row.id, record) {
                 Ok(one) => shown.extend(one),
                 Err(error @ StoreError::Damaged { .. }) => eprintln!("{error}"),
                 Err(error) => return Err(error.into()),

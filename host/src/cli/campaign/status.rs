@@ -30,7 +30,7 @@ impl Status {
             return output::json(&document(&store)?);
         }
         let (cells, records) = (store.cells()?, store.records()?);
-        let tally = Tally::new(&cells, &records);
+        let tally = Tally::new(&cells, store.rows()?, &records);
         let frfs = store.frf_rows()?;
         let (stored, raw) = store.sample_bytes()?;
         let size = std::fs::metadata(&self.file).map_or(0, |file| file.len());

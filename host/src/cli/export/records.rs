@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use jointrig_protocol::channel::{Quantity, Role};
 
 use super::{Files, Format, bad, make_folder};
-use crate::campaign::plan::configuration_name;
+use crate::campaign::plan::{Plan, configuration_name};
 use crate::campaign::store::Store;
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::record_row::RecordRow;
+use crate::campaign::store::rows::places;
 use crate::cli::error::CliError;
 use crate::cli::waiting::Waiting;
 use crate::exchange::channel_records::{self, ChannelRecords};
@@ -33,31 +34,43 @@ impl Files<'_> {
     /// One file for each cell with hits that count, or with any where all are wanted, and where each record went.
     pub(super) fn write_records(&self, store: &Store) -> Result<Vec<Written>, CliError> {
         let [folder, others] = ["records", "channels"].map(|name| self.what.out.join(name));
-        let (rows, cells) = (store.records()?, store.cells()?);
+        let (rows, cells, shared) = (store.records()?, store.cells()?, store.rows()?);
+        let plan = store.plan()?;
         let waiting = Waiting::of("writing records, by cell");
         let mut written = Vec::new();
         for (done, cell) in cells.iter().enumerate() {
             waiting.at(done, cells.len());
-            let own: Vec<&RecordRow> =
-                rows.iter().flatten().filter(|row| row.cell == cell.id && self.what.counts(row)).collect();
-            let Some(of_cell) = self.of_cell(store, &own)? else { continue };
+            let struck = [Some(cell.id), shared.lead(cell.id)];
+            let own: Vec<&RecordRow> = (rows.iter().flatten())
+                .filter(|row| struck.contains(&Some(row.cell)) && self.what.counts(row))
+                .collect();
+            let Some(of_cell) = self.of_cell(store, &plan, cell, &own)? else { continue };
             // a name may have dots: the extension is put behind it
             let name = format!("{}.{}", stem(cell), self.format.extension());
             self.write_impacts(&folder.join(&name), &of_cell.impacts, cell)?;
-            if let Some(all) = &of_cell.others {
+            // what else was measured stands with the cell that was struck
+            if let Some(all) = of_cell.others.as_ref().filter(|_| shared.lead(cell.id).is_none()) {
                 self.write_others(&others, &name, all)?;
             }
-            written.extend(own.iter().enumerate().map(|(hit, row)| Written {
-                record: row.id,
-                file: format!("records/{name}"),
-                hit,
-            }));
+            written.extend(
+                own.iter().enumerate().filter(|(_, row)| row.cell == cell.id).map(|(hit, row)| Written {
+                    record: row.id,
+                    file: format!("records/{name}"),
+                    hit,
+                }),
+            );
         }
         Ok(written)
     }
 
     /// All records of a cell in SI, as they were measured; none when it has none.
-    fn of_cell(&self, store: &Store, rows: &[&RecordRow]) -> Result<Option<OfCell>, CliError> {
+    fn of_cell(
+        &self,
+        store: &Store,
+        plan: &Plan,
+        cell: &CellRow,
+        rows: &[&RecordRow],
+    ) -> Result<Option<OfCell>, CliError> {
         let mut out: Option<OfCell> = None;
         for row in rows {
             let wrong = |what: &str| {
@@ -65,7 +78,8 @@ impl Files<'_> {
             };
             // scales belong to the session: one cell may have several
             let map = store.channels(row.session)?;
-            let (Some(force), Some(axes)) = (map.place(Role::HammerForce), map.responses()) else {
+            let axes = places(plan, cell, row, &map);
+            let (Some(force), Some(axes)) = (map.place(Role::HammerForce), axes) else {
                 return wrong("has no hammer force or no response");
             };
             let fs_hz = f64::from(map.rate_hz);

@@ -135,7 +135,7 @@ pub(super) fn bring(
     let missing = (0..recordings.len() as u32).any(|hit| !there.contains(&hit));
     let session = missing.then(|| store.begin_session(&session(origin), &map)).transpose()?;
     let mut brought = Brought { cells: 1, hits: recordings.len(), kept: 0, already: there.len(), map: None };
-    let mut others = Others::default();
+    let mut others = Others::of(map.responses().unwrap_or_default());
     for (hit, recording) in (0..).zip(recordings) {
         let verdict = ByRecord.judge(&cell, &plan, &map, &recording, &others);
         if verdict.kind == Kind::Good {

@@ -65,7 +65,7 @@ fn told(plan: &Plan) -> Vec<String> {
         .filter(|(_, count)| *count > 0)
         .map(|(name, count)| format!("{name} {count}"))
         .collect();
-    let hits: u32 = cells.iter().map(|cell| cell.wanted).sum();
+    let hits = plan.hits_wanted();
     let answer = |name: &str, missing: Vec<String>| match missing.as_slice() {
         [] => format!("{name}: yes"),
         missing => format!("{name}: no, it needs {}", missing.join("; ")),

@@ -29,6 +29,7 @@ function doing(w){
     'moving':()=>hit+'hammer and laser move',
     'move-by-hand':()=>`move hammer to ${c.impact}, laser to ${c.response} (${c.configuration})`,
     'settling':()=>`${hit}settling, ${since} s`,
+    'strike-by-hand':()=>`${hit}strike ${c.impact} now`,
     'recording':()=>hit+'recording',
     'judging':()=>hit+'judging',
     'shaking':()=>w.now.shaker?.settled?'shaking, settled':'shaking, on the way',

@@ -1,0 +1,149 @@
+//! A hit by hand: nothing is ordered, the host watches the force until somebody strikes.
+//!
+//! Nothing is armed, and the coil stays off. Nobody can be held back until the structure is at rest, so that the motion before each hit
+//! is measured: a hit that came too early is kept as one, and refused.
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use jointrig_protocol::channel::Role;
+use jointrig_protocol::shot::{Phase, Shot};
+
+use super::shot::{Outcome, QuietLimits, STEPS_PER_RING, Shooter, no_shot};
+use crate::campaign::watch::{Seen, Watchers};
+use crate::device::channels::ChannelMap;
+use crate::device::error::DeviceError;
+use crate::device::session::Session;
+
+/// The motion before a hit is measured over this long, s: two periods of the slowest mode that matters.
+const BEFORE_S: f64 = 0.075;
+/// What ends so long before the trigger is free of the hit: the force rises for less than that to the trigger's level, s.
+const CLEAR_S: f64 = 0.001;
+/// Samples in one mean: the converter's noise goes, and motion below 1 kHz stays.
+const MEAN: usize = 24;
+/// A person cannot tell when the last of the motion is gone: so many times what a coil would wait for is let pass.
+pub(super) const ALLOWANCE: f64 = 3.0;
+
+impl Shooter {
+    /// Waits until somebody strikes, for `patience_s` of the device's time at most. The acknowledgement is held when this returns.
+    ///
+    /// # Errors
+    /// The device refuses or is gone.
+    pub fn await_hand(
+        &mut self,
+        session: &mut Session,
+        channels: &ChannelMap,
+        patience_s: f64,
+        quiet: &QuietLimits,
+        stop: &AtomicBool,
+        watch: &Watchers,
+    ) -> Result<Outcome, DeviceError> {
+        self.number += 1;
+        let begin = self.ready_at;
+        let last = begin + (patience_s * self.rate_hz) as u64;
+        let step = (self.ring / STEPS_PER_RING).max(1);
+        let before = (BEFORE_S * self.rate_hz) as u64;
+        let mut from = begin;
+        let trigger = loop {
+            let reach = from + step;
+            session.hold_acknowledgement(Some(reach));
+            if session.wait_until(reach, |_| stop.load(Ordering::Relaxed))? {
+                return Ok(Outcome::Interrupted);
+            }
+            if let Some(found) = self.contact(session, channels, from..reach)? {
+                break found;
+            }
+            if reach > last {
+                self.ready_at = reach;
+                return Ok(Outcome::NobodyStruck);
+            }
+            from = reach;
+            session.forget_before(from.saturating_sub(self.pre.max(before) + step));
+        };
+        watch.saw(&Seen::Recording);
+        let end = trigger + self.post;
+        session.hold_acknowledgement(Some(end));
+        session.wait_for(end)?;
+        self.ready_at = end;
+        let clear = trigger - ((CLEAR_S * self.rate_hz) as u64).min(trigger - begin);
+        let moved = self.moving(session, channels, quiet, clear.saturating_sub(before).max(begin)..clear)?;
+        let recording = Box::new(self.collect(session, &self.struck(session, channels, trigger)?)?);
+        session.forget_before(end.saturating_sub(self.pre.max(before)));
+        Ok(match moved {
+            Some((place, ratio)) => Outcome::TooEarly { recording, place, ratio },
+            None => Outcome::Recorded(recording),
+        })
+    }
+
+    /// The first scan of the range at which the force is at the trigger's level.
+    fn contact(
+        &self,
+        session: &Session,
+        channels: &ChannelMap,
+        range: Range<u64>,
+    ) -> Result<Option<u64>, DeviceError> {
+        let Some(force) = channels.place(Role::HammerForce) else { return Ok(None) };
+        let level_n = f64::from(self.trigger.level_n);
+        let (codes, _) = session.cut(range.clone())?;
+        let own: Vec<i16> = codes.chunks_exact(self.channels).map(|scan| scan[force]).collect();
+        let found = channels.to_si(force, &own).iter().position(|force_n| *force_n >= level_n);
+        Ok(found.map(|scan| range.start + scan as u64))
+    }
+
+    /// The channel that moves most of all that move more than they may, and how many times that; none where all are quiet enough.
+    fn moving(
+        &self,
+        session: &Session,
+        channels: &ChannelMap,
+        quiet: &QuietLimits,
+        range: Range<u64>,
+    ) -> Result<Option<(usize, f64)>, DeviceError> {
+        let (codes, _) = session.cut(range)?;
+        let ratio = |(place, limit): (usize, &f32)| {
+            let own: Vec<i16> = codes.chunks_exact(self.channels).map(|scan| scan[place]).collect();
+            (place, rms_of_means(&channels.to_si(place, &own)) / f64::from(*limit))
+        };
+        let bounded = quiet.iter().enumerate().filter(|(_, limit)| **limit > 0.0);
+        Ok(bounded.map(ratio).filter(|(_, ratio)| *ratio > 1.0).max_by(|a, b| a.1.total_cmp(&b.1)))
+    }
+
+    /// What a device would tell of it.
+    fn struck(&self, session: &Session, channels: &ChannelMap, trigger: u64) -> Result<Shot, DeviceError> {
+        let listened = trigger..trigger + u64::from(self.trigger.listen_scans).min(self.post);
+        let peak_n = match channels.place(Role::HammerForce) {
+            None => 0.0,
+            Some(force) => {
+                let (codes, _) = session.cut(listened)?;
+                let own: Vec<i16> = codes.chunks_exact(self.channels).map(|scan| scan[force]).collect();
+                channels.to_si(force, &own).into_iter().fold(0.0, f64::max)
+            }
+        };
+        let none = no_shot(self.number, 0);
+        Ok(Shot { phase: Phase::Done, fired_at: trigger, trigger, peak_n: peak_n as f32, ..none })
+    }
+}
+
+/// Rms of the means of neighbouring samples about their own mean: slow motion, without offset and without broadband noise.
+fn rms_of_means(signal: &[f64]) -> f64 {
+    let means: Vec<f64> =
+        signal.chunks_exact(MEAN).map(|part| part.iter().sum::<f64>() / MEAN as f64).collect();
+    let count = means.len().max(1) as f64;
+    let offset = means.iter().sum::<f64>() / count;
+    (means.iter().map(|mean| (mean - offset).powi(2)).sum::<f64>() / count).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slow_motion_counts_and_offset_and_noise_do_not() {
+        let at = |i: usize| i as f64 / 51_200.0;
+        let slow: Vec<f64> =
+            (0..3_840).map(|i| 5.0 + (2.0 * std::f64::consts::PI * 200.0 * at(i)).sin()).collect();
+        assert!((rms_of_means(&slow) - 0.5f64.sqrt()).abs() < 0.02);
+        let noise: Vec<f64> = (0..3_840).map(|i| if i % 2 == 0 { 1.0 } else { -1.0 }).collect();
+        assert!(rms_of_means(&noise) < 1e-12);
+        assert_eq!(rms_of_means(&[]), 0.0);
+    }
+}
