@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use jointrig_hil_sim::rig::config::{ImpactPoint, ResponsePoint, RigConfig};
-use jointrig_hil_sim::rig::{Configuration, Quantity, exact_frf};
+use jointrig_hil_sim::rig::{CHANNELS, Configuration, Probe, Quantity, Rig, exact_frf};
 use nalgebra::DMatrix;
 use num_complex::Complex;
 use std::f64::consts::TAU;
@@ -141,4 +141,30 @@ fn what_cannot_be_is_refused_with_its_field_and_line() {
         let error = RigConfig::from_toml(&TIPS.replacen(old, new, 1)).unwrap_err().to_string();
         assert!(error.contains(said) && error.contains("line"), "{new}: {error}");
     }
+}
+
+#[test]
+fn spots_and_shaker_go_along_the_sliding_direction() {
+    let mut config = RigConfig::from_toml(TIPS).unwrap();
+    config.errors.none = true;
+    let sliding = config.contact.sliding();
+    assert!(sliding[0] > 0.7 && sliding[2] == 0.0, "{sliding:?}");
+    let mut rig = Rig::new(&config, 1).unwrap();
+    let (impact, response) = (config.impacts[0].name.clone(), config.responses[0].name.clone());
+    rig.stage(Configuration::Ajb, &impact, &response, 0).unwrap();
+    let mut codes = [0; CHANNELS];
+    let mut most = 0.0_f64;
+    for scan in 0..2_000 {
+        rig.drive((f64::from(scan) * 0.03).sin());
+        rig.scan(&mut codes);
+        for (place, spot) in [(4, &config.spots.ldv_a), (5, &config.spots.ldv_b)] {
+            let moves = rig.motion(&Probe::at(spot, sliding)).unwrap().1;
+            // the same state, summed in another order
+            assert!((rig.truth()[place] - moves).abs() < 1e-12, "{moves}");
+        }
+        let along = rig.motion(&Probe::at(&config.spots.ldv_a, sliding)).unwrap().1;
+        let across = rig.motion(&Probe::along_z(&config.spots.ldv_a)).unwrap().1;
+        most = most.max(along.abs() / across.abs().max(1e-9));
+    }
+    assert!(most > 10.0, "the shaker pushes along it: {most}");
 }

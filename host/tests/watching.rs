@@ -67,7 +67,7 @@ fn watching_allocates_nothing_on_the_measuring_thread() {
     let used = allocated(|| {
         for attempts in 0..5_000 {
             let (row, standing) = (&cells[0], Standing { kept: 1, attempts });
-            eye.saw(&Seen::Settling { row, standing, most_s: 25.0 });
+            eye.saw(&Seen::Settling { row, standing, most_s: 25.0, by_hand: false });
             eye.saw(&Seen::Recording);
             eye.saw(&Seen::Judging);
             eye.saw(&Seen::Link(Accounts::default()));

@@ -83,7 +83,8 @@ impl Plant {
         let nothing = || DVector::zeros(self.space.order());
         let [x, y, z] = &aim.response;
         let seen = |probe| velocity(probe).ok_or_else(|| missing(probe));
-        let spot = |spot| velocity(&Probe::along_z(spot)).unwrap_or_else(nothing);
+        let sliding = config.contact.sliding();
+        let spot = |spot| velocity(&Probe::at(spot, sliding)).unwrap_or_else(nothing);
         // A load cell's signal is its spring force kz · z on the body that it holds.
         let cell = |index: usize| {
             let it = &config.load_cells[index];
@@ -94,7 +95,7 @@ impl Plant {
         };
         let hit = self.structure.row(&aim.impact).ok_or_else(|| missing(&aim.impact))?;
         let pushed =
-            Probe { body: config.shaker.body, position_m: config.shaker.position_m, direction: AXES[2] };
+            Probe { body: config.shaker.body, position_m: config.shaker.position_m, direction: sliding };
         let aimed = Aimed {
             rows: [
                 seen(x)?,

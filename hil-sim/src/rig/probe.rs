@@ -19,9 +19,14 @@ pub struct Probe {
 }
 
 impl Probe {
-    /// The single-point vibrometer's: along z.
+    /// A single-point vibrometer's that looks along `direction`.
+    pub fn at(spot: &Spot, direction: [f64; 3]) -> Self {
+        Self { body: spot.body, position_m: spot.position_m, direction }
+    }
+
+    /// The same where the contact slides along z.
     pub fn along_z(spot: &Spot) -> Self {
-        Self { body: spot.body, position_m: spot.position_m, direction: AXES[2] }
+        Self::at(spot, AXES[2])
     }
 }
 

@@ -243,7 +243,7 @@ pub struct ImpactPoint {
     pub direction: [f64; 3],
 }
 
-/// Where one single-point vibrometer looks, along z.
+/// Where one single-point vibrometer looks, along the sliding direction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spot {
@@ -263,7 +263,7 @@ pub struct Spots {
     pub ldv_b: Spot,
 }
 
-/// The shaker: a force along z.
+/// The shaker: a force along the sliding direction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shaker {
