@@ -28,7 +28,7 @@ fn frf_is_the_analysis_one(page: &mut Page<'_>, store: &Store) {
     let structure =
         *Structure::ALL.iter().find(|s| s.name() == configuration_name(cell.configuration)).unwrap();
     let file = CampaignFile::open(store, KnownContact::default()).unwrap();
-    let frf = file.measured(structure, [10.0, 1000.0]).0.unwrap().to_receptance().unwrap();
+    let frf = file.measured(structure, [10.0, 1000.0]).0.unwrap().0.to_receptance().unwrap();
     let plan = store.plan().unwrap();
     let hit = plan.geometry.impact.iter().find(|p| p.get_ref().name == cell.impact).unwrap();
     let direction = hit.get_ref().direction;

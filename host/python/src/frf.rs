@@ -7,7 +7,9 @@ use jointrig::frf::MotionQuantity;
 use jointrig::report;
 use nalgebra::DMatrix;
 use numpy::ndarray::ArrayView3;
-use numpy::{Complex64, IntoPyArray, PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray3};
+use numpy::{
+    Complex64, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray3,
+};
 use pyo3::prelude::*;
 
 use crate::raised;
@@ -16,11 +18,17 @@ use crate::raised;
 #[pyclass(module = "jointrig._native", frozen)]
 pub struct Frf {
     frf: jointrig::frf::Frf,
+    /// Hits in each average, outputs × inputs; unknown of FRFs from elsewhere.
+    hits: Option<DMatrix<usize>>,
 }
 
 impl Frf {
     pub fn of(frf: jointrig::frf::Frf) -> Self {
-        Self { frf }
+        Self { frf, hits: None }
+    }
+
+    pub fn with_hits(frf: jointrig::frf::Frf, hits: DMatrix<usize>) -> Self {
+        Self { frf, hits: Some(hits) }
     }
 
     pub fn matrix(&self) -> &jointrig::frf::Frf {
@@ -129,6 +137,14 @@ impl Frf {
             .transpose()
     }
 
+    /// Hits in the average of each FRF, `(output, input)`; `None` of FRFs from a file or from arrays.
+    #[getter]
+    fn hits<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<i64>>>> {
+        let Some(hits) = &self.hits else { return Ok(None) };
+        let in_order: Vec<i64> = hits.transpose().iter().map(|count| *count as i64).collect();
+        in_order.into_pyarray(py).reshape([hits.nrows(), hits.ncols()]).map(Some)
+    }
+
     /// Names of the responses.
     #[getter]
     fn outputs(&self) -> Vec<String> {
@@ -155,18 +171,25 @@ impl Frf {
 
     /// The same as receptances, m/N: divided by s once or twice.
     fn to_receptance(&self, py: Python<'_>) -> PyResult<Self> {
-        self.frf.to_receptance().map(Self::of).map_err(|error| raised::refused(py, &error.to_string()))
+        let converted = self.frf.to_receptance().map_err(|error| raised::refused(py, &error.to_string()))?;
+        Ok(Self { frf: converted, hits: self.hits.clone() })
     }
 
     /// The lines from `low_hz` to `high_hz`, ends included.
     fn band(&self, low_hz: f64, high_hz: f64) -> Self {
-        Self::of(self.frf.band(low_hz, high_hz))
+        Self { frf: self.frf.band(low_hz, high_hz), hits: self.hits.clone() }
     }
 
     /// The rows and columns with these names, in this order.
     fn select(&self, py: Python<'_>, outputs: Vec<String>, inputs: Vec<String>) -> PyResult<Self> {
-        let chosen = self.frf.select(&outputs, &inputs);
-        chosen.map(Self::of).map_err(|error| raised::refused(py, &error.to_string()))
+        let chosen =
+            self.frf.select(&outputs, &inputs).map_err(|error| raised::refused(py, &error.to_string()))?;
+        let of = |wanted: &[String], names: &[String]| -> Vec<usize> {
+            wanted.iter().filter_map(|name| names.iter().position(|own| own == name)).collect()
+        };
+        let (rows, columns) = (of(&outputs, self.frf.outputs()), of(&inputs, self.frf.inputs()));
+        let hits = self.hits.as_ref().map(|hits| hits.select_rows(&rows).select_columns(&columns));
+        Ok(Self { frf: chosen, hits })
     }
 
     /// Writes an npz that `identify` and `import` take.

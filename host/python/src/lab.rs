@@ -96,11 +96,13 @@ impl Lab {
         let (measured, complaints) = self.computed(py, move |store, _| {
             let (measured, complaints) =
                 CampaignFile::open(store, KnownContact::default())?.measured(of, [band_hz.0, band_hz.1]);
-            let imported =
-                if measured.is_none() { store.frf(of.name())?.map(|found| found.frf) } else { None };
-            Ok((measured.or(imported), complaints))
+            let found = match measured {
+                Some((frf, hits)) => Some(Frf::with_hits(frf, hits)),
+                None => store.frf(of.name())?.map(|found| Frf::of(found.frf)),
+            };
+            Ok((found, complaints))
         })?;
-        measured.map(Frf::of).ok_or_else(|| {
+        measured.ok_or_else(|| {
             let why = complaints.first().map_or(String::new(), |why| format!(" ({why})"));
             raised::refused(py, &format!("{configuration} has no good hit and no imported FRFs{why}"))
         })

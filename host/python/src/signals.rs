@@ -87,10 +87,13 @@ pub fn frf<'py>(
             .and_then(|h1| h1.with_values(columns(spectra.rows(value))))
             .and_then(|frf| frf.with_variance(columns(spectra.rows(CrossSpectra::variance))))
             .and_then(|frf| frf.with_coherence(columns(spectra.rows(CrossSpectra::coherence))));
-        Ok((whole.map_err(|error| error.to_string())?, verdicts.iter().map(|v| v.kind.name()).collect()))
+        let verdicts: Vec<&str> = verdicts.iter().map(|verdict| verdict.kind.name()).collect();
+        Ok((whole.map_err(|error| error.to_string())?, verdicts))
     })?;
     let (frf, verdicts) = found.map_err(|what: String| raised::refused(py, &what))?;
-    Ok((Frf::of(frf), verdicts))
+    let used = verdicts.iter().filter(|verdict| **verdict == Kind::Good.name()).count();
+    let hits = nalgebra::DMatrix::from_element(frf.outputs().len(), 1, used);
+    Ok((Frf::with_hits(frf, hits), verdicts))
 }
 
 /// The FRF at a line, from the force to an output.

@@ -52,6 +52,10 @@ def test_signals_are_those_of_the_export_bit_for_bit(small_file: Path, tmp_path:
     for own, array in [("frequency_hz", "frequency"), ("frf", "frf"), ("coherence", "coherence"), ("variance", "variance")]:
         assert np.array_equal(getattr(ours, own), y[array], equal_nan=True), own
     assert (ours.outputs, ours.inputs) == (list(y["outputs"]), list(y["inputs"]))
+    kept = [r for r in lab.records(configuration="B", kept=True) if (r.response, r.impact) == (ours.outputs[1].split(":")[0], ours.inputs[0])]
+    assert ours.hits is not None and ours.hits.shape == ours.frf.shape[1:] and ours.hits[1, 0] == len(kept) > 0
+    part = ours.select(ours.outputs[1:2], ours.inputs[:1]).band(100, 200).to_receptance()
+    assert part.hits is not None and part.hits.tolist() == [[len(kept)]] and jr.read_frf(tmp_path / "frf" / "B.npz").hits is None
     assert ours.quantity == str(y["quantity"]) == "mobility"
     ours.save(tmp_path / "again.npz")
     assert np.array_equal(np.load(tmp_path / "again.npz")["frf"], y["frf"], equal_nan=True)

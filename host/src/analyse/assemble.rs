@@ -97,6 +97,14 @@ pub fn everything(points: &Configuration, cells: &[CellAverage], quantity: Motio
     measured(points, &all(points.channels.len()), &all(points.impacts.len()), cells, quantity)
 }
 
+/// How many hits each FRF of [`everything`] is the average of, outputs × inputs; 0 where there is none.
+pub fn hits(points: &Configuration, cells: &[CellAverage]) -> DMatrix<usize> {
+    DMatrix::from_fn(points.channels.len(), points.impacts.len(), |row, column| {
+        let cell = find(cells, &points.impacts[column], &points.channels[row].name);
+        cell.map_or(0, |cell| cell.spectra.hits())
+    })
+}
+
 /// The FRFs of these channels and impacts, with their noise.
 fn measured(
     points: &Configuration,

@@ -1,6 +1,6 @@
 //! The campaign file as measurements: records decoded, in SI units, one cell at a time, from any thread.
 
-use super::assemble::everything;
+use super::assemble::{everything, hits};
 use super::averages::{Asked, average};
 use super::campaign::analyse_measurements;
 use super::cell::{
@@ -27,6 +27,7 @@ use crate::structure::Structure;
 use crate::substructuring::Frf;
 use crate::substructuring::geometry::Geometry;
 use jointrig_protocol::channel::{Quantity, Role};
+use nalgebra::DMatrix;
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
@@ -243,8 +244,13 @@ impl CampaignFile {
 
 impl CampaignFile {
     /// The FRFs of a configuration's kept hits between two frequencies, Hz, for every pair of the geometry, formed as the analysis
-    /// forms them; and what is said about cells and records that cannot be used. None without a kept hit.
-    pub fn measured(&self, structure: Structure, lines_hz: [f64; 2]) -> (Option<Frf>, Vec<String>) {
+    /// forms them, with the number of hits in each (outputs × inputs); and what is said about cells and records that cannot be used. None
+    /// without a kept hit.
+    pub fn measured(
+        &self,
+        structure: Structure,
+        lines_hz: [f64; 2],
+    ) -> (Option<(Frf, DMatrix<usize>)>, Vec<String>) {
         let own = self.cells.iter().filter(|cell| cell.name.configuration == structure);
         let (mut averages, mut complaints) = (Vec::new(), Vec::new());
         for name in own.map(|cell| &cell.name) {
@@ -267,7 +273,8 @@ impl CampaignFile {
             }
         }
         let points = self.geometry.points(structure);
-        (everything(points, &averages, self.quantity), complaints)
+        let found = everything(points, &averages, self.quantity);
+        (found.map(|frf| (frf, hits(points, &averages))), complaints)
     }
 
     fn level(&self, store: &Store, row: &LevelRow) -> Result<ShakerLevel, String> {

@@ -86,7 +86,7 @@ impl What {
             } else {
                 None
             };
-            found.extend(measured.or(imported).map(|frf| (structure, frf)));
+            found.extend(measured.map(|(frf, _)| frf).or(imported).map(|frf| (structure, frf)));
         }
         if found.is_empty() {
             told.push("no good hit is in the file yet: there are no FRFs to export".into());
