@@ -87,10 +87,7 @@ impl Store {
         from_session: i64,
         reason: &str,
     ) -> Result<(), StoreError> {
-        let write = || {
-            let transaction = self.connection.unchecked_transaction()?;
-            // a file from before there were calibrations
-            transaction.execute_batch(&super::schema::missing_calibrations(&transaction)?)?;
+        self.change("entering calibrations", |connection| {
             for sensor in sensors {
                 let row = Calibration {
                     utc: utc_now(),
@@ -98,11 +95,10 @@ impl Store {
                     reason: reason.to_owned(),
                     ..Calibration::of_sensor(sensor)
                 };
-                row.insert(&transaction, &[])?;
+                row.insert(connection, &[])?;
             }
-            transaction.commit()
-        };
-        write().map_err(self.failed("entering calibrations"))
+            Ok(())
+        })
     }
 
     /// Every calibration that was entered, in that order.

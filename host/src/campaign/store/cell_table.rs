@@ -72,17 +72,19 @@ impl Store {
 
     /// Gives a cell up, with the reason.
     pub fn give_up(&self, cell: i64, reason: &str) -> Result<(), StoreError> {
-        self.connection
-            .execute("UPDATE cells SET given_up = ?2 WHERE id = ?1", params![cell, reason])
-            .map(|_| ())
-            .map_err(self.failed("giving a cell up"))
+        self.change("giving a cell up", |connection| {
+            connection
+                .execute("UPDATE cells SET given_up = ?2 WHERE id = ?1", params![cell, reason])
+                .map(|_| ())
+        })
     }
 
     /// Notes that a cell is done with fewer good hits than wanted, and why.
     pub fn settle(&self, cell: i64, reason: &str) -> Result<(), StoreError> {
-        self.connection
-            .execute("UPDATE cells SET settled = ?2 WHERE id = ?1", params![cell, reason])
-            .map(|_| ())
-            .map_err(self.failed("closing a cell"))
+        self.change("closing a cell", |connection| {
+            connection
+                .execute("UPDATE cells SET settled = ?2 WHERE id = ?1", params![cell, reason])
+                .map(|_| ())
+        })
     }
 }

@@ -45,7 +45,9 @@ pub enum StoreError {
         path: PathBuf,
     },
     /// Written by a newer program.
-    #[error("{path} has schema version {found}, this program reads version {known}: use a newer jointrig")]
+    #[error(
+        "{path} has schema version {found}, this program reads versions up to {known}: use a newer jointrig"
+    )]
     Newer {
         /// The file.
         path: PathBuf,
@@ -56,7 +58,7 @@ pub enum StoreError {
     },
     /// Written by an older program.
     #[error(
-        "{path} has schema version {found}, this program reads version {known}: use the jointrig that wrote it"
+        "{path} has schema version {found}, this program reads versions from {known} on: use the jointrig that wrote it"
     )]
     Older {
         /// The file.

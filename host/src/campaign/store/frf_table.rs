@@ -149,7 +149,7 @@ impl Store {
             variance: frf.variance().map(variances),
         };
         let crc = row.crc();
-        row.insert(&self.connection, &[("crc32", &crc)]).map_err(self.failed("storing FRFs"))
+        self.change("storing FRFs", |connection| row.insert(connection, &[("crc32", &crc)]))
     }
 
     /// The FRFs that count, without their values: the latest of each configuration.

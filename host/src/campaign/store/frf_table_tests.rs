@@ -63,11 +63,13 @@ fn every_flipped_bit_is_seen_and_named() {
         ("outputs", "'[]'"),
         ("source", "'other.uff'"),
     ] {
-        change(&format!("CREATE TABLE kept AS SELECT {column} AS value FROM frfs"));
+        change(&format!("CREATE TEMP TABLE kept AS SELECT {column} AS value FROM frfs"));
         change(&format!("UPDATE frfs SET {column} = {other}"));
         let error = store.frf("AJB").expect_err(column).to_string();
         assert!(error.contains("FRFs of AJB") && error.contains("import them again"), "{column}: {error}");
         let damage = store.verify().expect("checked");
+        // the triggers that were in the way
+        let damage: Vec<_> = damage.into_iter().filter(|one| !one.what.starts_with("it lacks")).collect();
         assert!(damage.len() == 1 && damage[0].what.contains("damaged"), "{column}: {damage:?}");
         change(&format!("UPDATE frfs SET {column} = (SELECT value FROM kept)"));
         change("DROP TABLE kept");

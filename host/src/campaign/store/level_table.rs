@@ -166,17 +166,14 @@ impl Store {
         let bytes = codec::encode(&new.codes, new.channels)
             .map_err(|error| self.content(format!("a level could not be compressed: {error}")))?;
         let (crc, bytes_crc) = (codec::checksum(&new.codes), crc32fast::hash(&bytes));
-        let store = || {
-            let transaction = self.connection.unchecked_transaction()?;
+        self.change("storing a level", |connection| {
             let id: i64 =
-                transaction.query_row("SELECT coalesce(max(id), 0) + 1 FROM levels", [], |row| row.get(0))?;
+                connection.query_row("SELECT coalesce(max(id), 0) + 1 FROM levels", [], |row| row.get(0))?;
             let values = new.row(id, crc, bytes_crc).into_values()?;
             let seal = row_seal::of(&values);
-            insert::<LevelRow>(&transaction, "levels", &values, &[("seal", &seal), ("samples", &bytes)])?;
-            transaction.commit()?;
+            insert::<LevelRow>(connection, "levels", &values, &[("seal", &seal), ("samples", &bytes)])?;
             Ok(id)
-        };
-        store().map_err(self.failed("storing a level"))
+        })
     }
 
     /// Every level without its samples, in order of measurement.

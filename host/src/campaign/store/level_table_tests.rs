@@ -76,6 +76,8 @@ fn nothing_of_a_level_can_be_changed_unseen() {
     ] {
         change(&store, sql).expect("changed behind its back");
         let damage = store.verify().expect("verified");
+        // the triggers that were in the way
+        let damage: Vec<_> = damage.into_iter().filter(|one| !one.what.starts_with("it lacks")).collect();
         assert_eq!(damage.len(), 1, "{sql}: {damage:?}");
         assert!(damage[0].what.contains("level 1"), "{damage:?}");
     }
@@ -94,15 +96,16 @@ fn every_column_of_a_level_is_under_its_seal() {
         store
             .connection
             .execute_batch(&format!(
-                "CREATE TABLE kept AS SELECT {name} AS value FROM levels; UPDATE levels SET {name} = \
+                "CREATE TEMP TABLE kept AS SELECT {name} AS value FROM levels; UPDATE levels SET {name} = \
                  CASE typeof({name}) WHEN 'text' THEN {name} || ' ' WHEN 'null' THEN 1.0 ELSE {name} + 1 END"
             ))
             .expect("changed behind its back");
         let damage = store.verify().expect("verified");
-        assert!(
-            damage.len() == 1 && damage[0].what.contains("description was changed"),
-            "{name}: {damage:?}"
-        );
+        // the triggers that were in the way
+        let damage: Vec<_> = damage.into_iter().filter(|one| !one.what.starts_with("it lacks")).collect();
+        let told = damage.iter().filter(|damage| damage.what.contains("description was changed")).count();
+        // another id is another row: the chain misses the one that was stored
+        assert_eq!((told, damage.len()), (1, if name == "id" { 2 } else { 1 }), "{name}: {damage:?}");
         let back = format!("UPDATE levels SET {name} = (SELECT value FROM kept); DROP TABLE kept");
         store.connection.execute_batch(&back).expect("changed back");
         assert_eq!(store.levels().expect("read"), before, "{name}");

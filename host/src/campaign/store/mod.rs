@@ -13,6 +13,7 @@
 mod backup;
 pub mod calibration_table;
 pub mod cell_table;
+mod chain;
 pub mod codec;
 pub mod error;
 pub mod frf_table;
@@ -20,6 +21,7 @@ pub mod level_table;
 mod lock;
 pub mod notes;
 pub mod overrules;
+mod own_schema;
 pub mod record_row;
 mod record_table;
 mod replan;
@@ -34,7 +36,6 @@ mod table;
 pub mod temperature_table;
 pub mod verify;
 
-use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -47,7 +48,10 @@ use lock::WriteLock;
 const APPLICATION_ID: i32 = i32::from_be_bytes(*b"JRIG");
 
 /// Version of the tables (`schema.rs`), in SQLite's `user_version`.
-const VERSION: i32 = 1;
+const VERSION: i32 = 2;
+
+/// The oldest version that is read: without the chain.
+const OLDEST: i32 = 1;
 
 /// How long to wait for another process's lock on the file.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -61,6 +65,8 @@ pub struct Store {
     lock: Option<WriteLock>,
     /// Whether everything is in the one file.
     tidy: bool,
+    /// What is written over the connection.
+    watch: chain::Watch,
 }
 
 impl Store {
@@ -72,9 +78,10 @@ impl Store {
         share::refuse(path)?;
         let lock = Some(WriteLock::take(path)?);
         let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE;
-        let connection =
+        let mut connection =
             Connection::open_with_flags(path, flags).map_err(|error| sqlite(path, "creating", error))?;
-        let store = Self { connection, path: path.into(), lock, tidy: false };
+        let watch = chain::Watch::new(&mut connection).map_err(|error| sqlite(path, "creating", error))?;
+        let store = Self { connection, path: path.into(), lock, tidy: false, watch };
         store.begin_writing()?;
         Ok(store)
     }
@@ -90,6 +97,7 @@ impl Store {
         let mut store = Self::connect(path, path, OpenFlags::SQLITE_OPEN_READ_WRITE)?;
         (store.lock, store.tidy) = (Some(lock), false);
         store.begin_writing()?;
+        store.bring_up().map_err(store.failed("bringing the file up to date"))?;
         store.mark_written()?;
         Ok(store)
     }
@@ -129,18 +137,45 @@ impl Store {
             }
             other => sqlite(path, "opening", other),
         };
-        let connection = Connection::open_with_flags(name, flags).map_err(open)?;
+        let mut connection = Connection::open_with_flags(name, flags).map_err(open)?;
         connection.busy_timeout(PATIENCE).map_err(open)?;
         let number = |pragma: &str| connection.pragma_query_value(None, pragma, |row| row.get::<_, i32>(0));
         if number("application_id").map_err(open)? != APPLICATION_ID {
             return Err(StoreError::Foreign { path: path.into() });
         }
         let found = number("user_version").map_err(open)?;
-        match found.cmp(&VERSION) {
-            Ordering::Greater => Err(StoreError::Newer { path: path.into(), found, known: VERSION }),
-            Ordering::Less => Err(StoreError::Older { path: path.into(), found, known: VERSION }),
-            Ordering::Equal => Ok(Self { connection, path: path.into(), lock: None, tidy: true }),
+        if found > VERSION {
+            return Err(StoreError::Newer { path: path.into(), found, known: VERSION });
         }
+        if found < OLDEST {
+            return Err(StoreError::Older { path: path.into(), found, known: OLDEST });
+        }
+        connection.pragma_update(None, "trusted_schema", false).map_err(open)?;
+        if let Some(what) = own_schema::strange(&connection).map_err(open)? {
+            return Err(StoreError::Content {
+                path: path.into(),
+                what: format!("{what}. Nothing of it is read"),
+            });
+        }
+        let watch = chain::Watch::new(&mut connection).map_err(open)?;
+        Ok(Self { connection, path: path.into(), lock: None, tidy: true, watch })
+    }
+
+    /// Writes in one transaction, and chains every row that it touches.
+    fn change<T>(
+        &self,
+        doing: &'static str,
+        work: impl FnOnce(&Connection) -> rusqlite::Result<T>,
+    ) -> Result<T, StoreError> {
+        let write = || {
+            let transaction = self.connection.unchecked_transaction()?;
+            self.watch.begin();
+            let done = work(&transaction)?;
+            self.watch.extend(&transaction)?;
+            transaction.commit()?;
+            Ok(done)
+        };
+        write().map_err(self.failed(doing))
     }
 
     fn begin_writing(&self) -> Result<(), StoreError> {

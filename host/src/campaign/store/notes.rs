@@ -98,10 +98,9 @@ impl Store {
 
     /// Writes a note on the whole campaign.
     pub fn set_meta(&self, key: &str, value: &str) -> Result<(), StoreError> {
-        self.connection
-            .execute("INSERT OR REPLACE INTO meta VALUES (?1, ?2)", [key, value])
-            .map(|_| ())
-            .map_err(self.failed("writing notes"))
+        self.change("writing notes", |connection| {
+            connection.execute("INSERT OR REPLACE INTO meta VALUES (?1, ?2)", [key, value]).map(|_| ())
+        })
     }
 
     /// The lines of the log behind line `after`, in order: id, time (RFC 3339, UTC), text.
@@ -129,6 +128,6 @@ impl Store {
 
     /// Adds a line to the campaign's log.
     pub fn log(&self, text: &str) -> Result<(), StoreError> {
-        write_log(&self.connection, text).map_err(self.failed("writing the log"))
+        self.change("writing the log", |connection| write_log(connection, text))
     }
 }

@@ -30,12 +30,7 @@ impl Store {
     /// Overrules a record's verdict; the first one stays in the file too. A cell that a refusal leaves with less than it
     /// was settled with is open again.
     pub fn overrule(&self, record: i64, verdict: Kind, reason: &str) -> Result<(), StoreError> {
-        let write = || {
-            let transaction = self.connection.unchecked_transaction()?;
-            write_overrule(&transaction, record, verdict, reason)?;
-            transaction.commit()
-        };
-        write().map_err(self.failed("overruling a verdict"))
+        self.change("overruling a verdict", |connection| write_overrule(connection, record, verdict, reason))
     }
 
     /// Has a cell struck anew: its good records are dropped, and it is open again. Returns how many were dropped.
@@ -43,15 +38,12 @@ impl Store {
         let records = self.records_of(cell)?;
         let good = records.iter().flatten().filter(|record| record.standing() == Kind::Good);
         let good: Vec<i64> = good.map(|record| record.id).collect();
-        let write = || {
-            let transaction = self.connection.unchecked_transaction()?;
+        self.change("opening a cell again", |connection| {
             for record in &good {
-                write_overrule(&transaction, *record, Kind::Dropped, reason)?;
+                write_overrule(connection, *record, Kind::Dropped, reason)?;
             }
-            transaction.execute("UPDATE cells SET settled = NULL, given_up = NULL WHERE id = ?1", [cell])?;
-            transaction.commit()
-        };
-        write().map_err(self.failed("opening a cell again"))?;
+            connection.execute("UPDATE cells SET settled = NULL, given_up = NULL WHERE id = ?1", [cell])
+        })?;
         Ok(good.len())
     }
 

@@ -19,21 +19,17 @@ impl Store {
         let bytes = codec::encode(&recording.codes, recording.channels)
             .map_err(|error| self.content(format!("a record could not be compressed: {error}")))?;
         let (crc, bytes_crc) = (codec::checksum(&recording.codes), crc32fast::hash(&bytes));
-        let store = || {
+        self.change("storing a record", |connection| {
             // this is the only writer
             let id: i64 =
-                self.connection
-                    .query_row("SELECT coalesce(max(id), 0) + 1 FROM records", [], |row| row.get(0))?;
+                connection.query_row("SELECT coalesce(max(id), 0) + 1 FROM records", [], |row| row.get(0))?;
             let values = record.row(id, crc, bytes_crc).into_values()?;
             let seal = row_seal::of(&values);
-            let transaction = self.connection.unchecked_transaction()?;
-            insert::<RecordRow>(&transaction, "records", &values, &[("samples", &bytes)])?;
-            insert::<RecordRow>(&transaction, "seals", &values, &[("record", &id), ("seal", &seal)])?;
-            write_link(&transaction, record.session, counters)?;
-            transaction.commit()?;
+            insert::<RecordRow>(connection, "records", &values, &[("samples", &bytes)])?;
+            insert::<RecordRow>(connection, "seals", &values, &[("record", &id), ("seal", &seal)])?;
+            write_link(connection, record.session, counters)?;
             Ok(id)
-        };
-        store().map_err(self.failed("storing a record"))
+        })
     }
 
     /// Every record without its samples, in order of measurement.

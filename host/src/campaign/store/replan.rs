@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use super::Store;
 use super::cell_table::{CellRow, write_cell};
-use super::error::{StoreError, sqlite};
+use super::error::StoreError;
 use super::notes::{write_log, write_plan};
 use crate::campaign::plan::{Cell, Plan, configuration_name};
 
@@ -50,22 +50,18 @@ impl Store {
                 "the cell {name} would be filled by hits that were measured without its sensor; give the impact another name for it"
             ));
         }
-        let path = self.path.clone();
-        let mut write = || {
-            let transaction = self.connection.transaction()?;
+        self.change("taking over the plan", |connection| {
             for row in rows.iter().filter(|row| !measured.contains(&row.id)) {
                 if !cells.iter().any(|cell| same(cell, &row.cell)) {
-                    transaction.execute("DELETE FROM cells WHERE id = ?1", [row.id])?;
+                    connection.execute("DELETE FROM cells WHERE id = ?1", [row.id])?;
                 }
             }
             for cell in &cells {
-                write_cell(&transaction, cell)?;
+                write_cell(connection, cell)?;
             }
-            write_plan(&transaction, text, source)?;
-            write_log(&transaction, &format!("the plan {source} took over"))?;
-            transaction.commit()
-        };
-        write().map_err(|error| sqlite(&path, "taking over the plan", error))
+            write_plan(connection, text, source)?;
+            write_log(connection, &format!("the plan {source} took over"))
+        })
     }
 }
 

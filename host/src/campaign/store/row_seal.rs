@@ -31,16 +31,21 @@ pub(super) fn read<R: Row>(row: &rusqlite::Row<'_>) -> rusqlite::Result<Result<R
 fn over<'v>(values: impl Iterator<Item = ValueRef<'v>>) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
     for value in values {
-        let (kind, number, bytes): (u8, [u8; 8], &[u8]) = match value {
-            ValueRef::Null => (0, [0; 8], &[]),
-            ValueRef::Integer(number) => (1, number.to_le_bytes(), &[]),
-            ValueRef::Real(real) => (2, real.to_bits().to_le_bytes(), &[]),
-            ValueRef::Text(text) => (3, (text.len() as u64).to_le_bytes(), text),
-            ValueRef::Blob(blob) => (4, (blob.len() as u64).to_le_bytes(), blob),
-        };
-        hasher.update(&[kind]);
-        hasher.update(&number);
-        hasher.update(bytes);
+        each(value, |bytes| hasher.update(bytes));
     }
     hasher.finalize()
+}
+
+/// Hands over kind, number and bytes of a value, in that order.
+pub(super) fn each(value: ValueRef<'_>, mut take: impl FnMut(&[u8])) {
+    let (kind, number, bytes): (u8, [u8; 8], &[u8]) = match value {
+        ValueRef::Null => (0, [0; 8], &[]),
+        ValueRef::Integer(number) => (1, number.to_le_bytes(), &[]),
+        ValueRef::Real(real) => (2, real.to_bits().to_le_bytes(), &[]),
+        ValueRef::Text(text) => (3, (text.len() as u64).to_le_bytes(), text),
+        ValueRef::Blob(blob) => (4, (blob.len() as u64).to_le_bytes(), blob),
+    };
+    take(&[kind]);
+    take(&number);
+    take(bytes);
 }

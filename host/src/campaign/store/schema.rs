@@ -2,8 +2,8 @@
 //!
 //! The columns stand beside the type of their row; the tables of a key and a value stand here.
 //!
-//! A file of another version is refused in words. Once a version is released, a change of any column makes a new one; what brings
-//! older files up is then to be written here, and applied by [`super::Store::open`].
+//! A file of a version that is not known is refused in words. A change of any column makes a new one; what brings older files up stands
+//! here ([`super::Store::bring_up`]), and is applied by [`super::Store::open`].
 
 use std::path::Path;
 
@@ -11,10 +11,11 @@ use rusqlite::Connection;
 
 use super::calibration_table::Calibration;
 use super::cell_table::{CellColumns, write_cell};
+use super::chain;
 use super::error::{StoreError, sqlite};
 use super::frf_table::FrfColumns;
 use super::level_table::LevelRow;
-use super::notes::{LogLine, PlanText, write_plan};
+use super::notes::{LogLine, PlanText, write_log, write_plan};
 use super::overrules::Overrule;
 use super::record_row::RecordRow;
 use super::session_table::{ChannelColumns, Sensor, SessionInfo};
@@ -30,12 +31,13 @@ CREATE TABLE links (session INTEGER PRIMARY KEY REFERENCES sessions(id), counter
 ";
 
 /// Tables whose rows stay as they were stored, and what their triggers call a row.
-const APPEND_ONLY: [(&str, &str); 5] = [
+const APPEND_ONLY: [(&str, &str); 6] = [
     ("records", "a raw record is"),
     ("seals", "a record''s seal is"),
     ("frfs", "imported FRFs are"),
     ("levels", "a raw record is"),
     ("calibrations", "a calibration is"),
+    ("chain", "an entry of the chain is"),
 ];
 
 impl Store {
@@ -62,6 +64,28 @@ impl Store {
         for cell in &plan.cells() {
             write_cell(&transaction, cell)?;
         }
+        chain::begin(&transaction)?;
+        transaction.commit()
+    }
+
+    /// Brings an older file up to date: since version 2 every row is chained.
+    pub(super) fn bring_up(&self) -> rusqlite::Result<()> {
+        let version: i32 = self.connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
+        if version == VERSION {
+            return Ok(());
+        }
+        let transaction = self.connection.unchecked_transaction()?;
+        transaction.execute_batch(&missing_calibrations(&transaction)?)?;
+        if !transaction.table_exists(None, "temperatures")? {
+            transaction.execute_batch(&create::<TemperatureRow>())?;
+        }
+        transaction.execute_batch(&(chain::TABLES.to_owned() + &stay(APPEND_ONLY[5])))?;
+        write_log(
+            &transaction,
+            "rows are chained from here on; what was changed before shows in records' seals only",
+        )?;
+        chain::begin(&transaction)?;
+        transaction.pragma_update(None, "user_version", VERSION)?;
         transaction.commit()
     }
 }
@@ -84,9 +108,10 @@ fn stay((table, row): (&str, &str)) -> String {
 }
 
 /// The SQL that makes an empty file.
-fn tables() -> String {
+pub(super) fn tables() -> String {
     let tables = [
         PAIRS.to_owned(),
+        chain::TABLES.to_owned(),
         create::<PlanText>(),
         create::<SessionInfo>(),
         create::<ChannelColumns>(),

@@ -7,7 +7,7 @@ use rusqlite::{Connection, ToSql, params};
 use toml::Spanned;
 
 use super::Store;
-use super::error::{StoreError, sqlite};
+use super::error::StoreError;
 use super::notes::utc_now;
 use super::stored::Hex;
 use super::table::{Row, table};
@@ -103,41 +103,44 @@ pub(super) fn write_link(connection: &Connection, session: i64, counters: &Count
         .map(|_| ())
 }
 
+fn write_session(
+    connection: &Connection,
+    info: &SessionInfo,
+    map: &ChannelMap,
+    plan: &Plan,
+) -> rusqlite::Result<i64> {
+    let software = env!("CARGO_PKG_VERSION");
+    let beside: [(&str, &dyn ToSql); 3] =
+        [("utc", &utc_now()), ("software_version", &software), ("rate_hz", &map.rate_hz)];
+    info.clone().insert(connection, &beside)?;
+    let session = connection.last_insert_rowid();
+    for (place, channel) in map.channels.iter().enumerate() {
+        let columns = ChannelColumns {
+            name: channel.name.as_str().into(),
+            role: channel.role,
+            quantity: channel.quantity,
+            units_per_volt: channel.units_per_volt,
+            range_v: channel.range_v,
+            delay_ns: channel.delay_ns,
+            bits: channel.bits,
+        };
+        let at: [(&str, &dyn ToSql); 2] = [("session", &session), ("place", &place)];
+        columns.insert(connection, &[at[0], at[1], ("unit", &channel.quantity.unit())])?;
+        let named =
+            plan.channel.iter().map(Spanned::get_ref).find(|sensor| sensor.name == channel.name.as_str());
+        if let Some(sensor) = named {
+            let (model, serial) = (sensor.model.clone(), sensor.serial.clone());
+            Sensor { model, serial, calibrated: sensor.calibrated.clone() }.insert(connection, &at)?;
+        }
+    }
+    Ok(session)
+}
+
 impl Store {
     /// Notes a connection to a device, its channels, and the sensors that the plan names behind them; returns its id.
     pub fn begin_session(&mut self, info: &SessionInfo, channels: &ChannelMap) -> Result<i64, StoreError> {
-        let (path, plan) = (self.path.clone(), self.plan()?);
-        self.write_session(info, channels, &plan).map_err(|error| sqlite(&path, "noting the session", error))
-    }
-
-    fn write_session(&mut self, info: &SessionInfo, map: &ChannelMap, plan: &Plan) -> rusqlite::Result<i64> {
-        let transaction = self.connection.transaction()?;
-        let software = env!("CARGO_PKG_VERSION");
-        let beside: [(&str, &dyn ToSql); 3] =
-            [("utc", &utc_now()), ("software_version", &software), ("rate_hz", &map.rate_hz)];
-        info.clone().insert(&transaction, &beside)?;
-        let session = transaction.last_insert_rowid();
-        for (place, channel) in map.channels.iter().enumerate() {
-            let columns = ChannelColumns {
-                name: channel.name.as_str().into(),
-                role: channel.role,
-                quantity: channel.quantity,
-                units_per_volt: channel.units_per_volt,
-                range_v: channel.range_v,
-                delay_ns: channel.delay_ns,
-                bits: channel.bits,
-            };
-            let at: [(&str, &dyn ToSql); 2] = [("session", &session), ("place", &place)];
-            columns.insert(&transaction, &[at[0], at[1], ("unit", &channel.quantity.unit())])?;
-            let named =
-                plan.channel.iter().map(Spanned::get_ref).find(|sensor| sensor.name == channel.name.as_str());
-            if let Some(sensor) = named {
-                let (model, serial) = (sensor.model.clone(), sensor.serial.clone());
-                Sensor { model, serial, calibrated: sensor.calibrated.clone() }.insert(&transaction, &at)?;
-            }
-        }
-        transaction.commit()?;
-        Ok(session)
+        let plan = self.plan()?;
+        self.change("noting the session", |connection| write_session(connection, info, channels, &plan))
     }
 
     /// The channels of one session, as they are calibrated by now.
@@ -176,7 +179,7 @@ impl Store {
 
     /// Notes the counters of a session's link.
     pub fn note_link(&self, session: i64, counters: &Counters) -> Result<(), StoreError> {
-        write_link(&self.connection, session, counters).map_err(self.failed("noting the link's counters"))
+        self.change("noting the link's counters", |connection| write_link(connection, session, counters))
     }
 
     /// The counters of the link, summed over all sessions that noted them.

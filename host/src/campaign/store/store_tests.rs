@@ -167,7 +167,7 @@ fn files_of_another_version_are_refused_in_words_and_stay_as_they_are() {
         for opened in [Store::open(&path), Store::open_read_only(&path)] {
             let said = opened.expect_err("another version").to_string();
             assert!(
-                said.contains(&format!("schema version {version}, this program reads version {VERSION}")),
+                said.contains(&format!("schema version {version}, this program reads versions")),
                 "{said}"
             );
             assert!(said.contains(advice), "{said}");
@@ -197,18 +197,21 @@ fn every_column_of_a_record_is_under_its_seal() {
         store
             .connection
             .execute_batch(&format!(
-                "CREATE TABLE kept AS SELECT {name} AS value FROM {table}; UPDATE {table} SET {name} = \
+                "CREATE TEMP TABLE kept AS SELECT {name} AS value FROM {table}; UPDATE {table} SET {name} = \
              CASE typeof({name}) WHEN 'text' THEN {name} || ' ' WHEN 'null' THEN 1.0 ELSE {name} + 1 END"
             ))
             .expect("changed behind its back");
         let damage = store.verify().expect("checked");
+        // the triggers that were in the way
+        let damage: Vec<_> = damage.into_iter().filter(|one| !one.what.starts_with("it lacks")).collect();
         assert!(damage.len() == 1 && damage[0].record == Some(id), "{table}.{name}: {damage:?}");
         let back = format!("UPDATE {table} SET {name} = (SELECT value FROM kept); DROP TABLE kept");
         store.connection.execute_batch(&back).expect("changed back");
         assert_eq!(store.record(id).expect("whole again"), before, "{table}.{name}");
     }
     store.connection.execute_batch("DROP TRIGGER seals_remain; DELETE FROM seals").expect("changed");
-    assert_eq!(store.verify().expect("checked")[0].what, "its seal is missing");
+    let damage = store.verify().expect("checked");
+    assert!(damage.iter().any(|one| one.what == "its seal is missing"), "{damage:?}");
 }
 
 #[test]

@@ -1,11 +1,9 @@
 //! The specimen's temperature in the campaign file, as the controller measured it.
 
-use rusqlite::Connection;
-
 use super::Store;
 use super::error::StoreError;
 use super::notes::utc_now;
-use super::table::{Row, create, table};
+use super::table::{Row, table};
 
 table! {
     /// A temperature at some moment of a session.
@@ -23,18 +21,11 @@ table! {
     }
 }
 
-/// Notes one; a file from before there were temperatures gets their table.
-pub(super) fn write_temperature(connection: &Connection, session: i64, celsius: f64) -> rusqlite::Result<()> {
-    if !connection.table_exists(None, "temperatures")? {
-        connection.execute_batch(&create::<TemperatureRow>())?;
-    }
-    TemperatureRow { session, utc: utc_now(), celsius }.insert(connection, &[])
-}
-
 impl Store {
     /// Notes the specimen's temperature now, °C.
     pub fn note_temperature(&self, session: i64, celsius: f64) -> Result<(), StoreError> {
-        write_temperature(&self.connection, session, celsius).map_err(self.failed("noting a temperature"))
+        let row = TemperatureRow { session, utc: utc_now(), celsius };
+        self.change("noting a temperature", |connection| row.insert(connection, &[]))
     }
 
     /// Every temperature that was noted, in that order.

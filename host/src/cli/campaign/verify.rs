@@ -1,4 +1,4 @@
-//! `campaign verify`: every record's checksum.
+//! `campaign verify`: every checksum, and every row as it was left.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use crate::campaign::store::Store;
 use crate::cli::error::CliError;
 use crate::cli::output;
 
-/// Check every record's checksum; exits with 1 on any damage.
+/// Check every checksum, and that no row was changed, added or removed by anything but jointrig; exits with 1 on any damage.
 #[derive(Debug, Args)]
 pub struct Verify {
     /// The campaign file.
@@ -30,7 +30,12 @@ impl Verify {
                 0 => String::new(),
                 count => format!(" and {count} FRF matrices from elsewhere"),
             };
-            output::lines([format!("{path}: {} records{frfs}, all whole", store.records()?.len())])
+            let chained = if store.has_chain()? {
+                ""
+            } else {
+                "; it is of an older version without a chain, so that only records, levels and FRFs could be checked"
+            };
+            output::lines([format!("{path}: {} records{frfs}, all whole{chained}", store.records()?.len())])
         } else {
             Err(CliError::Bad(format!(
                 "{path}: {} damaged; analysis leaves damaged records out",

@@ -1,0 +1,319 @@
+use super::*;
+use crate::campaign::plan::{Plan, SMALL};
+use crate::campaign::store::Store;
+use crate::campaign::store::error::StoreError;
+use crate::campaign::store::record_row::NewRecord;
+use crate::campaign::store::session_table::{Counters, SessionInfo};
+use crate::campaign::store::stored::Hex;
+use crate::campaign::verdict::{Kind, Verdict};
+use crate::device::channels::ChannelMap;
+use crate::device::recording::Recording;
+use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
+use jointrig_protocol::shot::{Phase, Shot};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use std::path::Path;
+
+fn map() -> ChannelMap {
+    let channel = |name: &str, role, units_per_volt| Channel {
+        name: name.try_into().expect("short"),
+        role,
+        quantity: Quantity::Velocity,
+        units_per_volt,
+        range_v: 10.0,
+        delay_ns: 5,
+        bits: 16,
+    };
+    let channels =
+        vec![channel("force", Role::HammerForce, 44.64), channel("z", Role::Response(Axis::Z), -0.005)];
+    ChannelMap { id: 0, rate_hz: 51_200, channels }
+}
+
+fn record(cell: i64, attempt: u32, session: i64, kind: Kind) -> NewRecord {
+    let shot = Shot {
+        number: attempt + 1,
+        phase: Phase::Done,
+        fired_at: 10,
+        trigger: 400,
+        pulse_us: 3_000,
+        peak_n: 49.3,
+        width_us: 270.1,
+        rebound_ratio: 0.1,
+        rebound_after: 3,
+        friction_peak_n: 17.0,
+        quiet_ratio: 0.3,
+    };
+    let codes = (0..400_i32).map(|i| ((i * 31 + attempt.cast_signed()) % 2_000 - 1_000) as i16).collect();
+    let recording =
+        Recording { epoch: 3, first_scan: 144, trigger_index: 25, channels: 2, codes, gaps: vec![], shot };
+    let verdict = Verdict { peak_n: 49.5, ..Verdict::without_pulse(kind, 0.1, 0.02, "because".into()) };
+    NewRecord {
+        cell,
+        attempt,
+        session,
+        utc: "2026-01-01T00:00:00Z".into(),
+        utc_error_s: None,
+        recording,
+        verdict,
+    }
+}
+
+fn begin_session(store: &mut Store) -> i64 {
+    let text = || "x".to_owned();
+    let info = SessionInfo {
+        address: text(),
+        board: text(),
+        serial: text(),
+        firmware_version: text(),
+        target: text(),
+        build: Hex(1),
+        schema_hash: Hex(2),
+    };
+    store.begin_session(&info, &map()).expect("noted")
+}
+
+/// A campaign in which everything has happened that may.
+fn eventful(path: &Path) -> Store {
+    let mut store = Store::create(path, SMALL, "small.toml").expect("created");
+    let session = begin_session(&mut store);
+    for attempt in 0..4 {
+        let kind = if attempt == 2 { Kind::Noisy } else { Kind::Good };
+        let counters = Counters::from([("scans_received".into(), u64::from(attempt))]);
+        store.insert(&record(1, attempt, session, kind), &counters).expect("stored");
+    }
+    store.overrule(1, Kind::Dropped, "a lorry").expect("dropped");
+    store.overrule(1, Kind::Good, "no lorry").expect("kept");
+    store.settle(2, "enough").expect("settled");
+    store.give_up(3, "out of reach").expect("given up");
+    store.redo(1, "again").expect("again");
+    store.log("a note").expect("noted");
+    store.note_temperature(session, 21.5).expect("noted");
+    store.note_link(session, &Counters::new()).expect("noted");
+    store.set_meta("who", "one").expect("noted");
+    store.set_meta("who", "another").expect("noted");
+    let sensors = "[[channel]]\nname = \"force\"\nsensitivity_v = 0.0224\n";
+    let plan = Plan::parse(&format!("{SMALL}\n{sensors}"), "p").expect("a plan");
+    let own: Vec<_> = plan.channel.into_iter().map(toml::Spanned::into_inner).collect();
+    store.calibrate(&own, 1, "certificate").expect("calibrated");
+    let more = SMALL.replace("impacts = [\"BZ1\"]", "impacts = [\"BZ1\", \"AZ1\"]");
+    store
+        .take_over(
+            &more.replace("\"AZ1\"]\nresponses = [\"B1\"]", "\"AZ1\"]\nresponses = [\"B2\"]"),
+            "b.toml",
+        )
+        .ok();
+    store
+}
+
+fn said(store: &Store) -> String {
+    store.verify().expect("checked").into_iter().map(|damage| damage.what + "\n").collect()
+}
+
+#[test]
+fn an_honest_history_raises_no_alarm() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.jrig");
+    for round in 0..3 {
+        let store = if round == 0 { eventful(&path) } else { Store::open(&path).expect("again") };
+        store.log("once more").expect("noted");
+        assert_eq!(said(&store), "", "while it is written");
+        store.close().expect("closed");
+        let reader = Store::open_read_only(&path).expect("open");
+        assert_eq!(said(&reader), "");
+        let copy = folder.path().join(format!("copy{round}.jrig"));
+        reader.back_up(&copy).expect("copied");
+        assert_eq!(said(&Store::open_read_only(&copy).expect("open")), "");
+    }
+    // broken off: what was accepted is chained, what was not leaves nothing
+    let store = Store::open(&path).expect("again");
+    assert!(
+        store
+            .change("trying", |connection| connection
+                .execute("INSERT INTO log VALUES (NULL, 'x', 'y')", [])
+                .and(connection.execute("INSERT INTO log VALUES (1, 'x', 'y')", [])))
+            .is_err()
+    );
+    store.log("after a transaction that failed").expect("noted");
+    assert_eq!(said(&store), "");
+}
+
+#[test]
+fn what_is_done_behind_its_back_is_named_by_table_and_row() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let original = folder.path().join("a.jrig");
+    eventful(&original).close().expect("closed");
+    for (sql, names) in [
+        (
+            "UPDATE channels SET units_per_volt = units_per_volt * 1.02 WHERE place = 0",
+            "row 1/0 of `channels` was changed",
+        ),
+        ("UPDATE sessions SET rate_hz = 25600", "row 1 of `sessions` was changed"),
+        (
+            "UPDATE plan SET text = replace(text, 'weak_n = 30.0', 'weak_n = 3.0') WHERE id = 1",
+            "row 1 of `plan` was changed",
+        ),
+        ("INSERT INTO overrules VALUES (NULL, 2, 'now', 'dropped', 'no')", "of `overrules` was added"),
+        ("DELETE FROM overrules WHERE id = 1", "row 1 of `overrules` was removed"),
+        (
+            "PRAGMA foreign_keys=OFF; DROP TRIGGER records_remain; DELETE FROM records WHERE id = 4",
+            "row 4 of `records` was removed",
+        ),
+        ("DELETE FROM log", "row 1 of `log` was removed"),
+        ("UPDATE cells SET wanted = 1 WHERE id = 1", "row 1 of `cells` was changed"),
+        ("UPDATE temperatures SET celsius = 60", "row 1 of `temperatures` was changed"),
+        (
+            "DROP TRIGGER calibrations_stay; UPDATE calibrations SET sensitivity_v = 0.0228",
+            "row 1 of `calibrations` was changed",
+        ),
+        ("INSERT INTO meta VALUES ('simulated_truth', '{}')", "row simulated_truth of `meta` was added"),
+        ("UPDATE meta SET value = 'third' WHERE key = 'who'", "row who of `meta` was changed"),
+        ("DROP TRIGGER chain_stay; UPDATE chain SET digest = zeroblob(32) WHERE id = 5", "broken at entry 5"),
+        ("DROP TRIGGER chain_remain; DELETE FROM chain WHERE id > 7", "does not end where it did"),
+        ("DROP TABLE chain_head", "it lacks `chain_head`"),
+        ("DROP TABLE chain", "the chain of rows cannot be read"),
+        ("DROP TRIGGER seals_stay", "it lacks `seals_stay`"),
+    ] {
+        let path = folder.path().join("b.jrig");
+        std::fs::copy(&original, &path).expect("copied");
+        Connection::open(&path).expect("open").execute_batch(sql).expect(sql);
+        let told = said(&Store::open_read_only(&path).expect("open"));
+        assert!(told.contains(names), "{sql}: {told}");
+    }
+    // every row and column, by dice
+    let mut dice = Xoshiro256PlusPlus::seed_from_u64(20);
+    let store = Store::open(&original).expect("open");
+    let vandals = "PRAGMA foreign_keys = OFF; DROP TRIGGER records_stay; DROP TRIGGER seals_stay; DROP TRIGGER frfs_stay; \
+                   DROP TRIGGER levels_stay; DROP TRIGGER calibrations_stay";
+    store.connection.execute_batch(vandals).expect("open to everything");
+    let before = said(&store);
+    let names = tables(&store.connection).expect("tables");
+    let mut edits = 0;
+    while edits < 500 {
+        let table = &names[dice.next_u32() as usize % names.len()];
+        let pick = |sql: &str, dice: &mut Xoshiro256PlusPlus| -> Option<String> {
+            let mut all = store.connection.prepare(sql).expect("a query");
+            let all: Vec<String> = all.query_map([], |row| row.get(0)).expect("rows").flatten().collect();
+            (!all.is_empty()).then(|| all[dice.next_u32() as usize % all.len()].clone())
+        };
+        let Some(row) = pick(&format!("SELECT CAST(rowid AS TEXT) FROM {table}"), &mut dice) else {
+            continue;
+        };
+        let column =
+            pick(&format!("SELECT name FROM pragma_table_info('{table}')"), &mut dice).expect("columns");
+        store.connection.execute_batch("SAVEPOINT edit").expect("begun");
+        let value = format!(
+            "CASE typeof({column}) WHEN 'text' THEN {column} || ' ' WHEN 'null' THEN '1' WHEN 'blob' THEN zeroblob(3) ELSE {column} * 2 + 1 END"
+        );
+        let sql = match dice.next_u32() % 4 {
+            0 => format!("DELETE FROM {table} WHERE rowid = {row}"),
+            _ => format!("UPDATE {table} SET {column} = {value} WHERE rowid = {row}"),
+        };
+        // the note of being written is nobody's result
+        let noted = table == "meta"
+            && row
+                == pick("SELECT CAST(rowid AS TEXT) FROM meta WHERE key = 'written_since'", &mut dice)
+                    .unwrap_or_default();
+        if store.connection.execute(&sql, []).is_ok() && !noted {
+            edits += 1;
+            let told = store.verify();
+            assert!(
+                !matches!(&told, Ok(damage) if damage.iter().map(|one| one.what.clone() + "\n").collect::<String>() == before),
+                "{sql}: not named"
+            );
+        }
+        store.connection.execute_batch("ROLLBACK TO edit; RELEASE edit").expect("undone");
+    }
+}
+
+#[test]
+fn five_hundred_damaged_bytes_are_named_or_change_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let original = folder.path().join("a.jrig");
+    eventful(&original).close().expect("closed");
+    let bytes = std::fs::read(&original).expect("read");
+    let whole = |path: &Path| -> Result<Vec<(String, String, [u8; 32])>, String> {
+        let store = Store::open_read_only(path).map_err(|error| error.to_string())?;
+        let damage = store.verify().map_err(|error| error.to_string())?;
+        if let Some(damage) = damage.into_iter().next() {
+            return Err(damage.what);
+        }
+        let mut all = Vec::new();
+        for table in tables(&store.connection).expect("tables") {
+            let own = rows(&store.connection, &table).expect("rows");
+            all.extend(own.into_iter().map(|(key, digest)| (table.clone(), key, digest)));
+        }
+        Ok(all)
+    };
+    let undamaged = whole(&original).expect("whole");
+    let mut dice = Xoshiro256PlusPlus::seed_from_u64(21);
+    let mut named = 0;
+    for _ in 0..500 {
+        let mut damaged = bytes.clone();
+        let at = dice.next_u64() as usize % damaged.len();
+        damaged[at] ^= 1 << (dice.next_u32() % 8);
+        let path = folder.path().join("b.jrig");
+        std::fs::write(&path, &damaged).expect("written");
+        match whole(&path) {
+            Err(what) => {
+                named += 1;
+                assert!(!what.is_empty());
+            }
+            // a byte that holds nothing
+            Ok(rows) => assert!(rows == undamaged, "byte {at} was silent"),
+        }
+    }
+    // most of a small file is free space
+    assert!(named > 40, "{named}");
+}
+
+#[test]
+fn a_file_without_a_chain_is_read_and_gets_one_when_it_is_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.jrig");
+    eventful(&path).close().expect("closed");
+    let old = "DROP TABLE chain; DROP TABLE chain_head; DROP TABLE temperatures; PRAGMA user_version = 1";
+    Connection::open(&path).expect("open").execute_batch(old).expect("as it was before");
+    let reader = Store::open_read_only(&path).expect("still read");
+    assert_eq!((said(&reader), reader.has_chain().expect("read")), (String::new(), false));
+    drop(reader);
+    Store::open(&path).expect("brought up").close().expect("closed");
+    let reader = Store::open_read_only(&path).expect("read");
+    assert_eq!((said(&reader), reader.has_chain().expect("read")), (String::new(), true));
+    assert!(
+        reader.log_lines(0).expect("log").iter().any(|(_, _, text)| text.contains("chained from here on"))
+    );
+    drop(reader);
+    // a version that was set back hides no chain
+    Connection::open(&path)
+        .expect("open")
+        .execute_batch("PRAGMA user_version = 1; DELETE FROM log")
+        .expect("done");
+    assert!(said(&Store::open_read_only(&path).expect("read")).contains("of `log` was removed"));
+}
+
+#[test]
+fn nothing_is_read_of_a_file_with_a_schema_of_somebody_elses() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.jrig");
+    for (sql, names) in [
+        (
+            "PRAGMA foreign_keys=OFF; DROP TABLE cells; CREATE VIEW cells AS WITH RECURSIVE n(id) AS (SELECT 1 UNION ALL SELECT id + 1 FROM n) \
+             SELECT id, 'A' AS configuration, 'x' AS impact, 'y' AS response, 1 AS wanted, NULL AS given_up, NULL AS settled FROM n",
+            "its view `cells` is not as jointrig makes it",
+        ),
+        ("CREATE TRIGGER mine AFTER INSERT ON log BEGIN DELETE FROM records; END", "it has a trigger `mine`"),
+        ("CREATE TABLE mine (a)", "DROP TABLE mine"),
+        ("ALTER TABLE log ADD COLUMN more TEXT", "its table `log` is not as jointrig makes it"),
+    ] {
+        Store::create(&path, SMALL, "small.toml").expect("created").close().expect("closed");
+        Connection::open(&path).expect("open").execute_batch(sql).expect(sql);
+        for opened in [Store::open(&path), Store::open_read_only(&path)] {
+            let error = opened.expect_err(sql);
+            assert!(
+                matches!(&error, StoreError::Content { .. }) && error.to_string().contains(names),
+                "{error}"
+            );
+        }
+        std::fs::remove_file(&path).expect("removed");
+    }
+}
