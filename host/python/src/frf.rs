@@ -141,7 +141,8 @@ impl Frf {
     #[getter]
     fn hits<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<i64>>>> {
         let Some(hits) = &self.hits else { return Ok(None) };
-        let in_order: Vec<i64> = hits.transpose().iter().map(|count| i64::try_from(*count).unwrap_or(i64::MAX)).collect();
+        let in_order: Vec<i64> =
+            hits.transpose().iter().map(|count| i64::try_from(*count).unwrap_or(i64::MAX)).collect();
         in_order.into_pyarray(py).reshape([hits.nrows(), hits.ncols()]).map(Some)
     }
 

@@ -20,6 +20,11 @@ fn config() -> ChunkConfig {
         .with_delta_spec(DeltaSpec::Auto)
 }
 
+/// Samples up to so many bytes are unpacked however small they are packed, …
+const ALWAYS_BYTES: usize = 64 << 20;
+/// … and larger ones up to this ratio: noise packs no better.
+const MOST_RATIO: usize = 16;
+
 /// Why a blob could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum CodecError {
@@ -29,6 +34,16 @@ pub enum CodecError {
     /// The blob ends in mid-channel, has bytes left, or its channels differ in length.
     #[error("the samples' bytes are cut or overgrown")]
     Shape,
+    /// It says that it holds far more than its bytes can.
+    #[error("{blob} bytes cannot hold {channels} channels of {scans} samples")]
+    Bomb {
+        /// Channels, as its row says.
+        channels: usize,
+        /// Samples of each, as its row says.
+        scans: usize,
+        /// Bytes that it is packed in.
+        blob: usize,
+    },
     /// The file system or the file's structure keeps them back.
     #[error("the samples cannot be read: {0}")]
     Unreadable(String),
@@ -72,8 +87,13 @@ pub fn encode(codes: &[i16], channels: usize) -> Result<Vec<u8>, CodecError> {
 /// # Errors
 /// The blob is damaged.
 pub fn decode(blob: &[u8], channels: usize, scans: usize, stored: u32) -> Result<Vec<i16>, CodecError> {
+    let bytes = channels.checked_mul(scans).and_then(|codes| codes.checked_mul(2));
+    let most = ALWAYS_BYTES + MOST_RATIO * blob.len();
+    let Some(bytes) = bytes.filter(|bytes| *bytes <= most) else {
+        return Err(CodecError::Bomb { channels, scans, blob: blob.len() });
+    };
     // a shot without contact has no samples, and no chunks either
-    let mut codes = vec![0; channels * scans];
+    let mut codes = vec![0; bytes / 2];
     let mut rest = blob;
     for channel in codes.chunks_exact_mut(scans.max(1)) {
         let (length, after) = rest.split_first_chunk::<4>().ok_or(CodecError::Shape)?;
@@ -132,6 +152,12 @@ mod tests {
         assert!(matches!(decode(&blob, 3, 999, crc), Err(CodecError::Shape)));
         assert!(matches!(decode(&blob, 3, 1_001, crc), Err(CodecError::Shape)));
         assert!(matches!(decode(&blob, 2, 1_000, crc), Err(CodecError::Shape)));
+        // and what no memory holds
+        for (channels, scans) in
+            [(usize::MAX, 2), (2, usize::MAX / 2), (1_000_000_000, 1_000_000_000), (16, 1 << 30)]
+        {
+            assert!(matches!(decode(&blob, channels, scans, crc), Err(CodecError::Bomb { .. })));
+        }
         let empty = encode(&[], 10).expect("nothing");
         assert!(decode(&empty, 10, 0, 0).expect("nothing").is_empty());
     }

@@ -106,6 +106,29 @@ pub enum StoreError {
         /// The file.
         path: PathBuf,
     },
+    /// The file went away while it was written.
+    #[error(
+        "{path} went away while it was written: {what}; {rescue}. Put the file back or go on with the copy"
+    )]
+    Gone {
+        /// The file.
+        path: PathBuf,
+        /// What happened to it.
+        what: String,
+        /// What became of what it held.
+        rescue: String,
+    },
+    /// It has several names.
+    #[error(
+        "{path} has {links} names (hard links): two of them could be measured at once; copy it with `jointrig campaign backup`, or remove \
+         the other names"
+    )]
+    Links {
+        /// The file.
+        path: PathBuf,
+        /// How many.
+        links: u64,
+    },
     /// A record cannot be read.
     #[error("{path}: record {record} is damaged ({what}); `jointrig campaign verify` lists all damage")]
     Damaged {

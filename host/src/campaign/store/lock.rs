@@ -2,6 +2,9 @@
 //!
 //! SQLite would let two writers take turns; two campaigns in one file would then strike the same cells. The operating system
 //! drops the lock with the process that holds it, however that ends, so that a file left behind locks nobody out.
+//!
+//! A name is not the file: a symbolic link is followed first, a file with a second name is refused, and where the system lets a lock on the
+//! campaign file itself stand beside SQLite's own (Linux), that is held too, so that a lock file that somebody removed lets nobody in.
 
 use std::ffi::OsString;
 use std::fs::{File, TryLockError};
@@ -18,6 +21,9 @@ const TRIES: usize = 10;
 pub(super) struct WriteLock {
     file: File,
     path: PathBuf,
+    /// The campaign file itself. It is closed after SQLite has closed it: closing it sooner would drop SQLite's own locks.
+    #[cfg(target_os = "linux")]
+    itself: Option<File>,
 }
 
 impl WriteLock {
@@ -26,7 +32,9 @@ impl WriteLock {
     /// # Errors
     /// Another process holds it ([`StoreError::Busy`] says which), or nothing can be written there.
     pub(super) fn take(campaign: &Path) -> Result<Self, StoreError> {
-        let path = beside(campaign);
+        let real = std::fs::canonicalize(campaign).unwrap_or_else(|_| campaign.into());
+        refuse_second_names(&real)?;
+        let path = beside(&real);
         let failed = |source| StoreError::Lock { path: campaign.into(), source };
         for _ in 0..TRIES {
             let mut file = File::options()
@@ -57,6 +65,9 @@ impl WriteLock {
             if let Err(error) = noted {
                 log::debug!("{}: {error}", path.display());
             }
+            #[cfg(target_os = "linux")]
+            return Ok(Self { itself: lock_itself(&real)?, file, path });
+            #[cfg(not(target_os = "linux"))]
             return Ok(Self { file, path });
         }
         Err(StoreError::Busy { path: campaign.into(), holder: String::new() })
@@ -68,7 +79,39 @@ impl Drop for WriteLock {
         // removed while it is held: whoever opened it before notices
         let _ = std::fs::remove_file(&self.path);
         let _ = self.file.unlock();
+        #[cfg(target_os = "linux")]
+        if let Some(itself) = &self.itself {
+            let _ = itself.unlock();
+        }
     }
+}
+
+/// Locks the campaign file, if it is there already: a new one is locked by its name until it is opened again.
+#[cfg(target_os = "linux")]
+fn lock_itself(campaign: &Path) -> Result<Option<File>, StoreError> {
+    let Ok(file) = File::open(campaign) else { return Ok(None) };
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => {
+            Err(StoreError::Busy { path: campaign.into(), holder: "its lock file was removed".into() })
+        }
+        // a file system without such locks has the lock beside the file
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(Some(file)),
+    }
+}
+
+/// A second name of the same file would have a lock of its own.
+#[cfg(unix)]
+fn refuse_second_names(campaign: &Path) -> Result<(), StoreError> {
+    use std::os::unix::fs::MetadataExt;
+    match std::fs::metadata(campaign) {
+        Ok(file) if file.nlink() > 1 => Err(StoreError::Links { path: campaign.into(), links: file.nlink() }),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(not(unix))]
+fn refuse_second_names(_: &Path) -> Result<(), StoreError> {
+    Ok(())
 }
 
 fn beside(campaign: &Path) -> PathBuf {

@@ -17,6 +17,7 @@ mod chain;
 pub mod codec;
 pub mod error;
 pub mod frf_table;
+mod identity;
 pub mod level_table;
 mod lock;
 pub mod notes;
@@ -42,6 +43,7 @@ use std::time::Duration;
 use rusqlite::{Connection, ErrorCode, OpenFlags, Row};
 
 use error::{StoreError, sqlite};
+use identity::Identity;
 use lock::WriteLock;
 
 /// Marks the file as ours (`JRIG`).
@@ -67,6 +69,8 @@ pub struct Store {
     tidy: bool,
     /// What is written over the connection.
     watch: chain::Watch,
+    /// Which file it was when it was opened for writing.
+    identity: Option<Identity>,
 }
 
 impl Store {
@@ -81,8 +85,9 @@ impl Store {
         let mut connection =
             Connection::open_with_flags(path, flags).map_err(|error| sqlite(path, "creating", error))?;
         let watch = chain::Watch::new(&mut connection).map_err(|error| sqlite(path, "creating", error))?;
-        let store = Self { connection, path: path.into(), lock, tidy: false, watch };
+        let mut store = Self { connection, path: path.into(), lock, tidy: false, watch, identity: None };
         store.begin_writing()?;
+        store.identity = Some(Identity::of(path));
         Ok(store)
     }
 
@@ -96,6 +101,7 @@ impl Store {
         let lock = WriteLock::take(path)?;
         let mut store = Self::connect(path, path, OpenFlags::SQLITE_OPEN_READ_WRITE)?;
         (store.lock, store.tidy) = (Some(lock), false);
+        store.identity = Some(Identity::of(path));
         store.begin_writing()?;
         store.bring_up().map_err(store.failed("bringing the file up to date"))?;
         store.mark_written()?;
@@ -158,7 +164,7 @@ impl Store {
             });
         }
         let watch = chain::Watch::new(&mut connection).map_err(open)?;
-        Ok(Self { connection, path: path.into(), lock: None, tidy: true, watch })
+        Ok(Self { connection, path: path.into(), lock: None, tidy: true, watch, identity: None })
     }
 
     /// Writes in one transaction, and chains every row that it touches.
@@ -175,7 +181,23 @@ impl Store {
             transaction.commit()?;
             Ok(done)
         };
-        write().map_err(self.failed(doing))
+        let done = write().map_err(self.failed(doing))?;
+        self.still_there()?;
+        Ok(done)
+    }
+
+    /// Nothing is claimed that stands in no file of this name. What the open file holds is copied beside it, as long as that is possible.
+    fn still_there(&self) -> Result<(), StoreError> {
+        // a new file has no log before its first transaction has ended
+        let Some(what) = self.identity.as_ref().and_then(Identity::lost) else { return Ok(()) };
+        let to = rescued(&self.path);
+        let rescue = match self.back_up(&to) {
+            Ok(records) => {
+                format!("all that was measured ({records} records) was copied to {}", to.display())
+            }
+            Err(error) => format!("and what it held could not be copied ({error})"),
+        };
+        Err(StoreError::Gone { path: self.path.clone(), what, rescue })
     }
 
     fn begin_writing(&self) -> Result<(), StoreError> {
@@ -284,4 +306,11 @@ fn log_of(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push("-wal");
     name.into()
+}
+
+/// Where a file that lost its name is copied to: beside it, under a name that is free.
+fn rescued(path: &Path) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let named = |number: u32| path.with_file_name(format!("{stem}-rescued-{number}.jrig"));
+    (1..1000).map(named).find(|name| !name.exists()).unwrap_or_else(|| named(0))
 }

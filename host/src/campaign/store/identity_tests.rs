@@ -1,0 +1,63 @@
+use crate::campaign::plan::SMALL;
+use crate::campaign::store::Store;
+use crate::campaign::store::error::StoreError;
+use std::path::Path;
+
+fn rescued(folder: &Path) -> Store {
+    Store::open_read_only(&folder.join("a-rescued-1.jrig")).expect("copied beside it")
+}
+
+#[test]
+fn a_file_that_goes_away_is_missed_at_once_and_what_it_held_is_saved() {
+    for (what, says) in [
+        ("removed", "removed or renamed"),
+        ("replaced", "another file has its name"),
+        ("its log", "removed or emptied"),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.jrig");
+        let store = Store::create(&path, SMALL, "small.toml").expect("created");
+        store.log("before").expect("noted");
+        match what {
+            "removed" => std::fs::remove_file(&path).expect("removed"),
+            "replaced" => {
+                std::fs::write(folder.path().join("other"), "another").expect("written");
+                std::fs::rename(folder.path().join("other"), &path).expect("moved");
+            }
+            _ => std::fs::remove_file(folder.path().join("a.jrig-wal")).expect("removed"),
+        }
+        let error = store.log("after").expect_err(what);
+        assert!(matches!(&error, StoreError::Gone { .. }), "{error}");
+        let said = error.to_string();
+        assert!(said.contains(says) && said.contains("a-rescued-1.jrig"), "{said}");
+        let saved = rescued(folder.path());
+        assert_eq!(saved.verify().expect("checked"), []);
+        let lines = saved.log_lines(0).expect("log");
+        assert!(
+            lines.iter().any(|(_, _, text)| text == "before")
+                && lines.iter().any(|(_, _, text)| text == "after")
+        );
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn another_name_or_a_lock_file_that_is_gone_lets_nobody_in() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    Store::create(&at("a.jrig"), SMALL, "small.toml").expect("created").close().expect("closed");
+    let store = Store::open(&at("a.jrig")).expect("open");
+    std::os::unix::fs::symlink(at("a.jrig"), at("link.jrig")).expect("linked");
+    assert!(matches!(Store::open(&at("link.jrig")), Err(StoreError::Busy { .. })), "a symbolic link");
+    std::fs::remove_file(at("a.jrig-lock")).expect("removed");
+    assert!(matches!(Store::open(&at("a.jrig")), Err(StoreError::Busy { .. })), "a lock file that is gone");
+    store.close().expect("closed");
+    std::fs::hard_link(at("a.jrig"), at("second.jrig")).expect("linked");
+    for name in ["a.jrig", "second.jrig"] {
+        let error = Store::open(&at(name)).expect_err("two names");
+        assert!(matches!(error, StoreError::Links { links: 2, .. }), "{error}");
+    }
+    assert!(Store::open_read_only(&at("second.jrig")).is_ok(), "reading is always possible");
+    std::fs::remove_file(at("second.jrig")).expect("removed");
+    Store::open(&at("link.jrig")).expect("through a link, if nobody else writes").close().expect("closed");
+}
