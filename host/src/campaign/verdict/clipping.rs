@@ -65,6 +65,15 @@ const SHORTEST: usize = 4;
 /// clean simulated hits, three did for four to six samples.
 const IN_ALL: usize = 12;
 
+/// A level that is reached so often is a limit, however short each visit ...
+const VISITS: usize = 3;
+
+/// ... of at least so many samples: three of a smooth top that are level fall by nine times that over the next two, and not by [`CORNER`].
+const SHORTEST_VISIT: usize = 3;
+
+/// Limits of both signs are one when they differ by less than this part: supplies of an amplifier are alike.
+const ALIKE: f64 = 0.02;
+
 /// Samples within this many steps of the converter are one level: rounding and the noise of what comes after the saturated stage.
 const LEVEL_STEPS: f64 = 3.0;
 
@@ -82,12 +91,36 @@ pub(super) fn plateau(x: &[f64], step: f64) -> Option<Clipped> {
     if largest < 100.0 * step {
         return None;
     }
-    let noise = noise(x);
-    [1.0, -1.0].into_iter().find_map(|sign| {
+    let slack = LEVEL_STEPS * step;
+    let fall = (CORNER * slack).max(NOISE * noise(x));
+    let sides = [1.0, -1.0].map(|sign| Side::of(x, sign, slack, fall));
+    let [above, below] = &sides;
+    // an amplifier has a limit above and one below, and a ring-down runs into both by turns
+    let alike = (above.top - below.top).abs() <= slack.max(ALIKE * largest);
+    let both = [above.visits.as_slice(), &below.visits].concat();
+    let found = [(above, alike.then_some(both.as_slice())), (below, None)];
+    found.into_iter().find_map(|(side, visits)| {
+        let visits = visits.unwrap_or(&side.visits);
+        let plateaus: usize = visits.iter().filter(|samples| **samples >= SHORTEST).sum();
+        let clipped = plateaus >= IN_ALL || visits.len() >= VISITS;
+        let level = side.sign * side.top;
+        clipped.then(|| Clipped { level, limit: level, samples: visits.iter().sum() })
+    })
+}
+
+/// How a signal stands at its highest or lowest value.
+struct Side {
+    sign: f64,
+    /// The value, times the sign.
+    top: f64,
+    /// Samples of each visit that has corners at both ends.
+    visits: Vec<usize>,
+}
+
+impl Side {
+    fn of(x: &[f64], sign: f64, slack: f64, fall: f64) -> Self {
         let top = x.iter().fold(f64::NEG_INFINITY, |most, v| most.max(sign * v));
-        let slack = LEVEL_STEPS * step;
-        let fall = (CORNER * slack).max(NOISE * noise);
-        let (mut start, mut level) = (None, 0);
+        let (mut start, mut visits) = (None, Vec::new());
         for i in 0..=x.len() {
             let inside = x.get(i).is_some_and(|v| top - sign * v <= slack);
             match (inside, start) {
@@ -98,18 +131,18 @@ pub(super) fn plateau(x: &[f64], step: f64) -> Option<Clipped> {
                     let fallen = |at: Option<usize>| {
                         at.and_then(|at| x.get(at)).is_some_and(|v| top - sign * v > fall)
                     };
-                    if i - from >= SHORTEST
+                    if i - from >= SHORTEST_VISIT
                         && fallen((from + 1).checked_sub(half + 1))
                         && fallen(Some(i - 1 + half))
                     {
-                        level += i - from;
+                        visits.push(i - from);
                     }
                 }
                 _ => {}
             }
         }
-        (level >= IN_ALL).then_some(Clipped { level: sign * top, limit: sign * top, samples: level })
-    })
+        Self { sign, top, visits }
+    }
 }
 
 /// Rms of white noise under the motion: from the median of third differences, which have 20 times its power.
@@ -122,4 +155,53 @@ fn noise(x: &[f64]) -> f64 {
     }
     // the median of |x| is 0.6745 σ
     *differences.select_nth_unstable_by(middle, f64::total_cmp).1 / (20f64.sqrt() * 0.6745)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A ring-down of 700 Hz at 51.2 kHz, hit at `peak`, that an amplifier cuts at ±`limit`, in steps of a converter.
+    fn ring_down(peak: f64, limit: f64, decay_per_s: f64, step: f64) -> Vec<f64> {
+        let at = |i: usize| {
+            let t = i as f64 / 51_200.0;
+            let v = peak * (-decay_per_s * t).exp() * (2.0 * std::f64::consts::PI * 700.0 * t).sin();
+            (v.clamp(-limit, limit) / step).round() * step
+        };
+        (0..4096).map(at).collect()
+    }
+
+    #[test]
+    fn plateaus_of_both_signs_count_together() {
+        let step = 1e-3;
+        let mut x = ring_down(10.0, 20.0, 400.0, step);
+        for v in &mut x {
+            *v *= 0.5;
+        }
+        // three tops of 5, 3 and 10 samples at one level, two above and one below, each with corners
+        for (from, samples, sign) in [(40, 5, 1.0), (120, 3, 1.0), (80, 10, -1.0)] {
+            x[from - 4..from + samples + 4].fill(0.0);
+            x[from..from + samples].fill(6.0 * sign);
+        }
+        let found = plateau(&x, step).expect("clipped");
+        assert_eq!((found.samples, found.level), (18, 6.0));
+        // two of them are what a sharp top may be
+        x[120..123].fill(0.0);
+        x[80..90].fill(-5.8);
+        x[80..84].fill(0.0);
+        assert!(plateau(&x, step).is_none());
+    }
+
+    #[test]
+    fn an_amplifier_that_cuts_both_ways_is_found_and_a_clean_ring_down_is_not() {
+        let step = 10.0 / 32_768.0;
+        for limit in [5.0, 7.0, 8.5] {
+            assert!(plateau(&ring_down(10.0, limit, 60.0, step), step).is_some(), "cut at {limit}");
+        }
+        for decay in [0.0, 0.1, 1.0, 10.0, 300.0] {
+            for peak in [0.1, 0.5, 3.0, 9.9] {
+                assert!(plateau(&ring_down(peak, 20.0, decay, step), step).is_none(), "{peak}, {decay}/s");
+            }
+        }
+    }
 }
