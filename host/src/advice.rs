@@ -12,6 +12,8 @@ pub(crate) fn reading(error: &Error) -> &'static str {
         ErrorKind::InvalidData | ErrorKind::UnexpectedEof => {
             "it is damaged, cut off or of another kind: copy or export it again"
         }
+        ErrorKind::Unsupported => "copy what it gives into a file, and name that",
+        ErrorKind::FileTooLarge => "check that it is the right file; if it is, split it",
         _ => "is the disk whole and connected?",
     }
 }

@@ -16,7 +16,9 @@ pub mod cli;
 pub mod dashboard;
 pub mod device;
 pub mod exchange;
+mod foreign;
 #[cfg(feature = "dashboard")]
 pub mod live;
+mod outside;
 pub mod report;
 pub mod results;

@@ -152,3 +152,15 @@ fn without_hits_there_is_no_result_and_the_exit_code_says_so() {
     let text = said(&out, 1);
     assert!(text.contains("no stiffness could be found"), "{text}");
 }
+
+#[test]
+fn a_stderr_that_is_closed_ends_no_campaign() {
+    let (_folder, file) = campaign(SMALL);
+    let mut run = jointrig();
+    run.args(["-vv", "campaign", "run", "--yes", "--bell", "--device", "sim:"]).arg(&file);
+    let mut run = run.stdin(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(run.stderr.take());
+    assert!(run.wait().unwrap().success());
+    let text = String::from_utf8_lossy(&status(&file).stdout).into_owned();
+    assert!(text.contains("complete"), "{text}");
+}

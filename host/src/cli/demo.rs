@@ -14,6 +14,7 @@ use crate::campaign::run::stage::Stage;
 use crate::campaign::store::Store;
 use crate::campaign::verdict::judge::ByRecord;
 use crate::device::address::Address;
+use crate::outside::tell_line;
 use crate::report::words;
 
 /// The whole job on the built-in simulator: campaign, analysis, report.
@@ -60,7 +61,7 @@ impl Demo {
         let summary = measure::measure(store, device, who, &mut onlooker, &again, &mut ByRecord)?;
         if summary.interrupted {
             let (file, folder) = (quoted(&file), quoted(folder));
-            eprintln!("`jointrig analyse {file} --out {folder}` works on what is there");
+            tell_line!("`jointrig analyse {file} --out {folder}` works on what is there");
             return Err(CliError::Bad("stopped before the campaign was complete".into()));
         }
         let store = Store::open_read_only(&file)?;
@@ -93,10 +94,8 @@ impl Demo {
     fn marks(&self) -> Result<Marks, CliError> {
         let rig = match &self.rig {
             None => "built-in".into(),
-            Some(path) => std::fs::read_to_string(path).map_err(|source| CliError::Read {
-                path: path.clone(),
-                doing: "reading the rig's description",
-                source,
+            Some(path) => crate::foreign::text(path, crate::foreign::SETTINGS).map_err(|source| {
+                CliError::Read { path: path.clone(), doing: "reading the rig's description", source }
             })?,
         };
         let plan = if self.full { "paper" } else { "demo" };
@@ -125,7 +124,7 @@ impl Demo {
                 )));
             }
         }
-        eprintln!("{} is there already: going on with it", file.display());
+        tell_line!("{} is there already: going on with it", file.display());
         Ok(store)
     }
 }

@@ -12,6 +12,7 @@ use crate::campaign::verdict::{Kind, Limits, Verdict, judge_all};
 use crate::exchange::npz::Array;
 use crate::exchange::record_uff::read_record_file;
 use crate::exchange::{Extra, write_frf};
+use crate::outside::tell_line;
 use crate::spectra::{
     CrossSpectra, ForceWeighting, FrfSettings, ImpactRecords, MotionQuantity, Origin, Windowing, estimate,
     usable_band,
@@ -118,7 +119,7 @@ impl Frf {
         let (records, warnings) =
             read_record_file(&self.records).map_err(|e| CliError::Bad(e.to_string()))?;
         for warning in &warnings {
-            eprintln!("{}: {warning}", self.records.display());
+            tell_line!("{}: {warning}", self.records.display());
         }
         let names = self.names(records.response.first().map_or(0, Vec::len))?;
         let verdicts = judge_all(&records, &Limits::default(), None);

@@ -11,7 +11,7 @@ use super::output;
 use super::waiting::Waiting;
 use crate::campaign::verdict::{Kind, Limits, judge_all};
 use crate::exchange::record_uff::{LabelledRecords, by_label};
-use crate::exchange::{uff, write_frf};
+use crate::exchange::{frf_uff, write_frf};
 use crate::frf::Frf;
 use crate::spectra::{CrossSpectra, FrfSettings, MotionQuantity, estimate};
 
@@ -43,12 +43,9 @@ pub(super) fn average(folder: &Path, out: &Path, wishes: &Wishes<'_>) -> Result<
     for (done, path) in files.iter().enumerate() {
         waiting.at(done, files.len());
         let wrong = |what: String| bad(format!("{}: {what}", path.display()));
-        let bytes = std::fs::read(path).map_err(|source| CliError::Read {
-            path: path.clone(),
-            doing: "reading records",
-            source,
-        })?;
-        let (rows, warnings) = by_label(&uff::read(&bytes)).map_err(wrong)?;
+        let contents = frf_uff::contents(path).map_err(|error| bad(error.to_string()))?;
+        let (rows, warnings) = by_label(&contents).map_err(wrong)?;
+        drop(contents);
         warnings
             .iter()
             .map(|warning| format!("{}: {warning}", path.display()))

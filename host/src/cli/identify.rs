@@ -10,6 +10,7 @@ use super::error::CliError;
 use super::output;
 use crate::analyse::{Asked, IdmSets, Question};
 use crate::exchange::{read_frf_file, read_geometry};
+use crate::outside::tell_line;
 use crate::report::{document, words};
 use crate::results::Source;
 use crate::substructuring::averaged::Priors;
@@ -75,7 +76,7 @@ impl Identify {
         let [a, b, ajb] = [read(&self.a)?, read(&self.b)?, read(&self.ajb)?];
         let (geometry, notes) = read_geometry(&self.geometry).map_err(bad)?;
         for note in notes {
-            eprintln!("jointrig: {note}");
+            tell_line!("jointrig: {note}");
         }
         let question = self.question();
         let found = question.answered(self.source(), [a, b, ajb], &geometry).map_err(bad)?;
@@ -131,7 +132,7 @@ fn bad(error: impl std::fmt::Display) -> CliError {
 fn read(path: &Path) -> Result<Frf, CliError> {
     let (frf, warnings) = read_frf_file(path).map_err(bad)?;
     for warning in &warnings {
-        eprintln!("jointrig: {}: {warning}", path.display());
+        tell_line!("jointrig: {}: {warning}", path.display());
     }
     Ok(frf)
 }

@@ -1,5 +1,6 @@
 //! Ctrl-C: the first one ends the work after the shot in hand, the second one ends the program.
 
+use crate::outside::tell_line;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -18,7 +19,7 @@ pub fn catch(stop: &Arc<AtomicBool>) {
             // everything accepted is in the file already
             std::process::exit(1);
         }
-        eprintln!("\nstopping after the shot in hand; Ctrl-C again ends at once");
+        tell_line!("\nstopping after the shot in hand; Ctrl-C again ends at once");
     });
     if let Err(error) = set {
         log::warn!("Ctrl-C cannot be caught ({error}): it will end the program at once");

@@ -15,6 +15,7 @@ use crate::campaign::verdict::judge::Judge;
 use crate::device::address::Address;
 use crate::device::logs::Tables;
 use crate::device::session::Session;
+use crate::outside::tell_line;
 
 /// What measures.
 pub struct Device<'a> {
@@ -66,7 +67,7 @@ fn tell_size(path: &Path) -> Result<(), CliError> {
     let (stored, raw) = Store::open_read_only(path)?.sample_bytes()?;
     let whole = std::fs::metadata(path).map_or(0, |file| file.len());
     let ratio = raw as f64 / stored.max(1) as f64;
-    eprintln!(
+    tell_line!(
         "{}: {:.1} MB on disk; samples {:.1} MB, stored in {:.1} MB ({ratio:.2} : 1, lossless)",
         path.display(),
         whole as f64 / 1e6,
@@ -78,18 +79,18 @@ fn tell_size(path: &Path) -> Result<(), CliError> {
 
 fn tell(path: &Path, summary: &Summary, again: &str) {
     let Summary { kept, wanted, hits, given_up, accounts, .. } = summary;
-    eprintln!("{}: {kept} of {wanted} good hits kept ({hits} struck in this run)", path.display());
+    tell_line!("{}: {kept} of {wanted} good hits kept ({hits} struck in this run)", path.display());
     if *given_up > 0 {
-        eprintln!("{given_up} cells were given up: `jointrig campaign status {}` says why", quoted(path));
+        tell_line!("{given_up} cells were given up: `jointrig campaign status {}` says why", quoted(path));
     }
     if accounts.lost > 0 || accounts.unexplained() > 0 {
-        eprintln!(
+        tell_line!(
             "samples lost: {} reported by the device, {} unexplained",
             accounts.lost,
             accounts.unexplained()
         );
     }
     if summary.interrupted {
-        eprintln!("stopped; `{again}` goes on from here");
+        tell_line!("stopped; `{again}` goes on from here");
     }
 }

@@ -34,9 +34,13 @@ mod serve;
 mod shaker;
 mod waiting;
 
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::{ArgAction, Parser, Subcommand};
+
+use crate::outside::tell_line;
+use crate::outside::visible;
 
 /// Stiffness of a friction joint, measured: impact campaigns, FRFs, substructuring, hysteresis.
 #[derive(Debug, Parser)]
@@ -100,7 +104,7 @@ pub fn main() -> ExitCode {
     match cli.run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("jointrig: {error}");
+            tell_line!("jointrig: {error}");
             ExitCode::from(error.code())
         }
     }
@@ -149,6 +153,12 @@ fn start_log(verbose: u8) {
     if verbose > 0 {
         builder.parse_filters(level);
     }
+    // what a device logs is told too; a stderr that is closed is env_logger's own business, and ends nothing
+    builder.format(|to, record| {
+        let time = to.timestamp_seconds();
+        let (level, from) = (record.level(), record.target());
+        writeln!(to, "[{time} {level:<5} {from}] {}", visible(&record.args().to_string()))
+    });
     builder.init();
 }
 

@@ -3,6 +3,7 @@
 //! A program's arguments are for every user of the machine to read, and the address holds a secret. So the browser is given the name of a file
 //! that its owner alone can read; that file leads on to the address, and goes when the page does.
 
+use crate::outside::tell_line;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -19,7 +20,7 @@ impl Opened {
         match Self::try_new(url) {
             Ok(opened) => Some(opened),
             Err(error) => {
-                eprintln!("no browser could be opened ({error}): open the address by hand");
+                tell_line!("no browser could be opened ({error}): open the address by hand");
                 None
             }
         }

@@ -1,21 +1,27 @@
 //! Printing: one JSON document, or lines for people, on stdout; a closed pipe is no error.
 
+use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 
 use serde::Serialize;
 
 use super::error::CliError;
+use crate::outside::{printed_json, visible};
 
 /// Prints one JSON document and nothing else.
 pub fn json<T: Serialize>(value: &T) -> Result<(), CliError> {
     let text = serde_json::to_string_pretty(value)
         .map_err(|error| CliError::Bad(format!("the answer could not be written as JSON: {error}")))?;
-    lines([text])
+    print([printed_json(&text)])
 }
 
-/// Prints lines.
+/// Prints lines, with whatever names they hold.
 pub fn lines(lines: impl IntoIterator<Item = String>) -> Result<(), CliError> {
+    print(lines.into_iter().map(|line| visible(&line).into_owned()))
+}
+
+fn print(lines: impl IntoIterator<Item = impl Display>) -> Result<(), CliError> {
     let mut out = std::io::stdout().lock();
     for line in lines {
         match writeln!(out, "{line}") {

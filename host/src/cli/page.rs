@@ -15,6 +15,7 @@ use crate::campaign::watch::Watchers;
 #[cfg(feature = "dashboard")]
 use crate::dashboard::{Dashboard, Measuring};
 use crate::device::tap::Tap;
+use crate::outside::tell_line;
 
 /// Whether a page shows what is measured.
 #[derive(Clone, Copy, Debug, Default, Args)]
@@ -60,9 +61,9 @@ impl Page {
         let Some(port) = self.serve else { return Ok(Onlooker::default()) };
         let measuring = Measuring { file, stop: stop.clone(), control };
         let (page, hooks) = Dashboard::of_measuring(&measuring, port)?;
-        eprintln!("live page: {}", page.url());
+        tell_line!("live page: {}", page.url());
         if let Some(url) = page.edit_url() {
-            eprintln!("to take notes, keep and drop there: {url}");
+            tell_line!("to take notes, keep and drop there: {url}");
         }
         let opened = self.open.then(|| Opened::new(&page.edit_url().unwrap_or_else(|| page.url()))).flatten();
         Ok(Onlooker {

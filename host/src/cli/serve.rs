@@ -17,6 +17,7 @@ use crate::dashboard::Dashboard;
 use crate::device::address::Address;
 use crate::device::logs::Tables;
 use crate::device::session::Session;
+use crate::outside::tell_line;
 
 /// Between two words on the link.
 const LINK: Duration = Duration::from_secs(1);
@@ -59,7 +60,7 @@ fn show(file: &Path, page: Page) -> Result<(), CliError> {
     let stop = interrupt::flag();
     let dashboard = Dashboard::of_file(file, page.serve.unwrap_or(0))?;
     output::lines([dashboard.url()])?;
-    eprintln!(
+    tell_line!(
         "Open this address in a browser of this machine. Ctrl-C ends the page; it changes nothing in the file."
     );
     let _opened = page.open.then(|| Opened::new(&dashboard.url()));
@@ -82,7 +83,7 @@ fn show_channels(device: &str, page: Page) -> Result<(), CliError> {
     let simulated = is_simulated_board(&info.board);
     onlooker.watch.saw(&Seen::Stream { channels: &channels, simulated });
     let (_, first) = session.start(channels.len())?;
-    eprintln!("nothing is struck and nothing moves; Ctrl-C ends");
+    tell_line!("nothing is struck and nothing moves; Ctrl-C ends");
     let (begun, mut told) = (Instant::now(), Instant::now());
     while !stop.load(Ordering::Relaxed) {
         session.pump(Duration::from_millis(20))?;

@@ -20,6 +20,7 @@ use crate::device::address::Address;
 use crate::device::logs::Tables;
 use crate::device::session::Session;
 use crate::hysteresis::{LoopAnalysis, Shape, analyse};
+use crate::outside::{tell, tell_line};
 use crate::report::words;
 use crate::report::words::number::{decimals, micro};
 
@@ -102,7 +103,7 @@ impl Shaker {
             prompt(self.yes, levels.len())?;
         }
         interrupt::catch(&stop);
-        eprintln!("{} levels, {} the hammer's cells; {CRITERION}", levels.len(), moment.name());
+        tell_line!("{} levels, {} the hammer's cells; {CRITERION}", levels.len(), moment.name());
         let options = Options {
             levels,
             moment,
@@ -122,16 +123,16 @@ impl Shaker {
             &onlookers,
             &mut |store, level, outcome| {
                 let Some(outcome) = outcome else {
-                    eprint!("{level}: ");
+                    tell(&format!("{level}: "));
                     return;
                 };
                 let (line, value) = told(store, outcome);
-                eprintln!("{line}");
+                tell_line!("{line}");
                 seen.push(value);
             },
         );
         if summary.is_err() {
-            eprintln!();
+            tell_line!();
         }
         let summary = summary?;
         store.close()?;
@@ -184,7 +185,7 @@ impl Shaker {
         let (stored, known) =
             (count(|o| matches!(o, Outcome::Stored(_))), count(|o| matches!(o, Outcome::Known(_))));
         let path = advice::quoted(&self.file);
-        eprintln!("{path}: {stored} levels recorded, {known} were there; the shaker is at rest");
+        tell_line!("{path}: {stored} levels recorded, {known} were there; the shaker is at rest");
         if summary.interrupted && summary.outcomes.len() < options.levels.len() {
             return Err(CliError::Bad("stopped; the same command goes on from here".into()));
         }
@@ -194,7 +195,7 @@ impl Shaker {
                 format!("{short} of {} levels were not reached, as said above", options.levels.len());
             return Err(CliError::Bad(message));
         }
-        eprintln!("next: jointrig analyse {path} --out DIR");
+        tell_line!("next: jointrig analyse {path} --out DIR");
         Ok(())
     }
 }
@@ -280,15 +281,15 @@ fn look(store: &Store, row: &LevelRow) -> Option<Result<LoopAnalysis, String>> {
 
 /// Asks whoever stands at the rig, before anything moves.
 fn prompt(yes: bool, levels: usize) -> Result<(), CliError> {
-    eprint!(
+    tell(&format!(
         "\n{levels} levels of the shaker. On the table: the assembly, under its normal load; the stinger attached, the amplifier on, \
          nobody's hand near the rig.\n"
-    );
+    ));
     if yes {
-        eprintln!("ready? yes (--yes)");
+        tell_line!("ready? yes (--yes)");
         return Ok(());
     }
-    eprint!("Enter when ready; q quit: ");
+    tell("Enter when ready; q quit: ");
     // a closed screen is no reason to stop: without an answer there is an error below
     let _ = std::io::stderr().flush();
     let mut line = String::new();

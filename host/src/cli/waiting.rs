@@ -5,6 +5,7 @@ use std::io::IsTerminal;
 use indicatif::{ProgressBar, ProgressDrawTarget};
 
 use crate::campaign::run::progress::Pace;
+use crate::outside::tell_line;
 
 /// How far a piece of work is.
 pub struct Waiting {
@@ -30,7 +31,7 @@ impl Waiting {
         self.bar.set_length(total as u64);
         self.bar.set_position(done as u64);
         if self.pace.as_ref().is_some_and(Pace::is_due) {
-            eprintln!("{}: {done} of {total}", self.what);
+            tell_line!("{}: {done} of {total}", self.what);
         }
     }
 }

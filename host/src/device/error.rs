@@ -111,16 +111,29 @@ pub enum DeviceError {
         /// The epoch that was running.
         epoch: u32,
     },
-    /// No samples although a stream runs.
+    /// What it says cannot be.
     #[error(
-        "{address} sent no samples for {seconds} s although its stream runs (waiting for scan {scan}): \
+        "{address} {what}; nothing more is done with it: check its firmware ({}), then run the same command again",
+        flash_file(address)
+    )]
+    Nonsense {
+        /// Which device.
+        address: String,
+        /// What it says, and what can be.
+        what: String,
+    },
+    /// No samples although a stream runs, or next to none.
+    #[error(
+        "{address} sent {got} scans in {seconds} s although its stream runs (waiting for scan {scan}): \
          reset the controller, then run the same command again"
     )]
     Stalled {
         /// Which device.
         address: String,
-        /// How long nothing came, s.
+        /// How long next to nothing came, s.
         seconds: u64,
+        /// What came, scans.
+        got: u64,
         /// The scan that was waited for.
         scan: u64,
     },

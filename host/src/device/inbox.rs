@@ -9,12 +9,16 @@ use jointrig_protocol::frame::{Frame, Kind};
 use jointrig_protocol::hello::{Hello, Mismatch};
 use jointrig_protocol::shot::{Phase, Shot};
 
+use super::claims::{self, Claim};
 use super::logs::DeviceLog;
 use super::stream::Stream;
 use super::tap::Tap;
 
 /// Events that wait for somebody to read them; the oldest go first when nobody does.
 const EVENTS_KEPT: usize = 256;
+
+/// Answers that wait; one request is under way at a time, and one errand.
+const ANSWERS_KEPT: usize = 64;
 
 /// Everything that arrived and was not used yet.
 #[derive(Default)]
@@ -42,6 +46,8 @@ pub struct Inbox {
     pub strangers: u64,
     /// The highest epoch among the strangers.
     pub stranger_epoch: Option<u32>,
+    /// The first thing that it said and that cannot be.
+    pub nonsense: Option<String>,
     /// What the device logs.
     pub log: DeviceLog,
 }
@@ -84,6 +90,11 @@ impl Inbox {
     }
 
     fn take_answer(&mut self, answer: answer::Numbered) {
+        if let Ok(said) = &answer.outcome
+            && !self.holds(claims::of_answer(said))
+        {
+            return;
+        }
         if let Ok(Answer::Started { epoch, map, first_scan }) = answer.outcome
             && let Some(starting) = self.starting.take_if(|starting| starting.number == answer.number)
         {
@@ -92,7 +103,17 @@ impl Inbox {
             stream.tapped(self.tap.take(), rate_hz);
             self.stream = Some(stream);
         }
+        if self.answers.len() == ANSWERS_KEPT {
+            self.answers.pop_front();
+        }
         self.answers.push_back(answer);
+    }
+
+    /// Whether something can be as the device says; what cannot is noted, for the session to end on.
+    fn holds(&mut self, claim: Claim) -> bool {
+        let holds = claim.is_ok();
+        self.nonsense = self.nonsense.take().or(claim.err());
+        holds
     }
 
     fn take_block(&mut self, payload: &[u8]) {
@@ -109,6 +130,9 @@ impl Inbox {
     }
 
     fn take_event(&mut self, event: event::Numbered) {
+        if !self.holds(claims::of_event(&event)) {
+            return;
+        }
         if let Some(next) = self.next_event {
             let jump = event.number.wrapping_sub(next);
             if jump > u32::MAX / 2 {
@@ -121,7 +145,13 @@ impl Inbox {
             Event::Lost { epoch, first_scan, scans, why } => {
                 log::warn!("the device lost {scans} scans from {first_scan} on ({why:?})");
                 if let Some(stream) = self.stream.as_mut().filter(|stream| stream.epoch() == *epoch) {
-                    stream.mark_lost(*first_scan..first_scan.saturating_add(u64::from(*scans)));
+                    let lost = *first_scan..first_scan.saturating_add(u64::from(*scans));
+                    if !stream.mark_lost(lost) {
+                        self.nonsense = Some(
+                            "reports more losses than a stream has room for, all of them ahead of its scans"
+                                .into(),
+                        );
+                    }
                 }
             }
             Event::Counters(counters) => self.counters = Some(*counters),

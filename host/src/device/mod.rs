@@ -6,6 +6,7 @@
 
 pub mod address;
 pub mod channels;
+mod claims;
 pub mod error;
 mod inbox;
 pub mod link;

@@ -10,6 +10,7 @@ use jointrig_protocol::request::{Fire, Numbered, Request, Stage, Trigger};
 use jointrig_protocol::slow::Slow;
 
 use super::channels::ChannelMap;
+use super::claims;
 use super::error::DeviceError;
 use super::inbox::Starting;
 use super::session::{Session, TRIES, patience};
@@ -25,8 +26,8 @@ const SLOW_SINCE: u16 = 1;
 /// Longest wait for a first byte within one pump.
 const POLL: Duration = Duration::from_millis(20);
 
-/// Without a single new scan for this long, a running stream counts as stalled.
-const STALLED: Duration = Duration::from_secs(30);
+/// The slowest clock of a device, of which a running stream's scans tell, against the host's.
+const SLOWEST: f64 = 1e-3;
 
 fn name(request: &Request) -> &'static str {
     match request {
@@ -97,6 +98,7 @@ impl Session {
     pub fn info(&mut self) -> Result<Info, DeviceError> {
         match self.ask(Request::Info)? {
             Answer::Info(info) => {
+                claims::of_info(&info, &self.hello).map_err(|what| self.nonsense(what))?;
                 self.rate_hz = f64::from(info.scan_rate_hz);
                 self.inbox.log.know_build(info.build);
                 Ok(info)
@@ -110,7 +112,10 @@ impl Session {
         let mut channels = Vec::with_capacity(info.channels.into());
         for index in 0..info.channels {
             match self.ask(Request::Channel { index })? {
-                Answer::Channel(channel) => channels.push(channel),
+                Answer::Channel(channel) => {
+                    claims::of_channel(&channel, &channels).map_err(|what| self.nonsense(what))?;
+                    channels.push(channel);
+                }
                 other => return Err(self.wrong("channel", &other)),
             }
         }
@@ -157,7 +162,10 @@ impl Session {
             return Ok(None);
         }
         match self.ask(Request::Slow)? {
-            Answer::Slow(slow) => Ok(Some(slow)),
+            Answer::Slow(slow) => {
+                claims::of_slow(&slow).map_err(|what| self.nonsense(what))?;
+                Ok(Some(slow))
+            }
             other => Err(self.wrong("slow", &other)),
         }
     }
@@ -211,7 +219,7 @@ impl Session {
     /// or virtual device is waited for as long as it makes progress.
     ///
     /// # Errors
-    /// A broken link, a restarted device, no progress for 30 s.
+    /// A broken link, a restarted device, next to no progress for 30 s, a scan more than an hour ahead.
     pub fn wait_for(&mut self, scan: u64) -> Result<(), DeviceError> {
         self.wait_until(scan, |_| false).map(|_| ())
     }
@@ -227,6 +235,14 @@ impl Session {
         mut stop: impl FnMut(&Self) -> bool,
     ) -> Result<bool, DeviceError> {
         let mut progress = (self.expected()?, Instant::now());
+        if scan.saturating_sub(progress.0) > (claims::AHEAD_S * self.rate_hz) as u64 {
+            let (now, hours) = (progress.0, claims::AHEAD_S / 3600.0);
+            return Err(self.nonsense(format!(
+                "says that something happens at scan {scan}, more than {hours} h after scan {now}, which came last"
+            )));
+        }
+        // a virtual device's time may be slow, and is still a thousandth of ours
+        let least = (self.stalled.as_secs_f64() * self.rate_hz * SLOWEST).max(1.0) as u64;
         loop {
             if stop(self) {
                 return Ok(true);
@@ -235,17 +251,23 @@ impl Session {
             if expected >= scan {
                 return Ok(false);
             }
-            if expected > progress.0 {
+            if expected - progress.0 >= least {
                 progress = (expected, Instant::now());
-            } else if progress.1.elapsed() > STALLED {
+            } else if progress.1.elapsed() > self.stalled {
                 return Err(DeviceError::Stalled {
                     address: self.address.clone(),
-                    seconds: STALLED.as_secs(),
+                    seconds: self.stalled.as_secs(),
+                    got: expected - progress.0,
                     scan: expected,
                 });
             }
             self.pump(POLL)?;
         }
+    }
+
+    /// With next to no new scan for so long, a running stream counts as stalled; 30 s unless it is said otherwise.
+    pub fn stalls_after(&mut self, quiet: Duration) {
+        self.stalled = quiet;
     }
 
     /// The next scan that has not arrived.

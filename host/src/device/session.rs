@@ -25,6 +25,7 @@ use jointrig_protocol::hello::{Hello, Mismatch};
 use jointrig_protocol::request::{Numbered, Request};
 use jointrig_protocol::shot::Shot;
 
+use super::claims;
 use super::error::DeviceError;
 use super::inbox::Inbox;
 use super::link::Link;
@@ -47,6 +48,9 @@ const STATUS_IDLE: Duration = Duration::from_millis(100);
 /// A gap that was asked for this often and never came is entered as lost.
 const RESEND_TRIES: u32 = 100;
 
+/// With next to no new scan for this long, a running stream counts as stalled.
+const STALLED: Duration = Duration::from_secs(30);
+
 /// Something asked for in the background, not by the session's user.
 #[derive(Clone, Debug)]
 enum Errand {
@@ -66,6 +70,7 @@ pub struct Session {
     pub(super) waiting: Option<u32>,
     pub(super) reply: Option<answer::Numbered>,
     pub(super) rate_hz: f64,
+    pub(super) stalled: Duration,
     pub(super) ended: bool,
     /// Whether the device was told other scales than its own.
     pub(super) scaled: bool,
@@ -101,6 +106,7 @@ impl Session {
             waiting: None,
             reply: None,
             rate_hz: 51_200.0,
+            stalled: STALLED,
             ended: false,
             scaled: false,
             shakes: false,
@@ -131,6 +137,7 @@ impl Session {
                 match self.inbox.hello.take() {
                     Some(Ok(theirs)) if theirs.session == ours.session || theirs.role == ours.role => {
                         ours.check(&theirs).map_err(|mismatch| self.mismatch(mismatch))?;
+                        claims::of_hello(&theirs).map_err(|what| self.nonsense(what))?;
                         self.hello = theirs;
                         return Ok(());
                     }
@@ -231,7 +238,10 @@ impl Session {
             Ok(false) => {}
             Err(error) => return Err(self.broken("reading", error)),
         }
-        Ok(())
+        match self.inbox.nonsense.take() {
+            Some(what) => Err(self.nonsense(what)),
+            None => Ok(()),
+        }
     }
 
     fn sort(&mut self, answer: answer::Numbered) -> Result<(), DeviceError> {
@@ -385,6 +395,10 @@ impl Session {
 
     pub(super) fn broken(&self, doing: &'static str, source: io::Error) -> DeviceError {
         DeviceError::Link { address: self.address.clone(), doing, source }
+    }
+
+    pub(super) fn nonsense(&self, what: String) -> DeviceError {
+        DeviceError::Nonsense { address: self.address.clone(), what }
     }
 
     fn mismatch(&self, mismatch: Mismatch) -> DeviceError {

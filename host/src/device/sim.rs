@@ -34,8 +34,12 @@ impl Sim {
         let address = || rig.map_or_else(|| "sim:".into(), |path| format!("sim:{}", path.display()));
         let open = |why: String| DeviceError::Open { address: address(), why };
         let text = match rig {
-            Some(path) => Some(std::fs::read_to_string(path).map_err(|error| {
-                open(format!("the rig's description {} cannot be read: {error}", path.display()))
+            Some(path) => Some(crate::foreign::text(path, crate::foreign::SETTINGS).map_err(|error| {
+                open(format!(
+                    "the rig's description {} cannot be read: {error}; {}",
+                    path.display(),
+                    crate::advice::reading(&error)
+                ))
             })?),
             None => None,
         };

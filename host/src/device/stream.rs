@@ -33,6 +33,12 @@ impl Accounts {
     }
 }
 
+/// Codes that the tape holds when scans are lost: 20 s of the fastest rig's, 256 MB.
+const TAPE_KEPT: u64 = 1 << 27;
+
+/// Ranges of lost scans that may wait for the scans before them.
+const GONE_KEPT: usize = 4096;
+
 /// A stream being put together.
 pub struct Stream {
     epoch: u32,
@@ -45,6 +51,8 @@ pub struct Stream {
     newest: u64,
     tail: u64,
     held: BTreeMap<u64, Held>,
+    /// Scans of all that is held.
+    held_scans: u64,
     gone: Vec<Range<u64>>,
     lost: Vec<Range<u64>>,
     tape: Vec<i16>,
@@ -73,6 +81,7 @@ impl Stream {
             newest: first_scan,
             tail: first_scan,
             held: BTreeMap::new(),
+            held_scans: 0,
             gone: Vec::new(),
             lost: Vec::new(),
             tape: Vec::new(),
@@ -142,7 +151,9 @@ impl Stream {
         } else if first <= self.expected {
             self.append(first, block.codes(), again);
             self.advance();
-        } else if first - self.expected < self.bound || self.held.is_empty() {
+        } else if (first - self.expected < self.bound && self.held_scans < self.bound) || self.held.is_empty()
+        {
+            self.held_scans += u64::from(block.header.scans);
             self.held.insert(first, Held { codes: block.codes().collect(), again });
             self.advance();
         }
@@ -150,12 +161,17 @@ impl Stream {
     }
 
     /// Enters scans that the device can never send (again). What has arrived stays.
-    pub fn mark_lost(&mut self, range: Range<u64>) {
+    /// False when more such ranges wait for their turn than a stream has room for.
+    pub fn mark_lost(&mut self, range: Range<u64>) -> bool {
         if range.end > self.expected && range.start < range.end {
+            if self.gone.len() == GONE_KEPT {
+                return false;
+            }
             let place = self.gone.partition_point(|other| other.start < range.start);
             self.gone.insert(place, range);
             self.advance();
         }
+        true
     }
 
     /// The device produced scans up to `next_scan` and nothing more is on its way: what has not
@@ -203,6 +219,7 @@ impl Stream {
             {
                 let first = *entry.key();
                 let held = entry.remove();
+                self.held_scans -= (held.codes.len() / self.channels) as u64;
                 if first + (held.codes.len() / self.channels) as u64 > self.expected {
                     self.append(first, held.codes.into_iter(), held.again);
                 } else {
@@ -230,7 +247,8 @@ impl Stream {
         }
         self.expected = end;
         self.newest = self.newest.max(end);
-        if scans > self.bound {
+        // a host's memory is not a device's to fill: behind many zeros the tape begins anew, as it does where nobody forgets it
+        if scans > self.bound || self.tape.len() as u64 + scans * self.channels as u64 > TAPE_KEPT {
             // nobody needs that many zeros: the tape begins anew behind the gap
             self.tape.clear();
             self.tape_first = end;

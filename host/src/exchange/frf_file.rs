@@ -3,9 +3,8 @@
 use super::frf_npz::read_frf;
 use super::frf_uff::{FrfUffError, read_frf_uff};
 use super::npz::NpzError;
-use crate::advice;
 use crate::frf::Frf;
-use std::fs::File;
+use crate::{advice, foreign};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
@@ -34,8 +33,8 @@ pub enum FrfFileError {
 /// It cannot be read.
 pub fn is_npz(path: &Path) -> Result<bool, FrfFileError> {
     let mut first = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(4).read_to_end(&mut first))
+    foreign::open(path)
+        .and_then(|(file, _)| file.take(4).read_to_end(&mut first))
         .map_err(|source| FrfFileError::Open { path: path.into(), source })?;
     // a zip archive begins with its first entry, an empty one with its end
     Ok(first.starts_with(b"PK\x03\x04") || first.starts_with(b"PK\x05\x06"))

@@ -18,6 +18,9 @@ pub enum Extra {
     Complex(String, Array<Complex<f64>>),
 }
 
+/// Bytes of memory of a line's matrix beside its values.
+const LINE: u64 = 64;
+
 /// Reads an FRF file, with the variance where it has one. Values may be NaN; whoever uses a cell checks it. A coherence of another
 /// shape than the FRFs' is no ordinary one, and is passed over.
 ///
@@ -45,6 +48,7 @@ pub fn read_frf(path: &Path) -> Result<Frf, NpzError> {
     if frf.shape != [frequency_hz.len(), rows, columns] {
         return Err(file.unexpected("frf", &format!("has shape {:?}", frf.shape), &expected));
     }
+    file.charge("frf", frequency_hz.len(), LINE + 16 * (rows * columns) as u64, &expected)?;
     // chunks of zero length are not allowed; an FRF without rows or columns has empty matrices
     let lines = if rows * columns == 0 {
         vec![DMatrix::zeros(rows, columns); frequency_hz.len()]
@@ -60,6 +64,7 @@ pub fn read_frf(path: &Path) -> Result<Frf, NpzError> {
         if !fits(&array, &whole) {
             return Err(file.unexpected("variance", &format!("has shape {:?}", array.shape), &expected));
         }
+        file.charge("variance", lines, LINE + 8 * (rows * columns) as u64, &expected)?;
         whole =
             whole.with_variance(by_line(&array, rows, columns)).map_err(|e| file.content(e.to_string()))?;
         whole.check_variance().map_err(|e| file.content(e.to_string()))?;
@@ -68,6 +73,8 @@ pub fn read_frf(path: &Path) -> Result<Frf, NpzError> {
         && let Ok(array) = file.real("coherence", "the coherence of each value")
         && fits(&array, &whole)
     {
+        let expected = "the coherence of each value";
+        file.charge("coherence", array.values.len() / (rows * columns), LINE, expected)?;
         let coherence = by_line(&array, rows, columns);
         whole = whole.with_coherence(coherence).map_err(|e| file.content(e.to_string()))?;
     }

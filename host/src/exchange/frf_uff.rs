@@ -6,12 +6,14 @@
 //! format has no field for, is in text 4 as `sigma 2.3 1/s`.
 
 use super::uff::{
-    Abscissa, Axis, Contents, DataSet, Dof, Encoding, Function, Values, WriteError, kind, quantity, read,
+    Abscissa, Axis, Contents, DataSet, Dof, Encoding, Function, Values, WriteError, kind, quantity,
+    read_functions,
 };
-use crate::advice;
 use crate::frf::{Frf, MotionQuantity};
+use crate::{advice, foreign};
 use nalgebra::DMatrix;
 use num_complex::Complex;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// Why a universal file does not give FRFs.
@@ -49,8 +51,17 @@ pub enum FrfUffError {
 /// # Errors
 /// [`FrfUffError`] when there is no FRF, or they differ in lines, quantity or damping.
 pub fn read_frf_uff(path: &Path) -> Result<(Frf, Vec<String>), FrfUffError> {
-    let bytes = std::fs::read(path).map_err(|source| FrfUffError::Open { path: path.into(), source })?;
-    from_contents(&read(&bytes)).map_err(|reason| FrfUffError::Content { path: path.into(), reason })
+    from_contents(&contents(path)?).map_err(|reason| FrfUffError::Content { path: path.into(), reason })
+}
+
+/// The functions of a universal file; everything else in it is passed over.
+///
+/// # Errors
+/// [`FrfUffError::Open`].
+pub fn contents(path: &Path) -> Result<Contents, FrfUffError> {
+    let bytes = foreign::bytes(path, foreign::UNIVERSAL)
+        .map_err(|source| FrfUffError::Open { path: path.into(), source })?;
+    Ok(read_functions(&bytes))
 }
 
 /// The same from what was read of a file.
@@ -58,7 +69,7 @@ pub fn read_frf_uff(path: &Path) -> Result<(Frf, Vec<String>), FrfUffError> {
 /// # Errors
 /// The reason in words.
 pub fn from_contents(contents: &Contents) -> Result<(Frf, Vec<String>), String> {
-    let mut warnings: Vec<String> = contents.faults.iter().map(|f| format!("{f}; left out")).collect();
+    let mut warnings = left_out(contents);
     let functions: Vec<(&Function, &[Complex<f64>])> = contents
         .functions()
         .filter(|f| f.kind == kind::FRF)
@@ -77,16 +88,17 @@ pub fn from_contents(contents: &Contents) -> Result<(Frf, Vec<String>), String> 
     let (lines, sigma_per_s) = (values.len(), sigma(first)?);
     let outputs = names(functions.iter().map(|(f, _)| (&f.response, true)));
     let inputs = names(functions.iter().map(|(f, _)| (&f.reference, false)));
-    let order = |names: &[String]| {
-        let mut distinct: Vec<String> = Vec::new();
-        for name in names {
-            if !distinct.contains(name) {
-                distinct.push(name.clone());
-            }
-        }
-        distinct
-    };
-    let (rows, columns) = (order(&outputs), order(&inputs));
+    let ((rows, row_of), (columns, column_of)) = (distinct(&outputs), distinct(&inputs));
+    // as many values as there are, or a matrix that is mostly holes
+    let (pairs, there) = (rows.len().saturating_mul(columns.len()), functions.len());
+    let bytes = (pairs.saturating_mul(16).saturating_add(LINE)).saturating_mul(lines);
+    if bytes > OF_HOLES.saturating_mul(there * lines * 16).saturating_add(MOST_OF_FEW) {
+        return Err(format!(
+            "{there} FRFs of {lines} lines name {} outputs and {} inputs, a matrix that is mostly holes: split the file",
+            rows.len(),
+            columns.len()
+        ));
+    }
     let hole = Complex::new(f64::NAN, f64::NAN);
     let mut found = vec![DMatrix::from_element(rows.len(), columns.len(), hole); lines];
     let mut filled = DMatrix::from_element(rows.len(), columns.len(), false);
@@ -103,11 +115,7 @@ pub fn from_contents(contents: &Contents) -> Result<(Frf, Vec<String>), String> 
         if sigma(f)?.to_bits() != sigma_per_s.to_bits() {
             return differs("damping of the exponential window");
         }
-        let (Some(row), Some(column)) =
-            (rows.iter().position(|n| n == output), columns.iter().position(|n| n == input))
-        else {
-            continue;
-        };
+        let (row, column) = (row_of[output.as_str()], column_of[input.as_str()]);
         if std::mem::replace(&mut filled[(row, column)], true) {
             return Err(format!(
                 "there are two FRFs from `{input}` to `{output}`: keep one, or split the file"
@@ -128,14 +136,52 @@ pub fn from_contents(contents: &Contents) -> Result<(Frf, Vec<String>), String> 
     Ok((frf, warnings))
 }
 
+/// A matrix may take so many times the memory of its FRFs …
+const OF_HOLES: usize = 2;
+/// … and of a few lines so much, bytes.
+const MOST_OF_FEW: usize = 16 << 20;
+/// Bytes of a line's matrix beside its values.
+const LINE: usize = 64;
+
+/// Most faults of a file that are told one by one.
+const MOST_TOLD: usize = 20;
+
+/// What could not be read, for people.
+pub(super) fn left_out(contents: &Contents) -> Vec<String> {
+    let faults = &contents.faults;
+    let mut told: Vec<String> =
+        faults.iter().take(MOST_TOLD).map(|fault| format!("{fault}; left out")).collect();
+    if let Some(more @ 1..) = faults.len().checked_sub(MOST_TOLD) {
+        told.push(format!("{more} more data sets could not be read and are left out"));
+    }
+    told
+}
+
+/// Names in the order in which they appear first, and where each stands in it.
+fn distinct(names: &[String]) -> (Vec<String>, HashMap<&str, usize>) {
+    let (mut order, mut place) = (Vec::new(), HashMap::new());
+    for name in names {
+        place.entry(name.as_str()).or_insert_with(|| {
+            order.push(name.clone());
+            order.len() - 1
+        });
+    }
+    (order, place)
+}
+
 /// The names of DoFs: with the axis where `axes` is asked for and the entity has several directions.
 fn names<'a>(dofs: impl Iterator<Item = (&'a Dof, bool)> + Clone) -> Vec<String> {
     let entity = |dof: &Dof| if dof.entity.is_empty() { dof.node.to_string() } else { dof.entity.clone() };
     let all: Vec<(String, i64, bool)> =
-        dofs.map(|(dof, axes)| (entity(dof), dof.direction.abs(), axes)).collect();
+        dofs.map(|(dof, axes)| (entity(dof), dof.direction.saturating_abs(), axes)).collect();
+    let mut directions: HashMap<&str, (i64, bool)> = HashMap::new();
+    for (name, direction, _) in &all {
+        let (first, several) = directions.entry(name).or_insert((*direction, false));
+        *several |= first != direction;
+    }
     all.iter()
         .map(|(name, direction, axes)| {
-            let several = all.iter().any(|(other, d, _)| other == name && d != direction);
+            let several = directions[name.as_str()].1;
             match direction {
                 1..=6 if *axes && several => {
                     format!("{name}:{}", ["x", "y", "z", "rx", "ry", "rz"][*direction as usize - 1])
@@ -236,7 +282,7 @@ pub fn write_uff(path: &Path, sets: &[DataSet]) -> Result<(), FrfUffError> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::uff::{ByteOrder, write};
+    use super::super::uff::{ByteOrder, read, write};
     use super::*;
 
     fn frf() -> Frf {

@@ -1,8 +1,8 @@
 //! A geometry in any of the forms in which it may lie on a disk.
 
 use super::positions::{PositionsError, read_positions};
-use crate::advice;
 use crate::substructuring::Geometry;
+use crate::{advice, foreign};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -44,7 +44,7 @@ pub fn read_geometry(path: &Path) -> Result<(Geometry, Vec<String>), GeometryFil
         let positions = read_positions(path)?;
         return Ok((positions.geometry, positions.warnings));
     }
-    let text = std::fs::read_to_string(path)
+    let text = foreign::text(path, foreign::SETTINGS)
         .map_err(|source| GeometryFileError::Read { path: path.into(), source })?;
     let geometry = toml::from_str(&text).map_err(|error| GeometryFileError::Toml {
         path: path.into(),

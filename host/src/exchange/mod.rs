@@ -7,11 +7,14 @@
 
 #[cfg(test)]
 mod any_bytes_tests;
+mod archive;
 pub mod channel_records;
 pub mod frf_file;
 pub mod frf_npz;
 pub mod frf_uff;
 pub mod geometry_file;
+mod npy_header;
+mod npy_values;
 pub mod npz;
 pub mod npz_output;
 #[cfg(feature = "parquet")]
@@ -26,6 +29,7 @@ mod tables;
 pub mod tables_output;
 pub mod typed_table;
 pub mod uff_output;
+mod workbook_parts;
 
 pub use jointrig_uff as uff;
 

@@ -1,11 +1,14 @@
 //! Arrays in npz archives: the layer that the FRF and record files share.
 //!
 //! Reads real, complex and text arrays of any numpy width, either byte order and either memory order; always
-//! gives C order and the widest type. Every error names the file, the array and what was expected of it.
+//! gives C order and the widest type. Every error names the file, the array and what was expected of it. Values are read as a stream, and
+//! all that is read of one file may take so much memory as its size allows: a few bytes may say that they are a billion zeros.
 
-use crate::advice;
+use super::archive;
+use super::npy_header::Header;
+use super::npy_values::{in_c_order, letters, number_of};
+use crate::{advice, foreign};
 use npyz::npz::{array_name_from_file_name, file_name_from_array_name};
-use npyz::{DType, NpyFile, Order, TypeChar};
 use num_complex::Complex;
 use std::fs::File;
 use std::io::{self, BufReader, Read};
@@ -78,7 +81,16 @@ pub struct Array<T> {
 pub struct NpzFile {
     path: PathBuf,
     archive: ZipArchive<BufReader<File>>,
+    size: u64,
+    /// Bytes of memory that its arrays may still take.
+    left: u64,
 }
+
+/// Bytes of a name's own place in memory, beside its letters.
+const NAME: u64 = 56;
+
+/// Values are read in pieces of so many bytes.
+const PIECE: usize = 1 << 16;
 
 impl NpzFile {
     /// Opens the archive; arrays are read when asked for.
@@ -86,10 +98,29 @@ impl NpzFile {
     /// # Errors
     /// [`NpzError::Open`].
     pub fn open(path: &Path) -> Result<Self, NpzError> {
-        let archive = File::open(path)
-            .and_then(|file| Ok(ZipArchive::new(BufReader::new(file))?))
-            .map_err(|source| NpzError::Open { path: path.into(), source })?;
-        Ok(NpzFile { path: path.into(), archive })
+        let (archive, size) =
+            archive::open(path).map_err(|source| NpzError::Open { path: path.into(), source })?;
+        Ok(NpzFile { path: path.into(), archive, size, left: foreign::memory_for(size) })
+    }
+
+    /// Counts memory that `array` is about to take, in the form in which it is handed on.
+    ///
+    /// # Errors
+    /// [`NpzError::Unexpected`] when a file of this size may not take it.
+    pub fn charge(&mut self, array: &str, count: usize, each: u64, expected: &str) -> Result<(), NpzError> {
+        let bytes = (count as u64).saturating_mul(each);
+        if let Some(left) = self.left.checked_sub(bytes) {
+            self.left = left;
+            return Ok(());
+        }
+        let found = format!(
+            "would take {} of memory, and what a file of {} holds may take {} in all: split it, or store it uncompressed and as \
+             floats (np.savez)",
+            foreign::megabytes(bytes),
+            foreign::megabytes(self.size),
+            foreign::megabytes(foreign::memory_for(self.size)),
+        );
+        Err(self.unexpected(array, &found, expected))
     }
 
     /// Whether there is an array of this name.
@@ -112,11 +143,12 @@ impl NpzFile {
     /// # Errors
     /// When it is missing, complex, text, or damaged.
     pub fn real(&mut self, array: &str, expected: &str) -> Result<Array<f64>, NpzError> {
-        let complex = self.complex(array, expected)?;
-        if complex.values.iter().any(|v| v.im != 0.0) {
-            return Err(self.unexpected(array, "is complex", expected));
-        }
-        Ok(Array { shape: complex.shape, values: complex.values.into_iter().map(|v| v.re).collect() })
+        let mut complex = false;
+        let found = self.numbers(array, expected, 8, |value| {
+            complex |= value.im != 0.0;
+            value.re
+        })?;
+        if complex { Err(self.unexpected(array, "is complex", expected)) } else { Ok(found) }
     }
 
     /// One real number: a scalar array, or one of length one.
@@ -137,34 +169,28 @@ impl NpzFile {
     /// # Errors
     /// When it is missing, text, or damaged.
     pub fn complex(&mut self, array: &str, expected: &str) -> Result<Array<Complex<f64>>, NpzError> {
-        let (kind, size, shape, order, file) = self.header(array, expected)?;
-        let values = match (kind, size) {
-            (TypeChar::Float, 4) => file.into_vec::<f32>().map(widen),
-            (TypeChar::Float, 8) => file.into_vec::<f64>().map(widen),
-            (TypeChar::Complex, 8) => file
-                .into_vec::<Complex<f32>>()
-                .map(|v| v.into_iter().map(|c| Complex::new(c.re.into(), c.im.into())).collect()),
-            (TypeChar::Complex, 16) => file.into_vec::<Complex<f64>>(),
-            (TypeChar::Int, 1) => file.into_vec::<i8>().map(widen),
-            (TypeChar::Int, 2) => file.into_vec::<i16>().map(widen),
-            (TypeChar::Int, 4) => file.into_vec::<i32>().map(widen),
-            (TypeChar::Int, 8) => {
-                file.into_vec::<i64>().map(|v| widen(v.into_iter().map(|i| i as f64).collect()))
-            }
-            (TypeChar::Uint, 1) => file.into_vec::<u8>().map(widen),
-            (TypeChar::Uint, 2) => file.into_vec::<u16>().map(widen),
-            (TypeChar::Uint, 4) => file.into_vec::<u32>().map(widen),
-            (TypeChar::Uint, 8) => {
-                file.into_vec::<u64>().map(|v| widen(v.into_iter().map(|i| i as f64).collect()))
-            }
-            _ => {
-                let found = format!("has elements of type {} with {size} bytes", kind.to_str());
-                drop(file);
-                return Err(self.unexpected(array, &found, expected));
-            }
+        self.numbers(array, expected, 16, |value| value)
+    }
+
+    /// Numbers as `take` wants them, each in so many bytes.
+    fn numbers<T: Clone>(
+        &mut self,
+        array: &str,
+        expected: &str,
+        each: u64,
+        mut take: impl FnMut(Complex<f64>) -> T,
+    ) -> Result<Array<T>, NpzError> {
+        let (header, count) = self.header(array, expected)?;
+        let Some(number) = number_of(&header) else {
+            return Err(self.unexpected(array, &of_type(&header), expected));
         };
-        let values = values.map_err(|e| self.unexpected(array, &format!("is damaged ({e})"), expected))?;
-        Ok(Array { values: in_c_order(values, &shape, order), shape })
+        self.charge(array, count, each, expected)?;
+        let mut values = Vec::with_capacity(count);
+        self.elements(array, &header, count, expected, |bytes| {
+            values.push(take(number(bytes, header.big)));
+            Ok(())
+        })?;
+        Ok(Array { values: in_c_order(values, &header), shape: header.shape })
     }
 
     /// A text array (unicode or bytes).
@@ -172,22 +198,17 @@ impl NpzFile {
     /// # Errors
     /// When it is missing, no text, or damaged.
     pub fn text(&mut self, array: &str, expected: &str) -> Result<Array<String>, NpzError> {
-        let (kind, size, shape, order, file) = self.header(array, expected)?;
-        let values = match kind {
-            TypeChar::UnicodeStr => file.into_vec::<String>(),
-            TypeChar::ByteStr => file.into_vec::<Vec<u8>>().and_then(|v| {
-                v.into_iter()
-                    .map(|b| String::from_utf8(b).map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e)))
-                    .collect()
-            }),
-            _ => {
-                let found = format!("has elements of type {} with {size} bytes", kind.to_str());
-                drop(file);
-                return Err(self.unexpected(array, &found, expected));
-            }
-        };
-        let values = values.map_err(|e| self.unexpected(array, &format!("is damaged ({e})"), expected))?;
-        Ok(Array { values: in_c_order(values, &shape, order), shape })
+        let (header, count) = self.header(array, expected)?;
+        if !matches!(header.kind, 'U' | 'S' | 'a') {
+            return Err(self.unexpected(array, &of_type(&header), expected));
+        }
+        self.charge(array, count, NAME + header.width as u64, expected)?;
+        let mut values = Vec::with_capacity(count);
+        self.elements(array, &header, count, expected, |bytes| {
+            values.push(letters(bytes, &header)?);
+            Ok(())
+        })?;
+        Ok(Array { values: in_c_order(values, &header), shape: header.shape })
     }
 
     /// One word.
@@ -212,19 +233,16 @@ impl NpzFile {
         }
     }
 
-    /// Kind, element size, shape and order of an array, with its reader standing at the data. A header that promises
-    /// more bytes than the archive holds is refused before anything of its size is allocated.
-    fn header(
-        &mut self,
-        array: &str,
-        expected: &str,
-    ) -> Result<(TypeChar, u64, Vec<usize>, Order, NpyFile<impl Read + '_>), NpzError> {
-        if !self.has(array) {
+    /// The member that an array stands in.
+    fn member(&mut self, array: &str, expected: &str) -> Result<impl Read + '_, NpzError> {
+        let at = self.archive.index_for_name(&file_name_from_array_name(array));
+        let Some(at) = at else {
             let mut available: Vec<String> = self
                 .archive
                 .file_names()
                 .flatten()
                 .filter_map(|name| array_name_from_file_name(&name).map(String::from))
+                .take(MOST_NAMED)
                 .collect();
             available.sort_unstable();
             return Err(NpzError::Missing {
@@ -233,62 +251,76 @@ impl NpzFile {
                 expected: expected.into(),
                 available: available.join(", "),
             });
-        }
-        let path = self.path.clone();
-        let damaged = |found: String| NpzError::Unexpected {
+        };
+        let path = &self.path;
+        self.archive.by_index(at).map_err(|error| NpzError::Unexpected {
             path: path.clone(),
             array: array.into(),
-            found,
+            found: format!("is damaged ({error})"),
             expected: expected.into(),
-        };
-        let member = self
-            .archive
-            .by_name(&file_name_from_array_name(array))
-            .map_err(|e| damaged(format!("is damaged ({e})")))?;
-        let stored = member.size();
-        let file = NpyFile::new(member).map_err(|e| damaged(format!("is damaged ({e})")))?;
-        let DType::Plain(kind) = file.dtype() else {
-            return Err(damaged("is a structured array".into()));
-        };
-        let shape: Vec<usize> = file.shape().iter().map(|&n| n as usize).collect();
-        let bytes = kind
-            .num_bytes()
-            .and_then(|b| shape.iter().try_fold(b, |product, &n| product.checked_mul(n)))
-            .map_or(u64::MAX, |b| b as u64);
-        if kind.uses_pickled_array() || bytes > stored {
-            return Err(damaged(format!(
-                "of shape {shape:?} needs {bytes} bytes and the archive has {stored} of it"
-            )));
-        }
-        let size = kind.num_bytes().unwrap_or(0) as u64;
-        let order = file.order();
-        Ok((kind.type_char(), size, shape, order, file))
+        })
     }
-}
 
-fn widen<T: Into<f64>>(values: Vec<T>) -> Vec<Complex<f64>> {
-    values.into_iter().map(|v| Complex::new(v.into(), 0.0)).collect()
-}
-
-/// Values as stored in `order`, rearranged so that the last index runs fastest.
-fn in_c_order<T: Clone>(values: Vec<T>, shape: &[usize], order: Order) -> Vec<T> {
-    if order == Order::C || shape.len() < 2 {
-        return values;
-    }
-    let mut index = vec![0; shape.len()];
-    let mut out = Vec::with_capacity(values.len());
-    for _ in 0..values.len() {
-        let at = shape.iter().zip(&index).rev().fold(0, |at, (&n, &i)| at * n + i);
-        out.push(values[at].clone());
-        for axis in (0..shape.len()).rev() {
-            index[axis] += 1;
-            if index[axis] < shape[axis] {
-                break;
+    /// What an array says of itself, and how many elements it has. One that promises more bytes than the archive says to hold is refused
+    /// before anything of its size is allocated.
+    fn header(&mut self, array: &str, expected: &str) -> Result<(Header, usize), NpzError> {
+        let header = Header::read(&mut self.member(array, expected)?);
+        let header = header.map_err(|found| self.unexpected(array, &found, expected))?;
+        let at = self.archive.index_for_name(&file_name_from_array_name(array));
+        let stored = at.and_then(|at| self.archive.by_index(at).ok()).map_or(0, |member| member.size());
+        let bytes = header.elements().and_then(|count| count.checked_mul(header.width));
+        match (header.elements(), bytes) {
+            (Some(count), Some(bytes)) if bytes as u64 <= stored => Ok((header, count)),
+            _ => {
+                let found = format!(
+                    "of shape {:?} needs {} bytes and the archive has {stored} of it",
+                    header.shape,
+                    bytes.map_or("too many".into(), |bytes| bytes.to_string())
+                );
+                Err(self.unexpected(array, &found, expected))
             }
-            index[axis] = 0;
         }
     }
-    out
+
+    /// Hands every element's bytes on, in the order of the file.
+    fn elements(
+        &mut self,
+        array: &str,
+        header: &Header,
+        count: usize,
+        expected: &str,
+        mut take: impl FnMut(&[u8]) -> Result<(), String>,
+    ) -> Result<(), NpzError> {
+        let mut from = self.member(array, expected)?;
+        let mut read = || -> Result<(), String> {
+            let damaged = |error: io::Error| format!("is damaged ({error})");
+            Header::read(&mut from)?;
+            if header.width == 0 {
+                return (0..count).try_for_each(|_| take(&[]));
+            }
+            let in_piece = (PIECE / header.width).max(1);
+            let mut buffer = vec![0; in_piece.min(count) * header.width];
+            let mut left = count;
+            while left > 0 {
+                let piece = &mut buffer[..in_piece.min(left) * header.width];
+                from.read_exact(piece).map_err(damaged)?;
+                piece.chunks_exact(header.width).try_for_each(&mut take)?;
+                left -= piece.len() / header.width;
+            }
+            // the archive's own sum is looked at where the member ends
+            from.read(&mut [0]).map(|_| ()).map_err(damaged)
+        };
+        let read = read();
+        drop(from);
+        read.map_err(|found| self.unexpected(array, &found, expected))
+    }
+}
+
+/// Most arrays whose names a message lists.
+const MOST_NAMED: usize = 40;
+
+fn of_type(header: &Header) -> String {
+    format!("has elements of type {} with {} bytes", header.kind.escape_debug(), header.width)
 }
 
 #[cfg(test)]
@@ -316,30 +348,54 @@ mod tests {
         assert!(file.real("c", "numbers").is_err());
     }
 
-    #[test]
-    fn fortran_order_is_turned() {
-        // column by column: (0,0) (1,0) (0,1) (1,1) (0,2) (1,2)
-        let turned = in_c_order(vec![1, 4, 2, 5, 3, 6], &[2, 3], Order::Fortran);
-        assert_eq!(turned, [1, 2, 3, 4, 5, 6]);
-        let three = in_c_order((0..24).collect(), &[2, 3, 4], Order::Fortran);
-        // (1, 2, 3) stands at 1 + 2·2 + 6·3 in Fortran order and last in C order
-        assert_eq!(three[23], 23);
-        // (0, 1, 2) at 0 + 2·1 + 6·2
-        assert_eq!(three[4 + 2], 14);
+    /// An archive of one array `force` with this header and so many bytes of zero behind it.
+    fn force(descr: &str, shape: &str, zeros: usize) -> tempfile::NamedTempFile {
+        let file = tempfile::NamedTempFile::new().expect("a temporary file");
+        let mut zip = zip::ZipWriter::new(file.reopen().expect("the same file"));
+        zip.start_file("force.npy", SimpleFileOptions::default()).expect("entry");
+        let mut npy = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+        let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}");
+        npy.extend(format!("{header:<117}\n").bytes());
+        npy.resize(npy.len() + zeros, 0);
+        io::Write::write_all(&mut zip, &npy).expect("written");
+        zip.finish().expect("closed");
+        file
     }
 
     #[test]
     fn a_header_that_promises_too_much_is_refused() {
-        let dir = tempfile::tempdir().expect("a temporary folder");
-        let path = dir.path().join("bomb.npz");
-        let mut zip = zip::ZipWriter::new(File::create(&path).expect("writable"));
-        zip.start_file("force.npy", SimpleFileOptions::default()).expect("entry");
-        let mut npy = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
-        let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (4000000000, 1000000), }".to_string();
-        npy.extend(format!("{header:<117}\n").bytes());
-        io::Write::write_all(&mut zip, &npy).expect("written");
-        zip.finish().expect("closed");
-        let error = NpzFile::open(&path).expect("a zip").real("force", "the force").expect_err("bomb");
+        let file = force("<f8", "(4000000000, 1000000)", 0);
+        let error = NpzFile::open(file.path()).expect("a zip").real("force", "the force").expect_err("bomb");
         assert!(error.to_string().contains("`force`"), "{error}");
+        // elements without a byte cost the file nothing, and memory each
+        let file = force("|S0", "(1000000000000,)", 0);
+        let error = NpzFile::open(file.path()).expect("a zip").text("force", "names").expect_err("bomb");
+        assert!(error.to_string().contains("`force` would take"), "{error}");
+    }
+
+    #[test]
+    fn zeros_without_end_are_refused_before_they_are_read() {
+        let file = force("<f4", "(50000000,)", 200_000_000);
+        let size = file.as_file().metadata().expect("there").len();
+        let begun = std::time::Instant::now();
+        let error = NpzFile::open(file.path()).expect("a zip").real("force", "the force").expect_err("bomb");
+        assert!(error.to_string().contains("would take 400 MB"), "{error} of {size} bytes");
+        assert!(begun.elapsed().as_secs() < 2);
+        // what a disk's sector of zeros makes smaller is read
+        let file = force("<f4", "(2, 100000)", 800_000);
+        let read = NpzFile::open(file.path()).expect("a zip").real("force", "the force").expect("zeros");
+        assert_eq!((read.shape, read.values.len()), (vec![2, 100_000], 200_000));
+    }
+
+    #[test]
+    fn a_byte_that_was_changed_is_noticed() {
+        let file = force("<f8", "(1000,)", 8000);
+        let mut bytes = std::fs::read(file.path()).expect("readable");
+        let sum = bytes.windows(4).position(|four| four == b"PK\x01\x02").expect("the list") + 16;
+        bytes[sum] ^= 1;
+        std::fs::write(file.path(), bytes).expect("written");
+        let error =
+            NpzFile::open(file.path()).expect("a zip").real("force", "the force").expect_err("changed");
+        assert!(error.to_string().contains("is damaged"), "{error}");
     }
 }

@@ -3,7 +3,7 @@
 //! Eight sheets (`Channels_A`, `Impacts_A`, …, `VP_Channels`, `VP_RefChannels`), columns found by their heading, in metres.
 //! Every error names sheet, row and column; the row is the one a spreadsheet program shows.
 
-use super::tables::{Cell, Table, csv_tables, workbook_tables};
+use super::tables::{Cell, Tables, csv_tables, workbook_tables};
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -72,12 +72,24 @@ pub struct Positions {
     pub warnings: Vec<String>,
 }
 
+/// The sheets of a geometry.
+const SHEETS: [&str; 8] = [
+    "Channels_A",
+    "Impacts_A",
+    "Channels_B",
+    "Impacts_B",
+    "Channels_AJB",
+    "Impacts_AJB",
+    "VP_Channels",
+    "VP_RefChannels",
+];
+
 /// Reads the workbook at `path`, or the csv tables when `path` is a folder.
 ///
 /// # Errors
 /// [`PositionsError`] naming sheet, row and column.
 pub fn read_positions(path: &Path) -> Result<Positions, PositionsError> {
-    let tables = if path.is_dir() { csv_tables(path) } else { workbook_tables(path) };
+    let tables = if path.is_dir() { csv_tables(path, &SHEETS) } else { workbook_tables(path, &SHEETS) };
     let tables = tables.map_err(|reason| PositionsError::Open { path: path.into(), reason })?;
     let mut reading = Reading { path, tables, warnings: Vec::new() };
     let a = reading.configuration("A")?;
@@ -98,7 +110,7 @@ pub fn read_positions(path: &Path) -> Result<Positions, PositionsError> {
 
 struct Reading<'a> {
     path: &'a Path,
-    tables: BTreeMap<String, Table>,
+    tables: Tables,
     warnings: Vec<String>,
 }
 
@@ -167,10 +179,10 @@ impl Reading<'_> {
     }
 
     fn points(&mut self, sheet_name: &str) -> Result<Vec<Point>, PositionsError> {
-        let table = self.tables.get(sheet_name).ok_or_else(|| PositionsError::MissingSheet {
+        let table = self.tables.named.get(sheet_name).ok_or_else(|| PositionsError::MissingSheet {
             path: self.path.into(),
             sheet: sheet_name.into(),
-            available: self.tables.keys().cloned().collect::<Vec<_>>().join(", "),
+            available: self.tables.available.join(", "),
         })?;
         let mut rows = table.iter().filter(|(_, cells)| cells.iter().any(|c| *c != Cell::Empty));
         let headings = rows.next().map(|(_, cells)| cells.as_slice()).unwrap_or_default();

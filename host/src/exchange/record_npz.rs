@@ -6,6 +6,10 @@ use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 use crate::spectra::{ImpactRecords, MotionQuantity};
 use std::path::Path;
 
+/// Most hits of a file, and most channels of a hit: more is an axis in the wrong place.
+pub(super) const MOST_HITS: usize = 10_000;
+pub(super) const MOST_CHANNELS: usize = 1000;
+
 /// Reads impact records: `fs` (Hz), `force` (hit, sample) N, `response` (hit, channel, sample) SI, `quantity` = velocity |
 /// acceleration | displacement. One hit may come without the hit axis, one channel without the channel axis.
 ///
@@ -20,6 +24,10 @@ pub fn read_impacts(path: &Path) -> Result<ImpactRecords, NpzError> {
         [hits, samples] => (hits, samples),
         _ => return Err(file.unexpected("force", &format!("has shape {:?}", force.shape), "(hit, sample)")),
     };
+    if hits > MOST_HITS {
+        let found = format!("has {hits} hits, at most {MOST_HITS} are read");
+        return Err(file.unexpected("force", &found, "(hit, sample): is the first axis the hit?"));
+    }
     let expected = format!("(hit, channel, sample) = ({hits}, channels, {samples})");
     let response = file.real("response", &expected)?;
     let channels = match response.shape[..] {
@@ -34,20 +42,38 @@ pub fn read_impacts(path: &Path) -> Result<ImpactRecords, NpzError> {
     if hits == 0 || samples == 0 || channels == 0 {
         return Err(file.content("there is no hit, no channel or no sample in it"));
     }
+    if channels > MOST_CHANNELS {
+        let found = format!("has {channels} channels, at most {MOST_CHANNELS} are read");
+        return Err(file.unexpected(
+            "response",
+            &found,
+            "(hit, channel, sample): is the second axis the channel?",
+        ));
+    }
     let word = file.word("quantity", "velocity, acceleration or displacement")?;
     let quantity = MotionQuantity::from_name(&word).ok_or_else(|| {
         file.unexpected("quantity", &format!("is `{word}`"), "velocity, acceleration or displacement")
     })?;
     Ok(ImpactRecords {
         fs_hz,
-        force_n: force.values.chunks(samples).map(<[f64]>::to_vec).collect(),
-        response: response
-            .values
-            .chunks(samples * channels)
-            .map(|hit| hit.chunks(samples).map(<[f64]>::to_vec).collect())
+        force_n: apart(force.values, samples),
+        response: apart(response.values, samples * channels)
+            .into_iter()
+            .map(|hit| apart(hit, samples))
             .collect(),
         quantity,
     })
+}
+
+/// Signals of `each` samples, from the last to the first, so that there is never a second copy of all.
+fn apart(mut all: Vec<f64>, each: usize) -> Vec<Vec<f64>> {
+    let mut signals = Vec::with_capacity(all.len().div_ceil(each));
+    while !all.is_empty() {
+        signals.push(all.split_off((all.len() - 1) / each * each));
+        all.shrink_to_fit();
+    }
+    signals.reverse();
+    signals
 }
 
 /// Writes impact records in the same form.

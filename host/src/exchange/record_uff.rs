@@ -3,9 +3,11 @@
 //! A function whose ordinate is a force begins a hit; the motions that follow it, up to the next force, are its responses. Responses
 //! along x, y and z (directions ±1, ±2, ±3) are put in this order, one along a negative axis is turned; others stay as they stand.
 
-use super::uff::{Abscissa, Contents, Dof, Function, Values, kind, quantity, read};
-use super::{FrfUffError, NpzError, frf_file, read_impacts};
+use super::record_npz::{MOST_CHANNELS, MOST_HITS};
+use super::uff::{Abscissa, Contents, Dof, Function, Values, kind, quantity};
+use super::{FrfUffError, NpzError, frf_file, frf_uff, read_impacts};
 use crate::spectra::{ImpactRecords, MotionQuantity};
+use std::collections::HashMap;
 use std::path::Path;
 
 /// Sampling rates this close to a whole number are one: the format keeps the step's digits, not the rate's.
@@ -33,8 +35,8 @@ pub fn read_record_file(path: &Path) -> Result<(ImpactRecords, Vec<String>), Rec
     if frf_file::is_npz(path)? {
         return Ok((read_impacts(path)?, Vec::new()));
     }
-    let bytes = std::fs::read(path).map_err(|source| FrfUffError::Open { path: path.into(), source })?;
-    Ok(from_contents(&read(&bytes)).map_err(|reason| FrfUffError::Content { path: path.into(), reason })?)
+    let contents = frf_uff::contents(path)?;
+    Ok(from_contents(&contents).map_err(|reason| FrfUffError::Content { path: path.into(), reason })?)
 }
 
 /// Records of one place of impact and one sensor, with the names that the labels give them.
@@ -67,9 +69,9 @@ pub fn from_contents(contents: &Contents) -> Result<(ImpactRecords, Vec<String>)
 pub fn by_label(contents: &Contents) -> Result<(Vec<LabelledRecords>, Vec<String>), String> {
     let (hits, warnings) = hits(contents)?;
     let mut rows: Vec<(String, String, Vec<Hit<'_>>)> = Vec::new();
+    let mut row_of: HashMap<(String, String), usize> = HashMap::new();
     for (number, hit) in hits.iter().enumerate() {
         let force = hit[0];
-        let of_hit = rows.len();
         let impact = name_of(&force.0.response)
             .ok_or_else(|| format!("the force of hit {number} names neither entity nor node"))?;
         let mut own: Vec<(String, Hit<'_>)> = Vec::new();
@@ -78,14 +80,16 @@ pub fn by_label(contents: &Contents) -> Result<(Vec<LabelledRecords>, Vec<String
                 .ok_or_else(|| format!("a response of hit {number} names neither entity nor node"))?;
             match own.iter_mut().find(|(known, _)| *known == name) {
                 Some((_, functions)) => functions.push(*response),
+                // a hit has no more responses than a rig has sensors
                 None => own.push((name, vec![force, *response])),
             }
         }
         for (response, functions) in own {
-            match rows[..of_hit].iter_mut().find(|row| row.0 == impact && row.1 == response) {
-                Some((.., hits)) => hits.push(functions),
-                None => rows.push((impact.clone(), response, vec![functions])),
-            }
+            let row = *row_of.entry((impact.clone(), response.clone())).or_insert_with(|| {
+                rows.push((impact.clone(), response, Vec::new()));
+                rows.len() - 1
+            });
+            rows[row].2.push(functions);
         }
     }
     let labelled = rows.into_iter().map(|(impact, response, hits)| {
@@ -111,11 +115,20 @@ fn name_of(dof: &Dof) -> Option<String> {
 }
 
 fn hits(contents: &Contents) -> Result<(Vec<Hit<'_>>, Vec<String>), String> {
-    let warnings: Vec<String> = contents.faults.iter().map(|f| format!("{f}; left out")).collect();
+    let warnings = frf_uff::left_out(contents);
     let mut hits: Vec<Hit<'_>> = Vec::new();
     for function in contents.functions() {
         let (kind::TIME, Values::Real(values)) = (function.kind, &function.values) else { continue };
+        let full = hits.len() == MOST_HITS;
         match (function.axes[1].quantity, hits.last_mut()) {
+            (quantity::FORCE, _) if full => {
+                return Err(format!("it has more than {MOST_HITS} hits: split the file"));
+            }
+            (_, Some(hit)) if hit.len() > MOST_CHANNELS => {
+                return Err(format!(
+                    "a force is followed by more than {MOST_CHANNELS} responses: every hit begins with its force"
+                ));
+            }
             (quantity::FORCE, _) => hits.push(vec![(function, values)]),
             (_, Some(hit)) => hit.push((function, values)),
             (_, None) => {
@@ -174,7 +187,8 @@ fn motion(hits: &[Hit<'_>]) -> Result<MotionQuantity, String> {
     let mut found: Vec<i64> = Vec::new();
     for (function, _) in hits.iter().flat_map(|hit| &hit[1..]) {
         let quantity = function.axes[1].quantity;
-        if !found.contains(&quantity) {
+        // two are one too many already
+        if found.len() < 4 && !found.contains(&quantity) {
             found.push(quantity);
         }
     }
@@ -190,7 +204,7 @@ fn motion(hits: &[Hit<'_>]) -> Result<MotionQuantity, String> {
 }
 
 fn responses(functions: &[(&Function, &[f64])]) -> Vec<Vec<f64>> {
-    let along = |axis: i64| functions.iter().find(|(f, _)| f.response.direction.abs() == axis);
+    let along = |axis: i64| functions.iter().find(|(f, _)| f.response.direction.saturating_abs() == axis);
     match [along(1), along(2), along(3)] {
         [Some(x), Some(y), Some(z)] if functions.len() == 3 => [x, y, z]
             .map(|(function, values)| {
@@ -204,7 +218,7 @@ fn responses(functions: &[(&Function, &[f64])]) -> Vec<Vec<f64>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::uff::{DataSet, write};
+    use super::super::uff::{DataSet, read, write};
     use super::super::uff_output::write_records;
     use super::*;
 

@@ -1,8 +1,14 @@
-//! Sheets of a workbook, or csv files of a folder, as plain rows of cells.
+//! Sheets of a workbook, or csv files of a folder, as plain rows of cells: the named ones only, cell by cell, and no more of them than a
+//! geometry can have.
 
-use calamine::{Data, Reader, Xlsx, open_workbook};
+use calamine::{DataRef, Reader, Xlsx};
 use std::collections::BTreeMap;
+use std::io::{BufReader, Cursor, ErrorKind, Read};
 use std::path::Path;
+
+use super::workbook_parts;
+use crate::advice;
+use crate::foreign::{self, megabytes};
 
 /// A cell: text as it stands, or a number.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,68 +21,239 @@ pub(super) enum Cell {
 /// Rows of one sheet with the spreadsheet's row number of each.
 pub(super) type Table = Vec<(usize, Vec<Cell>)>;
 
-/// All sheets of a workbook, or why it cannot be read.
-pub(super) fn workbook_tables(path: &Path) -> Result<BTreeMap<String, Table>, String> {
-    let mut workbook: Xlsx<_> = open_workbook(path).map_err(|e: calamine::XlsxError| e.to_string())?;
-    let mut tables = BTreeMap::new();
-    for sheet in workbook.sheet_names() {
-        let range = workbook.worksheet_range(&sheet).map_err(|e| format!("sheet `{sheet}`: {e}"))?;
-        let first = range.start().map_or(0, |(row, _)| row as usize);
-        let rows = range
-            .rows()
-            .enumerate()
-            .map(|(i, row)| (first + i + 1, row.iter().map(cell).collect()))
-            .collect();
-        tables.insert(sheet, rows);
-    }
-    Ok(tables)
+/// What was found: the tables that were asked for, and the names of all.
+#[derive(Debug, Default)]
+pub(super) struct Tables {
+    pub named: BTreeMap<String, Table>,
+    pub available: Vec<String>,
 }
 
-fn cell(data: &Data) -> Cell {
+/// Most rows of a table: a row is a channel or an impact.
+const MOST_ROWS: usize = 10_000;
+/// Most columns: a geometry has some ten.
+const MOST_COLUMNS: usize = 256;
+/// Most cells of all tables, and bytes of text in them.
+const MOST_CELLS: usize = 500_000;
+const MOST_TEXT: usize = 8 << 20;
+/// Most bytes of a workbook.
+const MOST_BYTES: u64 = 8 << 20;
+/// Most sheets that a message names.
+const MOST_NAMED: usize = 40;
+
+/// What may still be read of all tables.
+struct Room {
+    cells: usize,
+    text: usize,
+}
+
+impl Room {
+    const ALL: Room = Room { cells: MOST_CELLS, text: MOST_TEXT };
+
+    /// Puts a cell into the table's last row. `at` is how a message names the place.
+    fn put(
+        &mut self,
+        row: &mut Vec<Cell>,
+        column: usize,
+        cell: Cell,
+        at: impl Fn() -> String,
+    ) -> Result<(), String> {
+        let of_geometry = "a geometry has a row for each channel or impact: clear what is beside its table";
+        if column >= MOST_COLUMNS {
+            return Err(format!("{}: column {} of at most {MOST_COLUMNS}; {of_geometry}", at(), column + 1));
+        }
+        let added = (column + 1).saturating_sub(row.len());
+        let text = if let Cell::Text(text) = &cell { text.len() } else { 0 };
+        let (Some(cells), Some(text)) = (self.cells.checked_sub(added), self.text.checked_sub(text)) else {
+            let most = megabytes(MOST_TEXT as u64);
+            return Err(format!("{}: more than {MOST_CELLS} cells, or {most} of text; {of_geometry}", at()));
+        };
+        (self.cells, self.text) = (cells, text);
+        if added > 0 {
+            row.resize(column + 1, Cell::Empty);
+        }
+        row[column] = cell;
+        Ok(())
+    }
+}
+
+fn too_many_rows(at: &str) -> String {
+    format!(
+        "{at}: more than {MOST_ROWS} rows; a geometry has a row for each channel or impact: clear what is below its table"
+    )
+}
+
+/// The wanted sheets of a workbook, or why it cannot be read.
+pub(super) fn workbook_tables(path: &Path, wanted: &[&str]) -> Result<Tables, String> {
+    let bytes = foreign::bytes(path, MOST_BYTES).map_err(|error| told(&error))?;
+    workbook_parts::refuse_lies(&bytes)?;
+    let mut workbook: Xlsx<_> = Xlsx::new(Cursor::new(bytes)).map_err(|error| error.to_string())?;
+    let mut room = Room::ALL;
+    let mut found = Tables::default();
+    found.available.extend(workbook.sheet_names().into_iter().take(MOST_NAMED));
+    for sheet in wanted {
+        if !workbook.sheet_names().iter().any(|name| name == sheet) {
+            continue;
+        }
+        let of_sheet = |error: calamine::XlsxError| format!("sheet `{sheet}`: {error}");
+        let mut cells = match workbook.worksheet_cells_reader(sheet) {
+            Ok(cells) => cells,
+            // a sheet that holds a chart
+            Err(calamine::XlsxError::NotAWorksheet(_)) => continue,
+            Err(error) => return Err(of_sheet(error)),
+        };
+        let mut table: Table = Vec::new();
+        let mut read = 0;
+        while let Some(cell) = cells.next_cell().map_err(of_sheet)? {
+            let (row, column) = (cell.get_position().0 as usize + 1, cell.get_position().1 as usize);
+            let at = || format!("sheet `{sheet}`, row {row}");
+            read += 1;
+            if read > MOST_CELLS {
+                return Err(format!("{}: more than {MOST_CELLS} cells", at()));
+            }
+            let cell = of_workbook(cell.get_value(), &room);
+            if cell.is_err() {
+                return Err(format!("{}: more than {} of text in all", at(), megabytes(MOST_TEXT as u64)));
+            }
+            let Ok(Some(cell)) = cell else { continue };
+            match table.last() {
+                Some((last, _)) if *last == row => {}
+                Some((last, _)) if *last > row => {
+                    return Err(format!("{}: it stands below row {last}: save the workbook again", at()));
+                }
+                _ if table.len() >= MOST_ROWS => return Err(too_many_rows(&at())),
+                _ => table.push((row, Vec::new())),
+            }
+            if let Some((_, cells)) = table.last_mut() {
+                room.put(cells, column, cell, at)?;
+            }
+        }
+        found.named.insert((*sheet).into(), table);
+    }
+    Ok(found)
+}
+
+/// A text longer than there is room for.
+struct TooLong;
+
+/// A cell with something in it. Many cells may name one text, which the workbook holds once: its length is looked at before it is copied.
+fn of_workbook(data: &DataRef<'_>, room: &Room) -> Result<Option<Cell>, TooLong> {
+    let text = |text: &str| match text.len() <= room.text {
+        true if text.trim().is_empty() => Ok(None),
+        true => Ok(Some(Cell::Text(text.into()))),
+        false => Err(TooLong),
+    };
     match data {
-        Data::Empty => Cell::Empty,
-        Data::Float(v) => Cell::Number(*v),
-        Data::Int(v) => Cell::Number(*v as f64),
-        Data::String(text) if text.trim().is_empty() => Cell::Empty,
-        Data::String(text) => Cell::Text(text.clone()),
-        other => Cell::Text(other.to_string()),
+        DataRef::Empty => Ok(None),
+        DataRef::Float(value) => Ok(Some(Cell::Number(*value))),
+        DataRef::Int(value) => Ok(Some(Cell::Number(*value as f64))),
+        DataRef::String(owned) => text(owned),
+        DataRef::SharedString(shared) => text(shared),
+        other => text(&calamine::Data::from(other.clone()).to_string()),
     }
 }
 
-/// All csv files of a folder, named by their stems, or why they cannot be read.
-pub(super) fn csv_tables(path: &Path) -> Result<BTreeMap<String, Table>, String> {
-    let mut tables = BTreeMap::new();
-    for entry in std::fs::read_dir(path).map_err(|e| e.to_string())? {
-        let file = entry.map_err(|e| e.to_string())?.path();
+/// The wanted csv files of a folder, named by their stems, or why they cannot be read.
+pub(super) fn csv_tables(path: &Path, wanted: &[&str]) -> Result<Tables, String> {
+    let mut room = Room::ALL;
+    let mut left = foreign::TABLE;
+    let mut found = Tables::default();
+    for entry in std::fs::read_dir(path).map_err(|error| told(&error))? {
+        let file = entry.map_err(|error| told(&error))?.path();
         if file.extension().is_none_or(|e| !e.eq_ignore_ascii_case("csv")) {
             continue;
         }
         let Some(sheet) = file.file_stem().and_then(|s| s.to_str()) else { continue };
-        let text = std::fs::read_to_string(&file).map_err(|e| format!("{}: {e}", file.display()))?;
-        let mut reader =
-            csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
-        let mut table: Table = Vec::new();
-        for record in reader.records() {
-            let record = record.map_err(|e| format!("{}: {e}", file.display()))?;
-            // The reader's own line number lags by one in files with CR LF; its byte position may stand on
-            // the previous line's LF, which is counted then.
-            let byte = record.position().map_or(0, |p| p.byte() as usize);
-            let row = 1 + text.bytes().take(byte + 1).filter(|&b| b == b'\n').count();
-            let cells = record
-                .iter()
-                .map(|text| match text.trim_start_matches('\u{feff}').trim() {
-                    "" => Cell::Empty,
-                    text => Cell::Text(text.into()),
-                })
-                .collect();
-            table.push((row, cells));
+        if found.available.len() < MOST_NAMED {
+            found.available.push(sheet.into());
         }
-        tables.insert(sheet.to_string(), table);
+        if wanted.contains(&sheet) {
+            let of_file = |what: String| format!("{}: {what}", file.display());
+            let text = foreign::text(&file, left).map_err(|error| of_file(told(&error)))?;
+            left -= text.len() as u64;
+            let table = csv_table(&text, &mut room).map_err(of_file)?;
+            found.named.insert(sheet.to_string(), table);
+        }
     }
-    if tables.is_empty() {
+    found.available.sort_unstable();
+    if found.available.is_empty() {
         return Err(
             "the folder has no .csv tables; they are named Channels_A.csv, Impacts_A.csv and so on".into()
         );
     }
-    Ok(tables)
+    Ok(found)
+}
+
+fn csv_table(text: &str, room: &mut Room) -> Result<Table, String> {
+    // a row is held as a whole, with a place for each column, before anybody can count them
+    let wide = |line: &str| line.bytes().filter(|byte| *byte == b',').count() >= MOST_COLUMNS;
+    if let Some(at) = text.split('\n').position(wide) {
+        return Err(format!(
+            "row {}: column {} of at most {MOST_COLUMNS}; a geometry has some ten columns: clear what is beside its table",
+            at + 1,
+            MOST_COLUMNS + 1
+        ));
+    }
+    let from = BufReader::new(text.as_bytes().take(text.len() as u64));
+    let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(from);
+    let mut table: Table = Vec::new();
+    // lines are counted on from the row before: counting all of them for every row would take its time
+    let (mut counted, mut line) = (0, 1);
+    for record in reader.records() {
+        let record = record.map_err(|error| error.to_string())?;
+        // The reader's own line number lags by one in files with CR LF; its byte position may stand on the ends of lines before the record.
+        let byte = record.position().map_or(0, |p| p.byte() as usize).max(counted);
+        let ends = text.as_bytes()[byte..].iter().take_while(|byte| matches!(byte, b'\r' | b'\n')).count();
+        let end = byte + ends;
+        line += text[counted..end].matches('\n').count();
+        counted = end;
+        let at = || format!("row {line}");
+        if table.len() >= MOST_ROWS {
+            return Err(too_many_rows(&at()));
+        }
+        let mut cells = Vec::new();
+        for (column, text) in record.iter().enumerate() {
+            let cell = match text.trim_start_matches('\u{feff}').trim() {
+                "" => Cell::Empty,
+                text => Cell::Text(text.into()),
+            };
+            room.put(&mut cells, column, cell, at)?;
+        }
+        table.push((line, cells));
+    }
+    Ok(table)
+}
+
+fn told(error: &std::io::Error) -> String {
+    match error.kind() {
+        // the caller says what to give instead
+        ErrorKind::NotFound => error.to_string(),
+        _ => format!("{error}; {}", advice::reading(error)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_keep_their_numbers_with_either_end_of_line_and_breaks_in_quotes() {
+        for end in ["\n", "\r\n"] {
+            let text = ["a,b", "1,2", "\"x", "y\",3", "", "4,5", ""].join(end);
+            let rows: Vec<usize> =
+                csv_table(&text, &mut Room { ..Room::ALL }).expect("a table").iter().map(|r| r.0).collect();
+            assert_eq!(rows, [1, 2, 3, 6], "{end:?}");
+        }
+    }
+
+    #[test]
+    fn a_long_table_takes_no_longer_for_each_row() {
+        let begun = std::time::Instant::now();
+        let text = "1,2,3,4,5,6,7,8,9,10\n".repeat(MOST_ROWS);
+        assert_eq!(csv_table(&text, &mut Room { ..Room::ALL }).expect("a table").len(), MOST_ROWS);
+        assert!(begun.elapsed().as_secs() < 2);
+        let said = csv_table(&format!("{text}1\n"), &mut Room { ..Room::ALL }).expect_err("one too many");
+        assert!(said.contains("row 10001") && said.contains("clear"), "{said}");
+        let said = csv_table(&",".repeat(300), &mut Room { ..Room::ALL }).expect_err("too wide");
+        assert!(said.contains("row 1: column 257"), "{said}");
+    }
 }

@@ -8,6 +8,7 @@ use tokio::sync::watch;
 
 use super::message::{Can, Message, Snapshot};
 use super::now::{Now, Shaker, State as Doing};
+use crate::outside::shown_json;
 
 /// Messages that are kept for a listener who is late; who is later still gets the whole.
 const KEPT: usize = 4096;
@@ -128,7 +129,8 @@ struct Written<'a> {
 
 fn numbered(seq: u64, message: &Message) -> Numbered {
     let text = serde_json::to_string(&Written { seq, message }).unwrap_or_default();
-    Numbered { seq, text: text.into() }
+    // names of devices and of plans among them
+    Numbered { seq, text: shown_json(&text).into() }
 }
 
 impl Snapshot {

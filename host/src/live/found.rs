@@ -11,6 +11,7 @@ use super::message::Estimate;
 use super::numbers::{CellHeard, heard};
 use crate::analyse::{AnalyseError, Wanted};
 use crate::campaign::store::Store;
+use crate::outside::shown_json;
 use crate::report::figure::Figure;
 use crate::report::words::brief;
 use crate::report::{self, figure_fragment};
@@ -66,5 +67,5 @@ impl Found {
 
 /// A figure as the page gets it: as data, and as the drawing that stands there until the data are alive.
 pub fn drawn(figure: &Figure) -> String {
-    json!({ "figure": figure, "html": figure_fragment(figure) }).to_string()
+    shown_json(&json!({ "figure": figure, "html": figure_fragment(figure) }).to_string()).into_owned()
 }

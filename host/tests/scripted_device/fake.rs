@@ -7,6 +7,8 @@ use std::collections::VecDeque;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
 use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
 use jointrig_protocol::acknowledge::Acknowledge;
@@ -53,6 +55,17 @@ pub struct Fake {
     /// Whether it knows a stage.
     pub stage_known: bool,
     pub hello: Hello,
+    /// What it says of itself, and of a channel.
+    pub info: fn(&mut Info),
+    pub channel: fn(&mut Channel),
+    /// What it says of a shot that hit.
+    pub tells_shot: fn(&mut Shot),
+    /// Scans that it reports as lost at each block, whatever it sends.
+    pub loses: Option<Range<u64>>,
+    /// It waits so long before each block, and sends one at a time.
+    pub slow: Option<Duration>,
+    /// Shots that it was ordered, whatever became of them.
+    pub orders: Arc<AtomicU32>,
     accumulator: Accumulator,
     out: VecDeque<u8>,
     memory: VecDeque<(u32, Vec<u8>)>,
@@ -85,6 +98,12 @@ impl Default for Fake {
             restarts_after: None,
             stage_known: true,
             hello: Hello::device(0, 5, RING),
+            info: |_| (),
+            channel: |_| (),
+            tells_shot: |_| (),
+            loses: None,
+            slow: None,
+            orders: Arc::default(),
             accumulator: Accumulator::new(),
             out: VecDeque::new(),
             memory: VecDeque::new(),
@@ -182,32 +201,38 @@ impl Fake {
     #[expect(clippy::result_large_err, reason = "the protocol's own type")]
     fn carry_out(&mut self, request: Request, again: &mut Vec<(u64, Vec<i16>)>) -> Result<Answer, Refusal> {
         Ok(match request {
-            Request::Info => Answer::Info(Info {
-                board: "fake".parse().expect("short"),
-                serial: "1".parse().expect("short"),
-                version: "0.1.0".parse().expect("short"),
-                target: "test".parse().expect("short"),
-                build: 1,
-                channels: ROLES.len() as u8,
-                scan_rate_hz: RATE,
-                ring_scans: RING,
-                coil_cap_us: self.coil_cap_us,
-                stage: self.stage_known,
-                drive_v: 0.0,
-                reset: Reset::Power,
-            }),
+            Request::Info => Answer::Info(changed(
+                self.info,
+                Info {
+                    board: "fake".parse().expect("short"),
+                    serial: "1".parse().expect("short"),
+                    version: "0.1.0".parse().expect("short"),
+                    target: "test".parse().expect("short"),
+                    build: 1,
+                    channels: ROLES.len() as u8,
+                    scan_rate_hz: RATE,
+                    ring_scans: self.hello.ring_scans,
+                    coil_cap_us: self.coil_cap_us,
+                    stage: self.stage_known,
+                    drive_v: 0.0,
+                    reset: Reset::Power,
+                },
+            )),
             Request::Channel { index } => {
                 let role = *ROLES.get(usize::from(index)).ok_or(Refusal::NoSuchChannel)?;
                 let force = role == Role::HammerForce;
-                Answer::Channel(Channel {
-                    name: format!("ch{index}").as_str().try_into().expect("short"),
-                    role,
-                    quantity: if force { Quantity::Force } else { Quantity::Velocity },
-                    units_per_volt: if force { 32.768 } else { 0.001 },
-                    range_v: 10.0,
-                    delay_ns: 0,
-                    bits: 16,
-                })
+                Answer::Channel(changed(
+                    self.channel,
+                    Channel {
+                        name: format!("ch{index}").as_str().try_into().expect("short"),
+                        role,
+                        quantity: if force { Quantity::Force } else { Quantity::Velocity },
+                        units_per_volt: if force { 32.768 } else { 0.001 },
+                        range_v: 10.0,
+                        delay_ns: 0,
+                        bits: 16,
+                    },
+                ))
             }
             Request::Shake(_) | Request::Rest => return Err(Refusal::Unsupported),
             Request::Slow => Answer::Slow(Slow::default()),
@@ -268,6 +293,7 @@ impl Fake {
                 }
                 assert!(fire.not_before >= self.next_scan, "the device has passed not_before");
                 let number = fire.number;
+                self.orders.fetch_add(1, Ordering::Relaxed);
                 self.shot = Some(shot(&fire, Phase::Waiting));
                 self.fire = Some(fire);
                 self.armed = false;
@@ -314,6 +340,11 @@ impl Fake {
             return false;
         }
         let first = self.next_scan;
+        if let Some(lost) = self.loses.clone() {
+            let (epoch, why) = (self.epoch, Loss::LinkSlow);
+            let scans = (lost.end - lost.start) as u32;
+            self.event(Event::Lost { epoch, first_scan: lost.start, scans, why });
+        }
         self.hammer(first);
         let codes: Vec<i16> = (first..first + BLOCK)
             .flat_map(|scan| (0..ROLES.len()).map(move |place| (scan, place)))
@@ -352,6 +383,7 @@ impl Fake {
             && scan > shot.fired_at + FLIGHT + 600
         {
             shot.phase = if shot.trigger > 0 { Phase::Done } else { Phase::Missed };
+            (self.tells_shot)(&mut shot);
             self.shot = Some(shot);
             self.event(Event::Shot(shot));
         }
@@ -378,6 +410,11 @@ impl Fake {
     }
 }
 
+fn changed<T>(change: fn(&mut T), mut what: T) -> T {
+    change(&mut what);
+    what
+}
+
 fn shot(fire: &Fire, phase: Phase) -> Shot {
     Shot {
         number: fire.number,
@@ -399,7 +436,13 @@ impl Transport for Fake {
         if self.dies_after == Some(0) {
             return Err(io::ErrorKind::BrokenPipe.into());
         }
-        for _ in 0..8 {
+        let blocks = if let Some(wait) = self.slow.filter(|_| self.streaming) {
+            std::thread::sleep(wait);
+            1
+        } else {
+            8
+        };
+        for _ in 0..blocks {
             if !self.advance() {
                 break;
             }

@@ -5,5 +5,6 @@ mod by_summary;
 mod fake;
 mod faulty;
 mod following;
+mod hostile;
 mod runner;
 mod session;

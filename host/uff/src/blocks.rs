@@ -1,6 +1,6 @@
 //! Where each data set begins and ends: by its lines of `-1`, and by byte counts where the data are binary.
 
-use super::lines::{Lines, Span, Wrong, is_delimiter};
+use super::lines::{LONGEST_LINE, Lines, Span, Wrong, is_delimiter};
 use super::{set58_header, set58_values};
 
 /// One data set's bytes.
@@ -23,51 +23,71 @@ pub(super) struct Unusable {
     pub wrong: Wrong,
 }
 
-/// Splits a file into its data sets.
-pub(super) fn split(bytes: &[u8]) -> Vec<Result<Block<'_>, Unusable>> {
-    let mut blocks = Vec::new();
-    let mut lines = Lines::of(Span { bytes, offset: 0 });
-    while let Some((offset, line)) = lines.next() {
-        if !is_delimiter(line) {
-            continue;
-        }
-        // a second `-1` at once: the first one closed something that had not been opened
-        let Some((identifier_offset, identifier)) = lines.next_unless(is_delimiter) else { continue };
+/// The data sets of a file, one after the other.
+pub(super) struct Blocks<'a> {
+    bytes: &'a [u8],
+    lines: Lines<'a>,
+}
+
+impl<'a> Blocks<'a> {
+    /// The data sets in these bytes.
+    pub fn of(bytes: &'a [u8]) -> Self {
+        Blocks { bytes, lines: Lines::of(Span { bytes, offset: 0 }) }
+    }
+
+    /// Where the next one is looked for.
+    pub fn offset(&self) -> usize {
+        self.lines.offset()
+    }
+}
+
+impl<'a> Iterator for Blocks<'a> {
+    type Item = Result<Block<'a>, Unusable>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let (bytes, lines) = (self.bytes, &mut self.lines);
+        let (offset, identifier_offset, identifier) = loop {
+            let (offset, line) = lines.next()?;
+            if !is_delimiter(line) {
+                continue;
+            }
+            // a second `-1` at once: the first one closed something that had not been opened
+            if let Some((at, identifier)) = lines.next_unless(is_delimiter) {
+                break (offset, at, identifier);
+            }
+        };
         let digits = identifier.iter().skip_while(|b| **b == b' ').take_while(|b| b.is_ascii_digit()).count();
         let blanks = identifier.iter().take_while(|b| **b == b' ').count();
         let number =
             std::str::from_utf8(&identifier[blanks..blanks + digits]).ok().and_then(|t| t.parse().ok());
         let Some(number) = number else {
             let reason = "after a line of -1 there is no number of a data set".to_string();
-            blocks.push(Err(Unusable { number: 0, wrong: Wrong { offset: identifier_offset, reason } }));
-            skip_to_end(&mut lines);
-            continue;
+            skip_to_end(lines);
+            return Some(Err(Unusable { number: 0, wrong: Wrong { offset: identifier_offset, reason } }));
         };
-        let identifier = Span { bytes: &identifier[blanks + digits..], offset: identifier_offset };
+        let identifier = &identifier[blanks + digits..];
+        // the format's line has 80 columns
+        let identifier =
+            Span { bytes: &identifier[..identifier.len().min(LONGEST_LINE)], offset: identifier_offset };
         let start = lines.offset();
         let body = |end: usize| Span { bytes: &bytes[start..end], offset: start };
         let mut block = Block { number, offset, identifier, body: body(start), binary: None };
         let closed = if number == 58 && set58_header::is_binary(identifier.bytes) {
             let header_end = (0..set58_header::LINES).all(|_| lines.next_unless(is_delimiter).is_some());
             block.body = body(lines.offset());
-            if header_end {
-                close_binary(bytes, &mut lines, &mut block)
-            } else {
-                skip_to_end(&mut lines).is_some()
-            }
+            if header_end { close_binary(bytes, lines, &mut block) } else { skip_to_end(lines).is_some() }
         } else {
-            let end = skip_to_end(&mut lines);
+            let end = skip_to_end(lines);
             block.body = body(end.unwrap_or(bytes.len()));
             end.is_some()
         };
-        blocks.push(if closed {
+        Some(if closed {
             Ok(block)
         } else {
             let reason = "the file ends within this data set (there is no closing -1): it was cut off, copy or export it again".to_string();
             Err(Unusable { number, wrong: Wrong { offset: bytes.len(), reason } })
-        });
+        })
     }
-    blocks
 }
 
 /// Moves behind the next line of `-1` and gives the offset where that line begins. At the very end of a file, without an end of
@@ -97,7 +117,7 @@ fn close_binary<'a>(bytes: &'a [u8], lines: &mut Lines<'a>, block: &mut Block<'a
     let mut from = start;
     while let Some(at) = memchr::memmem::find(&bytes[from..], b"    -1").map(|at| from + at) {
         if let Some(after) = delimiter_at(bytes, at) {
-            let next = Lines::of(Span { bytes: &bytes[after..], offset: after }).next();
+            let next = Lines::of(Span { bytes: ahead(bytes, after), offset: after }).next();
             if next.is_none_or(|(_, line)| is_delimiter(line)) {
                 block.binary = Some(Span { bytes: &bytes[start..at], offset: start });
                 lines.jump(after);
@@ -110,9 +130,14 @@ fn close_binary<'a>(bytes: &'a [u8], lines: &mut Lines<'a>, block: &mut Block<'a
     false
 }
 
+/// As much of the file from `at` on as a line of `-1` may be long: whoever asks at many places must not look at all of it each time.
+fn ahead(bytes: &[u8], at: usize) -> &[u8] {
+    &bytes[at..bytes.len().min(at + LONGEST_LINE)]
+}
+
 /// The offset behind a line of `-1` that begins at `at`, or behind one false line end there.
 fn delimiter_at(bytes: &[u8], at: usize) -> Option<usize> {
-    let rest = &bytes[at..];
+    let rest = ahead(bytes, at);
     let blank =
         [&b"\r\n"[..], b"\n", b"\r"].iter().find(|end| rest.starts_with(end)).map_or(0, |end| end.len());
     [0, blank].into_iter().find_map(|skipped| {

@@ -41,7 +41,8 @@
 //! Reading forgives what other programs do: line ends of any kind (also a false one between binary data and the closing `-1`), Latin-1 and
 //! UTF-8 texts, trailing blanks or none, `e`, `E`, `d` and `D` exponents, columns that do not stand where they should, 4- and 8-byte
 //! floats of either byte order, byte counts in 58b headers that are wrong. What cannot be read is a [`Fault`] with the data set, its byte
-//! offset and the reason; all else is still read. No input makes it panic, and memory stays within a small multiple of the input.
+//! offset and the reason; all else is still read. No input makes it panic, and memory stays within a small multiple of the input: a file of
+//! more data sets than its size can hold is read in part, which its last fault says. [`read_functions`] passes everything else over.
 //!
 //! The structs of the data sets mirror a format that has been fixed for decades, so all their fields are public. The feature `parallel`
 //! (off by default) reads and writes large files on all processors.
@@ -173,46 +174,93 @@ impl Contents {
     }
 }
 
+/// So many data sets any file may have …
+const LEAST_SETS: usize = 32_768;
+/// … and one more for so many bytes: the header of a function alone has 400.
+const BYTES_OF_SET: usize = 512;
+/// Data sets that are read at a time.
+const BATCH: usize = 1024;
+
 /// Reads all data sets of a file's bytes; large ones in parallel.
 pub fn read(bytes: &[u8]) -> Contents {
-    enum Read {
-        Set(Box<DataSet>),
-        Fault(Fault),
-        Skipped(Skipped),
-    }
-    let read = of_each(blocks::split(bytes), |(place, block)| {
-        let fault = |number, at: lines::Wrong| {
-            Read::Fault(Fault { data_set: number, place: place + 1, offset: at.offset, reason: at.reason })
-        };
-        let block = match block {
-            Ok(block) => block,
-            Err(unusable) => return fault(unusable.number, unusable.wrong),
-        };
-        let body = lines::Lines::of(block.body);
-        let set = match block.number {
-            58 => set58::read(&block).map(DataSet::from),
-            15 => set15::read(body).map(DataSet::Nodes),
-            2411 => set2411::read(body).map(DataSet::NodesDouble),
-            82 => set82::read(body).map(DataSet::TraceLine),
-            2412 => set2412::read(body).map(DataSet::Elements),
-            151 => set151::read(body).map(DataSet::Header),
-            164 => set164::read(body).map(DataSet::Units),
-            data_set => return Read::Skipped(Skipped { data_set, offset: block.offset }),
-        };
-        match set {
-            Ok(set) => Read::Set(Box::new(set)),
-            Err(wrong) => fault(block.number, wrong),
-        }
-    });
+    read_those(bytes, |_| true)
+}
+
+/// Reads the functions (58 and 58b) alone; every other data set is passed over as one that is not known.
+pub fn read_functions(bytes: &[u8]) -> Contents {
+    read_those(bytes, |number| number == 58)
+}
+
+fn read_those(bytes: &[u8], wanted: impl Fn(u32) -> bool + Sync) -> Contents {
+    let most = LEAST_SETS + bytes.len() / BYTES_OF_SET;
     let mut contents = Contents::default();
-    for item in read {
-        match item {
-            Read::Set(set) => contents.sets.push(*set),
-            Read::Fault(fault) => contents.faults.push(fault),
-            Read::Skipped(skipped) => contents.skipped.push(skipped),
+    let (mut blocks, mut place) = (blocks::Blocks::of(bytes), 0);
+    loop {
+        let batch: Vec<_> = blocks.by_ref().take(BATCH).collect();
+        if batch.is_empty() {
+            return contents;
+        }
+        let first = place + 1;
+        place += batch.len();
+        for item in of_each(batch, |(i, block)| one(first + i, block, &wanted)) {
+            match item {
+                Read::Set(set) => contents.sets.push(*set),
+                Read::Fault(fault) => contents.faults.push(fault),
+                Read::Skipped(skipped) => contents.skipped.push(skipped),
+            }
+        }
+        if place > most {
+            contents.faults.push(Fault {
+                data_set: 0,
+                place,
+                offset: blocks.offset(),
+                reason: format!(
+                    "a file of {} bytes may have {most} data sets: what follows was left unread, split the file",
+                    bytes.len()
+                ),
+            });
+            return contents;
         }
     }
-    contents
+}
+
+/// What came of one data set.
+enum Read {
+    Set(Box<DataSet>),
+    Fault(Fault),
+    Skipped(Skipped),
+}
+
+fn one(
+    place: usize,
+    block: Result<blocks::Block<'_>, blocks::Unusable>,
+    wanted: impl Fn(u32) -> bool,
+) -> Read {
+    let fault = |number, at: lines::Wrong| {
+        Read::Fault(Fault { data_set: number, place, offset: at.offset, reason: at.reason })
+    };
+    let block = match block {
+        Ok(block) => block,
+        Err(unusable) => return fault(unusable.number, unusable.wrong),
+    };
+    if !wanted(block.number) {
+        return Read::Skipped(Skipped { data_set: block.number, offset: block.offset });
+    }
+    let body = lines::Lines::of(block.body);
+    let set = match block.number {
+        58 => set58::read(&block).map(DataSet::from),
+        15 => set15::read(body).map(DataSet::Nodes),
+        2411 => set2411::read(body).map(DataSet::NodesDouble),
+        82 => set82::read(body).map(DataSet::TraceLine),
+        2412 => set2412::read(body).map(DataSet::Elements),
+        151 => set151::read(body).map(DataSet::Header),
+        164 => set164::read(body).map(DataSet::Units),
+        data_set => return Read::Skipped(Skipped { data_set, offset: block.offset }),
+    };
+    match set {
+        Ok(set) => Read::Set(Box::new(set)),
+        Err(wrong) => fault(block.number, wrong),
+    }
 }
 
 /// `f` of each item and its place, in their order; on all processors with the feature `parallel`.

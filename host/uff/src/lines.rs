@@ -3,6 +3,9 @@
 use super::number;
 use std::borrow::Cow;
 
+/// Most bytes of a line that are looked at as text: the format's lines have 80 columns.
+pub(super) const LONGEST_LINE: usize = 1000;
+
 /// Bytes of a file, and where in it they begin.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Span<'a> {
@@ -65,7 +68,7 @@ impl<'a> Lines<'a> {
         let offset = self.offset();
         let (offset, line) =
             self.next().ok_or_else(|| Wrong { offset, reason: format!("the line of {what} is missing") })?;
-        Ok(Record { offset, text: decode(line) })
+        Ok(Record { offset, text: decode(shortened(line, LONGEST_LINE)) })
     }
 }
 
@@ -94,6 +97,15 @@ impl<'a> Iterator for Lines<'a> {
 pub(super) fn is_delimiter(line: &[u8]) -> bool {
     let end = line.iter().rposition(|b| !b.is_ascii_whitespace()).map_or(0, |at| at + 1);
     end <= 6 && line[..end].ends_with(b"-1") && line[..end - 2].iter().all(|b| *b == b' ')
+}
+
+/// At most so many bytes of `line`, without a part of a letter at the end.
+fn shortened(line: &[u8], most: usize) -> &[u8] {
+    let Some(part) = line.get(..most) else { return line };
+    match std::str::from_utf8(part) {
+        Err(error) if error.error_len().is_none() => &part[..error.valid_up_to()],
+        _ => part,
+    }
 }
 
 /// UTF-8 where it is valid, else Latin-1.
@@ -188,7 +200,10 @@ impl<'a> Words<'a> {
         };
         number::parse(word).ok_or_else(|| Wrong {
             offset,
-            reason: format!("`{}` is no number, {what} is expected", String::from_utf8_lossy(word)),
+            reason: format!(
+                "`{}` is no number, {what} is expected",
+                String::from_utf8_lossy(shortened(word, 40))
+            ),
         })
     }
 

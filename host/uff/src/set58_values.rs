@@ -94,31 +94,85 @@ pub(super) fn read_binary(
     Ok((abscissa(shape, places), values, Encoding::Binary(order)))
 }
 
+/// Bytes that a number in text takes, its blank with it: the standard's columns have 13 and 20.
+const NARROWEST: usize = 6;
+/// So many numbers may be narrower, as in files of zeros that somebody typed.
+const NARROW: usize = 1 << 20;
+
 /// Values in text: by columns, or by words where the columns are not the standard's.
 pub(super) fn read_text(lines: Lines<'_>, shape: &Shape) -> Result<(Abscissa, Values, Encoding), Wrong> {
     let start = lines.offset();
     let wanted = shape.points.checked_mul(shape.numbers());
-    let numbers = match by_columns(lines.clone(), shape) {
-        Some(numbers) if Some(numbers.len()) == wanted => numbers,
-        _ => by_words(lines)?,
+    let wrong = |there: &str| {
+        let reason =
+            format!("{} values of {} numbers each are announced and {there}", shape.points, shape.numbers());
+        Wrong { offset: start, reason }
     };
-    if Some(numbers.len()) != wanted {
-        let reason = format!(
-            "{} values of {} numbers each are announced and {} numbers are there",
-            shape.points,
-            shape.numbers(),
-            numbers.len()
-        );
-        return Err(Wrong { offset: start, reason });
+    let there = lines.rest().len();
+    let Some(wanted) = wanted.filter(|wanted| *wanted <= there) else {
+        return Err(wrong(&format!("{there} bytes are there")));
+    };
+    if wanted > there / NARROWEST + NARROW {
+        return Err(wrong(&format!(
+            "{there} bytes are there: write each number into the standard's columns (E13.5 or E20.12)"
+        )));
     }
-    let (place, all) = (usize::from(!shape.even), numbers.chunks_exact(shape.numbers()));
-    let places = if shape.even { Vec::new() } else { all.clone().map(|v| v[0]).collect() };
-    let values = match (shape.complex, shape.even) {
-        (true, _) => Values::Complex(all.map(|v| Complex::new(v[place], v[place + 1])).collect()),
-        (false, true) => Values::Real(numbers),
-        (false, false) => Values::Real(all.map(|v| v[place]).collect()),
+    let found = match by_columns(lines.clone(), Numbers::new(shape, wanted)) {
+        Some(numbers) if numbers.count == wanted => numbers,
+        _ => by_words(lines, Numbers::new(shape, wanted))?,
     };
-    Ok((abscissa(shape, places), values, Encoding::Ascii))
+    if found.count != wanted {
+        let more = if found.count > wanted { " or more" } else { "" };
+        return Err(wrong(&format!("{}{more} numbers are there", found.count)));
+    }
+    let values = if shape.complex { Values::Complex(found.complex) } else { Values::Real(found.real) };
+    Ok((abscissa(shape, found.places), values, Encoding::Ascii))
+}
+
+/// Numbers in the order of the file, put where they belong: there is never a second copy of all of them.
+struct Numbers<'s> {
+    shape: &'s Shape,
+    wanted: usize,
+    count: usize,
+    part: usize,
+    half: f64,
+    places: Vec<f64>,
+    real: Vec<f64>,
+    complex: Vec<Complex<f64>>,
+}
+
+impl<'s> Numbers<'s> {
+    fn new(shape: &'s Shape, wanted: usize) -> Self {
+        let points = wanted / shape.numbers();
+        let room = |there: bool| if there { points } else { 0 };
+        Numbers {
+            shape,
+            wanted,
+            count: 0,
+            part: 0,
+            half: 0.0,
+            places: Vec::with_capacity(room(!shape.even)),
+            real: Vec::with_capacity(room(!shape.complex)),
+            complex: Vec::with_capacity(room(shape.complex)),
+        }
+    }
+
+    /// Takes the next number; false when there are more than wanted.
+    fn take(&mut self, number: f64) -> bool {
+        self.count += 1;
+        if self.count > self.wanted {
+            return false;
+        }
+        let own = self.part + usize::from(self.shape.even);
+        match own {
+            0 => self.places.push(number),
+            1 if self.shape.complex => self.half = number,
+            1 => self.real.push(number),
+            _ => self.complex.push(Complex::new(self.half, number)),
+        }
+        self.part = (self.part + 1) % self.shape.numbers();
+        true
+    }
 }
 
 fn abscissa(shape: &Shape, places: Vec<f64>) -> Abscissa {
@@ -139,10 +193,9 @@ fn column_widths(complex: bool, precision: Precision, even: bool) -> &'static [u
     }
 }
 
-fn by_columns(lines: Lines<'_>, shape: &Shape) -> Option<Vec<f64>> {
+fn by_columns<'s>(lines: Lines<'_>, mut numbers: Numbers<'s>) -> Option<Numbers<'s>> {
+    let shape = numbers.shape;
     let widths = column_widths(shape.complex, shape.precision, shape.even);
-    // a number takes 13 bytes or more
-    let mut numbers = Vec::with_capacity(lines.rest().len() / 13 + 1);
     for (_, line) in lines {
         let mut rest = line;
         for width in widths {
@@ -152,10 +205,9 @@ fn by_columns(lines: Lines<'_>, shape: &Shape) -> Option<Vec<f64>> {
             }
             let (field, after) = rest.split_at_checked(*width).unwrap_or((rest, &[]));
             // a column that begins with a digit may have begun one column earlier
-            if field[0].is_ascii_digit() {
+            if field[0].is_ascii_digit() || !numbers.take(number::parse(field.trim_ascii())?) {
                 return None;
             }
-            numbers.push(number::parse(field.trim_ascii())?);
             rest = after;
         }
         if !rest.trim_ascii().is_empty() {
@@ -165,12 +217,9 @@ fn by_columns(lines: Lines<'_>, shape: &Shape) -> Option<Vec<f64>> {
     Some(numbers)
 }
 
-fn by_words(lines: Lines<'_>) -> Result<Vec<f64>, Wrong> {
+fn by_words<'s>(lines: Lines<'_>, mut numbers: Numbers<'s>) -> Result<Numbers<'s>, Wrong> {
     let mut words = Words::new(lines);
-    let mut numbers = Vec::new();
-    while !words.is_empty() {
-        numbers.push(words.real("a value")?);
-    }
+    while !words.is_empty() && numbers.take(words.real("a value")?) {}
     Ok(numbers)
 }
 

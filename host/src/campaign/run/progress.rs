@@ -7,6 +7,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::campaign::plan::{Cell as PlanCell, configuration_name};
 use crate::campaign::watch::{Left, Seen, Watch};
+use crate::outside::{tell_line, visible};
 
 /// A bar over the hits of the campaign, with the time that is left of cell, configuration and campaign; without a terminal, a line of it
 /// every ten seconds.
@@ -69,7 +70,8 @@ impl Watch for Progress {
         };
         match *seen {
             Seen::Moving { row, by_hand, left, .. } => {
-                state.bar.set_message(format!("{}  {}", label(&row.cell), state.time_left(&row.cell, left)));
+                let message = format!("{}  {}", label(&row.cell), state.time_left(&row.cell, left));
+                state.bar.set_message(visible(&message).into_owned());
                 if by_hand {
                     state.step_aside();
                 }
@@ -83,12 +85,13 @@ impl Watch for Progress {
                 state.bar.set_position(kept);
                 let (time, label) = (state.time_left(&row.cell, left), label(&row.cell));
                 if state.bar.is_hidden() && state.pace.is_due() {
-                    eprintln!("{kept} of {} hits  {label}  {time}", state.wanted);
+                    tell_line!("{kept} of {} hits  {label}  {time}", state.wanted);
                 }
-                state.bar.set_message(format!("{label}  {time}  {}: {}", verdict.kind, verdict.sentence));
+                let message = format!("{label}  {time}  {}: {}", verdict.kind, verdict.sentence);
+                state.bar.set_message(visible(&message).into_owned());
             }
             Seen::Remark(text) if state.bar.is_hidden() => log::warn!("{text}"),
-            Seen::Remark(text) => state.bar.println(text),
+            Seen::Remark(text) => state.bar.println(visible(text)),
             Seen::Ended => state.bar.finish_and_clear(),
             _ => {}
         }

@@ -13,6 +13,7 @@ use super::answers::{Answers, Key, Question};
 use crate::campaign::plan::{Cell, configuration_name};
 use crate::device::error::DeviceError;
 use crate::device::session::Session;
+use crate::outside::{tell, tell_line};
 
 /// Who moves hammer and laser.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -193,10 +194,10 @@ fn ask_both(what: &str, answers: &Answers, question: Question) -> Result<Key, St
     // what was said before the question is no answer to it
     answers.forget();
     lines.try_iter().for_each(drop);
-    eprint!("\n{what}\n{QUESTION}");
+    tell(&format!("\n{what}\n{QUESTION}"));
     loop {
         if let Some(key) = answers.heard(question) {
-            eprintln!("answered on the page: {key:?}");
+            tell_line!("answered on the page: {key:?}");
             return Ok(key);
         }
         if answers.stopped() {
@@ -206,7 +207,7 @@ fn ask_both(what: &str, answers: &Answers, question: Question) -> Result<Key, St
             Ok(line) => match understood(&line) {
                 Understood::Key(key) => return Ok(key),
                 Understood::Quit => return Err(StageError::Stopped),
-                Understood::Nothing => eprint!("`{}` is none of these\n{QUESTION}", line.trim()),
+                Understood::Nothing => tell(&format!("`{}` is none of these\n{QUESTION}", line.trim())),
             },
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => std::thread::sleep(LISTEN),

@@ -70,7 +70,7 @@ impl Calibrate {
 
 /// A laboratory's calibration file.
 pub fn read(path: &Path) -> Result<Vec<SensorPlan>, CliError> {
-    let text = std::fs::read_to_string(path).map_err(|source| CliError::Read {
+    let text = crate::foreign::text(path, crate::foreign::SETTINGS).map_err(|source| CliError::Read {
         path: path.into(),
         doing: "reading the calibration",
         source,

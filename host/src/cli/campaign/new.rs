@@ -9,6 +9,7 @@ use crate::campaign::plan;
 use crate::campaign::store::Store;
 use crate::cli::error::CliError;
 use crate::cli::plan::file as plan_file;
+use crate::outside::tell_line;
 
 /// Create a campaign file from a plan.
 #[derive(Debug, Args)]
@@ -33,11 +34,11 @@ impl New {
         let store = Store::create(&self.file, &text, &name)?;
         let (plan, cells) = (store.plan()?, store.cells()?);
         let path = quoted(&self.file);
-        eprintln!("{path}: {} cells, {} hits wanted", cells.len(), plan.hits_wanted());
+        tell_line!("{path}: {} cells, {} hits wanted", cells.len(), plan.hits_wanted());
         if let Some(shaker) = &plan.shaker {
-            eprintln!("{}", shaker.get_ref().remark(&self.file));
+            tell_line!("{}", shaker.get_ref().remark(&self.file));
         }
-        eprintln!("next: jointrig campaign run {path} --device sim:");
+        tell_line!("next: jointrig campaign run {path} --device sim:");
         Ok(store.close()?)
     }
 }

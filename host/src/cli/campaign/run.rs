@@ -1,5 +1,6 @@
 //! `campaign run`: measures what is left.
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -19,6 +20,7 @@ use crate::cli::{interrupt, measure};
 use crate::device::address::Address;
 use crate::device::channels::ChannelMap;
 use crate::device::recording::Recording;
+use crate::outside::tell_line;
 
 /// Measure what is left of a campaign.
 #[derive(Debug, Args)]
@@ -120,7 +122,7 @@ impl Run {
         if let Some(shaker) = &store.plan()?.shaker
             && store.levels()?.len() < 2 * shaker.get_ref().levels()
         {
-            eprintln!("{}", shaker.get_ref().remark(&self.file));
+            tell_line!("{}", shaker.get_ref().remark(&self.file));
         }
         Ok(())
     }
@@ -134,7 +136,7 @@ impl Run {
         let (text, source) = store.plan_text()?;
         // a plan that is gone, or was built in, was not edited
         if plan_file::read(Path::new(&source)).is_ok_and(|now| now != text) {
-            eprintln!(
+            tell_line!(
                 "{source} was edited since: going on with the plan in {}; `--plan {source}` takes the new one over",
                 self.file.display()
             );
@@ -159,7 +161,9 @@ impl Judge for Ringing {
     ) -> Verdict {
         let verdict = ByRecord.judge(cell, plan, channels, recording, others);
         if self.rings {
-            eprint!("{}", if verdict.kind == Kind::Good { "\x07" } else { "\x07\x07" });
+            let rings: &[u8] = if verdict.kind == Kind::Good { b"\x07" } else { b"\x07\x07" };
+            // nobody hears it where stderr is closed
+            let _ = std::io::stderr().write_all(rings);
         }
         verdict
     }

@@ -14,6 +14,7 @@ use crate::campaign::store::overrules::Overrule;
 use crate::campaign::store::record_row::{Damaged, RecordRow};
 use crate::cli::error::CliError;
 use crate::cli::output;
+use crate::outside::tell_line;
 use crate::report::cell_records::{Shown, records};
 
 /// Show a cell: its records, their verdicts, and a figure.
@@ -102,7 +103,7 @@ impl Show {
         for record in rows {
             match Shown::of(store, row.id, record) {
                 Ok(one) => shown.extend(one),
-                Err(error @ StoreError::Damaged { .. }) => eprintln!("{error}"),
+                Err(error @ StoreError::Damaged { .. }) => tell_line!("{error}"),
                 Err(error) => return Err(error.into()),
             }
         }

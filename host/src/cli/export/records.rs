@@ -14,6 +14,7 @@ use crate::cli::error::CliError;
 use crate::cli::waiting::Waiting;
 use crate::exchange::channel_records::{self, ChannelRecords};
 use crate::exchange::{tables_output, uff_output, write_impacts};
+use crate::outside::file_name;
 use crate::spectra::{ImpactRecords, MotionQuantity};
 
 /// A record in a file of its cell.
@@ -148,5 +149,5 @@ impl Files<'_> {
 
 fn stem(cell: &CellRow) -> String {
     let name = configuration_name(cell.cell.configuration);
-    format!("{name}_{}_{}", cell.cell.impact, cell.cell.response)
+    file_name(&format!("{name}_{}_{}", cell.cell.impact, cell.cell.response))
 }

@@ -9,8 +9,9 @@ use crate::campaign::store::Store;
 use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::cli::waiting::Waiting;
+use crate::exchange::frf_uff;
 use crate::exchange::record_uff::{by_label, read_record_file};
-use crate::exchange::uff;
+use crate::outside::tell_line;
 
 /// How files are named, and whether what came from a file of the same name before is dropped.
 pub(super) struct Wishes<'w> {
@@ -31,7 +32,7 @@ pub(super) fn import(folder: &Path, into: &Path, wishes: &Wishes<'_>) -> Result<
         None => from_folder(folder, &plan, wishes.configuration)?,
     };
     for path in &left_out {
-        eprintln!("{}: left out, it is neither .npz nor a universal file", path.display());
+        tell_line!("{}: left out, it is neither .npz nor a universal file", path.display());
     }
     let waiting = Waiting::of("importing files");
     let (mut all, mut matrices) = (Brought::default(), 0);
@@ -72,7 +73,7 @@ pub(super) fn import(folder: &Path, into: &Path, wishes: &Wishes<'_>) -> Result<
 
 fn say(path: &Path, warnings: &[String]) {
     for warning in warnings {
-        eprintln!("{}: {warning}", path.display());
+        tell_line!("{}: {warning}", path.display());
     }
 }
 
@@ -83,7 +84,7 @@ fn one(store: &mut Store, source: &Source, replace: bool) -> Result<Option<Broug
         Named::Frfs(configuration) => {
             let told = frfs(store, &Frfs { file: path, name, configuration, replace })?;
             for line in told {
-                eprintln!("{line}");
+                tell_line!("{line}");
             }
             Ok(None)
         }
@@ -97,7 +98,7 @@ fn one(store: &mut Store, source: &Source, replace: bool) -> Result<Option<Broug
         Named::Labelled(configuration) => {
             let origin = Origin::of(path, name)?;
             let wrong = |what: String| bad(format!("{}: {what}", path.display()));
-            let (rows, warnings) = by_label(&uff::read(&origin.bytes)).map_err(wrong)?;
+            let (rows, warnings) = by_label(&frf_uff::contents(path).map_err(bad)?).map_err(wrong)?;
             say(path, &warnings);
             let mut all = Brought::default();
             for row in rows {

@@ -8,6 +8,8 @@ mod records;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use nalgebra::{DMatrix, Scalar};
+use num_complex::Complex;
 
 use super::error::CliError;
 use super::output;
@@ -17,6 +19,7 @@ use crate::campaign::store::Store;
 use crate::campaign::verdict::Kind;
 use crate::exchange::{read_frf_file, write_frf};
 use crate::frf::Frf;
+use crate::outside::tell_line;
 use crate::substructuring::geometry::Configuration as Points;
 use folder::Wishes;
 use records::CellName;
@@ -102,7 +105,7 @@ impl Import {
 fn read(file: &Path) -> Result<Frf, CliError> {
     let (frf, warnings) = read_frf_file(file).map_err(bad)?;
     for warning in &warnings {
-        eprintln!("{}: {warning}", file.display());
+        tell_line!("{}: {warning}", file.display());
     }
     Ok(frf)
 }
@@ -143,7 +146,7 @@ fn frfs(store: &Store, from: &Frfs<'_>) -> Result<Vec<String>, CliError> {
         )));
     }
     match store.frf(name)? {
-        Some(there) if there.frf == frf => {
+        Some(there) if same(&there.frf, &frf) => {
             return Ok(vec![format!(
                 "{into}: {name}: the same FRFs are there already, from {}",
                 there.source
@@ -169,6 +172,33 @@ fn frfs(store: &Store, from: &Frfs<'_>) -> Result<Vec<String>, CliError> {
     Ok(told)
 }
 
+/// Whether they are the same FRFs. A pair that is missing holds NaN, which no number equals, itself included.
+fn same(one: &Frf, other: &Frf) -> bool {
+    fn alike(one: f64, other: f64) -> bool {
+        one == other || (one.is_nan() && other.is_nan())
+    }
+    fn all<T: Scalar + Copy>(
+        one: Option<&[DMatrix<T>]>,
+        other: Option<&[DMatrix<T>]>,
+        alike: impl Fn(T, T) -> bool,
+    ) -> bool {
+        let (Some(one), Some(other)) = (one, other) else { return one.is_none() == other.is_none() };
+        one.len() == other.len()
+            && one.iter().zip(other).all(|(one, other)| {
+                one.len() == other.len() && one.iter().zip(other.iter()).all(|(a, b)| alike(*a, *b))
+            })
+    }
+    let frame = |frf: &Frf| (frf.quantity(), frf.outputs().to_vec(), frf.inputs().to_vec());
+    frame(one) == frame(other)
+        && alike(one.sigma_per_s(), other.sigma_per_s())
+        && one.frequency_hz() == other.frequency_hz()
+        && all(Some(one.lines()), Some(other.lines()), |a: Complex<f64>, b| {
+            alike(a.re, b.re) && alike(a.im, b.im)
+        })
+        && all(one.variance(), other.variance(), alike)
+        && all(one.coherence(), other.coherence(), alike)
+}
+
 /// Names that the plan does not have are a mistake; points of the plan that were not measured are said.
 fn check_names(file: &Path, frf: &Frf, name: &str, points: &Points) -> Result<(), String> {
     let sides =
@@ -185,7 +215,7 @@ fn check_names(file: &Path, frf: &Frf, name: &str, points: &Points) -> Result<()
         }
         let absent: Vec<&str> = known.iter().filter(|n| !found.contains(n)).map(String::as_str).collect();
         if !absent.is_empty() {
-            eprintln!("{}: {side} of the plan that are not in it: {}", file.display(), absent.join(", "));
+            tell_line!("{}: {side} of the plan that are not in it: {}", file.display(), absent.join(", "));
         }
     }
     Ok(())
@@ -199,4 +229,32 @@ fn described(frf: &Frf) -> String {
         frf.inputs().len(),
         frf.lines().len()
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frf::MotionQuantity;
+
+    #[test]
+    fn what_was_imported_is_known_again_with_its_holes() {
+        let of = |value: f64| {
+            let hole = Complex::new(f64::NAN, f64::NAN);
+            let line = DMatrix::from_row_slice(1, 2, &[Complex::new(value, 0.0), hole]);
+            let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+            Frf::new(
+                vec![10.0],
+                0.0,
+                MotionQuantity::Velocity,
+                names(&["A1"]),
+                names(&["F1", "F2"]),
+                vec![line],
+            )
+            .expect("all agree")
+        };
+        assert!(of(1.0) != of(1.0), "which is why they are compared otherwise");
+        assert!(same(&of(1.0), &of(1.0)) && !same(&of(1.0), &of(2.0)));
+        let with = of(1.0).with_variance(vec![DMatrix::from_element(1, 2, f64::NAN)]).expect("fits");
+        assert!(same(&with, &with.clone()) && !same(&with, &of(1.0)));
+    }
 }

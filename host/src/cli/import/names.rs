@@ -7,7 +7,9 @@ use serde::Deserialize;
 use super::bad;
 use crate::campaign::plan::{Cell, Plan, configuration_name};
 use crate::cli::error::CliError;
-use crate::exchange::{frf_file, record_uff, uff};
+use crate::exchange::{frf_file, frf_uff, record_uff};
+use crate::foreign;
+use crate::outside::file_name;
 
 /// What a file holds.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -52,7 +54,12 @@ pub(super) fn from_table(folder: &Path, table: &Path) -> Result<Vec<Source>, Cli
             table.display()
         ))
     };
-    let mut rows = csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(table).map_err(told)?;
+    let text = foreign::text(table, foreign::TABLE).map_err(|source| CliError::Read {
+        path: table.into(),
+        doing: "reading the table of names",
+        source,
+    })?;
+    let mut rows = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
     let mut sources = Vec::new();
     for row in rows.deserialize::<Row>() {
         let Row { file, configuration, impact, response } = row.map_err(told)?;
@@ -123,7 +130,9 @@ fn named(
     let called = |cell: &Cell| {
         [configuration_name(cell.configuration), plan.called(cell.configuration)]
             .into_iter()
-            .any(|name| format!("{name}_{}_{}", cell.impact, cell.response) == *stem)
+            .map(|name| format!("{name}_{}_{}", cell.impact, cell.response))
+            // as it is, or as `export` writes it where a file cannot be called so
+            .any(|name| name == *stem || file_name(&name) == *stem)
     };
     if let Some(Cell { configuration, impact, response, .. }) = plan.cells().into_iter().find(called) {
         return Ok(Some(Named::Cell {
@@ -146,12 +155,7 @@ fn with_labels_or_frfs(path: &Path, configuration: String) -> Result<Named, CliE
     if frf_file::is_npz(path).map_err(bad)? {
         return Ok(Named::Frfs(configuration));
     }
-    let bytes = std::fs::read(path).map_err(|source| CliError::Read {
-        path: path.into(),
-        doing: "reading a file to import",
-        source,
-    })?;
-    let records = record_uff::holds_records(&uff::read(&bytes));
+    let records = record_uff::holds_records(&frf_uff::contents(path).map_err(bad)?);
     Ok(if records { Named::Labelled(configuration) } else { Named::Frfs(configuration) })
 }
 

@@ -1,5 +1,6 @@
 //! Impact records from elsewhere into one cell of a campaign file.
 
+use std::io::Read;
 use std::path::Path;
 
 use base64::Engine as _;
@@ -23,6 +24,8 @@ use crate::cli::output;
 use crate::device::channels::ChannelMap;
 use crate::device::recording::Recording;
 use crate::exchange::record_uff::read_record_file;
+use crate::foreign;
+use crate::outside::tell_line;
 use crate::spectra::{ImpactRecords, Pulse};
 
 /// The cell that the records belong to.
@@ -38,18 +41,23 @@ pub(super) struct Origin {
     name: String,
     /// What tells its content from any other.
     digest: String,
-    pub(super) bytes: Vec<u8>,
 }
 
 impl Origin {
     pub(super) fn of(path: &Path, name: &str) -> Result<Self, CliError> {
-        let bytes = std::fs::read(path).map_err(|source| CliError::Read {
-            path: path.into(),
-            doing: "reading a file to import",
-            source,
-        })?;
-        let digest = format!("sha256:{}", BASE64_STANDARD.encode(Sha256::digest(&bytes)));
-        Ok(Self { name: name.into(), digest, bytes })
+        let failed = |source| CliError::Read { path: path.into(), doing: "reading a file to import", source };
+        let (mut file, size) = foreign::open(path).map_err(failed)?;
+        let (mut digest, mut piece, mut read) = (Sha256::new(), vec![0; 1 << 16], 0u64);
+        loop {
+            let count = file.read(&mut piece).map_err(failed)?;
+            read += count as u64;
+            if count == 0 || read > size {
+                break;
+            }
+            digest.update(&piece[..count]);
+        }
+        let digest = format!("sha256:{}", BASE64_STANDARD.encode(digest.finalize()));
+        Ok(Self { name: name.into(), digest })
     }
 
     fn address(&self) -> String {
@@ -82,13 +90,13 @@ impl Brought {
 pub(super) fn import(file: &Path, into: &Path, name: &CellName<'_>, replace: bool) -> Result<(), CliError> {
     let (records, warnings) = read_record_file(file).map_err(bad)?;
     for warning in &warnings {
-        eprintln!("{}: {warning}", file.display());
+        tell_line!("{}: {warning}", file.display());
     }
     let mut store = Store::open(into)?;
     let called = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
     let origin = Origin::of(file, &called)?;
     let Brought { hits, kept, already, map, .. } =
-        bring(&mut store, &origin, name, &records, replace, &mut |line| eprintln!("{line}"))?;
+        bring(&mut store, &origin, name, &records, replace, &mut |line| tell_line!("{line}"))?;
     store.log(&format!("imported {hits} hits from {}", file.display()))?;
     store.close()?;
     let mut lines = vec![format!("{}: {kept} of {hits} hits are good", into.display())];

@@ -10,6 +10,7 @@ use crate::campaign::plan::{Plan, PlanError};
 use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::cli::plan::file;
+use crate::outside::tell_line;
 use crate::report::{self, Format};
 use crate::structure::Structure;
 
@@ -35,11 +36,11 @@ impl Check {
         if !self.no_picture {
             let picture = self.picture.unwrap_or_else(|| beside(&self.file));
             draw(&plan, &picture)?;
-            eprintln!("{}: where hammer and vibrometer go", picture.display());
+            tell_line!("{}: where hammer and vibrometer go", picture.display());
         }
         let path = quoted(&self.file);
         let campaign = quoted(&self.file.with_extension("jrig"));
-        eprintln!("next: jointrig campaign new {campaign} --plan {path}");
+        tell_line!("next: jointrig campaign new {campaign} --plan {path}");
         Ok(())
     }
 }

@@ -4,10 +4,12 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 use toml::Spanned;
 
 use crate::cli::error::CliError;
 use crate::exchange::read_positions;
+use crate::outside::tell_line;
 use crate::structure::Structure;
 use crate::substructuring::Geometry;
 use crate::substructuring::geometry::{Configuration, Point};
@@ -31,7 +33,50 @@ struct PeekGeometry {
 /// # Errors
 /// The plan or the workbook cannot be read, or the workbook describes what no plan can hold.
 pub fn read(path: &Path) -> Result<String, CliError> {
-    let text = std::fs::read_to_string(path).map_err(|source| CliError::Read {
+    let text = written_out(path)?;
+    refuse_many_cells(path, &text)?;
+    Ok(text)
+}
+
+/// Most cells of a plan; the paper's campaign has 252, and a cell takes minutes.
+const MOST_CELLS: usize = 20_000;
+
+/// Every impact of a configuration makes a cell with every response: two long lists are soon more cells than any memory holds.
+fn refuse_many_cells(path: &Path, text: &str) -> Result<(), CliError> {
+    #[derive(Deserialize)]
+    struct Lists {
+        #[serde(default)]
+        configuration: Vec<Spanned<List>>,
+    }
+    #[derive(Deserialize)]
+    struct List {
+        #[serde(default)]
+        impacts: Vec<IgnoredAny>,
+        #[serde(default)]
+        responses: Vec<IgnoredAny>,
+    }
+    // what is wrong with the plan itself is said where it is read as one
+    let Ok(lists) = toml::from_str::<Lists>(text) else { return Ok(()) };
+    let mut cells = 0usize;
+    for list in &lists.configuration {
+        let List { impacts, responses } = list.get_ref();
+        cells = cells.saturating_add(impacts.len().saturating_mul(responses.len()));
+        if cells > MOST_CELLS {
+            let line = 1 + text[..list.span().start].matches('\n').count();
+            return Err(CliError::Bad(format!(
+                "{}:{line}: configuration: {} impacts with {} responses each make more than {MOST_CELLS} cells: leave points out, or make \
+                 several campaigns",
+                path.display(),
+                impacts.len(),
+                responses.len()
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn written_out(path: &Path) -> Result<String, CliError> {
+    let text = crate::foreign::text(path, crate::foreign::SETTINGS).map_err(|source| CliError::Read {
         path: path.into(),
         doing: "reading the plan",
         source,
@@ -49,7 +94,7 @@ pub fn read(path: &Path) -> Result<String, CliError> {
     let place = path.parent().unwrap_or(Path::new("")).join(workbook.get_ref());
     let positions = read_positions(&place).map_err(|e| wrong(format!("geometry.workbook: {e}")))?;
     for warning in &positions.warnings {
-        eprintln!("{}: {warning}", place.display());
+        tell_line!("{}: {warning}", place.display());
     }
     let geometry = positions.geometry;
     if geometry.virtual_point_a_m != geometry.virtual_point_b_m {

@@ -9,6 +9,7 @@ use clap::{Args, ValueEnum};
 use crate::advice::quoted;
 use crate::campaign::plan;
 use crate::cli::error::CliError;
+use crate::outside::tell_line;
 
 /// Write a plan to begin with.
 #[derive(Debug, Args)]
@@ -60,8 +61,8 @@ impl New {
         let mut file = OpenOptions::new().write(true).create_new(true).open(path).map_err(failed)?;
         file.write_all(self.template.text().as_bytes()).map_err(failed)?;
         let path = quoted(path);
-        eprintln!("{path}: edit it, above all [geometry]");
-        eprintln!("next: jointrig plan check {path}");
+        tell_line!("{path}: edit it, above all [geometry]");
+        tell_line!("next: jointrig plan check {path}");
         Ok(())
     }
 }

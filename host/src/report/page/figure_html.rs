@@ -1,6 +1,7 @@
 //! A figure in the page: its sentence, its panels as vectors, where it came from; and the data by which the page makes it alive.
 
 use super::text::{Html, escaped};
+use crate::outside::shown_json;
 use crate::report::figure::{Figure, Height, Panel, Shape, role};
 use crate::report::svg;
 
@@ -94,7 +95,8 @@ pub fn data<'a>(html: &mut Html, figures: impl Iterator<Item = &'a Figure>) {
             html.raw(",");
         }
         // a figure is plain data: there is nothing in it that could fail to be written
-        html.raw(&serde_json::to_string(figure).unwrap_or_else(|_| "null".into()).replace('<', "\\u003c"));
+        let data = serde_json::to_string(figure).unwrap_or_else(|_| "null".into());
+        html.raw(&shown_json(&data).replace('<', "\\u003c"));
     }
     html.raw("]}</script>");
 }

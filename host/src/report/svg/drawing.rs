@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use crate::outside::visible;
+
 /// How a line looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stroke<'a> {
@@ -325,7 +327,7 @@ fn px(value: f64) -> String {
 /// Text made safe inside html and svg.
 pub fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
-    for c in text.chars() {
+    for c in visible(text).chars() {
         match c {
             '&' => safe.push_str("&amp;"),
             '<' => safe.push_str("&lt;"),

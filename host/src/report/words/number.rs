@@ -51,7 +51,9 @@ fn places(value: f64, significant: i32) -> usize {
     let places = |value: f64| (significant - 1 - value.abs().log10().floor() as i32).clamp(0, 12);
     // 0.09998 is 0.100 when it is rounded, not 0.1000
     let scale = 10f64.powi(places(value));
-    places((value * scale).round() / scale) as usize
+    let rounded = (value * scale).round() / scale;
+    // a zero has no scale: nothing is left of the value within the decimals that there are
+    if rounded == 0.0 { 0 } else { places(rounded) as usize }
 }
 
 /// `value` with this many decimals and a true minus sign; a dash when it is no number.
@@ -72,6 +74,7 @@ mod tests {
     fn digits_follow_the_scatter() {
         assert_eq!(stiffness(26.813e6, 0.912e6), "26.8 ± 0.9 N/µm");
         assert_eq!(stiffness(148.2e6, 4.1e6), "148 ± 4 N/µm");
+        assert_eq!(stiffness(148.2e6, 1e-8), "148 ± 0 N/µm");
         assert_eq!(stiffness(-12.3e6, 241.0e6), "−12 ± 241 N/µm");
         assert_eq!(with_scatter(26.8, 0.0), "26.8 ± 0.0");
         assert_eq!(short(0.012_34), "0.0123");

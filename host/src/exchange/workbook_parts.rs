@@ -1,0 +1,102 @@
+//! What a workbook says of itself, looked at before its reader believes it.
+//!
+//! A workbook is an archive of texts. Its reader makes room for as many shared texts as one attribute says, and holds what the texts
+//! inflate to: both are checked here, by inflating every part once into nothing.
+
+use std::io::{Cursor, Read};
+
+use memchr::memmem;
+use zip::ZipArchive;
+
+use crate::foreign::megabytes;
+
+/// Most bytes of all parts together; the paper's workbook has 70 kB.
+const MOST_BYTES: u64 = 4 << 20;
+
+/// Most parts.
+const MOST_PARTS: usize = 1000;
+
+/// Refuses a workbook that would take memory out of proportion.
+///
+/// # Errors
+/// Which part, and why.
+pub(super) fn refuse_lies(bytes: &[u8]) -> Result<(), String> {
+    // what is no archive may be one of the old format, in which the reader would follow any chain
+    if !bytes.starts_with(b"PK") {
+        return Err("it is no .xlsx workbook (a zip archive of tables)".into());
+    }
+    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| error.to_string())?;
+    if archive.len() > MOST_PARTS {
+        return Err(format!("it has {} parts, at most {MOST_PARTS} are read", archive.len()));
+    }
+    let mut left = MOST_BYTES;
+    for at in 0..archive.len() {
+        let mut part = archive.by_index(at).map_err(|error| error.to_string())?;
+        let name: String = part.name().map(|name| name.chars().take(80).collect()).unwrap_or_default();
+        let of_part = |what: &str| format!("its part `{}` {what}", name.escape_debug());
+        let mut text = Vec::new();
+        part.by_ref().take(left + 1).read_to_end(&mut text).map_err(|error| of_part(&error.to_string()))?;
+        left = left.checked_sub(text.len() as u64).ok_or_else(|| {
+            of_part(&format!(
+                "makes its parts larger than {} in all: save the geometry's sheets as a workbook of their own",
+                megabytes(MOST_BYTES)
+            ))
+        })?;
+        let is_text = [".xml", ".rels"].iter().any(|end| name.to_ascii_lowercase().ends_with(end));
+        if is_text && memchr::memchr(0, &text).is_some() {
+            return Err(of_part("is not in UTF-8: save the workbook again"));
+        }
+        if let Some(claimed) = claims(&text).find(|claimed| *claimed > text.len() as u64) {
+            return Err(of_part(&format!(
+                "says that it has {claimed} texts, in {} bytes: save the workbook again",
+                text.len()
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// What every `uniqueCount` says, too large where it is no number that fits.
+fn claims(text: &[u8]) -> impl Iterator<Item = u64> + '_ {
+    const NAME: &[u8] = b"uniqueCount";
+    memmem::find_iter(text, NAME).map(|at| {
+        let behind = &text[at + NAME.len()..];
+        let digits = behind
+            .iter()
+            .skip_while(|byte| byte.is_ascii_whitespace() || b"=\"'+".contains(byte))
+            .take_while(|byte| byte.is_ascii_digit());
+        digits.fold(0u64, |sum, byte| sum.saturating_mul(10).saturating_add(u64::from(byte - b'0')))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+    use zip::write::SimpleFileOptions;
+
+    fn of(parts: &[(&str, &[u8])]) -> Vec<u8> {
+        let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
+        for (name, text) in parts {
+            zip.start_file(*name, SimpleFileOptions::default()).expect("a part");
+            zip.write_all(text).expect("written");
+        }
+        zip.finish().expect("closed").into_inner()
+    }
+
+    #[test]
+    fn claims_and_bombs_are_refused_with_their_part() {
+        let good = of(&[("xl/sharedStrings.xml", b"<sst uniqueCount=\"3\"><si><t>a</t></si></sst>")]);
+        assert_eq!(refuse_lies(&good), Ok(()));
+        for (name, text, wanted) in [
+            ("xl/sharedStrings.xml", &b"<sst uniqueCount = '900000000000'/>"[..], "900000000000 texts"),
+            ("xl/sharedStrings.xml", b"<sst count='1' uniqueCount='+999'/>", "999 texts"),
+            ("xl/a.xml", b"<\0s\0s\0t\0", "UTF-8"),
+            ("xl/worksheets/sheet1.xml", &vec![b' '; 5_000_000], "larger than"),
+        ] {
+            let said = refuse_lies(&of(&[(name, text)])).expect_err("a lie");
+            assert!(said.contains(name) && said.contains(wanted), "{said}");
+        }
+        assert!(refuse_lies(b"\xd0\xcf\x11\xe0").is_err());
+    }
+}
