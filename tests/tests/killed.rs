@@ -90,7 +90,7 @@ fn killed_at_random_instants_it_ends_as_if_undisturbed() {
         child.wait().unwrap();
         struck += u64::from(ended_before.is_none());
 
-        let verified = jointrig().args(["campaign", "verify"]).arg(&file).output().unwrap();
+        let verified = jointrig().args(["campaign", "verify", "--deep"]).arg(&file).output().unwrap();
         let said = String::from_utf8_lossy(&verified.stdout).into_owned();
         assert!(verified.status.success(), "seed {seed}, kill {kill} after {instant:?}: {said}");
         let now = content(&file);

@@ -55,7 +55,7 @@ fn killed_in_mid_shake_nothing_moves_on_and_nothing_is_lost() {
     assert!(info.status.success(), "{}", String::from_utf8_lossy(&info.stderr));
     assert!(said.contains("\"Resting\"") || said.contains("\"Stopping\""), "{said}");
 
-    let verified = jointrig().args(["campaign", "verify"]).arg(&file).status().unwrap();
+    let verified = jointrig().args(["campaign", "verify", "--deep"]).arg(&file).status().unwrap();
     assert!(verified.success());
     assert!(shaker(&file, &rig.address).status().unwrap().success());
     let after = levels(&file);

@@ -8,12 +8,14 @@
 //! | what happens between two hits | [`run`]: `cell.rs` |
 //! | a level of the shaker | [`run::shaking`] |
 //! | what whoever watches is told | [`watch`] |
+//! | what `verify --deep` computes anew | [`recheck`] |
 //!
 //! [`run::runner::run`] walks the cells of the plan: hammer and laser are brought there ([`run::stage`]), shots are fired at repeatable
 //! scans ([`run::shot`]) with a pulse that finds the target force ([`run::pulse`]), each record is judged ([`verdict::judge`](mod@verdict::judge)) and stored on
 //! a thread of its own (`run/keeper.rs`).
 
 pub mod plan;
+pub mod recheck;
 pub mod run;
 pub mod sensor_check;
 pub mod store;

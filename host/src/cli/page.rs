@@ -15,6 +15,7 @@ use crate::campaign::watch::Watchers;
 #[cfg(feature = "dashboard")]
 use crate::dashboard::{Dashboard, Measuring};
 use crate::device::tap::Tap;
+#[cfg(feature = "dashboard")]
 use crate::outside::tell_line;
 
 /// Whether a page shows what is measured.

@@ -23,6 +23,8 @@ const CLEAR_S: f64 = 0.001;
 const MEAN: usize = 24;
 /// A person cannot tell when the last of the motion is gone: so many times what a coil would wait for is let pass.
 pub(super) const ALLOWANCE: f64 = 3.0;
+/// How the sentence of a hit that came too early begins: its verdict rests on what was heard before it, and not on its record.
+pub(in crate::campaign) const TOO_EARLY: &str = "struck before the structure was at rest";
 
 impl Shooter {
     /// Waits until somebody strikes, for `patience_s` of the device's time at most. The acknowledgement is held when this returns.

@@ -104,7 +104,8 @@ impl Runner<'_> {
                 Outcome::TooEarly { recording, place, ratio } => {
                     let name = &self.channels.channels[place].name;
                     let sentence = format!(
-                        "struck before the structure was at rest: {name} still moved {ratio:.1} times as much as it may"
+                        "{}: {name} still moved {ratio:.1} times as much as it may",
+                        by_hand::TOO_EARLY
                     );
                     let judged = self.judge.judge(&row.cell, self.plan, self.channels, &recording, &others);
                     let verdict =

@@ -6,7 +6,7 @@
 //! `fit.rs` asks before all that whether the device fits the plan.
 
 pub mod answers;
-mod by_hand;
+pub(in crate::campaign) mod by_hand;
 mod cell;
 mod clock;
 mod directions;

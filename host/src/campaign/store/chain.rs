@@ -185,6 +185,12 @@ fn rows(connection: &Connection, table: &str) -> rusqlite::Result<Vec<(String, [
     Ok(all.into_iter().filter(|(key, _)| table != "meta" || key != WRITTEN).collect())
 }
 
+/// Table and key of every row, in the order in which they were stored for the first time.
+pub(super) fn history(connection: &Connection) -> rusqlite::Result<Vec<(String, String)>> {
+    let sql = "SELECT in_table, row_key FROM chain GROUP BY in_table, row_key ORDER BY min(id)";
+    connection.prepare(sql)?.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?.collect()
+}
+
 /// Something that was done behind jointrig's back.
 pub(super) struct Behind {
     /// Which row, by table and key; none where it is the chain itself.

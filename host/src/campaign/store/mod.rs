@@ -214,7 +214,7 @@ impl Store {
         move |error| sqlite(&self.path, doing, error)
     }
 
-    fn content(&self, what: String) -> StoreError {
+    pub(in crate::campaign) fn content(&self, what: String) -> StoreError {
         StoreError::Content { path: self.path.clone(), what }
     }
 

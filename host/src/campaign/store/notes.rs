@@ -81,6 +81,17 @@ impl Store {
         Ok(Plan::parse(&text, &source)?)
     }
 
+    /// Every plan that the file has had, by its id; the last one counts.
+    ///
+    /// # Errors
+    /// The file cannot be read, or a text is no plan.
+    pub fn plans(&self) -> Result<Vec<(i64, Plan)>, StoreError> {
+        let sql = format!("SELECT {}, id FROM plan ORDER BY id", PlanText::list());
+        let read = |row: &rusqlite::Row<'_>| Ok((row.get("id")?, PlanText::read(row)?));
+        let texts: Vec<(i64, PlanText)> = self.all(&sql, [], read, "reading the plans")?;
+        texts.into_iter().map(|(id, plan)| Ok((id, Plan::parse(&plan.text, &plan.source)?))).collect()
+    }
+
     /// The plan's text and the name of the file that it came from.
     pub fn plan_text(&self) -> Result<(String, String), StoreError> {
         let sql = format!("SELECT {} FROM plan ORDER BY id DESC LIMIT 1", PlanText::list());

@@ -116,7 +116,7 @@ impl Store {
         Ok(Samples { codes, channels: record.channels })
     }
 
-    fn damaged(&self, record: i64, what: String) -> StoreError {
+    pub(in crate::campaign) fn damaged(&self, record: i64, what: String) -> StoreError {
         StoreError::Damaged { path: self.path.clone(), record, what }
     }
 

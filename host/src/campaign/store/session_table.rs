@@ -168,6 +168,15 @@ impl Store {
         Ok(ChannelMap { id: 0, rate_hz, channels })
     }
 
+    /// The versions of this program that wrote the sessions, each once.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn software_versions(&self) -> Result<Vec<String>, StoreError> {
+        let sql = "SELECT DISTINCT software_version FROM sessions ORDER BY software_version";
+        self.all(sql, [], |row| row.get(0), "reading the sessions")
+    }
+
     /// What is known of the sensors of one session's channels, in their order.
     pub fn sensors(&self, session: i64) -> Result<Vec<Sensor>, StoreError> {
         let sql = format!(

@@ -92,6 +92,17 @@ impl Store {
         })
     }
 
+    /// Table and key of every row, in the order in which they were stored; none in a file without a chain.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn history(&self) -> Result<Vec<(String, String)>, StoreError> {
+        if !self.has_chain()? {
+            return Ok(Vec::new());
+        }
+        chain::history(&self.connection).map_err(self.failed("reading the chain"))
+    }
+
     /// Whether rows are chained: in files of version 2 on.
     ///
     /// # Errors

@@ -13,6 +13,7 @@ mod sweep;
 
 pub use error::{ShakeError, Shortfall};
 pub use meter::CRITERION;
+pub(in crate::campaign) use meter::Meter;
 pub use options::{Limits, Onlookers, Options};
 pub use signals::{Unusable, record};
 
@@ -35,7 +36,7 @@ use crate::campaign::watch::{Seen, Shaking};
 use crate::device::channels::ChannelMap;
 use crate::device::recording::by_channel;
 use crate::device::session::Session;
-use meter::{Meter, SETTLED_WINDOWS, WITHIN, is_settled};
+use meter::{SETTLED_WINDOWS, WITHIN, is_settled};
 use order::Orders;
 
 /// A level that is not settled by then never will be, s of the device.

@@ -1,0 +1,251 @@
+//! What follows from the raw codes, against what the file says was found: verdicts with their measure, limit and peak, and the amplitudes of
+//! the shaker's levels.
+//!
+//! Checksums tell whether a row is as it was written. This tells whether it was right: each record is judged anew, as it was then, with the
+//! plan, the scales and the good records before it that counted at the time. The chain of rows gives the order of all that. A file of an
+//! older version has none, and in another order things may have happened while somebody worked on it from two sides: so a verdict also
+//! holds that follows with what the file says by now.
+
+use std::collections::HashMap;
+
+use super::plan::Plan;
+use super::plan::level::Held;
+use super::run::by_hand::TOO_EARLY;
+use super::run::shaking::Meter;
+use super::store::Store;
+use super::store::calibration_table::Calibration;
+use super::store::error::StoreError;
+use super::store::level_table::LevelRow;
+use super::store::overrules::Overrule;
+use super::store::record_row::{RecordRow, Samples};
+use super::store::session_table::SessionInfo;
+use super::verdict::judge::{ByRecord, Judge};
+use super::verdict::others::Others;
+use super::verdict::{Kind, Verdict};
+use crate::device::channels::ChannelMap;
+use crate::device::recording::Recording;
+
+/// Numbers that differ by less are the same: another machine's sine may end in another digit.
+const ALIKE: f64 = 1e-9;
+
+/// What was found.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Rechecked {
+    /// Records that were judged anew; those without samples cannot be.
+    pub records: usize,
+    /// Levels whose amplitude was measured anew: steps that hold a motion or a force.
+    pub levels: usize,
+    /// What differs, a sentence each.
+    pub different: Vec<String>,
+    /// Another version of this program that wrote a part of the file.
+    pub other_version: Option<String>,
+}
+
+/// Computes everything anew, telling how many records are done, of how many.
+///
+/// # Errors
+/// The file cannot be read, or a record is damaged: [`Store::verify`] names it.
+pub fn recheck(store: &Store, at: &dyn Fn(usize, usize)) -> Result<Rechecked, StoreError> {
+    let past = Past::of(store)?;
+    let mut found = Rechecked {
+        other_version: store.software_versions()?.into_iter().find(|own| own != env!("CARGO_PKG_VERSION")),
+        ..Rechecked::default()
+    };
+    let (cells, total) = (store.cells()?, store.places()?.len());
+    let mut done = 0;
+    for row in &cells {
+        let mut before: Vec<(RecordRow, Samples)> = Vec::new();
+        for record in store.records_of(row.id)? {
+            at(done, total);
+            done += 1;
+            let record = record.map_err(|damaged| store.damaged(damaged.place.id, damaged.what))?;
+            if record.scans == 0 {
+                continue;
+            }
+            let samples = store.samples(&record)?;
+            found.records += 1;
+            found.different.extend(past.differs(
+                &record,
+                &samples,
+                &before,
+                |judge, plan, map, recording, others| judge.judge(&row.cell, plan, map, recording, others),
+            )?);
+            before.push((record, samples));
+        }
+    }
+    for level in store.levels()? {
+        let level = level.map_err(|damaged| store.content(damaged.to_string()))?;
+        if let Some(measured) = past.amplitudes(&level)? {
+            found.levels += 1;
+            let (id, was) = (level.id, level.held.show(level.reached));
+            if !measured.iter().any(|amplitude| alike(*amplitude, level.reached)) {
+                let now = measured.first().map_or_else(String::new, |amplitude| level.held.show(*amplitude));
+                found.different.push(format!("level {id}: {was} in the file, and {now} from its codes"));
+            }
+        }
+    }
+    at(total, total);
+    Ok(found)
+}
+
+fn alike(one: f64, other: f64) -> bool {
+    one == other
+        || (one - other).abs() <= ALIKE * one.abs().max(other.abs())
+        || (one.is_nan() && other.is_nan())
+}
+
+/// Whether the file says of a record what was found in it.
+fn agrees(record: &RecordRow, found: &Verdict) -> bool {
+    let peak = alike(record.peak_n, found.peak_n);
+    if record.verdict == Kind::Noisy && record.sentence.starts_with(TOO_EARLY) {
+        return peak;
+    }
+    peak && record.verdict == found.kind
+        && alike(record.measure, found.measure)
+        && alike(record.limit, found.limit)
+}
+
+/// What was in the file when.
+struct Past<'s> {
+    store: &'s Store,
+    /// When each row was stored, by table and key.
+    order: HashMap<(String, String), usize>,
+    plans: Vec<(i64, Plan)>,
+    overrules: Vec<Overrule>,
+    calibrations: Vec<Calibration>,
+    sessions: HashMap<i64, SessionInfo>,
+}
+
+impl<'s> Past<'s> {
+    fn of(store: &'s Store) -> Result<Self, StoreError> {
+        let mut plans = store.plans()?;
+        for (_, plan) in &mut plans {
+            // whether the FRFs are good enough is no matter of a verdict, and takes long
+            plan.enough = None;
+        }
+        Ok(Self {
+            store,
+            order: store.history()?.into_iter().enumerate().map(|(at, row)| (row, at)).collect(),
+            plans,
+            overrules: store.overrules()?,
+            calibrations: store.calibrations()?,
+            sessions: store.sessions()?.into_iter().collect(),
+        })
+    }
+
+    /// When a row was stored. Without a chain, as if before everything.
+    fn at(&self, table: &str, id: i64) -> usize {
+        self.order.get(&(table.to_owned(), id.to_string())).copied().unwrap_or(0)
+    }
+
+    /// The plan that counted then, and the one that counts by now.
+    fn plans(&self, then: usize) -> impl Iterator<Item = &Plan> {
+        let known = self.plans.iter().rev().find(|(id, _)| self.at("plan", *id) <= then);
+        known.into_iter().chain(self.plans.last()).map(|(_, plan)| plan)
+    }
+
+    /// The channels of a session: as they were calibrated when it began, as they were measured, as they are calibrated by now.
+    fn channels(&self, session: i64) -> Result<Vec<ChannelMap>, StoreError> {
+        let measured = self.store.channels_as_measured(session)?;
+        let imported = self.sessions.get(&session).is_some_and(|info| info.board == SessionInfo::IMPORTED);
+        let begun = self.at("sessions", session);
+        let mut then = measured.clone();
+        for (calibration, id) in self.calibrations.iter().zip(1..) {
+            if imported || calibration.from_session > session || self.at("calibrations", id) > begun {
+                continue;
+            }
+            for channel in then.channels.iter_mut().filter(|own| own.name == calibration.channel.as_str()) {
+                calibration.apply(channel);
+            }
+        }
+        let mut all = vec![then, measured, self.store.channels(session)?];
+        all.dedup();
+        Ok(all)
+    }
+
+    /// Whether a record counted as good when another one was judged.
+    fn stood(&self, record: &RecordRow, then: usize) -> bool {
+        let of_record =
+            self.overrules.iter().zip(1i64..).filter(|(overrule, _)| overrule.record == record.id);
+        let last = of_record.filter(|(_, id)| self.at("overrules", *id) < then).last();
+        last.map_or(record.verdict == Kind::Good, |(overrule, _)| overrule.verdict == Kind::Good.name())
+    }
+
+    /// A sentence, when no verdict that could have been given then is the one in the file.
+    fn differs(
+        &self,
+        record: &RecordRow,
+        samples: &Samples,
+        before: &[(RecordRow, Samples)],
+        judge: impl Fn(&mut ByRecord, &Plan, &ChannelMap, &Recording, &Others) -> Verdict,
+    ) -> Result<Option<String>, StoreError> {
+        let then = self.at("records", record.id);
+        let recording = Recording {
+            epoch: record.epoch,
+            first_scan: record.first_scan,
+            trigger_index: record.trigger_index,
+            channels: record.channels,
+            codes: samples.codes.clone(),
+            gaps: record.gaps.clone(),
+            shot: record.shot,
+        };
+        let mut first = None;
+        for map in self.channels(record.session)? {
+            for plan in self.plans(then) {
+                for as_it_stood in [true, false] {
+                    let mut others = Others::of(Vec::new());
+                    for (other, samples) in before {
+                        let good =
+                            if as_it_stood { self.stood(other, then) } else { other.verdict == Kind::Good };
+                        if good && other.channels == map.len() && self.one_import(other, record) {
+                            others.learn(plan, &map, samples.view());
+                        }
+                    }
+                    let found = judge(&mut ByRecord, plan, &map, &recording, &others);
+                    if agrees(record, &found) {
+                        return Ok(None);
+                    }
+                    first.get_or_insert(found);
+                }
+            }
+        }
+        Ok(first.map(|found| {
+            format!(
+                "record {}: `{}` ({}; peak {:.2} N) in the file, and `{}` ({}; peak {:.2} N) from its codes",
+                record.id,
+                record.verdict,
+                record.sentence,
+                record.peak_n,
+                found.kind,
+                found.sentence,
+                found.peak_n
+            )
+        }))
+    }
+
+    /// Hits from files were judged with those of their own file alone.
+    fn one_import(&self, one: &RecordRow, other: &RecordRow) -> bool {
+        let info = |record: &RecordRow| self.sessions.get(&record.session);
+        match info(other).filter(|info| info.board == SessionInfo::IMPORTED) {
+            Some(own) => info(one).is_some_and(|info| info.serial == own.serial),
+            None => true,
+        }
+    }
+
+    /// The amplitude of a level, for each way in which its session may have been calibrated; none where none was held.
+    fn amplitudes(&self, level: &LevelRow) -> Result<Option<Vec<f64>>, StoreError> {
+        if level.end_hz.is_some() || level.held == Held::Drive || !level.whole() {
+            return Ok(None);
+        }
+        let samples = self.store.level_samples(level)?;
+        // the meter hears scan after scan
+        let codes: Vec<i16> = (0..level.scans)
+            .flat_map(|scan| (0..level.channels).map(move |place| (scan, place)))
+            .map(|(scan, place)| samples.channel(place).get(scan).copied().unwrap_or(0))
+            .collect();
+        let measured = |map: ChannelMap| {
+            Meter::new(&map, level.held, level.frequency_hz).amplitude(&codes, level.channels)
+        };
+        Ok(Some(self.channels(level.session)?.into_iter().map(measured).collect()))
+    }
+}
