@@ -12,7 +12,7 @@
 
 use core::cell::UnsafeCell;
 use core::future::poll_fn;
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering, compiler_fence, fence};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering, fence};
 use core::task::Poll;
 
 use embassy_stm32::interrupt::{self, InterruptExt};
@@ -32,6 +32,8 @@ use crate::{BLOCK_SCANS, restart};
 pub const BLOCKS: u32 = 8;
 /// Words of a ring.
 const RING_WORDS: u32 = BLOCKS * BLOCK_SCANS as u32 * SCAN_WORDS;
+
+const _: () = assert!((CHIP_BYTES * BLOCK_SCANS).is_multiple_of(2));
 
 /// One block of one chip.
 pub type Block = [[u8; CHIP_BYTES]; BLOCK_SCANS];
@@ -190,19 +192,28 @@ impl Ring {
         port.cr1().modify(|w| w.set_spe(true));
     }
 
-    /// Block `number`, counted from the start, where it lies. The DMA may write there: only the ring's position, read off
+    /// Block `number`, counted from the start, as it is by now. The DMA may write there meanwhile: only the ring's position, read off
     /// afterwards, tells that it did not.
-    pub fn block(&self, number: u32) -> &'static Block {
-        compiler_fence(Ordering::Acquire);
-        // SAFETY: in bounds by the remainder. What is read while the DMA writes is bytes of no meaning, which the reader throws away:
-        // it asks for the position afterwards, through a volatile register behind a fence.
-        unsafe { &*MEMORY[self.channel].0.get().cast::<Block>().add((number % BLOCKS) as usize) }
+    ///
+    /// Every word is read as a register would be. A reference would promise that nobody writes while it lives, which nobody can for the DMA,
+    /// and its reads might be moved behind the position's.
+    pub fn block(&self, number: u32) -> Block {
+        // SAFETY: in bounds by the remainder; a block has whole half-words, and the ring is aligned to more.
+        let from = unsafe { MEMORY[self.channel].0.get().cast::<Block>().add((number % BLOCKS) as usize) }
+            .cast::<u16>();
+        let mut block: Block = [[0; CHIP_BYTES]; BLOCK_SCANS];
+        for (place, bytes) in block.as_flattened_mut().chunks_exact_mut(2).enumerate() {
+            // SAFETY: within the block, whose half-words are counted; half-words are what the DMA writes, each at once.
+            bytes.copy_from_slice(&unsafe { from.add(place).read_volatile() }.to_ne_bytes());
+        }
+        block
     }
 
     /// How far the ring is filled, words from its beginning: the address that the DMA writes next (RM0456, "GPDMA channel x
     /// destination address register").
     pub fn position(&self) -> u32 {
-        compiler_fence(Ordering::AcqRel);
+        // what was read before is memory, and this is a device: the processor keeps no order between the two by itself
+        fence(Ordering::SeqCst);
         let filled = GPDMA1.ch(self.channel).dar().read().wrapping_sub(MEMORY[self.channel].0.get() as u32);
         // behind the last block, until the list's first is loaded, it is the ring's end
         filled / 2 % RING_WORDS

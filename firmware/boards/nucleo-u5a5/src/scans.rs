@@ -162,7 +162,7 @@ impl Converters {
         if FIRST.has_failed() || SECOND.has_failed() || !restart::works(0) || !restart::works(1) {
             return Err(Trouble::Dma);
         }
-        let (delivered, trouble) = self.reader.take([FIRST.block(due), SECOND.block(due)], look, block)?;
+        let (delivered, trouble) = self.reader.take([&FIRST.block(due), &SECOND.block(due)], look, block)?;
         if let Some(trouble) = trouble {
             self.report(trouble.into());
         } else {
