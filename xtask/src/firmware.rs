@@ -6,7 +6,7 @@
 use crate::consent::Consent;
 use crate::project::{EMULATED_BOARD, EMULATED_CHECKS, Package, Project, TARGET};
 use crate::toolchain::Toolchain;
-use crate::{command, flat, setup, size};
+use crate::{command, flat, sbom, setup, size};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 
@@ -55,6 +55,9 @@ pub fn build_boards(project: &Project, toolchain: &Toolchain, only: Option<&str>
         sizes.push((board.name.clone(), size::of_image(&image)?));
         if board.name != EMULATED_BOARD {
             images.push(flat::write(&image)?);
+            if let Some(root) = project.boards_root() {
+                println!("  what it is made of: {}", sbom::of_board(&root, &board.name, &image)?.display());
+            }
         }
     }
     print!("\n{}", size::table(&sizes));

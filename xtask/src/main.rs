@@ -23,6 +23,7 @@ mod parity;
 mod project;
 mod python;
 mod qemu;
+mod sbom;
 mod setup;
 mod size;
 mod suite;
@@ -80,6 +81,8 @@ enum Task {
     },
     /// Build the Python wheel, install it into an empty environment, and test it there.
     Python,
+    /// Write what each program is made of: every crate of others with version, licence and checksum (CycloneDX).
+    Sbom,
     /// Compare spectra, universal files and virtual points with pyFRF, pyuff and pyFBS: numbers, or times.
     Parity(parity::Options),
     /// Run every benchmark of the workspace.
@@ -114,6 +117,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Budgets => budgets::command(&project),
         Task::Flash { detach } => flash::run(&project, detach),
         Task::Python => python::run(&project).map(|remark| println!("{remark}")),
+        Task::Sbom => sbom::run(&project),
         Task::Parity(options) => parity::run(&project, &options),
         Task::Bench { extra } => bench::run(&project, &extra),
     }

@@ -8,8 +8,12 @@ use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::{Kind, Verdict};
 use crate::device::channels::ChannelMap;
 use crate::device::recording::Recording;
+use crate::frf::{Frf, MotionQuantity};
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
+use jointrig_protocol::request::Configuration;
 use jointrig_protocol::shot::{Phase, Shot};
+use nalgebra::DMatrix;
+use num_complex::Complex;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::path::Path;
@@ -135,6 +139,86 @@ fn an_honest_history_raises_no_alarm() {
     );
     store.log("after a transaction that failed").expect("noted");
     assert_eq!(said(&store), "");
+}
+
+/// One thing that the program does to its file, by dice; what could not be done leaves nothing behind either.
+fn deed(store: &mut Store, dice: &mut Xoshiro256PlusPlus) {
+    let number = |dice: &mut Xoshiro256PlusPlus, below: u32| dice.next_u32() % below;
+    let sessions = store.sessions().expect("sessions");
+    let session = sessions.last().map(|(id, _)| *id);
+    let cells = store.cells().expect("cells");
+    let cell = cells[number(dice, cells.len() as u32) as usize].id;
+    let records = store.places().expect("records");
+    let measured = records.get(number(dice, 64) as usize % records.len().max(1)).map(|place| place.id);
+    match (number(dice, 15), session, measured) {
+        (0, ..) | (_, None, _) => drop(begin_session(store)),
+        (1..=5, Some(session), _) => {
+            let attempt = store.records_of(cell).expect("records").len() as u32;
+            let kind = Kind::ALL[number(dice, Kind::ALL.len() as u32) as usize];
+            let counters = Counters::from([("scans_received".into(), u64::from(attempt))]);
+            store.insert(&record(cell, attempt, session, kind), &counters).expect("stored");
+        }
+        (6, _, Some(id)) => store.overrule(id, Kind::Dropped, "a lorry").expect("dropped"),
+        (7, _, Some(id)) => store.overrule(id, Kind::Good, "no lorry").expect("kept"),
+        (8, ..) => drop(store.redo(cell, "again").expect("opened")),
+        (9, ..) => store.settle(cell, "enough").expect("settled"),
+        (10, ..) => store.give_up(cell, "out of reach").expect("given up"),
+        (11, Some(session), _) => {
+            store.note_temperature(session, 20.0 + f64::from(number(dice, 5))).expect("noted");
+            store.set_meta("who", &number(dice, 3).to_string()).expect("noted");
+        }
+        (12, ..) => {
+            let y = Complex::new(1.0, f64::from(number(dice, 9)));
+            let lines = vec![DMatrix::from_element(1, 1, y)];
+            let names = |name: &str| vec![name.to_owned()];
+            let frf = Frf::new(vec![100.0], 0.0, MotionQuantity::Velocity, names("A1x"), names("AZ1"), lines);
+            store.insert_frf(Configuration::A, "a.npz", &frf.expect("an FRF")).expect("stored");
+        }
+        (13, ..) => {
+            let sensors = "[[channel]]\nname = \"force\"\nsensitivity_v = 0.0224\n";
+            let plan = Plan::parse(&format!("{SMALL}\n{sensors}"), "p").expect("a plan");
+            let own: Vec<_> = plan.channel.into_iter().map(toml::Spanned::into_inner).collect();
+            store.calibrate(&own, 1, "certificate").expect("calibrated");
+        }
+        // with a cell more or less; refused where that cell has hits
+        _ => drop(store.take_over(
+            &SMALL.replace(
+                "impacts = [\"BZ1\"]",
+                ["impacts = [\"BZ1\"]", "impacts = [\"BZ1\", \"AZ1\"]"][number(dice, 2) as usize],
+            ),
+            "b.toml",
+        )),
+    }
+}
+
+#[test]
+fn two_hundred_honest_histories_raise_no_alarm() {
+    // in memory where there is such a folder: thousands of transactions wait for a disk otherwise
+    let folder = tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir()).expect("a folder");
+    for history in 0..200 {
+        let mut dice = Xoshiro256PlusPlus::seed_from_u64(history);
+        let path = folder.path().join(format!("{history}.jrig"));
+        let mut store = Store::create(&path, SMALL, "small.toml").expect("created");
+        for _ in 0..dice.next_u32() % 4 {
+            for _ in 0..dice.next_u32() % 12 {
+                deed(&mut store, &mut dice);
+            }
+            match dice.next_u32() % 3 {
+                // as when a process is killed: nothing is closed in order
+                0 => drop(store),
+                _ => store.close().expect("closed"),
+            }
+            store = Store::open(&path).expect("open");
+        }
+        assert_eq!(said(&store), "", "history {history}, while it is written");
+        let copy = folder.path().join(format!("{history}-copy.jrig"));
+        store.back_up(&copy).expect("copied");
+        store.close().expect("closed");
+        for file in [&path, &copy] {
+            assert_eq!(said(&Store::open_read_only(file).expect("open")), "", "history {history}");
+            std::fs::remove_file(file).expect("removed");
+        }
+    }
 }
 
 #[test]
