@@ -267,3 +267,98 @@ fn a_matrix_that_is_mostly_holes_is_not_made() {
     std::fs::write(folder.path().join("holes.uff"), text).expect("written");
     refused(folder.path(), DOORS[0], "holes.uff", &["mostly holes"]);
 }
+
+/// A campaign with three hits, and FRFs.
+fn measured(folder: &Path) {
+    let mut hits = jointrig::exchange::read_impacts(&data("impacts/good.npz")).expect("test data");
+    for hit in &mut hits.response {
+        *hit = vec![hit[0].clone(); 3];
+    }
+    jointrig::exchange::uff_output::write_records(&folder.join("hits.uff"), &hits, "A1", "AZ1")
+        .expect("written");
+    for line in [
+        "import hits.uff --into c.jrig --configuration A --impact AZ1 --response A1",
+        "import B.npz --into c.jrig --configuration B",
+    ] {
+        let (code, said) = run(folder, line, 0);
+        assert_eq!(code, Some(0), "{said}");
+    }
+}
+
+/// Every door that reads a campaign.
+const OF_CAMPAIGNS: [&str; 8] = [
+    "campaign verify c.jrig",
+    "campaign verify c.jrig --deep",
+    "campaign status c.jrig",
+    "campaign show c.jrig A/AZ1/A1",
+    "campaign backup c.jrig copy.jrig",
+    "analyse c.jrig --out o",
+    "export c.jrig --format npz --out e",
+    "campaign drop c.jrig 1 --reason x",
+];
+
+#[test]
+fn campaign_files_that_claim_too_much_are_refused_or_named() {
+    let folder = folder();
+    let at = folder.path();
+    measured(at);
+    let whole = std::fs::read(at.join("c.jrig")).expect("read");
+    let numbers = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 1000000)";
+    let cells = format!(
+        "INSERT INTO cells (configuration, impact, response, wanted) {numbers} SELECT 'A', 'i' || i, 'A1', 1 FROM n"
+    );
+    for (sql, parts) in [
+        ("UPDATE records SET scans = 1000000000", ["description", "checksum"]),
+        ("UPDATE records SET channels = 1000000000", ["description", "checksum"]),
+        ("UPDATE records SET scans = -1", ["description", "checksum"]),
+        ("UPDATE sessions SET rate_hz = 0", ["of `sessions` was changed", "0 Hz"]),
+        ("UPDATE frfs SET frf = zeroblob(500000000)", ["FRFs", "frfs"]),
+        ("PRAGMA user_version = -1", ["version", "version"]),
+        ("PRAGMA user_version = 3", ["version", "version"]),
+        (
+            "PRAGMA foreign_keys = OFF; DROP TABLE cells; CREATE VIEW cells AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) \
+             SELECT i AS id, 'A' AS configuration, 'x' AS impact, 'y' AS response, 1 AS wanted, NULL AS given_up, NULL AS settled FROM n",
+            ["not as jointrig makes it", "not as jointrig makes it"],
+        ),
+        (cells.as_str(), ["cells", "cells"]),
+    ] {
+        std::fs::write(at.join("c.jrig"), &whole).expect("written");
+        let file = rusqlite::Connection::open(at.join("c.jrig")).expect("open");
+        let triggers: Vec<String> = {
+            let mut names =
+                file.prepare("SELECT name FROM sqlite_schema WHERE type = 'trigger'").expect("SQL");
+            names.query_map([], |row| row.get(0)).expect("SQL").flatten().collect()
+        };
+        let definitions: Vec<String> = {
+            let mut all = file.prepare("SELECT sql FROM sqlite_schema WHERE type = 'trigger'").expect("SQL");
+            all.query_map([], |row| row.get(0)).expect("SQL").flatten().collect()
+        };
+        for name in triggers {
+            file.execute_batch(&format!("DROP TRIGGER {name}")).expect("SQL");
+        }
+        file.execute_batch(sql).expect("SQL");
+        // as they were: the file looks like one of ours
+        for definition in definitions {
+            let _ = file.execute_batch(&definition);
+        }
+        file.close().expect("closed");
+        let size = std::fs::metadata(at.join("c.jrig")).expect("there").len();
+        for door in OF_CAMPAIGNS {
+            for made in ["copy.jrig", "o", "e"] {
+                let _ = std::fs::remove_file(at.join(made));
+                let _ = std::fs::remove_dir_all(at.join(made));
+            }
+            let (code, said) = run(at, door, size);
+            assert!(matches!(code, Some(0 | 1)), "{door}, {sql}: {code:?} {said}");
+            assert!(!said.contains("panicked"), "{door}, {sql}: {said}");
+            if door == OF_CAMPAIGNS[0] {
+                assert_eq!(code, Some(1), "{sql}: {said}");
+            }
+        }
+        let mut verify = Command::new(env!("CARGO_BIN_EXE_jointrig"));
+        let out = verify.current_dir(at).args(["campaign", "verify", "c.jrig"]).output().expect("runs");
+        let said =
+            [out.stdout, out.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+        assert!(parts.iter().any(|part| said.contains(part)), "{sql}: {said}");
+    }
+}

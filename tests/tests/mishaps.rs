@@ -333,3 +333,16 @@ fn the_signs_of_all_channels_are_right_on_the_simulated_rig() {
         }
     }
 }
+
+#[test]
+fn somebody_who_closes_stderr_in_mid_run_ends_no_campaign() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = new(folder.path(), SMALL);
+    let mut command = jointrig();
+    command.args(["campaign", "run"]).arg(&file).args(["--device", "sim:", "--seed", "4"]);
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stderr.take());
+    assert!(child.wait().unwrap().success());
+    assert_eq!(kept(&file), 14);
+    verified(&file);
+}

@@ -2,7 +2,43 @@
 
 use super::{ConfigurationPlan, Plan, configuration_named};
 use jointrig_protocol::request::Configuration;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
 use toml::Spanned;
+
+/// Most cells of a plan; the paper's campaign has 252, and a cell takes minutes.
+pub const MOST_CELLS: usize = 20_000;
+
+/// Where a plan's text begins to make more cells than [`MOST_CELLS`], and what is wrong there: every impact of a configuration makes a cell with
+/// every response, and two long lists are soon more than any memory holds. So this is asked before anything else is.
+pub(super) fn too_many(text: &str) -> Option<(usize, String)> {
+    #[derive(Deserialize)]
+    struct Lists {
+        #[serde(default)]
+        configuration: Vec<Spanned<List>>,
+    }
+    #[derive(Deserialize)]
+    struct List {
+        #[serde(default)]
+        impacts: Vec<IgnoredAny>,
+        #[serde(default)]
+        responses: Vec<IgnoredAny>,
+    }
+    // what else is wrong is said where it is read as a plan
+    let lists: Lists = toml::from_str(text).ok()?;
+    let mut cells = 0usize;
+    lists.configuration.iter().find_map(|list| {
+        let (impacts, responses) = (list.get_ref().impacts.len(), list.get_ref().responses.len());
+        cells = cells.saturating_add(impacts.saturating_mul(responses));
+        let what = || {
+            format!(
+                "configuration: {impacts} impacts with {responses} responses each make more than {MOST_CELLS} cells: leave points out, or make \
+                 several campaigns"
+            )
+        };
+        (cells > MOST_CELLS).then(|| (list.span().start, what()))
+    })
+}
 
 /// One impact position with one response location, in one structure.
 #[derive(Clone, Debug, PartialEq, Eq)]

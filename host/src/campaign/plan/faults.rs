@@ -2,6 +2,7 @@
 
 use serde::de::DeserializeOwned;
 
+use super::cells::too_many;
 use super::{Plan, PlanError, field};
 
 /// Unknown fields that are told at once, at most: more are another kind of file.
@@ -39,6 +40,7 @@ impl Plan {
     /// # Errors
     /// The first thing that is wrong, with line and field.
     pub fn parse(text: &str, source_name: &str) -> Result<Self, PlanError> {
+        few_cells(text, source_name)?;
         read(text, source_name, Self::check).map(Self::with_usual_names).map_err(first)
     }
 
@@ -55,12 +57,21 @@ impl Plan {
     /// # Errors
     /// All that is wrong. A value of the wrong kind, or a field that is missing, hides what a reader would find after it.
     pub fn parse_all(text: &str, source_name: &str) -> Result<Self, Vec<PlanError>> {
+        few_cells(text, source_name).map_err(|error| vec![error])?;
         read(text, source_name, |plan: &Self, faults| {
             plan.check(faults);
             plan.check_sense(faults);
         })
         .map(Self::with_usual_names)
     }
+}
+
+fn few_cells(text: &str, source_name: &str) -> Result<(), PlanError> {
+    let mut faults = Faults::default();
+    if let Some((at, what)) = too_many(text) {
+        faults.unless(false, at, what);
+    }
+    faults.told(text, source_name).pop().map_or(Ok(()), Err)
 }
 
 /// Reads a TOML document and has it checked.

@@ -17,7 +17,7 @@ mod sense;
 mod sensor;
 mod structure;
 
-pub use cells::Cell;
+pub use cells::{Cell, MOST_CELLS};
 pub use geometry::{GeometryPlan, ImpactPoint, ResponsePoint, SensorPoint};
 pub use hammer::{HammerPlan, Swung};
 pub use priors::PriorsPlan;

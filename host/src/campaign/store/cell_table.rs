@@ -6,7 +6,7 @@ use rusqlite::{Connection, params};
 use super::Store;
 use super::error::StoreError;
 use super::table::{Row, table};
-use crate::campaign::plan::{Cell, configuration_name};
+use crate::campaign::plan::{Cell, MOST_CELLS, configuration_name};
 
 table! {
     /// The columns of a cell.
@@ -64,8 +64,18 @@ pub(super) fn write_cell(connection: &Connection, cell: &Cell) -> rusqlite::Resu
 }
 
 impl Store {
-    /// Every cell, in the order of the plan.
+    /// Every cell, in the order of the plan. A file with more of them than a plan makes is not read.
     pub fn cells(&self) -> Result<Vec<CellRow>, StoreError> {
+        let count = |row: &rusqlite::Row<'_>| row.get::<_, usize>(0);
+        let there = self
+            .connection
+            .query_row("SELECT count(*) FROM cells", [], count)
+            .map_err(self.failed("counting cells"))?;
+        if there > MOST_CELLS {
+            return Err(self.content(format!(
+                "it has {there} cells, and no plan makes more than {MOST_CELLS}: `jointrig campaign verify` says what was added"
+            )));
+        }
         let sql = format!("SELECT {} FROM cells ORDER BY id", CellColumns::list());
         self.all(&sql, [], |row| CellColumns::read(row).map(CellRow::from), "reading cells")
     }

@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use serde::Deserialize;
-use serde::de::IgnoredAny;
 use toml::Spanned;
 
 use crate::cli::error::CliError;
@@ -33,49 +32,6 @@ struct PeekGeometry {
 /// # Errors
 /// The plan or the workbook cannot be read, or the workbook describes what no plan can hold.
 pub fn read(path: &Path) -> Result<String, CliError> {
-    let text = written_out(path)?;
-    refuse_many_cells(path, &text)?;
-    Ok(text)
-}
-
-/// Most cells of a plan; the paper's campaign has 252, and a cell takes minutes.
-const MOST_CELLS: usize = 20_000;
-
-/// Every impact of a configuration makes a cell with every response: two long lists are soon more cells than any memory holds.
-fn refuse_many_cells(path: &Path, text: &str) -> Result<(), CliError> {
-    #[derive(Deserialize)]
-    struct Lists {
-        #[serde(default)]
-        configuration: Vec<Spanned<List>>,
-    }
-    #[derive(Deserialize)]
-    struct List {
-        #[serde(default)]
-        impacts: Vec<IgnoredAny>,
-        #[serde(default)]
-        responses: Vec<IgnoredAny>,
-    }
-    // what is wrong with the plan itself is said where it is read as one
-    let Ok(lists) = toml::from_str::<Lists>(text) else { return Ok(()) };
-    let mut cells = 0usize;
-    for list in &lists.configuration {
-        let List { impacts, responses } = list.get_ref();
-        cells = cells.saturating_add(impacts.len().saturating_mul(responses.len()));
-        if cells > MOST_CELLS {
-            let line = 1 + text[..list.span().start].matches('\n').count();
-            return Err(CliError::Bad(format!(
-                "{}:{line}: configuration: {} impacts with {} responses each make more than {MOST_CELLS} cells: leave points out, or make \
-                 several campaigns",
-                path.display(),
-                impacts.len(),
-                responses.len()
-            )));
-        }
-    }
-    Ok(())
-}
-
-fn written_out(path: &Path) -> Result<String, CliError> {
     let text = crate::foreign::text(path, crate::foreign::SETTINGS).map_err(|source| CliError::Read {
         path: path.into(),
         doing: "reading the plan",
