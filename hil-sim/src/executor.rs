@@ -19,10 +19,12 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::pin::Pin;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::task::{Context, Wake, Waker};
 
 use embassy_executor::raw::{Executor, TaskStorage};
+
+use crate::sync::AtomicBool;
 
 /// A wake-up that somebody asked for.
 struct Alarm {

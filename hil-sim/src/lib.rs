@@ -11,3 +11,4 @@ pub mod executor;
 pub mod link;
 pub mod rig;
 pub mod serve;
+mod sync;

@@ -6,13 +6,14 @@
 
 use std::collections::VecDeque;
 use std::io;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, PoisonError};
 use std::task::{Poll, Waker};
 use std::time::{Duration, Instant};
 
 use jointrig_firmware::board::{ByteSink, ByteSource};
 
 use crate::executor::Woken;
+use crate::sync::{Condvar, Mutex, MutexGuard};
 
 /// Bytes that may wait for the host: beyond it the device's link is stalled, as a real one would be.
 const TO_HOST_BYTES: usize = 1 << 20;

@@ -1,0 +1,7 @@
+//! Locks and flags between the device's thread and the host's: the standard library's, or those of a model that tries every order of two
+//! threads (`tests/wakes.rs`).
+
+#[cfg(every_order)]
+pub use loom::sync::{Condvar, Mutex, MutexGuard, atomic::AtomicBool};
+#[cfg(not(every_order))]
+pub use std::sync::{Condvar, Mutex, MutexGuard, atomic::AtomicBool};

@@ -1,0 +1,94 @@
+//! Nobody sleeps through a byte, whatever order the device's thread and the host's take. Every order is tried:
+//!
+//!     RUSTFLAGS="--cfg every_order" cargo test --release -p jointrig-hil-sim --test wakes --target-dir target/loom
+//!
+//! Without that flag there is nothing here.
+#![cfg(every_order)]
+#![allow(clippy::unwrap_used)]
+
+use std::future::Future;
+use std::pin::pin;
+use std::sync::Arc;
+use std::task::{Context, Poll, Waker};
+use std::time::Duration;
+
+use jointrig_firmware::board::{ByteSink, ByteSource};
+use jointrig_hil_sim::executor::Woken;
+use jointrig_hil_sim::link::{DeviceEnd, pair};
+use loom::thread;
+
+/// Polls as the board's thread does, until the future is ready or the link is closed.
+fn driven<T>(link: &DeviceEnd, woken: &Arc<Woken>, future: impl Future<Output = T>) -> Option<T> {
+    let waker = Waker::from(Arc::clone(woken));
+    let mut future = pin!(future);
+    loop {
+        if let Poll::Ready(value) = future.as_mut().poll(&mut Context::from_waker(&waker)) {
+            return Some(value);
+        }
+        link.sleep(woken);
+        if !woken.take() && link.is_closed() {
+            return None;
+        }
+    }
+}
+
+#[test]
+fn a_byte_from_the_host_wakes_the_device() {
+    loom::model(|| {
+        let (mut host, mut device) = pair();
+        let board = thread::spawn(move || {
+            let woken = Arc::new(Woken::default());
+            let sleeper = device.clone();
+            let mut bytes = [0; 4];
+            driven(&sleeper, &woken, device.read(&mut bytes)).map(|count| bytes[..count].to_vec())
+        });
+        host.write_all(&[7]).unwrap();
+        assert_eq!(board.join().unwrap(), Some(vec![7]));
+    });
+}
+
+#[test]
+fn a_cut_and_a_close_wake_the_device() {
+    loom::model(|| {
+        let (mut host, mut device) = pair();
+        let board = thread::spawn(move || {
+            let woken = Arc::new(Woken::default());
+            let sleeper = device.clone();
+            let mut bytes = [0; 4];
+            driven(&sleeper, &woken, device.read(&mut bytes))
+        });
+        host.cut();
+        assert_eq!(board.join().unwrap(), Some(0));
+    });
+    loom::model(|| {
+        let (host, mut device) = pair();
+        let board = thread::spawn(move || {
+            let woken = Arc::new(Woken::default());
+            let sleeper = device.clone();
+            let mut bytes = [0; 4];
+            driven(&sleeper, &woken, device.read(&mut bytes))
+        });
+        drop(host);
+        assert_eq!(board.join().unwrap(), None);
+    });
+}
+
+#[test]
+fn a_frame_reaches_a_host_that_waits() {
+    loom::model(|| {
+        let (mut host, mut device) = pair();
+        let board = thread::spawn(move || {
+            let woken = Arc::new(Woken::default());
+            let sleeper = device.clone();
+            driven(&sleeper, &woken, device.write(&[9])).unwrap();
+            // nothing more to do: the board's thread sleeps until the host goes
+            sleeper.sleep(&woken);
+        });
+        let mut bytes = [0; 4];
+        // the model knows no time: a host that is not woken waits for ever, and is found
+        let count = host.read(&mut bytes, Duration::from_secs(3600)).unwrap();
+        assert_eq!(bytes[..count], [9]);
+        drop(host);
+        board.join().unwrap();
+    });
+}
