@@ -198,13 +198,13 @@ impl Ring {
     /// Every word is read as a register would be. A reference would promise that nobody writes while it lives, which nobody can for the DMA,
     /// and its reads might be moved behind the position's.
     pub fn block(&self, number: u32) -> Block {
-        // SAFETY: in bounds by the remainder; a block has whole half-words, and the ring is aligned to more.
-        let from = unsafe { MEMORY[self.channel].0.get().cast::<Block>().add((number % BLOCKS) as usize) }
-            .cast::<u16>();
+        const HALF_WORDS: usize = size_of::<Block>() / 2;
+        let ring = core::ptr::from_ref(&MEMORY[self.channel]).cast::<u16>();
         let mut block: Block = [[0; CHIP_BYTES]; BLOCK_SCANS];
         for (place, bytes) in block.as_flattened_mut().chunks_exact_mut(2).enumerate() {
-            // SAFETY: within the block, whose half-words are counted; half-words are what the DMA writes, each at once.
-            bytes.copy_from_slice(&unsafe { from.add(place).read_volatile() }.to_ne_bytes());
+            let place = (number % BLOCKS) as usize * HALF_WORDS + place;
+            // SAFETY: in bounds by the remainder, and aligned as the ring is; half-words are what the DMA writes, each at once.
+            bytes.copy_from_slice(&unsafe { ring.add(place).read_volatile() }.to_ne_bytes());
         }
         block
     }

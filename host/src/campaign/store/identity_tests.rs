@@ -61,3 +61,40 @@ fn another_name_or_a_lock_file_that_is_gone_lets_nobody_in() {
     std::fs::remove_file(at("second.jrig")).expect("removed");
     Store::open(&at("link.jrig")).expect("through a link, if nobody else writes").close().expect("closed");
 }
+
+#[test]
+fn a_log_that_is_emptied_takes_nothing_and_under_a_reader_it_is_missed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.jrig");
+    let empty = || {
+        let log =
+            std::fs::File::options().write(true).open(folder.path().join("a.jrig-wal")).expect("its log");
+        log.set_len(0).expect("emptied");
+    };
+    let store = Store::create(&path, SMALL, "small.toml").expect("created");
+    for line in 0..5 {
+        store.log(&format!("line {line}")).expect("noted");
+        empty();
+    }
+    store.close().expect("closed");
+    let store = Store::open_read_only(&path).expect("read");
+    let lines = |store: &Store| {
+        store.log_lines(0).expect("log").iter().filter(|line| line.2.starts_with("line")).count()
+    };
+    assert_eq!((lines(&store), store.verify().expect("checked")), (5, vec![]));
+    drop(store);
+    // somebody who reads keeps the log in use: what it holds is not in the file yet, and is gone
+    let store = Store::open(&path).expect("again");
+    store.log("line 5").expect("noted");
+    let reader = rusqlite::Connection::open(&path).expect("a reader");
+    reader.execute_batch("BEGIN; SELECT count(*) FROM log").expect("begun");
+    let _: i64 = reader.query_row("SELECT count(*) FROM log", [], |row| row.get(0)).expect("read");
+    store.log("line 6").expect("noted");
+    empty();
+    let said = store.log("line 7").expect_err("its log is gone").to_string();
+    drop(reader);
+    drop(store);
+    assert!(said.contains("removed or emptied") && said.contains("a-rescued-1.jrig"), "{said}");
+    let saved = rescued(folder.path());
+    assert!(lines(&saved) >= 6 && saved.verify().expect("checked").is_empty(), "{}", lines(&saved));
+}

@@ -195,7 +195,11 @@ impl Store {
             Ok(records) => {
                 format!("all that was measured ({records} records) was copied to {}", to.display())
             }
-            Err(error) => format!("and what it held could not be copied ({error})"),
+            // a log that was emptied under a reader: what stands in the file itself is left
+            Err(error) => match std::fs::copy(&self.path, &to) {
+                Ok(_) => format!("what stood in the file without its log was copied to {}", to.display()),
+                Err(_) => format!("and what it held could not be copied ({error})"),
+            },
         };
         Err(StoreError::Gone { path: self.path.clone(), what, rescue })
     }
@@ -205,6 +209,8 @@ impl Store {
             self.connection.busy_timeout(PATIENCE)?;
             self.connection.pragma_update(None, "journal_mode", "WAL")?;
             self.connection.pragma_update(None, "synchronous", "FULL")?;
+            // every record goes on into the file itself at once: whoever empties or removes the log then takes nothing
+            self.connection.pragma_update(None, "wal_autocheckpoint", 1)?;
             self.connection.pragma_update(None, "foreign_keys", true)
         };
         set().map_err(|error| sqlite(&self.path, "opening for writing", error))
