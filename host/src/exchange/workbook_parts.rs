@@ -16,6 +16,9 @@ const MOST_BYTES: u64 = 4 << 20;
 /// Most parts.
 const MOST_PARTS: usize = 1000;
 
+/// Most bytes of a range's name that are looked at.
+const LONGEST_PLACE: usize = 64;
+
 /// Refuses a workbook that would take memory out of proportion.
 ///
 /// # Errors
@@ -46,6 +49,13 @@ pub(super) fn refuse_lies(bytes: &[u8]) -> Result<(), String> {
         if is_text && memchr::memchr(0, &text).is_some() {
             return Err(of_part("is not in UTF-8: save the workbook again"));
         }
+        if let Some(cell) = places(&text).find(|cell| is_no_place(cell)) {
+            let cell: String = String::from_utf8_lossy(cell).chars().take(20).collect();
+            return Err(of_part(&format!(
+                "calls a cell `{}`, beyond the last column XFD: save the workbook again",
+                cell.escape_debug()
+            )));
+        }
         if let Some(claimed) = claims(&text).find(|claimed| *claimed > text.len() as u64) {
             return Err(of_part(&format!(
                 "says that it has {claimed} texts, in {} bytes: save the workbook again",
@@ -54,6 +64,28 @@ pub(super) fn refuse_lies(bytes: &[u8]) -> Result<(), String> {
         }
     }
     Ok(())
+}
+
+/// What every attribute `r` and `ref` says: cells, and the first and last one of a range.
+fn places(text: &[u8]) -> impl Iterator<Item = &[u8]> + '_ {
+    let of = |name: &'static [u8]| {
+        memmem::find_iter(text, name).filter_map(move |at| {
+            let own = at.checked_sub(1).is_some_and(|before| text[before].is_ascii_whitespace());
+            let behind = text[at + name.len()..].trim_ascii_start().strip_prefix(b"=")?.trim_ascii_start();
+            let said = behind.strip_prefix(b"\"").or_else(|| behind.strip_prefix(b"'"))?;
+            // no further than any name of a range: whoever leaves quotes open must not have all of it read each time
+            let said = &said[..said.len().min(LONGEST_PLACE)];
+            own.then(|| &said[..memchr::memchr2(b'"', b'\'', said).unwrap_or(said.len())])
+        })
+    };
+    of(b"r").chain(of(b"ref")).flat_map(|said| said.split(|byte| *byte == b':'))
+}
+
+/// Whether letters and figures are more than those of the last cell, XFD1048576: its reader multiplies them as they come.
+fn is_no_place(cell: &[u8]) -> bool {
+    let letters = cell.iter().take_while(|byte| byte.is_ascii_alphabetic()).count();
+    let figures = cell[letters..].iter().take_while(|byte| byte.is_ascii_digit()).count();
+    letters > 3 || figures > 7
 }
 
 /// What every `uniqueCount` says, too large where it is no number that fits.
@@ -88,9 +120,14 @@ mod tests {
     fn claims_and_bombs_are_refused_with_their_part() {
         let good = of(&[("xl/sharedStrings.xml", b"<sst uniqueCount=\"3\"><si><t>a</t></si></sst>")]);
         assert_eq!(refuse_lies(&good), Ok(()));
+        let cells = b"<dimension ref=\"A1:XFD1048576\"/><c r=\"B2\" t=\"inlineStr\"/><hyperlink ref='C3' r:id=\"rId12345678\"/>";
+        assert_eq!(refuse_lies(&of(&[("xl/worksheets/sheet1.xml", cells)])), Ok(()));
         for (name, text, wanted) in [
             ("xl/sharedStrings.xml", &b"<sst uniqueCount = '900000000000'/>"[..], "900000000000 texts"),
             ("xl/sharedStrings.xml", b"<sst count='1' uniqueCount='+999'/>", "999 texts"),
+            ("xl/worksheets/sheet1.xml", b"<dimension ref=\"A1:AinlineStr\">", "`AinlineStr`"),
+            ("xl/worksheets/sheet1.xml", b"<c t='s' r = 'ABCDEFGHIJ1'>", "`ABCDEFGHIJ1`"),
+            ("xl/worksheets/sheet1.xml", b"<row r=\"99999999999\">", "`99999999999`"),
             ("xl/a.xml", b"<\0s\0s\0t\0", "UTF-8"),
             ("xl/worksheets/sheet1.xml", &vec![b' '; 5_000_000], "larger than"),
         ] {
