@@ -6,18 +6,32 @@ use jointrig::report;
 use jointrig::report::words::headline;
 use jointrig::results::Results;
 use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::PyDict;
 
+use crate::frf::Frf;
+use crate::lab::Lab;
 use crate::{raised, values};
 
 /// What an analysis found.
 #[pyclass(module = "jointrig._native", frozen)]
 pub struct Analysis {
     found: Results,
+    of: Of,
+    spectra: PyOnceLock<Py<PyDict>>,
+}
+
+/// What was analysed.
+pub enum Of {
+    /// A campaign file.
+    Campaign(PathBuf),
+    /// FRFs of A, B and the assembly; none where a loop was.
+    Frfs(Vec<(&'static str, Py<Frf>)>),
 }
 
 impl Analysis {
-    pub fn of(found: Results) -> Self {
-        Self { found }
+    pub fn of(found: Results, of: Of) -> Self {
+        Self { found, of, spectra: PyOnceLock::new() }
     }
 }
 
@@ -28,6 +42,28 @@ impl Analysis {
     fn results<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let text = self.found.to_json().map_err(|error| raised::data(py, &error.to_string()))?;
         values(py, &text)
+    }
+
+    /// The FRFs behind it, by the configuration's name: those that have any. Of a campaign they are computed when they are asked for, once.
+    #[getter]
+    fn spectra(&self, py: Python<'_>) -> PyResult<Py<PyDict>> {
+        let made = self.spectra.get_or_try_init(py, || {
+            let all = PyDict::new(py);
+            match &self.of {
+                Of::Campaign(path) => {
+                    for (name, frf) in Lab::at(path.clone()).frfs(py)? {
+                        all.set_item(name, Bound::new(py, frf)?)?;
+                    }
+                }
+                Of::Frfs(given) => {
+                    for (name, frf) in given {
+                        all.set_item(name, frf.bind(py))?;
+                    }
+                }
+            }
+            Ok::<_, PyErr>(all.unbind())
+        })?;
+        Ok(made.clone_ref(py))
     }
 
     /// Names of the figures that there are data for, in the order of the report.

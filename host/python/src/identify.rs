@@ -10,7 +10,7 @@ use jointrig::substructuring::Band;
 use jointrig::substructuring::averaged::Priors;
 use pyo3::prelude::*;
 
-use crate::analysis::Analysis;
+use crate::analysis::{Analysis, Of};
 use crate::frf::Frf;
 use crate::{in_the_process_that_loaded_this, interruptible, raised};
 
@@ -87,5 +87,6 @@ pub fn identify(
     let found = interruptible::run(py, move |_| asked.answered(source, frfs, &geometry))?;
     let found = document(found.map_err(|error| refused(error.to_string()))?);
     question.was_answered(&found).map_err(refused)?;
-    Ok((Analysis::of(found), notes))
+    let given = [("A", a), ("B", b), ("AJB", ajb)].map(|(name, frf)| (name, frf.clone().unbind()));
+    Ok((Analysis::of(found, Of::Frfs(given.into())), notes))
 }

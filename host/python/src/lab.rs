@@ -3,18 +3,22 @@
 use std::path::PathBuf;
 
 use jointrig::analyse::{self, AnalyseError, CampaignFile, KnownContact, Wanted};
-use jointrig::campaign::plan::structure;
+use jointrig::campaign::plan::{configuration_named, structure};
 use jointrig::campaign::run::status;
 use jointrig::campaign::store::Store;
 use jointrig::campaign::store::error::StoreError;
 use jointrig::report;
+use jointrig::structure::Structure;
 use pyo3::prelude::*;
 
-use crate::analysis::Analysis;
+use crate::analysis::{Analysis, Of};
 use crate::frf::Frf;
 use crate::interruptible::{self, Stopped};
 use crate::record::Record;
 use crate::{in_the_process_that_loaded_this, raised, values};
+
+/// The lines of FRFs unless others are asked for, Hz.
+const BAND_HZ: (f64, f64) = (10.0, 1000.0);
 
 /// A campaign file, read only; it may be measured meanwhile. Holds a path and no connection, so that it can be pickled.
 #[pyclass(module = "jointrig._native", frozen)]
@@ -82,7 +86,7 @@ impl Lab {
     }
 
     /// H1 of a configuration's good hits, or the FRFs that were imported for it; lines of `band_hz`, (low, high), 10 Hz to 1 kHz.
-    #[pyo3(signature = (configuration, *, band_hz=(10.0, 1000.0)))]
+    #[pyo3(signature = (configuration, *, band_hz=BAND_HZ))]
     fn frf(&self, py: Python<'_>, configuration: &str, band_hz: (f64, f64)) -> PyResult<Frf> {
         in_the_process_that_loaded_this(py)?;
         let plan = self.read(py, Store::plan)?;
@@ -92,16 +96,7 @@ impl Lab {
                 &format!("there is no configuration `{configuration}`: A, B or AJB"),
             ));
         };
-        let of = structure(known);
-        let (measured, complaints) = self.computed(py, move |store, _| {
-            let (measured, complaints) =
-                CampaignFile::open(store, KnownContact::default())?.measured(of, [band_hz.0, band_hz.1]);
-            let found = match measured {
-                Some((frf, hits)) => Some(Frf::with_hits(frf, hits)),
-                None => store.frf(of.name())?.map(|found| Frf::of(found.frf)),
-            };
-            Ok((found, complaints))
-        })?;
+        let (measured, complaints) = self.measured(py, structure(known), band_hz)?;
         measured.ok_or_else(|| {
             let why = complaints.first().map_or(String::new(), |why| format!(" ({why})"));
             raised::refused(py, &format!("{configuration} has no good hit and no imported FRFs{why}"))
@@ -128,7 +123,7 @@ impl Lab {
             report::analysed(store, wanted, &tell)
         })?;
         report::must_hold_something(&found).map_err(|sentence| raised::refused(py, &sentence))?;
-        Ok(Analysis::of(found))
+        Ok(Analysis::of(found, Of::Campaign(self.path.clone())))
     }
 
     /// Writes results.json and report.html into `folder`.
@@ -143,6 +138,42 @@ impl Lab {
 }
 
 impl Lab {
+    /// A file that was opened before.
+    pub fn at(path: PathBuf) -> Self {
+        Self { path }
+    }
+
+    /// The FRFs of every configuration that has any, under the plan's name for it.
+    pub fn frfs(&self, py: Python<'_>) -> PyResult<Vec<(String, Frf)>> {
+        in_the_process_that_loaded_this(py)?;
+        let plan = self.read(py, Store::plan)?;
+        let mut found = Vec::new();
+        for own in ["A", "B", "AJB"].into_iter().filter_map(configuration_named) {
+            if let (Some(frf), _) = self.measured(py, structure(own), BAND_HZ)? {
+                found.push((plan.called(own).to_owned(), frf));
+            }
+        }
+        Ok(found)
+    }
+
+    /// The FRFs of a configuration, from hits or imported, and what was wrong with hits.
+    fn measured(
+        &self,
+        py: Python<'_>,
+        of: Structure,
+        band_hz: (f64, f64),
+    ) -> PyResult<(Option<Frf>, Vec<String>)> {
+        self.computed(py, move |store, _| {
+            let (measured, complaints) =
+                CampaignFile::open(store, KnownContact::default())?.measured(of, [band_hz.0, band_hz.1]);
+            let found = match measured {
+                Some((frf, hits)) => Some(Frf::with_hits(frf, hits)),
+                None => store.frf(of.name())?.map(|found| Frf::of(found.frf)),
+            };
+            Ok((found, complaints))
+        })
+    }
+
     /// What `work` finds in the file, with the interpreter released.
     fn read<T: Send>(
         &self,

@@ -10,7 +10,7 @@ use nalgebra::{Complex, DMatrix, Scalar};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 
-use crate::analysis::Analysis;
+use crate::analysis::{Analysis, Of};
 use crate::frf::Frf;
 use crate::{in_the_process_that_loaded_this, interruptible, raised};
 
@@ -141,5 +141,7 @@ pub fn hysteresis(
         let source = Source { kind: "record".into(), ..Source::default() };
         Ok(document(Findings { source, record: Some(loops), ..Findings::default() }))
     })?;
-    found.map(Analysis::of).map_err(|error: HysteresisError| raised::refused(py, &error.to_string()))
+    found
+        .map(|found| Analysis::of(found, Of::Frfs(Vec::new())))
+        .map_err(|error: HysteresisError| raised::refused(py, &error.to_string()))
 }

@@ -37,6 +37,7 @@ def test_the_answer_is_the_commands(case: str) -> None:
     again = jr.identify(**read, geometry=GEOMETRY, method="inverse", idms=["6"], band_hz=[(300, 600)])  # type: ignore[arg-type]
     inverse = by_command(case, "--method", "inverse", "--idms", "6", "--band", "300:600")
     assert without_source(again.results) == inverse
+    assert {name: frf.frf.shape for name, frf in again.spectra.items()} == {name.upper(): frf.frf.shape for name, frf in read.items()}
 
 
 def test_all_of_it_is_asked_for_where_nothing_is_named() -> None:

@@ -68,6 +68,11 @@ def test_the_analysis_is_the_commands(lab_file: Path, tmp_path: Path) -> None:
     results = found.results
     assert results == json.loads(told)
     assert seen and max(done for done, _ in seen) == seen[-1][1]
+    # the FRFs behind it, computed once
+    lab = jr.open(lab_file)
+    assert found.spectra is found.spectra and set(found.spectra) == {"A", "B", "AJB"}
+    for name, frf in found.spectra.items():
+        assert np.array_equal(frf.frf, lab.frf(name).frf, equal_nan=True) and frf.hits is not None
     jr.open(lab_file).report(tmp_path / "python")
     assert json.loads((tmp_path / "python" / "results.json").read_text()) == results
     assert (tmp_path / "python" / "report.html").stat().st_size > 50_000

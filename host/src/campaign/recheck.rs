@@ -8,8 +8,8 @@
 
 use std::collections::HashMap;
 
-use super::plan::Plan;
 use super::plan::level::Held;
+use super::plan::{Cell, Plan};
 use super::run::by_hand::TOO_EARLY;
 use super::run::shaking::Meter;
 use super::store::Store;
@@ -64,12 +64,7 @@ pub fn recheck(store: &Store, at: &dyn Fn(usize, usize)) -> Result<Rechecked, St
             }
             let samples = store.samples(&record)?;
             found.records += 1;
-            found.different.extend(past.differs(
-                &record,
-                &samples,
-                &before,
-                |judge, plan, map, recording, others| judge.judge(&row.cell, plan, map, recording, others),
-            )?);
+            found.different.extend(past.differs(&row.cell, &record, &samples, &before)?);
             before.push((record, samples));
         }
     }
@@ -174,10 +169,10 @@ impl<'s> Past<'s> {
     /// A sentence, when no verdict that could have been given then is the one in the file.
     fn differs(
         &self,
+        cell: &Cell,
         record: &RecordRow,
         samples: &Samples,
         before: &[(RecordRow, Samples)],
-        judge: impl Fn(&mut ByRecord, &Plan, &ChannelMap, &Recording, &Others) -> Verdict,
     ) -> Result<Option<String>, StoreError> {
         let then = self.at("records", record.id);
         let recording = Recording {
@@ -201,7 +196,7 @@ impl<'s> Past<'s> {
                             others.learn(plan, &map, samples.view());
                         }
                     }
-                    let found = judge(&mut ByRecord, plan, &map, &recording, &others);
+                    let found = ByRecord.judge(cell, plan, &map, &recording, &others);
                     if agrees(record, &found) {
                         return Ok(None);
                     }
