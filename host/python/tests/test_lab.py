@@ -70,7 +70,7 @@ def test_the_analysis_is_the_commands(lab_file: Path, tmp_path: Path) -> None:
     assert seen and max(done for done, _ in seen) == seen[-1][1]
     # the FRFs behind it, computed once
     lab = jr.open(lab_file)
-    assert found.spectra is found.spectra and set(found.spectra) == {"A", "B", "AJB"}
+    assert found.spectra is found.spectra and set(found.spectra) == {record.configuration for record in lab.records()}
     for name, frf in found.spectra.items():
         assert np.array_equal(frf.frf, lab.frf(name).frf, equal_nan=True) and frf.hits is not None
     jr.open(lab_file).report(tmp_path / "python")
