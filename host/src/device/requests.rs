@@ -234,6 +234,8 @@ impl Session {
         scan: u64,
         mut stop: impl FnMut(&Self) -> bool,
     ) -> Result<bool, DeviceError> {
+        // a virtual board that stands still for want of an acknowledgement would send nothing until the line counts as idle
+        self.acknowledge()?;
         let mut progress = (self.expected()?, Instant::now());
         if scan.saturating_sub(progress.0) > (claims::AHEAD_S * self.rate_hz) as u64 {
             let (now, hours) = (progress.0, claims::AHEAD_S / 3600.0);

@@ -308,7 +308,7 @@ impl Session {
         }
     }
 
-    fn acknowledge(&mut self) -> Result<(), DeviceError> {
+    pub(super) fn acknowledge(&mut self) -> Result<(), DeviceError> {
         let Some(stream) = &self.inbox.stream else { return Ok(()) };
         let up_to =
             self.hold.map_or(stream.expected(), |at| at.min(stream.expected())).max(self.acknowledged);

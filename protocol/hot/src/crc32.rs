@@ -1,69 +1,82 @@
-//! CRC-32 of a frame's content, four bytes at a time.
+//! CRC-32 of a frame's content: on a controller four bytes at a time by tables, on a host by whatever its processor has for it.
 
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-
-/// CRC-32/ISO-HDLC, reflected.
-const POLYNOMIAL: u32 = 0xEDB8_8320;
-
-// What a byte does to the CRC, at once and after one to three further zero bytes. Four tables and not one of four rows: each
-// then has its address in a register. Eight would be no faster: each byte costs its extraction, its look-up and its sum.
-//
-// They are filled at first use: in flash they would take 4 kB of it, and wait for it at each look-up. Whoever finds them empty
-// fills them, twice if need be, and with the same.
-static AT_ONCE: Table = [const { AtomicU32::new(0) }; 256];
-static AFTER_1: Table = [const { AtomicU32::new(0) }; 256];
-static AFTER_2: Table = [const { AtomicU32::new(0) }; 256];
-static AFTER_3: Table = [const { AtomicU32::new(0) }; 256];
-static FILLED: AtomicBool = AtomicBool::new(false);
-
-type Table = [AtomicU32; 256];
-
-#[cold]
-#[inline(never)]
-fn fill() {
-    for byte in 0..256 {
-        let mut crc = byte as u32;
-        for table in [&AT_ONCE, &AFTER_1, &AFTER_2, &AFTER_3] {
-            for _ in 0..8 {
-                crc = if crc & 1 == 1 { (crc >> 1) ^ POLYNOMIAL } else { crc >> 1 };
-            }
-            table[byte].store(crc, Ordering::Relaxed);
-        }
-    }
-    FILLED.store(true, Ordering::Release);
-}
-
-#[inline(always)]
-fn word(crc: u32, word: u32) -> u32 {
-    let word = crc ^ word;
-    AFTER_3[(word & 0xFF) as usize].load(Ordering::Relaxed)
-        ^ AFTER_2[(word >> 8 & 0xFF) as usize].load(Ordering::Relaxed)
-        ^ AFTER_1[(word >> 16 & 0xFF) as usize].load(Ordering::Relaxed)
-        ^ AT_ONCE[(word >> 24) as usize].load(Ordering::Relaxed)
-}
+#[cfg(any(target_os = "none", test))]
+pub use tables::checksum;
 
 /// The CRC of some bytes.
-#[inline(never)]
+#[cfg(not(any(target_os = "none", test)))]
 #[must_use]
 pub fn checksum(bytes: &[u8]) -> u32 {
-    if !FILLED.load(Ordering::Acquire) {
-        fill();
+    crc32fast::hash(bytes)
+}
+
+#[cfg(any(target_os = "none", test))]
+mod tables {
+    use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+    /// CRC-32/ISO-HDLC, reflected.
+    const POLYNOMIAL: u32 = 0xEDB8_8320;
+
+    // What a byte does to the CRC, at once and after one to three further zero bytes. Four tables and not one of four rows: each
+    // then has its address in a register. Eight would be no faster: each byte costs its extraction, its look-up and its sum.
+    //
+    // They are filled at first use: in flash they would take 4 kB of it, and wait for it at each look-up. Whoever finds them empty
+    // fills them, twice if need be, and with the same.
+    static AT_ONCE: Table = [const { AtomicU32::new(0) }; 256];
+    static AFTER_1: Table = [const { AtomicU32::new(0) }; 256];
+    static AFTER_2: Table = [const { AtomicU32::new(0) }; 256];
+    static AFTER_3: Table = [const { AtomicU32::new(0) }; 256];
+    static FILLED: AtomicBool = AtomicBool::new(false);
+
+    type Table = [AtomicU32; 256];
+
+    #[cold]
+    #[inline(never)]
+    fn fill() {
+        for byte in 0..256 {
+            let mut crc = byte as u32;
+            for table in [&AT_ONCE, &AFTER_1, &AFTER_2, &AFTER_3] {
+                for _ in 0..8 {
+                    crc = if crc & 1 == 1 { (crc >> 1) ^ POLYNOMIAL } else { crc >> 1 };
+                }
+                table[byte].store(crc, Ordering::Relaxed);
+            }
+        }
+        FILLED.store(true, Ordering::Release);
     }
-    let (lines, rest) = bytes.as_chunks::<32>();
-    let mut crc = u32::MAX;
-    for line in lines {
-        for bytes in line.as_chunks::<4>().0 {
+
+    #[inline(always)]
+    fn word(crc: u32, word: u32) -> u32 {
+        let word = crc ^ word;
+        AFTER_3[(word & 0xFF) as usize].load(Ordering::Relaxed)
+            ^ AFTER_2[(word >> 8 & 0xFF) as usize].load(Ordering::Relaxed)
+            ^ AFTER_1[(word >> 16 & 0xFF) as usize].load(Ordering::Relaxed)
+            ^ AT_ONCE[(word >> 24) as usize].load(Ordering::Relaxed)
+    }
+
+    /// The CRC of some bytes.
+    #[inline(never)]
+    #[must_use]
+    pub fn checksum(bytes: &[u8]) -> u32 {
+        if !FILLED.load(Ordering::Acquire) {
+            fill();
+        }
+        let (lines, rest) = bytes.as_chunks::<32>();
+        let mut crc = u32::MAX;
+        for line in lines {
+            for bytes in line.as_chunks::<4>().0 {
+                crc = word(crc, u32::from_le_bytes(*bytes));
+            }
+        }
+        let (words, rest) = rest.as_chunks::<4>();
+        for bytes in words {
             crc = word(crc, u32::from_le_bytes(*bytes));
         }
+        for byte in rest {
+            crc = (crc >> 8) ^ AT_ONCE[usize::from(crc as u8 ^ byte)].load(Ordering::Relaxed);
+        }
+        !crc
     }
-    let (words, rest) = rest.as_chunks::<4>();
-    for bytes in words {
-        crc = word(crc, u32::from_le_bytes(*bytes));
-    }
-    for byte in rest {
-        crc = (crc >> 8) ^ AT_ONCE[usize::from(crc as u8 ^ byte)].load(Ordering::Relaxed);
-    }
-    !crc
 }
 
 #[cfg(test)]
@@ -74,7 +87,9 @@ mod tests {
     proptest! {
         #[test]
         fn any_content_agrees_with_the_usual_crate(content in prop::collection::vec(any::<u8>(), 0..600)) {
-            prop_assert_eq!(checksum(&content), crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&content));
+            let wanted = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&content);
+            prop_assert_eq!(tables::checksum(&content), wanted);
+            prop_assert_eq!(crc32fast::hash(&content), wanted);
         }
     }
 }

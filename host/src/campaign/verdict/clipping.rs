@@ -1,6 +1,7 @@
 //! Overload: values at the range, or a flat top below it (an amplifier in front of the converter, or a foreign record whose
 //! range nobody wrote down).
 
+use super::dropout::{middle, third_differences};
 use crate::spectra::Pulse;
 
 /// Evidence of clipping.
@@ -92,7 +93,14 @@ pub(super) fn plateau(x: &[f64], step: f64) -> Option<Clipped> {
         return None;
     }
     let slack = LEVEL_STEPS * step;
-    let fall = (CORNER * slack).max(NOISE * noise(x));
+    let corner = CORNER * slack;
+    // whoever does not stand so with the lower corner does not with the higher one, and few do: only they are asked for their noise
+    standing(x, largest, slack, corner)?;
+    standing(x, largest, slack, corner.max(NOISE * noise(x)))
+}
+
+/// Whether the signal stands within `slack` of its highest or lowest value, with corners that are `fall` deep.
+fn standing(x: &[f64], largest: f64, slack: f64, fall: f64) -> Option<Clipped> {
     let sides = [1.0, -1.0].map(|sign| Side::of(x, sign, slack, fall));
     let [above, below] = &sides;
     // an amplifier has a limit above and one below, and a ring-down runs into both by turns
@@ -108,6 +116,9 @@ pub(super) fn plateau(x: &[f64], step: f64) -> Option<Clipped> {
     })
 }
 
+/// Samples that are passed over at once.
+const BLOCK: usize = 64;
+
 /// How a signal stands at its highest or lowest value.
 struct Side {
     sign: f64,
@@ -121,8 +132,17 @@ impl Side {
     fn of(x: &[f64], sign: f64, slack: f64, fall: f64) -> Self {
         let top = x.iter().fold(f64::NEG_INFINITY, |most, v| most.max(sign * v));
         let (mut start, mut visits) = (None, Vec::new());
-        for i in 0..=x.len() {
-            let inside = x.get(i).is_some_and(|v| top - sign * v <= slack);
+        let near = |v: &f64| top - sign * v <= slack;
+        let mut i = 0;
+        while i <= x.len() {
+            // few blocks come near the top: the others are passed over whole
+            if start.is_none() {
+                let away = x[i..]
+                    .chunks_exact(BLOCK)
+                    .take_while(|block| !block.iter().fold(false, |any, v| any | near(v)));
+                i += BLOCK * away.count();
+            }
+            let inside = x.get(i).is_some_and(near);
             match (inside, start) {
                 (true, None) => start = Some(i),
                 (false, Some(from)) => {
@@ -140,6 +160,7 @@ impl Side {
                 }
                 _ => {}
             }
+            i += 1;
         }
         Self { sign, top, visits }
     }
@@ -147,14 +168,8 @@ impl Side {
 
 /// Rms of white noise under the motion: from the median of third differences, which have 20 times its power.
 fn noise(x: &[f64]) -> f64 {
-    let mut differences: Vec<f64> =
-        x.windows(4).map(|w| (w[0] - 3.0 * w[1] + 3.0 * w[2] - w[3]).abs()).collect();
-    let middle = differences.len() / 2;
-    if differences.is_empty() {
-        return 0.0;
-    }
     // the median of |x| is 0.6745 σ
-    *differences.select_nth_unstable_by(middle, f64::total_cmp).1 / (20f64.sqrt() * 0.6745)
+    middle(&third_differences(x, 1)) / (20f64.sqrt() * 0.6745)
 }
 
 #[cfg(test)]

@@ -39,15 +39,27 @@ pub(super) fn find(force_n: &[f64], pulse: &Pulse, limit: f64, from: usize) -> O
     // a pulse of another width than the filter's is found a little early
     let soonest = (pulse.start + from).saturating_sub(width / 8).max(pulse.end + 2);
     let after = soonest..rest.len().saturating_sub(width);
+    let filtered = filtered(&rest, &shape);
     before
         .chain(after)
-        .map(|start| {
-            let product: f64 = rest[start..start + width].iter().zip(&shape).map(|(f, h)| f * h).sum();
-            (start, product / energy / pulse.peak_n)
-        })
+        .map(|start| (start, filtered[start] / energy / pulse.peak_n))
         .filter(|(_, fraction)| *fraction >= limit)
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .map(|(start, fraction)| Second { start, fraction, limit })
+}
+
+/// The products of `shape` with the record from each sample on, as far as it reaches.
+fn filtered(rest: &[f64], shape: &[f64]) -> Vec<f64> {
+    let mut products = vec![0.0; (rest.len() + 1).saturating_sub(shape.len())];
+    // block by block, so that the sums stay in the nearest cache and side by side in the processor
+    for (at, sums) in products.chunks_mut(512).enumerate().map(|(n, sums)| (512 * n, sums)) {
+        for (k, h) in shape.iter().enumerate() {
+            for (sum, f) in sums.iter_mut().zip(&rest[at + k..]) {
+                *sum += f * h;
+            }
+        }
+    }
+    products
 }
 
 /// Two humps within the main pulse (the bolt was pressed on and struck again before it left).

@@ -36,16 +36,26 @@ pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<B
     let mut worst: Option<Burst> = None;
     for block in BLOCKS {
         let differences = third_differences(x, block);
-        let scale = local_scale(&differences, (SURROUNDINGS / block).max(64), step / (block as f64).sqrt());
-        for (i, (d, s)) in differences.iter().zip(&scale).enumerate() {
-            // the difference spans four blocks
-            let (from, to) = (i * block, (i + 4) * block);
-            let far = from >= settled || to <= pulse.start;
-            let near = block == 1 && from >= quiet;
-            let ratio = d / s;
-            let worse = ratio > limit && worst.as_ref().is_none_or(|w| ratio > w.ratio);
-            if worse && (far || near && !moves(x, i)) {
-                worst = Some(Burst { sample: from + 2 * block, ratio });
+        let floor = step / (block as f64).sqrt();
+        let whole = middle(&differences).max(floor).max(f64::MIN_POSITIVE);
+        let width = (SURROUNDINGS / block).max(64);
+        let hop = (width / 4).max(1);
+        for (start, part) in differences.chunks(hop).enumerate().map(|(n, part)| (n * hop, part)) {
+            // no scale is below the whole record's: where nothing stands out of that, no surroundings need be looked at
+            if !part.iter().fold(false, |any, d| any | (d / whole > limit)) {
+                continue;
+            }
+            let s = local_scale(&differences, start, hop, width).max(whole);
+            for (i, d) in (start..).zip(part) {
+                // the difference spans four blocks
+                let (from, to) = (i * block, (i + 4) * block);
+                let far = from >= settled || to <= pulse.start;
+                let near = block == 1 && from >= quiet;
+                let ratio = d / s;
+                let worse = ratio > limit && worst.as_ref().is_none_or(|w| ratio > w.ratio);
+                if worse && (far || near && !moves(x, i)) {
+                    worst = Some(Burst { sample: from + 2 * block, ratio });
+                }
             }
         }
     }
@@ -59,9 +69,17 @@ fn moves(x: &[f64], third: usize) -> bool {
     x.get(from..from + LOOKED_AT).is_some_and(is_motion)
 }
 
-fn third_differences(x: &[f64], block: usize) -> Vec<f64> {
-    let means: Vec<f64> = x.chunks_exact(block).map(|b| b.iter().sum::<f64>() / block as f64).collect();
-    means.windows(4).map(|w| (w[0] - 3.0 * w[1] + 3.0 * w[2] - w[3]).abs()).collect()
+/// |Δ³| of the means of blocks.
+pub(super) fn third_differences(x: &[f64], block: usize) -> Vec<f64> {
+    let means: Vec<f64> = match block {
+        1 => return thirds(x),
+        _ => x.chunks_exact(block).map(|b| b.iter().sum::<f64>() / block as f64).collect(),
+    };
+    thirds(&means)
+}
+
+fn thirds(x: &[f64]) -> Vec<f64> {
+    x.windows(4).map(|w| (w[0] - 3.0 * w[1] + 3.0 * w[2] - w[3]).abs()).collect()
 }
 
 /// The converter's step: the smallest difference between neighbours. A quiet, coarse channel has a median difference of zero.
@@ -74,30 +92,19 @@ pub(super) fn quantum(x: &[f64]) -> f64 {
         .min(largest)
 }
 
-/// Median of the differences around each, at least the record's median and `floor`.
-fn local_scale(differences: &[f64], width: usize, floor: f64) -> Vec<f64> {
-    let whole = middle(differences).max(floor).max(f64::MIN_POSITIVE);
-    let hop = (width / 4).max(1);
-    let mut out = Vec::with_capacity(differences.len());
-    for start in (0..differences.len()).step_by(hop) {
-        let end = (start + hop).min(differences.len());
-        let (from, to) = (
-            (start + hop / 2).saturating_sub(width / 2),
-            (start + hop / 2 + width / 2).min(differences.len()),
-        );
-        let local = middle(&differences[from..to]).max(whole);
-        out.extend(std::iter::repeat_n(local, end - start));
-    }
-    out
+/// Median of the differences around the `hop` ones from `start` on.
+fn local_scale(differences: &[f64], start: usize, hop: usize, width: usize) -> f64 {
+    let centre = start + hop / 2;
+    let to = (centre + width / 2).min(differences.len());
+    middle(&differences[centre.saturating_sub(width / 2)..to])
 }
 
-fn middle(values: &[f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let mut sorted = values.to_vec();
-    let at = sorted.len() / 2;
-    *sorted.select_nth_unstable_by(at, f64::total_cmp).1
+/// Median of values that are not negative.
+pub(super) fn middle(values: &[f64]) -> f64 {
+    // the bits of such numbers are in their order, and compare quicker
+    let mut bits: Vec<u64> = values.iter().map(|v| v.to_bits()).collect();
+    let at = bits.len() / 2;
+    if bits.is_empty() { 0.0 } else { f64::from_bits(*bits.select_nth_unstable(at).1) }
 }
 
 #[cfg(test)]

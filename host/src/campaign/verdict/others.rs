@@ -110,15 +110,13 @@ pub fn channel_noise(channels: &ChannelMap, codes: Codes<'_>) -> Vec<f64> {
 fn noise_codes(codes: &[i16]) -> f64 {
     let late = &codes[codes.len() / 2..];
     // third differences of white noise have 1 + 9 + 9 + 1 times its power
-    let differences: Vec<f64> = late
-        .windows(4)
-        .map(|w| {
-            let [a, b, c, d] = [w[0], w[1], w[2], w[3]].map(f64::from);
-            (a - 3.0 * b + 3.0 * c - d).powi(2) / 20.0
-        })
-        .collect();
-    let mut power: Vec<f64> =
-        differences.chunks_exact(BLOCK).map(|block| block.iter().sum::<f64>() / BLOCK as f64).collect();
+    let squared = |w: &[i16]| {
+        let [a, b, c, d] = [w[0], w[1], w[2], w[3]].map(f64::from);
+        (a - 3.0 * b + 3.0 * c - d).powi(2) / 20.0
+    };
+    let blocks = late.len().saturating_sub(3) / BLOCK;
+    let of_block = |n: usize| late[n * BLOCK..(n + 1) * BLOCK + 3].windows(4).map(squared).sum::<f64>();
+    let mut power: Vec<f64> = (0..blocks).map(|n| of_block(n) / BLOCK as f64).collect();
     let middle = power.len() / 2;
     if power.is_empty() {
         return ROUNDING;
