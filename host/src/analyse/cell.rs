@@ -150,9 +150,10 @@ pub trait Measurements: Sync {
         None
     }
 
-    /// The kept hits of a cell; none if it was not measured.
+    /// The kept hits of a cell; none if it was not measured. The signals at the contact may be left out where `contact` does not ask
+    /// for them.
     ///
     /// # Errors
     /// The file cannot be read, or a record is damaged.
-    fn read(&self, cell: &CellName) -> Result<Cell, Self::Error>;
+    fn read(&self, cell: &CellName, contact: bool) -> Result<Cell, Self::Error>;
 }

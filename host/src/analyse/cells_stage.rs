@@ -59,7 +59,10 @@ pub fn read_all<M: Measurements>(
 fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> Cells {
     let mut found = Cells::default();
     let records = |told: String| Missing::Records { cell: name.clone(), told };
-    let mut cell = match measurements.read(name) {
+    let geometry = measurements.geometry();
+    let moves_contact = counts_for_contact(geometry, name);
+    let (drives, damped) = (drives_the_cells(geometry, name), contact_answer::reads(geometry, name));
+    let mut cell = match measurements.read(name, moves_contact || drives || damped) {
         Ok(cell) => cell,
         Err(error) => {
             found.missing.push(records(error.to_string()));
@@ -70,8 +73,6 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
     if cell.hits.is_empty() {
         return found;
     }
-    let geometry = measurements.geometry();
-    let moves_contact = counts_for_contact(geometry, name);
     if moves_contact {
         for hit in &cell.hits {
             let Some(signals) = hit.contact.as_ref().filter(|_| !hit.of_row) else { continue };
@@ -93,10 +94,7 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
     }
     // what the contact did under a hit is told by the cell that was struck, once
     let struck = cell.hits.iter().any(|hit| !hit.of_row);
-    let asked = Asked {
-        contact: struck && (moves_contact || drives_the_cells(geometry, name)),
-        damped: contact_answer::reads(geometry, name),
-    };
+    let asked = Asked { contact: struck && (moves_contact || drives), damped };
     match average(name.clone(), cell, sigma_per_s, quantity, asked, LINES_HZ) {
         Ok(averaged) => found.averages.push(averaged),
         Err(error) => found.missing.push(records(error.to_string())),

@@ -207,7 +207,7 @@ fn example<M: Measurements>(
 ) -> Option<(LoopCurve, Option<Reconstruction>)> {
     let shown = impact_loops::middle(impact_loops)?;
     let name = &averages.iter().find(|c| c.records.contains(&shown.record))?.name;
-    let cell = measurements.read(name).ok()?;
+    let cell = measurements.read(name, true).ok()?;
     let hit = cell.hits.iter().find(|h| h.record == shown.record)?;
     let contact = hit.contact.as_ref()?;
     let delays = contact.delay_s;

@@ -1,7 +1,7 @@
 //! The campaign file as measurements: records decoded, in SI units, one cell at a time, from any thread.
 
 use super::assemble::{everything, hits};
-use super::averages::{Asked, average};
+use super::averages::{Asked, CellAverage, average};
 use super::campaign::analyse_measurements;
 use super::cell::{
     Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel,
@@ -28,6 +28,7 @@ use crate::substructuring::Frf;
 use crate::substructuring::geometry::Geometry;
 use jointrig_protocol::channel::{Quantity, Role};
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
@@ -189,29 +190,47 @@ impl CampaignFile {
         result
     }
 
-    /// A record's signals for a cell, and its sampling rate, Hz.
-    fn hit(&self, store: &Store, cell: &CellRow, record: &RecordRow) -> Result<(Hit, f64), AnalyseError> {
+    /// A record's signals for a cell, with those at the contact where they are asked for, and its sampling rate, Hz.
+    fn hit(
+        &self,
+        store: &Store,
+        cell: &CellRow,
+        record: &RecordRow,
+        contact: bool,
+    ) -> Result<(Hit, f64), AnalyseError> {
         let missing = |role| AnalyseError::NoChannel { record: record.id, role };
         let map = self.channels.get(&record.session).ok_or(missing("anything"))?;
-        let samples = store.samples(record)?;
         let rate = f64::from(map.rate_hz);
+        let force = map.place(Role::HammerForce).ok_or(missing("the hammer's force"))?;
+        let responses = response_places(&self.plan, cell, record, map).ok_or(missing("the response"))?;
+        let is_velocity = |place: usize| map.channels[place].quantity == Quantity::Velocity;
+        let cells = self.plan.load_cells(map);
+        let at_contact = match (map.place(Role::SpecimenA), map.place(Role::SpecimenB)) {
+            (Some(a), Some(b)) if contact && is_velocity(a) && is_velocity(b) && !cells.is_empty() => {
+                Some((a, b))
+            }
+            _ => None,
+        };
+        // no channel is unpacked that nobody looks at
+        let mut wanted: Vec<usize> = std::iter::once(force).chain(responses.iter().copied()).collect();
+        if let Some((a, b)) = at_contact {
+            wanted.extend([a, b].into_iter().chain(cells.iter().map(|(place, _)| *place)));
+        }
+        wanted.sort_unstable();
+        wanted.dedup();
+        let samples = store.samples_of(record, &wanted)?;
         // exactly as many samples as the plan's length: half-hertz lines from two seconds
         let lead = (LEAD_S * rate).ceil() as usize;
         let length = self.plan.post_trigger_scans() as usize;
         let from = record.trigger_index.saturating_sub(lead);
         let signal = |place: usize| -> Vec<f64> {
-            let codes = samples.channel(place);
+            let codes = wanted.binary_search(&place).map_or(&[][..], |at| &samples[at]);
             map.to_si(place, &codes[from.min(codes.len())..(from + length).min(codes.len())])
         };
         let delay = |place: usize| f64::from(map.channels[place].delay_ns) * 1e-9;
-        let force = map.place(Role::HammerForce).ok_or(missing("the hammer's force"))?;
-        let responses = response_places(&self.plan, cell, record, map).ok_or(missing("the response"))?;
         let late = |place: usize| delay(place) - delay(force);
-        let (a, b, cells) =
-            (map.place(Role::SpecimenA), map.place(Role::SpecimenB), self.plan.load_cells(map));
-        let is_velocity = |place: usize| map.channels[place].quantity == Quantity::Velocity;
-        let contact = match (a, b) {
-            (Some(a), Some(b)) if is_velocity(a) && is_velocity(b) && !cells.is_empty() => {
+        let contact = match at_contact {
+            Some((a, b)) => {
                 let mut tangential_n = vec![0.0; signal(a).len()];
                 for (place, part) in &cells {
                     tangential_n.iter_mut().zip(signal(*place)).for_each(|(sum, v)| *sum += part * v);
@@ -251,27 +270,27 @@ impl CampaignFile {
         structure: Structure,
         lines_hz: [f64; 2],
     ) -> (Option<(Frf, DMatrix<usize>)>, Vec<String>) {
-        let own = self.cells.iter().filter(|cell| cell.name.configuration == structure);
-        let (mut averages, mut complaints) = (Vec::new(), Vec::new());
-        for name in own.map(|cell| &cell.name) {
+        let own: Vec<&CellName> =
+            self.cells.iter().map(|cell| &cell.name).filter(|name| name.configuration == structure).collect();
+        let one = |name: &&CellName| {
             let complaint =
                 |what: String| format!("{structure}: cell {} × {}: {what}.", name.impact, name.response);
-            let cell = match self.read(name) {
+            let cell = match self.read(name, false) {
                 Ok(cell) => cell,
-                Err(error) => {
-                    complaints.push(complaint(error.to_string()));
-                    continue;
-                }
+                Err(error) => return (None, vec![complaint(error.to_string())]),
             };
-            complaints.extend(cell.left_out.iter().cloned().map(complaint));
+            let mut complaints: Vec<String> = cell.left_out.iter().cloned().map(complaint).collect();
             if cell.hits.is_empty() {
-                continue;
+                return (None, complaints);
             }
-            match average(name.clone(), cell, self.sigma_per_s(), self.quantity, Asked::default(), lines_hz) {
-                Ok(found) => averages.push(found),
-                Err(error) => complaints.push(complaint(error.to_string())),
-            }
-        }
+            let (sigma_per_s, asked) = (self.sigma_per_s(), Asked::default());
+            let found = average((*name).clone(), cell, sigma_per_s, self.quantity, asked, lines_hz);
+            complaints.extend(found.as_ref().err().map(|error| complaint(error.to_string())));
+            (found.ok(), complaints)
+        };
+        let (averages, complaints): (Vec<_>, Vec<_>) = own.par_iter().map(one).unzip();
+        let averages: Vec<CellAverage> = averages.into_iter().flatten().collect();
+        let complaints = complaints.concat();
         let points = self.geometry.points(structure);
         let found = everything(points, &averages, self.quantity);
         (found.map(|frf| (frf, hits(points, &averages))), complaints)
@@ -370,7 +389,7 @@ impl Measurements for CampaignFile {
         (levels, complaints)
     }
 
-    fn read(&self, cell: &CellName) -> Result<Cell, AnalyseError> {
+    fn read(&self, cell: &CellName, contact: bool) -> Result<Cell, AnalyseError> {
         let Some(planned) = self.cells.iter().find(|c| c.name == *cell) else { return Ok(Cell::default()) };
         self.with_reader(|store| {
             let mut whole = Cell::default();
@@ -385,7 +404,7 @@ impl Measurements for CampaignFile {
                         continue;
                     }
                 };
-                match self.hit(store, &planned.row, record) {
+                match self.hit(store, &planned.row, record, contact) {
                     Ok((hit, rate)) if whole.hits.is_empty() || whole.fs_hz == rate => {
                         whole.fs_hz = rate;
                         whole.hits.push(hit);

@@ -176,7 +176,7 @@ fn analysed(store: &Store) -> Frf {
     let file = CampaignFile::open(store, KnownContact::default()).expect("readable");
     let cells = file.cells();
     let averages = cells.iter().filter_map(|name| {
-        let cell = file.read(name).expect("readable");
+        let cell = file.read(name, true).expect("readable");
         (!cell.hits.is_empty()).then(|| {
             average(
                 name.clone(),
@@ -231,7 +231,7 @@ fn sessions_of_other_rates_are_not_averaged() {
     let cell = file.records.values_mut().next().expect("a cell");
     cell.last_mut().expect("three records").as_mut().expect("whole").session = session;
     let told: Vec<String> =
-        file.cells().iter().filter_map(|name| file.read(name).err()).map(|e| e.to_string()).collect();
+        file.cells().iter().filter_map(|name| file.read(name, true).err()).map(|e| e.to_string()).collect();
     assert_eq!(told.len(), 1, "{told:?}");
     assert!(told[0].contains("25600 Hz") && told[0].contains("51200 Hz"), "{told:?}");
 }

@@ -71,9 +71,12 @@ impl NpzOutput {
         let written = archive.start_file(file_name_from_array_name(name), options).map_err(io::Error::from);
         let written = written.and_then(|()| {
             let array = WriteOptions::<T>::new().dtype(dtype).shape(&shape);
-            let mut array = array.writer(archive).begin_nd()?;
+            // the compressor works on what it is handed at once, however little that is
+            let mut gathered = BufWriter::with_capacity(1 << 16, archive);
+            let mut array = array.writer(&mut gathered).begin_nd()?;
             array.extend(values)?;
-            array.finish()
+            array.finish()?;
+            gathered.flush()
         });
         written.map_err(|source| NpzError::Write { path: self.path.clone(), source })
     }

@@ -128,7 +128,7 @@ impl Measurements for Assembly {
         cells
     }
 
-    fn read(&self, cell: &CellName) -> Result<Cell, Infallible> {
+    fn read(&self, cell: &CellName, _: bool) -> Result<Cell, Infallible> {
         let config = &self.config;
         let impact =
             config.impact(Configuration::Ajb, &cell.impact).expect("the workbook's impacts are the rig's");

@@ -74,11 +74,13 @@ pub(super) fn decay(motion: &Relative, force_n: &[f64], fs_hz: f64) -> Result<De
         Relative::Displacement(x) => x.clone(),
     };
     let edges: Vec<usize> = (0..=whole).map(|c| start + (c as f64 * period).round() as usize).collect();
+    // force and displacement are turned by the same angles
+    let turns: Vec<Complex<f64>> = (start..force_n.len())
+        .map(|i| Complex::from_polar(1.0, -TAU * frequency_hz * i as f64 / fs_hz))
+        .collect();
     let tone = |x: &[f64], from: usize, to: usize| -> Complex<f64> {
         let mean = x[from..to].iter().sum::<f64>() / (to - from) as f64;
-        (from..to)
-            .map(|i| (x[i] - mean) * Complex::from_polar(1.0, -TAU * frequency_hz * i as f64 / fs_hz))
-            .sum()
+        x[from..to].iter().zip(&turns[from - start..to - start]).map(|(x, turn)| (x - mean) * turn).sum()
     };
     let tones: Vec<Complex<f64>> = edges.windows(2).map(|e| tone(force_n, e[0], e[1])).collect();
     let cycles = edges
@@ -107,12 +109,14 @@ pub(super) fn decay(motion: &Relative, force_n: &[f64], fs_hz: f64) -> Result<De
 /// First sample that stands out: 5 % of the largest deviation, or six times the white noise, whichever is more.
 fn onset(x: &[f64]) -> usize {
     let mut tail: Vec<f64> = x[x.len() - x.len() / 4 - 1..].to_vec();
-    tail.sort_by(f64::total_cmp);
-    let rest = tail[tail.len() / 2];
+    let middle = tail.len() / 2;
+    let rest = *tail.select_nth_unstable_by(middle, f64::total_cmp).1;
     let mut second: Vec<f64> = x.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
-    second.sort_by(f64::total_cmp);
+    let middle = second.len() / 2;
+    let median =
+        if second.is_empty() { 0.0 } else { *second.select_nth_unstable_by(middle, f64::total_cmp).1 };
     // second differences of white noise have √6 times its rms, their median 0.6745 of that
-    let noise = second.get(second.len() / 2).copied().unwrap_or(0.0) / 0.6745 / 6f64.sqrt();
+    let noise = median / 0.6745 / 6f64.sqrt();
     let largest = x.iter().map(|v| (v - rest).abs()).fold(0.0, f64::max);
     let limit = (0.05 * largest).max(6.0 * noise).min(0.5 * largest);
     x.iter().position(|v| (v - rest).abs() >= limit).unwrap_or(0)

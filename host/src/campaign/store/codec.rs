@@ -87,32 +87,56 @@ pub fn encode(codes: &[i16], channels: usize) -> Result<Vec<u8>, CodecError> {
 /// # Errors
 /// The blob is damaged.
 pub fn decode(blob: &[u8], channels: usize, scans: usize, stored: u32) -> Result<Vec<i16>, CodecError> {
+    let chunks = chunks(blob, channels, scans)?;
+    let mut codes = vec![0; chunks.len() * scans];
+    for (chunk, channel) in chunks.into_iter().zip(codes.chunks_exact_mut(scans.max(1))) {
+        unpack(chunk, channel)?;
+    }
+    let found = checksum(&codes);
+    if found == stored { Ok(codes) } else { Err(CodecError::Checksum { found, stored }) }
+}
+
+/// Reads the codes of some channels back, in the order of `places`; none of a place beyond the last channel. The checksum over all codes
+/// cannot be compared: whoever asks has compared that of the blob.
+///
+/// # Errors
+/// The blob is damaged.
+pub fn decode_some(
+    blob: &[u8],
+    channels: usize,
+    scans: usize,
+    places: &[usize],
+) -> Result<Vec<Vec<i16>>, CodecError> {
+    let chunks = chunks(blob, channels, scans)?;
+    let one = |place: &usize| {
+        let Some(chunk) = chunks.get(*place) else { return Ok(Vec::new()) };
+        let mut codes = vec![0; scans];
+        unpack(chunk, &mut codes).map(|()| codes)
+    };
+    places.iter().map(one).collect()
+}
+
+/// The chunk of each channel; none of a shot without contact, which has no samples.
+fn chunks(blob: &[u8], channels: usize, scans: usize) -> Result<Vec<&[u8]>, CodecError> {
     let bytes = channels.checked_mul(scans).and_then(|codes| codes.checked_mul(2));
     let most = ALWAYS_BYTES + MOST_RATIO * blob.len();
-    let Some(bytes) = bytes.filter(|bytes| *bytes <= most) else {
+    if bytes.is_none_or(|bytes| bytes > most) {
         return Err(CodecError::Bomb { channels, scans, blob: blob.len() });
-    };
-    // a shot without contact has no samples, and no chunks either
-    let mut codes = vec![0; bytes / 2];
-    let mut rest = blob;
-    for channel in codes.chunks_exact_mut(scans.max(1)) {
+    }
+    let (mut chunks, mut rest) = (Vec::new(), blob);
+    for _ in 0..if scans == 0 { 0 } else { channels } {
         let (length, after) = rest.split_first_chunk::<4>().ok_or(CodecError::Shape)?;
         let (chunk, after) =
             after.split_at_checked(u32::from_le_bytes(*length) as usize).ok_or(CodecError::Shape)?;
-        let read = simple_decompress_into(chunk, channel)?;
-        if !read.finished || read.n_processed != scans {
-            return Err(CodecError::Shape);
-        }
+        chunks.push(chunk);
         rest = after;
     }
-    let found = checksum(&codes);
-    if !rest.is_empty() {
-        Err(CodecError::Shape)
-    } else if found != stored {
-        Err(CodecError::Checksum { found, stored })
-    } else {
-        Ok(codes)
-    }
+    if rest.is_empty() { Ok(chunks) } else { Err(CodecError::Shape) }
+}
+
+fn unpack(chunk: &[u8], channel: &mut [i16]) -> Result<(), CodecError> {
+    let read = simple_decompress_into(chunk, channel)?;
+    if read.finished && read.n_processed == channel.len() { Ok(()) } else { Err(CodecError::Shape) }
 }
 
 /// CRC-32 of the codes as little-endian bytes.
@@ -138,6 +162,8 @@ mod tests {
         let crc = checksum(&codes);
         let blob = encode(&codes, 3).expect("compresses");
         assert_eq!(decode(&blob, 3, 1_000, crc).expect("reads"), codes);
+        let some = decode_some(&blob, 3, 1_000, &[2, 0, 3]).expect("reads");
+        assert_eq!(some, [codes[2_000..].to_vec(), codes[..1_000].to_vec(), Vec::new()]);
         assert!(decode(&blob, 3, 1_000, crc ^ 1).is_err());
         assert!(decode(&blob[..blob.len() - 1], 3, 1_000, crc).is_err());
         for place in (0..blob.len()).step_by(97) {

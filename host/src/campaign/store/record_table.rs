@@ -102,18 +102,31 @@ impl Store {
     /// [`StoreError::Damaged`] names the record.
     pub fn samples(&self, record: &RecordRow) -> Result<Samples, StoreError> {
         let damaged = |error: CodecError| self.damaged(record.id, error.to_string());
+        let bytes = self.checked_bytes(record).map_err(damaged)?;
+        let codes = codec::decode(&bytes, record.channels, record.scans, record.crc).map_err(damaged)?;
+        Ok(Samples { codes, channels: record.channels })
+    }
+
+    /// The samples of some channels of one record, in the order of `places`, checked against the checksum of the stored bytes.
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`] names the record.
+    pub fn samples_of(&self, record: &RecordRow, places: &[usize]) -> Result<Vec<Vec<i16>>, StoreError> {
+        let damaged = |error: CodecError| self.damaged(record.id, error.to_string());
+        let bytes = self.checked_bytes(record).map_err(damaged)?;
+        codec::decode_some(&bytes, record.channels, record.scans, places).map_err(damaged)
+    }
+
+    fn checked_bytes(&self, record: &RecordRow) -> Result<Vec<u8>, CodecError> {
         let read =
             self.connection.query_row("SELECT samples FROM records WHERE id = ?1", [record.id], |row| {
                 row.get::<_, Vec<u8>>(0)
             });
-        let bytes = read.map_err(|error| damaged(CodecError::Unreadable(error.to_string())))?;
+        let bytes = read.map_err(|error| CodecError::Unreadable(error.to_string()))?;
         // a flipped bit in the compressor's padding changes no code, and yet the file is not what was stored
         let found = crc32fast::hash(&bytes);
-        if found != record.bytes_crc {
-            return Err(damaged(CodecError::Bytes { found, stored: record.bytes_crc }));
-        }
-        let codes = codec::decode(&bytes, record.channels, record.scans, record.crc).map_err(damaged)?;
-        Ok(Samples { codes, channels: record.channels })
+        let stored = record.bytes_crc;
+        if found == stored { Ok(bytes) } else { Err(CodecError::Bytes { found, stored }) }
     }
 
     pub(in crate::campaign) fn damaged(&self, record: i64, what: String) -> StoreError {
