@@ -3,7 +3,7 @@
 use super::cell::{Cell, CellName, ContactDelays, Hit};
 use crate::contact::{BAND, LEVEL_LINES, SIGMA_PER_S};
 use crate::spectra::{
-    CrossSpectra, FrfSettings, ImpactRecords, MotionQuantity, SpectraError, Windowing, estimate,
+    self, CrossSpectra, FrfSettings, ImpactRecords, MotionQuantity, SpectraError, Windowing,
 };
 
 /// The lines that are used, Hz: those below carry rigid-body drift and the mains' subharmonics, not the joint; those above are in
@@ -72,13 +72,18 @@ pub fn average(
         alike[place].1.force_n.push(force_n);
         alike[place].1.response.push(outputs);
     }
-    let all = summed(&alike, sigma_per_s)?;
+    let lines = if damped {
+        [lines_hz[0].min(LEVEL_LINES.low_hz), lines_hz[1].max(LEVEL_LINES.high_hz)]
+    } else {
+        lines_hz
+    };
+    let (all, force) = summed(&alike, sigma_per_s, lines)?;
     let damped =
-        if damped { Some(summed(&alike, SIGMA_PER_S)?.band(BAND.low_hz, BAND.high_hz)) } else { None };
+        if damped { Some(summed(&alike, SIGMA_PER_S, [BAND.low_hz, BAND.high_hz])?.0) } else { None };
     let light = damped.is_some().then(|| all.band(LEVEL_LINES.low_hz, LEVEL_LINES.high_hz));
-    let step_hz = all.frequency_hz().get(1).copied().unwrap_or(0.0);
+    let step_hz = force.frequency_hz().get(1).copied().unwrap_or(0.0);
     let mean = |lines: &[f64]| lines.iter().sum::<f64>() / lines.len() as f64;
-    let force_spectrum = all.force_spectrum().chunks(FORCE_LINES).map(mean).collect();
+    let force_spectrum = force.force_spectrum().chunks(FORCE_LINES).map(mean).collect();
     let kept = all.band(lines_hz[0], lines_hz[1]);
     Ok(CellAverage {
         name,
@@ -92,19 +97,28 @@ pub fn average(
     })
 }
 
-/// All hits, those that are late by the same times estimated together.
-fn summed(alike: &[(Vec<f64>, ImpactRecords)], sigma_per_s: f64) -> Result<CrossSpectra, SpectraError> {
-    let mut all: Option<CrossSpectra> = None;
+/// All hits, those that are late by the same times estimated together: the spectra at those lines, and the force at all lines.
+fn summed(
+    alike: &[(Vec<f64>, ImpactRecords)],
+    sigma_per_s: f64,
+    lines_hz: [f64; 2],
+) -> Result<(CrossSpectra, CrossSpectra), SpectraError> {
+    let mut all: Option<(CrossSpectra, CrossSpectra)> = None;
     for (delay_s, records) in alike {
         let settings = FrfSettings {
             windowing: Windowing { sigma_per_s, ..Windowing::default() },
             delay_s: delay_s.clone(),
+            band_hz: Some(lines_hz),
             ..FrfSettings::default()
         };
-        let own = estimate(records, &vec![true; records.force_n.len()], &settings)?;
+        let sums = spectra::estimate::summed(records, &vec![true; records.force_n.len()], &settings)?;
+        let (own, force) = (sums.finish(sigma_per_s, delay_s)?, sums.force(sigma_per_s)?);
         match &mut all {
-            Some(sum) => sum.add(&own)?,
-            None => all = Some(own),
+            Some((sum, sum_of_force)) => {
+                sum.add(&own)?;
+                sum_of_force.add(&force)?;
+            }
+            None => all = Some((own, force)),
         }
     }
     all.ok_or(SpectraError::NoHits)

@@ -39,9 +39,10 @@ pub fn of(
         let settings = FrfSettings {
             windowing: Windowing { sigma_per_s, ..Windowing::default() },
             delay_s: hit.response_delay_s.clone(),
+            band_hz: Some([MAIN_BAND.low_hz, MAIN_BAND.high_hz]),
             ..FrfSettings::default()
         };
-        let y = estimate(&one, &[true], &settings)?.band(MAIN_BAND.low_hz, MAIN_BAND.high_hz);
+        let y = estimate(&one, &[true], &settings)?;
         auto.resize(y.lines(), Vec::new());
         cross.resize(y.lines(), vec![Vec::new(); channels.len()]);
         for l in 0..y.lines() {

@@ -237,6 +237,7 @@ impl Frf {
             },
             origin: self.origin.map_or(Origin::PulseStart, Origin::At),
             delay_s: self.delay.clone(),
+            band_hz: None,
             transform_samples: self.pad_to,
             jackknife: self.jackknife,
             noise_ratio: self.noise_ratio,

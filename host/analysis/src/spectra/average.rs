@@ -6,6 +6,7 @@ use super::jackknife;
 use crate::parallel::{self, prelude::*};
 use num_complex::Complex;
 use realfft::{RealFftPlanner, RealToComplex};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Sums of spectra over the hits so far.
@@ -17,6 +18,8 @@ pub struct SpectraAverage {
     /// Force spectra of the hits being added.
     forces: Vec<Vec<Complex<f64>>>,
     s_ff: Vec<f64>,
+    /// The lines that the outputs' sums hold.
+    lines: Range<usize>,
     outputs: Vec<Output>,
     /// One for each thread: a channel's working memory stays in that core's cache.
     workers: Vec<Channel>,
@@ -78,6 +81,7 @@ impl SpectraAverage {
             hits: 0,
             forces: Vec::new(),
             s_ff: vec![0.0; lines],
+            lines: 0..lines,
             outputs: (0..outputs)
                 .map(|_| Output {
                     s_xf: vec![Complex::default(); lines],
@@ -91,6 +95,28 @@ impl SpectraAverage {
             keep_hits: false,
             kept_force: Vec::new(),
         }
+    }
+
+    /// Sums the responses at the lines with `low_hz` ≤ f ≤ `high_hz` alone; the force is summed at all of them.
+    #[must_use]
+    pub fn with_band(mut self, low_hz: f64, high_hz: f64) -> Self {
+        let frequency_hz = self.frequency_hz();
+        let from = frequency_hz.partition_point(|f| *f < low_hz);
+        let to = frequency_hz.partition_point(|f| *f <= high_hz).max(from);
+        self.lines = from..to;
+        for output in &mut self.outputs {
+            *output = Output {
+                s_xf: vec![Complex::default(); to - from],
+                s_xx: vec![0.0; to - from],
+                kept: Vec::new(),
+            };
+        }
+        self
+    }
+
+    /// Frequency of every line, Hz.
+    fn frequency_hz(&self) -> Vec<f64> {
+        (0..self.s_ff.len()).map(|l| l as f64 * self.fs_hz / self.samples as f64).collect()
     }
 
     /// Keeps the spectra of every hit, so that `finish` can leave each out in turn: hits × channels × lines complex numbers.
@@ -172,7 +198,7 @@ impl SpectraAverage {
         });
         transformed.collect::<Result<(), SpectraError>>()?;
         let forces = &self.forces;
-        let keep = self.keep_hits;
+        let (keep, lines) = (self.keep_hits, self.lines.clone());
         let share = self.outputs.len().div_ceil(self.workers.len()).max(1);
         let parts = self.outputs.par_chunks_mut(share).zip(&mut self.workers).enumerate();
         let summed = parts.map(|(part, (outputs, worker))| {
@@ -180,12 +206,13 @@ impl SpectraAverage {
                 for (hit, force) in hits.iter().zip(forces) {
                     worker.transform(fft, |out| response(hit, part * share + i, out))?;
                     let sums = output.s_xf.iter_mut().zip(&mut output.s_xx);
-                    for ((s_xf, s_xx), (x, f)) in sums.zip(worker.spectrum.iter().zip(force)) {
+                    let products = worker.spectrum[lines.clone()].iter().zip(&force[lines.clone()]);
+                    for ((s_xf, s_xx), (x, f)) in sums.zip(products) {
                         *s_xf += x * f.conj();
                         *s_xx += x.norm_sqr();
                     }
                     if keep {
-                        output.kept.push(worker.spectrum.clone());
+                        output.kept.push(worker.spectrum[lines.clone()].to_vec());
                     }
                 }
             }
@@ -198,7 +225,7 @@ impl SpectraAverage {
             }
         }
         if keep {
-            self.kept_force.extend(self.forces.iter().cloned());
+            self.kept_force.extend(self.forces.iter().map(|force| force[lines.clone()].to_vec()));
         }
         self.hits += hits.len();
         Ok(())
@@ -214,21 +241,29 @@ impl SpectraAverage {
         if let Some(error) = &self.failed {
             return Err(error.clone());
         }
-        let frequency_hz: Vec<f64> =
-            (0..self.s_ff.len()).map(|l| l as f64 * self.fs_hz / self.samples as f64).collect();
+        let frequency_hz = self.frequency_hz()[self.lines.clone()].to_vec();
         let outputs = self.outputs.iter().enumerate().map(|(o, output)| OutputSums {
             s_xf: output.s_xf.clone(),
             s_xx: output.s_xx.clone(),
             delay_s: delay_s.get(o).copied().unwrap_or(0.0),
         });
-        let (s_ff, outputs) = (self.s_ff.clone(), outputs.collect());
+        let (s_ff, outputs) = (self.s_ff[self.lines.clone()].to_vec(), outputs.collect());
         let spectra = CrossSpectra::new(self.fs_hz, frequency_hz, sigma_per_s, self.hits, s_ff, outputs)?;
         Ok(spectra.with_jackknife(self.keep_hits.then(|| self.jackknife(sigma_per_s, delay_s))))
     }
 
+    /// The force alone, at every line, whatever lines the responses are summed at.
+    ///
+    /// # Errors
+    /// As of [`SpectraAverage::finish`].
+    pub fn force(&self, sigma_per_s: f64) -> Result<CrossSpectra, SpectraError> {
+        let s_ff = self.s_ff.clone();
+        CrossSpectra::new(self.fs_hz, self.frequency_hz(), sigma_per_s, self.hits, s_ff, Vec::new())
+    }
+
     /// Variance by leaving out each hit in turn, \[line\]\[output\].
     fn jackknife(&self, sigma_per_s: f64, delay_s: &[f64]) -> Vec<Vec<f64>> {
-        (0..self.s_ff.len())
+        (0..self.lines.len())
             .into_par_iter()
             .map(|l| {
                 let force: Vec<_> = self.kept_force.iter().map(|f| f[l]).collect();

@@ -30,6 +30,9 @@ pub struct FrfSettings {
     /// Length of the transform, samples: longer than the records pads them with zeros (after the windows). None is the records' length.
     #[serde(default)]
     pub transform_samples: Option<usize>,
+    /// The lines that are wanted, Hz, ends included; None is all of them.
+    #[serde(default)]
+    pub band_hz: Option<[f64; 2]>,
     /// Whether the variance by jackknife is wanted too; the spectra of all hits are kept for it.
     #[serde(default)]
     pub jackknife: bool,
@@ -45,6 +48,7 @@ impl Default for FrfSettings {
             origin: Origin::PulseStart,
             delay_s: Vec::new(),
             transform_samples: None,
+            band_hz: None,
             jackknife: false,
             noise_ratio: None,
         }
@@ -71,6 +75,18 @@ pub fn estimate(
     used: &[bool],
     settings: &FrfSettings,
 ) -> Result<CrossSpectra, SpectraError> {
+    summed(records, used, settings)?.finish(settings.windowing.sigma_per_s, &settings.delay_s)
+}
+
+/// The sums that [`estimate`] makes its spectra of.
+///
+/// # Errors
+/// As of [`estimate`].
+pub fn summed(
+    records: &ImpactRecords,
+    used: &[bool],
+    settings: &FrfSettings,
+) -> Result<SpectraAverage, SpectraError> {
     let first = used.iter().position(|u| *u).ok_or(SpectraError::NoHits)?;
     let samples = records.force_n.get(first).ok_or(SpectraError::NoHits)?.len();
     let outputs = records.response.get(first).ok_or(SpectraError::NoHits)?.len();
@@ -81,6 +97,9 @@ pub fn estimate(
     let window = &settings.windowing;
     let decay = window.decay(records.fs_hz, samples);
     let mut average = SpectraAverage::new(records.fs_hz, transform, outputs);
+    if let Some([low_hz, high_hz]) = settings.band_hz {
+        average = average.with_band(low_hz, high_hz);
+    }
     if settings.jackknife {
         average = average.with_jackknife();
     }
@@ -110,5 +129,5 @@ pub fn estimate(
             |hit, o, out| window.response_into(&hit.responses[o], &decay, hit.origin_s, out),
         )?;
     }
-    average.finish(settings.windowing.sigma_per_s, &settings.delay_s)
+    Ok(average)
 }

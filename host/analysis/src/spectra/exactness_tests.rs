@@ -119,6 +119,24 @@ fn the_variance_formula_predicts_the_scatter() {
 }
 
 #[test]
+fn a_band_is_a_part_of_the_whole_and_the_force_stays_whole() {
+    let (records, _) = records(100, 3);
+    for jackknife in [false, true] {
+        let whole = FrfSettings { jackknife, delay_s: vec![3.0 / FS], ..FrfSettings::default() };
+        let all = estimate(&records, &[true], &whole).expect("one hit");
+        for [low_hz, high_hz] in [[0.0, f64::MAX], [10.0, 100.0], [10.1, 10.2], [1e9, 2e9]] {
+            let settings = FrfSettings { band_hz: Some([low_hz, high_hz]), ..whole.clone() };
+            let sums = estimate::summed(&records, &[true], &settings).expect("one hit");
+            let part = sums.finish(2.3, &settings.delay_s).expect("one hit");
+            // NaN of a single hit's variance equals nothing
+            assert_eq!(format!("{part:?}"), format!("{:?}", all.band(low_hz, high_hz)));
+            let force = sums.force(2.3).expect("one hit");
+            assert_eq!(force.force_spectrum(), all.force_spectrum());
+        }
+    }
+}
+
+#[test]
 fn zero_padding_adds_lines_and_moves_none() {
     let (records, h) = records(100, 0);
     let settings = FrfSettings { transform_samples: Some(4 * N), ..FrfSettings::default() };
