@@ -42,7 +42,7 @@ pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<B
         let hop = (width / 4).max(1);
         for (start, part) in differences.chunks(hop).enumerate().map(|(n, part)| (n * hop, part)) {
             // no scale is below the whole record's: where nothing stands out of that, no surroundings need be looked at
-            if !part.iter().fold(false, |any, d| any | (d / whole > limit)) {
+            if part.iter().fold(0.0, |most: f64, d| most.max(*d)) / whole <= limit {
                 continue;
             }
             let s = local_scale(&differences, start, hop, width).max(whole);
