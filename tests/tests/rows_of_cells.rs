@@ -73,6 +73,28 @@ fn one_hit_by_hand_fills_a_row_of_cells() {
     let [low, high] = [0, 1].map(|end| between["ci95"][end].as_f64().unwrap());
     println!("{said}");
     assert!(low < TRUTH && TRUTH < high && high < 1.3 * low, "{between}, and {TRUTH} is true");
+
+    // every sensor has the sign that the device promises; one that is scaled the other way round is told by name
+    let check = || jointrig().args(["campaign", "check", "--json"]).arg(&file).output().unwrap();
+    let signs: Value = serde_json::from_slice(&check().stdout).unwrap();
+    let signs = signs["polarity"].as_array().unwrap();
+    let right = |name: &str| &signs.iter().find(|sign| sign["channel"] == name).unwrap()["right"];
+    for name in ["force", "vib_z", "ldv_a", "p11_z", "p21_z"] {
+        assert_eq!(right(name), true, "{name} of {signs:?}");
+    }
+    // nobody struck along x or y
+    assert_eq!(*right("p11_x"), Value::Null);
+    assert!(signs.iter().all(|sign| sign["right"] != false), "{signs:?}");
+    std::fs::write(at("lab.toml"), "[[channel]]\nname = \"p11_z\"\npolarity = 1\n").unwrap();
+    done(
+        jointrig()
+            .args(["campaign", "calibrate", "--reason", "plugged the other way round"])
+            .arg(&file)
+            .args(["--calibration", at("lab.toml").to_str().unwrap()]),
+    );
+    let turned = check();
+    let told = String::from_utf8(turned.stderr).unwrap();
+    assert!(!turned.status.success() && told.contains("wrong sign: p11_z;"), "{told}");
 }
 
 #[test]

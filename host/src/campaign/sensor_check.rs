@@ -3,18 +3,19 @@
 //!
 //! **Polarity.** A hit gives energy to the place that it strikes: over the pulse, force times velocity along it is positive, whatever
 //! the structure. So a response's sign is Σ F v / √(Σ F² Σ v²), in −1 … 1, over the kept hits along its axis, nearest first (on the
-//! paper's campaign, simulated, 0.6 to 0.96 within 31 mm); a wrong plug or a turned head gives a clear negative. Vibrometers on the specimens
-//! and load cells are further off, and follow hits along z on A within the first millisecond: their sign is its mean over its
-//! rms; a load cell is positive when arm B moves along +z. So is the force's own: it pushes.
+//! paper's campaign, simulated, 0.6 to 0.96 within 31 mm); a wrong plug or a turned head gives a clear negative. A sensor that stays
+//! is judged at its own point, in every record of its part that was struck along what it feels. Vibrometers on the specimens
+//! and load cells are further off, and follow hits along the sliding direction on A within the first millisecond: their sign is its mean
+//! over its rms; a load cell is positive when arm B moves along the sliding direction. So is the force's own: it pushes.
 //!
 //! **Ratio calibration.** On a free, rigid mass m the hammer's impulse is the change of momentum: ∫F dt = m Δv, whatever the shape of
 //! the pulse. The ratio ∫F dt / (m Δv) is 1 when the sensitivities of hammer and vibrometer fit each other; else one of them is wrong by
 //! that factor. (Handbook practice: ISO 7626-5, ratio calibration.)
 
-use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
+use jointrig_protocol::channel::{Axis, Quantity, Role};
 use jointrig_protocol::request::Configuration;
 
-use super::plan::Plan;
+use super::plan::{ImpactPoint, Plan, ResponsePoint};
 use super::store::Store;
 use super::store::error::StoreError;
 use super::store::record_row::RecordRow;
@@ -63,6 +64,18 @@ pub struct Ratio {
     pub records: Vec<i64>,
 }
 
+/// What a channel feels.
+enum Felt<'a> {
+    /// The hammer's force.
+    Force,
+    /// The motion along a unit vector, where the vibrometer looks in that cell.
+    Aimed([f64; 3]),
+    /// The motion along a unit vector, at the point where the sensor stays.
+    Fixed(&'a ResponsePoint, [f64; 3]),
+    /// The contact's motion or force along the sliding direction.
+    Contact,
+}
+
 /// A kept record in SI units with where it was struck.
 struct Hit {
     record: i64,
@@ -84,10 +97,11 @@ pub fn polarity(store: &Store) -> Result<Vec<Polarity>, StoreError> {
     let cells = plan.load_cells(&map);
     let mut found = Vec::new();
     for (place, channel) in map.channels.iter().enumerate() {
-        let axis = match channel.role {
-            Role::HammerForce => None,
-            Role::Response(axis) => Some(index(axis)),
-            Role::SpecimenA | Role::SpecimenB | Role::LoadCell => Some(2),
+        let felt = match (plan.sensor_on(&channel.name), channel.role) {
+            (Some((point, direction)), _) => Felt::Fixed(point, direction),
+            (None, Role::HammerForce) => Felt::Force,
+            (None, Role::Response(axis)) => Felt::Aimed(unit(axis)),
+            (None, Role::SpecimenA | Role::SpecimenB | Role::LoadCell) => Felt::Contact,
             _ => continue,
         };
         // which way a load cell is mounted is the plan's to say; one across the sliding direction tells nothing
@@ -96,16 +110,17 @@ pub fn polarity(store: &Store) -> Result<Vec<Polarity>, StoreError> {
             None if channel.role == Role::LoadCell => continue,
             None => 1.0,
         };
-        let mut candidates = candidates(store, &plan, &rows, channel, axis)?;
+        let mut candidates = candidates(store, &plan, &rows, &felt)?;
         candidates.truncate(HITS);
         let (mut signs, mut records) = (Vec::new(), Vec::new());
         for row in candidates {
             let Some(hit) = hit(store, &plan, row)? else { continue };
             let own = hit.map.channels.iter().position(|other| other.name == channel.name);
-            let sign = match (channel.role, axis) {
-                (Role::Response(_), Some(axis)) => own.and_then(|own| power_sign(&hit, own, axis)),
-                _ => own.and_then(|own| early_sign(&hit, own, axis)),
-            };
+            let sign = own.and_then(|own| match felt {
+                Felt::Aimed(direction) | Felt::Fixed(_, direction) => power_sign(&hit, own, direction),
+                Felt::Force => early_sign(&hit, own, None),
+                Felt::Contact => early_sign(&hit, own, Some(plan.sliding())),
+            });
             if let Some(sign) = sign {
                 signs.push(sense * sign);
                 records.push(hit.record);
@@ -148,45 +163,56 @@ fn kept(store: &Store, wanted: impl Fn(&RecordRow) -> bool) -> Result<Vec<Record
     Ok(store.records()?.into_iter().flatten().filter(|row| row.kept() && wanted(row)).collect())
 }
 
-/// Records whose hits go along the channel's axis, the nearest to its place first.
+/// Records whose hits go along what the channel feels, the nearest to its place first.
 fn candidates<'a>(
     store: &Store,
     plan: &Plan,
     rows: &'a [RecordRow],
-    channel: &Channel,
-    axis: Option<usize>,
+    felt: &Felt<'_>,
 ) -> Result<Vec<&'a RecordRow>, StoreError> {
     let cells = store.cells()?;
     let mut near: Vec<(f64, &RecordRow)> = rows
         .iter()
         .filter_map(|row| {
             let cell = &cells.iter().find(|cell| cell.id == row.cell)?.cell;
-            let (direction, distance) = geometry(plan, &cell.impact, &cell.response)?;
-            let along = axis.is_none_or(|axis| direction[axis].abs() >= ALONG);
+            let impact = impact(plan, &cell.impact)?;
+            let looked_at = plan.response(&cell.response)?;
             let assembly = cell.configuration == Configuration::Ajb;
-            // the contact's channels see anything in the assembly only, and the force path goes from A's side to B
-            let seen = matches!(channel.role, Role::Response(_) | Role::HammerForce)
-                || (assembly && grouping(plan, &cell.impact) % 2 == 1);
-            (along && seen).then_some((distance, row))
+            let (told, at) = match felt {
+                Felt::Force => (true, looked_at),
+                // a sensor that stays leaves nothing for the vibrometer to look at in its cells
+                Felt::Aimed(direction) => {
+                    (looked_at.channels.is_none() && along(&impact.direction, direction), looked_at)
+                }
+                // beyond the contact the first motion is not the hit's
+                Felt::Fixed(point, direction) => {
+                    let same_part = impact.grouping % 2 == point.grouping % 2;
+                    (same_part && along(&impact.direction, direction), *point)
+                }
+                // these see anything in the assembly only, and the force path goes from A's side to B
+                Felt::Contact => {
+                    let slides = along(&impact.direction, &plan.sliding());
+                    (slides && assembly && impact.grouping % 2 == 1, looked_at)
+                }
+            };
+            let apart: f64 = (0..3).map(|i| (impact.position_m[i] - at.position_m[i]).powi(2)).sum();
+            told.then_some((apart.sqrt(), row))
         })
         .collect();
     near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.id.cmp(&b.1.id)));
     Ok(near.into_iter().map(|(_, row)| row).collect())
 }
 
-fn grouping(plan: &Plan, impact: &str) -> u8 {
-    let mut points = plan.geometry.impact.iter().map(toml::Spanned::get_ref);
-    points.find(|point| point.name == impact).map_or(0, |point| point.grouping)
+fn impact<'a>(plan: &'a Plan, name: &str) -> Option<&'a ImpactPoint> {
+    plan.geometry.impact.iter().map(toml::Spanned::get_ref).find(|point| point.name == name)
 }
 
-/// Direction of an impact, and its distance from a response point.
-fn geometry(plan: &Plan, impact: &str, response: &str) -> Option<([f64; 3], f64)> {
-    let impact =
-        plan.geometry.impact.iter().map(toml::Spanned::get_ref).find(|point| point.name == impact)?;
-    let response =
-        plan.geometry.response.iter().map(toml::Spanned::get_ref).find(|point| point.name == response)?;
-    let apart = (0..3).map(|i| (impact.position_m[i] - response.position_m[i]).powi(2)).sum::<f64>().sqrt();
-    Some((impact.direction, apart))
+fn along(a: &[f64; 3], b: &[f64; 3]) -> bool {
+    dot(a, b).abs() >= ALONG
+}
+
+fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// A record in SI units; none where a damaged one or one without pulse tells nothing.
@@ -204,31 +230,52 @@ fn hit(store: &Store, plan: &Plan, row: &RecordRow) -> Result<Option<Hit>, Store
     let signals: Vec<Vec<f64>> =
         (0..map.len()).map(|place| map.to_si(place, samples.channel(place))).collect();
     let pulse = map.place(Role::HammerForce).and_then(|place| Pulse::locate(&signals[place]));
-    let found = pulse.zip(geometry(plan, &cell.cell.impact, &cell.cell.response));
-    Ok(found.map(|(pulse, (direction, _))| Hit { record: row.id, direction, map, signals, pulse }))
+    let found = pulse.zip(impact(plan, &cell.cell.impact));
+    Ok(found.map(|(pulse, impact)| Hit { record: row.id, direction: impact.direction, map, signals, pulse }))
 }
 
 /// Force times velocity along the hit, summed over the pulse, as a part of what it could be at most.
-fn power_sign(hit: &Hit, place: usize, axis: usize) -> Option<f64> {
+fn power_sign(hit: &Hit, place: usize, felt: [f64; 3]) -> Option<f64> {
     let rate = f64::from(hit.map.rate_hz);
-    let late = (f64::from(hit.map.channels[place].delay_ns) * 1e-9 * rate) as usize;
+    let channel = hit.map.channels.get(place)?;
+    let late = (f64::from(channel.delay_ns) * 1e-9 * rate) as usize;
     let (force, signal) = (hit.signals.get(hit.map.place(Role::HammerForce)?)?, hit.signals.get(place)?);
     let Pulse { start, end, offset_n, .. } = hit.pulse;
     let before = signal.get((start + late).checked_sub((REST_S * rate) as usize)?..start + late)?;
     let rest = before.iter().sum::<f64>() / before.len().max(1) as f64;
-    let pairs = force.get(start..end)?.iter().zip(signal.get(start + late..end + late)?);
+    let moved = signal.get(start + late..end + late)?.iter().map(|value| value - rest);
+    // the scale does not matter to a sign
+    let velocity: Vec<f64> = match channel.quantity {
+        Quantity::Velocity => moved.collect(),
+        Quantity::Acceleration => running_sum(moved),
+        Quantity::Displacement => differences(moved),
+        Quantity::Force | Quantity::Voltage => return None,
+    };
     let (mut both, mut forces, mut motions) = (0.0, 0.0, 0.0);
-    for (f, v) in pairs.map(|(f, v)| (f - offset_n, v - rest)) {
+    for (f, v) in force.get(start..end)?.iter().map(|f| f - offset_n).zip(velocity) {
         both += f * v;
         forces += f * f;
         motions += v * v;
     }
     let most = (forces * motions).sqrt();
-    (most > 0.0).then_some(hit.direction[axis].signum() * both / most)
+    (most > 0.0).then_some(dot(&hit.direction, &felt).signum() * both / most)
+}
+
+fn running_sum(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    values
+        .scan(0.0, |sum, value| {
+            *sum += value;
+            Some(*sum)
+        })
+        .collect()
+}
+
+fn differences(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    values.scan(0.0, |before, value| Some(value - std::mem::replace(before, value))).collect()
 }
 
 /// The mean over the rms of a channel in the first millisecond, positive along the hit (the force itself: positive at all).
-fn early_sign(hit: &Hit, place: usize, axis: Option<usize>) -> Option<f64> {
+fn early_sign(hit: &Hit, place: usize, felt: Option<[f64; 3]>) -> Option<f64> {
     let rate = f64::from(hit.map.rate_hz);
     let channel = &hit.map.channels[place];
     let late = (f64::from(channel.delay_ns) * 1e-9 * rate) as usize;
@@ -238,7 +285,7 @@ fn early_sign(hit: &Hit, place: usize, axis: Option<usize>) -> Option<f64> {
     let early = signal.get(from..from + (EARLY_S * rate) as usize)?;
     let mean = early.iter().map(|value| value - rest).sum::<f64>() / early.len() as f64;
     let rms = (early.iter().map(|value| (value - rest).powi(2)).sum::<f64>() / early.len() as f64).sqrt();
-    let along = axis.map_or(1.0, |axis| hit.direction[axis].signum());
+    let along = felt.map_or(1.0, |felt| dot(&hit.direction, &felt).signum());
     (rms > 0.0).then_some(along * mean / rms)
 }
 
@@ -271,11 +318,11 @@ fn momentum_ratio(hit: &Hit, mass_kg: f64) -> Option<f64> {
     (change != 0.0).then(|| impulse / (mass_kg * change))
 }
 
-fn index(axis: Axis) -> usize {
+fn unit(axis: Axis) -> [f64; 3] {
     match axis {
-        Axis::X => 0,
-        Axis::Y => 1,
-        Axis::Z => 2,
+        Axis::X => [1.0, 0.0, 0.0],
+        Axis::Y => [0.0, 1.0, 0.0],
+        Axis::Z => [0.0, 0.0, 1.0],
     }
 }
 

@@ -31,6 +31,14 @@ impl Plan {
         self.response(response)?.channels.as_deref()
     }
 
+    /// The point where the sensor with this channel stays, and what the channel feels there; none for the vibrometer's channels.
+    pub fn sensor_on(&self, channel: &str) -> Option<(&ResponsePoint, [f64; 3])> {
+        self.geometry.response.iter().map(toml::Spanned::get_ref).find_map(|point| {
+            let place = point.channels.as_ref()?.iter().position(|name| name == channel)?;
+            point.axes().get(place).map(|(_, direction)| (point, *direction))
+        })
+    }
+
     /// Places in `map` of the sensor that stays at this response point, in the order of its axes; none without one, or where a channel of
     /// it is missing.
     pub fn own_places(&self, response: &str, map: &ChannelMap) -> Option<Vec<usize>> {

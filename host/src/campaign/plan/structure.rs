@@ -74,7 +74,7 @@ impl Plan {
         [x, y, z]
     }
 
-    /// Whether the contact's own signals, which are along z, are along the sliding direction.
+    /// Whether the sliding direction is z, so that what is measured needs no turning.
     pub fn slides_along_z(&self) -> bool {
         self.sliding() == [0.0, 0.0, 1.0]
     }
