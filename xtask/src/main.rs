@@ -31,6 +31,7 @@ mod sysroot;
 mod test_programs;
 mod tests_run;
 mod toolchain;
+mod wheels;
 
 use clap::{Parser, Subcommand};
 use project::Project;
@@ -81,6 +82,8 @@ enum Task {
     },
     /// Build the Python wheel, install it into an empty environment, and test it there.
     Python,
+    /// Build the Python wheels of a release: manylinux2014, x86-64 and aarch64.
+    Wheels,
     /// Write what each program is made of: every crate of others with version, licence and checksum (CycloneDX).
     Sbom,
     /// Compare spectra, universal files and virtual points with pyFRF, pyuff and pyFBS: numbers, or times.
@@ -117,6 +120,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Budgets => budgets::command(&project),
         Task::Flash { detach } => flash::run(&project, detach),
         Task::Python => python::run(&project).map(|remark| println!("{remark}")),
+        Task::Wheels => wheels::run(&project),
         Task::Sbom => sbom::run(&project),
         Task::Parity(options) => parity::run(&project, &options),
         Task::Bench { extra } => bench::run(&project, &extra),

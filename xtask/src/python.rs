@@ -12,13 +12,13 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Oldest Python that the wheel is made for.
-const OLDEST: (u32, u32) = (3, 10);
+pub const OLDEST: (u32, u32) = (3, 10);
 
 /// Newest that is looked for by its name.
 const NEWEST: u32 = 20;
 
 /// Bytes of the wheel, at most.
-const WHEEL: u64 = 5_000_000;
+pub const WHEEL: u64 = 5_000_000;
 
 /// What builds the wheel, and what tests it where nothing else is installed.
 const TOOLS: [&str; 1] = ["maturin>=1.9,<2"];
@@ -78,7 +78,7 @@ fn left_out(why: &str) -> String {
 }
 
 /// Each version of Python that the wheel is made for, once: by its name on the path, and where pyenv keeps them.
-fn interpreters() -> BTreeMap<(u32, u32), PathBuf> {
+pub fn interpreters() -> BTreeMap<(u32, u32), PathBuf> {
     let named = (OLDEST.1..NEWEST).map(|minor| format!("python3.{minor}"));
     let mut candidates: Vec<PathBuf> = ["python3".to_owned(), "python".to_owned()]
         .into_iter()
