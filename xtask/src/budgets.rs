@@ -185,11 +185,11 @@ fn enforce(figures: &Figures) -> Result<()> {
 fn page(figures: &Figures) -> Result<String> {
     let mut page = String::from(
         "# What the firmware costs\n\n\
-         Counted by the firmware's own benchmark in QEMU (`firmware/boards/mps2-an505/src/checks/bench.rs`): the real tasks\n\
-         over sixteen channels of small noise at 51.2 kHz, everything included: both converters' words are checked, proven in step\n\
-         and joined, the block is judged for the hammer, kept in the ring, sealed as a packet and handed to the link;\n\
-         acknowledgements, reports and the executor too. No unit of the chip helps with any CRC.\n\
-         Instructions of a Cortex-M33, equal in every run of one compiler; they are not cycles. At 160 MHz a scan\n\
+         The firmware's own benchmark counts these figures in QEMU (`firmware/boards/mps2-an505/src/checks/bench.rs`): the real tasks\n\
+         process sixteen channels of small noise at 51.2 kHz. Everything is included: both converters' words are checked, proven in step\n\
+         and joined; the block is judged for the hammer, kept in the ring, sealed as a packet and handed to the link;\n\
+         acknowledgements, reports and the executor count too. No CRC uses any of the chip's units.\n\
+         The figures are instructions of a Cortex-M33, equal in every run with one compiler; they are not cycles. At 160 MHz a scan\n\
          has 3125 cycles, and a block of 15 scans 46 875.\n\n\
          This page is written by `cargo xtask budgets`; `cargo xtask test` fails when a limit is exceeded.\n",
     );
@@ -201,12 +201,12 @@ fn page(figures: &Figures) -> Result<String> {
     // Writing into a String cannot fail.
     let _ = writeln!(
         page,
-        "\nWhere they go at rest: {join} CRC-16 and scans of both converters, {seal} CRC-32, about {copies} for three copies, and \
+        "\nWhere the instructions go at rest: {join} CRC-16 and scans of both converters, {seal} CRC-32, about {copies} for three copies, and \
          {rest} for the rest\n(proof that the converters are in step, hammer, ring, tasks and their wake-ups, acknowledgements, reports).\n\n\
-         What the chip's units would take off, by reasoning and not measured: its CRC unit takes a word in one store, so that a\n\
-         block's 124 words cost a load, a store and a quarter of a loop each, some 300 instead of {} instructions: about\n\
-         {} a scan. The serial port's own CRC could check the converters' (9 words of 16 bits, any polynomial), which would take off\n\
-         about 90 a scan more; neither is used, because neither has been seen to work on a board.",
+         What the chip's units would save (estimated, not measured): its CRC unit takes a word in one store, so that each of a\n\
+         block's 124 words costs a load, a store and a quarter of a loop. That is about 300 instructions instead of {}, and saves about\n\
+         {} a scan. The serial port's own CRC unit could check the converters' CRC (9 words of 16 bits, any polynomial), which would save\n\
+         about 90 more a scan. Neither is used, because neither has been seen to work on a board.",
         figures.of("frame.seal_packet")?,
         figures.of("frame.seal_packet")?.saturating_sub(300) / 15
     );
