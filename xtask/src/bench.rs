@@ -1,22 +1,57 @@
-//! `cargo xtask bench`: the benchmarks beside the hot paths.
+//! `cargo xtask bench`: one table of how fast our work is, beside its peers and beside the machine's limit.
 
 use crate::command;
+use crate::environment::{self, environment};
 use crate::project::Project;
-use anyhow::Result;
+use anyhow::{Context, Result, bail};
+use std::fs;
+use std::process::Stdio;
 
-/// Runs the benchmarks of every package that has some; unit tests are not run along with them.
-pub fn run(project: &Project, extra: &[String]) -> Result<()> {
-    let with_benches: Vec<&str> = project
-        .packages
-        .iter()
-        .filter(|package| !package.benches.is_empty())
-        .map(|package| &*package.name)
-        .collect();
-    if with_benches.is_empty() {
-        println!("no package has benchmarks yet: they live in the folder benches/ of a package");
-        return Ok(());
+/// The package that measures.
+const PACKAGE: &str = "jointrig-benches";
+
+/// Stands above the tables in docs/performance.md.
+const ABOUT: &str = "\
+# How fast it is
+
+`cargo xtask bench` writes this page; do not edit it. Every row was measured in one run: our time, the time of a program that laboratories use
+for the same work, and the time of what no program can do without on this machine (the limit). Both sides take turns, and the quickest run of
+each counts. *times as fast* is the peer's time over ours; *times as long* is ours over the limit's. The run fails where a ratio misses what is
+wanted or allowed.
+
+";
+
+/// Measures all parts and writes the page, or those that are named and only prints them.
+pub fn run(project: &Project, parts: &[String]) -> Result<()> {
+    let Some(system) = ["python3", "python"].into_iter().find_map(command::find_program) else {
+        bail!("there is no Python for the peers: install python3 with its venv module");
+    };
+    let python = environment(&system, &project.target.join("parity-python"), &[])?;
+    environment::with_peers(&python)?;
+    let mut cargo = command::cargo(&project.root);
+    cargo
+        .args(["run", "--release", "--quiet", "--package", PACKAGE, "--features", "table", "--"])
+        .args(parts);
+    cargo.env("JOINTRIG_PYTHON", python).stdout(Stdio::piped());
+    let measuring = cargo.spawn().context("cargo cannot be started")?;
+    let output = measuring.wait_with_output()?;
+    let tables = String::from_utf8(output.stdout).context("the tables are not text")?;
+    println!("{tables}");
+    if parts.is_empty() && !tables.is_empty() {
+        let page = project.root.join("docs/performance.md");
+        fs::write(&page, format!("{ABOUT}{}\n", tables.trim_end()))
+            .with_context(|| format!("{} cannot be written", page.display()))?;
+        println!("written: {}", page.display());
     }
-    println!("benchmarks of {}", with_benches.join(", "));
+    if output.status.success() {
+        Ok(())
+    } else {
+        bail!("something is slower than wanted, or could not be measured: see above")
+    }
+}
+
+/// The benchmarks beside the hot paths, of every package that has some.
+pub fn hot_paths(project: &Project, extra: &[String]) -> Result<()> {
     let mut cargo = command::cargo(&project.root);
     // `--workspace` compiles the dependencies with the same features as the tests do.
     cargo.args(["bench", "--workspace", "--bench", "*"]);

@@ -31,6 +31,19 @@ fn workspace(project: &Project) -> Result<()> {
     cargo.args(["clippy", "--workspace", "--all-targets", "--release", "--", "-Dwarnings"]);
     command::run(&mut cargo)
         .context("clippy found something: each finding above names its file and its remedy")?;
+    // what no other step builds, and would rot otherwise
+    let mut table = command::cargo(&project.root);
+    table.args([
+        "clippy",
+        "--package",
+        "jointrig-benches",
+        "--features",
+        "table",
+        "--release",
+        "--",
+        "-Dwarnings",
+    ]);
+    command::run(&mut table).context("clippy found something in the table of speed")?;
     // The crates for strangers once more as strangers build them: the workspace above turns their features on.
     let mut alone = command::cargo(&project.root);
     alone.args(["clippy", "--package", "jointrig-analysis", "--package", "jointrig-uff", "--all-targets"]);

@@ -86,12 +86,17 @@ enum Task {
     Wheels,
     /// Write what each program is made of: every crate of others with version, licence and checksum (CycloneDX).
     Sbom,
-    /// Compare spectra, universal files and virtual points with pyFRF, pyuff and pyFBS: numbers, or times.
-    Parity(parity::Options),
-    /// Run every benchmark of the workspace.
+    /// Compare the numbers of spectra, universal files and virtual points with those of pyFRF, pyuff and pyFBS.
+    Parity,
+    /// Measure how fast everything is beside its peers and the machine's limit, and write docs/performance.md.
     Bench {
-        /// Passed to `cargo bench`, for example a part of a benchmark's name.
-        #[arg(last = true)]
+        /// Measure these parts alone, and write no page: spectra, substructuring, loops, universal, frames, simulator, campaign, growth.
+        parts: Vec<String>,
+        /// Run the benchmarks beside the hot paths instead; what follows is passed to `cargo bench`.
+        #[arg(long, conflicts_with = "parts")]
+        hot_paths: bool,
+        /// A part of a benchmark's name, for example.
+        #[arg(last = true, requires = "hot_paths")]
         extra: Vec<String>,
     },
 }
@@ -122,7 +127,8 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Python => python::run(&project).map(|remark| println!("{remark}")),
         Task::Wheels => wheels::run(&project),
         Task::Sbom => sbom::run(&project),
-        Task::Parity(options) => parity::run(&project, &options),
-        Task::Bench { extra } => bench::run(&project, &extra),
+        Task::Parity => parity::run(&project),
+        Task::Bench { hot_paths: true, extra, .. } => bench::hot_paths(&project, &extra),
+        Task::Bench { parts, .. } => bench::run(&project, &parts),
     }
 }

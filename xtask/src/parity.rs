@@ -1,4 +1,4 @@
-//! `cargo xtask parity`: the same numbers as pyFRF, pyuff and pyFBS, and how long both take.
+//! `cargo xtask parity`: the same numbers as pyFRF, pyuff and pyFBS.
 //!
 //! Python and its packages are the check's alone, in a folder under `target/`; no part of jointrig needs them.
 
@@ -6,23 +6,13 @@ use crate::command;
 use crate::environment::{self, environment};
 use crate::project::Project;
 use anyhow::{Result, bail};
-use clap::Args;
 use std::path::PathBuf;
 
-/// Options of `cargo xtask parity`.
-#[derive(Args)]
-pub struct Options {
-    /// Compare times instead of numbers, and fail where we are not as much faster as promised.
-    #[arg(long)]
-    speed: bool,
-}
-
 /// Prepares Python and runs the comparison.
-pub fn run(project: &Project, options: &Options) -> Result<()> {
+pub fn run(project: &Project) -> Result<()> {
     let python = python(project)?;
     let mut cargo = command::cargo(&project.root);
-    cargo.args(["bench", "-p", "jointrig", "--bench", "peers", "--"]);
-    cargo.arg(if options.speed { "speed" } else { "parity" });
+    cargo.args(["bench", "-p", "jointrig", "--bench", "peers"]);
     cargo.env("JOINTRIG_PYTHON", python);
     command::run(&mut cargo)
 }

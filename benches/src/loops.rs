@@ -1,25 +1,24 @@
-//! Loops and all their figures from 60 s of ten channels at 51.2 kHz, beside a numpy script in the same run.
-//!
-//! `cargo bench -p jointrig --bench loops`; with `JOINTRIG_PYTHON` naming an interpreter that has numpy its side is run too, and
-//! both must find the same numbers.
+//! Loops and all their figures from 60 s of ten channels at 51.2 kHz, against numpy, which must find the same numbers, and against one
+//! pass over the samples of the five channels that are needed.
 
+use super::peers::{self, Peers};
+use super::row::{RUNS, Row, quickest};
 use jointrig::campaign::plan::level::{Held, Level};
 use jointrig::campaign::run::shaking::record;
 use jointrig::campaign::store::record_row::Samples;
 use jointrig::device::channels::ChannelMap;
 use jointrig::hysteresis::{Correction, LoopAnalysis, analyse, analyse_corrected};
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
+use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
 use std::hint::black_box;
-use std::process::{Command, ExitCode};
-use std::time::Instant;
+use std::path::Path;
 
 const RATE_HZ: u32 = 51_200;
 const SECONDS: usize = 60;
 /// A cycle of no whole number of samples: 204.8.
 const FREQUENCY_HZ: f64 = 250.0;
-const RUNS: usize = 5;
 const MASS_KG: f64 = 1.56;
 const PATH: f64 = 0.0133;
 /// Both sides' figures agree to this: they interpolate between samples in different ways.
@@ -27,54 +26,51 @@ const ALIKE: f64 = 2e-3;
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
-fn main() -> ExitCode {
-    match run() {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
-}
-
-fn run() -> Outcome<()> {
+/// The one row.
+pub fn rows(all: &Peers) -> Outcome<Vec<Row>> {
     let map = channels()?;
     let samples = Samples { codes: codes(&map), channels: map.len() };
     let level =
         Level { frequency_hz: FREQUENCY_HZ, end_hz: None, held: Held::Displacement, amplitude: 1.5e-7 };
     let mut found = both(&map, &samples, &level)?;
-    let mut times = Vec::new();
-    for _ in 0..RUNS {
-        let begun = Instant::now();
-        found = black_box(both(black_box(&map), black_box(&samples), &level)?);
-        times.push(begun.elapsed().as_secs_f64());
-    }
-    let ours = median(&mut times);
-    let megabytes = (2 * samples.codes.len()) as f64 / 1e6;
-    println!(
-        "{SECONDS} s of {} channels at {RATE_HZ} Hz: {megabytes:.1} MB of codes; median of {RUNS}",
-        map.len()
+    let [ours, least] = quickest(
+        RUNS,
+        [
+            &mut || {
+                found = black_box(both(black_box(&map), black_box(&samples), &level).expect("it did before"));
+            },
+            &mut || {
+                black_box(one_pass(&map, black_box(&samples)));
+            },
+        ],
     );
-    println!(
-        "jointrig: {ours:.3} s, {:.0} MB/s, {:.0} times real time",
-        megabytes / ours,
-        SECONDS as f64 / ours
-    );
-    let Ok(python) = std::env::var("JOINTRIG_PYTHON") else {
-        println!("numpy: not run (JOINTRIG_PYTHON names no interpreter)");
-        return Ok(());
-    };
-    let theirs = numpy(&python, &samples, &map)?;
-    for (name, mine) in figures(&found) {
-        let other = theirs["figures"][name].as_f64().ok_or(format!("loops.py gave no {name}"))?;
-        if (mine / other - 1.0).abs() > ALIKE {
-            return Err(format!("{name}: {mine} here, {other} by numpy").into());
+    let folder = tempfile::tempdir()?;
+    let theirs = numpy(all, folder.path(), &samples, &map)?;
+    if let Some(theirs) = &theirs {
+        for (name, mine) in figures(&found) {
+            let other = theirs["figures"][name].as_f64().ok_or(format!("loops.py gave no {name}"))?;
+            if (mine / other - 1.0).abs() > ALIKE {
+                return Err(format!("{name}: {mine} here, {other} by numpy").into());
+            }
         }
     }
-    let mut seconds: Vec<f64> = serde_json::from_value(theirs["seconds"].clone())?;
-    let peer = median(&mut seconds);
-    println!("numpy: {peer:.3} s, {:.0} MB/s; ratio {:.1}", megabytes / peer, peer / ours);
-    Ok(())
+    let peer = theirs.as_ref().and_then(|t| peers::quickest(&t["seconds"]));
+    let megabytes = (2 * samples.codes.len()) as f64 / 1e6;
+    Ok(vec![
+        Row::of(format!("loops, {SECONDS} s of {} channels ({megabytes:.0} MB of codes)", map.len()), ours)
+            .beside("numpy", peer, 6.0)
+            .against("one pass over the five channels' samples", least, None),
+    ])
+}
+
+/// Sums of the samples of the five channels, as numbers.
+fn one_pass(map: &ChannelMap, samples: &Samples) -> f64 {
+    let wanted = |role| matches!(role, Role::SpecimenA | Role::SpecimenB | Role::LoadCell);
+    let places: Vec<usize> = (0..map.len()).filter(|place| wanted(map.channels[*place].role)).collect();
+    places
+        .par_iter()
+        .map(|place| samples.channel(*place).iter().map(|code| f64::from(*code)).sum::<f64>())
+        .sum()
 }
 
 /// Loops of the raw and of the corrected force.
@@ -145,9 +141,11 @@ fn codes(map: &ChannelMap) -> Vec<i16> {
     codes
 }
 
-fn numpy(python: &str, samples: &Samples, map: &ChannelMap) -> Outcome<Value> {
-    let folder = tempfile::tempdir()?;
-    let path = folder.path().join("codes.bin");
+fn numpy(all: &Peers, folder: &Path, samples: &Samples, map: &ChannelMap) -> Outcome<Option<Value>> {
+    if !all.are_there() {
+        return Ok(None);
+    }
+    let path = folder.join("codes.bin");
     std::fs::write(&path, samples.codes.iter().flat_map(|c| c.to_le_bytes()).collect::<Vec<u8>>())?;
     let place = |role| map.place(role).ok_or("no such channel");
     let job = json!({
@@ -156,15 +154,5 @@ fn numpy(python: &str, samples: &Samples, map: &ChannelMap) -> Outcome<Value> {
         "cells": map.places(Role::LoadCell),
         "units": map.channels.iter().map(Channel::units_per_code).collect::<Vec<_>>(),
     });
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/peers/loops.py");
-    let output = Command::new(python).arg(script).arg(job.to_string()).output()?;
-    if !output.status.success() {
-        return Err(format!("loops.py failed:\n{}", String::from_utf8_lossy(&output.stderr)).into());
-    }
-    Ok(serde_json::from_slice(&output.stdout)?)
-}
-
-fn median(times: &mut [f64]) -> f64 {
-    times.sort_by(f64::total_cmp);
-    times[times.len() / 2]
+    all.run("loops.py", &job.to_string())
 }

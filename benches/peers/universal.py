@@ -1,4 +1,4 @@
-"""The peers' times for the jobs of peers.rs, seconds, five of each, as one JSON document on stdout."""
+"""pyuff's times for writing and reading, s, as one JSON document on stdout."""
 
 import json
 import os
@@ -7,7 +7,6 @@ import tempfile
 import time
 
 import numpy as np
-import pyFRF
 import pyuff
 
 RUNS = 5
@@ -21,19 +20,6 @@ def times(job, before=lambda: None):
         job()
         seconds.append(time.perf_counter() - start)
     return seconds
-
-
-def spectra(hits, responses, samples):
-    rng = np.random.default_rng(1)
-    force = rng.standard_normal((hits, 1, samples))
-    response = rng.standard_normal((hits, responses, samples))
-
-    def job():
-        frf = pyFRF.FRF(51200, force, response, exc_type="f", resp_type="v", copy=False)
-        frf.get_H1()
-        frf.get_coherence()
-
-    return times(job)
 
 
 def universal(functions, lines, binary, folder):
@@ -64,7 +50,6 @@ with tempfile.TemporaryDirectory() as folder:
     ascii_write, ascii_read = universal(job["functions"], job["lines"], 0, folder)
     binary_write, binary_read = universal(job["functions"], job["lines"], 1, folder)
 print(json.dumps({
-    "spectra": spectra(job["hits"], job["responses"], job["samples"]),
     "ascii write": ascii_write, "ascii read": ascii_read,
     "binary write": binary_write, "binary read": binary_read,
 }))

@@ -1,0 +1,89 @@
+//! The same work at 1, 4 and 16 times the size: time and memory, and the power of the size that they go with.
+
+use peak_alloc::PeakAlloc;
+use std::fmt::Write;
+use std::time::Instant;
+
+/// Counts what is on the heap.
+#[global_allocator]
+static HEAP: PeakAlloc = PeakAlloc;
+
+const RUNS: usize = 5;
+/// The largest exponent of time.
+const TIME: f64 = 1.05;
+/// Memory that does not grow with the size stays within this factor over the whole range; threads meet at different moments.
+const FLAT: f64 = 1.5;
+
+/// What one size takes.
+#[derive(Clone, Copy)]
+pub struct Cost {
+    /// The quickest run, s.
+    pub seconds: f64,
+    /// The heap's peak above what was there before, MB.
+    pub megabytes: f64,
+}
+
+/// A work at several sizes.
+pub struct Growth {
+    /// What is done, and what grows.
+    pub what: String,
+    /// How many times the first size, and what it took.
+    pub steps: Vec<(u32, Cost)>,
+    /// Whether memory must not grow with it.
+    pub flat_memory: bool,
+}
+
+/// The cost of a job.
+pub fn measured(mut job: impl FnMut()) -> Cost {
+    let mut cost = Cost { seconds: f64::INFINITY, megabytes: f64::INFINITY };
+    for _ in 0..RUNS {
+        let before = HEAP.current_usage();
+        HEAP.reset_peak_usage();
+        let start = Instant::now();
+        job();
+        cost.seconds = cost.seconds.min(start.elapsed().as_secs_f64());
+        cost.megabytes = cost.megabytes.min((HEAP.peak_usage().saturating_sub(before)) as f64 / 1e6);
+    }
+    cost
+}
+
+impl Growth {
+    fn exponent(&self, of: impl Fn(&Cost) -> f64) -> f64 {
+        let (Some((one, first)), Some((many, last))) = (self.steps.first(), self.steps.last()) else {
+            return f64::NAN;
+        };
+        (of(last) / of(first)).ln() / (f64::from(*many) / f64::from(*one)).ln()
+    }
+
+    /// What grows faster than wanted, in words.
+    pub fn short(&self) -> Vec<String> {
+        let (time, memory) = (self.exponent(|c| c.seconds), self.exponent(|c| c.megabytes));
+        let range = self.steps.last().map_or(1, |(times, _)| *times);
+        let mut short = Vec::new();
+        if time.is_nan() || time > TIME {
+            short.push(format!("{}: time grows with the power {time:.2}, wanted {TIME}", self.what));
+        }
+        if self.flat_memory && f64::from(range).powf(memory) > FLAT {
+            short.push(format!("{}: memory grows with the power {memory:.2}, and should not", self.what));
+        }
+        short
+    }
+}
+
+/// The table in Markdown.
+pub fn table(all: &[Growth]) -> String {
+    let mut text = String::from(
+        "| work | 1 × | 4 × | 16 × | exponent of time | exponent of memory |\n|---|---|---|---|---:|---:|\n",
+    );
+    for growth in all {
+        let cells: Vec<String> = growth
+            .steps
+            .iter()
+            .map(|(_, cost)| format!("{} s, {:.1} MB", super::row::brief(cost.seconds), cost.megabytes))
+            .collect();
+        let (time, memory) = (growth.exponent(|c| c.seconds), growth.exponent(|c| c.megabytes));
+        // writing to a string cannot fail
+        let _ = writeln!(text, "| {} | {} | {time:.2} | {memory:.2} |", growth.what, cells.join(" | "));
+    }
+    text
+}

@@ -1,0 +1,91 @@
+//! One table: how long our work takes, beside the programs that laboratories use and beside the least that this machine needs.
+//!
+//! `cargo xtask bench` prepares Python with numpy, pyFRF and pyuff, runs this, and writes docs/performance.md. Without
+//! `JOINTRIG_PYTHON` the peers' columns stay empty. Fails where something is slower than wanted, after the table.
+
+mod campaign;
+mod frames;
+mod growth;
+mod loops;
+mod noise;
+mod peers;
+mod row;
+mod simulator;
+mod spectra;
+mod substructuring;
+mod universal;
+
+use peers::Peers;
+use std::error::Error;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    match run() {
+        Ok(short) if short.is_empty() => ExitCode::SUCCESS,
+        Ok(short) => {
+            eprintln!("slower than wanted:\n  {}", short.join("\n  "));
+            ExitCode::FAILURE
+        }
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// What can be measured, by the words that choose a part of it.
+const PARTS: [&str; 8] =
+    ["spectra", "substructuring", "loops", "universal", "frames", "simulator", "campaign", "growth"];
+
+/// Prints the tables of the parts that are named, or of all; what is slower than wanted.
+fn run() -> Result<Vec<String>, Box<dyn Error>> {
+    let named: Vec<String> = std::env::args().skip(1).collect();
+    if let Some(unknown) = named.iter().find(|name| !PARTS.contains(&name.as_str())) {
+        return Err(format!("there is no part {unknown:?}: known are {}", PARTS.join(", ")).into());
+    }
+    let peers = Peers::found();
+    if !peers.are_there() {
+        eprintln!(
+            "JOINTRIG_PYTHON names no interpreter: the peers are left out (`cargo xtask bench` prepares one)"
+        );
+    }
+    let folder = tempfile::tempdir()?;
+    let (mut rows, mut growths, mut short) = (Vec::new(), Vec::new(), Vec::new());
+    for part in PARTS.into_iter().filter(|part| named.is_empty() || named.iter().any(|name| name == part)) {
+        eprintln!("{part} ...");
+        let (of_part, slow) = match part {
+            "spectra" => (spectra::rows(&peers)?, Vec::new()),
+            "substructuring" => substructuring::rows(&peers)?,
+            "loops" => (loops::rows(&peers)?, Vec::new()),
+            "universal" => (universal::rows(&peers)?, Vec::new()),
+            "frames" => (frames::rows()?, Vec::new()),
+            "simulator" => simulator::rows()?,
+            "campaign" => (campaign::rows(folder.path())?, Vec::new()),
+            _ => {
+                growths = campaign::growth(folder.path())?;
+                growths.push(substructuring::growth()?);
+                (Vec::new(), Vec::new())
+            }
+        };
+        rows.extend(of_part);
+        short.extend(slow);
+    }
+    short.extend(rows.iter().flat_map(row::Row::short));
+    short.extend(growths.iter().flat_map(growth::Growth::short));
+    println!("{}", machine());
+    if !rows.is_empty() {
+        println!("{}", row::table(&rows));
+    }
+    if !growths.is_empty() {
+        println!("## Growth\n\n{}", growth::table(&growths));
+    }
+    Ok(short)
+}
+
+/// Where the times are from.
+fn machine() -> String {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
+    let model = model.map_or("unknown processor", |(_, name)| name.trim());
+    format!("{model}, {} cores, {}.\n", rayon::current_num_threads(), std::env::consts::OS)
+}

@@ -1,0 +1,36 @@
+//! The peers' side: scripts for the Python that `JOINTRIG_PYTHON` names.
+
+use serde_json::Value;
+use std::error::Error;
+use std::process::Command;
+
+/// A Python with the peers' packages; none where nobody named one.
+pub struct Peers(Option<String>);
+
+impl Peers {
+    /// As the environment says.
+    pub fn found() -> Self {
+        Peers(std::env::var("JOINTRIG_PYTHON").ok())
+    }
+
+    /// Whether there is one.
+    pub fn are_there(&self) -> bool {
+        self.0.is_some()
+    }
+
+    /// Runs a script of the folder `peers` and gives the document that it prints; none without a Python.
+    pub fn run(&self, script: &str, job: &str) -> Result<Option<Value>, Box<dyn Error>> {
+        let Some(python) = &self.0 else { return Ok(None) };
+        let path = format!("{}/peers/{script}", env!("CARGO_MANIFEST_DIR"));
+        let output = Command::new(python).arg(path).arg(job).output()?;
+        if !output.status.success() {
+            return Err(format!("{script} failed:\n{}", String::from_utf8_lossy(&output.stderr)).into());
+        }
+        Ok(Some(serde_json::from_slice(&output.stdout)?))
+    }
+}
+
+/// The quickest of the runs that a script tells, s.
+pub fn quickest(seconds: &Value) -> Option<f64> {
+    seconds.as_array()?.iter().filter_map(Value::as_f64).reduce(f64::min)
+}

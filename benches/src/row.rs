@@ -1,0 +1,107 @@
+//! A line of the table: our time beside a peer's and beside the least that this machine needs.
+
+use std::fmt::Write;
+use std::time::Instant;
+
+/// Runs of each side; the quickest counts, because all else that a machine does can only add to a time.
+pub const RUNS: usize = 7;
+
+/// One work, and how long each side takes.
+pub struct Row {
+    /// What is done, and to how much.
+    pub work: String,
+    /// Our quickest run, s.
+    pub ours_s: f64,
+    /// The program that laboratories use for it; none without Python, or where there is none.
+    pub peer: Option<Other>,
+    /// What no program can do without.
+    pub limit: Option<Other>,
+}
+
+/// The other side of a ratio.
+pub struct Other {
+    /// Who, or what.
+    pub name: String,
+    /// Its quickest run, s.
+    pub seconds: f64,
+    /// For a peer, how many times as fast we want to be; for a limit, how many times its time we may take.
+    pub wanted: Option<f64>,
+}
+
+impl Row {
+    /// Ours alone.
+    pub fn of(work: impl Into<String>, ours_s: f64) -> Self {
+        Row { work: work.into(), ours_s, peer: None, limit: None }
+    }
+
+    /// Beside a peer, where it was run.
+    #[must_use]
+    pub fn beside(mut self, name: &str, seconds: Option<f64>, wanted: f64) -> Self {
+        self.peer = seconds.map(|seconds| Other { name: name.into(), seconds, wanted: Some(wanted) });
+        self
+    }
+
+    /// Beside the limit.
+    #[must_use]
+    pub fn against(mut self, name: &str, seconds: f64, wanted: Option<f64>) -> Self {
+        self.limit = Some(Other { name: name.into(), seconds, wanted });
+        self
+    }
+
+    /// What is slower than wanted, in words.
+    pub fn short(&self) -> Vec<String> {
+        let mut short = Vec::new();
+        if let Some(Other { name, seconds, wanted: Some(wanted) }) = &self.peer {
+            let ratio = seconds / self.ours_s;
+            if ratio.is_nan() || ratio < *wanted {
+                short.push(format!("{}: {ratio:.2} times as fast as {name}, wanted {wanted}", self.work));
+            }
+        }
+        if let Some(Other { name, seconds, wanted: Some(wanted) }) = &self.limit {
+            let ratio = self.ours_s / seconds;
+            if ratio.is_nan() || ratio > *wanted {
+                short.push(format!("{}: {ratio:.2} times the time of {name}, wanted {wanted}", self.work));
+            }
+        }
+        short
+    }
+}
+
+/// The table in Markdown.
+pub fn table(rows: &[Row]) -> String {
+    let mut text = String::from(
+        "| work | ours, s | peer | its time, s | times as fast | wanted | limit | its time, s | times as long | allowed |\n\
+         |---|---:|---|---:|---:|---:|---|---:|---:|---:|\n",
+    );
+    let number = |value: Option<f64>| value.map_or(String::new(), |value| value.to_string());
+    for row in rows {
+        let peer = row.peer.as_ref().map_or(" | | | ".into(), |Other { name, seconds, wanted }| {
+            format!("{name} | {} | {:.1} | {}", brief(*seconds), seconds / row.ours_s, number(*wanted))
+        });
+        let limit = row.limit.as_ref().map_or(" | | | ".into(), |Other { name, seconds, wanted }| {
+            format!("{name} | {} | {:.2} | {}", brief(*seconds), row.ours_s / seconds, number(*wanted))
+        });
+        // writing to a string cannot fail
+        let _ = writeln!(text, "| {} | {} | {peer} | {limit} |", row.work, brief(row.ours_s));
+    }
+    text
+}
+
+/// Three digits.
+pub fn brief(seconds: f64) -> String {
+    let digits = (2 - seconds.abs().log10().floor() as i32).clamp(0, 6) as usize;
+    format!("{seconds:.digits$}")
+}
+
+/// The quickest of the runs of several jobs, s, in their order. The jobs take turns, so that a busy spell of the machine falls on all of them.
+pub fn quickest<const N: usize>(runs: usize, mut jobs: [&mut dyn FnMut(); N]) -> [f64; N] {
+    let mut best = [f64::INFINITY; N];
+    for _ in 0..runs {
+        for (job, best) in jobs.iter_mut().zip(&mut best) {
+            let start = Instant::now();
+            job();
+            *best = best.min(start.elapsed().as_secs_f64());
+        }
+    }
+    best
+}

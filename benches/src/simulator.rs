@@ -1,0 +1,102 @@
+//! The whole simulated device (rig, firmware, frames, link, a host that decodes every frame) against its rig alone.
+//!
+//! Seconds here are seconds of processor time, all threads together, so that the figure is that of one core.
+
+#[path = "../../hil-sim/tests/support/mod.rs"]
+mod support;
+
+use super::row::Row;
+use jointrig_hil_sim::board::VirtualBoard;
+use jointrig_hil_sim::rig::{Configuration, Rig, RigConfig};
+use jointrig_protocol::request;
+use std::error::Error;
+use std::time::Instant;
+use support::SmallHost;
+
+/// Simulated seconds of each run.
+const SIMULATED_S: u64 = 40;
+const RATE_HZ: u64 = 51_200;
+const RUNS: usize = 3;
+/// Simulated seconds per processor second that are wanted of the whole.
+const WANTED: f64 = 120.0;
+
+/// A row for each way of framing; and what falls short of the pace that is wanted.
+pub fn rows() -> Result<(Vec<Row>, Vec<String>), Box<dyn Error>> {
+    let config = RigConfig::default();
+    let (mut alone, mut packets, mut cobs) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
+    for _ in 0..RUNS {
+        alone = alone.min(rig(&config)?);
+        packets = packets.min(chain(true)?);
+        cobs = cobs.min(chain(false)?);
+    }
+    let row = |name: &str, seconds: f64| {
+        let pace = SIMULATED_S as f64 / seconds;
+        Row::of(
+            format!("{SIMULATED_S} simulated seconds, frames in {name} (processor time; {pace:.0} : 1)"),
+            seconds,
+        )
+        .against("the rig alone", alone, None)
+    };
+    let pace = SIMULATED_S as f64 / packets;
+    let short = (pace < WANTED)
+        .then(|| format!("the chain: {pace:.0} simulated seconds per processor second, wanted {WANTED}"));
+    Ok((vec![row("packets", packets), row("COBS", cobs)], short.into_iter().collect()))
+}
+
+/// Processor time of this process in s where the system tells it, else wall time since `begun`.
+fn processor_s(begun: Instant) -> f64 {
+    let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
+    let nanoseconds: u64 = tasks
+        .filter_map(|task| std::fs::read_to_string(task.path().join("schedstat")).ok())
+        .filter_map(|text| text.split_whitespace().next()?.parse::<u64>().ok())
+        .sum();
+    if nanoseconds > 0 { nanoseconds as f64 * 1e-9 } else { begun.elapsed().as_secs_f64() }
+}
+
+/// Seconds of `run`.
+fn measure(run: impl FnOnce()) -> f64 {
+    let begun = Instant::now();
+    let before = processor_s(begun);
+    run();
+    processor_s(begun) - before
+}
+
+fn rig(config: &RigConfig) -> Result<f64, Box<dyn Error>> {
+    let mut rig = Rig::new(config, 1)?;
+    rig.stage(Configuration::Ajb, "AZ3", "B3", 0)?;
+    Ok(measure(|| {
+        let mut codes = [0; 10];
+        for scan in 0..SIMULATED_S * RATE_HZ {
+            if scan % (2 * RATE_HZ) == 0 {
+                rig.fire(3.5e-3);
+            }
+            rig.scan(&mut codes);
+        }
+        std::hint::black_box(codes);
+    }))
+}
+
+/// Frames in packets, as USB and `sim:` carry them, or in COBS.
+fn chain(packets: bool) -> Result<f64, Box<dyn Error>> {
+    let (board, link) = VirtualBoard::start(None, 1)?;
+    let mut host = SmallHost::reading(link, packets);
+    let seconds = measure(|| {
+        host.start();
+        let mut from = host.stage(request::Configuration::Ajb, "AZ3", "B3", 0);
+        for number in 1..=SIMULATED_S as u32 / 2 {
+            let shot = host.shoot(SmallHost::order(number, 3_500, from + host.lead()));
+            from = shot.trigger + RATE_HZ;
+            host.codes.clear();
+            host.first_scan = host.next_scan;
+        }
+        // the last shot's record is held to its end
+        host.release();
+        let end = SIMULATED_S * RATE_HZ;
+        while host.next_scan < end {
+            host.pump();
+            host.codes.clear();
+        }
+    });
+    drop(board);
+    Ok(seconds)
+}
