@@ -1,6 +1,6 @@
 //! A campaign's analysis against unpacking and transforming what it must read; and how time and memory grow with hits and cells.
 
-use super::growth::{Growth, measured};
+use super::growth::{Cost, Growth, measured};
 use super::row::{Row, quickest};
 use jointrig::analyse::{CampaignFile, Wanted, analyse};
 use jointrig::campaign::store::Store;
@@ -9,6 +9,7 @@ use jointrig::device::address::Address;
 use jointrig::device::transport::Transport;
 use jointrig::structure::Structure;
 use jointrig_tests::campaign::{plan, run};
+use peak_alloc::PeakAlloc;
 use rayon::prelude::*;
 use realfft::RealFftPlanner;
 use std::error::Error;
@@ -78,14 +79,14 @@ fn unpacked_and_transformed(path: &Path, records: &[i64]) {
 }
 
 /// FRFs of a part of configuration A: with more hits in each cell, and with more cells.
-pub fn growth(folder: &Path) -> Result<Vec<Growth>, Box<dyn Error>> {
+pub fn growth(folder: &Path, heap: &PeakAlloc) -> Result<Vec<Growth>, Box<dyn Error>> {
     let mut hits = Vec::new();
     for (times, wanted) in [(1, 1), (4, 4), (16, 16)] {
-        hits.push((times, of_file(&campaign(folder, wanted, 3, 4)?)?));
+        hits.push((times, of_file(heap, &campaign(folder, wanted, 3, 4)?)?));
     }
     let mut cells = Vec::new();
     for (times, impacts, responses) in [(1, 3, 1), (4, 12, 1), (16, 12, 4)] {
-        cells.push((times, of_file(&campaign(folder, 4, impacts, responses)?)?));
+        cells.push((times, of_file(heap, &campaign(folder, 4, impacts, responses)?)?));
     }
     Ok(vec![
         Growth {
@@ -111,10 +112,10 @@ fn campaign(folder: &Path, wanted: u32, impacts: usize, responses: usize) -> Res
 }
 
 /// Time and memory of the FRFs of a file.
-fn of_file(path: &Path) -> Result<super::growth::Cost, Box<dyn Error>> {
+fn of_file(heap: &PeakAlloc, path: &Path) -> Result<Cost, Box<dyn Error>> {
     let store = Store::open_read_only(path)?;
     let file = CampaignFile::open(&store, Wanted::default().known)?;
-    Ok(measured(|| {
+    Ok(measured(heap, &mut || {
         let (found, complaints) = file.measured(Structure::A, LINES_HZ);
         assert!(found.is_some() && complaints.is_empty(), "{complaints:?}");
         black_box(found);

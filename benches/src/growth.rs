@@ -4,10 +4,6 @@ use peak_alloc::PeakAlloc;
 use std::fmt::Write;
 use std::time::Instant;
 
-/// Counts what is on the heap.
-#[global_allocator]
-static HEAP: PeakAlloc = PeakAlloc;
-
 const RUNS: usize = 5;
 /// The largest exponent of time.
 const TIME: f64 = 1.05;
@@ -33,16 +29,16 @@ pub struct Growth {
     pub flat_memory: bool,
 }
 
-/// The cost of a job.
-pub fn measured(mut job: impl FnMut()) -> Cost {
+/// The cost of a job in a program whose allocator is `heap`.
+pub fn measured(heap: &PeakAlloc, job: &mut dyn FnMut()) -> Cost {
     let mut cost = Cost { seconds: f64::INFINITY, megabytes: f64::INFINITY };
     for _ in 0..RUNS {
-        let before = HEAP.current_usage();
-        HEAP.reset_peak_usage();
+        let before = heap.current_usage();
+        heap.reset_peak_usage();
         let start = Instant::now();
         job();
         cost.seconds = cost.seconds.min(start.elapsed().as_secs_f64());
-        cost.megabytes = cost.megabytes.min((HEAP.peak_usage().saturating_sub(before)) as f64 / 1e6);
+        cost.megabytes = cost.megabytes.min((heap.peak_usage().saturating_sub(before)) as f64 / 1e6);
     }
     cost
 }

@@ -2,6 +2,7 @@
 //!
 //! Seconds here are seconds of processor time, all threads together, so that the figure is that of one core.
 
+#[allow(missing_docs, reason = "test support")]
 #[path = "../../hil-sim/tests/support/mod.rs"]
 mod support;
 

@@ -12,6 +12,7 @@ use jointrig::substructuring::averaged::{CellHits, Prepared, Priors};
 use jointrig::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
 use jointrig::substructuring::{Band, BandStatistic, Dof, Frf, IdmSet, Method, decouple, identify, vpt};
 use nalgebra::{Complex, DMatrix, SMatrix, Vector3};
+use peak_alloc::PeakAlloc;
 use rayon::prelude::*;
 use std::error::Error;
 use std::hint::black_box;
@@ -179,11 +180,11 @@ pub fn rows(all: &Peers) -> Result<(Vec<Row>, Vec<String>), Box<dyn Error>> {
 }
 
 /// With more lines.
-pub fn growth() -> Result<Growth, Box<dyn Error>> {
+pub fn growth(heap: &PeakAlloc) -> Result<Growth, Box<dyn Error>> {
     let mut steps = Vec::new();
     for times in [1, 4, 16] {
         let ([a, b, ajb], geometry) = case(times * LINES / 4)?;
-        let cost = measured(|| {
+        let cost = measured(heap, &mut || {
             black_box(stiffness(&a, &b, &ajb, &geometry).expect("exact data"));
         });
         steps.push((times as u32, cost));

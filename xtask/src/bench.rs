@@ -5,10 +5,8 @@ use crate::environment::{self, environment};
 use crate::project::Project;
 use anyhow::{Context, Result, bail};
 use std::fs;
+use std::path::Path;
 use std::process::Stdio;
-
-/// The package that measures.
-const PACKAGE: &str = "jointrig-benches";
 
 /// Stands above the tables in docs/performance.md.
 const ABOUT: &str = "\
@@ -28,26 +26,37 @@ pub fn run(project: &Project, parts: &[String]) -> Result<()> {
     };
     let python = environment(&system, &project.target.join("parity-python"), &[])?;
     environment::with_peers(&python)?;
-    let mut cargo = command::cargo(&project.root);
-    cargo
-        .args(["run", "--release", "--quiet", "--package", PACKAGE, "--features", "table", "--"])
-        .args(parts);
-    cargo.env("JOINTRIG_PYTHON", python).stdout(Stdio::piped());
-    let measuring = cargo.spawn().context("cargo cannot be started")?;
-    let output = measuring.wait_with_output()?;
-    let tables = String::from_utf8(output.stdout).context("the tables are not text")?;
-    println!("{tables}");
-    if parts.is_empty() && !tables.is_empty() {
+    let only_growth = parts == ["growth"];
+    let times = if only_growth { None } else { Some(measured(project, &python, "jointrig-benches", parts)?) };
+    let growth =
+        (only_growth || parts.is_empty()).then(|| measured(project, &python, "jointrig-growth", &[]));
+    let growth = growth.transpose()?;
+    if let (Some((times, _)), Some((growth, _))) = (&times, &growth) {
         let page = project.root.join("docs/performance.md");
-        fs::write(&page, format!("{ABOUT}{}\n", tables.trim_end()))
+        fs::write(&page, format!("{ABOUT}{}\n\n{}\n", times.trim(), growth.trim()))
             .with_context(|| format!("{} cannot be written", page.display()))?;
         println!("written: {}", page.display());
     }
-    if output.status.success() {
+    if times.into_iter().chain(growth).all(|(_, good)| good) {
         Ok(())
     } else {
         bail!("something is slower than wanted, or could not be measured: see above")
     }
+}
+
+/// Runs a program of the package that measures: the tables that it prints, and whether all is as quick as wanted.
+fn measured(project: &Project, python: &Path, program: &str, parts: &[String]) -> Result<(String, bool)> {
+    let mut cargo = command::cargo(&project.root);
+    cargo.args(["run", "--release", "--quiet", "--package", "jointrig-benches", "--features", "table"]);
+    cargo.args(["--bin", program, "--"]).args(parts);
+    cargo.env("JOINTRIG_PYTHON", python).stdout(Stdio::piped());
+    let output = cargo.spawn().context("cargo cannot be started")?.wait_with_output()?;
+    let tables = String::from_utf8(output.stdout).context("the tables are not text")?;
+    if tables.is_empty() {
+        bail!("{program} measured nothing");
+    }
+    println!("{tables}");
+    Ok((tables, output.status.success()))
 }
 
 /// The benchmarks beside the hot paths, of every package that has some.

@@ -44,3 +44,5 @@ mod parallel;
 pub mod spectra;
 pub mod structure;
 pub mod substructuring;
+mod transforms;
+mod vectors;

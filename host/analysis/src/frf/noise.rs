@@ -52,19 +52,29 @@ impl Frf {
 fn smoothed(known: &[DMatrix<f64>], frequency_hz: &[f64]) -> Vec<DMatrix<f64>> {
     let Some(first) = known.first() else { return Vec::new() };
     let (rows, columns) = first.shape();
+    let windows: Vec<(usize, usize)> = frequency_hz
+        .iter()
+        .map(|at| {
+            let from = frequency_hz.partition_point(|f| *f < at - SMOOTH_HZ);
+            (from, frequency_hz.partition_point(|f| *f <= at + SMOOTH_HZ))
+        })
+        .collect();
     let mut variance = vec![DMatrix::from_element(rows, columns, f64::NAN); known.len()];
-    for row in 0..rows {
-        for column in 0..columns {
+    let mut sums = Vec::with_capacity(known.len() + 1);
+    for column in 0..columns {
+        for row in 0..rows {
             // sums from the left: a window's sum is a difference of two of them
-            let mut sums = vec![(0.0, 0usize)];
+            let (mut sum, mut count) = (0.0, 0usize);
+            sums.clear();
+            sums.push((sum, count));
             for v in known {
-                let (sum, count) = sums[sums.len() - 1];
                 let value = v[(row, column)];
-                sums.push(if value.is_finite() { (sum + value, count + 1) } else { (sum, count) });
+                if value.is_finite() {
+                    (sum, count) = (sum + value, count + 1);
+                }
+                sums.push((sum, count));
             }
-            for (l, out) in variance.iter_mut().enumerate() {
-                let from = frequency_hz.partition_point(|f| *f < frequency_hz[l] - SMOOTH_HZ);
-                let to = frequency_hz.partition_point(|f| *f <= frequency_hz[l] + SMOOTH_HZ);
+            for (out, &(from, to)) in variance.iter_mut().zip(&windows) {
                 let count = sums[to].1 - sums[from].1;
                 if count > 0 {
                     out[(row, column)] = ((sums[to].0 - sums[from].0) / count as f64).max(0.0);

@@ -4,8 +4,8 @@
 //! turns in its clamp) gives it an imaginary part near its frequency: loops there become ellipses.
 
 use super::record::{HysteresisRecord, Relative};
+use crate::transforms::forward;
 use num_complex::Complex;
-use realfft::RealFftPlanner;
 use std::f64::consts::TAU;
 
 /// Where a resonance of a specimen is looked for, Hz: below, the loops are quasi-static; above, Δx drowns in noise.
@@ -108,7 +108,7 @@ fn spectrum(mut x: Vec<f64>) -> Option<Vec<Complex<f64>>> {
     for v in &mut x {
         *v -= mean;
     }
-    let fft = RealFftPlanner::new().plan_fft_forward(x.len());
+    let fft = forward(x.len());
     let mut out = fft.make_output_vec();
     fft.process(&mut x, &mut out).ok()?;
     Some(out)
@@ -124,6 +124,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 mod tests {
     use super::*;
     use crate::hysteresis::RelativeMotion;
+    use crate::transforms::forward;
 
     const FS: f64 = 8_192.0;
 

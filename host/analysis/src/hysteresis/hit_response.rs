@@ -1,7 +1,7 @@
 //! What one hit gives per newton of it, line by line: the ground on which hits of different force are compared.
 
+use crate::transforms::forward;
 use num_complex::Complex;
-use realfft::RealFftPlanner;
 use std::f64::consts::TAU;
 
 /// Lines that are looked at, Hz: below, the records' ends cut the motion off; above, little of it passes the contact.
@@ -61,7 +61,7 @@ impl HitResponse {
         let from = peak.saturating_sub((LEAD_S * fs_hz).round() as usize);
         let length = ((LENGTH_S * fs_hz) as usize).min(hammer_n.len() - from);
         let size = ((LENGTH_S * fs_hz) as usize).next_power_of_two();
-        let fft = RealFftPlanner::<f64>::new().plan_fft_forward(size);
+        let fft = forward(size);
         let window: Vec<f64> = (0..length).map(|i| (-SIGMA_PER_S * i as f64 / fs_hz).exp()).collect();
         let step_hz = fs_hz / size as f64;
         let lines = (LINES_HZ[0] / step_hz).ceil() as usize..=(LINES_HZ[1] / step_hz).floor() as usize;

@@ -12,6 +12,7 @@ use num_complex::Complex;
 use realfft::RealFftPlanner;
 use serde::Serialize;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// The cycles whose slopes make the record's k: the first two, still well above noise and beyond the pulse itself.
 pub(super) const FIRST_CYCLES: usize = 2;
@@ -75,9 +76,7 @@ pub(super) fn decay(motion: &Relative, force_n: &[f64], fs_hz: f64) -> Result<De
     };
     let edges: Vec<usize> = (0..=whole).map(|c| start + (c as f64 * period).round() as usize).collect();
     // force and displacement are turned by the same angles
-    let turns: Vec<Complex<f64>> = (start..force_n.len())
-        .map(|i| Complex::from_polar(1.0, -TAU * frequency_hz * i as f64 / fs_hz))
-        .collect();
+    let turns = turns(start..force_n.len(), -TAU * frequency_hz / fs_hz);
     let tone = |x: &[f64], from: usize, to: usize| -> Complex<f64> {
         let mean = x[from..to].iter().sum::<f64>() / (to - from) as f64;
         x[from..to].iter().zip(&turns[from - start..to - start]).map(|(x, turn)| (x - mean) * turn).sum()
@@ -104,6 +103,20 @@ pub(super) fn decay(motion: &Relative, force_n: &[f64], fs_hz: f64) -> Result<De
     let end = edges[FIRST_CYCLES.min(whole)];
     let phase_deg = (tone(force_n, start, end) / tone(&displacement_m, start, end)).arg().to_degrees();
     Ok(Decay { frequency_hz, cycles, displacement_m, phase_deg })
+}
+
+/// Samples whose turns share one angle that is computed.
+const SHARED: usize = 64;
+
+/// e^(i `step` n) of every n of a range: each the product of two that are computed, and right to a few units in the last place.
+fn turns(range: Range<usize>, step: f64) -> Vec<Complex<f64>> {
+    let within: [Complex<f64>; SHARED] = std::array::from_fn(|i| Complex::from_polar(1.0, step * i as f64));
+    let mut all = Vec::with_capacity(range.len());
+    for first in range.clone().step_by(SHARED) {
+        let base = Complex::from_polar(1.0, step * first as f64);
+        all.extend(within[..SHARED.min(range.end - first)].iter().map(|turn| base * turn));
+    }
+    all
 }
 
 /// First sample that stands out: 5 % of the largest deviation, or six times the white noise, whichever is more.

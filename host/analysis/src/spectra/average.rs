@@ -4,8 +4,10 @@ use super::SpectraError;
 use super::cross_spectra::{CrossSpectra, OutputSums};
 use super::jackknife;
 use crate::parallel::{self, prelude::*};
+use crate::transforms::forward;
+use crate::vectors::wide;
 use num_complex::Complex;
-use realfft::{RealFftPlanner, RealToComplex};
+use realfft::RealToComplex;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -32,6 +34,8 @@ pub struct SpectraAverage {
 struct Channel {
     signal: Vec<f64>,
     spectrum: Vec<Complex<f64>>,
+    /// Of the hit after it, so that the sums are read and written once for both.
+    next: Vec<Complex<f64>>,
     scratch: Vec<Complex<f64>>,
 }
 
@@ -42,11 +46,46 @@ struct Output {
     kept: Vec<Vec<Complex<f64>>>,
 }
 
+/// A response's spectrum and its force's, line by line.
+struct Pair<'a> {
+    x: &'a [Complex<f64>],
+    f: &'a [Complex<f64>],
+}
+
+impl Output {
+    fn add_one(&mut self, Pair { x, f }: Pair<'_>) {
+        let (s_xf, s_xx) = (&mut self.s_xf[..], &mut self.s_xx[..]);
+        wide(|| {
+            for ((s_xf, s_xx), (x, f)) in s_xf.iter_mut().zip(s_xx).zip(x.iter().zip(f)) {
+                *s_xf += x * f.conj();
+                *s_xx += x.norm_sqr();
+            }
+        });
+    }
+
+    /// As one after the other, to the last bit.
+    fn add_two(&mut self, first: Pair<'_>, second: Pair<'_>) {
+        let (s_xf, s_xx) = (&mut self.s_xf[..], &mut self.s_xx[..]);
+        wide(|| {
+            let products = first.x.iter().zip(first.f).zip(second.x.iter().zip(second.f));
+            for ((s_xf, s_xx), ((x, f), (y, g))) in s_xf.iter_mut().zip(s_xx).zip(products) {
+                *s_xf = *s_xf + x * f.conj() + y * g.conj();
+                *s_xx = *s_xx + x.norm_sqr() + y.norm_sqr();
+            }
+        });
+    }
+}
+
+fn add_power(sums: &mut [f64], spectrum: &[Complex<f64>]) {
+    wide(|| sums.iter_mut().zip(spectrum).for_each(|(sum, f)| *sum += f.norm_sqr()));
+}
+
 impl Channel {
     fn new(fft: &dyn RealToComplex<f64>) -> Self {
         Channel {
             signal: fft.make_input_vec(),
             spectrum: fft.make_output_vec(),
+            next: fft.make_output_vec(),
             scratch: fft.make_scratch_vec(),
         }
     }
@@ -73,7 +112,7 @@ impl Channel {
 impl SpectraAverage {
     /// For records of `samples` samples (zero padding included) and `outputs` responses.
     pub fn new(fs_hz: f64, samples: usize, outputs: usize) -> Self {
-        let fft = RealFftPlanner::new().plan_fft_forward(samples);
+        let fft = forward(samples);
         let lines = samples / 2 + 1;
         SpectraAverage {
             fs_hz,
@@ -203,27 +242,37 @@ impl SpectraAverage {
         let parts = self.outputs.par_chunks_mut(share).zip(&mut self.workers).enumerate();
         let summed = parts.map(|(part, (outputs, worker))| {
             for (i, output) in outputs.iter_mut().enumerate() {
-                for (hit, force) in hits.iter().zip(forces) {
-                    worker.transform(fft, |out| response(hit, part * share + i, out))?;
-                    let sums = output.s_xf.iter_mut().zip(&mut output.s_xx);
-                    let products = worker.spectrum[lines.clone()].iter().zip(&force[lines.clone()]);
-                    for ((s_xf, s_xx), (x, f)) in sums.zip(products) {
-                        *s_xf += x * f.conj();
-                        *s_xx += x.norm_sqr();
+                for (hits, forces) in hits.chunks(2).zip(forces.chunks(2)) {
+                    for hit in hits {
+                        std::mem::swap(&mut worker.spectrum, &mut worker.next);
+                        worker.transform(fft, |out| response(hit, part * share + i, out))?;
+                        if keep {
+                            output.kept.push(worker.spectrum[lines.clone()].to_vec());
+                        }
                     }
-                    if keep {
-                        output.kept.push(worker.spectrum[lines.clone()].to_vec());
+                    match forces {
+                        [first, second] => {
+                            let first = Pair { x: &worker.next[lines.clone()], f: &first[lines.clone()] };
+                            let second =
+                                Pair { x: &worker.spectrum[lines.clone()], f: &second[lines.clone()] };
+                            output.add_two(first, second);
+                        }
+                        [only] => output
+                            .add_one(Pair { x: &worker.spectrum[lines.clone()], f: &only[lines.clone()] }),
+                        _ => {}
                     }
                 }
             }
             Ok(())
         });
         summed.collect::<Result<(), SpectraError>>()?;
-        for force in &self.forces {
-            for (sum, f) in self.s_ff.iter_mut().zip(force) {
-                *sum += f.norm_sqr();
+        let share = self.s_ff.len().div_ceil(self.workers.len()).max(1);
+        let forces = &self.forces;
+        self.s_ff.par_chunks_mut(share).enumerate().for_each(|(part, sums)| {
+            for force in forces {
+                add_power(sums, &force[part * share..]);
             }
-        }
+        });
         if keep {
             self.kept_force.extend(self.forces.iter().map(|force| force[lines.clone()].to_vec()));
         }

@@ -74,20 +74,28 @@ impl Windowing {
             ForceWeighting::Exponential => (self.sigma_per_s * origin_s).exp(),
             ForceWeighting::Rectangular => 1.0,
         };
-        for i in first..last.min(force_n.len()).min(out.len()) {
-            let t = i as f64 / decay.fs_hz;
-            let kept = if t < from || t > to + self.force_taper_s {
-                0.0
-            } else if t <= to {
-                1.0
-            } else {
-                0.5 + 0.5 * (PI * (t - to) / self.force_taper_s).cos()
-            };
-            let weight = match self.force_weighting {
-                ForceWeighting::Exponential => scale * decay.weights[i],
-                ForceWeighting::Rectangular => scale,
-            };
-            out[i] = kept * weight * force_n[i];
+        let last = last.min(force_n.len()).min(out.len()).max(first);
+        let weight = |i: usize| match self.force_weighting {
+            ForceWeighting::Exponential => scale * decay.weights[i],
+            ForceWeighting::Rectangular => scale,
+        };
+        let time = |i: &usize| *i as f64 / decay.fs_hz;
+        // samples' times only grow: what is kept whole is one run
+        let begin = (first..last).find(|i| time(i) >= from).unwrap_or(last);
+        let guess = ((to * decay.fs_hz).max(0.0) as usize).saturating_sub(1).clamp(begin, last);
+        let end = (guess..last).find(|i| time(i) > to).unwrap_or(last);
+        match self.force_weighting {
+            ForceWeighting::Exponential => {
+                let weighted = force_n[begin..end].iter().zip(&decay.weights[begin..end]);
+                out[begin..end].iter_mut().zip(weighted).for_each(|(out, (f, w))| *out = scale * w * f);
+            }
+            ForceWeighting::Rectangular => {
+                out[begin..end].iter_mut().zip(&force_n[begin..end]).for_each(|(out, f)| *out = scale * f);
+            }
+        }
+        for i in (end..last).take_while(|i| time(i) <= to + self.force_taper_s) {
+            let kept = 0.5 + 0.5 * (PI * (time(&i) - to) / self.force_taper_s).cos();
+            out[i] = kept * weight(i) * force_n[i];
         }
     }
 

@@ -66,6 +66,12 @@ const VECTORS: usize = 12;
 pub fn cmif(a: &Frf, b: &Frf, ajb: &Frf, geometry: &Geometry) -> Result<Cmif, FrfError> {
     let difference = difference(a, b, ajb)?;
     let rigid = rigid_motions(difference.outputs(), geometry);
+    let all = rigid.basis(&Dof::RIGID);
+    let sets = IdmSet::ALL.map(|set| rigid.basis(&set.dofs()));
+    let without = Dof::RIGID.map(|dof| {
+        let others: Vec<Dof> = Dof::RIGID.into_iter().filter(|d| *d != dof).collect();
+        rigid.basis(&others)
+    });
     let lines: Vec<OneLine> = difference
         .lines()
         .par_iter()
@@ -80,15 +86,13 @@ pub fn cmif(a: &Frf, b: &Frf, ajb: &Frf, geometry: &Geometry) -> Result<Cmif, Fr
                 for &i in order.iter().take(VECTORS) {
                     let vector = left.column(i).clone_owned();
                     let power = svd.singular_values[i].powi(2);
-                    let all = rigid.kept(&Dof::RIGID, &vector);
-                    for (sum, set) in explained.iter_mut().zip(IdmSet::ALL) {
-                        *sum += power * rigid.kept(&set.dofs(), &vector);
+                    let all = kept(&all, &vector);
+                    for (sum, set) in explained.iter_mut().zip(&sets) {
+                        *sum += power * kept(set, &vector);
                     }
                     explained[3] += power;
-                    participation.push(Dof::RIGID.map(|dof| {
-                        let others: Vec<Dof> = Dof::RIGID.into_iter().filter(|d| *d != dof).collect();
-                        (all - rigid.kept(&others, &vector)).max(0.0)
-                    }));
+                    participation
+                        .push(without.each_ref().map(|others| (all - kept(others, &vector)).max(0.0)));
                 }
             }
             (values, participation, explained)
@@ -188,12 +192,16 @@ fn rigid_motions(outputs: &[String], geometry: &Geometry) -> Rigid {
 }
 
 impl Rigid {
-    /// Squared length of a unit vector's projection onto these motions of both virtual points.
-    fn kept(&self, dofs: &[Dof], vector: &DVector<Complex<f64>>) -> f64 {
+    /// Orthonormal basis of these motions of both virtual points, adjoint: motion × channel.
+    fn basis(&self, dofs: &[Dof]) -> DMatrix<Complex<f64>> {
         let chosen: Vec<usize> =
             [0, 6].iter().flat_map(|side| dofs.iter().map(move |d| side + *d as usize)).collect();
         let all: Vec<usize> = (0..self.columns.nrows()).collect();
-        let basis = block(&self.columns.map(Complex::from), &all, &chosen).qr().q();
-        (basis.adjoint() * vector).norm_squared()
+        block(&self.columns.map(Complex::from), &all, &chosen).qr().q().adjoint()
     }
+}
+
+/// Squared length of a unit vector's projection onto the motions of a basis.
+fn kept(basis: &DMatrix<Complex<f64>>, vector: &DVector<Complex<f64>>) -> f64 {
+    (basis * vector).norm_squared()
 }

@@ -3,19 +3,8 @@
 //! `cargo xtask bench` prepares Python with numpy, pyFRF and pyuff, runs this, and writes docs/performance.md. Without
 //! `JOINTRIG_PYTHON` the peers' columns stay empty. Fails where something is slower than wanted, after the table.
 
-mod campaign;
-mod frames;
-mod growth;
-mod loops;
-mod noise;
-mod peers;
-mod row;
-mod simulator;
-mod spectra;
-mod substructuring;
-mod universal;
-
-use peers::Peers;
+use jointrig_benches::peers::Peers;
+use jointrig_benches::{campaign, frames, loops, row, simulator, spectra, substructuring, universal};
 use std::error::Error;
 use std::process::ExitCode;
 
@@ -34,8 +23,8 @@ fn main() -> ExitCode {
 }
 
 /// What can be measured, by the words that choose a part of it.
-const PARTS: [&str; 8] =
-    ["spectra", "substructuring", "loops", "universal", "frames", "simulator", "campaign", "growth"];
+const PARTS: [&str; 7] =
+    ["spectra", "substructuring", "loops", "universal", "frames", "simulator", "campaign"];
 
 /// Prints the tables of the parts that are named, or of all; what is slower than wanted.
 fn run() -> Result<Vec<String>, Box<dyn Error>> {
@@ -50,7 +39,7 @@ fn run() -> Result<Vec<String>, Box<dyn Error>> {
         );
     }
     let folder = tempfile::tempdir()?;
-    let (mut rows, mut growths, mut short) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut rows, mut short) = (Vec::new(), Vec::new());
     for part in PARTS.into_iter().filter(|part| named.is_empty() || named.iter().any(|name| name == part)) {
         eprintln!("{part} ...");
         let (of_part, slow) = match part {
@@ -60,25 +49,14 @@ fn run() -> Result<Vec<String>, Box<dyn Error>> {
             "universal" => (universal::rows(&peers)?, Vec::new()),
             "frames" => (frames::rows()?, Vec::new()),
             "simulator" => simulator::rows()?,
-            "campaign" => (campaign::rows(folder.path())?, Vec::new()),
-            _ => {
-                growths = campaign::growth(folder.path())?;
-                growths.push(substructuring::growth()?);
-                (Vec::new(), Vec::new())
-            }
+            _ => (campaign::rows(folder.path())?, Vec::new()),
         };
         rows.extend(of_part);
         short.extend(slow);
     }
     short.extend(rows.iter().flat_map(row::Row::short));
-    short.extend(growths.iter().flat_map(growth::Growth::short));
     println!("{}", machine());
-    if !rows.is_empty() {
-        println!("{}", row::table(&rows));
-    }
-    if !growths.is_empty() {
-        println!("## Growth\n\n{}", growth::table(&growths));
-    }
+    println!("{}", row::table(&rows));
     Ok(short)
 }
 
@@ -87,5 +65,6 @@ fn machine() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
     let model = model.map_or("unknown processor", |(_, name)| name.trim());
-    format!("{model}, {} cores, {}.\n", rayon::current_num_threads(), std::env::consts::OS)
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    format!("{model}, {cores} cores, {}.\n", std::env::consts::OS)
 }

@@ -1,0 +1,32 @@
+//! How time and memory grow with the size of the work. A program of its own, because counting the heap slows every allocation down.
+
+use jointrig_benches::growth::{Growth, table};
+use jointrig_benches::{campaign, substructuring};
+use peak_alloc::PeakAlloc;
+use std::error::Error;
+use std::process::ExitCode;
+
+#[global_allocator]
+static HEAP: PeakAlloc = PeakAlloc;
+
+fn main() -> ExitCode {
+    match run() {
+        Ok(short) if short.is_empty() => ExitCode::SUCCESS,
+        Ok(short) => {
+            eprintln!("grows faster than wanted:\n  {}", short.join("\n  "));
+            ExitCode::FAILURE
+        }
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Result<Vec<String>, Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let mut all = campaign::growth(folder.path(), &HEAP)?;
+    all.push(substructuring::growth(&HEAP)?);
+    println!("## Growth\n\n{}", table(&all));
+    Ok(all.iter().flat_map(Growth::short).collect())
+}

@@ -1,0 +1,14 @@
+//! What the tables of docs/performance.md are measured with.
+#![cfg(feature = "table")]
+
+pub mod campaign;
+pub mod frames;
+pub mod growth;
+pub mod loops;
+mod noise;
+pub mod peers;
+pub mod row;
+pub mod simulator;
+pub mod spectra;
+pub mod substructuring;
+pub mod universal;
