@@ -12,6 +12,7 @@ use super::record::{HysteresisRecord, RelativeMotion};
 use super::sums::{dot, mean};
 use super::timing::Timing;
 use crate::parallel::prelude::*;
+use crate::vectors::wide;
 use std::ops::Range;
 
 /// Fewer samples than this make no loop.
@@ -240,14 +241,18 @@ fn resample(signals: [&[f64]; 2], from: f64, step: f64, points: usize, to: [&mut
 /// Values between the second and third of each four samples in a row, at t, t + `drift`, …
 fn cubic(x: &[f64], t: f64, drift: f64, to: &mut [f64]) {
     let n = to.len();
-    let around = x[..n].iter().zip(&x[1..][..n]).zip(x[2..][..n].iter().zip(&x[3..][..n]));
-    for ((j, to), ((p0, p1), (p2, p3))) in (0_i32..).zip(to).zip(around) {
-        let t = t + f64::from(j) * drift;
-        *to = p1
-            + 0.5
-                * t
-                * (p2 - p0 + t * (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3 + t * (3.0 * (p1 - p2) + p3 - p0)));
-    }
+    let [p0, p1, p2, p3] = [0, 1, 2, 3].map(|i| &x[i..][..n]);
+    wide(|| {
+        for j in 0..n {
+            let (p0, p1, p2, p3) = (p0[j], p1[j], p2[j], p3[j]);
+            // a count that an i32 holds becomes a number in one step
+            let t = t + f64::from(j as i32) * drift;
+            to[j] = p1
+                + 0.5
+                    * t
+                    * (p2 - p0 + t * (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3 + t * (3.0 * (p1 - p2) + p3 - p0)));
+        }
+    });
 }
 
 #[cfg(test)]

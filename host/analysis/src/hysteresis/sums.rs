@@ -1,5 +1,7 @@
 //! Sums over long rows of numbers, in lanes: one running sum alone waits for its own last addition.
 
+use crate::vectors::wide;
+
 /// Sums that run side by side.
 const LANES: usize = 8;
 
@@ -7,11 +9,13 @@ const LANES: usize = 8;
 pub(super) fn sum(x: &[f64]) -> f64 {
     let (lanes, rest) = x.as_chunks::<LANES>();
     let mut sums = [0.0; LANES];
-    for lane in lanes {
-        for i in 0..LANES {
-            sums[i] += lane[i];
+    wide(|| {
+        for lane in lanes {
+            for i in 0..LANES {
+                sums[i] += lane[i];
+            }
         }
-    }
+    });
     sums.iter().chain(rest).sum()
 }
 
@@ -25,11 +29,13 @@ pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
     let n = x.len().min(y.len());
     let ((xs, x), (ys, y)) = (x[..n].as_chunks::<LANES>(), y[..n].as_chunks::<LANES>());
     let mut sums = [0.0; LANES];
-    for (x, y) in xs.iter().zip(ys) {
-        for i in 0..LANES {
-            sums[i] += x[i] * y[i];
+    wide(|| {
+        for (x, y) in xs.iter().zip(ys) {
+            for i in 0..LANES {
+                sums[i] += x[i] * y[i];
+            }
         }
-    }
+    });
     sums.iter().sum::<f64>() + x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>()
 }
 

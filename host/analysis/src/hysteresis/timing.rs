@@ -1,6 +1,7 @@
 //! When the cycles of a steady record begin: at the stated frequency, or as they came.
 
 use super::sums::mean;
+use crate::parallel::prelude::*;
 use num_complex::Complex;
 use std::f64::consts::TAU;
 
@@ -58,8 +59,7 @@ impl Timing {
             return None;
         }
         let turn = TAU / period;
-        let mut phases: Vec<f64> = Vec::with_capacity(cycles);
-        for c in 0..cycles {
+        let tone = |c: usize| {
             let edge = |c: usize| ((c as f64 * period).round() as usize).min(force.len());
             let (from, to) = (edge(c), edge(c + 1));
             let own = &force[from..to];
@@ -70,8 +70,13 @@ impl Timing {
                 tone += wheel * (value - rest);
                 wheel *= step;
             }
-            let last = phases.last().copied().unwrap_or(0.0);
-            phases.push(last + wrapped(tone.arg() - last));
+            tone.arg()
+        };
+        let mut phases: Vec<f64> = (0..cycles).into_par_iter().map(tone).collect();
+        let mut last = 0.0;
+        for phase in &mut phases {
+            last += wrapped(*phase - last);
+            *phase = last;
         }
         // phase over u = -1…1 by Legendre's polynomials, which are orthogonal over many cycles
         let n = cycles as f64;
