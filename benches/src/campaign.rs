@@ -79,7 +79,7 @@ fn unpacked_and_transformed(path: &Path, records: &[i64]) {
 }
 
 /// FRFs of a part of configuration A: with more hits in each cell, and with more cells.
-pub fn growth(folder: &Path, heap: &PeakAlloc) -> Result<Vec<Growth>, Box<dyn Error>> {
+pub fn growth(folder: &Path, heap: PeakAlloc) -> Result<Vec<Growth>, Box<dyn Error>> {
     let mut hits = Vec::new();
     for (times, wanted) in [(1, 1), (4, 4), (16, 16)] {
         hits.push((times, of_file(heap, &campaign(folder, wanted, 3, 4)?)?));
@@ -112,7 +112,7 @@ fn campaign(folder: &Path, wanted: u32, impacts: usize, responses: usize) -> Res
 }
 
 /// Time and memory of the FRFs of a file.
-fn of_file(heap: &PeakAlloc, path: &Path) -> Result<Cost, Box<dyn Error>> {
+fn of_file(heap: PeakAlloc, path: &Path) -> Result<Cost, Box<dyn Error>> {
     let store = Store::open_read_only(path)?;
     let file = CampaignFile::open(&store, Wanted::default().known)?;
     Ok(measured(heap, &mut || {

@@ -30,7 +30,7 @@ pub struct Growth {
 }
 
 /// The cost of a job in a program whose allocator is `heap`.
-pub fn measured(heap: &PeakAlloc, job: &mut dyn FnMut()) -> Cost {
+pub fn measured(heap: PeakAlloc, job: &mut dyn FnMut()) -> Cost {
     let mut cost = Cost { seconds: f64::INFINITY, megabytes: f64::INFINITY };
     for _ in 0..RUNS {
         let before = heap.current_usage();

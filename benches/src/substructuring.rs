@@ -180,7 +180,7 @@ pub fn rows(all: &Peers) -> Result<(Vec<Row>, Vec<String>), Box<dyn Error>> {
 }
 
 /// With more lines.
-pub fn growth(heap: &PeakAlloc) -> Result<Growth, Box<dyn Error>> {
+pub fn growth(heap: PeakAlloc) -> Result<Growth, Box<dyn Error>> {
     let mut steps = Vec::new();
     for times in [1, 4, 16] {
         let ([a, b, ajb], geometry) = case(times * LINES / 4)?;

@@ -25,8 +25,8 @@ fn main() -> ExitCode {
 
 fn run() -> Result<Vec<String>, Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
-    let mut all = campaign::growth(folder.path(), &HEAP)?;
-    all.push(substructuring::growth(&HEAP)?);
+    let mut all = campaign::growth(folder.path(), HEAP)?;
+    all.push(substructuring::growth(HEAP)?);
     println!("## Growth\n\n{}", table(&all));
     Ok(all.iter().flat_map(Growth::short).collect())
 }

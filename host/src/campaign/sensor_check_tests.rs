@@ -6,6 +6,7 @@ use crate::campaign::store::session_table::{Counters, SessionInfo};
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::{Kind, Verdict};
 use crate::device::recording::Recording;
+use jointrig_protocol::channel::Channel;
 use jointrig_protocol::shot::{Phase, Shot};
 use std::f64::consts::PI;
 

@@ -124,7 +124,6 @@ fn median(mut values: Vec<f64>) -> f64 {
 mod tests {
     use super::*;
     use crate::hysteresis::RelativeMotion;
-    use crate::transforms::forward;
 
     const FS: f64 = 8_192.0;
 

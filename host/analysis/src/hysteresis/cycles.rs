@@ -245,8 +245,7 @@ fn cubic(x: &[f64], t: f64, drift: f64, to: &mut [f64]) {
     wide(|| {
         for j in 0..n {
             let (p0, p1, p2, p3) = (p0[j], p1[j], p2[j], p3[j]);
-            // a count that an i32 holds becomes a number in one step
-            let t = t + f64::from(j as i32) * drift;
+            let t = t + f64::from(j as u32) * drift;
             to[j] = p1
                 + 0.5
                     * t

@@ -47,6 +47,7 @@ struct Output {
 }
 
 /// A response's spectrum and its force's, line by line.
+#[derive(Clone, Copy)]
 struct Pair<'a> {
     x: &'a [Complex<f64>],
     f: &'a [Complex<f64>],
