@@ -1,10 +1,8 @@
-//! From kept hits to spectra, one cell at a time; the time signals are gone when the cell is done.
+//! From kept hits to spectra, one cell at a time; a hit's time signals are gone when it is in the sums.
 
-use super::cell::{Cell, CellName, ContactDelays, Hit};
+use super::cell::{CellName, ContactDelays, Hit};
 use crate::contact::{BAND, LEVEL_LINES, SIGMA_PER_S};
-use crate::spectra::{
-    self, CrossSpectra, FrfSettings, ImpactRecords, MotionQuantity, SpectraError, Windowing,
-};
+use crate::spectra::{CrossSpectra, Pulse, SpectraError, Summing, Windowing};
 
 /// The lines that are used, Hz: those below carry rigid-body drift and the mains' subharmonics, not the joint; those above are in
 /// no band.
@@ -44,93 +42,156 @@ pub struct Asked {
     pub damped: bool,
 }
 
-/// Sums up the hits of a cell. Hits of sessions with other delays are brought in
-/// step with the force before they are added.
-///
-/// # Errors
-/// No hit, or hits that do not fit together.
-pub fn average(
+/// The sums over a cell's hits, which come one at a time. Hits of sessions with other delays are summed apart, and brought in step
+/// with the force before the sums are added.
+pub struct CellSums {
     name: CellName,
-    cell: Cell,
     sigma_per_s: f64,
-    quantity: MotionQuantity,
     asked: Asked,
     lines_hz: [f64; 2],
-) -> Result<CellAverage, SpectraError> {
-    let measured = cell.hits.iter().all(|h| h.contact.is_some());
-    let axes = cell.hits.first().map_or(0, |hit| hit.response.len());
-    let (contact, damped) = (asked.contact && measured, asked.damped && measured);
-    let records: Vec<i64> = cell.hits.iter().map(|h| h.record).collect();
-    let mut alike: Vec<(Vec<f64>, ImpactRecords)> = Vec::new();
-    for hit in cell.hits {
-        let (delay_s, force_n, outputs) = signals(hit, contact || damped);
-        let place = alike.iter().position(|(own, _)| *own == delay_s).unwrap_or(alike.len());
-        if place == alike.len() {
-            let none = ImpactRecords { fs_hz: cell.fs_hz, force_n: vec![], response: vec![], quantity };
-            alike.push((delay_s, none));
-        }
-        alike[place].1.force_n.push(force_n);
-        alike[place].1.response.push(outputs);
-    }
-    let lines = if damped {
-        [lines_hz[0].min(LEVEL_LINES.low_hz), lines_hz[1].max(LEVEL_LINES.high_hz)]
-    } else {
-        lines_hz
-    };
-    let (all, force) = summed(&alike, sigma_per_s, lines)?;
-    let damped =
-        if damped { Some(summed(&alike, SIGMA_PER_S, [BAND.low_hz, BAND.high_hz])?.0) } else { None };
-    let light = damped.is_some().then(|| all.band(LEVEL_LINES.low_hz, LEVEL_LINES.high_hz));
-    let step_hz = force.frequency_hz().get(1).copied().unwrap_or(0.0);
-    let mean = |lines: &[f64]| lines.iter().sum::<f64>() / lines.len() as f64;
-    let force_spectrum = force.force_spectrum().chunks(FORCE_LINES).map(mean).collect();
-    let kept = all.band(lines_hz[0], lines_hz[1]);
-    Ok(CellAverage {
-        name,
-        records,
-        spectra: kept.of_outputs(0..axes),
-        force_spectrum,
-        step_hz,
-        contact: contact.then(|| kept.of_outputs(axes..axes + 3)),
-        damped,
-        light,
-    })
+    records: Vec<i64>,
+    groups: Vec<Group>,
+    /// Channels of the response location.
+    axes: usize,
+    /// Whether every hit had the signals at the contact.
+    at_contact: bool,
 }
 
-/// All hits, those that are late by the same times estimated together: the spectra at those lines, and the force at all lines.
-fn summed(
-    alike: &[(Vec<f64>, ImpactRecords)],
-    sigma_per_s: f64,
-    lines_hz: [f64; 2],
-) -> Result<(CrossSpectra, CrossSpectra), SpectraError> {
-    let mut all: Option<(CrossSpectra, CrossSpectra)> = None;
-    for (delay_s, records) in alike {
-        let settings = FrfSettings {
-            windowing: Windowing { sigma_per_s, ..Windowing::default() },
-            delay_s: delay_s.clone(),
-            band_hz: Some(lines_hz),
-            ..FrfSettings::default()
+/// The hits that are late by the same times.
+struct Group {
+    delay_s: Vec<f64>,
+    light: Summing,
+    damped: Option<Summing>,
+}
+
+impl CellSums {
+    /// Of a cell without hits.
+    pub fn new(name: CellName, sigma_per_s: f64, asked: Asked, lines_hz: [f64; 2]) -> Self {
+        CellSums {
+            name,
+            sigma_per_s,
+            asked,
+            lines_hz,
+            records: Vec::new(),
+            groups: Vec::new(),
+            axes: 0,
+            at_contact: true,
+        }
+    }
+
+    /// Adds a hit that was sampled at `fs_hz`.
+    ///
+    /// # Errors
+    /// A hit that does not fit the others, or holds no pulse.
+    pub fn add(&mut self, hit: &Hit, fs_hz: f64) -> Result<(), SpectraError> {
+        if self.records.is_empty() {
+            self.axes = hit.response.len();
+        }
+        let mut delay_s = hit.response_delay_s.clone();
+        let mut outputs: Vec<&[f64]> = hit.response.iter().map(Vec::as_slice).collect();
+        let nothing = match (self.wants_contact(), &hit.contact) {
+            (true, None) => vec![0.0; hit.force_n.len()],
+            _ => Vec::new(),
         };
-        let sums = spectra::estimate::summed(records, &vec![true; records.force_n.len()], &settings)?;
-        let (own, force) = (sums.finish(sigma_per_s, delay_s)?, sums.force(sigma_per_s)?);
-        match &mut all {
-            Some((sum, sum_of_force)) => {
-                sum.add(&own)?;
-                sum_of_force.add(&force)?;
+        if self.wants_contact() {
+            if let Some(contact) = &hit.contact {
+                let ContactDelays { specimen_a, specimen_b, load_cells } = contact.delay_s;
+                delay_s.extend([specimen_a, specimen_b, load_cells]);
+                outputs.extend([
+                    &contact.specimen_a_m_per_s[..],
+                    &contact.specimen_b_m_per_s,
+                    &contact.tangential_n,
+                ]);
+            } else {
+                // what one hit lacks is told of none
+                self.at_contact = false;
+                delay_s.extend([0.0; 3]);
+                outputs.extend([&nothing[..]; 3]);
             }
-            None => all = Some((own, force)),
+        }
+        let place = self.groups.iter().position(|group| group.delay_s == delay_s);
+        let group = if let Some(place) = place {
+            &mut self.groups[place]
+        } else {
+            let (samples, channels) = (hit.force_n.len(), outputs.len());
+            let sums = |sigma_per_s: f64, band_hz: [f64; 2]| {
+                let windowing = Windowing { sigma_per_s, ..Windowing::default() };
+                Summing::new(fs_hz, samples, channels, windowing, band_hz)
+            };
+            let light = sums(self.sigma_per_s, self.summed_lines_hz());
+            let damped = self.asked.damped.then(|| sums(SIGMA_PER_S, [BAND.low_hz, BAND.high_hz]));
+            self.groups.push(Group { delay_s, light, damped });
+            let last = self.groups.len() - 1;
+            &mut self.groups[last]
+        };
+        let no_pulse = SpectraError::NoPulse { hit: self.records.len() };
+        let origin_s = Pulse::locate(&hit.force_n).ok_or(no_pulse)?.start as f64 / fs_hz;
+        group.light.add(&hit.force_n, &outputs, origin_s)?;
+        if let Some(damped) = &mut group.damped {
+            damped.add(&hit.force_n, &outputs, origin_s)?;
+        }
+        self.records.push(hit.record);
+        Ok(())
+    }
+
+    /// What the hits give together.
+    ///
+    /// # Errors
+    /// No hit, or hits that do not fit together.
+    pub fn finish(self) -> Result<CellAverage, SpectraError> {
+        let all = self.together(|group| Some(group.light.finish(&group.delay_s)))?;
+        let all = all.ok_or(SpectraError::NoHits)?;
+        let force = self.together(|group| Some(group.light.force()))?.ok_or(SpectraError::NoHits)?;
+        let damped = if self.at_contact {
+            self.together(|group| group.damped.as_ref().map(|sums| sums.finish(&group.delay_s)))?
+        } else {
+            None
+        };
+        let light = damped.is_some().then(|| all.band(LEVEL_LINES.low_hz, LEVEL_LINES.high_hz));
+        let step_hz = force.frequency_hz().get(1).copied().unwrap_or(0.0);
+        let mean = |lines: &[f64]| lines.iter().sum::<f64>() / lines.len() as f64;
+        let force_spectrum = force.force_spectrum().chunks(FORCE_LINES).map(mean).collect();
+        let kept = all.band(self.lines_hz[0], self.lines_hz[1]);
+        let contact =
+            (self.asked.contact && self.at_contact).then(|| kept.of_outputs(self.axes..self.axes + 3));
+        Ok(CellAverage {
+            spectra: kept.of_outputs(0..self.axes),
+            name: self.name,
+            records: self.records,
+            force_spectrum,
+            step_hz,
+            contact,
+            damped,
+            light,
+        })
+    }
+
+    fn wants_contact(&self) -> bool {
+        self.asked.contact || self.asked.damped
+    }
+
+    /// The lines that the light window's sums must hold.
+    fn summed_lines_hz(&self) -> [f64; 2] {
+        let [low_hz, high_hz] = self.lines_hz;
+        if self.asked.damped {
+            [low_hz.min(LEVEL_LINES.low_hz), high_hz.max(LEVEL_LINES.high_hz)]
+        } else {
+            [low_hz, high_hz]
         }
     }
-    all.ok_or(SpectraError::NoHits)
-}
 
-/// How late the responses are, the force, and the responses: the location's channels, and with `contact` v_A, v_B and T.
-fn signals(hit: Hit, contact: bool) -> (Vec<f64>, Vec<f64>, Vec<Vec<f64>>) {
-    let (mut delay_s, mut outputs) = (hit.response_delay_s, hit.response);
-    if let (true, Some(c)) = (contact, hit.contact) {
-        let ContactDelays { specimen_a, specimen_b, load_cells } = c.delay_s;
-        delay_s.extend([specimen_a, specimen_b, load_cells]);
-        outputs.extend([c.specimen_a_m_per_s, c.specimen_b_m_per_s, c.tangential_n]);
+    /// A part of every group, added.
+    fn together(
+        &self,
+        part: impl Fn(&Group) -> Option<Result<CrossSpectra, SpectraError>>,
+    ) -> Result<Option<CrossSpectra>, SpectraError> {
+        let mut all: Option<CrossSpectra> = None;
+        for own in self.groups.iter().filter_map(part) {
+            match &mut all {
+                Some(sum) => sum.add(&own?)?,
+                None => all = Some(own?),
+            }
+        }
+        Ok(all)
     }
-    (delay_s, hit.force_n, outputs)
 }

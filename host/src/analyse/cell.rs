@@ -150,10 +150,29 @@ pub trait Measurements: Sync {
         None
     }
 
-    /// The kept hits of a cell; none if it was not measured. The signals at the contact may be left out where `contact` does not ask
-    /// for them.
+    /// Shows `look` the kept hits of a cell, one at a time, with their sampling rate, Hz; none if it was not measured. Its own come before
+    /// those of the cell whose hits fill it. The signals at the contact may be left out where `contact` does not ask for them.
+    /// Returns what is said about records that were kept and cannot be used.
     ///
     /// # Errors
-    /// The file cannot be read, or a record is damaged.
-    fn read(&self, cell: &CellName, contact: bool) -> Result<Cell, Self::Error>;
+    /// The file cannot be read, or the hits differ in rate. Some of them may have been shown then.
+    fn each_hit(
+        &self,
+        cell: &CellName,
+        contact: bool,
+        look: &mut dyn FnMut(Hit, f64),
+    ) -> Result<Vec<String>, Self::Error>;
+
+    /// All kept hits of a cell, as [`Measurements::each_hit`] shows them.
+    ///
+    /// # Errors
+    /// As of `each_hit`.
+    fn read(&self, cell: &CellName, contact: bool) -> Result<Cell, Self::Error> {
+        let mut whole = Cell::default();
+        let left_out = self.each_hit(cell, contact, &mut |hit, fs_hz| {
+            whole.fs_hz = fs_hz;
+            whole.hits.push(hit);
+        })?;
+        Ok(Cell { left_out, ..whole })
+    }
 }

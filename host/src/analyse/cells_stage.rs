@@ -1,7 +1,7 @@
 //! The cells, one at a time on each thread: read, averaged, and their signals forgotten.
 
-use super::averages::{Asked, CellAverage, LINES_HZ, average};
-use super::cell::{CellName, Measurements};
+use super::averages::{Asked, CellAverage, CellSums, LINES_HZ};
+use super::cell::{Cell, CellName, Measurements};
 use super::contact_answer;
 use super::hammer_slip::{self, HitAtContact};
 use super::hit_spectra;
@@ -62,40 +62,45 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
     let geometry = measurements.geometry();
     let moves_contact = counts_for_contact(geometry, name);
     let (drives, damped) = (drives_the_cells(geometry, name), contact_answer::reads(geometry, name));
-    let mut cell = match measurements.read(name, moves_contact || drives || damped) {
-        Ok(cell) => cell,
-        Err(error) => {
-            found.missing.push(records(error.to_string()));
-            return found;
-        }
-    };
-    found.missing.extend(std::mem::take(&mut cell.left_out).into_iter().map(records));
-    if cell.hits.is_empty() {
-        return found;
-    }
-    if moves_contact {
-        for hit in &cell.hits {
-            let Some(signals) = hit.contact.as_ref().filter(|_| !hit.of_row) else { continue };
-            found.at_contact.extend(hammer_slip::of_hit(name, cell.fs_hz, hit));
-            match impact_loops::of_hit(hit.record, &name.impact, cell.fs_hz, signals, signals.delay_s) {
+    let (sigma_per_s, quantity) = (measurements.sigma_per_s(), measurements.quantity());
+    let mut sums: Option<CellSums> = None;
+    let (mut unfit, mut kept) = (None, Cell::default());
+    let read = measurements.each_hit(name, moves_contact || drives || damped, &mut |hit, fs_hz| {
+        // what the contact did under a hit is told by the cell that was struck, once; its own hits come first
+        let sums = sums.get_or_insert_with(|| {
+            let asked = Asked { contact: !hit.of_row && (moves_contact || drives), damped };
+            CellSums::new(name.clone(), sigma_per_s, asked, LINES_HZ)
+        });
+        if let Some(signals) = hit.contact.as_ref().filter(|_| moves_contact && !hit.of_row) {
+            found.at_contact.extend(hammer_slip::of_hit(name, fs_hz, &hit));
+            match impact_loops::of_hit(hit.record, &name.impact, fs_hz, signals, signals.delay_s) {
                 Ok(one) => found.loops.push(one),
                 Err(error) => {
                     found.missing.push(Missing::NoLoop { cell: name.clone(), record: hit.record, error });
                 }
             }
         }
-    }
-    let (sigma_per_s, quantity) = (measurements.sigma_per_s(), measurements.quantity());
+        if unfit.is_none() {
+            unfit = sums.add(&hit, fs_hz).err();
+        }
+        if keep_hits {
+            kept.fs_hz = fs_hz;
+            kept.hits.push(hit);
+        }
+    });
+    let left_out = match read {
+        Ok(left_out) => left_out,
+        Err(error) => return Cells { missing: vec![records(error.to_string())], ..Cells::default() },
+    };
+    found.missing.splice(0..0, left_out.into_iter().map(records));
+    let Some(sums) = sums else { return found };
     if keep_hits {
-        match hit_spectra::of(name, &geometry.ajb, &cell, sigma_per_s, quantity) {
+        match hit_spectra::of(name, &geometry.ajb, &kept, sigma_per_s, quantity) {
             Ok(hits) => found.hits.extend(hits),
             Err(error) => found.missing.push(records(error.to_string())),
         }
     }
-    // what the contact did under a hit is told by the cell that was struck, once
-    let struck = cell.hits.iter().any(|hit| !hit.of_row);
-    let asked = Asked { contact: struck && (moves_contact || drives), damped };
-    match average(name.clone(), cell, sigma_per_s, quantity, asked, LINES_HZ) {
+    match unfit.map_or_else(|| sums.finish(), Err) {
         Ok(averaged) => found.averages.push(averaged),
         Err(error) => found.missing.push(records(error.to_string())),
     }

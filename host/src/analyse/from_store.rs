@@ -1,11 +1,9 @@
 //! The campaign file as measurements: records decoded, in SI units, one cell at a time, from any thread.
 
 use super::assemble::{everything, hits};
-use super::averages::{Asked, CellAverage, average};
+use super::averages::{Asked, CellAverage, CellSums};
 use super::campaign::analyse_measurements;
-use super::cell::{
-    Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel,
-};
+use super::cell::{CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel};
 use super::findings::Findings;
 use super::plan_geometry::{geometry, places};
 use super::wanted::{Progress, Wanted};
@@ -275,16 +273,23 @@ impl CampaignFile {
         let one = |name: &&CellName| {
             let complaint =
                 |what: String| format!("{structure}: cell {} × {}: {what}.", name.impact, name.response);
-            let cell = match self.read(name, false) {
-                Ok(cell) => cell,
+            let mut sums = CellSums::new((*name).clone(), self.sigma_per_s(), Asked::default(), lines_hz);
+            let (mut some, mut unfit) = (false, None);
+            let read = self.each_hit(name, false, &mut |hit, fs_hz| {
+                some = true;
+                if unfit.is_none() {
+                    unfit = sums.add(&hit, fs_hz).err();
+                }
+            });
+            let left_out = match read {
+                Ok(left_out) => left_out,
                 Err(error) => return (None, vec![complaint(error.to_string())]),
             };
-            let mut complaints: Vec<String> = cell.left_out.iter().cloned().map(complaint).collect();
-            if cell.hits.is_empty() {
+            let mut complaints: Vec<String> = left_out.into_iter().map(complaint).collect();
+            if !some {
                 return (None, complaints);
             }
-            let (sigma_per_s, asked) = (self.sigma_per_s(), Asked::default());
-            let found = average((*name).clone(), cell, sigma_per_s, self.quantity, asked, lines_hz);
+            let found = unfit.map_or_else(|| sums.finish(), Err);
             complaints.extend(found.as_ref().err().map(|error| complaint(error.to_string())));
             (found.ok(), complaints)
         };
@@ -389,37 +394,39 @@ impl Measurements for CampaignFile {
         (levels, complaints)
     }
 
-    fn read(&self, cell: &CellName, contact: bool) -> Result<Cell, AnalyseError> {
-        let Some(planned) = self.cells.iter().find(|c| c.name == *cell) else { return Ok(Cell::default()) };
+    fn each_hit(
+        &self,
+        cell: &CellName,
+        contact: bool,
+        look: &mut dyn FnMut(Hit, f64),
+    ) -> Result<Vec<String>, AnalyseError> {
+        let Some(planned) = self.cells.iter().find(|c| c.name == *cell) else { return Ok(Vec::new()) };
         self.with_reader(|store| {
-            let mut whole = Cell::default();
+            let (mut left_out, mut rate_hz) = (Vec::new(), None);
             for record in self.records_for(planned) {
                 let record = match record {
                     Ok(record) if record.kept() => record,
                     Ok(_) => continue,
                     Err(Damaged { place, what }) => {
-                        whole
-                            .left_out
-                            .push(format!("record {} is damaged ({what}) and was left out", place.id));
+                        left_out.push(format!("record {} is damaged ({what}) and was left out", place.id));
                         continue;
                     }
                 };
                 match self.hit(store, &planned.row, record, contact) {
-                    Ok((hit, rate)) if whole.hits.is_empty() || whole.fs_hz == rate => {
-                        whole.fs_hz = rate;
-                        whole.hits.push(hit);
-                    }
-                    Ok((_, rate)) => {
-                        let others_hz = whole.fs_hz;
-                        return Err(AnalyseError::Rate { record: record.id, rate_hz: rate, others_hz });
+                    Ok((hit, rate)) => {
+                        let others_hz = *rate_hz.get_or_insert(rate);
+                        if others_hz != rate {
+                            return Err(AnalyseError::Rate { record: record.id, rate_hz: rate, others_hz });
+                        }
+                        look(hit, rate);
                     }
                     Err(AnalyseError::Store(StoreError::Damaged { record, what, .. })) => {
-                        whole.left_out.push(format!("record {record} is damaged ({what}) and was left out"));
+                        left_out.push(format!("record {record} is damaged ({what}) and was left out"));
                     }
                     Err(other) => return Err(other),
                 }
             }
-            Ok(whole)
+            Ok(left_out)
         })
     }
 }

@@ -176,18 +176,11 @@ fn analysed(store: &Store) -> Frf {
     let file = CampaignFile::open(store, KnownContact::default()).expect("readable");
     let cells = file.cells();
     let averages = cells.iter().filter_map(|name| {
-        let cell = file.read(name, true).expect("readable");
-        (!cell.hits.is_empty()).then(|| {
-            average(
-                name.clone(),
-                cell,
-                file.sigma_per_s(),
-                file.quantity(),
-                Asked { contact: true, damped: false },
-                LINES_HZ,
-            )
-            .expect("alike")
-        })
+        let asked = Asked { contact: true, damped: false };
+        let mut sums = CellSums::new(name.clone(), file.sigma_per_s(), asked, LINES_HZ);
+        let mut add = |hit, fs_hz| sums.add(&hit, fs_hz).expect("alike");
+        file.each_hit(name, true, &mut add).expect("readable");
+        sums.finish().ok()
     });
     let averages: Vec<_> = averages.collect();
     assemble(Structure::Ajb, &file.geometry().ajb, &averages, file.quantity())

@@ -2,7 +2,7 @@
 
 use super::assemble;
 use super::campaign::analyse_measurements;
-use super::cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, Measurements};
+use super::cell::{CellName, ContactDelays, ContactSignals, Hit, Measurements};
 use super::checks::{HiddenResonance, SeriesCompliance};
 use super::findings::Findings;
 use super::missing::Missing;
@@ -190,9 +190,14 @@ impl Measurements for Rig {
         cells
     }
 
-    fn read(&self, cell: &CellName, _: bool) -> Result<Cell, Damaged> {
+    fn each_hit(
+        &self,
+        cell: &CellName,
+        _: bool,
+        look: &mut dyn FnMut(Hit, f64),
+    ) -> Result<Vec<String>, Damaged> {
         if self.absent.contains(&(cell.configuration, cell.impact.clone(), cell.response.clone())) {
-            return Ok(Cell::default());
+            return Ok(Vec::new());
         }
         if cell.response == "damaged" {
             return Err(Damaged);
@@ -205,7 +210,7 @@ impl Measurements for Rig {
         let place = self.cells().iter().filter(|c| c.response != "S1").position(|c| c == cell);
         let coupled = cell.configuration == Structure::Ajb;
         let unit = &self.units[2 * usize::from(coupled) + usize::from(!hit_on_a)];
-        let hits = [50.0, 47.0]
+        [50.0, 47.0]
             .into_iter()
             .enumerate()
             .map(|(i, peak)| {
@@ -239,8 +244,8 @@ impl Measurements for Rig {
                     contact,
                 }
             })
-            .collect();
-        Ok(Cell { fs_hz: FS_HZ, hits, ..Cell::default() })
+            .for_each(|hit| look(hit, FS_HZ));
+        Ok(Vec::new())
     }
 }
 

@@ -1,7 +1,7 @@
 //! Impact records of a rig without waiting for them: the exact FRFs at each cell's true (wrong) geometry, times the hammer's
 //! spectrum, back into time, with the sensors' noise. What the analysis sees is what it would read from a campaign file.
 
-use jointrig::analyse::{Cell, CellName, ContactDelays, ContactSignals, Hit, Measurements};
+use jointrig::analyse::{CellName, ContactDelays, ContactSignals, Hit, Measurements};
 use jointrig::exchange::read_positions;
 use jointrig::spectra::MotionQuantity;
 use jointrig::substructuring::geometry::{Geometry, Grouping};
@@ -22,7 +22,7 @@ type C = Complex<f64>;
 const RATE_HZ: f64 = 51_200.0;
 const RECORD_S: f64 = 2.0;
 const SAMPLES: usize = 102_400;
-const HITS: usize = 2;
+const HITS: i64 = 2;
 /// Records are made on s = σ + iω, where they have decayed before they begin anew, and multiplied by e^(σt) afterwards.
 const SIGMA: f64 = 6.0;
 /// The hammer's half-sine, and where it begins.
@@ -128,7 +128,12 @@ impl Measurements for Assembly {
         cells
     }
 
-    fn read(&self, cell: &CellName, _: bool) -> Result<Cell, Infallible> {
+    fn each_hit(
+        &self,
+        cell: &CellName,
+        _: bool,
+        look: &mut dyn FnMut(Hit, f64),
+    ) -> Result<Vec<String>, Infallible> {
         let config = &self.config;
         let impact =
             config.impact(Configuration::Ajb, &cell.impact).expect("the workbook's impacts are the rig's");
@@ -167,9 +172,9 @@ impl Measurements for Assembly {
         let floor = config.sensors.vibrometer.floor * nyquist;
         let spot_floor = config.sensors.ldv_a.floor * nyquist;
         let cell_noise = config.sensors.load_cells.noise_n * (config.load_cells.len() as f64).sqrt();
-        let hits = (0..HITS)
-            .map(|h| Hit {
-                record: i64::try_from(h).expect("few hits") + 1,
+        for record in 1..=HITS {
+            let hit = Hit {
+                record,
                 of_row: false,
                 force_n: self.signal(|l| self.force[l], config.sensors.force.noise_n, &mut stream),
                 response: (0..3)
@@ -182,9 +187,10 @@ impl Measurements for Assembly {
                     specimen_b_m_per_s: self.signal(|l| spots[1][l], spot_floor, &mut stream),
                     tangential_n: self.signal(|l| tangential[l], cell_noise, &mut stream),
                 }),
-            })
-            .collect();
-        Ok(Cell { fs_hz: RATE_HZ, hits, left_out: Vec::new() })
+            };
+            look(hit, RATE_HZ);
+        }
+        Ok(Vec::new())
     }
 }
 

@@ -5,8 +5,9 @@ use super::average::SpectraAverage;
 use super::cross_spectra::CrossSpectra;
 use super::impact_records::ImpactRecords;
 use super::pulse::Pulse;
-use super::window::Windowing;
+use super::window::{Decay, Windowing};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// The origin t₀ of the windows.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -55,6 +56,58 @@ impl Default for FrfSettings {
     }
 }
 
+/// Hits of one rate and length that come one at a time: each is windowed and summed, and needs not be kept.
+pub struct Summing {
+    windowing: Windowing,
+    decay: Arc<Decay>,
+    average: SpectraAverage,
+    samples: usize,
+    outputs: usize,
+}
+
+impl Summing {
+    /// For records of `samples` samples and `outputs` responses, which are summed at the lines of `band_hz` (ends included) alone.
+    pub fn new(fs_hz: f64, samples: usize, outputs: usize, windowing: Windowing, band_hz: [f64; 2]) -> Self {
+        let average = SpectraAverage::new(fs_hz, samples, outputs).with_band(band_hz[0], band_hz[1]);
+        let decay = windowing.kept_decay(fs_hz, samples);
+        Summing { windowing, decay, average, samples, outputs }
+    }
+
+    /// Adds a hit: its force, N, and its responses, SI, as they were recorded, with the origin of its windows from the record's start.
+    ///
+    /// # Errors
+    /// Another length or number of responses than the others', or a value that is not a number.
+    pub fn add(&mut self, force_n: &[f64], responses: &[&[f64]], origin_s: f64) -> Result<(), SpectraError> {
+        if responses.len() != self.outputs {
+            return Err(SpectraError::Responses { found: responses.len(), expected: self.outputs });
+        }
+        if let Some(odd) = responses.iter().chain([&force_n]).find(|x| x.len() != self.samples) {
+            return Err(SpectraError::Samples { found: odd.len(), expected: self.samples });
+        }
+        let (window, decay) = (&self.windowing, &self.decay);
+        self.average.add_with(
+            |out| window.force_into(force_n, decay, origin_s, out),
+            |o, out| window.response_into(responses[o], decay, origin_s, out),
+        )
+    }
+
+    /// The spectra so far; a response is late by `delay_s[output]`.
+    ///
+    /// # Errors
+    /// As of [`SpectraAverage::finish`].
+    pub fn finish(&self, delay_s: &[f64]) -> Result<CrossSpectra, SpectraError> {
+        self.average.finish(self.windowing.sigma_per_s, delay_s)
+    }
+
+    /// The force alone, at every line.
+    ///
+    /// # Errors
+    /// As of [`SpectraAverage::finish`].
+    pub fn force(&self) -> Result<CrossSpectra, SpectraError> {
+        self.average.force(self.windowing.sigma_per_s)
+    }
+}
+
 /// Hits that are added together: enough that no core waits for another, few enough that their force spectra are small beside
 /// the records.
 const AT_ONCE: usize = 8;
@@ -79,10 +132,7 @@ pub fn estimate(
 }
 
 /// The sums that [`estimate`] makes its spectra of.
-///
-/// # Errors
-/// As of [`estimate`].
-pub fn summed(
+pub(super) fn summed(
     records: &ImpactRecords,
     used: &[bool],
     settings: &FrfSettings,

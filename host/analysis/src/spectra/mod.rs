@@ -18,7 +18,7 @@ pub mod window;
 pub use crate::frf::MotionQuantity;
 pub use average::SpectraAverage;
 pub use cross_spectra::CrossSpectra;
-pub use estimate::{FrfSettings, Origin, estimate};
+pub use estimate::{FrfSettings, Origin, Summing, estimate};
 pub use impact_records::ImpactRecords;
 pub use pulse::Pulse;
 pub use usable_band::usable_band;

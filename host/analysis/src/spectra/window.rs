@@ -8,6 +8,7 @@
 
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Whether the force is weighted exponentially too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -56,7 +57,30 @@ pub struct Decay {
     weights: Vec<f64>,
 }
 
+/// Weights that were asked for, by their damping: of one rate, length and damping they are the same for every cell of a campaign.
+static KEPT: Mutex<Vec<(f64, Arc<Decay>)>> = Mutex::new(Vec::new());
+
+/// Kept at most.
+const KEPT_AT_MOST: usize = 8;
+
 impl Windowing {
+    /// As [`Windowing::decay`], made once where the same are asked for again.
+    pub(super) fn kept_decay(&self, fs_hz: f64, samples: usize) -> Arc<Decay> {
+        let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+        let fits = |(sigma_per_s, decay): &&(f64, Arc<Decay>)| {
+            *sigma_per_s == self.sigma_per_s && decay.fs_hz == fs_hz && decay.weights.len() == samples
+        };
+        if let Some((_, decay)) = kept.iter().find(fits) {
+            return decay.clone();
+        }
+        if kept.len() == KEPT_AT_MOST {
+            kept.remove(0);
+        }
+        let decay = Arc::new(self.decay(fs_hz, samples));
+        kept.push((self.sigma_per_s, decay.clone()));
+        decay
+    }
+
     /// The weights for records of `samples` samples.
     pub fn decay(&self, fs_hz: f64, samples: usize) -> Decay {
         let weights = (0..samples).map(|i| (-self.sigma_per_s * (i as f64 / fs_hz)).exp()).collect();
