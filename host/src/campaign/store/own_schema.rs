@@ -3,6 +3,7 @@
 //! A view that never ends, or a trigger that does more than refuse, would otherwise act with the first SELECT.
 
 use std::collections::HashMap;
+use std::sync::OnceLock;
 
 use rusqlite::Connection;
 
@@ -22,11 +23,16 @@ fn objects(connection: &Connection) -> rusqlite::Result<Objects> {
     statement.query_map([], read)?.collect()
 }
 
-/// What jointrig makes.
-fn ours() -> rusqlite::Result<Objects> {
+/// What jointrig makes. Asked for at every opening, so made once.
+fn ours() -> rusqlite::Result<&'static Objects> {
+    static OURS: OnceLock<Objects> = OnceLock::new();
+    if let Some(ours) = OURS.get() {
+        return Ok(ours);
+    }
     let empty = Connection::open_in_memory()?;
     empty.execute_batch(&schema::tables())?;
-    objects(&empty)
+    let made = objects(&empty)?;
+    Ok(OURS.get_or_init(|| made))
 }
 
 /// What is in the schema that jointrig does not put there, or puts there otherwise; none where all is ours.
@@ -67,7 +73,7 @@ pub(super) fn missing(connection: &Connection) -> rusqlite::Result<Vec<String>> 
     let later =
         |name: &String| ["chain", "calibrations", "temperatures"].iter().any(|later| name.starts_with(later));
     let found = objects(connection)?;
-    let mut names: Vec<String> = ours()?.into_keys().filter(|name| !found.contains_key(name)).collect();
+    let mut names: Vec<String> = ours()?.keys().filter(|name| !found.contains_key(*name)).cloned().collect();
     names.retain(|name| version > super::OLDEST || !later(name));
     names.sort();
     Ok(names)
