@@ -6,7 +6,8 @@
 
 use pulp::{Arch, NullaryFnOnce};
 
-/// Does `work`, a loop that is inlined with all that it calls, compiled for this processor.
+/// Does `work`, a loop that is inlined with all that it calls, compiled for this processor. A closure of more than a few lines is not
+/// inlined: that takes a type with a `call` that always is.
 #[inline]
 pub(crate) fn wide<T>(work: impl NullaryFnOnce<Output = T>) -> T {
     Arch::new().dispatch(work)

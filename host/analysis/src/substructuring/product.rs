@@ -1,7 +1,9 @@
 //! Products of the small complex matrices of one line, about twice as fast as the general ones: those are made for large
 //! matrices, and scale every term once more.
 
+use crate::vectors::wide;
 use nalgebra::{Complex, DMatrix, Scalar};
+use pulp::NullaryFnOnce;
 use std::ops::Mul;
 
 /// A B, where either may be real.
@@ -12,10 +14,8 @@ where
 {
     assert_eq!(a.ncols(), b.nrows(), "A has as many columns as B has rows");
     let mut out = DMatrix::zeros(a.nrows(), b.ncols());
-    let columns = b.as_slice().chunks_exact(b.nrows().max(1));
-    for (sum, factors) in out.as_mut_slice().chunks_exact_mut(a.nrows().max(1)).zip(columns) {
-        add_columns(sum, a.as_slice(), factors);
-    }
+    let (columns, factors) = (a.as_slice(), b.as_slice());
+    wide(Sums { out: out.as_mut_slice(), rows: a.nrows(), columns, factors, inner: b.nrows() });
     out
 }
 
@@ -28,24 +28,58 @@ pub(crate) fn product_of_block(
 ) -> DMatrix<Complex<f64>> {
     assert_eq!(t.ncols(), rows.len(), "T has a column for each row named");
     let mut out = DMatrix::zeros(t.nrows(), columns.len());
-    let mut factors = vec![Complex::default(); rows.len()];
-    for (sum, &c) in out.as_mut_slice().chunks_exact_mut(t.nrows().max(1)).zip(columns) {
-        let column = &y.as_slice()[c * y.nrows()..][..y.nrows()];
-        factors.iter_mut().zip(rows).for_each(|(f, &r)| *f = column[r]);
-        add_columns(sum, t.as_slice(), &factors);
+    let mut factors = Vec::with_capacity(rows.len() * columns.len());
+    for column in columns.iter().map(|&c| &y.as_slice()[c * y.nrows()..][..y.nrows()]) {
+        factors.extend(rows.iter().map(|&r| column[r]));
     }
+    wide(Sums {
+        out: out.as_mut_slice(),
+        rows: t.nrows(),
+        columns: t.as_slice(),
+        factors: &factors,
+        inner: rows.len(),
+    });
     out
 }
 
-/// sum += Σ fᵢ columnᵢ.
-fn add_columns<A, B>(sum: &mut [Complex<f64>], columns: &[A], factors: &[B])
+/// out + A B, all by columns.
+struct Sums<'a, A, B> {
+    out: &'a mut [Complex<f64>],
+    rows: usize,
+    columns: &'a [A],
+    factors: &'a [B],
+    inner: usize,
+}
+
+impl<A, B> NullaryFnOnce for Sums<'_, A, B>
 where
     A: Copy + Mul<B, Output = Complex<f64>>,
     B: Copy,
 {
-    match sum.len() {
-        6 => add_columns_of(6, &mut sum[..6], columns, factors),
-        n => add_columns_of(n, sum, columns, factors),
+    type Output = ();
+
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn call(self) {
+        match self.rows {
+            6 => self.of(6),
+            n => self.of(n.max(1)),
+        }
+    }
+}
+
+impl<A, B> Sums<'_, A, B>
+where
+    A: Copy + Mul<B, Output = Complex<f64>>,
+    B: Copy,
+{
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn of(self, rows: usize) {
+        let factors = self.factors.chunks_exact(self.inner.max(1));
+        for (sum, factors) in self.out.chunks_exact_mut(rows).zip(factors) {
+            add_columns_of(rows, sum, self.columns, factors);
+        }
     }
 }
 

@@ -7,7 +7,9 @@
 //! Thousands of lines are inverted several times each. Where the pivots leave no doubt, elimination and Gram–Schmidt do it in a
 //! third of the time; whatever is near the edge goes through QR with column pivoting, whose pivots tell the rank.
 
+use crate::vectors::wide;
 use nalgebra::{ColPivQR, Complex, DMatrix, Dyn};
+use pulp::NullaryFnOnce;
 use std::cmp::Ordering;
 
 type Line = DMatrix<Complex<f64>>;
@@ -70,105 +72,134 @@ pub fn full_rank_inverse(a: &Line, name: &'static str) -> Result<Line, RankLost>
 fn elimination(a: &Line) -> Option<Line> {
     // sizes known beforehand are loops without counters: one virtual point's motions, and both of an assembly
     match a.nrows() {
-        6 => elimination_of(a, 6),
-        12 => elimination_of(a, 12),
-        n => elimination_of(a, n),
+        6 => wide(Elimination::<6> { a, scratch: &mut [Complex::default(); 12] }),
+        12 => wide(Elimination::<12> { a, scratch: &mut [Complex::default(); 24] }),
+        n => wide(Elimination::<ANY> { a, scratch: &mut vec![Complex::default(); 2 * n] }),
     }
 }
 
-#[expect(clippy::inline_always, reason = "only there the size is known")]
-#[inline(always)]
-fn elimination_of(a: &Line, n: usize) -> Option<Line> {
-    let mut inverse = a.clone();
-    let mut swaps = Vec::with_capacity(n);
-    let mut scratch = vec![Complex::default(); 2 * n];
-    let (x, turned) = scratch.split_at_mut(n);
-    let mut largest = 0.0f64;
-    for k in 0..n {
-        let column = &mut inverse.as_mut_slice()[k * n..(k + 1) * n];
-        let (mut row, mut pivot) = (k, 0.0);
-        for (r, v) in column.iter().enumerate().skip(k) {
-            if v.norm_sqr() > pivot {
-                (row, pivot) = (r, v.norm_sqr());
+/// Of a matrix of N rows, or of [`ANY`] number.
+struct Elimination<'a, const N: usize> {
+    a: &'a Line,
+    /// Two columns.
+    scratch: &'a mut [Complex<f64>],
+}
+
+const ANY: usize = 0;
+
+impl<const N: usize> NullaryFnOnce for Elimination<'_, N> {
+    type Output = Option<Line>;
+
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn call(self) -> Option<Line> {
+        let n = if N == ANY { self.a.nrows() } else { N };
+        let mut inverse = self.a.clone();
+        let mut swaps = Vec::with_capacity(n);
+        let (x, turned) = self.scratch.split_at_mut(n);
+        let mut largest = 0.0f64;
+        for k in 0..n {
+            let column = &mut inverse.as_mut_slice()[k * n..(k + 1) * n];
+            let (mut row, mut pivot) = (k, 0.0);
+            for (r, v) in column.iter().enumerate().skip(k) {
+                if v.norm_sqr() > pivot {
+                    (row, pivot) = (r, v.norm_sqr());
+                }
+            }
+            largest = largest.max(pivot);
+            if !clear(pivot, largest) {
+                return None;
+            }
+            swaps.push(row);
+            // column k makes room for that of the inverse, which starts as the unit vector; −1 puts row k itself in its place
+            x.copy_from_slice(column);
+            x.swap(k, row);
+            let minus_inverse = -x[k].inv();
+            x[k] = Complex::from(-1.0);
+            column.fill(Complex::default());
+            column[row] = Complex::from(1.0);
+            // f x = x Re f + ix Im f: real factors only
+            for (turned, x) in turned.iter_mut().zip(x.iter()) {
+                *turned = Complex::new(-x.im, x.re);
+            }
+            for column in inverse.as_mut_slice().chunks_exact_mut(n) {
+                column.swap(k, row);
+                let f = std::mem::take(&mut column[k]) * minus_inverse;
+                for ((v, x), turned) in column.iter_mut().zip(x.iter()).zip(turned.iter()) {
+                    *v += x * f.re + turned * f.im;
+                }
             }
         }
-        largest = largest.max(pivot);
-        if !clear(pivot, largest) {
-            return None;
+        for (k, row) in swaps.into_iter().enumerate().rev() {
+            inverse.swap_columns(k, row);
         }
-        swaps.push(row);
-        // column k makes room for that of the inverse, which starts as the unit vector; −1 puts row k itself in its place
-        x.copy_from_slice(column);
-        x.swap(k, row);
-        let minus_inverse = -x[k].inv();
-        x[k] = Complex::from(-1.0);
-        column.fill(Complex::default());
-        column[row] = Complex::from(1.0);
-        // f x = x Re f + ix Im f: real factors only
-        for (turned, x) in turned.iter_mut().zip(x.iter()) {
-            *turned = Complex::new(-x.im, x.re);
-        }
-        for column in inverse.as_mut_slice().chunks_exact_mut(n) {
-            column.swap(k, row);
-            let f = std::mem::take(&mut column[k]) * minus_inverse;
-            for ((v, x), turned) in column.iter_mut().zip(x.iter()).zip(turned.iter()) {
-                *v += x * f.re + turned * f.im;
-            }
-        }
+        Some(inverse)
     }
-    for (k, row) in swaps.into_iter().enumerate().rev() {
-        inverse.swap_columns(k, row);
-    }
-    Some(inverse)
 }
 
 /// A⁺ = R⁻¹Qᴴ of a tall matrix by Gram–Schmidt, done again where much cancels, so that Q is orthogonal to rounding; none
 /// when a diagonal entry of R is not clearly above it.
 fn orthogonalisation(a: &Line) -> Option<Line> {
-    let (m, n) = a.shape();
-    let mut q = a.clone();
-    let mut r = Line::zeros(n, n);
-    let mut largest = 0.0f64;
-    for k in 0..n {
-        let (done, rest) = q.as_mut_slice().split_at_mut(k * m);
-        let (v, r) = (&mut rest[..m], &mut r.as_mut_slice()[k * n..=k * n + k]);
-        let mut square = square_of(v);
-        for _ in 0..2 {
-            for (q, r) in done.chunks_exact(m).zip(r.iter_mut()) {
-                let along = q.iter().zip(v.iter()).fold(Complex::default(), |sum, (q, v)| sum + q.conj() * v);
-                *r += along;
-                for (v, q) in v.iter_mut().zip(q) {
-                    *v -= q * along;
+    wide(Orthogonalisation { a })
+}
+
+struct Orthogonalisation<'a> {
+    a: &'a Line,
+}
+
+impl NullaryFnOnce for Orthogonalisation<'_> {
+    type Output = Option<Line>;
+
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn call(self) -> Option<Line> {
+        let a = self.a;
+        let (m, n) = a.shape();
+        let mut q = a.clone();
+        let mut r = Line::zeros(n, n);
+        let mut largest = 0.0f64;
+        for k in 0..n {
+            let (done, rest) = q.as_mut_slice().split_at_mut(k * m);
+            let (v, r) = (&mut rest[..m], &mut r.as_mut_slice()[k * n..=k * n + k]);
+            let mut square = square_of(v);
+            for _ in 0..2 {
+                for (q, r) in done.chunks_exact(m).zip(r.iter_mut()) {
+                    let along =
+                        q.iter().zip(v.iter()).fold(Complex::default(), |sum, (q, v)| sum + q.conj() * v);
+                    *r += along;
+                    for (v, q) in v.iter_mut().zip(q) {
+                        *v -= q * along;
+                    }
+                }
+                let before = std::mem::replace(&mut square, square_of(v));
+                // where little was taken away, little of the rounding's direction along the others is left
+                if square > 0.1 * before {
+                    break;
                 }
             }
-            let before = std::mem::replace(&mut square, square_of(v));
-            // where little was taken away, little of the rounding's direction along the others is left
-            if square > 0.1 * before {
-                break;
+            largest = largest.max(square);
+            if !clear(square, largest) {
+                return None;
+            }
+            // the diagonal holds 1/Rₖₖ: many products instead of quotients
+            let inverse = 1.0 / square.sqrt();
+            r[k] = Complex::from(inverse);
+            for v in v {
+                *v *= inverse;
             }
         }
-        largest = largest.max(square);
-        if !clear(square, largest) {
-            return None;
-        }
-        // the diagonal holds 1/Rₖₖ: many products instead of quotients
-        let inverse = 1.0 / square.sqrt();
-        r[k] = Complex::from(inverse);
-        for v in v {
-            *v *= inverse;
-        }
-    }
-    let mut inverse = q.adjoint();
-    for x in inverse.as_mut_slice().chunks_exact_mut(n.max(1)) {
-        for (k, r) in r.as_slice().chunks_exact(n).enumerate().rev() {
-            let solved = x[k] * r[k].re;
-            x[k] = solved;
-            for (x, r) in x[..k].iter_mut().zip(r) {
-                *x -= r * solved;
+        let mut inverse = q.adjoint();
+        for x in inverse.as_mut_slice().chunks_exact_mut(n.max(1)) {
+            for (k, r) in r.as_slice().chunks_exact(n).enumerate().rev() {
+                let solved = x[k] * r[k].re;
+                x[k] = solved;
+                for (x, r) in x[..k].iter_mut().zip(r) {
+                    *x -= r * solved;
+                }
             }
         }
+        Some(inverse)
     }
-    Some(inverse)
 }
 
 fn square_of(v: &[Complex<f64>]) -> f64 {
