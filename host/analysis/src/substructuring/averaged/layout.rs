@@ -2,7 +2,7 @@
 
 use super::Line;
 use crate::substructuring::geometry::{Geometry, Point};
-use crate::substructuring::idm::IdmSet;
+use crate::substructuring::idm::{Dof, IdmSet};
 use crate::substructuring::interface_data::{Found, VirtualPoint, balance};
 use crate::substructuring::vpt::{reduce_inputs, reduce_outputs};
 use nalgebra::{DMatrix, Vector3};
@@ -25,8 +25,12 @@ pub(super) struct Layout {
     pub(super) channels: Vec<Place>,
     pub(super) impacts: Vec<Place>,
     pub(super) points: usize,
-    pub(super) idms: IdmSet,
+    pub(super) translations: Axes,
+    pub(super) rotations: Axes,
 }
+
+/// Where the degree of freedom along each axis stands in the IDM set, and its scale; none where the set does not carry it.
+pub(super) type Axes = [Option<(usize, f64)>; 3];
 
 impl Layout {
     pub(super) fn new(
@@ -72,7 +76,10 @@ impl Layout {
             .enumerate()
             .map(|(i, impact)| place(impact, usize::from(i >= columns_a), i))
             .collect();
-        Layout { t_u, t_f, channels, impacts, points: names.len(), idms }
+        let axes = |dofs: [Dof; 3]| dofs.map(|dof| idms.position(dof).map(|at| (at, d[at])));
+        let translations = axes([Dof::X, Dof::Y, Dof::Z]);
+        let rotations = axes([Dof::Rx, Dof::Ry, Dof::Rz]);
+        Layout { t_u, t_f, channels, impacts, points: names.len(), translations, rotations }
     }
 
     /// T_u Y T_f: cells onto both virtual points, rotations scaled.

@@ -6,10 +6,8 @@
 //! serves them all.
 
 use super::assembly::Assembly;
-use super::layout::Layout;
+use super::layout::Axes;
 use super::{Line, Priors, compliance};
-use crate::substructuring::idm::Dof;
-use crate::substructuring::interface_data::balance;
 use nalgebra::{Complex, Vector3};
 
 type C = Complex<f64>;
@@ -109,13 +107,18 @@ impl Assembly {
         }
         let motion = t_u * cells;
         let wrench = cells * t_f;
+        let sides = [0, 1].map(|side| side * n);
+        // of each impact at either virtual point, and of either virtual point at each channel
+        let rotations: Vec<[Vector3<C>; 2]> = (0..impacts)
+            .map(|i| sides.map(|from| along(&layout.rotations, |at| motion[(from + at, i)])))
+            .collect();
         for (o, channel) in layout.channels.iter().enumerate() {
+            let forces = sides.map(|from| along(&layout.translations, |at| wrench[(o, from + at)]));
+            let moments = sides.map(|from| along(&layout.rotations, |at| wrench[(o, from + at)]));
             for (i, impact) in layout.impacts.iter().enumerate() {
                 let factor = phi[(o, i)];
-                let rotation = layout.vector(|at| motion[(channel.side * n + at, i)], true);
-                let by_channel = cross(channel.direction, rotation) * factor;
-                let force = layout.vector(|at| wrench[(o, impact.side * n + at)], false);
-                let moment = layout.vector(|at| wrench[(o, impact.side * n + at)], true);
+                let by_channel = cross(channel.direction, rotations[i][channel.side]) * factor;
+                let (force, moment) = (forces[impact.side], moments[impact.side]);
                 let by_impact = cross(impact.direction, moment) * factor;
                 // δY = (force + moment × r) · δe
                 let tilt = force - cross(impact.offset, moment);
@@ -131,14 +134,10 @@ impl Assembly {
     }
 }
 
-impl Layout {
-    /// The three translations or rotations of a virtual point out of its degrees of freedom, in metres or radians; zero where
-    /// the IDM set does not carry one.
-    fn vector(&self, at: impl Fn(usize) -> C, rotation: bool) -> Vector3<C> {
-        let d = balance(self.idms);
-        let axes = if rotation { [Dof::Rx, Dof::Ry, Dof::Rz] } else { [Dof::X, Dof::Y, Dof::Z] };
-        Vector3::from(axes.map(|dof| self.idms.position(dof).map_or(C::default(), |i| at(i) / d[i])))
-    }
+/// The three translations or rotations of a virtual point out of its degrees of freedom, in metres or radians; zero where
+/// the IDM set does not carry one.
+fn along(axes: &Axes, of: impl Fn(usize) -> C) -> Vector3<C> {
+    Vector3::from(axes.map(|axis| axis.map_or(C::default(), |(at, scale)| of(at) / scale)))
 }
 
 fn cross(a: Vector3<f64>, b: Vector3<C>) -> Vector3<C> {

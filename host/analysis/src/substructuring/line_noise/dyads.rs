@@ -72,11 +72,15 @@ impl<'a> Dyads<'a> {
                 continue;
             }
             let mut g = [false, true].map(|_| Line::zeros(variance.nrows(), variance.ncols()));
+            let mut left: Vec<C> = Vec::new();
             for dyad in of_file {
-                let to = &mut g[usize::from(dyad.conjugate)];
-                for (j, &column) in dyad.source.columns.iter().enumerate() {
-                    for (i, &row) in dyad.source.rows.iter().enumerate() {
-                        to[(row, column)] += dyad.left[(d, i)] * dyad.right[(j, d)];
+                let to = g[usize::from(dyad.conjugate)].as_mut_slice();
+                left.clear();
+                left.extend(dyad.left.row(d).iter());
+                for (&column, right) in dyad.source.columns.iter().zip(dyad.right.column(d).iter()) {
+                    let to = &mut to[column * variance.nrows()..][..variance.nrows()];
+                    for (&row, left) in dyad.source.rows.iter().zip(&left) {
+                        to[row] += left * right;
                     }
                 }
             }
