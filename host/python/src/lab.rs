@@ -107,7 +107,7 @@ impl Lab {
     #[pyo3(signature = (progress=None, *, bootstrap=0))]
     fn analyse(&self, py: Python<'_>, progress: Option<Py<PyAny>>, bootstrap: usize) -> PyResult<Analysis> {
         in_the_process_that_loaded_this(py)?;
-        let wanted = Wanted { replicates: bootstrap, known: KnownContact::default() };
+        let wanted = Wanted { replicates: bootstrap, ..Wanted::default() };
         let found = self.computed(py, move |store, stopped| {
             let tell = |now: analyse::Progress| {
                 stopped.end_here_if_so();

@@ -1,5 +1,6 @@
 //! The stages of a campaign's analysis, one after the other.
 
+use super::assemble::everything;
 use super::averages::{CellAverage, LINES_HZ};
 use super::cell::Measurements;
 use super::checks::between_the_arms;
@@ -35,11 +36,16 @@ pub fn analyse_measurements<M: Measurements>(
     found.missing.extend(given_up(&names, measurements.given_up()));
     found.heard = heard::heard(geometry, &cells.averages);
 
+    let place = |structure: Structure| Structure::ALL.iter().position(|s| *s == structure);
+    cells.averages.sort_by_key(|average| place(average.name.configuration));
     let all = Structure::ALL.map(|structure| {
         let planned = names.iter().filter(|c| c.configuration == structure).count();
-        let own = cells.averages.iter().filter(|a| a.name.configuration == structure);
-        let own: Vec<CellAverage> = own.cloned().collect();
-        let one = configuration_stage::of(measurements, structure, geometry.points(structure), &own, planned);
+        let own = of_configuration(&cells.averages, structure);
+        let points = geometry.points(structure);
+        if wanted.frfs {
+            found.frfs.extend(Some(structure).zip(everything(points, own, measurements.quantity())));
+        }
+        let one = configuration_stage::of(measurements, structure, points, own, planned);
         found.missing.extend(one.missing);
         found.configurations.push(one.measured);
         one.frf
@@ -83,6 +89,14 @@ pub fn analyse_measurements<M: Measurements>(
     found.own_stiffness = Some(own.map(|(stiffness, _)| stiffness));
     found.between_arms = Some(decided(&found));
     found
+}
+
+/// The averages of one configuration, of all that are sorted by it.
+fn of_configuration(sorted: &[CellAverage], structure: Structure) -> &[CellAverage] {
+    sorted
+        .chunk_by(|a, b| a.name.configuration == b.name.configuration)
+        .find(|own| own[0].name.configuration == structure)
+        .unwrap_or_default()
 }
 
 fn substructured(frfs: [&Frf; 3], geometry: &Geometry) -> Result<Substructured, Missing> {

@@ -15,6 +15,7 @@ use crate::results::{
 };
 use crate::spectra::Windowing;
 use crate::structure::Structure;
+use crate::substructuring::Frf;
 use crate::substructuring::averaged::{Averaged, Priors};
 use crate::substructuring::between_arms::{BetweenArms, NoStiffness};
 
@@ -37,6 +38,9 @@ pub struct Findings {
     pub hits: Vec<HitRow>,
     /// What each configuration gave.
     pub configurations: Vec<ConfigurationFindings>,
+    /// The FRFs between all channels and impacts of the geometry, measured or not, where they are wanted: of each configuration with a
+    /// kept hit, at the lines of the settings.
+    pub frfs: Vec<(Structure, Frf)>,
     /// Joint and interface, line by line.
     pub substructured: Option<Substructured>,
     /// The fits that were asked for.

@@ -15,6 +15,8 @@ pub struct Wanted {
     pub replicates: usize,
     /// Contact and static arm.
     pub known: KnownContact,
+    /// Whether the FRFs of every pair are kept in the findings.
+    pub frfs: bool,
 }
 
 /// How far the analysis is: cells done, and cells in all.

@@ -50,7 +50,12 @@ impl Analyse {
             parallel_path: self.parallel_path,
             effective_mass_kg: self.effective_mass,
         };
-        let found = analyse_into(&store, Wanted { replicates: self.bootstrap, known }, &self.out, &[])?;
+        let found = analyse_into(
+            &store,
+            Wanted { replicates: self.bootstrap, known, ..Wanted::default() },
+            &self.out,
+            &[],
+        )?;
         if self.json {
             output::json(&found)?;
         } else {

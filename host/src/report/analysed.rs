@@ -1,9 +1,12 @@
 //! The document of a campaign file: what `jointrig analyse` writes, and what a page shows of it while it is measured.
 
 use super::document::document;
-use crate::analyse::{AnalyseError, Progress, Wanted, analyse};
+use super::words::missing_sentences;
+use crate::analyse::{AnalyseError, Findings, Missing, Progress, Wanted, analyse};
 use crate::campaign::store::Store;
 use crate::results::Results;
+use crate::structure::Structure;
+use crate::substructuring::Frf;
 
 /// Analyses what the file holds. A simulated rig's truth joins the document when all is found: no estimator can see it.
 ///
@@ -14,7 +17,27 @@ pub fn analysed(
     wanted: Wanted,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Results, AnalyseError> {
-    let mut results = document(analyse(store, wanted, progress)?);
+    written(store, analyse(store, wanted, progress)?)
+}
+
+/// As [`analysed`], with the FRFs of [`Findings::frfs`] and what is said about records that cannot be used.
+///
+/// # Errors
+/// As of [`analysed`].
+pub fn analysed_with_frfs(
+    store: &Store,
+    wanted: Wanted,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<(Results, Vec<(Structure, Frf)>, Vec<String>), AnalyseError> {
+    let mut found = analyse(store, Wanted { frfs: true, ..wanted }, progress)?;
+    let frfs = std::mem::take(&mut found.frfs);
+    let of_records = found.missing.iter().filter(|missing| matches!(missing, Missing::Records { .. }));
+    let told = of_records.map(missing_sentences::sentence).collect();
+    Ok((written(store, found)?, frfs, told))
+}
+
+fn written(store: &Store, found: Findings) -> Result<Results, AnalyseError> {
+    let mut results = document(found);
     if let Some(answer) = &mut results.answer {
         answer.truth = store.simulated_truth()?;
     }

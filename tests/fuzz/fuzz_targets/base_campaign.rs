@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use jointrig::analyse::{KnownContact, Wanted};
+use jointrig::analyse::Wanted;
 use jointrig::campaign::plan::SMALL;
 use jointrig::campaign::store::Store;
 use jointrig::campaign::store::record_row::NewRecord;
@@ -64,7 +64,7 @@ enum Found {
 fn found(path: &Path) -> Found {
     let Ok(store) = Store::open_read_only(path) else { return Found::Refused };
     let Ok(damage) = store.verify() else { return Found::Refused };
-    let wanted = Wanted { replicates: 0, known: KnownContact::default() };
+    let wanted = Wanted::default();
     let results = report::analysed(&store, wanted, &|_| ()).ok().and_then(|found| found.to_json().ok());
     match results {
         Some(results) if damage.is_empty() => Found::Whole(results),

@@ -7,13 +7,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 use serde_json::json;
 
+use super::analysed::Analysed;
 use super::records::Written as Place;
 use super::{What, bad, estimates, levels, make_folder, tables};
-use crate::analyse::{self, Wanted};
+use crate::analyse;
 use crate::campaign::plan::{Cell, configuration_name};
 use crate::campaign::store::Store;
 use crate::campaign::store::record_row::RecordRow;
-use crate::cli::analyse::analyse_into;
+use crate::cli::analyse::write_into;
 use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::cli::waiting::Waiting;
@@ -102,9 +103,9 @@ impl Columns<'_> {
             part.records.iter().enumerate().map(place).collect::<Vec<_>>()
         });
         let levels = self.write_levels(&store, &mut files)?;
-        let (frfs, mut told) = self.what.frfs(&store)?;
+        let Analysed { frfs, mut told, results } = Analysed::of(&store, self.what.band)?;
         files.insert("frf.parquet".into(), write_frfs(&out.join("frf.parquet"), &frfs)?);
-        let results = analyse_into(&store, Wanted::default(), out, &[])?;
+        write_into(&results, out, &[])?;
         let tables = [
             ("records.parquet", tables::records(&store, &places.collect::<Vec<_>>())?),
             ("cells.parquet", tables::cells(&store)?),

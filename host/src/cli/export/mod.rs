@@ -1,5 +1,6 @@
 //! `export`: what a campaign file holds, in forms that other programs read.
 
+mod analysed;
 #[cfg(feature = "parquet")]
 mod columns;
 #[cfg(feature = "parquet")]
@@ -11,19 +12,18 @@ mod tables;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use nalgebra::DMatrix;
 
-use super::analyse::analyse_into;
+use super::analyse::write_into;
 use super::error::CliError;
 use super::{frf, output};
-use crate::analyse::{self, CampaignFile, KnownContact, Wanted};
+use crate::analyse;
 use crate::campaign::store::Store;
 use crate::campaign::store::record_row::RecordRow;
 use crate::exchange::positions_output::write_positions;
 use crate::exchange::{tables_output, uff_output, write_frf};
 use crate::frf::Frf;
-use crate::structure::Structure;
 use crate::substructuring::geometry::Configuration;
+use analysed::Analysed;
 
 /// Write everything that a campaign file holds for other programs.
 ///
@@ -73,30 +73,7 @@ impl What {
     fn counts(&self, row: &RecordRow) -> bool {
         row.scans > 0 && (self.all || row.kept())
     }
-
-    /// The FRFs of each structure that has any, and what a reader must know of them.
-    fn frfs(&self, store: &Store) -> Result<Frfs, CliError> {
-        let file = CampaignFile::open(store, KnownContact::default())?;
-        let (mut found, mut told) = (Vec::new(), Vec::new());
-        for structure in Structure::ALL {
-            let (measured, complaints) = file.measured(structure, [self.band.0, self.band.1]);
-            told.extend(complaints);
-            let imported = if measured.is_none() {
-                store.frf(structure.name())?.map(|found| imported(found.frf))
-            } else {
-                None
-            };
-            found.extend(measured.map(|(frf, _)| frf).or(imported).map(|frf| (structure, frf)));
-        }
-        if found.is_empty() {
-            told.push("no good hit is in the file yet: there are no FRFs to export".into());
-        }
-        Ok((found, told))
-    }
 }
-
-/// FRFs by structure, and remarks on them.
-type Frfs = (Vec<(Structure, Frf)>, Vec<String>);
 
 /// Forms that can be asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -196,8 +173,8 @@ impl Files<'_> {
         write_positions(&folders[0], &geometry, "Velocity").map_err(bad)?;
         let written = if *without_records { Vec::new() } else { self.write_records(&store)? };
         tables::write(&store, out, &written)?;
-        let (found, mut told) = self.what.frfs(&store)?;
-        for (structure, frf) in found {
+        let Analysed { frfs, mut told, results } = Analysed::of(&store, self.what.band)?;
+        for (structure, frf) in frfs {
             let path = folders[1].join(structure.name()).with_extension(self.format.extension());
             self.write_frf(&path, &frf, geometry.points(structure))?;
             let (outputs, inputs, lines) = (frf.outputs().len(), frf.inputs().len(), frf.lines().len());
@@ -208,7 +185,7 @@ impl Files<'_> {
         if levels > 0 {
             told.push(format!("{}: {levels} levels of the shaker", folder.display()));
         }
-        analyse_into(&store, Wanted::default(), out, &[])?;
+        write_into(&results, out, &[])?;
         told.push(format!("geometry, results.json and report.html are in {}", out.display()));
         output::lines(told)
     }
@@ -220,13 +197,4 @@ impl Files<'_> {
             Format::Csv => tables_output::write_frf(path, frf).map_err(bad),
         }
     }
-}
-
-/// FRFs from elsewhere; their coherence is not known, and their variance need not be.
-fn imported(frf: Frf) -> Frf {
-    let unknown =
-        vec![DMatrix::from_element(frf.outputs().len(), frf.inputs().len(), f64::NAN); frf.lines().len()];
-    let variance = frf.variance().map_or_else(|| unknown.clone(), <[_]>::to_vec);
-    let whole = frf.with_variance(variance).and_then(|frf| frf.with_coherence(unknown));
-    whole.expect("one of each was made for every value")
 }
