@@ -63,34 +63,38 @@ impl<'a> Dyads<'a> {
         }
     }
 
-    /// Variances of K and of ωC, where Z is `factor` times what the dyads move, from those of the files' cells at this line.
-    pub(super) fn variances(&self, d: usize, factor: C, variance: [&DMatrix<f64>; 3], tau: f64) -> [f64; 2] {
-        let mut sums = [0.0; 2];
+    /// Variances of K and of ωC of every degree of freedom, where Z is its factor times what the dyads move, from those of the files'
+    /// cells at this line.
+    pub(super) fn variances(&self, factors: &[C], variance: [&DMatrix<f64>; 3], tau: f64) -> Vec<[f64; 2]> {
+        let mut sums = vec![[0.0; 2]; factors.len()];
         for (file, variance) in variance.into_iter().enumerate() {
-            let mut of_file = self.0.iter().filter(|dyad| dyad.source.file == file).peekable();
-            if of_file.peek().is_none() {
-                continue;
+            // the matrix column by column, so that only one is at hand; what moves a column stays in the dyads' order
+            let mut places: Vec<(usize, &Dyad<'_>, usize)> = Vec::new();
+            for dyad in self.0.iter().filter(|dyad| dyad.source.file == file) {
+                places.extend(dyad.source.columns.iter().enumerate().map(|(j, column)| (*column, dyad, j)));
             }
-            let mut g = [false, true].map(|_| Line::zeros(variance.nrows(), variance.ncols()));
-            let mut left: Vec<C> = Vec::new();
-            for dyad in of_file {
-                let to = g[usize::from(dyad.conjugate)].as_mut_slice();
-                left.clear();
-                left.extend(dyad.left.row(d).iter());
-                for (&column, right) in dyad.source.columns.iter().zip(dyad.right.column(d).iter()) {
-                    let to = &mut to[column * variance.nrows()..][..variance.nrows()];
-                    for (&row, left) in dyad.source.rows.iter().zip(&left) {
-                        to[row] += left * right;
+            places.sort_by_key(|(column, ..)| *column);
+            let mut g = [false, true].map(|_| vec![C::default(); variance.nrows()]);
+            for (d, (factor, sums)) in factors.iter().zip(&mut sums).enumerate() {
+                let of_k = factor * C::new(1.0, tau);
+                for column in places.chunk_by(|a, b| a.0 == b.0) {
+                    for g in &mut g {
+                        g.fill(C::default());
                     }
-                }
-            }
-            let turn = C::new(1.0, tau);
-            let of_k = factor * turn;
-            for ((g, h), v) in g[0].iter().zip(g[1].iter()).zip(variance.iter()) {
-                // a cell that does not count may be unknown
-                if *g != C::default() || *h != C::default() {
-                    sums[0] += (of_k * g + of_k.conj() * h).norm_sqr() * v;
-                    sums[1] += (factor * g - factor.conj() * h).norm_sqr() * v;
+                    for (_, dyad, j) in column {
+                        let (to, right) = (&mut g[usize::from(dyad.conjugate)], dyad.right[(*j, d)]);
+                        for (&row, left) in dyad.source.rows.iter().zip(dyad.left.row(d).iter()) {
+                            to[row] += left * right;
+                        }
+                    }
+                    let variance = variance.column(column[0].0);
+                    for ((g, h), v) in g[0].iter().zip(&g[1]).zip(variance.iter()) {
+                        // a cell that does not count may be unknown
+                        if *g != C::default() || *h != C::default() {
+                            sums[0] += (of_k * g + of_k.conj() * h).norm_sqr() * v;
+                            sums[1] += (factor * g - factor.conj() * h).norm_sqr() * v;
+                        }
+                    }
                 }
             }
         }

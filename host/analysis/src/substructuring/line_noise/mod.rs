@@ -181,13 +181,9 @@ impl Reduced {
         let s = frf.s(l);
         let quantity = s.powi(frf.quantity().order_of_s());
         let variance = noises.map(|n| &n[l]);
-        (balance(self.idms).iter().enumerate())
-            .map(|(d, length)| {
-                let factor = quantity * length * length;
-                let [k, omega_c] = dyads.variances(d, factor, variance, s.re / s.im).map(f64::sqrt);
-                [k, omega_c / s.im]
-            })
-            .collect()
+        let factors: Vec<_> = balance(self.idms).iter().map(|length| quantity * length * length).collect();
+        let variances = dyads.variances(&factors, variance, s.re / s.im).into_iter();
+        variances.map(|[k, omega_c]| [k.sqrt(), omega_c.sqrt() / s.im]).collect()
     }
 }
 
