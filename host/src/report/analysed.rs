@@ -20,7 +20,18 @@ pub fn analysed(
     written(store, analyse(store, wanted, progress)?)
 }
 
-/// As [`analysed`], with the FRFs of [`Findings::frfs`] and what is said about records that cannot be used.
+/// What a file holds, with the FRFs.
+#[derive(Debug)]
+pub struct WithFrfs {
+    /// As [`analysed`] gives them.
+    pub results: Results,
+    /// Those of [`Findings::frfs`].
+    pub frfs: Vec<(Structure, Frf)>,
+    /// What is said about records that cannot be used.
+    pub told: Vec<String>,
+}
+
+/// As [`analysed`], with the FRFs of all pairs.
 ///
 /// # Errors
 /// As of [`analysed`].
@@ -28,12 +39,12 @@ pub fn analysed_with_frfs(
     store: &Store,
     wanted: Wanted,
     progress: &(dyn Fn(Progress) + Sync),
-) -> Result<(Results, Vec<(Structure, Frf)>, Vec<String>), AnalyseError> {
+) -> Result<WithFrfs, AnalyseError> {
     let mut found = analyse(store, Wanted { frfs: true, ..wanted }, progress)?;
     let frfs = std::mem::take(&mut found.frfs);
     let of_records = found.missing.iter().filter(|missing| matches!(missing, Missing::Records { .. }));
     let told = of_records.map(missing_sentences::sentence).collect();
-    Ok((written(store, found)?, frfs, told))
+    Ok(WithFrfs { results: written(store, found)?, frfs, told })
 }
 
 fn written(store: &Store, found: Findings) -> Result<Results, AnalyseError> {

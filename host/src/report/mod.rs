@@ -17,7 +17,7 @@ mod svg;
 mod tables;
 pub mod words;
 
-pub use analysed::{analysed, analysed_with_frfs, must_hold_something};
+pub use analysed::{WithFrfs, analysed, analysed_with_frfs, must_hold_something};
 pub use document::{compare, document};
 pub use page::{chart_style, comparison_page, figure_fragment, page, script};
 

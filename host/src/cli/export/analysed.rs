@@ -7,54 +7,38 @@ use crate::campaign::store::Store;
 use crate::cli::error::CliError;
 use crate::cli::waiting::Waiting;
 use crate::frf::Frf;
-use crate::report;
-use crate::results::Results;
+use crate::report::{self, WithFrfs};
 use crate::structure::Structure;
 
-/// What the file says.
-pub(super) struct Analysed {
-    /// Of each structure that has any.
-    pub(super) frfs: Vec<(Structure, Frf)>,
-    /// What a reader must know of them.
-    pub(super) told: Vec<String>,
-    pub(super) results: Results,
+/// Analyses the file, with the FRFs between two frequencies, Hz, of each structure that has any.
+pub(super) fn analysed(store: &Store, (low_hz, high_hz): (f64, f64)) -> Result<WithFrfs, CliError> {
+    let waiting = Waiting::of("analysing");
+    let progress = |progress: Progress| waiting.at(progress.done, progress.total);
+    let mut found = report::analysed_with_frfs(store, Wanted::default(), &progress)?;
+    if low_hz < LINES_HZ[0] || LINES_HZ[1] < high_hz {
+        (found.frfs, found.told) = measured_anew(store, [low_hz, high_hz])?;
+    }
+    let mut measured = found.frfs.into_iter().peekable();
+    found.frfs = Vec::new();
+    for structure in Structure::ALL {
+        if let Some((_, frf)) = measured.next_if(|(own, _)| *own == structure) {
+            found.frfs.push((structure, frf.band(low_hz, high_hz)));
+        } else {
+            let there = store.frf(structure.name())?;
+            found.frfs.extend(there.map(|found| (structure, imported(found.frf))));
+        }
+    }
+    if found.frfs.is_empty() {
+        found.told.push("no good hit is in the file yet: there are no FRFs to export".into());
+    }
+    Ok(found)
 }
 
-impl Analysed {
-    /// With the FRFs between two frequencies, Hz.
-    pub(super) fn of(store: &Store, (low_hz, high_hz): (f64, f64)) -> Result<Self, CliError> {
-        let waiting = Waiting::of("analysing");
-        let progress = |progress: Progress| waiting.at(progress.done, progress.total);
-        let (results, measured, mut told) = if LINES_HZ[0] <= low_hz && high_hz <= LINES_HZ[1] {
-            let (results, frfs, told) = report::analysed_with_frfs(store, Wanted::default(), &progress)?;
-            let cut = frfs.into_iter().map(|(structure, frf)| (structure, frf.band(low_hz, high_hz)));
-            (results, cut.collect(), told)
-        } else {
-            let (frfs, told) = measured_anew(store, [low_hz, high_hz])?;
-            (report::analysed(store, Wanted::default(), &progress)?, frfs, told)
-        };
-        let mut frfs = Vec::new();
-        let mut measured = measured.into_iter().peekable();
-        for structure in Structure::ALL {
-            match measured.next_if(|(own, _)| *own == structure) {
-                Some(found) => frfs.push(found),
-                None => {
-                    frfs.extend(store.frf(structure.name())?.map(|found| (structure, imported(found.frf))));
-                }
-            }
-        }
-        if frfs.is_empty() {
-            told.push("no good hit is in the file yet: there are no FRFs to export".into());
-        }
-        Ok(Self { frfs, told, results })
-    }
-}
+/// FRFs, and what is said about records that cannot be used.
+type Measured = (Vec<(Structure, Frf)>, Vec<String>);
 
 /// At lines that the analysis does not form.
-fn measured_anew(
-    store: &Store,
-    lines_hz: [f64; 2],
-) -> Result<(Vec<(Structure, Frf)>, Vec<String>), CliError> {
+fn measured_anew(store: &Store, lines_hz: [f64; 2]) -> Result<Measured, CliError> {
     let file = CampaignFile::open(store, KnownContact::default())?;
     let (mut frfs, mut told) = (Vec::new(), Vec::new());
     for structure in Structure::ALL {

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 use serde_json::json;
 
-use super::analysed::Analysed;
+use super::analysed::analysed;
 use super::records::Written as Place;
 use super::{What, bad, estimates, levels, make_folder, tables};
 use crate::analyse;
@@ -25,6 +25,7 @@ use crate::exchange::tables_output::loop_signals;
 use crate::exchange::typed_table::{Kind, Table};
 use crate::frf::Frf;
 use crate::report;
+use crate::report::WithFrfs;
 use crate::structure::Structure;
 
 /// Records in a file of samples: some hundred megabytes, one row group each.
@@ -103,7 +104,7 @@ impl Columns<'_> {
             part.records.iter().enumerate().map(place).collect::<Vec<_>>()
         });
         let levels = self.write_levels(&store, &mut files)?;
-        let Analysed { frfs, mut told, results } = Analysed::of(&store, self.what.band)?;
+        let WithFrfs { frfs, mut told, results } = analysed(&store, self.what.band)?;
         files.insert("frf.parquet".into(), write_frfs(&out.join("frf.parquet"), &frfs)?);
         write_into(&results, out, &[])?;
         let tables = [

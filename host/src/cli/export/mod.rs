@@ -22,8 +22,9 @@ use crate::campaign::store::record_row::RecordRow;
 use crate::exchange::positions_output::write_positions;
 use crate::exchange::{tables_output, uff_output, write_frf};
 use crate::frf::Frf;
+use crate::report::WithFrfs;
 use crate::substructuring::geometry::Configuration;
-use analysed::Analysed;
+use analysed::analysed;
 
 /// Write everything that a campaign file holds for other programs.
 ///
@@ -173,7 +174,7 @@ impl Files<'_> {
         write_positions(&folders[0], &geometry, "Velocity").map_err(bad)?;
         let written = if *without_records { Vec::new() } else { self.write_records(&store)? };
         tables::write(&store, out, &written)?;
-        let Analysed { frfs, mut told, results } = Analysed::of(&store, self.what.band)?;
+        let WithFrfs { frfs, mut told, results } = analysed(&store, self.what.band)?;
         for (structure, frf) in frfs {
             let path = folders[1].join(structure.name()).with_extension(self.format.extension());
             self.write_frf(&path, &frf, geometry.points(structure))?;
