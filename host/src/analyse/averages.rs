@@ -86,6 +86,10 @@ impl CellSums {
     pub fn add(&mut self, hit: &Hit, fs_hz: f64) -> Result<(), SpectraError> {
         if self.records.is_empty() {
             self.axes = hit.response.len();
+            if hit.contact.is_none() {
+                // what one hit lacks is told of none
+                self.asked = Asked::default();
+            }
         }
         let mut delay_s = hit.response_delay_s.clone();
         let mut outputs: Vec<&[f64]> = hit.response.iter().map(Vec::as_slice).collect();

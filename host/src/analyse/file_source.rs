@@ -1,6 +1,7 @@
 //! What a campaign file says of itself: where it comes from, and how much of its plan was measured.
 
-use super::from_store::{AnalyseError, CampaignFile};
+use super::analyse_error::AnalyseError;
+use super::from_store::CampaignFile;
 use super::heard::Heard;
 use super::hit_counts::completeness;
 use crate::campaign::store::Store;

@@ -1,7 +1,6 @@
 //! The campaign file as measurements: records decoded, in SI units, one cell at a time, from any thread.
 
-use super::assemble::{everything, hits};
-use super::averages::{Asked, CellAverage, CellSums};
+use super::analyse_error::AnalyseError;
 use super::campaign::analyse_measurements;
 use super::cell::{CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel};
 use super::findings::Findings;
@@ -22,50 +21,14 @@ use crate::device::channels::ChannelMap;
 use crate::hysteresis::HysteresisRecord;
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
-use crate::substructuring::Frf;
 use crate::substructuring::geometry::Geometry;
 use jointrig_protocol::channel::{Quantity, Role};
-use nalgebra::DMatrix;
-use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 /// Scans kept before the trigger: the force window begins 1 ms before the pulse, which is 51 scans at 51.2 kHz.
 pub const LEAD_S: f64 = 1.25e-3;
-
-/// Why a campaign file cannot be analysed, or a cell of it not be read.
-#[derive(Debug, thiserror::Error)]
-pub enum AnalyseError {
-    /// The file cannot be read, or a record is damaged.
-    #[error(transparent)]
-    Store(#[from] StoreError),
-    /// A channel is not there without which an impact cannot be analysed.
-    #[error("record {record}: its session has no channel for {role}")]
-    NoChannel {
-        /// The record.
-        record: i64,
-        /// What is missing.
-        role: &'static str,
-    },
-    /// One cell has records of two sampling rates.
-    #[error(
-        "record {record} was sampled at {rate_hz} Hz, those before it at {others_hz} Hz: their spectra have other lines; refuse one or the other and measure again"
-    )]
-    Rate {
-        /// The record.
-        record: i64,
-        /// Its rate, Hz.
-        rate_hz: f64,
-        /// That of the records before it, Hz.
-        others_hz: f64,
-    },
-    /// The response channels of the file's sessions measure different quantities, or none that is motion.
-    #[error(
-        "the vibrometer's channels measure {0}: velocity, displacement or acceleration is needed, the same in all sessions"
-    )]
-    Quantity(String),
-}
 
 /// Everything that a campaign file says about the joint. What is `known` beforehand counts more than what the plan says.
 ///
@@ -260,47 +223,6 @@ impl CampaignFile {
 }
 
 impl CampaignFile {
-    /// The FRFs of a configuration's kept hits between two frequencies, Hz, for every pair of the geometry, formed as the analysis
-    /// forms them, with the number of hits in each (outputs × inputs); and what is said about cells and records that cannot be used. None
-    /// without a kept hit.
-    pub fn measured(
-        &self,
-        structure: Structure,
-        lines_hz: [f64; 2],
-    ) -> (Option<(Frf, DMatrix<usize>)>, Vec<String>) {
-        let own: Vec<&CellName> =
-            self.cells.iter().map(|cell| &cell.name).filter(|name| name.configuration == structure).collect();
-        let one = |name: &&CellName| {
-            let complaint =
-                |what: String| format!("{structure}: cell {} × {}: {what}.", name.impact, name.response);
-            let mut sums = CellSums::new((*name).clone(), self.sigma_per_s(), Asked::default(), lines_hz);
-            let (mut some, mut unfit) = (false, None);
-            let read = self.each_hit(name, false, &mut |hit, fs_hz| {
-                some = true;
-                if unfit.is_none() {
-                    unfit = sums.add(&hit, fs_hz).err();
-                }
-            });
-            let left_out = match read {
-                Ok(left_out) => left_out,
-                Err(error) => return (None, vec![complaint(error.to_string())]),
-            };
-            let mut complaints: Vec<String> = left_out.into_iter().map(complaint).collect();
-            if !some {
-                return (None, complaints);
-            }
-            let found = unfit.map_or_else(|| sums.finish(), Err);
-            complaints.extend(found.as_ref().err().map(|error| complaint(error.to_string())));
-            (found.ok(), complaints)
-        };
-        let (averages, complaints): (Vec<_>, Vec<_>) = own.par_iter().map(one).unzip();
-        let averages: Vec<CellAverage> = averages.into_iter().flatten().collect();
-        let complaints = complaints.concat();
-        let points = self.geometry.points(structure);
-        let found = everything(points, &averages, self.quantity);
-        (found.map(|frf| (frf, hits(points, &averages))), complaints)
-    }
-
     fn level(&self, store: &Store, row: &LevelRow) -> Result<ShakerLevel, String> {
         if !row.gaps.is_empty() {
             return Err("samples of it were lost on the way: measure it again".into());

@@ -1,5 +1,5 @@
 use super::super::assemble::assemble;
-use super::super::averages::LINES_HZ;
+use super::super::averages::{Asked, CellSums, LINES_HZ};
 use super::*;
 use crate::analyse::missing::Missing;
 use crate::campaign::plan::SMALL;
@@ -9,6 +9,7 @@ use crate::campaign::store::session_table::{Counters, SessionInfo};
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::{Kind, Verdict};
 use crate::device::recording::Recording;
+use crate::substructuring::Frf;
 use clap::Parser;
 use jointrig_protocol::channel::{Axis, Channel};
 use jointrig_protocol::shot::{Phase, Shot};

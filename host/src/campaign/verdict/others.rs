@@ -6,7 +6,7 @@ use jointrig_protocol::channel::{Quantity, Role};
 use crate::campaign::plan::{Enough, Plan};
 use crate::device::channels::ChannelMap;
 use crate::device::recording::Codes;
-use crate::spectra::{CrossSpectra, Pulse, SpectraAverage, Windowing};
+use crate::spectra::{CrossSpectra, Pulse, Summing, Windowing};
 
 /// Good records from which on there is something usual.
 const FEW: usize = 3;
@@ -23,7 +23,7 @@ pub struct Others {
     /// Places of the channels whose FRFs are followed.
     responses: Vec<usize>,
     noise: Vec<Vec<f64>>,
-    average: Option<SpectraAverage>,
+    sums: Option<Summing>,
 }
 
 impl Others {
@@ -35,8 +35,8 @@ impl Others {
     /// Learns from a good record. The FRFs are followed only where the plan asks when they are good enough.
     pub fn learn(&mut self, plan: &Plan, channels: &ChannelMap, codes: Codes<'_>) {
         self.noise.push(channel_noise(channels, codes));
-        if plan.enough.is_some() {
-            self.add_to_average(plan, channels, codes);
+        if let Some(enough) = &plan.enough {
+            self.add_to_sums(plan, enough.get_ref(), channels, codes);
         }
     }
 
@@ -59,7 +59,7 @@ impl Others {
     /// Random error of the averaged FRFs as a part of them, √(Σ var H1 / Σ |H1|²) over lines and axes of the band; none of
     /// fewer than two hits.
     pub fn random_error(&self, enough: &Enough) -> Option<f64> {
-        let found = self.average.as_ref()?.finish(0.0, &[]).ok().filter(|found| found.hits() > 1)?;
+        let found = self.sums.as_ref()?.finish(&[]).ok().filter(|found| found.hits() > 1)?;
         let [low_hz, high_hz] = enough.band_hz;
         let band = found.band(low_hz, high_hz);
         // `variance` is the real part's; the imaginary part has as much
@@ -70,7 +70,7 @@ impl Others {
         (power > 0.0).then(|| (variance / power).sqrt())
     }
 
-    fn add_to_average(&mut self, plan: &Plan, channels: &ChannelMap, codes: Codes<'_>) {
+    fn add_to_sums(&mut self, plan: &Plan, enough: &Enough, channels: &ChannelMap, codes: Codes<'_>) {
         let Some(force) = channels.place(Role::HammerForce) else { return };
         let fs_hz = f64::from(channels.rate_hz);
         let si = |place: usize| channels.to_si(place, codes.channel(place));
@@ -80,14 +80,11 @@ impl Others {
             Windowing { sigma_per_s: plan.window.get_ref().exponential_per_s, ..Windowing::default() };
         let origin_s = pulse.start as f64 / fs_hz;
         let responses: Vec<Vec<f64>> = self.responses.iter().copied().map(si).collect();
-        let average =
-            self.average.get_or_insert_with(|| SpectraAverage::new(fs_hz, force_n.len(), responses.len()));
-        let decay = window.decay(fs_hz, force_n.len());
-        let added = average.add_with(
-            |out| window.force_into(&force_n, &decay, origin_s, out),
-            |axis, out| window.response_into(&responses[axis], &decay, origin_s, out),
-        );
-        if let Err(error) = added {
+        let responses: Vec<&[f64]> = responses.iter().map(Vec::as_slice).collect();
+        let sums = self.sums.get_or_insert_with(|| {
+            Summing::new(fs_hz, force_n.len(), responses.len(), window, enough.band_hz)
+        });
+        if let Err(error) = sums.add(&force_n, &responses, origin_s) {
             log::warn!("a good record does not enter the cell's FRFs: {error}");
         }
     }

@@ -18,15 +18,13 @@ pub(super) fn analysed(store: &Store, (low_hz, high_hz): (f64, f64)) -> Result<W
     if low_hz < LINES_HZ[0] || LINES_HZ[1] < high_hz {
         (found.frfs, found.told) = measured_anew(store, [low_hz, high_hz])?;
     }
-    let mut measured = found.frfs.into_iter().peekable();
-    found.frfs = Vec::new();
+    let measured = std::mem::take(&mut found.frfs);
     for structure in Structure::ALL {
-        if let Some((_, frf)) = measured.next_if(|(own, _)| *own == structure) {
-            found.frfs.push((structure, frf.band(low_hz, high_hz)));
-        } else {
-            let there = store.frf(structure.name())?;
-            found.frfs.extend(there.map(|found| (structure, imported(found.frf))));
-        }
+        let frf = match measured.iter().find(|(own, _)| *own == structure) {
+            Some((_, frf)) => Some(frf.band(low_hz, high_hz)),
+            None => store.frf(structure.name())?.map(|found| imported(found.frf)),
+        };
+        found.frfs.extend(Some(structure).zip(frf));
     }
     if found.frfs.is_empty() {
         found.told.push("no good hit is in the file yet: there are no FRFs to export".into());
