@@ -200,8 +200,9 @@ fn the_bootstrap_agrees_with_the_propagated_noise() {
 }
 
 #[test]
-#[ignore = "prints a table of docs/accuracy.md; minutes"]
+#[ignore = "docs/accuracy.md, by `cargo xtask accuracy`: the recommended estimate"]
 fn table_of_the_recommended() {
+    println!("table: recommended");
     println!("| estimate | contact | floor | mean | σ | covered | half width (median) | not identified |");
     println!("|---|---|---|---|---|---|---|---|");
     for (truth, floor) in cases() {
@@ -212,8 +213,9 @@ fn table_of_the_recommended() {
 }
 
 #[test]
-#[ignore = "prints a table of docs/accuracy.md; a quarter of an hour"]
+#[ignore = "docs/accuracy.md, by `cargo xtask accuracy`: the fit"]
 fn table_of_the_fit() {
+    println!("table: fit");
     println!("| estimate | contact | floor | mean | σ | covered | half width (median) | not identified |");
     println!("|---|---|---|---|---|---|---|---|");
     for (truth, floor) in cases() {
@@ -222,8 +224,9 @@ fn table_of_the_fit() {
 }
 
 #[test]
-#[ignore = "prints a table of docs/accuracy.md; minutes"]
+#[ignore = "docs/accuracy.md, by `cargo xtask accuracy`: every method"]
 fn table_of_every_method() {
+    println!("table: methods");
     println!("| method | floor | mean | σ over campaigns | interval of the lines' scatter covers |");
     println!("|---|---|---|---|---|");
     for floor in [QUIET, LOUD] {

@@ -106,9 +106,15 @@ impl Summary {
         }
     }
 
+    /// Of so many campaigns, as a row of docs/accuracy.md.
     fn line(&self, name: &str, campaigns: usize) -> String {
-        let [covered, rms, half, null] = [self.covered, self.rms, self.half, self.null].map(|x| 100.0 * x);
-        format!("| {name} | {campaigns} | {covered:.1} % | {rms:.2} % | {half:.2} % | {null:.1} % |")
+        let [share, rms, half] = [self.covered, self.rms, self.half].map(|x| 100.0 * x);
+        let none = (self.null * campaigns as f64).round();
+        let answers = campaigns as f64 - none;
+        let covered = (self.covered * answers).round();
+        format!(
+            "| {name} | {campaigns} | {covered} of {answers} ({share:.1} %) | {rms:.2} % | {half:.2} % | {none} |"
+        )
     }
 }
 
@@ -116,10 +122,19 @@ fn stiffness(rows: &[Row]) -> Summary {
     Summary::of(&rows.iter().map(|row| row.stiffness).collect::<Vec<_>>())
 }
 
-fn table(name: &str, rows: &[Row]) {
-    println!("{}", stiffness(rows).line(name, rows.len()));
+/// The header of docs/accuracy.md's tables of answers, after the name of the first column.
+const HEADER: &str =
+    "campaigns | covered | rms error | half width (median) | no answer |\n|---|---|---|---|---|---|";
+
+/// The rows of k_T and of c_T.
+fn lines(name: &str, rows: &[Row]) -> [String; 2] {
     let damping = Summary::of(&rows.iter().map(|row| row.damping).collect::<Vec<_>>());
-    println!("{}", damping.line(&format!("{name}: c_T"), rows.len()));
+    [stiffness(rows).line(name, rows.len()), damping.line(&format!("{name}: c_T"), rows.len())]
+}
+
+/// Prints a table where `cargo xtask accuracy` finds it.
+fn print_table(name: &str, header: &str, rows: &[String]) {
+    println!("table: {name}\n{header}\n{}\n", rows.join("\n"));
 }
 
 /// Takes what the simulator is known to be out of a campaign file.
@@ -180,9 +195,9 @@ fn slipping_and_stuck(first: u64, each: usize) -> [Vec<DrawnCampaign>; 2] {
 }
 
 #[test]
-#[ignore = "prints docs/accuracy.md's table of slipping contacts: half an hour"]
+#[ignore = "docs/accuracy.md, by `cargo xtask accuracy`: contacts that may slip"]
 fn a_contact_that_may_slip_has_its_stuck_stiffness_or_none() {
-    let kinds = slipping_and_stuck(count("FIRST", 400), count("EACH", 25) as usize);
+    let kinds = slipping_and_stuck(count("FIRST", 400), count("EACH", 50) as usize);
     let slipping_rigs: Vec<u64> = kinds[0].iter().map(|campaign| campaign.number).collect();
     let rows = each_of(&kinds.concat(), |campaign| {
         let row = told(campaign);
@@ -191,23 +206,23 @@ fn a_contact_that_may_slip_has_its_stuck_stiffness_or_none() {
     });
     let (slipping, stuck): (Vec<&Row>, Vec<&Row>) =
         rows.iter().partition(|row| slipping_rigs.contains(&row.rig));
-    println!(
-        "| contacts that | campaigns | called slipping | called stuck | not told | no k_T | the stuck k_T | another |"
-    );
+    let mut lines = Vec::new();
     for (name, rows) in [("slip", &slipping), ("stick", &stuck)] {
         let told = |slips| rows.iter().filter(|row| row.slips == slips).count();
         let none = rows.iter().filter(|row| row.stiffness.found.is_none()).count();
         let covered =
             rows.iter().filter(|row| row.stiffness.found.is_some() && row.stiffness.covers()).count();
-        println!(
+        lines.push(format!(
             "| {name} | {} | {} | {} | {} | {none} | {covered} | {} |",
             rows.len(),
             told(Some(true)),
             told(Some(false)),
             told(None),
             rows.len() - none - covered
-        );
+        ));
     }
+    let header = "| contacts that | campaigns | called slipping | called stuck | not told | no k_T | the stuck k_T covered | missed |\n|---|---|---|---|---|---|---|---|";
+    print_table("slip", header, &lines);
     let right = slipping.iter().filter(|row| row.slips == Some(true)).count()
         + stuck.iter().filter(|row| row.slips == Some(false)).count();
     assert!(20 * right >= 19 * rows.len(), "{rows:?}");
@@ -217,9 +232,9 @@ fn a_contact_that_may_slip_has_its_stuck_stiffness_or_none() {
 }
 
 #[test]
-#[ignore = "prints docs/accuracy.md's table of marks beside the contact: half an hour"]
+#[ignore = "docs/accuracy.md, by `cargo xtask accuracy`: marks beside the contact"]
 fn marks_beside_the_contact() {
-    let (first, rigs, seeds) = (count("FIRST", 100), count("RIGS", 12), count("SEEDS", 1));
+    let (first, rigs, seeds) = (count("FIRST", 100), count("RIGS", 24), count("SEEDS", 1));
     let like = Drawn { errors: 0.5, gain: 0.0, ..Drawn::default() };
     let plans: [(&str, Plan); 3] = [
         ("`contact.toml`: S1–S6; T1–T6 where B has a clamp", contact_plan),
@@ -227,37 +242,35 @@ fn marks_beside_the_contact() {
         ("S5 and S6 left out of these", near_instead_plan),
     ];
     let plans = plans.iter().enumerate().filter(|(n, _)| count("PLAN", *n as u64) == *n as u64);
+    let mut rows = Vec::new();
     for (_, (name, plan)) in plans {
         println!("{name}");
-        let rows = campaigns(first, rigs, seeds, like, |campaign| told_of(campaign, *plan));
-        println!("| points | campaigns | covered | rms error | half width (median) | no answer |");
-        table(name, &rows);
+        rows.extend(lines(name, &campaigns(first, rigs, seeds, like, |campaign| told_of(campaign, *plan))));
     }
+    print_table("marks", &format!("| points | {HEADER}"), &rows);
 }
 
 #[test]
-#[ignore = "prints docs/accuracy.md's tables: over an hour"]
+#[ignore = "docs/accuracy.md, by `cargo xtask accuracy`: the answer"]
 fn accuracy_of_the_contacts_own_stiffness() {
-    let (rigs, seeds) = (count("RIGS", 24), count("SEEDS", 3));
     let drawn = Drawn::default();
-    let mut tables = vec![
-        ("60–300 N/µm, default errors", 0, drawn),
-        ("60–300 N/µm, half of them, exact gains", 100, Drawn { errors: 0.5, gain: 0.0, ..drawn }),
-        ("60–600 N/µm, default errors", 200, Drawn { stiffest_n_per_m: 600e6, ..drawn }),
-        ("60–300 N/µm, gains of 1 %", 500, Drawn { gain: 0.01, ..drawn }),
-        ("60–300 N/µm, twice the errors, gains of 1 %", 300, Drawn { errors: 2.0, gain: 0.01, ..drawn }),
-        ("60–300 N/µm, next to no errors", 600, Drawn { errors: 0.02, gain: 0.0, ..drawn }),
+    // name, first rig, how it is drawn, campaigns of each rig
+    let mut kinds = vec![
+        ("default", 0, drawn, 3),
+        ("half of them, gains exact", 100, Drawn { errors: 0.5, gain: 0.0, ..drawn }, 3),
+        ("twice as large, gains of 1 %", 300, Drawn { errors: 2.0, gain: 0.01, ..drawn }, 3),
+        ("default, gains of 1 %", 500, Drawn { gain: 0.01, ..drawn }, 1),
+        ("default, contacts to 600 N/µm", 200, Drawn { stiffest_n_per_m: 600e6, ..drawn }, 1),
     ];
     // FIRST names the first rig of one of them
     if let Some(only) = std::env::var("FIRST").ok().map(|text| text.parse::<u64>().unwrap()) {
-        tables.retain(|(_, first, _)| *first == only);
+        kinds.retain(|(_, first, ..)| *first == only);
     }
-    let mut lines = Vec::new();
-    for (name, first, like) in tables {
-        lines.push((name, campaigns(first, rigs, seeds, like, told)));
-        println!("| errors | campaigns | covered | rms error | half width (median) | no answer |");
-        for (name, rows) in &lines {
-            table(name, rows);
-        }
+    let mut rows = Vec::new();
+    for (name, first, like, seeds) in kinds {
+        let told = campaigns(first, count("RIGS", 24), count("SEEDS", seeds), like, told);
+        rows.extend(lines(name, &told));
+        rows.iter().for_each(|row| println!("{row}"));
     }
+    print_table("contact", &format!("| errors | {HEADER}"), &rows);
 }

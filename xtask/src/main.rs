@@ -4,6 +4,7 @@
 //! test run, [`firmware`] builds for the microcontroller. The exit code is 0 when all went well, 1 when a step failed
 //! (the message says what, where and what to do), 2 for a command line that makes no sense.
 
+mod accuracy;
 mod bench;
 mod budgets;
 mod chromium;
@@ -88,6 +89,11 @@ enum Task {
     Sbom,
     /// Compare the numbers of spectra, universal files and virtual points with those of pyFRF, pyuff and pyFBS.
     Parity,
+    /// Run the campaigns whose truth is known (under two hours), and write the tables of docs/accuracy.md.
+    Accuracy {
+        /// Make these tables alone: contact, marks, slip, levels, between-arms, between-arms-campaigns, recommended, methods, fit.
+        tables: Vec<String>,
+    },
     /// Measure how fast everything is beside its peers and the machine's limit, and write docs/performance.md.
     Bench {
         /// Measure these parts alone, and write no page: spectra, substructuring, loops, universal, frames, simulator, campaign, growth.
@@ -128,6 +134,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Wheels => wheels::run(&project),
         Task::Sbom => sbom::run(&project),
         Task::Parity => parity::run(&project),
+        Task::Accuracy { tables } => accuracy::run(&project, &tables),
         Task::Bench { hot_paths: true, extra, .. } => bench::hot_paths(&project, &extra),
         Task::Bench { parts, .. } => bench::run(&project, &parts),
     }

@@ -1,0 +1,145 @@
+//! `cargo xtask accuracy`: runs the campaigns whose truth is known, and writes the tables of docs/accuracy.md.
+
+use crate::command;
+use crate::project::Project;
+use anyhow::{Context, Result, bail};
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::process::Stdio;
+use std::time::Instant;
+
+/// A test that prints a table.
+struct Source {
+    /// The table's name, in the page and in what the test prints.
+    table: &'static str,
+    package: &'static str,
+    target: &'static str,
+    test: &'static str,
+    /// Which of its parts the page shows.
+    part: Option<(&'static str, &'static str)>,
+}
+
+const fn source(
+    table: &'static str,
+    package: &'static str,
+    target: &'static str,
+    test: &'static str,
+) -> Source {
+    Source { table, package, target, test, part: None }
+}
+
+const SOURCES: [Source; 9] = [
+    source("contact", "jointrig-tests", "contact_accuracy", "accuracy_of_the_contacts_own_stiffness"),
+    Source {
+        part: Some(("PLAN", "1")),
+        ..source("marks", "jointrig-tests", "contact_accuracy", "marks_beside_the_contact")
+    },
+    source(
+        "slip",
+        "jointrig-tests",
+        "contact_accuracy",
+        "a_contact_that_may_slip_has_its_stuck_stiffness_or_none",
+    ),
+    source("levels", "jointrig-tests", "level_accuracy", "accuracy_of_the_shakers_levels"),
+    source("between-arms", "jointrig", "between_arms", "table_of_random_rigs"),
+    source(
+        "between-arms-campaigns",
+        "jointrig-tests",
+        "between_arms_accuracy",
+        "accuracy_of_the_stiffness_between_the_arms",
+    ),
+    source("recommended", "jointrig", "accuracy", "table_of_the_recommended"),
+    source("methods", "jointrig", "accuracy", "table_of_every_method"),
+    source("fit", "jointrig", "accuracy", "table_of_the_fit"),
+];
+
+/// Makes these tables, or all, and puts each in its place in the page.
+pub fn run(project: &Project, tables: &[String]) -> Result<()> {
+    if let Some(unknown) = tables.iter().find(|name| SOURCES.iter().all(|source| source.table != **name)) {
+        let known: Vec<&str> = SOURCES.iter().map(|source| source.table).collect();
+        bail!("there is no table `{unknown}`; those there are: {}", known.join(", "));
+    }
+    let page = project.root.join("docs/accuracy.md");
+    let wanted = |source: &&Source| tables.is_empty() || tables.iter().any(|name| name == source.table);
+    let mut failed = Vec::new();
+    for source in SOURCES.iter().filter(wanted) {
+        let begun = Instant::now();
+        let (table, passed) = printed(project, source)?;
+        let text = fs::read_to_string(&page).with_context(|| format!("{} cannot be read", page.display()))?;
+        fs::write(&page, placed(&text, source.table, &table)?)
+            .with_context(|| format!("{} cannot be written", page.display()))?;
+        println!("table `{}`: {:.0} s", source.table, begun.elapsed().as_secs_f64());
+        if !passed {
+            failed.push(source.table);
+        }
+    }
+    if !failed.is_empty() {
+        bail!("these tables do not show what they must, see above: {}", failed.join(", "));
+    }
+    Ok(())
+}
+
+/// Runs a test, shows what it prints, and returns its table and whether it passed.
+fn printed(project: &Project, source: &Source) -> Result<(String, bool)> {
+    let mut cargo = command::cargo(&project.root);
+    cargo.args(["test", "--release", "--package", source.package, "--test", source.target, "--"]);
+    cargo.args(["--ignored", "--exact", source.test, "--nocapture"]);
+    cargo.envs(source.part).stdout(Stdio::piped());
+    println!("  $ {}", command::line(&cargo));
+    let mut test = cargo.spawn().context("cargo cannot be started")?;
+    let mut lines = Vec::new();
+    for line in BufReader::new(test.stdout.take().context("the test's output is not there")?).lines() {
+        let line = line.context("the test's output is not text")?;
+        println!("{line}");
+        lines.push(line);
+    }
+    let passed = test.wait()?.success();
+    let table = table_in(&lines, source.table)
+        .with_context(|| format!("`{}` printed no table `{}`", source.test, source.table))?;
+    Ok((table, passed))
+}
+
+/// The rows after the line that names the table.
+fn table_in(lines: &[String], name: &str) -> Option<String> {
+    // the test's own name may stand before it on the same line
+    let named = |line: &String| line.split_once("table: ").is_some_and(|(_, rest)| rest == name);
+    let from = lines.iter().position(named)? + 1;
+    let rows: Vec<&str> =
+        lines[from..].iter().map(String::as_str).take_while(|line| line.starts_with('|')).collect();
+    (rows.len() > 2).then(|| rows.join("\n"))
+}
+
+/// The page with the table in its place.
+fn placed(page: &str, name: &str, table: &str) -> Result<String> {
+    let (begin, end) = (format!("<!-- table: {name} -->\n"), "<!-- end of table -->");
+    let from = page.find(&begin).with_context(|| format!("docs/accuracy.md has no place for `{name}`"))?;
+    let from = from + begin.len();
+    let to = page[from..].find(end).with_context(|| format!("the place for `{name}` has no end"))?;
+    Ok(format!("{}\n{table}\n\n{}", &page[..from], &page[from + to..]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{SOURCES, placed, table_in};
+
+    #[test]
+    fn a_table_is_found_and_put_in_its_place() {
+        let lines = ["rig 1: 180", "test some ... table: b", "| x |", "|---|", "| 1 |", "", "| no |"];
+        let table = table_in(&lines.map(str::to_owned), "b").unwrap();
+        assert_eq!(table, "| x |\n|---|\n| 1 |");
+        assert_eq!(table_in(&lines.map(str::to_owned), "c"), None);
+        let page = "one\n<!-- table: b -->\nold\n<!-- end of table -->\ntwo\n";
+        let new = placed(page, "b", &table).unwrap();
+        assert_eq!(new, "one\n<!-- table: b -->\n\n| x |\n|---|\n| 1 |\n\n<!-- end of table -->\ntwo\n");
+        assert_eq!(placed(&new, "b", &table).unwrap(), new);
+        assert!(placed(page, "c", &table).is_err());
+    }
+
+    #[test]
+    fn the_page_has_a_place_for_every_table() {
+        let page = include_str!("../../docs/accuracy.md");
+        for source in &SOURCES {
+            assert!(placed(page, source.table, "| |").is_ok(), "{}", source.table);
+        }
+    }
+}
