@@ -270,7 +270,7 @@ fn accuracy_of_the_contacts_own_stiffness() {
     for (name, first, like, seeds) in kinds {
         let told = campaigns(first, count("RIGS", 24), count("SEEDS", seeds), like, told);
         rows.extend(lines(name, &told));
-        rows.iter().for_each(|row| println!("{row}"));
+        println!("{}", rows.join("\n"));
     }
     print_table("contact", &format!("| errors | {HEADER}"), &rows);
 }
