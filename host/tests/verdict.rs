@@ -34,7 +34,12 @@ impl Verdict {
 
     fn direct(&self) -> f64 {
         let row = self.results.joint.iter().find(|j| j.method == DIRECT).expect("T and Δx are there");
-        assert_eq!(row.band_hz, [250.0, 400.0].into());
+        // away from the specimen's local mode, wherever the clamp puts it
+        let mode = self.results.check(HIDDEN_RESONANCE).and_then(|check| check.frequency_hz);
+        assert!(
+            mode.is_none_or(|f| row.band_hz.low_hz > 1.2 * f || row.band_hz.high_hz < 0.8 * f),
+            "{row:?}"
+        );
         row.sliding_stiffness().expect("along z").mean
     }
 }

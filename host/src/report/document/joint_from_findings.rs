@@ -3,7 +3,7 @@
 use crate::analyse::{Findings, Row, Substructured};
 use crate::report::words::warning_sentences;
 use crate::results::{DIRECT, Goodness, Joint, JointSpectrum, Refusal, SpectrumCurve, rounded};
-use crate::substructuring::direct::{self, Direct};
+use crate::substructuring::direct::Direct;
 use crate::substructuring::fit::{self, Fitted};
 use crate::substructuring::{BandStatistic, Dof, JointRow};
 use std::collections::BTreeMap;
@@ -48,7 +48,7 @@ fn at_the_specimens(found: &Direct) -> Joint {
     let along_z = |s| BTreeMap::from([("z".to_owned(), s)]);
     Joint {
         method: DIRECT.into(),
-        band_hz: direct::BAND,
+        band_hz: found.band_hz,
         stiffness_n_per_m: along_z(found.stiffness_n_per_m),
         damping_n_s_per_m: along_z(found.damping_n_s_per_m),
         lines: found.lines,
