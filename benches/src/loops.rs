@@ -7,7 +7,7 @@ use jointrig::campaign::plan::level::{Held, Level};
 use jointrig::campaign::run::shaking::record;
 use jointrig::campaign::store::record_row::Samples;
 use jointrig::device::channels::ChannelMap;
-use jointrig::hysteresis::{Correction, LoopAnalysis, analyse, analyse_corrected};
+use jointrig::hysteresis::{Correction, LoopAnalysis, analyse_both};
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -78,7 +78,7 @@ fn both(map: &ChannelMap, samples: &Samples, level: &Level) -> Outcome<[LoopAnal
     let cells: Vec<(usize, f64)> = map.places(Role::LoadCell).into_iter().map(|place| (place, 1.0)).collect();
     let raw = record(map, &cells, samples, level)?;
     let correction = Correction { effective_mass_kg: MASS_KG, parallel_path: PATH };
-    Ok([analyse(&raw)?, analyse_corrected(&raw, &correction)?])
+    Ok(analyse_both(&raw, &correction)?)
 }
 
 /// The figures that both sides must agree in.

@@ -6,7 +6,7 @@ use super::cells_stage::Cells;
 use super::checks::{ContactChange, HiddenResonance, SeriesCompliance, at_the_specimens};
 use super::impact_loops::{self, ImpactLoop, ImpactLoops};
 use super::missing::Missing;
-use super::shaker_levels::{self, Analysed, RecordLoops};
+use super::shaker_levels::{self, RecordLoops};
 use super::specimen_curves::specimen_curves;
 use super::{arm_from_hits, chosen, hammer_slip, level_stiffness};
 use crate::contact::{ContactError, Joint, Known, Stiffness};
@@ -68,7 +68,9 @@ pub fn at_the_contact<M: Measurements>(
     let (geometry, sigma_per_s) = (measurements.geometry(), measurements.sigma_per_s());
     let (levels, complaints) = measurements.shaker_levels();
     let mut missing: Vec<Missing> = complaints.into_iter().map(Missing::Level).collect();
-    let (steady, no_loop) = shaker_levels::analysed(&levels);
+    let mut unfit = Vec::new();
+    let arm = known_arm(measurements, averages, &mut unfit);
+    let (steady, no_loop) = shaker_levels::analysed(&levels, arm.as_ref());
     missing.extend(no_loop);
 
     let by_impact = summed(averages, &mut missing);
@@ -83,7 +85,9 @@ pub fn at_the_contact<M: Measurements>(
         HiddenResonance::of(compliance.as_ref(), &in_groups(averages), &shaker_levels::swept(&levels))
             .with_phases(&frfs);
 
-    let arm = static_arm(measurements, averages, &steady, &mut missing);
+    missing.extend(unfit);
+    let parallel_path = measurements.known_contact().parallel_path.unwrap_or(0.0);
+    let arm = arm.or_else(|| from_levels(&shaker_levels::stuck(&steady), parallel_path));
     if arm.is_none() && !(steady.is_empty() && impact_loops.is_empty()) {
         missing.push(Missing::EffectiveMass);
     }
@@ -179,23 +183,20 @@ fn shown_impact<'a>(
     Some((name, point(name).map_or(1.0, |p| p.direction[2].signum()), sum))
 }
 
-/// What the force is corrected by: stated, or from hits on B alone, or from stuck levels.
-fn static_arm<M: Measurements>(
+/// What the force is corrected by, if the levels are not needed to tell it: stated, or from hits on B alone.
+fn known_arm<M: Measurements>(
     measurements: &M,
     averages: &[CellAverage],
-    steady: &[Analysed<'_>],
     missing: &mut Vec<Missing>,
 ) -> Option<Identified> {
     let known = measurements.known_contact();
-    let parallel_path = known.parallel_path.unwrap_or(0.0);
     if let Some(effective_mass_kg) = known.effective_mass_kg {
-        let correction = Correction { effective_mass_kg, parallel_path };
+        let correction = Correction { effective_mass_kg, parallel_path: known.parallel_path.unwrap_or(0.0) };
         return Some(Identified { correction, basis: Basis::Given, residual: 0.0 });
     }
     let geometry = measurements.geometry();
     let (points, at, sigma_per_s) = (&geometry.b, geometry.virtual_point_b_m, measurements.sigma_per_s());
     arm_from_hits::from_hits(averages, points, at, sigma_per_s, known.parallel_path, missing)
-        .or_else(|| from_levels(&shaker_levels::stuck(steady), parallel_path))
 }
 
 /// The signals of the hit whose slope is the middle of all, read once more.

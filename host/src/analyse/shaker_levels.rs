@@ -9,7 +9,9 @@ use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
 use crate::hysteresis::integration::open_record;
 use crate::hysteresis::static_arm::Identified;
 use crate::hysteresis::tones::Tones;
-use crate::hysteresis::{HysteresisRecord, LoopAnalysis, RelativeMotion, Shape, analyse, analyse_corrected};
+use crate::hysteresis::{
+    HysteresisRecord, LoopAnalysis, RelativeMotion, Shape, analyse, analyse_both, analyse_corrected,
+};
 use crate::results::{Backbone, ShakerLoop, rounded};
 
 /// A sweep's ends belong to the way up and the ramp down, Hz.
@@ -22,6 +24,8 @@ pub struct Analysed<'a> {
     pub level: &'a ShakerLevel,
     /// Its loops with the raw force.
     pub raw: LoopAnalysis,
+    /// With the force corrected, where the static arm was known beforehand.
+    pub corrected: Option<LoopAnalysis>,
     /// Its amplitudes.
     pub tones: Option<Tones>,
 }
@@ -39,12 +43,24 @@ pub struct RecordLoops {
     pub own: Option<level_stiffness::Outcome>,
 }
 
-/// Every steady level, analysed with the raw force; and those that give no loop.
-pub fn analysed(levels: &[ShakerLevel]) -> (Vec<Analysed<'_>>, Vec<Missing>) {
+/// Every steady level, analysed with the raw force, and with the corrected one where the static `arm` is known already; and those that
+/// give no loop.
+pub fn analysed<'a>(
+    levels: &'a [ShakerLevel],
+    arm: Option<&Identified>,
+) -> (Vec<Analysed<'a>>, Vec<Missing>) {
     let (mut found, mut missing) = (Vec::new(), Vec::new());
     for level in levels.iter().filter(|level| level.level.end_hz.is_none()) {
-        match analyse(&level.record) {
-            Ok(raw) => found.push(Analysed { level, raw, tones: Tones::of(&level.record).ok() }),
+        let both = arm.and_then(|arm| analyse_both(&level.record, &arm.correction).ok());
+        let loops = match both {
+            Some([raw, corrected]) => Ok((raw, Some(corrected))),
+            // a force that cannot be corrected has its raw loops
+            None => analyse(&level.record).map(|raw| (raw, None)),
+        };
+        match loops {
+            Ok((raw, corrected)) => {
+                found.push(Analysed { level, raw, corrected, tones: Tones::of(&level.record).ok() });
+            }
             Err(error) => missing.push(Missing::LevelLoop { level: level.level, error }),
         }
     }
@@ -75,14 +91,14 @@ pub fn loops(
     arm: Option<&Identified>,
     own: Vec<level_stiffness::Outcome>,
 ) -> Vec<RecordLoops> {
-    let corrected =
-        |one: &Analysed<'_>| arm.and_then(|arm| analyse_corrected(&one.level.record, &arm.correction).ok());
+    let late =
+        |level: &ShakerLevel| arm.and_then(|arm| analyse_corrected(&level.record, &arm.correction).ok());
     levels
         .into_iter()
         .zip(own)
         .map(|(one, own)| RecordLoops {
             level: Some((one.level.id, one.level.moment)),
-            corrected: corrected(&one),
+            corrected: one.corrected.or_else(|| late(one.level)),
             raw: one.raw,
             own: Some(own),
         })

@@ -38,7 +38,7 @@ fn wear_between_before_and_after_shows() {
             level(4, Moment::After, 300.0, after),
         ]
     };
-    let check = |levels: &[ShakerLevel]| ContactChange::of(&analysed(levels).0);
+    let check = |levels: &[ShakerLevel]| ContactChange::of(&analysed(levels, None).0);
     let same = check(&levels(179.0e6)).expect("pairs");
     assert_eq!((same.pairs, same.beyond), (2, 0), "{same:?}");
     let worn = check(&levels(150e6)).expect("pairs");
@@ -49,7 +49,7 @@ fn wear_between_before_and_after_shows() {
 #[test]
 fn raw_and_corrected_stand_side_by_side() {
     let levels = [level(7, Moment::Before, 250.0, 180e6)];
-    let (found, missing) = analysed(&levels);
+    let (found, missing) = analysed(&levels, None);
     assert!(missing.is_empty());
     assert_eq!(curves(&found).len(), 1);
     let correction = Correction { effective_mass_kg: 1.5, parallel_path: 0.01 };

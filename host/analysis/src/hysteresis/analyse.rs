@@ -4,7 +4,7 @@ use super::HysteresisError;
 use super::compliance::{ContactCompliance, ImaginaryPeak, SEARCH_HZ};
 use super::correction::Correction;
 use super::cycle::Cycle;
-use super::cycles::{Steady, Summed};
+use super::cycles::{Force, Steady, Summed};
 use super::finding::LoopFinding;
 use super::friction_harmonic::Quadratures;
 use super::hum;
@@ -109,7 +109,10 @@ const CLEAN_LINE: f64 = 0.95;
 /// # Errors
 /// [`HysteresisError`] when the signals do not fit together, nothing moves, or there is no whole cycle.
 pub fn analyse(record: &HysteresisRecord) -> Result<LoopAnalysis, HysteresisError> {
-    with(record, None)
+    match excitation(record)? {
+        Some(frequency_hz) => shaker(record, [None], frequency_hz).map(|[found]| found),
+        None => impact(record, &record.relative()),
+    }
 }
 
 /// As [`analyse`], with the force at the contact in place of the load cells' sum.
@@ -121,25 +124,38 @@ pub fn analyse_corrected(
     correction: &Correction,
 ) -> Result<LoopAnalysis, HysteresisError> {
     if record.excitation_hz.is_none() {
-        return with(&correction.applied(record), None);
+        return analyse(&correction.applied(record));
     }
     // a shaker's record is long: no second one is made of it
-    with(record, Some(correction))
+    let frequency_hz = excitation(record)?.ok_or(HysteresisError::NoMotion)?;
+    shaker(record, [Some(correction)], frequency_hz).map(|[found]| found)
 }
 
-fn with(record: &HysteresisRecord, correction: Option<&Correction>) -> Result<LoopAnalysis, HysteresisError> {
+/// What [`analyse`] and [`analyse_corrected`] say, in this order; the cycles of a shaker's record are cut once for both.
+///
+/// # Errors
+/// As [`analyse`].
+pub fn analyse_both(
+    record: &HysteresisRecord,
+    correction: &Correction,
+) -> Result<[LoopAnalysis; 2], HysteresisError> {
+    if record.excitation_hz.is_none() {
+        return Ok([analyse(record)?, analyse_corrected(record, correction)?]);
+    }
+    let frequency_hz = excitation(record)?.ok_or(HysteresisError::NoMotion)?;
+    shaker(record, [None, Some(correction)], frequency_hz)
+}
+
+/// The frequency of a steady record that is good; none of one that decays.
+fn excitation(record: &HysteresisRecord) -> Result<Option<f64>, HysteresisError> {
     record.check()?;
-    let frequency_hz = match record.excitation_hz {
-        Some(f) if f > 0.0 && f.is_finite() => Some(f),
-        Some(f) => return Err(HysteresisError::Excitation(f)),
+    match record.excitation_hz {
+        Some(f) if f > 0.0 && f.is_finite() => Ok(Some(f)),
+        Some(f) => Err(HysteresisError::Excitation(f)),
         None if is_steady(&record.force_n) => {
-            Some(dominant_frequency(&record.force_n, record.fs_hz).ok_or(HysteresisError::NoMotion)?)
+            dominant_frequency(&record.force_n, record.fs_hz).map(Some).ok_or(HysteresisError::NoMotion)
         }
-        None => None,
-    };
-    match frequency_hz {
-        Some(frequency_hz) => shaker(record, correction, frequency_hz),
-        None => impact(record, &record.relative()),
+        None => Ok(None),
     }
 }
 
@@ -182,120 +198,145 @@ fn late_at_least(quadratures: &Quadratures, frequency_hz: f64) -> Option<LoopFin
     })
 }
 
-fn shaker(
+/// A record's loops with each of these forces.
+fn shaker<const N: usize>(
     record: &HysteresisRecord,
-    correction: Option<&Correction>,
+    forces: [Force<'_>; N],
     frequency_hz: f64,
-) -> Result<LoopAnalysis, HysteresisError> {
+) -> Result<[LoopAnalysis; N], HysteresisError> {
     let (timing, off) = timing(record, frequency_hz);
-    let cycles = Steady::new(record, correction, timing)?;
+    let cycles = Steady::new(record, timing)?;
     let frequency_hz = timing.at(0.5 * record.force_n.len() as f64 / record.fs_hz);
-    let Summed { mean, mut slopes, mut energies, scatter } = cycles.summed();
-    if swing(&mean.displacement_m) == 0.0 || swing(&mean.force_n) == 0.0 {
+    let hum = hum::at_the_loop(record, frequency_hz);
+    let summed = cycles.summed(forces);
+    let still = |all: &Summed| swing(&all.mean.displacement_m) == 0.0 || swing(&all.mean.force_n) == 0.0;
+    if summed.iter().any(still) {
         return Err(HysteresisError::NoMotion);
     }
-    let mut findings: Vec<LoopFinding> = off.into_iter().collect();
-    let raw = OverCycles::of(&slopes).expect("Steady::new() gives at least one cycle");
-    let quadratures = Quadratures::of(&cycles, &mean);
-    let (shape, evidence) = shape(&mean, &scatter, quadratures);
-    let taken = OverCycles::of(&energies).expect("as many as slopes");
-    let reversed = is_reversed(&raw, &taken, 0.25 * swing(&mean.force_n) * swing(&mean.displacement_m));
-    if reversed {
-        findings.push(LoopFinding::ReversedForce { k_eq_n_per_m: raw.mean, energy_j: taken.mean });
-    } else if shape != Shape::GrossSlip {
-        findings.extend(quadratures.and_then(|q| late_at_least(&q, frequency_hz)));
-    }
-    findings.extend(hum::at_the_loop(record, frequency_hz));
-    let strokes = strokes(&mean);
-    let mut warnings = Vec::new();
-    let repair = if shape == Shape::GrossSlip && !reversed {
-        let (repair, said) = Repair::of(&mean, cycles.dt_s());
-        findings.extend(said);
-        repair
-    } else {
-        Repair::default()
-    };
-    if repair.is_late() {
-        let both = cycles.each(|cycle| {
-            let cycle = repair.in_step(cycle);
-            (equivalent_stiffness(&cycle), energy(&cycle))
-        });
-        (slopes, energies) = both.into_iter().unzip();
-    }
-    let k_eq = OverCycles::of(&slopes).expect("as many as there are cycles");
-    let friction = repair.friction(&mean);
-    let stick_part: Option<Part> = match shape {
-        Shape::Stuck | Shape::Elliptical => None,
-        Shape::Microslip => Some(first_part(&friction, &strokes)),
-        Shape::GrossSlip => Some(flank_part(&friction, &strokes)),
-    };
-    let k_t = match (shape, stick_part) {
-        _ if reversed => None,
-        (Shape::Stuck, _) => Some(k_eq),
-        (_, None) => {
-            warnings.push(
+    let steady = SteadyRecord { record, cycles, frequency_hz, off, hum };
+    let mut forces = forces.into_iter();
+    Ok(summed.map(|all| steady.loops(forces.next().flatten(), all)))
+}
+
+/// What the loops of a steady record have in common, whichever force they show.
+struct SteadyRecord<'a> {
+    record: &'a HysteresisRecord,
+    cycles: Steady<'a>,
+    frequency_hz: f64,
+    off: Option<LoopFinding>,
+    hum: Option<LoopFinding>,
+}
+
+impl SteadyRecord<'_> {
+    fn loops(&self, force: Force<'_>, summed: Summed) -> LoopAnalysis {
+        let Self { record, cycles, frequency_hz, off, hum } = self;
+        let frequency_hz = *frequency_hz;
+        let Summed { mean, mut slopes, mut energies, harmonics, of_mean, scatter } = summed;
+        let mut findings: Vec<LoopFinding> = off.iter().cloned().collect();
+        let raw = OverCycles::of(&slopes).expect("Steady::new() gives at least one cycle");
+        let quadratures = Quadratures::of(&of_mean, &harmonics);
+        let (shape, evidence) = shape(&mean, &scatter, quadratures);
+        let taken = OverCycles::of(&energies).expect("as many as slopes");
+        let reversed = is_reversed(&raw, &taken, 0.25 * swing(&mean.force_n) * swing(&mean.displacement_m));
+        if reversed {
+            findings.push(LoopFinding::ReversedForce { k_eq_n_per_m: raw.mean, energy_j: taken.mean });
+        } else if shape != Shape::GrossSlip {
+            findings.extend(quadratures.and_then(|q| late_at_least(&q, frequency_hz)));
+        }
+        findings.extend(hum.iter().cloned());
+        let strokes = strokes(&mean);
+        let mut warnings = Vec::new();
+        let repair = if shape == Shape::GrossSlip && !reversed {
+            let (repair, said) = Repair::of(&mean, cycles.dt_s());
+            findings.extend(said);
+            repair
+        } else {
+            Repair::default()
+        };
+        if repair.is_late() {
+            let both = cycles.each(force, |cycle| {
+                let cycle = repair.in_step(cycle);
+                (equivalent_stiffness(&cycle), energy(&cycle))
+            });
+            (slopes, energies) = both.into_iter().unzip();
+        }
+        let k_eq = OverCycles::of(&slopes).expect("as many as there are cycles");
+        let friction = repair.friction(&mean);
+        let stick_part: Option<Part> = match shape {
+            Shape::Stuck | Shape::Elliptical => None,
+            Shape::Microslip => Some(first_part(&friction, &strokes)),
+            Shape::GrossSlip => Some(flank_part(&friction, &strokes)),
+        };
+        let k_t = match (shape, stick_part) {
+            _ if reversed => None,
+            (Shape::Stuck, _) => Some(k_eq),
+            (_, None) => {
+                warnings.push(
                 "an ellipse without slip: something between the measured spots resonates near this frequency; its slope is no contact stiffness"
                     .into(),
             );
-            None
-        }
-        (_, Some(part)) => {
-            let read = |cycle: &Cycle| {
-                if bends(part) {
-                    tangent_at_reversal(cycle, &strokes)
+                None
+            }
+            (_, Some(part)) => {
+                let read = |cycle: &Cycle| {
+                    if bends(part) {
+                        tangent_at_reversal(cycle, &strokes)
+                    } else {
+                        slope_over(cycle, &strokes, part)
+                    }
+                };
+                let values: Vec<Option<f64>> = if repair.is_some() {
+                    cycles.each(force, |cycle| read(&repair.friction(cycle)))
                 } else {
-                    slope_over(cycle, &strokes, part)
-                }
-            };
-            let values: Vec<Option<f64>> = if repair.is_some() {
-                cycles.each(|cycle| read(&repair.friction(cycle)))
-            } else {
-                cycles.each(read)
-            };
-            let values: Vec<f64> = values.into_iter().flatten().collect();
-            if values.len() < slopes.len() {
-                warnings.push(format!(
+                    cycles.each(force, read)
+                };
+                let values: Vec<f64> = values.into_iter().flatten().collect();
+                if values.len() < slopes.len() {
+                    warnings.push(format!(
                     "{} of {} cycles have too few samples on the stick part: sample faster, or excite more slowly",
                     slopes.len() - values.len(),
                     slopes.len()
                 ));
+                }
+                let before = repair.is_some().then(|| read(&mean)).flatten();
+                OverCycles::of(&values).map(|k| widened(k, before, repair.unsure()))
             }
-            let before = repair.is_some().then(|| read(&mean)).flatten();
-            OverCycles::of(&values).map(|k| widened(k, before, repair.unsure()))
+        };
+        let mut friction_limit_n =
+            if shape == Shape::GrossSlip && !reversed { friction_limit(&friction, &strokes) } else { None };
+        if let (Some(limit), Some(k)) = (friction_limit_n, k_t)
+            && let Some(plateaus) = Plateaus::of(&friction, &strokes, k.mean, limit)
+            && plateaus.is_uneven()
+        {
+            findings.push(LoopFinding::UnevenLoad { change: plateaus.change, std: plateaus.std });
+            friction_limit_n = Some(plateaus.limit_n);
         }
-    };
-    let mut friction_limit_n =
-        if shape == Shape::GrossSlip && !reversed { friction_limit(&friction, &strokes) } else { None };
-    if let (Some(limit), Some(k)) = (friction_limit_n, k_t)
-        && let Some(plateaus) = Plateaus::of(&friction, &strokes, k.mean, limit)
-        && plateaus.is_uneven()
-    {
-        findings.push(LoopFinding::UnevenLoad { change: plateaus.change, std: plateaus.std });
-        friction_limit_n = Some(plateaus.limit_n);
+        let shown = repair.in_step(&mean);
+        LoopAnalysis {
+            kind: Kind::Shaker,
+            frequency_hz,
+            amplitude_m: 0.5 * swing(&mean.displacement_m),
+            force_amplitude_n: 0.5 * swing(&mean.force_n),
+            shape,
+            shape_evidence: Some(evidence),
+            k_t_n_per_m: k_t,
+            stick_part,
+            k_eq_n_per_m: k_eq,
+            energy_j: OverCycles::of(&energies),
+            k_secant_n_per_m: Some(secant_stiffness(&shown)),
+            k_fundamental_n_per_m: Some(fundamental_stiffness(&shown)),
+            friction_limit_n,
+            friction_coefficient: friction_limit_n
+                .zip(record.normal_load_n)
+                .map(|(limit, load)| limit / load),
+            phase_deg: evidence.phase_deg,
+            loop_displacement_m: mean.displacement_m,
+            loop_force_n: mean.force_n,
+            decay_cycles: Vec::new(),
+            findings,
+            warnings,
+        }
     }
-    let shown = repair.in_step(&mean);
-    Ok(LoopAnalysis {
-        kind: Kind::Shaker,
-        frequency_hz,
-        amplitude_m: 0.5 * swing(&mean.displacement_m),
-        force_amplitude_n: 0.5 * swing(&mean.force_n),
-        shape,
-        shape_evidence: Some(evidence),
-        k_t_n_per_m: k_t,
-        stick_part,
-        k_eq_n_per_m: k_eq,
-        energy_j: OverCycles::of(&energies),
-        k_secant_n_per_m: Some(secant_stiffness(&shown)),
-        k_fundamental_n_per_m: Some(fundamental_stiffness(&shown)),
-        friction_limit_n,
-        friction_coefficient: friction_limit_n.zip(record.normal_load_n).map(|(limit, load)| limit / load),
-        phase_deg: evidence.phase_deg,
-        loop_displacement_m: mean.displacement_m,
-        loop_force_n: mean.force_n,
-        decay_cycles: Vec::new(),
-        findings,
-        warnings,
-    })
 }
 
 /// Whether the force has the wrong sign: it falls where the contact is pushed, and the loop takes no energy. One beside a resonance

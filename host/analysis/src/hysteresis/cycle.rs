@@ -12,16 +12,7 @@ pub struct Cycle {
 }
 
 impl Cycle {
-    pub(super) fn zeros(points: usize) -> Self {
-        let zeros = || vec![0.0; points];
-        Self { displacement_m: zeros(), velocity_m_per_s: zeros(), force_n: zeros() }
-    }
-
     pub(super) fn signals(&self) -> [&[f64]; 3] {
         [&self.displacement_m, &self.velocity_m_per_s, &self.force_n]
-    }
-
-    pub(super) fn signals_mut(&mut self) -> [&mut Vec<f64>; 3] {
-        [&mut self.displacement_m, &mut self.velocity_m_per_s, &mut self.force_n]
     }
 }

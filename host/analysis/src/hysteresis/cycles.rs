@@ -6,6 +6,7 @@
 use super::HysteresisError;
 use super::correction::Correction;
 use super::cycle::Cycle;
+use super::harmonics::{Harmonics, Wheels};
 use super::integration::closed_cycle;
 use super::loops::energy;
 use super::record::{HysteresisRecord, RelativeMotion};
@@ -21,10 +22,12 @@ const FEWEST_SAMPLES: usize = 16;
 /// Cycles that are summed one after the other; fixed, so that rounding does not depend on the number of cores.
 const BLOCK: usize = 64;
 
+/// Which force a cycle holds: the load cells' sum, or that at the contact.
+pub(super) type Force<'a> = Option<&'a Correction>;
+
 /// All whole cycles of a steady record, each resampled to the same number of points: a period need not be a whole number of samples.
 pub(super) struct Steady<'a> {
     record: &'a HysteresisRecord,
-    correction: Option<&'a Correction>,
     timing: Timing,
     points: usize,
     cycles: usize,
@@ -38,6 +41,10 @@ pub(super) struct Summed {
     pub slopes: Vec<f64>,
     /// Loop area of each cycle, J.
     pub energies: Vec<f64>,
+    /// Harmonics of each cycle.
+    pub harmonics: Vec<Harmonics>,
+    /// Those of the average cycle.
+    pub of_mean: Harmonics,
     /// How the cycles scatter about their average.
     pub scatter: Scatter,
 }
@@ -63,36 +70,59 @@ type Products = [f64; 6];
 
 fn products(cycle: &Cycle) -> Products {
     let [x, v, t] = cycle.signals();
-    [dot(t, t), dot(x, x), dot(v, v), dot(x, t), dot(v, t), dot(x, v)]
+    with_force(of_motion(x, v), x, v, t)
 }
 
-/// One block of cycles, summed.
+/// xx, vv, xv.
+fn of_motion(x: &[f64], v: &[f64]) -> [f64; 3] {
+    [dot(x, x), dot(v, v), dot(x, v)]
+}
+
+fn with_force([xx, vv, xv]: [f64; 3], x: &[f64], v: &[f64], t: &[f64]) -> Products {
+    [dot(t, t), xx, vv, dot(x, t), dot(v, t), xv]
+}
+
+/// One block of cycles, summed with one force.
 struct Sums {
-    cycle: Cycle,
+    force_n: Vec<f64>,
     products: Products,
     slopes: Vec<f64>,
     energies: Vec<f64>,
+    harmonics: Vec<Harmonics>,
+}
+
+/// One block of cycles, summed with `N` forces.
+struct Block<const N: usize> {
+    displacement_m: Vec<f64>,
+    velocity_m_per_s: Vec<f64>,
+    forces: [Sums; N],
 }
 
 /// Memory of whoever cuts one cycle after the other.
 #[derive(Default)]
 struct Scratch {
     cycle: Cycle,
-    motion: Vec<f64>,
-    force: Vec<f64>,
+    samples: Vec<f64>,
+}
+
+/// Where a cycle lies in the record.
+struct Place {
+    /// The samples that it is interpolated from.
+    samples: Range<isize>,
+    /// Its first point, in samples after the first of these.
+    from: f64,
+    /// Samples from point to point.
+    step: f64,
+    /// The same, s.
+    dt_s: f64,
 }
 
 impl<'a> Steady<'a> {
-    /// The cycles of this timing in a record that [`HysteresisRecord::check`] found good, with the force at the contact if a
-    /// correction is given.
+    /// The cycles of this timing in a record that [`HysteresisRecord::check`] found good.
     ///
     /// # Errors
     /// When there is no whole cycle, or too few samples in one.
-    pub fn new(
-        record: &'a HysteresisRecord,
-        correction: Option<&'a Correction>,
-        timing: Timing,
-    ) -> Result<Self, HysteresisError> {
+    pub fn new(record: &'a HysteresisRecord, timing: Timing) -> Result<Self, HysteresisError> {
         let samples = record.force_n.len();
         let time_s = samples as f64 / record.fs_hz;
         let frequency_hz = timing.at(0.5 * time_s);
@@ -102,7 +132,7 @@ impl<'a> Steady<'a> {
         if cycles == 0 || points < FEWEST_SAMPLES {
             return Err(HysteresisError::NoCycle { frequency_hz, samples, points });
         }
-        Ok(Self { record, correction, timing, points, cycles })
+        Ok(Self { record, timing, points, cycles })
     }
 
     /// Time between the points of the average cycle, s.
@@ -110,36 +140,58 @@ impl<'a> Steady<'a> {
         self.timing.begin_s(self.cycles as f64) / (self.cycles * self.points) as f64
     }
 
-    /// `look` at every cycle, in order.
-    pub fn each<T: Send>(&self, look: impl Fn(&Cycle) -> T + Sync) -> Vec<T> {
+    /// `look` at every cycle with this force, in order.
+    pub fn each<T: Send>(&self, force: Force<'_>, look: impl Fn(&Cycle) -> T + Sync) -> Vec<T> {
         let blocks: Vec<Vec<T>> = self.blocks(|cycles| {
             let mut scratch = Scratch::default();
-            cycles.map(|cycle| look(self.cut(cycle, &mut scratch))).collect()
+            cycles
+                .map(|cycle| {
+                    let place = self.place(cycle);
+                    self.cut_motion(&place, &mut scratch);
+                    self.cut_force(&place, force, &mut scratch);
+                    look(&scratch.cycle)
+                })
+                .collect()
         });
         blocks.into_iter().flatten().collect()
     }
 
-    /// What all of them give together.
-    pub fn summed(&self) -> Summed {
-        let blocks = self.blocks(|cycles| self.sum(cycles));
-        let mut mean = Cycle::zeros(self.points);
-        let (mut all, mut slopes, mut energies) = ([0.0; 6], Vec::new(), Vec::new());
+    /// What all of them give together, with each of these forces: the motion is cut once for all.
+    pub fn summed<const N: usize>(&self, forces: [Force<'_>; N]) -> [Summed; N] {
+        let wheels = Wheels::new(self.points);
+        let blocks = self.blocks(|cycles| self.sum(cycles, &forces, &wheels));
+        let zeros = || vec![0.0; self.points];
+        let mut motion = [zeros(), zeros()];
+        let mut sums: [Sums; N] = std::array::from_fn(|_| Sums::none(self.points));
         for block in blocks {
-            add(&mut mean, &block.cycle);
-            all.iter_mut().zip(block.products).for_each(|(sum, own)| *sum += own);
-            slopes.extend(block.slopes);
-            energies.extend(block.energies);
-        }
-        let n = self.cycles as f64;
-        for x in mean.signals_mut() {
-            for value in x {
-                *value /= n;
+            add(&mut motion[0], &block.displacement_m);
+            add(&mut motion[1], &block.velocity_m_per_s);
+            for (sum, own) in sums.iter_mut().zip(block.forces) {
+                add(&mut sum.force_n, &own.force_n);
+                sum.products.iter_mut().zip(own.products).for_each(|(sum, own)| *sum += own);
+                sum.slopes.extend(own.slopes);
+                sum.energies.extend(own.energies);
+                sum.harmonics.extend(own.harmonics);
             }
         }
-        let of_mean = products(&mean);
-        let points = self.points as f64;
-        let apart = std::array::from_fn(|i| (all[i] / n - of_mean[i]) / points);
-        Summed { mean, slopes, energies, scatter: Scatter { cycles: self.cycles, products: apart } }
+        let n = self.cycles as f64;
+        let mean = |sum: &[f64]| sum.iter().map(|value| value / n).collect::<Vec<_>>();
+        sums.map(|Sums { force_n, products: all, slopes, energies, harmonics }| {
+            let mean = Cycle {
+                displacement_m: mean(&motion[0]),
+                velocity_m_per_s: mean(&motion[1]),
+                force_n: mean(&force_n),
+            };
+            let common = products(&mean);
+            let points = self.points as f64;
+            let apart = std::array::from_fn(|i| (all[i] / n - common[i]) / points);
+            let scatter = Scatter { cycles: self.cycles, products: apart };
+            let of_mean = Harmonics {
+                displacement: wheels.harmonics(&mean.displacement_m),
+                force: wheels.harmonics(&mean.force_n),
+            };
+            Summed { mean, slopes, energies, harmonics, of_mean, scatter }
+        })
     }
 
     fn blocks<T: Send>(&self, work: impl Fn(Range<usize>) -> T + Sync) -> Vec<T> {
@@ -147,62 +199,102 @@ impl<'a> Steady<'a> {
         (0..self.cycles.div_ceil(BLOCK)).into_par_iter().map(block).collect()
     }
 
-    fn sum(&self, cycles: Range<usize>) -> Sums {
+    fn sum<const N: usize>(
+        &self,
+        cycles: Range<usize>,
+        forces: &[Force<'_>; N],
+        wheels: &Wheels,
+    ) -> Block<N> {
         let mut scratch = Scratch::default();
-        let cycle = Cycle::zeros(self.points);
-        let mut sums = Sums { cycle, products: [0.0; 6], slopes: Vec::new(), energies: Vec::new() };
+        let mut block = Block {
+            displacement_m: vec![0.0; self.points],
+            velocity_m_per_s: vec![0.0; self.points],
+            forces: std::array::from_fn(|_| Sums::none(self.points)),
+        };
         for cycle in cycles {
-            let cycle = self.cut(cycle, &mut scratch);
-            let own = products(cycle);
-            let [_, xx, _, xt, _, _] = own;
-            // both have no mean
-            sums.slopes.push(xt / xx);
-            sums.energies.push(energy(cycle));
-            sums.products.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
-            add(&mut sums.cycle, cycle);
+            let place = self.place(cycle);
+            self.cut_motion(&place, &mut scratch);
+            let [x, v, _] = scratch.cycle.signals();
+            let motion = of_motion(x, v);
+            let of_x = wheels.harmonics(x);
+            add(&mut block.displacement_m, x);
+            add(&mut block.velocity_m_per_s, v);
+            for (sums, force) in block.forces.iter_mut().zip(forces) {
+                self.cut_force(&place, *force, &mut scratch);
+                let [x, v, t] = scratch.cycle.signals();
+                let own = with_force(motion, x, v, t);
+                let [_, xx, _, xt, _, _] = own;
+                // both have no mean
+                sums.slopes.push(xt / xx);
+                sums.energies.push(energy(&scratch.cycle));
+                sums.harmonics.push(Harmonics { displacement: of_x, force: wheels.harmonics(t) });
+                sums.products.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+                add(&mut sums.force_n, t);
+            }
         }
-        sums
+        block
     }
 
-    /// Cycle number `cycle`.
-    fn cut<'s>(&self, cycle: usize, scratch: &'s mut Scratch) -> &'s Cycle {
-        let Scratch { cycle: cut, motion, force } = scratch;
+    /// Where cycle number `cycle` lies.
+    fn place(&self, cycle: usize) -> Place {
         let [begin_s, end_s] = [0.0, 1.0].map(|more| self.timing.begin_s(cycle as f64 + more));
         let (begin, period) = (begin_s * self.record.fs_hz, (end_s - begin_s) * self.record.fs_hz);
-        let dt_s = (end_s - begin_s) / self.points as f64;
         // a cubic takes one sample before and two after
         let first = begin.floor() as isize - 1;
-        let end = (begin + period).floor() as isize + 3;
-        self.record.relative_motion(first..end, motion);
-        match self.correction {
-            None => self.record.force(first..end, force),
-            Some(correction) => correction.force(self.record, first..end, force),
+        Place {
+            samples: first..(begin + period).floor() as isize + 3,
+            from: begin - first as f64,
+            step: period / self.points as f64,
+            dt_s: (end_s - begin_s) / self.points as f64,
         }
-        let from = begin - first as f64;
-        let step = period / self.points as f64;
-        resample([motion, force], from, step, self.points, [&mut cut.velocity_m_per_s, &mut cut.force_n]);
+    }
+
+    /// A cycle's displacement and velocity.
+    fn cut_motion(&self, place: &Place, scratch: &mut Scratch) {
+        let Scratch { cycle: cut, samples } = scratch;
+        self.record.relative_motion(place.samples.clone(), samples);
+        resample(samples, place, self.points, &mut cut.velocity_m_per_s);
         centre(&mut cut.velocity_m_per_s);
-        centre(&mut cut.force_n);
         match self.record.motion {
             RelativeMotion::Velocity { .. } => {
-                closed_cycle(&cut.velocity_m_per_s, dt_s, &mut cut.displacement_m);
+                closed_cycle(&cut.velocity_m_per_s, place.dt_s, &mut cut.displacement_m);
             }
             RelativeMotion::Displacement { .. } => {
                 std::mem::swap(&mut cut.velocity_m_per_s, &mut cut.displacement_m);
                 let (x, n) = (&cut.displacement_m, self.points);
                 cut.velocity_m_per_s.clear();
-                let slope = |j: usize| (x[(j + 1) % n] - x[(j + n - 1) % n]) / (2.0 * dt_s);
+                let slope = |j: usize| (x[(j + 1) % n] - x[(j + n - 1) % n]) / (2.0 * place.dt_s);
                 cut.velocity_m_per_s.extend((0..n).map(slope));
             }
         }
-        cut
+    }
+
+    /// Its force.
+    fn cut_force(&self, place: &Place, force: Force<'_>, scratch: &mut Scratch) {
+        let Scratch { cycle: cut, samples } = scratch;
+        match force {
+            None => self.record.force(place.samples.clone(), samples),
+            Some(correction) => correction.force(self.record, place.samples.clone(), samples),
+        }
+        resample(samples, place, self.points, &mut cut.force_n);
+        centre(&mut cut.force_n);
     }
 }
 
-fn add(sum: &mut Cycle, cycle: &Cycle) {
-    for (sum, x) in sum.signals_mut().into_iter().zip(cycle.signals()) {
-        sum.iter_mut().zip(x).for_each(|(sum, value)| *sum += value);
+impl Sums {
+    fn none(points: usize) -> Self {
+        Sums {
+            force_n: vec![0.0; points],
+            products: [0.0; 6],
+            slopes: Vec::new(),
+            energies: Vec::new(),
+            harmonics: Vec::new(),
+        }
     }
+}
+
+fn add(sum: &mut [f64], own: &[f64]) {
+    sum.iter_mut().zip(own).for_each(|(sum, value)| *sum += value);
 }
 
 fn centre(x: &mut [f64]) {
@@ -212,17 +304,14 @@ fn centre(x: &mut [f64]) {
     }
 }
 
-/// Both signals at `points` places from sample `from` on, `step` samples apart, by cubic (Catmull–Rom) interpolation.
+/// A signal at the `points` places of a cycle, by cubic (Catmull–Rom) interpolation of its samples `x`.
 ///
 /// A step is one sample but for a fraction, so that the place between two samples is the same but for a slow drift: only where
 /// that passes a sample, runs of equal whole steps end.
-fn resample(signals: [&[f64]; 2], from: f64, step: f64, points: usize, to: [&mut Vec<f64>; 2]) {
+fn resample(x: &[f64], &Place { from, step, .. }: &Place, points: usize, to: &mut Vec<f64>) {
     let drift = step - 1.0;
-    let [to_a, to_b] = to;
-    for to in [&mut *to_a, &mut *to_b] {
-        to.clear();
-        to.resize(points, 0.0);
-    }
+    to.clear();
+    to.resize(points, 0.0);
     let mut done = 0;
     while done < points {
         let at = from + done as f64 * step;
@@ -231,9 +320,7 @@ fn resample(signals: [&[f64]; 2], from: f64, step: f64, points: usize, to: [&mut
         let run = if drift > 0.0 { (1.0 - t) / drift } else { t / -drift };
         // the first point may lie on a sample and drift down from it
         let run = (run.min(points as f64) as usize).clamp(1, points - done);
-        for (x, to) in signals.into_iter().zip([&mut *to_a, &mut *to_b]) {
-            cubic(&x[i - 1..i + run + 2], t, drift, &mut to[done..done + run]);
-        }
+        cubic(&x[i - 1..i + run + 2], t, drift, &mut to[done..done + run]);
         done += run;
     }
 }
@@ -264,11 +351,12 @@ mod tests {
         let parabola = |at: f64| 3.0 - 2.0 * at + 0.25 * at * at;
         let x: Vec<f64> = (0..64).map(|i| parabola(f64::from(i))).collect();
         for (from, step) in [(1.0, 1.0), (1.3, 1.0), (1.0, 0.98), (1.02, 0.97), (1.99, 1.03), (1.5, 1.01)] {
-            let (mut a, mut b) = (Vec::new(), Vec::new());
-            resample([&x, &x], from, step, 58, [&mut a, &mut b]);
-            for (j, (a, b)) in a.iter().zip(&b).enumerate() {
+            let place = Place { samples: 0..64, from, step, dt_s: 1.0 };
+            let mut found = Vec::new();
+            resample(&x, &place, 58, &mut found);
+            for (j, found) in found.iter().enumerate() {
                 let expected = parabola(from + j as f64 * step);
-                assert!((a - expected).abs() < 1e-9 && a == b, "{from} {step} {j}: {a} for {expected}");
+                assert!((found - expected).abs() < 1e-9, "{from} {step} {j}: {found} for {expected}");
             }
         }
     }

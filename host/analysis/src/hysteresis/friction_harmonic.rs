@@ -5,11 +5,9 @@
 //! in quadrature tells microslip from damping at energies where the loop's residual from an ellipse is still lost in what
 //! instruments may bend.
 
-use super::cycle::Cycle;
-use super::cycles::Steady;
+use super::harmonics::Harmonics;
 use num_complex::Complex;
 use serde::Serialize;
-use std::f64::consts::TAU;
 
 /// A scatter needs some cycles.
 const FEWEST_CYCLES: usize = 4;
@@ -37,23 +35,20 @@ pub struct Quadratures {
 }
 
 impl Quadratures {
-    /// Of all cycles; none for few, or where nothing moves.
-    pub(super) fn of(cycles: &Steady<'_>, mean: &Cycle) -> Option<Self> {
-        let points = mean.force_n.len();
-        let wheel: Vec<Complex<f64>> = (0..points)
-            .map(|i| Complex::from_polar(2.0 / points as f64, -TAU * i as f64 / points as f64))
-            .collect();
-        let [x1, _, t1, _] = harmonics(mean, &wheel);
+    /// Of the harmonics of the average cycle and of each; none for few, or where nothing moves.
+    pub(super) fn of(mean: &Harmonics, cycles: &[Harmonics]) -> Option<Self> {
+        let ([x1, _], [t1, _]) = (mean.displacement, mean.force);
         let turn = Complex::from_polar(1.0, -x1.arg());
         let (cube, stiffness, force) = (turn.powi(3), (t1 / x1).re, t1.norm());
         if !stiffness.is_finite() || force <= 0.0 {
             return None;
         }
         // both noises count: that of Δx, raised by integration, is the larger one
-        let own = cycles.each(|cycle| {
-            let [x1, x3, t1, t3] = harmonics(cycle, &wheel);
+        let quadratures = |own: &Harmonics| {
+            let ([x1, x3], [t1, t3]) = (own.displacement, own.force);
             [((t1 - x1 * stiffness) * turn).im / force, ((t3 - x3 * stiffness) * cube).im / force]
-        });
+        };
+        let own: Vec<[f64; 2]> = cycles.iter().map(quadratures).collect();
         if own.len() < FEWEST_CYCLES {
             return None;
         }
@@ -78,17 +73,4 @@ impl Quadratures {
             && self.first > 0.0
             && self.friction_share() > SHARE
     }
-}
-
-/// First and third harmonic of Δx, and of T.
-fn harmonics(cycle: &Cycle, wheel: &[Complex<f64>]) -> [Complex<f64>; 4] {
-    let mut sums = [Complex::default(); 4];
-    for (i, (x, t)) in cycle.displacement_m.iter().zip(&cycle.force_n).enumerate() {
-        let (once, thrice) = (wheel[i], wheel[3 * i % wheel.len()]);
-        sums[0] += once * x;
-        sums[1] += thrice * x;
-        sums[2] += once * t;
-        sums[3] += thrice * t;
-    }
-    sums
 }

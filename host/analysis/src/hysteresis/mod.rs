@@ -20,6 +20,7 @@ pub mod finding;
 pub mod first_cycle;
 pub mod friction_harmonic;
 pub mod hammer_slip;
+mod harmonics;
 pub mod hit_response;
 mod hum;
 pub mod impact;
@@ -40,7 +41,7 @@ mod sums;
 mod timing;
 pub mod tones;
 
-pub use analyse::{Kind, LoopAnalysis, analyse, analyse_corrected};
+pub use analyse::{Kind, LoopAnalysis, analyse, analyse_both, analyse_corrected};
 pub use correction::Correction;
 pub use finding::LoopFinding;
 pub use loops::OverCycles;

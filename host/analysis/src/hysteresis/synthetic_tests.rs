@@ -145,6 +145,20 @@ fn displacements_serve_as_well_as_velocities_and_a_steady_record_needs_no_freque
 }
 
 #[test]
+fn both_forces_at_once_say_what_each_says_alone() {
+    let correction = Correction { effective_mass_kg: 1.56, parallel_path: 0.0133 };
+    let slipping = record(&[(180e6, 150.0)], 4e-6, 80.0, 0.0);
+    let stuck = record(&[(180e6, f64::INFINITY)], 2e-7, 251.3, 3e3);
+    let steady_without_frequency = HysteresisRecord { excitation_hz: None, ..slipping.clone() };
+    for record in [slipping, stuck, steady_without_frequency] {
+        let [raw, corrected] = analyse_both(&record, &correction).expect("loops");
+        assert_eq!(raw, analyse(&record).expect("a loop"));
+        assert_eq!(corrected, analyse_corrected(&record, &correction).expect("a loop"));
+        assert!(raw.k_eq_n_per_m != corrected.k_eq_n_per_m);
+    }
+}
+
+#[test]
 fn broken_records_are_refused_with_the_reason() {
     let good = record(&[(180e6, 150.0)], 4e-6, 80.0, 0.0);
     let refuse = |edit: &dyn Fn(&mut HysteresisRecord)| {
