@@ -20,14 +20,13 @@ const MOST_OF_A_PATH: usize = 60;
 /// Marks a record as one of ours ("JRIG").
 const MAGIC: u32 = 0x4A52_4947;
 
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct Record {
-    magic: u32,
-    length: u32,
-    text: [u8; SENTENCE_BYTES],
-    sum: u32,
-}
+/// The last words: [`MAGIC`], their length, their bytes and a check sum, all in words. A volatile access to each byte would be an instruction
+/// of its own: as bytes this took 2 kB of flash.
+type Record = [u32; RECORD_WORDS];
+/// Words of a sentence.
+const TEXT_WORDS: usize = SENTENCE_BYTES / 4;
+const RECORD_WORDS: usize = TEXT_WORDS + 3;
+const _: () = assert!(SENTENCE_BYTES.is_multiple_of(4));
 
 #[derive(Clone, Copy)]
 #[repr(C)]
@@ -53,34 +52,36 @@ pub struct Start {
     pub boot: u32,
 }
 
-// SAFETY of the section: both types are plain numbers, of which any bytes are a value; nothing reads them as
+// SAFETY of the section: both are plain numbers, of which any bytes are a value; nothing reads them as
 // initialised before they were checked.
 #[unsafe(link_section = ".uninit.jointrig_panic")]
 static mut RECORD: MaybeUninit<Record> = MaybeUninit::uninit();
 #[unsafe(link_section = ".uninit.jointrig_starts")]
 static mut STARTS: MaybeUninit<Starts> = MaybeUninit::uninit();
 
-impl Record {
-    fn sum_of(&self) -> u32 {
-        // FNV-1a: noise that passes both this and the magic is a matter of 2^-64
-        let bytes =
-            self.text.iter().chain(&self.length.to_le_bytes()).copied().collect::<heapless::Vec<u8, 128>>();
-        bytes.iter().fold(0x811C_9DC5, |sum, byte| (sum ^ u32::from(*byte)).wrapping_mul(0x0100_0193))
-    }
+/// FNV-1a by words: noise that passes both this and the magic is a matter of 2^-64.
+fn sum_of(record: &Record) -> u32 {
+    record[1..RECORD_WORDS - 1]
+        .iter()
+        .fold(0x811C_9DC5, |sum, word| (sum ^ word).rotate_left(5).wrapping_mul(0x0100_0193))
 }
 
 /// Says what the last run's panic said, once.
 pub fn take_panic() -> Option<String<SENTENCE_BYTES>> {
-    // SAFETY: called first of all in `main`, before any task or interrupt that could panic runs; the volatile
-    // read takes whatever bytes are there, and all bytes are a `Record`.
-    let record = unsafe { addr_of!(RECORD).cast::<Record>().read_volatile() };
+    let mut record = [0; RECORD_WORDS];
+    let kept = addr_of_mut!(RECORD).cast::<u32>();
+    for (place, word) in record.iter_mut().enumerate() {
+        // SAFETY: called first of all in `main`, before any task or interrupt that could panic runs; the volatile
+        // read takes whatever is there, inside the record, and any bytes are a word.
+        *word = unsafe { kept.add(place).read_volatile() };
+    }
     // SAFETY: as above; a record is told once.
-    unsafe { addr_of_mut!(RECORD).cast::<u32>().write_volatile(0) };
-    if record.magic != MAGIC || record.sum != record.sum_of() {
+    unsafe { kept.write_volatile(0) };
+    if record[0] != MAGIC || record[RECORD_WORDS - 1] != sum_of(&record) {
         return None;
     }
-    let text = core::str::from_utf8(record.text.get(..record.length as usize)?).ok()?;
-    String::try_from(text).ok()
+    let words = record[2..2 + TEXT_WORDS].iter().flat_map(|word| word.to_le_bytes());
+    String::from_utf8(words.take(record[1] as usize).collect()).ok()
 }
 
 /// Why this start is, once: the flags are cleared, so that the next start tells its own (RM0456, "RCC control/status register",
@@ -130,11 +131,16 @@ fn end(what: &Sentence) -> ! {
     cortex_m::interrupt::disable();
     pac::TIM1.bdtr().modify(|w| w.set_moe(false));
     let text = what.as_str().as_bytes();
-    let mut record = Record { magic: MAGIC, length: text.len() as u32, text: [0; SENTENCE_BYTES], sum: 0 };
-    record.text.iter_mut().zip(text).for_each(|(place, byte)| *place = *byte);
-    record.sum = record.sum_of();
-    // SAFETY: interrupts are off and nothing returns from here, so that nobody else uses the record.
-    unsafe { addr_of_mut!(RECORD).cast::<Record>().write_volatile(record) };
+    let mut record = [0; RECORD_WORDS];
+    (record[0], record[1]) = (MAGIC, text.len() as u32);
+    for (place, byte) in text.iter().enumerate() {
+        record[2 + place / 4] |= u32::from(*byte) << (8 * (place % 4));
+    }
+    record[RECORD_WORDS - 1] = sum_of(&record);
+    for (place, word) in record.iter().enumerate() {
+        // SAFETY: interrupts are off and nothing returns from here, so that nobody else uses the record; inside it.
+        unsafe { addr_of_mut!(RECORD).cast::<u32>().add(place).write_volatile(*word) };
+    }
     cortex_m::asm::dsb();
     SCB::sys_reset()
 }
