@@ -6,18 +6,11 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_usb::class::cdc_acm::{CdcAcmClass, State};
 use embassy_usb::driver::Driver;
-use embassy_usb::msos::{
-    CompatibleIdFeatureDescriptor, PropertyData, RegistryPropertyFeatureDescriptor, windows_version,
-};
 use embassy_usb::{Builder, Config, Handler, UsbDevice};
 use jointrig_protocol::usb::{INTERFACE_CLASS, PRODUCT, PRODUCT_ID, VENDOR_ID};
 
 use super::link::{Bulk, Choice, Sink, Source};
-
-/// The request by which Windows asks for the descriptors that are its own.
-pub const VENDOR_CODE: u8 = 0x4A;
-/// By which a Windows program finds the vendor interface.
-pub const INTERFACE_GUID: &str = "{6C1E3B6A-58F0-4C4B-9D0E-6A2F1B7D9E35}";
+use super::windows::{self, Windows};
 
 /// What the bus came up at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,11 +37,11 @@ impl Speed {
 pub struct Buffers<'d> {
     config: [u8; 192],
     bos: [u8; 64],
-    msos: [u8; 256],
     control: [u8; 128],
     serial_port: State<'d>,
     choice: Choice,
     suspension: Option<Suspension<'d>>,
+    windows: Windows,
 }
 
 /// Tells the link that the bus was suspended.
@@ -75,7 +68,6 @@ impl Buffers<'_> {
         Self {
             config: [0; 192],
             bos: [0; 64],
-            msos: [0; 256],
             control: [0; 128],
             serial_port: State::new(),
             choice: Choice {
@@ -84,6 +76,7 @@ impl Buffers<'_> {
                 suspended: Signal::<CriticalSectionRawMutex, ()>::new(),
             },
             suspension: None,
+            windows: Windows,
         }
     }
 }
@@ -110,26 +103,22 @@ pub fn build<'d, D: Driver<'d>>(
     config.product = Some(PRODUCT);
     config.serial_number = Some(serial);
     config.max_power = 500;
-    let Buffers { config: configuration, bos, msos, control, serial_port, choice, suspension } = buffers;
+    let Buffers { config: configuration, bos, control, serial_port, choice, suspension, windows } = buffers;
     let choice: &Choice = choice;
-    let mut builder = Builder::new(driver, config, configuration, bos, msos, control);
-    builder.msos_descriptor(windows_version::WIN8_1, VENDOR_CODE);
+    let mut builder = Builder::new(driver, config, configuration, bos, &mut [], control);
 
     let packet = speed.bulk_packet();
     let (out, into) = {
         let mut function = builder.function(INTERFACE_CLASS, 0, 0);
-        function.msos_feature(CompatibleIdFeatureDescriptor::new("WINUSB", ""));
-        function.msos_feature(RegistryPropertyFeatureDescriptor::new(
-            "DeviceInterfaceGUIDs",
-            PropertyData::RegMultiSz(&[INTERFACE_GUID]),
-        ));
         let mut interface = function.interface();
         let mut alternate = interface.alt_setting(INTERFACE_CLASS, 0, 0, None);
+        alternate.bos_capability(windows::PLATFORM, &windows::CAPABILITY);
         (alternate.endpoint_bulk_out(None, packet), alternate.endpoint_bulk_in(None, packet))
     };
     let (sender, receiver) = CdcAcmClass::new(&mut builder, serial_port, packet).split();
 
     builder.handler(suspension.insert(Suspension(choice)));
+    builder.handler(windows);
     Usb {
         device: builder.build(),
         source: Source::new(Bulk(out), receiver, choice),

@@ -19,6 +19,8 @@
 mod device;
 mod link;
 pub mod mended;
+mod windows;
 
-pub use device::{Buffers, INTERFACE_GUID, Speed, Usb, VENDOR_CODE, build};
+pub use device::{Buffers, Speed, Usb, build};
 pub use link::{Sink, Source};
+pub use windows::{INTERFACE_GUID, VENDOR_CODE};

@@ -1,0 +1,130 @@
+//! What Windows wants to be told: that its own WinUSB serves the vendor interface, and by which GUID a program finds that.
+//!
+//! Bytes that never change, as "Microsoft OS 2.0 Descriptors Specification" has them (July 2018, tables 3 to 15). The builder that
+//! embassy-usb has for them puts them together on the controller, in 1.7 kB of flash.
+
+use embassy_usb::Handler;
+use embassy_usb::control::{InResponse, Recipient, Request, RequestType};
+
+/// The request by which Windows asks for the descriptors that are its own.
+pub const VENDOR_CODE: u8 = 0x4A;
+/// By which a Windows program finds the vendor interface.
+pub const INTERFACE_GUID: &str = "{6C1E3B6A-58F0-4C4B-9D0E-6A2F1B7D9E35}";
+
+/// wIndex of the request for the whole set.
+const DESCRIPTOR_INDEX: u16 = 7;
+/// Windows 8.1, the first that asks.
+const WINDOWS_VERSION: [u8; 4] = 0x0603_0000_u32.to_le_bytes();
+/// Under which name Windows keeps the GUID.
+const PROPERTY: &str = "DeviceInterfaceGUIDs";
+const NAME: usize = utf16(PROPERTY, 1);
+const GUID: usize = utf16(INTERFACE_GUID, 2);
+const REGISTRY: usize = 10 + NAME + GUID;
+const FUNCTION: usize = 8 + 20 + REGISTRY;
+const SET: usize = 10 + 8 + FUNCTION;
+
+/// bDevCapabilityType of a platform capability.
+pub const PLATFORM: u8 = 5;
+/// The platform capability that names the set: its UUID, the version, the set's length, and [`VENDOR_CODE`].
+pub const CAPABILITY: [u8; 25] = [
+    0,
+    0xDF,
+    0x60,
+    0xDD,
+    0xD8,
+    0x89,
+    0x45,
+    0xC7,
+    0x4C,
+    0x9C,
+    0xD2,
+    0x65,
+    0x9D,
+    0x9E,
+    0x64,
+    0x8A,
+    0x9F, //
+    WINDOWS_VERSION[0],
+    WINDOWS_VERSION[1],
+    WINDOWS_VERSION[2],
+    WINDOWS_VERSION[3], //
+    SET as u8,
+    0,
+    VENDOR_CODE,
+    0,
+];
+const _: () = assert!(SET <= 0xFF, "one byte of each length is written");
+
+/// Bytes of an ASCII text in UTF-16 with so many zeros behind it.
+const fn utf16(text: &str, zeros: usize) -> usize {
+    2 * (text.len() + zeros)
+}
+
+/// The set: header, the one configuration, its function at interface 0, "WINUSB", and the GUID.
+static DESCRIPTORS: [u8; SET] = {
+    let mut set = [0; SET];
+    let mut at = 0;
+    let [a, b, c, d] = WINDOWS_VERSION;
+    let heads: [&[u8]; 6] = [
+        &[10, 0, 0, 0, a, b, c, d, SET as u8, 0],
+        &[8, 0, 1, 0, 0, 0, (8 + FUNCTION) as u8, 0],
+        &[8, 0, 2, 0, 0, 0, FUNCTION as u8, 0],
+        &[20, 0, 3, 0, b'W', b'I', b'N', b'U', b'S', b'B', 0, 0, 0, 0, 0, 0, 0, 0, 0, 0],
+        // a list of texts (REG_MULTI_SZ)
+        &[REGISTRY as u8, 0, 4, 0, 7, 0, NAME as u8, 0],
+        &[GUID as u8, 0],
+    ];
+    let mut part = 0;
+    while part < heads.len() {
+        if part == 5 {
+            at = write_utf16(&mut set, at, PROPERTY) + 2;
+        }
+        let mut i = 0;
+        while i < heads[part].len() {
+            set[at] = heads[part][i];
+            (at, i) = (at + 1, i + 1);
+        }
+        part += 1;
+    }
+    assert!(write_utf16(&mut set, at, INTERFACE_GUID) + 4 == SET);
+    set
+};
+
+/// Writes an ASCII text in UTF-16; where it ends.
+const fn write_utf16(set: &mut [u8; SET], mut at: usize, text: &str) -> usize {
+    let mut i = 0;
+    while i < text.len() {
+        set[at] = text.as_bytes()[i];
+        (at, i) = (at + 2, i + 1);
+    }
+    at
+}
+
+/// Answers Windows.
+pub struct Windows;
+
+impl Handler for Windows {
+    fn control_in<'a>(&'a mut self, asked: Request, _: &'a mut [u8]) -> Option<InResponse<'a>> {
+        let whole = (asked.request_type, asked.recipient) == (RequestType::Vendor, Recipient::Device)
+            && (asked.request, asked.index) == (VENDOR_CODE, DESCRIPTOR_INDEX);
+        whole.then_some(InResponse::Accepted(&DESCRIPTORS))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_part_says_its_length_and_they_fill_the_set() {
+        let word = |at: usize| usize::from(u16::from_le_bytes([DESCRIPTORS[at], DESCRIPTORS[at + 1]]));
+        // total length, configuration's, function's
+        assert_eq!((word(8), word(16), word(24)), (178, 168, 160));
+        let (mut at, mut kinds) = (0, [0; 5]);
+        for kind in &mut kinds {
+            *kind = word(at + 2);
+            at += word(at);
+        }
+        assert_eq!((at, kinds), (SET, [0, 1, 2, 3, 4]));
+    }
+}
