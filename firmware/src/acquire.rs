@@ -35,7 +35,10 @@ pub async fn acquire<M: RawMutex, S: Scans, C: Coil, D: Drive, I: Inputs>(
     core.watch_inputs(inputs);
     loop {
         if scans.can_be_held() {
-            core.wait_until_it_may_run().await;
+            // a clock is asked for while nothing runs
+            while !core.wait_until_it_may_run().await {
+                core.keep_in_step(scans);
+            }
         }
         let delivered = scans.next(&mut samples.0).await;
         core.watch_inputs(inputs);
@@ -56,6 +59,12 @@ pub async fn acquire<M: RawMutex, S: Scans, C: Coil, D: Drive, I: Inputs>(
             // a drive that has just taken codes takes their end
             let _ = drive.play(&[]);
         }
+        if let Some(seen) = scans.seen() {
+            core.see(seen, S::PERIOD);
+        }
+        if given.sync {
+            core.keep_in_step(scans);
+        }
         if given.send {
             core.to_send.signal(());
         }
@@ -75,6 +84,8 @@ struct Given {
     drive_off: bool,
     /// The link is to be woken.
     send: bool,
+    /// The board has something to do for clock or sync output.
+    sync: bool,
 }
 
 /// Words are copied faster than bytes.
@@ -103,15 +114,20 @@ impl Scanned for InHand<'_> {
 }
 
 impl<M: RawMutex> Core<'_, M> {
-    /// A front end that can be held waits here: without a stream, and half a ring ahead of the host.
-    async fn wait_until_it_may_run(&self) {
+    /// A front end that can be held waits here: without a stream, and half a ring ahead of the host. False when the board has
+    /// something to do for clock or sync output first.
+    async fn wait_until_it_may_run(&self) -> bool {
         loop {
-            let runs = self.with(|state| {
+            let (runs, due) = self.with(|state| {
                 let ahead = state.next_scan.saturating_sub(state.acknowledged);
-                state.streaming && ahead < u64::from(state.ring.capacity_scans() / 2)
+                let runs = state.streaming && ahead < u64::from(state.ring.capacity_scans() / 2);
+                (runs || state.clock_is_measured(), state.in_step.is_due())
             });
+            if due {
+                return false;
+            }
             if runs {
-                return;
+                return true;
             }
             // whatever is left of what was delivered
             self.to_send.signal(());
@@ -149,7 +165,14 @@ impl<M: RawMutex> Core<'_, M> {
         self.with(|state| {
             let given = state.take(delivered, channels, pairs, over, samples, codes);
             let send = state.ring.unsent() >= BLOCKS_PER_WAKE || state.has_words();
-            Given { coil: state.coil.take(), drive_off: core::mem::take(&mut state.drive_off), send, ..given }
+            let sync = state.in_step.is_due();
+            Given {
+                coil: state.coil.take(),
+                drive_off: core::mem::take(&mut state.drive_off),
+                send,
+                sync,
+                ..given
+            }
         })
     }
 }

@@ -9,6 +9,9 @@ use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
 use jointrig_protocol::request::Stage as Place;
 use jointrig_protocol::slow::Slow;
+use jointrig_protocol::sync::{Clock, ClockFault};
+
+use crate::ruler::{Ago, Span};
 
 /// The parts of one board.
 pub trait Board {
@@ -55,6 +58,44 @@ pub trait Scans {
     ///
     /// The sampling instants are the timer's; being late here costs buffer space, never punctuality.
     fn next(&mut self, block: &mut [u8; BLOCK_SAMPLE_BYTES]) -> impl Future<Output = Delivered>;
+
+    /// Counts of the board's own crystal in a nominal scan, of which [`Seen::span`] speaks.
+    const PERIOD: u32 = 1;
+
+    /// What sync input and external clock have done since this was asked last; asked after each block. Asking also ends a pulse of
+    /// the sync output.
+    #[inline]
+    fn seen(&mut self) -> Option<Seen> {
+        None
+    }
+
+    /// Lets this time the scans from now on. The count of scans goes on, and so do the scans when the clock fails: by the board's own
+    /// crystal, a little slower, so that the failure shows in [`Seen::span`].
+    ///
+    /// # Errors
+    /// Nothing that could be a clock comes to the input; the board's own goes on.
+    fn clock(&mut self, clock: Clock) -> Result<(), ClockFault> {
+        match clock {
+            Clock::Internal => Ok(()),
+            Clock::External { .. } => Err(ClockFault::Absent),
+        }
+    }
+
+    /// Raises the sync output, until [`Scans::seen`] is asked next; when that was. None on a board without one.
+    fn mark(&mut self) -> Option<Ago> {
+        None
+    }
+}
+
+/// What sync input and external clock have done.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Seen {
+    /// The newest edge at the sync input.
+    pub edge: Option<Ago>,
+    /// Edges that came too fast after another for their instants to be known: at least so many.
+    pub lost: u32,
+    /// How long scans took that an external clock timed.
+    pub span: Option<Span>,
 }
 
 /// The coil that pulls the hammer's bolt.

@@ -37,6 +37,7 @@ pub mod relay;
 pub mod report;
 mod requests;
 pub mod ring;
+pub mod ruler;
 mod scales;
 mod scan_time;
 pub mod sentence;
@@ -46,6 +47,7 @@ pub mod sine;
 pub mod slow;
 mod state;
 mod supplies;
+mod sync;
 pub mod transmit;
 #[cfg(feature = "usb")]
 pub mod usb;

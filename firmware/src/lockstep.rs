@@ -13,6 +13,7 @@
 //! | [`REPLY_AT`] | 64 | simulator | [`Reply`] |
 //! | [`TEXT_AT`] | 4096 | whoever has the turn | [`Setup`], a stage order and its refusal, a last sentence |
 //! | [`BLOCK_AT`] | 896 | simulator | a [`Delivery`], then the words of both converters |
+//! | [`SEEN_AT`] | 28 | simulator | what came to the sync port, with a [`Delivery`] that says so |
 //! | [`DRIVE_AT`] | 480 | board | codes for the shaker's drive |
 //! | [`TO_DEVICE_AT`] | 64 Ki | simulator | bytes for the board, a ring |
 //! | [`TO_HOST_AT`] | 64 Ki | board | bytes for the host, a ring |
@@ -22,6 +23,8 @@
 
 use crate::ad7606b::alignment::{Clock, Moment};
 use crate::ad7606b::trouble::Trouble;
+use crate::board::Seen;
+use crate::ruler::{Ago, Span};
 use heapless::Vec;
 use jointrig_protocol::channel::{Channel, Name};
 use jointrig_protocol::limits::MAX_CHANNELS;
@@ -32,7 +35,7 @@ pub const BASE: usize = 0x8000_0000;
 /// Its size: QEMU insists on exactly this much.
 pub const BYTES: usize = 16 << 20;
 /// Changes with this layout, so that an image and a simulator of different sources refuse each other.
-pub const MAGIC: u32 = 0x4A52_4C05;
+pub const MAGIC: u32 = 0x4A52_4C06;
 /// Where [`MAGIC`] stands.
 pub const MAGIC_AT: usize = 0;
 /// Where the board's words stand.
@@ -53,6 +56,12 @@ pub const DRIVE_AT: usize = 0x3000;
 pub const SLOW_AT: usize = 0x5000;
 /// The longest of them.
 pub const SLOW_BYTES: usize = 0x100;
+/// Where a [`Seen`] stands.
+pub const SEEN_AT: usize = 0x5800;
+/// Its words.
+pub const SEEN_WORDS: usize = 7;
+/// Counts of the simulated board's crystal in a scan, of which [`Seen::span`] speaks.
+pub const PERIOD: u32 = 3125;
 /// Slow values have been measured; it counts once, with the next block.
 pub const SLOW_MEASURED: u32 = 128;
 /// Where the ring of bytes for the board begins.
@@ -90,6 +99,12 @@ pub enum Op {
     Rest = 8,
     /// Both converters' rings start anew with the next scan; the reply's length is that scan's number since the start.
     Join = 9,
+    /// The external clock times the scans from now on (argument 1) or the board's own (0); the reply's length is 0, 1 when none comes to
+    /// the input, 2 when it is of another rate.
+    Clock = 10,
+    /// The sync output rises, and falls with the next block; the reply's length is when: in parts of 2¹⁶ of a scan after the newest scan's
+    /// successor.
+    Mark = 11,
 }
 
 impl Op {
@@ -106,6 +121,8 @@ impl Op {
             7 => Self::Play,
             8 => Self::Rest,
             9 => Self::Join,
+            10 => Self::Clock,
+            11 => Self::Mark,
             _ => return None,
         })
     }
@@ -277,6 +294,8 @@ pub struct Delivery {
     pub periods: u32,
     /// What the board reads off when it has the block, and again until it can tell: the phase of every second look is a quiet one.
     pub moment: Moment,
+    /// Something came to the sync port and stands at [`SEEN_AT`].
+    pub seen: bool,
 }
 
 impl Delivery {
@@ -293,8 +312,9 @@ impl Delivery {
             Some(Trouble::Slipped(..)) => 5,
         };
         let [first, second] = self.moment.words;
+        let seen = u32::from(self.seen);
         let words =
-            [self.scans, trouble, self.periods, self.moment.periods, self.moment.phase, first, second, 0];
+            [self.scans, trouble, self.periods, self.moment.periods, self.moment.phase, first, second, seen];
         let mut bytes = [0; DELIVERY_BYTES];
         for (place, word) in bytes.as_chunks_mut().0.iter_mut().zip(words) {
             *place = u32::to_le_bytes(word);
@@ -315,7 +335,32 @@ impl Delivery {
             _ => None,
         };
         let moment = Moment { periods: word(3), phase: word(4), words: [word(5), word(6)] };
-        Self { scans: word(0), trouble, periods: word(2), moment }
+        Self { scans: word(0), trouble, periods: word(2), moment, seen: word(7) != 0 }
+    }
+}
+
+/// What came to the sync port, as it stands in memory.
+#[must_use]
+pub fn seen_to_words(seen: &Seen) -> [u32; SEEN_WORDS] {
+    let (edge, span) = (seen.edge.unwrap_or_default(), seen.span.unwrap_or_default());
+    [
+        u32::from(seen.edge.is_some()),
+        edge.scans.cast_unsigned(),
+        u32::from(edge.part),
+        seen.lost,
+        u32::from(seen.span.is_some()),
+        span.scans,
+        span.counts,
+    ]
+}
+
+/// From memory.
+#[must_use]
+pub fn seen_from_words([edge, scans, part, lost, span, of, counts]: [u32; SEEN_WORDS]) -> Seen {
+    Seen {
+        edge: (edge != 0).then_some(Ago { scans: scans.cast_signed(), part: part as u16 }),
+        lost,
+        span: (span != 0).then_some(Span { scans: of, counts }),
     }
 }
 
@@ -365,8 +410,16 @@ mod tests {
         assert_eq!(Op::from_word(0), None);
         for trouble in [None, Some(Trouble::Silent(0, 0)), Some(Trouble::Crc), Some(Trouble::Slipped(0, 0))] {
             let moment = Moment { periods: 7, phase: 16, words: [207, 216] };
-            let delivery = Delivery { scans: 24, trouble, periods: 8, moment };
-            assert_eq!(Delivery::from_bytes(&delivery.to_bytes()), delivery);
+            for seen in [false, true] {
+                let delivery = Delivery { scans: 24, trouble, periods: 8, moment, seen };
+                assert_eq!(Delivery::from_bytes(&delivery.to_bytes()), delivery);
+            }
+        }
+        for edge in [None, Some(Ago { scans: -3, part: 0xFFFF })] {
+            for span in [None, Some(Span { scans: 15, counts: 46_875 })] {
+                let seen = Seen { edge, lost: 2, span };
+                assert_eq!(seen_from_words(seen_to_words(&seen)), seen);
+            }
         }
         let reply = Reply {
             now_us: 0xFFFF_FFFF_0000_0001,

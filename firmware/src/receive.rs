@@ -89,6 +89,7 @@ impl<M: RawMutex> Core<'_, M> {
             state.memory = Memory::new();
             state.hammer.forget();
             state.forget_scales(self.facts.channels);
+            state.forget_clock();
             state.session = agreed.then_some(theirs.session);
             if agreed {
                 info!("session {}", theirs.session);

@@ -21,7 +21,7 @@ impl<M: RawMutex> Core<'_, M> {
                 Ok(Answer::Channel(channel.clone()))
             }
             Request::Status => Ok(Answer::Status(self.status())),
-            Request::Start => Ok(self.start()),
+            Request::Start => self.start(),
             Request::Stop => {
                 self.with(|state| {
                     state.bring_to_rest(Reason::StreamEnded);
@@ -65,6 +65,9 @@ impl<M: RawMutex> Core<'_, M> {
             Request::Scales { units_per_volt } => self
                 .with(|state| state.take_scales(self.facts.channels, units_per_volt))
                 .map(|()| Answer::Done),
+            Request::Clock(clock) => self.ask_for_clock(*clock),
+            Request::Sync => Ok(Answer::Sync(self.with(|state| state.in_step.now))),
+            Request::Mark => self.ask_for_mark(),
             Request::Slow => Ok(Answer::Slow(self.with(|state| state.slow.clone()))),
         }
     }
@@ -90,8 +93,11 @@ impl<M: RawMutex> Core<'_, M> {
     }
 
     /// A new stream is a new epoch; the scan index goes on.
-    fn start(&self) -> Answer {
+    fn start(&self) -> Result<Answer, Refusal> {
         let answer = self.with(|state| {
+            if let Some(fault) = state.in_step.now.fault {
+                return Err(Refusal::Clock(fault));
+            }
             state.bring_to_rest(Reason::StreamEnded);
             // each start has room for 65536 streams; after those its epochs run on rather than repeat
             state.epoch = (self.facts.boot << 16).wrapping_add(state.streams);
@@ -105,10 +111,10 @@ impl<M: RawMutex> Core<'_, M> {
             state.counters.scans_missed = 0;
             state.acknowledged = state.next_scan;
             state.streaming = true;
-            Answer::Started { epoch: state.epoch, map: CHANNEL_MAP, first_scan: state.next_scan }
-        });
+            Ok(Answer::Started { epoch: state.epoch, map: CHANNEL_MAP, first_scan: state.next_scan })
+        })?;
         self.may_run.signal(());
-        answer
+        Ok(answer)
     }
 
     fn resend(&self, epoch: u32, first_scan: u64, scans: u32) -> Result<Answer, Refusal> {

@@ -11,7 +11,9 @@ use jointrig_protocol::answer::{self, Counters, Info, Refusal, Reset};
 use jointrig_protocol::channel::{Channel, Name, Role};
 use jointrig_protocol::event::{self, Event, Loss, Reason};
 use jointrig_protocol::limits;
+use jointrig_protocol::shot::Phase;
 use jointrig_protocol::slow::Slow;
+use jointrig_protocol::sync::Line;
 
 use crate::fmt::{info, warning};
 use crate::friction::Friction;
@@ -20,6 +22,7 @@ use crate::logs::Tap;
 use crate::memory::Memory;
 use crate::ring::{Range, Ring, Slot};
 use crate::shaker::Shaker;
+use crate::sync::InStep;
 
 /// Events that wait for the link.
 const EVENTS: usize = 16;
@@ -49,6 +52,8 @@ pub struct Facts<'a> {
     pub stage: bool,
     /// Full scale of the shaker's drive, V; 0 without a shaker.
     pub drive_v: f32,
+    /// Whether the board has sync input, sync output and clock input.
+    pub sync: bool,
     /// Why the device started.
     pub reset: Reset,
     /// Tells this start from all others: one more than the last start's, or a number that none had. Its low 16 bits
@@ -106,6 +111,8 @@ pub(crate) struct State<'a> {
     pub excitation: Option<usize>,
     /// The session has brought scales of its own.
     pub scales_told: bool,
+    /// Clock of the scans, sync input and output.
+    pub in_step: InStep,
 }
 
 impl<'a, M: RawMutex> Core<'a, M> {
@@ -149,6 +156,7 @@ impl<'a, M: RawMutex> Core<'a, M> {
             slow: Slow::default(),
             excitation: facts.channels.iter().position(|channel| channel.role == Role::Excitation),
             scales_told: false,
+            in_step: InStep::default(),
         };
         Self {
             facts,
@@ -242,6 +250,11 @@ impl State<'_> {
     fn tell_of_hammer(&mut self, outcome: &Outcome) {
         if let Some(shot) = outcome.shot {
             info!("shot {} is {:?}", shot.number, shot.phase);
+            match shot.phase {
+                Phase::Firing => self.mark(Line::Fired),
+                Phase::Listening => self.mark(Line::Trigger),
+                _ => {}
+            }
             self.say(Event::Shot(shot));
         }
         if let Some(reason) = outcome.disarmed {

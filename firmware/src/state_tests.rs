@@ -21,6 +21,7 @@ fn armed<'a>(channels: &'a [Channel], slots: &'a mut [Slot]) -> Core<'a, NoopRaw
         channels,
         coil_cap_us: 8_000,
         stage: false,
+        sync: false,
         drive_v: 0.0,
         reset: jointrig_protocol::answer::Reset::Power,
         boot: 1,

@@ -108,6 +108,7 @@ fn run<F: Future<Output = ()>>(speed: Speed, scenario: impl FnOnce(Session) -> F
             channels: &channels,
             coil_cap_us: 8_000,
             stage: false,
+            sync: false,
             drive_v: 0.0,
             reset: Reset::Power,
             boot: 1,

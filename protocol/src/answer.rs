@@ -9,6 +9,7 @@ use crate::frame::FrameError;
 use crate::limits::SENTENCE_BYTES;
 use crate::shot::Shot;
 use crate::slow::{Slow, SupplyFault};
+use crate::sync::{ClockFault, Sync};
 
 /// The answer to the request of the same number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
@@ -68,6 +69,8 @@ pub enum Answer {
     },
     /// Slow values.
     Slow(Slow),
+    /// Clock and edges.
+    Sync(Sync),
 }
 
 /// Why a request was not carried out. Variants only ever grow at the end.
@@ -126,6 +129,8 @@ pub enum Refusal {
         /// What it finds.
         fault: SupplyFault,
     },
+    /// The clock that the scans are to have is not good, or not known to be.
+    Clock(ClockFault),
 }
 
 impl core::fmt::Display for Refusal {
@@ -154,6 +159,7 @@ impl core::fmt::Display for Refusal {
             Self::Supply { channel, fault } => {
                 write!(f, "the sensor of channel {channel} (from 0) is not there: {fault}")
             }
+            Self::Clock(fault) => fault.fmt(f),
         }
     }
 }

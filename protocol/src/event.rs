@@ -9,6 +9,7 @@ use crate::answer::Counters;
 use crate::frame::FrameError;
 use crate::limits::SENTENCE_BYTES;
 use crate::shot::Shot;
+use crate::sync::{ClockFault, Edge};
 
 /// A numbered event.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
@@ -67,6 +68,10 @@ pub enum Event {
     ShakerStops(Reason),
     /// The shaker has come to rest.
     ShakerRests,
+    /// An edge at the sync input or output.
+    Edge(Edge),
+    /// The external clock is not good, or not any more: the stream has ended, and everything comes to rest.
+    Clock(ClockFault),
 }
 
 /// Why the hammer disarmed, or the shaker stops.
@@ -105,6 +110,8 @@ pub enum Reason {
         /// Place in the scan, from 0.
         channel: u8,
     },
+    /// The external clock was lost.
+    Clock,
 }
 
 /// Why scans were lost.

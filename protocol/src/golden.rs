@@ -16,6 +16,7 @@ use crate::hello::{Hello, Role as HelloRole};
 use crate::request::{self, Configuration, Control, Fire, Request, Shake, Stage, Trigger};
 use crate::shot::{Phase, Shot};
 use crate::slow::{Slow, Supply};
+use crate::sync::{Clock, ClockFault, Edge, Line, Moment, Sync};
 
 macro_rules! golden {
     ($($name:ident),* $(,)?) => {
@@ -34,16 +35,21 @@ golden!(
     started,
     refused,
     slow,
+    sync,
+    clock_refused,
     fire,
     shake,
     stage,
     trigger,
     resend,
     scales,
+    clock,
     shot_event,
     shaker_event,
     lost_event,
     counters_event,
+    edge_event,
+    clock_event,
     samples,
     short_samples,
     acknowledge,
@@ -160,6 +166,17 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
 
     let slow = Slow { temperature_c: Some(22.25), supplies };
     each("slow", frame.seal_value(&answer::Numbered { number: 6, outcome: Ok(Answer::Slow(slow)) })?);
+    let sync = Sync {
+        clock: Clock::External { rate_hz: 51_200 },
+        fault: Some(ClockFault::Rate),
+        ppm: -212.5,
+        edges: 300,
+        edges_lost: 2,
+        pulses: 41,
+    };
+    each("sync", frame.seal_value(&answer::Numbered { number: 7, outcome: Ok(Answer::Sync(sync)) })?);
+    let refused = answer::Numbered { number: 8, outcome: Err(Refusal::Clock(ClockFault::Absent)) };
+    each("clock_refused", frame.seal_value(&refused)?);
 
     let mut quiet_limits = Vec::new();
     for limit in [0.0, 2.5e-6, 2.5e-6] {
@@ -217,6 +234,7 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
         ),
         ("resend", Request::Resend { epoch: 3, first_scan: 5_000_000_000, scans: 48 }),
         ("scales", Request::Scales { units_per_volt }),
+        ("clock", Request::Clock(Clock::External { rate_hz: 51_200 })),
     ];
     frame.restart(Kind::Request);
     for (number, (name, request)) in requests.into_iter().enumerate() {
@@ -228,6 +246,15 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
         ("shaker_event", Event::ShakerStops(Reason::Limit { channel: 2 })),
         ("lost_event", Event::Lost { epoch: 3, first_scan: 24, scans: 24, why: Loss::LinkSlow }),
         ("counters_event", Event::Counters(COUNTERS)),
+        (
+            "edge_event",
+            Event::Edge(Edge {
+                line: Line::Trigger,
+                number: 300,
+                at: Moment { scan: 5_000_000_335, part: 0x8001 },
+            }),
+        ),
+        ("clock_event", Event::Clock(ClockFault::Lost)),
     ];
     frame.restart(Kind::Event);
     for (number, (name, event)) in events.into_iter().enumerate() {

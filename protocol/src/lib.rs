@@ -26,4 +26,5 @@ pub mod request;
 pub mod schema;
 pub mod shot;
 pub mod slow;
+pub mod sync;
 pub mod usb;

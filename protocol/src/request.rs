@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::channel::Name;
 use crate::limits::MAX_CHANNELS;
+use crate::sync::Clock;
 
 /// A numbered request. Numbers increase within a session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
@@ -92,6 +93,15 @@ pub enum Request {
     },
     /// Temperature and sensor supplies as they were measured last. → [`crate::answer::Answer::Slow`]. Since protocol 1.1.
     Slow,
+    /// What is to time the scans. It is measured before anything can be started by it: ask [`Request::Sync`] until its fault is not
+    /// [`crate::sync::ClockFault::Unproven`] any more. → `Done`
+    ///
+    /// Refused while a stream runs. Forgotten when the session ends. Since protocol 1.2.
+    Clock(Clock),
+    /// Clock and edges as they are now. → [`crate::answer::Answer::Sync`]. Since protocol 1.2.
+    Sync,
+    /// One pulse of the sync output, as soon as it can be; its instant comes as [`crate::event::Event::Edge`]. → `Done`. Since protocol 1.2.
+    Mark,
 }
 
 /// How the force pulse is recognised.

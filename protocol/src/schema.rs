@@ -5,13 +5,13 @@
 
 use postcard_schema::key::Key;
 
-use crate::{acknowledge, answer, block, event, limits, request, slow};
+use crate::{acknowledge, answer, block, event, limits, request, slow, sync};
 
 /// Another major is another protocol.
 pub const MAJOR: u16 = 1;
 
 /// Minors add at the end of enumerations and structures.
-pub const MINOR: u16 = 1;
+pub const MINOR: u16 = 2;
 
 /// Everything that gives bytes a meaning and that the types do not show. Change a layout, change this.
 pub const LAYOUT: &[u64] = &[
@@ -31,6 +31,7 @@ pub const LAYOUT: &[u64] = &[
     limits::HELLO_BYTES as u64,
     limits::SCALE_FACTOR_CAP as u64,
     slow::MAX_SUPPLIES as u64,
+    sync::CLOCK_TOLERANCE_PPM as u64,
     acknowledge::BYTES as u64,
     block::HEADER_PAYLOAD as u64,
     limits::HEAD_BYTES as u64,

@@ -13,7 +13,7 @@ fn committed_vectors_are_what_is_written() {
             .unwrap();
         panic!("golden vectors rewritten; run again without JOINTRIG_BLESS");
     }
-    assert_eq!(golden::check(), Ok(24));
+    assert_eq!(golden::check(), Ok(29));
 }
 
 #[test]

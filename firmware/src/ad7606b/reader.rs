@@ -41,6 +41,12 @@ impl Reader {
         self.block
     }
 
+    /// The period of the next scan that will be delivered or reported missing, in the clock's count.
+    #[must_use]
+    pub fn next_period(&self) -> u32 {
+        self.accounted
+    }
+
     /// Takes the block that is due from the rings' own memory; `look` reads a moment off, with the clock's own count of periods. It is
     /// called after the block was read, so that a block is proven not to have been overwritten meanwhile. Good scans are
     /// written to `scans`, which hold nothing of worth after an error.

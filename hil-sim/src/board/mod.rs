@@ -8,6 +8,7 @@ mod drive;
 mod parts;
 #[cfg(unix)]
 pub mod qemu;
+mod sync;
 
 use std::cell::RefCell;
 use std::pin::Pin;
@@ -29,6 +30,7 @@ use crate::rig::{Rig, RigConfig, RigError};
 use drive::VirtualDrive;
 pub use parts::{Controls, Seen, Virtual};
 use parts::{VirtualCoil, VirtualInputs, VirtualScans, VirtualStage, describe};
+pub use sync::Wires;
 
 /// Seconds of scans that the ring holds, at least.
 const RING_S: f64 = 1.0;
@@ -127,6 +129,7 @@ fn run(rig: Rig, options: &Options, link: &DeviceEnd, controls: &Arc<Controls>) 
         channels,
         coil_cap_us: COIL_PULSE_CAP_US,
         stage: true,
+        sync: true,
         drive_v: drive.full_scale_v(),
         reset: Reset::Power,
         boot: options.boot,

@@ -7,14 +7,17 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_time::{Instant, Timer};
-use jointrig_firmware::board::{Board, Coil, Delivered, Inputs, Scans, Stage};
+use jointrig_firmware::board::{self, Board, Coil, Delivered, Inputs, Scans, Stage};
+use jointrig_firmware::ruler::Ago;
 use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, COIL_PULSE_CAP_US};
 use jointrig_protocol::request;
 use jointrig_protocol::slow::{Slow, Supply};
+use jointrig_protocol::sync::{Clock, ClockFault};
 
 use super::drive::VirtualDrive;
+use super::sync::{PERIOD, SyncPort, Wires};
 use crate::link::DeviceEnd;
 use crate::rig::channels::{EXCITATION, FORCE};
 use crate::rig::config::Cable;
@@ -49,6 +52,7 @@ pub struct Controls {
     /// Cables that were changed since the start: the hammer's force cell, the shaker's.
     cables: Mutex<[Option<Cable>; 2]>,
     seen: Mutex<Seen>,
+    wires: Wires,
 }
 
 /// What the rig has come to by the end of a block.
@@ -65,6 +69,11 @@ pub struct Seen {
 }
 
 impl Controls {
+    /// Another recorder at the sync port.
+    pub fn wires(&self) -> &Wires {
+        &self.wires
+    }
+
     /// Opens or closes the guard over the hammer.
     pub fn open_guard(&self, open: bool) {
         self.guard_open.store(open, Ordering::Release);
@@ -166,6 +175,9 @@ pub struct VirtualScans {
     per_block: usize,
     rate_hz: u64,
     scans: u64,
+    /// Up to here the sync port was looked at.
+    looked_at: u64,
+    port: SyncPort,
     held: bool,
     sampling: Rc<Cell<bool>>,
 }
@@ -180,7 +192,19 @@ impl VirtualScans {
     ) -> Self {
         let (channels, rate_hz) = (rig.borrow().channels().len(), u64::from(rig.borrow().scan_rate_hz()));
         let (rig, drive, controls) = (Rc::clone(rig), drive.clone(), Arc::clone(controls));
-        Self { rig, drive, controls, channels, per_block, rate_hz, scans: 0, held, sampling: Rc::default() }
+        Self {
+            rig,
+            drive,
+            controls,
+            channels,
+            per_block,
+            rate_hz,
+            scans: 0,
+            looked_at: 0,
+            port: SyncPort::default(),
+            held,
+            sampling: Rc::default(),
+        }
     }
 
     /// True while the converters run, that is while virtual time may go on.
@@ -190,6 +214,21 @@ impl VirtualScans {
 }
 
 impl Scans for VirtualScans {
+    const PERIOD: u32 = PERIOD;
+
+    fn seen(&mut self) -> Option<board::Seen> {
+        let from = std::mem::replace(&mut self.looked_at, self.scans);
+        self.port.seen(self.controls.wires(), from, self.scans)
+    }
+
+    fn clock(&mut self, clock: Clock) -> Result<(), ClockFault> {
+        self.port.clock(self.controls.wires(), self.scans, clock)
+    }
+
+    fn mark(&mut self) -> Option<Ago> {
+        Some(SyncPort::mark(self.controls.wires(), self.scans))
+    }
+
     fn can_be_held(&self) -> bool {
         self.held
     }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use jointrig_protocol::slow::{Slow, Supply};
+use jointrig_protocol::sync::{Clock, Sync};
 use serde_json::json;
 
 use super::error::CliError;
@@ -36,6 +37,36 @@ fn supplies(slow: &Slow, map: &ChannelMap) -> Vec<serde_json::Value> {
     slow.supplies.iter().map(one).collect()
 }
 
+/// Clock and edges for a program.
+fn sync_value(sync: &Sync) -> serde_json::Value {
+    let (clock, rate_hz) = match sync.clock {
+        Clock::Internal => ("internal", None),
+        Clock::External { rate_hz } => ("external", Some(rate_hz)),
+    };
+    json!({
+        "clock": clock,
+        "rate_hz": rate_hz,
+        "fault": sync.fault.map(|fault| format!("{fault:?}").to_lowercase()),
+        "ppm": sync.ppm,
+        "edges": sync.edges,
+        "edges_lost": sync.edges_lost,
+        "pulses": sync.pulses,
+    })
+}
+
+/// Clock and edges for a person.
+fn sync_line(sync: &Sync) -> String {
+    let clock = match (sync.clock, sync.fault) {
+        (Clock::Internal, _) => "its own".into(),
+        (Clock::External { rate_hz }, None) => format!("external, {rate_hz} Hz {:+.1} ppm", sync.ppm),
+        (Clock::External { rate_hz }, Some(fault)) => format!("external, {rate_hz} Hz: {fault}"),
+    };
+    let (edges, lost, pulses) = (sync.edges, sync.edges_lost, sync.pulses);
+    format!(
+        "  clock of the scans: {clock}; sync input: {edges} edges, {lost} of them too fast; sync output: {pulses} pulses"
+    )
+}
+
 /// Show a device: handshake, channels, firmware version, counters.
 #[derive(Debug, Args)]
 pub struct Info {
@@ -60,6 +91,7 @@ impl Info {
         let status = session.status()?;
         let hello = *session.hello();
         let slow = session.slow()?.unwrap_or_default();
+        let sync = session.sync()?;
         if self.json {
             let channels: Vec<_> = (map.channels.iter().zip(0..))
                 .map(|(channel, place)| {
@@ -98,6 +130,7 @@ impl Info {
                 "streaming": status.streaming,
                 "temperature_c": slow.temperature_c,
                 "supplies": supplies(&slow, &map),
+                "sync": sync.as_ref().map(sync_value),
                 "counters": status.counters,
             }));
         }
@@ -138,6 +171,7 @@ impl Info {
                 Some(fault) => format!("  supply of `{name}`: {bias:.1} V of bias: {fault}"),
             }
         }));
+        text.extend(sync.as_ref().map(sync_line));
         if !fits(&info.version) {
             text.push(format!(
                 "  this program is {HOST_VERSION} and speaks the same protocol; its own firmware is flashed from {}",

@@ -138,6 +138,9 @@ fn of_status(status: &Status) -> Claim {
 pub(super) fn of_answer(answer: &Answer) -> Claim {
     match answer {
         Answer::Status(status) => of_status(status),
+        Answer::Sync(sync) => {
+            refuse(sync.ppm.is_finite(), || format!("says that its clock is {} ppm off", sync.ppm))
+        }
         Answer::Started { first_scan, .. } => scan("its stream begins", *first_scan),
         Answer::Staged { at_scan } => scan("everything is in place", *at_scan),
         _ => Ok(()),
@@ -150,6 +153,7 @@ pub(super) fn of_event(event: &event::Numbered) -> Claim {
         Event::Shot(shot) => of_shot(shot),
         Event::Counters(counters) => of_counters(counters),
         Event::Lost { first_scan, .. } => scan("it lost some", *first_scan),
+        Event::Edge(edge) => scan("an edge came to its sync port", edge.at.scan),
         _ => Ok(()),
     }
 }

@@ -4,6 +4,7 @@ use std::io;
 
 use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::hello::Mismatch;
+use jointrig_protocol::sync::ClockFault;
 
 /// What to do about "permission denied" on Linux.
 pub(super) const INSTALL_UDEV_RULE: &str = "install docs/udev/70-jointrig.rules (`sudo cp` it to /etc/udev/rules.d, \
@@ -157,6 +158,14 @@ pub enum DeviceError {
         needs: (u16, u16),
         /// What it cannot.
         what: &'static str,
+    },
+    /// The clock that was to time the scans is not good.
+    #[error("{address}: {fault}")]
+    Clock {
+        /// Which device.
+        address: String,
+        /// What is wrong with it, and what to do.
+        fault: ClockFault,
     },
     /// The channels do not serve the purpose.
     #[error("{address}: {what}")]

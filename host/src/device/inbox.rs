@@ -8,6 +8,7 @@ use jointrig_protocol::event::{self, Event};
 use jointrig_protocol::frame::{Frame, Kind};
 use jointrig_protocol::hello::{Hello, Mismatch};
 use jointrig_protocol::shot::{Phase, Shot};
+use jointrig_protocol::sync::{ClockFault, Edge, Line};
 
 use super::claims::{self, Claim};
 use super::logs::DeviceLog;
@@ -19,6 +20,9 @@ const EVENTS_KEPT: usize = 256;
 
 /// Answers that wait; one request is under way at a time, and one errand.
 const ANSWERS_KEPT: usize = 64;
+
+/// Edges that wait to be taken: more than an input gives in a minute. Those of a session that takes none are not wanted.
+const EDGES_KEPT: usize = 1 << 18;
 
 /// Everything that arrived and was not used yet.
 #[derive(Default)]
@@ -35,6 +39,10 @@ pub struct Inbox {
     pub answers: VecDeque<answer::Numbered>,
     /// Events that concern whoever uses the session.
     pub events: VecDeque<event::Numbered>,
+    /// Edges at the sync input and output that nobody has taken yet.
+    pub edges: Vec<Edge>,
+    /// The external clock is not good any more.
+    pub clock_fault: Option<ClockFault>,
     /// The newest word on the last shot.
     pub shot: Option<Shot>,
     /// The newest counters of the device.
@@ -42,6 +50,8 @@ pub struct Inbox {
     /// Events that were lost on the way, from the jumps of their numbers.
     pub events_lost: u64,
     next_event: Option<u32>,
+    /// Numbers of the newest edges of the input and of the output.
+    edge_numbers: [Option<u32>; 2],
     /// Sample blocks of another stream, or unreadable ones.
     pub strangers: u64,
     /// The highest epoch among the strangers.
@@ -156,6 +166,8 @@ impl Inbox {
             }
             Event::Counters(counters) => self.counters = Some(*counters),
             Event::Shot(shot) => self.note_shot(shot),
+            Event::Clock(fault) => self.clock_fault = Some(*fault),
+            Event::Edge(edge) => self.note_edge(*edge),
             _ => {
                 log::debug!("event at scan {}: {:?}", event.at_scan, event.event);
                 if self.events.len() == EVENTS_KEPT {
@@ -163,6 +175,20 @@ impl Inbox {
                 }
                 self.events.push_back(event);
             }
+        }
+    }
+
+    fn note_edge(&mut self, edge: Edge) {
+        let lost = self.edge_numbers[usize::from(edge.line != Line::Input)]
+            .replace(edge.number)
+            .map_or(0, |before| edge.number.wrapping_sub(before).wrapping_sub(1));
+        if lost > 0 {
+            log::warn!(
+                "{lost} edges of the sync port were not told before {edge:?}: they came too fast, or the link lost them"
+            );
+        }
+        if self.edges.len() < EDGES_KEPT {
+            self.edges.push(edge);
         }
     }
 

@@ -8,6 +8,7 @@ pub mod address;
 pub mod channels;
 mod claims;
 pub mod error;
+mod in_step;
 mod inbox;
 pub mod link;
 pub mod logs;

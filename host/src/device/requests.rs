@@ -48,6 +48,9 @@ fn name(request: &Request) -> &'static str {
         Request::Rest => "rest",
         Request::Scales { .. } => "scales",
         Request::Slow => "slow",
+        Request::Clock(_) => "clock",
+        Request::Sync => "sync",
+        Request::Mark => "mark",
     }
 }
 
@@ -82,7 +85,7 @@ impl Session {
         Err(DeviceError::NoAnswer { address: self.address.clone(), request: asked, tries: TRIES })
     }
 
-    fn wrong(&self, request: &'static str, got: &Answer) -> DeviceError {
+    pub(super) fn wrong(&self, request: &'static str, got: &Answer) -> DeviceError {
         DeviceError::WrongAnswer { address: self.address.clone(), request, got: format!("{got:?}") }
     }
 

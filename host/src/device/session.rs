@@ -72,6 +72,8 @@ pub struct Session {
     pub(super) rate_hz: f64,
     pub(super) stalled: Duration,
     pub(super) ended: bool,
+    /// A status has said that the stream ended unasked.
+    doubted: bool,
     /// Whether the device was told other scales than its own.
     pub(super) scaled: bool,
     /// Whether the shaker may be moving at this session's order.
@@ -108,6 +110,7 @@ impl Session {
             rate_hz: 51_200.0,
             stalled: STALLED,
             ended: false,
+            doubted: false,
             scaled: false,
             shakes: false,
             errand: None,
@@ -229,6 +232,7 @@ impl Session {
         self.tail = None;
         self.hold = None;
         self.ended = false;
+        self.doubted = false;
     }
 
     fn receive(&mut self, timeout: Duration) -> Result<(), DeviceError> {
@@ -238,8 +242,11 @@ impl Session {
             Ok(false) => {}
             Err(error) => return Err(self.broken("reading", error)),
         }
-        match self.inbox.nonsense.take() {
-            Some(what) => Err(self.nonsense(what)),
+        if let Some(what) = self.inbox.nonsense.take() {
+            return Err(self.nonsense(what));
+        }
+        match self.inbox.clock_fault.take() {
+            Some(fault) => Err(DeviceError::Clock { address: self.address.clone(), fault }),
             None => Ok(()),
         }
     }
@@ -299,13 +306,11 @@ impl Session {
         })
     }
 
-    fn check_epoch(&self, status: &Status) -> Result<(), DeviceError> {
-        match &self.inbox.stream {
-            Some(stream) if !self.ended && (status.epoch != stream.epoch() || !status.streaming) => {
-                Err(self.restarted())
-            }
-            _ => Ok(()),
-        }
+    fn check_epoch(&mut self, status: &Status) -> Result<(), DeviceError> {
+        let Some(stream) = self.inbox.stream.as_ref().filter(|_| !self.ended) else { return Ok(()) };
+        // answers overtake events: why a stream has ended may be told behind the first status that says that it has
+        let ended = !status.streaming && std::mem::replace(&mut self.doubted, true);
+        if ended || status.epoch != stream.epoch() { Err(self.restarted()) } else { Ok(()) }
     }
 
     pub(super) fn acknowledge(&mut self) -> Result<(), DeviceError> {

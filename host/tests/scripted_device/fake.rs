@@ -21,6 +21,7 @@ use jointrig_protocol::hello::Hello;
 use jointrig_protocol::request::{Fire, Numbered, Request, Stage};
 use jointrig_protocol::shot::{Phase, Shot};
 use jointrig_protocol::slow::Slow;
+use jointrig_protocol::sync::Sync;
 
 use jointrig::device::transport::Transport;
 
@@ -234,8 +235,11 @@ impl Fake {
                     },
                 ))
             }
-            Request::Shake(_) | Request::Rest => return Err(Refusal::Unsupported),
+            Request::Shake(_) | Request::Rest | Request::Clock(_) | Request::Mark => {
+                return Err(Refusal::Unsupported);
+            }
             Request::Slow => Answer::Slow(Slow::default()),
+            Request::Sync => Answer::Sync(Sync::default()),
             Request::Status => Answer::Status(Status {
                 epoch: self.epoch,
                 streaming: self.streaming,

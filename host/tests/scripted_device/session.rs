@@ -12,6 +12,7 @@ use jointrig_logs::example::{WARNING, image, line};
 use jointrig_logs::file_name;
 use jointrig_protocol::hello::Hello;
 use jointrig_protocol::request::Fire;
+use jointrig_protocol::sync::Clock;
 
 fn open(transport: impl Transport + 'static) -> Session {
     Session::open(Box::new(transport), "fake:").expect("it answers")
@@ -173,4 +174,19 @@ fn a_controller_of_an_older_protocol_is_not_told_scales_and_is_asked_for_nothing
     session.info().expect("info");
     session.calibrate(&device, &calibrated).expect("told");
     session.calibrate(&device, &device).expect("told again");
+}
+
+#[test]
+fn a_controller_of_an_older_protocol_is_refused_by_a_plan_with_sync_and_asked_for_nothing_otherwise() {
+    let older = |fake: &mut Fake| fake.hello = Hello { minor: 1, schema: 1, ..fake.hello };
+    let mut session = open(Fake::scripted(older));
+    assert_eq!(session.sync().expect("nothing is asked"), None);
+    let refused = session.take_clock(Clock::Internal).expect_err("it knows of no clock").to_string();
+    assert!(
+        refused.contains("speaks protocol 1.1") && refused.contains("flash firmware of protocol 1.2"),
+        "{refused}"
+    );
+    // one that knows of it and has no sync port says so
+    let refused = open(Fake::default()).take_clock(Clock::External { rate_hz: 48_000 }).expect_err("no port");
+    assert!(refused.to_string().contains("cannot do that"), "{refused}");
 }

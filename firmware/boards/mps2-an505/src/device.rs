@@ -39,6 +39,7 @@ pub fn run(setup: &Setup) -> ! {
         channels,
         coil_cap_us: COIL_PULSE_CAP_US,
         stage: true,
+        sync: true,
         drive_v: board::Drive::full_scale_v(&Drive),
         reset: Reset::Power,
         boot: setup.boot,

@@ -8,17 +8,20 @@ use heapless::String;
 use jointrig_firmware::ad7606b::alignment::Alignment;
 use jointrig_firmware::ad7606b::reader::Reader;
 use jointrig_firmware::ad7606b::trouble::Trouble;
-use jointrig_firmware::board::{self, Delivered, RanDry};
+use jointrig_firmware::board::{self, Delivered, RanDry, Seen};
 use jointrig_firmware::lockstep::{
     BLOCK_AT, CLOCK, DELIVERY_BYTES, DRIVE_AT, DRIVE_FULL_SCALE_V, Delivery, EMERGENCY_STOP, HELD,
-    INTERLOCK_CLOSED, LOCAL_RESET, MUST_FAULT, MUST_OVERFLOW, MUST_PANIC, NEVER, Op, RING_BLOCKS, RING_BYTES,
-    SLOW_AT, SLOW_BYTES, SLOW_MEASURED, TEXT_AT, TEXT_BYTES, TO_DEVICE_AT, TO_HOST_AT, from_text, to_text,
+    INTERLOCK_CLOSED, LOCAL_RESET, MUST_FAULT, MUST_OVERFLOW, MUST_PANIC, NEVER, Op, PERIOD, RING_BLOCKS,
+    RING_BYTES, SEEN_AT, SEEN_WORDS, SLOW_AT, SLOW_BYTES, SLOW_MEASURED, TEXT_AT, TEXT_BYTES, TO_DEVICE_AT,
+    TO_HOST_AT, from_text, seen_from_words, to_text,
 };
+use jointrig_firmware::ruler::Ago;
 use jointrig_hot::pair::CHIP_BYTES;
 use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, COIL_PULSE_CAP_US};
 use jointrig_protocol::request::Stage as Place;
 use jointrig_protocol::slow::Slow;
+use jointrig_protocol::sync::{Clock, ClockFault};
 
 use crate::device::Shared;
 use crate::{fault, memory, port, uart};
@@ -52,6 +55,10 @@ pub struct Scans {
     /// The rings are to be started.
     join: bool,
     last_report: Option<Trouble>,
+    /// What came to the sync port with the last block.
+    seen: Option<Seen>,
+    /// Periods of the clock that have begun.
+    periods: u32,
 }
 
 impl Scans {
@@ -59,7 +66,18 @@ impl Scans {
     pub fn new(core: &'static Shared, per_block: usize, channels: usize, rate_hz: u32) -> Self {
         let alignment = Alignment { clock: CLOCK, block_scans: per_block as u32, blocks: RING_BLOCKS };
         let reader = Reader::new(alignment, channels, 0);
-        Self { core, reader, per_block, rate_hz, due: (0, 0), blocks: 0, join: true, last_report: None }
+        Self {
+            core,
+            reader,
+            per_block,
+            rate_hz,
+            due: (0, 0),
+            blocks: 0,
+            join: true,
+            last_report: None,
+            seen: None,
+            periods: 0,
+        }
     }
 
     /// Waits until the simulator has delivered.
@@ -80,6 +98,11 @@ impl Scans {
         .await
     }
 
+    /// By how many scans what was delivered or reported missing is behind the clock, as a number to be added to what is told from there.
+    fn behind(&self) -> i32 {
+        self.reader.next_period().wrapping_sub(self.periods).cast_signed()
+    }
+
     fn report(&mut self, trouble: Trouble) {
         self.join = true;
         if self.last_report != Some(trouble) {
@@ -90,6 +113,29 @@ impl Scans {
 }
 
 impl board::Scans for Scans {
+    const PERIOD: u32 = PERIOD;
+
+    fn seen(&mut self) -> Option<Seen> {
+        let mut seen = self.seen.take()?;
+        if let Some(edge) = &mut seen.edge {
+            edge.scans += self.behind();
+        }
+        Some(seen)
+    }
+
+    fn clock(&mut self, clock: Clock) -> Result<(), ClockFault> {
+        match port::turn(Op::Clock, u32::from(clock != Clock::Internal)).length {
+            0 => Ok(()),
+            1 => Err(ClockFault::Absent),
+            _ => Err(ClockFault::Rate),
+        }
+    }
+
+    fn mark(&mut self) -> Option<Ago> {
+        let part = port::turn(Op::Mark, 0).length as u16;
+        Some(Ago { scans: self.behind(), part })
+    }
+
     fn can_be_held(&self) -> bool {
         port::with(|port| port.reply.inputs & HELD != 0)
     }
@@ -112,6 +158,12 @@ impl board::Scans for Scans {
         let mut head = [0; DELIVERY_BYTES];
         memory::read(BLOCK_AT, &mut head);
         let delivery = Delivery::from_bytes(&head);
+        self.periods = delivery.periods;
+        if delivery.seen {
+            let mut words = [[0; 4]; SEEN_WORDS];
+            memory::read(SEEN_AT, words.as_flattened_mut());
+            self.seen = Some(seen_from_words(words.map(u32::from_le_bytes)));
+        }
         if let Some(trouble) = delivery.trouble {
             self.report(trouble);
             return self.reader.nothing(delivery.periods);

@@ -14,6 +14,7 @@
 //! | the beginning of a coil pulse | TIM2 starts TIM1 ([`coil`]) |
 //! | its end | TIM1 in one-pulse mode; its longest period is the cap |
 //! | the shaker's codes | TIM2 asks for each; the DMA brings them, and rest behind them ([`drive`]) |
+//! | an external clock, edges at the sync input | TIM3 ([`sync`]) |
 //! | guard and emergency stop | TIM1's break input, and the coil driver's own gate |
 //! | a program that hangs | the independent watchdog ([`watchdog`]) |
 //!
@@ -39,6 +40,7 @@ mod restart;
 mod rings;
 mod scans;
 mod slow;
+mod sync;
 mod usb;
 mod watchdog;
 
@@ -147,6 +149,7 @@ async fn main(spawner: Spawner) {
         channels: channels::table(),
         coil_cap_us: coil.cap_us(),
         stage: NoStage::PRESENT,
+        sync: true,
         drive_v: drive::FULL_SCALE_V,
         reset,
         boot: start.boot,
@@ -181,7 +184,8 @@ async fn main(spawner: Spawner) {
             dma: p.GPDMA1_CH1,
         },
     };
-    let scans = scans::Converters::new(core, chips, p.TIM2, p.TIM5, p.PA0);
+    let port = || sync::Port::new(p.TIM3, p.PC6, p.PC8, p.PD15);
+    let scans = scans::Converters::new(core, chips, p.TIM2, p.TIM5, p.PA0, port);
 
     let drive = drive::ShakerDrive::new(p.DAC1, p.PA4, p.PE10, p.GPDMA1_CH2, p.GPDMA1_CH3);
 

@@ -21,20 +21,24 @@ use jointrig_firmware::ad7606b::alignment::{Alignment, Clock, Moment};
 use jointrig_firmware::ad7606b::part::AD7606B;
 use jointrig_firmware::ad7606b::reader::Reader;
 use jointrig_firmware::ad7606b::trouble::Trouble;
-use jointrig_firmware::board::{Delivered, Scans};
+use jointrig_firmware::board::{Delivered, Scans, Seen};
+use jointrig_firmware::ruler::Ago;
 use jointrig_firmware::sentence::{Sentence, Tell};
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, MAX_CHANNELS};
+use jointrig_protocol::sync::{self as protocol, ClockFault};
 
 use crate::chips::{self, Chips, SETTINGS};
 use crate::lights::{FAULT, SCANNING};
 use crate::rings::{self, BLOCKS, FIRST, SECOND};
-use crate::{BLOCK_SCANS, SCAN_RATE_HZ, Shared, restart, watchdog};
+use crate::{BLOCK_SCANS, SCAN_RATE_HZ, Shared, restart, sync, watchdog};
 use core::sync::atomic::Ordering;
 
 /// Counts of the timers per second.
 pub const TIMER_HZ: u32 = 160_000_000;
 /// CONVST is low for the first µs of each period and rises then: counts of TIM2.
 pub const CONVST_LOW: u32 = TIMER_HZ / 1_000_000;
+/// TIM5 hears of TIM2's update through a synchroniser of some cycles (RM0456, "Timer synchronization"): counts after which it has.
+pub const SETTLED: u32 = 32;
 /// A block takes 0.29 ms; this long without one is silence.
 const PATIENCE: Duration = Duration::from_millis(5);
 /// Between two tries to set silent converters up.
@@ -83,6 +87,7 @@ pub struct Converters {
     _edges: Counter<'static, peripherals::TIM5>,
     next: Next,
     reader: Reader,
+    sync: sync::Port,
     last_report: Option<Fault>,
 }
 
@@ -94,6 +99,7 @@ impl Converters {
         convst: Peri<'static, peripherals::TIM2>,
         edges: Peri<'static, peripherals::TIM5>,
         convst_pin: Peri<'static, peripherals::PA0>,
+        sync: impl FnOnce() -> sync::Port,
     ) -> Self {
         let edges = Counter::new(edges);
         // counts TIM2's updates: RM0456, "TIM5 internal trigger connection", ITR1 is TIM2's TRGO
@@ -109,6 +115,7 @@ impl Converters {
         convst.set_compare_value(Channel::Ch1, CONVST_LOW);
         convst.set_master_mode(MasterMode::UPDATE);
         convst.start();
+        let sync = sync();
         rings::enable_interrupts();
         Self {
             core,
@@ -118,6 +125,7 @@ impl Converters {
             _edges: edges,
             next: Next::SetUp,
             reader: Reader::new(alignment(), MAX_CHANNELS, TIM5.cnt().read()),
+            sync,
             last_report: None,
         }
     }
@@ -191,8 +199,7 @@ impl Converters {
 fn alignment() -> Alignment {
     let from_edge = |ns: u32| CONVST_LOW + ns * (TIMER_HZ / 1_000_000) / 1_000;
     let clock = Clock {
-        // TIM5 hears of TIM2's update through a synchroniser of some cycles (RM0456, "Timer synchronization")
-        settled: 32,
+        settled: SETTLED,
         // no averaging ends within half of its longest time
         read_from: from_edge(AD7606B.conversion_us(SETTINGS.oversampling) * 500),
         // the longest averaging, 144 bits of 25 ns, two idle clocks before and after, and 1 µs for trigger and DMA
@@ -214,6 +221,20 @@ fn look() -> Moment {
 }
 
 impl Scans for Converters {
+    const PERIOD: u32 = sync::PERIOD;
+
+    fn seen(&mut self) -> Option<Seen> {
+        self.sync.seen(self.reader.next_period())
+    }
+
+    fn clock(&mut self, clock: protocol::Clock) -> Result<(), ClockFault> {
+        self.sync.clock(clock)
+    }
+
+    fn mark(&mut self) -> Option<Ago> {
+        Some(self.sync.mark(self.reader.next_period()))
+    }
+
     async fn next(&mut self, block: &mut [u8; BLOCK_SAMPLE_BYTES]) -> Delivered {
         watchdog::ACQUISITION.beat();
         if self.next == Next::SetUp {

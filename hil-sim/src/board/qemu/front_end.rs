@@ -52,8 +52,12 @@ impl FrontEnd {
             words: slip.lags.map(place),
         };
         let produced = first + (codes.len() / self.channels) as u64;
-        let delivery =
-            Delivery { scans: self.per_block as u32, trouble: None, periods: produced as u32, moment };
+        let delivery = Delivery {
+            scans: self.per_block as u32,
+            periods: produced as u32,
+            moment,
+            ..Delivery::default()
+        };
         (delivery, words.collect())
     }
 
@@ -64,7 +68,7 @@ impl FrontEnd {
         let periods = (first + scans) as u32;
         let moment =
             Moment { periods: periods.wrapping_sub(1), phase: CLOCK.read_by, words: [place as u32; 2] };
-        let delivery = Delivery { scans: self.per_block as u32, trouble: None, periods, moment };
+        let delivery = Delivery { scans: self.per_block as u32, periods, moment, ..Delivery::default() };
         (delivery, vec![0; 2 * self.per_block * CHIP_BYTES])
     }
 

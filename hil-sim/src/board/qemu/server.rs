@@ -12,11 +12,13 @@ use std::time::Duration;
 use jointrig_firmware::board::{ByteSink, ByteSource, Coil, Drive, Inputs, Stage};
 use jointrig_firmware::lockstep::{
     Ask, BLOCK_AT, DELIVERY_BYTES, DRIVE_AT, Delivery, EMERGENCY_STOP, HELD, INTERLOCK_CLOSED, LOCAL_RESET,
-    LOG_AT, MUST_FAULT, MUST_OVERFLOW, MUST_PANIC, NEVER, Op, RING_BYTES, Reply, SLOW_AT, SLOW_BYTES,
-    SLOW_MEASURED, Setup, TEXT_AT, TEXT_BYTES, TO_DEVICE_AT, TO_HOST_AT, from_text, to_text,
+    LOG_AT, MUST_FAULT, MUST_OVERFLOW, MUST_PANIC, NEVER, Op, RING_BYTES, Reply, SEEN_AT, SLOW_AT,
+    SLOW_BYTES, SLOW_MEASURED, Setup, TEXT_AT, TEXT_BYTES, TO_DEVICE_AT, TO_HOST_AT, from_text,
+    seen_to_words, to_text,
 };
 use jointrig_logs::Table;
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, scans_per_block};
+use jointrig_protocol::sync::{Clock, ClockFault};
 use jointrig_protocol::{request, schema};
 use serde::Serialize;
 
@@ -27,6 +29,7 @@ use super::process::Pipes;
 use super::shared_ram::SharedRam;
 use crate::board::drive::VirtualDrive;
 use crate::board::parts::{VirtualCoil, VirtualInputs, VirtualStage, describe, fill};
+use crate::board::sync::SyncPort;
 use crate::board::{Controls, Options, name, ring_slots};
 use crate::executor::Woken;
 use crate::link::DeviceEnd;
@@ -66,6 +69,7 @@ pub struct Server {
     front_end: FrontEnd,
     free_running: bool,
     reply: Reply,
+    port: SyncPort,
     /// Scans since the start, lost ones among them.
     produced: u64,
     /// The image's log strings, where it has any.
@@ -112,6 +116,7 @@ impl Server {
             per_block,
             front_end: FrontEnd::new(per_block, channels.len()),
             free_running: options.free_running,
+            port: SyncPort::default(),
             reply: Reply { inputs: INTERLOCK_CLOSED, ..Reply::default() },
             produced: 0,
             strings: None,
@@ -160,6 +165,18 @@ impl Server {
                 Some(Op::Join) => {
                     self.front_end.join(self.produced);
                     self.reply.length = self.produced as u32;
+                }
+                Some(Op::Clock) => {
+                    let rate_hz = self.setup.scan_rate_hz;
+                    let clock = if ask.argument == 0 { Clock::Internal } else { Clock::External { rate_hz } };
+                    self.reply.length = match self.port.clock(self.controls.wires(), self.produced, clock) {
+                        Ok(()) => 0,
+                        Err(ClockFault::Absent) => 1,
+                        Err(_) => 2,
+                    };
+                }
+                Some(Op::Mark) => {
+                    self.reply.length = SyncPort::mark(self.controls.wires(), self.produced).part.into();
                 }
                 Some(Op::Stage) => self.go(ask.argument)?,
                 Some(Op::Panic) => {
@@ -227,7 +244,7 @@ impl Server {
         self.reply.now_us = self.reply.now_us.max(next);
         if block_us <= self.reply.now_us {
             let first = self.produced;
-            let (delivery, words) = match self.faults.of_block(first, self.per_block) {
+            let (mut delivery, words) = match self.faults.of_block(first, self.per_block) {
                 Happening::Sent(slip, at) => {
                     let codes = self.convert(self.front_end.blocks_for(&slip));
                     self.front_end.deliver(first, &codes, &slip, at)
@@ -243,6 +260,11 @@ impl Server {
                     (Delivery { trouble: Some(trouble), periods, ..Delivery::default() }, Vec::new())
                 }
             };
+            if let Some(seen) = self.port.seen(self.controls.wires(), first, self.produced) {
+                let words = seen_to_words(&seen).map(u32::to_le_bytes);
+                self.ram.write(SEEN_AT, words.as_flattened())?;
+                delivery.seen = true;
+            }
             self.ram.write(BLOCK_AT, &delivery.to_bytes())?;
             self.ram.write(BLOCK_AT + DELIVERY_BYTES, &words)?;
             self.reply.blocks += 1;

@@ -16,6 +16,7 @@ mod response_channels;
 mod sense;
 mod sensor;
 mod structure;
+mod sync;
 
 pub use cells::{Cell, MOST_CELLS};
 pub use geometry::{GeometryPlan, ImpactPoint, ResponsePoint, SensorPoint};
@@ -23,6 +24,7 @@ pub use hammer::{HammerPlan, Swung};
 pub use priors::PriorsPlan;
 pub use sensor::{CalibrationFile, SensorPlan};
 pub use structure::{StructurePlan, turned};
+pub use sync::{ClockSource, SyncPlan};
 
 use crate::structure::Structure;
 use jointrig_protocol::request::Configuration;
@@ -98,6 +100,8 @@ pub struct Plan {
     pub window: Spanned<Window>,
     /// When a cell's FRFs are good enough to stop before all wanted hits; never, without it.
     pub enough: Option<Spanned<Enough>>,
+    /// In step with another recorder; by itself, without it.
+    pub sync: Option<Spanned<SyncPlan>>,
     /// The shaker's levels before and after the campaign; none, without it.
     pub shaker: Option<Spanned<ShakerPlan>>,
     /// What is known of contact and static arm; without it, only what the records say.

@@ -7,6 +7,8 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, s
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use jointrig_protocol::sync::Edge;
+
 use super::edits::{Edits, Recount};
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
@@ -42,6 +44,10 @@ enum Entry {
     Temperature {
         session: i64,
         celsius: f64,
+    },
+    Edges {
+        session: i64,
+        edges: Vec<Edge>,
     },
     /// Somebody waits until all before this is stored.
     Waited(SyncSender<()>),
@@ -116,6 +122,12 @@ impl Keeper {
         self.send(Entry::Temperature { session, celsius })
     }
 
+    /// Notes edges of the sync input and output. Returns as [`Keeper::record`] does.
+    #[must_use]
+    pub fn edges(&self, session: i64, edges: Vec<Edge>) -> bool {
+        self.send(Entry::Edges { session, edges })
+    }
+
     /// Waits until all that was handed over is in the file. Returns as [`Keeper::record`] does.
     #[must_use]
     pub fn catch_up(&self) -> bool {
@@ -163,6 +175,7 @@ fn keep(store: &Store, entry: Entry) -> Result<(), StoreError> {
         Entry::GivenUp { cell, reason } => store.give_up(cell, &reason),
         Entry::Log(text) => store.log(&text),
         Entry::Temperature { session, celsius } => store.note_temperature(session, celsius),
+        Entry::Edges { session, edges } => store.note_edges(session, &edges),
         Entry::Waited(by) => {
             // who waited may have ended
             let _ = by.send(());

@@ -99,6 +99,7 @@ pub fn run(
         RunError::AnotherStructure,
     )?;
     session.calibrate(&device, &channels)?;
+    let sync = plan.clock().map(|clock| session.take_clock(clock)).transpose()?;
     let noted = SessionInfo {
         address: session.address().into(),
         board: info.board.as_str().into(),
@@ -109,6 +110,7 @@ pub fn run(
         schema_hash: Hex(session.hello().schema),
     };
     let id = store.begin_session(&noted, &planned)?;
+    sync.iter().try_for_each(|sync| store.note_clock(id, sync))?;
     changed.iter().try_for_each(|what| store.note_another_structure(what))?;
     let unknown = |name: &str| channels.channels.iter().all(|channel| channel.name != name);
     let calibrations = store.calibrations()?;
@@ -286,6 +288,11 @@ impl Runner<'_> {
         self.saw(&Seen::Judged { row, verdict: &verdict, kept, left });
         self.saw(&Seen::Link(self.session.accounts()));
         log::debug!("{:?} attempt {attempt}: {} ({})", row.cell, verdict.kind, verdict.sentence);
+        if self.plan.by_hand().is_some() && self.plan.sync.is_some() {
+            // the device does not know of this hit, and another recorder is to
+            self.session.pulse_output()?;
+        }
+        self.keep_edges()?;
         self.keep_log()?;
         let (utc, utc_error_s) = self.clock.utc(recording.first_scan + recording.trigger_index as u64);
         let record = NewRecord {
@@ -306,6 +313,15 @@ impl Runner<'_> {
             Some(celsius) => still(self.keeper.temperature(self.session_id, celsius)),
             None => Ok(()),
         }
+    }
+
+    /// Keeps edges of the sync input and output, where the plan wants them.
+    fn keep_edges(&mut self) -> Result<(), RunError> {
+        let edges = self.session.edges();
+        if self.plan.sync.is_none() || edges.is_empty() {
+            return Ok(());
+        }
+        still(self.keeper.edges(self.session_id, edges))
     }
 
     /// Keeps what the controller has logged.
@@ -346,6 +362,7 @@ impl Runner<'_> {
             let _ = self.keeper.link(self.session_id, counters(self.session));
         }
         // here too a keeper that is gone says so below
+        let _ = self.keep_edges();
         let _ = self.keep_log();
         let closed = self.keeper.finish();
         match &walked {

@@ -7,6 +7,7 @@ use crate::campaign::plan::configuration_name;
 use crate::campaign::store::Store;
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::error::StoreError;
+use crate::campaign::store::sync_table::ClockRow;
 
 /// Per cell what is wanted, kept and refused, and why; and the FRFs that came from elsewhere.
 ///
@@ -17,6 +18,8 @@ pub fn document(store: &Store) -> Result<Value, StoreError> {
     let tally = Tally::new(&cells, store.rows()?, &records);
     let frf = |row: &crate::campaign::store::frf_table::FrfRow| json!({ "configuration": row.configuration, "file": row.source, "imported": row.utc });
     let frfs: Vec<Value> = store.frf_rows()?.iter().map(frf).collect();
+    let clock = |row: &ClockRow| json!({ "session": row.session, "source": row.source, "rate_hz": row.rate_hz, "ppm": row.ppm });
+    let clocks: Vec<Value> = store.clocks()?.iter().map(clock).collect();
     let all: Vec<Value> = cells.iter().map(|row| of_cell(row, &tally.cell(row.id))).collect();
     Ok(json!({
         "wanted": tally.wanted(),
@@ -24,6 +27,8 @@ pub fn document(store: &Store) -> Result<Value, StoreError> {
         "complete": tally.complete(),
         "records": records.len(),
         "imported_frf": frfs,
+        "clocks": clocks,
+        "edges": store.edges()?.len(),
         "cells": all,
     }))
 }

@@ -33,6 +33,7 @@ pub mod session_table;
 mod share;
 pub mod simulated;
 pub mod stored;
+pub mod sync_table;
 mod table;
 pub mod temperature_table;
 pub mod verify;

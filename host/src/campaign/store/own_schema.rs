@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 
 use rusqlite::Connection;
 
-use super::schema;
+use super::{schema, sync_table};
 
 /// What stands in the schema under a name: its kind and its SQL.
 type Objects = HashMap<String, (String, String)>;
@@ -31,6 +31,7 @@ fn ours() -> rusqlite::Result<&'static Objects> {
     }
     let empty = Connection::open_in_memory()?;
     empty.execute_batch(&schema::tables())?;
+    empty.execute_batch(&sync_table::tables())?;
     let made = objects(&empty)?;
     Ok(OURS.get_or_init(|| made))
 }
@@ -75,6 +76,8 @@ pub(super) fn missing(connection: &Connection) -> rusqlite::Result<Vec<String>> 
     let found = objects(connection)?;
     let mut names: Vec<String> = ours()?.keys().filter(|name| !found.contains_key(*name)).cloned().collect();
     names.retain(|name| version > super::OLDEST || !later(name));
+    // made when they are needed
+    names.retain(|name| !["clocks", "edges"].contains(&name.as_str()));
     names.sort();
     Ok(names)
 }

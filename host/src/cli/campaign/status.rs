@@ -40,6 +40,14 @@ impl Status {
                 format!("FRFs of {} from {}, imported {}", row.configuration, row.source, row.utc)
             }),
         )?;
+        let (clocks, edges) = (store.clocks()?, store.edges()?.len());
+        let external = clocks.iter().filter(|row| row.rate_hz.is_some()).count();
+        if !clocks.is_empty() {
+            output::lines([format!(
+                "in step with another recorder: {external} of {} sessions by its clock, {edges} edges of the sync input and output",
+                clocks.len()
+            )])?;
+        }
         output::lines(started.map(|row| cell_line(row, &tally.cell(row.id))))?;
         output::lines([
             format!(

@@ -112,6 +112,7 @@ impl Columns<'_> {
             ("cells.parquet", tables::cells(&store)?),
             ("channels.parquet", tables::channels(&store)?),
             ("calibrations.parquet", tables::calibrations(&store)?),
+            ("edges.parquet", tables::edges(&store)?),
             ("overrules.parquet", tables::overrules(&store)?),
             ("levels.parquet", levels),
             ("estimates.parquet", estimates::table(&results)),

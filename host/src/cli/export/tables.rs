@@ -78,6 +78,17 @@ const CHANNELS: [(&str, Kind); 15] = [
     ("calibrated", Kind::Text),
 ];
 
+/// One row for each edge of the sync input and output.
+const EDGES: [(&str, Kind); 7] = [
+    ("session", Kind::Whole),
+    ("clock", Kind::Text),
+    ("line", Kind::Text),
+    ("number", Kind::Whole),
+    ("scan", Kind::Real),
+    ("record", Kind::Whole),
+    ("sample", Kind::Real),
+];
+
 /// One row for each calibration.
 const CALIBRATIONS: [(&str, Kind); 11] = [
     ("utc", Kind::Utc),
@@ -117,6 +128,34 @@ pub(super) fn overrules(store: &Store) -> Result<Table, CliError> {
     let mut table = Table::new(&OVERRULES);
     for row in store.overrules()? {
         table.push(vec![row.record.into(), row.utc.into(), row.verdict.into(), row.reason.into()]);
+    }
+    Ok(table)
+}
+
+/// Every edge of the sync input and output, with the record in which it lies and its place among the record's samples.
+pub(super) fn edges(store: &Store) -> Result<Table, CliError> {
+    let mut table = Table::new(&EDGES);
+    let (edges, clocks) = (store.edges()?, store.clocks()?);
+    if edges.is_empty() {
+        return Ok(table);
+    }
+    let records: Vec<RecordRow> = store.records()?.into_iter().flatten().collect();
+    for row in edges {
+        let clock = clocks.iter().find(|clock| clock.session == row.session);
+        let inside = |record: &&RecordRow| {
+            record.session == row.session
+                && (record.first_scan..record.first_scan + record.scans as u64).contains(&row.scan)
+        };
+        let record = records.iter().find(inside);
+        table.push(vec![
+            row.session.into(),
+            clock.map(|clock| clock.source.as_str()).into(),
+            row.line.as_str().into(),
+            row.number.into(),
+            row.at_scan().into(),
+            record.map(|record| record.id).into(),
+            record.map(|record| row.at_scan() - record.first_scan as f64).into(),
+        ]);
     }
     Ok(table)
 }
@@ -233,10 +272,14 @@ pub(super) fn channels(store: &Store) -> Result<Table, CliError> {
     Ok(table)
 }
 
-/// Writes `records.csv`, `channels.csv` and, where there are any, `calibrations.csv`.
+/// Writes `records.csv`, `channels.csv` and, where there are any, `calibrations.csv` and `edges.csv`.
 pub(super) fn write(store: &Store, folder: &Path, written: &[Written]) -> Result<(), CliError> {
     records(store, written)?.write_csv(&folder.join("records.csv")).map_err(bad)?;
     channels(store)?.write_csv(&folder.join("channels.csv")).map_err(bad)?;
+    let seen = edges(store)?;
+    if !seen.rows().is_empty() {
+        seen.write_csv(&folder.join("edges.csv")).map_err(bad)?;
+    }
     let entered = calibrations(store)?;
     if entered.rows().is_empty() {
         return Ok(());

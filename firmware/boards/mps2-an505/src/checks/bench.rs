@@ -170,7 +170,7 @@ impl Bench {
             Some(Op::Idle) => self.idle(ask),
             Some(Op::Pulse) => self.note_coil("latency.coil_on"),
             Some(Op::Off) => self.note_coil("latency.coil_off"),
-            Some(Op::Stage | Op::Play | Op::Rest) => {}
+            Some(Op::Stage | Op::Play | Op::Rest | Op::Clock | Op::Mark) => {}
             Some(Op::Join) => self.reply.length = self.blocks * PER_BLOCK as u32,
             Some(Op::Start | Op::Panic) | None => broken("an unknown wish"),
         }
@@ -269,7 +269,7 @@ impl Bench {
         let periods = self.blocks * PER_BLOCK as u32 - 1;
         let words = (periods + 1) * SCAN_WORDS % (RING_BLOCKS * PER_BLOCK as u32 * SCAN_WORDS);
         let moment = Moment { periods, phase: CLOCK.read_by, words: [words; 2] };
-        let delivery = Delivery { scans: PER_BLOCK as u32, trouble: None, periods, moment };
+        let delivery = Delivery { scans: PER_BLOCK as u32, periods, moment, ..Delivery::default() };
         memory::write(BLOCK_AT, &delivery.to_bytes());
         self.reply.blocks = self.blocks;
         if self.blocks.is_multiple_of(ACKNOWLEDGE_EVERY) {

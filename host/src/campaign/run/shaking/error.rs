@@ -176,6 +176,7 @@ pub fn in_words(reason: Option<Reason>, channels: &ChannelMap, limit: impl Fn(u8
             format!("the sensor of channel `{name}` is not there any more: its cable is open or shorted")
         }
         Some(Reason::FrontEnd) => "the converters lost scans; see the controller's log".into(),
+        Some(Reason::Clock) => "the external clock was lost: it stopped or left its tolerance".into(),
         Some(Reason::RanDry) => "its drive was not fed in time; see the controller's log".into(),
         Some(Reason::StreamEnded) => "the stream ended".into(),
         Some(Reason::Asked) => "another program asked for it".into(),

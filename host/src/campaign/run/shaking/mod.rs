@@ -104,6 +104,7 @@ pub fn run_watched(
     let changed =
         same_or_accepted(store, &info, session.simulated(), accepted, ShakeError::AnotherStructure)?;
     session.calibrate(&device, &channels)?;
+    let sync = plan.clock().map(|clock| session.take_clock(clock)).transpose()?;
     let noted = SessionInfo {
         address,
         board: info.board.as_str().into(),
@@ -115,6 +116,7 @@ pub fn run_watched(
     };
     let known = store.levels()?;
     let id = store.begin_session(&noted, &planned)?;
+    sync.iter().try_for_each(|sync| store.note_clock(id, sync))?;
     changed.iter().try_for_each(|what| store.note_another_structure(what))?;
     remarks.iter().try_for_each(|remark| store.log(remark))?;
     if let Some(simulated) = session.simulated() {
@@ -144,11 +146,18 @@ pub fn run_watched(
             Ok(Outcome::Known(row.clone()))
         } else {
             tell(store, level, None);
+            if plan.sync.is_some() {
+                // a level begins
+                bench.session.pulse_output()?;
+            }
             let outcome = bench.measure(store, level);
             if outcome.is_ok()
                 && let Some(celsius) = bench.session.temperature_c()?
             {
                 store.note_temperature(id, celsius)?;
+            }
+            if plan.sync.is_some() {
+                store.note_edges(id, &bench.session.edges())?;
             }
             bench.over(&outcome);
             outcome

@@ -1,0 +1,162 @@
+//! From counts of a board's timers to instants in scans, and whether an external clock is good.
+//!
+//! A board has a timer whose period is a scan, a count of those periods, and a third timer that never stops and whose
+//! inputs catch its count at an edge. An edge is thus known in counts of the third; one look at all three, whenever it is taken, says
+//! how many scans ago that was. With an external clock a period is not exactly its nominal count: over a block of scans that is an
+//! error of less than 0.003 of a scan.
+
+use jointrig_protocol::sync::CLOCK_TOLERANCE_PPM;
+
+/// An instant, as seen from the next scan that will be delivered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Ago {
+    /// By how many scans the last scan at it or before it precedes the next one to be delivered; negative, follows it.
+    pub scans: i32,
+    /// The part of a scan that had passed since, in parts of 2¹⁶.
+    pub part: u16,
+}
+
+/// A scan in counts of a board's timers.
+#[derive(Clone, Copy, Debug)]
+pub struct Ruler {
+    /// Counts of a nominal scan, below 65536.
+    pub period: u32,
+    /// Counts from the beginning of a period to the instant at which its scan is taken.
+    pub taken_at: u32,
+}
+
+impl Ruler {
+    /// Where an instant lies that is `since` counts before a look at which the timer was `phase` counts into period `now`, when scan
+    /// `next` (in that count of periods) is the next one to be delivered. `since` is at most 2³⁰: 6 s of 160 MHz.
+    #[must_use]
+    pub fn place(&self, now: u32, phase: u32, since: u32, next: u32) -> Ago {
+        let back = since.wrapping_add(self.taken_at).wrapping_sub(phase).cast_signed();
+        let period = self.period.cast_signed();
+        let forward = back.wrapping_neg();
+        let scan = now.wrapping_add(forward.div_euclid(period).cast_unsigned());
+        let rest = forward.rem_euclid(period).cast_unsigned();
+        Ago { scans: next.wrapping_sub(scan).cast_signed(), part: ((rest << 16) / self.period) as u16 }
+    }
+}
+
+/// How long some scans took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Span {
+    /// Scans.
+    pub scans: u32,
+    /// Counts of the board's own crystal.
+    pub counts: u32,
+}
+
+/// Good spans after which an external clock is trusted: 16 blocks of 0.3 ms are 5 ms.
+const PROOF: u32 = 16;
+/// Scans after which the mean of a clock's rate begins anew: 5 minutes of 51.2 kHz.
+const MEAN_OVER: u32 = 1 << 24;
+/// Counts by which a span may be off because both its ends are seen in whole counts, behind a synchroniser of one more.
+const SLACK: u32 = 4;
+
+/// Watches an external clock.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ClockWatch {
+    good: u32,
+    scans: u32,
+    off: i32,
+}
+
+impl ClockWatch {
+    /// Whether the clock was in its tolerance for long enough to be trusted.
+    #[must_use]
+    pub fn trusts(&self) -> bool {
+        self.good >= PROOF
+    }
+
+    /// Takes one span; whether it is within the tolerance.
+    pub fn is_good(&mut self, span: Span, period: u32) -> bool {
+        let nominal = span.scans.wrapping_mul(period);
+        let off = span.counts.wrapping_sub(nominal).cast_signed();
+        // a million is a multiple of the tolerance: no product of more than 32 bits
+        if off.unsigned_abs() > nominal / (1_000_000 / CLOCK_TOLERANCE_PPM) + SLACK {
+            return false;
+        }
+        if self.scans > MEAN_OVER {
+            (self.scans, self.off) = (0, 0);
+        }
+        self.scans += span.scans;
+        self.off = self.off.saturating_add(off);
+        self.good = (self.good + 1).min(PROOF);
+        true
+    }
+
+    /// How much faster than nominal it is, in the mean of the last minutes, ppm.
+    #[must_use]
+    pub fn ppm(&self, period: u32) -> f32 {
+        match self.scans {
+            0 => 0.0,
+            scans => -1e6 * self.off as f32 / (scans as f32 * period as f32),
+        }
+    }
+}
+
+const _: () = assert!(1_000_000 % CLOCK_TOLERANCE_PPM == 0);
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+
+    /// As on the nucleo: 160 MHz, 51.2 kHz, CONVST rises after 1 µs.
+    const RULER: Ruler = Ruler { period: 3125, taken_at: 160 };
+
+    #[test]
+    fn an_edge_lies_where_it_was_whenever_it_is_looked_at() {
+        // time in counts; scan k is taken at 3125 k + 160; the counts of periods wrap in the midst of it
+        let started = u32::MAX - 3;
+        for edge in (0..40_000_u32).step_by(37).chain([159, 160, 161, 3284, 3285, 3286]) {
+            let after = edge.wrapping_sub(160).cast_signed();
+            let (scan, part) = (after.div_euclid(3125), after.rem_euclid(3125).cast_unsigned());
+            for later in [0, 1, 5, 159, 160, 3124, 3125, 46_875, 3_000_000] {
+                let look = edge + later;
+                let now = started.wrapping_add(look / 3125);
+                for next in [0, 15, 30] {
+                    let ago = RULER.place(now, look % 3125, later, started.wrapping_add(next));
+                    assert_eq!(ago.scans, next.cast_signed() - scan, "edge {edge}, looked at {later} later");
+                    assert_eq!(u32::from(ago.part), part * 65_536 / 3125);
+                }
+            }
+        }
+    }
+
+    fn span(scans: u32, ppm: f64) -> Span {
+        Span { scans, counts: (f64::from(scans * 3125) * (1.0 - ppm * 1e-6)).round() as u32 }
+    }
+
+    #[test]
+    fn a_clock_is_trusted_after_a_while_and_its_rate_is_told() {
+        for ppm in [-190.0, -50.0, 0.0, 120.0, 199.0] {
+            let mut watch = ClockWatch::default();
+            for _ in 0..PROOF {
+                assert!(!watch.trusts());
+                assert!(watch.is_good(span(15, ppm), 3125), "{ppm}");
+            }
+            assert!(watch.trusts());
+            assert!((f64::from(watch.ppm(3125)) - ppm).abs() < 12.0, "half a count of a block is 11 ppm");
+            // longer than the mean lasts
+            for _ in 0..20_000 {
+                assert!(watch.is_good(span(1_500, ppm), 3125), "{ppm}");
+            }
+            assert!((f64::from(watch.ppm(3125)) - ppm).abs() < 0.2, "{} for {ppm}", watch.ppm(3125));
+        }
+    }
+
+    #[test]
+    fn beyond_its_tolerance_it_is_not_good() {
+        for (scans, ppm) in [(15, 400.0), (15, -400.0), (1_500, 205.0), (1_500, -205.0), (15, 1e5)] {
+            assert!(!ClockWatch::default().is_good(span(scans, ppm), 3125), "{ppm} ppm over {scans}");
+        }
+        // two periods of fifteen in which nothing came: the timer goes on by itself, a hundredth slower
+        assert!(!ClockWatch::default().is_good(Span { scans: 15, counts: 46_875 + 2 * 31 }, 3125));
+        // a disturbance that came as an edge too many
+        assert!(!ClockWatch::default().is_good(Span { scans: 15, counts: 46_875 - 1_500 }, 3125));
+        assert!(!ClockWatch::default().is_good(Span { scans: 15, counts: 0 }, 3125));
+    }
+}

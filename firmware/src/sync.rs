@@ -1,0 +1,158 @@
+//! In step with another recorder: which clock times the scans, edges at the sync input, pulses of the output.
+//!
+//! Nothing here moves anything: an edge is told, and a pulse follows what hammer and host do. An external clock that fails is a failed
+//! front end: the stream ends, everything comes to rest, and the scans go on by the board's own crystal.
+
+use embassy_sync::blocking_mutex::raw::RawMutex;
+use jointrig_protocol::answer::{Answer, Refusal};
+use jointrig_protocol::event::{Event, Reason};
+use jointrig_protocol::sync::{Clock, ClockFault, Edge, Line, Moment, Sync};
+
+use crate::Core;
+use crate::board::{Scans, Seen};
+use crate::refusal::out_of_bounds;
+use crate::ruler::{Ago, ClockWatch};
+use crate::state::State;
+
+/// What is known of clock and edges, and what is to be done about them.
+#[derive(Default)]
+pub(crate) struct InStep {
+    pub now: Sync,
+    watch: ClockWatch,
+    /// The board is to take this clock.
+    order: Option<Clock>,
+    /// The output is to pulse for this.
+    due: Option<Line>,
+}
+
+impl InStep {
+    /// Whether the board has something to do.
+    #[inline]
+    pub fn is_due(&self) -> bool {
+        self.order.is_some() | self.due.is_some()
+    }
+
+    fn take(&mut self, clock: Clock) {
+        let fault = (clock != Clock::Internal).then_some(ClockFault::Unproven);
+        self.now = Sync { clock, fault, ppm: 0.0, ..self.now };
+        (self.watch, self.order) = (ClockWatch::default(), Some(clock));
+    }
+}
+
+impl State<'_> {
+    /// The output is to pulse with the next block.
+    pub fn mark(&mut self, line: Line) {
+        self.in_step.due = Some(line);
+    }
+
+    /// Whether scans must be taken without a stream, because an external clock is measured by them.
+    pub fn clock_is_measured(&self) -> bool {
+        self.in_step.now.fault == Some(ClockFault::Unproven)
+    }
+
+    /// A session has ended: its clock is forgotten.
+    pub fn forget_clock(&mut self) {
+        if self.in_step.now.clock != Clock::Internal || self.in_step.now.fault.is_some() {
+            self.in_step.take(Clock::Internal);
+        }
+    }
+
+    fn say_edge(&mut self, line: Line, number: u32, ago: Ago) {
+        let scan = self.next_scan.wrapping_add_signed(-i64::from(ago.scans));
+        self.say(Event::Edge(Edge { line, number, at: Moment { scan, part: ago.part } }));
+    }
+
+    /// The clock is not good: what it timed ends.
+    fn lose_clock(&mut self, fault: ClockFault) {
+        let asked = self.in_step.now.clock;
+        self.in_step.take(Clock::Internal);
+        self.in_step.now = Sync { clock: asked, fault: Some(fault), ..self.in_step.now };
+        self.bring_to_rest(Reason::Clock);
+        self.streaming = false;
+        self.say(Event::Clock(fault));
+    }
+
+    fn see(&mut self, seen: Seen, period: u32) {
+        let now = &mut self.in_step.now;
+        now.edges += seen.lost;
+        now.edges_lost += seen.lost;
+        if let Some(ago) = seen.edge {
+            now.edges += 1;
+            let number = now.edges;
+            self.say_edge(Line::Input, number, ago);
+        }
+        let Some(span) = seen.span else { return };
+        // a span of the clock before, or of one that was given up
+        if self.in_step.order.is_some() || self.in_step.now.clock == Clock::Internal {
+            return;
+        }
+        let proven = self.in_step.watch.trusts();
+        if !self.in_step.watch.is_good(span, period) {
+            self.lose_clock(if proven { ClockFault::Lost } else { ClockFault::Rate });
+        } else if self.in_step.watch.trusts() {
+            self.in_step.now.fault = None;
+            self.in_step.now.ppm = self.in_step.watch.ppm(period);
+        }
+    }
+}
+
+impl<M: RawMutex> Core<'_, M> {
+    /// What a board has seen beside the block that was just taken.
+    #[inline(never)]
+    pub(crate) fn see(&self, seen: Seen, period: u32) {
+        self.with(|state| state.see(seen, period));
+    }
+
+    /// Lets the board do what is due.
+    #[inline(never)]
+    pub(crate) fn keep_in_step(&self, scans: &mut impl Scans) {
+        let (order, due) = self.with(|state| (state.in_step.order.take(), state.in_step.due.take()));
+        if let Some(clock) = order
+            && let Err(fault) = scans.clock(clock)
+        {
+            self.with(|state| state.lose_clock(fault));
+        }
+        if let Some(line) = due
+            && let Some(ago) = scans.mark()
+        {
+            self.with(|state| {
+                state.in_step.now.pulses += 1;
+                state.say_edge(line, state.in_step.now.pulses, ago);
+            });
+        }
+    }
+
+    /// The scans are to have this clock.
+    pub(crate) fn ask_for_clock(&self, clock: Clock) -> Result<Answer, Refusal> {
+        if !self.facts.sync {
+            return Err(Refusal::Unsupported);
+        }
+        if let Clock::External { rate_hz } = clock
+            && rate_hz != self.facts.scan_rate_hz
+        {
+            return Err(out_of_bounds("clock: its nominal rate must be that of the scans"));
+        }
+        self.with(|state| {
+            if state.streaming {
+                return Err(out_of_bounds("clock: end the stream first"));
+            }
+            state.in_step.take(clock);
+            Ok(())
+        })?;
+        self.may_run.signal(());
+        Ok(Answer::Done)
+    }
+
+    pub(crate) fn ask_for_mark(&self) -> Result<Answer, Refusal> {
+        if !self.facts.sync {
+            return Err(Refusal::Unsupported);
+        }
+        self.with(|state| {
+            if !state.streaming {
+                return Err(Refusal::NotStreaming);
+            }
+            state.mark(Line::Asked);
+            Ok(Answer::Done)
+        })
+    }
+}
