@@ -36,7 +36,7 @@ const SCANS: [Budget; 6] = [
 ];
 
 /// Instructions for what a scan's cost is made of, and for frames.
-const PARTS: [Budget; 7] = [
+const PARTS: [Budget; 8] = [
     budget(
         "part.join",
         "a block of both converters: CRC-16, scans of sixteen channels, over-range (15 scans)",
@@ -44,6 +44,11 @@ const PARTS: [Budget; 7] = [
     ),
     budget("frame.seal_packet", "CRC-32 of a full block of samples (15 scans), as a packet", 1_900),
     budget("frame.seal", "CRC-32 and COBS of a full block of samples (15 scans)", 7_000),
+    budget(
+        "part.half_band",
+        "30 scans of sixteen channels into 15, by a half-band filter (in no image: docs/front-end.md)",
+        9_000,
+    ),
     budget("part.copy_480", "one copy of a block's samples (there are three on the way)", 600),
     budget("frame.seal_short", "CRC-32 and COBS of an acknowledgement", 500),
     budget("frame.read", "finding and checking a frame of the longest size", 20_000),

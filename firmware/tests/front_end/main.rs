@@ -2,6 +2,7 @@
 //! against a model of the registers; and the timing of a bit on its way, from the datasheets.
 
 mod hardware;
+mod noise;
 mod timing;
 
 use hardware::{BLOCK_SCANS, BLOCKS, CLOCK, Hardware, PERIOD, Slip};

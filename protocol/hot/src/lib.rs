@@ -9,5 +9,6 @@
 pub mod cobs;
 pub mod column;
 pub mod crc32;
+pub mod half_band;
 pub mod pair;
 pub mod range;

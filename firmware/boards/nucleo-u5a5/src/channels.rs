@@ -36,6 +36,20 @@ const INPUTS: [Input; MAX_CHANNELS] = [
     ("aux_16", Role::Auxiliary, Quantity::Voltage, 1.0, 0),
 ];
 
+/// A filter that follows the range would let channels of different ranges lag by different times (docs/front-end.md), of which
+/// nothing here tells the host.
+const _: () = {
+    let mut place = 1;
+    while place < SETTINGS.ranges.len() {
+        let alike = SETTINGS.ranges[place] as u8 == SETTINGS.ranges[0] as u8;
+        assert!(
+            alike || AD7606B.has_bandwidth,
+            "channels of different ranges have different phase with this part"
+        );
+        place += 1;
+    }
+};
+
 /// The table, made once.
 ///
 /// # Panics

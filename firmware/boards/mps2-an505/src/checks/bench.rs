@@ -15,6 +15,7 @@ use jointrig_firmware::lockstep::{
     Ask, BLOCK_AT, CLOCK, DELIVERY_BYTES, Delivery, INTERLOCK_CLOSED, Op, RING_BLOCKS, RING_BYTES, Reply,
     Setup, TO_DEVICE_AT, to_text,
 };
+use jointrig_hot::half_band::{HalfBand, INPUT};
 use jointrig_hot::pair::{CHANNELS, CHIP_BYTES, data_crc, join};
 use jointrig_protocol::acknowledge::Acknowledge;
 use jointrig_protocol::block::HEADER_PAYLOAD;
@@ -117,6 +118,11 @@ impl Bench {
         let (first, second) = chips.split_at(PER_BLOCK as usize);
         self.count("part.join", || {
             black_box(join(black_box(first), black_box(second), MAX_CHANNELS, black_box(&mut noise)));
+        });
+        let mut filter = HalfBand::new();
+        let (twice, mut once) = ([[0x123; MAX_CHANNELS]; INPUT], [[0; MAX_CHANNELS]; INPUT / 2]);
+        self.count("part.half_band", || {
+            black_box(&mut filter).block(black_box(&twice), black_box(&mut once))
         });
         let mut copy = [0; BLOCK_SAMPLE_BYTES];
         self.count("part.copy_480", || black_box(&mut copy).copy_from_slice(black_box(&noise)));
