@@ -73,6 +73,7 @@ pub async fn acquire<M: RawMutex, S: Scans, C: Coil, D: Drive, I: Inputs>(
 
 /// What a block has yielded.
 #[derive(Clone, Copy, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own, true or not")]
 struct Given {
     /// Codes for the drive.
     codes: usize,

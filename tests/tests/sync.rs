@@ -41,7 +41,7 @@ impl Transport for Wired {
 
 /// Two good hits of one cell.
 fn plan(sync: &str) -> String {
-    small_plan(&[("AJB", &["AZ3"], &["B3"])]).replacen("[record]", &format!("{sync}\n[record]"), 1)
+    small_plan(&[("AJB", &["AZ1"], &["B1"])]).replacen("[record]", &format!("{sync}\n[record]"), 1)
 }
 
 fn measure(file: &Path, plan: &str, wire: impl Fn(&Wires)) -> Result<Summary, RunError> {

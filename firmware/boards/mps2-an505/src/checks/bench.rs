@@ -122,7 +122,7 @@ impl Bench {
         let mut filter = HalfBand::new();
         let (twice, mut once) = ([[0x123; MAX_CHANNELS]; INPUT], [[0; MAX_CHANNELS]; INPUT / 2]);
         self.count("part.half_band", || {
-            black_box(&mut filter).block(black_box(&twice), black_box(&mut once))
+            black_box(&mut filter).block(black_box(&twice), black_box(&mut once));
         });
         let mut copy = [0; BLOCK_SAMPLE_BYTES];
         self.count("part.copy_480", || black_box(&mut copy).copy_from_slice(black_box(&noise)));
