@@ -125,13 +125,13 @@ mod tests {
     #[test]
     fn a_table_is_found_and_put_in_its_place() {
         let lines = ["rig 1: 180", "test some ... table: b", "| x |", "|---|", "| 1 |", "", "| no |"];
-        let table = table_in(&lines.map(str::to_owned), "b").unwrap();
+        let table = table_in(&lines.map(str::to_owned), "b").expect("it is there");
         assert_eq!(table, "| x |\n|---|\n| 1 |");
         assert_eq!(table_in(&lines.map(str::to_owned), "c"), None);
         let page = "one\n<!-- table: b -->\nold\n<!-- end of table -->\ntwo\n";
-        let new = placed(page, "b", &table).unwrap();
+        let new = placed(page, "b", &table).expect("it is there");
         assert_eq!(new, "one\n<!-- table: b -->\n\n| x |\n|---|\n| 1 |\n\n<!-- end of table -->\ntwo\n");
-        assert_eq!(placed(&new, "b", &table).unwrap(), new);
+        assert_eq!(placed(&new, "b", &table).expect("it is there"), new);
         assert!(placed(page, "c", &table).is_err());
     }
 

@@ -72,8 +72,8 @@ pub struct Session {
     pub(super) rate_hz: f64,
     pub(super) stalled: Duration,
     pub(super) ended: bool,
-    /// A status has said that the stream ended unasked.
-    doubted: bool,
+    /// How many statuses have said that the stream ended unasked.
+    ends_told: u32,
     /// Whether the device was told other scales than its own.
     pub(super) scaled: bool,
     /// Whether the shaker may be moving at this session's order.
@@ -110,7 +110,7 @@ impl Session {
             rate_hz: 51_200.0,
             stalled: STALLED,
             ended: false,
-            doubted: false,
+            ends_told: 0,
             scaled: false,
             shakes: false,
             errand: None,
@@ -232,7 +232,7 @@ impl Session {
         self.tail = None;
         self.hold = None;
         self.ended = false;
-        self.doubted = false;
+        self.ends_told = 0;
     }
 
     fn receive(&mut self, timeout: Duration) -> Result<(), DeviceError> {
@@ -309,8 +309,8 @@ impl Session {
     fn check_epoch(&mut self, status: &Status) -> Result<(), DeviceError> {
         let Some(stream) = self.inbox.stream.as_ref().filter(|_| !self.ended) else { return Ok(()) };
         // answers overtake events: why a stream has ended may be told behind the first status that says that it has
-        let ended = !status.streaming && std::mem::replace(&mut self.doubted, true);
-        if ended || status.epoch != stream.epoch() { Err(self.restarted()) } else { Ok(()) }
+        self.ends_told += u32::from(!status.streaming);
+        if self.ends_told > 1 || status.epoch != stream.epoch() { Err(self.restarted()) } else { Ok(()) }
     }
 
     pub(super) fn acknowledge(&mut self) -> Result<(), DeviceError> {

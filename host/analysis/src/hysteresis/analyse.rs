@@ -232,7 +232,7 @@ impl SteadyRecord<'_> {
         let Self { record, cycles, frequency_hz, off, hum } = self;
         let frequency_hz = *frequency_hz;
         let Summed { mean, mut slopes, mut energies, harmonics, of_mean, scatter } = summed;
-        let mut findings: Vec<LoopFinding> = off.iter().cloned().collect();
+        let mut findings: Vec<LoopFinding> = off.iter().copied().collect();
         let raw = OverCycles::of(&slopes).expect("Steady::new() gives at least one cycle");
         let quadratures = Quadratures::of(&of_mean, &harmonics);
         let (shape, evidence) = shape(&mean, &scatter, quadratures);
@@ -243,7 +243,7 @@ impl SteadyRecord<'_> {
         } else if shape != Shape::GrossSlip {
             findings.extend(quadratures.and_then(|q| late_at_least(&q, frequency_hz)));
         }
-        findings.extend(hum.iter().cloned());
+        findings.extend(hum.iter().copied());
         let strokes = strokes(&mean);
         let mut warnings = Vec::new();
         let repair = if shape == Shape::GrossSlip && !reversed {
