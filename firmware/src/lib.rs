@@ -23,6 +23,7 @@ pub mod feed;
 mod fmt;
 pub mod friction;
 pub mod hammer;
+mod in_step;
 mod judging;
 pub mod lock_in;
 pub mod lockstep;

@@ -18,11 +18,11 @@ use jointrig_protocol::sync::Line;
 use crate::fmt::{info, warning};
 use crate::friction::Friction;
 use crate::hammer::{CoilOrder, Hammer, Outcome};
+use crate::in_step::InStep;
 use crate::logs::Tap;
 use crate::memory::Memory;
 use crate::ring::{Range, Ring, Slot};
 use crate::shaker::Shaker;
-use crate::sync::InStep;
 
 /// Events that wait for the link.
 const EVENTS: usize = 16;

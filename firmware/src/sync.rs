@@ -11,33 +11,8 @@ use jointrig_protocol::sync::{Clock, ClockFault, Edge, Line, Moment, Sync};
 use crate::Core;
 use crate::board::{Scans, Seen};
 use crate::refusal::out_of_bounds;
-use crate::ruler::{Ago, ClockWatch};
+use crate::ruler::Ago;
 use crate::state::State;
-
-/// What is known of clock and edges, and what is to be done about them.
-#[derive(Default)]
-pub(crate) struct InStep {
-    pub now: Sync,
-    watch: ClockWatch,
-    /// The board is to take this clock.
-    order: Option<Clock>,
-    /// The output is to pulse for this.
-    due: Option<Line>,
-}
-
-impl InStep {
-    /// Whether the board has something to do.
-    #[inline]
-    pub fn is_due(&self) -> bool {
-        self.order.is_some() | self.due.is_some()
-    }
-
-    fn take(&mut self, clock: Clock) {
-        let fault = (clock != Clock::Internal).then_some(ClockFault::Unproven);
-        self.now = Sync { clock, fault, ppm: 0.0, ..self.now };
-        (self.watch, self.order) = (ClockWatch::default(), Some(clock));
-    }
-}
 
 impl State<'_> {
     /// The output is to pulse with the next block.
