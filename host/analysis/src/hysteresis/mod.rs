@@ -2,7 +2,8 @@
 //!
 //! The way through the room: [`record`] (what was measured) → [`integration`] (velocity to displacement over whole cycles) → [`cycles`]
 //! (a shaker's record, cut by its frequency) or [`impact`] (a decay, cut by its dominant mode) → [`loops`] (slopes, area, secant,
-//! fundamental) with `stick` (the stick part and the plateau) and [`shape`]. [`analyse`](mod@analyse) is the front door.
+//! fundamental) with `stick` (the stick part and the plateau) and [`shape`]; `steady` puts a shaker's record together. [`analyse`](mod@analyse) is the front
+//! door, [`loop_analysis`] what comes out of it.
 //!
 //! Definitions are fixed here and nowhere else: k_T is the least-squares slope of the stick part; k_eq that of the whole loop; the peak
 //! secant and the ratio of fundamentals carry their own names. T is taken as given: the load cells' sum is not T at the
@@ -27,6 +28,7 @@ pub mod impact;
 pub mod impact_spectra;
 pub mod integration;
 mod law_fit;
+pub mod loop_analysis;
 pub mod loops;
 pub mod phase_split;
 mod plateau;
@@ -36,14 +38,16 @@ mod repair;
 pub mod repeated_peak;
 pub mod shape;
 pub mod static_arm;
+mod steady;
 mod stick;
 mod sums;
 mod timing;
 pub mod tones;
 
-pub use analyse::{Kind, LoopAnalysis, analyse, analyse_both, analyse_corrected};
+pub use analyse::{analyse, analyse_both, analyse_corrected};
 pub use correction::Correction;
 pub use finding::LoopFinding;
+pub use loop_analysis::{Kind, LoopAnalysis};
 pub use loops::OverCycles;
 pub use record::{HysteresisRecord, RelativeMotion};
 pub use shape::{Shape, ShapeEvidence};
