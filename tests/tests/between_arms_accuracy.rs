@@ -15,7 +15,7 @@ fn plan(rig: &RigConfig) -> String {
 #[test]
 #[ignore = "docs/accuracy.md, by `cargo xtask accuracy`: between the arms, whole campaigns"]
 fn accuracy_of_the_stiffness_between_the_arms() {
-    let (first, rigs, seeds) = (count("FIRST", 700), count("RIGS", 24), count("SEEDS", 1));
+    let (first, rigs, seeds) = (count("FIRST", 700), count("RIGS", 5), count("SEEDS", 1));
     let all = campaigns(first, rigs, seeds, Drawn::default(), |drawn| {
         let truth = drawn.rig().truth().between_arms_k_n_per_m;
         let arms = drawn.results(plan, |_, _, _| {}).answer.unwrap().between_arms;

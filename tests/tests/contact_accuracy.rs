@@ -234,7 +234,7 @@ fn a_contact_that_may_slip_has_its_stuck_stiffness_or_none() {
 #[test]
 #[ignore = "docs/accuracy.md, by `cargo xtask accuracy`: marks beside the contact"]
 fn marks_beside_the_contact() {
-    let (first, rigs, seeds) = (count("FIRST", 100), count("RIGS", 24), count("SEEDS", 1));
+    let (first, rigs, seeds) = (count("FIRST", 100), count("RIGS", 24), count("SEEDS", 3));
     let like = Drawn { errors: 0.5, gain: 0.0, ..Drawn::default() };
     let plans: [(&str, Plan); 3] = [
         ("`contact.toml`: S1–S6; T1–T6 where B has a clamp", contact_plan),
