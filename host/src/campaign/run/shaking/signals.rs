@@ -55,11 +55,18 @@ fn sum(channels: &ChannelMap, samples: &Samples, places: &[(usize, f64)]) -> Vec
     let Some((first, _)) = places.first() else { return Vec::new() };
     let mut sum = vec![0.0; samples.channel(*first).len()];
     sum.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, sum)| {
-        for (place, part) in places {
+        for (n, (place, part)) in places.iter().enumerate() {
             let Some(channel) = channels.channels.get(*place) else { continue };
             let scale = channel.units_per_code() * part;
             let codes = &samples.channel(*place)[chunk * CHUNK..];
-            sum.iter_mut().zip(codes).for_each(|(sum, code)| *sum += f64::from(*code) * scale);
+            let cell = |code: &i16| f64::from(*code) * scale;
+            let pairs = sum.iter_mut().zip(codes);
+            if n == 0 {
+                // fresh memory that is read before it is written is mapped twice, and every core is told
+                pairs.for_each(|(sum, code)| *sum = 0.0 + cell(code));
+            } else {
+                pairs.for_each(|(sum, code)| *sum += cell(code));
+            }
         }
     });
     sum
