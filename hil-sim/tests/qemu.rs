@@ -23,15 +23,7 @@ use jointrig_protocol::frame::{Accumulator, Kind, encode};
 use jointrig_protocol::hello::Hello;
 use jointrig_protocol::limits::MAX_WIRE;
 use jointrig_protocol::request::{Configuration, Numbered, Request};
-use support::{SmallHost, scenarios};
-
-fn image() -> Option<PathBuf> {
-    let image = std::env::var_os("JOINTRIG_MPS2_IMAGE").map(PathBuf::from);
-    if image.is_none() {
-        eprintln!("left out: JOINTRIG_MPS2_IMAGE names no image; `cargo xtask test` builds one and sets it");
-    }
-    image
-}
+use support::{SmallHost, image, scenarios};
 
 fn board(seed: u64) -> Option<(QemuBoard, SmallHost)> {
     let (board, link) = QemuBoard::start(&image()?, None, seed).unwrap();

@@ -3,17 +3,13 @@
 
 mod support;
 
-use std::sync::Arc;
-
-use jointrig_hil_sim::board::{Controls, Options, VirtualBoard};
-use jointrig_hil_sim::link::HostEnd;
 use jointrig_hil_sim::rig::RigConfig;
 use jointrig_hil_sim::rig::config::Cable;
 use jointrig_protocol::answer::{Answer, Hammer, Refusal};
 use jointrig_protocol::event::{Event, Reason};
 use jointrig_protocol::request::{Control, Request, Shake};
 use jointrig_protocol::slow::{Slow, Supply, SupplyFault};
-use support::SmallHost;
+use support::{SmallHost, Started};
 
 const RATE: u32 = 51_200;
 /// Places of the two force cells in a scan.
@@ -47,7 +43,7 @@ fn shake() -> Request {
 }
 
 /// What must hold of a board, native or emulated.
-fn keeps_its_promises(start: impl Fn(&RigConfig) -> (Box<dyn std::any::Any>, Arc<Controls>, HostEnd)) {
+fn keeps_its_promises(start: impl Fn(&RigConfig) -> Started) {
     let faults = [(Cable::Open, SupplyFault::Open), (Cable::Short, SupplyFault::Short)];
     for (cable, fault) in faults {
         // broken from the start: no arming, but the shaker is not concerned
@@ -113,28 +109,13 @@ fn keeps_its_promises(start: impl Fn(&RigConfig) -> (Box<dyn std::any::Any>, Arc
 
 #[test]
 fn the_native_board_asks_its_supplies() {
-    keeps_its_promises(|config| {
-        let options = Options { seed: 3, ..Options::default() };
-        let (board, link) = VirtualBoard::start_with(config, &options).unwrap();
-        let controls = Arc::clone(board.controls());
-        (Box::new(board), controls, link)
-    });
+    keeps_its_promises(support::native);
 }
 
 #[cfg(unix)]
 #[test]
 fn so_does_the_binary() {
-    use jointrig_hil_sim::board::qemu::QemuBoard;
-    let Some(image) = std::env::var_os("JOINTRIG_MPS2_IMAGE") else {
-        eprintln!(
-            "JOINTRIG_MPS2_IMAGE is not set: the emulated board is left out (`cargo xtask test` has it)"
-        );
-        return;
-    };
-    keeps_its_promises(|config| {
-        let options = Options { seed: 3, ..Options::default() };
-        let (board, link) = QemuBoard::start_with(image.as_ref(), config, &options).unwrap();
-        let controls = Arc::clone(board.controls());
-        (Box::new(board), controls, link)
-    });
+    if let Some(image) = support::image() {
+        keeps_its_promises(|config| support::emulated(&image, config));
+    }
 }

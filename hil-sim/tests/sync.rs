@@ -3,23 +3,16 @@
 
 mod support;
 
-use std::any::Any;
-use std::sync::Arc;
-
-use jointrig_hil_sim::board::{Controls, Options, VirtualBoard};
-use jointrig_hil_sim::link::HostEnd;
 use jointrig_hil_sim::rig::RigConfig;
 use jointrig_protocol::answer::{Answer, Hammer, Refusal};
 use jointrig_protocol::event::{Event, Reason};
 use jointrig_protocol::request::{Configuration, Control, Request, Shake};
 use jointrig_protocol::sync::{Clock, ClockFault, Edge, Line, Sync};
-use support::{PULSE_US, SmallHost};
+use support::{PULSE_US, SmallHost, Started};
 
 const EXTERNAL: Clock = Clock::External { rate_hz: 51_200 };
 /// Half a part of 2¹⁶ of a scan is what rounding down leaves in the mean; this is all that it may.
 const PART: f64 = 1.0 / 65_536.0;
-
-type Started = (Box<dyn Any>, Arc<Controls>, HostEnd);
 
 fn sync(host: &mut SmallHost) -> Sync {
     match host.ask(Request::Sync) {
@@ -201,28 +194,13 @@ fn a_lost_clock_stops_the_shaker((_board, controls, link): Started) {
 
 #[test]
 fn the_native_board_keeps_its_promises() {
-    keeps_its_promises(|config| {
-        let options = Options { seed: 3, ..Options::default() };
-        let (board, link) = VirtualBoard::start_with(config, &options).unwrap();
-        let controls = Arc::clone(board.controls());
-        (Box::new(board), controls, link)
-    });
+    keeps_its_promises(support::native);
 }
 
 #[cfg(unix)]
 #[test]
 fn so_does_the_binary() {
-    use jointrig_hil_sim::board::qemu::QemuBoard;
-    let Some(image) = std::env::var_os("JOINTRIG_MPS2_IMAGE") else {
-        eprintln!(
-            "JOINTRIG_MPS2_IMAGE is not set: the emulated board is left out (`cargo xtask test` has it)"
-        );
-        return;
-    };
-    keeps_its_promises(|config| {
-        let options = Options { seed: 3, ..Options::default() };
-        let (board, link) = QemuBoard::start_with(image.as_ref(), config, &options).unwrap();
-        let controls = Arc::clone(board.controls());
-        (Box::new(board), controls, link)
-    });
+    if let Some(image) = support::image() {
+        keeps_its_promises(|config| support::emulated(&image, config));
+    }
 }

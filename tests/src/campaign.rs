@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use jointrig::campaign::run::error::RunError;
 use jointrig::campaign::run::runner::{self, Options, Summary};
 use jointrig::campaign::run::stage::Stage;
 use jointrig::campaign::store::Store;
@@ -54,8 +55,8 @@ pub struct Kept {
     pub codes: Vec<i16>,
 }
 
-/// Runs the plan over `transport` and returns the summary and all records.
-pub fn run(file: &Path, plan: &str, transport: Box<dyn Transport>) -> (Summary, Vec<Kept>) {
+/// Runs the plan over `transport`, to its end or to what ends it before.
+pub fn attempt(file: &Path, plan: &str, transport: Box<dyn Transport>) -> Result<Summary, RunError> {
     let store = Store::create(file, plan, "test plan").unwrap();
     let mut session = Session::open(transport, "test").unwrap();
     let options = Options {
@@ -67,8 +68,25 @@ pub fn run(file: &Path, plan: &str, transport: Box<dyn Transport>) -> (Summary, 
         answers: None,
         stop: Arc::new(AtomicBool::new(false)),
     };
-    let summary = runner::run(store, &mut session, &mut ByRecord, &options).unwrap();
-    (summary, records(file))
+    runner::run(store, &mut session, &mut ByRecord, &options)
+}
+
+/// The same to its end: the summary and all records.
+pub fn run(file: &Path, plan: &str, transport: Box<dyn Transport>) -> (Summary, Vec<Kept>) {
+    (attempt(file, plan, transport).unwrap(), records(file))
+}
+
+/// For each record the first scan of its cell's first one: scans are comparable within a cell alone, because a cell is staged when the
+/// order for it arrives.
+pub fn origins<'a>(rows: impl IntoIterator<Item = &'a RecordRow>) -> Vec<u64> {
+    let mut origin = (0, 0);
+    let of = |row: &RecordRow| {
+        if origin.0 != row.cell {
+            origin = (row.cell, row.first_scan);
+        }
+        origin.1
+    };
+    rows.into_iter().map(of).collect()
 }
 
 /// The rows of all records, in order; every one must be whole.

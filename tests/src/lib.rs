@@ -7,6 +7,7 @@
 pub mod browser;
 pub mod campaign;
 pub mod command;
+pub mod coverage;
 pub mod drawn_campaigns;
 pub mod live;
 pub mod origins;

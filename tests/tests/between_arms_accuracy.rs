@@ -4,6 +4,7 @@
 
 use jointrig::campaign::plan::DEMO;
 use jointrig_hil_sim::rig::RigConfig;
+use jointrig_tests::coverage::{Answer, COLUMNS, Coverage, print_table};
 use jointrig_tests::drawn_campaigns::{campaigns, count};
 use jointrig_tests::rigs::{Drawn, with_priors};
 
@@ -24,27 +25,14 @@ fn accuracy_of_the_stiffness_between_the_arms() {
             println!("{row} – | {} | {} |", arms.why, arms.basis);
             return None;
         };
-        let [low, high] = k.ci95;
-        let covers = (low..=high).contains(&truth);
-        let [mean, low, high] = [k.mean, low, high].map(|k| 1e-6 * k);
-        let missed = if covers { "" } else { ", missed" };
+        let answer = Answer::new(k.mean, k.ci95, truth);
+        let [mean, low, high] = [k.mean, k.ci95[0], k.ci95[1]].map(|k| 1e-6 * k);
+        let missed = if answer.covers { "" } else { ", missed" };
         println!("{row} {mean:.2} | {low:.2}…{high:.2}{missed} | {} |", arms.basis);
-        Some((mean * 1e6 / truth - 1.0, 0.5 * (high - low) / mean, covers))
+        Some(answer)
     });
-    let found: Vec<_> = all.iter().flatten().collect();
-    let covered = found.iter().filter(|(.., covers)| *covers).count();
-    let rms = (found.iter().map(|(error, ..)| error * error).sum::<f64>() / found.len().max(1) as f64).sqrt();
-    let mut half: Vec<f64> = found.iter().map(|(_, half, _)| *half).collect();
-    half.sort_by(f64::total_cmp);
-    println!(
-        "table: between-arms-campaigns\n| campaigns | answers | covered | half width (median) | rms error | none |\n|---|---|---|---|---|---|\n\
-         | {} | {} | {covered} of {} | {:.1} % | {:.1} % | {} |\n",
-        all.len(),
-        found.len(),
-        found.len(),
-        100.0 * half.get(half.len() / 2).copied().unwrap_or(f64::NAN),
-        100.0 * rms,
-        all.len() - found.len()
-    );
-    assert!(100 * covered >= 93 * found.len(), "{covered} of {} covered", found.len());
+    let found = Coverage::of(&all.iter().flatten().copied().collect::<Vec<_>>());
+    let row = format!("| {} | {} | {} |", all.len(), found.cells(), all.len() - found.answers);
+    print_table("between-arms-campaigns", &format!("campaigns | {COLUMNS} | no answer"), &[row]);
+    assert!(100 * found.covered >= 93 * found.answers, "{found:?}");
 }

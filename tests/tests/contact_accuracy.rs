@@ -6,6 +6,7 @@ use jointrig::campaign::store::Store;
 use jointrig::contact::Interval;
 use jointrig::results::Results;
 use jointrig_hil_sim::rig::RigConfig;
+use jointrig_tests::coverage::{Answer, COLUMNS, Coverage, print_table};
 use jointrig_tests::drawn_campaigns::{DrawnCampaign, campaigns, count, each_of, found};
 use jointrig_tests::rigs::{Drawn, contact_plan, near_instead_plan, near_plan};
 use jointrig_tests::slip_truth::slid;
@@ -24,8 +25,13 @@ impl Estimate {
         Estimate { truth, found: found.map(|k| [k.mean, k.ci95[0], k.ci95[1]]) }
     }
 
+    fn answer(&self) -> Option<Answer> {
+        self.found.map(|[mean, low, high]| Answer::new(mean, [low, high], self.truth))
+    }
+
+    /// Whether nothing wrong is said.
     fn covers(&self) -> bool {
-        self.found.is_none_or(|[_, low, high]| low <= self.truth && self.truth <= high)
+        self.answer().is_none_or(|answer| answer.covers)
     }
 }
 
@@ -83,58 +89,25 @@ fn told_of(campaign: DrawnCampaign, plan: Plan) -> Row {
     row
 }
 
-/// What a table's line says of them.
-struct Summary {
-    covered: f64,
-    rms: f64,
-    half: f64,
-    null: f64,
+fn coverage(all: impl Iterator<Item = Estimate>) -> Coverage {
+    Coverage::of(&all.filter_map(|estimate| estimate.answer()).collect::<Vec<_>>())
 }
 
-impl Summary {
-    fn of(all: &[Estimate]) -> Self {
-        let found: Vec<(f64, [f64; 3])> = all.iter().filter_map(|e| Some((e.truth, e.found?))).collect();
-        let answered = found.len() as f64;
-        let mut half: Vec<f64> = found.iter().map(|(_, [k, low, high])| 0.5 * (high - low) / k).collect();
-        half.sort_by(f64::total_cmp);
-        Summary {
-            covered: all.iter().filter(|e| e.found.is_some() && e.covers()).count() as f64 / answered,
-            rms: (found.iter().map(|(truth, [k, ..])| (k / truth - 1.0).powi(2)).sum::<f64>() / answered)
-                .sqrt(),
-            half: half.get(half.len() / 2).copied().unwrap_or(f64::NAN),
-            null: 1.0 - answered / all.len() as f64,
-        }
-    }
-
-    /// Of so many campaigns, as a row of docs/accuracy.md.
-    fn line(&self, name: &str, campaigns: usize) -> String {
-        let [share, rms, half] = [self.covered, self.rms, self.half].map(|x| 100.0 * x);
-        let none = (self.null * campaigns as f64).round();
-        let answers = campaigns as f64 - none;
-        let covered = (self.covered * answers).round();
-        format!(
-            "| {name} | {campaigns} | {covered} of {answers} ({share:.1} %) | {rms:.2} % | {half:.2} % | {none} |"
-        )
-    }
+/// What a table of answers says of each row after its first column.
+fn columns(first: &str) -> String {
+    format!("{first} | campaigns | {COLUMNS} | no answer")
 }
-
-fn stiffness(rows: &[Row]) -> Summary {
-    Summary::of(&rows.iter().map(|row| row.stiffness).collect::<Vec<_>>())
-}
-
-/// The header of docs/accuracy.md's tables of answers, after the name of the first column.
-const HEADER: &str =
-    "campaigns | covered | rms error | half width (median) | no answer |\n|---|---|---|---|---|---|";
 
 /// The rows of k_T and of c_T.
 fn lines(name: &str, rows: &[Row]) -> [String; 2] {
-    let damping = Summary::of(&rows.iter().map(|row| row.damping).collect::<Vec<_>>());
-    [stiffness(rows).line(name, rows.len()), damping.line(&format!("{name}: c_T"), rows.len())]
-}
-
-/// Prints a table where `cargo xtask accuracy` finds it.
-fn print_table(name: &str, header: &str, rows: &[String]) {
-    println!("table: {name}\n{header}\n{}\n", rows.join("\n"));
+    let line = |name: &str, found: Coverage| {
+        format!("| {name} | {} | {} | {} |", rows.len(), found.cells(), rows.len() - found.answers)
+    };
+    let damping = format!("{name}: c_T");
+    [
+        line(name, coverage(rows.iter().map(|row| row.stiffness))),
+        line(&damping, coverage(rows.iter().map(|row| row.damping))),
+    ]
 }
 
 /// Takes what the simulator is known to be out of a campaign file.
@@ -166,8 +139,8 @@ fn the_contacts_own_stiffness_is_found_on_rigs_that_nobody_tuned_for() {
         };
         [30, 31].map(|number| scope.spawn(move || one(number))).map(|thread| thread.join().unwrap())
     });
-    let Summary { covered, rms, half, null } = stiffness(&rows);
-    assert_eq!((covered, null), (1.0, 0.0), "{rows:?}");
+    let Coverage { answers, covered, rms, half } = coverage(rows.iter().map(|row| row.stiffness));
+    assert_eq!((covered, answers), (rows.len(), rows.len()), "{rows:?}");
     // 2.5 % rms is what the placing of spots and points leaves; three of two draws may not exceed three of them
     assert!(rms < 0.06 && half < 0.15, "{rows:?}");
 }
@@ -221,8 +194,8 @@ fn a_contact_that_may_slip_has_its_stuck_stiffness_or_none() {
             rows.len() - none - covered
         ));
     }
-    let header = "| contacts that | campaigns | called slipping | called stuck | not told | no k_T | the stuck k_T covered | missed |\n|---|---|---|---|---|---|---|---|";
-    print_table("slip", header, &lines);
+    let columns = "contacts that | campaigns | called slipping | called stuck | not told | no k_T | the stuck k_T covered | missed";
+    print_table("slip", columns, &lines);
     let right = slipping.iter().filter(|row| row.slips == Some(true)).count()
         + stuck.iter().filter(|row| row.slips == Some(false)).count();
     assert!(20 * right >= 19 * rows.len(), "{rows:?}");
@@ -247,7 +220,7 @@ fn marks_beside_the_contact() {
         println!("{name}");
         rows.extend(lines(name, &campaigns(first, rigs, seeds, like, |campaign| told_of(campaign, *plan))));
     }
-    print_table("marks", &format!("| points | {HEADER}"), &rows);
+    print_table("marks", &columns("points"), &rows);
 }
 
 #[test]
@@ -272,5 +245,5 @@ fn accuracy_of_the_contacts_own_stiffness() {
         rows.extend(lines(name, &told));
         println!("{}", rows.join("\n"));
     }
-    print_table("contact", &format!("| errors | {HEADER}"), &rows);
+    print_table("contact", &columns("errors"), &rows);
 }

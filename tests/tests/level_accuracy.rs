@@ -8,6 +8,7 @@ use jointrig::campaign::store::Store;
 use jointrig::device::address::Address;
 use jointrig::device::session::Session;
 use jointrig::results::{Excitation, Force, Hysteresis, Results};
+use jointrig_tests::coverage::{Answer, COLUMNS, Coverage, print_table, rms};
 use jointrig_tests::drawn_campaigns::{DrawnCampaign, campaigns, count};
 use jointrig_tests::rigs::{Drawn, levels_plan};
 use std::path::Path;
@@ -30,31 +31,27 @@ impl Campaign {
         rows.filter(|row| row.kind == Excitation::Shaker && row.force == Force::Raw)
     }
 
-    /// Error and half width of a level's k_T, relative, and whether its interval covers; none where it has none.
-    fn named(&self, row: &Hysteresis) -> Option<(f64, f64, bool)> {
+    /// A level's k_T against the truth; none where it has none.
+    fn named(&self, row: &Hysteresis) -> Option<Answer> {
         let k = row.k_t_n_per_m?;
-        let [low, high] = k.ci95.unwrap();
-        let covers = low <= self.truth && self.truth <= high;
-        Some((k.mean / self.truth - 1.0, 0.5 * (high - low) / k.mean, covers))
+        Some(Answer::new(k.mean, k.ci95.unwrap(), self.truth))
     }
 
     /// The same of the answer, to which hits and levels both contribute.
-    fn answer(&self) -> Option<(f64, f64, bool)> {
+    fn answer(&self) -> Option<Answer> {
         let k = self.results.answer.as_ref()?.contact.k_t_n_per_m?;
-        let [low, high] = k.ci95;
-        let covers = low <= self.truth && self.truth <= high;
-        Some((k.mean / self.truth - 1.0, 0.5 * (high - low) / k.mean, covers))
+        Some(Answer::new(k.mean, k.ci95, self.truth))
     }
 
     fn tell(&self, label: &str) {
-        if let Some((error, half, covers)) = self.answer() {
+        if let Some(Answer { error, half, covers }) = self.answer() {
             let basis = self.results.answer.as_ref().unwrap().contact.basis;
             let missed = if covers { "" } else { "MISSED" };
             println!("{label} answer: {:+5.1} % ± {:.1} % {basis:?} {missed}", 100.0 * error, 100.0 * half);
         }
         for row in self.levels() {
             let told = match self.named(row) {
-                Some((error, half, covers)) => format!(
+                Some(Answer { error, half, covers }) => format!(
                     "{:+5.1} % ± {:.1} % {}",
                     100.0 * error,
                     100.0 * half,
@@ -100,10 +97,9 @@ fn shake(file: &Path, address: &Address, seed: u64) {
 struct Counted {
     campaigns: usize,
     levels: usize,
-    /// Error and half width of each level that is named k_T, relative; whether its interval covers.
-    named: Vec<(f64, f64, bool)>,
-    /// The same of the answers.
-    answers: Vec<(f64, f64, bool)>,
+    /// Each level that is named k_T.
+    named: Vec<Answer>,
+    answers: Vec<Answer>,
     /// Error of the slope between the spots of the same levels where it has one.
     raw: Vec<f64>,
 }
@@ -121,33 +117,19 @@ impl Counted {
         }
     }
 
-    fn row(&self, name: &str) -> String {
-        let rms = |errors: &[f64]| {
-            100.0 * (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt()
-        };
-        let told = |all: &[(f64, f64, bool)]| {
-            let covered = all.iter().filter(|(.., covers)| *covers).count();
-            let mut half: Vec<f64> = all.iter().map(|(_, half, _)| 100.0 * half).collect();
-            half.sort_by(f64::total_cmp);
-            let errors: Vec<f64> = all.iter().map(|(error, ..)| *error).collect();
+    /// Levels, and the answers of the same campaigns.
+    fn rows(&self, name: &str) -> [String; 2] {
+        let told = |all: &[Answer]| Coverage::of(all).cells();
+        let Counted { campaigns, levels, named, answers, raw } = self;
+        [
             format!(
-                "{} | {covered} ({:.1} %) | {:.1} % | {:.1} %",
-                all.len(),
-                100.0 * covered as f64 / all.len().max(1) as f64,
-                rms(&errors),
-                half.get(half.len() / 2).copied().unwrap_or(f64::NAN)
-            )
-        };
-        format!(
-            "| {name} | {} | {} | {} | {:.0} % ({} levels) |\n| {name}: answer.contact | {} | – | {} | – |",
-            self.campaigns,
-            self.levels,
-            told(&self.named),
-            rms(&self.raw),
-            self.raw.len(),
-            self.campaigns,
-            told(&self.answers)
-        )
+                "| {name} | {campaigns} | {levels} | {} | {:.0} % ({} levels) |",
+                told(named),
+                100.0 * rms(raw),
+                raw.len()
+            ),
+            format!("| {name}: answer.contact | {campaigns} | – | {} | – |", told(answers)),
+        ]
     }
 }
 
@@ -159,13 +141,13 @@ fn a_level_is_called_k_t_only_where_its_interval_holds() {
     counted.add(&campaign);
     assert_eq!(counted.levels, 6);
     assert!(counted.named.len() >= 2, "some levels of this rig tell its contact");
-    assert!(counted.named.iter().all(|(error, half, covers)| *covers && *half <= 0.1 && error.abs() < 0.1));
+    assert!(counted.named.iter().all(|level| level.covers && level.half <= 0.1 && level.error.abs() < 0.1));
     // what stands beside it, between the spots, is another number
     assert!(counted.raw.iter().any(|error| error.abs() > 0.1), "{:?}", counted.raw);
     // the levels that have a k_T count in the answer as well
     let contact = &campaign.results.answer.as_ref().unwrap().contact;
     assert_eq!(contact.basis, jointrig::results::Basis::Joint, "{}", contact.why);
-    let (_, half, covers) = campaign.answer().unwrap();
+    let Answer { half, covers, .. } = campaign.answer().unwrap();
     assert!(covers && half < 0.05, "{}", contact.why);
     let shares: f64 = contact.budget.values().map(|share| share * share).sum();
     let k = contact.k_t_n_per_m.unwrap();
@@ -200,12 +182,8 @@ fn accuracy_of_the_shakers_levels() {
         counted[0].add(campaign);
         counted[if *both { 2 } else { 1 }].add(campaign);
     }
-    println!(
-        "table: levels\n| rigs | campaigns | levels | named k_T | covered | rms error | half width (median) | rms error between the spots |\n\
-         |---|---|---|---|---|---|---|---|"
-    );
-    for (name, counted) in ["all", "clamp on A", "clamps on A and B"].iter().zip(&counted) {
-        println!("{}", counted.row(name));
-    }
-    println!();
+    let named = ["all", "clamp on A", "clamps on A and B"].iter().zip(&counted);
+    let rows: Vec<String> = named.flat_map(|(name, counted)| counted.rows(name)).collect();
+    let columns = format!("rigs | campaigns | levels | {COLUMNS} | rms error between the spots");
+    print_table("levels", &columns, &rows);
 }

@@ -7,6 +7,7 @@ use jointrig::campaign::store::session_table::Counters;
 use jointrig::campaign::verdict::{Kind, Verdict};
 use jointrig::device::recording::Recording;
 use jointrig_tests::browser::{Browser, Look, Page};
+use jointrig_tests::campaign::{origins, rows};
 use jointrig_tests::command::jointrig;
 use jointrig_tests::live::{self, Served, done, picture};
 use serde_json::Value;
@@ -222,15 +223,10 @@ fn a_stored_verdict_is_on_the_page_at_once() {
 
 /// What a run stored, with its scans counted from each cell's first record on: when a stream begins is a matter of the process's start.
 fn stored(file: &Path) -> Vec<(i64, u64, u32, f64, String)> {
-    let records = Store::open_read_only(file).unwrap().records().unwrap();
-    let records: Vec<RecordRow> = records.into_iter().map(|record| record.unwrap()).collect();
-    // a cell is staged when the order for it arrives, so that scans are comparable within a cell alone
-    let mut first = std::collections::BTreeMap::new();
-    for record in &records {
-        first.entry(record.cell).or_insert(record.first_scan);
-    }
-    let since = |r: &RecordRow| r.first_scan - first[&r.cell];
-    records.iter().map(|r| (r.cell, since(r), r.crc, r.measure, r.sentence.clone())).collect()
+    let records = rows(&Store::open_read_only(file).unwrap());
+    let since = origins(&records);
+    let told = |(r, from): (RecordRow, u64)| (r.cell, r.first_scan - from, r.crc, r.measure, r.sentence);
+    records.into_iter().zip(since).map(told).collect()
 }
 
 #[test]

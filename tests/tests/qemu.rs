@@ -15,7 +15,7 @@ use jointrig::device::channels::ChannelMap;
 use jointrig::device::logs::Tables;
 use jointrig::device::session::Session;
 use jointrig::device::transport::Transport;
-use jointrig_tests::campaign::{rows, run, small_plan};
+use jointrig_tests::campaign::{origins, rows, run, small_plan};
 use jointrig_tests::command::Served;
 
 const SEED: u64 = 7;
@@ -77,15 +77,8 @@ fn comparable(mut stored: Stored, origin: u64) -> Stored {
 
 /// All of a campaign as it must be the same; scans count from the first scan of each cell's first record.
 fn comparables(stored: Vec<Stored>) -> Vec<Stored> {
-    let mut origin = (0, 0);
-    let from = |stored: Stored| {
-        let row = &stored.row;
-        if origin.0 != row.cell {
-            origin = (row.cell, row.first_scan);
-        }
-        comparable(stored, origin.1)
-    };
-    stored.into_iter().map(from).collect()
+    let origins = origins(stored.iter().map(|stored| &stored.row));
+    stored.into_iter().zip(origins).map(|(stored, origin)| comparable(stored, origin)).collect()
 }
 
 /// How much too large the controller's square root may be: where there is no `std`, it is micromath's, which halves the

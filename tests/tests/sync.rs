@@ -3,23 +3,17 @@
 
 use std::io;
 use std::path::Path;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use jointrig::campaign::run::error::RunError;
-use jointrig::campaign::run::runner::{self, Options, Summary};
-use jointrig::campaign::run::stage::Stage;
+use jointrig::campaign::run::runner::Summary;
 use jointrig::campaign::store::Store;
 use jointrig::campaign::store::sync_table::{ClockRow, EdgeRow};
-use jointrig::campaign::verdict::judge::ByRecord;
-use jointrig::campaign::watch::Watchers;
-use jointrig::device::session::Session;
 use jointrig::device::transport::Transport;
 use jointrig_hil_sim::board::{Options as BoardOptions, VirtualBoard, Wires};
 use jointrig_hil_sim::link::HostEnd;
 use jointrig_hil_sim::rig::RigConfig;
-use jointrig_tests::campaign::small_plan;
+use jointrig_tests::campaign::{attempt, small_plan};
 use jointrig_tests::command::jointrig;
 use jointrig_tests::live::done;
 
@@ -48,18 +42,7 @@ fn measure(file: &Path, plan: &str, wire: impl Fn(&Wires)) -> Result<Summary, Ru
     let options = BoardOptions { seed: 5, ..BoardOptions::default() };
     let (board, link) = VirtualBoard::start_with(&RigConfig::default(), &options).unwrap();
     wire(board.controls().wires());
-    let store = Store::create(file, plan, "test plan").unwrap();
-    let mut session = Session::open(Box::new(Wired { link, _board: board }), "test:").unwrap();
-    let options = Options {
-        stage: Stage::Auto,
-        yes: true,
-        new_structure: false,
-        watch: Watchers::default(),
-        edits: None,
-        answers: None,
-        stop: Arc::new(AtomicBool::new(false)),
-    };
-    runner::run(store, &mut session, &mut ByRecord, &options)
+    attempt(file, plan, Box::new(Wired { link, _board: board }))
 }
 
 fn noted(file: &Path) -> (Vec<ClockRow>, Vec<EdgeRow>) {
@@ -128,7 +111,7 @@ fn a_clock_that_is_not_there_is_refused_before_anything_is_stored() {
     for (name, ppm, words) in [("a", None, "no external clock"), ("b", Some(900.0), "within 200 ppm")] {
         let file = folder.path().join(name).with_extension("jrig");
         let said = measure(&file, &external, |wires| wires.give_clock(ppm)).unwrap_err().to_string();
-        assert!(said.contains("test:") && said.contains(words), "{said}");
+        assert!(said.contains("test: ") && said.contains(words), "{said}");
         assert!(Store::open_read_only(&file).unwrap().sessions().unwrap().is_empty());
     }
 }
@@ -144,7 +127,7 @@ fn a_clock_that_is_lost_ends_the_run_by_name_and_keeps_what_was_measured() {
     })
     .unwrap_err()
     .to_string();
-    assert!(said.contains("test:") && said.contains("the external clock was lost"), "{said}");
+    assert!(said.contains("test: ") && said.contains("the external clock was lost"), "{said}");
     let store = Store::open_read_only(&file).unwrap();
     assert!(!store.records().unwrap().is_empty(), "what was measured before is there");
 }

@@ -3,9 +3,16 @@
 
 pub mod scenarios;
 
+use std::any::Any;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+#[cfg(unix)]
+use jointrig_hil_sim::board::qemu::QemuBoard;
+use jointrig_hil_sim::board::{Controls, Options, VirtualBoard};
 use jointrig_hil_sim::link::HostEnd;
+use jointrig_hil_sim::rig::RigConfig;
 use jointrig_protocol::acknowledge::Acknowledge;
 use jointrig_protocol::answer::{self, Answer, Refusal, Status};
 use jointrig_protocol::block::Block;
@@ -23,6 +30,35 @@ pub const PULSE_US: u32 = 3_500;
 const BEFORE: u64 = 256;
 /// Scans of a record.
 const LENGTH: u64 = 20_480;
+
+/// A running board, what a test may see and do of it, and its link.
+pub type Started = (Box<dyn Any>, Arc<Controls>, HostEnd);
+
+/// The native board with this rig.
+pub fn native(config: &RigConfig) -> Started {
+    let options = Options { seed: 3, ..Options::default() };
+    let (board, link) = VirtualBoard::start_with(config, &options).unwrap();
+    let controls = Arc::clone(board.controls());
+    (Box::new(board), controls, link)
+}
+
+/// The image for QEMU; where there is none, it says so.
+pub fn image() -> Option<PathBuf> {
+    let image = std::env::var_os("JOINTRIG_MPS2_IMAGE").map(PathBuf::from);
+    if image.is_none() {
+        eprintln!("left out: JOINTRIG_MPS2_IMAGE names no image; `cargo xtask test` builds one and sets it");
+    }
+    image
+}
+
+/// The emulated board with this rig, of an [`image`].
+#[cfg(unix)]
+pub fn emulated(image: &Path, config: &RigConfig) -> Started {
+    let options = Options { seed: 3, ..Options::default() };
+    let (board, link) = QemuBoard::start_with(image, config, &options).unwrap();
+    let controls = Arc::clone(board.controls());
+    (Box::new(board), controls, link)
+}
 
 pub struct SmallHost {
     link: HostEnd,

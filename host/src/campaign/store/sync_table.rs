@@ -93,6 +93,9 @@ impl Store {
 
     /// Notes edges of a session.
     pub fn note_edges(&self, session: i64, edges: &[Edge]) -> Result<(), StoreError> {
+        if edges.is_empty() {
+            return Ok(());
+        }
         self.change("noting edges of the sync input and output", |connection| {
             make(connection)?;
             edges.iter().try_for_each(|edge| {

@@ -139,14 +139,16 @@ pub(super) fn edges(store: &Store) -> Result<Table, CliError> {
     if edges.is_empty() {
         return Ok(table);
     }
-    let records: Vec<RecordRow> = store.records()?.into_iter().flatten().collect();
+    let mut records: Vec<RecordRow> = store.records()?.into_iter().flatten().collect();
+    records.sort_by_key(|record| (record.session, record.first_scan));
     for row in edges {
         let clock = clocks.iter().find(|clock| clock.session == row.session);
+        // the last record that begins before the edge is the only one that may hold it
+        let begun = records.partition_point(|r| (r.session, r.first_scan) <= (row.session, row.scan));
         let inside = |record: &&RecordRow| {
-            record.session == row.session
-                && (record.first_scan..record.first_scan + record.scans as u64).contains(&row.scan)
+            record.session == row.session && row.scan < record.first_scan + record.scans as u64
         };
-        let record = records.iter().find(inside);
+        let record = begun.checked_sub(1).map(|last| &records[last]).filter(inside);
         table.push(vec![
             row.session.into(),
             clock.map(|clock| clock.source.as_str()).into(),
