@@ -6,7 +6,9 @@
 //! rooms know nothing of devices, files or screens: arrays and geometry in, numbers out.
 #![forbid(unsafe_code)]
 
-pub use jointrig_analysis::{contact, frf, hysteresis, identified, spectra, structure, substructuring};
+pub use jointrig_analysis::{
+    contact, frf, hysteresis, identified, median, spectra, structure, substructuring,
+};
 
 mod advice;
 pub mod analyse;

@@ -40,6 +40,7 @@ mod errors_in_variables;
 pub mod frf;
 pub mod hysteresis;
 pub mod identified;
+pub mod median;
 mod parallel;
 pub mod spectra;
 pub mod structure;

@@ -3,8 +3,9 @@
 use super::HysteresisError;
 use super::compliance::{ContactCompliance, ImaginaryPeak, SEARCH_HZ};
 use super::correction::Correction;
+use super::dominant_frequency::dominant_frequency;
 use super::finding::LoopFinding;
-use super::impact::{FIRST_CYCLES, decay, dominant_frequency};
+use super::impact::{FIRST_CYCLES, decay};
 use super::loop_analysis::{Kind, LoopAnalysis};
 use super::loops::{OverCycles, swing};
 use super::record::{HysteresisRecord, Relative};

@@ -5,14 +5,14 @@
 //! stiffness, and is reported as such.
 
 use super::HysteresisError;
+use super::dominant_frequency::{dominant_frequency, turns};
 use super::integration::open_record;
 use super::loops::{slope, swing};
 use super::record::Relative;
+use crate::median::middle;
 use num_complex::Complex;
-use realfft::RealFftPlanner;
 use serde::Serialize;
 use std::f64::consts::TAU;
-use std::ops::Range;
 
 /// The cycles whose slopes make the record's k: the first two, still well above noise and beyond the pulse itself.
 pub(super) const FIRST_CYCLES: usize = 2;
@@ -105,58 +105,13 @@ pub(super) fn decay(motion: &Relative, force_n: &[f64], fs_hz: f64) -> Result<De
     Ok(Decay { frequency_hz, cycles, displacement_m, phase_deg })
 }
 
-/// Samples whose turns share one angle that is computed.
-const SHARED: usize = 64;
-
-/// e^(i `step` n) of every n of a range: each the product of two that are computed, and right to a few units in the last place.
-fn turns(range: Range<usize>, step: f64) -> Vec<Complex<f64>> {
-    let within: [Complex<f64>; SHARED] = std::array::from_fn(|i| Complex::from_polar(1.0, step * i as f64));
-    let mut all = Vec::with_capacity(range.len());
-    for first in range.clone().step_by(SHARED) {
-        let base = Complex::from_polar(1.0, step * first as f64);
-        all.extend(within[..SHARED.min(range.end - first)].iter().map(|turn| base * turn));
-    }
-    all
-}
-
 /// First sample that stands out: 5 % of the largest deviation, or six times the white noise, whichever is more.
 fn onset(x: &[f64]) -> usize {
-    let mut tail: Vec<f64> = x[x.len() - x.len() / 4 - 1..].to_vec();
-    let middle = tail.len() / 2;
-    let rest = *tail.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let mut second: Vec<f64> = x.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
-    let middle = second.len() / 2;
-    let median =
-        if second.is_empty() { 0.0 } else { *second.select_nth_unstable_by(middle, f64::total_cmp).1 };
+    let rest = middle(&x[x.len() - x.len() / 4 - 1..]).unwrap_or(0.0);
+    let second: Vec<f64> = x.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
     // second differences of white noise have √6 times its rms, their median 0.6745 of that
-    let noise = median / 0.6745 / 6f64.sqrt();
+    let noise = middle(&second).unwrap_or(0.0) / 0.6745 / 6f64.sqrt();
     let largest = x.iter().map(|v| (v - rest).abs()).fold(0.0, f64::max);
     let limit = (0.05 * largest).max(6.0 * noise).min(0.5 * largest);
     x.iter().position(|v| (v - rest).abs() >= limit).unwrap_or(0)
-}
-
-/// The strongest frequency (Hz) above two periods of the record, from a Hann-windowed spectrum with parabolic refinement.
-pub(super) fn dominant_frequency(x: &[f64], fs_hz: f64) -> Option<f64> {
-    let n = x.len();
-    if n < 32 {
-        return None;
-    }
-    let mean = x.iter().sum::<f64>() / n as f64;
-    let mut windowed: Vec<f64> = x
-        .iter()
-        .enumerate()
-        .map(|(i, v)| (v - mean) * (0.5 - 0.5 * (TAU * (i as f64 + 0.5) / n as f64).cos()))
-        .collect();
-    let fft = RealFftPlanner::new().plan_fft_forward(n);
-    let mut spectrum = fft.make_output_vec();
-    fft.process(&mut windowed, &mut spectrum).ok()?;
-    let level: Vec<f64> = spectrum.iter().map(|v| v.norm_sqr().max(f64::MIN_POSITIVE).ln()).collect();
-    let top = (2..level.len() - 1).max_by(|&a, &b| level[a].total_cmp(&level[b]))?;
-    if spectrum[top].norm_sqr() <= f64::MIN_POSITIVE {
-        return None;
-    }
-    let (l, m, r) = (level[top - 1], level[top], level[top + 1]);
-    let bend = l - 2.0 * m + r;
-    let shift = if bend < 0.0 { (0.5 * (l - r) / bend).clamp(-0.5, 0.5) } else { 0.0 };
-    Some((top as f64 + shift) * fs_hz / n as f64)
 }

@@ -17,6 +17,7 @@ pub mod correction;
 pub mod cycle;
 pub mod cycles;
 pub mod delays;
+mod dominant_frequency;
 pub mod finding;
 pub mod first_cycle;
 pub mod friction_harmonic;

@@ -1,5 +1,8 @@
 //! Where the hammer's main pulse is in a force record, and how high it really is.
 
+use crate::median::middle;
+use crate::vectors::{all_finite, largest};
+
 /// Fraction of the peak that bounds the pulse.
 const EDGE: f64 = 0.02;
 
@@ -27,19 +30,14 @@ pub struct Pulse {
 impl Pulse {
     /// Finds the pulse; none in an empty or constant record or one with values that are not numbers.
     pub fn locate(force_n: &[f64]) -> Option<Pulse> {
-        if force_n.iter().any(|v| !v.is_finite()) {
+        if !all_finite(force_n) {
             return None;
         }
         let offset_n = middle(force_n)?;
-        let mut rms: Vec<f64> = force_n
-            .chunks(NOISE_BLOCK)
-            .map(|b| (b.iter().map(|v| (v - offset_n).powi(2)).sum::<f64>() / b.len() as f64).sqrt())
-            .collect();
-        let at = rms.len() / 2;
-        let noise_n = *rms.select_nth_unstable_by(at, f64::total_cmp).1;
-        let (peak_sample, top) =
-            force_n.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))?;
-        let top = top - offset_n;
+        let noise_n = middle(&rms_of_blocks(force_n, offset_n))?;
+        let highest = largest(force_n);
+        let peak_sample = force_n.iter().position(|v| *v == highest)?;
+        let top = highest - offset_n;
         if top <= 0.0 {
             return None;
         }
@@ -57,13 +55,25 @@ impl Pulse {
     }
 }
 
-fn middle(values: &[f64]) -> Option<f64> {
-    if values.is_empty() {
-        return None;
+/// Root mean square about `offset` of each block.
+fn rms_of_blocks(x: &[f64], offset: f64) -> Vec<f64> {
+    // a sum waits for its own last addition: those of several blocks do not wait for one another
+    const TOGETHER: usize = 8;
+    let rms = |sum: f64, count: usize| (sum / count as f64).sqrt();
+    let mut all = Vec::with_capacity(x.len().div_ceil(NOISE_BLOCK));
+    let mut groups = x.chunks_exact(TOGETHER * NOISE_BLOCK);
+    for group in groups.by_ref() {
+        let mut sums = [0.0; TOGETHER];
+        for i in 0..NOISE_BLOCK {
+            for (block, sum) in sums.iter_mut().enumerate() {
+                *sum += (group[block * NOISE_BLOCK + i] - offset).powi(2);
+            }
+        }
+        all.extend(sums.map(|sum| rms(sum, NOISE_BLOCK)));
     }
-    let mut sorted = values.to_vec();
-    let at = sorted.len() / 2;
-    Some(*sorted.select_nth_unstable_by(at, f64::total_cmp).1)
+    let rest = groups.remainder().chunks(NOISE_BLOCK);
+    all.extend(rest.map(|b| rms(b.iter().map(|v| (v - offset).powi(2)).sum(), b.len())));
+    all
 }
 
 /// The largest value within one sample of `peak` of the record interpolated sixteenfold by a windowed sinc.

@@ -1,7 +1,8 @@
 //! Overload: values at the range, or a flat top below it (an amplifier in front of the converter, or a foreign record whose
 //! range nobody wrote down).
 
-use super::dropout::{middle, third_differences};
+use super::dropout::third_differences;
+use crate::median::middle;
 use crate::spectra::Pulse;
 
 /// Evidence of clipping.
@@ -169,7 +170,7 @@ impl Side {
 /// Rms of white noise under the motion: from the median of third differences, which have 20 times its power.
 fn noise(x: &[f64]) -> f64 {
     // the median of |x| is 0.6745 σ
-    middle(&third_differences(x, 1)) / (20f64.sqrt() * 0.6745)
+    middle(&third_differences(x, 1)).unwrap_or(0.0) / (20f64.sqrt() * 0.6745)
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 //! with the median of its surroundings, so that neither the level of noise nor a decaying mode counts.
 
 use super::motion::{LOOKED_AT, is_motion};
+use crate::median::middle;
 use crate::spectra::Pulse;
 
 /// The strongest jump found.
@@ -37,7 +38,7 @@ pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<B
     for block in BLOCKS {
         let differences = third_differences(x, block);
         let floor = step / (block as f64).sqrt();
-        let whole = middle(&differences).max(floor).max(f64::MIN_POSITIVE);
+        let whole = middle(&differences).unwrap_or(0.0).max(floor).max(f64::MIN_POSITIVE);
         let width = (SURROUNDINGS / block).max(64);
         let hop = (width / 4).max(1);
         for (start, part) in differences.chunks(hop).enumerate().map(|(n, part)| (n * hop, part)) {
@@ -96,15 +97,7 @@ pub(super) fn quantum(x: &[f64]) -> f64 {
 fn local_scale(differences: &[f64], start: usize, hop: usize, width: usize) -> f64 {
     let centre = start + hop / 2;
     let to = (centre + width / 2).min(differences.len());
-    middle(&differences[centre.saturating_sub(width / 2)..to])
-}
-
-/// Median of values that are not negative.
-pub(super) fn middle(values: &[f64]) -> f64 {
-    // the bits of such numbers are in their order, and compare quicker
-    let mut bits: Vec<u64> = values.iter().map(|v| v.to_bits()).collect();
-    let at = bits.len() / 2;
-    if bits.is_empty() { 0.0 } else { f64::from_bits(*bits.select_nth_unstable(at).1) }
+    middle(&differences[centre.saturating_sub(width / 2)..to]).unwrap_or(0.0)
 }
 
 #[cfg(test)]

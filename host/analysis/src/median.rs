@@ -1,0 +1,126 @@
+//! The middle value of many: what is left of a record when pulses and bursts do not count.
+
+use crate::vectors::wide;
+use pulp::NullaryFnOnce;
+
+/// Values below which the whole is searched at once.
+const FEW: usize = 4096;
+/// Values of the sample that tells about where the middle is.
+const SAMPLE: usize = 1024;
+/// So far from its middle the sample is trusted, ranks: four standard deviations (√1024 / 2 = 16).
+const MARGIN: usize = 64;
+
+/// Values that are looked at together for some that lie between.
+const BLOCK: usize = 64;
+
+/// The value at half the length of the sorted list, by [`f64::total_cmp`]; none of nothing.
+///
+/// A sample tells about where it is. Of a coarse signal, whose values are few and come often, the sample's own middle is it already, and
+/// needs only to be counted. Else what is between two values of the sample is searched. Where the sample was wrong, as it may be of a periodic
+/// record, everything is.
+pub fn middle(values: &[f64]) -> Option<f64> {
+    let at = values.len() / 2;
+    let all = || values.iter().map(|v| key(*v)).collect::<Vec<i64>>();
+    if values.len() < FEW {
+        return (!values.is_empty()).then(|| value(*all().select_nth_unstable(at).1));
+    }
+    let mut sample: Vec<i64> = values.iter().step_by(values.len() / SAMPLE).map(|v| key(*v)).collect();
+    sample.sort_unstable();
+    let middle = sample.len() / 2;
+    let [below, equal] = wide(Counted { values, from: sample[middle], to: sample[middle] });
+    if (below..below + equal).contains(&at) {
+        return Some(value(sample[middle]));
+    }
+    let (from, to) = if at < below {
+        (sample[middle - MARGIN], sample[middle])
+    } else {
+        (sample[middle], sample[middle + MARGIN])
+    };
+    let [below, count] = wide(Counted { values, from, to });
+    if !(below..below + count).contains(&at) {
+        return Some(value(*all().select_nth_unstable(at).1));
+    }
+    let mut between = Vec::with_capacity(count);
+    for block in values.chunks(BLOCK) {
+        let [_, within] = wide(Counted { values: block, from, to });
+        if within > 0 {
+            between.extend(block.iter().map(|v| key(*v)).filter(|key| (from..=to).contains(key)));
+        }
+    }
+    Some(value(*between.select_nth_unstable(at - below).1))
+}
+
+/// How many keys are below `from`, and how many between it and `to`, both included.
+struct Counted<'a> {
+    values: &'a [f64],
+    from: i64,
+    to: i64,
+}
+
+impl NullaryFnOnce for Counted<'_> {
+    type Output = [usize; 2];
+
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn call(self) -> [usize; 2] {
+        let (mut below, mut up_to) = (0_u64, 0_u64);
+        for value in self.values {
+            let key = key(*value);
+            below += u64::from(key < self.from);
+            up_to += u64::from(key <= self.to);
+        }
+        [below as usize, (up_to - below) as usize]
+    }
+}
+
+/// A whole number in the order of [`f64::total_cmp`]; whole numbers compare quicker.
+#[expect(clippy::inline_always, reason = "called where the processor's vectors are known")]
+#[inline(always)]
+fn key(value: f64) -> i64 {
+    let bits = value.to_bits().cast_signed();
+    bits ^ ((bits >> 63).cast_unsigned() >> 1).cast_signed()
+}
+
+/// What `key` was made of: it is its own inverse.
+fn value(key: i64) -> f64 {
+    f64::from_bits((key ^ ((key >> 63).cast_unsigned() >> 1).cast_signed()).cast_unsigned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    fn sorted(values: &[f64]) -> Option<f64> {
+        let mut values = values.to_vec();
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied()
+    }
+
+    #[test]
+    fn it_is_the_middle_of_the_sorted_list() {
+        let mut stream = Xoshiro256PlusPlus::seed_from_u64(5);
+        for n in (0..40).chain([FEW - 1, FEW, FEW + 1, 51_199, 102_400]) {
+            let noise: Vec<f64> = (0..n).map(|_| stream.random_range(-1.0..1.0)).collect();
+            // few different values, as of a quiet channel; rising; a wave in step with the sample; zeros of both signs
+            let coarse = noise.iter().map(|v| (v * 3.0).round()).collect();
+            let rising = (0..n).map(|i| i as f64 - 9.0).collect();
+            let wave = (0..n).map(|i| ((i % 100) as f64 - 50.0) / 7.0).collect();
+            let infinite = noise.iter().map(|v| if *v > 0.9 { f64::INFINITY } else { *v }).collect();
+            for values in [noise, coarse, rising, wave, infinite] {
+                let values: Vec<f64> = values;
+                assert_eq!(middle(&values).map(f64::to_bits), sorted(&values).map(f64::to_bits), "{n}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_sample_that_misleads_changes_nothing() {
+        // every sampled value is far above the others
+        let step = 102_400 / SAMPLE;
+        let values: Vec<f64> =
+            (0..102_400).map(|i| if i % step == 0 { 1e9 + i as f64 } else { (i % 977) as f64 }).collect();
+        assert_eq!(middle(&values), sorted(&values));
+    }
+}
