@@ -2,15 +2,11 @@
 //!
 //! Column by column, as small matrices are factorised, a thousand columns take most of a second; in blocks, a small part of it.
 
+use super::narrow::{NARROW, add_product, crossed};
 use nalgebra::DMatrix;
 
 /// Columns of a block: few enough for the processor's cache, enough for a product to be worth its start.
 const BLOCK: usize = 64;
-
-/// AᵀB by the product that is fast for wide A.
-pub(super) fn crossed(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    (b.transpose() * a).transpose()
-}
 
 /// These rows in memory of their own, column by column: a view of them is copied value by value.
 pub(super) fn rows(x: &DMatrix<f64>, first: usize, count: usize) -> DMatrix<f64> {
@@ -68,11 +64,20 @@ impl Factor {
         let mut first = 0;
         for block in &self.blocks {
             let size = block.inverse.nrows();
-            let solved = &block.inverse * rows(x, first, size);
-            x.rows_mut(first, size).copy_from(&solved);
-            first += size;
-            let mut rest = x.rows_mut(first, block.below.nrows());
-            rest -= &block.below * solved;
+            let own = rows(x, first, size);
+            if x.ncols() <= NARROW {
+                x.rows_mut(first, size).fill(0.0);
+                add_product(x, first, 1.0, &block.inverse, &own);
+                let solved = rows(x, first, size);
+                first += size;
+                add_product(x, first, -1.0, &block.below, &solved);
+            } else {
+                let solved = &block.inverse * own;
+                x.rows_mut(first, size).copy_from(&solved);
+                first += size;
+                let mut rest = x.rows_mut(first, block.below.nrows());
+                rest -= &block.below * solved;
+            }
         }
     }
 
@@ -82,8 +87,12 @@ impl Factor {
         for block in self.blocks.iter().rev() {
             let size = block.inverse.nrows();
             let first = below - size;
-            let known = &block.below_turned * rows(x, below, block.below.nrows());
-            let solved = &block.inverse_turned * (rows(x, first, size) - known);
+            let (own, solved_before) = (rows(x, first, size), rows(x, below, block.below.nrows()));
+            let solved = if x.ncols() <= NARROW {
+                crossed(&block.inverse, &(own - crossed(&block.below, &solved_before)))
+            } else {
+                &block.inverse_turned * (own - &block.below_turned * solved_before)
+            };
             x.rows_mut(first, size).copy_from(&solved);
             below = first;
         }
@@ -100,18 +109,19 @@ mod tests {
         for n in [1, BLOCK - 1, BLOCK, BLOCK + 1, 3 * BLOCK + 7] {
             let root = DMatrix::from_fn(n, n, |r, c| ((r * 37 + c * 101) % 97) as f64 / 97.0 - 0.5);
             let a = &root * root.transpose() + DMatrix::identity(n, n);
-            let x = DMatrix::from_fn(n, 13, |r, c| ((r * 11 + c * 5) % 31) as f64 - 15.0);
             let plain = a.clone().cholesky().expect("positive");
             let factor = Factor::of(a).expect("positive");
-            let mut solved = x.clone();
-            factor.forward(&mut solved);
-            let half = plain.l().solve_lower_triangular(&x).expect("regular");
-            // rounding: the condition number is below 1e4
-            assert!((&solved - &half).norm() < 1e-10 * half.norm(), "{n}");
-            factor.backward(&mut solved);
-            let whole = plain.solve(&x);
-            assert!((&solved - &whole).norm() < 1e-10 * whole.norm(), "{n}");
-            assert!((crossed(&x, &half) - x.transpose() * &half).norm() < 1e-12 * x.norm() * half.norm());
+            for count in [13, NARROW + 1] {
+                let x = DMatrix::from_fn(n, count, |r, c| ((r * 11 + c * 5) % 31) as f64 - 15.0);
+                let mut solved = x.clone();
+                factor.forward(&mut solved);
+                let half = plain.l().solve_lower_triangular(&x).expect("regular");
+                // rounding: the condition number is below 1e4
+                assert!((&solved - &half).norm() < 1e-10 * half.norm(), "{n}");
+                factor.backward(&mut solved);
+                let whole = plain.solve(&x);
+                assert!((&solved - &whole).norm() < 1e-10 * whole.norm(), "{n}");
+            }
         }
     }
 

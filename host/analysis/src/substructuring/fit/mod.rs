@@ -18,6 +18,7 @@ mod chart;
 mod effect;
 mod factor;
 mod model;
+mod narrow;
 mod noise;
 mod nuisance;
 mod outcome;

@@ -2,7 +2,8 @@
 
 use super::FitError;
 use super::chart::{Chart, Shape};
-use super::factor::{Factor, crossed};
+use super::factor::Factor;
+use super::narrow::crossed;
 use super::problem::{Corrected, Problem};
 use super::weight::{Point, Weight};
 use crate::errors_in_variables::Feigned;

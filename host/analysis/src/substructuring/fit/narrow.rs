@@ -1,0 +1,264 @@
+//! Products of large matrices with a few columns, as every step of the search needs them.
+//!
+//! Products made for large matrices first copy both into an order that suits them. With a dozen columns the copy of the large one takes as long as
+//! the product; here it is read once, as it stands. Sums run in vectors as wide as the processor has, so that they differ from those of
+//! single numbers in rounding.
+
+use nalgebra::DMatrix;
+use pulp::{Arch, Simd, WithSimd};
+
+/// Columns up to which these products are the quicker ones.
+pub(super) const NARROW: usize = 48;
+
+/// AᵀB.
+pub(super) fn crossed(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    assert_eq!(a.nrows(), b.nrows(), "A and B are of one height");
+    let mut out = DMatrix::zeros(a.ncols(), b.ncols());
+    if a.nrows() > 0 && !out.is_empty() {
+        let height = a.nrows();
+        let (a, b) = (a.as_slice(), b.as_slice());
+        Arch::new().dispatch(Crossed { a, b, height, out: out.as_mut_slice() });
+    }
+    out
+}
+
+/// Adds `factor` A X to the rows of `to` from `first` on.
+pub(super) fn add_product(
+    to: &mut DMatrix<f64>,
+    first: usize,
+    factor: f64,
+    a: &DMatrix<f64>,
+    x: &DMatrix<f64>,
+) {
+    assert_eq!((a.ncols(), to.ncols()), (x.nrows(), x.ncols()), "A, X and what they are added to fit");
+    assert!(first + a.nrows() <= to.nrows(), "there are rows for all of A's");
+    if a.is_empty() || x.is_empty() {
+        return;
+    }
+    let (rows, inner, stride) = (a.nrows(), a.ncols(), to.nrows());
+    let (a, x) = (a.as_slice(), x.as_slice());
+    Arch::new().dispatch(Added { to: to.as_mut_slice(), stride, first, factor, a, rows, x, inner });
+}
+
+/// Columns of `a` and `b` of the same height, and AᵀB by columns.
+struct Crossed<'a> {
+    a: &'a [f64],
+    b: &'a [f64],
+    height: usize,
+    out: &'a mut [f64],
+}
+
+impl WithSimd for Crossed<'_> {
+    type Output = ();
+
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        // as many sums as there are registers for them and for what they are made of
+        if S::REGISTER_COUNT >= 32 { self.by::<S, 8, 3>(simd) } else { self.by::<S, 4, 2>(simd) }
+    }
+}
+
+impl Crossed<'_> {
+    /// I columns of A with J of B at a time.
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn by<S: Simd, const I: usize, const J: usize>(self, simd: S) {
+        let Crossed { a, b, height, out } = self;
+        let count = a.len() / height;
+        let mut put = |i: usize, j: usize, sum: f64| out[j * count + i] = sum;
+        let several = a.chunks_exact(I * height);
+        let single = several.remainder().chunks_exact(height);
+        let first_single = count - single.len();
+        for (at, a) in several.enumerate() {
+            crossed_with::<S, I, J>(simd, I * at, a, b, height, &mut put);
+        }
+        for (i, a) in single.enumerate() {
+            crossed_with::<S, 1, J>(simd, first_single + i, a, b, height, &mut put);
+        }
+    }
+}
+
+/// I columns with all of `b`.
+#[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+#[inline(always)]
+fn crossed_with<S: Simd, const I: usize, const J: usize>(
+    simd: S,
+    first: usize,
+    a: &[f64],
+    b: &[f64],
+    height: usize,
+    put: &mut impl FnMut(usize, usize, f64),
+) {
+    let several = b.chunks_exact(J * height);
+    let single = several.remainder().chunks_exact(height);
+    let first_single = b.len() / height - single.len();
+    for (at, b) in several.enumerate() {
+        for (i, sums) in dots::<S, I, J>(simd, a, b, height).into_iter().enumerate() {
+            for (j, sum) in sums.into_iter().enumerate() {
+                put(first + i, J * at + j, sum);
+            }
+        }
+    }
+    for (j, b) in single.enumerate() {
+        for (i, [sum]) in dots::<S, I, 1>(simd, a, b, height).into_iter().enumerate() {
+            put(first + i, first_single + j, sum);
+        }
+    }
+}
+
+/// The products of I columns with J others.
+#[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+#[inline(always)]
+fn dots<S: Simd, const I: usize, const J: usize>(
+    simd: S,
+    a: &[f64],
+    b: &[f64],
+    height: usize,
+) -> [[f64; J]; I] {
+    let whole = height - height % S::F64_LANES;
+    let a_vectors: [&[S::f64s]; I] = std::array::from_fn(|i| S::as_simd_f64s(&a[i * height..][..whole]).0);
+    let b_vectors: [&[S::f64s]; J] = std::array::from_fn(|j| S::as_simd_f64s(&b[j * height..][..whole]).0);
+    let mut sums = [[simd.splat_f64s(0.0); J]; I];
+    for l in 0..whole / S::F64_LANES {
+        let own: [S::f64s; I] = std::array::from_fn(|i| a_vectors[i][l]);
+        for j in 0..J {
+            let other = b_vectors[j][l];
+            for i in 0..I {
+                sums[i][j] = simd.mul_add_e_f64s(own[i], other, sums[i][j]);
+            }
+        }
+    }
+    std::array::from_fn(|i| {
+        std::array::from_fn(|j| {
+            let rest = a[i * height + whole..(i + 1) * height].iter().zip(&b[j * height + whole..]);
+            rest.fold(sum_of_lanes::<S>(sums[i][j]), |sum, (a, b)| sum + a * b)
+        })
+    })
+}
+
+/// The sum of a vector's numbers. By way of memory: the processor's own way is not inlined where vectors are of eight, and costs more than the
+/// products.
+#[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+#[inline(always)]
+fn sum_of_lanes<S: Simd>(vector: S::f64s) -> f64 {
+    const MOST: usize = 8;
+    let mut lanes = [0.0; MOST];
+    if let [all, ..] = S::as_mut_simd_f64s(&mut lanes).0 {
+        *all = vector;
+    }
+    let [a, b, c, d, e, f, g, h] = lanes;
+    ((a + b) + (c + d)) + ((e + f) + (g + h))
+}
+
+/// A of `rows` × `inner`, X of `inner` rows, and where `factor` times their product goes, all by columns.
+struct Added<'a> {
+    to: &'a mut [f64],
+    stride: usize,
+    first: usize,
+    factor: f64,
+    a: &'a [f64],
+    rows: usize,
+    x: &'a [f64],
+    inner: usize,
+}
+
+/// Vectors of a column that are summed at once.
+const HIGH: usize = 4;
+
+impl WithSimd for Added<'_> {
+    type Output = ();
+
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let count = self.x.len() / self.inner;
+        let mut row = 0;
+        while self.rows - row >= HIGH * S::F64_LANES {
+            self.strip::<S, HIGH>(simd, row, count);
+            row += HIGH * S::F64_LANES;
+        }
+        while self.rows - row >= S::F64_LANES {
+            self.strip::<S, 1>(simd, row, count);
+            row += S::F64_LANES;
+        }
+        for row in row..self.rows {
+            for j in 0..count {
+                let x = &self.x[j * self.inner..(j + 1) * self.inner];
+                let a = self.a[row..].iter().step_by(self.rows);
+                let sum: f64 = a.zip(x).map(|(a, x)| a * x).sum();
+                self.to[j * self.stride + self.first + row] += self.factor * sum;
+            }
+        }
+    }
+}
+
+impl Added<'_> {
+    /// R vectors of rows from `row` on, with all columns of X.
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn strip<S: Simd, const R: usize>(&mut self, simd: S, row: usize, count: usize) {
+        let mut j = 0;
+        while j + 4 <= count {
+            self.tile::<S, R, 4>(simd, row, j);
+            j += 4;
+        }
+        while j < count {
+            self.tile::<S, R, 1>(simd, row, j);
+            j += 1;
+        }
+    }
+
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn tile<S: Simd, const R: usize, const J: usize>(&mut self, simd: S, row: usize, first_j: usize) {
+        let mut sums = [[simd.splat_f64s(0.0); R]; J];
+        let x: [&[f64]; J] = std::array::from_fn(|j| &self.x[(first_j + j) * self.inner..][..self.inner]);
+        for i in 0..self.inner {
+            let own = &self.a[i * self.rows + row..][..R * S::F64_LANES];
+            let own: [S::f64s; R] = std::array::from_fn(|r| S::as_simd_f64s(own).0[r]);
+            for j in 0..J {
+                let factor = simd.splat_f64s(x[j][i]);
+                for r in 0..R {
+                    sums[j][r] = simd.mul_add_e_f64s(own[r], factor, sums[j][r]);
+                }
+            }
+        }
+        let factor = simd.splat_f64s(self.factor);
+        for (j, sums) in sums.into_iter().enumerate() {
+            let at = (first_j + j) * self.stride + self.first + row;
+            let to = S::as_mut_simd_f64s(&mut self.to[at..][..R * S::F64_LANES]).0;
+            for (to, sum) in to.iter_mut().zip(sums) {
+                *to = simd.mul_add_e_f64s(sum, factor, *to);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn matrix(rows: usize, columns: usize, seed: usize) -> DMatrix<f64> {
+        DMatrix::from_fn(rows, columns, |r, c| ((r * 37 + c * 101 + seed) % 97) as f64 / 97.0 - 0.5)
+    }
+
+    #[test]
+    fn products_of_every_shape_are_those_of_whole_matrices() {
+        for (rows, inner, count) in
+            [(1, 1, 1), (3, 7, 2), (8, 8, 4), (41, 5, 13), (288, 9, 13), (130, 66, 43), (0, 3, 2), (3, 0, 2)]
+        {
+            let (a, b) = (matrix(rows, inner, 1), matrix(rows, count, 2));
+            // rounding of sums of numbers below one
+            assert!((crossed(&a, &b) - a.transpose() * &b).amax() < 1e-12);
+            let x = matrix(inner, count, 3);
+            let before = matrix(rows + 5, count, 4);
+            let mut to = before.clone();
+            add_product(&mut to, 2, -1.5, &a, &x);
+            let mut whole = before;
+            let mut part = whole.rows_mut(2, rows);
+            part -= (&a * &x) * 1.5;
+            assert!((to - whole).amax() < 1e-12, "{rows} × {inner}, {count}");
+        }
+    }
+}
