@@ -192,12 +192,13 @@ impl CampaignFile {
         let late = |place: usize| delay(place) - delay(force);
         let contact = match at_contact {
             Some((a, b)) => {
-                let mut tangential_n = vec![0.0; signal(a).len()];
+                let specimen_a_m_per_s = signal(a);
+                let mut tangential_n = vec![0.0; specimen_a_m_per_s.len()];
                 for (place, part) in &cells {
                     tangential_n.iter_mut().zip(signal(*place)).for_each(|(sum, v)| *sum += part * v);
                 }
                 Some(ContactSignals {
-                    specimen_a_m_per_s: signal(a),
+                    specimen_a_m_per_s,
                     specimen_b_m_per_s: signal(b),
                     tangential_n,
                     // one amplifier: the load cells are alike

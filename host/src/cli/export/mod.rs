@@ -12,6 +12,7 @@ mod tables;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use rayon::prelude::*;
 
 use super::analyse::write_into;
 use super::error::CliError;
@@ -23,6 +24,7 @@ use crate::exchange::positions_output::write_positions;
 use crate::exchange::{tables_output, uff_output, write_frf};
 use crate::frf::Frf;
 use crate::report::WithFrfs;
+use crate::structure::Structure;
 use crate::substructuring::geometry::Configuration;
 use analysed::analysed;
 
@@ -175,18 +177,22 @@ impl Files<'_> {
         let written = if *without_records { Vec::new() } else { self.write_records(&store)? };
         tables::write(&store, out, &written)?;
         let WithFrfs { frfs, mut told, results } = analysed(&store, self.what.band)?;
-        for (structure, frf) in frfs {
+        // each file is packed on one core: all of them at once, beside the report
+        let write = |(structure, frf): &(Structure, Frf)| -> Result<String, CliError> {
             let path = folders[1].join(structure.name()).with_extension(self.format.extension());
-            self.write_frf(&path, &frf, geometry.points(structure))?;
+            self.write_frf(&path, frf, geometry.points(*structure))?;
             let (outputs, inputs, lines) = (frf.outputs().len(), frf.inputs().len(), frf.lines().len());
-            told.push(format!("{}: {outputs} outputs, {inputs} inputs, {lines} lines", path.display()));
-        }
+            Ok(format!("{}: {outputs} outputs, {inputs} inputs, {lines} lines", path.display()))
+        };
+        let all = || frfs.par_iter().map(write).collect::<Result<Vec<String>, CliError>>();
+        let (reported, frfs_told) = rayon::join(|| write_into(&results, out, &[]), all);
+        reported?;
+        told.extend(frfs_told?);
         let folder = out.join("levels");
         let levels = levels::write(&store, &folder, self.format, !without_records)?;
         if levels > 0 {
             told.push(format!("{}: {levels} levels of the shaker", folder.display()));
         }
-        write_into(&results, out, &[])?;
         told.push(format!("geometry, results.json and report.html are in {}", out.display()));
         output::lines(told)
     }

@@ -8,6 +8,7 @@
 use super::assembly::Assembly;
 use super::layout::Axes;
 use super::{Line, Priors, compliance};
+use crate::substructuring::product::product;
 use nalgebra::{Complex, Vector3};
 
 type C = Complex<f64>;
@@ -105,8 +106,7 @@ impl Assembly {
                 }
             }
         }
-        let motion = t_u * cells;
-        let wrench = cells * t_f;
+        let (motion, wrench) = (product(&layout.t_u, cells), product(cells, &layout.t_f));
         let sides = [0, 1].map(|side| side * n);
         // of each impact at either virtual point, and of either virtual point at each channel
         let rotations: Vec<[Vector3<C>; 2]> = (0..impacts)
