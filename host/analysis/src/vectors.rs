@@ -4,12 +4,12 @@
 //! have four. Which a loop gets is found out when it runs. Each number is computed by the same operations either way: results are equal to the
 //! last bit.
 
-use pulp::{Arch, NullaryFnOnce};
+use pulp::{Arch, WithSimd};
 
 /// Does `work`, a loop that is inlined with all that it calls, compiled for this processor. A closure of more than a few lines is not
-/// inlined: that takes a type with a `call` that always is.
+/// inlined: that takes a type with a `call` that always is. A work that has to know how many numbers a vector holds is told.
 #[inline]
-pub(crate) fn wide<T>(work: impl NullaryFnOnce<Output = T>) -> T {
+pub(crate) fn wide<T>(work: impl WithSimd<Output = T>) -> T {
     Arch::new().dispatch(work)
 }
 

@@ -8,8 +8,9 @@ use super::joint_over_bands::{JointRow, JointSpectrum};
 use super::line_noise::LineNoise;
 use super::method::Method;
 pub use super::quality::{Internals, VirtualPointQuality};
-use super::reduced::{Reduced, Solution};
+use super::reduced::{Reduced, RefusedReason};
 use super::rooms::Rooms;
+use super::solve::{Solution, Solutions};
 use crate::band::Band;
 use crate::frf::{Frf, MotionQuantity};
 use crate::parallel::prelude::*;
@@ -148,12 +149,13 @@ pub fn identify(
     };
     for &set in idms {
         let reduced = Reduced::of(&rooms, set);
-        if let Ok(reduced) = &reduced {
-            out.virtual_points.extend(reduced.quality(&rooms));
+        let (alone, solutions) = solve(&rooms, &reduced, set, methods, true);
+        if let (Ok(reduced), Some(alone)) = (&reduced, &alone) {
+            out.virtual_points.extend(reduced.quality(&rooms, alone));
         }
         let mut solved = Vec::new();
-        for &method in methods {
-            match solve(&rooms, &reduced, set, method) {
+        for (method, solution) in solutions {
+            match solution {
                 Ok(solution) => solved.push((method, solution)),
                 Err(refused) => out.refused.push(refused),
             }
@@ -200,8 +202,8 @@ pub fn decouple(
     let files = [a, b, ajb].map(above_zero);
     let rooms = rooms(&files, geometry);
     let reduced = Reduced::of(&rooms, idms);
-    let z = |method| solve(&rooms, &reduced, idms, method).map(|solution| solution.z);
-    Ok(methods.iter().map(|&method| (method, z(method))).collect())
+    let (_, solutions) = solve(&rooms, &reduced, idms, methods, false);
+    Ok(solutions.into_iter().map(|(method, found)| (method, found.map(|solution| solution.z))).collect())
 }
 
 /// The noise of a method's lines, or why there is none.
@@ -243,8 +245,8 @@ pub fn back_coupled(
     let files = [a, b, ajb].map(above_zero);
     let rooms = rooms(&files, geometry);
     let reduced = Reduced::of(&rooms, idms).ok()?;
-    let z = reduced.solve(&rooms, Method::Inverse).ok()?.z;
-    reduced.back_coupling(&rooms, &z, band)
+    let solution = reduced.solve(&rooms, &[Method::Inverse], false).ok()?.by_method.pop()?.ok()?;
+    reduced.back_coupling(&rooms, &solution.z, band)
 }
 
 fn rooms<'a>(files: &'a [Cow<'_, Frf>; 3], geometry: &'a Geometry) -> Rooms<'a> {
@@ -257,17 +259,29 @@ fn rooms<'a>(files: &'a [Cow<'_, Frf>; 3], geometry: &'a Geometry) -> Rooms<'a> 
     }
 }
 
+/// Every method's solution or refusal, and Y^A and Y^B where `alone` asks for them and they are there.
 fn solve(
     rooms: &Rooms<'_>,
     reduced: &Result<Reduced, InterfaceError>,
     idms: IdmSet,
-    method: Method,
-) -> Result<Solution, Refused> {
-    let solution = match reduced {
-        Ok(reduced) => reduced.solve(rooms, method),
+    methods: &[Method],
+    alone: bool,
+) -> (Option<[Vec<DMatrix<Complex<f64>>>; 2]>, Vec<(Method, Result<Solution, Refused>)>) {
+    let refused =
+        |method, reason: RefusedReason| Refused { method, idms: idms.count(), reason: reason.to_string() };
+    let solutions = match reduced {
+        Ok(reduced) => reduced.solve(rooms, methods, alone),
         Err(error) => Err(error.clone().into()),
     };
-    solution.map_err(|reason| Refused { method, idms: idms.count(), reason: reason.to_string() })
+    match solutions {
+        Ok(Solutions { alone, by_method }) => {
+            let by_method = methods.iter().zip(by_method);
+            let by_method =
+                by_method.map(|(&m, found)| (m, found.map_err(|reason| refused(m, reason)))).collect();
+            (Some(alone), by_method)
+        }
+        Err(reason) => (None, methods.iter().map(|&m| (m, Err(refused(m, reason.clone())))).collect()),
+    }
 }
 
 /// The file without a line at 0 Hz, where no receptance can be told from a mobility.

@@ -1,10 +1,12 @@
 //! P, Q and M of Eq. (3) and its sisters: which internal points they take, and their values line by line.
 
 use super::geometry::Grouping;
-use super::interface_data::{Found, InterfaceError};
+use super::interface_data::{Found, InterfaceError, Measured};
+use super::lanes::{Matrix, lines, minus, times, to_left_of};
 use super::rooms::{Balanced, Rooms, Side};
 use super::vpt::reduce_inputs;
 use nalgebra::{Complex, DMatrix};
+use pulp::Simd;
 
 type Line = DMatrix<Complex<f64>>;
 
@@ -79,6 +81,23 @@ impl<'a> Rearrangement<'a> {
     pub(super) fn q(&self, l: usize) -> Result<Line, InterfaceError> {
         let file = self.rooms.alone(self.hit);
         file.reduced_outputs(l, &self.hit_at.t_u, &self.hit_at.vp.rows, &self.columns)
+    }
+
+    /// P, M and Q of the lines of a vector.
+    pub(super) fn at_once<S: Simd>(&self, simd: S, first: usize) -> [Matrix<S>; 3] {
+        let read = |file: Measured<'_>, rows: &Found, columns: &Found| {
+            Matrix::read(simd, &lines(simd, file.frf.lines(), first), &rows.at, &columns.at)
+        };
+        let (seen, hit) = (self.rooms.alone(self.seen), self.rooms.alone(self.hit));
+        let p = times(simd, &read(seen, &self.rows, &self.seen_at.vp.columns), &self.seen_at.t_f);
+        let q = to_left_of(simd, &self.hit_at.t_u, &read(hit, &self.hit_at.vp.rows, &self.columns));
+        let assembled = read(self.rooms.ajb, &self.rows_ajb, &self.columns_ajb);
+        let m = if self.seen == self.hit {
+            minus(simd, read(seen, &self.rows, &self.columns), &assembled)
+        } else {
+            assembled
+        };
+        [p, m, q]
     }
 
     /// M: between them in the assembly; where both are of one substructure, alone minus in the assembly.

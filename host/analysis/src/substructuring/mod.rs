@@ -17,6 +17,7 @@
 //! All FRFs of a campaign must share one exponential window: every method is algebraic in s, so it is exact on
 //! s = σ + iω, but only if A, B and AJB are on the same s. Degrees of freedom are ordered x, y, z, rx, ry, rz.
 
+mod at_once;
 pub mod averaged;
 pub mod back_coupling;
 pub mod between_arms;
@@ -35,6 +36,7 @@ pub mod idm;
 mod interface_data;
 mod internal_dofs;
 pub mod joint_over_bands;
+mod lanes;
 pub mod line_noise;
 pub mod method;
 pub mod plausibility;
@@ -45,6 +47,7 @@ mod quality_over_band;
 mod reduced;
 mod rooms;
 pub mod semm;
+mod solve;
 pub mod virtual_points;
 pub mod vpt;
 

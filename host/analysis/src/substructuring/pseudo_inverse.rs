@@ -18,7 +18,7 @@ type Line = DMatrix<Complex<f64>>;
 /// while the weakest true direction seen in exact data is about 1e-8.
 const ROUNDING: f64 = 1e-13;
 /// With all pivots above this fraction of the largest nobody doubts the rank, and the quick ways are exact enough.
-const CLEAR: f64 = 1e-8;
+pub(super) const CLEAR: f64 = 1e-8;
 
 /// A matrix that ought to have full rank has not.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

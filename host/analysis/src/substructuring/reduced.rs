@@ -1,19 +1,16 @@
-//! One IDM set's virtual points with their admittances, and every method solved on them line by line.
+//! One IDM set's virtual points with their admittances, line by line.
 
 use super::back_coupling::BackCoupling;
 use super::consistency::consistency;
-use super::decoupling::{
-    ASSEMBLY, DecouplingError, InverseBlock, PrimalBlock, interface, internal, internal_printed, inverse_of,
-    observed_rank, primal_of,
-};
+use super::decoupling::{ASSEMBLY, DecouplingError, InverseBlock, PrimalBlock};
 use super::geometry::Grouping;
 use super::idm::IdmSet;
 use super::interface_data::{InterfaceError, balance, scaled};
-use super::internal_dofs::{Rearrangement, Which};
+use super::internal_dofs::Which;
 use super::method::Method;
 use super::plausibility::{passivity, reciprocity};
-use super::pseudo_inverse::{condition, full_rank_inverse, rank};
-use super::quality::{Internals, VirtualPointQuality};
+use super::pseudo_inverse::full_rank_inverse;
+use super::quality::VirtualPointQuality;
 use super::rooms::{Balanced, Rooms, Side};
 use crate::band::Band;
 use crate::parallel::prelude::*;
@@ -66,7 +63,7 @@ impl From<Method> for Kind {
     }
 }
 
-/// Virtual points of A and B alone for one IDM set, with their admittances (rotations scaled to metres).
+/// Virtual points of A and B for one IDM set, alone and in the assembly (rotations scaled to metres).
 ///
 /// Admittances stay in the files' quantity, receptance times sᵏ: every method turns it into Z^J over sᵏ, and one factor at the
 /// end makes up for it.
@@ -74,34 +71,25 @@ pub(super) struct Reduced {
     pub(super) idms: IdmSet,
     pub(super) a: Balanced,
     pub(super) b: Balanced,
-    pub(super) y_a: Vec<Line>,
-    pub(super) y_b: Vec<Line>,
-    /// Y^AJB_cc and its inverse: five methods share them.
+    assembled: Result<[Balanced; 2], InterfaceError>,
+    /// Of all lines, for those who ask for them more than once: Y^A and Y^B, Y^AJB_cc, and its inverse.
+    alone: OnceLock<Result<[Vec<Line>; 2], RefusedReason>>,
     assembly: OnceLock<Result<Vec<Line>, RefusedReason>>,
     impedance: OnceLock<Result<Vec<Line>, RefusedReason>>,
 }
 
-/// Z^J per line, and what is to be said about it.
-pub(super) struct Solution {
-    pub(super) z: Vec<Line>,
-    pub(super) notes: Vec<String>,
-    pub(super) internals: Option<Internals>,
-}
-
-type Solved = Result<Solution, RefusedReason>;
-
 impl Reduced {
     pub(super) fn of(rooms: &Rooms<'_>, idms: IdmSet) -> Result<Reduced, InterfaceError> {
-        let a = Balanced::of(rooms.a, Grouping::InterfaceA, rooms.geometry, idms)?;
-        let b = Balanced::of(rooms.b, Grouping::InterfaceB, rooms.geometry, idms)?;
-        let y_a = every_line(rooms.a.frf.lines().len(), |l| a.admittance(rooms.a, l, &a))?;
-        let y_b = every_line(rooms.b.frf.lines().len(), |l| b.admittance(rooms.b, l, &b))?;
-        let (assembly, impedance) = (OnceLock::new(), OnceLock::new());
-        Ok(Reduced { idms, a, b, y_a, y_b, assembly, impedance })
+        let of = |file, grouping| Balanced::of(file, grouping, rooms.geometry, idms);
+        let (a, b) = (of(rooms.a, Grouping::InterfaceA)?, of(rooms.b, Grouping::InterfaceB)?);
+        let in_ajb = |grouping| of(rooms.ajb, grouping);
+        let assembled = in_ajb(Grouping::InterfaceA).and_then(|a| Ok([a, in_ajb(Grouping::InterfaceB)?]));
+        let (alone, assembly, impedance) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
+        Ok(Reduced { idms, a, b, assembled, alone, assembly, impedance })
     }
 
-    pub(super) fn quality(&self, rooms: &Rooms<'_>) -> Vec<VirtualPointQuality> {
-        [(Structure::A, rooms.a, &self.a.vp, &self.y_a), (Structure::B, rooms.b, &self.b.vp, &self.y_b)]
+    pub(super) fn quality(&self, rooms: &Rooms<'_>, [y_a, y_b]: &[Vec<Line>; 2]) -> Vec<VirtualPointQuality> {
+        [(Structure::A, rooms.a, &self.a.vp, y_a), (Structure::B, rooms.b, &self.b.vp, y_b)]
             .into_par_iter()
             .filter_map(|(substructure, file, vp, y)| {
                 // what times a driving-point admittance is a mobility
@@ -125,144 +113,78 @@ impl Reduced {
             .collect()
     }
 
-    pub(super) fn solve(&self, rooms: &Rooms<'_>, method: Method) -> Solved {
-        match Kind::from(method) {
-            Kind::Internal(seen, hit, which) => {
-                let internals = Rearrangement::of(seen, hit, which, rooms, [&self.a, &self.b]);
-                self.with_internals(rooms, method, &internals)
-            }
-            Kind::Interface => {
-                let y = self.assembly(rooms)?;
-                self.plain(rooms, |l| interface(&self.y_a[l], &self.y_b[l], &y[l]))
-            }
-            Kind::Primal(block) => {
-                let z = self.impedance(rooms)?;
-                let y = match block {
-                    PrimalBlock::A => &self.y_a,
-                    PrimalBlock::B => &self.y_b,
-                };
-                self.plain(rooms, |l| primal_of(block, &y[l], &z[l]))
-            }
-            Kind::Inverse(block) => {
-                let z = self.impedance(rooms)?;
-                self.plain(rooms, |l| Ok(inverse_of(block, &z[l])))
-            }
-        }
-    }
-
     /// How well A and B, coupled by this joint (mean over `band`), give the measured assembly; none where that cannot be said.
     pub(super) fn back_coupling(&self, rooms: &Rooms<'_>, z: &[Line], band: Band) -> Option<BackCoupling> {
         let d: Vec<f64> = balance(self.idms).iter().map(|d| 1.0 / d).collect();
         let z: Vec<Line> = z.par_iter().map(|z| scaled(z.clone(), &d, Complex::from(1.0))).collect();
+        let [y_a, y_b] = self.alone(rooms).ok()?;
         let y = self.assembly(rooms).ok()?;
-        BackCoupling::of(rooms.a.frf, &self.y_a, &self.y_b, y, &z, band)
+        BackCoupling::of(rooms.a.frf, y_a, y_b, y, &z, band)
+    }
+
+    /// The virtual point of one substructure alone.
+    pub(super) fn own(&self, side: Side) -> &Balanced {
+        match side {
+            Side::A => &self.a,
+            Side::B => &self.b,
+        }
+    }
+
+    /// Y^A or Y^B at one line.
+    pub(super) fn alone_at(&self, rooms: &Rooms<'_>, side: Side, l: usize) -> Result<Line, InterfaceError> {
+        let own = self.own(side);
+        own.admittance(rooms.alone(side), l, own)
+    }
+
+    /// Y^A and Y^B.
+    pub(super) fn alone(&self, rooms: &Rooms<'_>) -> Result<&[Vec<Line>; 2], RefusedReason> {
+        let of = |side| every_line(rooms.alone(side).frf.lines().len(), |l| self.alone_at(rooms, side, l));
+        let found = self.alone.get_or_init(|| Ok([of(Side::A)?, of(Side::B)?]));
+        found.as_ref().map_err(Clone::clone)
     }
 
     /// Both virtual points of the assembly, A's first.
-    pub(super) fn assembled(&self, rooms: &Rooms<'_>) -> Result<[Balanced; 2], InterfaceError> {
-        let of = |grouping| Balanced::of(rooms.ajb, grouping, rooms.geometry, self.idms);
-        Ok([of(Grouping::InterfaceA)?, of(Grouping::InterfaceB)?])
+    pub(super) fn assembled(&self) -> Result<&[Balanced; 2], InterfaceError> {
+        self.assembled.as_ref().map_err(Clone::clone)
     }
 
-    /// Y^AJB_cc: both virtual points of the assembly, A's first.
+    /// Y^AJB_cc at one line: both virtual points of the assembly, A's first.
+    pub(super) fn assembly_at(&self, rooms: &Rooms<'_>, l: usize) -> Result<Line, InterfaceError> {
+        let (n, vp) = (self.idms.count(), self.assembled()?);
+        let mut line = Line::zeros(2 * n, 2 * n);
+        for (r, out) in vp.iter().enumerate() {
+            for (c, input) in vp.iter().enumerate() {
+                let y = out.admittance(rooms.ajb, l, input)?;
+                line.view_mut((r * n, c * n), (n, n)).copy_from(&y);
+            }
+        }
+        Ok(line)
+    }
+
+    /// Y^AJB_cc.
     pub(super) fn assembly(&self, rooms: &Rooms<'_>) -> Result<&[Line], RefusedReason> {
         let found = self.assembly.get_or_init(|| {
-            let n = self.idms.count();
-            let vp = self.assembled(rooms)?;
-            every_line(rooms.ajb.frf.lines().len(), |l| {
-                let mut line = Line::zeros(2 * n, 2 * n);
-                for (r, out) in vp.iter().enumerate() {
-                    for (c, input) in vp.iter().enumerate() {
-                        let y = out.admittance(rooms.ajb, l, input)?;
-                        line.view_mut((r * n, c * n), (n, n)).copy_from(&y);
-                    }
-                }
-                Ok(line)
-            })
+            self.assembled()?;
+            every_line(rooms.ajb.frf.lines().len(), |l| Ok(self.assembly_at(rooms, l)?))
         });
         found.as_deref().map_err(Clone::clone)
+    }
+
+    /// (Y^AJB_cc)⁻¹ at one line, where `y` is Y^AJB_cc.
+    pub(super) fn impedance_of(rooms: &Rooms<'_>, l: usize, y: &Line) -> Result<Line, RefusedReason> {
+        full_rank_inverse(y, ASSEMBLY).map_err(|lost| Self::refused(rooms, l, lost.into()))
     }
 
     /// (Y^AJB_cc)⁻¹.
     pub(super) fn impedance(&self, rooms: &Rooms<'_>) -> Result<&[Line], RefusedReason> {
         let y = self.assembly(rooms)?;
-        let found = self.impedance.get_or_init(|| {
-            every_line(y.len(), |l| {
-                full_rank_inverse(&y[l], ASSEMBLY).map_err(|lost| RefusedReason::Decoupling {
-                    frequency_hz: rooms.ajb.frf.frequency_hz()[l],
-                    source: lost.into(),
-                })
-            })
-        });
+        let found =
+            self.impedance.get_or_init(|| every_line(y.len(), |l| Self::impedance_of(rooms, l, &y[l])));
         found.as_deref().map_err(Clone::clone)
-    }
-
-    /// A method without anything to add.
-    fn plain(
-        &self,
-        rooms: &Rooms<'_>,
-        solve: impl Fn(usize) -> Result<Line, DecouplingError> + Sync,
-    ) -> Solved {
-        let z = self.per_line(rooms, |l| solve(l).map_err(|source| Self::refused(rooms, l, source)))?;
-        Ok(Solution { z, notes: Vec::new(), internals: None })
-    }
-
-    /// Both forms of Eq. (3) and its sisters: P, Q from the substructures, M from the assembly, at the internals that both have.
-    fn with_internals(&self, rooms: &Rooms<'_>, name: Method, internals: &Rearrangement<'_>) -> Solved {
-        let printed = internals.printed;
-        let mut notes = Vec::new();
-        let (n_b, n_a) = (internals.rows.at.len(), internals.columns.at.len());
-        let n_c = self.idms.count();
-        let lines = self.y_a.len();
-        if n_a.min(n_b) == 0 && lines > 0 {
-            let source = DecouplingError::TooFewInternals { impacts: n_a, responses: n_b, needed: n_c };
-            return Err(Self::refused(rooms, 0, source));
-        }
-        let found = if lines == 0 {
-            None
-        } else {
-            let middle = lines / 2;
-            let (p, q) = (internals.p(middle)?, internals.q(middle)?);
-            Some(Internals {
-                method: name,
-                idms: n_c,
-                impacts: n_a,
-                responses: n_b,
-                frequency_hz: rooms.ajb.frf.frequency_hz()[middle],
-                rank_p: rank(&p),
-                rank_q: rank(&q),
-                condition_p: condition(&p),
-                condition_q: condition(&q),
-            })
-        };
-        if printed && lines > 0 && (n_a != n_c || n_b != n_c) {
-            let rank = observed_rank(&internals.p(0)?, &internals.q(0)?);
-            notes.push(format!(
-                "Eq. 3 as printed with {n_a} internal impacts and {n_b} internal responses for {n_c} interface DoFs: Π has rank {rank} of {n_c}, \
-                 so the result is right only for the interface forces that these internals generate, and biased otherwise; `internal` is the exact form"
-            ));
-        }
-        let method = if printed { internal_printed } else { internal };
-        let z = self.per_line(rooms, |l| {
-            method(&self.y_a[l], &self.y_b[l], &internals.p(l)?, &internals.m(l)?, &internals.q(l)?)
-                .map_err(|source| Self::refused(rooms, l, source))
-        })?;
-        Ok(Solution { z, notes, internals: found })
     }
 
     pub(super) fn refused(rooms: &Rooms<'_>, line: usize, source: DecouplingError) -> RefusedReason {
         RefusedReason::Decoupling { frequency_hz: rooms.a.frf.frequency_hz()[line], source }
-    }
-
-    /// Solves every line and takes the rotations' scale and the files' quantity out again: Z = D Z' D sᵏ.
-    fn per_line(
-        &self,
-        rooms: &Rooms<'_>,
-        solve: impl Fn(usize) -> Result<Line, RefusedReason> + Sync,
-    ) -> Result<Vec<Line>, RefusedReason> {
-        let d = balance(self.idms);
-        let order = rooms.a.frf.quantity().order_of_s();
-        every_line(self.y_a.len(), |l| Ok(scaled(solve(l)?, &d, rooms.a.frf.s(l).powi(order))))
     }
 }
 

@@ -46,30 +46,32 @@ impl Reduced {
         method: Method,
     ) -> Result<LineNoise, RefusedReason> {
         let own = [own(Side::A, &self.a), own(Side::B, &self.b)];
-        let lines = self.y_a.len();
+        let [y_a, y_b] = self.alone(rooms)?;
+        let lines = y_a.len();
         let by_line: Result<Vec<Vec<[f64; 2]>>, RefusedReason> = match Kind::from(method) {
             Kind::Internal(seen, hit, which) => {
                 let internals = Rearrangement::of(seen, hit, which, rooms, [&self.a, &self.b]);
                 let sources = Sources::of(&internals);
                 every_line(lines, |l| {
-                    let dyads = self.by_internals(rooms, l, &internals, &sources, &own)?;
+                    let dyads =
+                        self.by_internals(rooms, l, [&y_a[l], &y_b[l]], &internals, &sources, &own)?;
                     Ok(self.deviations(rooms, noises, l, &dyads))
                 })
             }
             Kind::Interface => {
-                let both = Both::of(&self.assembled(rooms)?);
+                let both = Both::of(self.assembled()?);
                 let (both, y) = (both.source(), self.assembly(rooms)?);
                 every_line(lines, |l| {
-                    let dyads = self.by_interface(rooms, l, &y[l], &both, &own)?;
+                    let dyads = self.by_interface(rooms, l, [&y_a[l], &y_b[l], &y[l]], &both, &own)?;
                     Ok(self.deviations(rooms, noises, l, &dyads))
                 })
             }
             Kind::Primal(block) => {
-                let both = Both::of(&self.assembled(rooms)?);
+                let both = Both::of(self.assembled()?);
                 let (both, z) = (both.source(), self.impedance(rooms)?);
                 let (at, y, own) = match block {
-                    PrimalBlock::A => (0, &self.y_a, &own[0]),
-                    PrimalBlock::B => (self.idms.count(), &self.y_b, &own[1]),
+                    PrimalBlock::A => (0, y_a, &own[0]),
+                    PrimalBlock::B => (self.idms.count(), y_b, &own[1]),
                 };
                 every_line(lines, |l| {
                     let alone = full_rank_inverse(&y[l], SUBSTRUCTURE)
@@ -82,7 +84,7 @@ impl Reduced {
                 })
             }
             Kind::Inverse(block) => {
-                let both = Both::of(&self.assembled(rooms)?);
+                let both = Both::of(self.assembled()?);
                 let (both, z) = (both.source(), self.impedance(rooms)?);
                 let n = self.idms.count();
                 let (at, other) = match block {
@@ -117,11 +119,11 @@ impl Reduced {
         &self,
         rooms: &Rooms<'_>,
         l: usize,
-        y: &Line,
+        [y_a, y_b, y]: [&Line; 3],
         both: &'a Source<'a>,
         own: &'a [Source<'a>; 2],
     ) -> Result<Dyads<'a>, RefusedReason> {
-        let [d, w] = stiffnesses(&self.y_a[l], &self.y_b[l], y).map_err(refused(rooms, l))?;
+        let [d, w] = stiffnesses(y_a, y_b, y).map_err(refused(rooms, l))?;
         let relative = boolean_difference(self.idms.count());
         let mut dyads = Dyads::default();
         dyads.linear(both, &-product(&d, &relative), &product(&relative.transpose(), &d));
@@ -136,6 +138,7 @@ impl Reduced {
         &self,
         rooms: &Rooms<'_>,
         l: usize,
+        [y_a, y_b]: [&Line; 2],
         internals: &Rearrangement<'_>,
         sources: &'a Sources<'a>,
         own: &'a [Source<'a>; 2],
@@ -143,8 +146,7 @@ impl Reduced {
         let (p, q, m) = (internals.p(l)?, internals.q(l)?, internals.m(l)?);
         let mut dyads = Dyads::default();
         let z = if internals.printed {
-            let [z, m_plus] =
-                with_m_inverse(&self.y_a[l], &self.y_b[l], &p, &m, &q).map_err(refused(rooms, l))?;
+            let [z, m_plus] = with_m_inverse(y_a, y_b, &p, &m, &q).map_err(refused(rooms, l))?;
             dyads.linear(&sources.q, &-&z, &product(&m_plus, &product(&p, &z)));
             for source in &sources.m {
                 dyads.inverse(source, &-product(&z, &q), [&m, &m_plus], &product(&p, &z));
@@ -153,7 +155,7 @@ impl Reduced {
             z
         } else {
             let Factors { p_plus, q_plus, g, z } =
-                factors(&self.y_a[l], &self.y_b[l], &p, &m, &q).map_err(refused(rooms, l))?;
+                factors(y_a, y_b, &p, &m, &q).map_err(refused(rooms, l))?;
             let (left, right) = (product(&z, &g), product(&g, &z));
             let (to_m, from_m) = (product(&left, &p_plus), product(&q_plus, &right));
             dyads.inverse(&sources.p, &left, [&p, &p_plus], &product(&m, &from_m));

@@ -1,0 +1,109 @@
+//! A⁺ = R⁻¹Qᴴ of a tall matrix by Gram–Schmidt, done again at those lines where much cancels.
+
+use super::super::pseudo_inverse::CLEAR;
+use super::matrix::Matrix;
+use super::number::{Cell, Lanes, Sure};
+use pulp::{NullaryFnOnce, Simd};
+
+pub(super) fn orthogonalised<S: Simd>(simd: S, mut a: Matrix<S>, sure: &mut Sure<S>) -> Matrix<S> {
+    let (m, n) = (a.rows(), a.columns());
+    let mut r = Matrix::zeros(simd, n, n);
+    simd.vectorize(Orthogonalisation { simd, m, n, q: a.cells_mut(), r: r.cells_mut(), sure });
+    let mut inverse = a.adjoint();
+    simd.vectorize(Substitution { n, x: inverse.cells_mut(), r: r.cells() });
+    inverse
+}
+
+struct Orthogonalisation<'a, S: Simd> {
+    simd: S,
+    m: usize,
+    n: usize,
+    q: &'a mut [Cell<S>],
+    r: &'a mut [Cell<S>],
+    sure: &'a mut Sure<S>,
+}
+
+impl<S: Simd> NullaryFnOnce for Orthogonalisation<'_, S> {
+    type Output = ();
+
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn call(self) {
+        let Orthogonalisation { simd, m, n, q, r, sure } = self;
+        let all = |value| Lanes::all(simd, value);
+        let none = Cell::all(simd, 0.0);
+        let mut largest = all(0.0);
+        for k in 0..n {
+            let (done, rest) = q.split_at_mut(k * m);
+            let (v, r) = (&mut rest[..m], &mut r[k * n..=k * n + k]);
+            let mut square = square_of(simd, v);
+            // all lines at first, then those where much was taken away
+            let mut at = all(0.0).equals(all(0.0));
+            for _ in 0..2 {
+                for (q, r) in done.chunks_exact(m).zip(r.iter_mut()) {
+                    let mut along = none;
+                    for (q, v) in q.iter().zip(v.iter()) {
+                        along += q.conj() * *v;
+                    }
+                    let along = along.where_or(at, none);
+                    *r += along;
+                    for (v, q) in v.iter_mut().zip(q) {
+                        *v -= *q * along;
+                    }
+                }
+                let (before, after) = (square, square_of(simd, v));
+                square = after.where_or(at, before);
+                // where little was taken away, little of the rounding's direction along the others is left
+                let enough = all(1.0).where_or(square.exceeds(all(0.1) * before), all(0.0));
+                if enough.range() == [1.0; 2] {
+                    break;
+                }
+                at = all(0.5).exceeds(enough);
+            }
+            largest = square.where_or(square.exceeds(largest), largest);
+            sure.only(square.exceeds(largest * all(CLEAR * CLEAR)));
+            sure.only(all(f64::INFINITY).exceeds(largest));
+            // the diagonal holds 1/Rₖₖ: many products instead of quotients
+            let inverse = all(1.0).over(square.sqrt());
+            r[k] = Cell { re: inverse, im: all(0.0) };
+            for v in v {
+                *v = *v * inverse;
+            }
+        }
+    }
+}
+
+/// R⁻¹ of each column.
+struct Substitution<'a, S: Simd> {
+    n: usize,
+    x: &'a mut [Cell<S>],
+    r: &'a [Cell<S>],
+}
+
+impl<S: Simd> NullaryFnOnce for Substitution<'_, S> {
+    type Output = ();
+
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn call(self) {
+        for x in self.x.chunks_exact_mut(self.n.max(1)) {
+            for (k, r) in self.r.chunks_exact(self.n).enumerate().rev() {
+                let solved = x[k] * r[k].re;
+                x[k] = solved;
+                for (x, r) in x[..k].iter_mut().zip(r) {
+                    *x -= *r * solved;
+                }
+            }
+        }
+    }
+}
+
+#[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+#[inline(always)]
+fn square_of<S: Simd>(simd: S, v: &[Cell<S>]) -> Lanes<S> {
+    let mut sum = Lanes::all(simd, 0.0);
+    for v in v {
+        sum = sum + v.norm_sqr();
+    }
+    sum
+}

@@ -1,0 +1,184 @@
+//! Z^J of every line by every method asked for.
+
+use super::at_once::{Found, Job};
+use super::decoupling::{
+    DecouplingError, InverseBlock, PrimalBlock, interface, internal, internal_printed, inverse_of,
+    observed_rank, primal_of,
+};
+use super::internal_dofs::Rearrangement;
+use super::method::Method;
+use super::pseudo_inverse::{condition, rank};
+use super::quality::Internals;
+use super::reduced::{Kind, Reduced, RefusedReason};
+use super::rooms::{Rooms, Side};
+use nalgebra::{Complex, DMatrix};
+
+type Line = DMatrix<Complex<f64>>;
+
+/// Z^J per line, and what is to be said about it.
+pub(super) struct Solution {
+    pub(super) z: Vec<Line>,
+    pub(super) notes: Vec<String>,
+    pub(super) internals: Option<Internals>,
+}
+
+/// What all methods gave.
+pub(super) struct Solutions {
+    /// Y^A and Y^B, rotations in metres.
+    pub(super) alone: [Vec<Line>; 2],
+    /// In the order of the methods.
+    pub(super) by_method: Vec<Result<Solution, RefusedReason>>,
+}
+
+/// What a method does with a line.
+pub(super) enum Work<'a> {
+    Internals(Rearrangement<'a>),
+    Interface,
+    Primal(PrimalBlock),
+    Inverse(InverseBlock),
+}
+
+/// A method with what is to be said about it.
+struct Plan<'a> {
+    work: Work<'a>,
+    notes: Vec<String>,
+    internals: Option<Internals>,
+}
+
+/// What is asked of all lines before the next: which refusal is the first.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Stage {
+    Assembly,
+    Impedance,
+    Method,
+}
+
+/// A line's refusal.
+pub(super) struct Refusal {
+    pub(super) stage: Stage,
+    pub(super) reason: RefusedReason,
+}
+
+impl Stage {
+    fn refuses<R: Into<RefusedReason>>(self) -> impl Fn(R) -> Box<Refusal> {
+        move |reason| Box::new(Refusal { stage: self, reason: reason.into() })
+    }
+}
+
+impl Reduced {
+    /// Every method, its refusal where it cannot work on the data; and Y^A and Y^B where they are asked for.
+    ///
+    /// # Errors
+    /// Y^A or Y^B has a value that is no number: then no method works.
+    pub(super) fn solve(
+        &self,
+        rooms: &Rooms<'_>,
+        methods: &[Method],
+        alone: bool,
+    ) -> Result<Solutions, RefusedReason> {
+        let plans: Vec<Result<Plan<'_>, RefusedReason>> =
+            methods.iter().map(|&method| self.plan(rooms, method)).collect();
+        let works = plans.iter().flatten().map(|plan| &plan.work).collect();
+        let Found { alone, z } = Job { reduced: self, rooms, works, alone }.found()?;
+        let mut z = z.into_iter();
+        let by_method = plans
+            .into_iter()
+            .map(|plan| {
+                let Plan { notes, internals, .. } = plan?;
+                let z = z.next().unwrap_or_else(|| Ok(Vec::new()))?;
+                Ok(Solution { z, notes, internals })
+            })
+            .collect();
+        Ok(Solutions { alone, by_method })
+    }
+
+    fn plan<'a>(&'a self, rooms: &'a Rooms<'a>, method: Method) -> Result<Plan<'a>, RefusedReason> {
+        let work = match Kind::from(method) {
+            Kind::Internal(seen, hit, which) => {
+                let internals = Rearrangement::of(seen, hit, which, rooms, [&self.a, &self.b]);
+                return self.with_internals(rooms, method, internals);
+            }
+            Kind::Interface => Work::Interface,
+            Kind::Primal(block) => Work::Primal(block),
+            Kind::Inverse(block) => Work::Inverse(block),
+        };
+        self.assembled()?;
+        Ok(Plan { work, notes: Vec::new(), internals: None })
+    }
+
+    /// Both forms of Eq. (3) and its sisters: P, Q from the substructures, M from the assembly, at the internals that both have.
+    fn with_internals<'a>(
+        &self,
+        rooms: &Rooms<'_>,
+        name: Method,
+        internals: Rearrangement<'a>,
+    ) -> Result<Plan<'a>, RefusedReason> {
+        let mut notes = Vec::new();
+        let (n_b, n_a) = (internals.rows.at.len(), internals.columns.at.len());
+        let n_c = self.idms.count();
+        let lines = rooms.a.frf.lines().len();
+        if n_a.min(n_b) == 0 && lines > 0 {
+            let source = DecouplingError::TooFewInternals { impacts: n_a, responses: n_b, needed: n_c };
+            return Err(Self::refused(rooms, 0, source));
+        }
+        let found = if lines == 0 {
+            None
+        } else {
+            let middle = lines / 2;
+            let (p, q) = (internals.p(middle)?, internals.q(middle)?);
+            Some(Internals {
+                method: name,
+                idms: n_c,
+                impacts: n_a,
+                responses: n_b,
+                frequency_hz: rooms.ajb.frf.frequency_hz()[middle],
+                rank_p: rank(&p),
+                rank_q: rank(&q),
+                condition_p: condition(&p),
+                condition_q: condition(&q),
+            })
+        };
+        if internals.printed && lines > 0 && (n_a != n_c || n_b != n_c) {
+            let rank = observed_rank(&internals.p(0)?, &internals.q(0)?);
+            notes.push(format!(
+                "Eq. 3 as printed with {n_a} internal impacts and {n_b} internal responses for {n_c} interface DoFs: Π has rank {rank} of {n_c}, \
+                 so the result is right only for the interface forces that these internals generate, and biased otherwise; `internal` is the exact form"
+            ));
+        }
+        Ok(Plan { work: Work::Internals(internals), notes, internals: found })
+    }
+
+    /// One line by itself: where it is near rank loss, and where it is refused. Rotations in metres.
+    pub(super) fn with_care(
+        &self,
+        rooms: &Rooms<'_>,
+        work: &Work<'_>,
+        l: usize,
+    ) -> Result<Line, Box<Refusal>> {
+        let alone = |side| self.alone_at(rooms, side, l).map_err(Stage::Method.refuses());
+        let assembly = || self.assembly_at(rooms, l).map_err(Stage::Assembly.refuses());
+        let impedance = || Self::impedance_of(rooms, l, &assembly()?).map_err(Stage::Impedance.refuses());
+        let found = match work {
+            Work::Internals(internals) => {
+                let method = if internals.printed { internal_printed } else { internal };
+                let (p, m, q) = (internals.p(l), internals.m(l), internals.q(l));
+                let [p, m, q] = [p, m, q].map(|block| block.map_err(Stage::Method.refuses()));
+                method(&alone(Side::A)?, &alone(Side::B)?, &p?, &m?, &q?)
+            }
+            Work::Interface => {
+                let y = assembly()?;
+                interface(&alone(Side::A)?, &alone(Side::B)?, &y)
+            }
+            Work::Primal(block) => {
+                let z = impedance()?;
+                let side = match block {
+                    PrimalBlock::A => Side::A,
+                    PrimalBlock::B => Side::B,
+                };
+                primal_of(*block, &alone(side)?, &z)
+            }
+            Work::Inverse(block) => Ok(inverse_of(*block, &impedance()?)),
+        };
+        found.map_err(|source| Stage::Method.refuses()(Self::refused(rooms, l, source)))
+    }
+}
