@@ -2,11 +2,11 @@
 //! careful way, line by line.
 
 use super::decoupling::{InverseBlock, PrimalBlock};
-use super::interface_data::{InterfaceError, balance, scaled};
+use super::interface_data::{balance, scaled};
 use super::internal_dofs::Rearrangement;
-use super::lanes::{Cell, Matrix, Sure, inverse, lines, minus, plus, product, times, to_left_of};
+use super::lanes::{Cell, Matrix, Pool, Sure, inverse, lines, minus, plus, product, times, to_left_of};
 use super::reduced::{Reduced, RefusedReason};
-use super::rooms::{Balanced, Rooms, Side};
+use super::rooms::{Rooms, Side};
 use super::solve::{Refusal, Work};
 use crate::parallel::prelude::*;
 use crate::vectors::wide;
@@ -19,7 +19,7 @@ type Line = DMatrix<Complex<f64>>;
 /// What was found at all lines.
 pub(super) struct Found {
     /// Y^A and Y^B, rotations in metres; nothing where they were not asked for.
-    pub(super) alone: [Vec<Line>; 2],
+    pub(super) alone: Vec<Vec<Line>>,
     /// Z^J by each work.
     pub(super) z: Vec<Result<Vec<Line>, RefusedReason>>,
 }
@@ -39,151 +39,165 @@ impl Job<'_> {
     /// # Errors
     /// Y^A or Y^B has a value that is no number.
     pub(super) fn found(&self) -> Result<Found, RefusedReason> {
-        let mut vectors = wide(self);
-        let mut of = |side: Side| -> Result<Vec<Line>, InterfaceError> {
-            vectors.iter_mut().flat_map(|vector| vector.alone[side as usize].drain(..)).collect()
-        };
-        let alone = [of(Side::A)?, of(Side::B)?];
-        let z = (0..self.works.len())
-            .map(|work| {
-                in_order(vectors.iter_mut().flat_map(|vector| vector.z[work].drain(..)), self.lines())
-            })
-            .collect();
+        let lines = self.rooms.a.frf.lines().len();
+        let places = |count| vec![vec![Line::zeros(0, 0); lines]; count];
+        let (mut alone, mut z) = (places(if self.alone { 2 } else { 0 }), places(self.works.len()));
+        let refused = wide(Into { job: self, alone: &mut alone, z: &mut z });
+        for side in [Side::A, Side::B] {
+            if let Some(l) = refused.iter().flat_map(|refused| &refused.alone[side as usize]).min() {
+                self.reduced.alone_at(self.rooms, side, *l)?;
+            }
+        }
+        let mut z: Vec<Result<Vec<Line>, RefusedReason>> = z.into_iter().map(Ok).collect();
+        for (work, z) in z.iter_mut().enumerate() {
+            // the first line of those that have the earliest stage
+            let of_work = refused.iter().flat_map(|refused| &refused.z).filter(|(of, _)| *of == work);
+            if let Some((_, refusal)) = of_work.min_by_key(|(_, refusal)| refusal.stage) {
+                *z = Err(refusal.reason.clone());
+            }
+        }
         Ok(Found { alone, z })
     }
-
-    fn lines(&self) -> usize {
-        self.rooms.a.frf.lines().len()
-    }
 }
 
-/// All lines, or the refusal that comes first.
-fn in_order(
-    lines: impl Iterator<Item = Result<Line, Box<Refusal>>>,
-    count: usize,
-) -> Result<Vec<Line>, RefusedReason> {
-    let (mut all, mut first) = (Vec::with_capacity(count), None::<Box<Refusal>>);
-    for line in lines {
-        match line {
-            Ok(line) => all.push(line),
-            Err(refusal) if first.as_ref().is_none_or(|first| refusal.stage < first.stage) => {
-                first = Some(refusal);
+/// What could not be found at some lines: which of Y^A and Y^B, and by which work.
+#[derive(Default)]
+pub(super) struct RefusedLines {
+    alone: [Vec<usize>; 2],
+    z: Vec<(usize, Refusal)>,
+}
+
+/// Where to put what is found.
+struct Into<'a> {
+    job: &'a Job<'a>,
+    alone: &'a mut [Vec<Line>],
+    z: &'a mut [Vec<Line>],
+}
+
+/// So many vectors are one share of the work: enough for the memory that it asks for to pay, few enough for all cores to have some.
+const SHARE: usize = 8;
+
+/// The places of some lines in each of several results.
+type Places<'a> = Vec<&'a mut [Line]>;
+
+impl WithSimd for Into<'_> {
+    type Output = Vec<RefusedLines>;
+
+    fn with_simd<S: Simd>(self, simd: S) -> Vec<RefusedLines> {
+        let lines = SHARE * S::F64_LANES;
+        let count = self.job.rooms.a.frf.lines().len().div_ceil(lines);
+        let shares = |results| -> Vec<Places<'_>> {
+            let mut shares: Vec<Places<'_>> = (0..count).map(|_| Vec::new()).collect();
+            for result in results {
+                let result: &mut Vec<Line> = result;
+                shares.iter_mut().zip(result.chunks_mut(lines)).for_each(|(share, part)| share.push(part));
             }
-            Err(_) => {}
-        }
-    }
-    first.map_or(Ok(all), |refusal| Err(refusal.reason))
-}
-
-/// What was found at the lines of one vector.
-pub(super) struct Vector {
-    alone: [Vec<Result<Line, InterfaceError>>; 2],
-    z: Vec<Vec<Result<Line, Box<Refusal>>>>,
-}
-
-impl WithSimd for &Job<'_> {
-    type Output = Vec<Vector>;
-
-    fn with_simd<S: Simd>(self, simd: S) -> Vec<Vector> {
-        (0..self.lines().div_ceil(S::F64_LANES))
+            shares
+        };
+        let shares: Vec<[Places<'_>; 2]> =
+            shares(self.alone).into_iter().zip(shares(self.z)).map(|(alone, z)| [alone, z]).collect();
+        shares
             .into_par_iter()
-            .with_min_len(2)
-            .map(|vector| AtOnce::of(simd, self, vector * S::F64_LANES).vector())
+            .enumerate()
+            .map(|(share, [mut alone, mut z])| {
+                let (pool, mut refused) = (Pool::new(simd), RefusedLines::default());
+                for vector in 0..SHARE {
+                    let at = vector * S::F64_LANES;
+                    if let Some(vector) = AtOnce::of(&pool, self.job, share * lines + at) {
+                        vector.put(at, &mut alone, &mut z, &mut refused);
+                    }
+                }
+                refused
+            })
             .collect()
     }
 }
 
 /// A matrix of each line, and where it is beyond doubt.
-type Surely<S> = (Matrix<S>, Sure<S>);
+type Surely<'p, S> = (Matrix<'p, S>, Sure<S>);
 
 /// The lines of one vector.
 struct AtOnce<'a, S: Simd> {
-    simd: S,
+    pool: &'a Pool<S>,
     job: &'a Job<'a>,
     /// The first line, and how many there are.
     first: usize,
     count: usize,
     /// Y^A and Y^B.
-    alone: [Matrix<S>; 2],
+    alone: [Matrix<'a, S>; 2],
     /// Y^AJB_cc and its inverse: five methods share them.
-    assembly: OnceCell<Option<Matrix<S>>>,
-    impedance: OnceCell<Option<Surely<S>>>,
+    assembly: OnceCell<Option<Matrix<'a, S>>>,
+    impedance: OnceCell<Option<Surely<'a, S>>>,
 }
 
 impl<'a, S: Simd> AtOnce<'a, S> {
-    fn of(simd: S, job: &'a Job<'a>, first: usize) -> Self {
+    fn of(pool: &'a Pool<S>, job: &'a Job<'a>, first: usize) -> Option<Self> {
+        let count = S::F64_LANES.min(job.rooms.a.frf.lines().len().checked_sub(first)?);
+        if count == 0 {
+            return None;
+        }
         let alone = [Side::A, Side::B].map(|side| {
             let (file, own) = (job.rooms.alone(side), job.reduced.own(side));
-            let lines = lines(simd, file.frf.lines(), first);
-            let cells = Matrix::read(simd, &lines, &own.vp.rows.at, &own.vp.columns.at);
-            times(simd, &to_left_of(simd, &own.t_u, &cells), &own.t_f)
+            let lines = lines(pool, file.frf.lines(), first);
+            let cells = Matrix::read(pool, &lines, &own.vp.rows.at, &own.vp.columns.at);
+            times(&to_left_of(&own.t_u, &cells), &own.t_f)
         });
-        let count = S::F64_LANES.min(job.lines() - first);
-        AtOnce { simd, job, first, count, alone, assembly: OnceCell::new(), impedance: OnceCell::new() }
+        Some(AtOnce { pool, job, first, count, alone, assembly: OnceCell::new(), impedance: OnceCell::new() })
     }
 
-    fn vector(&self) -> Vector {
+    /// Puts what is found at the places from `at` on.
+    fn put(&self, at: usize, alone: &mut Places<'_>, z: &mut Places<'_>, refused: &mut RefusedLines) {
         let Job { reduced, rooms, works, .. } = self.job;
-        let mut numbers = Sure::all(self.simd);
-        let alone = [Side::A, Side::B].map(|side| {
-            let y = &self.alone[side as usize];
-            let finite = y.finite(self.simd);
+        let mut numbers = Sure::all(self.pool.simd);
+        for (y, refused) in self.alone.iter().zip(&mut refused.alone) {
+            let finite = y.finite();
             numbers.and(finite);
-            let line = |lane: usize| {
-                if !finite.at(lane) {
-                    reduced.alone_at(rooms, side, self.first + lane)
-                } else if self.job.alone {
-                    Ok(y.line(lane))
-                } else {
-                    Ok(Line::zeros(0, 0))
-                }
-            };
-            (0..self.count).map(line).collect()
-        });
+            refused.extend((0..self.count).filter(|lane| !finite.at(*lane)).map(|lane| self.first + lane));
+        }
+        for (y, places) in self.alone.iter().zip(alone) {
+            (0..self.count).for_each(|lane| places[at + lane] = y.line(lane));
+        }
         let d = balance(reduced.idms);
         let order = rooms.a.frf.quantity().order_of_s();
-        let factors: Vec<Complex<f64>> =
-            (0..self.count).map(|lane| rooms.a.frf.s(self.first + lane).powi(order)).collect();
-        let mut factor = Cell::all(self.simd, 1.0);
-        for (lane, Complex { re, im }) in factors.iter().enumerate() {
-            factor.re.each_mut()[lane] = *re;
-            factor.im.each_mut()[lane] = *im;
+        let mut factor = Cell::all(self.pool.simd, 1.0);
+        for lane in 0..self.count {
+            let Complex { re, im } = rooms.a.frf.s(self.first + lane).powi(order);
+            (factor.re.each_mut()[lane], factor.im.each_mut()[lane]) = (re, im);
         }
-        let z = works
-            .iter()
-            .map(|work| {
-                let found = self.by(work).map(|(mut z, mut sure)| {
-                    z.scaled(self.simd, &d, factor);
-                    sure.and(numbers);
-                    (z, sure)
-                });
-                let line = |lane: usize| match &found {
-                    Some((z, sure)) if sure.at(lane) => Ok(z.line(lane)),
-                    _ => {
-                        let z = reduced.with_care(rooms, work, self.first + lane)?;
-                        Ok(scaled(z, &d, factors[lane]))
-                    }
-                };
-                (0..self.count).map(line).collect()
-            })
-            .collect();
-        Vector { alone, z }
+        for (w, (work, places)) in works.iter().zip(z).enumerate() {
+            let found = self.by(work).map(|(z, mut sure)| {
+                sure.and(numbers);
+                (z.scaled(&d, factor), sure)
+            });
+            for (lane, place) in places[at..at + self.count].iter_mut().enumerate() {
+                match &found {
+                    Some((z, sure)) if sure.at(lane) => *place = z.line(lane),
+                    _ => match reduced.with_care(rooms, work, self.first + lane) {
+                        Ok(z) => {
+                            let factor = Complex::new(factor.re.each()[lane], factor.im.each()[lane]);
+                            *place = scaled(z, &d, factor);
+                        }
+                        Err(refusal) => refused.z.push((w, refusal)),
+                    },
+                }
+            }
+        }
     }
 
     /// What a method finds; nothing where the careful way shall say why.
-    fn by(&self, work: &Work<'_>) -> Option<Surely<S>> {
-        let (simd, n) = (self.simd, self.job.reduced.idms.count());
+    fn by(&self, work: &Work<'_>) -> Option<Surely<'a, S>> {
+        let n = self.job.reduced.idms.count();
         let [y_a, y_b] = &self.alone;
         match work {
             Work::Internals(internals) => self.by_internals(internals),
             Work::Interface => {
                 let y = self.assembly()?;
-                let mut sure = Sure::all(simd);
+                let mut sure = Sure::all(self.pool.simd);
                 let block = |row: usize, column: usize| y.block((row * n, column * n), (n, n));
-                let d = minus(simd, minus(simd, block(0, 0), &block(0, 1)), &block(1, 0));
-                let d = inverse(simd, plus(simd, d, &block(1, 1)), &mut sure);
-                let w = inverse(simd, plus(simd, y_a.clone(), y_b), &mut sure);
-                Some((minus(simd, d, &w), sure))
+                let d = minus(minus(block(0, 0), &block(0, 1)), &block(1, 0));
+                let d = inverse(plus(d, &block(1, 1)), &mut sure);
+                let w = inverse(plus(y_a.copy(), y_b), &mut sure);
+                Some((minus(d, &w), sure))
             }
             Work::Primal(block) => {
                 let (z, sure) = self.impedance()?;
@@ -192,8 +206,8 @@ impl<'a, S: Simd> AtOnce<'a, S> {
                     PrimalBlock::B => (n, y_b),
                 };
                 let mut sure = *sure;
-                let alone = inverse(simd, y.clone(), &mut sure);
-                Some((minus(simd, z.block((at, at), (n, n)), &alone), sure))
+                let alone = inverse(y.copy(), &mut sure);
+                Some((minus(z.block((at, at), (n, n)), &alone), sure))
             }
             Work::Inverse(block) => {
                 let (z, sure) = self.impedance()?;
@@ -201,53 +215,54 @@ impl<'a, S: Simd> AtOnce<'a, S> {
                     InverseBlock::Ab => (0, n),
                     InverseBlock::Ba => (n, 0),
                 };
-                let mut z = z.block(at, (n, n));
-                z.negate(simd);
-                Some((z, *sure))
+                Some((z.block(at, (n, n)).negated(), *sure))
             }
         }
     }
 
-    fn by_internals(&self, internals: &Rearrangement<'_>) -> Option<Surely<S>> {
-        let (simd, n) = (self.simd, self.job.reduced.idms.count());
+    fn by_internals(&self, internals: &Rearrangement<'_>) -> Option<Surely<'a, S>> {
+        let n = self.job.reduced.idms.count();
         let [y_a, y_b] = &self.alone;
-        let mut sure = Sure::all(simd);
-        let without = |g| minus(simd, minus(simd, g, y_a), y_b);
+        let mut sure = Sure::all(self.pool.simd);
+        let without = |g| minus(minus(g, y_a), y_b);
         if internals.printed {
-            let [p, m, q] = internals.at_once(simd, self.first);
-            let g = product(simd, &product(simd, &q, &inverse(simd, m, &mut sure)), &p);
-            return Some((inverse(simd, without(g), &mut sure), sure));
+            let [p, m, q] = internals.at_once(self.pool, self.first);
+            let g = product(&product(&q, &inverse(m, &mut sure)), &p);
+            return Some((inverse(without(g), &mut sure), sure));
         }
         if internals.rows.at.len().min(internals.columns.at.len()) < n {
             return None;
         }
-        let [p, m, q] = internals.at_once(simd, self.first);
-        let [p_plus, q_plus] = [p, q].map(|all| inverse(simd, all, &mut sure));
-        let g = inverse(simd, product(simd, &product(simd, &p_plus, &m), &q_plus), &mut sure);
-        Some((inverse(simd, without(g), &mut sure), sure))
+        let [p, m, q] = internals.at_once(self.pool, self.first);
+        let [p_plus, q_plus] = [p, q].map(|all| inverse(all, &mut sure));
+        let g = inverse(product(&product(&p_plus, &m), &q_plus), &mut sure);
+        Some((inverse(without(g), &mut sure), sure))
     }
 
     /// Y^AJB_cc; nothing where a virtual point cannot be formed.
-    fn assembly(&self) -> Option<&Matrix<S>> {
+    fn assembly(&self) -> Option<&Matrix<'a, S>> {
         let found = self.assembly.get_or_init(|| {
             let Job { reduced, rooms, .. } = self.job;
             let vp = reduced.assembled().ok()?;
-            let lines = lines(self.simd, rooms.ajb.frf.lines(), self.first);
-            Some(Matrix::beside(vp.each_ref().map(|input| {
-                Matrix::above(vp.each_ref().map(|out: &Balanced| {
-                    let cells = Matrix::read(self.simd, &lines, &out.vp.rows.at, &input.vp.columns.at);
-                    times(self.simd, &to_left_of(self.simd, &out.t_u, &cells), &input.t_f)
-                }))
-            })))
+            let lines = lines(self.pool, rooms.ajb.frf.lines(), self.first);
+            let n = reduced.idms.count();
+            let mut y = Matrix::any(self.pool, 2 * n, 2 * n);
+            for (r, out) in vp.iter().enumerate() {
+                for (c, input) in vp.iter().enumerate() {
+                    let cells = Matrix::read(self.pool, &lines, &out.vp.rows.at, &input.vp.columns.at);
+                    y.put((r * n, c * n), &times(&to_left_of(&out.t_u, &cells), &input.t_f));
+                }
+            }
+            Some(y)
         });
         found.as_ref()
     }
 
     /// (Y^AJB_cc)⁻¹.
-    fn impedance(&self) -> Option<&Surely<S>> {
+    fn impedance(&self) -> Option<&Surely<'a, S>> {
         let found = self.impedance.get_or_init(|| {
-            let mut sure = Sure::all(self.simd);
-            let z = inverse(self.simd, self.assembly()?.clone(), &mut sure);
+            let mut sure = Sure::all(self.pool.simd);
+            let z = inverse(self.assembly()?.copy(), &mut sure);
             Some((z, sure))
         });
         found.as_ref()

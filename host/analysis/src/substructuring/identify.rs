@@ -151,7 +151,7 @@ pub fn identify(
         let reduced = Reduced::of(&rooms, set);
         let (alone, solutions) = solve(&rooms, &reduced, set, methods, true);
         if let (Ok(reduced), Some(alone)) = (&reduced, &alone) {
-            out.virtual_points.extend(reduced.quality(&rooms, alone));
+            out.virtual_points.extend(reduced.quality(&rooms, [&alone[0], &alone[1]]));
         }
         let mut solved = Vec::new();
         for (method, solution) in solutions {
@@ -266,7 +266,7 @@ fn solve(
     idms: IdmSet,
     methods: &[Method],
     alone: bool,
-) -> (Option<[Vec<DMatrix<Complex<f64>>>; 2]>, Vec<(Method, Result<Solution, Refused>)>) {
+) -> (Option<Vec<Vec<DMatrix<Complex<f64>>>>>, Vec<(Method, Result<Solution, Refused>)>) {
     let refused =
         |method, reason: RefusedReason| Refused { method, idms: idms.count(), reason: reason.to_string() };
     let solutions = match reduced {

@@ -2,7 +2,7 @@
 
 use super::geometry::Grouping;
 use super::interface_data::{Found, InterfaceError, Measured};
-use super::lanes::{Matrix, lines, minus, times, to_left_of};
+use super::lanes::{Matrix, Pool, lines, minus, times, to_left_of};
 use super::rooms::{Balanced, Rooms, Side};
 use super::vpt::reduce_inputs;
 use nalgebra::{Complex, DMatrix};
@@ -84,16 +84,16 @@ impl<'a> Rearrangement<'a> {
     }
 
     /// P, M and Q of the lines of a vector.
-    pub(super) fn at_once<S: Simd>(&self, simd: S, first: usize) -> [Matrix<S>; 3] {
+    pub(super) fn at_once<'p, S: Simd>(&self, pool: &'p Pool<S>, first: usize) -> [Matrix<'p, S>; 3] {
         let read = |file: Measured<'_>, rows: &Found, columns: &Found| {
-            Matrix::read(simd, &lines(simd, file.frf.lines(), first), &rows.at, &columns.at)
+            Matrix::read(pool, &lines(pool, file.frf.lines(), first), &rows.at, &columns.at)
         };
         let (seen, hit) = (self.rooms.alone(self.seen), self.rooms.alone(self.hit));
-        let p = times(simd, &read(seen, &self.rows, &self.seen_at.vp.columns), &self.seen_at.t_f);
-        let q = to_left_of(simd, &self.hit_at.t_u, &read(hit, &self.hit_at.vp.rows, &self.columns));
+        let p = times(&read(seen, &self.rows, &self.seen_at.vp.columns), &self.seen_at.t_f);
+        let q = to_left_of(&self.hit_at.t_u, &read(hit, &self.hit_at.vp.rows, &self.columns));
         let assembled = read(self.rooms.ajb, &self.rows_ajb, &self.columns_ajb);
         let m = if self.seen == self.hit {
-            minus(simd, read(seen, &self.rows, &self.columns), &assembled)
+            minus(read(seen, &self.rows, &self.columns), &assembled)
         } else {
             assembled
         };

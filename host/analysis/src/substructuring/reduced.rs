@@ -88,7 +88,7 @@ impl Reduced {
         Ok(Reduced { idms, a, b, assembled, alone, assembly, impedance })
     }
 
-    pub(super) fn quality(&self, rooms: &Rooms<'_>, [y_a, y_b]: &[Vec<Line>; 2]) -> Vec<VirtualPointQuality> {
+    pub(super) fn quality(&self, rooms: &Rooms<'_>, [y_a, y_b]: [&[Line]; 2]) -> Vec<VirtualPointQuality> {
         [(Structure::A, rooms.a, &self.a.vp, y_a), (Structure::B, rooms.b, &self.b.vp, y_b)]
             .into_par_iter()
             .filter_map(|(substructure, file, vp, y)| {

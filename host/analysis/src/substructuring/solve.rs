@@ -24,8 +24,8 @@ pub(super) struct Solution {
 
 /// What all methods gave.
 pub(super) struct Solutions {
-    /// Y^A and Y^B, rotations in metres.
-    pub(super) alone: [Vec<Line>; 2],
+    /// Y^A and Y^B, rotations in metres; nothing where they were not asked for.
+    pub(super) alone: Vec<Vec<Line>>,
     /// In the order of the methods.
     pub(super) by_method: Vec<Result<Solution, RefusedReason>>,
 }
@@ -60,8 +60,8 @@ pub(super) struct Refusal {
 }
 
 impl Stage {
-    fn refuses<R: Into<RefusedReason>>(self) -> impl Fn(R) -> Box<Refusal> {
-        move |reason| Box::new(Refusal { stage: self, reason: reason.into() })
+    fn refuses<R: Into<RefusedReason>>(self) -> impl Fn(R) -> Refusal {
+        move |reason| Refusal { stage: self, reason: reason.into() }
     }
 }
 
@@ -149,12 +149,7 @@ impl Reduced {
     }
 
     /// One line by itself: where it is near rank loss, and where it is refused. Rotations in metres.
-    pub(super) fn with_care(
-        &self,
-        rooms: &Rooms<'_>,
-        work: &Work<'_>,
-        l: usize,
-    ) -> Result<Line, Box<Refusal>> {
+    pub(super) fn with_care(&self, rooms: &Rooms<'_>, work: &Work<'_>, l: usize) -> Result<Line, Refusal> {
         let alone = |side| self.alone_at(rooms, side, l).map_err(Stage::Method.refuses());
         let assembly = || self.assembly_at(rooms, l).map_err(Stage::Assembly.refuses());
         let impedance = || Self::impedance_of(rooms, l, &assembly()?).map_err(Stage::Impedance.refuses());

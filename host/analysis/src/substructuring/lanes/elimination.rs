@@ -5,11 +5,11 @@ use super::matrix::Matrix;
 use super::number::{Cell, Lanes, Sure};
 use pulp::{NullaryFnOnce, Simd};
 
-pub(super) fn eliminated<S: Simd>(simd: S, mut a: Matrix<S>, sure: &mut Sure<S>) -> Matrix<S> {
-    let n = a.rows();
-    let mut scratch = Vec::with_capacity(n);
-    let mut pivots = Vec::with_capacity(n);
-    simd.vectorize(Elimination { simd, n, a: a.cells_mut(), x: &mut scratch, pivots: &mut pivots, sure });
+pub(super) fn eliminated<'p, S: Simd>(mut a: Matrix<'p, S>, sure: &mut Sure<S>) -> Matrix<'p, S> {
+    let (simd, n) = (a.pool.simd, a.rows());
+    let mut x = Matrix::any(a.pool, n, 1);
+    let mut swaps = Vec::with_capacity(n);
+    simd.vectorize(Elimination { simd, n, a: a.cells_mut(), x: x.cells_mut(), swaps: &mut swaps, sure });
     a
 }
 
@@ -18,9 +18,8 @@ struct Elimination<'a, S: Simd> {
     n: usize,
     a: &'a mut [Cell<S>],
     /// The column at work.
-    x: &'a mut Vec<Cell<S>>,
-    /// Each step's row, of each line.
-    pivots: &'a mut Vec<Lanes<S>>,
+    x: &'a mut [Cell<S>],
+    swaps: &'a mut Vec<Swap<S>>,
     sure: &'a mut Sure<S>,
 }
 
@@ -30,7 +29,7 @@ impl<S: Simd> NullaryFnOnce for Elimination<'_, S> {
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     fn call(self) {
-        let Elimination { simd, n, a, x, pivots, sure } = self;
+        let Elimination { simd, n, a, x, swaps, sure } = self;
         let (all, none) = (|value| Lanes::all(simd, value), Lanes::all(simd, 0.0));
         let mut largest = none;
         for k in 0..n {
@@ -44,12 +43,10 @@ impl<S: Simd> NullaryFnOnce for Elimination<'_, S> {
             largest = pivot.where_or(pivot.exceeds(largest), largest);
             sure.only(pivot.exceeds(largest * all(CLEAR * CLEAR)));
             sure.only(all(f64::INFINITY).exceeds(largest));
-            pivots.push(row);
             let swap = Swap::of(simd, k, row);
             swap.in_column(column);
             // column k makes room for that of the inverse, which starts as the unit vector; −1 puts row k itself in its place
-            x.clear();
-            x.extend_from_slice(column);
+            x.copy_from_slice(column);
             let minus_inverse = -x[k].inv();
             x[k] = Cell::all(simd, -1.0);
             column.fill(Cell::all(simd, 0.0));
@@ -63,62 +60,64 @@ impl<S: Simd> NullaryFnOnce for Elimination<'_, S> {
                     *v += *x * f;
                 }
             }
+            swaps.push(swap);
         }
-        for (k, row) in pivots.iter().enumerate().rev() {
-            Swap::of(simd, k, *row).of_columns(a, n);
+        for swap in swaps.iter().rev() {
+            swap.of_columns(a, n);
         }
     }
 }
 
+/// No processor's vectors hold more.
+const MOST_LANES: usize = 8;
+
 /// The exchange of row (or column) k with another one of each line.
-enum Swap<S: Simd> {
-    /// All lines have the same, as neighbours mostly do.
-    Same(usize, usize),
-    /// From k to the last row, and which it is.
-    Own { k: usize, last: usize, row: Lanes<S>, simd: S },
+struct Swap<S: Simd> {
+    simd: S,
+    k: usize,
+    /// The other one of each line, and all that there are: neighbours mostly have the same.
+    row: Lanes<S>,
+    others: [usize; MOST_LANES],
+    count: usize,
 }
 
 impl<S: Simd> Swap<S> {
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     fn of(simd: S, k: usize, row: Lanes<S>) -> Self {
-        let [first, last] = row.range().map(|row| row as usize);
-        if first == last { Swap::Same(k, last) } else { Swap::Own { k, last, row, simd } }
+        let (mut others, mut count) = ([0; MOST_LANES], 0);
+        for other in row.each().iter().map(|row| *row as usize) {
+            if !others[..count].contains(&other) {
+                others[count] = other;
+                count += 1;
+            }
+        }
+        Swap { simd, k, row, others, count }
     }
 
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     fn in_column(&self, column: &mut [Cell<S>]) {
-        match *self {
-            Swap::Same(k, row) => column.swap(k, row),
-            Swap::Own { k, last, row, simd } => {
-                for r in k + 1..=last {
-                    let here = row.equals(Lanes::all(simd, r as f64));
-                    let (one, other) = (column[k], column[r]);
-                    (column[k], column[r]) = (other.where_or(here, one), one.where_or(here, other));
-                }
-            }
+        if self.count == 1 {
+            return column.swap(self.k, self.others[0]);
+        }
+        for &other in &self.others[..self.count] {
+            let here = self.row.equals(Lanes::all(self.simd, other as f64));
+            let (one, two) = (column[self.k], column[other]);
+            // where the other is k itself, both are the same
+            column[self.k] = two.where_or(here, one);
+            column[other] = one.where_or(here, two);
         }
     }
 
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     fn of_columns(&self, a: &mut [Cell<S>], n: usize) {
-        match *self {
-            Swap::Same(k, row) if k == row => {}
-            Swap::Same(k, row) => {
-                for r in 0..n {
-                    a.swap(k * n + r, row * n + r);
-                }
-            }
-            Swap::Own { k, last, row, simd } => {
-                for c in k + 1..=last {
-                    let here = row.equals(Lanes::all(simd, c as f64));
-                    for r in 0..n {
-                        let (one, other) = (a[k * n + r], a[c * n + r]);
-                        (a[k * n + r], a[c * n + r]) = (other.where_or(here, one), one.where_or(here, other));
-                    }
-                }
+        for &other in self.others[..self.count].iter().filter(|other| **other != self.k) {
+            let here = self.row.equals(Lanes::all(self.simd, other as f64));
+            let (one, two) = a.split_at_mut(other * n);
+            for (one, two) in one[self.k * n..(self.k + 1) * n].iter_mut().zip(two) {
+                (*one, *two) = (two.where_or(here, *one), one.where_or(here, *two));
             }
         }
     }

@@ -1,33 +1,41 @@
 //! A matrix of each line, by columns.
 
 use super::number::{Cell, Lanes, Sure};
+use super::pool::Pool;
 use nalgebra::{Complex, DMatrix};
 use pulp::{NullaryFnOnce, Simd};
 
 type Line = DMatrix<Complex<f64>>;
 
 /// A matrix of as many lines as a vector holds.
-#[derive(Clone)]
-pub(crate) struct Matrix<S: Simd> {
+pub(crate) struct Matrix<'p, S: Simd> {
+    pub(super) pool: &'p Pool<S>,
     rows: usize,
     columns: usize,
     cells: Vec<Cell<S>>,
 }
 
+impl<S: Simd> Drop for Matrix<'_, S> {
+    fn drop(&mut self) {
+        self.pool.back(std::mem::take(&mut self.cells));
+    }
+}
+
 /// The lines of a vector from `first` on; where they end, the last one again.
-pub(crate) fn lines<S: Simd>(_: S, of: &[Line], first: usize) -> Vec<&Line> {
+pub(crate) fn lines<'a, S: Simd>(_: &Pool<S>, of: &'a [Line], first: usize) -> Vec<&'a Line> {
     (first..first + S::F64_LANES).filter_map(|line| of.get(line).or(of.last())).collect()
 }
 
-impl<S: Simd> Matrix<S> {
-    pub(crate) fn zeros(simd: S, rows: usize, columns: usize) -> Self {
-        simd.vectorize(Zeros { simd, rows, columns })
+impl<'p, S: Simd> Matrix<'p, S> {
+    /// A matrix of any values.
+    pub(crate) fn any(pool: &'p Pool<S>, rows: usize, columns: usize) -> Self {
+        Matrix { pool, rows, columns, cells: pool.cells(rows * columns) }
     }
 
     /// The named rows and columns of a vector's lines.
-    pub(crate) fn read(simd: S, lines: &[&Line], rows: &[usize], columns: &[usize]) -> Self {
-        let mut matrix = Matrix::zeros(simd, rows.len(), columns.len());
-        simd.vectorize(Read { into: &mut matrix, lines, rows, columns });
+    pub(crate) fn read(pool: &'p Pool<S>, lines: &[&Line], rows: &[usize], columns: &[usize]) -> Self {
+        let mut matrix = Matrix::any(pool, rows.len(), columns.len());
+        pool.simd.vectorize(Read { into: &mut matrix.cells, lines, rows, columns });
         matrix
     }
 
@@ -39,79 +47,76 @@ impl<S: Simd> Matrix<S> {
         self.columns
     }
 
-    pub(crate) fn cells(&self) -> &[Cell<S>] {
+    pub(super) fn cells(&self) -> &[Cell<S>] {
         &self.cells
     }
 
-    pub(crate) fn cells_mut(&mut self) -> &mut [Cell<S>] {
+    pub(super) fn cells_mut(&mut self) -> &mut [Cell<S>] {
         &mut self.cells
-    }
-
-    /// Columns from `first` on, `count` of them.
-    pub(crate) fn columns_from(&self, first: usize, count: usize) -> &[Cell<S>] {
-        &self.cells[first * self.rows..(first + count) * self.rows]
-    }
-
-    pub(crate) fn adjoint(&self) -> Self {
-        let cells = (0..self.rows)
-            .flat_map(|r| self.cells.iter().skip(r).step_by(self.rows).map(|cell| cell.conj()))
-            .collect();
-        Matrix { rows: self.columns, columns: self.rows, cells }
     }
 
     /// The block of `rows` × `columns` from (`row`, `column`) on.
     pub(crate) fn block(&self, (row, column): (usize, usize), (rows, columns): (usize, usize)) -> Self {
-        let cells = self
-            .columns_from(column, columns)
-            .chunks_exact(self.rows.max(1))
-            .flat_map(|column| &column[row..row + rows])
-            .copied()
-            .collect();
-        Matrix { rows, columns, cells }
+        let mut block = Matrix::any(self.pool, rows, columns);
+        let from = self.cells[column * self.rows..].chunks_exact(self.rows.max(1));
+        for (to, from) in block.cells.chunks_exact_mut(rows.max(1)).zip(from) {
+            to.copy_from_slice(&from[row..row + rows]);
+        }
+        block
     }
 
-    /// One over the other, as many columns each.
-    pub(crate) fn above([upper, lower]: [Self; 2]) -> Self {
-        let rows = upper.rows + lower.rows;
-        let both =
-            upper.cells.chunks_exact(upper.rows.max(1)).zip(lower.cells.chunks_exact(lower.rows.max(1)));
-        let cells = both.flat_map(|(upper, lower)| upper.iter().chain(lower)).copied().collect();
-        Matrix { rows, columns: upper.columns, cells }
+    /// Puts a block of as many rows as it has at (`row`, `column`).
+    pub(crate) fn put(&mut self, (row, column): (usize, usize), block: &Self) {
+        let rows = self.rows.max(1);
+        let to = self.cells[column * self.rows..].chunks_exact_mut(rows);
+        for (to, from) in to.zip(block.cells.chunks_exact(block.rows.max(1))) {
+            to[row..row + block.rows].copy_from_slice(from);
+        }
     }
 
-    /// One beside the other, as many rows each.
-    pub(crate) fn beside([mut left, right]: [Self; 2]) -> Self {
-        left.cells.extend(right.cells);
-        Matrix { columns: left.columns + right.columns, ..left }
+    pub(crate) fn adjoint(&self) -> Self {
+        let mut adjoint = Matrix::any(self.pool, self.columns, self.rows);
+        let columns = self.columns;
+        self.pool.simd.vectorize(Adjoint { from: &self.cells, to: &mut adjoint.cells, columns });
+        adjoint
+    }
+
+    /// The same again.
+    pub(crate) fn copy(&self) -> Self {
+        self.block((0, 0), (self.rows, self.columns))
+    }
+
+    /// −Z.
+    #[must_use]
+    pub(crate) fn negated(mut self) -> Self {
+        self.pool.simd.vectorize(Negated { cells: &mut self.cells });
+        self
+    }
+
+    /// diag(d) Z diag(d) times `factor`, as [`scaled`](super::super::interface_data::scaled) does it.
+    #[must_use]
+    pub(crate) fn scaled(mut self, d: &[f64], factor: Cell<S>) -> Self {
+        let (simd, rows) = (self.pool.simd, self.rows.max(1));
+        simd.vectorize(Scaled { simd, cells: &mut self.cells, rows, d, factor });
+        self
+    }
+
+    /// Where all cells are numbers.
+    pub(crate) fn finite(&self) -> Sure<S> {
+        let simd = self.pool.simd;
+        simd.vectorize(Finite { simd, cells: &self.cells })
     }
 
     /// The matrix of one line.
     pub(crate) fn line(&self, lane: usize) -> Line {
-        let cells =
-            self.cells.iter().map(|cell| Complex::new(cell.re.each()[lane], cell.im.each()[lane])).collect();
-        Line::from_vec(self.rows, self.columns, cells)
-    }
-}
-
-struct Zeros<S: Simd> {
-    simd: S,
-    rows: usize,
-    columns: usize,
-}
-
-impl<S: Simd> NullaryFnOnce for Zeros<S> {
-    type Output = Matrix<S>;
-
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
-    #[inline(always)]
-    fn call(self) -> Matrix<S> {
-        let Zeros { simd, rows, columns } = self;
-        Matrix { rows, columns, cells: vec![Cell::all(simd, 0.0); rows * columns] }
+        let mut line = Vec::with_capacity(self.cells.len());
+        self.pool.simd.vectorize(OneLine { cells: &self.cells, lane, line: &mut line });
+        Line::from_vec(self.rows, self.columns, line)
     }
 }
 
 struct Read<'a, S: Simd> {
-    into: &'a mut Matrix<S>,
+    into: &'a mut [Cell<S>],
     lines: &'a [&'a Line],
     rows: &'a [usize],
     columns: &'a [usize],
@@ -123,8 +128,9 @@ impl<S: Simd> NullaryFnOnce for Read<'_, S> {
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     fn call(self) {
+        self.bring_near();
         // a column of all lines at a time stays in the first cache
-        for (into, &c) in self.into.cells.chunks_exact_mut(self.rows.len().max(1)).zip(self.columns) {
+        for (into, &c) in self.into.chunks_exact_mut(self.rows.len().max(1)).zip(self.columns) {
             for (lane, y) in self.lines.iter().enumerate() {
                 let column = &y.as_slice()[c * y.nrows()..][..y.nrows()];
                 for (cell, &r) in into.iter_mut().zip(self.rows) {
@@ -137,23 +143,43 @@ impl<S: Simd> NullaryFnOnce for Read<'_, S> {
     }
 }
 
-impl<S: Simd> Matrix<S> {
-    /// diag(d) Z diag(d) times `factor`, as [`scaled`](super::super::interface_data::scaled) does it.
-    pub(crate) fn scaled(&mut self, simd: S, d: &[f64], factor: Cell<S>) {
-        let rows = self.rows.max(1);
-        simd.vectorize(Scaled { simd, cells: &mut self.cells, rows, d, factor });
+impl<S: Simd> Read<'_, S> {
+    /// Looks at every column once, one line after the other: so the memory delivers many pieces at the same time, which it does not
+    /// where each of them is waited for to be put into its lane.
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn bring_near(&self) {
+        let mut seen = 0.0;
+        for y in self.lines {
+            for &c in self.columns {
+                // four complex numbers are one piece
+                for value in y.as_slice()[c * y.nrows()..][..y.nrows()].iter().step_by(4) {
+                    seen += value.re;
+                }
+            }
+        }
+        std::hint::black_box(seen);
     }
 }
 
-impl<S: Simd> Matrix<S> {
-    /// −Z.
-    pub(crate) fn negate(&mut self, simd: S) {
-        simd.vectorize(Negated { cells: &mut self.cells });
-    }
+struct Adjoint<'a, S: Simd> {
+    from: &'a [Cell<S>],
+    to: &'a mut [Cell<S>],
+    columns: usize,
+}
 
-    /// Where all cells are numbers.
-    pub(crate) fn finite(&self, simd: S) -> Sure<S> {
-        simd.vectorize(Finite { simd, cells: &self.cells })
+impl<S: Simd> NullaryFnOnce for Adjoint<'_, S> {
+    type Output = ();
+
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn call(self) {
+        let rows = self.from.len() / self.columns.max(1);
+        for (r, to) in self.to.chunks_exact_mut(self.columns.max(1)).enumerate() {
+            for (c, to) in to.iter_mut().enumerate() {
+                *to = self.from[c * rows + r].conj();
+            }
+        }
     }
 }
 
@@ -169,6 +195,29 @@ impl<S: Simd> NullaryFnOnce for Negated<'_, S> {
     fn call(self) {
         for cell in self.cells {
             *cell = -*cell;
+        }
+    }
+}
+
+struct Scaled<'a, S: Simd> {
+    simd: S,
+    cells: &'a mut [Cell<S>],
+    rows: usize,
+    d: &'a [f64],
+    factor: Cell<S>,
+}
+
+impl<S: Simd> NullaryFnOnce for Scaled<'_, S> {
+    type Output = ();
+
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn call(self) {
+        for (column, right) in self.cells.chunks_exact_mut(self.rows).zip(self.d) {
+            let factor = self.factor * Lanes::all(self.simd, *right);
+            for (cell, left) in column.iter_mut().zip(self.d) {
+                *cell = *cell * factor * Lanes::all(self.simd, *left);
+            }
         }
     }
 }
@@ -196,25 +245,20 @@ impl<S: Simd> NullaryFnOnce for Finite<'_, S> {
     }
 }
 
-struct Scaled<'a, S: Simd> {
-    simd: S,
-    cells: &'a mut [Cell<S>],
-    rows: usize,
-    d: &'a [f64],
-    factor: Cell<S>,
+struct OneLine<'a, S: Simd> {
+    cells: &'a [Cell<S>],
+    lane: usize,
+    line: &'a mut Vec<Complex<f64>>,
 }
 
-impl<S: Simd> NullaryFnOnce for Scaled<'_, S> {
+impl<S: Simd> NullaryFnOnce for OneLine<'_, S> {
     type Output = ();
 
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     fn call(self) {
-        for (column, right) in self.cells.chunks_exact_mut(self.rows).zip(self.d) {
-            let factor = self.factor * Lanes::all(self.simd, *right);
-            for (cell, left) in column.iter_mut().zip(self.d) {
-                *cell = *cell * factor * Lanes::all(self.simd, *left);
-            }
+        for cell in self.cells {
+            self.line.push(Complex::new(cell.re.each()[self.lane], cell.im.each()[self.lane]));
         }
     }
 }

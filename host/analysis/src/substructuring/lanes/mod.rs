@@ -9,10 +9,12 @@ mod elimination;
 mod matrix;
 mod number;
 mod orthogonalisation;
+mod pool;
 mod product;
 
 pub(super) use matrix::{Matrix, lines};
 pub(super) use number::{Cell, Sure};
+pub(super) use pool::Pool;
 pub(super) use product::{minus, plus, product, times, to_left_of};
 
 use elimination::eliminated;
@@ -21,11 +23,11 @@ use pulp::Simd;
 use std::cmp::Ordering;
 
 /// As [`full_rank_inverse`](super::pseudo_inverse::full_rank_inverse), at those lines that are sure.
-pub(super) fn inverse<S: Simd>(simd: S, a: Matrix<S>, sure: &mut Sure<S>) -> Matrix<S> {
+pub(super) fn inverse<'p, S: Simd>(a: Matrix<'p, S>, sure: &mut Sure<S>) -> Matrix<'p, S> {
     match a.rows().cmp(&a.columns()) {
-        Ordering::Equal => eliminated(simd, a, sure),
-        Ordering::Greater => orthogonalised(simd, a, sure),
-        Ordering::Less => orthogonalised(simd, a.adjoint(), sure).adjoint(),
+        Ordering::Equal => eliminated(a, sure),
+        Ordering::Greater => orthogonalised(a, sure),
+        Ordering::Less => orthogonalised(a.adjoint(), sure).adjoint(),
     }
 }
 

@@ -5,9 +5,9 @@ use super::matrix::Matrix;
 use super::number::{Cell, Lanes, Sure};
 use pulp::{NullaryFnOnce, Simd};
 
-pub(super) fn orthogonalised<S: Simd>(simd: S, mut a: Matrix<S>, sure: &mut Sure<S>) -> Matrix<S> {
-    let (m, n) = (a.rows(), a.columns());
-    let mut r = Matrix::zeros(simd, n, n);
+pub(super) fn orthogonalised<'p, S: Simd>(mut a: Matrix<'p, S>, sure: &mut Sure<S>) -> Matrix<'p, S> {
+    let (simd, m, n) = (a.pool.simd, a.rows(), a.columns());
+    let mut r = Matrix::any(a.pool, n, n);
     simd.vectorize(Orthogonalisation { simd, m, n, q: a.cells_mut(), r: r.cells_mut(), sure });
     let mut inverse = a.adjoint();
     simd.vectorize(Substitution { n, x: inverse.cells_mut(), r: r.cells() });
@@ -36,6 +36,7 @@ impl<S: Simd> NullaryFnOnce for Orthogonalisation<'_, S> {
         for k in 0..n {
             let (done, rest) = q.split_at_mut(k * m);
             let (v, r) = (&mut rest[..m], &mut r[k * n..=k * n + k]);
+            r.fill(none);
             let mut square = square_of(simd, v);
             // all lines at first, then those where much was taken away
             let mut at = all(0.0).equals(all(0.0));

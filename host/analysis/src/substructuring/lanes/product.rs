@@ -2,60 +2,54 @@
 
 use super::matrix::Matrix;
 use super::number::{Cell, Lanes};
+use super::pool::Pool;
 use nalgebra::DMatrix;
 use pulp::{NullaryFnOnce, Simd};
 use std::ops::Mul;
 
 /// A B.
-pub(crate) fn product<S: Simd>(simd: S, a: &Matrix<S>, b: &Matrix<S>) -> Matrix<S> {
+pub(crate) fn product<'p, S: Simd>(a: &Matrix<'p, S>, b: &Matrix<'p, S>) -> Matrix<'p, S> {
     assert_eq!(a.columns(), b.rows(), "A has as many columns as B has rows");
-    let mut out = Matrix::zeros(simd, a.rows(), b.columns());
     let (rows, inner) = (a.rows(), a.columns());
-    simd.vectorize(Sums { simd, out: out.cells_mut(), rows, columns: a.cells(), factors: b.cells(), inner });
-    out
+    sums(a.pool, [rows, inner, b.columns()], a.cells(), b.cells())
 }
 
 /// Y T with the real T.
-pub(crate) fn times<S: Simd>(simd: S, y: &Matrix<S>, t: &DMatrix<f64>) -> Matrix<S> {
+pub(crate) fn times<'p, S: Simd>(y: &Matrix<'p, S>, t: &DMatrix<f64>) -> Matrix<'p, S> {
     assert_eq!(y.columns(), t.nrows(), "Y has as many columns as T has rows");
-    let mut out = Matrix::zeros(simd, y.rows(), t.ncols());
-    let (rows, inner) = (y.rows(), y.columns());
-    simd.vectorize(Sums {
-        simd,
-        out: out.cells_mut(),
-        rows,
-        columns: y.cells(),
-        factors: t.as_slice(),
-        inner,
-    });
-    out
+    sums(y.pool, [y.rows(), y.columns(), t.ncols()], y.cells(), t.as_slice())
 }
 
 /// T Y with the real T.
-pub(crate) fn to_left_of<S: Simd>(simd: S, t: &DMatrix<f64>, y: &Matrix<S>) -> Matrix<S> {
+pub(crate) fn to_left_of<'p, S: Simd>(t: &DMatrix<f64>, y: &Matrix<'p, S>) -> Matrix<'p, S> {
     assert_eq!(t.ncols(), y.rows(), "T has as many columns as Y has rows");
-    let mut out = Matrix::zeros(simd, t.nrows(), y.columns());
-    let (rows, inner) = t.shape();
-    simd.vectorize(Sums {
-        simd,
-        out: out.cells_mut(),
-        rows,
-        columns: t.as_slice(),
-        factors: y.cells(),
-        inner,
-    });
+    sums(y.pool, [t.nrows(), t.ncols(), y.columns()], t.as_slice(), y.cells())
+}
+
+fn sums<'p, S: Simd, A: Factor<S>, B: Factor<S>>(
+    pool: &'p Pool<S>,
+    [rows, inner, count]: [usize; 3],
+    columns: &[A],
+    factors: &[B],
+) -> Matrix<'p, S>
+where
+    A::In: Mul<B::In, Output = Cell<S>>,
+{
+    let mut out = Matrix::any(pool, rows, count);
+    let simd = pool.simd;
+    simd.vectorize(Sums { simd, out: out.cells_mut(), rows, columns, factors, inner });
     out
 }
 
 /// A + B.
-pub(crate) fn plus<S: Simd>(simd: S, mut a: Matrix<S>, b: &Matrix<S>) -> Matrix<S> {
-    simd.vectorize(Added::<S, true> { a: a.cells_mut(), b: b.cells() });
+pub(crate) fn plus<'p, S: Simd>(mut a: Matrix<'p, S>, b: &Matrix<'p, S>) -> Matrix<'p, S> {
+    a.pool.simd.vectorize(Added::<S, true> { a: a.cells_mut(), b: b.cells() });
     a
 }
 
 /// A − B.
-pub(crate) fn minus<S: Simd>(simd: S, mut a: Matrix<S>, b: &Matrix<S>) -> Matrix<S> {
-    simd.vectorize(Added::<S, false> { a: a.cells_mut(), b: b.cells() });
+pub(crate) fn minus<'p, S: Simd>(mut a: Matrix<'p, S>, b: &Matrix<'p, S>) -> Matrix<'p, S> {
+    a.pool.simd.vectorize(Added::<S, false> { a: a.cells_mut(), b: b.cells() });
     a
 }
 
@@ -135,7 +129,8 @@ where
     #[inline(always)]
     fn call(self) {
         let Sums { simd, out, rows, columns, factors, inner } = self;
-        for (sum, factors) in out.chunks_exact_mut(rows.max(1)).zip(factors.chunks_exact(inner.max(1))) {
+        for (column, sum) in out.chunks_exact_mut(rows.max(1)).enumerate() {
+            let factors = &factors[column * inner..(column + 1) * inner];
             let mut row = 0;
             while row + TILE <= rows {
                 add::<S, A, B, TILE>(simd, &mut sum[row..row + TILE], columns, rows, row, factors);

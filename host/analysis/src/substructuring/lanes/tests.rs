@@ -19,11 +19,11 @@ impl WithSimd for Inverses<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let (rows, columns) = self.0[0].shape();
         let (rows, columns): (Vec<usize>, Vec<usize>) = ((0..rows).collect(), (0..columns).collect());
-        let mut found = Vec::new();
+        let (pool, mut found) = (Pool::new(simd), Vec::new());
         while found.len() < self.0.len() {
             let (first, mut sure) = (found.len(), Sure::all(simd));
-            let a = Matrix::read(simd, &lines(simd, self.0, first), &rows, &columns);
-            let inverses = inverse(simd, a, &mut sure);
+            let a = Matrix::read(&pool, &lines(&pool, self.0, first), &rows, &columns);
+            let inverses = inverse(a, &mut sure);
             let lanes = 0..S::F64_LANES.min(self.0.len() - first);
             found.extend(lanes.map(|lane| sure.at(lane).then(|| inverses.line(lane))));
         }
@@ -41,15 +41,11 @@ impl WithSimd for Products<'_> {
         let (rows, columns) = self.0[0].shape();
         let (rows, columns): (Vec<usize>, Vec<usize>) = ((0..rows).collect(), (0..columns).collect());
         let real = self.0[0].map(|v| v.re);
-        let mut found = Vec::new();
+        let (pool, mut found) = (Pool::new(simd), Vec::new());
         for first in (0..self.0.len()).step_by(S::F64_LANES) {
-            let a = Matrix::read(simd, &lines(simd, self.0, first), &rows, &columns);
+            let a = Matrix::read(&pool, &lines(&pool, self.0, first), &rows, &columns);
             let adjoint = a.adjoint();
-            let all = [
-                product(simd, &a, &adjoint),
-                times(simd, &adjoint, &real),
-                to_left_of(simd, &real, &adjoint),
-            ];
+            let all = [product(&a, &adjoint), times(&adjoint, &real), to_left_of(&real, &adjoint)];
             let lanes = 0..S::F64_LANES.min(self.0.len() - first);
             found.extend(lanes.map(|lane| all.each_ref().map(|all| all.line(lane))));
         }

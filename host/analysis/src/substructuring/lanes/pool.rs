@@ -1,0 +1,48 @@
+//! The memory of matrices that come and go.
+
+use super::number::Cell;
+use pulp::{NullaryFnOnce, Simd};
+use std::cell::RefCell;
+
+/// Lends cells to matrices: to ask the system for them every time takes as long as some of the products.
+pub(crate) struct Pool<S: Simd> {
+    pub(crate) simd: S,
+    free: RefCell<Vec<Vec<Cell<S>>>>,
+}
+
+impl<S: Simd> Pool<S> {
+    pub(crate) fn new(simd: S) -> Self {
+        Pool { simd, free: RefCell::default() }
+    }
+
+    /// So many cells, of any value.
+    pub(super) fn cells(&self, count: usize) -> Vec<Cell<S>> {
+        let mut cells = self.free.borrow_mut().pop().unwrap_or_default();
+        if cells.len() < count {
+            self.simd.vectorize(Longer { simd: self.simd, cells: &mut cells, count });
+        }
+        cells.truncate(count);
+        cells
+    }
+
+    /// They are not needed any more.
+    pub(super) fn back(&self, cells: Vec<Cell<S>>) {
+        self.free.borrow_mut().push(cells);
+    }
+}
+
+struct Longer<'a, S: Simd> {
+    simd: S,
+    cells: &'a mut Vec<Cell<S>>,
+    count: usize,
+}
+
+impl<S: Simd> NullaryFnOnce for Longer<'_, S> {
+    type Output = ();
+
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn call(self) {
+        self.cells.resize(self.count, Cell::all(self.simd, 0.0));
+    }
+}
