@@ -4,21 +4,17 @@
 //! long as one of a length with small factors, and its plan as long again. Lengths with small factors are transformed as they are; others are padded with zeros
 //! to the next such length, which shows where the spectrum is high, and the record's own lines are summed there alone, one by one.
 
+use super::line_sums::{line_sum, turns};
 use crate::transforms::forward;
-use crate::vectors::wide;
 use num_complex::Complex;
-use pulp::NullaryFnOnce;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-use std::ops::Range;
 
 /// Peaks of the padded spectrum below this fraction of the highest are not looked at: between two lines a Hann-windowed tone loses 28 % of
 /// its power at the most.
 const NEAR_HIGHEST: f64 = 0.25;
 /// Peaks that are looked at one by one; with more the record is noise, and all of its lines are.
 const PEAKS: usize = 6;
-/// Samples whose turns share one angle that is computed.
-const SHARED: usize = 64;
 
 /// The strongest frequency (Hz) above two periods of the record, from a Hann-windowed spectrum with parabolic refinement.
 pub(super) fn dominant_frequency(x: &[f64], fs_hz: f64) -> Option<f64> {
@@ -43,17 +39,6 @@ fn windowed(x: &[f64]) -> Vec<f64> {
     let turns = turns(0..n, TAU / n as f64);
     let half = Complex::from_polar(1.0, 0.5 * TAU / n as f64);
     x.iter().zip(&turns).map(|(v, turn)| (v - mean) * (0.5 - 0.5 * (half * turn).re)).collect()
-}
-
-/// e^(i `step` n) of every n of a range: each the product of two that are computed, and right to a few units in the last place.
-pub(super) fn turns(range: Range<usize>, step: f64) -> Vec<Complex<f64>> {
-    let within: [Complex<f64>; SHARED] = std::array::from_fn(|i| Complex::from_polar(1.0, step * i as f64));
-    let mut all = Vec::with_capacity(range.len());
-    for first in range.clone().step_by(SHARED) {
-        let base = Complex::from_polar(1.0, step * first as f64);
-        all.extend(within[..SHARED.min(range.end - first)].iter().map(|turn| base * turn));
-    }
-    all
 }
 
 /// Whether 2, 3, 5 and 7 are all its prime factors, 2 among them: lengths that are transformed quickly.
@@ -149,48 +134,7 @@ fn powers(signal: &mut [f64]) -> Option<Vec<f64>> {
 
 /// |X|² of one line, by its sum.
 fn line_power(signal: &[f64], line: usize) -> f64 {
-    wide(Line { signal, step: -TAU * line as f64 / signal.len() as f64 }).norm_sqr()
-}
-
-/// Σ x e^(i `step` n).
-struct Line<'a> {
-    signal: &'a [f64],
-    step: f64,
-}
-
-impl NullaryFnOnce for Line<'_> {
-    type Output = Complex<f64>;
-
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
-    #[inline(always)]
-    fn call(self) -> Complex<f64> {
-        const LANES: usize = 8;
-        let (mut cos, mut sin) = ([0.0; SHARED], [0.0; SHARED]);
-        for (i, (cos, sin)) in cos.iter_mut().zip(&mut sin).enumerate() {
-            (*sin, *cos) = (self.step * i as f64).sin_cos();
-        }
-        let mut sum = Complex::default();
-        for (block, x) in self.signal.chunks(SHARED).enumerate() {
-            let (mut re, mut im) = ([0.0; LANES], [0.0; LANES]);
-            let lanes = x.chunks_exact(LANES);
-            let rest = lanes.remainder();
-            let turns = cos.chunks_exact(LANES).zip(sin.chunks_exact(LANES));
-            for (x, (cos, sin)) in lanes.zip(turns) {
-                for i in 0..LANES {
-                    re[i] += x[i] * cos[i];
-                    im[i] += x[i] * sin[i];
-                }
-            }
-            let first = x.len() - rest.len();
-            for ((i, x), (cos, sin)) in rest.iter().enumerate().zip(cos[first..].iter().zip(&sin[first..])) {
-                re[i] += x * cos;
-                im[i] += x * sin;
-            }
-            let own = Complex::new(re.iter().sum::<f64>(), im.iter().sum::<f64>());
-            sum += own * Complex::from_polar(1.0, self.step * (block * SHARED) as f64);
-        }
-        sum
-    }
+    line_sum(signal, -TAU * line as f64 / signal.len() as f64).norm_sqr()
 }
 
 #[cfg(test)]

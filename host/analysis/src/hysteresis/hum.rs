@@ -4,10 +4,11 @@
 //! harmonics, and those that do not fall on the loop's own stand free in the spectrum of the whole record.
 
 use super::finding::LoopFinding;
+use super::line_sums::{line_sum, turns};
 use super::record::{HysteresisRecord, RelativeMotion};
-use crate::parallel::prelude::*;
+use crate::parallel::{join, prelude::*};
+use crate::transforms::forward;
 use num_complex::Complex;
-use realfft::RealFftPlanner;
 use std::f64::consts::TAU;
 
 /// The mains of the world, Hz.
@@ -35,9 +36,6 @@ const SURROUNDINGS: i32 = 24;
 /// Less than this part of the fundamental moves nothing that matters.
 const MATTERS: f64 = 2e-3;
 
-/// Tones that are summed side by side.
-const WHEELS: usize = 8;
-
 /// Looks for hum in a record whose loop runs at `frequency_hz`.
 pub(super) fn at_the_loop(record: &HysteresisRecord, frequency_hz: f64) -> Option<LoopFinding> {
     let samples = record.force_n.len().min((LONGEST_S * record.fs_hz) as usize);
@@ -54,10 +52,12 @@ pub(super) fn at_the_loop(record: &HysteresisRecord, frequency_hz: f64) -> Optio
     }
     let (RelativeMotion::Velocity { a_m_per_s: a, b_m_per_s: b }
     | RelativeMotion::Displacement { a_m: a, b_m: b }) = &record.motion;
-    let relative: Vec<f64> = a[..samples].iter().zip(b).map(|(a, b)| a - b).collect();
-    let signals = [windowed(&record.force_n[..samples]), windowed(&relative)];
+    let relative = || a[..samples].iter().zip(b).map(|(a, b)| a - b).collect::<Vec<f64>>();
+    let (force, relative) = join(|| windowed(&record.force_n[..samples]), || windowed(&relative()));
     let strongest = |mains: f64| {
-        signals.iter().map(|signal| part(signal, record.fs_hz, frequency_hz, mains)).fold(0.0, f64::max)
+        let of = |signal: &[f64]| part(signal, record.fs_hz, frequency_hz, mains);
+        let (force, relative) = join(|| of(&force), || of(&relative));
+        force.max(relative)
     };
     candidates
         .into_iter()
@@ -68,29 +68,13 @@ pub(super) fn at_the_loop(record: &HysteresisRecord, frequency_hz: f64) -> Optio
 /// The strongest multiple of the mains that stands free, over the fundamental; 0 if none stands out.
 fn part(signal: &[f64], fs_hz: f64, frequency_hz: f64, mains_hz: f64) -> f64 {
     let line_hz = fs_hz / signal.len() as f64;
-    let fft = RealFftPlanner::new().plan_fft_forward(signal.len());
+    let fft = forward(signal.len());
     let mut spectrum = fft.make_output_vec();
     // lengths are the plan's own, so that nothing can fail
     if fft.process(&mut signal.to_vec(), &mut spectrum).is_err() {
         return 0.0;
     }
-    let amplitude = |f: f64| {
-        // wheels that run side by side: one alone waits for its own last turn
-        let turn = -TAU * f / fs_hz;
-        let step = Complex::from_polar(1.0, turn * WHEELS as f64);
-        let mut wheels: [Complex<f64>; WHEELS] =
-            std::array::from_fn(|i| Complex::from_polar(1.0, turn * i as f64));
-        let mut sums = [Complex::<f64>::default(); WHEELS];
-        let (rows, rest) = signal.as_chunks::<WHEELS>();
-        for row in rows {
-            for i in 0..WHEELS {
-                sums[i] += wheels[i] * row[i];
-                wheels[i] *= step;
-            }
-        }
-        let rest = rest.iter().zip(&wheels).map(|(value, wheel)| wheel * value);
-        (sums.iter().sum::<Complex<f64>>() + rest.sum::<Complex<f64>>()).norm()
-    };
+    let amplitude = |f: f64| line_sum(signal, -TAU * f / fs_hz).norm();
     let fundamental = amplitude(frequency_hz);
     let free = |f: &f64| {
         let harmonic = (f / frequency_hz).round() * frequency_hz;
@@ -121,12 +105,13 @@ fn part(signal: &[f64], fs_hz: f64, frequency_hz: f64, mains_hz: f64) -> f64 {
 fn windowed(x: &[f64]) -> Vec<f64> {
     let n = x.len() as f64;
     let mean = x.iter().sum::<f64>() / n;
+    let half = Complex::from_polar(1.0, 0.5 * TAU / n);
+    let turns = turns(0..x.len(), TAU / n);
     x.iter()
-        .enumerate()
-        .map(|(i, v)| {
-            let turn = TAU * (i as f64 + 0.5) / n;
+        .zip(&turns)
+        .map(|(v, turn)| {
             // cosines of twice and three times the angle by that of the angle
-            let c = turn.cos();
+            let c = (half * turn).re;
             let (c2, c3) = (2.0 * c * c - 1.0, c * (4.0 * c * c - 3.0));
             (v - mean) * (0.35875 - 0.48829 * c + 0.14128 * c2 - 0.01168 * c3)
         })

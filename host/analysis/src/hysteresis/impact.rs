@@ -5,8 +5,9 @@
 //! stiffness, and is reported as such.
 
 use super::HysteresisError;
-use super::dominant_frequency::{dominant_frequency, turns};
+use super::dominant_frequency::dominant_frequency;
 use super::integration::open_record;
+use super::line_sums::turns;
 use super::loops::{slope, swing};
 use super::record::Relative;
 use crate::median::middle;

@@ -29,6 +29,7 @@ pub mod impact;
 pub mod impact_spectra;
 pub mod integration;
 mod law_fit;
+mod line_sums;
 pub mod loop_analysis;
 pub mod loops;
 pub mod phase_split;

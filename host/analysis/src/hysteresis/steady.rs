@@ -18,6 +18,7 @@ use super::stick::{
     Part, bends, first_part, flank_part, friction_limit, slope_over, strokes, tangent_at_reversal,
 };
 use super::timing::Timing;
+use crate::parallel::join;
 use std::f64::consts::TAU;
 
 /// A frequency that was read off a record may be off by this part.
@@ -77,8 +78,7 @@ pub(super) fn shaker<const N: usize>(
     let (timing, off) = timing(record, frequency_hz);
     let cycles = Steady::new(record, timing)?;
     let frequency_hz = timing.at(0.5 * record.force_n.len() as f64 / record.fs_hz);
-    let hum = hum::at_the_loop(record, frequency_hz);
-    let summed = cycles.summed(forces);
+    let (hum, summed) = join(|| hum::at_the_loop(record, frequency_hz), || cycles.summed(forces));
     let still = |all: &Summed| swing(&all.mean.displacement_m) == 0.0 || swing(&all.mean.force_n) == 0.0;
     if summed.iter().any(still) {
         return Err(HysteresisError::NoMotion);
