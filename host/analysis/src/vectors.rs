@@ -1,7 +1,7 @@
 //! Loops over long rows, with the widest vectors that the processor at hand has.
 //!
 //! What is shipped runs on every x86-64 and every aarch64, so that the compiler may use two numbers at a time; most machines
-//! have four. Which a loop gets is found out when it runs. Each number is computed by the same operations either way: results are equal to the
+//! have four, newer ones eight. Which a loop gets is found out when it runs. Each number is computed by the same operations either way: results are equal to the
 //! last bit.
 
 use pulp::{Arch, WithSimd};

@@ -5,7 +5,7 @@ use super::cross_spectra::{CrossSpectra, OutputSums};
 use super::jackknife;
 use crate::parallel::{self, prelude::*};
 use crate::transforms::forward;
-use crate::vectors::wide;
+use crate::vectors::{all_finite, wide};
 use num_complex::Complex;
 use realfft::RealToComplex;
 use std::ops::Range;
@@ -331,9 +331,7 @@ impl SpectraAverage {
 
 /// Refuses NaN and infinite values, naming the first.
 fn check_finite(signal: &[f64]) -> Result<(), SpectraError> {
-    // blocks without branches inside are several values per cycle
-    let fine = |block: &[f64]| block.iter().fold(true, |fine, v| fine & v.is_finite());
-    if signal.chunks(64).all(fine) {
+    if all_finite(signal) {
         return Ok(());
     }
     let sample = signal.iter().position(|v| !v.is_finite()).unwrap_or(0);

@@ -75,7 +75,7 @@ struct Into<'a> {
 }
 
 /// So many vectors are one share of the work: enough for the memory that it asks for to pay, few enough for all cores to have some.
-const SHARE: usize = 8;
+const SHARE: usize = 16;
 
 /// The places of some lines in each of several results.
 type Places<'a> = Vec<&'a mut [Line]>;
@@ -101,6 +101,11 @@ impl WithSimd for Into<'_> {
             .enumerate()
             .map(|(share, [mut alone, mut z])| {
                 let (pool, mut refused) = (Pool::new(simd), RefusedLines::default());
+                // what is one after the other in a result is so in memory, too: whoever goes through it later need not jump
+                let n = self.job.reduced.idms.count();
+                for place in alone.iter_mut().chain(&mut z).flat_map(|places| places.iter_mut()) {
+                    *place = Line::zeros(n, n);
+                }
                 for vector in 0..SHARE {
                     let at = vector * S::F64_LANES;
                     if let Some(vector) = AtOnce::of(&pool, self.job, share * lines + at) {
@@ -155,7 +160,7 @@ impl<'a, S: Simd> AtOnce<'a, S> {
             refused.extend((0..self.count).filter(|lane| !finite.at(*lane)).map(|lane| self.first + lane));
         }
         for (y, places) in self.alone.iter().zip(alone) {
-            (0..self.count).for_each(|lane| places[at + lane] = y.line(lane));
+            (0..self.count).for_each(|lane| y.line_to(lane, &mut places[at + lane]));
         }
         let d = balance(reduced.idms);
         let order = rooms.a.frf.quantity().order_of_s();
@@ -171,7 +176,7 @@ impl<'a, S: Simd> AtOnce<'a, S> {
             });
             for (lane, place) in places[at..at + self.count].iter_mut().enumerate() {
                 match &found {
-                    Some((z, sure)) if sure.at(lane) => *place = z.line(lane),
+                    Some((z, sure)) if sure.at(lane) => z.line_to(lane, place),
                     _ => match reduced.with_care(rooms, work, self.first + lane) {
                         Ok(z) => {
                             let factor = Complex::new(factor.re.each()[lane], factor.im.each()[lane]);

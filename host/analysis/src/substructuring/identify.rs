@@ -259,6 +259,9 @@ fn rooms<'a>(files: &'a [Cow<'_, Frf>; 3], geometry: &'a Geometry) -> Rooms<'a> 
     }
 }
 
+type Line = DMatrix<Complex<f64>>;
+type Solved = (Method, Result<Solution, Refused>);
+
 /// Every method's solution or refusal, and Y^A and Y^B where `alone` asks for them and they are there.
 fn solve(
     rooms: &Rooms<'_>,
@@ -266,7 +269,7 @@ fn solve(
     idms: IdmSet,
     methods: &[Method],
     alone: bool,
-) -> (Option<Vec<Vec<DMatrix<Complex<f64>>>>>, Vec<(Method, Result<Solution, Refused>)>) {
+) -> (Option<Vec<Vec<Line>>>, Vec<Solved>) {
     let refused =
         |method, reason: RefusedReason| Refused { method, idms: idms.count(), reason: reason.to_string() };
     let solutions = match reduced {

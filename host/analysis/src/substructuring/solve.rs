@@ -32,7 +32,7 @@ pub(super) struct Solutions {
 
 /// What a method does with a line.
 pub(super) enum Work<'a> {
-    Internals(Rearrangement<'a>),
+    Internals(Box<Rearrangement<'a>>),
     Interface,
     Primal(PrimalBlock),
     Inverse(InverseBlock),
@@ -145,7 +145,7 @@ impl Reduced {
                  so the result is right only for the interface forces that these internals generate, and biased otherwise; `internal` is the exact form"
             ));
         }
-        Ok(Plan { work: Work::Internals(internals), notes, internals: found })
+        Ok(Plan { work: Work::Internals(Box::new(internals)), notes, internals: found })
     }
 
     /// One line by itself: where it is near rank loss, and where it is refused. Rotations in metres.

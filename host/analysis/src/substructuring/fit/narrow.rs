@@ -4,8 +4,9 @@
 //! the product; here it is read once, as it stands. Sums run in vectors as wide as the processor has, so that they differ from those of
 //! single numbers in rounding.
 
+use crate::vectors::wide;
 use nalgebra::DMatrix;
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 
 /// Columns up to which these products are the quicker ones.
 pub(super) const NARROW: usize = 48;
@@ -17,7 +18,7 @@ pub(super) fn crossed(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     if a.nrows() > 0 && !out.is_empty() {
         let height = a.nrows();
         let (a, b) = (a.as_slice(), b.as_slice());
-        Arch::new().dispatch(Crossed { a, b, height, out: out.as_mut_slice() });
+        wide(Crossed { a, b, height, out: out.as_mut_slice() });
     }
     out
 }
@@ -37,7 +38,7 @@ pub(super) fn add_product(
     }
     let (rows, inner, stride) = (a.nrows(), a.ncols(), to.nrows());
     let (a, x) = (a.as_slice(), x.as_slice());
-    Arch::new().dispatch(Added { to: to.as_mut_slice(), stride, first, factor, a, rows, x, inner });
+    wide(Added { to: to.as_mut_slice(), stride, first, factor, a, rows, x, inner });
 }
 
 /// Columns of `a` and `b` of the same height, and AᵀB by columns.

@@ -107,11 +107,17 @@ impl<'p, S: Simd> Matrix<'p, S> {
         simd.vectorize(Finite { simd, cells: &self.cells })
     }
 
+    /// Writes the matrix of one line to one of its size.
+    pub(crate) fn line_to(&self, lane: usize, to: &mut Line) {
+        self.pool.simd.vectorize(OneLine { cells: &self.cells, lane, to: to.as_mut_slice() });
+    }
+
     /// The matrix of one line.
-    pub(crate) fn line(&self, lane: usize) -> Line {
-        let mut line = Vec::with_capacity(self.cells.len());
-        self.pool.simd.vectorize(OneLine { cells: &self.cells, lane, line: &mut line });
-        Line::from_vec(self.rows, self.columns, line)
+    #[cfg(test)]
+    pub(super) fn line(&self, lane: usize) -> Line {
+        let mut line = Line::zeros(self.rows, self.columns);
+        self.line_to(lane, &mut line);
+        line
     }
 }
 
@@ -248,7 +254,7 @@ impl<S: Simd> NullaryFnOnce for Finite<'_, S> {
 struct OneLine<'a, S: Simd> {
     cells: &'a [Cell<S>],
     lane: usize,
-    line: &'a mut Vec<Complex<f64>>,
+    to: &'a mut [Complex<f64>],
 }
 
 impl<S: Simd> NullaryFnOnce for OneLine<'_, S> {
@@ -257,8 +263,8 @@ impl<S: Simd> NullaryFnOnce for OneLine<'_, S> {
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     fn call(self) {
-        for cell in self.cells {
-            self.line.push(Complex::new(cell.re.each()[self.lane], cell.im.each()[self.lane]));
+        for (to, cell) in self.to.iter_mut().zip(self.cells) {
+            *to = Complex::new(cell.re.each()[self.lane], cell.im.each()[self.lane]);
         }
     }
 }

@@ -73,7 +73,6 @@ macro_rules! operators {
         impl<S: Simd> $name for Lanes<S> {
             type Output = Self;
 
-            #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
             #[inline(always)]
             fn $call(self, other: Self) -> Self {
                 Lanes { of: self.simd.$of(self.of, other.of), ..self }
@@ -83,7 +82,6 @@ macro_rules! operators {
         impl<S: Simd> $name for Cell<S> {
             type Output = Self;
 
-            #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
             #[inline(always)]
             fn $call(self, other: Self) -> Self {
                 Cell { re: self.re.$call(other.re), im: self.im.$call(other.im) }
@@ -91,7 +89,6 @@ macro_rules! operators {
         }
 
         impl<S: Simd> $in_place for Cell<S> {
-            #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
             #[inline(always)]
             fn $call_in_place(&mut self, other: Self) {
                 *self = self.$call(other);

@@ -53,8 +53,7 @@ impl Reduced {
                 let internals = Rearrangement::of(seen, hit, which, rooms, [&self.a, &self.b]);
                 let sources = Sources::of(&internals);
                 every_line(lines, |l| {
-                    let dyads =
-                        self.by_internals(rooms, l, [&y_a[l], &y_b[l]], &internals, &sources, &own)?;
+                    let dyads = Self::by_internals(rooms, l, [&y_a[l], &y_b[l]], &internals, &sources, &own)?;
                     Ok(self.deviations(rooms, noises, l, &dyads))
                 })
             }
@@ -135,7 +134,6 @@ impl Reduced {
 
     /// Z = (G − Y^A − Y^B)⁻¹ with G⁻¹ = P⁺ M Q⁺, or G = Q M⁻¹ P as printed.
     fn by_internals<'a>(
-        &self,
         rooms: &Rooms<'_>,
         l: usize,
         [y_a, y_b]: [&Line; 2],
