@@ -23,7 +23,8 @@ pub(super) fn dominant_frequency(x: &[f64], fs_hz: f64) -> Option<f64> {
         return None;
     }
     let windowed = windowed(x);
-    let smooth = (n..).find(|size| only_small_factors(*size))?;
+    // some power of two is among them
+    let smooth = (n..=2 * n).find(|size| only_small_factors(*size))?;
     let strongest = if smooth == n { None } else { Strongest::near_peaks(&windowed, smooth) };
     let strongest = match strongest {
         Some(found) => found,
@@ -174,7 +175,7 @@ mod tests {
             for n in [97, 1013, 20_011, 101_979, 102_149] {
                 for noise in [0.0, 0.01, 1.0] {
                     let windowed = windowed(&decay(n, modes, noise, seed as u64));
-                    let size = (n..).find(|size| only_small_factors(*size)).expect("some length");
+                    let size = (n..=2 * n).find(|size| only_small_factors(*size)).expect("some length");
                     let whole = Strongest::of_all_lines(windowed.clone()).expect("a line");
                     let Some(near) = Strongest::near_peaks(&windowed, size) else { continue };
                     met += 1;

@@ -7,6 +7,8 @@ use std::ops::Range;
 
 /// Samples whose turns share one angle that is computed.
 const SHARED: usize = 64;
+/// Sums that run side by side.
+const LANES: usize = 8;
 
 /// e^(i `step` n) of every n of a range: each the product of two that are computed, and right to a few units in the last place.
 pub(super) fn turns(range: Range<usize>, step: f64) -> Vec<Complex<f64>> {
@@ -35,7 +37,6 @@ impl NullaryFnOnce for Line<'_> {
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     fn call(self) -> Complex<f64> {
-        const LANES: usize = 8;
         let (mut cos, mut sin) = ([0.0; SHARED], [0.0; SHARED]);
         for (i, (cos, sin)) in cos.iter_mut().zip(&mut sin).enumerate() {
             (*sin, *cos) = (self.step * i as f64).sin_cos();

@@ -138,13 +138,15 @@ fn dots<S: Simd, const I: usize, const J: usize>(
     })
 }
 
+/// No processor's vectors hold more.
+const MOST_LANES: usize = 8;
+
 /// The sum of a vector's numbers. By way of memory: the processor's own way is not inlined where vectors are of eight, and costs more than the
 /// products.
 #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
 #[inline(always)]
 fn sum_of_lanes<S: Simd>(vector: S::f64s) -> f64 {
-    const MOST: usize = 8;
-    let mut lanes = [0.0; MOST];
+    let mut lanes = [0.0; MOST_LANES];
     if let [all, ..] = S::as_mut_simd_f64s(&mut lanes).0 {
         *all = vector;
     }
@@ -215,8 +217,8 @@ impl Added<'_> {
     fn tile<S: Simd, const R: usize, const J: usize>(&mut self, simd: S, row: usize, first_j: usize) {
         let mut sums = [[simd.splat_f64s(0.0); R]; J];
         let x: [&[f64]; J] = std::array::from_fn(|j| &self.x[(first_j + j) * self.inner..][..self.inner]);
-        for i in 0..self.inner {
-            let own = &self.a[i * self.rows + row..][..R * S::F64_LANES];
+        for (i, own) in self.a.chunks_exact(self.rows).enumerate() {
+            let own = &own[row..][..R * S::F64_LANES];
             let own: [S::f64s; R] = std::array::from_fn(|r| S::as_simd_f64s(own).0[r]);
             for j in 0..J {
                 let factor = simd.splat_f64s(x[j][i]);
