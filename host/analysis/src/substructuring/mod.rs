@@ -50,6 +50,7 @@ pub mod semm;
 mod solve;
 pub mod virtual_points;
 pub mod vpt;
+mod with_care;
 
 pub use crate::band::Band;
 pub use crate::frf::{Frf, FrfError, MotionQuantity};

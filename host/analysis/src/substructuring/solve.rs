@@ -1,16 +1,14 @@
 //! Z^J of every line by every method asked for.
 
 use super::at_once::{Found, Job};
-use super::decoupling::{
-    DecouplingError, InverseBlock, PrimalBlock, interface, internal, internal_printed, inverse_of,
-    observed_rank, primal_of,
-};
+use super::decoupling::{DecouplingError, observed_rank};
 use super::internal_dofs::Rearrangement;
 use super::method::Method;
 use super::pseudo_inverse::{condition, rank};
 use super::quality::Internals;
 use super::reduced::{Kind, Reduced, RefusedReason};
-use super::rooms::{Rooms, Side};
+use super::rooms::Rooms;
+use super::with_care::Work;
 use nalgebra::{Complex, DMatrix};
 
 type Line = DMatrix<Complex<f64>>;
@@ -30,39 +28,11 @@ pub(super) struct Solutions {
     pub(super) by_method: Vec<Result<Solution, RefusedReason>>,
 }
 
-/// What a method does with a line.
-pub(super) enum Work<'a> {
-    Internals(Box<Rearrangement<'a>>),
-    Interface,
-    Primal(PrimalBlock),
-    Inverse(InverseBlock),
-}
-
 /// A method with what is to be said about it.
 struct Plan<'a> {
     work: Work<'a>,
     notes: Vec<String>,
     internals: Option<Internals>,
-}
-
-/// What is asked of all lines before the next: which refusal is the first.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Stage {
-    Assembly,
-    Impedance,
-    Method,
-}
-
-/// A line's refusal.
-pub(super) struct Refusal {
-    pub(super) stage: Stage,
-    pub(super) reason: RefusedReason,
-}
-
-impl Stage {
-    fn refuses<R: Into<RefusedReason>>(self) -> impl Fn(R) -> Refusal {
-        move |reason| Refusal { stage: self, reason: reason.into() }
-    }
 }
 
 impl Reduced {
@@ -146,34 +116,5 @@ impl Reduced {
             ));
         }
         Ok(Plan { work: Work::Internals(Box::new(internals)), notes, internals: found })
-    }
-
-    /// One line by itself: where it is near rank loss, and where it is refused. Rotations in metres.
-    pub(super) fn with_care(&self, rooms: &Rooms<'_>, work: &Work<'_>, l: usize) -> Result<Line, Refusal> {
-        let alone = |side| self.alone_at(rooms, side, l).map_err(Stage::Method.refuses());
-        let assembly = || self.assembly_at(rooms, l).map_err(Stage::Assembly.refuses());
-        let impedance = || Self::impedance_of(rooms, l, &assembly()?).map_err(Stage::Impedance.refuses());
-        let found = match work {
-            Work::Internals(internals) => {
-                let method = if internals.printed { internal_printed } else { internal };
-                let (p, m, q) = (internals.p(l), internals.m(l), internals.q(l));
-                let [p, m, q] = [p, m, q].map(|block| block.map_err(Stage::Method.refuses()));
-                method(&alone(Side::A)?, &alone(Side::B)?, &p?, &m?, &q?)
-            }
-            Work::Interface => {
-                let y = assembly()?;
-                interface(&alone(Side::A)?, &alone(Side::B)?, &y)
-            }
-            Work::Primal(block) => {
-                let z = impedance()?;
-                let side = match block {
-                    PrimalBlock::A => Side::A,
-                    PrimalBlock::B => Side::B,
-                };
-                primal_of(*block, &alone(side)?, &z)
-            }
-            Work::Inverse(block) => Ok(inverse_of(*block, &impedance()?)),
-        };
-        found.map_err(|source| Stage::Method.refuses()(Self::refused(rooms, l, source)))
     }
 }
