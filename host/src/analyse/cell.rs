@@ -42,7 +42,7 @@ pub struct ContactDelays {
 }
 
 /// One kept hit. Its delays are those of the session that recorded it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Hit {
     /// The record's id in the campaign file.
     pub record: i64,
@@ -59,7 +59,7 @@ pub struct Hit {
 }
 
 /// The signals at the contact during one hit.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct ContactSignals {
     /// Velocity of specimen A along z, m/s.
     pub specimen_a_m_per_s: Vec<f64>,
@@ -160,7 +160,7 @@ pub trait Measurements: Sync {
         &self,
         cell: &CellName,
         contact: bool,
-        look: &mut dyn FnMut(Hit, f64),
+        look: &mut dyn FnMut(&Hit, f64),
     ) -> Result<Vec<String>, Self::Error>;
 
     /// All kept hits of a cell, as [`Measurements::each_hit`] shows them.
@@ -171,7 +171,7 @@ pub trait Measurements: Sync {
         let mut whole = Cell::default();
         let left_out = self.each_hit(cell, contact, &mut |hit, fs_hz| {
             whole.fs_hz = fs_hz;
-            whole.hits.push(hit);
+            whole.hits.push(hit.clone());
         })?;
         Ok(Cell { left_out, ..whole })
     }

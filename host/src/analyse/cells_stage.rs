@@ -72,7 +72,7 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
             CellSums::new(name.clone(), sigma_per_s, asked, LINES_HZ)
         });
         if let Some(signals) = hit.contact.as_ref().filter(|_| moves_contact && !hit.of_row) {
-            found.at_contact.extend(hammer_slip::of_hit(name, fs_hz, &hit));
+            found.at_contact.extend(hammer_slip::of_hit(name, fs_hz, hit));
             match impact_loops::of_hit(hit.record, &name.impact, fs_hz, signals, signals.delay_s) {
                 Ok(one) => found.loops.push(one),
                 Err(error) => {
@@ -81,11 +81,11 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
             }
         }
         if unfit.is_none() {
-            unfit = sums.add(&hit, fs_hz).err();
+            unfit = sums.add(hit, fs_hz).err();
         }
         if keep_hits {
             kept.fs_hz = fs_hz;
-            kept.hits.push(hit);
+            kept.hits.push(hit.clone());
         }
     });
     let left_out = match read {

@@ -2,7 +2,7 @@
 
 use super::analyse_error::AnalyseError;
 use super::campaign::analyse_measurements;
-use super::cell::{CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel};
+use super::cell::{CellName, ContactDelays, Hit, KnownContact, Measurements, ShakerLevel};
 use super::findings::Findings;
 use super::plan_geometry::{geometry, places};
 use super::wanted::{Progress, Wanted};
@@ -23,7 +23,7 @@ use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
 use crate::substructuring::geometry::Geometry;
 use jointrig_protocol::channel::{Quantity, Role};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
@@ -151,14 +151,15 @@ impl CampaignFile {
         result
     }
 
-    /// A record's signals for a cell, with those at the contact where they are asked for, and its sampling rate, Hz.
-    fn hit(
+    /// Reads a record's signals for a cell into `hit`, with those at the contact where they are asked for; gives its sampling rate, Hz.
+    fn read_hit(
         &self,
         store: &Store,
         cell: &CellRow,
         record: &RecordRow,
         contact: bool,
-    ) -> Result<(Hit, f64), AnalyseError> {
+        hit: &mut Hit,
+    ) -> Result<f64, AnalyseError> {
         let missing = |role| AnalyseError::NoChannel { record: record.id, role };
         let map = self.channels.get(&record.session).ok_or(missing("anything"))?;
         let rate = f64::from(map.rate_hz);
@@ -172,54 +173,57 @@ impl CampaignFile {
             }
             _ => None,
         };
+        let delay = |place: usize| f64::from(map.channels[place].delay_ns) * 1e-9;
+        let late = |place: usize| delay(place) - delay(force);
+        hit.record = record.id;
+        hit.of_row = record.cell != cell.id;
+        hit.response.resize_with(responses.len(), Vec::new);
+        hit.response_delay_s = responses.iter().map(|place| late(*place)).collect();
+        hit.contact = at_contact.map(|(a, b)| {
+            let mut signals = hit.contact.take().unwrap_or_default();
+            signals.tangential_n.clear();
+            // one amplifier: the load cells are alike
+            signals.delay_s =
+                ContactDelays { specimen_a: late(a), specimen_b: late(b), load_cells: late(cells[0].0) };
+            signals
+        });
         // no channel is unpacked that nobody looks at
         let mut wanted: Vec<usize> = std::iter::once(force).chain(responses.iter().copied()).collect();
         if let Some((a, b)) = at_contact {
             wanted.extend([a, b].into_iter().chain(cells.iter().map(|(place, _)| *place)));
         }
-        wanted.sort_unstable();
-        wanted.dedup();
-        let samples = store.samples_of(record, &wanted)?;
+        let mut seen = HashSet::new();
+        wanted.retain(|place| seen.insert(*place));
         // exactly as many samples as the plan's length: half-hertz lines from two seconds
         let lead = (LEAD_S * rate).ceil() as usize;
         let length = self.plan.post_trigger_scans() as usize;
         let from = record.trigger_index.saturating_sub(lead);
-        let signal = |place: usize| -> Vec<f64> {
-            let codes = wanted.binary_search(&place).map_or(&[][..], |at| &samples[at]);
-            map.to_si(place, &codes[from.min(codes.len())..(from + length).min(codes.len())])
-        };
-        let delay = |place: usize| f64::from(map.channels[place].delay_ns) * 1e-9;
-        let late = |place: usize| delay(place) - delay(force);
-        let contact = match at_contact {
-            Some((a, b)) => {
-                let specimen_a_m_per_s = signal(a);
-                let mut tangential_n = vec![0.0; specimen_a_m_per_s.len()];
-                for (place, part) in &cells {
-                    tangential_n.iter_mut().zip(signal(*place)).for_each(|(sum, v)| *sum += part * v);
-                }
-                Some(ContactSignals {
-                    specimen_a_m_per_s,
-                    specimen_b_m_per_s: signal(b),
-                    tangential_n,
-                    // one amplifier: the load cells are alike
-                    delay_s: ContactDelays {
-                        specimen_a: late(a),
-                        specimen_b: late(b),
-                        load_cells: late(cells[0].0),
-                    },
-                })
+        store.each_channel(record, &wanted, |place, codes| {
+            let codes = &codes[from.min(codes.len())..(from + length).min(codes.len())];
+            let write = |signal: &mut Vec<f64>| {
+                signal.clear();
+                signal.extend(map.si(place, codes));
+            };
+            if place == force {
+                write(&mut hit.force_n);
             }
-            _ => None,
-        };
-        let hit = Hit {
-            record: record.id,
-            of_row: record.cell != cell.id,
-            force_n: signal(force),
-            response: responses.iter().map(|place| signal(*place)).collect(),
-            response_delay_s: responses.iter().map(|place| late(*place)).collect(),
-            contact,
-        };
-        Ok((hit, rate))
+            for (signal, _) in hit.response.iter_mut().zip(&responses).filter(|(_, own)| **own == place) {
+                write(signal);
+            }
+            let (Some((a, b)), Some(signals)) = (at_contact, &mut hit.contact) else { return };
+            if place == a {
+                write(&mut signals.specimen_a_m_per_s);
+            }
+            if place == b {
+                write(&mut signals.specimen_b_m_per_s);
+            }
+            for (_, part) in cells.iter().filter(|(own, _)| *own == place) {
+                signals.tangential_n.resize(codes.len(), 0.0);
+                let sum = signals.tangential_n.iter_mut().zip(map.si(place, codes));
+                sum.for_each(|(sum, v)| *sum += part * v);
+            }
+        })?;
+        Ok(rate)
     }
 }
 
@@ -321,11 +325,12 @@ impl Measurements for CampaignFile {
         &self,
         cell: &CellName,
         contact: bool,
-        look: &mut dyn FnMut(Hit, f64),
+        look: &mut dyn FnMut(&Hit, f64),
     ) -> Result<Vec<String>, AnalyseError> {
         let Some(planned) = self.cells.iter().find(|c| c.name == *cell) else { return Ok(Vec::new()) };
         self.with_reader(|store| {
-            let (mut left_out, mut rate_hz) = (Vec::new(), None);
+            // the same memory for every hit
+            let (mut left_out, mut rate_hz, mut hit) = (Vec::new(), None, Hit::default());
             for record in self.records_for(planned) {
                 let record = match record {
                     Ok(record) if record.kept() => record,
@@ -335,13 +340,13 @@ impl Measurements for CampaignFile {
                         continue;
                     }
                 };
-                match self.hit(store, &planned.row, record, contact) {
-                    Ok((hit, rate)) => {
+                match self.read_hit(store, &planned.row, record, contact, &mut hit) {
+                    Ok(rate) => {
                         let others_hz = *rate_hz.get_or_insert(rate);
                         if others_hz != rate {
                             return Err(AnalyseError::Rate { record: record.id, rate_hz: rate, others_hz });
                         }
-                        look(hit, rate);
+                        look(&hit, rate);
                     }
                     Err(AnalyseError::Store(StoreError::Damaged { record, what, .. })) => {
                         left_out.push(format!("record {record} is damaged ({what}) and was left out"));

@@ -179,7 +179,7 @@ fn analysed(store: &Store) -> Frf {
     let averages = cells.iter().filter_map(|name| {
         let asked = Asked { contact: true, damped: false };
         let mut sums = CellSums::new(name.clone(), file.sigma_per_s(), asked, LINES_HZ);
-        let mut add = |hit, fs_hz| sums.add(&hit, fs_hz).expect("alike");
+        let mut add = |hit: &Hit, fs_hz| sums.add(hit, fs_hz).expect("alike");
         file.each_hit(name, true, &mut add).expect("readable");
         sums.finish().ok()
     });

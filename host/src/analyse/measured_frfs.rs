@@ -28,7 +28,7 @@ impl CampaignFile {
             let read = self.each_hit(name, false, &mut |hit, fs_hz| {
                 some = true;
                 if unfit.is_none() {
-                    unfit = sums.add(&hit, fs_hz).err();
+                    unfit = sums.add(hit, fs_hz).err();
                 }
             });
             let left_out = match read {

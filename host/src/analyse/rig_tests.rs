@@ -194,7 +194,7 @@ impl Measurements for Rig {
         &self,
         cell: &CellName,
         _: bool,
-        look: &mut dyn FnMut(Hit, f64),
+        look: &mut dyn FnMut(&Hit, f64),
     ) -> Result<Vec<String>, Damaged> {
         if self.absent.contains(&(cell.configuration, cell.impact.clone(), cell.response.clone())) {
             return Ok(Vec::new());
@@ -244,7 +244,7 @@ impl Measurements for Rig {
                     contact,
                 }
             })
-            .for_each(|hit| look(hit, FS_HZ));
+            .for_each(|hit| look(&hit, FS_HZ));
         Ok(Vec::new())
     }
 }

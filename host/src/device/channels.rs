@@ -50,9 +50,14 @@ impl ChannelMap {
     /// The codes of the channel at `place` in SI units ([`jointrig_protocol::channel::Quantity::unit`]).
     /// A place outside the map gives nothing.
     pub fn to_si(&self, place: usize, codes: &[i16]) -> Vec<f64> {
-        let Some(channel) = self.channels.get(place) else { return Vec::new() };
-        let scale = channel.units_per_code();
-        codes.iter().map(|code| f64::from(*code) * scale).collect()
+        self.si(place, codes).collect()
+    }
+
+    /// As [`ChannelMap::to_si`], value by value.
+    pub fn si(&self, place: usize, codes: &[i16]) -> impl ExactSizeIterator<Item = f64> {
+        let channel = self.channels.get(place);
+        let (scale, codes) = channel.map_or((0.0, &[][..]), |channel| (channel.units_per_code(), codes));
+        codes.iter().map(move |code| f64::from(*code) * scale)
     }
 
     /// SI value of full scale of the channel at `place`, always positive; `None` outside the map.

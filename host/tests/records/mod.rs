@@ -132,7 +132,7 @@ impl Measurements for Assembly {
         &self,
         cell: &CellName,
         _: bool,
-        look: &mut dyn FnMut(Hit, f64),
+        look: &mut dyn FnMut(&Hit, f64),
     ) -> Result<Vec<String>, Infallible> {
         let config = &self.config;
         let impact =
@@ -188,7 +188,7 @@ impl Measurements for Assembly {
                     tangential_n: self.signal(|l| tangential[l], cell_noise, &mut stream),
                 }),
             };
-            look(hit, RATE_HZ);
+            look(&hit, RATE_HZ);
         }
         Ok(Vec::new())
     }

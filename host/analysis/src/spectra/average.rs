@@ -2,12 +2,12 @@
 
 use super::SpectraError;
 use super::cross_spectra::{CrossSpectra, OutputSums};
+use super::half_length::{HalfLength, Lent, check_finite};
 use super::jackknife;
 use crate::parallel::{self, prelude::*};
-use crate::transforms::forward;
-use crate::vectors::{all_finite, wide};
+use crate::vectors::wide;
 use num_complex::Complex;
-use realfft::RealToComplex;
+use std::mem::take;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -15,65 +15,55 @@ use std::sync::Arc;
 pub struct SpectraAverage {
     fs_hz: f64,
     samples: usize,
-    fft: Arc<dyn RealToComplex<f64>>,
+    transform: Arc<HalfLength>,
     hits: usize,
-    /// Force spectra of the hits being added.
-    forces: Vec<Vec<Complex<f64>>>,
     s_ff: Vec<f64>,
     /// The lines that the outputs' sums hold.
     lines: Range<usize>,
     outputs: Vec<Output>,
-    /// One for each thread: a channel's working memory stays in that core's cache.
-    workers: Vec<Channel>,
     failed: Option<SpectraError>,
     keep_hits: bool,
     kept_force: Vec<Vec<Complex<f64>>>,
 }
 
-/// Working memory of one channel's transform, used again for every channel and hit.
-struct Channel {
-    signal: Vec<f64>,
-    spectrum: Vec<Complex<f64>>,
-    /// Of the hit after it, so that the sums are read and written once for both.
-    next: Vec<Complex<f64>>,
-    scratch: Vec<Complex<f64>>,
-}
-
 /// A response and its sums.
+#[derive(Clone)]
 struct Output {
     s_xf: Vec<Complex<f64>>,
     s_xx: Vec<f64>,
     kept: Vec<Vec<Complex<f64>>>,
 }
 
-/// A response's spectrum and its force's, line by line.
-#[derive(Clone, Copy)]
-struct Pair<'a> {
-    x: &'a [Complex<f64>],
-    f: &'a [Complex<f64>],
-}
+/// Lines that are summed at once: all that is read for them, and written, fits into a core's first cache.
+const BLOCK: usize = 256;
 
 impl Output {
-    fn add_one(&mut self, Pair { x, f }: Pair<'_>) {
-        let (s_xf, s_xx) = (&mut self.s_xf[..], &mut self.s_xx[..]);
-        wide(|| {
-            for ((s_xf, s_xx), (x, f)) in s_xf.iter_mut().zip(s_xx).zip(x.iter().zip(f)) {
-                *s_xf += x * f.conj();
-                *s_xx += x.norm_sqr();
-            }
-        });
+    fn of(lines: usize) -> Self {
+        Output { s_xf: vec![Complex::default(); lines], s_xx: vec![0.0; lines], kept: Vec::new() }
     }
 
-    /// As one after the other, to the last bit.
-    fn add_two(&mut self, first: Pair<'_>, second: Pair<'_>) {
-        let (s_xf, s_xx) = (&mut self.s_xf[..], &mut self.s_xx[..]);
-        wide(|| {
-            let products = first.x.iter().zip(first.f).zip(second.x.iter().zip(second.f));
-            for ((s_xf, s_xx), ((x, f), (y, g))) in s_xf.iter_mut().zip(s_xx).zip(products) {
-                *s_xf = *s_xf + x * f.conj() + y * g.conj();
-                *s_xx = *s_xx + x.norm_sqr() + y.norm_sqr();
-            }
-        });
+    /// Adds the lines of one hit's response and force.
+    fn add(&mut self, transform: &HalfLength, lines: &Range<usize>, response: &Lent, force: &Lent) {
+        let mut x = [Complex::default(); BLOCK];
+        let sums = self.s_xf.chunks_mut(BLOCK).zip(self.s_xx.chunks_mut(BLOCK));
+        for (first, (s_xf, s_xx)) in lines.clone().step_by(BLOCK).zip(sums) {
+            let x = &mut x[..s_xf.len()];
+            transform.put(response, first, x);
+            let f = &force[first..first + x.len()];
+            wide(|| {
+                for ((s_xf, s_xx), (x, f)) in s_xf.iter_mut().zip(s_xx).zip(x.iter().zip(f)) {
+                    *s_xf += x * f.conj();
+                    *s_xx += x.norm_sqr();
+                }
+            });
+        }
+    }
+
+    /// Keeps the lines of one hit's response.
+    fn keep(&mut self, transform: &HalfLength, lines: &Range<usize>, response: &Lent) {
+        let mut own = vec![Complex::default(); lines.len()];
+        transform.put(response, lines.start, &mut own);
+        self.kept.push(own);
     }
 }
 
@@ -81,77 +71,33 @@ fn add_power(sums: &mut [f64], spectrum: &[Complex<f64>]) {
     wide(|| sums.iter_mut().zip(spectrum).for_each(|(sum, f)| *sum += f.norm_sqr()));
 }
 
-impl Channel {
-    fn new(fft: &dyn RealToComplex<f64>) -> Self {
-        Channel {
-            signal: fft.make_input_vec(),
-            spectrum: fft.make_output_vec(),
-            next: fft.make_output_vec(),
-            scratch: fft.make_scratch_vec(),
-        }
-    }
-
-    /// Transforms what `fill` writes into the signal.
-    fn transform(
-        &mut self,
-        fft: &dyn RealToComplex<f64>,
-        fill: impl Fn(&mut [f64]),
-    ) -> Result<(), SpectraError> {
-        fill(&mut self.signal);
-        fft.process_with_scratch(&mut self.signal, &mut self.spectrum, &mut self.scratch)
-            .map_err(|e| SpectraError::Transform(e.to_string()))?;
-        // every sample is in every line, so that one line tells of a sample that is not a number
-        if self.spectrum.first().is_some_and(|line| !line.re.is_finite()) {
-            fill(&mut self.signal);
-            check_finite(&self.signal)?;
-            return Err(SpectraError::Transform("the sum of the samples is beyond an f64".into()));
-        }
-        Ok(())
-    }
-}
-
 impl SpectraAverage {
     /// For records of `samples` samples (zero padding included) and `outputs` responses.
     pub fn new(fs_hz: f64, samples: usize, outputs: usize) -> Self {
-        let fft = forward(samples);
-        let lines = samples / 2 + 1;
-        SpectraAverage {
+        Self::of_band(fs_hz, samples, outputs, [f64::NEG_INFINITY, f64::INFINITY])
+    }
+
+    /// The same, which sums the responses at the lines with `low_hz` ≤ f ≤ `high_hz` alone; the force is summed at all of them.
+    pub fn of_band(fs_hz: f64, samples: usize, outputs: usize, [low_hz, high_hz]: [f64; 2]) -> Self {
+        let transform = HalfLength::of(samples);
+        let mut average = SpectraAverage {
             fs_hz,
             samples,
             hits: 0,
-            forces: Vec::new(),
-            s_ff: vec![0.0; lines],
-            lines: 0..lines,
-            outputs: (0..outputs)
-                .map(|_| Output {
-                    s_xf: vec![Complex::default(); lines],
-                    s_xx: vec![0.0; lines],
-                    kept: Vec::new(),
-                })
-                .collect(),
-            workers: (0..parallel::threads().min(outputs).max(1)).map(|_| Channel::new(&*fft)).collect(),
+            s_ff: vec![0.0; transform.lines()],
+            transform,
+            lines: 0..0,
+            outputs: Vec::new(),
             failed: None,
-            fft,
             keep_hits: false,
             kept_force: Vec::new(),
-        }
-    }
-
-    /// Sums the responses at the lines with `low_hz` ≤ f ≤ `high_hz` alone; the force is summed at all of them.
-    #[must_use]
-    pub fn with_band(mut self, low_hz: f64, high_hz: f64) -> Self {
-        let frequency_hz = self.frequency_hz();
+        };
+        let frequency_hz = average.frequency_hz();
         let from = frequency_hz.partition_point(|f| *f < low_hz);
         let to = frequency_hz.partition_point(|f| *f <= high_hz).max(from);
-        self.lines = from..to;
-        for output in &mut self.outputs {
-            *output = Output {
-                s_xf: vec![Complex::default(); to - from],
-                s_xx: vec![0.0; to - from],
-                kept: Vec::new(),
-            };
-        }
-        self
+        average.lines = from..to;
+        average.outputs = vec![Output::of(to - from); outputs];
+        average
     }
 
     /// Frequency of every line, Hz.
@@ -225,57 +171,38 @@ impl SpectraAverage {
         force: impl Fn(&H, &mut [f64]) + Sync,
         response: impl Fn(&H, usize, &mut [f64]) + Sync,
     ) -> Result<(), SpectraError> {
-        let fft = &*self.fft;
-        self.forces.resize_with(hits.len(), || fft.make_output_vec());
-        let share = hits.len().div_ceil(self.workers.len()).max(1);
-        let parts = self.forces.par_chunks_mut(share).zip(hits.par_chunks(share)).zip(&mut self.workers);
-        let transformed = parts.map(|((spectra, hits), worker)| {
-            for (spectrum, hit) in spectra.iter_mut().zip(hits) {
-                worker.transform(fft, |out| force(hit, out))?;
-                std::mem::swap(spectrum, &mut worker.spectrum);
-            }
-            Ok(())
+        let (transform, lines, keep) = (&*self.transform, &self.lines, self.keep_hits);
+        let forces = hits.par_iter().map(|hit| {
+            let spectrum = transform.transform(|out| force(hit, out))?;
+            let mut own = Lent::of(transform.lines());
+            transform.put(&spectrum, 0, &mut own);
+            Ok(own)
         });
-        transformed.collect::<Result<(), SpectraError>>()?;
-        let forces = &self.forces;
-        let (keep, lines) = (self.keep_hits, self.lines.clone());
-        let share = self.outputs.len().div_ceil(self.workers.len()).max(1);
-        let parts = self.outputs.par_chunks_mut(share).zip(&mut self.workers).enumerate();
-        let summed = parts.map(|(part, (outputs, worker))| {
-            for (i, output) in outputs.iter_mut().enumerate() {
-                for (hits, forces) in hits.chunks(2).zip(forces.chunks(2)) {
-                    for hit in hits {
-                        std::mem::swap(&mut worker.spectrum, &mut worker.next);
-                        worker.transform(fft, |out| response(hit, part * share + i, out))?;
-                        if keep {
-                            output.kept.push(worker.spectrum[lines.clone()].to_vec());
-                        }
-                    }
-                    match forces {
-                        [first, second] => {
-                            let first = Pair { x: &worker.next[lines.clone()], f: &first[lines.clone()] };
-                            let second =
-                                Pair { x: &worker.spectrum[lines.clone()], f: &second[lines.clone()] };
-                            output.add_two(first, second);
-                        }
-                        [only] => output
-                            .add_one(Pair { x: &worker.spectrum[lines.clone()], f: &only[lines.clone()] }),
-                        _ => {}
+        let forces = forces.collect::<Result<Vec<Lent>, SpectraError>>()?;
+        // one hit by itself comes of a loop over cells, which keeps every core busy
+        let at_least = if hits.len() == 1 { self.outputs.len() } else { 1 };
+        let outputs = self.outputs.par_chunks_mut(1).enumerate().with_min_len(at_least);
+        let summed = outputs.map(|(o, output)| {
+            for (hit, force) in hits.iter().zip(&forces) {
+                let spectrum = transform.transform(|out| response(hit, o, out))?;
+                for output in &mut *output {
+                    output.add(transform, lines, &spectrum, force);
+                    if keep {
+                        output.keep(transform, lines, &spectrum);
                     }
                 }
             }
             Ok(())
         });
         summed.collect::<Result<(), SpectraError>>()?;
-        let share = self.s_ff.len().div_ceil(self.workers.len()).max(1);
-        let forces = &self.forces;
+        let share = self.s_ff.len().div_ceil(parallel::threads()).max(BLOCK);
         self.s_ff.par_chunks_mut(share).enumerate().for_each(|(part, sums)| {
-            for force in forces {
+            for force in &forces {
                 add_power(sums, &force[part * share..]);
             }
         });
         if keep {
-            self.kept_force.extend(self.forces.iter().map(|force| force[lines.clone()].to_vec()));
+            self.kept_force.extend(forces.iter().map(|force| force[lines.clone()].to_vec()));
         }
         self.hits += hits.len();
         Ok(())
@@ -288,15 +215,34 @@ impl SpectraAverage {
     /// # Errors
     /// When no hit was added, or adding one failed half way.
     pub fn finish(&self, sigma_per_s: f64, delay_s: &[f64]) -> Result<CrossSpectra, SpectraError> {
+        let sums = self.outputs.iter().map(|output| (output.s_xf.clone(), output.s_xx.clone()));
+        self.spectra(sums.collect(), sigma_per_s, delay_s)
+    }
+
+    /// As [`SpectraAverage::finish`] of an average to which nothing more is added: its sums are not copied.
+    ///
+    /// # Errors
+    /// As of `finish`.
+    pub fn finished(mut self, sigma_per_s: f64, delay_s: &[f64]) -> Result<CrossSpectra, SpectraError> {
+        let sums = self.outputs.iter_mut().map(|output| (take(&mut output.s_xf), take(&mut output.s_xx)));
+        let sums = sums.collect();
+        self.spectra(sums, sigma_per_s, delay_s)
+    }
+
+    /// Of the outputs' sums.
+    fn spectra(
+        &self,
+        sums: Vec<(Vec<Complex<f64>>, Vec<f64>)>,
+        sigma_per_s: f64,
+        delay_s: &[f64],
+    ) -> Result<CrossSpectra, SpectraError> {
         if let Some(error) = &self.failed {
             return Err(error.clone());
         }
         let frequency_hz = self.frequency_hz()[self.lines.clone()].to_vec();
-        let outputs = self.outputs.iter().enumerate().map(|(o, output)| OutputSums {
-            s_xf: output.s_xf.clone(),
-            s_xx: output.s_xx.clone(),
-            delay_s: delay_s.get(o).copied().unwrap_or(0.0),
-        });
+        let delay_s_of = |o: usize| delay_s.get(o).copied().unwrap_or(0.0);
+        let outputs = sums.into_iter().enumerate();
+        let outputs = outputs.map(|(o, (s_xf, s_xx))| OutputSums { s_xf, s_xx, delay_s: delay_s_of(o) });
         let (s_ff, outputs) = (self.s_ff[self.lines.clone()].to_vec(), outputs.collect());
         let spectra = CrossSpectra::new(self.fs_hz, frequency_hz, sigma_per_s, self.hits, s_ff, outputs)?;
         Ok(spectra.with_jackknife(self.keep_hits.then(|| self.jackknife(sigma_per_s, delay_s))))
@@ -327,13 +273,4 @@ impl SpectraAverage {
             })
             .collect()
     }
-}
-
-/// Refuses NaN and infinite values, naming the first.
-fn check_finite(signal: &[f64]) -> Result<(), SpectraError> {
-    if all_finite(signal) {
-        return Ok(());
-    }
-    let sample = signal.iter().position(|v| !v.is_finite()).unwrap_or(0);
-    Err(SpectraError::NotFinite { sample })
 }

@@ -68,7 +68,7 @@ pub struct Summing {
 impl Summing {
     /// For records of `samples` samples and `outputs` responses, which are summed at the lines of `band_hz` (ends included) alone.
     pub fn new(fs_hz: f64, samples: usize, outputs: usize, windowing: Windowing, band_hz: [f64; 2]) -> Self {
-        let average = SpectraAverage::new(fs_hz, samples, outputs).with_band(band_hz[0], band_hz[1]);
+        let average = SpectraAverage::of_band(fs_hz, samples, outputs, band_hz);
         let decay = windowing.kept_decay(fs_hz, samples);
         Summing { windowing, decay, average, samples, outputs }
     }
@@ -128,7 +128,7 @@ pub fn estimate(
     used: &[bool],
     settings: &FrfSettings,
 ) -> Result<CrossSpectra, SpectraError> {
-    summed(records, used, settings)?.finish(settings.windowing.sigma_per_s, &settings.delay_s)
+    summed(records, used, settings)?.finished(settings.windowing.sigma_per_s, &settings.delay_s)
 }
 
 /// The sums that [`estimate`] makes its spectra of.
@@ -145,11 +145,11 @@ pub(super) fn summed(
         return Err(SpectraError::Padding { transform, samples });
     }
     let window = &settings.windowing;
-    let decay = window.decay(records.fs_hz, samples);
-    let mut average = SpectraAverage::new(records.fs_hz, transform, outputs);
-    if let Some([low_hz, high_hz]) = settings.band_hz {
-        average = average.with_band(low_hz, high_hz);
-    }
+    let decay = window.kept_decay(records.fs_hz, samples);
+    let mut average = match settings.band_hz {
+        None => SpectraAverage::new(records.fs_hz, transform, outputs),
+        Some(band_hz) => SpectraAverage::of_band(records.fs_hz, transform, outputs, band_hz),
+    };
     if settings.jackknife {
         average = average.with_jackknife();
     }

@@ -9,6 +9,7 @@ pub mod average;
 pub mod cross_spectra;
 pub mod estimate;
 pub mod estimators;
+mod half_length;
 pub mod impact_records;
 pub mod jackknife;
 pub mod pulse;

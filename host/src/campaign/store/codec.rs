@@ -105,24 +105,30 @@ pub fn decode(blob: &[u8], channels: usize, scans: usize, stored: u32) -> Result
     if found == stored { Ok(codes) } else { Err(CodecError::Checksum { found, stored }) }
 }
 
-/// Reads the codes of some channels back, in the order of `places`; none of a place beyond the last channel. The checksum over all codes
-/// cannot be compared: whoever asks has compared that of the blob.
+/// Shows `look` the codes of some channels, each with its place, in the order of `places`; none of a place beyond the last channel. The
+/// checksum over all codes cannot be compared: whoever asks has compared that of the blob.
 ///
 /// # Errors
-/// The blob is damaged.
-pub fn decode_some(
+/// The blob is damaged. Some channels may have been shown then.
+pub fn decode_each(
     blob: &[u8],
     channels: usize,
     scans: usize,
     places: &[usize],
-) -> Result<Vec<Vec<i16>>, CodecError> {
+    mut look: impl FnMut(usize, &[i16]),
+) -> Result<(), CodecError> {
     let chunks = chunks(blob, channels, scans)?;
-    let one = |place: &usize| {
-        let Some(chunk) = chunks.get(*place) else { return Ok(Vec::new()) };
-        let mut codes = vec![0; scans];
-        unpack(chunk, &mut codes).map(|()| codes)
-    };
-    places.iter().map(one).collect()
+    let mut codes = vec![0; scans];
+    for place in places {
+        match chunks.get(*place) {
+            Some(chunk) => {
+                unpack(chunk, &mut codes)?;
+                look(*place, &codes);
+            }
+            None => look(*place, &[]),
+        }
+    }
+    Ok(())
 }
 
 /// The chunk of each channel; none of a shot without contact, which has no samples.
@@ -171,8 +177,10 @@ mod tests {
         let crc = checksum(&codes);
         let blob = encode(&codes, 3).expect("compresses");
         assert_eq!(decode(&blob, 3, 1_000, crc).expect("reads"), codes);
-        let some = decode_some(&blob, 3, 1_000, &[2, 0, 3]).expect("reads");
-        assert_eq!(some, [codes[2_000..].to_vec(), codes[..1_000].to_vec(), Vec::new()]);
+        let mut some = Vec::new();
+        decode_each(&blob, 3, 1_000, &[2, 0, 3], |place, own| some.push((place, own.to_vec())))
+            .expect("reads");
+        assert_eq!(some, [(2, codes[2_000..].to_vec()), (0, codes[..1_000].to_vec()), (3, Vec::new())]);
         assert!(decode(&blob, 3, 1_000, crc ^ 1).is_err());
         assert!(decode(&blob[..blob.len() - 1], 3, 1_000, crc).is_err());
         for place in (0..blob.len()).step_by(97) {

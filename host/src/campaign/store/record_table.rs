@@ -102,31 +102,40 @@ impl Store {
     /// [`StoreError::Damaged`] names the record.
     pub fn samples(&self, record: &RecordRow) -> Result<Samples, StoreError> {
         let damaged = |error: CodecError| self.damaged(record.id, error.to_string());
-        let bytes = self.checked_bytes(record).map_err(damaged)?;
-        let codes = codec::decode(&bytes, record.channels, record.scans, record.crc).map_err(damaged)?;
+        let decode = |bytes: &[u8]| codec::decode(bytes, record.channels, record.scans, record.crc);
+        let codes = self.with_checked_bytes(record, decode).map_err(damaged)?;
         Ok(Samples { codes, channels: record.channels })
     }
 
-    /// The samples of some channels of one record, in the order of `places`, checked against the checksum of the stored bytes.
+    /// Shows `look` the samples of some channels of one record, each with its place, in the order of `places`. They are checked against the
+    /// checksum of the stored bytes.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`] names the record.
-    pub fn samples_of(&self, record: &RecordRow, places: &[usize]) -> Result<Vec<Vec<i16>>, StoreError> {
-        let damaged = |error: CodecError| self.damaged(record.id, error.to_string());
-        let bytes = self.checked_bytes(record).map_err(damaged)?;
-        codec::decode_some(&bytes, record.channels, record.scans, places).map_err(damaged)
+    /// [`StoreError::Damaged`] names the record. Some channels may have been shown then.
+    pub fn each_channel(
+        &self,
+        record: &RecordRow,
+        places: &[usize],
+        look: impl FnMut(usize, &[i16]),
+    ) -> Result<(), StoreError> {
+        let decode = |bytes: &[u8]| codec::decode_each(bytes, record.channels, record.scans, places, look);
+        self.with_checked_bytes(record, decode).map_err(|error| self.damaged(record.id, error.to_string()))
     }
 
-    fn checked_bytes(&self, record: &RecordRow) -> Result<Vec<u8>, CodecError> {
+    /// Runs `work` on a record's bytes where they lie.
+    fn with_checked_bytes<T>(
+        &self,
+        record: &RecordRow,
+        work: impl FnOnce(&[u8]) -> Result<T, CodecError>,
+    ) -> Result<T, CodecError> {
         let read =
             self.connection.query_row("SELECT samples FROM records WHERE id = ?1", [record.id], |row| {
-                row.get::<_, Vec<u8>>(0)
+                let bytes = row.get_ref(0)?.as_blob()?;
+                // a flipped bit in the compressor's padding changes no code, and yet the file is not what was stored
+                let (found, stored) = (crc32fast::hash(bytes), record.bytes_crc);
+                Ok(if found == stored { work(bytes) } else { Err(CodecError::Bytes { found, stored }) })
             });
-        let bytes = read.map_err(|error| CodecError::Unreadable(error.to_string()))?;
-        // a flipped bit in the compressor's padding changes no code, and yet the file is not what was stored
-        let found = crc32fast::hash(&bytes);
-        let stored = record.bytes_crc;
-        if found == stored { Ok(bytes) } else { Err(CodecError::Bytes { found, stored }) }
+        read.map_err(|error| CodecError::Unreadable(error.to_string()))?
     }
 
     pub(in crate::campaign) fn damaged(&self, record: i64, what: String) -> StoreError {
