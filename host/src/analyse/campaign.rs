@@ -50,6 +50,10 @@ pub fn analyse_measurements<M: Measurements>(
         found.configurations.push(one.measured);
         one.frf
     });
+    for average in &mut cells.averages {
+        // they are in the matrices now, and would be held beside them to the end
+        average.spectra = average.spectra.of_outputs(0..0);
+    }
     let frfs = all.each_ref().map(Option::as_ref);
     let identified = if let [Some(a), Some(b), Some(ajb)] = frfs {
         substructured([a, b, ajb], geometry)

@@ -22,6 +22,7 @@ mod info;
 mod interrupt;
 mod man;
 mod measure;
+mod memory;
 mod number;
 #[cfg(feature = "dashboard")]
 mod open_page;
@@ -100,6 +101,7 @@ enum Command {
 pub fn main() -> ExitCode {
     // clap prints help and usage errors itself, and exits with 0 and 2
     let cli = Cli::parse();
+    memory::expect_signals();
     start_log(cli.verbose);
     match cli.run() {
         Ok(()) => ExitCode::SUCCESS,
