@@ -2,10 +2,11 @@
 
 use super::SpectraError;
 use super::cross_spectra::{CrossSpectra, OutputSums};
-use super::half_length::{HalfLength, Lent, check_finite};
+use super::half_length::{HalfLength, Lent, Lines, check_finite};
 use super::jackknife;
 use crate::parallel::{self, prelude::*};
 use crate::vectors::wide;
+use bytemuck::zeroed_vec;
 use num_complex::Complex;
 use std::mem::take;
 use std::ops::Range;
@@ -27,36 +28,16 @@ pub struct SpectraAverage {
 }
 
 /// A response and its sums.
-#[derive(Clone)]
 struct Output {
     s_xf: Vec<Complex<f64>>,
     s_xx: Vec<f64>,
     kept: Vec<Vec<Complex<f64>>>,
 }
 
-/// Lines that are summed at once: all that is read for them, and written, fits into a core's first cache.
-const BLOCK: usize = 256;
-
 impl Output {
     fn of(lines: usize) -> Self {
-        Output { s_xf: vec![Complex::default(); lines], s_xx: vec![0.0; lines], kept: Vec::new() }
-    }
-
-    /// Adds the lines of one hit's response and force.
-    fn add(&mut self, transform: &HalfLength, lines: &Range<usize>, response: &Lent, force: &Lent) {
-        let mut x = [Complex::default(); BLOCK];
-        let sums = self.s_xf.chunks_mut(BLOCK).zip(self.s_xx.chunks_mut(BLOCK));
-        for (first, (s_xf, s_xx)) in lines.clone().step_by(BLOCK).zip(sums) {
-            let x = &mut x[..s_xf.len()];
-            transform.put(response, first, x);
-            let f = &force[first..first + x.len()];
-            wide(|| {
-                for ((s_xf, s_xx), (x, f)) in s_xf.iter_mut().zip(s_xx).zip(x.iter().zip(f)) {
-                    *s_xf += x * f.conj();
-                    *s_xx += x.norm_sqr();
-                }
-            });
-        }
+        // zeros from the system: whoever sums first touches them first, on every core
+        Output { s_xf: zeroed_vec(lines), s_xx: zeroed_vec(lines), kept: Vec::new() }
     }
 
     /// Keeps the lines of one hit's response.
@@ -64,6 +45,28 @@ impl Output {
         let mut own = vec![Complex::default(); lines.len()];
         transform.put(response, lines.start, &mut own);
         self.kept.push(own);
+    }
+}
+
+/// The sums that a hit's lines enter, from line `first` on, and its force at every line.
+struct Sums<'a> {
+    first: usize,
+    output: &'a mut Output,
+    force: &'a [Complex<f64>],
+}
+
+impl Lines for Sums<'_> {
+    #[inline]
+    fn take(&mut self, lines: Range<usize>, values: impl Iterator<Item = Complex<f64>>) {
+        let place = lines.start - self.first..lines.end - self.first;
+        let (s_xf, s_xx) = (&mut self.output.s_xf[place.clone()], &mut self.output.s_xx[place]);
+        let force = &self.force[lines];
+        wide(|| {
+            for ((s_xf, s_xx), (x, f)) in s_xf.iter_mut().zip(s_xx).zip(values.zip(force)) {
+                *s_xf += x * f.conj();
+                *s_xx += x.norm_sqr();
+            }
+        });
     }
 }
 
@@ -96,7 +99,7 @@ impl SpectraAverage {
         let from = frequency_hz.partition_point(|f| *f < low_hz);
         let to = frequency_hz.partition_point(|f| *f <= high_hz).max(from);
         average.lines = from..to;
-        average.outputs = vec![Output::of(to - from); outputs];
+        average.outputs = (0..outputs).map(|_| Output::of(to - from)).collect();
         average
     }
 
@@ -186,7 +189,8 @@ impl SpectraAverage {
             for (hit, force) in hits.iter().zip(&forces) {
                 let spectrum = transform.transform(|out| response(hit, o, out))?;
                 for output in &mut *output {
-                    output.add(transform, lines, &spectrum, force);
+                    let mut sums = Sums { first: lines.start, output, force };
+                    transform.read(&spectrum, lines.clone(), &mut sums);
                     if keep {
                         output.keep(transform, lines, &spectrum);
                     }
@@ -195,7 +199,7 @@ impl SpectraAverage {
             Ok(())
         });
         summed.collect::<Result<(), SpectraError>>()?;
-        let share = self.s_ff.len().div_ceil(parallel::threads()).max(BLOCK);
+        let share = self.s_ff.len().div_ceil(parallel::threads()).max(1);
         self.s_ff.par_chunks_mut(share).enumerate().for_each(|(part, sums)| {
             for force in &forces {
                 add_power(sums, &force[part * share..]);

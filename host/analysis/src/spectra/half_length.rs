@@ -8,6 +8,7 @@ use crate::vectors::{all_finite, wide};
 use num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 use std::f64::consts::PI;
+use std::iter::once;
 use std::ops::{Deref, DerefMut, Range};
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
@@ -140,71 +141,93 @@ impl HalfLength {
 
     /// Puts the lines from `first` on into `out`.
     pub(super) fn put(&self, spectrum: &[C], first: usize, out: &mut [C]) {
+        let lines = first..first + out.len();
+        self.read(spectrum, lines, &mut Put { first, out });
+    }
+
+    /// Gives these lines to `to`.
+    pub(super) fn read(&self, spectrum: &[C], lines: Range<usize>, to: &mut impl Lines) {
+        if lines.is_empty() {
+            return;
+        }
+        let part = |from: usize, until: usize| {
+            from.clamp(lines.start, lines.end)..until.clamp(lines.start, lines.end)
+        };
         if self.fft.len() == self.samples {
-            out.copy_from_slice(&spectrum[first..first + out.len()]);
-            if let (0, Some(mean)) = (first, out.first_mut()) {
-                mean.im = 0.0;
-            }
+            // the mean is real
+            to.take(part(0, 1), spectrum[..1].iter().map(|z| C::from(z.re)));
+            let rest = part(1, self.lines());
+            to.take(rest.clone(), spectrum[rest].iter().copied());
             return;
         }
         let (half, below) = (self.samples / 2, self.twiddles.len());
-        let end = first + out.len();
-        let wanted = |from: usize, to: usize| from.clamp(first, end)..to.clamp(first, end);
-        for line in wanted(0, 1) {
-            out[line - first] = C::from(spectrum[0].re + spectrum[0].im);
+        let first = spectrum[0];
+        to.take(part(0, 1), once(C::from(first.re + first.im)));
+        let own = part(1, 1 + below);
+        if !own.is_empty() {
+            to.take(own.clone(), self.below(spectrum, own));
         }
-        let lines = wanted(1, 1 + below);
-        self.put_below(spectrum, lines.clone(), &mut out[lines.start - first..lines.end - first]);
         // the middle one of an odd number of lines is its own mirror image
-        for line in wanted(1 + below, half - below) {
-            out[line - first] = spectrum[line].conj();
+        let own = part(1 + below, half - below);
+        to.take(own.clone(), spectrum[own].iter().map(C::conj));
+        let own = part(half - below, half);
+        if !own.is_empty() {
+            to.take(own.clone(), self.above(spectrum, own));
         }
-        let lines = wanted(half - below, half);
-        self.put_above(spectrum, lines.clone(), &mut out[lines.start - first..lines.end - first]);
-        for line in wanted(half.max(1), half + 1) {
-            out[line - first] = C::from(spectrum[0].re - spectrum[0].im);
-        }
+        to.take(part(half.max(1), half + 1), once(C::from(first.re - first.im)));
     }
 
     /// Lines from 1 to below the middle.
-    fn put_below(&self, spectrum: &[C], lines: Range<usize>, out: &mut [C]) {
-        if lines.is_empty() {
-            return;
-        }
-        let half = self.samples / 2;
+    #[inline]
+    fn below<'a>(&'a self, spectrum: &'a [C], lines: Range<usize>) -> impl Iterator<Item = C> + 'a {
+        let mirrored = &spectrum[self.mirrored(&lines)];
         let twiddles = &self.twiddles[lines.start - 1..lines.end - 1];
-        let mirrored = &spectrum[half + 1 - lines.end..half + 1 - lines.start];
-        let own = &spectrum[lines];
-        wide(|| {
-            let lines = own.iter().zip(mirrored.iter().rev()).zip(twiddles);
-            for (out, ((z, mirrored), twiddle)) in out.iter_mut().zip(lines) {
-                let (sum, difference) = (z + mirrored, z - mirrored);
-                let turned_re = sum.im * twiddle.re + difference.re * twiddle.im;
-                let turned_im = sum.im * twiddle.im - difference.re * twiddle.re;
-                *out = C::new(0.5 * sum.re + turned_re, 0.5 * difference.im + turned_im);
-            }
-        });
+        spectrum[lines].iter().zip(mirrored.iter().rev()).zip(twiddles).map(|((z, mirrored), twiddle)| {
+            let (sum, difference) = (z + mirrored, z - mirrored);
+            let turned_re = sum.im * twiddle.re + difference.re * twiddle.im;
+            let turned_im = sum.im * twiddle.im - difference.re * twiddle.re;
+            C::new(0.5 * sum.re + turned_re, 0.5 * difference.im + turned_im)
+        })
     }
 
     /// Lines from above the middle to below the last: those below it, from their other side.
-    fn put_above(&self, spectrum: &[C], lines: Range<usize>, out: &mut [C]) {
-        if lines.is_empty() {
-            return;
-        }
-        let half = self.samples / 2;
-        let below = half + 1 - lines.end..half + 1 - lines.start;
+    #[inline]
+    fn above<'a>(&'a self, spectrum: &'a [C], lines: Range<usize>) -> impl Iterator<Item = C> + 'a {
+        let below = self.mirrored(&lines);
         let twiddles = &self.twiddles[below.start - 1..below.end - 1];
-        let mirrored = &spectrum[lines];
-        let own = &spectrum[below];
-        wide(|| {
-            let lines = own.iter().zip(twiddles).rev().zip(mirrored);
-            for (out, ((z, twiddle), mirrored)) in out.iter_mut().zip(lines) {
-                let (sum, difference) = (z + mirrored, z - mirrored);
-                let turned_re = sum.im * twiddle.re + difference.re * twiddle.im;
-                let turned_im = sum.im * twiddle.im - difference.re * twiddle.re;
-                *out = C::new(0.5 * sum.re - turned_re, turned_im - 0.5 * difference.im);
-            }
-        });
+        let own = spectrum[below].iter().zip(twiddles).rev();
+        own.zip(&spectrum[lines]).map(|((z, twiddle), mirrored)| {
+            let (sum, difference) = (z + mirrored, z - mirrored);
+            let turned_re = sum.im * twiddle.re + difference.re * twiddle.im;
+            let turned_im = sum.im * twiddle.im - difference.re * twiddle.re;
+            C::new(0.5 * sum.re - turned_re, turned_im - 0.5 * difference.im)
+        })
+    }
+
+    /// M − k of these lines k.
+    fn mirrored(&self, lines: &Range<usize>) -> Range<usize> {
+        let half = self.samples / 2;
+        half + 1 - lines.end..half + 1 - lines.start
+    }
+}
+
+/// What lines are for.
+pub(super) trait Lines {
+    /// Takes `lines`, one value for each, in a loop compiled for the processor at hand.
+    fn take(&mut self, lines: Range<usize>, values: impl Iterator<Item = C>);
+}
+
+/// Lines that are written from `first` on.
+struct Put<'a> {
+    first: usize,
+    out: &'a mut [C],
+}
+
+impl Lines for Put<'_> {
+    #[inline]
+    fn take(&mut self, lines: Range<usize>, values: impl Iterator<Item = C>) {
+        let own = &mut self.out[lines.start - self.first..lines.end - self.first];
+        wide(|| own.iter_mut().zip(values).for_each(|(own, value)| *own = value));
     }
 }
 
