@@ -56,7 +56,7 @@ impl WithSimd for Crossed<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         // as many sums as there are registers for them and for what they are made of
-        if S::REGISTER_COUNT >= 32 { self.by::<S, 8, 3>(simd) } else { self.by::<S, 4, 2>(simd) }
+        if S::REGISTER_COUNT >= 32 { self.by::<S, 6, 4>(simd) } else { self.by::<S, 4, 2>(simd) }
     }
 }
 
@@ -111,17 +111,21 @@ fn crossed_with<S: Simd, const I: usize, const J: usize>(
 /// The products of I columns with J others.
 #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
 #[inline(always)]
-fn dots<S: Simd, const I: usize, const J: usize>(
+fn dots<'a, S: Simd, const I: usize, const J: usize>(
     simd: S,
-    a: &[f64],
-    b: &[f64],
+    a: &'a [f64],
+    b: &'a [f64],
     height: usize,
 ) -> [[f64; J]; I] {
-    let whole = height - height % S::F64_LANES;
-    let a_vectors: [&[S::f64s]; I] = std::array::from_fn(|i| S::as_simd_f64s(&a[i * height..][..whole]).0);
-    let b_vectors: [&[S::f64s]; J] = std::array::from_fn(|j| S::as_simd_f64s(&b[j * height..][..whole]).0);
+    let count = height / S::F64_LANES;
+    let whole = count * S::F64_LANES;
+    let vectors = |of: &'a [f64], column: usize| -> &'a [S::f64s] {
+        &S::as_simd_f64s(&of[column * height..][..whole]).0[..count]
+    };
+    let a_vectors: [&[S::f64s]; I] = std::array::from_fn(|i| vectors(a, i));
+    let b_vectors: [&[S::f64s]; J] = std::array::from_fn(|j| vectors(b, j));
     let mut sums = [[simd.splat_f64s(0.0); J]; I];
-    for l in 0..whole / S::F64_LANES {
+    for l in 0..count {
         let own: [S::f64s; I] = std::array::from_fn(|i| a_vectors[i][l]);
         for j in 0..J {
             let other = b_vectors[j][l];
@@ -130,12 +134,14 @@ fn dots<S: Simd, const I: usize, const J: usize>(
             }
         }
     }
-    std::array::from_fn(|i| {
-        std::array::from_fn(|j| {
+    let mut dots = [[0.0; J]; I];
+    for i in 0..I {
+        for j in 0..J {
             let rest = a[i * height + whole..(i + 1) * height].iter().zip(&b[j * height + whole..]);
-            rest.fold(sum_of_lanes::<S>(sums[i][j]), |sum, (a, b)| sum + a * b)
-        })
-    })
+            dots[i][j] = rest.fold(sum_of_lanes::<S>(sums[i][j]), |sum, (a, b)| sum + a * b);
+        }
+    }
+    dots
 }
 
 /// No processor's vectors hold more.
