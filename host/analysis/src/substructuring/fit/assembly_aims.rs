@@ -4,6 +4,7 @@
 //! v ⊗ tᵢ, where v has an entry for each measured row only, and the products with N⁻¹ that the fit needs are made of these short columns: two
 //! thirds of all nuisance parameters are such aims.
 
+use super::narrow::add_product;
 use super::noise::{ByImpact, Whitening};
 use nalgebra::{Complex, DMatrix, DMatrixView};
 
@@ -12,7 +13,12 @@ pub(super) struct AssemblyAims {
     /// v of every aim at an impact's cells, sensor by sensor, in standard deviations of the aim: real parts of the measured rows above imaginary
     /// ones.
     pub(super) by_impact: Vec<DMatrix<f64>>,
+    /// Their transposes, with rows of zeros below up to whole vectors.
+    turned: Vec<DMatrix<f64>>,
 }
+
+/// No processor's vectors hold more.
+const MOST_LANES: usize = 8;
 
 /// tᵢ of all impacts: impacts × measured columns, and its transpose.
 pub(super) struct Pushes {
@@ -30,25 +36,35 @@ impl Pushes {
         DMatrixView::from_slice(values, inner, self.t.ncols()) * &self.turned
     }
 
-    /// Columns of real parts above imaginary ones as each impact meets them: per impact columns × (2 · rows).
+    /// Columns of real parts above imaginary ones as each impact meets them: per impact (2 · rows) × columns.
     fn met(&self, columns: &DMatrix<f64>) -> Vec<DMatrix<f64>> {
         let (height, count) = columns.shape();
-        let turned = columns.transpose();
-        let (re, im) = turned.as_slice().split_at(count * height / 2);
-        let rows = height / 2 / self.t.ncols();
-        let [re, im] = [re, im].map(|part| self.contracted(part, count * rows));
-        re.column_iter()
-            .zip(im.column_iter())
-            .map(|(re, im)| DMatrix::from_iterator(count, 2 * rows, re.iter().chain(&im).copied()))
-            .collect()
+        let met = height / self.t.ncols();
+        let rows = met / 2;
+        // all that one measured column holds stands in one column
+        let mut values = DMatrix::zeros(met * count, self.t.ncols());
+        for (part, own) in columns.as_slice().chunks_exact((height / 2).max(1)).enumerate() {
+            for (own, to) in own.chunks_exact(rows).zip(values.as_mut_slice().chunks_exact_mut(met * count)) {
+                to[part * rows..][..rows].copy_from_slice(own);
+            }
+        }
+        let mut sums = DMatrix::zeros(met * count, self.t.nrows());
+        add_product(&mut sums, 0, 1.0, &values, &self.turned);
+        sums.column_iter().map(|sum| DMatrix::from_column_slice(met, count, sum.as_slice())).collect()
     }
 }
 
 impl AssemblyAims {
+    pub(super) fn of(by_impact: Vec<DMatrix<f64>>) -> AssemblyAims {
+        let turned =
+            |v: &DMatrix<f64>| v.transpose().resize_vertically(v.ncols().next_multiple_of(MOST_LANES), 0.0);
+        AssemblyAims { turned: by_impact.iter().map(turned).collect(), by_impact }
+    }
+
     /// The difference of these and others, times `scale`.
     pub(super) fn apart(&self, other: &AssemblyAims, scale: f64) -> AssemblyAims {
         let pairs = self.by_impact.iter().zip(&other.by_impact);
-        AssemblyAims { by_impact: pairs.map(|(one, other)| (one - other) * scale).collect() }
+        AssemblyAims::of(pairs.map(|(one, other)| (one - other) * scale).collect())
     }
 
     /// The covariance of the residual where every aim has variance one.
@@ -89,10 +105,14 @@ impl AssemblyAims {
         sum
     }
 
-    /// Gᵀ x of these aims per impact (aims × columns); x = N⁻¹ of something, unwhitened.
+    /// Gᵀ x of these aims per impact (aims × columns, then rows of zeros); x = N⁻¹ of something, unwhitened.
     pub(super) fn pulled(&self, pushes: &Pushes, x: &DMatrix<f64>) -> Vec<DMatrix<f64>> {
-        let met = pushes.met(x);
-        self.by_impact.iter().zip(met).map(|(v, x)| (x * v).transpose()).collect()
+        let pulled = |(turned, x): (&DMatrix<f64>, DMatrix<f64>)| {
+            let mut pulled = DMatrix::zeros(turned.nrows(), x.ncols());
+            add_product(&mut pulled, 0, 1.0, turned, &x);
+            pulled
+        };
+        self.turned.iter().zip(pushes.met(x)).map(pulled).collect()
     }
 }
 
@@ -122,7 +142,7 @@ impl Met {
         written: &DMatrix<f64>,
         aims: &AssemblyAims,
     ) -> Met {
-        let written = pushes.met(&whitening.back(written.clone()));
+        let written = pushes.met(&whitening.back(written.clone())).iter().map(DMatrix::transpose).collect();
         let (impacts, columns) = pushes.t.shape();
         let between = |part: &DMatrix<f64>| -> DMatrix<f64> {
             let m = part.nrows();

@@ -73,7 +73,7 @@ impl Point<'_> {
             lines_slopes.push(predicted.slopes);
         }
         problem.add_measured(model.column_mut(0).as_mut_slice(), &mean, 1.0);
-        problem.put_slopes(&mut model, &lines_slopes, share);
+        problem.put_slopes(&mut model.as_mut_slice()[2 * m..], &lines_slopes, share);
         for (side, ways) in ways.iter().enumerate() {
             // Y^A and Y^B stand on the model's side of the residual: minus
             self.aims(side, ways, -share, &mut written);
@@ -138,7 +138,7 @@ impl Point<'_> {
             }
             by_impact.push(shown);
         }
-        AssemblyAims { by_impact }
+        AssemblyAims::of(by_impact)
     }
 
     /// Adds ∂(left · cells · right)/∂η (unscaled) of A or B, summed over `ways` and times `share`: of the aims, and of the tilts,

@@ -222,34 +222,51 @@ impl Problem {
             .ok_or(FitError::Singular { frequency_hz: self.frequency_hz(l) })
     }
 
-    /// Measured minus model, averaged over a band, and the model's derivatives: real parts above imaginary ones, the residual in
-    /// the first column.
-    pub(super) fn residuals(
+    /// Measured minus model, averaged over a band: real parts above imaginary ones.
+    pub(super) fn residual(
         &self,
         chart: &Chart,
         p: &DVector<f64>,
         data: &Corrected,
         band: Range<usize>,
     ) -> Result<DMatrix<f64>, FitError> {
-        let mut sums = DMatrix::zeros(2 * self.entries(), 1 + chart.count());
+        let mut sum = DMatrix::zeros(2 * self.entries(), 1);
+        let share = 1.0 / band.len() as f64;
+        for l in band {
+            let model = self
+                .layout
+                .assembly(&chart.at(p, self.s[l], false), [&data.parts[0][l], &data.parts[1][l]])
+                .ok_or(FitError::Singular { frequency_hz: self.frequency_hz(l) })?;
+            let difference = &data.ajb[l] - model - &data.bias[l];
+            self.add_measured(sum.as_mut_slice(), &difference, share);
+        }
+        Ok(sum)
+    }
+
+    /// The model's derivatives by the joint, averaged over a band: a column for each parameter.
+    pub(super) fn slopes(
+        &self,
+        chart: &Chart,
+        p: &DVector<f64>,
+        data: &Corrected,
+        band: Range<usize>,
+    ) -> Result<DMatrix<f64>, FitError> {
+        let mut sums = DMatrix::zeros(2 * self.entries(), chart.count());
         let share = 1.0 / band.len() as f64;
         let mut slopes = Vec::with_capacity(band.len());
         for l in band {
-            let predicted = self.predict(chart, p, [&data.parts[0][l], &data.parts[1][l]], l, true)?;
-            let difference = &data.ajb[l] - predicted.y - &data.bias[l];
-            self.add_measured(sums.column_mut(0).as_mut_slice(), &difference, share);
-            slopes.push(predicted.slopes);
+            slopes.push(self.predict(chart, p, [&data.parts[0][l], &data.parts[1][l]], l, true)?.slopes);
         }
-        self.put_slopes(&mut sums, &slopes, share);
+        self.put_slopes(sums.as_mut_slice(), &slopes, share);
         Ok(sums)
     }
 
-    /// Puts the derivatives of lines, summed and times `share`, into the columns after the first.
+    /// Puts the derivatives of lines, summed and times `share`, into one column after the other.
     ///
     /// Each is a column times a row, so their sum over lines is one product of matrices.
-    pub(super) fn put_slopes(&self, sums: &mut DMatrix<f64>, lines: &[Vec<Vec<Product>>], share: f64) {
+    pub(super) fn put_slopes(&self, sums: &mut [f64], lines: &[Vec<Vec<Product>>], share: f64) {
         let (rows, columns) = (self.rows.len(), self.columns.len());
-        for parameter in 0..lines.first().map_or(0, Vec::len) {
+        for (parameter, sum) in sums.chunks_exact_mut((2 * rows * columns).max(1)).enumerate() {
             let count: usize = lines.iter().map(|slopes| slopes[parameter].len()).sum();
             let mut moved = DMatrix::<f64>::zeros(rows, 2 * count);
             let mut by = DMatrix::<f64>::zeros(2 * count, 2 * columns);
@@ -266,7 +283,7 @@ impl Problem {
                     by[(count + j, columns + c)] = v.re;
                 }
             }
-            sums.column_mut(1 + parameter).copy_from_slice((moved * by).as_slice());
+            sum.copy_from_slice((moved * by).as_slice());
         }
     }
 

@@ -46,6 +46,12 @@ pub(super) struct Found {
     pub(super) settled: bool,
 }
 
+/// The cost at one point, without its derivatives: all that it takes to refuse a step.
+struct Tried {
+    cost: f64,
+    residual: Products,
+}
+
 /// The cost and its derivatives at one point.
 struct Score {
     cost: f64,
@@ -71,59 +77,77 @@ struct Pass<'a> {
     prior: DVector<f64>,
 }
 
-/// Sums of products of residual and derivatives (residual first), with the nuisance parameters integrated out.
+/// Columns and the sums of their products, with the nuisance parameters integrated out.
 struct Products {
-    /// (1 + parameters)².
-    all: DMatrix<f64>,
-    /// L⁻¹Gᵀ N⁻¹ of the same columns.
+    /// In units of their noise, one matrix for each band.
+    columns: Vec<DMatrix<f64>>,
+    /// L⁻¹Gᵀ N⁻¹ of them.
     pulled: DMatrix<f64>,
+    /// Each column with each.
+    all: DMatrix<f64>,
 }
 
 impl Pass<'_> {
-    /// Of columns that are in units of their noise, one matrix for each band.
-    fn products(&self, columns: &[DMatrix<f64>]) -> Products {
-        let by_band: Vec<_> = (self.weight.bands.par_iter())
-            .zip(columns)
-            .map(|(weight, columns)| {
-                let pulled = weight.g.pulled(self.problem, &weight.whitening, columns);
-                (crossed(columns, columns), pulled)
-            })
-            .collect();
-        let count = 1 + self.chart.count();
-        let mut all = DMatrix::zeros(count, count);
-        let mut pulled = DMatrix::zeros(self.weight.information.nrows(), count);
-        for (own, by_nuisance) in by_band {
-            all += own;
-            pulled += by_nuisance;
-        }
-        self.marginal.forward(&mut pulled);
-        let all = (all - crossed(&pulled, &pulled) / self.mild) / self.mild;
-        Products { all, pulled }
-    }
-
-    fn score(&self, p: &DVector<f64>) -> Result<Score, FitError> {
-        let columns: Vec<DMatrix<f64>> = (self.weight.bands.par_iter())
-            .zip(&self.problem.bands)
-            .zip(self.believed)
-            .map(|((weight, band), believed)| {
-                // r falls where the model rises
-                let residuals = self.problem.residuals(self.chart, p, self.data, band.clone())?;
-                let mut columns = weight.whitening.of(residuals);
-                let mut residual = columns.column_mut(0);
-                residual += believed.column(0);
-                Ok(columns)
+    /// Of columns that `of` makes for each band, in units of their noise.
+    fn products(
+        &self,
+        of: impl Fn(usize) -> Result<DMatrix<f64>, FitError> + Send + Sync,
+    ) -> Result<Products, FitError> {
+        let by_band: Vec<_> = (0..self.weight.bands.len())
+            .into_par_iter()
+            .map(|band| {
+                let (weight, columns) = (&self.weight.bands[band], of(band)?);
+                let pulled = weight.g.pulled(self.problem, &weight.whitening, &columns);
+                Ok((crossed(&columns, &columns), pulled, columns))
             })
             .collect::<Result<_, FitError>>()?;
-        let Products { all, pulled } = self.products(&columns);
-        let chi = all[(0, 0)];
-        let count = p.len();
-        let prior = self.prior.component_mul(p);
+        let count = by_band.first().map_or(0, |(own, ..)| own.nrows());
+        let mut all = DMatrix::zeros(count, count);
+        let mut pulled = DMatrix::zeros(self.weight.information.nrows(), count);
+        let mut columns = Vec::with_capacity(by_band.len());
+        for (own, by_nuisance, of_band) in by_band {
+            all += own;
+            pulled += by_nuisance;
+            columns.push(of_band);
+        }
+        self.marginal.forward(&mut pulled);
+        let all = self.integrated(all, &pulled, &pulled);
+        Ok(Products { columns, pulled, all })
+    }
+
+    /// Sums of products without what the nuisance parameters explain of them.
+    fn integrated(&self, all: DMatrix<f64>, one: &DMatrix<f64>, other: &DMatrix<f64>) -> DMatrix<f64> {
+        (all - crossed(one, other) / self.mild) / self.mild
+    }
+
+    fn tried(&self, p: &DVector<f64>) -> Result<Tried, FitError> {
+        let residual = self.products(|band| {
+            // r falls where the model rises
+            let residual =
+                self.problem.residual(self.chart, p, self.data, self.problem.bands[band].clone())?;
+            Ok(self.weight.bands[band].whitening.of(residual) + &self.believed[band])
+        })?;
+        Ok(Tried { cost: residual.all[(0, 0)] + p.dot(&self.prior.component_mul(p)), residual })
+    }
+
+    /// At `p`, which was tried.
+    fn score(&self, p: &DVector<f64>, tried: Tried) -> Result<Score, FitError> {
+        let Tried { cost, residual } = tried;
+        let slopes = self.products(|band| {
+            let slopes = self.problem.slopes(self.chart, p, self.data, self.problem.bands[band].clone())?;
+            Ok(self.weight.bands[band].whitening.of(slopes))
+        })?;
+        let mut downhill = DMatrix::zeros(p.len(), 1);
+        for (slopes, residual) in slopes.columns.iter().zip(&residual.columns) {
+            downhill += crossed(slopes, residual);
+        }
+        let downhill = self.integrated(downhill, &slopes.pulled, &residual.pulled);
         Ok(Score {
-            cost: chi + p.dot(&prior),
-            chi,
-            gradient: all.view((1, 0), (count, 1)).column(0) - prior,
-            hessian: all.view((1, 1), (count, count)) + DMatrix::from_diagonal(&self.prior),
-            pulled: pulled.columns(0, 1).clone_owned(),
+            cost,
+            chi: residual.all[(0, 0)],
+            gradient: downhill.column(0) - self.prior.component_mul(p),
+            hessian: slopes.all + DMatrix::from_diagonal(&self.prior),
+            pulled: residual.pulled,
         })
     }
 
@@ -136,13 +160,16 @@ impl Pass<'_> {
 
     /// The minimum without what noise feigns in the derivatives (errors in variables), and its covariance; none where noise is
     /// all there is.
-    fn corrected(&self, p: &DVector<f64>, at: &Score) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    fn corrected(
+        &self,
+        p: &DVector<f64>,
+        at: &Score,
+    ) -> Result<Option<(DVector<f64>, DMatrix<f64>)>, FitError> {
         let count = p.len();
-        let columns: Vec<DMatrix<f64>> = self.weight.bands.iter().map(|b| b.feigned.clone()).collect();
-        let all = self.products(&columns).all;
+        let all = self.products(|band| Ok(self.weight.bands[band].feigned.clone()))?.all;
         let pull = all.view((1, 0), (count, 1));
         let feigned = all.view((1, 1), (count, count)).clone_owned();
-        let feigned = Feigned::of(at.hessian.clone(), &feigned)?;
+        let Some(feigned) = Feigned::of(at.hessian.clone(), &feigned) else { return Ok(None) };
         let inverse = feigned.weighed(|f| if f < FEIGNED_MOST { 1.0 / (1.0 - f.max(0.0)) } else { 0.0 });
         let mut rest = &at.gradient - pull.column(0);
         for i in 0..count {
@@ -159,7 +186,7 @@ impl Pass<'_> {
         for (i, step) in (&next - p).iter().enumerate() {
             covariance[(i, i)] += step * step;
         }
-        Some((next, covariance))
+        Ok(Some((next, covariance)))
     }
 
     /// Goes downhill from `p` until a step's gain is `enough`.
@@ -168,7 +195,7 @@ impl Pass<'_> {
         p: &DVector<f64>,
         enough: impl Fn(f64, &Score) -> bool,
     ) -> Result<(DVector<f64>, Score), FitError> {
-        let (mut p, mut here) = (p.clone(), self.score(p)?);
+        let (mut p, mut here) = (p.clone(), self.score(p, self.tried(p)?)?);
         let mut damping = 1e-3;
         for _ in 0..STEPS {
             let mut damped = here.hessian.clone();
@@ -185,10 +212,11 @@ impl Pass<'_> {
             }
             let step = damped.cholesky().map(|c| c.solve(&downhill));
             let next = step.map(|step| self.chart.bounded(&(&p + step)));
-            match next.map(|next| (self.score(&next), next)) {
-                Some((Ok(score), next)) if score.cost <= here.cost => {
-                    let gain = here.cost - score.cost;
-                    (p, here) = (next, score);
+            match next.map(|next| (self.tried(&next), next)) {
+                Some((Ok(tried), next)) if tried.cost <= here.cost => {
+                    let gain = here.cost - tried.cost;
+                    // two steps in five lead uphill: derivatives are for those that do not
+                    (here, p) = (self.score(&next, tried)?, next);
                     damping = (damping / 10.0f64).max(1e-9);
                     if enough(gain, &here) {
                         break;
@@ -240,7 +268,7 @@ pub(super) fn search(problem: &Problem, chart: &Chart, start: &DVector<f64>) -> 
                 let again = at.chi / freedom >= STEEP && trial < MILDER;
                 gain < last || (again && gain < SHOWN * at.cost)
             })?;
-            let corrected = here.corrected(&next, &score);
+            let corrected = here.corrected(&next, &score)?;
             trial += 1;
             if score.chi / freedom < STEEP || trial > MILDER {
                 break (score.chi, here.eta(&score), corrected.ok_or(FitError::NoMinimum)?);

@@ -195,7 +195,7 @@ impl Whitened {
         pulled.rows_mut(0, self.written.ncols()).copy_from(&crossed(&self.written, columns));
         let aims = self.aims.pulled(&problem.pushes, &whitening.back(columns.clone()));
         for (i, own) in aims.iter().enumerate() {
-            for k in 0..own.nrows() {
+            for k in 0..self.aims.by_impact[i].ncols() {
                 pulled.row_mut(problem.assembly_aim(i, k)).copy_from(&own.row(k));
             }
         }
