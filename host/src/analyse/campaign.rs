@@ -18,6 +18,7 @@ use crate::substructuring::averaged::Priors;
 use crate::substructuring::between_arms::{BetweenArms, NoStiffness, between_arms};
 use crate::substructuring::geometry::Grouping;
 use crate::substructuring::{Band, Frf, Geometry, IdmSet, Method, fit, identify};
+use std::collections::HashSet;
 
 /// Everything that the measurements say; of what they were measured with, nothing.
 pub fn analyse_measurements<M: Measurements>(
@@ -50,10 +51,7 @@ pub fn analyse_measurements<M: Measurements>(
         found.configurations.push(one.measured);
         one.frf
     });
-    for average in &mut cells.averages {
-        // they are in the matrices now, and would be held beside them to the end
-        average.spectra = average.spectra.of_outputs(0..0);
-    }
+    forget_frfs(&mut cells.averages);
     let frfs = all.each_ref().map(Option::as_ref);
     let identified = if let [Some(a), Some(b), Some(ajb)] = frfs {
         substructured([a, b, ajb], geometry)
@@ -93,6 +91,19 @@ pub fn analyse_measurements<M: Measurements>(
     found.own_stiffness = Some(own.map(|(stiffness, _)| stiffness));
     found.between_arms = Some(decided(&found));
     found
+}
+
+/// Takes from the averages the FRFs that are in the matrices now: they would be held beside them to the end. Those of the impacts that the
+/// contact is seen from are shown with it.
+fn forget_frfs(averages: &mut [CellAverage]) {
+    let of_assembly = |average: &CellAverage| average.name.configuration == Structure::Ajb;
+    let seen = averages.iter().filter(|average| of_assembly(average) && average.contact.is_some());
+    let seen: HashSet<String> = seen.map(|average| average.name.impact.clone()).collect();
+    for average in averages {
+        if !of_assembly(average) || !seen.contains(&average.name.impact) {
+            average.spectra = average.spectra.of_outputs(0..0);
+        }
+    }
 }
 
 /// The averages of one configuration, of all that are sorted by it.

@@ -11,7 +11,8 @@ use num_complex::Complex;
 
 /// The cell of this impact and channel, if it was measured.
 fn find<'c>(cells: &'c [CellAverage], impact: &Point, channel: &Point) -> Option<&'c CellAverage> {
-    cells.iter().find(|c| c.name.impact == impact.name && c.name.response == channel.name)
+    let named = |c: &&CellAverage| c.name.impact == impact.name && c.name.response == channel.name;
+    cells.iter().find(named).filter(|c| c.spectra.outputs() > 0)
 }
 
 /// The curves of a configuration that was measured here.
