@@ -5,7 +5,7 @@ use super::compliance::{ContactCompliance, ImaginaryPeak, SEARCH_HZ};
 use super::correction::Correction;
 use super::dominant_frequency::dominant_frequency;
 use super::finding::LoopFinding;
-use super::impact::{FIRST_CYCLES, decay};
+use super::impact::{Decay, FIRST_CYCLES, decay};
 use super::loop_analysis::{Kind, LoopAnalysis};
 use super::loops::{OverCycles, swing};
 use super::record::{HysteresisRecord, Relative};
@@ -92,20 +92,34 @@ fn hidden_resonance(record: &HysteresisRecord) -> Option<ImaginaryPeak> {
     contact.imaginary_peak().filter(ImaginaryPeak::stands_out)
 }
 
+/// The decay after a hit and its shape; none of a record that is steady.
+pub(super) fn decay_of(record: &HysteresisRecord) -> Result<Option<(Decay, Shape)>, HysteresisError> {
+    if excitation(record)?.is_some() {
+        return Ok(None);
+    }
+    let decay = decay(&record.relative(), &record.force_n, record.fs_hz)?;
+    let shape = shape_of(&decay);
+    Ok(Some((decay, shape)))
+}
+
+fn shape_of(decay: &Decay) -> Shape {
+    let ratio = decay.cycles[0].frequency_hz / decay.frequency_hz;
+    if ratio < SOFTENED.1 {
+        Shape::GrossSlip
+    } else if ratio < SOFTENED.0 {
+        Shape::Microslip
+    } else {
+        Shape::Stuck
+    }
+}
+
 fn impact(record: &HysteresisRecord, motion: &Relative) -> Result<LoopAnalysis, HysteresisError> {
     let decay = decay(motion, &record.force_n, record.fs_hz)?;
     let used = &decay.cycles[..FIRST_CYCLES.min(decay.cycles.len())];
     let slopes: Vec<f64> = used.iter().map(|c| c.stiffness_n_per_m).collect();
     let k = OverCycles::of(&slopes).expect("decay() gives at least one cycle");
     let (from, to) = (used[0].first_sample, used[used.len() - 1].end_sample);
-    let ratio = used[0].frequency_hz / decay.frequency_hz;
-    let shape = if ratio < SOFTENED.1 {
-        Shape::GrossSlip
-    } else if ratio < SOFTENED.0 {
-        Shape::Microslip
-    } else {
-        Shape::Stuck
-    };
+    let shape = shape_of(&decay);
     let hidden = hidden_resonance(record);
     // the loops of a decay do not close, and have no energy to ask
     let findings: Vec<LoopFinding> = (k.mean < 0.0)

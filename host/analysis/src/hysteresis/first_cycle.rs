@@ -1,10 +1,11 @@
 //! The first cycle of a hit's decay: its slope, and what an arm's inertia would add to it.
 
+use super::analyse::decay_of;
 use super::correction::{Correction, rates};
 use super::impact::DecayCycle;
 use super::loops::slope;
 use super::record::{HysteresisRecord, RelativeMotion};
-use super::{HysteresisError, Shape, analyse};
+use super::{HysteresisError, Shape};
 
 /// Cycles of a decay that are told: later ones drown, or carry the lowest modes alone.
 pub const DECAY_CYCLES: usize = 8;
@@ -39,28 +40,30 @@ impl FirstCycle {
     /// The signals hold no whole cycle, or are no numbers.
     pub fn of(fs_hz: f64, [a, b]: [Vec<f64>; 2], force_n: Vec<f64>) -> Result<Self, HysteresisError> {
         let acceleration = rates(&b, fs_hz);
-        let found = analyse(&HysteresisRecord {
+        let record = HysteresisRecord {
             fs_hz,
             motion: RelativeMotion::Velocity { a_m_per_s: a, b_m_per_s: b },
             force_n,
             excitation_hz: None,
             normal_load_n: None,
-        })?;
-        let first = found.decay_cycles.first().ok_or(HysteresisError::NoMotion)?;
+        };
+        let (mut decay, shape) = decay_of(&record)?.ok_or(HysteresisError::NoMotion)?;
+        let first = &decay.cycles[0];
         let (from, to) = (first.first_sample, first.end_sample);
-        // the loop to be drawn begins with the first cycle
-        let displacement = &found.loop_displacement_m[..(to - from).min(found.loop_displacement_m.len())];
-        Ok(Self {
+        let acceleration_per_m = slope(&decay.displacement_m[from..to], &acceleration[from..to]);
+        let of_first = Self {
             slope_n_per_m: first.stiffness_n_per_m,
             r_squared: first.r_squared,
             amplitude_m: first.amplitude_m,
-            frequency_hz: found.frequency_hz,
+            frequency_hz: decay.frequency_hz,
             phase_deg: first.phase_deg,
-            shape: found.shape,
+            shape,
             cycle: [from, to],
-            acceleration_per_m: slope(displacement, &acceleration[from..from + displacement.len()]),
-            decay: found.decay_cycles[..DECAY_CYCLES.min(found.decay_cycles.len())].to_vec(),
-        })
+            acceleration_per_m,
+            decay: Vec::new(),
+        };
+        decay.cycles.truncate(DECAY_CYCLES);
+        Ok(Self { decay: decay.cycles, ..of_first })
     }
 
     /// The slope with the force at the contact in place of T, N/m: a least-squares slope is linear in the force.

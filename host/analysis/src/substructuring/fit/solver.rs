@@ -46,6 +46,9 @@ pub(super) struct Found {
     pub(super) settled: bool,
 }
 
+/// Parameters and their covariance.
+type Estimate = (DVector<f64>, DMatrix<f64>);
+
 /// The cost at one point, without its derivatives: all that it takes to refuse a step.
 struct Tried {
     cost: f64,
@@ -160,11 +163,7 @@ impl Pass<'_> {
 
     /// The minimum without what noise feigns in the derivatives (errors in variables), and its covariance; none where noise is
     /// all there is.
-    fn corrected(
-        &self,
-        p: &DVector<f64>,
-        at: &Score,
-    ) -> Result<Option<(DVector<f64>, DMatrix<f64>)>, FitError> {
+    fn corrected(&self, p: &DVector<f64>, at: &Score) -> Result<Option<Estimate>, FitError> {
         let count = p.len();
         let all = self.products(|band| Ok(self.weight.bands[band].feigned.clone()))?.all;
         let pull = all.view((1, 0), (count, 1));
