@@ -78,9 +78,12 @@ pub fn planned_places(places: &[Place], plan: &str) -> Option<figure::Figure> {
 /// The folder cannot be made or written.
 pub fn write(results: &Results, folder: &Path, formats: &[Format]) -> io::Result<()> {
     fs::create_dir_all(folder)?;
-    let json = results.to_json().map_err(io::Error::other)?;
-    write_whole(&folder.join(RESULTS_FILE), json.as_bytes())?;
-    write_whole(&folder.join(REPORT_FILE), page(results).as_bytes())?;
+    let json = || results.to_json().map_err(io::Error::other);
+    let (for_scripts, for_people) = rayon::join(
+        || write_whole(&folder.join(RESULTS_FILE), json()?.as_bytes()),
+        || write_whole(&folder.join(REPORT_FILE), page(results).as_bytes()),
+    );
+    for_scripts.and(for_people)?;
     if formats.is_empty() {
         return Ok(());
     }
