@@ -2,8 +2,9 @@
 
 use super::SpectraError;
 use super::cross_spectra::{CrossSpectra, OutputSums};
-use super::half_length::{HalfLength, Lent, Lines, check_finite};
+use super::half_length::{HalfLength, Lines, check_finite};
 use super::jackknife;
+use super::lent::Lent;
 use crate::parallel::{self, prelude::*};
 use crate::vectors::wide;
 use bytemuck::zeroed_vec;

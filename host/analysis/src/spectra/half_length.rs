@@ -4,12 +4,13 @@
 //! M = N/2, X(k) = ½ (Z(k) + Z*(M−k)) − ½ i e^(−i2πk/N) (Z(k) − Z*(M−k)).
 
 use super::SpectraError;
+use super::lent::Lent;
 use crate::vectors::{all_finite, wide};
 use num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 use std::f64::consts::PI;
 use std::iter::once;
-use std::ops::{Deref, DerefMut, Range};
+use std::ops::Range;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
 type C = Complex<f64>;
@@ -24,50 +25,8 @@ pub(super) struct HalfLength {
 
 static PLANNER: LazyLock<Mutex<FftPlanner<f64>>> = LazyLock::new(|| Mutex::new(FftPlanner::new()));
 static KEPT: Mutex<Vec<Arc<HalfLength>>> = Mutex::new(Vec::new());
-/// Memory that nobody uses: fresh memory costs as much as a transform's first pass over it.
-static IDLE: Mutex<Vec<Vec<C>>> = Mutex::new(Vec::new());
-
 /// Plans kept at most.
 const PLANS: usize = 8;
-/// Pieces of idle memory kept at most.
-const PIECES: usize = 32;
-
-/// Memory that is given back when it is no longer used. It holds other values before.
-pub(super) struct Lent(Vec<C>);
-
-impl Lent {
-    pub(super) fn of(count: usize) -> Lent {
-        let mut idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner);
-        let place = idle.iter().rposition(|piece| piece.len() == count);
-        Lent(place.map_or_else(|| vec![C::default(); count], |place| idle.remove(place)))
-    }
-}
-
-impl Drop for Lent {
-    fn drop(&mut self) {
-        let mut idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner);
-        if idle.len() == PIECES {
-            // of a length that may not come again
-            idle.remove(0);
-        }
-        idle.push(std::mem::take(&mut self.0));
-    }
-}
-
-impl Deref for Lent {
-    type Target = [C];
-
-    fn deref(&self) -> &[C] {
-        &self.0
-    }
-}
-
-impl DerefMut for Lent {
-    fn deref_mut(&mut self) -> &mut [C] {
-        &mut self.0
-    }
-}
-
 impl HalfLength {
     /// Plans are kept, for lengths that come again and again.
     pub(super) fn of(samples: usize) -> Arc<HalfLength> {
@@ -77,11 +36,8 @@ impl HalfLength {
             return plan.clone();
         }
         let even = samples.is_multiple_of(2);
-        let fft = (PLANNER.lock().unwrap_or_else(PoisonError::into_inner)).plan_fft_forward(if even {
-            samples / 2
-        } else {
-            samples
-        });
+        let points = if even { samples / 2 } else { samples };
+        let fft = PLANNER.lock().unwrap_or_else(PoisonError::into_inner).plan_fft_forward(points);
         let step = -2.0 * PI / samples as f64;
         let twiddle = |k: usize| {
             let angle = step * k as f64;
@@ -107,7 +63,9 @@ impl HalfLength {
     /// A value that is not a number.
     pub(super) fn transform(&self, fill: impl Fn(&mut [f64])) -> Result<Lent, SpectraError> {
         if self.samples == 0 {
-            return Ok(Lent(vec![C::default()]));
+            let mut nothing = Lent::of(1);
+            nothing.fill(C::default());
+            return Ok(nothing);
         }
         let mut signal = Lent::of(self.fft.len());
         self.write(&fill, &mut signal);
@@ -300,12 +258,5 @@ mod tests {
             let found = HalfLength::of(samples).transform(|out| out.copy_from_slice(&record));
             assert_eq!(found.err(), Some(SpectraError::NotFinite { sample: 3 }));
         }
-    }
-
-    #[test]
-    fn memory_is_lent_again_and_only_so_much_of_it_kept() {
-        drop((0..3 * PIECES).map(|i| Lent::of(10 + i)).collect::<Vec<_>>());
-        assert_eq!(Lent::of(12).len(), 12);
-        assert!(IDLE.lock().expect("whole").len() <= PIECES);
     }
 }

@@ -12,6 +12,7 @@ pub mod estimators;
 mod half_length;
 pub mod impact_records;
 pub mod jackknife;
+mod lent;
 pub mod pulse;
 pub mod usable_band;
 pub mod window;
