@@ -152,7 +152,7 @@ pub trait Measurements: Sync {
 
     /// Shows `look` the kept hits of a cell, one at a time, with their sampling rate, Hz; none if it was not measured. Its own come before
     /// those of the cell whose hits fill it. The signals at the contact may be left out where `contact` does not ask for them.
-    /// Returns what is said about records that were kept and cannot be used.
+    /// A hit is lent: the next one may take its memory. Returns what is said about records that were kept and cannot be used.
     ///
     /// # Errors
     /// The file cannot be read, or the hits differ in rate. Some of them may have been shown then.

@@ -140,12 +140,8 @@ impl HalfLength {
     fn below<'a>(&'a self, spectrum: &'a [C], lines: Range<usize>) -> impl Iterator<Item = C> + 'a {
         let mirrored = &spectrum[self.mirrored(&lines)];
         let twiddles = &self.twiddles[lines.start - 1..lines.end - 1];
-        spectrum[lines].iter().zip(mirrored.iter().rev()).zip(twiddles).map(|((z, mirrored), twiddle)| {
-            let (sum, difference) = (z + mirrored, z - mirrored);
-            let turned_re = sum.im * twiddle.re + difference.re * twiddle.im;
-            let turned_im = sum.im * twiddle.im - difference.re * twiddle.re;
-            C::new(0.5 * sum.re + turned_re, 0.5 * difference.im + turned_im)
-        })
+        let own = spectrum[lines].iter().zip(mirrored.iter().rev()).zip(twiddles);
+        own.map(|((z, mirrored), twiddle)| taken_apart(*z, *mirrored, *twiddle).0)
     }
 
     /// Lines from above the middle to below the last: those below it, from their other side.
@@ -154,12 +150,7 @@ impl HalfLength {
         let below = self.mirrored(&lines);
         let twiddles = &self.twiddles[below.start - 1..below.end - 1];
         let own = spectrum[below].iter().zip(twiddles).rev();
-        own.zip(&spectrum[lines]).map(|((z, twiddle), mirrored)| {
-            let (sum, difference) = (z + mirrored, z - mirrored);
-            let turned_re = sum.im * twiddle.re + difference.re * twiddle.im;
-            let turned_im = sum.im * twiddle.im - difference.re * twiddle.re;
-            C::new(0.5 * sum.re - turned_re, turned_im - 0.5 * difference.im)
-        })
+        own.zip(&spectrum[lines]).map(|((z, twiddle), mirrored)| taken_apart(*z, *mirrored, *twiddle).1)
     }
 
     /// M − k of these lines k.
@@ -167,6 +158,16 @@ impl HalfLength {
         let half = self.samples / 2;
         half + 1 - lines.end..half + 1 - lines.start
     }
+}
+
+/// The lines k and M − k of Z(k), Z(M − k) and ½ e^(−i2πk/N).
+#[inline]
+fn taken_apart(z: C, mirrored: C, twiddle: C) -> (C, C) {
+    let (sum, difference) = (z + mirrored, z - mirrored);
+    let turned_re = sum.im * twiddle.re + difference.re * twiddle.im;
+    let turned_im = sum.im * twiddle.im - difference.re * twiddle.re;
+    let line = C::new(0.5 * sum.re + turned_re, 0.5 * difference.im + turned_im);
+    (line, C::new(0.5 * sum.re - turned_re, turned_im - 0.5 * difference.im))
 }
 
 /// What lines are for.

@@ -4,7 +4,7 @@
 //! v ⊗ tᵢ, where v has an entry for each measured row only, and the products with N⁻¹ that the fit needs are made of these short columns: two
 //! thirds of all nuisance parameters are such aims.
 
-use super::narrow::add_product;
+use super::narrow::{MOST_LANES, add_product};
 use super::noise::{ByImpact, Whitening};
 use nalgebra::{Complex, DMatrix, DMatrixView};
 
@@ -16,9 +16,6 @@ pub(super) struct AssemblyAims {
     /// Their transposes, with rows of zeros below up to whole vectors.
     turned: Vec<DMatrix<f64>>,
 }
-
-/// No processor's vectors hold more.
-const MOST_LANES: usize = 8;
 
 /// tᵢ of all impacts: impacts × measured columns, and its transpose.
 pub(super) struct Pushes {

@@ -145,7 +145,7 @@ fn dots<'a, S: Simd, const I: usize, const J: usize>(
 }
 
 /// No processor's vectors hold more.
-const MOST_LANES: usize = 8;
+pub(super) const MOST_LANES: usize = 8;
 
 /// The sum of a vector's numbers. By way of memory: the processor's own way is not inlined where vectors are of eight, and costs more than the
 /// products.

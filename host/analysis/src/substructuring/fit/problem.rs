@@ -152,10 +152,7 @@ impl Problem {
             }
             let model: Vec<Line> = (0..self.s.len())
                 .into_par_iter()
-                .map(|l| {
-                    (self.layout.assembly(&chart.at(p, self.s[l], false), [&parts[0][l], &parts[1][l]]))
-                        .ok_or(FitError::Singular { frequency_hz: self.frequency_hz(l) })
-                })
+                .map(|l| self.model(chart, p, &parts, l))
                 .collect::<Result<_, FitError>>()?;
             ajb.iter_mut().zip(shift(2).added_to(&model)).for_each(|(y, more)| *y -= more);
         }
@@ -209,6 +206,18 @@ impl Problem {
             .collect()
     }
 
+    /// The assembly's admittance at a line, by Eq. (1).
+    fn model(
+        &self,
+        chart: &Chart,
+        p: &DVector<f64>,
+        parts: &[Vec<Line>; 2],
+        l: usize,
+    ) -> Result<Line, FitError> {
+        (self.layout.assembly(&chart.at(p, self.s[l], false), [&parts[0][l], &parts[1][l]]))
+            .ok_or(FitError::Singular { frequency_hz: self.frequency_hz(l) })
+    }
+
     pub(super) fn predict(
         &self,
         chart: &Chart,
@@ -233,11 +242,7 @@ impl Problem {
         let mut sum = DMatrix::zeros(2 * self.entries(), 1);
         let share = 1.0 / band.len() as f64;
         for l in band {
-            let model = self
-                .layout
-                .assembly(&chart.at(p, self.s[l], false), [&data.parts[0][l], &data.parts[1][l]])
-                .ok_or(FitError::Singular { frequency_hz: self.frequency_hz(l) })?;
-            let difference = &data.ajb[l] - model - &data.bias[l];
+            let difference = &data.ajb[l] - self.model(chart, p, &data.parts, l)? - &data.bias[l];
             self.add_measured(sum.as_mut_slice(), &difference, share);
         }
         Ok(sum)
