@@ -41,6 +41,7 @@ mod serial {
         pub(crate) trait SerialSlice<T> {
             fn par_chunks(&self, size: usize) -> std::slice::Chunks<'_, T>;
             fn par_chunks_mut(&mut self, size: usize) -> std::slice::ChunksMut<'_, T>;
+            fn par_iter_mut(&mut self) -> std::slice::IterMut<'_, T>;
         }
 
         impl<T> SerialSlice<T> for [T] {
@@ -50,6 +51,10 @@ mod serial {
 
             fn par_chunks_mut(&mut self, size: usize) -> std::slice::ChunksMut<'_, T> {
                 self.chunks_mut(size)
+            }
+
+            fn par_iter_mut(&mut self) -> std::slice::IterMut<'_, T> {
+                self.iter_mut()
             }
         }
 

@@ -73,7 +73,7 @@ fn records(folder: &Path) -> Outcome {
         let origin_s = Pulse::locate(force).ok_or("no pulse")?.start as f64 / records.fs_hz;
         let (mut f, mut x) = (vec![0.0; samples], vec![0.0; samples]);
         window.force_into(force, &decay, origin_s, &mut f);
-        window.response_into(&responses[0], &decay, origin_s, &mut x);
+        window.of_response(&decay, origin_s).response_into(&responses[0], 0, &mut x);
         for x in &mut x {
             *x *= 1e4;
         }

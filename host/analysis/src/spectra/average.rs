@@ -2,16 +2,20 @@
 
 use super::SpectraError;
 use super::cross_spectra::{CrossSpectra, OutputSums};
-use super::half_length::{HalfLength, Lines, check_finite};
+use super::half_length::{HalfLength, Lines, Put, check_finite};
 use super::jackknife;
 use super::lent::Lent;
+use super::order::Order;
 use crate::parallel::{self, prelude::*};
 use crate::vectors::wide;
-use bytemuck::zeroed_vec;
+use bytemuck::{cast_slice, cast_slice_mut};
 use num_complex::Complex;
-use std::mem::take;
 use std::ops::Range;
 use std::sync::Arc;
+
+/// Hits that are added together: enough that no core waits for another, few enough that their force spectra are small beside
+/// the records.
+const TOGETHER: usize = 8;
 
 /// Sums of spectra over the hits so far.
 pub struct SpectraAverage {
@@ -19,56 +23,73 @@ pub struct SpectraAverage {
     samples: usize,
     transform: Arc<HalfLength>,
     hits: usize,
+    /// In the transform's order, as all sums are.
     s_ff: Vec<f64>,
+    /// Every line.
+    all: Order,
     /// The lines that the outputs' sums hold.
-    lines: Range<usize>,
+    band: Order,
     outputs: Vec<Output>,
     failed: Option<SpectraError>,
     keep_hits: bool,
     kept_force: Vec<Vec<Complex<f64>>>,
 }
 
-/// A response and its sums.
+/// A response and its sums, in lent memory: they live as long as one cell's average.
 struct Output {
-    s_xf: Vec<Complex<f64>>,
-    s_xx: Vec<f64>,
-    kept: Vec<Vec<Complex<f64>>>,
+    s_xf: Lent,
+    /// Two real numbers in each complex one.
+    s_xx: Lent,
+    /// The lines of every hit, one after the other, where they are kept.
+    kept: Vec<Complex<f64>>,
 }
 
 impl Output {
     fn of(lines: usize) -> Self {
-        // zeros from the system: whoever sums first touches them first, on every core
-        Output { s_xf: zeroed_vec(lines), s_xx: zeroed_vec(lines), kept: Vec::new() }
-    }
-
-    /// Keeps the lines of one hit's response.
-    fn keep(&mut self, transform: &HalfLength, lines: &Range<usize>, response: &Lent) {
-        let mut own = vec![Complex::default(); lines.len()];
-        transform.put(response, lines.start, &mut own);
-        self.kept.push(own);
+        Output { s_xf: Lent::zeros(lines), s_xx: Lent::zeros(lines.div_ceil(2)), kept: Vec::new() }
     }
 }
 
-/// The sums that a hit's lines enter, from line `first` on, and its force at every line.
+/// The sums that the lines of a hit enter, and its force at every line.
 struct Sums<'a> {
-    first: usize,
+    all: &'a Order,
+    band: &'a Order,
     output: &'a mut Output,
     force: &'a [Complex<f64>],
+    /// Where the hit's lines begin in what is kept.
+    keep_from: Option<usize>,
 }
 
 impl Lines for Sums<'_> {
     #[inline]
-    fn take(&mut self, lines: Range<usize>, values: impl Iterator<Item = Complex<f64>>) {
-        let place = lines.start - self.first..lines.end - self.first;
-        let (s_xf, s_xx) = (&mut self.output.s_xf[place.clone()], &mut self.output.s_xx[place]);
-        let force = &self.force[lines];
-        wide(|| {
-            for ((s_xf, s_xx), (x, f)) in s_xf.iter_mut().zip(s_xx).zip(values.zip(force)) {
-                *s_xf += x * f.conj();
-                *s_xx += x.norm_sqr();
-            }
-        });
+    fn take(&mut self, piece: usize, within: Range<usize>, values: impl Iterator<Item = Complex<f64>>) {
+        let place = self.band.places(piece, &within);
+        let Output { s_xf, s_xx, kept } = &mut *self.output;
+        let (s_xf, s_xx) = (&mut s_xf[place.clone()], &mut cast_slice_mut(s_xx)[place.clone()]);
+        let force = &self.force[self.all.places(piece, &within)];
+        let Some(from) = self.keep_from else {
+            return add(s_xf, s_xx, values, force);
+        };
+        let own = &mut kept[from..][place];
+        wide(|| own.iter_mut().zip(values).for_each(|(own, value)| *own = value));
+        add(s_xf, s_xx, own.iter().copied(), force);
     }
+}
+
+/// Adds the lines x of a response with those of its force to the sums.
+#[inline]
+fn add(
+    s_xf: &mut [Complex<f64>],
+    s_xx: &mut [f64],
+    x: impl Iterator<Item = Complex<f64>>,
+    force: &[Complex<f64>],
+) {
+    wide(|| {
+        for ((s_xf, s_xx), (x, f)) in s_xf.iter_mut().zip(s_xx).zip(x.zip(force)) {
+            *s_xf += x * f.conj();
+            *s_xx += x.norm_sqr();
+        }
+    });
 }
 
 fn add_power(sums: &mut [f64], spectrum: &[Complex<f64>]) {
@@ -89,24 +110,25 @@ impl SpectraAverage {
             samples,
             hits: 0,
             s_ff: vec![0.0; transform.lines()],
+            all: transform.order(0..transform.lines()),
+            band: transform.order(0..0),
             transform,
-            lines: 0..0,
             outputs: Vec::new(),
             failed: None,
             keep_hits: false,
             kept_force: Vec::new(),
         };
-        let frequency_hz = average.frequency_hz();
+        let frequency_hz: Vec<f64> = average.all.lines().map(|l| average.frequency_hz(l)).collect();
         let from = frequency_hz.partition_point(|f| *f < low_hz);
         let to = frequency_hz.partition_point(|f| *f <= high_hz).max(from);
-        average.lines = from..to;
-        average.outputs = (0..outputs).map(|_| Output::of(to - from)).collect();
+        average.band = average.transform.order(from..to);
+        average.outputs = (0..outputs).into_par_iter().map(|_| Output::of(to - from)).collect();
         average
     }
 
-    /// Frequency of every line, Hz.
-    fn frequency_hz(&self) -> Vec<f64> {
-        (0..self.s_ff.len()).map(|l| l as f64 * self.fs_hz / self.samples as f64).collect()
+    /// Frequency of a line, Hz.
+    fn frequency_hz(&self, line: usize) -> f64 {
+        line as f64 * self.fs_hz / self.samples as f64
     }
 
     /// Keeps the spectra of every hit, so that `finish` can leave each out in turn: hits × channels × lines complex numbers.
@@ -131,7 +153,10 @@ impl SpectraAverage {
             // before anything is summed: a refused hit leaves the average as it was
             check_finite(signal)?;
         }
-        self.add_with(|out| out.copy_from_slice(force_n), |o, out| out.copy_from_slice(&responses[o]))
+        let response = |o: usize, first: usize, out: &mut [f64]| {
+            out.copy_from_slice(&responses[o][first..first + out.len()]);
+        };
+        self.add_with(|out| out.copy_from_slice(force_n), response)
     }
 
     /// Adds one hit whose windowed force and responses (by output) are written straight into the transforms' memory, which
@@ -142,12 +167,12 @@ impl SpectraAverage {
     pub fn add_with(
         &mut self,
         force: impl Fn(&mut [f64]) + Sync,
-        response: impl Fn(usize, &mut [f64]) + Sync,
+        response: impl Fn(usize, usize, &mut [f64]) + Sync,
     ) -> Result<(), SpectraError> {
-        self.add_hits(&[()], |(), out| force(out), |(), o, out| response(o, out))
+        self.add_hits(&[()], |(), out| force(out), |(), o, first, out| response(o, first, out))
     }
 
-    /// Adds several hits at once, which keeps every core busy and costs the memory of their force spectra. The windowed force
+    /// Adds many hits, which keeps every core busy. The windowed force
     /// and responses (by output) of a hit are written straight into the transforms' memory, which holds other values before.
     ///
     /// # Errors
@@ -157,7 +182,7 @@ impl SpectraAverage {
         &mut self,
         hits: &[H],
         force: impl Fn(&H, &mut [f64]) + Sync,
-        response: impl Fn(&H, usize, &mut [f64]) + Sync,
+        response: impl Fn(&H, usize, usize, &mut [f64]) + Sync,
     ) -> Result<(), SpectraError> {
         if let Some(error) = &self.failed {
             return Err(error.clone());
@@ -173,44 +198,52 @@ impl SpectraAverage {
         &mut self,
         hits: &[H],
         force: impl Fn(&H, &mut [f64]) + Sync,
-        response: impl Fn(&H, usize, &mut [f64]) + Sync,
+        response: impl Fn(&H, usize, usize, &mut [f64]) + Sync,
     ) -> Result<(), SpectraError> {
-        let (transform, lines, keep) = (&*self.transform, &self.lines, self.keep_hits);
-        let forces = hits.par_iter().map(|hit| {
-            let spectrum = transform.transform(|out| force(hit, out))?;
-            let mut own = Lent::of(transform.lines());
-            transform.put(&spectrum, 0, &mut own);
-            Ok(own)
-        });
-        let forces = forces.collect::<Result<Vec<Lent>, SpectraError>>()?;
-        // one hit by itself comes of a loop over cells, which keeps every core busy
-        let at_least = if hits.len() == 1 { self.outputs.len() } else { 1 };
-        let outputs = self.outputs.par_chunks_mut(1).enumerate().with_min_len(at_least);
-        let summed = outputs.map(|(o, output)| {
-            for (hit, force) in hits.iter().zip(&forces) {
-                let spectrum = transform.transform(|out| response(hit, o, out))?;
-                for output in &mut *output {
-                    let mut sums = Sums { first: lines.start, output, force };
-                    transform.read(&spectrum, lines.clone(), &mut sums);
+        for hits in hits.chunks(TOGETHER) {
+            let forces = hits
+                .par_iter()
+                .map(|hit| self.force_of(|out| force(hit, out)))
+                .collect::<Result<Vec<_>, _>>()?;
+            // one hit by itself comes of a loop over cells, which keeps every core busy
+            let at_least = if hits.len() == 1 { self.outputs.len() } else { 1 };
+            let (transform, all, band, keep) = (&*self.transform, &self.all, &self.band, self.keep_hits);
+            let outputs = self.outputs.par_iter_mut().enumerate().with_min_len(at_least);
+            let summed = outputs.map(|(o, output)| {
+                for (hit, force) in hits.iter().zip(&forces) {
+                    let keep_from = keep.then_some(output.kept.len());
                     if keep {
-                        output.keep(transform, lines, &spectrum);
+                        output.kept.resize(output.kept.len() + band.len(), Complex::default());
                     }
+                    let fill = |first: usize, out: &mut [f64]| response(hit, o, first, out);
+                    transform.transform(fill, band, &mut Sums { all, band, output, force, keep_from })?;
                 }
+                Ok(())
+            });
+            summed.collect::<Result<(), SpectraError>>()?;
+            let share = self.s_ff.len().div_ceil(parallel::threads()).max(1);
+            self.s_ff.par_chunks_mut(share).enumerate().for_each(|(part, sums)| {
+                for force in &forces {
+                    add_power(sums, &force[part * share..]);
+                }
+            });
+            if keep {
+                self.kept_force.extend(forces.iter().map(|force| all.only(band, force)));
             }
-            Ok(())
-        });
-        summed.collect::<Result<(), SpectraError>>()?;
-        let share = self.s_ff.len().div_ceil(parallel::threads()).max(1);
-        self.s_ff.par_chunks_mut(share).enumerate().for_each(|(part, sums)| {
-            for force in &forces {
-                add_power(sums, &force[part * share..]);
-            }
-        });
-        if keep {
-            self.kept_force.extend(forces.iter().map(|force| force[lines.clone()].to_vec()));
+            self.hits += hits.len();
         }
-        self.hits += hits.len();
         Ok(())
+    }
+
+    /// The spectrum of a force, at every line in the transform's order.
+    fn force_of(&self, force: impl Fn(&mut [f64])) -> Result<Lent, SpectraError> {
+        let mut windowed = Lent::of(self.samples.div_ceil(2));
+        let windowed: &mut [f64] = &mut cast_slice_mut(&mut windowed)[..self.samples];
+        force(windowed);
+        let fill = |first: usize, out: &mut [f64]| out.copy_from_slice(&windowed[first..first + out.len()]);
+        let mut own = Lent::of(self.all.len());
+        self.transform.transform(fill, &self.all, &mut Put { order: &self.all, out: &mut own })?;
+        Ok(own)
     }
 
     /// The spectra on s = σ + iω, where σ is the damping of the window that the signals went through.
@@ -220,35 +253,21 @@ impl SpectraAverage {
     /// # Errors
     /// When no hit was added, or adding one failed half way.
     pub fn finish(&self, sigma_per_s: f64, delay_s: &[f64]) -> Result<CrossSpectra, SpectraError> {
-        let sums = self.outputs.iter().map(|output| (output.s_xf.clone(), output.s_xx.clone()));
-        self.spectra(sums.collect(), sigma_per_s, delay_s)
-    }
-
-    /// As [`SpectraAverage::finish`] of an average to which nothing more is added: its sums are not copied.
-    ///
-    /// # Errors
-    /// As of `finish`.
-    pub fn finished(mut self, sigma_per_s: f64, delay_s: &[f64]) -> Result<CrossSpectra, SpectraError> {
-        let sums = self.outputs.iter_mut().map(|output| (take(&mut output.s_xf), take(&mut output.s_xx)));
-        let sums = sums.collect();
-        self.spectra(sums, sigma_per_s, delay_s)
-    }
-
-    /// Of the outputs' sums.
-    fn spectra(
-        &self,
-        sums: Vec<(Vec<Complex<f64>>, Vec<f64>)>,
-        sigma_per_s: f64,
-        delay_s: &[f64],
-    ) -> Result<CrossSpectra, SpectraError> {
         if let Some(error) = &self.failed {
             return Err(error.clone());
         }
-        let frequency_hz = self.frequency_hz()[self.lines.clone()].to_vec();
         let delay_s_of = |o: usize| delay_s.get(o).copied().unwrap_or(0.0);
-        let outputs = sums.into_iter().enumerate();
-        let outputs = outputs.map(|(o, (s_xf, s_xx))| OutputSums { s_xf, s_xx, delay_s: delay_s_of(o) });
-        let (s_ff, outputs) = (self.s_ff[self.lines.clone()].to_vec(), outputs.collect());
+        let outputs = self.outputs.par_iter().enumerate().map(|(o, output)| OutputSums {
+            s_xf: self.band.by_line(&output.s_xf),
+            s_xx: self.band.by_line(&cast_slice(&output.s_xx)[..self.band.len()]),
+            delay_s: delay_s_of(o),
+        });
+        let outputs = outputs.collect();
+        let (frequency_hz, s_ff) = (
+            self.band.lines().map(|l| self.frequency_hz(l)).collect(),
+            self.all.only(&self.band, &self.s_ff),
+        );
+        let s_ff = self.band.by_line(&s_ff);
         let spectra = CrossSpectra::new(self.fs_hz, frequency_hz, sigma_per_s, self.hits, s_ff, outputs)?;
         Ok(spectra.with_jackknife(self.keep_hits.then(|| self.jackknife(sigma_per_s, delay_s))))
     }
@@ -258,24 +277,33 @@ impl SpectraAverage {
     /// # Errors
     /// As of [`SpectraAverage::finish`].
     pub fn force(&self, sigma_per_s: f64) -> Result<CrossSpectra, SpectraError> {
-        let s_ff = self.s_ff.clone();
-        CrossSpectra::new(self.fs_hz, self.frequency_hz(), sigma_per_s, self.hits, s_ff, Vec::new())
+        let frequency_hz = self.all.lines().map(|l| self.frequency_hz(l)).collect();
+        CrossSpectra::new(
+            self.fs_hz,
+            frequency_hz,
+            sigma_per_s,
+            self.hits,
+            self.all.by_line(&self.s_ff),
+            Vec::new(),
+        )
     }
 
     /// Variance by leaving out each hit in turn, \[line\]\[output\].
     fn jackknife(&self, sigma_per_s: f64, delay_s: &[f64]) -> Vec<Vec<f64>> {
-        (0..self.lines.len())
+        let variance: Vec<Vec<f64>> = (0..self.band.len())
             .into_par_iter()
             .map(|l| {
                 let force: Vec<_> = self.kept_force.iter().map(|f| f[l]).collect();
                 let of_output = |(o, output): (usize, &Output)| {
-                    let response: Vec<_> = output.kept.iter().map(|x| x[l]).collect();
+                    let response: Vec<_> =
+                        (0..self.hits).map(|hit| output.kept[hit * self.band.len() + l]).collect();
                     // |e^(sτ)|², for the advance that H is multiplied with
                     let gain = (2.0 * sigma_per_s * delay_s.get(o).copied().unwrap_or(0.0)).exp();
                     gain * jackknife::variance_of_part(&force, &response)
                 };
                 self.outputs.iter().enumerate().map(of_output).collect()
             })
-            .collect()
+            .collect();
+        self.band.by_line(&variance)
     }
 }

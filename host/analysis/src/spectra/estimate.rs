@@ -5,7 +5,7 @@ use super::average::SpectraAverage;
 use super::cross_spectra::CrossSpectra;
 use super::impact_records::ImpactRecords;
 use super::pulse::Pulse;
-use super::window::{Decay, Windowing};
+use super::window::{Decay, ResponseWeighting, Windowing};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -85,9 +85,10 @@ impl Summing {
             return Err(SpectraError::Samples { found: odd.len(), expected: self.samples });
         }
         let (window, decay) = (&self.windowing, &self.decay);
+        let weighting = window.of_response(decay, origin_s);
         self.average.add_with(
             |out| window.force_into(force_n, decay, origin_s, out),
-            |o, out| window.response_into(responses[o], decay, origin_s, out),
+            |o, first, out| weighting.response_into(responses[o], first, out),
         )
     }
 
@@ -108,15 +109,12 @@ impl Summing {
     }
 }
 
-/// Hits that are added together: enough that no core waits for another, few enough that their force spectra are small beside
-/// the records.
-const AT_ONCE: usize = 8;
-
 /// A hit that is used.
 struct Hit<'r> {
     force: &'r [f64],
     responses: &'r [Vec<f64>],
     origin_s: f64,
+    weighting: ResponseWeighting<'r>,
 }
 
 /// Auto- and cross-spectra over those hits of `records` for which `used` is true.
@@ -128,7 +126,7 @@ pub fn estimate(
     used: &[bool],
     settings: &FrfSettings,
 ) -> Result<CrossSpectra, SpectraError> {
-    summed(records, used, settings)?.finished(settings.windowing.sigma_per_s, &settings.delay_s)
+    summed(records, used, settings)?.finish(settings.windowing.sigma_per_s, &settings.delay_s)
 }
 
 /// The sums that [`estimate`] makes its spectra of.
@@ -170,14 +168,12 @@ pub(super) fn summed(
                 Pulse::locate(force).ok_or(SpectraError::NoPulse { hit })?.start as f64 / records.fs_hz
             }
         };
-        hits.push(Hit { force, responses, origin_s });
+        hits.push(Hit { force, responses, origin_s, weighting: window.of_response(&decay, origin_s) });
     }
-    for hits in hits.chunks(AT_ONCE) {
-        average.add_hits(
-            hits,
-            |hit, out| window.force_into(hit.force, &decay, hit.origin_s, out),
-            |hit, o, out| window.response_into(&hit.responses[o], &decay, hit.origin_s, out),
-        )?;
-    }
+    average.add_hits(
+        &hits,
+        |hit, out| window.force_into(hit.force, &decay, hit.origin_s, out),
+        |hit, o, first, out| hit.weighting.response_into(&hit.responses[o], first, out),
+    )?;
     Ok(average)
 }

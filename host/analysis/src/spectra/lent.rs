@@ -25,6 +25,13 @@ impl Lent {
         drop(idle);
         Lent(piece.unwrap_or_else(|| vec![C::default(); count]))
     }
+
+    /// So many zeros.
+    pub(super) fn zeros(count: usize) -> Lent {
+        let mut own = Lent::of(count);
+        own.fill(C::default());
+        own
+    }
 }
 
 impl Drop for Lent {

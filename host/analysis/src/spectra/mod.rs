@@ -7,12 +7,14 @@
 
 pub mod average;
 pub mod cross_spectra;
+mod eighths;
 pub mod estimate;
 pub mod estimators;
 mod half_length;
 pub mod impact_records;
 pub mod jackknife;
 mod lent;
+mod order;
 pub mod pulse;
 pub mod usable_band;
 pub mod window;

@@ -123,24 +123,44 @@ impl Windowing {
         }
     }
 
-    /// Writes the windowed response (SI) of the same hit into `out`.
-    pub fn response_into(&self, response: &[f64], decay: &Decay, origin_s: f64, out: &mut [f64]) {
-        let kept = response.len().min(out.len());
+    /// How the responses of the same hit are weighted.
+    pub fn of_response<'d>(&self, decay: &'d Decay, origin_s: f64) -> ResponseWeighting<'d> {
+        let samples = decay.weights.len();
         // samples stay as they are without a window, and up to the origin where only the response is weighted
         let plain = match self.force_weighting {
-            _ if self.sigma_per_s == 0.0 => kept,
+            _ if self.sigma_per_s == 0.0 => samples,
             ForceWeighting::Exponential => 0,
             ForceWeighting::Rectangular => {
-                (0..kept).position(|i| i as f64 / decay.fs_hz > origin_s).unwrap_or(kept)
+                (0..samples).position(|i| i as f64 / decay.fs_hz > origin_s).unwrap_or(samples)
             }
         };
-        out[..plain].copy_from_slice(&response[..plain]);
-        let scale = (self.sigma_per_s * origin_s).exp();
-        let weights = &decay.weights[plain..kept];
-        for ((out, x), weight) in out[plain..kept].iter_mut().zip(&response[plain..kept]).zip(weights) {
-            *out = x * (scale * weight);
+        ResponseWeighting { weights: &decay.weights, plain, scale: (self.sigma_per_s * origin_s).exp() }
+    }
+}
+
+/// The window of a hit's responses.
+pub struct ResponseWeighting<'d> {
+    weights: &'d [f64],
+    /// Samples from the record's start that stay as they are.
+    plain: usize,
+    scale: f64,
+}
+
+impl ResponseWeighting<'_> {
+    /// Writes a windowed response (SI) from its sample `first` on into `out`; what `out` goes beyond the record (zero padding)
+    /// becomes 0.
+    pub fn response_into(&self, response: &[f64], first: usize, out: &mut [f64]) {
+        let kept = response.len().saturating_sub(first).min(out.len());
+        let plain = self.plain.saturating_sub(first).min(kept);
+        let (out, beyond) = out.split_at_mut(kept);
+        beyond.fill(0.0);
+        let (whole, weighted) = out.split_at_mut(plain);
+        let Some(response) = response.get(first..first + kept) else { return };
+        whole.copy_from_slice(&response[..plain]);
+        let values = response[plain..].iter().zip(&self.weights[first + plain..]);
+        for (out, (x, weight)) in weighted.iter_mut().zip(values) {
+            *out = x * (self.scale * weight);
         }
-        out[kept..].fill(0.0);
     }
 }
 
@@ -188,8 +208,16 @@ mod tests {
             ..Windowing::default()
         };
         let mut x = [9.0; 4];
-        w.response_into(&[1.0; 3], &w.decay(10.0, 3), 0.1, &mut x);
+        let decay = w.decay(10.0, 3);
+        let weighting = w.of_response(&decay, 0.1);
+        weighting.response_into(&[1.0; 3], 0, &mut x);
         assert_eq!((x[0], x[1], x[3]), (1.0, 1.0, 0.0));
         assert!((x[2] - (-1.0f64).exp()).abs() < 1e-15);
+        // any part of it is the same
+        for (first, end) in (0..=4).flat_map(|first| (first..=4).map(move |end| (first, end))) {
+            let mut part = vec![9.0; end - first];
+            weighting.response_into(&[1.0; 3], first, &mut part);
+            assert_eq!(part, x[first..end]);
+        }
     }
 }
