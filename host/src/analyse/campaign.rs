@@ -43,10 +43,11 @@ pub fn analyse_measurements<M: Measurements>(
         let planned = names.iter().filter(|c| c.configuration == structure).count();
         let own = of_configuration(&cells.averages, structure);
         let points = geometry.points(structure);
-        if wanted.frfs {
-            found.frfs.extend(Some(structure).zip(everything(points, own, measurements.quantity())));
-        }
-        let one = configuration_stage::of(measurements, structure, points, own, planned);
+        let (one, whole) = rayon::join(
+            || configuration_stage::of(measurements, structure, points, own, planned),
+            || wanted.frfs.then(|| everything(points, own, measurements.quantity())).flatten(),
+        );
+        found.frfs.extend(Some(structure).zip(whole));
         found.missing.extend(one.missing);
         found.configurations.push(one.measured);
         one.frf

@@ -101,7 +101,8 @@ fn by_line(array: &Array<f64>, rows: usize, columns: usize) -> Vec<DMatrix<f64>>
 /// # Errors
 /// [`NpzError::Write`].
 pub fn write_frf(path: &Path, frf: &Frf, extras: &[Extra]) -> Result<(), NpzError> {
-    let mut out = NpzOutput::create(path)?;
+    // every bit of an FRF's numbers is in use: two of three files would grow
+    let mut out = NpzOutput::create(path)?.unpacked();
     out.real("frequency", &[frf.frequency_hz().len()], frf.frequency_hz())?;
     let (lines, rows, columns) = shape(frf);
     out.complex("frf", &[lines, rows, columns], &in_c_order(frf.lines()))?;

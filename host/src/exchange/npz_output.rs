@@ -7,13 +7,14 @@ use num_complex::Complex;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
-use zip::ZipWriter;
+use zip::{CompressionMethod, ZipWriter};
 use zip::write::SimpleFileOptions;
 
 /// An npz file being written.
 pub struct NpzOutput {
     path: PathBuf,
     archive: ZipWriter<BufWriter<File>>,
+    packing: CompressionMethod,
 }
 
 impl NpzOutput {
@@ -23,7 +24,14 @@ impl NpzOutput {
     /// [`NpzError::Write`].
     pub fn create(path: &Path) -> Result<Self, NpzError> {
         let file = File::create(path).map_err(|source| NpzError::Write { path: path.into(), source })?;
-        Ok(NpzOutput { path: path.into(), archive: ZipWriter::new(BufWriter::new(file)) })
+        let archive = ZipWriter::new(BufWriter::new(file));
+        Ok(NpzOutput { path: path.into(), archive, packing: CompressionMethod::Deflated })
+    }
+
+    /// As numpy's `savez` writes it, for numbers that deflating would hardly make smaller.
+    #[must_use]
+    pub fn unpacked(self) -> Self {
+        NpzOutput { packing: CompressionMethod::Stored, ..self }
     }
 
     /// Adds a float64 array in C order.
@@ -63,8 +71,9 @@ impl NpzOutput {
         // A fixed date keeps files of the same content identical.
         let options = SimpleFileOptions::default()
             .last_modified_time(zip::DateTime::default())
+            .compression_method(self.packing)
             // records are the bulk: the usual effort takes two and a half times as long for half the size
-            .compression_level(Some(1))
+            .compression_level((self.packing == CompressionMethod::Deflated).then_some(1))
             .large_file(shape.iter().product::<u64>() > 100_000_000);
         let dtype = DType::new_scalar(kind.parse().expect("type strings above are numpy's own"));
         let archive = &mut self.archive;

@@ -24,7 +24,7 @@ struct Dyad<'a> {
     source: &'a Source<'a>,
     /// Whether it belongs to h* instead of g.
     conjugate: bool,
-    /// Degree of freedom × row.
+    /// Row × degree of freedom.
     left: Line,
     /// Column × degree of freedom.
     right: Line,
@@ -39,14 +39,14 @@ impl<'a> Dyads<'a> {
     pub(super) fn linear(&mut self, source: &'a Source<'a>, l: &Line, r: &Line) {
         let left = source.t_l.map_or_else(|| l.clone(), |t| product(l, t));
         let right = source.t_r.map_or_else(|| r.clone(), |t| product(t, r));
-        self.0.push(Dyad { source, conjugate: false, left, right });
+        self.0.push(Dyad { source, conjugate: false, left: left.transpose(), right });
     }
 
     /// X δAᴴ W.
     fn adjoint(&mut self, source: &'a Source<'a>, x: &Line, w: &Line) {
         let rows = source.t_l.map_or_else(|| w.clone(), |t| product(&t.transpose(), w));
         let columns = source.t_r.map_or_else(|| x.clone(), |t| product(x, &t.transpose()));
-        self.0.push(Dyad { source, conjugate: true, left: rows.adjoint(), right: columns.adjoint() });
+        self.0.push(Dyad { source, conjugate: true, left: rows.conjugate(), right: columns.adjoint() });
     }
 
     /// L δ(A⁺) R.
@@ -78,16 +78,25 @@ impl<'a> Dyads<'a> {
             for (d, (factor, sums)) in factors.iter().zip(&mut sums).enumerate() {
                 let of_k = factor * C::new(1.0, tau);
                 for column in places.chunk_by(|a, b| a.0 == b.0) {
-                    for g in &mut g {
+                    // most dyads are none of h*
+                    let mixed = column.iter().any(|(_, dyad, _)| dyad.conjugate);
+                    for g in &mut g[..1 + usize::from(mixed)] {
                         g.fill(C::default());
                     }
                     for (_, dyad, j) in column {
                         let (to, right) = (&mut g[usize::from(dyad.conjugate)], dyad.right[(*j, d)]);
-                        for (&row, left) in dyad.source.rows.iter().zip(dyad.left.row(d).iter()) {
+                        for (&row, left) in dyad.source.rows.iter().zip(&dyad.left.column(d)) {
                             to[row] += left * right;
                         }
                     }
                     let variance = variance.column(column[0].0);
+                    if !mixed {
+                        let moved = g[0].iter().zip(&variance).filter(|(g, _)| **g != C::default());
+                        let sum: f64 = moved.map(|(g, v)| g.norm_sqr() * v).sum();
+                        sums[0] += of_k.norm_sqr() * sum;
+                        sums[1] += factor.norm_sqr() * sum;
+                        continue;
+                    }
                     for ((g, h), v) in g[0].iter().zip(&g[1]).zip(variance.iter()) {
                         // a cell that does not count may be unknown
                         if *g != C::default() || *h != C::default() {
