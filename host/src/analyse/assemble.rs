@@ -7,7 +7,7 @@
 
 use super::averages::CellAverage;
 use crate::frf::Frf;
-use crate::spectra::MotionQuantity;
+use crate::spectra::{CrossSpectra, MotionQuantity};
 use crate::structure::Structure;
 use crate::substructuring::geometry::{Configuration, Grouping, Point};
 use nalgebra::DMatrix;
@@ -16,7 +16,7 @@ use num_complex::Complex;
 /// What came of a configuration.
 #[derive(Debug)]
 pub struct Assembled {
-    /// H1 with its variance and coherence, if anything was measured; NaN where nothing was.
+    /// H1 with its variance, if anything was measured; NaN where nothing was.
     pub measured: Option<Frf>,
     /// Impacts that had to be left out because cells are missing.
     pub impacts_left_out: Vec<String>,
@@ -87,14 +87,31 @@ pub fn assemble(
     let channels: Vec<usize> = (0..points.channels.len())
         .filter(|c| kept_locations.iter().any(|l| locations[*l] == points.channels[*c].name))
         .collect();
-    let measured = measured(points, &channels, &impacts, cells, quantity);
+    let measured = measured(points, &channels, &impacts, cells, quantity).map(|(frf, _)| frf);
     Assembled { measured, impacts_left_out, responses_left_out }
 }
 
 /// H1 of every pair of the geometry with its variance and coherence, measured or not; none where nothing was measured.
 pub fn everything(points: &Configuration, cells: &[CellAverage], quantity: MotionQuantity) -> Option<Frf> {
     let all = |count: usize| (0..count).collect::<Vec<_>>();
-    measured(points, &all(points.channels.len()), &all(points.impacts.len()), cells, quantity)
+    let (channels, impacts) = (all(points.channels.len()), all(points.impacts.len()));
+    let (frf, averages) = measured(points, &channels, &impacts, cells, quantity)?;
+    let mut coherence =
+        vec![DMatrix::from_element(channels.len(), impacts.len(), f64::NAN); frf.lines().len()];
+    for Average { row, column, spectra, axis } in averages {
+        for (line, coherence) in coherence.iter_mut().enumerate() {
+            coherence[(row, column)] = spectra.coherence(line, axis);
+        }
+    }
+    Some(frf.with_coherence(coherence).expect("one of each was made for every value"))
+}
+
+/// What one value of a matrix is of.
+struct Average<'c> {
+    row: usize,
+    column: usize,
+    spectra: &'c CrossSpectra,
+    axis: usize,
 }
 
 /// How many hits each FRF of [`everything`] is the average of, outputs × inputs; 0 where there is none.
@@ -105,40 +122,36 @@ pub fn hits(points: &Configuration, cells: &[CellAverage]) -> DMatrix<usize> {
     })
 }
 
-/// The FRFs of these channels and impacts, with their noise.
-fn measured(
+/// The FRFs of these channels and impacts with their noise, and what they are of.
+fn measured<'c>(
     points: &Configuration,
     channels: &[usize],
     impacts: &[usize],
-    cells: &[CellAverage],
+    cells: &'c [CellAverage],
     quantity: MotionQuantity,
-) -> Option<Frf> {
+) -> Option<(Frf, Vec<Average<'c>>)> {
     let first = &cells.first()?.spectra;
     if channels.is_empty() || impacts.is_empty() {
         return None;
     }
     let (rows, columns) = (channels.len(), impacts.len());
+    let mut averages = Vec::new();
+    for (column, i) in impacts.iter().enumerate() {
+        for (row, c) in channels.iter().enumerate() {
+            let Some(cell) = find(cells, &points.impacts[*i], &points.channels[*c].name) else { continue };
+            let (spectra, axis) = (&cell.spectra, component(points, *c));
+            if spectra.lines() == first.lines() && axis < spectra.outputs() {
+                averages.push(Average { row, column, spectra, axis });
+            }
+        }
+    }
     let hole = Complex::new(f64::NAN, f64::NAN);
     let mut lines = vec![DMatrix::from_element(rows, columns, hole); first.lines()];
     let mut variance = vec![DMatrix::from_element(rows, columns, f64::NAN); first.lines()];
-    let mut coherence = variance.clone();
-    for (column, i) in impacts.iter().enumerate() {
-        for (row, c) in channels.iter().enumerate() {
-            let channel = &points.channels[*c];
-            let Some(cell) = find(cells, &points.impacts[*i], &channel.name) else { continue };
-            let y = &cell.spectra;
-            if y.lines() != first.lines() {
-                continue;
-            }
-            let axis = component(points, *c);
-            if axis >= y.outputs() {
-                continue;
-            }
-            for line in 0..first.lines() {
-                lines[line][(row, column)] = y.h1(line, axis);
-                variance[line][(row, column)] = y.variance(line, axis);
-                coherence[line][(row, column)] = y.coherence(line, axis);
-            }
+    for Average { row, column, spectra, axis } in &averages {
+        for line in 0..first.lines() {
+            lines[line][(*row, *column)] = spectra.h1(line, *axis);
+            variance[line][(*row, *column)] = spectra.variance(line, *axis);
         }
     }
     let (outputs, inputs) = (points.output_names(), points.input_names());
@@ -150,8 +163,10 @@ fn measured(
         impacts.iter().map(|i| inputs[*i].clone()).collect(),
         lines,
     );
-    let whole = frf.and_then(|frf| frf.with_variance(variance)?.with_coherence(coherence));
-    Some(whole.expect("the geometry's names differ, and there is one matrix for each line of the first cell"))
+    let whole = frf.and_then(|frf| frf.with_variance(variance));
+    let whole =
+        whole.expect("the geometry's names differ, and there is one matrix for each line of the first cell");
+    Some((whole, averages))
 }
 
 /// Which of its location's channels this one is: records hold them in the geometry's order.

@@ -77,15 +77,18 @@ pub fn analyse_measurements<M: Measurements>(
         (found.recommended, found.bootstrap) = (estimates, bootstrap);
         found.missing.extend(missing);
     }
-    if let [Some(a), Some(b), Some(ajb)] = frfs {
+    let fit = || {
+        let [Some(a), Some(b), Some(ajb)] = frfs else { return Vec::new() };
         let options =
             fit::Options { priors: measurements.contact_priors().positions, ..fit::Options::default() };
-        found.fits = fit_of_the_main_band([a, b, ajb], geometry, &options);
-    }
+        fit_of_the_main_band([a, b, ajb], geometry, &options)
+    };
+    // where one waits for a core the other does not
+    let (fits, own) = rayon::join(fit, || contact_answer::answer(measurements, &cells.averages));
+    found.fits = fits;
     let fitted: Vec<_> = found.fits.iter().filter_map(|fit| Some(fit.outcome.as_ref().ok()?.row())).collect();
     let rows = found.substructured.iter().flat_map(|s| &s.rows).map(|row| &row.joint).chain(&fitted);
     let fbs = between_the_arms(&found.recommended, rows);
-    let own = contact_answer::answer(measurements, &cells.averages);
     let (contact, missing) = contact_stage::at_the_contact(measurements, &cells, fbs.as_ref(), own.as_ref());
     found.missing.extend(missing);
     found.contact = Some(contact);
