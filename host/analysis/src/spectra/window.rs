@@ -6,6 +6,7 @@
 //! differs by a factor of about 1 + σ·0.2 ms, and the offset of t₀ from the pulse adds to it. Both are here, because
 //! records processed elsewhere must be reproducible.
 
+use crate::vectors::wide;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -51,10 +52,46 @@ impl Default for Windowing {
 }
 
 /// e^(−σ i/fs) of every sample i: made once for all channels and hits of one rate and length.
+///
+/// A weight is the product of its run's and of its place in the run, so that the cache next to the core holds what all of them are made of.
 #[derive(Debug, Clone)]
 pub struct Decay {
     fs_hz: f64,
-    weights: Vec<f64>,
+    samples: usize,
+    /// Of the first sample of every run.
+    runs: Vec<f64>,
+    /// Of the samples of a run from its first on.
+    places: Vec<f64>,
+}
+
+/// Samples in a run.
+const RUN: usize = 512;
+
+impl Decay {
+    fn of(sigma_per_s: f64, fs_hz: f64, samples: usize) -> Decay {
+        let weight = |i: usize| (-sigma_per_s * (i as f64 / fs_hz)).exp();
+        let runs = (0..samples.div_ceil(RUN)).map(|run| weight(run * RUN)).collect();
+        Decay { fs_hz, samples, runs, places: (0..RUN).map(weight).collect() }
+    }
+
+    fn weight(&self, i: usize) -> f64 {
+        self.runs[i / RUN] * self.places[i % RUN]
+    }
+
+    /// Writes the samples `x` from `first` on, times their weights and `scale`.
+    fn weigh(&self, x: &[f64], first: usize, scale: f64, out: &mut [f64]) {
+        let (mut x, mut out, mut first) = (x, out, first);
+        while !x.is_empty() {
+            let (run, place) = (first / RUN, first % RUN);
+            let count = x.len().min(RUN - place);
+            let (own, rest) = x.split_at(count);
+            let (to, rest_of_out) = out.split_at_mut(count);
+            let (scale, places) = (scale * self.runs[run], &self.places[place..place + count]);
+            let weighted = own.iter().zip(places).map(|(x, place)| x * (scale * place));
+            wide(|| to.iter_mut().zip(weighted).for_each(|(out, x)| *out = x));
+            (x, out, first) = (rest, rest_of_out, first + count);
+        }
+    }
 }
 
 /// Weights that were asked for, by their damping: of one rate, length and damping they are the same for every cell of a campaign.
@@ -68,7 +105,7 @@ impl Windowing {
     pub(super) fn kept_decay(&self, fs_hz: f64, samples: usize) -> Arc<Decay> {
         let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
         let fits = |(sigma_per_s, decay): &&(f64, Arc<Decay>)| {
-            *sigma_per_s == self.sigma_per_s && decay.fs_hz == fs_hz && decay.weights.len() == samples
+            *sigma_per_s == self.sigma_per_s && decay.fs_hz == fs_hz && decay.samples == samples
         };
         if let Some((_, decay)) = kept.iter().find(fits) {
             return decay.clone();
@@ -83,8 +120,7 @@ impl Windowing {
 
     /// The weights for records of `samples` samples.
     pub fn decay(&self, fs_hz: f64, samples: usize) -> Decay {
-        let weights = (0..samples).map(|i| (-self.sigma_per_s * (i as f64 / fs_hz)).exp()).collect();
-        Decay { fs_hz, weights }
+        Decay::of(self.sigma_per_s, fs_hz, samples)
     }
 
     /// Writes the windowed force (N) of a hit with its origin at `origin_s` from the record's start into `out`; what `out` is longer
@@ -100,7 +136,7 @@ impl Windowing {
         };
         let last = last.min(force_n.len()).min(out.len()).max(first);
         let weight = |i: usize| match self.force_weighting {
-            ForceWeighting::Exponential => scale * decay.weights[i],
+            ForceWeighting::Exponential => scale * decay.weight(i),
             ForceWeighting::Rectangular => scale,
         };
         let time = |i: &usize| *i as f64 / decay.fs_hz;
@@ -110,8 +146,7 @@ impl Windowing {
         let end = (guess..last).find(|i| time(i) > to).unwrap_or(last);
         match self.force_weighting {
             ForceWeighting::Exponential => {
-                let weighted = force_n[begin..end].iter().zip(&decay.weights[begin..end]);
-                out[begin..end].iter_mut().zip(weighted).for_each(|(out, (f, w))| *out = scale * w * f);
+                decay.weigh(&force_n[begin..end], begin, scale, &mut out[begin..end]);
             }
             ForceWeighting::Rectangular => {
                 out[begin..end].iter_mut().zip(&force_n[begin..end]).for_each(|(out, f)| *out = scale * f);
@@ -125,7 +160,7 @@ impl Windowing {
 
     /// How the responses of the same hit are weighted.
     pub fn of_response<'d>(&self, decay: &'d Decay, origin_s: f64) -> ResponseWeighting<'d> {
-        let samples = decay.weights.len();
+        let samples = decay.samples;
         // samples stay as they are without a window, and up to the origin where only the response is weighted
         let plain = match self.force_weighting {
             _ if self.sigma_per_s == 0.0 => samples,
@@ -134,13 +169,13 @@ impl Windowing {
                 (0..samples).position(|i| i as f64 / decay.fs_hz > origin_s).unwrap_or(samples)
             }
         };
-        ResponseWeighting { weights: &decay.weights, plain, scale: (self.sigma_per_s * origin_s).exp() }
+        ResponseWeighting { decay, plain, scale: (self.sigma_per_s * origin_s).exp() }
     }
 }
 
 /// The window of a hit's responses.
 pub struct ResponseWeighting<'d> {
-    weights: &'d [f64],
+    decay: &'d Decay,
     /// Samples from the record's start that stay as they are.
     plain: usize,
     scale: f64,
@@ -157,10 +192,7 @@ impl ResponseWeighting<'_> {
         let (whole, weighted) = out.split_at_mut(plain);
         let Some(response) = response.get(first..first + kept) else { return };
         whole.copy_from_slice(&response[..plain]);
-        let values = response[plain..].iter().zip(&self.weights[first + plain..]);
-        for (out, (x, weight)) in weighted.iter_mut().zip(values) {
-            *out = x * (self.scale * weight);
-        }
+        self.decay.weigh(&response[plain..], first + plain, self.scale, weighted);
     }
 }
 
@@ -218,6 +250,24 @@ mod tests {
             let mut part = vec![9.0; end - first];
             weighting.response_into(&[1.0; 3], first, &mut part);
             assert_eq!(part, x[first..end]);
+        }
+    }
+
+    #[test]
+    fn every_sample_has_its_weight() {
+        let w = Windowing { sigma_per_s: 40.0, ..Windowing::default() };
+        let decay = w.decay(1000.0, 1300);
+        for (first, end) in [(0, 1300), (511, 1025), (1299, 1300), (600, 600)] {
+            let mut out = vec![9.0; end - first];
+            decay.weigh(&vec![2.0; end - first], first, 3.0, &mut out);
+            for (i, out) in (first..end).zip(out) {
+                let exact = 6.0 * (-40.0 * i as f64 / 1000.0).exp();
+                // the exponents' rounding, and three products'
+                assert!(
+                    (out - exact).abs() < 1e-14 * exact && decay.weight(i) > 0.0,
+                    "{i}: {out} for {exact}"
+                );
+            }
         }
     }
 }

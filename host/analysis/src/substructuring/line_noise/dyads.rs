@@ -80,7 +80,7 @@ impl<'a> Dyads<'a> {
                 for column in places.chunk_by(|a, b| a.0 == b.0) {
                     // most dyads are none of h*
                     let mixed = column.iter().any(|(_, dyad, _)| dyad.conjugate);
-                    for g in &mut g[..1 + usize::from(mixed)] {
+                    for g in &mut g[..=usize::from(mixed)] {
                         g.fill(C::default());
                     }
                     for (_, dyad, j) in column {
