@@ -172,8 +172,8 @@ impl SpectraAverage {
         self.add_hits(&[()], |(), out| force(out), |(), o, first, out| response(o, first, out))
     }
 
-    /// Adds many hits, which keeps every core busy. The windowed force
-    /// and responses (by output) of a hit are written straight into the transforms' memory, which holds other values before.
+    /// Adds many hits, which keeps every core busy. The windowed force of a hit is written as a whole, its windowed responses by
+    /// output, from any sample on and as many as there is room for: straight into the transforms' memory, which holds other values before.
     ///
     /// # Errors
     /// A value that is not a number. Some responses of the hits may be in the sums then, so that the average is spent: this
@@ -256,18 +256,15 @@ impl SpectraAverage {
         if let Some(error) = &self.failed {
             return Err(error.clone());
         }
-        let delay_s_of = |o: usize| delay_s.get(o).copied().unwrap_or(0.0);
+        let band = &self.band;
         let outputs = self.outputs.par_iter().enumerate().map(|(o, output)| OutputSums {
-            s_xf: self.band.by_line(&output.s_xf),
-            s_xx: self.band.by_line(&cast_slice(&output.s_xx)[..self.band.len()]),
-            delay_s: delay_s_of(o),
+            s_xf: band.by_line(&output.s_xf),
+            s_xx: band.by_line(&cast_slice(&output.s_xx)[..band.len()]),
+            delay_s: delay_s.get(o).copied().unwrap_or(0.0),
         });
         let outputs = outputs.collect();
-        let (frequency_hz, s_ff) = (
-            self.band.lines().map(|l| self.frequency_hz(l)).collect(),
-            self.all.only(&self.band, &self.s_ff),
-        );
-        let s_ff = self.band.by_line(&s_ff);
+        let frequency_hz = band.lines().map(|l| self.frequency_hz(l)).collect();
+        let s_ff = band.by_line(&self.all.only(band, &self.s_ff));
         let spectra = CrossSpectra::new(self.fs_hz, frequency_hz, sigma_per_s, self.hits, s_ff, outputs)?;
         Ok(spectra.with_jackknife(self.keep_hits.then(|| self.jackknife(sigma_per_s, delay_s))))
     }

@@ -85,6 +85,8 @@ struct Points<S>(S);
 
 #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
 impl<S: Simd> Points<S> {
+    /// A processor that multiplies and adds in one step rounds once where another rounds twice, as in the transforms' library: the last
+    /// digit of a line depends on it.
     #[inline(always)]
     fn times(self, a: S::c64s, b: S::c64s) -> S::c64s {
         self.0.mul_e_c64s(a, b)
