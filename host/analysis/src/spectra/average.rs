@@ -17,6 +17,12 @@ use std::sync::Arc;
 /// the records.
 const TOGETHER: usize = 8;
 
+/// Writes the windowed force of a hit, by its number.
+pub type ForceOf<'a> = dyn Fn(usize, &mut [f64]) + Sync + 'a;
+
+/// Writes a windowed response of a hit, by the numbers of hit, output and first sample.
+pub type ResponseOf<'a> = dyn Fn(usize, usize, usize, &mut [f64]) + Sync + 'a;
+
 /// Sums of spectra over the hits so far.
 pub struct SpectraAverage {
     fs_hz: f64,
@@ -169,20 +175,20 @@ impl SpectraAverage {
         force: impl Fn(&mut [f64]) + Sync,
         response: impl Fn(usize, usize, &mut [f64]) + Sync,
     ) -> Result<(), SpectraError> {
-        self.add_hits(&[()], |(), out| force(out), |(), o, first, out| response(o, first, out))
+        self.add_hits(1, &|_, out| force(out), &|_, o, first, out| response(o, first, out))
     }
 
-    /// Adds many hits, which keeps every core busy. The windowed force of a hit is written as a whole, its windowed responses by
+    /// Adds `hits` hits, which keeps every core busy. The windowed force of a hit is written as a whole, its windowed responses by
     /// output, from any sample on and as many as there is room for: straight into the transforms' memory, which holds other values before.
     ///
     /// # Errors
     /// A value that is not a number. Some responses of the hits may be in the sums then, so that the average is spent: this
     /// and [`SpectraAverage::finish`] give the same error from then on.
-    pub fn add_hits<H: Sync>(
+    pub fn add_hits(
         &mut self,
-        hits: &[H],
-        force: impl Fn(&H, &mut [f64]) + Sync,
-        response: impl Fn(&H, usize, usize, &mut [f64]) + Sync,
+        hits: usize,
+        force: &ForceOf<'_>,
+        response: &ResponseOf<'_>,
     ) -> Result<(), SpectraError> {
         if let Some(error) = &self.failed {
             return Err(error.clone());
@@ -194,29 +200,28 @@ impl SpectraAverage {
         summed
     }
 
-    fn sum<H: Sync>(
+    fn sum(
         &mut self,
-        hits: &[H],
-        force: impl Fn(&H, &mut [f64]) + Sync,
-        response: impl Fn(&H, usize, usize, &mut [f64]) + Sync,
+        hits: usize,
+        force: &ForceOf<'_>,
+        response: &ResponseOf<'_>,
     ) -> Result<(), SpectraError> {
-        for hits in hits.chunks(TOGETHER) {
-            let forces = hits
-                .par_iter()
-                .map(|hit| self.force_of(|out| force(hit, out)))
-                .collect::<Result<Vec<_>, _>>()?;
+        for first in (0..hits).step_by(TOGETHER) {
+            let hits = first..hits.min(first + TOGETHER);
+            let forces = hits.clone().into_par_iter().map(|hit| self.force_of(&|out| force(hit, out)));
+            let forces = forces.collect::<Result<Vec<_>, _>>()?;
             // one hit by itself comes of a loop over cells, which keeps every core busy
             let at_least = if hits.len() == 1 { self.outputs.len() } else { 1 };
             let (transform, all, band, keep) = (&*self.transform, &self.all, &self.band, self.keep_hits);
             let outputs = self.outputs.par_iter_mut().enumerate().with_min_len(at_least);
             let summed = outputs.map(|(o, output)| {
-                for (hit, force) in hits.iter().zip(&forces) {
+                for (hit, force) in hits.clone().zip(&forces) {
                     let keep_from = keep.then_some(output.kept.len());
                     if keep {
                         output.kept.resize(output.kept.len() + band.len(), Complex::default());
                     }
                     let fill = |first: usize, out: &mut [f64]| response(hit, o, first, out);
-                    transform.transform(fill, band, &mut Sums { all, band, output, force, keep_from })?;
+                    transform.transform(&fill, band, &mut Sums { all, band, output, force, keep_from })?;
                 }
                 Ok(())
             });
@@ -236,13 +241,13 @@ impl SpectraAverage {
     }
 
     /// The spectrum of a force, at every line in the transform's order.
-    fn force_of(&self, force: impl Fn(&mut [f64])) -> Result<Lent, SpectraError> {
+    fn force_of(&self, force: &dyn Fn(&mut [f64])) -> Result<Lent, SpectraError> {
         let mut windowed = Lent::of(self.samples.div_ceil(2));
         let windowed: &mut [f64] = &mut cast_slice_mut(&mut windowed)[..self.samples];
         force(windowed);
         let fill = |first: usize, out: &mut [f64]| out.copy_from_slice(&windowed[first..first + out.len()]);
         let mut own = Lent::of(self.all.len());
-        self.transform.transform(fill, &self.all, &mut Put { order: &self.all, out: &mut own })?;
+        self.transform.transform(&fill, &self.all, &mut Put { order: &self.all, out: &mut own })?;
         Ok(own)
     }
 

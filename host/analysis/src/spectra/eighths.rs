@@ -38,7 +38,7 @@ impl Eighths {
     }
 
     /// Writes the eight pieces of the record that `fill` gives from any sample on, two samples to a point.
-    pub(super) fn write(&self, fill: impl Fn(usize, &mut [f64]), pieces: &mut [C]) {
+    pub(super) fn write(&self, fill: &dyn Fn(usize, &mut [f64]), pieces: &mut [C]) {
         let points = self.once.len();
         let mut parts = Lent::of(PIECES * BLOCK);
         for first in (0..points).step_by(BLOCK) {

@@ -171,9 +171,15 @@ pub(super) fn summed(
         hits.push(Hit { force, responses, origin_s, weighting: window.of_response(&decay, origin_s) });
     }
     average.add_hits(
-        &hits,
-        |hit, out| window.force_into(hit.force, &decay, hit.origin_s, out),
-        |hit, o, first, out| hit.weighting.response_into(&hit.responses[o], first, out),
+        hits.len(),
+        &|hit, out| {
+            let Hit { force, origin_s, .. } = &hits[hit];
+            window.force_into(force, &decay, *origin_s, out);
+        },
+        &|hit, o, first, out| {
+            let Hit { responses, weighting, .. } = &hits[hit];
+            weighting.response_into(&responses[o], first, out);
+        },
     )?;
     Ok(average)
 }

@@ -85,7 +85,7 @@ impl HalfLength {
     /// A value that is not a number; then no line was given.
     pub(super) fn transform(
         &self,
-        fill: impl Fn(usize, &mut [f64]),
+        fill: &dyn Fn(usize, &mut [f64]),
         order: &Order,
         to: &mut impl Lines,
     ) -> Result<(), SpectraError> {
@@ -96,7 +96,7 @@ impl HalfLength {
         }
         let (pieces, points) = (self.pieces(), self.fft.len());
         let mut spectrum = Lent::of(pieces * points);
-        self.write(&fill, &mut spectrum);
+        self.write(fill, &mut spectrum);
         let mut scratch = Lent::of(self.fft.get_inplace_scratch_len());
         // two pieces hold each other's mirror images
         for piece in 0..=pieces / 2 {
@@ -106,7 +106,7 @@ impl HalfLength {
                 self.fft.process_with_scratch(&mut spectrum[own * points..][..points], &mut scratch);
             }
             if piece == 0 {
-                self.check(&fill, spectrum[0])?;
+                self.check(fill, spectrum[0])?;
             }
             for own in both {
                 self.read(&spectrum, *own, order.within(*own), to);
@@ -116,7 +116,7 @@ impl HalfLength {
     }
 
     /// Two samples in each point of half the length, one in each of the whole.
-    fn write(&self, fill: impl Fn(usize, &mut [f64]), points: &mut [C]) {
+    fn write(&self, fill: &dyn Fn(usize, &mut [f64]), points: &mut [C]) {
         if let Some(eighths) = &self.eighths {
             return eighths.write(fill, points);
         }
@@ -132,7 +132,7 @@ impl HalfLength {
     }
 
     /// Every sample is in the first point of the spectrum, so that it tells of one that is not a number.
-    fn check(&self, fill: impl Fn(usize, &mut [f64]), first: C) -> Result<(), SpectraError> {
+    fn check(&self, fill: &dyn Fn(usize, &mut [f64]), first: C) -> Result<(), SpectraError> {
         if (first.re + first.im).is_finite() {
             return Ok(());
         }
@@ -238,7 +238,7 @@ mod tests {
         let order = plan.order(band);
         let mut found = vec![C::new(f64::NAN, f64::NAN); order.len()];
         let fill = |first: usize, out: &mut [f64]| out.copy_from_slice(&record[first..first + out.len()]);
-        plan.transform(fill, &order, &mut Put { order: &order, out: &mut found }).expect("numbers");
+        plan.transform(&fill, &order, &mut Put { order: &order, out: &mut found }).expect("numbers");
         order.by_line(&found)
     }
 
@@ -307,7 +307,7 @@ mod tests {
             let order = plan.order(0..plan.lines());
             let mut out = vec![C::default(); order.len()];
             let fill = |first: usize, out: &mut [f64]| out.copy_from_slice(&record[first..first + out.len()]);
-            let found = plan.transform(fill, &order, &mut Put { order: &order, out: &mut out });
+            let found = plan.transform(&fill, &order, &mut Put { order: &order, out: &mut out });
             assert_eq!(found, Err(SpectraError::NotFinite { sample: 3 }));
             assert_eq!(out, vec![C::default(); order.len()]);
         }
