@@ -46,8 +46,8 @@ struct Output {
     s_xf: Lent,
     /// Two real numbers in each complex one.
     s_xx: Lent,
-    /// The lines of every hit, one after the other, where they are kept.
-    kept: Vec<Complex<f64>>,
+    /// The lines of every hit, where they are kept.
+    kept: Vec<Vec<Complex<f64>>>,
 }
 
 impl Output {
@@ -62,23 +62,15 @@ struct Sums<'a> {
     band: &'a Order,
     output: &'a mut Output,
     force: &'a [Complex<f64>],
-    /// Where the hit's lines begin in what is kept.
-    keep_from: Option<usize>,
 }
 
 impl Lines for Sums<'_> {
     #[inline]
     fn take(&mut self, piece: usize, within: Range<usize>, values: impl Iterator<Item = Complex<f64>>) {
         let place = self.band.places(piece, &within);
-        let Output { s_xf, s_xx, kept } = &mut *self.output;
-        let (s_xf, s_xx) = (&mut s_xf[place.clone()], &mut cast_slice_mut(s_xx)[place.clone()]);
-        let force = &self.force[self.all.places(piece, &within)];
-        let Some(from) = self.keep_from else {
-            return add(s_xf, s_xx, values, force);
-        };
-        let own = &mut kept[from..][place];
-        wide(|| own.iter_mut().zip(values).for_each(|(own, value)| *own = value));
-        add(s_xf, s_xx, own.iter().copied(), force);
+        let Output { s_xf, s_xx, .. } = &mut *self.output;
+        let (s_xf, s_xx) = (&mut s_xf[place.clone()], &mut cast_slice_mut(s_xx)[place]);
+        add(s_xf, s_xx, values, &self.force[self.all.places(piece, &within)]);
     }
 }
 
@@ -128,7 +120,7 @@ impl SpectraAverage {
         let from = frequency_hz.partition_point(|f| *f < low_hz);
         let to = frequency_hz.partition_point(|f| *f <= high_hz).max(from);
         average.band = average.transform.order(from..to);
-        average.outputs = (0..outputs).into_par_iter().map(|_| Output::of(to - from)).collect();
+        average.outputs = (0..outputs).map(|_| Output::of(to - from)).collect();
         average
     }
 
@@ -216,12 +208,19 @@ impl SpectraAverage {
             let outputs = self.outputs.par_iter_mut().enumerate().with_min_len(at_least);
             let summed = outputs.map(|(o, output)| {
                 for (hit, force) in hits.clone().zip(&forces) {
-                    let keep_from = keep.then_some(output.kept.len());
-                    if keep {
-                        output.kept.resize(output.kept.len() + band.len(), Complex::default());
-                    }
                     let fill = |first: usize, out: &mut [f64]| response(hit, o, first, out);
-                    transform.transform(&fill, band, &mut Sums { all, band, output, force, keep_from })?;
+                    if !keep {
+                        transform.transform(&fill, band, &mut Sums { all, band, output, force })?;
+                        continue;
+                    }
+                    let mut own = vec![Complex::default(); band.len()];
+                    transform.transform(&fill, band, &mut Put { order: band, out: &mut own })?;
+                    let mut sums = Sums { all, band, output, force };
+                    for piece in 0..band.pieces() {
+                        let within = band.within(piece);
+                        sums.take(piece, within.clone(), own[band.places(piece, &within)].iter().copied());
+                    }
+                    output.kept.push(own);
                 }
                 Ok(())
             });
@@ -262,7 +261,7 @@ impl SpectraAverage {
             return Err(error.clone());
         }
         let band = &self.band;
-        let outputs = self.outputs.par_iter().enumerate().map(|(o, output)| OutputSums {
+        let outputs = self.outputs.iter().enumerate().map(|(o, output)| OutputSums {
             s_xf: band.by_line(&output.s_xf),
             s_xx: band.by_line(&cast_slice(&output.s_xx)[..band.len()]),
             delay_s: delay_s.get(o).copied().unwrap_or(0.0),
@@ -297,8 +296,7 @@ impl SpectraAverage {
             .map(|l| {
                 let force: Vec<_> = self.kept_force.iter().map(|f| f[l]).collect();
                 let of_output = |(o, output): (usize, &Output)| {
-                    let response: Vec<_> =
-                        (0..self.hits).map(|hit| output.kept[hit * self.band.len() + l]).collect();
+                    let response: Vec<_> = output.kept.iter().map(|x| x[l]).collect();
                     // |e^(sτ)|², for the advance that H is multiplied with
                     let gain = (2.0 * sigma_per_s * delay_s.get(o).copied().unwrap_or(0.0)).exp();
                     gain * jackknife::variance_of_part(&force, &response)

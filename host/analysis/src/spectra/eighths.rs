@@ -73,10 +73,15 @@ impl WithSimd for Pass<'_> {
         let mut pieces = self.pieces.map(S::as_mut_simd_c64s);
         let whole = pieces.each_mut().map(|(whole, _)| &mut **whole);
         Points(simd).pass(parts.map(|(whole, _)| whole), whole, factors.map(|(whole, _)| whole));
-        // what does not fill a vector
         let last = pieces.each_mut().map(|(_, last)| &mut **last);
-        Points(Scalar).pass(parts.map(|(_, last)| last), last, factors.map(|(_, last)| last));
+        rest(parts.map(|(_, last)| last), last, factors.map(|(_, last)| last));
     }
+}
+
+/// What does not fill a vector.
+#[inline(never)]
+fn rest(parts: [&[C]; PIECES], pieces: [&mut [C]; PIECES], factors: [&[C]; 2]) {
+    Points(Scalar).pass(parts, pieces, factors);
 }
 
 /// Vectors of points, which a processor adds and multiplies. What it does is inlined into where its vectors are known.

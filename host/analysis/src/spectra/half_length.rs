@@ -13,7 +13,6 @@ use crate::vectors::{all_finite, wide};
 use num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 use std::f64::consts::PI;
-use std::iter::once;
 use std::ops::Range;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
@@ -83,6 +82,7 @@ impl HalfLength {
     ///
     /// # Errors
     /// A value that is not a number; then no line was given.
+    #[inline(never)]
     pub(super) fn transform(
         &self,
         fill: &dyn Fn(usize, &mut [f64]),
@@ -91,7 +91,7 @@ impl HalfLength {
     ) -> Result<(), SpectraError> {
         if self.samples == 0 {
             let within = order.within(0);
-            to.take(0, within.clone(), within.map(|_| C::default()));
+            to.take(0, within.clone(), [C::default()][within].iter().copied());
             return Ok(());
         }
         let (pieces, points) = (self.pieces(), self.fft.len());
@@ -151,7 +151,7 @@ impl HalfLength {
         };
         if points == self.samples {
             // the mean is real
-            to.take(0, part(0, 1), once(C::from(own[0].re)));
+            to.take(0, part(0, 1), [C::from(own[0].re)].iter().copied());
             let rest = part(1, within.end);
             return to.take(0, rest.clone(), own[rest].iter().copied());
         }
@@ -161,13 +161,13 @@ impl HalfLength {
             return to.take(piece, within.clone(), self.taken_apart(piece, own, &other[mirrored], within));
         }
         // the two ends are real
-        to.take(0, part(0, 1), once(C::from(own[0].re + own[0].im)));
+        to.take(0, part(0, 1), [C::from(own[0].re + own[0].im)].iter().copied());
         let between = part(1, points);
         if !between.is_empty() {
             let mirrored = points + 1 - between.end..points + 1 - between.start;
             to.take(0, between.clone(), self.taken_apart(0, own, &own[mirrored], between));
         }
-        to.take(0, part(points, points + 1), once(C::from(own[0].re - own[0].im)));
+        to.take(0, part(points, points + 1), [C::from(own[0].re - own[0].im)].iter().copied());
     }
 
     /// The lines k of Z(k), Z(M − k) of which the last comes first, and ½ e^(−i2πk/N).

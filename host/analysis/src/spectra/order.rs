@@ -14,6 +14,10 @@ impl Order {
         Order { pieces, lines }
     }
 
+    pub(super) fn pieces(&self) -> usize {
+        self.pieces
+    }
+
     /// The lines.
     pub(super) fn lines(&self) -> Range<usize> {
         self.lines.clone()
