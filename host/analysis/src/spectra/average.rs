@@ -2,10 +2,12 @@
 
 use super::SpectraError;
 use super::cross_spectra::{CrossSpectra, OutputSums};
-use super::half_length::{HalfLength, Lines, Put, check_finite};
 use super::jackknife;
 use super::lent::Lent;
+use super::lines::{Lines, Put};
 use super::order::Order;
+use super::record_transform::{RecordTransform, check_finite};
+use super::windowed::Windowed;
 use crate::parallel::{self, prelude::*};
 use crate::vectors::wide;
 use bytemuck::{cast_slice, cast_slice_mut};
@@ -20,14 +22,14 @@ const TOGETHER: usize = 8;
 /// Writes the windowed force of a hit, by its number.
 pub type ForceOf<'a> = dyn Fn(usize, &mut [f64]) + Sync + 'a;
 
-/// Writes a windowed response of a hit, by the numbers of hit, output and first sample.
-pub type ResponseOf<'a> = dyn Fn(usize, usize, usize, &mut [f64]) + Sync + 'a;
+/// A windowed response of a hit, by the numbers of hit and output.
+pub type ResponseOf<'a> = dyn Fn(usize, usize) -> Windowed<'a> + Sync + 'a;
 
 /// Sums of spectra over the hits so far.
 pub struct SpectraAverage {
     fs_hz: f64,
     samples: usize,
-    transform: Arc<HalfLength>,
+    transform: Arc<RecordTransform>,
     hits: usize,
     /// In the transform's order, as all sums are.
     s_ff: Vec<f64>,
@@ -66,11 +68,11 @@ struct Sums<'a> {
 
 impl Lines for Sums<'_> {
     #[inline]
-    fn take(&mut self, piece: usize, within: Range<usize>, values: impl Iterator<Item = Complex<f64>>) {
-        let place = self.band.places(piece, &within);
+    fn take(&mut self, stretch: usize, within: Range<usize>, values: impl Iterator<Item = Complex<f64>>) {
+        let place = self.band.places(stretch, &within);
         let Output { s_xf, s_xx, .. } = &mut *self.output;
         let (s_xf, s_xx) = (&mut s_xf[place.clone()], &mut cast_slice_mut(s_xx)[place]);
-        add(s_xf, s_xx, values, &self.force[self.all.places(piece, &within)]);
+        add(s_xf, s_xx, values, &self.force[self.all.places(stretch, &within)]);
     }
 }
 
@@ -102,7 +104,7 @@ impl SpectraAverage {
 
     /// The same, which sums the responses at the lines with `low_hz` ≤ f ≤ `high_hz` alone; the force is summed at all of them.
     pub fn of_band(fs_hz: f64, samples: usize, outputs: usize, [low_hz, high_hz]: [f64; 2]) -> Self {
-        let transform = HalfLength::of(samples);
+        let transform = RecordTransform::of(samples);
         let mut average = SpectraAverage {
             fs_hz,
             samples,
@@ -151,27 +153,23 @@ impl SpectraAverage {
             // before anything is summed: a refused hit leaves the average as it was
             check_finite(signal)?;
         }
-        let response = |o: usize, first: usize, out: &mut [f64]| {
-            out.copy_from_slice(&responses[o][first..first + out.len()]);
-        };
-        self.add_with(|out| out.copy_from_slice(force_n), response)
+        self.add_with(|out| out.copy_from_slice(force_n), |o| Windowed::plain(&responses[o]))
     }
 
-    /// Adds one hit whose windowed force and responses (by output) are written straight into the transforms' memory, which
-    /// holds other values before. See [`SpectraAverage::add_hits`].
+    /// Adds one hit: its windowed force, which is written into memory that holds other values before, and its windowed responses, by
+    /// output. See [`SpectraAverage::add_hits`].
     ///
     /// # Errors
     /// As of `add_hits`.
-    pub fn add_with(
+    pub fn add_with<'a>(
         &mut self,
         force: impl Fn(&mut [f64]) + Sync,
-        response: impl Fn(usize, usize, &mut [f64]) + Sync,
+        response: impl Fn(usize) -> Windowed<'a> + Sync,
     ) -> Result<(), SpectraError> {
-        self.add_hits(1, &|_, out| force(out), &|_, o, first, out| response(o, first, out))
+        self.add_hits(1, &|_, out| force(out), &|_, o| response(o))
     }
 
-    /// Adds `hits` hits, which keeps every core busy. The windowed force of a hit is written as a whole, its windowed responses by
-    /// output, from any sample on and as many as there is room for: straight into the transforms' memory, which holds other values before.
+    /// Adds `hits` hits, which keeps every core busy. What a response is shorter than the transform becomes 0.
     ///
     /// # Errors
     /// A value that is not a number. Some responses of the hits may be in the sums then, so that the average is spent: this
@@ -208,17 +206,18 @@ impl SpectraAverage {
             let outputs = self.outputs.par_iter_mut().enumerate().with_min_len(at_least);
             let summed = outputs.map(|(o, output)| {
                 for (hit, force) in hits.clone().zip(&forces) {
-                    let fill = |first: usize, out: &mut [f64]| response(hit, o, first, out);
+                    let record = response(hit, o);
                     if !keep {
-                        transform.transform(&fill, band, &mut Sums { all, band, output, force })?;
+                        transform.transform(record, band, &mut Sums { all, band, output, force })?;
                         continue;
                     }
                     let mut own = vec![Complex::default(); band.len()];
-                    transform.transform(&fill, band, &mut Put { order: band, out: &mut own })?;
+                    transform.transform(record, band, &mut Put { order: band, out: &mut own })?;
                     let mut sums = Sums { all, band, output, force };
-                    for piece in 0..band.pieces() {
-                        let within = band.within(piece);
-                        sums.take(piece, within.clone(), own[band.places(piece, &within)].iter().copied());
+                    for stretch in 0..band.stretches().len() {
+                        let within = band.within(stretch);
+                        let own = &own[band.places(stretch, &within)];
+                        sums.take(stretch, within, own.iter().copied());
                     }
                     output.kept.push(own);
                 }
@@ -244,9 +243,9 @@ impl SpectraAverage {
         let mut windowed = Lent::of(self.samples.div_ceil(2));
         let windowed: &mut [f64] = &mut cast_slice_mut(&mut windowed)[..self.samples];
         force(windowed);
-        let fill = |first: usize, out: &mut [f64]| out.copy_from_slice(&windowed[first..first + out.len()]);
         let mut own = Lent::of(self.all.len());
-        self.transform.transform(&fill, &self.all, &mut Put { order: &self.all, out: &mut own })?;
+        let to = &mut Put { order: &self.all, out: &mut own };
+        self.transform.transform(Windowed::plain(windowed), &self.all, to)?;
         Ok(own)
     }
 
@@ -261,7 +260,7 @@ impl SpectraAverage {
             return Err(error.clone());
         }
         let band = &self.band;
-        let outputs = self.outputs.iter().enumerate().map(|(o, output)| OutputSums {
+        let outputs = self.outputs.par_iter().enumerate().map(|(o, output)| OutputSums {
             s_xf: band.by_line(&output.s_xf),
             s_xx: band.by_line(&cast_slice(&output.s_xx)[..band.len()]),
             delay_s: delay_s.get(o).copied().unwrap_or(0.0),

@@ -6,6 +6,7 @@ use super::cross_spectra::CrossSpectra;
 use super::impact_records::ImpactRecords;
 use super::pulse::Pulse;
 use super::window::{Decay, ResponseWeighting, Windowing};
+use super::windowed::Windowed;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -88,7 +89,7 @@ impl Summing {
         let weighting = window.of_response(decay, origin_s);
         self.average.add_with(
             |out| window.force_into(force_n, decay, origin_s, out),
-            |o, first, out| weighting.response_into(responses[o], first, out),
+            |o| Windowed::response(responses[o], &weighting),
         )
     }
 
@@ -176,9 +177,9 @@ pub(super) fn summed(
             let Hit { force, origin_s, .. } = &hits[hit];
             window.force_into(force, &decay, *origin_s, out);
         },
-        &|hit, o, first, out| {
+        &|hit, o| {
             let Hit { responses, weighting, .. } = &hits[hit];
-            weighting.response_into(&responses[o], first, out);
+            Windowed::response(&responses[o], weighting)
         },
     )?;
     Ok(average)

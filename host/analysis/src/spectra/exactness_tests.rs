@@ -182,7 +182,8 @@ fn a_hit_that_is_not_a_number_leaves_the_average_as_it_was() {
     assert_eq!(error, Err(SpectraError::NotFinite { sample: 2 }));
     assert_eq!(average.finish(0.0, &[]).expect("a hit").rows(CrossSpectra::h1), before);
     // written straight into the transforms the hit is half in, so that the average says so for ever
-    let error = average.add_with(|f| f.fill(1.0), |_, _, x| x.fill(f64::INFINITY));
+    let response = [f64::INFINITY; 4];
+    let error = average.add_with(|f| f.fill(1.0), |_| windowed::Windowed::plain(&response));
     assert_eq!(error, Err(SpectraError::NotFinite { sample: 0 }));
     assert_eq!(average.finish(0.0, &[]), Err(SpectraError::NotFinite { sample: 0 }));
 }

@@ -7,17 +7,20 @@
 
 pub mod average;
 pub mod cross_spectra;
-mod eighths;
 pub mod estimate;
 pub mod estimators;
 mod half_length;
 pub mod impact_records;
 pub mod jackknife;
 mod lent;
+mod lines;
 mod order;
 pub mod pulse;
+mod quarters;
+mod record_transform;
 pub mod usable_band;
 pub mod window;
+pub mod windowed;
 
 pub use crate::frf::MotionQuantity;
 pub use average::SpectraAverage;

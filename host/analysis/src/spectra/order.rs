@@ -1,21 +1,48 @@
-//! The order in which a transform leaves its lines: piece by piece, of which each holds the lines that are alike modulo their number.
+//! The order in which a transform leaves its lines: stretch by stretch, of which each is of one piece, whose lines are alike modulo
+//! their number.
 
+use super::quarters::PARTS;
 use std::ops::Range;
 
-/// Lines in the order of so many pieces: line l is number l / pieces of piece l modulo pieces.
+/// The lines of a transform in the order in which it leaves them.
 #[derive(Clone)]
 pub(super) struct Order {
-    pieces: usize,
+    samples: usize,
+    stretches: &'static [Stretch],
     lines: Range<usize>,
 }
 
+/// Lines of one piece that follow each other in it.
+pub(super) struct Stretch {
+    /// Which piece.
+    pub(super) piece: usize,
+    /// Number k of the piece is line `step` k + piece.
+    step: usize,
+    /// Or as far from the end, N minus that: the piece holds its conjugate.
+    pub(super) mirrored: bool,
+}
+
+/// Of a transform that is whole.
+const WHOLE: [Stretch; 1] = [Stretch { piece: 0, step: 1, mirrored: false }];
+
+/// Of one in [quarters](super::quarters).
+const QUARTERS: [Stretch; 7] = {
+    const fn of(piece: usize, mirrored: bool) -> Stretch {
+        Stretch { piece, step: PARTS, mirrored }
+    }
+    let zero = Stretch { piece: 0, step: PARTS / 2, mirrored: false };
+    [zero, of(1, false), of(1, true), of(2, false), of(2, true), of(3, false), of(3, true)]
+};
+
 impl Order {
-    pub(super) fn of(pieces: usize, lines: Range<usize>) -> Order {
-        Order { pieces, lines }
+    /// These lines of so many samples' transform.
+    pub(super) fn of(samples: usize, in_quarters: bool, lines: Range<usize>) -> Order {
+        Order { samples, stretches: if in_quarters { &QUARTERS } else { &WHOLE }, lines }
     }
 
-    pub(super) fn pieces(&self) -> usize {
-        self.pieces
+    /// The stretches, in their order.
+    pub(super) fn stretches(&self) -> &'static [Stretch] {
+        self.stretches
     }
 
     /// The lines.
@@ -28,38 +55,62 @@ impl Order {
         self.lines.len()
     }
 
-    /// Which of a piece's lines are among these, by their number in the piece.
-    pub(super) fn within(&self, piece: usize) -> Range<usize> {
-        let number = |line: usize| line.saturating_sub(piece).div_ceil(self.pieces);
-        number(self.lines.start)..number(self.lines.end)
+    /// Which of a stretch's lines are among these, by their number in the piece.
+    pub(super) fn within(&self, stretch: usize) -> Range<usize> {
+        let Stretch { piece, step, mirrored } = self.stretches[stretch];
+        let Range { start, end } = self.lines;
+        if mirrored {
+            // N − (step k + piece) ≥ line up to this k
+            let until = |line: usize| (self.samples - piece - line) / step + 1;
+            until(end)..until(start)
+        } else {
+            let from = |line: usize| line.saturating_sub(piece).div_ceil(step);
+            from(start)..from(end)
+        }
     }
 
-    /// Where values of these lines of a piece are among the values of all lines in this order.
-    pub(super) fn places(&self, piece: usize, within: &Range<usize>) -> Range<usize> {
-        let before: usize = (0..piece).map(|piece| self.within(piece).len()).sum();
-        let first = before + within.start - self.within(piece).start;
+    /// Where values of these numbers of a stretch are among the values of all lines in this order.
+    pub(super) fn places(&self, stretch: usize, within: &Range<usize>) -> Range<usize> {
+        let before: usize = (0..stretch).map(|stretch| self.within(stretch).len()).sum();
+        let first = before + within.start - self.within(stretch).start;
         first..first + within.len()
+    }
+
+    /// The stretch of a line, and where its value is among the values of all lines in this order.
+    fn place(&self, line: usize) -> Option<(&Stretch, usize)> {
+        self.stretches.iter().enumerate().find_map(|(number, stretch)| {
+            let Stretch { piece, step, mirrored } = stretch;
+            let turned = if *mirrored { self.samples.checked_sub(line)? } else { line };
+            let beyond = turned.checked_sub(*piece).filter(|beyond| beyond.is_multiple_of(*step))?;
+            let k = beyond / step;
+            let among = self.within(number).contains(&k);
+            among.then(|| (stretch, self.places(number, &(k..k + 1)).start))
+        })
     }
 
     /// Values in this order, by rising line.
     pub(super) fn by_line<T: Clone>(&self, values: &[T]) -> Vec<T> {
-        let pieces: Vec<(usize, &[T])> = (0..self.pieces)
-            .map(|piece| {
-                let within = self.within(piece);
-                (within.start, &values[self.places(piece, &within)])
-            })
-            .collect();
+        // of lines that are alike modulo PARTS each value is as far from the one before
+        let mut cursors = [(0, 0); PARTS];
+        for line in self.lines().take(PARTS) {
+            if let Some((stretch, place)) = self.place(line) {
+                let step = (PARTS / stretch.step).cast_signed();
+                cursors[line % PARTS] = (place, if stretch.mirrored { -step } else { step });
+            }
+        }
         let value = |line: usize| {
-            let (first, values) = pieces[line % self.pieces];
-            values[line / self.pieces - first].clone()
+            let (place, step) = &mut cursors[line % PARTS];
+            let value = values[*place].clone();
+            *place = place.wrapping_add_signed(*step);
+            value
         };
-        self.lines.clone().map(value).collect()
+        self.lines().map(value).collect()
     }
 
     /// Of values in this order, those of `fewer` lines in the order of these.
     pub(super) fn only<T: Copy>(&self, fewer: &Order, values: &[T]) -> Vec<T> {
-        (0..self.pieces)
-            .flat_map(|piece| &values[self.places(piece, &fewer.within(piece))])
+        (0..self.stretches.len())
+            .flat_map(|stretch| &values[self.places(stretch, &fewer.within(stretch))])
             .copied()
             .collect()
     }
@@ -71,13 +122,21 @@ mod tests {
 
     #[test]
     fn every_line_has_its_place_and_is_found_there() {
-        for pieces in [1, 3, 8] {
-            let all = Order::of(pieces, 0..30);
-            let mut ordered: Vec<usize> = (0..30).collect();
-            ordered.sort_by_key(|line| (line % pieces, *line));
-            assert_eq!(all.by_line(&ordered), (0..30).collect::<Vec<_>>());
-            for (start, end) in (0..=30).flat_map(|start| (start..=30).map(move |end| (start, end))) {
-                let band = Order::of(pieces, start..end);
+        for (samples, in_quarters) in
+            [(1, false), (58, false), (59, false), (8, true), (48, true), (56, true)]
+        {
+            let lines = samples / 2 + 1;
+            let all = Order::of(samples, in_quarters, 0..lines);
+            // which line is where
+            let mut ordered = vec![usize::MAX; lines];
+            for line in 0..lines {
+                let (_, place) = all.place(line).expect("a line");
+                assert_eq!(ordered[place], usize::MAX, "line {line}");
+                ordered[place] = line;
+            }
+            assert_eq!(all.by_line(&ordered), (0..lines).collect::<Vec<_>>());
+            for (start, end) in (0..=lines).flat_map(|start| (start..=lines).map(move |end| (start, end))) {
+                let band = Order::of(samples, in_quarters, start..end);
                 let own = all.only(&band, &ordered);
                 assert_eq!(own.len(), band.len());
                 assert_eq!(band.by_line(&own), (start..end).collect::<Vec<_>>());

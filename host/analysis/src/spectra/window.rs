@@ -60,18 +60,18 @@ pub struct Decay {
     samples: usize,
     /// Of the first sample of every run.
     runs: Vec<f64>,
-    /// Of the samples of a run from its first on.
+    /// Of the samples of a run from its first on, and of as many after it: a run's length from any place on is one row.
     places: Vec<f64>,
 }
 
 /// Samples in a run.
-const RUN: usize = 512;
+pub(super) const RUN: usize = 512;
 
 impl Decay {
     fn of(sigma_per_s: f64, fs_hz: f64, samples: usize) -> Decay {
         let weight = |i: usize| (-sigma_per_s * (i as f64 / fs_hz)).exp();
         let runs = (0..samples.div_ceil(RUN)).map(|run| weight(run * RUN)).collect();
-        Decay { fs_hz, samples, runs, places: (0..RUN).map(weight).collect() }
+        Decay { fs_hz, samples, runs, places: (0..2 * RUN).map(weight).collect() }
     }
 
     fn weight(&self, i: usize) -> f64 {
@@ -160,12 +160,12 @@ impl Windowing {
 
     /// How the responses of the same hit are weighted.
     pub fn of_response<'d>(&self, decay: &'d Decay, origin_s: f64) -> ResponseWeighting<'d> {
-        let samples = decay.samples;
-        // samples stay as they are without a window, and up to the origin where only the response is weighted
+        // what is before the origin stays as it is where only the response is weighted
         let plain = match self.force_weighting {
-            _ if self.sigma_per_s == 0.0 => samples,
+            _ if self.sigma_per_s == 0.0 => 0,
             ForceWeighting::Exponential => 0,
             ForceWeighting::Rectangular => {
+                let samples = decay.samples;
                 (0..samples).position(|i| i as f64 / decay.fs_hz > origin_s).unwrap_or(samples)
             }
         };
@@ -182,6 +182,17 @@ pub struct ResponseWeighting<'d> {
 }
 
 impl ResponseWeighting<'_> {
+    /// The weights of the samples from the first of a run on.
+    pub(super) fn places(&self) -> &[f64] {
+        &self.decay.places
+    }
+
+    /// The weights of up to [`RUN`] samples from the `first` on: a number, and from which on of the
+    /// [places](ResponseWeighting::places) it is to be multiplied with. None of samples that stay as they are beside ones that do not.
+    pub(super) fn weights(&self, first: usize) -> Option<(f64, usize)> {
+        (first >= self.plain).then(|| (self.scale * self.decay.runs[first / RUN], first % RUN))
+    }
+
     /// Writes a windowed response (SI) from its sample `first` on into `out`; what `out` goes beyond the record (zero padding)
     /// becomes 0.
     pub fn response_into(&self, response: &[f64], first: usize, out: &mut [f64]) {

@@ -1,0 +1,28 @@
+//! Where a transform's lines go.
+
+use super::order::Order;
+use crate::vectors::wide;
+use num_complex::Complex;
+use std::ops::Range;
+
+type C = Complex<f64>;
+
+/// What lines are for.
+pub(super) trait Lines {
+    /// Takes lines of a stretch, by their number in its piece: one value for each, in a loop compiled for the processor at hand.
+    fn take(&mut self, stretch: usize, within: Range<usize>, values: impl Iterator<Item = C>);
+}
+
+/// Lines that are written in their order.
+pub(super) struct Put<'a> {
+    pub(super) order: &'a Order,
+    pub(super) out: &'a mut [C],
+}
+
+impl Lines for Put<'_> {
+    #[inline]
+    fn take(&mut self, stretch: usize, within: Range<usize>, values: impl Iterator<Item = C>) {
+        let own = &mut self.out[self.order.places(stretch, &within)];
+        wide(|| own.iter_mut().zip(values).for_each(|(own, value)| *own = value));
+    }
+}
