@@ -83,9 +83,10 @@ pub fn of_hit(
 
 /// v_A, v_B and T with their delays against each other taken out.
 fn in_step(contact: &ContactSignals, delays: ContactDelays, fs_hz: f64) -> [Vec<f64>; 3] {
-    let ContactSignals { specimen_a_m_per_s, specimen_b_m_per_s, tangential_n, .. } = contact.clone();
+    let ContactSignals { specimen_a_m_per_s, specimen_b_m_per_s, tangential_n, .. } = contact;
     let delays = [delays.specimen_a, delays.specimen_b, delays.load_cells];
-    delays::in_step([specimen_a_m_per_s, specimen_b_m_per_s, tangential_n], delays, fs_hz)
+    let signals = [specimen_a_m_per_s, specimen_b_m_per_s, tangential_n];
+    delays::in_step(signals.map(Vec::clone), delays, fs_hz)
 }
 
 /// All first cycles together; none without any.

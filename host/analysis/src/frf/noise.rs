@@ -1,6 +1,7 @@
 //! Noise of measured FRFs: what the variance of every cell and line is used as, and how neighbouring lines share it.
 
 use super::{Frf, block};
+use crate::parallel::prelude::*;
 use nalgebra::DMatrix;
 
 /// Variances are averaged over this many Hz on either side: one from a handful of hits scatters by its own size.
@@ -59,30 +60,30 @@ fn smoothed(known: &[DMatrix<f64>], frequency_hz: &[f64]) -> Vec<DMatrix<f64>> {
             (from, frequency_hz.partition_point(|f| *f <= at + SMOOTH_HZ))
         })
         .collect();
-    let mut variance = vec![DMatrix::from_element(rows, columns, f64::NAN); known.len()];
-    let mut sums = Vec::with_capacity(known.len() + 1);
-    for column in 0..columns {
-        for row in 0..rows {
-            // sums from the left: a window's sum is a difference of two of them
-            let (mut sum, mut count) = (0.0, 0usize);
-            sums.clear();
+    let by_row = |row: usize, column: usize| -> Vec<f64> {
+        // sums from the left: a window's sum is a difference of two of them
+        let (mut sum, mut count) = (0.0, 0usize);
+        let mut sums = Vec::with_capacity(known.len() + 1);
+        sums.push((sum, count));
+        for v in known {
+            let value = v[(row, column)];
+            if value.is_finite() {
+                (sum, count) = (sum + value, count + 1);
+            }
             sums.push((sum, count));
-            for v in known {
-                let value = v[(row, column)];
-                if value.is_finite() {
-                    (sum, count) = (sum + value, count + 1);
-                }
-                sums.push((sum, count));
-            }
-            for (out, &(from, to)) in variance.iter_mut().zip(&windows) {
-                let count = sums[to].1 - sums[from].1;
-                if count > 0 {
-                    out[(row, column)] = ((sums[to].0 - sums[from].0) / count as f64).max(0.0);
-                }
-            }
         }
-    }
-    variance
+        let mean = |&(from, to): &(usize, usize)| match sums[to].1 - sums[from].1 {
+            0 => f64::NAN,
+            count => ((sums[to].0 - sums[from].0) / count as f64).max(0.0),
+        };
+        windows.iter().map(mean).collect()
+    };
+    let by_column: Vec<Vec<Vec<f64>>> = (0..columns)
+        .into_par_iter()
+        .map(|column| (0..rows).map(|row| by_row(row, column)).collect())
+        .collect();
+    let line = |l: usize| DMatrix::from_fn(rows, columns, |row, column| by_column[column][row][l]);
+    (0..known.len()).into_par_iter().map(line).collect()
 }
 
 /// By how much the variance of a sum over many lines exceeds that of independent lines.

@@ -92,12 +92,15 @@ fn hidden_resonance(record: &HysteresisRecord) -> Option<ImaginaryPeak> {
     contact.imaginary_peak().filter(ImaginaryPeak::stands_out)
 }
 
-/// The decay after a hit and its shape; none of a record that is steady.
-pub(super) fn decay_of(record: &HysteresisRecord) -> Result<Option<(Decay, Shape)>, HysteresisError> {
+/// The first `most` cycles of the decay after a hit, and its shape; none of a record that is steady.
+pub(super) fn decay_of(
+    record: &HysteresisRecord,
+    most: usize,
+) -> Result<Option<(Decay, Shape)>, HysteresisError> {
     if excitation(record)?.is_some() {
         return Ok(None);
     }
-    let decay = decay(&record.relative(), &record.force_n, record.fs_hz)?;
+    let decay = decay(&record.relative(), &record.force_n, record.fs_hz, most)?;
     let shape = shape_of(&decay);
     Ok(Some((decay, shape)))
 }
@@ -114,7 +117,7 @@ fn shape_of(decay: &Decay) -> Shape {
 }
 
 fn impact(record: &HysteresisRecord, motion: &Relative) -> Result<LoopAnalysis, HysteresisError> {
-    let decay = decay(motion, &record.force_n, record.fs_hz)?;
+    let decay = decay(motion, &record.force_n, record.fs_hz, usize::MAX)?;
     let used = &decay.cycles[..FIRST_CYCLES.min(decay.cycles.len())];
     let slopes: Vec<f64> = used.iter().map(|c| c.stiffness_n_per_m).collect();
     let k = OverCycles::of(&slopes).expect("decay() gives at least one cycle");

@@ -47,11 +47,11 @@ impl FirstCycle {
             excitation_hz: None,
             normal_load_n: None,
         };
-        let (mut decay, shape) = decay_of(&record)?.ok_or(HysteresisError::NoMotion)?;
+        let (decay, shape) = decay_of(&record, DECAY_CYCLES)?.ok_or(HysteresisError::NoMotion)?;
         let first = &decay.cycles[0];
         let (from, to) = (first.first_sample, first.end_sample);
         let acceleration_per_m = slope(&decay.displacement_m[from..to], &acceleration[from..to]);
-        let of_first = Self {
+        Ok(Self {
             slope_n_per_m: first.stiffness_n_per_m,
             r_squared: first.r_squared,
             amplitude_m: first.amplitude_m,
@@ -60,10 +60,8 @@ impl FirstCycle {
             shape,
             cycle: [from, to],
             acceleration_per_m,
-            decay: Vec::new(),
-        };
-        decay.cycles.truncate(DECAY_CYCLES);
-        Ok(Self { decay: decay.cycles, ..of_first })
+            decay: decay.cycles,
+        })
     }
 
     /// The slope with the force at the contact in place of T, N/m: a least-squares slope is linear in the force.
@@ -97,5 +95,33 @@ mod tests {
         assert_eq!(found.phase_deg.to_bits(), one.phase_deg.to_bits());
         assert_eq!(found.slope_n_per_m.to_bits(), one.stiffness_n_per_m.to_bits());
         assert_eq!(found.amplitude_m.to_bits(), one.amplitude_m.to_bits());
+    }
+
+    /// What is not told of a long decay changes nothing of what is.
+    #[test]
+    fn the_first_cycles_are_the_same_whatever_is_told_of_later_ones() {
+        let fs_hz = 51_200.0;
+        let wave = |scale: f64, phase: f64| -> Vec<f64> {
+            let turn = |i: usize| (TAU * 190.0 * i as f64 / fs_hz + phase).sin();
+            (0..20_480).map(|i| scale * (-(i as f64) / 4000.0).exp() * turn(i)).collect()
+        };
+        let record = HysteresisRecord {
+            fs_hz,
+            motion: RelativeMotion::Velocity { a_m_per_s: wave(1e-4, 1.5), b_m_per_s: wave(1e-5, 1.4) },
+            force_n: wave(15.0, 0.0),
+            excitation_hz: None,
+            normal_load_n: None,
+        };
+        let of = |most| decay_of(&record, most).expect("a decay").expect("no steady vibration");
+        let (all, shape) = of(usize::MAX);
+        for most in [2, 8, all.cycles.len() - 1, all.cycles.len()] {
+            let (told, same_shape) = of(most);
+            assert_eq!(told.cycles, all.cycles[..most]);
+            assert_eq!(
+                (told.frequency_hz, told.phase_deg, same_shape),
+                (all.frequency_hz, all.phase_deg, shape)
+            );
+            assert_eq!(told.displacement_m, all.displacement_m[..told.displacement_m.len()]);
+        }
     }
 }

@@ -42,16 +42,22 @@ pub struct DecayCycle {
 pub(super) struct Decay {
     pub(super) frequency_hz: f64,
     pub(super) cycles: Vec<DecayCycle>,
+    /// From the record's start to the end of the last cycle that was cut.
     pub(super) displacement_m: Vec<f64>,
     /// Phase by which Δx lags T at the mode over the first cycles, degrees.
     pub(super) phase_deg: f64,
 }
 
-/// Cuts a decaying record.
+/// Cuts a decaying record into its cycles, of which the first `most` (at least [`FIRST_CYCLES`]) are told.
 ///
 /// # Errors
 /// When nothing moves, or not one cycle of the dominant mode follows the onset.
-pub(super) fn decay(motion: &Relative, force_n: &[f64], fs_hz: f64) -> Result<Decay, HysteresisError> {
+pub(super) fn decay(
+    motion: &Relative,
+    force_n: &[f64],
+    fs_hz: f64,
+    most: usize,
+) -> Result<Decay, HysteresisError> {
     let signal = match motion {
         Relative::Velocity(v) | Relative::Displacement(v) => v,
     };
@@ -66,18 +72,21 @@ pub(super) fn decay(motion: &Relative, force_n: &[f64], fs_hz: f64) -> Result<De
             points: period as usize,
         });
     }
+    // a cycle's frequency takes the one after it
+    let cut = whole.min(most.saturating_add(1));
+    let edges: Vec<usize> = (0..=cut).map(|c| start + (c as f64 * period).round() as usize).collect();
+    let end = edges[cut];
     let displacement_m = match motion {
         Relative::Velocity(v) => {
             // A stuck contact returns to where it was: over whole cycles to the end, mean velocity is the sensor's offset.
             let until = start + (whole as f64 * period) as usize;
             let offset = v[start..until].iter().sum::<f64>() / (until - start) as f64;
-            open_record(v, offset, 1.0 / fs_hz)
+            open_record(&v[..end], offset, 1.0 / fs_hz)
         }
-        Relative::Displacement(x) => x.clone(),
+        Relative::Displacement(x) => x[..end].to_vec(),
     };
-    let edges: Vec<usize> = (0..=whole).map(|c| start + (c as f64 * period).round() as usize).collect();
     // force and displacement are turned by the same angles
-    let turns = turns(start..force_n.len(), -TAU * frequency_hz / fs_hz);
+    let turns = turns(start..end, -TAU * frequency_hz / fs_hz);
     let tone = |x: &[f64], from: usize, to: usize| -> Complex<f64> {
         let mean = x[from..to].iter().sum::<f64>() / (to - from) as f64;
         x[from..to].iter().zip(&turns[from - start..to - start]).map(|(x, turn)| (x - mean) * turn).sum()
@@ -86,6 +95,7 @@ pub(super) fn decay(motion: &Relative, force_n: &[f64], fs_hz: f64) -> Result<De
     let cycles = edges
         .windows(2)
         .enumerate()
+        .take(most)
         .map(|(c, e)| {
             let (x, t) = (&displacement_m[e[0]..e[1]], &force_n[e[0]..e[1]]);
             let stiffness_n_per_m = slope(x, t);

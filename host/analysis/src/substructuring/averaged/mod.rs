@@ -241,8 +241,8 @@ impl Prepared {
             })
             .collect();
         let shared = shared_by_lines(ajb.sigma_per_s(), assembly.step_hz());
-        let weights = sums.iter().map(|lines| weights(lines, shared, priors)).collect();
-        let typical = (sums.iter().enumerate())
+        let weights = sums.par_iter().map(|lines| weights(lines, shared, priors)).collect();
+        let typical = (sums.par_iter().enumerate())
             .map(|(d, lines)| Typical::of(&impedance, d).known(lines, &impedance, d, shared, priors))
             .collect();
         Ok(Prepared {
@@ -262,7 +262,7 @@ impl Prepared {
 
     /// The estimate with its interval.
     pub fn estimate(&self) -> Averaged {
-        let joint = (self.idms.dofs().iter().enumerate())
+        let joint = (self.idms.dofs().par_iter().enumerate())
             .map(|(d, &dof)| {
                 // N/m for translations, N m/rad for rotations
                 let found = self.estimate_of(d).scaled(balance(self.idms)[d].powi(2));
@@ -300,7 +300,7 @@ impl Prepared {
         }
         let s = self.mean_s(d);
         let (stiffness, damping) = stiffness_and_damping((y - drawn).inv(), s);
-        let total = Sums::weighted(&self.sums[d], &self.weights[d]);
+        let total = Sums::weighted(&self.sums[d], self.weights[d].iter().copied());
         // dK = −K² dy, to the loss factor's square
         let to_stiffness = stiffness * stiffness;
         let enough = if self.idms.dofs()[d].is_rotation() { HIDDEN_ROTATION } else { HIDDEN };

@@ -27,54 +27,47 @@ pub(super) struct Sums {
 
 impl Sums {
     /// Σ w · line, in the lines' order; variances with w².
-    pub(super) fn weighted(lines: &[Sums], weights: &[f64]) -> Sums {
+    pub(super) fn weighted(lines: &[Sums], weights: impl IntoIterator<Item = f64>) -> Sums {
         let mut total = lines[0].clone();
         total.noise_variance = 0.0;
-        total.parts().into_iter().flatten().for_each(|v| *v = Vector3::zeros());
-        for (line, &w) in lines.iter().zip(weights) {
+        total.parts_mut().into_iter().flatten().for_each(|v| *v = Vector3::zeros());
+        for (line, w) in lines.iter().zip(weights) {
             total.noise_variance += w * w * line.noise_variance;
-            let mut line = line.clone();
-            for (sum, part) in total.parts().into_iter().zip(line.parts()) {
+            for (sum, part) in total.parts_mut().into_iter().zip(line.parts()) {
                 sum.iter_mut().zip(part).for_each(|(a, b)| *a += *b * C::from(w));
             }
         }
         total
     }
 
-    /// Sensitivities times `factor`.
-    pub(super) fn scaled(mut self, factor: f64) -> Sums {
-        self.noise_variance *= factor * factor;
-        self.parts().into_iter().flatten().for_each(|v| *v *= C::from(factor));
-        self
+    fn parts(&self) -> [&Vec<Vector3<C>>; 5] {
+        [
+            &self.channel_position,
+            &self.impact_position,
+            &self.channel_aim,
+            &self.impact_aim,
+            &self.impact_angle,
+        ]
     }
 
-    fn parts(&mut self) -> [&mut Vec<Vector3<C>>; 5] {
+    fn parts_mut(&mut self) -> [&mut Vec<Vector3<C>>; 5] {
         [
             &mut self.channel_position,
             &mut self.impact_position,
-            &mut self.impact_angle,
             &mut self.channel_aim,
             &mut self.impact_aim,
+            &mut self.impact_angle,
         ]
     }
 
-    /// Sensitivities to every error of geometry, each in standard deviations of its prior.
-    pub(super) fn columns(&self, priors: &Priors) -> Vec<C> {
-        [
-            (&self.channel_position, priors.position_m),
-            (&self.impact_position, priors.position_m),
-            (&self.channel_aim, priors.aim_m),
-            (&self.impact_aim, priors.aim_m),
-            (&self.impact_angle, priors.hammer_angle_rad),
-        ]
-        .into_iter()
-        .flat_map(|(all, prior)| all.iter().flat_map(move |v| v.iter().map(move |c| *c * prior)))
-        .collect()
-    }
-
-    /// Variance of the real part from errors of position, aim and angle.
+    /// Variance of the real part from errors of position, aim and angle: each error's sensitivity is in standard deviations of its prior.
     pub(super) fn geometry_variance(&self, priors: &Priors) -> f64 {
-        self.columns(priors).iter().map(|c| c.re * c.re).sum()
+        let Priors { position_m, aim_m, hammer_angle_rad } = *priors;
+        let deviations = [position_m, position_m, aim_m, aim_m, hammer_angle_rad];
+        let sensitivities = self.parts().into_iter().zip(deviations);
+        sensitivities
+            .flat_map(|(all, deviation)| all.iter().flatten().map(move |c| (c.re * deviation).powi(2)))
+            .sum()
     }
 }
 

@@ -63,10 +63,8 @@ impl Typical {
         shared: f64,
         priors: &Priors,
     ) -> f64 {
-        let there: Vec<Sums> = (lines.iter().zip(impedance))
-            .map(|(sums, z)| sums.clone().scaled(self.instead_of(compliance(z, d))))
-            .collect();
-        let total = Sums::weighted(&there, &vec![1.0 / lines.len() as f64; lines.len()]);
+        let there = impedance.iter().map(|z| self.instead_of(compliance(z, d)) / lines.len() as f64);
+        let total = Sums::weighted(lines, there);
         let variance = total.noise_variance * shared + total.geometry_variance(priors);
         if self.pushing < PUSHING { f64::INFINITY } else { variance.sqrt() / self.joint }
     }
