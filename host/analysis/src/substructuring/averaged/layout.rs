@@ -86,8 +86,4 @@ impl Layout {
     pub(super) fn reduce(&self, cells: &Line) -> Line {
         reduce_inputs(&reduce_outputs(&self.t_u, cells), &self.t_f)
     }
-
-    pub(super) fn cell_count(&self) -> (usize, usize) {
-        (self.channels.len(), self.impacts.len())
-    }
 }

@@ -233,13 +233,13 @@ impl Prepared {
             })
             .collect::<Result<_, AveragedError>>()?;
         let by_line = bias::of(&assembly, &impedance);
-        let all = 0..idms.count();
-        let bias = all.clone().map(|d| by_line.iter().map(|line| line[d]).collect()).collect();
-        let sums: Vec<Vec<Sums>> = all
-            .map(|d| {
-                (0..impedance.len()).into_par_iter().map(|l| assembly.sums(l, &impedance[l], d)).collect()
-            })
-            .collect();
+        let bias = (0..idms.count()).map(|d| by_line.iter().map(|line| line[d]).collect()).collect();
+        let by_line: Vec<Vec<Sums>> =
+            (0..impedance.len()).into_par_iter().map(|l| assembly.sums(l, &impedance[l])).collect();
+        let mut sums: Vec<Vec<Sums>> = (0..idms.count()).map(|_| Vec::with_capacity(by_line.len())).collect();
+        for line in by_line {
+            sums.iter_mut().zip(line).for_each(|(sums, own)| sums.push(own));
+        }
         let shared = shared_by_lines(ajb.sigma_per_s(), assembly.step_hz());
         let weights = sums.par_iter().map(|lines| weights(lines, shared, priors)).collect();
         let typical = (sums.par_iter().enumerate())

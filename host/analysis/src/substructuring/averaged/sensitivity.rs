@@ -72,33 +72,31 @@ impl Sums {
 }
 
 impl Assembly {
-    /// Sensitivities of the joint's compliance along `d` at line `l`, whose inverse admittance is `z`.
-    pub(super) fn sums(&self, l: usize, z: &Line, d: usize) -> Sums {
+    /// Sensitivities of the joint's compliance along every degree of freedom at line `l`, whose inverse admittance is `z`.
+    pub(super) fn sums(&self, l: usize, z: &Line) -> Vec<Sums> {
         let layout = &self.layout;
         let n = z.nrows() / 2;
-        let scale = -compliance(z, d).powi(2) * 0.5;
-        let (t_u, t_f) = (layout.t_u.map(C::from), layout.t_f.map(C::from));
-        let phi = [(d, n + d), (n + d, d)].map(|(row, column)| {
-            t_u.transpose() * z.row(row).transpose() * (&t_f * z.column(column)).transpose() * scale
-        });
-        let phi = &phi[0] + &phi[1];
         let cells = &self.cells[l];
-        let (channels, impacts) = layout.cell_count();
-        let mut sums = Sums {
+        let impacts = layout.impacts.len();
+        let zeros = |count| vec![Vector3::zeros(); count];
+        let none = Sums {
             noise_variance: 0.0,
-            channel_position: vec![Vector3::zeros(); layout.points],
-            impact_position: vec![Vector3::zeros(); impacts],
-            impact_angle: vec![Vector3::zeros(); impacts],
-            channel_aim: vec![Vector3::zeros(); layout.points * impacts],
-            impact_aim: vec![Vector3::zeros(); layout.points * impacts],
+            channel_position: zeros(layout.points),
+            impact_position: zeros(impacts),
+            impact_angle: zeros(impacts),
+            channel_aim: zeros(layout.points * impacts),
+            impact_aim: zeros(layout.points * impacts),
         };
-        if let Some(variance) = &self.variance {
-            for i in 0..impacts {
-                for o in 0..channels {
-                    sums.noise_variance += phi[(o, i)].norm_sqr() * variance[l][(o, i)];
-                }
-            }
-        }
+        let mut sums = vec![none; n];
+        // u and v of every degree of freedom, carried to the cells
+        let (to_channels, to_impacts) =
+            (product(&layout.t_u.transpose(), &z.transpose()), product(&layout.t_f, z));
+        let scales: Vec<C> = (0..n).map(|d| -compliance(z, d).powi(2) * 0.5).collect();
+        let phi = |d: usize, o: usize, i: usize| {
+            let dyads =
+                to_channels[(o, d)] * to_impacts[(i, n + d)] + to_channels[(o, n + d)] * to_impacts[(i, d)];
+            dyads * scales[d]
+        };
         let (motion, wrench) = (product(&layout.t_u, cells), product(cells, &layout.t_f));
         let sides = [0, 1].map(|side| side * n);
         // of each impact at either virtual point, and of either virtual point at each channel
@@ -109,18 +107,22 @@ impl Assembly {
             let forces = sides.map(|from| along(&layout.translations, |at| wrench[(o, from + at)]));
             let moments = sides.map(|from| along(&layout.rotations, |at| wrench[(o, from + at)]));
             for (i, impact) in layout.impacts.iter().enumerate() {
-                let factor = phi[(o, i)];
-                let by_channel = cross(channel.direction, rotations[i][channel.side]) * factor;
+                let by_channel = cross(channel.direction, rotations[i][channel.side]);
                 let (force, moment) = (forces[impact.side], moments[impact.side]);
-                let by_impact = cross(impact.direction, moment) * factor;
+                let by_impact = cross(impact.direction, moment);
                 // δY = (force + moment × r) · δe
-                let tilt = force - cross(impact.offset, moment);
+                let by_angle = cross(impact.direction, force - cross(impact.offset, moment));
                 let cell = channel.point * impacts + i;
-                sums.channel_position[channel.point] += by_channel;
-                sums.channel_aim[cell] += by_channel;
-                sums.impact_position[i] += by_impact;
-                sums.impact_aim[cell] += by_impact;
-                sums.impact_angle[i] += cross(impact.direction, tilt) * factor;
+                let variance = self.variance.as_ref().map_or(0.0, |variance| variance[l][(o, i)]);
+                for (d, sums) in sums.iter_mut().enumerate() {
+                    let factor = phi(d, o, i);
+                    sums.noise_variance += factor.norm_sqr() * variance;
+                    sums.channel_position[channel.point] += by_channel * factor;
+                    sums.channel_aim[cell] += by_channel * factor;
+                    sums.impact_position[i] += by_impact * factor;
+                    sums.impact_aim[cell] += by_impact * factor;
+                    sums.impact_angle[i] += by_angle * factor;
+                }
             }
         }
         sums

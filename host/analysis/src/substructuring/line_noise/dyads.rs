@@ -2,7 +2,9 @@
 
 use crate::substructuring::product::product;
 use crate::substructuring::rooms::{Balanced, Side};
+use crate::vectors::wide;
 use nalgebra::{Complex, DMatrix};
+use pulp::NullaryFnOnce;
 
 type C = Complex<f64>;
 type Line = DMatrix<C>;
@@ -24,9 +26,9 @@ struct Dyad<'a> {
     source: &'a Source<'a>,
     /// Whether it belongs to h* instead of g.
     conjugate: bool,
-    /// Row × degree of freedom.
+    /// Degree of freedom × row.
     left: Line,
-    /// Column × degree of freedom.
+    /// Degree of freedom × column.
     right: Line,
 }
 
@@ -39,14 +41,14 @@ impl<'a> Dyads<'a> {
     pub(super) fn linear(&mut self, source: &'a Source<'a>, l: &Line, r: &Line) {
         let left = source.t_l.map_or_else(|| l.clone(), |t| product(l, t));
         let right = source.t_r.map_or_else(|| r.clone(), |t| product(t, r));
-        self.0.push(Dyad { source, conjugate: false, left: left.transpose(), right });
+        self.0.push(Dyad { source, conjugate: false, left, right: right.transpose() });
     }
 
     /// X δAᴴ W.
     fn adjoint(&mut self, source: &'a Source<'a>, x: &Line, w: &Line) {
         let rows = source.t_l.map_or_else(|| w.clone(), |t| product(&t.transpose(), w));
         let columns = source.t_r.map_or_else(|| x.clone(), |t| product(x, &t.transpose()));
-        self.0.push(Dyad { source, conjugate: true, left: rows.conjugate(), right: columns.adjoint() });
+        self.0.push(Dyad { source, conjugate: true, left: rows.adjoint(), right: columns.conjugate() });
     }
 
     /// L δ(A⁺) R.
@@ -66,7 +68,8 @@ impl<'a> Dyads<'a> {
     /// Variances of K and of ωC of every degree of freedom, where Z is its factor times what the dyads move, from those of the files'
     /// cells at this line.
     pub(super) fn variances(&self, factors: &[C], variance: [&DMatrix<f64>; 3], tau: f64) -> Vec<[f64; 2]> {
-        let mut sums = vec![[0.0; 2]; factors.len()];
+        let dofs = factors.len();
+        let mut sums = vec![[0.0; 2]; dofs];
         for (file, variance) in variance.into_iter().enumerate() {
             // the matrix column by column, so that only one is at hand; what moves a column stays in the dyads' order
             let mut places: Vec<(usize, &Dyad<'_>, usize)> = Vec::new();
@@ -74,40 +77,75 @@ impl<'a> Dyads<'a> {
                 places.extend(dyad.source.columns.iter().enumerate().map(|(j, column)| (*column, dyad, j)));
             }
             places.sort_by_key(|(column, ..)| *column);
-            let mut g = [false, true].map(|_| vec![C::default(); variance.nrows()]);
-            for (d, (factor, sums)) in factors.iter().zip(&mut sums).enumerate() {
-                let of_k = factor * C::new(1.0, tau);
-                for column in places.chunk_by(|a, b| a.0 == b.0) {
-                    // most dyads are none of h*
-                    let mixed = column.iter().any(|(_, dyad, _)| dyad.conjugate);
-                    for g in &mut g[..=usize::from(mixed)] {
-                        g.fill(C::default());
-                    }
-                    for (_, dyad, j) in column {
-                        let (to, right) = (&mut g[usize::from(dyad.conjugate)], dyad.right[(*j, d)]);
-                        for (&row, left) in dyad.source.rows.iter().zip(&dyad.left.column(d)) {
-                            to[row] += left * right;
+            // g and h* of every row, all degrees of freedom side by side
+            let mut by_dof = vec![0.0; dofs];
+            let mut moved = [false, true].map(|_| vec![C::default(); dofs * variance.nrows()]);
+            for column in places.chunk_by(|a, b| a.0 == b.0) {
+                // most dyads are none of h*
+                let mixed = column.iter().any(|(_, dyad, _)| dyad.conjugate);
+                for to in &mut moved[..=usize::from(mixed)] {
+                    to.fill(C::default());
+                }
+                for (_, dyad, j) in column {
+                    let rows = (dyad.source.rows, dyad.left.as_slice());
+                    let right = &dyad.right.as_slice()[j * dofs..][..dofs];
+                    wide(Add { to: &mut moved[usize::from(dyad.conjugate)], rows, right });
+                }
+                let variance = variance.column(column[0].0);
+                if mixed {
+                    let [g, h] = &moved;
+                    let rows = g.chunks_exact(dofs).zip(h.chunks_exact(dofs)).zip(&variance);
+                    for ((g, h), v) in rows {
+                        for (((g, h), factor), sums) in g.iter().zip(h).zip(factors).zip(&mut sums) {
+                            // a cell that does not count may be unknown
+                            if *g != C::default() || *h != C::default() {
+                                let of_k = factor * C::new(1.0, tau);
+                                sums[0] += (of_k * g + of_k.conj() * h).norm_sqr() * v;
+                                sums[1] += (factor * g - factor.conj() * h).norm_sqr() * v;
+                            }
                         }
                     }
-                    let variance = variance.column(column[0].0);
-                    if !mixed {
-                        let moved = g[0].iter().zip(&variance).filter(|(g, _)| **g != C::default());
-                        let sum: f64 = moved.map(|(g, v)| g.norm_sqr() * v).sum();
-                        sums[0] += of_k.norm_sqr() * sum;
-                        sums[1] += factor.norm_sqr() * sum;
-                        continue;
+                    continue;
+                }
+                by_dof.fill(0.0);
+                for (g, v) in moved[0].chunks_exact(dofs).zip(&variance) {
+                    for (sum, g) in by_dof.iter_mut().zip(g) {
+                        *sum += if *g == C::default() { 0.0 } else { g.norm_sqr() * v };
                     }
-                    for ((g, h), v) in g[0].iter().zip(&g[1]).zip(variance.iter()) {
-                        // a cell that does not count may be unknown
-                        if *g != C::default() || *h != C::default() {
-                            sums[0] += (of_k * g + of_k.conj() * h).norm_sqr() * v;
-                            sums[1] += (factor * g - factor.conj() * h).norm_sqr() * v;
-                        }
-                    }
+                }
+                for ((sums, sum), factor) in sums.iter_mut().zip(&by_dof).zip(factors) {
+                    sums[0] += (factor * C::new(1.0, tau)).norm_sqr() * sum;
+                    sums[1] += factor.norm_sqr() * sum;
                 }
             }
         }
         sums
+    }
+}
+
+/// Adds left times right of every row and degree of freedom.
+struct Add<'a> {
+    /// Of all rows, the degrees of freedom of each side by side.
+    to: &'a mut [C],
+    /// Those that are moved, and their left sides.
+    rows: (&'a [usize], &'a [C]),
+    right: &'a [C],
+}
+
+impl NullaryFnOnce for Add<'_> {
+    type Output = ();
+
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn call(self) {
+        let dofs = self.right.len();
+        let (rows, left) = self.rows;
+        for (row, left) in rows.iter().zip(left.chunks_exact(dofs)) {
+            let to = &mut self.to[row * dofs..][..dofs];
+            for ((to, left), right) in to.iter_mut().zip(left).zip(self.right) {
+                *to += left * right;
+            }
+        }
     }
 }
 
