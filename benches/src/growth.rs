@@ -4,7 +4,8 @@ use peak_alloc::PeakAlloc;
 use std::fmt::Write;
 use std::time::Instant;
 
-const RUNS: usize = 5;
+/// A long run is disturbed more often than a short one.
+const RUNS: usize = 15;
 /// The largest exponent of time.
 const TIME: f64 = 1.05;
 /// Memory that does not grow with the size stays within this factor over the whole range; threads meet at different moments.

@@ -41,6 +41,7 @@ pub mod verify;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use rusqlite::config::DbConfig;
 use rusqlite::{Connection, ErrorCode, OpenFlags, Row};
 
 use error::{StoreError, sqlite};
@@ -158,6 +159,8 @@ impl Store {
             return Err(StoreError::Older { path: path.into(), found, known: OLDEST });
         }
         connection.pragma_update(None, "trusted_schema", false).map_err(open)?;
+        // otherwise SQLite plans a statement anew for each record that it is asked for
+        connection.set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_QPSG, true).map_err(open)?;
         if let Some(what) = own_schema::strange(&connection).map_err(open)? {
             return Err(StoreError::Content {
                 path: path.into(),
