@@ -11,6 +11,7 @@ use super::line_sums::turns;
 use super::loops::{slope, swing};
 use super::record::Relative;
 use crate::median::middle;
+use crate::vectors::wide;
 use num_complex::Complex;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -119,10 +120,65 @@ pub(super) fn decay(
 /// First sample that stands out: 5 % of the largest deviation, or six times the white noise, whichever is more.
 fn onset(x: &[f64]) -> usize {
     let rest = middle(&x[x.len() - x.len() / 4 - 1..]).unwrap_or(0.0);
-    let second: Vec<f64> = x.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
-    // second differences of white noise have √6 times its rms, their median 0.6745 of that
-    let noise = middle(&second).unwrap_or(0.0) / 0.6745 / 6f64.sqrt();
     let largest = x.iter().map(|v| (v - rest).abs()).fold(0.0, f64::max);
-    let limit = (0.05 * largest).max(6.0 * noise).min(0.5 * largest);
+    let part = 0.05 * largest;
+    let limit =
+        if noise_is_below(x, part / 6.0) { part } else { part.max(6.0 * noise(x)).min(0.5 * largest) };
     x.iter().position(|v| (v - rest).abs() >= limit).unwrap_or(0)
+}
+
+/// Second differences of white noise have √6 times its rms, their median 0.6745 of that.
+const MEDIAN: f64 = 0.6745 * 2.449_489_742_783_178;
+
+fn second_difference(w: &[f64]) -> f64 {
+    (w[0] - 2.0 * w[1] + w[2]).abs()
+}
+
+/// Rms of a record's white noise.
+fn noise(x: &[f64]) -> f64 {
+    let second: Vec<f64> = x.windows(3).map(second_difference).collect();
+    middle(&second).unwrap_or(0.0) / MEDIAN
+}
+
+/// Whether it is below this for certain: counting is a fraction of the work of finding the median.
+fn noise_is_below(x: &[f64], rms: f64) -> bool {
+    // by more than rounding
+    let limit = rms * MEDIAN * (1.0 - 1e-9);
+    let below: usize = wide(|| x.windows(3).map(|w| usize::from(second_difference(w) < limit)).sum());
+    below > x.len().saturating_sub(2) / 2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    #[test]
+    fn counting_says_what_the_median_says() {
+        let mut stream = Xoshiro256PlusPlus::seed_from_u64(4);
+        let mut dice = || -> f64 { StandardNormal.sample(&mut stream) };
+        for count in [3, 4, 5, 1000, 5001] {
+            let x: Vec<f64> = (0..count).map(|_| 0.3 * dice()).collect();
+            let rms = noise(&x);
+            assert!(count < 1000 || (rms / 0.3 - 1.0).abs() < 0.1, "{rms}");
+            assert!(noise_is_below(&x, rms * (1.0 + 1e-6)) && !noise_is_below(&x, rms), "{count}");
+        }
+        // nothing to count
+        assert!(!noise_is_below(&[1.0, 2.0], 1.0) && noise(&[1.0, 2.0]) == 0.0);
+    }
+
+    #[test]
+    fn the_onset_is_where_motion_stands_out_of_noise() {
+        let mut stream = Xoshiro256PlusPlus::seed_from_u64(5);
+        for scatter in [0.0, 1e-3, 0.05] {
+            let mut dice = || -> f64 { StandardNormal.sample(&mut stream) };
+            let motion = |i: usize| if i < 500 { 0.0 } else { ((i - 500) as f64 / 20.0).sin() };
+            let x: Vec<f64> = (0..2000).map(|i| motion(i) + scatter * dice()).collect();
+            let at = onset(&x);
+            // six deviations of 0.05 are reached after six samples
+            assert!((500..510).contains(&at), "{scatter}: {at}");
+        }
+    }
 }
