@@ -138,6 +138,7 @@ pub(super) fn check_finite(signal: &[f64]) -> Result<(), SpectraError> {
 #[cfg(test)]
 mod tests {
     use super::super::lines::Put;
+    use super::super::window::{ForceWeighting, Windowing};
     use super::*;
     use crate::transforms::forward;
     use std::f64::consts::PI;
@@ -211,6 +212,32 @@ mod tests {
                 let off: f64 = found.iter().zip(&whole).map(|(a, b)| (a - b).norm_sqr()).sum();
                 // an f64 holds 1.1e-16, of which a transform gathers a little at each of its passes
                 assert!((off / power).sqrt() < 1e-15, "{samples} samples: {:e}", (off / power).sqrt());
+            }
+        }
+    }
+
+    /// Blocks within the window, across its origin, and beyond the record's end, where zeros are added.
+    #[test]
+    fn a_window_applied_on_the_way_in_is_that_of_the_windowed_record() {
+        let (samples, recorded) = (6_400, 5_003);
+        let record = record(recorded);
+        for force_weighting in [ForceWeighting::Exponential, ForceWeighting::Rectangular] {
+            let window = Windowing { sigma_per_s: 3.0, force_weighting, ..Windowing::default() };
+            let decay = window.decay(5120.0, recorded);
+            let weighting = window.of_response(&decay, 0.21);
+            let mut windowed = vec![0.0; samples];
+            weighting.response_into(&record, 0, &mut windowed);
+            for plan in plans(samples) {
+                let order = plan.order(0..plan.lines());
+                let mut found = vec![C::default(); order.len()];
+                let to = &mut Put { order: &order, out: &mut found };
+                plan.transform(Windowed::response(&record, &weighting), &order, to).expect("numbers");
+                let whole = lines(&plan, &windowed, 0..plan.lines());
+                let power: f64 = whole.iter().map(C::norm_sqr).sum();
+                let off: f64 =
+                    order.by_line(&found).iter().zip(&whole).map(|(a, b)| (a - b).norm_sqr()).sum();
+                // weights are rounded twice instead of once
+                assert!((off / power).sqrt() < 1e-15, "{force_weighting:?}: {:e}", (off / power).sqrt());
             }
         }
     }
