@@ -6,10 +6,11 @@
 //!
 //! A long transform and its factors do not fit into the cache next to a core; a piece does.
 
+use super::window::RUN;
 use super::windowed::Windowed;
 use crate::vectors::wide;
 use num_complex::Complex;
-use pulp::{Simd, WithSimd, bytemuck};
+use pulp::{NullaryFnOnce, bytemuck};
 use std::array::from_fn;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
@@ -23,6 +24,7 @@ pub(super) const PARTS: usize = 8;
 
 /// Samples of each part that are folded together.
 const BLOCK: usize = 256;
+const _: () = assert!(BLOCK <= RUN, "weights are known for a run at a time");
 
 /// The factors of one length.
 pub(super) struct Quarters {
@@ -46,25 +48,17 @@ impl Quarters {
         let mut gathered = [0.0; PARTS * BLOCK];
         for start in (0..q).step_by(BLOCK) {
             let block = start..q.min(start + BLOCK);
-            let at = |part: usize| part * q + start;
-            let seen = from_fn(|part| record.weights(at(part), block.len()));
-            let direct = seen.iter().all(Option::is_some);
-            if !direct {
-                for (part, own) in gathered.chunks_exact_mut(BLOCK).enumerate() {
-                    record.write(at(part), &mut own[..block.len()]);
-                }
-            }
-            let gathered = Windowed::plain(&gathered);
-            let (from, at, weights): (_, [usize; PARTS], _) = if direct {
-                (record, from_fn(at), seen)
+            let in_record: [usize; PARTS] = from_fn(|part| part * q + start);
+            let direct = in_record.iter().all(|at| record.weights(*at, block.len()).is_some());
+            let (from, at) = if direct {
+                (record, in_record)
             } else {
-                (
-                    gathered,
-                    from_fn(|part| part * BLOCK),
-                    from_fn(|part| gathered.weights(part * BLOCK, block.len())),
-                )
+                for (at, own) in in_record.into_iter().zip(gathered.chunks_exact_mut(BLOCK)) {
+                    record.write(at, &mut own[..block.len()]);
+                }
+                (Windowed::plain(&gathered), from_fn(|part| part * BLOCK))
             };
-            let weights = weights.map(Option::unwrap_or_default);
+            let weights = at.map(|at| from.weights(at, block.len()).expect("samples of one kind"));
             wide(Fold {
                 samples: from.samples(),
                 at,
@@ -97,12 +91,12 @@ struct Fold<'a> {
     third: &'a mut [C],
 }
 
-impl WithSimd for Fold<'_> {
+impl NullaryFnOnce for Fold<'_> {
     type Output = ();
 
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
+    fn call(self) {
         let Fold { samples, at, places, weights, factors, .. } = self;
         fold(
             (samples, at),

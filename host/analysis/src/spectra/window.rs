@@ -161,13 +161,11 @@ impl Windowing {
     /// How the responses of the same hit are weighted.
     pub fn of_response<'d>(&self, decay: &'d Decay, origin_s: f64) -> ResponseWeighting<'d> {
         // what is before the origin stays as it is where only the response is weighted
-        let plain = match self.force_weighting {
-            _ if self.sigma_per_s == 0.0 => 0,
-            ForceWeighting::Exponential => 0,
-            ForceWeighting::Rectangular => {
-                let samples = decay.samples;
-                (0..samples).position(|i| i as f64 / decay.fs_hz > origin_s).unwrap_or(samples)
-            }
+        let plain = if self.force_weighting == ForceWeighting::Rectangular && self.sigma_per_s != 0.0 {
+            let samples = decay.samples;
+            (0..samples).position(|i| i as f64 / decay.fs_hz > origin_s).unwrap_or(samples)
+        } else {
+            0
         };
         ResponseWeighting { decay, plain, scale: (self.sigma_per_s * origin_s).exp() }
     }

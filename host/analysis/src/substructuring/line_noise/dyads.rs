@@ -77,8 +77,8 @@ impl<'a> Dyads<'a> {
                 places.extend(dyad.source.columns.iter().enumerate().map(|(j, column)| (*column, dyad, j)));
             }
             places.sort_by_key(|(column, ..)| *column);
-            // g and h* of every row, all degrees of freedom side by side
             let mut by_dof = vec![0.0; dofs];
+            // g and h* of every row, all degrees of freedom side by side
             let mut moved = [false, true].map(|_| vec![C::default(); dofs * variance.nrows()]);
             for column in places.chunk_by(|a, b| a.0 == b.0) {
                 // most dyads are none of h*
