@@ -39,25 +39,22 @@ pub(super) struct Chart {
     size: Vec<f64>,
 }
 
-/// The joint at one s as D and E with G⁻¹ = (D W + E)⁻¹ D, where G = W + (K + sC)⁻¹; and their derivatives by each parameter.
+/// The joint at one s as D and E with G⁻¹ = (D W + E)⁻¹ D, where G = W + (K + sC)⁻¹.
 pub(super) struct At {
     pub(super) d: Line,
     pub(super) e: Line,
-    pub(super) slopes: Vec<Slope>,
+    /// Their derivatives, if asked for.
+    pub(super) slopes: Option<Slopes>,
 }
 
-/// The derivative of D and E by one parameter: Σ (left dᵀ, left eᵀ).
-pub(super) type Slope = Vec<Dyad>;
-
-/// One term of a derivative.
-pub(super) struct Dyad {
-    pub(super) left: Sparse,
-    pub(super) d: Sparse,
-    pub(super) e: Sparse,
+/// The derivatives of D and E by each parameter, as sums of dyads left dᵀ and left eᵀ.
+///
+/// Each matrix has a column for each dyad. Every parameter has as many as the others, side by side.
+pub(super) struct Slopes {
+    pub(super) left: Line,
+    pub(super) d: Line,
+    pub(super) e: Line,
 }
-
-/// A vector of which only these entries differ from zero.
-pub(super) type Sparse = Vec<(usize, C)>;
 
 impl Chart {
     pub(super) fn diagonal(unit: Vec<f64>, omega: f64) -> Chart {
@@ -144,23 +141,23 @@ impl Chart {
 
     fn diagonal_at(&self, p: &DVector<f64>, s: C, slopes: bool) -> At {
         let n = self.n();
-        let zero = || Line::zeros(n, n);
-        let mut at = At { d: zero(), e: zero(), slopes: vec![] };
-        let (mut by_kappa, mut by_loss) = (vec![], vec![]);
+        let mut at = At { d: Line::zeros(n, n), e: Line::zeros(n, n), slopes: None };
+        let loss = |d: usize| 1.0 + s * (p[n + d] / self.omega);
         for d in 0..n {
-            let loss = 1.0 + s * (p[n + d] / self.omega);
-            at.d[(d, d)] = loss * (p[d] / self.unit[d]);
+            at.d[(d, d)] = loss(d) * (p[d] / self.unit[d]);
             at.e[(d, d)] = C::from(1.0 - p[d]);
-            if slopes {
-                let dyad = |dd: C, de: C| {
-                    vec![Dyad { left: vec![(d, C::from(1.0))], d: vec![(d, dd)], e: vec![(d, de)] }]
-                };
-                by_kappa.push(dyad(loss / self.unit[d], C::from(-1.0)));
-                by_loss.push(dyad(s * (p[d] / self.unit[d] / self.omega), C::default()));
-            }
         }
-        at.slopes.extend(by_kappa);
-        at.slopes.extend(by_loss);
+        if slopes {
+            let mut of = Slopes::none(n, 2 * n);
+            for d in 0..n {
+                of.left[(d, d)] = C::from(1.0);
+                of.d[(d, d)] = loss(d) / self.unit[d];
+                of.e[(d, d)] = C::from(-1.0);
+                of.left[(d, n + d)] = C::from(1.0);
+                of.d[(d, n + d)] = s * (p[d] / self.unit[d] / self.omega);
+            }
+            at.slopes = Some(of);
+        }
         at
     }
 
@@ -170,21 +167,24 @@ impl Chart {
         let scale = |z: Line| Line::from_fn(n, n, |r, c| z[(r, c)] / (self.unit[r] * self.unit[c]).sqrt());
         let per = s / self.omega;
         let d = (&l * l.transpose()).map(C::from) + (&m * m.transpose()).map(|v| per * v);
-        let mut at = At { d: scale(d), e: Line::identity(n, n), slopes: vec![] };
+        let mut at = At { d: scale(d), e: Line::identity(n, n), slopes: None };
         if slopes {
-            for (root, factor) in [(&l, C::from(1.0)), (&m, per)] {
-                for (r, c) in triangle(n) {
-                    // d(L Lᵀ) = e_r (column c of L)ᵀ + its transpose
-                    let unit = |i: usize| self.unit[i].sqrt().recip();
-                    let row: Sparse = vec![(r, C::from(unit(r)))];
-                    let column: Sparse = (0..n).map(|i| (i, C::from(root[(i, c)] * unit(i)))).collect();
-                    let scaled = |v: &Sparse| v.iter().map(|(i, v)| (*i, v * factor)).collect();
-                    at.slopes.push(vec![
-                        Dyad { d: scaled(&column), left: row.clone(), e: vec![] },
-                        Dyad { d: scaled(&row), left: column, e: vec![] },
-                    ]);
+            let mut of = Slopes::none(n, 2 * self.count());
+            let unit = |i: usize| self.unit[i].sqrt().recip();
+            let entries = [(&l, C::from(1.0)), (&m, per)]
+                .into_iter()
+                .flat_map(|root| triangle(n).map(move |entry| (root, entry)));
+            for (i, ((root, factor), (r, c))) in entries.enumerate() {
+                // d(L Lᵀ) = e_r (column c of L)ᵀ + its transpose
+                for k in 0..n {
+                    let value = C::from(root[(k, c)] * unit(k));
+                    of.d[(k, 2 * i)] = value * factor;
+                    of.left[(k, 2 * i + 1)] = value;
                 }
+                of.left[(r, 2 * i)] = C::from(unit(r));
+                of.d[(r, 2 * i + 1)] = C::from(unit(r)) * factor;
             }
+            at.slopes = Some(of);
         }
         at
     }
@@ -203,6 +203,13 @@ impl Chart {
     pub(super) fn matrices(&self, p: &DVector<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
         let (l, m) = self.roots(p);
         (&l * l.transpose(), &m * m.transpose())
+    }
+}
+
+impl Slopes {
+    fn none(n: usize, dyads: usize) -> Slopes {
+        let none = || Line::zeros(n, dyads);
+        Slopes { left: none(), d: none(), e: none() }
     }
 }
 

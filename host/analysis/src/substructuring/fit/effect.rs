@@ -4,7 +4,7 @@ use super::FitError;
 use super::assembly_aims::AssemblyAims;
 use super::block::{Block, Line};
 use super::cell::CellGeometry;
-use super::model::Predicted;
+use super::model::{Predicted, Slopes, Wanted};
 use super::nuisance::AIMS;
 use super::problem::Problem;
 use super::weight::Point;
@@ -61,17 +61,20 @@ impl Point<'_> {
         let (rows, columns) = problem.layout.shape();
         let mut mean = Line::zeros(rows, columns);
         let mut ways: [Vec<Way>; 2] = [vec![], vec![]];
-        let mut lines_slopes = Vec::with_capacity(lines.len());
-        for l in lines.clone() {
-            let y = [part(0, l), part(1, l)];
-            let predicted = problem.predict(chart, self.p, [&y[0], &y[1]], l, slopes)?;
+        let parts = [0, 1].map(|side| lines.clone().map(|l| part(side, l)).collect::<Vec<Line>>());
+        let wanted = Wanted { y: true, gains: true, slopes };
+        let own = parts.each_ref().map(Vec::as_slice);
+        let predicted = problem.predict(chart, self.p, own, lines.clone(), wanted)?;
+        for predicted in &predicted {
             mean += &predicted.y * C::from(share);
-            for (side, y) in y.into_iter().enumerate() {
-                let (left, right) = problem.through(side, &predicted);
+        }
+        for (side, parts) in parts.into_iter().enumerate() {
+            for (y, predicted) in parts.into_iter().zip(&predicted) {
+                let (left, right) = problem.through(side, predicted);
                 ways[side].push(Way { y, left: stacked(&left), right });
             }
-            lines_slopes.push(predicted.slopes);
         }
+        let lines_slopes: Vec<Slopes> = predicted.into_iter().map(|line| line.slopes).collect();
         problem.add_measured(model.column_mut(0).as_mut_slice(), &mean, 1.0);
         problem.put_slopes(&mut model.as_mut_slice()[2 * m..], &lines_slopes, share);
         for (side, ways) in ways.iter().enumerate() {

@@ -4,10 +4,12 @@
 //! R = I − Bᵀ G⁻¹ Q; a change of the joint −P δ(G⁻¹) Q.
 
 use super::block::{Line, Ports};
-use super::chart::{At, Dyad};
-use crate::substructuring::product::product;
+use super::chart::{self, At};
+use crate::substructuring::lanes::{Matrix, Pool, Sure, inverse, lines, minus, plus, product};
 use crate::substructuring::pseudo_inverse::full_rank_inverse;
+use crate::vectors::wide;
 use nalgebra::Complex;
+use pulp::{Simd, WithSimd};
 
 type C = Complex<f64>;
 
@@ -19,21 +21,35 @@ pub(super) struct Layout {
     pub(super) columns: [Ports; 2],
 }
 
-/// The model at one line.
+/// What is to be computed of the model.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Wanted {
+    /// Y^AJB.
+    pub(super) y: bool,
+    /// P G⁻¹ and G⁻¹ Q.
+    pub(super) gains: bool,
+    /// The derivatives by the joint.
+    pub(super) slopes: bool,
+}
+
+/// The model at one line; empty where it was not wanted.
 pub(super) struct Predicted {
     /// All output ports × all input ports.
     pub(super) y: Line,
     /// P G⁻¹ and G⁻¹ Q.
     pg: Line,
     gq: Line,
-    /// Derivative of `y` by each parameter of the joint, as sums of products.
-    pub(super) slopes: Vec<Vec<Product>>,
+    pub(super) slopes: Slopes,
 }
 
-/// A column for all output ports times a row for all input ports.
-pub(super) struct Product {
-    pub(super) moved: Vec<C>,
-    pub(super) by: Vec<C>,
+/// The derivatives of Y^AJB by the parameters of the joint, as sums of dyads: a column of `moved` times that of `by`, transposed.
+///
+/// Every parameter has as many dyads as the others, side by side.
+pub(super) struct Slopes {
+    /// All output ports × dyads.
+    pub(super) moved: Line,
+    /// All input ports × dyads.
+    pub(super) by: Line,
 }
 
 impl Layout {
@@ -46,30 +62,6 @@ impl Layout {
         if side == 0 { (0, 0) } else { (self.rows[0].count, self.columns[0].count) }
     }
 
-    /// Y of both parts, block-diagonal.
-    fn apart(&self, parts: [&Line; 2]) -> Line {
-        let (rows, columns) = self.shape();
-        let mut y = Line::zeros(rows, columns);
-        for (side, part) in parts.into_iter().enumerate() {
-            y.view_mut(self.corner(side), part.shape()).copy_from(part);
-        }
-        y
-    }
-
-    /// P = Y Bᵀ and Q = B Y.
-    fn edges(&self, parts: [&Line; 2]) -> (Line, Line) {
-        let (rows, columns) = self.shape();
-        let (mut p, mut q) = (Line::zeros(rows, self.n), Line::zeros(self.n, columns));
-        for (side, part) in parts.into_iter().enumerate() {
-            let (row, column) = self.corner(side);
-            let pushed = part.columns(self.columns[side].first[0], self.n) * sign(side);
-            p.view_mut((row, 0), pushed.shape()).copy_from(&pushed);
-            let moved = part.rows(self.rows[side].first[0], self.n) * sign(side);
-            q.view_mut((0, column), moved.shape()).copy_from(&moved);
-        }
-        (p, q)
-    }
-
     /// W = B Y Bᵀ of the interface.
     pub(super) fn interface(&self, parts: [&Line; 2]) -> Line {
         let mut w = Line::zeros(self.n, self.n);
@@ -80,44 +72,21 @@ impl Layout {
         w
     }
 
-    /// Only the assembly's admittance; none where G is singular.
-    pub(super) fn assembly(&self, joint: &At, parts: [&Line; 2]) -> Option<Line> {
-        let g = product(&held(joint, &self.interface(parts))?, &joint.d);
-        let (p, q) = self.edges(parts);
-        Some(self.apart(parts) - product(&p, &product(&g, &q)))
-    }
-
-    /// The model with its derivatives; none where G is singular.
-    pub(super) fn predict(&self, joint: &At, parts: [&Line; 2]) -> Option<Predicted> {
-        let w = self.interface(parts);
-        let h = held(joint, &w)?;
-        let g = product(&h, &joint.d);
-        let (p, q) = self.edges(parts);
-        let (pg, gq) = (product(&p, &g), product(&g, &q));
-        let (rows, columns) = self.shape();
-        // δ(G⁻¹) = H (δD (I − W G⁻¹) − δE G⁻¹)
-        let ph = product(&p, &h);
-        let rest = &q - product(&w, &gq);
-        let product_of = |dyad: &Dyad| {
-            let mut moved = vec![C::default(); rows];
-            for (i, v) in &dyad.left {
-                moved.iter_mut().zip(ph.column(*i).iter()).for_each(|(to, p)| *to -= p * v);
-            }
-            let by = (0..columns).map(|c| {
-                let pushed: C = dyad.d.iter().map(|(i, v)| rest[(*i, c)] * v).sum();
-                let eased: C = dyad.e.iter().map(|(i, v)| gq[(*i, c)] * v).sum();
-                pushed - eased
-            });
-            Product { moved, by: by.collect() }
-        };
-        let slopes = joint.slopes.iter().map(|dyads| dyads.iter().map(product_of).collect()).collect();
-        Some(Predicted { y: self.apart(parts) - product(&p, &gq), pg, gq, slopes })
+    /// The model at some lines, given the joint, Y^A and Y^B at each; none where G is singular.
+    pub(super) fn predict(
+        &self,
+        joint: &[At],
+        parts: [&[Line]; 2],
+        wanted: Wanted,
+    ) -> Vec<Option<Predicted>> {
+        assert!(parts.iter().all(|part| part.len() == joint.len()), "A, B and the joint have the same lines");
+        wide(Predictions { layout: self, joint, parts, wanted })
     }
 
     /// The columns of L that a side's output ports pass through: all output ports × the side's.
     pub(super) fn left(&self, at: &Predicted, side: usize) -> Line {
         let (ports, row) = (&self.rows[side], self.corner(side).0);
-        let mut left = Line::zeros(at.y.nrows(), ports.count);
+        let mut left = Line::zeros(self.shape().0, ports.count);
         left.view_mut((row, 0), (ports.count, ports.count)).fill_with_identity();
         let mut own = left.columns_mut(ports.first[0], self.n);
         own -= &at.pg * sign(side);
@@ -127,7 +96,7 @@ impl Layout {
     /// The rows of R that its input ports pass through: the side's input ports × all.
     pub(super) fn right(&self, at: &Predicted, side: usize) -> Line {
         let (ports, column) = (&self.columns[side], self.corner(side).1);
-        let mut right = Line::zeros(ports.count, at.y.ncols());
+        let mut right = Line::zeros(ports.count, self.shape().1);
         right.view_mut((0, column), (ports.count, ports.count)).fill_with_identity();
         let mut own = right.rows_mut(ports.first[0], self.n);
         own -= &at.gq * sign(side);
@@ -140,7 +109,103 @@ fn sign(side: usize) -> C {
     C::from(if side == 0 { 1.0 } else { -1.0 })
 }
 
-/// H = (D W + E)⁻¹; none where it is singular.
-fn held(joint: &At, w: &Line) -> Option<Line> {
-    full_rank_inverse(&(product(&joint.d, w) + &joint.e), "the interface with the joint").ok()
+/// The model at as many lines at once as the processor's vectors hold.
+struct Predictions<'a> {
+    layout: &'a Layout,
+    joint: &'a [At],
+    parts: [&'a [Line]; 2],
+    wanted: Wanted,
+}
+
+impl WithSimd for Predictions<'_> {
+    type Output = Vec<Option<Predicted>>;
+
+    fn with_simd<S: Simd>(self, simd: S) -> Vec<Option<Predicted>> {
+        let pool = Pool::new(simd);
+        let firsts = (0..self.joint.len()).step_by(S::F64_LANES);
+        firsts.flat_map(|first| self.from(&pool, first)).collect()
+    }
+}
+
+impl Predictions<'_> {
+    /// The lines of a vector from `first` on.
+    fn from<S: Simd>(&self, pool: &Pool<S>, first: usize) -> Vec<Option<Predicted>> {
+        let Predictions { layout, joint, parts, wanted } = *self;
+        let n = layout.n;
+        let lanes = S::F64_LANES.min(joint.len() - first);
+        let (rows, columns) = layout.shape();
+        let own = [0, 1].map(|side| Matrix::whole(pool, &lines(pool, parts[side], first)));
+        let (mut p, mut q) = (Matrix::zeros(pool, rows, n), Matrix::zeros(pool, n, columns));
+        let mut w = Matrix::zeros(pool, n, n);
+        for (side, own) in own.iter().enumerate() {
+            let (row, column) = layout.corner(side);
+            let at = (layout.rows[side].first[0], layout.columns[side].first[0]);
+            let pushed = own.block((0, at.1), (own.rows(), n));
+            let moved = own.block((at.0, 0), (n, own.columns()));
+            let [pushed, moved] = if side == 0 { [pushed, moved] } else { [pushed.negated(), moved.negated()] };
+            p.put((row, 0), &pushed);
+            q.put((0, column), &moved);
+            w = plus(w, &own.block(at, (n, n)));
+        }
+        let joint: Vec<&At> = (first..first + S::F64_LANES).filter_map(|l| joint.get(l).or(joint.last())).collect();
+        let of_joint = |of: fn(&At) -> &Line| {
+            Matrix::whole(pool, &joint.iter().map(|at| of(at)).collect::<Vec<&Line>>())
+        };
+        let d = of_joint(|at| &at.d);
+        let (h, regular) = held(plus(product(&d, &w), &of_joint(|at| &at.e)), lanes);
+        let g = product(&h, &d);
+        let gq = product(&g, &q);
+        let y = wanted.y.then(|| {
+            let mut apart = Matrix::zeros(pool, rows, columns);
+            for (side, own) in own.iter().enumerate() {
+                apart.put(layout.corner(side), own);
+            }
+            minus(apart, &product(&p, &gq))
+        });
+        let pg = wanted.gains.then(|| product(&p, &g));
+        let slopes = wanted.slopes.then(|| {
+            let of = |of: fn(&chart::Slopes) -> &Line| {
+                let lines: Vec<&Line> = joint.iter().filter_map(|at| at.slopes.as_ref()).map(of).collect();
+                Matrix::whole(pool, &lines)
+            };
+            // δ(G⁻¹) = H (δD (I − W G⁻¹) − δE G⁻¹), δD = left dᵀ
+            let rest = minus(q, &product(&w, &gq));
+            let moved = product(&product(&p, &h), &of(|s| &s.left)).negated();
+            let by = minus(
+                product(&rest.transpose(), &of(|s| &s.d)),
+                &product(&gq.transpose(), &of(|s| &s.e)),
+            );
+            (moved, by)
+        });
+        let line = |matrix: Option<&Matrix<'_, S>>, lane: usize| {
+            matrix.map_or_else(|| Line::zeros(0, 0), |matrix| matrix.line(lane))
+        };
+        (0..lanes)
+            .map(|lane| {
+                regular[lane].then(|| Predicted {
+                    y: line(y.as_ref(), lane),
+                    pg: line(pg.as_ref(), lane),
+                    gq: line(pg.as_ref().map(|_| &gq), lane),
+                    slopes: Slopes {
+                        moved: line(slopes.as_ref().map(|s| &s.0), lane),
+                        by: line(slopes.as_ref().map(|s| &s.1), lane),
+                    },
+                })
+            })
+            .collect()
+    }
+}
+
+/// H = (D W + E)⁻¹, and at which of the lines it is one.
+fn held<S: Simd>(interface: Matrix<'_, S>, lanes: usize) -> (Matrix<'_, S>, Vec<bool>) {
+    let mut sure = Sure::all(interface.pool().simd);
+    let mut h = inverse(interface.copy(), &mut sure);
+    let regular = (0..lanes).map(|lane| {
+        sure.at(lane) || {
+            let careful = full_rank_inverse(&interface.line(lane), "the interface with the joint");
+            careful.map(|own| h.put_line(lane, &own)).is_ok()
+        }
+    });
+    let regular = regular.collect();
+    (h, regular)
 }

@@ -24,6 +24,13 @@ fn through(problem: &Problem, side: usize, predicted: &model::Predicted) -> (Lin
     (left * block.t_u.map(C::from), block.t_f.map(C::from) * right)
 }
 
+/// The model at a line where Y^A and Y^B are `y`.
+fn predicted(point: &Point<'_>, l: usize, [a, b]: [Line; 2]) -> model::Predicted {
+    let all = model::Wanted { y: true, gains: true, slopes: false };
+    let found = point.problem.predict(point.chart, point.p, [&[a], &[b]], l..l + 1, all);
+    found.expect("regular").remove(0)
+}
+
 /// Adds ∂(left · cells · right)/∂η (unscaled) of a block whose ports move by `y`.
 fn add_effect(point: &Point<'_>, place: usize, y: &Line, way: (&Line, &Line, f64), effect: &mut Line) {
     let problem = point.problem;
@@ -70,7 +77,7 @@ fn effect(point: &Point<'_>, lines: &Range<usize>, part: impl Fn(usize, usize) -
     let share = 1.0 / lines.len() as f64;
     for l in lines.clone() {
         let y = [part(0, l), part(1, l)];
-        let predicted = problem.predict(point.chart, point.p, [&y[0], &y[1]], l, true).expect("regular");
+        let predicted = predicted(point, l, y.clone());
         mean += &predicted.y * C::from(share);
         for (side, y) in y.iter().enumerate() {
             let (left, right) = through(problem, side, &predicted);
@@ -113,7 +120,7 @@ fn information(point: &Point<'_>) -> DMatrix<f64> {
         let part = |side: usize, l: usize| point.data.parts[side][l].clone();
         for l in lines.clone().step_by(step) {
             let y = [part(0, l), part(1, l)];
-            let predicted = problem.predict(point.chart, point.p, [&y[0], &y[1]], l, false).expect("regular");
+            let predicted = predicted(point, l, y);
             for side in 0..2 {
                 let (left, right) = through(problem, side, &predicted);
                 spread(&mut noise, &left, &right, &problem.parts[side].variance[l], averaged / sampled);

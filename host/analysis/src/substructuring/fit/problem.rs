@@ -4,8 +4,8 @@ use super::FitError;
 use super::assembly_aims::Pushes;
 use super::block::{Block, Line};
 use super::cell::CellGeometry;
-use super::chart::Chart;
-use super::model::{Layout, Predicted, Product};
+use super::chart::{At, Chart};
+use super::model::{Layout, Predicted, Slopes, Wanted};
 use super::noise::{ByImpact, Noise};
 use super::nuisance::{AIMS, Nuisances};
 use super::shift::Shift;
@@ -150,10 +150,10 @@ impl Problem {
                     *part = (measured.iter().zip(shift.added_to(part))).map(|(y, more)| y - more).collect();
                 }
             }
-            let model: Vec<Line> = (0..self.s.len())
-                .into_par_iter()
-                .map(|l| self.model(chart, p, &parts, l))
+            let model: Vec<Vec<Line>> = (self.bands.par_iter())
+                .map(|band| self.model(chart, p, &parts, band.clone()))
                 .collect::<Result<_, FitError>>()?;
+            let model = model.concat();
             ajb.iter_mut().zip(shift(2).added_to(&model)).for_each(|(y, more)| *y -= more);
         }
         let bias = self.bias(chart, p, &parts)?;
@@ -183,52 +183,65 @@ impl Problem {
     /// E\[model(Y + n)\] − model(Y) per line: Eq. (1) bends, so the noise of Y^A and Y^B moves its mean. Pairs ±n cancel the
     /// linear part.
     fn bias(&self, chart: &Chart, p: &DVector<f64>, parts: &[Vec<Line>; 2]) -> Result<Vec<Line>, FitError> {
-        (0..self.s.len())
-            .into_par_iter()
-            .map(|l| {
-                let singular = FitError::Singular { frequency_hz: self.frequency_hz(l) };
-                let joint = chart.at(p, self.s[l], false);
-                let still = self.layout.assembly(&joint, [&parts[0][l], &parts[1][l]]).ok_or(singular)?;
-                let mut sum = still.map(|_| C::default());
+        let by_band: Vec<Vec<Line>> = (self.bands.par_iter())
+            .map(|band| {
+                let still = self.model(chart, p, parts, band.clone())?;
+                let joint = self.joint(chart, p, band.clone(), false);
+                let mut sums: Vec<Line> = still.iter().map(|y| y.map(|_| C::default())).collect();
                 for pair in 0..PAIRS {
-                    let draw = self.noise(l, SEED + pair);
+                    let draws: Vec<[Line; 2]> = band.clone().map(|l| self.noise(l, SEED + pair)).collect();
                     let at = |sign: f64| {
-                        let moved = [0, 1].map(|side| &parts[side][l] + &draw[side] * C::from(sign));
-                        self.layout.assembly(&joint, [&moved[0], &moved[1]])
+                        let moved = [0, 1].map(|side| -> Vec<Line> {
+                            let own = parts[side][band.clone()].iter().zip(&draws);
+                            own.map(|(y, draw)| y + &draw[side] * C::from(sign)).collect()
+                        });
+                        let wanted = Wanted { y: true, ..Wanted::default() };
+                        self.layout.predict(&joint, moved.each_ref().map(Vec::as_slice), wanted)
                     };
-                    // a draw that makes G singular to rounding has probability zero, and says nothing
-                    if let (Some(plus), Some(minus)) = (at(1.0), at(-1.0)) {
-                        sum += ((plus + minus) * C::from(0.5) - &still) / C::from(PAIRS as f64);
+                    for ((sum, still), both) in sums.iter_mut().zip(&still).zip(at(1.0).into_iter().zip(at(-1.0))) {
+                        // a draw that makes G singular to rounding has probability zero, and says nothing
+                        if let (Some(plus), Some(minus)) = both {
+                            *sum += ((plus.y + minus.y) * C::from(0.5) - still) / C::from(PAIRS as f64);
+                        }
                     }
                 }
-                Ok(sum)
+                Ok(sums)
             })
-            .collect()
+            .collect::<Result<_, FitError>>()?;
+        Ok(by_band.concat())
     }
 
-    /// The assembly's admittance at a line, by Eq. (1).
+    /// The joint at some lines.
+    fn joint(&self, chart: &Chart, p: &DVector<f64>, lines: Range<usize>, slopes: bool) -> Vec<At> {
+        lines.map(|l| chart.at(p, self.s[l], slopes)).collect()
+    }
+
+    /// The assembly's admittance at some lines, by Eq. (1).
     fn model(
         &self,
         chart: &Chart,
         p: &DVector<f64>,
         parts: &[Vec<Line>; 2],
-        l: usize,
-    ) -> Result<Line, FitError> {
-        (self.layout.assembly(&chart.at(p, self.s[l], false), [&parts[0][l], &parts[1][l]]))
-            .ok_or(FitError::Singular { frequency_hz: self.frequency_hz(l) })
+        lines: Range<usize>,
+    ) -> Result<Vec<Line>, FitError> {
+        let own = parts.each_ref().map(|part| &part[lines.clone()]);
+        let wanted = Wanted { y: true, ..Wanted::default() };
+        Ok(self.predict(chart, p, own, lines, wanted)?.into_iter().map(|line| line.y).collect())
     }
 
+    /// The model at some lines, at which Y^A and Y^B are `parts`.
     pub(super) fn predict(
         &self,
         chart: &Chart,
         p: &DVector<f64>,
-        parts: [&Line; 2],
-        l: usize,
-        slopes: bool,
-    ) -> Result<Predicted, FitError> {
-        self.layout
-            .predict(&chart.at(p, self.s[l], slopes), parts)
-            .ok_or(FitError::Singular { frequency_hz: self.frequency_hz(l) })
+        parts: [&[Line]; 2],
+        lines: Range<usize>,
+        wanted: Wanted,
+    ) -> Result<Vec<Predicted>, FitError> {
+        let joint = self.joint(chart, p, lines.clone(), wanted.slopes);
+        (self.layout.predict(&joint, parts, wanted).into_iter().zip(lines))
+            .map(|(line, l)| line.ok_or(FitError::Singular { frequency_hz: self.frequency_hz(l) }))
+            .collect()
     }
 
     /// Measured minus model, averaged over a band: real parts above imaginary ones.
@@ -241,8 +254,9 @@ impl Problem {
     ) -> Result<DMatrix<f64>, FitError> {
         let mut sum = DMatrix::zeros(2 * self.entries(), 1);
         let share = 1.0 / band.len() as f64;
-        for l in band {
-            let difference = &data.ajb[l] - self.model(chart, p, &data.parts, l)? - &data.bias[l];
+        let model = self.model(chart, p, &data.parts, band.clone())?;
+        for (l, model) in band.zip(model) {
+            let difference = &data.ajb[l] - model - &data.bias[l];
             self.add_measured(sum.as_mut_slice(), &difference, share);
         }
         Ok(sum)
@@ -258,10 +272,10 @@ impl Problem {
     ) -> Result<DMatrix<f64>, FitError> {
         let mut sums = DMatrix::zeros(2 * self.entries(), chart.count());
         let share = 1.0 / band.len() as f64;
-        let mut slopes = Vec::with_capacity(band.len());
-        for l in band {
-            slopes.push(self.predict(chart, p, [&data.parts[0][l], &data.parts[1][l]], l, true)?.slopes);
-        }
+        let parts = data.parts.each_ref().map(|part| &part[band.clone()]);
+        let wanted = Wanted { slopes: true, ..Wanted::default() };
+        let lines = self.predict(chart, p, parts, band, wanted)?;
+        let slopes: Vec<Slopes> = lines.into_iter().map(|line| line.slopes).collect();
         self.put_slopes(sums.as_mut_slice(), &slopes, share);
         Ok(sums)
     }
@@ -269,19 +283,25 @@ impl Problem {
     /// Puts the derivatives of lines, summed and times `share`, into one column after the other.
     ///
     /// Each is a column times a row, so their sum over lines is one product of matrices.
-    pub(super) fn put_slopes(&self, sums: &mut [f64], lines: &[Vec<Vec<Product>>], share: f64) {
+    pub(super) fn put_slopes(&self, sums: &mut [f64], lines: &[Slopes], share: f64) {
         let (rows, columns) = (self.rows.len(), self.columns.len());
-        for (parameter, sum) in sums.chunks_exact_mut((2 * rows * columns).max(1)).enumerate() {
-            let count: usize = lines.iter().map(|slopes| slopes[parameter].len()).sum();
+        let height = (2 * rows * columns).max(1);
+        let parameters = (sums.len() / height).max(1);
+        let dyads = lines.first().map_or(0, |slopes| slopes.moved.ncols() / parameters);
+        let count = lines.len() * dyads;
+        for (parameter, sum) in sums.chunks_exact_mut(height).enumerate() {
             let mut moved = DMatrix::<f64>::zeros(rows, 2 * count);
             let mut by = DMatrix::<f64>::zeros(2 * count, 2 * columns);
-            for (j, product) in lines.iter().flat_map(|slopes| &slopes[parameter]).enumerate() {
+            let own = parameter * dyads..(parameter + 1) * dyads;
+            let all = lines.iter().flat_map(|slopes| own.clone().map(move |dyad| (slopes, dyad)));
+            for (j, (slopes, dyad)) in all.enumerate() {
                 for (r, port) in self.rows.iter().enumerate() {
-                    moved[(r, j)] = product.moved[*port].re;
-                    moved[(r, count + j)] = product.moved[*port].im;
+                    let v = slopes.moved[(*port, dyad)];
+                    moved[(r, j)] = v.re;
+                    moved[(r, count + j)] = v.im;
                 }
                 for (c, port) in self.columns.iter().enumerate() {
-                    let v = product.by[*port] * share;
+                    let v = slopes.by[(*port, dyad)] * share;
                     by[(j, c)] = v.re;
                     by[(count + j, c)] = -v.im;
                     by[(j, columns + c)] = v.im;

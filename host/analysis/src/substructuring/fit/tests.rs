@@ -43,15 +43,17 @@ fn the_analytic_derivatives_are_the_difference_quotients() {
     }
     let parts = [0, 1].map(|side: usize| problem.parts[side].reduce(&problem.parts[side].cells[10]));
     for (chart, p) in [(&diagonal, &p), (&full, &q)] {
-        let at = |p: &nalgebra::DVector<f64>| {
-            problem.predict(chart, p, [&parts[0], &parts[1]], 10, true).expect("regular")
+        let all = model::Wanted { y: true, gains: true, slopes: true };
+        let with = |p: &nalgebra::DVector<f64>, [a, b]: [&DMatrix<nalgebra::Complex<f64>>; 2]| {
+            let parts = [std::slice::from_ref(a), std::slice::from_ref(b)];
+            problem.predict(chart, p, parts, 10..11, all).expect("regular").remove(0)
         };
+        let at = |p: &nalgebra::DVector<f64>| with(p, [&parts[0], &parts[1]]);
         let here = at(p);
-        for (i, products) in here.slopes.iter().enumerate() {
-            let slope = products.iter().fold(here.y.map(|_| nalgebra::Complex::default()), |sum, product| {
-                let column = nalgebra::DVector::from_column_slice(&product.moved);
-                sum + column * nalgebra::RowDVector::from_row_slice(&product.by)
-            });
+        let dyads = here.slopes.moved.ncols() / chart.count();
+        for i in 0..chart.count() {
+            let own = |of: &DMatrix<nalgebra::Complex<f64>>| of.columns(i * dyads, dyads).clone_owned();
+            let slope = own(&here.slopes.moved) * own(&here.slopes.by).transpose();
             let step = 1e-5;
             let (mut up, mut down) = (p.clone(), p.clone());
             up[i] += step;
@@ -65,8 +67,7 @@ fn the_analytic_derivatives_are_the_difference_quotients() {
         }
         // L δY R is what a change of Y^A does
         let change = &parts[0] * nalgebra::Complex::from(1e-6);
-        let moved =
-            problem.predict(chart, p, [&(&parts[0] + &change), &parts[1]], 10, false).expect("regular").y;
+        let moved = with(p, [&(&parts[0] + &change), &parts[1]]).y;
         let left = problem.layout.left(&here, 0);
         let right = problem.layout.right(&here, 0);
         let linear = left * &change * right;

@@ -10,6 +10,7 @@ use super::block::Line;
 use super::cell::CellGeometry;
 use super::chart::Chart;
 use super::factor::rows as own_rows;
+use super::model::Wanted;
 use super::narrow::crossed;
 use super::noise::{ByImpact, Whitening};
 use super::problem::{Corrected, Problem};
@@ -143,12 +144,14 @@ impl Point<'_> {
         let sampled = lines.clone().step_by(step).count() as f64;
         let mut parts = Vec::new();
         for l in lines.clone().step_by(step) {
-            let predicted =
-                problem.predict(self.chart, self.p, [&data.parts[0][l], &data.parts[1][l]], l, false)?;
-            for side in 0..2 {
-                let (left, right) = problem.through(side, &predicted);
-                let variance = &problem.parts[side].variance[l];
-                parts.push(ByImpact::of_cells(&left, right, variance, averaged / sampled));
+            let wanted = Wanted { gains: true, ..Wanted::default() };
+            let own = data.parts.each_ref().map(|part| &part[l..=l]);
+            for predicted in problem.predict(self.chart, self.p, own, l..l + 1, wanted)? {
+                for side in 0..2 {
+                    let (left, right) = problem.through(side, &predicted);
+                    let variance = &problem.parts[side].variance[l];
+                    parts.push(ByImpact::of_cells(&left, right, variance, averaged / sampled));
+                }
             }
         }
         let draws: Vec<[Line; 2]> = lines.clone().map(|l| problem.noise(l, NOISE_SEED)).collect();

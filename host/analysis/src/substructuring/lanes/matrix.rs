@@ -39,6 +39,28 @@ impl<'p, S: Simd> Matrix<'p, S> {
         matrix
     }
 
+    /// Whole matrices of a vector's lines, all of the first one's size.
+    pub(crate) fn whole(pool: &'p Pool<S>, lines: &[&Line]) -> Self {
+        let (rows, columns) = lines.first().map_or((0, 0), |line| line.shape());
+        assert!(lines.iter().all(|line| line.shape() == (rows, columns)), "matrices of one size");
+        let mut matrix = Matrix::any(pool, rows, columns);
+        for (lane, line) in lines.iter().enumerate() {
+            matrix.put_line(lane, line);
+        }
+        matrix
+    }
+
+    /// A matrix of zeros.
+    pub(crate) fn zeros(pool: &'p Pool<S>, rows: usize, columns: usize) -> Self {
+        let mut matrix = Matrix::any(pool, rows, columns);
+        matrix.cells.fill(Cell::all(pool.simd, 0.0));
+        matrix
+    }
+
+    pub(crate) fn pool(&self) -> &'p Pool<S> {
+        self.pool
+    }
+
     pub(crate) fn rows(&self) -> usize {
         self.rows
     }
@@ -75,10 +97,18 @@ impl<'p, S: Simd> Matrix<'p, S> {
     }
 
     pub(crate) fn adjoint(&self) -> Self {
-        let mut adjoint = Matrix::any(self.pool, self.columns, self.rows);
+        self.turned::<true>()
+    }
+
+    pub(crate) fn transpose(&self) -> Self {
+        self.turned::<false>()
+    }
+
+    fn turned<const CONJUGATE: bool>(&self) -> Self {
+        let mut turned = Matrix::any(self.pool, self.columns, self.rows);
         let columns = self.columns;
-        self.pool.simd.vectorize(Adjoint { from: &self.cells, to: &mut adjoint.cells, columns });
-        adjoint
+        self.pool.simd.vectorize(Turned::<S, CONJUGATE> { from: &self.cells, to: &mut turned.cells, columns });
+        turned
     }
 
     /// The same again.
@@ -107,14 +137,18 @@ impl<'p, S: Simd> Matrix<'p, S> {
         simd.vectorize(Finite { simd, cells: &self.cells })
     }
 
+    /// Puts one line's matrix, of its size, in its lane.
+    pub(crate) fn put_line(&mut self, lane: usize, line: &Line) {
+        self.pool.simd.vectorize(PutLine { cells: &mut self.cells, lane, line: line.as_slice() });
+    }
+
     /// Writes the matrix of one line to one of its size.
     pub(crate) fn line_to(&self, lane: usize, to: &mut Line) {
         self.pool.simd.vectorize(OneLine { cells: &self.cells, lane, to: to.as_mut_slice() });
     }
 
     /// The matrix of one line.
-    #[cfg(test)]
-    pub(super) fn line(&self, lane: usize) -> Line {
+    pub(crate) fn line(&self, lane: usize) -> Line {
         let mut line = Line::zeros(self.rows, self.columns);
         self.line_to(lane, &mut line);
         line
@@ -168,13 +202,13 @@ impl<S: Simd> Read<'_, S> {
     }
 }
 
-struct Adjoint<'a, S: Simd> {
+struct Turned<'a, S: Simd, const CONJUGATE: bool> {
     from: &'a [Cell<S>],
     to: &'a mut [Cell<S>],
     columns: usize,
 }
 
-impl<S: Simd> NullaryFnOnce for Adjoint<'_, S> {
+impl<S: Simd, const CONJUGATE: bool> NullaryFnOnce for Turned<'_, S, CONJUGATE> {
     type Output = ();
 
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
@@ -183,7 +217,8 @@ impl<S: Simd> NullaryFnOnce for Adjoint<'_, S> {
         let rows = self.from.len() / self.columns.max(1);
         for (r, to) in self.to.chunks_exact_mut(self.columns.max(1)).enumerate() {
             for (c, to) in to.iter_mut().enumerate() {
-                *to = self.from[c * rows + r].conj();
+                let from = self.from[c * rows + r];
+                *to = if CONJUGATE { from.conj() } else { from };
             }
         }
     }
@@ -265,6 +300,25 @@ impl<S: Simd> NullaryFnOnce for OneLine<'_, S> {
     fn call(self) {
         for (to, cell) in self.to.iter_mut().zip(self.cells) {
             *to = Complex::new(cell.re.each()[self.lane], cell.im.each()[self.lane]);
+        }
+    }
+}
+
+struct PutLine<'a, S: Simd> {
+    cells: &'a mut [Cell<S>],
+    lane: usize,
+    line: &'a [Complex<f64>],
+}
+
+impl<S: Simd> NullaryFnOnce for PutLine<'_, S> {
+    type Output = ();
+
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn call(self) {
+        for (cell, value) in self.cells.iter_mut().zip(self.line) {
+            cell.re.each_mut()[self.lane] = value.re;
+            cell.im.each_mut()[self.lane] = value.im;
         }
     }
 }
