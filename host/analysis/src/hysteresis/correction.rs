@@ -66,14 +66,9 @@ fn around(i: usize, len: usize) -> (usize, usize) {
 }
 
 /// Rate of change of `x` per second at one sample: the central difference, one-sided at the ends.
-fn rate(x: &[f64], i: usize, fs_hz: f64) -> f64 {
+pub(super) fn rate(x: &[f64], i: usize, fs_hz: f64) -> f64 {
     let (from, to) = around(i, x.len());
     (x[to] - x[from]) * fs_hz / (to - from) as f64
-}
-
-/// Rate of change of `x` per second: central differences, one-sided at the ends.
-pub fn rates(x: &[f64], fs_hz: f64) -> Vec<f64> {
-    (0..x.len()).map(|i| rate(x, i, fs_hz)).collect()
 }
 
 #[cfg(test)]

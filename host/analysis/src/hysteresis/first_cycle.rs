@@ -1,7 +1,7 @@
 //! The first cycle of a hit's decay: its slope, and what an arm's inertia would add to it.
 
 use super::analyse::decay_of;
-use super::correction::{Correction, rates};
+use super::correction::{Correction, rate};
 use super::impact::DecayCycle;
 use super::loops::slope;
 use super::record::{HysteresisRecord, RelativeMotion};
@@ -39,7 +39,6 @@ impl FirstCycle {
     /// # Errors
     /// The signals hold no whole cycle, or are no numbers.
     pub fn of(fs_hz: f64, [a, b]: [Vec<f64>; 2], force_n: Vec<f64>) -> Result<Self, HysteresisError> {
-        let acceleration = rates(&b, fs_hz);
         let record = HysteresisRecord {
             fs_hz,
             motion: RelativeMotion::Velocity { a_m_per_s: a, b_m_per_s: b },
@@ -50,7 +49,11 @@ impl FirstCycle {
         let (decay, shape) = decay_of(&record, DECAY_CYCLES)?.ok_or(HysteresisError::NoMotion)?;
         let first = &decay.cycles[0];
         let (from, to) = (first.first_sample, first.end_sample);
-        let acceleration_per_m = slope(&decay.displacement_m[from..to], &acceleration[from..to]);
+        let RelativeMotion::Velocity { b_m_per_s, .. } = &record.motion else {
+            unreachable!("made of velocities")
+        };
+        let acceleration: Vec<f64> = (from..to).map(|i| rate(b_m_per_s, i, fs_hz)).collect();
+        let acceleration_per_m = slope(&decay.displacement_m[from..to], &acceleration);
         Ok(Self {
             slope_n_per_m: first.stiffness_n_per_m,
             r_squared: first.r_squared,

@@ -10,7 +10,7 @@ use super::problem::Problem;
 use super::weight::Point;
 use crate::substructuring::product::product;
 use nalgebra::{Complex, DMatrix};
-use std::ops::{AddAssign, Range};
+use std::ops::Range;
 
 type C = Complex<f64>;
 
@@ -154,7 +154,7 @@ impl Point<'_> {
         let block: &Block = &problem.parts[side];
         let sensors = block.sensors.len();
         let (rows, columns, lines) = (problem.rows.len(), problem.columns.len(), ways.len());
-        let effects = effects(&self.cells[side], ways);
+        let effects = effects(&self.factors[side], ways);
         let mut first = 0;
         for (i, cells) in self.cells[side].chunks_exact(sensors.max(1)).enumerate() {
             // per cell its five aims, then both tilts of all cells together
@@ -216,6 +216,7 @@ impl Point<'_> {
     /// A position acts as the aims of all its cells do, each alike: their sum, here of A's and B's cells.
     fn positions(&self, effect: &mut DMatrix<f64>) {
         let problem = self.problem;
+        let height = effect.nrows();
         for (place, block) in problem.parts.iter().enumerate() {
             for i in 0..block.impacts.len() {
                 for s in 0..block.sensors.len() {
@@ -223,8 +224,11 @@ impl Point<'_> {
                     let own = [at.sensor.map(|own| (own, 0, 3)), at.impact.map(|own| (own, 3, 2))];
                     for (own, first, count) in own.into_iter().flatten() {
                         for k in 0..count {
-                            let aim = effect.column(at.aim + first + k).clone_owned();
-                            effect.column_mut(own + k).add_assign(&aim);
+                            // positions stand before all aims
+                            let (positions, aims) =
+                                effect.as_mut_slice().split_at_mut((at.aim + first + k) * height);
+                            let to = &mut positions[(own + k) * height..][..height];
+                            to.iter_mut().zip(&aims[..height]).for_each(|(to, aim)| *to += aim);
                         }
                     }
                 }
@@ -233,12 +237,10 @@ impl Point<'_> {
     }
 }
 
-/// The derivatives of all cells' readings, cell by cell as [`of_cell`] has them by columns; each line's real parts in its column, then the
-/// imaginary parts.
-///
-/// Each is linear in y with real factors that are the same at every line.
-fn effects(cells: &[CellGeometry], ways: &[Way]) -> DMatrix<f64> {
-    let (rows, columns) = ways.first().map_or((0, 0), |way| way.y.shape());
+/// What makes the ports' admittance y (by columns) the derivatives of all cells' readings, cell by cell as [`of_cell`] has them by columns:
+/// real, and the same at every line.
+pub(super) fn factors(cells: &[CellGeometry]) -> DMatrix<f64> {
+    let (rows, columns) = cells.first().map_or((0, 0), |cell| (cell.seen.ncols(), cell.pushed.nrows()));
     let count: usize = cells.iter().map(|cell| cell.seen.nrows() * (AIMS + 2)).sum();
     // transposed, so that the factors of one value stand together
     let mut factors = DMatrix::<f64>::zeros(rows * columns, count);
@@ -254,14 +256,19 @@ fn effects(cells: &[CellGeometry], ways: &[Way]) -> DMatrix<f64> {
             }
         }
     }
-    let mut y = DMatrix::zeros(rows * columns, 2 * ways.len());
+    factors.transpose()
+}
+
+/// The derivatives at some lines; each line's real parts in its column, then the imaginary parts.
+fn effects(factors: &DMatrix<f64>, ways: &[Way]) -> DMatrix<f64> {
+    let mut y = DMatrix::zeros(factors.ncols(), 2 * ways.len());
     for (l, way) in ways.iter().enumerate() {
         for (at, v) in way.y.iter().enumerate() {
             y[(at, l)] = v.re;
             y[(at, ways.len() + l)] = v.im;
         }
     }
-    factors.transpose() * y
+    factors * y
 }
 
 /// The derivatives of one cell's reading (axes × 7, where the ports' admittance is y): by three shifts of the sensor, two of the impact, and

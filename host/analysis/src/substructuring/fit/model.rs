@@ -135,19 +135,23 @@ impl Predictions<'_> {
         let lanes = S::F64_LANES.min(joint.len() - first);
         let (rows, columns) = layout.shape();
         let own = [0, 1].map(|side| Matrix::whole(pool, &lines(pool, parts[side], first)));
-        let (mut p, mut q) = (Matrix::zeros(pool, rows, n), Matrix::zeros(pool, n, columns));
-        let mut w = Matrix::zeros(pool, n, n);
+        let (mut p, mut q) = (Matrix::any(pool, rows, n), Matrix::any(pool, n, columns));
         for (side, own) in own.iter().enumerate() {
             let (row, column) = layout.corner(side);
-            let at = (layout.rows[side].first[0], layout.columns[side].first[0]);
-            let pushed = own.block((0, at.1), (own.rows(), n));
-            let moved = own.block((at.0, 0), (n, own.columns()));
-            let [pushed, moved] = if side == 0 { [pushed, moved] } else { [pushed.negated(), moved.negated()] };
+            let pushed = own.block((0, layout.columns[side].first[0]), (own.rows(), n));
+            let moved = own.block((layout.rows[side].first[0], 0), (n, own.columns()));
+            let [pushed, moved] =
+                if side == 0 { [pushed, moved] } else { [pushed.negated(), moved.negated()] };
             p.put((row, 0), &pushed);
             q.put((0, column), &moved);
-            w = plus(w, &own.block(at, (n, n)));
         }
-        let joint: Vec<&At> = (first..first + S::F64_LANES).filter_map(|l| joint.get(l).or(joint.last())).collect();
+        let [of_a, of_b] = [0, 1].map(|side| {
+            let at = (layout.rows[side].first[0], layout.columns[side].first[0]);
+            own[side].block(at, (n, n))
+        });
+        let w = plus(of_a, &of_b);
+        let joint: Vec<&At> =
+            (first..first + S::F64_LANES).filter_map(|l| joint.get(l).or(joint.last())).collect();
         let of_joint = |of: fn(&At) -> &Line| {
             Matrix::whole(pool, &joint.iter().map(|at| of(at)).collect::<Vec<&Line>>())
         };
@@ -156,11 +160,13 @@ impl Predictions<'_> {
         let g = product(&h, &d);
         let gq = product(&g, &q);
         let y = wanted.y.then(|| {
-            let mut apart = Matrix::zeros(pool, rows, columns);
+            let mut y = product(&p, &gq).negated();
             for (side, own) in own.iter().enumerate() {
-                apart.put(layout.corner(side), own);
+                let at = layout.corner(side);
+                let alone = y.block(at, (own.rows(), own.columns()));
+                y.put(at, &plus(alone, own));
             }
-            minus(apart, &product(&p, &gq))
+            y
         });
         let pg = wanted.gains.then(|| product(&p, &g));
         let slopes = wanted.slopes.then(|| {
@@ -171,10 +177,8 @@ impl Predictions<'_> {
             // δ(G⁻¹) = H (δD (I − W G⁻¹) − δE G⁻¹), δD = left dᵀ
             let rest = minus(q, &product(&w, &gq));
             let moved = product(&product(&p, &h), &of(|s| &s.left)).negated();
-            let by = minus(
-                product(&rest.transpose(), &of(|s| &s.d)),
-                &product(&gq.transpose(), &of(|s| &s.e)),
-            );
+            let by =
+                minus(product(&rest.transpose(), &of(|s| &s.d)), &product(&gq.transpose(), &of(|s| &s.e)));
             (moved, by)
         });
         let line = |matrix: Option<&Matrix<'_, S>>, lane: usize| {

@@ -198,7 +198,9 @@ impl Problem {
                         let wanted = Wanted { y: true, ..Wanted::default() };
                         self.layout.predict(&joint, moved.each_ref().map(Vec::as_slice), wanted)
                     };
-                    for ((sum, still), both) in sums.iter_mut().zip(&still).zip(at(1.0).into_iter().zip(at(-1.0))) {
+                    for ((sum, still), both) in
+                        sums.iter_mut().zip(&still).zip(at(1.0).into_iter().zip(at(-1.0)))
+                    {
                         // a draw that makes G singular to rounding has probability zero, and says nothing
                         if let (Some(plus), Some(minus)) = both {
                             *sum += ((plus.y + minus.y) * C::from(0.5) - still) / C::from(PAIRS as f64);

@@ -61,6 +61,8 @@ pub(super) struct Point<'a> {
     pub(super) p: &'a DVector<f64>,
     /// A's, B's and the assembly's cells where their geometry is believed to be.
     pub(super) cells: &'a [Vec<CellGeometry>; 3],
+    /// See [`factors`](super::effect::factors), of A's and B's cells.
+    pub(super) factors: &'a [DMatrix<f64>; 2],
     pub(super) data: &'a Corrected,
 }
 

@@ -50,13 +50,6 @@ impl<'p, S: Simd> Matrix<'p, S> {
         matrix
     }
 
-    /// A matrix of zeros.
-    pub(crate) fn zeros(pool: &'p Pool<S>, rows: usize, columns: usize) -> Self {
-        let mut matrix = Matrix::any(pool, rows, columns);
-        matrix.cells.fill(Cell::all(pool.simd, 0.0));
-        matrix
-    }
-
     pub(crate) fn pool(&self) -> &'p Pool<S> {
         self.pool
     }
@@ -107,7 +100,11 @@ impl<'p, S: Simd> Matrix<'p, S> {
     fn turned<const CONJUGATE: bool>(&self) -> Self {
         let mut turned = Matrix::any(self.pool, self.columns, self.rows);
         let columns = self.columns;
-        self.pool.simd.vectorize(Turned::<S, CONJUGATE> { from: &self.cells, to: &mut turned.cells, columns });
+        self.pool.simd.vectorize(Turned::<S, CONJUGATE> {
+            from: &self.cells,
+            to: &mut turned.cells,
+            columns,
+        });
         turned
     }
 

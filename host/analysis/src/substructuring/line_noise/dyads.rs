@@ -69,6 +69,9 @@ impl<'a> Dyads<'a> {
     /// cells at this line.
     pub(super) fn variances(&self, factors: &[C], variance: [&DMatrix<f64>; 3], tau: f64) -> Vec<[f64; 2]> {
         let dofs = factors.len();
+        // of K, and of ωC
+        let factors: Vec<[C; 2]> =
+            factors.iter().map(|factor| [factor * C::new(1.0, tau), *factor]).collect();
         let mut sums = vec![[0.0; 2]; dofs];
         for (file, variance) in variance.into_iter().enumerate() {
             // the matrix column by column, so that only one is at hand; what moves a column stays in the dyads' order
@@ -92,30 +95,17 @@ impl<'a> Dyads<'a> {
                     wide(Add { to: &mut moved[usize::from(dyad.conjugate)], rows, right });
                 }
                 let variance = variance.column(column[0].0);
+                let [g, h] = &moved;
+                let variance = variance.as_slice();
                 if mixed {
-                    let [g, h] = &moved;
-                    let rows = g.chunks_exact(dofs).zip(h.chunks_exact(dofs)).zip(&variance);
-                    for ((g, h), v) in rows {
-                        for (((g, h), factor), sums) in g.iter().zip(h).zip(factors).zip(&mut sums) {
-                            // a cell that does not count may be unknown
-                            if *g != C::default() || *h != C::default() {
-                                let of_k = factor * C::new(1.0, tau);
-                                sums[0] += (of_k * g + of_k.conj() * h).norm_sqr() * v;
-                                sums[1] += (factor * g - factor.conj() * h).norm_sqr() * v;
-                            }
-                        }
+                    wide(Mixed { g, h, variance, factors: &factors, sums: &mut sums });
+                } else {
+                    by_dof.fill(0.0);
+                    wide(Squares { g, variance, sums: &mut by_dof });
+                    for ((sums, sum), [of_k, of_c]) in sums.iter_mut().zip(&by_dof).zip(&factors) {
+                        sums[0] += of_k.norm_sqr() * sum;
+                        sums[1] += of_c.norm_sqr() * sum;
                     }
-                    continue;
-                }
-                by_dof.fill(0.0);
-                for (g, v) in moved[0].chunks_exact(dofs).zip(&variance) {
-                    for (sum, g) in by_dof.iter_mut().zip(g) {
-                        *sum += if *g == C::default() { 0.0 } else { g.norm_sqr() * v };
-                    }
-                }
-                for ((sums, sum), factor) in sums.iter_mut().zip(&by_dof).zip(factors) {
-                    sums[0] += (factor * C::new(1.0, tau)).norm_sqr() * sum;
-                    sums[1] += factor.norm_sqr() * sum;
                 }
             }
         }
@@ -144,6 +134,58 @@ impl NullaryFnOnce for Add<'_> {
             let to = &mut self.to[row * dofs..][..dofs];
             for ((to, left), right) in to.iter_mut().zip(left).zip(self.right) {
                 *to += left * right;
+            }
+        }
+    }
+}
+
+/// Adds the variance of what a column of cells does by g alone to the sums of the degrees of freedom, which stand side by side.
+struct Squares<'a> {
+    g: &'a [C],
+    variance: &'a [f64],
+    sums: &'a mut [f64],
+}
+
+impl NullaryFnOnce for Squares<'_> {
+    type Output = ();
+
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn call(self) {
+        for (g, v) in self.g.chunks_exact(self.sums.len()).zip(self.variance) {
+            for (sum, g) in self.sums.iter_mut().zip(g) {
+                // a cell that does not count may be unknown
+                *sum += if *g == C::default() { 0.0 } else { g.norm_sqr() * v };
+            }
+        }
+    }
+}
+
+/// The same of K and of ωC, by g and h* together.
+struct Mixed<'a> {
+    g: &'a [C],
+    h: &'a [C],
+    variance: &'a [f64],
+    /// Of K and of ωC.
+    factors: &'a [[C; 2]],
+    sums: &'a mut [[f64; 2]],
+}
+
+impl NullaryFnOnce for Mixed<'_> {
+    type Output = ();
+
+    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[inline(always)]
+    fn call(self) {
+        let dofs = self.factors.len();
+        let rows = self.g.chunks_exact(dofs).zip(self.h.chunks_exact(dofs)).zip(self.variance);
+        for ((g, h), v) in rows {
+            for (((g, h), [of_k, of_c]), sums) in g.iter().zip(h).zip(self.factors).zip(&mut *self.sums) {
+                let counts = *g != C::default() || *h != C::default();
+                let k = (of_k * g + of_k.conj() * h).norm_sqr() * v;
+                let c = (of_c * g - of_c.conj() * h).norm_sqr() * v;
+                sums[0] += if counts { k } else { 0.0 };
+                sums[1] += if counts { c } else { 0.0 };
             }
         }
     }
