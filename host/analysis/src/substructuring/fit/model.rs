@@ -156,7 +156,7 @@ impl Predictions<'_> {
             Matrix::whole(pool, &joint.iter().map(|at| of(at)).collect::<Vec<&Line>>())
         };
         let d = of_joint(|at| &at.d);
-        let (h, regular) = held(plus(product(&d, &w), &of_joint(|at| &at.e)), lanes);
+        let (h, regular) = held(&plus(product(&d, &w), &of_joint(|at| &at.e)), lanes);
         let g = product(&h, &d);
         let gq = product(&g, &q);
         let y = wanted.y.then(|| {
@@ -201,7 +201,7 @@ impl Predictions<'_> {
 }
 
 /// H = (D W + E)⁻¹, and at which of the lines it is one.
-fn held<S: Simd>(interface: Matrix<'_, S>, lanes: usize) -> (Matrix<'_, S>, Vec<bool>) {
+fn held<'p, S: Simd>(interface: &Matrix<'p, S>, lanes: usize) -> (Matrix<'p, S>, Vec<bool>) {
     let mut sure = Sure::all(interface.pool().simd);
     let mut h = inverse(interface.copy(), &mut sure);
     let regular = (0..lanes).map(|lane| {

@@ -8,7 +8,7 @@ use super::narrow::crossed;
 use super::problem::{Corrected, Problem};
 use super::weight::{Point, Weight};
 use crate::errors_in_variables::Feigned;
-use crate::parallel::prelude::*;
+use crate::parallel::{join, prelude::*};
 use nalgebra::{DMatrix, DVector};
 
 /// How often geometry, weights and bias are evaluated anew. Tilts act in second order too, which the second pass takes out. Many
@@ -66,37 +66,40 @@ struct Score {
     pulled: DMatrix<f64>,
 }
 
-/// Everything that stays fixed while the joint moves.
-struct Pass<'a> {
+/// Everything that stays fixed during a pass.
+struct Linear<'a> {
     problem: &'a Problem,
     chart: &'a Chart,
     data: &'a Corrected,
     weight: &'a Weight,
     /// G η₀ per band: the residual is that of η₀, while the prior is about zero.
-    believed: &'a [DMatrix<f64>],
-    /// Variances are larger by this factor.
-    mild: f64,
-    /// Of I + Gᵀ N⁻¹ G / mild.
-    marginal: Factor,
-    prior: DVector<f64>,
+    believed: Vec<DMatrix<f64>>,
 }
 
-/// Columns and the sums of their products, with the nuisance parameters integrated out.
-struct Products {
+/// Columns and the sums of their products over the bands.
+#[derive(Clone)]
+struct Sums {
     /// In units of their noise, one matrix for each band.
     columns: Vec<DMatrix<f64>>,
-    /// L⁻¹Gᵀ N⁻¹ of them.
+    /// Gᵀ N⁻¹ of them.
     pulled: DMatrix<f64>,
     /// Each column with each.
     all: DMatrix<f64>,
 }
 
-impl Pass<'_> {
+/// Where a descent begins.
+#[derive(Clone)]
+struct Start {
+    residual: Sums,
+    slopes: Sums,
+}
+
+impl Linear<'_> {
     /// Of columns that `of` makes for each band, in units of their noise.
-    fn products(
+    fn sums(
         &self,
         of: impl Fn(usize) -> Result<DMatrix<f64>, FitError> + Send + Sync,
-    ) -> Result<Products, FitError> {
+    ) -> Result<Sums, FitError> {
         let by_band: Vec<_> = (0..self.weight.bands.len())
             .into_par_iter()
             .map(|band| {
@@ -114,9 +117,65 @@ impl Pass<'_> {
             pulled += by_nuisance;
             columns.push(of_band);
         }
+        Ok(Sums { columns, pulled, all })
+    }
+
+    fn residual(&self, p: &DVector<f64>) -> Result<Sums, FitError> {
+        self.sums(|band| {
+            // r falls where the model rises
+            let residual =
+                self.problem.residual(self.chart, p, self.data, self.problem.bands[band].clone())?;
+            Ok(self.weight.bands[band].whitening.of(residual) + &self.believed[band])
+        })
+    }
+
+    fn slopes(&self, p: &DVector<f64>) -> Result<Sums, FitError> {
+        self.sums(|band| {
+            let slopes = self.problem.slopes(self.chart, p, self.data, self.problem.bands[band].clone())?;
+            Ok(self.weight.bands[band].whitening.of(slopes))
+        })
+    }
+
+    fn start(&self, p: &DVector<f64>) -> Result<Start, FitError> {
+        Ok(Start { residual: self.residual(p)?, slopes: self.slopes(p)? })
+    }
+
+    /// What the nuisance parameters are integrated out with where variances are larger by the factor `mild`: of I + Gᵀ N⁻¹ G / mild.
+    fn marginal(&self, mild: f64) -> Result<Factor, FitError> {
+        let mut marginal = self.weight.information.map(|v| v / mild);
+        for i in 0..marginal.nrows() {
+            marginal[(i, i)] += 1.0;
+        }
+        Factor::of(marginal).ok_or(FitError::NoiseSingular)
+    }
+}
+
+/// Everything that stays fixed while the joint moves.
+struct Pass<'a> {
+    linear: &'a Linear<'a>,
+    /// Variances are larger by this factor.
+    mild: f64,
+    /// See [`Linear::marginal`].
+    marginal: Factor,
+    prior: DVector<f64>,
+}
+
+/// Columns and the sums of their products, with the nuisance parameters integrated out.
+struct Products {
+    /// In units of their noise, one matrix for each band.
+    columns: Vec<DMatrix<f64>>,
+    /// L⁻¹Gᵀ N⁻¹ of them.
+    pulled: DMatrix<f64>,
+    /// Each column with each.
+    all: DMatrix<f64>,
+}
+
+impl Pass<'_> {
+    fn products(&self, sums: Sums) -> Products {
+        let Sums { columns, mut pulled, all } = sums;
         self.marginal.forward(&mut pulled);
         let all = self.integrated(all, &pulled, &pulled);
-        Ok(Products { columns, pulled, all })
+        Products { columns, pulled, all }
     }
 
     /// Sums of products without what the nuisance parameters explain of them.
@@ -124,35 +183,27 @@ impl Pass<'_> {
         (all - crossed(one, other) / self.mild) / self.mild
     }
 
-    fn tried(&self, p: &DVector<f64>) -> Result<Tried, FitError> {
-        let residual = self.products(|band| {
-            // r falls where the model rises
-            let residual =
-                self.problem.residual(self.chart, p, self.data, self.problem.bands[band].clone())?;
-            Ok(self.weight.bands[band].whitening.of(residual) + &self.believed[band])
-        })?;
-        Ok(Tried { cost: residual.all[(0, 0)] + p.dot(&self.prior.component_mul(p)), residual })
+    fn tried(&self, p: &DVector<f64>, residual: Sums) -> Tried {
+        let residual = self.products(residual);
+        Tried { cost: residual.all[(0, 0)] + p.dot(&self.prior.component_mul(p)), residual }
     }
 
     /// At `p`, which was tried.
-    fn score(&self, p: &DVector<f64>, tried: Tried) -> Result<Score, FitError> {
+    fn score(&self, p: &DVector<f64>, tried: Tried, slopes: Sums) -> Score {
         let Tried { cost, residual } = tried;
-        let slopes = self.products(|band| {
-            let slopes = self.problem.slopes(self.chart, p, self.data, self.problem.bands[band].clone())?;
-            Ok(self.weight.bands[band].whitening.of(slopes))
-        })?;
+        let slopes = self.products(slopes);
         let mut downhill = DMatrix::zeros(p.len(), 1);
         for (slopes, residual) in slopes.columns.iter().zip(&residual.columns) {
             downhill += crossed(slopes, residual);
         }
         let downhill = self.integrated(downhill, &slopes.pulled, &residual.pulled);
-        Ok(Score {
+        Score {
             cost,
             chi: residual.all[(0, 0)],
             gradient: downhill.column(0) - self.prior.component_mul(p),
             hessian: slopes.all + DMatrix::from_diagonal(&self.prior),
             pulled: residual.pulled,
-        })
+        }
     }
 
     /// The nuisance parameters' own estimate there, in standard deviations of their priors.
@@ -166,18 +217,19 @@ impl Pass<'_> {
     /// all there is.
     fn corrected(&self, p: &DVector<f64>, at: &Score) -> Result<Option<Estimate>, FitError> {
         let count = p.len();
-        let all = self.products(|band| Ok(self.weight.bands[band].feigned.clone()))?.all;
+        let weight = self.linear.weight;
+        let all = self.products(self.linear.sums(|band| Ok(weight.bands[band].feigned.clone()))?).all;
         let pull = all.view((1, 0), (count, 1));
         let feigned = all.view((1, 1), (count, count)).clone_owned();
         let Some(feigned) = Feigned::of(at.hessian.clone(), &feigned) else { return Ok(None) };
         let inverse = feigned.weighed(|f| if f < FEIGNED_MOST { 1.0 / (1.0 - f.max(0.0)) } else { 0.0 });
         let mut rest = &at.gradient - pull.column(0);
         for i in 0..count {
-            if self.chart.held(p, i, rest[i] > 0.0) {
+            if self.linear.chart.held(p, i, rest[i] > 0.0) {
                 rest[i] = 0.0;
             }
         }
-        let next = self.chart.bounded(&(p + &inverse * rest));
+        let next = self.linear.chart.bounded(&(p + &inverse * rest));
         let mut covariance = feigned.weighed(|f| {
             let left = 1.0 - f.clamp(0.0, FEIGNED_MOST);
             1.0 / (left * left)
@@ -193,9 +245,11 @@ impl Pass<'_> {
     fn descend(
         &self,
         p: &DVector<f64>,
+        start: Start,
         enough: impl Fn(f64, &Score) -> bool,
     ) -> Result<(DVector<f64>, Score), FitError> {
-        let (mut p, mut here) = (p.clone(), self.score(p, self.tried(p)?)?);
+        let Start { residual, slopes } = start;
+        let (mut p, mut here) = (p.clone(), self.score(p, self.tried(p, residual), slopes));
         let mut damping = 1e-3;
         for _ in 0..STEPS {
             let mut damped = here.hessian.clone();
@@ -203,7 +257,7 @@ impl Pass<'_> {
             for i in 0..p.len() {
                 damped[(i, i)] *= 1.0 + damping;
                 // what stands at its bound and would leave stays, and the others know
-                if self.chart.held(&p, i, here.gradient[i] > 0.0) {
+                if self.linear.chart.held(&p, i, here.gradient[i] > 0.0) {
                     damped.row_mut(i).fill(0.0);
                     damped.column_mut(i).fill(0.0);
                     damped[(i, i)] = 1.0;
@@ -211,12 +265,14 @@ impl Pass<'_> {
                 }
             }
             let step = damped.cholesky().map(|c| c.solve(&downhill));
-            let next = step.map(|step| self.chart.bounded(&(&p + step)));
-            match next.map(|next| (self.tried(&next), next)) {
+            let next = step.map(|step| self.linear.chart.bounded(&(&p + step)));
+            let tried =
+                next.map(|next| (self.linear.residual(&next).map(|sums| self.tried(&next, sums)), next));
+            match tried {
                 Some((Ok(tried), next)) if tried.cost <= here.cost => {
                     let gain = here.cost - tried.cost;
                     // two steps in five lead uphill: derivatives are for those that do not
-                    (here, p) = (self.score(&next, tried)?, next);
+                    (here, p) = (self.score(&next, tried, self.linear.slopes(&next)?), next);
                     damping = (damping / 10.0f64).max(1e-9);
                     if enough(gain, &here) {
                         break;
@@ -247,35 +303,27 @@ pub(super) fn search(problem: &Problem, chart: &Chart, start: &DVector<f64>) -> 
         let factors = [0, 1].map(|place: usize| effect::factors(&cells[place]));
         let point = Point { problem, chart, p: &p, cells: &cells, factors: &factors, data: &data };
         let weight = Weight::of(point)?;
-        let believed: Vec<DMatrix<f64>> = (weight.bands.par_iter())
+        let believed = (weight.bands.par_iter())
             .map(|band| band.g.times(problem, &band.whitening, eta.as_slice()))
             .collect();
+        let linear = Linear { problem, chart, data: &data, weight: &weight, believed };
         let mut mild = 1.0;
+        let (mut marginal, start) = join(|| linear.marginal(mild), || linear.start(&p));
         let mut trial = 0;
         let (chi, found_eta, (next, covariance)) = loop {
-            let marginal = DMatrix::identity(nuisances, nuisances) + &weight.information / mild;
-            let marginal = Factor::of(marginal).ok_or(FitError::NoiseSingular)?;
-            let here = Pass {
-                problem,
-                chart,
-                data: &data,
-                weight: &weight,
-                believed: &believed,
-                mild,
-                marginal,
-                prior: chart.prior(),
-            };
+            let here = Pass { linear: &linear, mild, marginal: marginal?, prior: chart.prior() };
             let last = if pass + 1 < PASSES { COARSE_GAIN } else { GAIN };
-            let (next, score) = here.descend(&p, |gain, at| {
+            let (next, score) = here.descend(&p, start.clone()?, |gain, at| {
                 let again = at.chi / freedom >= STEEP && trial < MILDER;
                 gain < last || (again && gain < SHOWN * at.cost)
             })?;
-            let corrected = here.corrected(&next, &score)?;
             trial += 1;
             if score.chi / freedom < STEEP || trial > MILDER {
-                break (score.chi, here.eta(&score), corrected.ok_or(FitError::NoMinimum)?);
+                let corrected = here.corrected(&next, &score)?.ok_or(FitError::NoMinimum)?;
+                break (score.chi, here.eta(&score), corrected);
             }
             mild *= score.chi / freedom;
+            marginal = linear.marginal(mild);
         };
         // what a pass still moves is not known better than that
         let mut covariance = covariance;
