@@ -223,13 +223,17 @@ impl SpectraAverage {
                 }
                 Ok(())
             });
-            summed.collect::<Result<(), SpectraError>>()?;
+            // beside the outputs, so that no core waits for the last of them alone
             let share = self.s_ff.len().div_ceil(parallel::threads()).max(1);
-            self.s_ff.par_chunks_mut(share).enumerate().for_each(|(part, sums)| {
-                for force in &forces {
-                    add_power(sums, &force[part * share..]);
-                }
-            });
+            let powers = self.s_ff.par_chunks_mut(share).enumerate();
+            let add_powers = || {
+                powers.for_each(|(part, sums)| {
+                    for force in &forces {
+                        add_power(sums, &force[part * share..]);
+                    }
+                });
+            };
+            parallel::join(|| summed.collect::<Result<(), SpectraError>>(), add_powers).0?;
             if keep {
                 self.kept_force.extend(forces.iter().map(|force| all.only(band, force)));
             }
