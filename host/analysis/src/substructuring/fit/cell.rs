@@ -113,3 +113,26 @@ impl Block {
         }
     }
 }
+
+/// What makes the ports' admittance y (by columns) the derivatives of all cells' readings, cell by cell: by three shifts of
+/// the sensor, two of the impact, and two tilts. They are real, and the same at every line.
+pub(super) fn factors(cells: &[CellGeometry]) -> DMatrix<f64> {
+    let (rows, columns) = cells.first().map_or((0, 0), |cell| (cell.seen.ncols(), cell.pushed.nrows()));
+    let count: usize =
+        cells.iter().map(|cell| cell.seen.nrows() * (cell.turned.len() + cell.slopes.ncols())).sum();
+    // transposed, so that the factors of one value stand together
+    let mut factors = DMatrix::<f64>::zeros(rows * columns, count);
+    let mut values = factors.column_iter_mut();
+    for cell in cells {
+        let by_shift = cell.turned.iter().map(|turned| (turned, cell.pushed.column(0)));
+        let by_impact = cell.slopes.column_iter().map(|slope| (&cell.seen, slope));
+        for (seen, pushed) in by_shift.chain(by_impact) {
+            for (axis, mut own) in (0..seen.nrows()).zip(values.by_ref()) {
+                for (own, push) in own.as_mut_slice().chunks_exact_mut(rows.max(1)).zip(pushed.iter()) {
+                    own.iter_mut().zip(seen.row(axis).iter()).for_each(|(to, seen)| *to = seen * push);
+                }
+            }
+        }
+    }
+    factors.transpose()
+}

@@ -51,6 +51,7 @@ impl Point<'_> {
         &self,
         lines: &Range<usize>,
         slopes: bool,
+        factors: &[DMatrix<f64>; 2],
         part: impl Fn(usize, usize) -> Line,
     ) -> Result<Evaluated, FitError> {
         let Point { problem, chart, .. } = *self;
@@ -79,7 +80,7 @@ impl Point<'_> {
         problem.put_slopes(&mut model.as_mut_slice()[2 * m..], &lines_slopes, share);
         for (side, ways) in ways.iter().enumerate() {
             // Y^A and Y^B stand on the model's side of the residual: minus
-            self.aims(side, ways, -share, &mut written);
+            self.aims(side, ways, &factors[side], -share, &mut written);
         }
         self.positions(&mut written);
         let aims = self.assembly_aims(&mean, &mut written);
@@ -149,12 +150,12 @@ impl Point<'_> {
     ///
     /// An impact's cells have one row of `right`, so the sum over lines is a product of matrices: what the cells show through
     /// `left`, by what comes of the impact through `right`.
-    fn aims(&self, side: usize, ways: &[Way], share: f64, effect: &mut DMatrix<f64>) {
+    fn aims(&self, side: usize, ways: &[Way], factors: &DMatrix<f64>, share: f64, effect: &mut DMatrix<f64>) {
         let problem = self.problem;
         let block: &Block = &problem.parts[side];
         let sensors = block.sensors.len();
         let (rows, columns, lines) = (problem.rows.len(), problem.columns.len(), ways.len());
-        let effects = effects(&self.factors[side], ways);
+        let effects = effects(factors, ways);
         let mut first = 0;
         for (i, cells) in self.cells[side].chunks_exact(sensors.max(1)).enumerate() {
             // per cell its five aims, then both tilts of all cells together
@@ -237,29 +238,8 @@ impl Point<'_> {
     }
 }
 
-/// What makes the ports' admittance y (by columns) the derivatives of all cells' readings, cell by cell as [`of_cell`] has them by columns:
-/// real, and the same at every line.
-pub(super) fn factors(cells: &[CellGeometry]) -> DMatrix<f64> {
-    let (rows, columns) = cells.first().map_or((0, 0), |cell| (cell.seen.ncols(), cell.pushed.nrows()));
-    let count: usize = cells.iter().map(|cell| cell.seen.nrows() * (AIMS + 2)).sum();
-    // transposed, so that the factors of one value stand together
-    let mut factors = DMatrix::<f64>::zeros(rows * columns, count);
-    let mut values = factors.column_iter_mut();
-    for cell in cells {
-        let by_shift = cell.turned.iter().map(|turned| (turned, cell.pushed.column(0)));
-        let by_impact = cell.slopes.column_iter().map(|slope| (&cell.seen, slope));
-        for (seen, pushed) in by_shift.chain(by_impact) {
-            for (axis, mut own) in (0..seen.nrows()).zip(values.by_ref()) {
-                for (own, push) in own.as_mut_slice().chunks_exact_mut(rows.max(1)).zip(pushed.iter()) {
-                    own.iter_mut().zip(seen.row(axis).iter()).for_each(|(to, seen)| *to = seen * push);
-                }
-            }
-        }
-    }
-    factors.transpose()
-}
-
-/// The derivatives at some lines; each line's real parts in its column, then the imaginary parts.
+/// The derivatives of all cells' readings at some lines, in the order of [`factors`](super::cell::factors); each line's real parts in its
+/// column, then the imaginary parts.
 fn effects(factors: &DMatrix<f64>, ways: &[Way]) -> DMatrix<f64> {
     let mut y = DMatrix::zeros(factors.ncols(), 2 * ways.len());
     for (l, way) in ways.iter().enumerate() {

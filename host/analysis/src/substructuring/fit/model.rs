@@ -150,13 +150,12 @@ impl Predictions<'_> {
             own[side].block(at, (n, n))
         });
         let w = plus(of_a, &of_b);
-        let joint: Vec<&At> =
-            (first..first + S::F64_LANES).filter_map(|l| joint.get(l).or(joint.last())).collect();
+        let joint = lines(pool, joint, first);
         let of_joint = |of: fn(&At) -> &Line| {
             Matrix::whole(pool, &joint.iter().map(|at| of(at)).collect::<Vec<&Line>>())
         };
         let d = of_joint(|at| &at.d);
-        let (h, regular) = held(&plus(product(&d, &w), &of_joint(|at| &at.e)), lanes);
+        let (h, regular) = held(pool, &plus(product(&d, &w), &of_joint(|at| &at.e)), lanes);
         let g = product(&h, &d);
         let gq = product(&g, &q);
         let y = wanted.y.then(|| {
@@ -201,8 +200,8 @@ impl Predictions<'_> {
 }
 
 /// H = (D W + E)⁻¹, and at which of the lines it is one.
-fn held<'p, S: Simd>(interface: &Matrix<'p, S>, lanes: usize) -> (Matrix<'p, S>, Vec<bool>) {
-    let mut sure = Sure::all(interface.pool().simd);
+fn held<'p, S: Simd>(pool: &Pool<S>, interface: &Matrix<'p, S>, lanes: usize) -> (Matrix<'p, S>, Vec<bool>) {
+    let mut sure = Sure::all(pool.simd);
     let mut h = inverse(interface.copy(), &mut sure);
     let regular = (0..lanes).map(|lane| {
         sure.at(lane) || {

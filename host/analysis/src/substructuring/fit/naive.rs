@@ -166,18 +166,8 @@ impl Case {
         self.problem.corrected(&self.chart, &self.p, &self.eta).expect("regular")
     }
 
-    fn point<'a>(
-        &'a self,
-        data: &'a Corrected,
-        (cells, factors): &'a ([Vec<CellGeometry>; 3], [DMatrix<f64>; 2]),
-    ) -> Point<'a> {
-        Point { problem: &self.problem, chart: &self.chart, p: &self.p, cells, factors, data }
-    }
-
-    fn at_cells(&self) -> ([Vec<CellGeometry>; 3], [DMatrix<f64>; 2]) {
-        let cells = self.cells();
-        let factors = [0, 1].map(|place: usize| effect::factors(&cells[place]));
-        (cells, factors)
+    fn point<'a>(&'a self, data: &'a Corrected, cells: &'a [Vec<CellGeometry>; 3]) -> Point<'a> {
+        Point { problem: &self.problem, chart: &self.chart, p: &self.p, cells, data }
     }
 
     fn cells(&self) -> [Vec<CellGeometry>; 3] {
@@ -188,7 +178,7 @@ impl Case {
 #[test]
 fn the_fast_weights_are_the_naive_ones() {
     let case = Case::new();
-    let (data, cells) = (case.corrected(), case.at_cells());
+    let (data, cells) = (case.corrected(), case.cells());
     let point = case.point(&data, &cells);
     let fast = Weight::of(point).expect("regular").information;
     let naive = information(&point);
@@ -231,7 +221,7 @@ fn geometry_taken_out_of_the_data_is_what_moved_cells_read() {
 #[ignore = "prints how much faster the fast weights are"]
 fn speed_of_the_weights() {
     let case = Case::new();
-    let (data, cells) = (case.corrected(), case.at_cells());
+    let (data, cells) = (case.corrected(), case.cells());
     let point = case.point(&data, &cells);
     let time = |work: &dyn Fn()| {
         let start = std::time::Instant::now();

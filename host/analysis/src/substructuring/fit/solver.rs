@@ -2,7 +2,6 @@
 
 use super::FitError;
 use super::chart::{Chart, Shape};
-use super::effect;
 use super::factor::Factor;
 use super::narrow::crossed;
 use super::problem::{Corrected, Problem};
@@ -300,9 +299,7 @@ pub(super) fn search(problem: &Problem, chart: &Chart, start: &DVector<f64>) -> 
     for pass in 0..PASSES {
         let data = problem.corrected(chart, &p, eta.as_slice())?;
         let cells = [0, 1, 2].map(|place| problem.cells(place, eta.as_slice()));
-        let factors = [0, 1].map(|place: usize| effect::factors(&cells[place]));
-        let point = Point { problem, chart, p: &p, cells: &cells, factors: &factors, data: &data };
-        let weight = Weight::of(point)?;
+        let weight = Weight::of(Point { problem, chart, p: &p, cells: &cells, data: &data })?;
         let believed = (weight.bands.par_iter())
             .map(|band| band.g.times(problem, &band.whitening, eta.as_slice()))
             .collect();

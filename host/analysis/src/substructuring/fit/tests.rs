@@ -1,3 +1,4 @@
+use super::chart::At;
 use super::*;
 use crate::substructuring::exact_rig_tests::rig;
 use nalgebra::DMatrix;
@@ -72,5 +73,54 @@ fn the_analytic_derivatives_are_the_difference_quotients() {
         let right = problem.layout.right(&here, 0);
         let linear = left * &change * right;
         assert!((moved - &here.y - &linear).norm() < 1e-4 * linear.norm());
+    }
+}
+
+/// Lines of one vector: one as usual, one whose inverse takes the careful way, one that has none, and one as usual again.
+#[test]
+fn a_line_of_the_model_in_doubt_is_inverted_with_care_and_leaves_its_neighbours_alone() {
+    let case = Case::rigid(1e-3);
+    let [a, b, ajb] = &case.frf;
+    let problem =
+        problem(a, b, ajb, &case.geometry, IdmSet::Six, BAND, &Options::default()).expect("exact data");
+    let layout = &problem.layout;
+    let lines = 4;
+    let parts = [0, 1].map(|side: usize| -> Vec<DMatrix<nalgebra::Complex<f64>>> {
+        let block = &problem.parts[side];
+        block.cells[..lines].iter().map(|cells| block.reduce(cells)).collect()
+    });
+    let diagonal = |last: [f64; 2]| {
+        let of = |one: f64, last: f64| {
+            let values =
+                (0..layout.n).map(|i| nalgebra::Complex::from(if i + 1 < layout.n { one } else { last }));
+            DMatrix::from_diagonal(&nalgebra::DVector::from_iterator(layout.n, values))
+        };
+        chart::At { d: of(1.0, last[0]), e: of(1.0, last[1]), slopes: None }
+    };
+    // beyond doubt, below what the quick way trusts, singular
+    let joint = [[1.0, 1.0], [0.0, 1e-10], [0.0, 0.0], [1.0, 1.0]].map(diagonal);
+    let wanted = model::Wanted { y: true, ..model::Wanted::default() };
+    let found = layout.predict(&joint, parts.each_ref().map(Vec::as_slice), wanted);
+    assert_eq!(found.iter().map(Option::is_some).collect::<Vec<_>>(), [true, true, false, true]);
+    for (l, found) in found.into_iter().enumerate() {
+        let Some(found) = found else { continue };
+        let own = [&parts[0][l], &parts[1][l]];
+        let (rows, columns) = layout.shape();
+        let mut apart = DMatrix::zeros(rows, columns);
+        let mut b = DMatrix::zeros(layout.n, rows);
+        for side in 0..2 {
+            apart.view_mut(layout.corner(side), own[side].shape()).copy_from(own[side]);
+            let sign = nalgebra::Complex::from(if side == 0 { 1.0 } else { -1.0 });
+            for i in 0..layout.n {
+                b[(i, layout.corner(side).0 + layout.rows[side].first[0] + i)] = sign;
+            }
+        }
+        // rows and columns are the interface's alone here, so that one B serves both
+        assert_eq!(rows, columns);
+        let At { d, e, .. } = &joint[l];
+        let held = (d * layout.interface(own) + e).try_inverse().expect("regular");
+        let y = &apart - &apart * b.transpose() * held * d * &b * &apart;
+        // rounding, for the last degree of freedom is loose where its inverse is in doubt
+        assert!((found.y - &y).norm() < 1e-12 * y.norm(), "line {l}");
     }
 }

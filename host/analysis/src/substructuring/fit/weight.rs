@@ -7,7 +7,7 @@
 use super::FitError;
 use super::assembly_aims::{AssemblyAims, Met, OfImpact};
 use super::block::Line;
-use super::cell::CellGeometry;
+use super::cell::{CellGeometry, factors};
 use super::chart::Chart;
 use super::factor::rows as own_rows;
 use super::model::Wanted;
@@ -61,18 +61,17 @@ pub(super) struct Point<'a> {
     pub(super) p: &'a DVector<f64>,
     /// A's, B's and the assembly's cells where their geometry is believed to be.
     pub(super) cells: &'a [Vec<CellGeometry>; 3],
-    /// See [`factors`](super::effect::factors), of A's and B's cells.
-    pub(super) factors: &'a [DMatrix<f64>; 2],
     pub(super) data: &'a Corrected,
 }
 
 impl Weight {
     pub(super) fn of(point: Point<'_>) -> Result<Weight, FitError> {
         let problem = point.problem;
+        let factors = [0, 1].map(|place: usize| factors(&point.cells[place]));
         let (bands, met): (Vec<BandWeight>, Vec<Met>) = (problem.bands.par_iter())
             .enumerate()
             .map(|(band, lines)| {
-                let weight = point.weight(band, lines.clone())?;
+                let weight = point.weight(band, lines.clone(), &factors)?;
                 let met = Met::of(&weight.whitening, &problem.pushes, &weight.g.written, &weight.g.aims);
                 Ok((weight, met))
             })
@@ -138,7 +137,13 @@ fn put_aims(problem: &Problem, bands: &[BandWeight], met: &[Met], information: &
 }
 
 impl Point<'_> {
-    fn weight(&self, band: usize, lines: Range<usize>) -> Result<BandWeight, FitError> {
+    /// Of one band; `factors` of A's and B's cells.
+    fn weight(
+        &self,
+        band: usize,
+        lines: Range<usize>,
+        factors: &[DMatrix<f64>; 2],
+    ) -> Result<BandWeight, FitError> {
         let Point { problem, data, .. } = *self;
         // variance of a band's mean: 2 for real and imaginary part together
         let averaged = 2.0 * problem.shared / lines.len() as f64;
@@ -158,11 +163,11 @@ impl Point<'_> {
         }
         let draws: Vec<[Line; 2]> = lines.clone().map(|l| problem.noise(l, NOISE_SEED)).collect();
         let moved = |sign: f64| {
-            self.evaluated(&lines, true, |side, l| {
+            self.evaluated(&lines, true, factors, |side, l| {
                 &data.parts[side][l] + &draws[l - lines.start][side] * C::from(sign)
             })
         };
-        let here = self.evaluated(&lines, false, |side, l| data.parts[side][l].clone())?.effect;
+        let here = self.evaluated(&lines, false, factors, |side, l| data.parts[side][l].clone())?.effect;
         let (plus, minus) = (moved(1.0)?, moved(-1.0)?);
         // neighbouring lines share their noise, the draws do not
         let half = 0.5 * problem.shared.sqrt();

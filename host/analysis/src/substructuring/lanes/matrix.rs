@@ -22,7 +22,7 @@ impl<S: Simd> Drop for Matrix<'_, S> {
 }
 
 /// The lines of a vector from `first` on; where they end, the last one again.
-pub(crate) fn lines<'a, S: Simd>(_: &Pool<S>, of: &'a [Line], first: usize) -> Vec<&'a Line> {
+pub(crate) fn lines<'a, S: Simd, T>(_: &Pool<S>, of: &'a [T], first: usize) -> Vec<&'a T> {
     (first..first + S::F64_LANES).filter_map(|line| of.get(line).or(of.last())).collect()
 }
 
@@ -48,10 +48,6 @@ impl<'p, S: Simd> Matrix<'p, S> {
             matrix.put_line(lane, line);
         }
         matrix
-    }
-
-    pub(crate) fn pool(&self) -> &'p Pool<S> {
-        self.pool
     }
 
     pub(crate) fn rows(&self) -> usize {
