@@ -2,9 +2,10 @@
 
 import json
 import sys
-import time
 
 import numpy as np
+
+from stopwatch import times
 
 
 def cycles_of(x, period, points):
@@ -57,11 +58,8 @@ def job(codes, given):
 def main():
     given = json.loads(sys.argv[1])
     codes = np.fromfile(given["path"], dtype="<i2").reshape(given["channels"], -1)
-    seconds = []
-    for _ in range(given["runs"]):
-        begun = time.perf_counter()
-        figures = job(codes, given)
-        seconds.append(time.perf_counter() - begun)
+    figures = job(codes, given)
+    seconds = times(lambda: job(codes, given))
     print(json.dumps({"seconds": seconds, "figures": {name: float(value) for name, value in figures.items()}}))
 
 

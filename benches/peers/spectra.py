@@ -2,22 +2,11 @@
 
 import json
 import sys
-import time
 
 import numpy as np
 import pyFRF
 
-RUNS = 5
-
-
-def times(job, before=lambda: None):
-    seconds = []
-    for _ in range(RUNS):
-        before()
-        start = time.perf_counter()
-        job()
-        seconds.append(time.perf_counter() - start)
-    return seconds
+from stopwatch import times
 
 
 def spectra(hits, responses, samples):

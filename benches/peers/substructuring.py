@@ -2,11 +2,11 @@
 
 import json
 import sys
-import time
 
 import numpy as np
 
-RUNS = 9
+from stopwatch import times
+
 data = dict(np.load(sys.argv[1]))
 
 
@@ -51,9 +51,6 @@ def notebook():
     return {name: [float(v.mean()), float(v.std()), float(np.median(v))] for name, v in k.items()}
 
 
-seconds = []
-for _ in range(RUNS):
-    start = time.perf_counter()
-    statistics = notebook()
-    seconds.append(time.perf_counter() - start)
+statistics = notebook()
+seconds = times(notebook)
 print(json.dumps({"seconds": seconds, "k_z": {name: k[0] for name, k in statistics.items()}}))

@@ -4,22 +4,14 @@ import json
 import os
 import sys
 import tempfile
-import time
 
 import numpy as np
 import pyuff
 
+from stopwatch import times
+
+# to write text takes it ten seconds
 RUNS = 5
-
-
-def times(job, before=lambda: None):
-    seconds = []
-    for _ in range(RUNS):
-        before()
-        start = time.perf_counter()
-        job()
-        seconds.append(time.perf_counter() - start)
-    return seconds
 
 
 def universal(functions, lines, binary, folder):
@@ -40,8 +32,8 @@ def universal(functions, lines, binary, folder):
         if os.path.exists(path):
             os.remove(path)
 
-    write = times(lambda: pyuff.UFF(path).write_sets(sets, mode="add"), before=remove)
-    read = times(lambda: pyuff.UFF(path).read_sets())
+    write = times(lambda: pyuff.UFF(path).write_sets(sets, mode="add"), before=remove, runs=RUNS)
+    read = times(lambda: pyuff.UFF(path).read_sets(), runs=RUNS)
     return write, read
 
 

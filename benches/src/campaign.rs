@@ -80,23 +80,18 @@ fn unpacked_and_transformed(path: &Path, records: &[i64]) {
 
 /// FRFs of a part of configuration A: with more hits in each cell, and with more cells.
 pub fn growth(folder: &Path, heap: PeakAlloc) -> Result<Vec<Growth>, Box<dyn Error>> {
-    let mut hits = Vec::new();
-    for (times, wanted) in [(1, 1), (4, 4), (16, 16)] {
-        hits.push((times, of_file(heap, &campaign(folder, wanted, 3, 4)?)?));
-    }
-    let mut cells = Vec::new();
-    for (times, impacts, responses) in [(1, 3, 1), (4, 12, 1), (16, 12, 4)] {
-        cells.push((times, of_file(heap, &campaign(folder, 4, impacts, responses)?)?));
-    }
+    let of_hits = [1, 4, 16].map(|wanted| campaign(folder, wanted, 3, 4));
+    let of_cells =
+        [(3, 1), (12, 1), (12, 4)].map(|(impacts, responses)| campaign(folder, 4, impacts, responses));
     Ok(vec![
         Growth {
             what: "FRFs of a campaign with more hits in each of 12 cells".into(),
-            steps: hits,
+            steps: of_files(heap, of_hits)?,
             flat_memory: true,
         },
         Growth {
             what: "FRFs of a campaign with more cells of 4 hits".into(),
-            steps: cells,
+            steps: of_files(heap, of_cells)?,
             flat_memory: false,
         },
     ])
@@ -111,13 +106,23 @@ fn campaign(folder: &Path, wanted: u32, impacts: usize, responses: usize) -> Res
     Ok(path)
 }
 
-/// Time and memory of the FRFs of a file.
-fn of_file(heap: PeakAlloc, path: &Path) -> Result<Cost, Box<dyn Error>> {
-    let store = Store::open_read_only(path)?;
-    let file = CampaignFile::open(&store, Wanted::default().known)?;
-    Ok(measured(heap, &mut || {
-        let (found, complaints) = file.measured(Structure::A, LINES_HZ);
-        assert!(found.is_some() && complaints.is_empty(), "{complaints:?}");
-        black_box(found);
-    }))
+/// Time and memory of the FRFs of files of 1, 4 and 16 times the size.
+fn of_files(
+    heap: PeakAlloc,
+    paths: [Result<PathBuf, Box<dyn Error>>; 3],
+) -> Result<Vec<(u32, Cost)>, Box<dyn Error>> {
+    let mut stores = Vec::new();
+    for path in paths {
+        stores.push(Store::open_read_only(&path?)?);
+    }
+    let mut jobs = Vec::new();
+    for store in &stores {
+        let file = CampaignFile::open(store, Wanted::default().known)?;
+        jobs.push(move || {
+            let (found, complaints) = file.measured(Structure::A, LINES_HZ);
+            assert!(found.is_some() && complaints.is_empty(), "{complaints:?}");
+            black_box(found);
+        });
+    }
+    Ok([1, 4, 16].into_iter().zip(measured(heap, &mut jobs)).collect())
 }

@@ -1,11 +1,10 @@
 //! The same work at 1, 4 and 16 times the size: time and memory, and the power of the size that they go with.
 
+use super::row::{RUNS, in_turns};
 use peak_alloc::PeakAlloc;
 use std::fmt::Write;
 use std::time::Instant;
 
-/// A long run is disturbed more often than a short one.
-const RUNS: usize = 15;
 /// The largest exponent of time.
 const TIME: f64 = 1.05;
 /// Memory that does not grow with the size stays within this factor over the whole range; threads meet at different moments.
@@ -30,18 +29,20 @@ pub struct Growth {
     pub flat_memory: bool,
 }
 
-/// The cost of a job in a program whose allocator is `heap`.
-pub fn measured(heap: PeakAlloc, job: &mut dyn FnMut()) -> Cost {
-    let mut cost = Cost { seconds: f64::INFINITY, megabytes: f64::INFINITY };
-    for _ in 0..RUNS {
+/// The cost of the same job at each size, in a program whose allocator is `heap`. The sizes take turns: none finds its data in the
+/// processor's cache because it is small, and a busy spell of the machine falls on all of them.
+pub fn measured(heap: PeakAlloc, jobs: &mut [impl FnMut()]) -> Vec<Cost> {
+    let mut costs = vec![Cost { seconds: f64::INFINITY, megabytes: f64::INFINITY }; jobs.len()];
+    in_turns(RUNS, jobs.len(), |job| {
+        let cost = &mut costs[job];
         let before = heap.current_usage();
         heap.reset_peak_usage();
         let start = Instant::now();
-        job();
+        jobs[job]();
         cost.seconds = cost.seconds.min(start.elapsed().as_secs_f64());
         cost.megabytes = cost.megabytes.min((heap.peak_usage().saturating_sub(before)) as f64 / 1e6);
-    }
-    cost
+    });
+    costs
 }
 
 impl Growth {

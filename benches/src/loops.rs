@@ -149,7 +149,7 @@ fn numpy(all: &Peers, folder: &Path, samples: &Samples, map: &ChannelMap) -> Out
     std::fs::write(&path, samples.codes.iter().flat_map(|c| c.to_le_bytes()).collect::<Vec<u8>>())?;
     let place = |role| map.place(role).ok_or("no such channel");
     let job = json!({
-        "path": path, "channels": map.len(), "rate": RATE_HZ, "frequency": FREQUENCY_HZ, "runs": RUNS,
+        "path": path, "channels": map.len(), "rate": RATE_HZ, "frequency": FREQUENCY_HZ,
         "mass": MASS_KG, "parallel": PATH, "a": place(Role::SpecimenA)?, "b": place(Role::SpecimenB)?,
         "cells": map.places(Role::LoadCell),
         "units": map.channels.iter().map(Channel::units_per_code).collect::<Vec<_>>(),

@@ -22,7 +22,7 @@ impl Peers {
     pub fn run(&self, script: &str, job: &str) -> Result<Option<Value>, Box<dyn Error>> {
         let Some(python) = &self.0 else { return Ok(None) };
         let path = format!("{}/peers/{script}", env!("CARGO_MANIFEST_DIR"));
-        let output = Command::new(python).arg(path).arg(job).output()?;
+        let output = Command::new(python).arg("-B").arg(path).arg(job).output()?;
         if !output.status.success() {
             return Err(format!("{script} failed:\n{}", String::from_utf8_lossy(&output.stderr)).into());
         }

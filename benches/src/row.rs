@@ -1,10 +1,13 @@
 //! A line of the table: our time beside a peer's and beside the least that this machine needs.
 
 use std::fmt::Write;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-/// Runs of each side; the quickest counts, because all else that a machine does can only add to a time.
+/// Runs of each side at least; the quickest counts, because all else that a machine does can only add to a time.
 pub const RUNS: usize = 15;
+
+/// All sides run for as long at least: who shares the cache with a virtual machine has busy spells of some seconds.
+const SPELL: Duration = Duration::from_secs(15);
 
 /// One work, and how long each side takes.
 pub struct Row {
@@ -96,12 +99,20 @@ pub fn brief(seconds: f64) -> String {
 /// The quickest of the runs of several jobs, s, in their order. The jobs take turns, so that a busy spell of the machine falls on all of them.
 pub fn quickest<const N: usize>(runs: usize, mut jobs: [&mut dyn FnMut(); N]) -> [f64; N] {
     let mut best = [f64::INFINITY; N];
-    for _ in 0..runs {
-        for (job, best) in jobs.iter_mut().zip(&mut best) {
-            let start = Instant::now();
-            job();
-            *best = best.min(start.elapsed().as_secs_f64());
-        }
-    }
+    in_turns(runs, N, |job| {
+        let start = Instant::now();
+        jobs[job]();
+        best[job] = best[job].min(start.elapsed().as_secs_f64());
+    });
     best
+}
+
+/// Calls `run` with the number of each job in turn, so many times and for long enough.
+pub fn in_turns(runs: usize, jobs: usize, mut run: impl FnMut(usize)) {
+    let begun = Instant::now();
+    let mut done = 0;
+    while done < runs || begun.elapsed() < SPELL {
+        (0..jobs).for_each(&mut run);
+        done += 1;
+    }
 }

@@ -181,17 +181,19 @@ pub fn rows(all: &Peers) -> Result<(Vec<Row>, Vec<String>), Box<dyn Error>> {
 
 /// With more lines.
 pub fn growth(heap: PeakAlloc) -> Result<Growth, Box<dyn Error>> {
-    let mut steps = Vec::new();
-    for times in [1, 4, 16] {
-        let ([a, b, ajb], geometry) = case(times * LINES / 4)?;
-        let cost = measured(heap, &mut || {
-            black_box(stiffness(&a, &b, &ajb, &geometry).expect("exact data"));
+    let times = [1, 4, 16];
+    let cases = times.map(|times| case(times * LINES / 4));
+    let mut jobs = Vec::new();
+    for case in &cases {
+        let ([a, b, ajb], geometry) = case.as_ref().map_err(ToString::to_string)?;
+        jobs.push(move || {
+            black_box(stiffness(a, b, ajb, geometry).expect("exact data"));
         });
-        steps.push((times as u32, cost));
     }
+    let costs = measured(heap, &mut jobs);
     Ok(Growth {
         what: format!("virtual points and methods of more lines ({} and up)", LINES / 4),
-        steps,
+        steps: times.map(|times| times as u32).into_iter().zip(costs).collect(),
         flat_memory: false,
     })
 }
