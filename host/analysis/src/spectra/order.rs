@@ -1,7 +1,7 @@
 //! The order in which a transform leaves its lines: stretch by stretch, of which each is of one piece, whose lines are alike modulo
 //! their number.
 
-use super::quarters::PARTS;
+use super::pieces::{PARTS, PIECES};
 use std::ops::Range;
 
 /// The lines of a transform in the order in which it leaves them.
@@ -13,6 +13,7 @@ pub(super) struct Order {
 }
 
 /// Lines of one piece that follow each other in it.
+#[derive(Clone, Copy)]
 pub(super) struct Stretch {
     /// Which piece.
     pub(super) piece: usize,
@@ -25,19 +26,23 @@ pub(super) struct Stretch {
 /// Of a transform that is whole.
 const WHOLE: [Stretch; 1] = [Stretch { piece: 0, step: 1, mirrored: false }];
 
-/// Of one in [quarters](super::quarters).
-const QUARTERS: [Stretch; 7] = {
-    const fn of(piece: usize, mirrored: bool) -> Stretch {
-        Stretch { piece, step: PARTS, mirrored }
-    }
+/// Of one in [pieces](super::pieces).
+const IN_PIECES: [Stretch; 2 * PIECES - 1] = {
     let zero = Stretch { piece: 0, step: PARTS / 2, mirrored: false };
-    [zero, of(1, false), of(1, true), of(2, false), of(2, true), of(3, false), of(3, true)]
+    let mut all = [zero; 2 * PIECES - 1];
+    let mut piece = 1;
+    while piece < PIECES {
+        all[2 * piece - 1] = Stretch { piece, step: PARTS, mirrored: false };
+        all[2 * piece] = Stretch { piece, step: PARTS, mirrored: true };
+        piece += 1;
+    }
+    all
 };
 
 impl Order {
     /// These lines of so many samples' transform.
-    pub(super) fn of(samples: usize, in_quarters: bool, lines: Range<usize>) -> Order {
-        Order { samples, stretches: if in_quarters { &QUARTERS } else { &WHOLE }, lines }
+    pub(super) fn of(samples: usize, in_pieces: bool, lines: Range<usize>) -> Order {
+        Order { samples, stretches: if in_pieces { &IN_PIECES } else { &WHOLE }, lines }
     }
 
     /// The stretches, in their order.
@@ -122,11 +127,11 @@ mod tests {
 
     #[test]
     fn every_line_has_its_place_and_is_found_there() {
-        for (samples, in_quarters) in
-            [(1, false), (58, false), (59, false), (8, true), (48, true), (56, true)]
+        for (samples, in_pieces) in
+            [(1, false), (58, false), (59, false), (16, true), (48, true), (112, true)]
         {
             let lines = samples / 2 + 1;
-            let all = Order::of(samples, in_quarters, 0..lines);
+            let all = Order::of(samples, in_pieces, 0..lines);
             // which line is where
             let mut ordered = vec![usize::MAX; lines];
             for line in 0..lines {
@@ -136,7 +141,7 @@ mod tests {
             }
             assert_eq!(all.by_line(&ordered), (0..lines).collect::<Vec<_>>());
             for (start, end) in (0..=lines).flat_map(|start| (start..=lines).map(move |end| (start, end))) {
-                let band = Order::of(samples, in_quarters, start..end);
+                let band = Order::of(samples, in_pieces, start..end);
                 let own = all.only(&band, &ordered);
                 assert_eq!(own.len(), band.len());
                 assert_eq!(band.by_line(&own), (start..end).collect::<Vec<_>>());

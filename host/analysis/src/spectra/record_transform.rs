@@ -1,4 +1,4 @@
-//! The transform of a windowed record, as a whole or in [quarters](super::quarters), line after line in the [order](super::order) in which
+//! The transform of a windowed record, as a whole or in [pieces](super::pieces), line after line in the [order](super::order) in which
 //! they come out.
 
 use super::SpectraError;
@@ -6,7 +6,7 @@ use super::half_length::HalfLength;
 use super::lent::Lent;
 use super::lines::Lines;
 use super::order::Order;
-use super::quarters::{PARTS, PIECES, Quarters};
+use super::pieces::{PARTS, PIECES, Pieces};
 use super::windowed::Windowed;
 use crate::vectors::all_finite;
 use bytemuck::cast_slice_mut;
@@ -20,7 +20,7 @@ type C = Complex<f64>;
 pub(super) struct RecordTransform {
     samples: usize,
     /// Of a record that is transformed in pieces.
-    quarters: Option<Quarters>,
+    pieces: Option<Pieces>,
     /// Of piece 0, or of the record.
     real: HalfLength,
 }
@@ -29,7 +29,7 @@ static KEPT: Mutex<Vec<Arc<RecordTransform>>> = Mutex::new(Vec::new());
 /// Plans kept at most.
 const PLANS: usize = 8;
 /// Samples from which on pieces pay: shorter transforms fit into the cache as they are.
-const IN_QUARTERS: usize = 1 << 15;
+const IN_PIECES: usize = 1 << 15;
 
 impl RecordTransform {
     /// Plans are kept, for lengths that come again and again.
@@ -39,8 +39,8 @@ impl RecordTransform {
         if let Some(plan) = kept.iter().find(|plan| plan.samples == samples) {
             return plan.clone();
         }
-        let in_quarters = samples >= IN_QUARTERS && samples.is_multiple_of(PARTS);
-        let plan = Arc::new(Self::planned(samples, in_quarters));
+        let in_pieces = samples >= IN_PIECES && samples.is_multiple_of(PARTS);
+        let plan = Arc::new(Self::planned(samples, in_pieces));
         if kept.len() == PLANS {
             kept.remove(0);
         }
@@ -48,11 +48,11 @@ impl RecordTransform {
         plan
     }
 
-    fn planned(samples: usize, in_quarters: bool) -> RecordTransform {
+    fn planned(samples: usize, in_pieces: bool) -> RecordTransform {
         RecordTransform {
             samples,
-            quarters: in_quarters.then(|| Quarters::of(samples)),
-            real: HalfLength::of(if in_quarters { samples / PIECES } else { samples }),
+            pieces: in_pieces.then(|| Pieces::of(samples)),
+            real: HalfLength::of(if in_pieces { samples / PIECES } else { samples }),
         }
     }
 
@@ -63,7 +63,7 @@ impl RecordTransform {
 
     /// The order in which these lines are given.
     pub(super) fn order(&self, lines: Range<usize>) -> Order {
-        Order::of(self.samples, self.quarters.is_some(), lines)
+        Order::of(self.samples, self.pieces.is_some(), lines)
     }
 
     /// Transforms a record, to which zeros are added up to the plan's length, and gives the lines of an
@@ -86,9 +86,9 @@ impl RecordTransform {
         let fft = &self.real.fft;
         let points = fft.len();
         let mut scratch = Lent::of(fft.get_inplace_scratch_len());
-        let mut spectrum = Lent::of(points * if self.quarters.is_some() { PIECES } else { 1 });
-        if let Some(quarters) = &self.quarters {
-            quarters.write(record, &mut spectrum);
+        let mut spectrum = Lent::of(points * if self.pieces.is_some() { PIECES } else { 1 });
+        if let Some(pieces) = &self.pieces {
+            pieces.write(record, &mut spectrum);
         } else {
             record.write(0, &mut cast_slice_mut(&mut spectrum)[..self.samples]);
             self.real.pack(&mut spectrum);
