@@ -13,9 +13,9 @@ const ABOUT: &str = "\
 # How fast it is
 
 `cargo xtask bench` writes this page; do not edit it. Every row was measured in one run: our time, the time of a program that laboratories use
-for the same work, and the time of what no program can do without on this machine (the limit). Both sides take turns, and the quickest run of
-each counts. *times as fast* is the peer's time over ours; *times as long* is ours over the limit's. The run fails where a ratio misses what is
-wanted or allowed.
+for the same work, and the time of what no program can do without on this machine (the limit). We and the limit take turns for fifteen seconds
+at least, longer than most busy spells of a shared machine; the peer runs as long. The quickest run of each counts. *times as fast* is the peer's
+time over ours; *times as long* is ours over the limit's. The run fails where a ratio misses what is wanted or allowed.
 
 ";
 
