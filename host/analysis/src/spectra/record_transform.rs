@@ -29,7 +29,7 @@ static KEPT: Mutex<Vec<Arc<RecordTransform>>> = Mutex::new(Vec::new());
 /// Plans kept at most.
 const PLANS: usize = 8;
 /// Samples from which on pieces pay: shorter transforms fit into the cache as they are.
-const IN_PIECES: usize = 1 << 15;
+const LONG: usize = 1 << 15;
 
 impl RecordTransform {
     /// Plans are kept, for lengths that come again and again.
@@ -39,7 +39,7 @@ impl RecordTransform {
         if let Some(plan) = kept.iter().find(|plan| plan.samples == samples) {
             return plan.clone();
         }
-        let in_pieces = samples >= IN_PIECES && samples.is_multiple_of(PARTS);
+        let in_pieces = samples >= LONG && samples.is_multiple_of(PARTS);
         let plan = Arc::new(Self::planned(samples, in_pieces));
         if kept.len() == PLANS {
             kept.remove(0);
