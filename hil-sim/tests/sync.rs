@@ -189,7 +189,7 @@ fn a_lost_clock_stops_the_shaker((_board, controls, link): Started) {
     let stops_at = host.next_scan + 60_000;
     controls.wires().stop_clock_at(stops_at);
     host.until("the stop", |host| host.events.contains(&Event::ShakerStops(Reason::Clock)));
-    assert!(host.events.contains(&Event::Clock(ClockFault::Lost)));
+    host.until("the loss", |host| host.events.contains(&Event::Clock(ClockFault::Lost)));
 }
 
 #[test]

@@ -151,6 +151,10 @@ impl SmallHost {
             let (used, frame) = self.reader.feed(rest);
             rest = &rest[used..];
             let Some(frame) = frame else { continue };
+            if frame.is_err() && self.hello.is_none() {
+                // the rest of a frame that the link's earlier host had read half of
+                continue;
+            }
             let frame = frame.unwrap();
             match frame.kind {
                 Kind::Hello => self.hello = Some(Hello::from_bytes(frame.payload).unwrap()),
