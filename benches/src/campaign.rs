@@ -1,6 +1,6 @@
 //! A campaign's analysis against unpacking and transforming what it must read; and how time and memory grow with hits and cells.
 
-use super::growth::{Cost, Growth, measured};
+use super::growth::{Cost, Growth, TIMES, measured};
 use super::row::{Row, quickest};
 use jointrig::analyse::{CampaignFile, Wanted, analyse};
 use jointrig::campaign::store::Store;
@@ -80,18 +80,17 @@ fn unpacked_and_transformed(path: &Path, records: &[i64]) {
 
 /// FRFs of a part of configuration A: with more hits in each cell, and with more cells.
 pub fn growth(folder: &Path, heap: PeakAlloc) -> Result<Vec<Growth>, Box<dyn Error>> {
-    let of_hits = [1, 4, 16].map(|wanted| campaign(folder, wanted, 3, 4));
-    let of_cells =
-        [(3, 1), (12, 1), (12, 4)].map(|(impacts, responses)| campaign(folder, 4, impacts, responses));
+    let of_hits = [campaign(folder, 1, 3, 4)?, campaign(folder, 4, 3, 4)?, campaign(folder, 16, 3, 4)?];
+    let of_cells = [campaign(folder, 4, 3, 1)?, campaign(folder, 4, 12, 1)?, campaign(folder, 4, 12, 4)?];
     Ok(vec![
         Growth {
             what: "FRFs of a campaign with more hits in each of 12 cells".into(),
-            steps: of_files(heap, of_hits)?,
+            steps: of_files(heap, &of_hits),
             flat_memory: true,
         },
         Growth {
             what: "FRFs of a campaign with more cells of 4 hits".into(),
-            steps: of_files(heap, of_cells)?,
+            steps: of_files(heap, &of_cells),
             flat_memory: false,
         },
     ])
@@ -106,23 +105,16 @@ fn campaign(folder: &Path, wanted: u32, impacts: usize, responses: usize) -> Res
     Ok(path)
 }
 
-/// Time and memory of the FRFs of files of 1, 4 and 16 times the size.
-fn of_files(
-    heap: PeakAlloc,
-    paths: [Result<PathBuf, Box<dyn Error>>; 3],
-) -> Result<Vec<(u32, Cost)>, Box<dyn Error>> {
-    let mut stores = Vec::new();
-    for path in paths {
-        stores.push(Store::open_read_only(&path?)?);
-    }
-    let mut jobs = Vec::new();
-    for store in &stores {
-        let file = CampaignFile::open(store, Wanted::default().known)?;
-        jobs.push(move || {
+/// Time and memory of the FRFs of a file of each size.
+fn of_files(heap: PeakAlloc, paths: &[PathBuf; TIMES.len()]) -> [Cost; TIMES.len()] {
+    let stores = paths.each_ref().map(|path| Store::open_read_only(path).expect("just measured"));
+    let jobs = stores.each_ref().map(|store| {
+        let file = CampaignFile::open(store, Wanted::default().known).expect("just measured");
+        move || {
             let (found, complaints) = file.measured(Structure::A, LINES_HZ);
             assert!(found.is_some() && complaints.is_empty(), "{complaints:?}");
             black_box(found);
-        });
-    }
-    Ok([1, 4, 16].into_iter().zip(measured(heap, &mut jobs)).collect())
+        }
+    });
+    measured(heap, jobs)
 }

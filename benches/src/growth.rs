@@ -10,6 +10,9 @@ const TIME: f64 = 1.05;
 /// Memory that does not grow with the size stays within this factor over the whole range; threads meet at different moments.
 const FLAT: f64 = 1.5;
 
+/// How many times the first size.
+pub const TIMES: [usize; 3] = [1, 4, 16];
+
 /// What one size takes.
 #[derive(Clone, Copy)]
 pub struct Cost {
@@ -23,16 +26,16 @@ pub struct Cost {
 pub struct Growth {
     /// What is done, and what grows.
     pub what: String,
-    /// How many times the first size, and what it took.
-    pub steps: Vec<(u32, Cost)>,
+    /// What each size of [`TIMES`] took.
+    pub steps: [Cost; TIMES.len()],
     /// Whether memory must not grow with it.
     pub flat_memory: bool,
 }
 
 /// The cost of the same job at each size, in a program whose allocator is `heap`. The sizes take turns: none finds its data in the
 /// processor's cache because it is small, and a busy spell of the machine falls on all of them.
-pub fn measured(heap: PeakAlloc, jobs: &mut [impl FnMut()]) -> Vec<Cost> {
-    let mut costs = vec![Cost { seconds: f64::INFINITY, megabytes: f64::INFINITY }; jobs.len()];
+pub fn measured(heap: PeakAlloc, mut jobs: [impl FnMut(); TIMES.len()]) -> [Cost; TIMES.len()] {
+    let mut costs = [Cost { seconds: f64::INFINITY, megabytes: f64::INFINITY }; TIMES.len()];
     in_turns(RUNS, jobs.len(), |job| {
         let cost = &mut costs[job];
         let before = heap.current_usage();
@@ -47,21 +50,18 @@ pub fn measured(heap: PeakAlloc, jobs: &mut [impl FnMut()]) -> Vec<Cost> {
 
 impl Growth {
     fn exponent(&self, of: impl Fn(&Cost) -> f64) -> f64 {
-        let (Some((one, first)), Some((many, last))) = (self.steps.first(), self.steps.last()) else {
-            return f64::NAN;
-        };
-        (of(last) / of(first)).ln() / (f64::from(*many) / f64::from(*one)).ln()
+        let [first, _, last] = &self.steps;
+        (of(last) / of(first)).ln() / (TIMES[2] as f64).ln()
     }
 
     /// What grows faster than wanted, in words.
     pub fn short(&self) -> Vec<String> {
         let (time, memory) = (self.exponent(|c| c.seconds), self.exponent(|c| c.megabytes));
-        let range = self.steps.last().map_or(1, |(times, _)| *times);
         let mut short = Vec::new();
         if time.is_nan() || time > TIME {
             short.push(format!("{}: time grows with the power {time:.2}, wanted {TIME}", self.what));
         }
-        if self.flat_memory && f64::from(range).powf(memory) > FLAT {
+        if self.flat_memory && (TIMES[2] as f64).powf(memory) > FLAT {
             short.push(format!("{}: memory grows with the power {memory:.2}, and should not", self.what));
         }
         short
@@ -77,7 +77,7 @@ pub fn table(all: &[Growth]) -> String {
         let cells: Vec<String> = growth
             .steps
             .iter()
-            .map(|(_, cost)| format!("{} s, {:.1} MB", super::row::brief(cost.seconds), cost.megabytes))
+            .map(|cost| format!("{} s, {:.1} MB", super::row::brief(cost.seconds), cost.megabytes))
             .collect();
         let (time, memory) = (growth.exponent(|c| c.seconds), growth.exponent(|c| c.megabytes));
         // writing to a string cannot fail

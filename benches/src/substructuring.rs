@@ -1,7 +1,7 @@
 //! Virtual points and the paper's seven methods on 3600 lines, 27 × 24 → 12 × 12, against a numpy notebook and against the bare inverses
 //! that they need; and the bootstrap of 1000 replicates of the paper's campaign.
 
-use super::growth::{Growth, measured};
+use super::growth::{Growth, TIMES, measured};
 use super::noise::numbers;
 use super::peers::{self, Peers};
 use super::row::{RUNS, Row, quickest};
@@ -181,19 +181,15 @@ pub fn rows(all: &Peers) -> Result<(Vec<Row>, Vec<String>), Box<dyn Error>> {
 
 /// With more lines.
 pub fn growth(heap: PeakAlloc) -> Result<Growth, Box<dyn Error>> {
-    let times = [1, 4, 16];
-    let cases = times.map(|times| case(times * LINES / 4));
-    let mut jobs = Vec::new();
-    for case in &cases {
-        let ([a, b, ajb], geometry) = case.as_ref().map_err(ToString::to_string)?;
-        jobs.push(move || {
+    let cases = TIMES.map(|times| case(times * LINES / 4).expect("it fits, as that of the rows"));
+    let jobs = cases.each_ref().map(|([a, b, ajb], geometry)| {
+        move || {
             black_box(stiffness(a, b, ajb, geometry).expect("exact data"));
-        });
-    }
-    let costs = measured(heap, &mut jobs);
+        }
+    });
     Ok(Growth {
         what: format!("virtual points and methods of more lines ({} and up)", LINES / 4),
-        steps: times.map(|times| times as u32).into_iter().zip(costs).collect(),
+        steps: measured(heap, jobs),
         flat_memory: false,
     })
 }

@@ -81,6 +81,8 @@ pub struct SmallHost {
     pub gaps: Vec<(u64, u64)>,
     /// A shot is waited for, whose record will be read.
     shooting: bool,
+    /// An earlier host of the link may have read half of the first frame.
+    within_frame: bool,
 }
 
 impl SmallHost {
@@ -91,15 +93,15 @@ impl SmallHost {
 
     /// Shakes hands over the link of an earlier host, in a session of its own.
     pub fn again(earlier: Self, session: u32) -> Self {
-        Self::in_session(earlier.link, false, session)
+        Self::in_session(earlier.link, false, session, true)
     }
 
     /// Shakes hands, and reads packets if told so.
     pub fn reading(link: HostEnd, packets: bool) -> Self {
-        Self::in_session(link, packets, 99)
+        Self::in_session(link, packets, 99, false)
     }
 
-    fn in_session(link: HostEnd, packets: bool, session: u32) -> Self {
+    fn in_session(link: HostEnd, packets: bool, session: u32, within_frame: bool) -> Self {
         let mut host = Self {
             link,
             reader: Reader::new(),
@@ -116,6 +118,7 @@ impl SmallHost {
             latest: 0,
             gaps: Vec::new(),
             shooting: false,
+            within_frame,
         };
         host.send(Kind::Hello, &Hello { packets, ..Hello::host(session) }.to_bytes());
         host.until("a Hello", |host| host.hello.is_some());
@@ -151,8 +154,7 @@ impl SmallHost {
             let (used, frame) = self.reader.feed(rest);
             rest = &rest[used..];
             let Some(frame) = frame else { continue };
-            if frame.is_err() && self.hello.is_none() {
-                // the rest of a frame that the link's earlier host had read half of
+            if std::mem::take(&mut self.within_frame) && frame.is_err() {
                 continue;
             }
             let frame = frame.unwrap();
