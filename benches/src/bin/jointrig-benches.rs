@@ -3,12 +3,14 @@
 //! `cargo xtask bench` prepares Python with numpy, pyFRF and pyuff, runs this, and writes docs/performance.md. Without
 //! `JOINTRIG_PYTHON` the peers' columns stay empty. Fails where something is slower than wanted, after the table.
 
+use jointrig::cli::memory::expect_signals;
 use jointrig_benches::peers::Peers;
 use jointrig_benches::{campaign, frames, loops, row, simulator, spectra, substructuring, universal};
 use std::error::Error;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    expect_signals();
     match run() {
         Ok(short) if short.is_empty() => ExitCode::SUCCESS,
         Ok(short) => {

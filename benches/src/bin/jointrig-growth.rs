@@ -1,5 +1,6 @@
 //! How time and memory grow with the size of the work. A program of its own, because counting the heap slows every allocation down.
 
+use jointrig::cli::memory::expect_signals;
 use jointrig_benches::growth::{Growth, table};
 use jointrig_benches::{campaign, substructuring};
 use peak_alloc::PeakAlloc;
@@ -10,6 +11,7 @@ use std::process::ExitCode;
 static HEAP: PeakAlloc = PeakAlloc;
 
 fn main() -> ExitCode {
+    expect_signals();
     match run() {
         Ok(short) if short.is_empty() => ExitCode::SUCCESS,
         Ok(short) => {

@@ -6,6 +6,6 @@ const BLOCK_BYTES: usize = 4 << 20;
 /// glibc gives memory back to the system when some more than the largest block that was ever freed lies idle, so that each record's signals
 /// would be paged in anew, which takes a tenth of an analysis. It learns from this block that such sizes come and go (`mallopt(3)`,
 /// dynamic threshold); other allocators are not impressed.
-pub(super) fn expect_signals() {
+pub fn expect_signals() {
     drop(std::hint::black_box(Vec::<u8>::with_capacity(BLOCK_BYTES)));
 }

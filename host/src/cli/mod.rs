@@ -22,7 +22,7 @@ mod info;
 mod interrupt;
 mod man;
 mod measure;
-mod memory;
+pub mod memory;
 mod number;
 #[cfg(feature = "dashboard")]
 mod open_page;

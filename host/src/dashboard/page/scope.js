@@ -9,7 +9,9 @@ function takeFrame(v){
   if(v.byteLength<32||v.getUint8(0)!==1||v.getUint8(1)!==1)return;
   const channels=v.getUint16(2,true),stretches=v.getUint32(4,true),first=Number(v.getBigUint64(8,true)),per=v.getUint32(16,true);
   if(channels!==scope.channels||first<scope.end)roomFor(channels);
-  scope.received++;scope.missed=v.getUint32(20,true);scope.pending=v.getFloat64(24,true);
+  const missed=v.getUint32(20,true);
+  scope.received++;scope.pending=v.getFloat64(24,true);
+  if(missed!==scope.missed){scope.missed=missed;tell('link')}
   const codes=new Int16Array(v.buffer,32);
   for(let s=0;s<stretches;s++){
     const at=scope.next;
