@@ -1,9 +1,10 @@
-//! How the system's allocator treats the signals of one record after another.
+//! How the system's allocator treats signals and matrices that come and go.
 
-/// More than a signal of a record takes: 0.8 MB for two seconds at 51.2 kHz.
-const BLOCK_BYTES: usize = 4 << 20;
+/// Half of what the signals of several records, or the matrices of one step of the fit, take together. More would be held idle than an analysis
+/// gains by it.
+const BLOCK_BYTES: usize = 7 << 20;
 
-/// glibc gives memory back to the system when some more than the largest block that was ever freed lies idle, so that each record's signals
+/// glibc gives memory back to the system when twice the largest block that was ever freed lies idle, so that each record's signals
 /// would be paged in anew, which takes a tenth of an analysis. It learns from this block that such sizes come and go (`mallopt(3)`,
 /// dynamic threshold); other allocators are not impressed.
 pub fn expect_signals() {

@@ -105,14 +105,14 @@ pub fn write_frf(path: &Path, frf: &Frf, extras: &[Extra]) -> Result<(), NpzErro
     let mut out = NpzOutput::create(path)?.unpacked();
     out.real("frequency", &[frf.frequency_hz().len()], frf.frequency_hz())?;
     let (lines, rows, columns) = shape(frf);
-    out.complex("frf", &[lines, rows, columns], &in_c_order(frf.lines()))?;
+    out.complex("frf", &[lines, rows, columns], in_c_order(frf.lines()))?;
     out.text("quantity", &[], &[frf.quantity().frf_name().into()])?;
     out.text("outputs", &[frf.outputs().len()], frf.outputs())?;
     out.text("inputs", &[frf.inputs().len()], frf.inputs())?;
     out.real("sigma", &[], &[frf.sigma_per_s()])?;
     for (name, known) in [("coherence", frf.coherence()), ("variance", frf.variance())] {
         if let Some(known) = known {
-            out.real(name, &[lines, rows, columns], &in_c_order(known))?;
+            out.real(name, &[lines, rows, columns], in_c_order(known))?;
         }
     }
     for extra in extras {
@@ -124,9 +124,12 @@ pub fn write_frf(path: &Path, frf: &Frf, extras: &[Extra]) -> Result<(), NpzErro
     out.finish()
 }
 
-/// (line, output, input) in C order, which the transposes' columns are.
-fn in_c_order<T: nalgebra::Scalar>(lines: &[DMatrix<T>]) -> Vec<T> {
-    lines.iter().flat_map(|y| y.transpose().data.as_vec().clone()).collect()
+/// (line, output, input) in C order: row after row of matrices that hold column after column.
+fn in_c_order<T: nalgebra::Scalar>(lines: &[DMatrix<T>]) -> impl Iterator<Item = &T> {
+    lines.iter().flat_map(|y| {
+        let rows = y.nrows();
+        (0..rows).flat_map(move |row| y.as_slice().iter().skip(row).step_by(rows))
+    })
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use super::npz::NpzError;
 use npyz::npz::file_name_from_array_name;
 use npyz::{DType, WriteOptions, WriterBuilder};
 use num_complex::Complex;
+use std::borrow::Borrow;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -38,16 +39,26 @@ impl NpzOutput {
     ///
     /// # Errors
     /// [`NpzError::Write`].
-    pub fn real(&mut self, name: &str, shape: &[usize], values: &[f64]) -> Result<(), NpzError> {
-        self.array(name, shape, "<f8", values.iter().copied())
+    pub fn real(
+        &mut self,
+        name: &str,
+        shape: &[usize],
+        values: impl IntoIterator<Item: Borrow<f64>>,
+    ) -> Result<(), NpzError> {
+        self.array(name, shape, "<f8", values.into_iter().map(|v| *v.borrow()))
     }
 
     /// Adds a complex128 array in C order.
     ///
     /// # Errors
     /// [`NpzError::Write`].
-    pub fn complex(&mut self, name: &str, shape: &[usize], values: &[Complex<f64>]) -> Result<(), NpzError> {
-        self.array(name, shape, "<c16", values.iter().copied())
+    pub fn complex(
+        &mut self,
+        name: &str,
+        shape: &[usize],
+        values: impl IntoIterator<Item: Borrow<Complex<f64>>>,
+    ) -> Result<(), NpzError> {
+        self.array(name, shape, "<c16", values.into_iter().map(|v| *v.borrow()))
     }
 
     /// Adds a unicode array.

@@ -1,5 +1,7 @@
 //! FRFs and results of the file, from one reading of its records wherever the analysis has all lines that are asked for.
 
+use std::collections::HashMap;
+
 use nalgebra::DMatrix;
 
 use crate::analyse::{CampaignFile, KnownContact, LINES_HZ, Progress, Wanted};
@@ -18,10 +20,12 @@ pub(super) fn analysed(store: &Store, (low_hz, high_hz): (f64, f64)) -> Result<W
     if low_hz < LINES_HZ[0] || LINES_HZ[1] < high_hz {
         (found.frfs, found.told) = measured_anew(store, [low_hz, high_hz])?;
     }
-    let measured = std::mem::take(&mut found.frfs);
+    let mut measured: HashMap<Structure, Frf> = std::mem::take(&mut found.frfs).into_iter().collect();
     for structure in Structure::ALL {
-        let frf = match measured.iter().find(|(own, _)| *own == structure) {
-            Some((_, frf)) => Some(frf.band(low_hz, high_hz)),
+        let frf = match measured.remove(&structure) {
+            // hundreds of megabytes are not copied to leave no line out
+            Some(frf) if frf.frequency_hz().iter().all(|f| (low_hz..=high_hz).contains(f)) => Some(frf),
+            Some(frf) => Some(frf.band(low_hz, high_hz)),
             None => store.frf(structure.name())?.map(|found| imported(found.frf)),
         };
         found.frfs.extend(Some(structure).zip(frf));

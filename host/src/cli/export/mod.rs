@@ -177,17 +177,17 @@ impl Files<'_> {
         let written = if *without_records { Vec::new() } else { self.write_records(&store)? };
         tables::write(&store, out, &written)?;
         let WithFrfs { frfs, mut told, results } = analysed(&store, self.what.band)?;
-        // each file is packed on one core: all of them at once, beside the report
+        // each file is packed on one core: all of them at once, beside the report, and the last, the assembly's, which is the largest, first
         let write = |(structure, frf): &(Structure, Frf)| -> Result<String, CliError> {
             let path = folders[1].join(structure.name()).with_extension(self.format.extension());
             self.write_frf(&path, frf, geometry.points(*structure))?;
             let (outputs, inputs, lines) = (frf.outputs().len(), frf.inputs().len(), frf.lines().len());
             Ok(format!("{}: {outputs} outputs, {inputs} inputs, {lines} lines", path.display()))
         };
-        let all = || frfs.par_iter().map(write).collect::<Result<Vec<String>, CliError>>();
+        let all = || frfs.par_iter().rev().map(write).collect::<Result<Vec<String>, CliError>>();
         let (reported, frfs_told) = rayon::join(|| write_into(&results, out, &[]), all);
         reported?;
-        told.extend(frfs_told?);
+        told.extend(frfs_told?.into_iter().rev());
         let folder = out.join("levels");
         let levels = levels::write(&store, &folder, self.format, !without_records)?;
         if levels > 0 {
