@@ -47,12 +47,12 @@ pub fn write_npz(path: &Path, all: &ChannelRecords) -> Result<(), NpzError> {
         return Err(NpzError::Content { path: path.into(), reason: "hits differ in length".into() });
     }
     let mut out = NpzOutput::create(path)?;
-    out.real("fs", &[], &[all.fs_hz])?;
-    out.real("record", &[hits], &all.records.iter().map(|id| *id as f64).collect::<Vec<_>>())?;
+    out.real("fs", &[], [all.fs_hz])?;
+    out.real("record", &[hits], all.records.iter().map(|id| *id as f64))?;
     out.text("names", &[channels], &all.names)?;
     out.text("units", &[channels], &all.quantities.iter().map(|q| q.unit().to_owned()).collect::<Vec<_>>())?;
-    out.real("delay_s", &[hits, channels], &all.delay_s.concat())?;
-    out.real("signals", &[hits, channels, samples], &all.signals.concat().concat())?;
+    out.real("delay_s", &[hits, channels], all.delay_s.iter().flatten())?;
+    out.real("signals", &[hits, channels, samples], all.signals.iter().flatten().flatten())?;
     out.finish()
 }
 

@@ -109,7 +109,7 @@ pub fn write_frf(path: &Path, frf: &Frf, extras: &[Extra]) -> Result<(), NpzErro
     out.text("quantity", &[], &[frf.quantity().frf_name().into()])?;
     out.text("outputs", &[frf.outputs().len()], frf.outputs())?;
     out.text("inputs", &[frf.inputs().len()], frf.inputs())?;
-    out.real("sigma", &[], &[frf.sigma_per_s()])?;
+    out.real("sigma", &[], [frf.sigma_per_s()])?;
     for (name, known) in [("coherence", frf.coherence()), ("variance", frf.variance())] {
         if let Some(known) = known {
             out.real(name, &[lines, rows, columns], in_c_order(known))?;
@@ -162,11 +162,11 @@ mod tests {
         let dir = tempfile::tempdir().expect("a temporary folder");
         let path = dir.path().join("frf.npz");
         let mut out = NpzOutput::create(&path).expect("writable");
-        out.real("frequency", &[2], &[1.0, 2.0]).expect("written");
+        out.real("frequency", &[2], [1.0, 2.0]).expect("written");
         out.text("outputs", &[1], &["a".into()]).expect("written");
         out.text("inputs", &[1], &["f".into()]).expect("written");
         out.text("quantity", &[], &["mobility".into()]).expect("written");
-        out.complex("frf", &[1, 1, 1], &[Complex::new(0.0, 0.0)]).expect("written");
+        out.complex("frf", &[1, 1, 1], [Complex::new(0.0, 0.0)]).expect("written");
         out.finish().expect("closed");
         let text = read_frf(&path).expect_err("one line of two").to_string();
         assert!(text.contains("`frf`") && text.contains("(2, 1, 1)"), "{text}");

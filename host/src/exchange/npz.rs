@@ -334,8 +334,8 @@ mod tests {
         let dir = tempfile::tempdir().expect("a temporary folder");
         let path = dir.path().join("x.npz");
         let mut out = NpzOutput::create(&path).expect("writable");
-        out.real("r", &[2, 3], &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).expect("written");
-        out.complex("c", &[1], &[Complex::new(1.0, -2.0)]).expect("written");
+        out.real("r", &[2, 3], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).expect("written");
+        out.complex("c", &[1], [Complex::new(1.0, -2.0)]).expect("written");
         out.text("t", &[], &["αβ".into()]).expect("written");
         out.finish().expect("closed");
         let mut file = NpzFile::open(&path).expect("readable");

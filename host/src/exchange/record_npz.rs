@@ -92,9 +92,9 @@ pub fn write_impacts(path: &Path, records: &ImpactRecords) -> Result<(), NpzErro
         return Err(content("every hit needs the same channels and the same number of samples"));
     }
     let mut out = NpzOutput::create(path)?;
-    out.real("fs", &[], &[records.fs_hz])?;
-    out.real("force", &[hits, samples], &records.force_n.concat())?;
-    out.real("response", &[hits, channels, samples], &records.response.concat().concat())?;
+    out.real("fs", &[], [records.fs_hz])?;
+    out.real("force", &[hits, samples], records.force_n.iter().flatten())?;
+    out.real("response", &[hits, channels, samples], records.response.iter().flatten().flatten())?;
     out.text("quantity", &[], &[records.quantity.name().into()])?;
     out.finish()
 }
@@ -204,7 +204,7 @@ fn write_loop(path: &Path, record: &HysteresisRecord, measured: Option<&str>) ->
     if let Some(measured) = measured {
         out.text("measured", &[], &[measured.into()])?;
     }
-    out.real("fs", &[], &[record.fs_hz])?;
+    out.real("fs", &[], [record.fs_hz])?;
     let (names, a, b) = match &record.motion {
         RelativeMotion::Velocity { a_m_per_s, b_m_per_s } => {
             (["velocity_a", "velocity_b"], a_m_per_s, b_m_per_s)
@@ -215,10 +215,10 @@ fn write_loop(path: &Path, record: &HysteresisRecord, measured: Option<&str>) ->
     out.real(names[1], &[b.len()], b)?;
     out.real("force", &[record.force_n.len()], &record.force_n)?;
     if let Some(f) = record.excitation_hz {
-        out.real("excitation", &[], &[f])?;
+        out.real("excitation", &[], [f])?;
     }
     if let Some(n) = record.normal_load_n {
-        out.real("normal_load", &[], &[n])?;
+        out.real("normal_load", &[], [n])?;
     }
     out.finish()
 }
@@ -274,10 +274,10 @@ mod tests {
         let dir = tempfile::tempdir().expect("a temporary folder");
         let path = dir.path().join("loop.npz");
         let mut out = NpzOutput::create(&path).expect("writable");
-        out.real("fs", &[1], &[100.0]).expect("written");
-        out.real("velocity_a", &[2], &[1.0, 2.0]).expect("written");
-        out.real("velocity_b", &[2], &[0.0, 0.0]).expect("written");
-        out.real("load_cells", &[3, 2], &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).expect("written");
+        out.real("fs", &[1], [100.0]).expect("written");
+        out.real("velocity_a", &[2], [1.0, 2.0]).expect("written");
+        out.real("velocity_b", &[2], [0.0, 0.0]).expect("written");
+        out.real("load_cells", &[3, 2], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).expect("written");
         out.finish().expect("closed");
         assert_eq!(read_hysteresis(&path).expect("read").force_n, [9.0, 12.0]);
     }
@@ -287,9 +287,9 @@ mod tests {
         let dir = tempfile::tempdir().expect("a temporary folder");
         let path = dir.path().join("loop.npz");
         let mut out = NpzOutput::create(&path).expect("writable");
-        out.real("fs", &[], &[100.0]).expect("written");
-        out.real("velocity_a", &[2], &[1.0, 2.0]).expect("written");
-        out.real("velocity_b", &[3], &[0.0, 0.0, 0.0]).expect("written");
+        out.real("fs", &[], [100.0]).expect("written");
+        out.real("velocity_a", &[2], [1.0, 2.0]).expect("written");
+        out.real("velocity_b", &[3], [0.0, 0.0, 0.0]).expect("written");
         out.finish().expect("closed");
         assert!(read_hysteresis(&path).expect_err("no force").to_string().contains("load_cells"));
         assert!(read_impacts(&path).expect_err("no force").to_string().contains("`force`"));
