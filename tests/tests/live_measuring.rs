@@ -39,9 +39,9 @@ fn the_stream_is_seen_as_it_comes() {
     }
     picture(&mut page, "scope");
     // a page that stands still misses frames, counts them, and goes on
-    assert_eq!(page.eval("live.scope.missed"), 0);
+    let missed = page.eval("live.scope.missed");
     page.eval("(() => { const end = performance.now() + 2000; while (performance.now() < end); })()");
-    page.until("live.scope.missed > 0");
+    page.until(&format!("live.scope.missed > {missed}"));
     let before = page.eval("live.scope.drawn").as_u64().unwrap();
     page.until(&format!("live.scope.drawn > {before} + 10"));
     assert!(
@@ -197,6 +197,8 @@ fn a_person_answers_notes_keeps_and_drops_on_the_page() {
     page.until("live.scope.drawn > 3");
     page.key("1");
     page.until("document.querySelector('.answers button:first-child:not([disabled])') !== null");
+    // what was on its way still comes
+    std::thread::sleep(Duration::from_millis(300));
     let end = page.eval("live.scope.end");
     std::thread::sleep(Duration::from_millis(600));
     assert_eq!(page.eval("live.scope.end"), end);

@@ -33,6 +33,9 @@ const STANDS_OUT: f64 = 25.0;
 /// Lines on each side that tell what the surroundings are.
 const SURROUNDINGS: i32 = 24;
 
+/// A frequency lies on a line to this part of a line's width: the window there is flat, so that amplitudes differ by rounding.
+const ON_A_LINE: f64 = 1e-6;
+
 /// Less than this part of the fundamental moves nothing that matters.
 const MATTERS: f64 = 2e-3;
 
@@ -74,7 +77,10 @@ fn part(signal: &[f64], fs_hz: f64, frequency_hz: f64, mains_hz: f64) -> f64 {
     if fft.process(&mut signal.to_vec(), &mut spectrum).is_err() {
         return 0.0;
     }
-    let amplitude = |f: f64| line_sum(signal, -TAU * f / fs_hz).norm();
+    let amplitude = |f: f64| match line_at(f / line_hz) {
+        Some(line) if line < spectrum.len() => spectrum[line].norm(),
+        _ => line_sum(signal, -TAU * f / fs_hz).norm(),
+    };
     let fundamental = amplitude(frequency_hz);
     let free = |f: &f64| {
         let harmonic = (f / frequency_hz).round() * frequency_hz;
@@ -99,6 +105,12 @@ fn part(signal: &[f64], fs_hz: f64, frequency_hz: f64, mains_hz: f64) -> f64 {
         })
         .collect();
     found.into_iter().flatten().fold(0.0, f64::max)
+}
+
+/// The line of the spectrum at this many widths of a line, if it lies on one: multiples of the mains do in whole seconds.
+fn line_at(widths: f64) -> Option<usize> {
+    let line = widths.round();
+    ((widths - line).abs() < ON_A_LINE).then_some(line as usize)
 }
 
 /// Mean taken off, and a Blackman-Harris window put on: 92 dB between lines that are five widths apart.
@@ -127,10 +139,14 @@ mod tests {
 
     const FS_HZ: f64 = 51_200.0;
 
-    /// 0.6 s of 200 Hz in noise, with this part of hum at 150 Hz.
+    /// Some 0.6 s of 200 Hz in noise, with this part of hum at 150 Hz.
     fn in_noise(seed: u64, hum: f64) -> Vec<f64> {
+        samples_in_noise(30_721, seed, hum)
+    }
+
+    fn samples_in_noise(samples: u32, seed: u64, hum: f64) -> Vec<f64> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let signal: Vec<f64> = (0..30_721)
+        let signal: Vec<f64> = (0..samples)
             .map(|i| {
                 let turns = TAU * f64::from(i) / FS_HZ;
                 let noise: f64 = StandardNormal.sample(&mut rng);
@@ -151,6 +167,19 @@ mod tests {
         for seed in 0..20 {
             let found = part(&in_noise(seed, 0.02), FS_HZ, 200.0, 50.0);
             assert!((found - 0.02).abs() < 0.005, "seed {seed}: {found}");
+        }
+    }
+
+    /// In 0.6 s multiples of 50 Hz are lines of the spectrum; a sample more, and each is summed by itself.
+    #[test]
+    fn lines_of_the_spectrum_say_what_sums_say() {
+        for seed in 0..20 {
+            let [on, off] = [30_720, 30_721].map(|samples| {
+                assert_eq!(line_at(50.0 * f64::from(samples) / FS_HZ).is_some(), samples == 30_720);
+                part(&samples_in_noise(samples, seed, 0.02), FS_HZ, 200.0, 50.0)
+            });
+            // one sample of 30 000, and a line's place by 3e-3 of its width
+            assert!((on / off - 1.0).abs() < 1e-3, "seed {seed}: {on} {off}");
         }
     }
 }
