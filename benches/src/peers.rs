@@ -1,5 +1,6 @@
 //! The peers' side: scripts for the Python that `JOINTRIG_PYTHON` names.
 
+use super::row::{RUNS, SPELL};
 use serde_json::Value;
 use std::error::Error;
 use std::process::Command;
@@ -18,11 +19,17 @@ impl Peers {
         self.0.is_some()
     }
 
-    /// Runs a script of the folder `peers` and gives the document that it prints; none without a Python.
+    /// Runs a script of the folder `peers`, which is told how long our own jobs run, and gives the document that it prints; none without a Python.
     pub fn run(&self, script: &str, job: &str) -> Result<Option<Value>, Box<dyn Error>> {
         let Some(python) = &self.0 else { return Ok(None) };
         let path = format!("{}/peers/{script}", env!("CARGO_MANIFEST_DIR"));
-        let output = Command::new(python).arg("-B").arg(path).arg(job).output()?;
+        let output = Command::new(python)
+            .env("JOINTRIG_BENCH_RUNS", RUNS.to_string())
+            .env("JOINTRIG_BENCH_SECONDS", SPELL.as_secs_f64().to_string())
+            .arg("-B")
+            .arg(path)
+            .arg(job)
+            .output()?;
         if !output.status.success() {
             return Err(format!("{script} failed:\n{}", String::from_utf8_lossy(&output.stderr)).into());
         }
