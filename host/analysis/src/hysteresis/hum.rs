@@ -33,7 +33,7 @@ const STANDS_OUT: f64 = 25.0;
 /// Lines on each side that tell what the surroundings are.
 const SURROUNDINGS: i32 = 24;
 
-/// A frequency lies on a line to this part of a line's width: the window there is flat, so that amplitudes differ by rounding.
+/// A frequency lies on a line to this part of a line's width, by which no amplitude changes more.
 const ON_A_LINE: f64 = 1e-6;
 
 /// Less than this part of the fundamental moves nothing that matters.
