@@ -2,7 +2,7 @@
 
 use super::frf_npz::read_frf;
 use super::frf_uff::{FrfUffError, read_frf_uff};
-use super::npz::NpzError;
+use super::npz_error::NpzError;
 use crate::frf::Frf;
 use crate::{advice, foreign};
 use std::io::{self, Read};

@@ -2,7 +2,8 @@
 //! damping of the exponential window in 1/s (absent means 0), `variance` of the real part of each value and `coherence`, both shaped like
 //! `frf`.
 
-use super::npz::{Array, NpzError, NpzFile};
+use super::npz::{Array, NpzFile};
+use super::npz_error::NpzError;
 use super::npz_output::NpzOutput;
 use crate::frf::{Frf, MotionQuantity};
 use nalgebra::DMatrix;

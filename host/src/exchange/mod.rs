@@ -16,6 +16,7 @@ pub mod geometry_file;
 mod npy_header;
 mod npy_values;
 pub mod npz;
+mod npz_error;
 pub mod npz_output;
 #[cfg(feature = "parquet")]
 pub mod parquet;
@@ -37,7 +38,7 @@ pub use frf_file::{FrfFileError, read_frf_file};
 pub use frf_npz::{Extra, read_frf, write_frf};
 pub use frf_uff::FrfUffError;
 pub use geometry_file::{GeometryFileError, read_geometry};
-pub use npz::NpzError;
+pub use npz_error::NpzError;
 pub use positions::{PositionsError, read_positions};
 pub use record_npz::{
     is_beside_the_contact, read_hysteresis, read_impacts, write_hysteresis, write_impacts, write_level,

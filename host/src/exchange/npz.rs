@@ -7,66 +7,14 @@
 use super::archive;
 use super::npy_header::Header;
 use super::npy_values::{in_c_order, letters, number_of};
-use crate::{advice, foreign};
+use super::npz_error::NpzError;
+use crate::foreign;
 use npyz::npz::{array_name_from_file_name, file_name_from_array_name};
 use num_complex::Complex;
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 use zip::ZipArchive;
-
-/// Why an npz file cannot be read or written.
-#[derive(Debug, thiserror::Error)]
-pub enum NpzError {
-    /// The file is not there, not readable, or no npz archive.
-    #[error("{}: cannot be opened as npz: {source}; {}", path.display(), advice::reading(source))]
-    Open {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// An array is missing.
-    #[error("{}: there is no array `{array}` ({expected}); the file has: {available}", path.display())]
-    Missing {
-        /// The file.
-        path: PathBuf,
-        /// The array.
-        array: String,
-        /// What it should hold.
-        expected: String,
-        /// Names of the arrays that are there.
-        available: String,
-    },
-    /// An array is not what it should be.
-    #[error("{}: array `{array}` {found}; expected {expected}", path.display())]
-    Unexpected {
-        /// The file.
-        path: PathBuf,
-        /// The array.
-        array: String,
-        /// What it is.
-        found: String,
-        /// What it should be.
-        expected: String,
-    },
-    /// Arrays are well formed, but what they say is not an FRF or a record.
-    #[error("{}: {reason}", path.display())]
-    Content {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        reason: String,
-    },
-    /// The file cannot be written.
-    #[error("{}: cannot be written: {source}; {}", path.display(), advice::writing(source))]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-}
 
 /// An array in C order: the last index runs fastest.
 #[derive(Debug, Clone, PartialEq)]

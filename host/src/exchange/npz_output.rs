@@ -1,6 +1,6 @@
 //! Arrays into an npz archive: float64, complex128 and unicode, in C order.
 
-use super::npz::NpzError;
+use super::npz_error::NpzError;
 use npyz::npz::file_name_from_array_name;
 use npyz::{DType, WriteOptions, WriterBuilder};
 use num_complex::Complex;

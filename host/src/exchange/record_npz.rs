@@ -1,6 +1,7 @@
 //! Time records in npz: impact records, and hysteresis records.
 
-use super::npz::{NpzError, NpzFile};
+use super::npz::NpzFile;
+use super::npz_error::NpzError;
 use super::npz_output::NpzOutput;
 use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 use crate::spectra::{ImpactRecords, MotionQuantity};

@@ -77,10 +77,7 @@ fn part(signal: &[f64], fs_hz: f64, frequency_hz: f64, mains_hz: f64) -> f64 {
     if fft.process(&mut signal.to_vec(), &mut spectrum).is_err() {
         return 0.0;
     }
-    let amplitude = |f: f64| match line_at(f / line_hz) {
-        Some(line) if line < spectrum.len() => spectrum[line].norm(),
-        _ => line_sum(signal, -TAU * f / fs_hz).norm(),
-    };
+    let amplitude = |f: f64| amplitude(signal, &spectrum, f, fs_hz);
     let fundamental = amplitude(frequency_hz);
     let free = |f: &f64| {
         let harmonic = (f / frequency_hz).round() * frequency_hz;
@@ -107,10 +104,14 @@ fn part(signal: &[f64], fs_hz: f64, frequency_hz: f64, mains_hz: f64) -> f64 {
     found.into_iter().flatten().fold(0.0, f64::max)
 }
 
-/// The line of the spectrum at this many widths of a line, if it lies on one: multiples of the mains do in whole seconds.
-fn line_at(widths: f64) -> Option<usize> {
-    let line = widths.round();
-    ((widths - line).abs() < ON_A_LINE).then_some(line as usize)
+/// |X| at `f`: of the signal's spectrum where that has a line there, as multiples of the mains have in whole seconds, else summed.
+fn amplitude(signal: &[f64], spectrum: &[Complex<f64>], f: f64, fs_hz: f64) -> f64 {
+    // a real signal has as much at −f
+    let widths = (f * signal.len() as f64 / fs_hz).abs();
+    match spectrum.get(widths.round() as usize) {
+        Some(line) if (widths - widths.round()).abs() < ON_A_LINE => line.norm(),
+        _ => line_sum(signal, -TAU * f / fs_hz).norm(),
+    }
 }
 
 /// Mean taken off, and a Blackman-Harris window put on: 92 dB between lines that are five widths apart.
@@ -139,12 +140,11 @@ mod tests {
 
     const FS_HZ: f64 = 51_200.0;
 
-    /// Some 0.6 s of 200 Hz in noise, with this part of hum at 150 Hz.
-    fn in_noise(seed: u64, hum: f64) -> Vec<f64> {
-        samples_in_noise(30_721, seed, hum)
-    }
+    /// 0.6 s of 200 Hz and a sample more.
+    const SAMPLES: u32 = 30_721;
 
-    fn samples_in_noise(samples: u32, seed: u64, hum: f64) -> Vec<f64> {
+    /// 200 Hz in noise, with this part of hum at 150 Hz.
+    fn in_noise(samples: u32, seed: u64, hum: f64) -> Vec<f64> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let signal: Vec<f64> = (0..samples)
             .map(|i| {
@@ -160,24 +160,41 @@ mod tests {
     fn noise_is_no_hum_and_hum_is_found_in_it() {
         for seed in 0..100 {
             for mains in MAINS_HZ {
-                let found = part(&in_noise(seed, 0.0), FS_HZ, 200.0, mains);
+                let found = part(&in_noise(SAMPLES, seed, 0.0), FS_HZ, 200.0, mains);
                 assert!(found == 0.0, "seed {seed}: {found} at {mains} Hz");
             }
         }
         for seed in 0..20 {
-            let found = part(&in_noise(seed, 0.02), FS_HZ, 200.0, 50.0);
+            let found = part(&in_noise(SAMPLES, seed, 0.02), FS_HZ, 200.0, 50.0);
             assert!((found - 0.02).abs() < 0.005, "seed {seed}: {found}");
         }
     }
 
-    /// In 0.6 s multiples of 50 Hz are lines of the spectrum; a sample more, and each is summed by itself.
+    /// In 0.6 s, multiples of 50 Hz are lines of the spectrum.
+    #[test]
+    fn a_line_of_the_spectrum_is_the_sum_that_it_stands_for() {
+        let signal = in_noise(SAMPLES - 1, 1, 0.02);
+        let fft = forward(signal.len());
+        let mut spectrum = fft.make_output_vec();
+        fft.process(&mut signal.clone(), &mut spectrum).expect("lengths are the plan's own");
+        let summed = |f: f64| line_sum(&signal, -TAU * f / FS_HZ).norm();
+        for f in [50.0, 150.0, 200.0, 450.0] {
+            let line = (f * signal.len() as f64 / FS_HZ).round() as usize;
+            let found = amplitude(&signal, &spectrum, f, FS_HZ);
+            assert_eq!(found.to_bits(), spectrum[line].norm().to_bits(), "{f} Hz");
+            // rounding of both, against the highest line
+            assert!((found - summed(f)).abs() < 1e-12 * summed(200.0), "{f} Hz: {found} {}", summed(f));
+        }
+        let beside = 150.3;
+        assert_eq!(amplitude(&signal, &spectrum, beside, FS_HZ).to_bits(), summed(beside).to_bits());
+    }
+
+    /// Whichever way it is read, the hum is the same: a sample more or less.
     #[test]
     fn lines_of_the_spectrum_say_what_sums_say() {
         for seed in 0..20 {
-            let [on, off] = [30_720, 30_721].map(|samples| {
-                assert_eq!(line_at(50.0 * f64::from(samples) / FS_HZ).is_some(), samples == 30_720);
-                part(&samples_in_noise(samples, seed, 0.02), FS_HZ, 200.0, 50.0)
-            });
+            let [on, off] = [SAMPLES - 1, SAMPLES]
+                .map(|samples| part(&in_noise(samples, seed, 0.02), FS_HZ, 200.0, 50.0));
             // one sample of 30 000, and a line's place by 3e-3 of its width
             assert!((on / off - 1.0).abs() < 1e-3, "seed {seed}: {on} {off}");
         }

@@ -23,9 +23,7 @@ pub(super) fn analysed(store: &Store, (low_hz, high_hz): (f64, f64)) -> Result<W
     let mut measured: HashMap<Structure, Frf> = std::mem::take(&mut found.frfs).into_iter().collect();
     for structure in Structure::ALL {
         let frf = match measured.remove(&structure) {
-            // they can be large: they are copied only where lines are left out
-            Some(frf) if frf.frequency_hz().iter().all(|f| (low_hz..=high_hz).contains(f)) => Some(frf),
-            Some(frf) => Some(frf.band(low_hz, high_hz)),
+            Some(frf) => Some(frf.into_band(low_hz, high_hz)),
             None => store.frf(structure.name())?.map(|found| imported(found.frf)),
         };
         found.frfs.extend(Some(structure).zip(frf));
