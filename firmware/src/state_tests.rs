@@ -111,3 +111,105 @@ fn no_two_streams_of_some_starts_have_one_epoch() {
     epochs.dedup();
     assert_eq!(epochs.len(), 9);
 }
+
+/// A host says hello in a session of its own.
+fn greet(core: &Core<'_, NoopRawMutex>, session: u32) {
+    let hello = jointrig_protocol::hello::Hello::host(session).to_bytes();
+    core.greet(&hello);
+}
+
+fn fire(number: u32) -> Request {
+    Request::Fire(jointrig_protocol::request::Fire {
+        number,
+        pulse_us: 2_000,
+        not_before: 1_000_000,
+        quiet_limits: heapless::Vec::new(),
+        quiet_window: 0,
+        quiet_patience: 0,
+    })
+}
+
+#[test]
+fn a_new_session_gets_no_event_of_the_old_one_and_no_shot_number_twice() {
+    let channels = [channel(Role::HammerForce)];
+    let mut slots = [Slot::EMPTY; 2];
+    let core = armed(&channels, &mut slots);
+    greet(&core, 1);
+    core.with(|state| {
+        state.streaming = true;
+        state.hammer.arm(0, 1_000).expect("a hammer at rest");
+    });
+    assert_eq!(core.carry_out(&fire(37), &mut NoStage), Ok(Answer::Scheduled { number: 37 }));
+    core.report_fault("a converter");
+    core.with(|state| state.heed(false, false));
+    // the host is killed while the shot waits, and another one opens a session
+    greet(&core, 2);
+    let events = said(&core);
+    assert!(events.iter().any(|event| matches!(event, Event::Fault(_))), "{events:?}");
+    assert!(events.contains(&Event::Interlock(false)), "the board's own state is told");
+    assert!(!events.iter().any(|event| matches!(event, Event::Shot(_) | Event::Disarmed(_))), "{events:?}");
+    core.with(|state| {
+        state.heed(true, false);
+        state.streaming = true;
+        state.hammer.arm(0, 1_000).expect("a hammer at rest");
+    });
+    assert_eq!(core.carry_out(&fire(1), &mut NoStage), Err(Refusal::ShotRepeated { last: 37 }));
+    assert_eq!(core.carry_out(&fire(38), &mut NoStage), Ok(Answer::Scheduled { number: 38 }));
+}
+
+#[test]
+fn a_flood_of_counters_drops_no_loss_and_no_safety_event() {
+    let channels = [channel(Role::HammerForce)];
+    let mut slots = [Slot::EMPTY; 2];
+    let core = armed(&channels, &mut slots);
+    let range = |first_scan| Range { first_scan, scans: 10 };
+    core.with(|state| {
+        for _ in 0..3 * EVENTS {
+            state.say(Event::Counters(state.counters));
+        }
+        for first_scan in [100, 500, 900] {
+            state.ring.report(range(first_scan), jointrig_protocol::event::Loss::LinkSlow);
+        }
+        state.report_losses();
+        state.heed(false, true);
+        for _ in 0..3 * EVENTS {
+            state.say(Event::Counters(state.counters));
+        }
+        assert_eq!(
+            state.counters.events_dropped as usize,
+            5 * EVENTS + 6,
+            "each counter that found no room, or gave it"
+        );
+    });
+    let events = said(&core);
+    let lost: Vec<u64> = events
+        .iter()
+        .filter_map(|event| if let Event::Lost { first_scan, .. } = event { Some(*first_scan) } else { None })
+        .collect();
+    assert_eq!(lost, [100, 500, 900]);
+    assert!(events.contains(&Event::EmergencyStop(true)) && events.contains(&Event::Interlock(false)));
+}
+
+#[test]
+fn a_loss_waits_while_the_queue_has_no_room_and_the_last_state_of_an_input_counts() {
+    let channels = [channel(Role::HammerForce)];
+    let mut slots = [Slot::EMPTY; 2];
+    let core = armed(&channels, &mut slots);
+    core.with(|state| {
+        for _ in 0..EVENTS - 1 {
+            state.say(Event::Fault(String::new()));
+        }
+        state.heed(false, false);
+        state.heed(true, false);
+        let lost = Range { first_scan: 7, scans: 3 };
+        state.ring.report(lost, jointrig_protocol::event::Loss::FrontEnd);
+        state.report_losses();
+        assert!(state.ring.has_loss(), "it was not taken for an event that found no room");
+        let events = &state.events;
+        assert_eq!(events.iter().filter(|queued| queued.event == Event::Interlock(true)).count(), 1);
+        state.events.pop_front();
+        state.report_losses();
+        assert!(!state.ring.has_loss());
+    });
+    assert!(said(&core).iter().any(|event| matches!(event, Event::Lost { first_scan: 7, scans: 3, .. })));
+}
