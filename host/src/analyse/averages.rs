@@ -129,10 +129,10 @@ impl CellSums {
             &mut self.groups[last]
         };
         let no_pulse = SpectraError::NoPulse { hit: self.records.len() };
-        let origin_s = Pulse::locate(&hit.force_n).ok_or(no_pulse)?.start as f64 / fs_hz;
-        group.light.add(&hit.force_n, &outputs, origin_s)?;
+        let pulse = Pulse::locate(&hit.force_n).ok_or(no_pulse)?;
+        group.light.add(&hit.force_n, &outputs, &pulse)?;
         if let Some(damped) = &mut group.damped {
-            damped.add(&hit.force_n, &outputs, origin_s)?;
+            damped.add(&hit.force_n, &outputs, &pulse)?;
         }
         self.records.push(hit.record);
         Ok(())

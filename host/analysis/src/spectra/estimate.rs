@@ -5,7 +5,7 @@ use super::average::SpectraAverage;
 use super::cross_spectra::CrossSpectra;
 use super::impact_records::ImpactRecords;
 use super::pulse::Pulse;
-use super::window::{Decay, ResponseWeighting, Windowing};
+use super::window::{Decay, PulseSamples, ResponseWeighting, Windowing};
 use super::windowed::Windowed;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -59,6 +59,7 @@ impl Default for FrfSettings {
 
 /// Hits of one rate and length that come one at a time: each is windowed and summed, and needs not be kept.
 pub struct Summing {
+    fs_hz: f64,
     windowing: Windowing,
     decay: Arc<Decay>,
     average: SpectraAverage,
@@ -71,14 +72,15 @@ impl Summing {
     pub fn new(fs_hz: f64, samples: usize, outputs: usize, windowing: Windowing, band_hz: [f64; 2]) -> Self {
         let average = SpectraAverage::of_band(fs_hz, samples, outputs, band_hz);
         let decay = windowing.kept_decay(fs_hz, samples);
-        Summing { windowing, decay, average, samples, outputs }
+        Summing { fs_hz, windowing, decay, average, samples, outputs }
     }
 
-    /// Adds a hit: its force, N, and its responses, SI, as they were recorded, with the origin of its windows from the record's start.
+    /// Adds a hit: its force, N, and its responses, SI, as they were recorded, with the pulse of its force, whose
+    /// start is the origin of the windows.
     ///
     /// # Errors
     /// Another length or number of responses than the others', or a value that is not a number.
-    pub fn add(&mut self, force_n: &[f64], responses: &[&[f64]], origin_s: f64) -> Result<(), SpectraError> {
+    pub fn add(&mut self, force_n: &[f64], responses: &[&[f64]], pulse: &Pulse) -> Result<(), SpectraError> {
         if responses.len() != self.outputs {
             return Err(SpectraError::Responses { found: responses.len(), expected: self.outputs });
         }
@@ -86,9 +88,11 @@ impl Summing {
             return Err(SpectraError::Samples { found: odd.len(), expected: self.samples });
         }
         let (window, decay) = (&self.windowing, &self.decay);
+        let origin_s = pulse.start as f64 / self.fs_hz;
+        let pulse = PulseSamples::of(pulse, force_n);
         let weighting = window.of_response(decay, origin_s);
         self.average.add_with(
-            |out| window.force_into(force_n, decay, origin_s, out),
+            |out| window.force_into(force_n, decay, origin_s, &pulse, out),
             |o| Windowed::response(responses[o], &weighting),
         )
     }
@@ -115,6 +119,7 @@ struct Hit<'r> {
     force: &'r [f64],
     responses: &'r [Vec<f64>],
     origin_s: f64,
+    pulse: PulseSamples,
     weighting: ResponseWeighting<'r>,
 }
 
@@ -163,19 +168,20 @@ pub(super) fn summed(
         if let Some(odd) = responses.iter().chain([force]).find(|x| x.len() != samples) {
             return Err(SpectraError::Samples { found: odd.len(), expected: samples });
         }
+        let found = Pulse::locate(force);
         let origin_s = match settings.origin {
             Origin::At(seconds) => seconds,
-            Origin::PulseStart => {
-                Pulse::locate(force).ok_or(SpectraError::NoPulse { hit })?.start as f64 / records.fs_hz
-            }
+            Origin::PulseStart => found.ok_or(SpectraError::NoPulse { hit })?.start as f64 / records.fs_hz,
         };
-        hits.push(Hit { force, responses, origin_s, weighting: window.of_response(&decay, origin_s) });
+        let pulse = found.map_or_else(PulseSamples::none, |pulse| PulseSamples::of(&pulse, force));
+        let weighting = window.of_response(&decay, origin_s);
+        hits.push(Hit { force, responses, origin_s, pulse, weighting });
     }
     average.add_hits(
         hits.len(),
         &|hit, out| {
-            let Hit { force, origin_s, .. } = &hits[hit];
-            window.force_into(force, &decay, *origin_s, out);
+            let Hit { force, origin_s, pulse, .. } = &hits[hit];
+            window.force_into(force, &decay, *origin_s, pulse, out);
         },
         &|hit, o| {
             let Hit { responses, weighting, .. } = &hits[hit];

@@ -27,9 +27,9 @@ pub use average::SpectraAverage;
 pub use cross_spectra::CrossSpectra;
 pub use estimate::{FrfSettings, Origin, Summing, estimate};
 pub use impact_records::ImpactRecords;
-pub use pulse::Pulse;
+pub use pulse::{Pulse, reversed_peak_n, several_hits_s};
 pub use usable_band::usable_band;
-pub use window::{ForceWeighting, Windowing};
+pub use window::{ForceWeighting, PulseSamples, Windowing};
 
 /// Why records cannot become FRFs.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

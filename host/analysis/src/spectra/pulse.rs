@@ -1,10 +1,30 @@
 //! Where the hammer's main pulse is in a force record, and how high it really is.
+//!
+//! Also what is wrong with a record as a record of one hit: a force of the wrong sign, a record that begins or ends
+//! within the pulse, and several hits in one record.
 
 use crate::median::middle;
 use crate::vectors::{all_finite, largest};
+use std::ops::Range;
 
 /// Fraction of the peak that bounds the pulse.
 const EDGE: f64 = 0.02;
+
+/// The feet of the pulse are followed down to this fraction of the peak, or to the noise.
+const FOOT: f64 = 1e-3;
+
+/// ... and no further than this many widths from the edges.
+const LONGEST_FOOT: usize = 4;
+
+/// A force that falls this much further below its resting level than it rises above it has the wrong sign. The
+/// undershoot of an AC-coupled cell is a small part of its pulse.
+const REVERSED: f64 = 2.0;
+
+/// Another pulse counts as a hit of its own from this fraction of the highest on ...
+const OWN_HIT: f64 = 0.3;
+
+/// ... and this long after the one before, s. A hammer that bounces is back within a tenth of a second.
+const OWN_HIT_AFTER_S: f64 = 0.25;
 
 /// A block of samples whose rms is one estimate of the noise; the median over the record is robust against pulses.
 const NOISE_BLOCK: usize = 64;
@@ -53,6 +73,61 @@ impl Pulse {
     pub fn width(&self) -> usize {
         self.end - self.start
     }
+
+    /// The samples that hold the whole pulse, its feet included, in the record that it was found in.
+    pub fn whole(&self, force_n: &[f64]) -> Range<usize> {
+        let top = force_n[self.peak_sample] - self.offset_n;
+        let level = (FOOT * top).max(2.0 * self.noise_n);
+        let foot = |i: &usize| force_n[*i] - self.offset_n > level;
+        let most = LONGEST_FOOT * self.width();
+        let before = (0..self.start).rev().take(most).take_while(foot).count();
+        let after = (self.end..force_n.len()).take(most).take_while(foot).count();
+        // what lies below the level: a hundredth of the width of a Hann pulse, a tenth of that of a Gaussian one
+        let margin = self.width().div_ceil(8) + 2;
+        let first = self.start.saturating_sub(before + margin);
+        first..(self.end + after + margin).min(force_n.len())
+    }
+
+    /// The impulse of the force outside the samples `kept`, as a part of the pulse's impulse: the largest of the means over
+    /// the stretches before and after, which are looked at as far as twice the length of what is kept. 0 where
+    /// it is not above the noise.
+    pub fn impulse_outside(&self, force_n: &[f64], kept: Range<usize>) -> f64 {
+        let sum = |range: Range<usize>| -> f64 { force_n[range].iter().map(|f| f - self.offset_n).sum() };
+        let reach = 2 * kept.len();
+        let own = sum(self.start..self.end);
+        let beside =
+            [kept.start.saturating_sub(reach)..kept.start, kept.end..(kept.end + reach).min(force_n.len())];
+        let part = |range: Range<usize>| {
+            let by_chance = 4.0 * self.noise_n * (range.len() as f64).sqrt();
+            let found = sum(range).abs();
+            if found > by_chance { found / own } else { 0.0 }
+        };
+        beside.into_iter().map(part).fold(0.0, f64::max)
+    }
+}
+
+/// Peak of the force, N, below its resting level where its sign is the wrong way round: it falls in the hit.
+pub fn reversed_peak_n(force_n: &[f64]) -> Option<f64> {
+    let turned: Vec<f64> = force_n.iter().map(|f| -f).collect();
+    let fall = Pulse::locate(&turned)?;
+    let rise = Pulse::locate(force_n).map_or(0.0, |pulse| pulse.peak_n);
+    (fall.peak_n > 10.0 * fall.noise_n && fall.peak_n > REVERSED * rise).then_some(-fall.peak_n)
+}
+
+/// Where the hits of a record begin, s, when it holds more than one.
+pub fn several_hits_s(force_n: &[f64], fs_hz: f64) -> Option<Vec<f64>> {
+    let main = Pulse::locate(force_n)?;
+    let apart = (OWN_HIT_AFTER_S * fs_hz).ceil() as usize;
+    let level = main.offset_n + (OWN_HIT * main.peak_n).max(10.0 * main.noise_n);
+    let mut starts: Vec<usize> = Vec::new();
+    let mut last_above: Option<usize> = None;
+    for (i, _) in force_n.iter().enumerate().filter(|(_, f)| **f >= level) {
+        if last_above.is_none_or(|last| i - last > apart) {
+            starts.push(i);
+        }
+        last_above = Some(i);
+    }
+    (starts.len() > 1).then(|| starts.into_iter().map(|start| start as f64 / fs_hz).collect())
 }
 
 /// Root mean square about `offset` of each block.
@@ -122,6 +197,72 @@ mod tests {
             prop_assert!((pulse.peak_n / 50.0 - 1.0).abs() < 5e-3, "{}", pulse.peak_n);
             prop_assert!((pulse.start as f64 - start).abs() < 2.0 && (pulse.end as f64 - start - width).abs() < 2.0);
         }
+    }
+
+    fn hann(peak: f64, start: f64, width: f64, n: usize) -> Vec<f64> {
+        let inside = |t: f64| (0.0..1.0).contains(&t);
+        let value = |t: f64| 0.5 * peak * (1.0 - (2.0 * std::f64::consts::PI * t).cos());
+        let t = |i: usize| (i as f64 - start) / width;
+        (0..n).map(|i| if inside(t(i)) { value(t(i)) } else { 0.0 }).collect()
+    }
+
+    #[test]
+    fn the_whole_pulse_has_its_impulse_whatever_its_shape_and_width() {
+        let gauss = |width: f64| -> Vec<f64> {
+            (0..4000).map(|i| 30.0 * (-((f64::from(i) - 1000.0) / width).powi(2)).exp()).collect()
+        };
+        // a soft tip that lets go slowly
+        let tail = |width: f64| -> Vec<f64> {
+            let t = |i: i32| (f64::from(i) - 1000.0) / width;
+            (0..4000).map(|i| if t(i) < 0.0 { 0.0 } else { 30.0 * t(i) * (-2.0 * t(i)).exp() }).collect()
+        };
+        for width in [5.0, 20.0, 90.0, 300.0] {
+            for force in [
+                half_sine(50.0, 1000.3, width, 4000),
+                hann(50.0, 1000.3, width, 4000),
+                gauss(width),
+                tail(width),
+            ] {
+                let pulse = Pulse::locate(&force).expect("a pulse");
+                let kept = pulse.whole(&force);
+                let all: f64 = force.iter().sum();
+                let inside: f64 = force[kept.clone()].iter().sum();
+                assert!((inside / all - 1.0).abs() < 2e-3, "{width}: {inside} of {all}");
+                assert!(pulse.impulse_outside(&force, kept.clone()) < 2e-3);
+                let half = pulse.impulse_outside(&force, kept.start..pulse.peak_sample);
+                assert!(half > 0.2, "{width}: {half}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_reversed_force_is_told_from_an_undershoot() {
+        let mut force = hann(25.0, 300.0, 20.0, 4000);
+        assert_eq!(reversed_peak_n(&force), None);
+        // an AC-coupled cell undershoots by a tenth
+        for (i, f) in force.iter_mut().enumerate().skip(320) {
+            *f -= 2.5 * (-((i - 320) as f64) / 400.0).exp();
+        }
+        assert_eq!(reversed_peak_n(&force), None);
+        let turned: Vec<f64> = force.iter().map(|f| 3.0 - f).collect();
+        let peak_n = reversed_peak_n(&turned).expect("reversed");
+        assert!((peak_n + 25.0).abs() < 0.5, "{peak_n}");
+        assert_eq!(reversed_peak_n(&[1.0; 100]), None);
+    }
+
+    #[test]
+    fn hits_are_counted_and_a_bounce_is_not_one() {
+        let add = |one: &mut Vec<f64>, other: Vec<f64>| {
+            one.iter_mut().zip(other).for_each(|(a, b)| *a += b);
+        };
+        let mut force = hann(25.0, 300.0, 8.0, 10_000);
+        add(&mut force, hann(15.0, 700.0, 8.0, 10_000));
+        assert_eq!(several_hits_s(&force, 5120.0), None, "a bounce after 78 ms");
+        add(&mut force, hann(20.0, 4000.0, 8.0, 10_000));
+        add(&mut force, hann(26.0, 9000.0, 8.0, 10_000));
+        let hits = several_hits_s(&force, 5120.0).expect("three");
+        assert_eq!(hits.len(), 3);
+        assert!((hits[1] - 4002.0 / 5120.0).abs() < 2e-3, "{hits:?}");
     }
 
     #[test]

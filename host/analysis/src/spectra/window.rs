@@ -6,9 +6,11 @@
 //! differs by a factor of about 1 + σ·0.2 ms, and the offset of t₀ from the pulse adds to it. Both are here, because
 //! records processed elsewhere must be reproducible.
 
+use super::pulse::Pulse;
 use crate::vectors::wide;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
+use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Whether the force is weighted exponentially too.
@@ -24,9 +26,9 @@ pub enum ForceWeighting {
 /// Windows of one measurement. Times are relative to the origin t₀ of a hit (its trigger or the start of its pulse).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Windowing {
-    /// The force is kept from this long before the origin, s.
+    /// The force is kept from this long before the origin, s, and always from where its pulse begins.
     pub force_before_s: f64,
-    /// The force is kept until this long after the origin, s (ends included).
+    /// The force is kept until this long after the origin, s (ends included), and always until its pulse is over.
     pub force_after_s: f64,
     /// After that it falls to zero along half a cosine of this length, s; 0 cuts it off.
     #[serde(default)]
@@ -37,8 +39,24 @@ pub struct Windowing {
     pub force_weighting: ForceWeighting,
 }
 
+/// Where the windows of one hit stand.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct PulseSamples(Range<usize>);
+
+impl PulseSamples {
+    /// The force window holds the whole of `pulse`, which was found in `force_n`, however long it is.
+    pub fn of(pulse: &Pulse, force_n: &[f64]) -> Self {
+        PulseSamples(pulse.whole(force_n))
+    }
+
+    /// The force window is placed by its times alone.
+    pub fn none() -> Self {
+        PulseSamples(0..0)
+    }
+}
+
 impl Default for Windowing {
-    /// 1 ms before to 3 ms after the pulse's start holds the longest pulse of the hammer; σ = 2.3 /s keeps the truncation of the
+    /// 1 ms before to 3 ms after the pulse's start holds the longest pulse of the automatic hammer; σ = 2.3 /s keeps the truncation of the
     /// slowest mode (0.57 /s, 2 s records) under 0.3 %.
     fn default() -> Self {
         Windowing {
@@ -123,11 +141,35 @@ impl Windowing {
         Decay::of(self.sigma_per_s, fs_hz, samples)
     }
 
+    /// From when to when the force is kept, s from the record's start: what the times ask for, and all of `pulse`.
+    fn kept_s(&self, fs_hz: f64, origin_s: f64, pulse: &PulseSamples) -> [f64; 2] {
+        let asked = [origin_s - self.force_before_s, origin_s + self.force_after_s];
+        let Range { start, end } = pulse.0;
+        if start >= end {
+            return asked;
+        }
+        [asked[0].min(start as f64 / fs_hz), asked[1].max((end - 1) as f64 / fs_hz)]
+    }
+
+    /// The samples of a hit's force that the window keeps whole.
+    pub fn kept(&self, fs_hz: f64, samples: usize, origin_s: f64, pulse: &PulseSamples) -> Range<usize> {
+        let [from, to] = self.kept_s(fs_hz, origin_s, pulse);
+        let first = ((from * fs_hz).ceil().max(0.0) as usize).min(samples);
+        first..((to * fs_hz).floor().max(-1.0) + 1.0).min(samples as f64).max(first as f64) as usize
+    }
+
     /// Writes the windowed force (N) of a hit with its origin at `origin_s` from the record's start into `out`; what `out` is longer
-    /// than the record (zero padding) becomes 0.
-    pub fn force_into(&self, force_n: &[f64], decay: &Decay, origin_s: f64, out: &mut [f64]) {
+    /// than the record (zero padding) becomes 0. The window holds all of `pulse`.
+    pub fn force_into(
+        &self,
+        force_n: &[f64],
+        decay: &Decay,
+        origin_s: f64,
+        pulse: &PulseSamples,
+        out: &mut [f64],
+    ) {
         out.fill(0.0);
-        let (from, to) = (origin_s - self.force_before_s, origin_s + self.force_after_s);
+        let [from, to] = self.kept_s(decay.fs_hz, origin_s, pulse);
         let first = ((from * decay.fs_hz).floor().max(0.0) as usize).min(force_n.len());
         let last = (((to + self.force_taper_s) * decay.fs_hz).ceil().max(-1.0) + 1.0) as usize;
         let scale = match self.force_weighting {
@@ -210,6 +252,27 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_force_window_follows_a_pulse_that_is_longer_than_its_times() {
+        let w = Windowing { sigma_per_s: 0.0, ..Windowing::default() };
+        let hann = |i: i32| {
+            let t = (f64::from(i) - 40.0) / 60.0;
+            if (0.0..1.0).contains(&t) { 1.0 - (2.0 * PI * t).cos() } else { 0.0 }
+        };
+        let force: Vec<f64> = (0..400).map(hann).collect();
+        let pulse = Pulse::locate(&force).expect("a pulse");
+        let origin_s = pulse.start as f64 / 2000.0;
+        let mut kept = [9.0; 400];
+        w.force_into(&force, &w.decay(2000.0, 400), origin_s, &PulseSamples::of(&pulse, &force), &mut kept);
+        assert_eq!(kept[..], force[..], "a pulse of 30 ms");
+        w.force_into(&force, &w.decay(2000.0, 400), origin_s, &PulseSamples::none(), &mut kept);
+        assert!(kept[50..].iter().all(|f| *f == 0.0), "3 ms are six samples");
+        // a short one leaves the window as it is
+        let range = w.kept(2000.0, 400, 0.1, &PulseSamples(199..205));
+        assert_eq!(range, w.kept(2000.0, 400, 0.1, &PulseSamples::none()));
+        assert_eq!(w.kept(2000.0, 400, 0.1, &PulseSamples(190..240)), 190..240);
+    }
+
+    #[test]
     fn the_force_window_includes_its_ends() {
         let w = Windowing {
             force_before_s: 0.001,
@@ -218,7 +281,7 @@ mod tests {
             ..Windowing::default()
         };
         let mut kept = [9.0; 12];
-        w.force_into(&[1.0; 10], &w.decay(1000.0, 10), 0.004, &mut kept);
+        w.force_into(&[1.0; 10], &w.decay(1000.0, 10), 0.004, &PulseSamples::none(), &mut kept);
         assert_eq!(kept, [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     }
 
@@ -232,12 +295,12 @@ mod tests {
             ..Windowing::default()
         };
         let mut kept = [9.0; 14];
-        w.force_into(&[1.0; 14], &w.decay(1000.0, 14), 0.004, &mut kept);
+        w.force_into(&[1.0; 14], &w.decay(1000.0, 14), 0.004, &PulseSamples::none(), &mut kept);
         // full at 6 ms, half at 8 ms, none at 10 ms
         assert!((kept[8] - 0.5).abs() < 1e-12 && kept[6] == 1.0 && kept[10].abs() < 1e-12, "{kept:?}");
         assert!(kept[7] > kept[8] && kept[8] > kept[9] && kept[11..] == [0.0; 3], "{kept:?}");
         // a window beyond the record is no fault
-        w.force_into(&[1.0; 3], &w.decay(1000.0, 3), 9.0, &mut kept);
+        w.force_into(&[1.0; 3], &w.decay(1000.0, 3), 9.0, &PulseSamples::none(), &mut kept);
         assert_eq!(kept, [0.0; 14]);
     }
 

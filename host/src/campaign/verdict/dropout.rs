@@ -3,7 +3,9 @@
 //! A lost beam leaves steps of milliseconds and spikes of single samples, on top of whatever broadband noise the spot has. Plain noise
 //! is no reason to refuse a hit (averaging takes it out, and some directions hardly move), jumps are. Third differences of block
 //! means remove smooth motion; blocks of 1, 4, 8 and 16 samples make steps stand out of noise. Each difference is compared
-//! with the median of its surroundings, so that neither the level of noise nor a decaying mode counts.
+//! with the median of its surroundings, so that neither the level of noise nor a decaying mode counts. Where there is hardly any noise
+//! (simulations, 24-bit recordings), a mode that decays fast stands out of those, too: a jump must also stand out of the
+//! few differences before or after it, which a smooth motion does not.
 
 use super::motion::{LOOKED_AT, is_motion};
 use crate::median::middle;
@@ -26,6 +28,16 @@ const SETTLED_S: f64 = 0.010;
 /// Within that time only single-sample spikes are looked for, from this many milliseconds after the pulse on.
 const QUIET_AFTER_PULSE_S: f64 = 0.001;
 
+/// The pulse's foot, which is lost in the force's noise, already moves a quiet response: at least so many samples before the pulse are
+/// not looked at.
+const FOOT: usize = 16;
+
+/// Of the differences next to a jump these take part in it, ...
+const OWN: usize = 4;
+
+/// ... and so many beside them say what is usual there.
+const NEXT: usize = 12;
+
 /// Surroundings: this many differences, s of record for single samples.
 const SURROUNDINGS: usize = 512;
 
@@ -34,6 +46,7 @@ pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<B
     let step = quantum(x);
     let settled = pulse.end + (SETTLED_S * fs_hz) as usize;
     let quiet = pulse.end + (QUIET_AFTER_PULSE_S * fs_hz) as usize;
+    let foot = pulse.start.saturating_sub(pulse.width().max(FOOT));
     let mut worst: Option<Burst> = None;
     for block in BLOCKS {
         let differences = third_differences(x, block);
@@ -50,17 +63,27 @@ pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<B
             for (i, d) in (start..).zip(part) {
                 // the difference spans four blocks
                 let (from, to) = (i * block, (i + 4) * block);
-                let far = from >= settled || to <= pulse.start;
+                let far = from >= settled || to <= foot;
                 let near = block == 1 && from >= quiet;
                 let ratio = d / s;
                 let worse = ratio > limit && worst.as_ref().is_none_or(|w| ratio > w.ratio);
-                if worse && (far || near && !moves(x, i)) {
+                if worse && (far && d / next_to(&differences, i).max(whole) > limit || near && !moves(x, i)) {
                     worst = Some(Burst { sample: from + 2 * block, ratio });
                 }
             }
         }
     }
     worst
+}
+
+/// Median of the differences next to the one at `i`, on the side where it is smaller: before a jump all is quiet, or after it.
+fn next_to(differences: &[f64], i: usize) -> f64 {
+    let before = &differences[i.saturating_sub(OWN + NEXT)..i.saturating_sub(OWN)];
+    let after =
+        &differences[(i + OWN + 1).min(differences.len())..(i + OWN + 1 + NEXT).min(differences.len())];
+    let side = |part: &[f64]| (part.len() == NEXT).then(|| middle(part)).flatten().unwrap_or(f64::INFINITY);
+    let quieter = side(before).min(side(after));
+    if quieter.is_finite() { quieter } else { 0.0 }
 }
 
 /// Whether the structure itself moves so where this third difference is.

@@ -21,7 +21,7 @@ pub trait Judge {
     ) -> Verdict;
 }
 
-/// Judges by the raw record itself ([`super::judge`](fn@super::judge)): hammer force and every velocity of the record, in SI.
+/// Judges by the raw record itself ([`super::judge`](fn@super::judge)): hammer force and every motion of the record, in SI.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ByRecord;
 
@@ -39,11 +39,7 @@ impl Judge for ByRecord {
             recording.channel(place).iter().map(|code| f64::from(*code) * unit).collect()
         };
         let force_n = channels.place(Role::HammerForce).map(si).unwrap_or_default();
-        let places = channels
-            .channels
-            .iter()
-            .enumerate()
-            .filter(|(_, channel)| channel.quantity == Quantity::Velocity);
+        let places = channels.channels.iter().enumerate().filter(|(_, channel)| is_motion(channel.quantity));
         let (names, responses): (Vec<&str>, Vec<Vec<f64>>) =
             places.map(|(place, channel)| (channel.name.as_str(), si(place))).unzip();
         let (wanted, given) = (plan.force.get_ref(), plan.limits.get_ref());
@@ -107,6 +103,11 @@ fn noisier<'a>(
         Some((channel.name.as_str(), noise / usual))
     });
     ratios.filter(|(_, ratio)| *ratio > limit).max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Whether a channel measures how something moves, and is judged for dropouts, spikes and plateaus.
+fn is_motion(quantity: Quantity) -> bool {
+    matches!(quantity, Quantity::Velocity | Quantity::Acceleration | Quantity::Displacement)
 }
 
 /// Full scale of a channel in its unit.

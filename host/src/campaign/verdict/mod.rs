@@ -2,7 +2,8 @@
 //!
 //! Before windowing: the rectangular force window hides the second pulse of a double hit while the response keeps it, and
 //! averaging bad hits in cost a median FRF error of 25 % against 0.6 %. Each check stands in its own file and needs this one
-//! record only; the first that fails gives the verdict, in the order gap, overload, double hit, weak, strong, noisy, mistimed.
+//! record only; the first that fails gives the verdict, in the order gap, reversed, mistimed (a pulse that the record does not hold whole),
+//! overload, double hit, weak, strong, noisy, mistimed.
 //! (A refused hit needs one reason; the earlier checks would spoil the figures of the later ones.)
 //!
 //! A new verdict is a new [`Kind`], a file with its check here, and its place in [`judge`](fn@judge). The limits are [`Limits`]: the double-hit
@@ -17,7 +18,7 @@ pub mod others;
 #[cfg(test)]
 mod synthetic_tests;
 
-use crate::spectra::{ImpactRecords, Pulse};
+use crate::spectra::{ImpactRecords, Pulse, reversed_peak_n, several_hits_s};
 use serde::{Deserialize, Serialize};
 
 /// The kinds of verdict. Only [`Kind::Good`] hits enter an average.
@@ -44,6 +45,9 @@ pub enum Kind {
     /// The pulse is not where it should be.
     #[serde(rename = "mistimed")]
     Mistimed,
+    /// The force falls in the hit: its sign is the wrong way round.
+    #[serde(rename = "reversed")]
+    Reversed,
     /// Samples are missing.
     #[serde(rename = "gap")]
     Gap,
@@ -54,7 +58,7 @@ pub enum Kind {
 
 impl Kind {
     /// Every kind, good first.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Good,
         Self::DoubleHit,
         Self::Overload,
@@ -62,6 +66,7 @@ impl Kind {
         Self::Weak,
         Self::Strong,
         Self::Mistimed,
+        Self::Reversed,
         Self::Gap,
         Self::Dropped,
     ];
@@ -81,6 +86,7 @@ impl Kind {
             Kind::Weak => "weak",
             Kind::Strong => "strong",
             Kind::Mistimed => "mistimed",
+            Kind::Reversed => "reversed",
             Kind::Gap => "gap",
             Kind::Dropped => "dropped",
         }
@@ -189,6 +195,12 @@ pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) ->
     if missing > 0.0 {
         return verdict(Kind::Gap, missing, 0.0, format!("{missing} samples are missing from the record"));
     }
+    if let Some(peak_n) = reversed_peak_n(hit.force_n) {
+        let sentence = format!(
+            "the force's sign is the wrong way round: its peak is {peak_n:.4} N; a push is positive, so multiply the force by -1"
+        );
+        return verdict(Kind::Reversed, peak_n, 0.0, sentence);
+    }
     let Some(pulse) = pulse else {
         return verdict(Kind::Weak, 0.0, 0.0, "there is no force pulse at all".into());
     };
@@ -198,6 +210,30 @@ pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) ->
         let sentence =
             format!("the highest force of {:.3} N is not above noise ({floor:.3} N)", pulse.peak_n);
         return verdict(Kind::Weak, pulse.peak_n, floor, sentence);
+    }
+    for (at, end) in [(0, "begins"), (hit.force_n.len() - 1, "ends")] {
+        if (pulse.start..pulse.end).contains(&at) {
+            let height =
+                (hit.force_n[at] - pulse.offset_n) / (hit.force_n[pulse.peak_sample] - pulse.offset_n);
+            let sentence = format!(
+                "the record {end} within the pulse: its {} sample has {:.0} % of the peak, and the rest of the pulse is missing; \
+                 record from before the hit until after it",
+                if at == 0 { "first" } else { "last" },
+                100.0 * height
+            );
+            return verdict(Kind::Mistimed, height, 0.0, sentence);
+        }
+    }
+    if let Some(hits_s) = several_hits_s(hit.force_n, hit.fs_hz) {
+        let times: Vec<String> = hits_s.iter().take(12).map(|t| format!("{t:.3}")).collect();
+        let more = if hits_s.len() > 12 { ", …" } else { "" };
+        let sentence = format!(
+            "the record holds {} hits, at {}{more} s: cut it into one record for each, from before its hit to before the next \
+             (docs/own-data.md shows how)",
+            hits_s.len(),
+            times.join(", ")
+        );
+        return verdict(Kind::DoubleHit, hits_s.len() as f64, 1.0, sentence);
     }
     if let Some(found) = clipping::force(hit.force_n, &pulse, limits.force_range_n) {
         return verdict(Kind::Overload, found.level, found.limit, found.sentence("force", "N"));
@@ -249,9 +285,11 @@ pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) ->
     }
     if let Some(expected) = limits.expected_start_s {
         let late = pulse.start as f64 / hit.fs_hz - expected;
-        if late.abs() > limits.start_tolerance_s {
+        // a soft pulse passes the trigger's level anywhere on its flank
+        let tolerance = limits.start_tolerance_s.max(pulse.width() as f64 / hit.fs_hz);
+        if late.abs() > tolerance {
             let sentence = format!("the pulse starts {:.2} ms from where it should", 1e3 * late);
-            return verdict(Kind::Mistimed, late.abs(), limits.start_tolerance_s, sentence);
+            return verdict(Kind::Mistimed, late.abs(), tolerance, sentence);
         }
     }
     let limit = reference_peak_n.map_or(floor, |r| limits.weak_fraction * r);

@@ -78,13 +78,12 @@ impl Others {
         let Some(pulse) = Pulse::locate(&force_n) else { return };
         let window =
             Windowing { sigma_per_s: plan.window.get_ref().exponential_per_s, ..Windowing::default() };
-        let origin_s = pulse.start as f64 / fs_hz;
         let responses: Vec<Vec<f64>> = self.responses.iter().copied().map(si).collect();
         let responses: Vec<&[f64]> = responses.iter().map(Vec::as_slice).collect();
         let sums = self.sums.get_or_insert_with(|| {
             Summing::new(fs_hz, force_n.len(), responses.len(), window, enough.band_hz)
         });
-        if let Err(error) = sums.add(&force_n, &responses, origin_s) {
+        if let Err(error) = sums.add(&force_n, &responses, &pulse) {
             log::warn!("a good record does not enter the cell's FRFs: {error}");
         }
     }
