@@ -39,7 +39,7 @@ pub struct Windowing {
     pub force_weighting: ForceWeighting,
 }
 
-/// Where the windows of one hit stand.
+/// The samples of a hit that its force window must hold.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct PulseSamples(Range<usize>);
 
