@@ -16,6 +16,7 @@ use crate::campaign::store::frf_table::ImportedFrf;
 use crate::campaign::store::level_table::LevelRow;
 use crate::campaign::store::record_row::{Damaged, RecordRow};
 use crate::campaign::store::rows::{Rows, places as response_places};
+use crate::campaign::store::session_table::SessionInfo;
 use crate::contact::ContactPriors;
 use crate::device::channels::ChannelMap;
 use crate::hysteresis::HysteresisRecord;
@@ -24,11 +25,105 @@ use crate::structure::Structure;
 use crate::substructuring::geometry::Geometry;
 use jointrig_protocol::channel::{Quantity, Role};
 use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 /// Scans kept before the trigger: the force window begins 1 ms before the pulse, which is 51 scans at 51.2 kHz.
-pub const LEAD_S: f64 = 1.25e-3;
+const LEAD_S: f64 = 1.25e-3;
+
+/// How much of each record is analysed: of all the same, so that their FRFs have the same lines.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AnalysedLength {
+    /// The plan's length, s.
+    plan_s: f64,
+    /// Shortest and longest kept record that came from a file, from its lead on, s.
+    imported_s: Option<[f64; 2]>,
+    /// Whether records were measured here, which have the plan's length.
+    measured: bool,
+}
+
+impl AnalysedLength {
+    /// Of the kept records of a campaign.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn of(store: &Store, plan: &Plan) -> Result<Self, StoreError> {
+        let sessions = store.sessions()?;
+        let imported: HashSet<i64> = (sessions.iter())
+            .filter(|(_, info)| info.board == SessionInfo::IMPORTED)
+            .map(|(id, _)| *id)
+            .collect();
+        let mut found =
+            AnalysedLength { plan_s: plan.record.get_ref().length_s, imported_s: None, measured: false };
+        if imported.is_empty() {
+            return Ok(AnalysedLength { measured: true, ..found });
+        }
+        let mut rates = HashMap::new();
+        for id in &imported {
+            rates.insert(*id, f64::from(store.channels(*id)?.rate_hz));
+        }
+        for record in store.records()?.iter().flatten().filter(|record| record.kept()) {
+            let Some(rate_hz) = rates.get(&record.session) else {
+                found.measured = true;
+                continue;
+            };
+            let own_s = record.scans.saturating_sub(first_sample(record, *rate_hz)) as f64 / rate_hz;
+            let [least, most] = found.imported_s.unwrap_or([own_s; 2]);
+            found.imported_s = Some([least.min(own_s), most.max(own_s)]);
+        }
+        Ok(found)
+    }
+
+    /// The analysed part of every record, s. Records from files are used whole where nothing was measured here.
+    fn length_s(&self) -> f64 {
+        match self.imported_s {
+            // a record of the plan's length has the lead beside it
+            Some([least, _]) if !self.measured && !(0.0..=LEAD_S).contains(&(least - self.plan_s)) => least,
+            _ => self.plan_s,
+        }
+    }
+
+    /// The samples of a record that are analysed, as far as it has them.
+    pub fn samples(&self, record: &RecordRow, rate_hz: f64) -> Range<usize> {
+        let from = first_sample(record, rate_hz);
+        from..from + (self.length_s() * rate_hz).round() as usize
+    }
+
+    /// What is to be said of records from files that do not have the plan's length.
+    pub fn notice(&self) -> Option<String> {
+        let [least, most] = self.imported_s?;
+        let plan_s = self.plan_s;
+        if self.measured {
+            return (most > plan_s + LEAD_S).then(|| {
+                format!(
+                    "imported records last up to {most:.3} s from the hit on: they are cut to the plan's length_s of {plan_s} s, which the \
+                     measured records have"
+                )
+            });
+        }
+        if most - least > LEAD_S {
+            return Some(format!(
+                "imported records last from {least:.3} to {most:.3} s from the hit on: the analysis cuts all of them to {:.3} s, so that \
+                 their FRFs have the same lines",
+                self.length_s()
+            ));
+        }
+        ((least - plan_s).abs() > LEAD_S).then(|| {
+            format!(
+                "imported records last {least:.3} s from the hit on, and the plan's length_s is {plan_s} s: they are used whole, with a line \
+                 every {:.3} Hz",
+                1.0 / least
+            )
+        })
+    }
+}
+
+/// The first sample of a record that is analysed. A soft pulse needs more before the trigger, which is on its flank.
+fn first_sample(record: &RecordRow, rate_hz: f64) -> usize {
+    let lead_s = LEAD_S.max(1e-6 * f64::from(record.shot.width_us));
+    record.trigger_index.saturating_sub((lead_s * rate_hz).ceil() as usize)
+}
 
 /// Everything that a campaign file says about the joint. What is `known` beforehand counts more than what the plan says.
 ///
@@ -66,6 +161,7 @@ pub struct CampaignFile {
     pub(super) tally: Tally,
     pub(super) records: HashMap<i64, Vec<Result<RecordRow, Damaged>>>,
     channels: HashMap<i64, ChannelMap>,
+    analysed: AnalysedLength,
     /// Open connections that no thread uses at the moment: SQLite's cannot be shared, only handed on.
     idle: Mutex<Vec<Store>>,
 }
@@ -118,6 +214,7 @@ impl CampaignFile {
             path: store.path().into(),
             geometry: geometry(&plan),
             quantity: response_quantity(&plan, channels.values())?,
+            analysed: AnalysedLength::of(store, &plan)?,
             known,
             plan,
             cells,
@@ -195,11 +292,9 @@ impl CampaignFile {
         let mut seen = HashSet::new();
         wanted.retain(|place| seen.insert(*place));
         // exactly as many samples as the plan's length: half-hertz lines from two seconds
-        let lead = (LEAD_S * rate).ceil() as usize;
-        let length = self.plan.post_trigger_scans() as usize;
-        let from = record.trigger_index.saturating_sub(lead);
+        let analysed = self.analysed.samples(record, rate);
         store.each_channel(record, &wanted, |place, codes| {
-            let codes = &codes[from.min(codes.len())..(from + length).min(codes.len())];
+            let codes = &codes[analysed.start.min(codes.len())..analysed.end.min(codes.len())];
             let write = |signal: &mut Vec<f64>| {
                 signal.clear();
                 signal.extend(map.si(place, codes));

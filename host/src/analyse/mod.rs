@@ -53,7 +53,7 @@ pub use contact_stage::Contact;
 pub use findings::{ConfigurationFindings, Findings, ImportedFrom, Settings};
 pub use fits::{Fit, NoFit, fits};
 pub use from_frfs::{Row, Substructured};
-pub use from_store::{CampaignFile, LEAD_S, analyse};
+pub use from_store::{AnalysedLength, CampaignFile, analyse};
 pub use impact_loops::{ImpactLoops, SlopeIs};
 pub use level_stiffness::NoLevelStiffness;
 pub use missing::Missing;

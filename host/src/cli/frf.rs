@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use super::error::CliError;
 use super::frf_matrix::{Wishes, average};
+use super::hit_agreement::Agreement;
 use super::output;
 use crate::campaign::verdict::{Kind, Limits, Verdict, judge_all};
 use crate::exchange::npz::Array;
@@ -14,8 +15,8 @@ use crate::exchange::record_uff::read_record_file;
 use crate::exchange::{Extra, write_frf};
 use crate::outside::tell_line;
 use crate::spectra::{
-    CrossSpectra, ForceWeighting, FrfSettings, ImpactRecords, MotionQuantity, Origin, Windowing, estimate,
-    usable_band,
+    CrossSpectra, ForceWeighting, FrfSettings, ImpactRecords, MotionQuantity, Origin, Pulse, PulseSamples,
+    Windowing, estimate, reversed_peak_n, several_hits_s, usable_band,
 };
 use crate::substructuring::Band;
 
@@ -43,10 +44,10 @@ pub struct Frf {
     /// Damping of the exponential window, 1/s; 0 for none.
     #[arg(long, value_name = "PER_S", default_value_t = Windowing::default().sigma_per_s)]
     sigma: f64,
-    /// The force is kept from this long before the pulse, s.
+    /// The force is kept from this long before the pulse's start, s, and always from its foot on.
     #[arg(long, value_name = "S", default_value_t = Windowing::default().force_before_s)]
     force_before: f64,
-    /// The force is kept until this long after the pulse's start, s.
+    /// The force is kept until this long after the pulse's start, s, and always until the pulse is over.
     #[arg(long, value_name = "S", default_value_t = Windowing::default().force_after_s)]
     force_after: f64,
     /// After that it falls to zero along half a cosine of this length, s.
@@ -128,21 +129,14 @@ impl Frf {
             if self.json {
                 output::json(&self.document(&records, &verdicts, None))?;
             }
-            let why: Vec<String> = verdicts
-                .iter()
-                .enumerate()
-                .map(|(i, v)| format!("hit {i}: {}, {}", v.kind, v.sentence))
-                .collect();
-            return Err(CliError::Bad(format!(
-                "{}: no hit is good, so there is nothing to average; measure again\n  {}",
-                self.records.display(),
-                why.join("\n  ")
-            )));
+            return Err(CliError::Bad(self.nothing_good(&records, &verdicts)));
         }
         let settings = self.settings();
         let found = estimate(&records, &used, &settings)
             .map_err(|e| CliError::Bad(format!("{}: {e}", self.records.display())))?;
         let excited = usable_band(found.frequency_hz(), &found.force_spectrum(), 6.0);
+        let agreement = Agreement::of(&records, &used, &settings, &found, excited, &names)
+            .map_err(|e| CliError::Bad(format!("{}: {e}", self.records.display())))?;
         let quantity = self.quantity.map_or(records.quantity, MotionQuantity::from);
         let mut found = found.converted(records.quantity, quantity);
         if let Some((low, high)) = self.band {
@@ -163,10 +157,81 @@ impl Frf {
             return output::json(&self.document(
                 &records,
                 &verdicts,
-                Some((&found, excited, quantity, &names)),
+                Some((&found, excited, quantity, &names, &agreement)),
             ));
         }
-        output::lines(self.words(&verdicts, &found, excited))
+        let mut lines = self.words(&verdicts, &found, excited);
+        // before the last line, which names the file
+        let last = lines.len() - 1;
+        let told = [agreement.lines(&names), self.about_window(&records, &used)].concat();
+        lines.splice(last..last, told);
+        output::lines(lines)
+    }
+
+    /// Why there is nothing to average, and what to do.
+    fn nothing_good(&self, records: &ImpactRecords, verdicts: &[Verdict]) -> String {
+        let file = self.records.display();
+        let reversed: Vec<Option<f64>> = records.force_n.iter().map(|force| reversed_peak_n(force)).collect();
+        if let (Some(Some(peak_n)), true) = (reversed.first(), reversed.iter().all(Option::is_some)) {
+            return format!(
+                "{file}: the force's sign is the wrong way round: peak {peak_n:.1} N in hit 0; a push is positive, so multiply the force by -1"
+            );
+        }
+        let why: Vec<String> = verdicts
+            .iter()
+            .enumerate()
+            .map(|(i, v)| {
+                if reversed[i].is_some() {
+                    format!("hit {i}: {}", v.sentence)
+                } else {
+                    format!("hit {i}: {}, {}", v.kind, v.sentence)
+                }
+            })
+            .collect();
+        let several = match records.force_n.as_slice() {
+            [force] => several_hits_s(force, records.fs_hz),
+            _ => None,
+        };
+        if let Some(hits_s) = several {
+            let lines = cut_lines(&self.records.to_string_lossy(), records, &hits_s);
+            return format!("{file}: {}\n{lines}", verdicts[0].sentence);
+        }
+        format!(
+            "{file}: no hit is good, so there is nothing to average; measure again\n  {}",
+            why.join("\n  ")
+        )
+    }
+
+    /// What is to be said of the force windows of the hits that are used.
+    fn about_window(&self, records: &ImpactRecords, used: &[bool]) -> Vec<String> {
+        let windows = force_windows(records, &self.settings());
+        let of_used = || {
+            windows
+                .iter()
+                .enumerate()
+                .filter(|(hit, _)| used[*hit])
+                .filter_map(|(hit, w)| Some((hit, w.as_ref()?)))
+        };
+        let mut lines = Vec::new();
+        let longest = of_used().max_by(|a, b| a.1.to_s.total_cmp(&b.1.to_s));
+        if let Some((hit, window)) =
+            longest.filter(|(_, window)| window.to_s > self.force_after + 1.0 / records.fs_hz)
+        {
+            lines.push(format!(
+                "the force is kept until {:.1} ms after the pulse's start, not {:.1} ms: the pulse of hit {hit} lasts {:.1} ms",
+                1e3 * window.to_s,
+                1e3 * self.force_after,
+                1e3 * window.pulse_s
+            ));
+        }
+        let most = of_used().max_by(|a, b| a.1.outside.total_cmp(&b.1.outside));
+        if let Some((hit, window)) = most.filter(|(_, window)| window.outside > OUTSIDE) {
+            lines.push(format!(
+                "hit {hit}: beside the force window the force has {:.1} % of the pulse's impulse, which is left out: it drifts, or something else pushes",
+                100.0 * window.outside
+            ));
+        }
+        lines
     }
 
     fn of_folder(&self) -> Result<(), CliError> {
@@ -248,13 +313,17 @@ impl Frf {
         &self,
         records: &ImpactRecords,
         verdicts: &[Verdict],
-        found: Option<(&CrossSpectra, Option<Band>, MotionQuantity, &[String])>,
+        found: Option<(&CrossSpectra, Option<Band>, MotionQuantity, &[String], &Agreement)>,
     ) -> Value {
+        let windows = force_windows(records, &self.settings());
         let hits: Vec<Value> = verdicts
             .iter()
             .enumerate()
             .map(|(index, v)| {
+                let window = windows[index].as_ref();
                 json!({
+                    "force_window_s": window.map(|w| [w.from_s, w.to_s]),
+                    "force_outside_window": window.map(|w| w.outside),
                     "index": index, "verdict": v.kind, "measure": v.measure, "limit": v.limit,
                     "sentence": v.sentence, "peak_n": v.peak_n, "start_s": v.start_s,
                 })
@@ -267,13 +336,15 @@ impl Frf {
             "used": found.map_or(0, |(y, ..)| y.hits()),
             "settings": self.settings(),
         });
-        if let Some((y, band, quantity, names)) = found {
+        if let Some((y, band, quantity, names, agreement)) = found {
             document["quantity"] = json!(quantity.frf_name());
             document["outputs"] = json!(names);
             document["input"] = json!(self.input);
             document["lines"] = json!(y.lines());
             document["usable_band_hz"] = json!(band.map(|b| [b.low_hz, b.high_hz]));
             document["median_coherence"] = json!(median_coherence(y, band));
+            document["coherence"] = agreement.document();
+            document["suspicions"] = json!(agreement.suspicions);
         }
         document
     }
@@ -297,6 +368,74 @@ impl Frf {
         }
         lines
     }
+}
+
+/// Told from this part of the pulse's impulse on.
+const OUTSIDE: f64 = 0.01;
+
+/// Where the force of a hit is kept.
+struct ForceWindow {
+    /// From the windows' origin, s.
+    from_s: f64,
+    /// The same of its end.
+    to_s: f64,
+    /// Length of the pulse, s.
+    pulse_s: f64,
+    /// The force's impulse beside the window, as a part of the pulse's.
+    outside: f64,
+}
+
+/// The windows of all hits; none of a hit without a pulse.
+fn force_windows(records: &ImpactRecords, settings: &FrfSettings) -> Vec<Option<ForceWindow>> {
+    let fs_hz = records.fs_hz;
+    let of = |force: &Vec<f64>| {
+        let pulse = Pulse::locate(force)?;
+        let origin_s = match settings.origin {
+            Origin::PulseStart => pulse.start as f64 / fs_hz,
+            Origin::At(origin_s) => origin_s,
+        };
+        let whole = PulseSamples::of(&pulse, force);
+        let [from_s, to_s] = settings.windowing.kept_s(fs_hz, origin_s, &whole);
+        let kept = settings.windowing.kept(fs_hz, force.len(), origin_s, &whole);
+        Some(ForceWindow {
+            from_s: from_s - origin_s,
+            to_s: to_s - origin_s,
+            pulse_s: pulse.width() as f64 / fs_hz,
+            outside: pulse.impulse_outside(force, kept),
+        })
+    };
+    records.force_n.iter().map(of).collect()
+}
+
+/// Lines of Python that cut one record with several hits.
+fn cut_lines(file: &str, records: &ImpactRecords, hits_s: &[f64]) -> String {
+    let gap_s = hits_s.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
+    let first_s = hits_s.first().copied().unwrap_or(0.0);
+    let before_s = first_s.min(0.05 * gap_s).min(0.05);
+    let after_s = records.force_n[0].len() as f64 / records.fs_hz - hits_s.last().copied().unwrap_or(0.0);
+    let length = (gap_s.min(after_s + before_s) * records.fs_hz) as usize;
+    let starts: Vec<String> =
+        hits_s.iter().map(|t| (((t - before_s) * records.fs_hz) as usize).to_string()).collect();
+    let channels = records.response.first().map_or(0, Vec::len);
+    if !file.ends_with(".npz") {
+        return format!(
+            "write one record of {length} samples for each hit, from the samples {} on",
+            starts.join(", ")
+        );
+    }
+    let cut = file.strip_suffix(".npz").unwrap_or(file);
+    format!(
+        "these lines of Python cut it into {} records of {length} samples; check that the motion has died away within that time:\n\
+         \x20 import numpy as np\n\
+         \x20 r = np.load(\"{file}\")\n\
+         \x20 starts, n = [{}], {length}\n\
+         \x20 force = np.stack([r[\"force\"].reshape(-1)[s:s + n] for s in starts])\n\
+         \x20 response = np.stack([r[\"response\"].reshape({channels}, -1)[:, s:s + n] for s in starts])\n\
+         \x20 rest = {{key: r[key] for key in r.files if key not in (\"force\", \"response\")}}\n\
+         \x20 np.savez(\"{cut}-cut.npz\", force=force, response=response, **rest)",
+        hits_s.len(),
+        starts.join(", ")
+    )
 }
 
 /// Median coherence of each response over the lines that were excited; none for a single hit.

@@ -6,6 +6,7 @@ use nalgebra::DMatrix;
 use num_complex::Complex;
 
 use super::error::CliError;
+use super::hit_agreement::Agreement;
 use super::import::universal_files;
 use super::output;
 use super::waiting::Waiting;
@@ -13,7 +14,7 @@ use crate::campaign::verdict::{Kind, Limits, judge_all};
 use crate::exchange::record_uff::{LabelledRecords, by_label};
 use crate::exchange::{frf_uff, write_frf};
 use crate::frf::Frf;
-use crate::spectra::{CrossSpectra, FrfSettings, MotionQuantity, estimate};
+use crate::spectra::{CrossSpectra, FrfSettings, MotionQuantity, estimate, usable_band};
 
 /// How the records become FRFs.
 pub(super) struct Wishes<'w> {
@@ -40,6 +41,7 @@ pub(super) fn average(folder: &Path, out: &Path, wishes: &Wishes<'_>) -> Result<
     let files = universal_files(folder)?;
     let waiting = Waiting::of("averaging files");
     let (mut pairs, mut told, mut quantity) = (Vec::<Pair>::new(), Vec::new(), wishes.quantity);
+    let mut worst: Vec<(f64, String)> = Vec::new();
     for (done, path) in files.iter().enumerate() {
         waiting.at(done, files.len());
         let wrong = |what: String| bad(format!("{}: {what}", path.display()));
@@ -60,11 +62,31 @@ pub(super) fn average(folder: &Path, out: &Path, wishes: &Wishes<'_>) -> Result<
             if good < used.len() {
                 told.push(format!("{impact} to {response}: {good} of {} hits are good", used.len()));
             }
+            for (hit, verdict) in verdicts.iter().enumerate().filter(|(hit, _)| !used[*hit]) {
+                told.push(format!(
+                    "{impact} to {response}: hit {hit}: {} ({})",
+                    verdict.kind, verdict.sentence
+                ));
+            }
             if good == 0 {
                 continue;
             }
             let of = |what: String| wrong(format!("{impact} to {response}: {what}"));
             let found = estimate(&records, &used, wishes.settings).map_err(|error| of(error.to_string()))?;
+            let excited = usable_band(found.frequency_hz(), &found.force_spectrum(), 6.0);
+            let channels = outputs_of(&response, found.outputs());
+            let agreement = Agreement::of(&records, &used, wishes.settings, &found, excited, &channels)
+                .map_err(|error| of(error.to_string()))?;
+            told.extend(agreement.suspicions.iter().map(|what| format!("{impact} to {response}: {what}")));
+            worst.extend(agreement.worst().map(|(o, median, lowest, hz)| {
+                (
+                    median,
+                    format!(
+                        "{} from {impact}: median {median:.3}, lowest {lowest:.3} at {hz:.1} Hz",
+                        channels[o]
+                    ),
+                )
+            }));
             let wanted = *quantity.get_or_insert(records.quantity);
             let mut spectra = found.converted(records.quantity, wanted);
             if let Some((low, high)) = wishes.band {
@@ -81,12 +103,23 @@ pub(super) fn average(folder: &Path, out: &Path, wishes: &Wishes<'_>) -> Result<
     }
     drop(waiting);
     let (Some(first), Some(quantity)) = (pairs.first(), quantity) else {
-        return Err(bad(format!("{}: no hit is good, so there is nothing to average", folder.display())));
+        let why: Vec<String> = told.iter().map(|line| format!("\n  {line}")).collect();
+        return Err(bad(format!(
+            "{}: no hit is good, so there is nothing to average{}",
+            folder.display(),
+            why.concat()
+        )));
     };
     let lines = first.spectra.lines();
     let frf = matrix(&pairs, quantity)?;
     write_frf(out, &frf, &[]).map_err(|error| bad(error.to_string()))?;
     let (rows, columns) = (frf.outputs().len(), frf.inputs().len());
+    worst.sort_by(|a, b| a.0.total_cmp(&b.0));
+    if let (Some((_, lowest)), Some((median, _))) = (worst.first(), worst.get(worst.len() / 2)) {
+        told.push(format!(
+            "coherence: the worst response is {lowest}; half of the pairs have {median:.3} or more"
+        ));
+    }
     told.push(format!(
         "{}: {} of {rows} outputs, {columns} inputs, {lines} lines",
         out.display(),
@@ -96,10 +129,9 @@ pub(super) fn average(folder: &Path, out: &Path, wishes: &Wishes<'_>) -> Result<
 }
 
 /// The outputs are called `NAME:x`, `NAME:y`, `NAME:z` where a sensor has three channels, `NAME` where it has one, else `NAME:1`, `NAME:2`.
-fn outputs_of(pair: &Pair) -> Vec<String> {
-    let name = &pair.response;
-    match pair.spectra.outputs() {
-        1 => vec![name.clone()],
+fn outputs_of(name: &str, channels: usize) -> Vec<String> {
+    match channels {
+        1 => vec![name.to_owned()],
         3 => ["x", "y", "z"].map(|axis| format!("{name}:{axis}")).to_vec(),
         channels => (1..=channels).map(|channel| format!("{name}:{channel}")).collect(),
     }
@@ -112,7 +144,7 @@ fn matrix(pairs: &[Pair], quantity: MotionQuantity) -> Result<Frf, CliError> {
         if !inputs.contains(&pair.impact) {
             inputs.push(pair.impact.clone());
         }
-        for name in outputs_of(pair) {
+        for name in outputs_of(&pair.response, pair.spectra.outputs()) {
             if !outputs.contains(&name) {
                 outputs.push(name);
             }
@@ -126,7 +158,7 @@ fn matrix(pairs: &[Pair], quantity: MotionQuantity) -> Result<Frf, CliError> {
     for pair in pairs {
         let y = &pair.spectra;
         let column = inputs.iter().position(|name| *name == pair.impact).unwrap_or(0);
-        for (channel, name) in outputs_of(pair).iter().enumerate() {
+        for (channel, name) in outputs_of(&pair.response, pair.spectra.outputs()).iter().enumerate() {
             let at = (outputs.iter().position(|own| own == name).unwrap_or(0), column);
             for line in 0..y.lines() {
                 values[line][at] = y.h1(line, channel);

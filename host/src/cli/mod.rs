@@ -15,6 +15,7 @@ mod error;
 mod export;
 mod frf;
 mod frf_matrix;
+mod hit_agreement;
 mod hysteresis;
 mod identify;
 mod import;

@@ -3,7 +3,7 @@
 use jointrig_protocol::channel::{Quantity, Role};
 use std::sync::{Mutex, PoisonError};
 
-use crate::analyse::{LEAD_S, LINES_HZ};
+use crate::analyse::{AnalysedLength, LINES_HZ};
 use crate::campaign::plan::Plan;
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
@@ -50,10 +50,9 @@ pub fn of_hit(store: &Store, plan: &Plan, cell: i64, row: &RecordRow) -> Result<
         Quantity::Acceleration => MotionQuantity::Acceleration,
         Quantity::Force | Quantity::Voltage => return Err(NoSpectra::NoMotion),
     };
-    let from = shown.trigger.saturating_sub((LEAD_S * shown.rate_hz).ceil() as usize);
-    let length = plan.post_trigger_scans() as usize;
+    let analysed = AnalysedLength::of(store, plan)?.samples(row, shown.rate_hz);
     let cut = |signal: &[f64]| -> Vec<f64> {
-        signal[from.min(signal.len())..(from + length).min(signal.len())].to_vec()
+        signal[analysed.start.min(signal.len())..analysed.end.min(signal.len())].to_vec()
     };
     let records = ImpactRecords {
         fs_hz: shown.rate_hz,

@@ -2,7 +2,7 @@
 //!
 //! [`pulse`] finds the hit, [`window`] cuts and weights, [`average`] accumulates S_ff, S_xf and S_xx one hit at a time,
 //! [`cross_spectra`] keeps them and gives FRFs with their scatter by [`estimators`] and [`jackknife`], [`estimate`](mod@estimate) does all of it over a set of
-//! records, [`usable_band`](mod@usable_band) says where the hammer excited anything. Which hits are good is
+//! records, [`odd_hit`](mod@odd_hit) names a hit that disagrees with the others, [`usable_band`](mod@usable_band) says where the hammer excited anything. Which hits are good is
 //! decided elsewhere, on the raw records: the force window hides a second pulse that the response keeps.
 
 pub mod average;
@@ -14,6 +14,7 @@ pub mod impact_records;
 pub mod jackknife;
 mod lent;
 mod lines;
+pub mod odd_hit;
 mod order;
 mod pieces;
 pub mod pulse;
@@ -27,6 +28,7 @@ pub use average::SpectraAverage;
 pub use cross_spectra::CrossSpectra;
 pub use estimate::{FrfSettings, Origin, Summing, estimate};
 pub use impact_records::ImpactRecords;
+pub use odd_hit::{Fit, OddHit, odd_hit};
 pub use pulse::{Pulse, reversed_peak_n, several_hits_s};
 pub use usable_band::usable_band;
 pub use window::{ForceWeighting, PulseSamples, Windowing};

@@ -39,7 +39,7 @@ pub struct Windowing {
     pub force_weighting: ForceWeighting,
 }
 
-/// Where the windows of one hit stand.
+/// The samples of a hit that its force window must hold.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct PulseSamples(Range<usize>);
 
@@ -142,7 +142,7 @@ impl Windowing {
     }
 
     /// From when to when the force is kept, s from the record's start: what the times ask for, and all of `pulse`.
-    fn kept_s(&self, fs_hz: f64, origin_s: f64, pulse: &PulseSamples) -> [f64; 2] {
+    pub fn kept_s(&self, fs_hz: f64, origin_s: f64, pulse: &PulseSamples) -> [f64; 2] {
         let asked = [origin_s - self.force_before_s, origin_s + self.force_after_s];
         let Range { start, end } = pulse.0;
         if start >= end {

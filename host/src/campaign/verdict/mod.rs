@@ -2,8 +2,8 @@
 //!
 //! Before windowing: the rectangular force window hides the second pulse of a double hit while the response keeps it, and
 //! averaging bad hits in cost a median FRF error of 25 % against 0.6 %. Each check stands in its own file and needs this one
-//! record only; the first that fails gives the verdict, in the order gap, reversed, mistimed (a pulse that the record does not hold whole),
-//! overload, double hit, weak, strong, noisy, mistimed.
+//! record only; the first that fails gives the verdict, in the order gap, mistimed (a force of the wrong sign, or a pulse that the record
+//! does not hold whole), overload, double hit, weak, strong, noisy, mistimed.
 //! (A refused hit needs one reason; the earlier checks would spoil the figures of the later ones.)
 //!
 //! A new verdict is a new [`Kind`], a file with its check here, and its place in [`judge`](fn@judge). The limits are [`Limits`]: the double-hit
@@ -42,12 +42,10 @@ pub enum Kind {
     /// A pulse too high.
     #[serde(rename = "strong")]
     Strong,
-    /// The pulse is not where it should be.
+    /// The record does not hold the pulse as it should: at another time, only a part of it, or with the
+    /// wrong sign.
     #[serde(rename = "mistimed")]
     Mistimed,
-    /// The force falls in the hit: its sign is the wrong way round.
-    #[serde(rename = "reversed")]
-    Reversed,
     /// Samples are missing.
     #[serde(rename = "gap")]
     Gap,
@@ -58,7 +56,7 @@ pub enum Kind {
 
 impl Kind {
     /// Every kind, good first.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 9] = [
         Self::Good,
         Self::DoubleHit,
         Self::Overload,
@@ -66,7 +64,6 @@ impl Kind {
         Self::Weak,
         Self::Strong,
         Self::Mistimed,
-        Self::Reversed,
         Self::Gap,
         Self::Dropped,
     ];
@@ -86,7 +83,6 @@ impl Kind {
             Kind::Weak => "weak",
             Kind::Strong => "strong",
             Kind::Mistimed => "mistimed",
-            Kind::Reversed => "reversed",
             Kind::Gap => "gap",
             Kind::Dropped => "dropped",
         }
@@ -197,9 +193,9 @@ pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) ->
     }
     if let Some(peak_n) = reversed_peak_n(hit.force_n) {
         let sentence = format!(
-            "the force's sign is the wrong way round: its peak is {peak_n:.4} N; a push is positive, so multiply the force by -1"
+            "the force's sign is the wrong way round: peak {peak_n:.1} N; a push is positive, so multiply the force by -1"
         );
-        return verdict(Kind::Reversed, peak_n, 0.0, sentence);
+        return verdict(Kind::Mistimed, peak_n, 0.0, sentence);
     }
     let Some(pulse) = pulse else {
         return verdict(Kind::Weak, 0.0, 0.0, "there is no force pulse at all".into());

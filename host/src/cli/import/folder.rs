@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use super::names::{Named, Source, from_folder, from_table};
-use super::records::{Brought, CellName, Origin, bring};
+use super::records::{Brought, CellName, Origin, bring, length_notice};
 use super::{Frfs, bad, frfs};
 use crate::campaign::store::Store;
+use crate::campaign::verdict::{Kind, Verdict};
 use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::cli::waiting::Waiting;
@@ -52,6 +53,7 @@ pub(super) fn import(folder: &Path, into: &Path, wishes: &Wishes<'_>) -> Result<
     }
     drop(waiting);
     store.log(&format!("imported {} files from {}", sources.len(), folder.display()))?;
+    let length = length_notice(&store)?;
     store.close()?;
     let mut lines = Vec::new();
     if all.hits > 0 {
@@ -64,6 +66,7 @@ pub(super) fn import(folder: &Path, into: &Path, wishes: &Wishes<'_>) -> Result<
             all.cells,
             all.kept
         ));
+        lines.extend(length);
     }
     if matrices > 0 {
         lines.push(format!("{}: FRFs of {matrices} configurations", into.display()));
@@ -74,6 +77,13 @@ pub(super) fn import(folder: &Path, into: &Path, wishes: &Wishes<'_>) -> Result<
 fn say(path: &Path, warnings: &[String]) {
     for warning in warnings {
         tell_line!("{}: {warning}", path.display());
+    }
+}
+
+/// Prints the verdict of a hit that is not good.
+fn say_refused(of: &str, hit: u32, verdict: &Verdict) {
+    if verdict.kind != Kind::Good {
+        tell_line!("{of}: hit {hit}: {} ({})", verdict.kind, verdict.sentence);
     }
 }
 
@@ -93,7 +103,9 @@ fn one(store: &mut Store, source: &Source, replace: bool) -> Result<Option<Broug
             say(path, &warnings);
             let origin = Origin::of(path, name)?;
             let cell = CellName { configuration, impact, response };
-            Ok(Some(bring(store, &origin, &cell, &records, replace, &mut |_| {})?))
+            Ok(Some(bring(store, &origin, &cell, &records, replace, &mut |hit, verdict| {
+                say_refused(name, hit, verdict);
+            })?))
         }
         Named::Labelled(configuration) => {
             let origin = Origin::of(path, name)?;
@@ -103,7 +115,10 @@ fn one(store: &mut Store, source: &Source, replace: bool) -> Result<Option<Broug
             let mut all = Brought::default();
             for row in rows {
                 let cell = CellName { configuration, impact: &row.impact, response: &row.response };
-                all.add(&bring(store, &origin, &cell, &row.records, replace, &mut |_| {})?);
+                let of_cell = format!("{name}: {} to {}", row.impact, row.response);
+                all.add(&bring(store, &origin, &cell, &row.records, replace, &mut |hit, verdict| {
+                    say_refused(&of_cell, hit, verdict);
+                })?);
             }
             Ok(Some(all))
         }

@@ -10,15 +10,16 @@ use sha2::{Digest, Sha256};
 
 use super::bad;
 use super::quantised::quantised;
+use crate::analyse::AnalysedLength;
 use crate::campaign::plan::{Cell, configuration_name};
 use crate::campaign::store::Store;
 use crate::campaign::store::notes::utc_now;
 use crate::campaign::store::record_row::{NewRecord, RecordRow};
 use crate::campaign::store::session_table::{Counters, SessionInfo};
 use crate::campaign::store::stored::Hex;
-use crate::campaign::verdict::Kind;
 use crate::campaign::verdict::judge::{ByRecord, Judge};
 use crate::campaign::verdict::others::Others;
+use crate::campaign::verdict::{Kind, Verdict};
 use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::device::channels::ChannelMap;
@@ -26,7 +27,7 @@ use crate::device::recording::Recording;
 use crate::exchange::record_uff::read_record_file;
 use crate::foreign;
 use crate::outside::tell_line;
-use crate::spectra::{ImpactRecords, Pulse};
+use crate::spectra::{ImpactRecords, Pulse, reversed_peak_n};
 
 /// The cell that the records belong to.
 pub(super) struct CellName<'n> {
@@ -96,10 +97,20 @@ pub(super) fn import(file: &Path, into: &Path, name: &CellName<'_>, replace: boo
     let called = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
     let origin = Origin::of(file, &called)?;
     let Brought { hits, kept, already, map, .. } =
-        bring(&mut store, &origin, name, &records, replace, &mut |line| tell_line!("{line}"))?;
+        bring(&mut store, &origin, name, &records, replace, &mut |hit, verdict| {
+            tell_line!("hit {hit}: {} ({})", verdict.kind, verdict.sentence);
+        })?;
     store.log(&format!("imported {hits} hits from {}", file.display()))?;
+    let length = length_notice(&store)?;
     store.close()?;
+    if kept == 0 {
+        return Err(bad(format!(
+            "{}: none of the {hits} hits is good; they are stored with their verdicts, and no analysis uses them",
+            file.display()
+        )));
+    }
     let mut lines = vec![format!("{}: {kept} of {hits} hits are good", into.display())];
+    lines.extend(length);
     if already > 0 {
         lines.push(format!("{already} of them were there already, from an earlier import of the same file"));
     }
@@ -112,17 +123,23 @@ pub(super) fn import(file: &Path, into: &Path, name: &CellName<'_>, replace: boo
     output::lines(lines)
 }
 
+/// What is to be said of the length of the records that were imported into a campaign.
+pub(super) fn length_notice(store: &Store) -> Result<Option<String>, CliError> {
+    let notice = AnalysedLength::of(store, &store.plan()?)?.notice();
+    Ok(notice.map(|notice| format!("{}: {notice}", store.path().display())))
+}
+
 /// Judges the hits like measured ones and stores those that are not there yet; tells each verdict.
 ///
 /// # Errors
-/// There is no such cell, a hit has no pulse, or hits of another file of this name are there and shall not be replaced.
+/// There is no such cell, a hit has no pulse, the force has the wrong sign in all of them, or hits of another file of this name are there and shall not be replaced.
 pub(super) fn bring(
     store: &mut Store,
     origin: &Origin,
     name: &CellName<'_>,
     records: &ImpactRecords,
     replace: bool,
-    tell: &mut dyn FnMut(String),
+    tell: &mut dyn FnMut(u32, &Verdict),
 ) -> Result<Brought, CliError> {
     let plan = store.plan()?;
     let (id, cell, attempt) = find(store, name)?;
@@ -130,13 +147,25 @@ pub(super) fn bring(
     let axes = place.map_or(3, |place| place.axes().len());
     let (map, codes) =
         quantised(records, axes).map_err(|reason| bad(format!("{}: {reason}", origin.name)))?;
+    let reversed: Vec<Option<f64>> = records.force_n.iter().map(|f| reversed_peak_n(f)).collect();
+    if let (Some(peak_n), true) = (reversed.first().copied().flatten(), reversed.iter().all(Option::is_some))
+    {
+        return Err(bad(format!(
+            "{}: the force's sign is the wrong way round: peak {peak_n:.1} N; a push is positive, so multiply the force by -1",
+            origin.name
+        )));
+    }
     let recordings: Vec<Recording> = codes
         .into_iter()
         .zip(&records.force_n)
         .enumerate()
         .map(|(hit, (codes, force_n))| {
             let no_pulse = || bad(format!("{}: hit {hit} has no force pulse: take it out", origin.name));
-            Ok(recording(hit, codes, map.len(), &Pulse::locate(force_n).ok_or_else(no_pulse)?))
+            let pulse = match Pulse::locate(force_n) {
+                None if reversed[hit].is_none() => return Err(no_pulse()),
+                pulse => pulse,
+            };
+            Ok(recording(hit, codes, map.len(), pulse.as_ref(), records.fs_hz))
         })
         .collect::<Result<_, CliError>>()?;
     let there = already_there(store, origin, id, replace)?;
@@ -150,7 +179,7 @@ pub(super) fn bring(
             others.learn(&plan, &map, recording.view());
             brought.kept += 1;
         }
-        tell(format!("hit {hit}: {} ({})", verdict.kind, verdict.sentence));
+        tell(hit, &verdict);
         if let (Some(session), false) = (session, there.contains(&hit)) {
             let record = NewRecord {
                 cell: id,
@@ -234,11 +263,12 @@ fn session(origin: &Origin) -> SessionInfo {
     }
 }
 
-fn recording(hit: usize, codes: Vec<i16>, channels: usize, pulse: &Pulse) -> Recording {
+fn recording(hit: usize, codes: Vec<i16>, channels: usize, pulse: Option<&Pulse>, fs_hz: f64) -> Recording {
+    let start = pulse.map_or(0, |pulse| pulse.start);
     Recording {
         epoch: 0,
         first_scan: 0,
-        trigger_index: pulse.start,
+        trigger_index: start,
         channels,
         codes,
         gaps: Vec::new(),
@@ -246,10 +276,11 @@ fn recording(hit: usize, codes: Vec<i16>, channels: usize, pulse: &Pulse) -> Rec
             number: hit as u32,
             phase: Phase::Done,
             fired_at: 0,
-            trigger: pulse.start as u64,
+            trigger: start as u64,
             pulse_us: 0,
-            peak_n: pulse.peak_n as f32,
-            width_us: 0.0,
+            peak_n: pulse.map_or(0.0, |pulse| pulse.peak_n as f32),
+            // how much of the record before its trigger the pulse needs
+            width_us: pulse.map_or(0.0, |pulse| (1e6 * pulse.width() as f64 / fs_hz) as f32),
             rebound_ratio: 0.0,
             rebound_after: 0,
             friction_peak_n: 0.0,

@@ -1,0 +1,184 @@
+//! Whether the hits of a set agree: coherence, and what is suspected where one differs from the others.
+
+use serde_json::{Value, json};
+
+use crate::spectra::{
+    CrossSpectra, Fit, FrfSettings, ImpactRecords, OddHit, SpectraError, estimate, odd_hit,
+};
+use crate::substructuring::Band;
+
+/// Below this median coherence the hits of a response are compared one by one.
+const LOW: f64 = 0.95;
+
+/// From this on, another order of the file's axes is believed.
+const HIGH: f64 = 0.98;
+
+/// Coherence of one response over the excited lines.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Coherence {
+    median: f64,
+    lowest: f64,
+    lowest_hz: f64,
+}
+
+/// What is known of a set's agreement.
+pub(super) struct Agreement {
+    /// Of each response; none with a single hit, or without lines.
+    coherence: Vec<Option<Coherence>>,
+    /// What may be wrong, in sentences.
+    pub(super) suspicions: Vec<String>,
+}
+
+impl Agreement {
+    /// Of the hits that are `used`, of which `found` are the spectra; the responses have these names.
+    ///
+    /// # Errors
+    /// As of [`estimate`].
+    pub(super) fn of(
+        records: &ImpactRecords,
+        used: &[bool],
+        settings: &FrfSettings,
+        found: &CrossSpectra,
+        excited: Option<Band>,
+        names: &[String],
+    ) -> Result<Self, SpectraError> {
+        let inside = |y: &CrossSpectra| excited.map_or_else(|| y.clone(), |b| y.band(b.low_hz, b.high_hz));
+        let coherence = coherence(&inside(found));
+        let low: Vec<usize> = (0..coherence.len())
+            .filter(|o| coherence[*o].is_some_and(|coherence| coherence.median < LOW))
+            .collect();
+        let mut suspicions = Vec::new();
+        if !low.is_empty() {
+            let hits: Vec<usize> = (0..used.len()).filter(|hit| used[*hit]).collect();
+            let mut each = Vec::new();
+            for hit in &hits {
+                let one: Vec<bool> = (0..used.len()).map(|other| other == *hit).collect();
+                each.push(inside(&estimate(records, &one, settings)?));
+            }
+            match odd_hit(&each) {
+                Some(odd) => suspicions.push(sentence(&odd, &hits, names)),
+                None => {
+                    let of: Vec<&str> = low.iter().map(|o| name(names, *o)).collect();
+                    suspicions.push(format!(
+                        "the hits disagree in {}: their FRFs differ from hit to hit, or there is mostly noise",
+                        of.join(", ")
+                    ));
+                }
+            }
+            if turned_axes_agree(records, settings, excited) {
+                suspicions.push(
+                    "the hits agree when the first two axes of `response` change places: it may be (channel, hit, sample), and \
+                     (hit, channel, sample) is wanted; np.swapaxes(response, 0, 1) turns it"
+                        .into(),
+                );
+            }
+        }
+        Ok(Self { coherence, suspicions })
+    }
+
+    /// Lines for the terminal.
+    pub(super) fn lines(&self, names: &[String]) -> Vec<String> {
+        let mut lines: Vec<String> = (self.coherence.iter().enumerate())
+            .filter_map(|(o, coherence)| {
+                let Coherence { median, lowest, lowest_hz } = (*coherence)?;
+                let name = name(names, o);
+                Some(format!(
+                    "coherence of {name}: median {median:.3}, lowest {lowest:.3} at {lowest_hz:.1} Hz"
+                ))
+            })
+            .collect();
+        if lines.is_empty() {
+            lines.push("there is no coherence: it takes two good hits".into());
+        }
+        lines.extend(self.suspicions.iter().cloned());
+        lines
+    }
+
+    /// The response with the lowest median: its index, its median, its lowest value and where that is, Hz.
+    pub(super) fn worst(&self) -> Option<(usize, f64, f64, f64)> {
+        (self.coherence.iter().enumerate())
+            .filter_map(|(o, c)| c.map(|c| (o, c.median, c.lowest, c.lowest_hz)))
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// Of each response, as in the document.
+    pub(super) fn document(&self) -> Value {
+        let of = |coherence: &Option<Coherence>| {
+            coherence.map(|c| json!({ "median": c.median, "lowest": c.lowest, "lowest_hz": c.lowest_hz }))
+        };
+        json!(self.coherence.iter().map(of).collect::<Vec<_>>())
+    }
+}
+
+fn name(names: &[String], output: usize) -> &str {
+    names.get(output).map_or("a response", String::as_str)
+}
+
+fn coherence(y: &CrossSpectra) -> Vec<Option<Coherence>> {
+    (0..y.outputs())
+        .map(|o| {
+            let mut values: Vec<(f64, f64)> =
+                (0..y.lines()).map(|line| (y.coherence(line, o), y.frequency_hz()[line])).collect();
+            values.retain(|(coherence, _)| coherence.is_finite());
+            values.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let (lowest, lowest_hz) = *values.first()?;
+            Some(Coherence { median: values[values.len() / 2].0, lowest, lowest_hz })
+        })
+        .collect()
+}
+
+/// Whether the file may have its hits and channels in the other order: as many of each, and then they agree.
+fn turned_axes_agree(records: &ImpactRecords, settings: &FrfSettings, excited: Option<Band>) -> bool {
+    let hits = records.response.len();
+    if hits < 2 || records.response.iter().any(|responses| responses.len() != hits) {
+        return false;
+    }
+    let turned: Vec<Vec<Vec<f64>>> = (0..hits)
+        .map(|hit| (0..hits).map(|channel| records.response[channel][hit].clone()).collect())
+        .collect();
+    let turned = ImpactRecords { response: turned, ..records.clone() };
+    let Ok(found) = estimate(&turned, &vec![true; hits], settings) else { return false };
+    let found = excited.map_or_else(|| found.clone(), |band| found.band(band.low_hz, band.high_hz));
+    coherence(&found).iter().all(|coherence| coherence.is_some_and(|coherence| coherence.median > HIGH))
+}
+
+/// What is said of a hit that differs from the others; `hits` are the indices of those that were compared.
+fn sentence(odd: &OddHit, hits: &[usize], names: &[String]) -> String {
+    let hit = hits.get(odd.hit).copied().unwrap_or(odd.hit);
+    let others = match hits {
+        [first, _] => format!("hit {first}"),
+        _ => "the other hits".into(),
+    };
+    let differs = format!("hit {hit} differs from {others} by {:.0} %", 100.0 * odd.difference);
+    let Some(fit) = &odd.fit else {
+        return format!("{differs}: look whether a sensor, a cable or the place of impact was another one");
+    };
+    match fit {
+        Fit::Scaled(factor) => {
+            format!("{differs}: it fits when it is divided by {factor:.3} (a gain was changed?)")
+        }
+        Fit::Channels(own) if own.iter().enumerate().all(|(place, (channel, _))| place == *channel) => {
+            let turned: Vec<&str> = (own.iter().enumerate())
+                .filter(|(_, (_, negative))| *negative)
+                .map(|(place, _)| name(names, place))
+                .collect();
+            format!("{differs}: it fits with the sign of {} turned round", turned.join(", "))
+        }
+        Fit::Channels(own) => {
+            let signed =
+                |text: &str, negative: bool| if negative { format!("−{text}") } else { text.into() };
+            let order: Vec<String> =
+                own.iter().map(|(channel, negative)| signed(name(names, *channel), *negative)).collect();
+            let axes = if own.len() == 3 {
+                let axis = |(channel, negative): &(usize, bool)| signed(["x", "y", "z"][*channel], *negative);
+                format!(" ({})", own.iter().map(axis).collect::<Vec<_>>().join(", "))
+            } else {
+                String::new()
+            };
+            format!(
+                "{differs}: its channels fit the others' in the order {}{axes} (a sensor was turned, or cables were swapped?)",
+                order.join(", ")
+            )
+        }
+    }
+}
