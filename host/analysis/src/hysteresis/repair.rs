@@ -30,16 +30,60 @@ pub(super) struct Repair {
     unsure: f64,
 }
 
+/// A loop that no friction law fits to this part of its force (rms) may be late by any part of the cycle;
+const UNEXPLAINED: f64 = 0.02;
+
+/// the delay found must leave less than this part of the squares,
+const EXPLAINS: f64 = 0.25;
+
+/// or less than this for the loop to count as late at all, though not as put right,
+const LOOKS_LATE: f64 = 0.5;
+
+/// and be no longer than this part of the cycle: beyond it, the force's sign may as well be wrong.
+const LONGEST: f64 = 0.25;
+
+/// What a search for a delay over the whole cycle said.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Delay {
+    /// The loop needs none.
+    None,
+    /// So much explains it, s.
+    Found(f64),
+    /// It looks late by so much, s (and its standard deviation), but that does not explain it.
+    NotExplained(f64, f64),
+}
+
+/// Whether a loop that bends is a friction loop whose force is out of step by so much that its shape is lost.
+pub(super) fn delay(mean: &Cycle, dt_s: f64, play_m: f64) -> Delay {
+    let Some(fit) = LawFit::far(mean, dt_s, play_m) else { return Delay::None };
+    let [left, without_delay, _] = fit.residuals;
+    let squares: f64 = mean.force_n.iter().map(|t| t * t).sum();
+    let [by_s, std_s] = fit.late_s;
+    let unexplained = |left: f64| left > UNEXPLAINED.powi(2) * squares;
+    if !unexplained(without_delay) || left > LOOKS_LATE * without_delay || by_s.abs() < LATE_S {
+        Delay::None
+    } else if unexplained(left)
+        || left > EXPLAINS * without_delay
+        || by_s.abs() > LONGEST * dt_s * mean.force_n.len() as f64
+    {
+        Delay::NotExplained(by_s, std_s)
+    } else {
+        Delay::Found(by_s)
+    }
+}
+
 impl Repair {
-    /// What the averaged loop asks for, and what is to be said of it.
-    pub fn of(mean: &Cycle, dt_s: f64) -> (Self, Vec<LoopFinding>) {
-        let (mut repair, mut said) = (Self::default(), Vec::new());
-        let Some(fit) = LawFit::of(mean, dt_s) else { return (repair, said) };
+    /// What the averaged loop of a contact in gross slip asks for, and what is to be said of it. `late_s` was taken out of `mean`
+    /// already; it is part of the delay that is said.
+    pub fn of(mean: &Cycle, dt_s: f64, play_m: f64, late_s: f64) -> (Self, Vec<LoopFinding>) {
+        let (mut repair, mut said) = (Self { late_points: late_s / dt_s, ..Self::default() }, Vec::new());
+        let Some(fit) = LawFit::of(mean, dt_s, play_m) else { return (repair, said) };
         let [left, without_delay, without_dashpot] = fit.residuals;
-        let [by_s, std_s] = fit.late_s;
-        if by_s.abs() > LATE_S.max(SIGNIFICANT * std_s).max(LATE_SAMPLES * dt_s)
-            && without_delay > BETTER * left
-        {
+        let [more_s, std_s] = fit.late_s;
+        let needed = more_s.abs() > LATE_S.max(SIGNIFICANT * std_s).max(LATE_SAMPLES * dt_s)
+            && without_delay > BETTER * left;
+        if needed || late_s != 0.0 {
+            let by_s = late_s + if needed { more_s } else { 0.0 };
             repair.late_points = by_s / dt_s;
             repair.unsure = std_s / by_s.abs();
             said.push(LoopFinding::LateForce { by_s, std_s, at_least: false, corrected: true });
@@ -57,6 +101,11 @@ impl Repair {
             said.push(LoopFinding::Viscous { viscous_n_s_per_m, std_n_s_per_m, force_n });
         }
         (repair, said)
+    }
+
+    /// A delay of the force alone.
+    pub fn in_step_by(late_s: f64, dt_s: f64) -> Self {
+        Self { late_points: late_s / dt_s, ..Self::default() }
     }
 
     /// Whether there is anything to do.
