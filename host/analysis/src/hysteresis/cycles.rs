@@ -172,12 +172,7 @@ impl<'a> Steady<'a> {
     }
 
     /// `look` at every cycle with this force, in order; `of` is what they gave together.
-    pub fn each<T: Send>(
-        &self,
-        force: Force<'_>,
-        of: &Summed,
-        look: impl Fn(&Cycle) -> T + Sync,
-    ) -> Vec<T> {
+    pub fn each<T: Send>(&self, force: Force<'_>, of: &Summed, look: impl Fn(&Cycle) -> T + Sync) -> Vec<T> {
         let blocks: Vec<Vec<T>> = self.blocks(|cycles| {
             let mut scratch = Scratch::default();
             cycles

@@ -83,3 +83,19 @@ pub enum LoopFinding {
         to_hz: f64,
     },
 }
+
+impl LoopFinding {
+    /// Its name in `results.json`.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::ReversedForce { .. } => "reversed-force",
+            Self::LateForce { .. } => "late-force",
+            Self::Play { .. } => "play",
+            Self::Unsteady { .. } => "unsteady",
+            Self::Viscous { .. } => "viscous",
+            Self::Hum { .. } => "hum",
+            Self::UnevenLoad { .. } => "uneven-load",
+            Self::FrequencyOff { .. } => "frequency-off",
+        }
+    }
+}

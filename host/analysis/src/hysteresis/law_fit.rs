@@ -187,13 +187,7 @@ impl LawFit {
     }
 
     /// The same for a delay within this range, s, beginning at `first_s`.
-    fn within(
-        cycle: &Cycle,
-        dt_s: f64,
-        play_m: f64,
-        first_s: f64,
-        range_s: [f64; 2],
-    ) -> Option<Self> {
+    fn within(cycle: &Cycle, dt_s: f64, play_m: f64, first_s: f64, range_s: [f64; 2]) -> Option<Self> {
         let points = cycle.force_n.len();
         let half = 0.5 * super::loops::swing(&cycle.displacement_m);
         if half.is_nan() || half <= 0.0 {

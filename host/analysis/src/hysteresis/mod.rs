@@ -131,4 +131,6 @@ mod faulty_loops_tests;
 #[cfg(test)]
 mod loop_bench;
 #[cfg(test)]
+mod loops_of_any_size_tests;
+#[cfg(test)]
 mod synthetic_tests;

@@ -125,10 +125,8 @@ fn flat_part(cycle: &Cycle, stroke: &[usize]) -> Option<f64> {
     let (first, last) = (*stroke.first()?, *stroke.last()?);
     let (x, t) = (&cycle.displacement_m, &cycle.force_n);
     // part of the force's swing, and the motion since the reversal
-    let course: Vec<[f64; 2]> = stroke
-        .iter()
-        .map(|&i| [(t[i] - t[first]) / (t[last] - t[first]), (x[i] - x[first]).abs()])
-        .collect();
+    let course: Vec<[f64; 2]> =
+        stroke.iter().map(|&i| [(t[i] - t[first]) / (t[last] - t[first]), (x[i] - x[first]).abs()]).collect();
     let on_flank = course.iter().filter(|[part, _]| (ENDS[0]..ENDS[1]).contains(part)).count();
     if on_flank < FEWEST_ON_FLANK {
         return None;

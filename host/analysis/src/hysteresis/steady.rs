@@ -5,9 +5,9 @@ use super::cycle::Cycle;
 use super::cycles::{Force, Steady, Summed};
 use super::finding::LoopFinding;
 use super::friction_harmonic::Quadratures;
+use super::harmonics::Harmonics;
 use super::hum;
 use super::loop_analysis::{Kind, LoopAnalysis};
-use super::harmonics::Harmonics;
 use super::loops::{
     OverCycles, closed_swing, energy, equivalent_stiffness, fundamental_stiffness, secant_stiffness, swing,
 };
@@ -48,9 +48,6 @@ const ALIKE_RATIO: f64 = 0.1;
 /// and by so many times what neighbouring cycles scatter by.
 const SCATTERS: f64 = 12.0;
 
-/// From so many cycles on, the scatter is told from a steady change.
-const FEWEST_CHANGES: usize = 8;
-
 /// When the cycles of a record begin, and what is to be said of their frequency.
 fn timing(
     record: &HysteresisRecord,
@@ -71,8 +68,11 @@ fn timing(
     }
     let timing = tracked.unwrap_or(Timing::steady(runs_hz));
     let end_hz = timing.at(record.force_n.len() as f64 / record.fs_hz);
-    let off =
-        LoopFinding::FrequencyOff { stated_hz: record.excitation_hz, from_hz: timing.start_hz, to_hz: end_hz };
+    let off = LoopFinding::FrequencyOff {
+        stated_hz: record.excitation_hz,
+        from_hz: timing.start_hz,
+        to_hz: end_hz,
+    };
     // a guess from the record's spectrum may be off by a part of a line
     let drifts = (end_hz / timing.start_hz - 1.0).abs() > GUESSED;
     Ok((timing, (record.excitation_hz.is_some() || drifts).then_some(off)))
@@ -100,11 +100,13 @@ fn alike(cycles: &[Harmonics]) -> Range<usize> {
         .map(|(least, values)| least.max(SCATTERS * scatter(values)))
         .collect();
     let inside = |values: &[f64], limit: f64| -> bool {
-        let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+        let (low, high) =
+            values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
         // nothing can be said of a value that is no number
         high - low <= limit || !(high - low).is_finite()
     };
-    let all_inside = |range: Range<usize>| series.iter().zip(&limits).all(|(v, limit)| inside(&v[range.clone()], *limit));
+    let all_inside =
+        |range: Range<usize>| series.iter().zip(&limits).all(|(v, limit)| inside(&v[range.clone()], *limit));
     if all_inside(0..n) {
         return 0..n;
     }
@@ -121,18 +123,14 @@ fn alike(cycles: &[Harmonics]) -> Range<usize> {
     longest
 }
 
-/// What neighbouring values scatter by (standard deviation), from the median of their steps; of many values from second
-/// differences, in which a steady change is nothing. None of it for two values.
+/// What neighbouring values scatter by (standard deviation), from the lower quartile of their second differences: a steady change
+/// has none, and a beginning that grows has few of them. Nothing for three values or fewer.
 fn scatter(values: &[f64]) -> f64 {
-    let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let mut changes: Vec<f64> = if values.len() < FEWEST_CHANGES {
-        steps.iter().map(|step| step.abs() / 2f64.sqrt()).collect()
-    } else {
-        steps.windows(2).map(|pair| (pair[1] - pair[0]).abs() / 6f64.sqrt()).collect()
-    };
+    let mut changes: Vec<f64> =
+        values.windows(3).map(|v| (v[2] - 2.0 * v[1] + v[0]).abs() / 6f64.sqrt()).collect();
     changes.sort_by(f64::total_cmp);
-    // the lower median: of two steps, one may be that from the cycle that grows
-    if changes.len() < 2 { 0.0 } else { 1.4826 * changes[(changes.len() - 1) / 2] }
+    // a quarter of normally distributed values lies within 0.3186 standard deviations
+    if changes.len() < 2 { 0.0 } else { changes[(changes.len() - 1) / 4] / 0.3186 }
 }
 
 /// The cycles that are alike, and what is to be said of the others.

@@ -39,6 +39,9 @@ const SAME_LINE: f64 = 0.7;
 /// In the motion, the other frequency must have so many times the power of the stated one.
 const STRONGER: f64 = 4.0;
 
+/// The stated frequency is in a signal if it has this part of the power of the strongest one.
+const PRESENT: f64 = 0.0625;
+
 /// Frequency over the time of a record, a straight line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Timing {
@@ -175,15 +178,16 @@ pub(super) fn runs_at(record: &HysteresisRecord, stated_hz: f64) -> Result<f64, 
     let motion = level(&motion);
     // of displacement, from velocity too
     let power = |f: f64| line_power(&motion, f / fs_hz) / f.powi(2 * order);
-    if power(force_hz) > STRONGER * power(stated_hz) {
+    let motion_hz = dominant_frequency(&motion, fs_hz).unwrap_or(force_hz);
+    let [stated, of_force, of_motion] = [stated_hz, force_hz, motion_hz].map(power);
+    if of_force > STRONGER * stated && (of_force >= of_motion || same(force_hz, motion_hz)) {
         return Ok(force_hz);
     }
-    match dominant_frequency(&motion, fs_hz) {
-        Some(motion_hz) if power(motion_hz) > STRONGER * power(stated_hz) && !same(motion_hz, stated_hz) => {
-            Err(HysteresisError::OtherFrequency { stated_hz, force_hz, motion_hz })
-        }
-        _ => Ok(stated_hz),
+    let in_force = |f: f64| line_power(&level(&record.force_n), f / fs_hz);
+    if stated >= PRESENT * of_motion || in_force(stated_hz) >= PRESENT * in_force(force_hz) {
+        return Ok(stated_hz);
     }
+    Err(HysteresisError::OtherFrequency { stated_hz, force_hz, motion_hz })
 }
 
 /// The part of a signal's mean square about its mean that a tone of this frequency has, in stretches of [`STRETCH`] cycles.
