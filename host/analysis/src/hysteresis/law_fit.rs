@@ -154,13 +154,15 @@ impl LawFit {
     /// loop that does not move.
     ///
     /// Delays near nothing are looked for first. A loop that is later or earlier than those is found over the whole cycle, and
-    /// wins where it leaves less than half of the squares.
+    /// wins where it leaves less than half of the squares, and next to nothing of the loop.
     pub fn of(cycle: &Cycle, dt_s: f64, play_m: f64) -> Option<Self> {
         let near = Self::within(cycle, dt_s, play_m, 0.0, DELAY_S)?;
         let [low, high] = DELAY_S;
         match Self::far(cycle, dt_s, play_m) {
             Some(far)
-                if !(low..high).contains(&far.late_s[0]) && far.residuals[0] < 0.5 * near.residuals[0] =>
+                if !(low..high).contains(&far.late_s[0])
+                    && far.residuals[0] < 0.5 * near.residuals[0]
+                    && !unexplained(far.residuals[0], &cycle.force_n) =>
             {
                 Some(far)
             }
@@ -234,6 +236,14 @@ impl LawFit {
             residuals: [left, without_delay, without_dashpot],
         })
     }
+}
+
+/// A friction law that leaves more than this part of the force (rms) does not explain a loop.
+const UNEXPLAINED: f64 = 0.02;
+
+/// Whether a sum of squared residuals is more than a friction law may leave of this force.
+pub(super) fn unexplained(left: f64, force_n: &[f64]) -> bool {
+    left > UNEXPLAINED.powi(2) * force_n.iter().map(|t| t * t).sum::<f64>()
 }
 
 /// Reaches from one to another, evenly in their logarithm.

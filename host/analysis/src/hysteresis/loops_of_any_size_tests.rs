@@ -430,3 +430,30 @@ fn two_frequencies_beside_the_stated_one_are_refused_with_all_three() {
         assert!(error.contains(word), "{error}");
     }
 }
+
+/// Twenty sliders of which some or all let go: a delay that is found and put right leaves k_T right, and one that is not is no
+/// silent one.
+#[test]
+fn a_late_force_in_microslip_is_put_right_or_said() {
+    let mut silent = Vec::new();
+    for seed in 0..60 {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(90_000 + seed);
+        let over = between(&mut rng, 0.5, 6.0);
+        let l = Loop { law: Law::Sliders, over, late: signed(&mut rng, 0.015, 0.1), ..Loop::any(&mut rng) };
+        let found = l.analysed(&mut rng).expect("a loop");
+        let said = found.findings.iter().any(|f| matches!(f, LoopFinding::LateForce { .. }));
+        let right = found.k_t_n_per_m.is_none_or(|k| near(k.mean, l.stiffness, 0.15));
+        if !said && !right {
+            silent.push(format!(
+                "{:?} {:?} k_T {:?} on {l:?}",
+                found.shape,
+                found.findings,
+                found.k_t_n_per_m.map(|k| k.mean / l.stiffness)
+            ));
+        }
+        let corrected =
+            found.findings.iter().any(|f| matches!(f, LoopFinding::LateForce { corrected: true, .. }));
+        assert!(!corrected || right, "{:?} on {l:?}", found.k_t_n_per_m.map(|k| k.mean / l.stiffness));
+    }
+    assert!(silent.len() <= 2, "{} of 60:\n{}", silent.len(), silent.join("\n"));
+}

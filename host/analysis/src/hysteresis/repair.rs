@@ -2,7 +2,7 @@
 
 use super::cycle::Cycle;
 use super::finding::LoopFinding;
-use super::law_fit::{LawFit, earlier};
+use super::law_fit::{LawFit, earlier, unexplained};
 
 /// A delay below this is left alone, s: channels are never in step to better.
 const LATE_S: f64 = 8e-6;
@@ -30,16 +30,13 @@ pub(super) struct Repair {
     unsure: f64,
 }
 
-/// A loop that no friction law fits to this part of its force (rms) may be late by any part of the cycle;
-const UNEXPLAINED: f64 = 0.02;
-
-/// the delay found must leave less than this part of the squares,
+/// The delay found must leave less than this part of the squares,
 const EXPLAINS: f64 = 0.25;
 
-/// or less than this for the loop to count as late at all, though not as put right,
-const LOOKS_LATE: f64 = 0.5;
+/// be at least this part of the cycle (a small one leaves the loop's shape, and is looked for with the dashpot),
+const SHORTEST: f64 = 0.01;
 
-/// and be no longer than this part of the cycle: beyond it, the force's sign may as well be wrong.
+/// and be no longer than this part: beyond it, the force's sign may as well be wrong.
 const LONGEST: f64 = 0.25;
 
 /// What a search for a delay over the whole cycle said.
@@ -47,8 +44,8 @@ const LONGEST: f64 = 0.25;
 pub(super) enum Delay {
     /// The loop needs none.
     None,
-    /// So much explains it, s.
-    Found(f64),
+    /// So much explains it, s (and its standard deviation).
+    Found(f64, f64),
     /// It looks late by so much, s (and its standard deviation), but that does not explain it.
     NotExplained(f64, f64),
 }
@@ -57,18 +54,14 @@ pub(super) enum Delay {
 pub(super) fn delay(mean: &Cycle, dt_s: f64, play_m: f64) -> Delay {
     let Some(fit) = LawFit::far(mean, dt_s, play_m) else { return Delay::None };
     let [left, without_delay, _] = fit.residuals;
-    let squares: f64 = mean.force_n.iter().map(|t| t * t).sum();
     let [by_s, std_s] = fit.late_s;
-    let unexplained = |left: f64| left > UNEXPLAINED.powi(2) * squares;
-    if !unexplained(without_delay) || left > LOOKS_LATE * without_delay || by_s.abs() < LATE_S {
+    let part = by_s.abs() / (dt_s * mean.force_n.len() as f64);
+    if !unexplained(without_delay, &mean.force_n) || left > EXPLAINS * without_delay || part < SHORTEST {
         Delay::None
-    } else if unexplained(left)
-        || left > EXPLAINS * without_delay
-        || by_s.abs() > LONGEST * dt_s * mean.force_n.len() as f64
-    {
+    } else if unexplained(left, &mean.force_n) || part > LONGEST {
         Delay::NotExplained(by_s, std_s)
     } else {
-        Delay::Found(by_s)
+        Delay::Found(by_s, std_s)
     }
 }
 
@@ -103,9 +96,10 @@ impl Repair {
         (repair, said)
     }
 
-    /// A delay of the force alone.
-    pub fn in_step_by(late_s: f64, dt_s: f64) -> Self {
-        Self { late_points: late_s / dt_s, ..Self::default() }
+    /// A delay of the force alone, with its standard deviation.
+    pub fn in_step_by(late_s: f64, std_s: f64, dt_s: f64) -> Self {
+        let unsure = if late_s == 0.0 { 0.0 } else { std_s / late_s.abs() };
+        Self { late_points: late_s / dt_s, unsure, ..Self::default() }
     }
 
     /// Whether there is anything to do.

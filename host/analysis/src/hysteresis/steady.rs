@@ -239,17 +239,15 @@ impl SteadyRecord<'_> {
         } else {
             Delay::None
         };
-        let mut late_s = 0.0;
-        if let Delay::Found(by_s) = out_of_step {
-            let in_step = Repair::in_step_by(by_s, dt_s).in_step(mean);
+        let mut late = [0.0, 0.0];
+        if let Delay::Found(by_s, std_s) = out_of_step {
+            let in_step = Repair::in_step_by(by_s, std_s, dt_s).in_step(mean);
             let (again, seen) = shape(&in_step, scatter, None);
-            // a small delay leaves the shape, and is measured below
-            if again == Shape::GrossSlip || shape_found == Shape::GrossSlip {
-                (shape_found, evidence) = (again, ShapeEvidence { quadratures, ..seen });
-                play = Play::of(&in_step, &strokes);
-                late_s = by_s;
-            }
+            (shape_found, evidence) = (again, ShapeEvidence { quadratures, ..seen });
+            play = Play::of(&in_step, &strokes);
+            late = [by_s, std_s];
         }
+        let [late_s, late_std_s] = late;
         let shape = shape_found;
         let play_m = play.map_or(0.0, |play| play.size_m);
         let not_put_right = match out_of_step {
@@ -260,19 +258,27 @@ impl SteadyRecord<'_> {
             findings.push(LoopFinding::ReversedForce { k_eq_n_per_m: raw.mean, energy_j: taken.mean });
         } else if let Some((by_s, std_s)) = not_put_right {
             findings.push(LoopFinding::LateForce { by_s, std_s, at_least: false, corrected: false });
-        } else if shape != Shape::GrossSlip {
+        } else if shape != Shape::GrossSlip && late_s == 0.0 {
             findings.extend(quadratures.and_then(|q| late_at_least(&q, frequency_hz)));
         }
         findings.extend(play.map(|Play { size_m, std_m }| LoopFinding::Play { size_m, std_m }));
         let mut warnings = Vec::new();
         let usable = !reversed && not_put_right.is_none();
+        let in_step_by = Repair::in_step_by(late_s, late_std_s, dt_s);
         let repair = if shape == Shape::GrossSlip && usable {
-            let in_step = Repair::in_step_by(late_s, dt_s).in_step(mean);
-            let (repair, said) = Repair::of(&in_step, dt_s, play_m, late_s);
+            let (repair, said) = Repair::of(&in_step_by.in_step(mean), dt_s, play_m, late_s);
             findings.extend(said);
             repair
         } else {
-            Repair::default()
+            if late_s != 0.0 && usable {
+                findings.push(LoopFinding::LateForce {
+                    by_s: late_s,
+                    std_s: late_std_s,
+                    at_least: false,
+                    corrected: true,
+                });
+            }
+            in_step_by
         };
         if repair.is_late() {
             let both = cycles.each(force, &summed, |cycle| {
