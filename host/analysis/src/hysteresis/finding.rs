@@ -24,7 +24,8 @@ pub enum LoopFinding {
         /// A loop without a plateau shows only by how much it is late at least: its own damping hides the rest.
         at_least: bool,
         /// Stiffness, friction and energy are those of the loop with the delay taken out. If neither this nor `at_least` is true,
-        /// the loop looks late but no delay makes a friction loop of it: no k_T and no μN are given.
+        /// the loop looks out of step, but no delay makes a friction loop of it, or damping explains it as well: no k_T and no μN
+        /// are given.
         corrected: bool,
     },
     /// Play (backlash): after each reversal the contact moves by so much without the force changing.

@@ -47,6 +47,10 @@ pub(super) struct LawFit {
     pub viscous_n_s_per_m: [f64; 2],
     /// Sums of squared residuals: with both, without the delay, without the dashpot.
     pub residuals: [f64; 3],
+    /// The delay that friction without a dashpot asks for, s.
+    pub undamped_s: f64,
+    /// Sum of squared residuals of friction alone, without delay and dashpot.
+    pub friction_alone: f64,
 }
 
 /// Least squares with weights that may not be negative, but for the last column.
@@ -234,6 +238,8 @@ impl LawFit {
             late_s: [late, std_s],
             viscous_n_s_per_m: [viscous, std_n_s_per_m],
             residuals: [left, without_delay, without_dashpot],
+            undamped_s: undamped,
+            friction_alone: at(0.0, false).0,
         })
     }
 }

@@ -48,20 +48,31 @@ pub(super) enum Delay {
     Found(f64, f64),
     /// It looks late by so much, s (and its standard deviation), but that does not explain it.
     NotExplained(f64, f64),
+    /// A dashpot beside the friction explains it about as well as a force that is late by so much, s (early if negative, as for any
+    /// dashpot that takes energy; and its standard deviation).
+    OrDamped(f64, f64),
 }
 
-/// Whether a loop that bends is a friction loop whose force is out of step by so much that its shape is lost.
+/// Whether a loop that bends is a friction loop whose force is out of step by so much that its figures are lost.
 pub(super) fn delay(mean: &Cycle, dt_s: f64, play_m: f64) -> Delay {
     let Some(fit) = LawFit::far(mean, dt_s, play_m) else { return Delay::None };
     let [left, without_delay, _] = fit.residuals;
     let [by_s, std_s] = fit.late_s;
-    let part = by_s.abs() / (dt_s * mean.force_n.len() as f64);
-    if !unexplained(without_delay, &mean.force_n) || left > EXPLAINS * without_delay || part < SHORTEST {
+    let explains = |than: f64| left <= EXPLAINS * than && unexplained(than, &mean.force_n);
+    let part = |late_s: f64| late_s.abs() / (dt_s * mean.force_n.len() as f64);
+    if explains(without_delay) && part(by_s) >= SHORTEST {
+        return if unexplained(left, &mean.force_n) || part(by_s) > LONGEST {
+            Delay::NotExplained(by_s, std_s)
+        } else {
+            Delay::Found(by_s, std_s)
+        };
+    }
+    // friction and a dashpot may explain it as well
+    let alone_s = fit.undamped_s;
+    if !explains(fit.friction_alone) || part(alone_s) < SHORTEST || unexplained(left, &mean.force_n) {
         Delay::None
-    } else if unexplained(left, &mean.force_n) || part > LONGEST {
-        Delay::NotExplained(by_s, std_s)
     } else {
-        Delay::Found(by_s, std_s)
+        Delay::OrDamped(alone_s, std_s)
     }
 }
 

@@ -252,6 +252,8 @@ impl SteadyRecord<'_> {
         let play_m = play.map_or(0.0, |play| play.size_m);
         let not_put_right = match out_of_step {
             Delay::NotExplained(by_s, std_s) => Some((by_s, std_s)),
+            // in gross slip the corners tell a dashpot from a delay
+            Delay::OrDamped(by_s, std_s) if shape != Shape::GrossSlip => Some((by_s, std_s)),
             _ => None,
         };
         if reversed {

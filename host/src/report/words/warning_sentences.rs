@@ -90,7 +90,7 @@ pub fn loop_finding(found: &LoopFinding) -> String {
             if by_s < 0.0 { "earlier" } else { "later" }
         ),
         LoopFinding::LateForce { by_s, .. } => format!(
-            "the force is out of step with the motion, as if it came some {} µs {}, but no delay makes a friction loop of this one: it was not put right, and no k_T or friction limit is given; energy and k_eq are those of the loop as it is; check the channels' delays",
+            "the force is out of step with the motion, as if it came some {} µs {}, but it was not put right: no delay makes a friction loop of this one, or damping beside the friction explains it as well; no k_T or friction limit is given, and energy and k_eq are those of the loop as it is; check the channels' delays",
             micros(by_s.abs()),
             if by_s < 0.0 { "earlier" } else { "later" }
         ),
