@@ -143,3 +143,89 @@ fn what_is_no_record_is_refused_by_name_place_and_remedy() {
     assert_eq!(gone.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&gone.stderr).contains("none.npz"));
 }
+
+/// A slider of 100 N/µm and 100 N under ± 5 µm at 25 Hz, its force late by so many of the 1024 samples to a cycle.
+fn slider(folder: &Path, late: usize, more: Vec<(&'static str, Vec<usize>, Vec<f64>)>) -> PathBuf {
+    let (cycle, cycles) = (1_024, 8);
+    let x: Vec<f64> =
+        (0..cycle * cycles).map(|i| 5e-6 * (std::f64::consts::TAU * i as f64 / cycle as f64).sin()).collect();
+    let mut at = 0.0;
+    // a cycle ahead, which loads it
+    let force: Vec<f64> = x[..cycle]
+        .iter()
+        .chain(&x)
+        .map(|x| {
+            let carried = (100e6 * (x - at)).clamp(-100.0, 100.0);
+            at = x - carried / 100e6;
+            carried
+        })
+        .collect();
+    let n = x.len();
+    let force = force[cycle - late..][..n].to_vec();
+    let path = folder.join(format!("late_{late}.npz"));
+    let mut out = NpzOutput::create(&path).unwrap();
+    let own = vec![
+        ("fs", vec![], vec![25_600.0]),
+        ("displacement_a", vec![n], x),
+        ("displacement_b", vec![n], vec![0.0; n]),
+        ("force", vec![n], force),
+        ("excitation", vec![], vec![25.0]),
+    ];
+    for (name, shape, values) in own.into_iter().chain(more) {
+        out.real(name, &shape, &values).unwrap();
+    }
+    out.finish().unwrap();
+    path
+}
+
+#[test]
+fn the_text_has_every_figure_and_finding_and_calls_the_contacts_own_slope_k_t() {
+    let folder = tempfile::tempdir().unwrap();
+    let load = || vec![("normal_load", vec![], vec![250.0])];
+    let late = slider(folder.path(), 52, load());
+    let output = run(&late, &[]);
+    let said = String::from_utf8(output.stdout).unwrap();
+    for word in [
+        "25.0 Hz",
+        "± 5.00 µm",
+        "gross-slip",
+        "k_T: 100 ± 0",
+        "k_eq: 14.2",
+        "energy: 1.60 mJ",
+        "friction limit μN: 100 N",
+        "μ = 0.400",
+        "late-force",
+        "µs later than the motion",
+    ] {
+        assert!(said.contains(word), "`{word}` is not in: {said}");
+    }
+    assert!(!said.contains("between the spots"), "{said}");
+    let in_step = slider(folder.path(), 0, Vec::new());
+    let said = String::from_utf8(run(&in_step, &[]).stdout).unwrap();
+    assert!(said.contains("--normal-load") && !said.contains("!!"), "{said}");
+    // an ellipse has no k_T, and the text says why
+    let said = String::from_utf8(run(&case("elliptical"), &[]).stdout).unwrap();
+    assert!(said.contains("k_T: none") && said.contains("resonates"), "{said}");
+}
+
+#[test]
+fn a_force_late_by_any_part_of_the_cycle_is_put_in_step() {
+    let folder = tempfile::tempdir().unwrap();
+    for late in [13, 26, 77, 130] {
+        let found = json(&slider(folder.path(), late, Vec::new()), &[]);
+        let one = &found["hysteresis"][0];
+        let finding = &one["findings"][0];
+        assert_eq!(
+            (&finding["finding"], &finding["corrected"]),
+            (&"late-force".into(), &true.into()),
+            "{one}"
+        );
+        let by_s = finding["by_s"].as_f64().unwrap();
+        // a tenth of a sample: corners lie between samples
+        assert!((by_s * 25_600.0 - late as f64).abs() < 0.1, "{late}: {by_s}");
+        for (name, right) in [("k_t_n_per_m", 100e6), ("energy_j", 1.6e-3)] {
+            let value = one[name]["mean"].as_f64().unwrap();
+            assert!((value / right - 1.0).abs() < 0.01, "{late}: {name} {value}");
+        }
+    }
+}

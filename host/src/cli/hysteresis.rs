@@ -11,7 +11,7 @@ use crate::analyse::{Findings, RecordLoops};
 use crate::exchange::{is_beside_the_contact, read_hysteresis};
 use crate::hysteresis::{Correction, HysteresisRecord, analyse};
 use crate::report::{document, words};
-use crate::results::{Hysteresis, Source};
+use crate::results::{BESIDE_THE_CONTACT, Hysteresis, RECORD, Source};
 
 /// Loops of a time record measured anywhere: stiffness, energy, shape, friction.
 ///
@@ -22,7 +22,7 @@ pub struct Loops {
     /// The record.
     #[arg(value_name = "RECORD.npz")]
     record: PathBuf,
-    /// Print results.json on stdout instead of a summary.
+    /// Print results.json on stdout instead of the figures, findings and warnings as text.
     #[arg(long)]
     json: bool,
     /// Normal load, N, for the friction coefficient; that of the record without it.
@@ -58,6 +58,7 @@ impl Loops {
         if is_beside_the_contact(&self.record).map_err(|error| CliError::Bad(error.to_string()))? {
             // its slope is that of whatever lies between the spots
             results.hysteresis = results.hysteresis.into_iter().map(Hysteresis::between_spots).collect();
+            results.source.settings.insert(BESIDE_THE_CONTACT.into(), "beside the contact".into());
         }
         if self.json { output::json(&results) } else { output::lines(words::summary(&results)) }
     }
@@ -65,7 +66,7 @@ impl Loops {
     fn source(&self, record: &HysteresisRecord) -> Source {
         let mut source = Source {
             file: self.record.file_name().unwrap_or(self.record.as_os_str()).to_string_lossy().into_owned(),
-            kind: "record".into(),
+            kind: RECORD.into(),
             ..Source::default()
         };
         let settings = [

@@ -37,7 +37,7 @@ pub use loop_rows::{Backbone, DecayStep, Force, Hysteresis, ImpactSlope, LoopCur
 pub use measured::{CellRow, Cells, HitRow, NoiseFloor, Place};
 pub use reconstruction::Reconstruction;
 pub use side_by_side::SideBySide;
-pub use source::{Calibrated, Software, Source, ranges};
+pub use source::{BESIDE_THE_CONTACT, Calibrated, RECORD, Software, Source, ranges};
 
 use crate::substructuring::Band;
 use serde::Serialize;

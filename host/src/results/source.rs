@@ -3,6 +3,13 @@
 use serde::Serialize;
 use std::collections::BTreeMap;
 
+/// [`Source::kind`] of a time record that was analysed by itself.
+pub const RECORD: &str = "record";
+
+/// The setting of a [`RECORD`] that says that its signals are not the contact's own: the slope of its loops is that of whatever
+/// lies between the spots.
+pub const BESIDE_THE_CONTACT: &str = "measured";
+
 /// Provenance: enough to compute the same result again from the campaign file alone.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Source {

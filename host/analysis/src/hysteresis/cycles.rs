@@ -8,7 +8,7 @@ use super::correction::Correction;
 use super::cycle::Cycle;
 use super::harmonics::{Harmonics, Wheels};
 use super::integration::closed_cycle;
-use super::loops::energy;
+use super::loops::{energy, swing};
 use super::record::{HysteresisRecord, RelativeMotion};
 use super::sums::{dot, mean};
 use super::timing::Timing;
@@ -30,7 +30,8 @@ pub(super) struct Steady<'a> {
     record: &'a HysteresisRecord,
     timing: Timing,
     points: usize,
-    cycles: usize,
+    /// Numbers of the cycles that are used, counted from the record's beginning.
+    used: Range<usize>,
 }
 
 /// What all cycles give together.
@@ -47,6 +48,15 @@ pub(super) struct Summed {
     pub of_mean: Harmonics,
     /// How the cycles scatter about their average.
     pub scatter: Scatter,
+    /// How displacement sensors and load cells drift.
+    drift: Drifts,
+}
+
+/// How displacement and force drift from cycle to cycle: what each changes over each cycle. Empty without a drift.
+#[derive(Debug, Clone, Default)]
+struct Drifts {
+    motion: Vec<f64>,
+    force: Vec<f64>,
 }
 
 /// Mean products of what single cycles differ by from their average, per point.
@@ -85,6 +95,7 @@ fn with_force([xx, vv, xv]: [f64; 3], x: &[f64], v: &[f64], t: &[f64]) -> Produc
 /// One block of cycles, summed with one force.
 struct Sums {
     force_n: Vec<f64>,
+    force_means: Vec<f64>,
     products: Products,
     slopes: Vec<f64>,
     energies: Vec<f64>,
@@ -94,11 +105,12 @@ struct Sums {
 /// One block of cycles, summed with `N` forces.
 struct Block<const N: usize> {
     displacement_m: Vec<f64>,
+    motion_means: Vec<f64>,
     velocity_m_per_s: Vec<f64>,
     forces: [Sums; N],
 }
 
-/// Memory of whoever cuts one cycle after the other.
+/// Buffers that are reused from cycle to cycle.
 #[derive(Default)]
 struct Scratch {
     cycle: Cycle,
@@ -107,6 +119,8 @@ struct Scratch {
 
 /// Where a cycle lies in the record.
 struct Place {
+    /// Which of the cycles that are used it is.
+    number: usize,
     /// The samples that it is interpolated from.
     samples: Range<isize>,
     /// Its first point, in samples after the first of these.
@@ -132,23 +146,40 @@ impl<'a> Steady<'a> {
         if cycles == 0 || points < FEWEST_SAMPLES {
             return Err(HysteresisError::NoCycle { frequency_hz, samples, points });
         }
-        Ok(Self { record, timing, points, cycles })
+        Ok(Self { record, timing, points, used: 0..cycles })
+    }
+
+    /// Number of cycles that are used.
+    pub fn len(&self) -> usize {
+        self.used.len()
+    }
+
+    /// The same with these of its cycles alone.
+    pub fn only(&self, cycles: Range<usize>) -> Self {
+        let first = self.used.start;
+        Self { used: first + cycles.start..first + cycles.end, ..*self }
     }
 
     /// Time between the points of the average cycle, s.
     pub fn dt_s(&self) -> f64 {
-        self.timing.begin_s(self.cycles as f64) / (self.cycles * self.points) as f64
+        let [from, to] = [self.used.start, self.used.end].map(|cycle| self.timing.begin_s(cycle as f64));
+        (to - from) / (self.len() * self.points) as f64
     }
 
-    /// `look` at every cycle with this force, in order.
-    pub fn each<T: Send>(&self, force: Force<'_>, look: impl Fn(&Cycle) -> T + Sync) -> Vec<T> {
+    /// The middle of the cycles that are used, s after the first sample.
+    pub fn middle_s(&self) -> f64 {
+        self.timing.begin_s(0.5 * (self.used.start + self.used.end) as f64)
+    }
+
+    /// `look` at every cycle with this force, in order; `of` is what they gave together.
+    pub fn each<T: Send>(&self, force: Force<'_>, of: &Summed, look: impl Fn(&Cycle) -> T + Sync) -> Vec<T> {
         let blocks: Vec<Vec<T>> = self.blocks(|cycles| {
             let mut scratch = Scratch::default();
             cycles
                 .map(|cycle| {
                     let place = self.place(cycle);
-                    self.cut_motion(&place, &mut scratch);
-                    self.cut_force(&place, force, &mut scratch);
+                    self.cut_motion(&place, &of.drift.motion, &mut scratch);
+                    self.cut_force(&place, force, &of.drift.force, &mut scratch);
                     look(&scratch.cycle)
                 })
                 .collect()
@@ -156,27 +187,45 @@ impl<'a> Steady<'a> {
         blocks.into_iter().flatten().collect()
     }
 
-    /// What all of them give together, with each of these forces: the motion is cut once for all.
+    /// What all of them give together, with each of these forces: the motion is cut once for all. Where displacement or force
+    /// drifts, the cycles are cut a second time without it.
     pub fn summed<const N: usize>(&self, forces: [Force<'_>; N]) -> [Summed; N] {
+        let (summed, drifts) = self.summed_without(forces, &std::array::from_fn(|_| Drifts::default()));
+        if drifts.iter().all(|drift| drift.motion.is_empty() && drift.force.is_empty()) {
+            return summed;
+        }
+        self.summed_without(forces, &drifts).0
+    }
+
+    /// The same after these drifts are taken out, and the drifts that the cycles' means show.
+    fn summed_without<const N: usize>(
+        &self,
+        forces: [Force<'_>; N],
+        without: &[Drifts; N],
+    ) -> ([Summed; N], [Drifts; N]) {
         let wheels = Wheels::new(self.points);
-        let blocks = self.blocks(|cycles| self.sum(cycles, &forces, &wheels));
+        let blocks = self.blocks(|cycles| self.sum(cycles, &forces, without, &wheels));
         let zeros = || vec![0.0; self.points];
         let mut motion = [zeros(), zeros()];
+        let mut motion_means = Vec::new();
         let mut sums: [Sums; N] = std::array::from_fn(|_| Sums::none(self.points));
         for block in blocks {
+            motion_means.extend(block.motion_means);
             add(&mut motion[0], &block.displacement_m);
             add(&mut motion[1], &block.velocity_m_per_s);
             for (sum, own) in sums.iter_mut().zip(block.forces) {
                 add(&mut sum.force_n, &own.force_n);
+                sum.force_means.extend(own.force_means);
                 sum.products.iter_mut().zip(own.products).for_each(|(sum, own)| *sum += own);
                 sum.slopes.extend(own.slopes);
                 sum.energies.extend(own.energies);
                 sum.harmonics.extend(own.harmonics);
             }
         }
-        let n = self.cycles as f64;
+        let n = self.len() as f64;
         let mean = |sum: &[f64]| sum.iter().map(|value| value / n).collect::<Vec<_>>();
-        sums.map(|Sums { force_n, products: all, slopes, energies, harmonics }| {
+        let mut without = without.iter();
+        let both = sums.map(|Sums { force_n, force_means, products: all, slopes, energies, harmonics }| {
             let mean = Cycle {
                 displacement_m: mean(&motion[0]),
                 velocity_m_per_s: mean(&motion[1]),
@@ -185,42 +234,59 @@ impl<'a> Steady<'a> {
             let common = products(&mean);
             let points = self.points as f64;
             let apart = std::array::from_fn(|i| (all[i] / n - common[i]) / points);
-            let scatter = Scatter { cycles: self.cycles, products: apart };
+            let scatter = Scatter { cycles: self.len(), products: apart };
+            let moved = match self.record.motion {
+                RelativeMotion::Velocity { .. } => &mean.velocity_m_per_s,
+                RelativeMotion::Displacement { .. } => &mean.displacement_m,
+            };
+            let shown = Drifts {
+                motion: per_cycle(&motion_means, 0.5 * swing(moved)),
+                force: per_cycle(&force_means, 0.5 * swing(&mean.force_n)),
+            };
             let of_mean = Harmonics {
                 displacement: wheels.harmonics(&mean.displacement_m),
                 force: wheels.harmonics(&mean.force_n),
             };
-            Summed { mean, slopes, energies, harmonics, of_mean, scatter }
-        })
+            let drift = without.next().cloned().unwrap_or_default();
+            (Summed { mean, slopes, energies, harmonics, of_mean, scatter, drift }, shown)
+        });
+        let mut shown = both.iter().map(|(_, shown)| shown.clone());
+        let shown = std::array::from_fn(|_| shown.next().unwrap_or_default());
+        (both.map(|(summed, _)| summed), shown)
     }
 
     fn blocks<T: Send>(&self, work: impl Fn(Range<usize>) -> T + Sync) -> Vec<T> {
-        let block = |b: usize| work(b * BLOCK..((b + 1) * BLOCK).min(self.cycles));
-        (0..self.cycles.div_ceil(BLOCK)).into_par_iter().map(block).collect()
+        let first = self.used.start;
+        let block = |b: usize| work(first + b * BLOCK..(first + (b + 1) * BLOCK).min(self.used.end));
+        (0..self.len().div_ceil(BLOCK)).into_par_iter().map(block).collect()
     }
 
     fn sum<const N: usize>(
         &self,
         cycles: Range<usize>,
         forces: &[Force<'_>; N],
+        without: &[Drifts; N],
         wheels: &Wheels,
     ) -> Block<N> {
         let mut scratch = Scratch::default();
         let mut block = Block {
             displacement_m: vec![0.0; self.points],
+            motion_means: Vec::new(),
             velocity_m_per_s: vec![0.0; self.points],
             forces: std::array::from_fn(|_| Sums::none(self.points)),
         };
         for cycle in cycles {
             let place = self.place(cycle);
-            self.cut_motion(&place, &mut scratch);
+            // the motion is the same whichever force goes with it
+            let drift = without.first().map_or(&[][..], |without| &without.motion);
+            block.motion_means.push(self.cut_motion(&place, drift, &mut scratch));
             let [x, v, _] = scratch.cycle.signals();
             let motion = of_motion(x, v);
             let of_x = wheels.harmonics(x);
             add(&mut block.displacement_m, x);
             add(&mut block.velocity_m_per_s, v);
-            for (sums, force) in block.forces.iter_mut().zip(forces) {
-                self.cut_force(&place, *force, &mut scratch);
+            for ((sums, force), without) in block.forces.iter_mut().zip(forces).zip(without) {
+                sums.force_means.push(self.cut_force(&place, *force, &without.force, &mut scratch));
                 let [x, v, t] = scratch.cycle.signals();
                 let own = with_force(motion, x, v, t);
                 let [_, xx, _, xt, _, _] = own;
@@ -242,6 +308,7 @@ impl<'a> Steady<'a> {
         // a cubic takes one sample before and two after
         let first = begin.floor() as isize - 1;
         Place {
+            number: cycle - self.used.start,
             samples: first..(begin + period).floor() as isize + 3,
             from: begin - first as f64,
             step: period / self.points as f64,
@@ -249,12 +316,12 @@ impl<'a> Steady<'a> {
         }
     }
 
-    /// A cycle's displacement and velocity.
-    fn cut_motion(&self, place: &Place, scratch: &mut Scratch) {
+    /// A cycle's displacement and velocity without the drift; its mean, of what was measured, comes back.
+    fn cut_motion(&self, place: &Place, drift: &[f64], scratch: &mut Scratch) -> f64 {
         let Scratch { cycle: cut, samples } = scratch;
         self.record.relative_motion(place.samples.clone(), samples);
         resample(samples, place, self.points, &mut cut.velocity_m_per_s);
-        centre(&mut cut.velocity_m_per_s);
+        let middle = levelled(&mut cut.velocity_m_per_s, drift.get(place.number));
         match self.record.motion {
             RelativeMotion::Velocity { .. } => {
                 closed_cycle(&cut.velocity_m_per_s, place.dt_s, &mut cut.displacement_m);
@@ -267,24 +334,58 @@ impl<'a> Steady<'a> {
                 cut.velocity_m_per_s.extend((0..n).map(slope));
             }
         }
+        middle
     }
 
-    /// Its force.
-    fn cut_force(&self, place: &Place, force: Force<'_>, scratch: &mut Scratch) {
+    /// Its force without the drift, and the mean of it.
+    fn cut_force(&self, place: &Place, force: Force<'_>, drift: &[f64], scratch: &mut Scratch) -> f64 {
         let Scratch { cycle: cut, samples } = scratch;
         match force {
             None => self.record.force(place.samples.clone(), samples),
             Some(correction) => correction.force(self.record, place.samples.clone(), samples),
         }
         resample(samples, place, self.points, &mut cut.force_n);
-        centre(&mut cut.force_n);
+        levelled(&mut cut.force_n, drift.get(place.number))
     }
+}
+
+/// A drift that over a cycle changes less than this part of the amplitude moves no figure by 1 in 3000, and is left in.
+const DRIFTS: f64 = 1e-3;
+
+/// Sum of the squared steps from mean to mean over that of their squared distances from the mean of all: 2 for means that scatter
+/// independently, near 0 where they drift.
+const SMOOTH: f64 = 0.5;
+
+/// Fewer means than this cannot tell drift from scatter: what they change by is taken out as drift.
+const FEWEST_MEANS: usize = 6;
+
+/// What a signal of this amplitude drifts by over each cycle, from the means of all cycles; empty where it does not drift.
+fn per_cycle(means: &[f64], amplitude: f64) -> Vec<f64> {
+    let n = means.len();
+    if n < 2 {
+        return Vec::new();
+    }
+    let drift = |c: usize| match (n, c) {
+        (2, _) => means[1] - means[0],
+        // the parabola through the first three means, or the last three
+        (_, 0) => -1.5 * means[0] + 2.0 * means[1] - 0.5 * means[2],
+        (_, c) if c == n - 1 => 1.5 * means[c] - 2.0 * means[c - 1] + 0.5 * means[c - 2],
+        (_, c) => 0.5 * (means[c + 1] - means[c - 1]),
+    };
+    let drifts: Vec<f64> = (0..n).map(drift).collect();
+    let size = (drifts.iter().map(|d| d * d).sum::<f64>() / n as f64).sqrt();
+    let centre = mean(means);
+    let about: f64 = means.iter().map(|m| (m - centre).powi(2)).sum();
+    let steps: f64 = means.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
+    let scatters = n >= FEWEST_MEANS && steps > SMOOTH * about;
+    if size > DRIFTS * amplitude && !scatters { drifts } else { Vec::new() }
 }
 
 impl Sums {
     fn none(points: usize) -> Self {
         Sums {
             force_n: vec![0.0; points],
+            force_means: Vec::new(),
             products: [0.0; 6],
             slopes: Vec::new(),
             energies: Vec::new(),
@@ -297,11 +398,21 @@ fn add(sum: &mut [f64], own: &[f64]) {
     sum.iter_mut().zip(own).for_each(|(sum, value)| *sum += value);
 }
 
-fn centre(x: &mut [f64]) {
+/// Takes the mean out of one cycle, and the straight line by which the signal drifts over it; gives the mean.
+fn levelled(x: &mut [f64], drift: Option<&f64>) -> f64 {
     let mean = mean(x);
-    for v in x {
-        *v -= mean;
+    let Some(drift) = drift else {
+        for v in x {
+            *v -= mean;
+        }
+        return mean;
+    };
+    let step = drift / x.len() as f64;
+    let middle = 0.5 * (x.len() as f64 - 1.0);
+    for (i, v) in x.iter_mut().enumerate() {
+        *v -= mean + step * (i as f64 - middle);
     }
+    mean
 }
 
 /// A signal at the `points` places of a cycle, by cubic (Catmull–Rom) interpolation of its samples `x`.
@@ -351,7 +462,7 @@ mod tests {
         let parabola = |at: f64| 3.0 - 2.0 * at + 0.25 * at * at;
         let x: Vec<f64> = (0..64).map(|i| parabola(f64::from(i))).collect();
         for (from, step) in [(1.0, 1.0), (1.3, 1.0), (1.0, 0.98), (1.02, 0.97), (1.99, 1.03), (1.5, 1.01)] {
-            let place = Place { samples: 0..64, from, step, dt_s: 1.0 };
+            let place = Place { number: 0, samples: 0..64, from, step, dt_s: 1.0 };
             let mut found = Vec::new();
             resample(&x, &place, 58, &mut found);
             for (j, found) in found.iter().enumerate() {

@@ -33,6 +33,17 @@ pub(super) fn dominant_frequency(x: &[f64], fs_hz: f64) -> Option<f64> {
     strongest.frequency(fs_hz / n as f64)
 }
 
+/// A signal without the straight line from the mean of its first quarter to that of its last: a drift has power at low
+/// frequencies.
+pub(super) fn level(x: &[f64]) -> Vec<f64> {
+    let n = x.len();
+    let quarter = (n / 4).max(1).min(n);
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len().max(1) as f64;
+    let (first, last) = (mean(&x[..quarter]), mean(&x[n - quarter..]));
+    let slope = (last - first) / (n - quarter).max(1) as f64;
+    x.iter().enumerate().map(|(i, v)| v - first - slope * (i as f64 - 0.5 * quarter as f64)).collect()
+}
+
 /// Without its mean, through a Hann window.
 fn windowed(x: &[f64]) -> Vec<f64> {
     let n = x.len();

@@ -170,7 +170,18 @@ fn faults() -> Vec<Fault> {
 
 /// Clean loops on which each kind of finding was made.
 fn false_findings(count: u64) -> Vec<(&'static str, usize)> {
-    let kinds = ["reversed", "late", "viscous", "hum", "uneven", "frequency", "microslip", "k_T off by 4 %"];
+    let kinds = [
+        "reversed",
+        "late",
+        "viscous",
+        "hum",
+        "uneven",
+        "frequency",
+        "microslip",
+        "k_T off by 4 %",
+        "play",
+        "unsteady",
+    ];
     let mut counts = vec![0; kinds.len()];
     for seed in 0..count {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(40_000 + seed);
@@ -184,6 +195,8 @@ fn false_findings(count: u64) -> Vec<(&'static str, usize)> {
                 LoopFinding::Hum { .. } => 3,
                 LoopFinding::UnevenLoad { .. } => 4,
                 LoopFinding::FrequencyOff { .. } => 5,
+                LoopFinding::Play { .. } => 8,
+                LoopFinding::Unsteady { .. } => 9,
             };
             counts[kind] += 1;
             println!(

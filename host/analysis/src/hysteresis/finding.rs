@@ -23,8 +23,30 @@ pub enum LoopFinding {
         std_s: f64,
         /// A loop without a plateau shows only by how much it is late at least: its own damping hides the rest.
         at_least: bool,
-        /// Stiffness, friction and energy are those of the loop with the delay taken out.
+        /// Stiffness, friction and energy are those of the loop with the delay taken out. If neither this nor `at_least` is true,
+        /// the loop looks out of step, but no delay makes a friction loop of it, or damping explains it as well: no k_T and no μN
+        /// are given.
         corrected: bool,
+    },
+    /// Play (backlash): after each reversal the contact moves by so much without the force changing.
+    Play {
+        /// Size of the play, m.
+        size_m: f64,
+        /// Half the difference of the sizes on both strokes, m.
+        std_m: f64,
+    },
+    /// Cycles whose amplitude or force is not that of the others were left out at the beginning and the end of the record.
+    Unsteady {
+        /// Cycles left out at the beginning.
+        left_out_first: usize,
+        /// Cycles left out at the end.
+        left_out_last: usize,
+        /// Cycles used.
+        used: usize,
+        /// Amplitude of Δx at the fundamental in the cycles used, m.
+        amplitude_m: f64,
+        /// The same in the cycle left out that differs most, m.
+        left_out_amplitude_m: f64,
     },
     /// A force that goes with the velocity acts beside the friction. It is taken out of k_T and μN.
     Viscous {
@@ -51,7 +73,7 @@ pub enum LoopFinding {
         /// Its standard deviation.
         std: f64,
     },
-    /// The excitation is not at the stated frequency, or drifts. The cycles were cut as they came.
+    /// The excitation is not at the stated frequency, or drifts. The cycles were cut at the frequency found.
     FrequencyOff {
         /// As stated, Hz; none where it was read off the record.
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -61,4 +83,20 @@ pub enum LoopFinding {
         /// At its end, Hz.
         to_hz: f64,
     },
+}
+
+impl LoopFinding {
+    /// Its name in `results.json`.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::ReversedForce { .. } => "reversed-force",
+            Self::LateForce { .. } => "late-force",
+            Self::Play { .. } => "play",
+            Self::Unsteady { .. } => "unsteady",
+            Self::Viscous { .. } => "viscous",
+            Self::Hum { .. } => "hum",
+            Self::UnevenLoad { .. } => "uneven-load",
+            Self::FrequencyOff { .. } => "frequency-off",
+        }
+    }
 }

@@ -2,24 +2,32 @@
 
 use super::sums::mean;
 
+/// Weights of the six values around one step in its integral, over 1440: the quadrature is exact for polynomials of fifth degree.
+const STEP: [f64; 6] = [11.0, -93.0, 802.0, 802.0, -93.0, 11.0];
+
 /// Displacement over one closed cycle from its velocities (m/s, `dt_s` apart), into `x`: the mean velocity is removed first, so the
-/// loop closes, then the trapezoid rule, then the mean displacement goes.
+/// loop closes, then each step is integrated over the six values around it, then the mean displacement goes. The trapezoid rule
+/// would lose 1.3 % of a sine of 16 samples to a cycle; this rule loses 1e-5 of it.
 ///
 /// One whole cycle of a steady vibration has no mean velocity of its own: what is removed is the vibrometer's offset and the noise's
 /// random walk. A straight line fitted to the displacement of a few cycles is *not* the same and biases the stiffness.
 pub fn closed_cycle(velocity: &[f64], dt_s: f64, x: &mut Vec<f64>) {
     let offset = mean(velocity);
+    let n = velocity.len();
     x.clear();
-    let Some(first) = velocity.first() else { return };
-    let (mut at, mut before) = (0.0, first - offset);
-    x.extend(velocity.iter().enumerate().map(|(i, v)| {
-        let v = v - offset;
-        if i > 0 {
-            at += 0.5 * dt_s * (before + v);
-        }
-        before = v;
-        at
-    }));
+    x.resize(n, 0.0);
+    let mut at = 0.0;
+    for i in 1..n {
+        // the step from value i − 1 to value i
+        let step: f64 = if i >= 3 && i + 2 < n {
+            STEP.iter().zip(&velocity[i - 3..i + 3]).map(|(weight, v)| weight * (v - offset)).sum()
+        } else {
+            // the last values of the cycle come before its first ones
+            (0..6).map(|j| STEP[j] * (velocity[(i + j + 3 * n - 3) % n] - offset)).sum()
+        };
+        at += step * dt_s / 1440.0;
+        x[i] = at;
+    }
     let centre = mean(x);
     for value in x {
         *value -= centre;
@@ -52,15 +60,15 @@ mod tests {
 
         /// An offset of any size does not matter over a whole cycle.
         #[test]
-        fn a_cycle_comes_back_whatever_the_offset(phase in 0.0..TAU, offset in -1e-2..1e-2f64, n in 100usize..700) {
+        fn a_cycle_comes_back_whatever_the_offset(phase in 0.0..TAU, offset in -1e-2..1e-2f64, n in 16usize..700) {
             let (w, dt) = (TAU * 80.0, 1.0 / (80.0 * n as f64));
             let v: Vec<f64> = (0..n).map(|i| 1e-6 * w * (w * dt * i as f64 + phase).cos() + offset).collect();
             let mut x = Vec::new();
             closed_cycle(&v, dt, &mut x);
             for (i, x) in x.iter().enumerate() {
-                // the trapezoid loses (ω dt)² / 12
+                // what six values lose: 191/60480 (ω dt)⁶, and rounding
                 let exact = 1e-6 * (w * dt * i as f64 + phase).sin();
-                prop_assert!((x - exact).abs() < 1e-6 * ((TAU / n as f64).powi(2) / 11.0 + 1e-9 * offset.abs() / 1e-6));
+                prop_assert!((x - exact).abs() < 1e-6 * ((TAU / n as f64).powi(6) / 300.0 + 1e-9 * (1.0 + offset.abs() / 1e-6)));
             }
         }
     }

@@ -16,11 +16,21 @@ const FINE: usize = 24;
 const CLOSER: [f64; 2] = [0.06, 0.015];
 const FINER: usize = 11;
 
-/// Delays that are looked for, s.
+/// Delays near nothing that are looked for, s.
 const DELAY_S: [f64; 2] = [-2e-4, 3e-4];
 
 /// Steps of the first look.
 const STEPS: usize = 21;
+
+/// Delays that are looked for over a whole cycle.
+const AROUND: usize = 64;
+
+/// A delay is known no better than to this part of the time between points, however little noise there is.
+const BETWEEN_POINTS: f64 = 0.02;
+
+/// Second differences of the residual are taken over this part of a cycle, or this time (s), whichever is longer.
+const PROBE_CYCLES: f64 = 1e-4;
+const PROBE_S: f64 = 1e-5;
 
 /// Columns that may join the active ones: a straight flank needs three, a bent one a dozen.
 const ROUNDS: usize = 60;
@@ -37,6 +47,10 @@ pub(super) struct LawFit {
     pub viscous_n_s_per_m: [f64; 2],
     /// Sums of squared residuals: with both, without the delay, without the dashpot.
     pub residuals: [f64; 3],
+    /// The delay that friction without a dashpot asks for, s.
+    pub undamped_s: f64,
+    /// Sum of squared residuals of friction alone, without delay and dashpot.
+    pub friction_alone: f64,
 }
 
 /// Least squares with weights that may not be negative, but for the last column.
@@ -48,11 +62,11 @@ struct Problem {
 }
 
 impl Problem {
-    fn new(cycle: &Cycle, reaches: &[f64]) -> Self {
+    fn new(cycle: &Cycle, reaches: &[f64], play_m: f64) -> Self {
         let points = cycle.displacement_m.len();
         let mut columns = DMatrix::zeros(points, reaches.len() + 2);
         for (j, reach) in reaches.iter().enumerate() {
-            columns.set_column(j, &element(&cycle.displacement_m, *reach));
+            columns.set_column(j, &element(&cycle.displacement_m, *reach, play_m));
         }
         columns.set_column(reaches.len(), &DVector::from_column_slice(&cycle.displacement_m));
         columns.set_column(reaches.len() + 1, &DVector::from_column_slice(&cycle.velocity_m_per_s));
@@ -122,68 +136,125 @@ impl Problem {
     }
 }
 
-/// What a Jenkins element of this reach (m) carries over the cycle, per stiffness: from one round on it repeats itself.
-fn element(x: &[f64], reach: f64) -> DVector<f64> {
+/// What a Jenkins element of this reach (m) with this play (m) carries over the cycle, per stiffness: from one round on it repeats
+/// itself.
+fn element(x: &[f64], reach: f64, play_m: f64) -> DVector<f64> {
     let mut slider = 0.0;
     let mut carried = DVector::zeros(x.len());
     for _ in 0..2 {
         for (x, carried) in x.iter().zip(carried.iter_mut()) {
-            *carried = (x - slider).clamp(-reach, reach);
-            slider = x - *carried;
+            let apart = x - slider;
+            let taken_up = apart.clamp(-0.5 * play_m, 0.5 * play_m);
+            *carried = (apart - taken_up).clamp(-reach, reach);
+            // the slider is drawn along by what is more than play and reach together
+            slider += apart - taken_up - *carried;
         }
     }
     carried
 }
 
 impl LawFit {
-    /// Takes the averaged loop of a contact in gross slip apart; `dt_s` between its points. None for a loop that does not move.
-    pub fn of(cycle: &Cycle, dt_s: f64) -> Option<Self> {
+    /// Takes the averaged loop of a contact in gross slip apart; `dt_s` between its points, `play_m` of play in it. None for a
+    /// loop that does not move.
+    ///
+    /// Delays near nothing are looked for first. A loop that is later or earlier than those is found over the whole cycle, and
+    /// wins where it leaves less than half of the squares, and next to nothing of the loop.
+    pub fn of(cycle: &Cycle, dt_s: f64, play_m: f64) -> Option<Self> {
+        let near = Self::within(cycle, dt_s, play_m, 0.0, DELAY_S)?;
+        let [low, high] = DELAY_S;
+        match Self::far(cycle, dt_s, play_m) {
+            Some(far)
+                if !(low..high).contains(&far.late_s[0])
+                    && far.residuals[0] < 0.5 * near.residuals[0]
+                    && !unexplained(far.residuals[0], &cycle.force_n) =>
+            {
+                Some(far)
+            }
+            _ => Some(near),
+        }
+    }
+
+    /// The same for a delay of any part of the cycle.
+    pub fn far(cycle: &Cycle, dt_s: f64, play_m: f64) -> Option<Self> {
+        let half = 0.5 * super::loops::swing(&cycle.displacement_m);
+        if half.is_nan() || half <= 0.0 {
+            return None;
+        }
+        let problem = Problem::new(cycle, &spread(0.01 * half, half, COARSE), play_m);
+        let period_s = dt_s * cycle.force_n.len() as f64;
+        let step_s = period_s / AROUND as f64;
+        let left = |late_s: f64| problem.solved(&shifted(&cycle.force_n, late_s / dt_s), true).1;
+        let delays = (0..AROUND).map(|i| (i as f64 + 1.0) * step_s - 0.5 * period_s);
+        let (first, _) = delays.map(|late_s| (late_s, left(late_s))).min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let centre_s = closest(&problem, cycle, dt_s, true, first, step_s);
+        // the coarse elements may pass for a delay of about a step
+        let around = DELAY_S.map(|end| centre_s + end.signum() * end.abs().max(1.5 * step_s));
+        Self::within(cycle, dt_s, play_m, centre_s, around)
+    }
+
+    /// The same for a delay within this range, s, beginning at `first_s`.
+    fn within(cycle: &Cycle, dt_s: f64, play_m: f64, first_s: f64, range_s: [f64; 2]) -> Option<Self> {
         let points = cycle.force_n.len();
         let half = 0.5 * super::loops::swing(&cycle.displacement_m);
         if half.is_nan() || half <= 0.0 {
             return None;
         }
-        let spread = |from: f64, to: f64, count: usize| -> Vec<f64> {
-            (0..count).map(|i| from * (to / from).powf(i as f64 / (count - 1) as f64)).collect()
-        };
+        let step_s = (range_s[1] - range_s[0]) / (STEPS - 1) as f64;
         let mut reaches = spread(0.01 * half, half, COARSE);
-        let coarse = Problem::new(cycle, &reaches);
-        let (weights, _) = coarse.solved(&shifted(&cycle.force_n, 0.0), true);
+        let coarse = Problem::new(cycle, &reaches, play_m);
+        let (weights, _) = coarse.solved(&shifted(&cycle.force_n, first_s / dt_s), true);
         let most = centre(&coarse, &weights, &reaches)?;
         reaches.extend(spread(0.7 * most, 1.4 * most, FINE));
         // each look refines the elements about the one that carries most, at the delay that the last one found: a corner between two
         // reaches would pass for a delay
         let mut late = 0.0;
         for width in CLOSER {
-            let problem = Problem::new(cycle, &reaches);
-            late = earliest(&problem, cycle, dt_s, true);
+            let problem = Problem::new(cycle, &reaches, play_m);
+            late = earliest(&problem, cycle, dt_s, true, range_s);
             let (weights, _) = problem.solved(&shifted(&cycle.force_n, late / dt_s), true);
             let about = centre(&problem, &weights, &reaches)?;
             reaches.extend(spread(about * (1.0 - width), about * (1.0 + width), FINER));
         }
-        let problem = Problem::new(cycle, &reaches);
+        let problem = Problem::new(cycle, &reaches, play_m);
         let free = reaches.len() + 1;
         let at = |late_s: f64, dashpot: bool| {
             let (weights, left) = problem.solved(&shifted(&cycle.force_n, late_s / dt_s), dashpot);
             (left, weights[free] / problem.scale[free])
         };
-        late = closest(&problem, cycle, dt_s, true, late);
+        late = closest(&problem, cycle, dt_s, true, late, step_s);
         let (left, viscous) = at(late, true);
         let without_delay = at(0.0, true).0;
-        let undamped = closest(&problem, cycle, dt_s, false, late);
+        let undamped = closest(&problem, cycle, dt_s, false, late, step_s);
         let without_dashpot = at(undamped, false).0;
         let variance = TOGETHER * left / points.saturating_sub(8).max(1) as f64;
-        let probe = 1e-5;
+        let probe = PROBE_S.max(PROBE_CYCLES * points as f64 * dt_s);
         let bend = (at(late - probe, true).0 - 2.0 * left + at(late + probe, true).0) / (probe * probe);
         let std_s = if bend > 0.0 { (2.0 * variance / bend).sqrt() } else { f64::INFINITY };
+        // corners lie between points, and interpolation rounds them
+        let std_s = std_s.hypot(BETWEEN_POINTS * dt_s);
         // what the other columns leave of the velocity: at least a half in a loop with flanks and plateaus
         let std_n_s_per_m = variance.sqrt() / (0.5 * problem.scale[free]);
         Some(Self {
             late_s: [late, std_s],
             viscous_n_s_per_m: [viscous, std_n_s_per_m],
             residuals: [left, without_delay, without_dashpot],
+            undamped_s: undamped,
+            friction_alone: at(0.0, false).0,
         })
     }
+}
+
+/// A friction law that leaves more than this part of the force (rms) does not explain a loop.
+const UNEXPLAINED: f64 = 0.02;
+
+/// Whether a sum of squared residuals is more than a friction law may leave of this force.
+pub(super) fn unexplained(left: f64, force_n: &[f64]) -> bool {
+    left > UNEXPLAINED.powi(2) * force_n.iter().map(|t| t * t).sum::<f64>()
+}
+
+/// Reaches from one to another, evenly in their logarithm.
+fn spread(from: f64, to: f64, count: usize) -> Vec<f64> {
+    (0..count).map(|i| from * (to / from).powf(i as f64 / (count - 1) as f64)).collect()
 }
 
 /// The reach about which the elements lie that carry most.
@@ -199,20 +270,26 @@ fn centre(problem: &Problem, weights: &DVector<f64>, reaches: &[f64]) -> Option<
     (weight > 0.0).then(|| sum / weight)
 }
 
-/// The delay (s) that leaves least, of all that are looked for.
-fn earliest(problem: &Problem, cycle: &Cycle, dt_s: f64, dashpot: bool) -> f64 {
-    let step = (DELAY_S[1] - DELAY_S[0]) / (STEPS - 1) as f64;
+/// The delay (s) that leaves least, of all within a range.
+fn earliest(problem: &Problem, cycle: &Cycle, dt_s: f64, dashpot: bool, [from, to]: [f64; 2]) -> f64 {
+    let step = (to - from) / (STEPS - 1) as f64;
     let left = |late_s: &f64| problem.solved(&shifted(&cycle.force_n, late_s / dt_s), dashpot).1;
     let all: Vec<(f64, f64)> =
-        (0..STEPS).map(|i| DELAY_S[0] + step * i as f64).map(|late_s| (late_s, left(&late_s))).collect();
-    let first = all.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |(late_s, _)| *late_s);
-    closest(problem, cycle, dt_s, dashpot, first)
+        (0..STEPS).map(|i| from + step * i as f64).map(|late_s| (late_s, left(&late_s))).collect();
+    let first = all.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(from, |(late_s, _)| *late_s);
+    closest(problem, cycle, dt_s, dashpot, first, step)
 }
 
-/// The same near `centre`: a parabola through three, ever closer.
-fn closest(problem: &Problem, cycle: &Cycle, dt_s: f64, dashpot: bool, mut centre: f64) -> f64 {
+/// The same near `centre`: a parabola through three that are `width` apart, ever closer.
+fn closest(
+    problem: &Problem,
+    cycle: &Cycle,
+    dt_s: f64,
+    dashpot: bool,
+    mut centre: f64,
+    mut width: f64,
+) -> f64 {
     let left = |late_s: f64| problem.solved(&shifted(&cycle.force_n, late_s / dt_s), dashpot).1;
-    let mut width = (DELAY_S[1] - DELAY_S[0]) / (STEPS - 1) as f64;
     for _ in 0..6 {
         let [l, m, r] = [-1.0, 0.0, 1.0].map(|o| left(centre + o * width));
         let bend = l - 2.0 * m + r;

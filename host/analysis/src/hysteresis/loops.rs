@@ -71,19 +71,33 @@ pub fn equivalent_stiffness(cycle: &Cycle) -> f64 {
     slope(&cycle.displacement_m, &cycle.force_n)
 }
 
+/// Weights of the central difference of eighth order: x' = Σ wₖ (x₊ₖ − x₋ₖ) per step.
+const DIFFERENCE: [f64; 4] = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
+
 /// Area of the closed loop, ∮ T dΔx, J. May come out slightly negative for a stuck contact: that is noise, not an error. The area of
 /// an ellipse beside a hidden resonance is no friction energy.
+///
+/// This is the sum of T Δẋ over the points, with Δẋ by the central difference of eighth order. The polygon through the points
+/// would be the same sum with the difference of first order, and would lose 2.6 % of an ellipse of 16 points; this sum loses
+/// 1e-6 of it. The corners of a friction loop move both sums by about the same.
 pub fn energy(cycle: &Cycle) -> f64 {
-    let (x, t) = (&cycle.displacement_m, &cycle.force_n);
-    let ([x_first, .., x_last], [t_first, .., t_last]) = (&x[..], &t[..]) else { return 0.0 };
-    // the trapezoids' sum, once round
-    let around = dot(t, &x[1..]) - dot(&t[1..], x);
-    0.5 * (around + t_last * x_first - t_first * x_last)
+    let (x, t) = (&cycle.displacement_m[..], &cycle.force_n[..]);
+    let n = x.len().min(t.len());
+    if n <= 2 * DIFFERENCE.len() {
+        return 0.0;
+    }
+    let area = |(weight, shift): (&f64, usize)| {
+        // the last points of the cycle are followed by its first ones
+        let inside = dot(t, &x[shift..]) - dot(&t[shift..], x);
+        let around = dot(&t[n - shift..], &x[..shift]) - dot(&t[..shift], &x[n - shift..]);
+        weight * (inside + around)
+    };
+    DIFFERENCE.iter().zip(1..).map(area).sum()
 }
 
 /// Peak secant: the force's swing over the displacement's, N/m.
 pub fn secant_stiffness(cycle: &Cycle) -> f64 {
-    swing(&cycle.force_n) / swing(&cycle.displacement_m)
+    closed_swing(&cycle.force_n) / closed_swing(&cycle.displacement_m)
 }
 
 /// Ratio of the fundamentals T₁/Δx₁, N/m: its angle is the phase by which Δx lags T, its real part is k_eq for a sinusoidal Δx.
@@ -95,6 +109,19 @@ pub fn fundamental_stiffness(cycle: &Cycle) -> Complex<f64> {
 pub(super) fn swing(x: &[f64]) -> f64 {
     let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     high - low
+}
+
+/// Largest minus smallest value of one closed cycle. Each extreme is that of the parabola through the outermost point and its two
+/// neighbours: of a sine of 16 points the outermost one may lie 2 % below the peak, the parabola 0.1 %.
+pub(super) fn closed_swing(x: &[f64]) -> f64 {
+    let n = x.len();
+    let extreme = |sign: f64| {
+        let at = (0..n).max_by(|&a, &b| (sign * x[a]).total_cmp(&(sign * x[b]))).unwrap_or(0);
+        let [before, own, after] = [n - 1, 0, 1].map(|shift| x[(at + shift) % n]);
+        let bend = before - 2.0 * own + after;
+        if bend == 0.0 { own } else { own - (after - before).powi(2) / (8.0 * bend) }
+    };
+    if n < 3 { swing(x) } else { extreme(1.0) - extreme(-1.0) }
 }
 
 /// |T_n/T_1| for n = 2…5. Slip that is the same both ways makes odd ones: a third of 1/9 for a triangle, 1/3 for a rectangle.

@@ -98,6 +98,30 @@ pub enum HysteresisError {
         /// Samples of one cycle.
         points: usize,
     },
+    /// The stated frequency is not in the record, and force and motion show different ones.
+    #[error(
+        "the excitation is stated as {stated_hz:.4} Hz, but the force runs at {force_hz:.4} Hz and the relative motion at {motion_hz:.4} Hz: check the stated frequency and the channels"
+    )]
+    OtherFrequency {
+        /// As stated, Hz.
+        stated_hz: f64,
+        /// The strongest frequency of the force, Hz.
+        force_hz: f64,
+        /// The strongest frequency of the relative motion, Hz.
+        motion_hz: f64,
+    },
+    /// No two cycles in a row are alike.
+    #[error(
+        "none of the {cycles} cycles has the amplitude of its neighbour ({low_m:.3e} to {high_m:.3e} m): no steady loop is in this record; record longer, or after the excitation has settled"
+    )]
+    NotSteady {
+        /// Cycles of the record.
+        cycles: usize,
+        /// Smallest amplitude of Δx in a cycle, m.
+        low_m: f64,
+        /// Largest, m.
+        high_m: f64,
+    },
     /// Nothing moves.
     #[error("force or relative motion is constant: there is no loop; check the channels")]
     NoMotion,
@@ -106,5 +130,7 @@ pub enum HysteresisError {
 mod faulty_loops_tests;
 #[cfg(test)]
 mod loop_bench;
+#[cfg(test)]
+mod loops_of_any_size_tests;
 #[cfg(test)]
 mod synthetic_tests;

@@ -2,7 +2,7 @@
 
 use super::cycle::Cycle;
 use super::finding::LoopFinding;
-use super::law_fit::{LawFit, earlier};
+use super::law_fit::{LawFit, earlier, unexplained};
 
 /// A delay below this is left alone, s: channels are never in step to better.
 const LATE_S: f64 = 8e-6;
@@ -30,16 +30,64 @@ pub(super) struct Repair {
     unsure: f64,
 }
 
+/// The delay found must leave less than this part of the squares,
+const EXPLAINS: f64 = 0.25;
+
+/// be at least this part of the cycle (a small one leaves the loop's shape, and is looked for with the dashpot),
+const SHORTEST: f64 = 0.01;
+
+/// and be no longer than this part: beyond it, the force's sign may as well be wrong.
+const LONGEST: f64 = 0.25;
+
+/// What a search for a delay over the whole cycle said.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Delay {
+    /// The loop needs none.
+    None,
+    /// So much explains it, s (and its standard deviation).
+    Found(f64, f64),
+    /// It looks late by so much, s (and its standard deviation), but that does not explain it.
+    NotExplained(f64, f64),
+    /// A dashpot beside the friction explains it about as well as a force that is late by so much, s (early if negative, as for any
+    /// dashpot that takes energy; and its standard deviation).
+    OrDamped(f64, f64),
+}
+
+/// Whether a loop that bends is a friction loop whose force is out of step by so much that its figures are lost.
+pub(super) fn delay(mean: &Cycle, dt_s: f64, play_m: f64) -> Delay {
+    let Some(fit) = LawFit::far(mean, dt_s, play_m) else { return Delay::None };
+    let [left, without_delay, _] = fit.residuals;
+    let [by_s, std_s] = fit.late_s;
+    let explains = |than: f64| left <= EXPLAINS * than && unexplained(than, &mean.force_n);
+    let part = |late_s: f64| late_s.abs() / (dt_s * mean.force_n.len() as f64);
+    if explains(without_delay) && part(by_s) >= SHORTEST {
+        return if unexplained(left, &mean.force_n) || part(by_s) > LONGEST {
+            Delay::NotExplained(by_s, std_s)
+        } else {
+            Delay::Found(by_s, std_s)
+        };
+    }
+    // friction and a dashpot may explain it as well
+    let alone_s = fit.undamped_s;
+    if !explains(fit.friction_alone) || part(alone_s) < SHORTEST || unexplained(left, &mean.force_n) {
+        Delay::None
+    } else {
+        Delay::OrDamped(alone_s, std_s)
+    }
+}
+
 impl Repair {
-    /// What the averaged loop asks for, and what is to be said of it.
-    pub fn of(mean: &Cycle, dt_s: f64) -> (Self, Vec<LoopFinding>) {
-        let (mut repair, mut said) = (Self::default(), Vec::new());
-        let Some(fit) = LawFit::of(mean, dt_s) else { return (repair, said) };
+    /// What the averaged loop of a contact in gross slip asks for, and what is to be said of it. `late_s` was taken out of `mean`
+    /// already; it is part of the delay that is said.
+    pub fn of(mean: &Cycle, dt_s: f64, play_m: f64, late_s: f64) -> (Self, Vec<LoopFinding>) {
+        let (mut repair, mut said) = (Self { late_points: late_s / dt_s, ..Self::default() }, Vec::new());
+        let Some(fit) = LawFit::of(mean, dt_s, play_m) else { return (repair, said) };
         let [left, without_delay, without_dashpot] = fit.residuals;
-        let [by_s, std_s] = fit.late_s;
-        if by_s.abs() > LATE_S.max(SIGNIFICANT * std_s).max(LATE_SAMPLES * dt_s)
-            && without_delay > BETTER * left
-        {
+        let [more_s, std_s] = fit.late_s;
+        let needed = more_s.abs() > LATE_S.max(SIGNIFICANT * std_s).max(LATE_SAMPLES * dt_s)
+            && without_delay > BETTER * left;
+        if needed || late_s != 0.0 {
+            let by_s = late_s + if needed { more_s } else { 0.0 };
             repair.late_points = by_s / dt_s;
             repair.unsure = std_s / by_s.abs();
             said.push(LoopFinding::LateForce { by_s, std_s, at_least: false, corrected: true });
@@ -57,6 +105,12 @@ impl Repair {
             said.push(LoopFinding::Viscous { viscous_n_s_per_m, std_n_s_per_m, force_n });
         }
         (repair, said)
+    }
+
+    /// A delay of the force alone, with its standard deviation.
+    pub fn in_step_by(late_s: f64, std_s: f64, dt_s: f64) -> Self {
+        let unsure = if late_s == 0.0 { 0.0 } else { std_s / late_s.abs() };
+        Self { late_points: late_s / dt_s, unsure, ..Self::default() }
     }
 
     /// Whether there is anything to do.

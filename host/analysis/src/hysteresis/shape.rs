@@ -19,7 +19,8 @@ use serde::Serialize;
 pub enum Shape {
     /// A straight line: the contact sticks, and k_eq is k_T.
     Stuck,
-    /// An ellipse without slip: a resonance hidden between the measured spots. It has no k_T.
+    /// An ellipse, in which no slip is seen: a resonance hidden between the measured spots, damping, or a force out of step. It has no
+    /// k_T.
     Elliptical,
     /// Part of the contact slips.
     Microslip,
@@ -43,6 +44,18 @@ pub struct ShapeEvidence {
     /// What dissipates: friction or a dashpot; none for few cycles.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quadratures: Option<Quadratures>,
+}
+
+impl ShapeEvidence {
+    /// Whether the loop is no ellipse, beyond the noise.
+    pub(super) fn bends(&self) -> bool {
+        self.nonlinearity > NONLINEAR.max(SIGNIFICANT * self.nonlinearity_noise)
+    }
+
+    /// Whether noise could hide slip: the residual is more than instruments bend, and less than what would count.
+    pub(super) fn is_unsure(&self) -> bool {
+        self.nonlinearity > NONLINEAR && !self.bends()
+    }
 }
 
 /// Below this a residual may be the instruments' linearity.
@@ -81,9 +94,8 @@ pub(super) fn shape(
         final_tangent: final_tangent(mean, &strokes, initial),
         quadratures,
     };
-    let bends = evidence.nonlinearity > NONLINEAR.max(SIGNIFICANT * nonlinearity_noise);
     let begins_to_slip = evidence.quadratures.is_some_and(|q| q.slips());
-    let shape = if bends {
+    let shape = if evidence.bends() {
         if evidence.final_tangent < PLATEAU { Shape::GrossSlip } else { Shape::Microslip }
     } else if begins_to_slip {
         Shape::Microslip

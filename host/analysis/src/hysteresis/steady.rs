@@ -5,21 +5,24 @@ use super::cycle::Cycle;
 use super::cycles::{Force, Steady, Summed};
 use super::finding::LoopFinding;
 use super::friction_harmonic::Quadratures;
+use super::harmonics::Harmonics;
 use super::hum;
 use super::loop_analysis::{Kind, LoopAnalysis};
 use super::loops::{
-    OverCycles, energy, equivalent_stiffness, fundamental_stiffness, secant_stiffness, swing,
+    OverCycles, closed_swing, energy, equivalent_stiffness, fundamental_stiffness, secant_stiffness, swing,
 };
-use super::plateau::Plateaus;
+use super::plateau::{Plateaus, Play};
 use super::record::HysteresisRecord;
-use super::repair::Repair;
-use super::shape::{Shape, shape};
+use super::repair::{Delay, Repair, delay};
+use super::shape::{Shape, ShapeEvidence, shape};
 use super::stick::{
     Part, bends, first_part, flank_part, friction_limit, slope_over, strokes, tangent_at_reversal,
 };
-use super::timing::Timing;
+use super::timing::{Timing, runs_at};
+use crate::median::middle;
 use crate::parallel::join;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// A frequency that was read off a record may be off by this part.
 const GUESSED: f64 = 5e-3;
@@ -36,20 +39,129 @@ const REVERSED_SIGNIFICANT: f64 = 4.0;
 /// if the loop's area is no larger than this part of force times displacement.
 const NO_ENERGY: f64 = 0.05;
 
-/// Cycles as they came, and what is to be said of their frequency.
-fn timing(record: &HysteresisRecord, frequency_hz: f64) -> (Timing, Option<LoopFinding>) {
-    let Some(tracked) = Timing::tracked(&record.force_n, record.fs_hz, frequency_hz) else {
-        return (Timing::steady(frequency_hz), None);
+/// Steady cycles may differ in amplitude by this part of their median,
+const ALIKE: f64 = 0.04;
+
+/// in T₁/Δx₁ by this part,
+const ALIKE_RATIO: f64 = 0.1;
+
+/// and by so many times what neighbouring cycles scatter by.
+const SCATTERS: f64 = 12.0;
+
+/// When the cycles of a record begin, and what is to be said of their frequency.
+fn timing(
+    record: &HysteresisRecord,
+    frequency_hz: f64,
+) -> Result<(Timing, Option<LoopFinding>), HysteresisError> {
+    let runs_hz = match record.excitation_hz {
+        // what has no whole cycle at the stated frequency is refused with that frequency
+        Some(stated_hz) => {
+            Steady::new(record, Timing::steady(stated_hz))?;
+            runs_at(record, stated_hz)?
+        }
+        None => frequency_hz,
     };
-    let end_hz = tracked.at(record.force_n.len() as f64 / record.fs_hz);
+    let tracked = Timing::tracked(&record.force_n, record.fs_hz, runs_hz);
+    let other = runs_hz != frequency_hz;
+    if tracked.is_none() && !other {
+        return Ok((Timing::steady(frequency_hz), None));
+    }
+    let timing = tracked.unwrap_or(Timing::steady(runs_hz));
+    let end_hz = timing.at(record.force_n.len() as f64 / record.fs_hz);
     let off = LoopFinding::FrequencyOff {
         stated_hz: record.excitation_hz,
-        from_hz: tracked.start_hz,
+        from_hz: timing.start_hz,
         to_hz: end_hz,
     };
     // a guess from the record's spectrum may be off by a part of a line
-    let drifts = (end_hz / tracked.start_hz - 1.0).abs() > GUESSED;
-    (tracked, (record.excitation_hz.is_some() || drifts).then_some(off))
+    let drifts = (end_hz / timing.start_hz - 1.0).abs() > GUESSED;
+    Ok((timing, (record.excitation_hz.is_some() || drifts).then_some(off)))
+}
+
+/// Amplitude of Δx at the fundamental, m.
+fn amplitude(cycle: &Harmonics) -> f64 {
+    cycle.displacement[0].norm()
+}
+
+/// The longest run of cycles that are alike in amplitude and in T₁/Δx₁: an excitation that grows or decays, and a contact that is
+/// loaded for the first time, have cycles at the beginning or the end that are not.
+fn alike(cycles: &[Harmonics]) -> Range<usize> {
+    let n = cycles.len();
+    let ratio = |h: &Harmonics| h.force[0] / h.displacement[0];
+    let scaled = |of: &dyn Fn(&Harmonics) -> f64, by: f64| -> Vec<f64> {
+        cycles.iter().map(|cycle| of(cycle) / by).collect()
+    };
+    let size = |of: &dyn Fn(&Harmonics) -> f64| middle(&scaled(of, 1.0)).unwrap_or(f64::NAN);
+    let (a, r) = (size(&amplitude), size(&|h| ratio(h).norm()));
+    let series = [scaled(&amplitude, a), scaled(&|h| ratio(h).re, r), scaled(&|h| ratio(h).im, r)];
+    let limits: Vec<f64> = [ALIKE, ALIKE_RATIO, ALIKE_RATIO]
+        .into_iter()
+        .zip(&series)
+        .map(|(least, values)| least.max(SCATTERS * scatter(values)))
+        .collect();
+    let inside = |values: &[f64], limit: f64| -> bool {
+        let (low, high) =
+            values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+        // nothing can be said of a value that is no number
+        high - low <= limit || !(high - low).is_finite()
+    };
+    let all_inside =
+        |range: Range<usize>| series.iter().zip(&limits).all(|(v, limit)| inside(&v[range.clone()], *limit));
+    if all_inside(0..n) {
+        return 0..n;
+    }
+    let mut longest = 0..1;
+    let mut start = 0;
+    for end in 1..=n {
+        while !all_inside(start..end) {
+            start += 1;
+        }
+        if end - start > longest.len() {
+            longest = start..end;
+        }
+    }
+    longest
+}
+
+/// What neighbouring values scatter by (standard deviation), from the lower quartile of their second differences: a steady change
+/// has none, and a beginning that grows has few of them. Nothing for three values or fewer.
+fn scatter(values: &[f64]) -> f64 {
+    let mut changes: Vec<f64> =
+        values.windows(3).map(|v| (v[2] - 2.0 * v[1] + v[0]).abs() / 6f64.sqrt()).collect();
+    changes.sort_by(f64::total_cmp);
+    // a quarter of normally distributed values lies within 0.3186 standard deviations
+    if changes.len() < 2 { 0.0 } else { changes[(changes.len() - 1) / 4] / 0.3186 }
+}
+
+/// The cycles that are alike, and what is to be said of the others.
+fn steady_part<'a>(
+    cycles: Steady<'a>,
+    each: &[Harmonics],
+) -> Result<(Steady<'a>, Option<LoopFinding>), HysteresisError> {
+    let used = alike(each);
+    if used.len() == each.len() {
+        return Ok((cycles, None));
+    }
+    if used.len() < 2 {
+        let (low_m, high_m) = each
+            .iter()
+            .map(amplitude)
+            .fold((f64::INFINITY, 0.0f64), |(low, high), own| (low.min(own), high.max(own)));
+        return Err(HysteresisError::NotSteady { cycles: each.len(), low_m, high_m });
+    }
+    let amplitude_m = each[used.clone()].iter().map(amplitude).sum::<f64>() / used.len() as f64;
+    let others = each[..used.start].iter().chain(&each[used.end..]).map(amplitude);
+    let left_out_amplitude_m = others
+        .max_by(|a, b| (a - amplitude_m).abs().total_cmp(&(b - amplitude_m).abs()))
+        .unwrap_or(amplitude_m);
+    let said = LoopFinding::Unsteady {
+        left_out_first: used.start,
+        left_out_last: each.len() - used.end,
+        used: used.len(),
+        amplitude_m,
+        left_out_amplitude_m,
+    };
+    Ok((cycles.only(used), Some(said)))
 }
 
 /// The force against the motion, in loops that show no plateau: late by at least this.
@@ -75,15 +187,25 @@ pub(super) fn shaker<const N: usize>(
     forces: [Force<'_>; N],
     frequency_hz: f64,
 ) -> Result<[LoopAnalysis; N], HysteresisError> {
-    let (timing, off) = timing(record, frequency_hz);
-    let cycles = Steady::new(record, timing)?;
+    let (timing, off) = timing(record, frequency_hz)?;
+    let mut cycles = Steady::new(record, timing)?;
     let frequency_hz = timing.at(0.5 * record.force_n.len() as f64 / record.fs_hz);
-    let (hum, summed) = join(|| hum::at_the_loop(record, frequency_hz), || cycles.summed(forces));
+    let (hum, mut summed) = join(|| hum::at_the_loop(record, frequency_hz), || cycles.summed(forces));
     let still = |all: &Summed| swing(&all.mean.displacement_m) == 0.0 || swing(&all.mean.force_n) == 0.0;
     if summed.iter().any(still) {
         return Err(HysteresisError::NoMotion);
     }
-    let steady = SteadyRecord { record, cycles, frequency_hz, off, hum };
+    let mut unsteady = None;
+    // all forces share the cycles of the first
+    if let Some(first) = summed.first() {
+        (cycles, unsteady) = steady_part(cycles, &first.harmonics)?;
+    }
+    if unsteady.is_some() {
+        summed = cycles.summed(forces);
+    }
+    let frequency_hz = if unsteady.is_some() { timing.at(cycles.middle_s()) } else { frequency_hz };
+    let said = [off, unsteady, hum].into_iter().flatten().collect();
+    let steady = SteadyRecord { record, cycles, frequency_hz, said };
     let mut forces = forces.into_iter();
     Ok(summed.map(|all| steady.loops(forces.next().flatten(), all)))
 }
@@ -93,58 +215,96 @@ struct SteadyRecord<'a> {
     record: &'a HysteresisRecord,
     cycles: Steady<'a>,
     frequency_hz: f64,
-    off: Option<LoopFinding>,
-    hum: Option<LoopFinding>,
+    /// Findings of the whole record.
+    said: Vec<LoopFinding>,
 }
 
 impl SteadyRecord<'_> {
     fn loops(&self, force: Force<'_>, summed: Summed) -> LoopAnalysis {
-        let Self { record, cycles, frequency_hz, off, hum } = self;
-        let frequency_hz = *frequency_hz;
-        let Summed { mean, mut slopes, mut energies, harmonics, of_mean, scatter } = summed;
-        let mut findings: Vec<LoopFinding> = off.iter().copied().collect();
+        let Self { record, cycles, frequency_hz, said } = self;
+        let (frequency_hz, dt_s) = (*frequency_hz, cycles.dt_s());
+        let mut findings = said.clone();
+        let Summed { mean, slopes, energies, harmonics, of_mean, scatter, .. } = &summed;
+        let (mut slopes, mut energies) = (slopes.clone(), energies.clone());
         let raw = OverCycles::of(&slopes).expect("Steady::new() gives at least one cycle");
-        let quadratures = Quadratures::of(&of_mean, &harmonics);
-        let (shape, evidence) = shape(&mean, &scatter, quadratures);
+        let quadratures = Quadratures::of(of_mean, harmonics);
+        let (mut shape_found, mut evidence) = shape(mean, scatter, quadratures);
         let taken = OverCycles::of(&energies).expect("as many as slopes");
-        let reversed = is_reversed(&raw, &taken, 0.25 * swing(&mean.force_n) * swing(&mean.displacement_m));
+        let product = 0.25 * swing(&mean.force_n) * swing(&mean.displacement_m);
+        let reversed = is_reversed(&raw, &taken, product);
+        let strokes = strokes(mean);
+        let mut play = if evidence.bends() && !reversed { Play::of(mean, &strokes) } else { None };
+        let out_of_step = if evidence.bends() && !reversed {
+            delay(mean, dt_s, play.map_or(0.0, |play| play.size_m))
+        } else {
+            Delay::None
+        };
+        let mut late = [0.0, 0.0];
+        if let Delay::Found(by_s, std_s) = out_of_step {
+            let in_step = Repair::in_step_by(by_s, std_s, dt_s).in_step(mean);
+            let (again, seen) = shape(&in_step, scatter, None);
+            (shape_found, evidence) = (again, ShapeEvidence { quadratures, ..seen });
+            play = Play::of(&in_step, &strokes);
+            late = [by_s, std_s];
+        }
+        let [late_s, late_std_s] = late;
+        let shape = shape_found;
+        let play_m = play.map_or(0.0, |play| play.size_m);
+        let not_put_right = match out_of_step {
+            Delay::NotExplained(by_s, std_s) => Some((by_s, std_s)),
+            // in gross slip the corners tell a dashpot from a delay
+            Delay::OrDamped(by_s, std_s) if shape != Shape::GrossSlip => Some((by_s, std_s)),
+            _ => None,
+        };
         if reversed {
             findings.push(LoopFinding::ReversedForce { k_eq_n_per_m: raw.mean, energy_j: taken.mean });
-        } else if shape != Shape::GrossSlip {
+        } else if let Some((by_s, std_s)) = not_put_right {
+            findings.push(LoopFinding::LateForce { by_s, std_s, at_least: false, corrected: false });
+        } else if shape != Shape::GrossSlip && late_s == 0.0 {
             findings.extend(quadratures.and_then(|q| late_at_least(&q, frequency_hz)));
         }
-        findings.extend(hum.iter().copied());
-        let strokes = strokes(&mean);
+        findings.extend(play.map(|Play { size_m, std_m }| LoopFinding::Play { size_m, std_m }));
         let mut warnings = Vec::new();
-        let repair = if shape == Shape::GrossSlip && !reversed {
-            let (repair, said) = Repair::of(&mean, cycles.dt_s());
+        let usable = !reversed && not_put_right.is_none();
+        let in_step_by = Repair::in_step_by(late_s, late_std_s, dt_s);
+        let repair = if shape == Shape::GrossSlip && usable {
+            let (repair, said) = Repair::of(&in_step_by.in_step(mean), dt_s, play_m, late_s);
             findings.extend(said);
             repair
         } else {
-            Repair::default()
+            if late_s != 0.0 && usable {
+                findings.push(LoopFinding::LateForce {
+                    by_s: late_s,
+                    std_s: late_std_s,
+                    at_least: false,
+                    corrected: true,
+                });
+            }
+            in_step_by
         };
         if repair.is_late() {
-            let both = cycles.each(force, |cycle| {
+            let both = cycles.each(force, &summed, |cycle| {
                 let cycle = repair.in_step(cycle);
                 (equivalent_stiffness(&cycle), energy(&cycle))
             });
             (slopes, energies) = both.into_iter().unzip();
         }
         let k_eq = OverCycles::of(&slopes).expect("as many as there are cycles");
-        let friction = repair.friction(&mean);
+        let friction = repair.friction(mean);
         let stick_part: Option<Part> = match shape {
             Shape::Stuck | Shape::Elliptical => None,
             Shape::Microslip => Some(first_part(&friction, &strokes)),
             Shape::GrossSlip => Some(flank_part(&friction, &strokes)),
         };
         let k_t = match (shape, stick_part) {
-            _ if reversed => None,
+            _ if !usable => None,
             (Shape::Stuck, _) => Some(k_eq),
             (_, None) => {
-                warnings.push(
-                "an ellipse without slip: something between the measured spots resonates near this frequency; its slope is no contact stiffness"
-                    .into(),
-            );
+                warnings.push(if evidence.is_unsure() {
+                    "an ellipse as far as the noise shows: it may hide slip, a resonance between the measured spots, damping, or a force out of step; its slope is no contact stiffness".into()
+                } else {
+                    "an ellipse without slip: something between the measured spots resonates near this frequency, or damps, or the force is out of step, which an ellipse cannot tell apart; its slope is no contact stiffness".into()
+                });
                 None
             }
             (_, Some(part)) => {
@@ -156,9 +316,9 @@ impl SteadyRecord<'_> {
                     }
                 };
                 let values: Vec<Option<f64>> = if repair.is_some() {
-                    cycles.each(force, |cycle| read(&repair.friction(cycle)))
+                    cycles.each(force, &summed, |cycle| read(&repair.friction(cycle)))
                 } else {
-                    cycles.each(force, read)
+                    cycles.each(force, &summed, read)
                 };
                 let values: Vec<f64> = values.into_iter().flatten().collect();
                 if values.len() < slopes.len() {
@@ -168,25 +328,25 @@ impl SteadyRecord<'_> {
                     slopes.len()
                 ));
                 }
-                let before = repair.is_some().then(|| read(&mean)).flatten();
+                let before = repair.is_some().then(|| read(mean)).flatten();
                 OverCycles::of(&values).map(|k| widened(k, before, repair.unsure()))
             }
         };
         let mut friction_limit_n =
-            if shape == Shape::GrossSlip && !reversed { friction_limit(&friction, &strokes) } else { None };
+            if shape == Shape::GrossSlip && usable { friction_limit(&friction, &strokes) } else { None };
         if let (Some(limit), Some(k)) = (friction_limit_n, k_t)
-            && let Some(plateaus) = Plateaus::of(&friction, &strokes, k.mean, limit)
+            && let Some(plateaus) = Plateaus::of(&friction, &strokes, k.mean, limit, play_m)
             && plateaus.is_uneven()
         {
             findings.push(LoopFinding::UnevenLoad { change: plateaus.change, std: plateaus.std });
             friction_limit_n = Some(plateaus.limit_n);
         }
-        let shown = repair.in_step(&mean);
+        let shown = repair.in_step(mean);
         LoopAnalysis {
             kind: Kind::Shaker,
             frequency_hz,
-            amplitude_m: 0.5 * swing(&mean.displacement_m),
-            force_amplitude_n: 0.5 * swing(&mean.force_n),
+            amplitude_m: 0.5 * closed_swing(&mean.displacement_m),
+            force_amplitude_n: 0.5 * closed_swing(&mean.force_n),
             shape,
             shape_evidence: Some(evidence),
             k_t_n_per_m: k_t,
@@ -200,8 +360,8 @@ impl SteadyRecord<'_> {
                 .zip(record.normal_load_n)
                 .map(|(limit, load)| limit / load),
             phase_deg: evidence.phase_deg,
-            loop_displacement_m: mean.displacement_m,
-            loop_force_n: mean.force_n,
+            loop_displacement_m: mean.displacement_m.clone(),
+            loop_force_n: mean.force_n.clone(),
             decay_cycles: Vec::new(),
             findings,
             warnings,

@@ -1,6 +1,10 @@
 //! When the cycles of a steady record begin: at the stated frequency, or as they came.
 
-use super::sums::mean;
+use super::HysteresisError;
+use super::dominant_frequency::{dominant_frequency, level};
+use super::line_sums::line_sum;
+use super::record::{HysteresisRecord, Relative};
+use super::sums::{dot, mean};
 use crate::parallel::prelude::*;
 use num_complex::Complex;
 use std::f64::consts::TAU;
@@ -14,8 +18,29 @@ const SIGNIFICANT: f64 = 8.0;
 /// What the cycles may scatter about a steady drift for that drift to be believed, rad.
 const SCATTER_RAD: f64 = 0.5;
 
-/// Fewer cycles show no drift.
+/// Fewer cycles show no drift: only another frequency than the stated one,
 const FEWEST_CYCLES: usize = 8;
+
+/// and fewer than these not even that.
+const FEWEST_PHASES: usize = 3;
+
+/// The phases are looked at again, about the frequency found, if it is further off than this part: a cycle cut too long or too
+/// short holds a part of its neighbour.
+const FURTHER: f64 = 5e-3;
+
+/// A stated frequency is that of the record if its tone alone has this part of the force's mean square in stretches of so many
+/// cycles. A square wave's fundamental has 0.81 of it.
+const EXPLAINED: f64 = 0.5;
+const STRETCH: f64 = 16.0;
+
+/// The strongest frequency is the stated one if it lies within this part of a line (one over the record's duration) of it.
+const SAME_LINE: f64 = 0.7;
+
+/// In the motion, the other frequency must have so many times the power of the stated one.
+const STRONGER: f64 = 4.0;
+
+/// The stated frequency is in a signal if it has this part of the power of the strongest one.
+const PRESENT: f64 = 0.0625;
 
 /// Frequency over the time of a record, a straight line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,11 +78,27 @@ impl Timing {
 
     /// The timing that the phase of `force` shows, if it is not `frequency_hz` all along.
     pub fn tracked(force: &[f64], fs_hz: f64, frequency_hz: f64) -> Option<Self> {
-        let period = fs_hz / frequency_hz;
-        let cycles = (force.len() as f64 / period).floor() as usize;
-        if cycles < FEWEST_CYCLES {
+        let first = Self::tracked_near(force, fs_hz, frequency_hz)?;
+        let middle_hz = first.at(0.5 * force.len() as f64 / fs_hz);
+        if (middle_hz / frequency_hz - 1.0).abs() < FURTHER {
+            return Some(first);
+        }
+        // none means that the frequency found first is that of the whole record
+        Some(Self::tracked_near(force, fs_hz, middle_hz).unwrap_or(Self::steady(middle_hz)))
+    }
+
+    fn tracked_near(force: &[f64], fs_hz: f64, frequency_hz: f64) -> Option<Self> {
+        if frequency_hz.is_nan() || frequency_hz <= 0.0 {
             return None;
         }
+        let period = fs_hz / frequency_hz;
+        // rounding must not make 7 cycles of 8
+        let cycles = (force.len() as f64 / period + 1e-6).floor() as usize;
+        if cycles < FEWEST_PHASES {
+            return None;
+        }
+        // a drift is a bow of the phase, which a few cycles do not show
+        let terms = if cycles < FEWEST_CYCLES { 2 } else { 3 };
         let turn = TAU / period;
         let tone = |c: usize| {
             let edge = |c: usize| ((c as f64 * period).round() as usize).min(force.len());
@@ -89,19 +130,19 @@ impl Timing {
             let mut norm = [0.0; 3];
             for (c, phase) in phases.iter().enumerate() {
                 let b = basis(c);
-                let rest = phase - (0..3).map(|i| fit[i] * b[i]).sum::<f64>();
-                for i in 0..3 {
+                let rest = phase - (0..terms).map(|i| fit[i] * b[i]).sum::<f64>();
+                for i in 0..terms {
                     left[i] += rest * b[i];
                     norm[i] += b[i] * b[i];
                 }
             }
-            (0..3).for_each(|i| fit[i] += left[i] / norm[i]);
+            (0..terms).for_each(|i| fit[i] += left[i] / norm[i]);
         }
         let rest = |(c, phase): (usize, &f64)| {
             let b = basis(c);
             (phase - (0..3).map(|i| fit[i] * b[i]).sum::<f64>()).powi(2)
         };
-        let scatter = (phases.iter().enumerate().map(rest).sum::<f64>() / (n - 3.0)).sqrt();
+        let scatter = (phases.iter().enumerate().map(rest).sum::<f64>() / (n - terms as f64)).sqrt();
         // from end to end the line rises by twice its slope, the parabola by 1.5 of its factor
         let (line, bow) = (2.0 * fit[1], 1.5 * fit[2]);
         let limit = |over: f64| OFF_RAD.max(SIGNIFICANT * scatter * over / n.sqrt());
@@ -114,6 +155,69 @@ impl Timing {
             [-1.0, 1.0].map(|u| frequency_hz + (fit[1] + 3.0 * fit[2] * u) * 2.0 / time_s / TAU);
         Some(Self { start_hz: from_hz, rate_hz_per_s: (to_hz - from_hz) / time_s })
     }
+}
+
+/// The frequency that a record with a stated one runs at: the stated one, or that of force and motion where both have next to
+/// nothing at the stated one. Differences below a line's width are left to [`Timing::tracked`].
+///
+/// # Errors
+/// Neither force nor motion runs at the stated frequency, and they do not agree.
+pub(super) fn runs_at(record: &HysteresisRecord, stated_hz: f64) -> Result<f64, HysteresisError> {
+    let fs_hz = record.fs_hz;
+    if explained(&record.force_n, fs_hz, stated_hz) > EXPLAINED {
+        return Ok(stated_hz);
+    }
+    let line_hz = fs_hz / record.force_n.len() as f64;
+    let same = |found_hz: f64, other_hz: f64| (found_hz - other_hz).abs() < SAME_LINE * line_hz;
+    let force_hz = dominant_frequency(&level(&record.force_n), fs_hz);
+    let Some(force_hz) = force_hz.filter(|found| !same(*found, stated_hz)) else { return Ok(stated_hz) };
+    let (motion, order) = match record.relative() {
+        Relative::Velocity(v) => (v, 1),
+        Relative::Displacement(x) => (x, 0),
+    };
+    let motion = level(&motion);
+    // of displacement, from velocity too
+    let power = |f: f64| line_power(&motion, f / fs_hz) / f.powi(2 * order);
+    let motion_hz = dominant_frequency(&motion, fs_hz).unwrap_or(force_hz);
+    let [stated, of_force, of_motion] = [stated_hz, force_hz, motion_hz].map(power);
+    if of_force > STRONGER * stated && (of_force >= of_motion || same(force_hz, motion_hz)) {
+        return Ok(force_hz);
+    }
+    let in_force = |f: f64| line_power(&level(&record.force_n), f / fs_hz);
+    if stated >= PRESENT * of_motion || in_force(stated_hz) >= PRESENT * in_force(force_hz) {
+        return Ok(stated_hz);
+    }
+    Err(HysteresisError::OtherFrequency { stated_hz, force_hz, motion_hz })
+}
+
+/// The part of a signal's mean square about its mean that a tone of this frequency has, in stretches of [`STRETCH`] cycles.
+fn explained(x: &[f64], fs_hz: f64, frequency_hz: f64) -> f64 {
+    let period = fs_hz / frequency_hz;
+    let cycles = (x.len() as f64 / period + 1e-6).floor().clamp(1.0, STRETCH);
+    let stretch = ((cycles * period).round() as usize).clamp(1, x.len().max(1));
+    let of = |x: &[f64]| {
+        let n = x.len() as f64;
+        let rest = mean(x);
+        // the mean's own part of the sum goes out, which only counts where the stretch is no whole number of cycles
+        let turn = -TAU / period;
+        let ones = Complex::from_polar(1.0, turn * n) - 1.0;
+        let constant = ones / (Complex::from_polar(1.0, turn) - 1.0) * rest;
+        let tone = 2.0 * (line_sum(x, turn) - constant).norm_sqr() / n;
+        [tone, dot(x, x) - n * rest * rest]
+    };
+    let sums: Vec<[f64; 2]> = x.par_chunks(stretch).filter(|part| part.len() == stretch).map(of).collect();
+    let [tone, all] = sums.iter().fold([0.0, 0.0], |sum, own| [sum[0] + own[0], sum[1] + own[1]]);
+    if all > 0.0 { tone / all } else { 1.0 }
+}
+
+/// |X|² at a frequency (turns per sample), through a Hann window.
+fn line_power(x: &[f64], frequency: f64) -> f64 {
+    let n = x.len() as f64;
+    let at = |turns: f64| line_sum(x, -TAU * turns);
+    // the window is half a constant, less a quarter of one turn each way; it is centred by half a sample
+    let half = Complex::from_polar(1.0, 0.5 * TAU / n);
+    let [below, above] = [frequency - 1.0 / n, frequency + 1.0 / n].map(at);
+    (0.5 * at(frequency) - 0.25 * (half * below + half.conj() * above)).norm_sqr()
 }
 
 /// Into −π…π.

@@ -10,6 +10,7 @@ pub mod line;
 pub(super) mod missing_sentences;
 mod names;
 pub mod number;
+mod record_loops;
 pub mod side_by_side;
 mod summary;
 pub(super) mod warning_sentences;

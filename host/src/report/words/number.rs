@@ -44,6 +44,22 @@ pub fn count(n: u64) -> String {
     text
 }
 
+/// A value with the decimal prefix that leaves 1 to 1000 of it.
+pub fn prefixed(value: f64, unit: &str) -> String {
+    const PREFIXES: [(f64, &str); 7] =
+        [(1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p")];
+    // 999.6 µm is 1.00 mm
+    let size = value.abs() * 1.0005;
+    let (factor, prefix) = PREFIXES.into_iter().find(|(factor, _)| size >= *factor).unwrap_or((1.0, ""));
+    format!("{} {prefix}{unit}", short(value / factor))
+}
+
+/// A length with its scatter, in the prefix of the length.
+pub fn length(mean_m: f64, std_m: f64) -> String {
+    let (factor, unit) = if mean_m.abs() >= 1e-3 { (1e3, "mm") } else { (1e6, "µm") };
+    format!("{} {unit}", with_scatter(factor * mean_m, factor * std_m))
+}
+
 fn places(value: f64, significant: i32) -> usize {
     if value == 0.0 || !value.is_finite() {
         return significant.max(1) as usize - 1;
@@ -69,6 +85,16 @@ pub fn decimals(value: f64, places: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn values_have_the_prefix_that_leaves_few_digits() {
+        assert_eq!(prefixed(2.5e-2, "m"), "25.0 mm");
+        assert_eq!(prefixed(9.999e-4, "m"), "1.00 mm");
+        assert_eq!(prefixed(11_000.0, "N"), "11.0 kN");
+        assert_eq!(prefixed(-1.6e-3, "J"), "−1.60 mJ");
+        assert_eq!(prefixed(0.0, "J"), "0.00 J");
+        assert_eq!(length(3.0e-3, 2e-6), "3.000 ± 0.002 mm");
+    }
 
     #[test]
     fn digits_follow_the_scatter() {

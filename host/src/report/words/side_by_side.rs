@@ -2,6 +2,7 @@
 
 use super::names::{BETWEEN_SPOTS, slope};
 use super::number::{band, count, decimals, short};
+use super::record_loops::slope_name;
 use crate::results::{
     DIRECT, Excitation, Force, HIDDEN_RESONANCE, Hysteresis, MAIN_BAND, OverCycles, Results,
     SERIES_COMPLIANCE, Shape, SideBySide as Kind,
@@ -109,7 +110,7 @@ fn shaker(results: &Results, force: Force) -> Vec<Kind> {
                 own.iter().filter_map(|h| if straight { h.stick_slope() } else { h.k_eq_n_per_m }).collect();
             let Some((mean, std)) = pooled(&slopes) else { continue };
             let levels = if own.len() == 1 { "1 level".into() } else { format!("{} levels", own.len()) };
-            let name = if straight { BETWEEN_SPOTS } else { "k_eq" };
+            let name = if straight { slope_name(&own) } else { "k_eq" };
             kinds.push(Kind {
                 found: format!("{name}, shaker, {} Hz, {levels}", short(f)),
                 mean_n_per_m: mean,

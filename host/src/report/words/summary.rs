@@ -2,8 +2,9 @@
 
 use super::names::{method, slope, static_arm};
 use super::number::{band, count, micro, short, stiffness};
+use super::record_loops::{record_loops, slope_name};
 use super::{answer_sentences, side_by_side};
-use crate::results::{Bootstrap, Excitation, Force, Hysteresis, Joint, MAIN_BAND, Results, Shape};
+use crate::results::{Bootstrap, Excitation, Force, Hysteresis, Joint, MAIN_BAND, RECORD, Results, Shape};
 use crate::substructuring::{Dof, fit};
 
 /// What FBS found between the arms, in one sentence: the recommended estimate, or else the headline's method.
@@ -85,6 +86,7 @@ pub fn shaker_loops(results: &Results) -> Option<String> {
     let rows: Vec<&Hysteresis> =
         results.hysteresis.iter().filter(|h| h.kind == Excitation::Shaker && h.force == Force::Raw).collect();
     let values: Vec<f64> = rows.iter().filter_map(|h| h.stick_slope()).map(|k| micro(k.mean)).collect();
+    let name = slope_name(&rows);
     let ellipses = rows.iter().filter(|h| h.shape == Shape::Elliptical).count();
     let aside = match ellipses {
         0 => String::new(),
@@ -96,11 +98,9 @@ pub fn shaker_loops(results: &Results) -> Option<String> {
         0 if rows.is_empty() => None,
         0 if rows.len() == 1 => Some("The shaker's loop gives no slope between the spots.".into()),
         0 => Some(format!("None of the shaker's {} loops gives a slope between the spots.", rows.len())),
-        1 => {
-            Some(format!("The shaker's loop gives a slope between the spots of {} N/µm{aside}.", short(low)))
-        }
+        1 => Some(format!("The shaker's loop gives a {name} of {} N/µm{aside}.", short(low))),
         n => Some(format!(
-            "The shaker's loops ({n}) give slopes between the spots of {} to {} N/µm{aside}.",
+            "The shaker's loops ({n}) give a {name} of {} to {} N/µm{aside}.",
             short(low),
             short(high)
         )),
@@ -155,6 +155,9 @@ fn joint_line(joint: &Joint) -> Option<String> {
 
 /// The whole summary, line by line, as `demo` and `analyse` print it.
 pub fn summary(results: &Results) -> Vec<String> {
+    if results.source.kind == RECORD {
+        return record_loops(results);
+    }
     let mut lines = answer_sentences::lines(results);
     lines.extend(substructuring(results));
     lines.extend(impact_loops(results));

@@ -1,6 +1,6 @@
 //! What a reader must know before using a number.
 
-use super::number::{decimals, micro, short};
+use super::number::{decimals, length, micro, prefixed, short};
 use crate::analyse::{ImpactLoops, NoFit, SlopeIs};
 use crate::hysteresis::LoopFinding;
 use crate::substructuring::direct::Direct;
@@ -61,6 +61,16 @@ pub fn impact_loops(found: &ImpactLoops) -> Vec<String> {
     warnings
 }
 
+/// A frequency with two decimals, or more below 10 Hz.
+fn hertz(frequency_hz: f64) -> String {
+    decimals(frequency_hz, if frequency_hz < 10.0 { 4 } else { 2 })
+}
+
+/// So many cycles.
+fn cycles(count: usize) -> String {
+    if count == 1 { "1 cycle".into() } else { format!("{count} cycles") }
+}
+
 /// What a loop shows that must not pass in silence.
 pub fn loop_finding(found: &LoopFinding) -> String {
     let micros = |s: f64| short(1e6 * s);
@@ -73,14 +83,32 @@ pub fn loop_finding(found: &LoopFinding) -> String {
             "the loop gives energy instead of taking it: the force comes at least {} µs later than the motion, or something between the spots resonates; check the channels' delays",
             micros(by_s)
         ),
-        LoopFinding::LateForce { by_s, std_s, corrected, .. } => {
-            let way = if by_s < 0.0 { "earlier" } else { "later" };
-            let done =
-                if corrected { "; it was put in step before k_T, friction and energy were read" } else { "" };
+        LoopFinding::LateForce { by_s, std_s, corrected: true, .. } => format!(
+            "the force comes {} ± {} µs {} than the motion; it was put in step before k_T, friction and energy were read; check the channels' delays",
+            micros(by_s.abs()),
+            micros(std_s),
+            if by_s < 0.0 { "earlier" } else { "later" }
+        ),
+        LoopFinding::LateForce { by_s, .. } => format!(
+            "the force is out of step with the motion, as if it came some {} µs {}, but it was not put right: no delay makes a friction loop of this one, or damping beside the friction explains it as well; no k_T or friction limit is given, and energy and k_eq are those of the loop as it is; check the channels' delays",
+            micros(by_s.abs()),
+            if by_s < 0.0 { "earlier" } else { "later" }
+        ),
+        LoopFinding::Play { size_m, std_m } => format!(
+            "the contact has play: after each reversal it moves by {} while the force stays; look for backlash in the drive, the pins or the clamps",
+            length(size_m, std_m)
+        ),
+        LoopFinding::Unsteady { left_out_first, left_out_last, used, amplitude_m, left_out_amplitude_m } => {
+            let place = match (left_out_first, left_out_last) {
+                (first, 0) => format!("the first {}", cycles(first)),
+                (0, last) => format!("the last {}", cycles(last)),
+                (first, last) => format!("the first {} and the last {}", cycles(first), cycles(last)),
+            };
             format!(
-                "the force comes {} ± {} µs {way} than the motion{done}; check the channels' delays",
-                micros(by_s.abs()),
-                micros(std_s)
+                "the record is not steady: {place} differ from the others (amplitude of Δx {} against {}) and were left out; all figures are those of the {} between",
+                prefixed(left_out_amplitude_m, "m"),
+                prefixed(amplitude_m, "m"),
+                cycles(used)
             )
         }
         LoopFinding::Viscous { viscous_n_s_per_m, force_n, .. } => format!(
@@ -100,12 +128,10 @@ pub fn loop_finding(found: &LoopFinding) -> String {
             short(100.0 * std)
         ),
         LoopFinding::FrequencyOff { stated_hz, from_hz, to_hz } => {
-            let stated = stated_hz.map_or(String::new(), |f| format!(", stated {} Hz", decimals(f, 2)));
-            format!(
-                "the excitation runs from {} to {} Hz{stated}: the cycles were cut as they came",
-                decimals(from_hz, 2),
-                decimals(to_hz, 2)
-            )
+            let stated = stated_hz.map_or(String::new(), |f| format!(", not at the stated {} Hz", hertz(f)));
+            let (from, to) = (hertz(from_hz), hertz(to_hz));
+            let at = if from == to { format!("at {from}") } else { format!("from {from} to {to}") };
+            format!("the excitation runs {at} Hz{stated}: the cycles were cut at the frequency found")
         }
         _ => "something else is the matter with this loop: see its findings".into(),
     }
