@@ -264,8 +264,39 @@ fn files_on_other_lines_are_refused() {
     });
     files.refused(&[], &["B is on other frequency lines than A", "300.5 Hz against 300 Hz"]);
     let files = Files::of("frf_rigid");
+    files.change("AJB.npz", |frf| {
+        let beyond = frf.frequency_hz().iter().map(|f| f + 400.0).collect();
+        relabelled(&frf, beyond, frf.outputs().to_vec())
+    });
+    files.refused(&[], &["AJB is on other frequency lines than A"]);
+}
+
+#[test]
+fn files_of_overlapping_bands_are_answered_from_their_common_lines_and_it_is_said() {
+    let asked = ["--method", "inverse", "--idms", "6", "--band", "300:500"];
+    let joint = |files: &Files| {
+        let out = files.identify(&[&asked[..], &["--json"]].concat());
+        assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
+        let found: Value = serde_json::from_slice(&out.stdout).expect("one JSON document");
+        let z = &found["joint"][0]["stiffness_n_per_m"]["z"]["mean"];
+        (z.as_f64().expect("a number"), found["joint"][0]["lines"].clone(), found["missing"].to_string())
+    };
+    let files = Files::of("frf_rigid");
+    let (whole, lines, missing) = joint(&files);
+    assert_eq!((lines, missing.contains("in common")), (Value::from(51), false));
     files.change("AJB.npz", |frf| frf.band(300.0, 500.0));
-    files.refused(&[], &["AJB", "51 lines against 76"]);
+    files.change("A.npz", |frf| {
+        // as six printed digits have it
+        let printed = frf.frequency_hz().iter().map(|f| f * (1.0 + 2e-6)).collect();
+        relabelled(&frf, printed, frf.outputs().to_vec())
+    });
+    let (common, lines, missing) = joint(&files);
+    assert_eq!(lines, 51);
+    assert!(missing.contains("51 lines from 300") && missing.contains("500"), "{missing}");
+    // the data are exact, and so is the method
+    assert!((common / whole - 1.0).abs() < 1e-4, "{common} {whole}");
+    let text = files.identify(&asked);
+    assert!(String::from_utf8_lossy(&text.stdout).contains("that A, B and AJB have in common"));
 }
 
 #[test]

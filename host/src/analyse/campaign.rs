@@ -17,7 +17,7 @@ use crate::structure::Structure;
 use crate::substructuring::averaged::Priors;
 use crate::substructuring::between_arms::{BetweenArms, NoStiffness, between_arms};
 use crate::substructuring::geometry::Grouping;
-use crate::substructuring::{Band, Frf, Geometry, IdmSet, Method, fit, identify};
+use crate::substructuring::{Band, Frf, Geometry, IdmSet, Method, fit, identify, keep_common_lines};
 use std::collections::HashSet;
 
 /// Everything that the measurements say; of what they were measured with, nothing.
@@ -54,7 +54,9 @@ pub fn analyse_measurements<M: Measurements>(
     });
     forget_frfs(&mut cells.averages);
     let frfs = all.each_ref().map(Option::as_ref);
-    let identified = if let [Some(a), Some(b), Some(ajb)] = frfs {
+    let own = on_common_lines(frfs, &mut found.missing);
+    let alike = own.as_ref().map_or(frfs, |own| own.each_ref().map(Some));
+    let identified = if let [Some(a), Some(b), Some(ajb)] = alike {
         substructured([a, b, ajb], geometry)
     } else {
         let absent = Structure::ALL.into_iter().zip(frfs).filter(|(_, frf)| frf.is_none());
@@ -78,7 +80,7 @@ pub fn analyse_measurements<M: Measurements>(
         found.missing.extend(missing);
     }
     let fit = || {
-        let [Some(a), Some(b), Some(ajb)] = frfs else { return Vec::new() };
+        let [Some(a), Some(b), Some(ajb)] = alike else { return Vec::new() };
         let options =
             fit::Options { priors: measurements.contact_priors().positions, ..fit::Options::default() };
         fit_of_the_main_band([a, b, ajb], geometry, &options)
@@ -116,6 +118,19 @@ fn of_configuration(sorted: &[CellAverage], structure: Structure) -> &[CellAvera
         .chunk_by(|a, b| a.name.configuration == b.name.configuration)
         .find(|own| own[0].name.configuration == structure)
         .unwrap_or_default()
+}
+
+/// Copies of all three with the lines that they have in common; none where one is missing, their lines
+/// are the same, or there is no common grid, which [`identify`] then says.
+fn on_common_lines(frfs: [Option<&Frf>; 3], missing: &mut Vec<Missing>) -> Option<[Frf; 3]> {
+    let [Some(a), Some(b), Some(ajb)] = frfs else { return None };
+    if b.frequency_hz() == a.frequency_hz() && ajb.frequency_hz() == a.frequency_hz() {
+        return None;
+    }
+    let mut own = [a, b, ajb].map(Frf::clone);
+    let left_out = keep_common_lines(&mut own).ok()?;
+    missing.extend(left_out.map(Missing::LinesLeftOut));
+    Some(own)
 }
 
 fn substructured(frfs: [&Frf; 3], geometry: &Geometry) -> Result<Substructured, Missing> {

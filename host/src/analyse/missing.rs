@@ -5,7 +5,7 @@ use crate::campaign::plan::level::Level;
 use crate::hysteresis::HysteresisError;
 use crate::structure::Structure;
 use crate::substructuring::averaged::AveragedError;
-use crate::substructuring::{FrfError, IdentifyError};
+use crate::substructuring::{CommonLines, FrfError, IdentifyError};
 
 /// One thing that was done without. Errors that come from files are kept as they were told.
 #[derive(Debug, Clone, PartialEq)]
@@ -98,6 +98,8 @@ pub enum Missing {
     OtherLines(CellName),
     /// Configurations without which there is no substructuring.
     Configurations(Vec<Structure>),
+    /// The three configurations have lines in common, and others that are left out.
+    LinesLeftOut(CommonLines),
     /// The three configurations do not fit together.
     Substructuring(IdentifyError),
     /// No CMIF.

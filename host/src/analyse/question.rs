@@ -7,7 +7,9 @@ use crate::results::{Joint, Results, Source};
 use crate::structure::Structure;
 use crate::substructuring::averaged::{Priors, averaged};
 use crate::substructuring::fit;
-use crate::substructuring::{Band, Dof, Frf, Geometry, IdentifyError, IdmSet, Method, identify};
+use crate::substructuring::{
+    Band, Dof, Frf, Geometry, IdentifyError, IdmSet, Method, identify, keep_common_lines,
+};
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
@@ -63,14 +65,14 @@ pub enum QuestionError {
 }
 
 impl Question {
-    /// What these FRFs of A, B and the assembly say.
+    /// What these FRFs of A, B and the assembly say, on the lines that all three have.
     ///
     /// # Errors
     /// FRFs, geometry and bands do not fit one another. What one method cannot do stands among the findings.
     pub fn answered(
         &self,
         source: Source,
-        [a, b, ajb]: [Frf; 3],
+        mut frfs: [Frf; 3],
         geometry: &Geometry,
     ) -> Result<Findings, QuestionError> {
         let methods: Vec<Method> = if self.methods.is_empty() {
@@ -80,9 +82,12 @@ impl Question {
                 |asked: &Asked| if let Asked::ByLine(method) = asked { Some(*method) } else { None };
             self.methods.iter().filter_map(by_line).collect()
         };
+        let left_out = keep_common_lines(&mut frfs)?;
+        let [a, b, ajb] = frfs;
         let idms = if self.idms.is_empty() { IdmSet::ALL.to_vec() } else { self.idms.clone() };
         let bands = if self.bands.is_empty() { default_bands(&ajb)? } else { self.bands.clone() };
         let mut found = Findings { source, ..Findings::default() };
+        found.missing.extend(left_out.map(Missing::LinesLeftOut));
         if !methods.is_empty() {
             let identified = identify(&a, &b, &ajb, geometry, &methods, &idms, &bands)?;
             let of_frfs = Substructured::of([&a, &b, &ajb], geometry, &self.priors, identified);

@@ -1,7 +1,7 @@
 //! Where each data set begins and ends: by its lines of `-1`, and by byte counts where the data are binary.
 
-use super::lines::{LONGEST_LINE, Lines, Span, Wrong, is_delimiter};
-use super::{set58_header, set58_values};
+use super::lines::{LONGEST_LINE, Lines, Record, Span, Wrong, is_delimiter};
+use super::{Outside, set58_header, set58_values};
 
 /// One data set's bytes.
 pub(super) struct Block<'a> {
@@ -27,12 +27,24 @@ pub(super) struct Unusable {
 pub(super) struct Blocks<'a> {
     bytes: &'a [u8],
     lines: Lines<'a>,
+    /// Text that stood outside the data sets read so far.
+    pub outside: Vec<Outside>,
 }
+
+/// UTF-8's byte order mark, which editors put before the text.
+const MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// Most places of text outside the data sets that are kept: a file with more has lost its lines of `-1` altogether.
+const MOST_OUTSIDE: usize = 100;
 
 impl<'a> Blocks<'a> {
     /// The data sets in these bytes.
     pub fn of(bytes: &'a [u8]) -> Self {
-        Blocks { bytes, lines: Lines::of(Span { bytes, offset: 0 }) }
+        let mut lines = Lines::of(Span { bytes, offset: 0 });
+        if bytes.starts_with(MARK) {
+            lines.jump(MARK.len());
+        }
+        Blocks { bytes, lines, outside: Vec::new() }
     }
 
     /// Where the next one is looked for.
@@ -46,9 +58,19 @@ impl<'a> Iterator for Blocks<'a> {
 
     fn next(&mut self) -> Option<Self::Item> {
         let (bytes, lines) = (self.bytes, &mut self.lines);
+        let mut passed_over = None;
         let (offset, identifier_offset, identifier) = loop {
-            let (offset, line) = lines.next()?;
+            let Some((offset, line)) = lines.next() else {
+                note(&mut self.outside, passed_over);
+                return None;
+            };
             if !is_delimiter(line) {
+                let opened = before_delimiter(line, lines);
+                add(&mut passed_over, offset, opened.map_or(line, |length| &line[..length]));
+                let Some(length) = opened else { continue };
+                if let Some((at, identifier)) = lines.next_unless(is_delimiter) {
+                    break (offset + length, at, identifier);
+                }
                 continue;
             }
             // a second `-1` at once: the first one closed something that had not been opened
@@ -56,6 +78,7 @@ impl<'a> Iterator for Blocks<'a> {
                 break (offset, at, identifier);
             }
         };
+        note(&mut self.outside, passed_over);
         let digits = identifier.iter().skip_while(|b| **b == b' ').take_while(|b| b.is_ascii_digit()).count();
         let blanks = identifier.iter().take_while(|b| **b == b' ').count();
         let number =
@@ -88,6 +111,36 @@ impl<'a> Iterator for Blocks<'a> {
             Err(Unusable { number, wrong: Wrong { offset: bytes.len(), reason } })
         })
     }
+}
+
+/// Counts a line to the text outside the data sets, unless it is blank.
+fn add(passed_over: &mut Option<Outside>, offset: usize, line: &[u8]) {
+    if line.trim_ascii().is_empty() {
+        return;
+    }
+    let text = || Record::of(offset, line).label().chars().take(MOST_SHOWN).collect();
+    let outside = passed_over.get_or_insert_with(|| Outside { offset, text: text(), lines: 0 });
+    outside.lines += 1;
+}
+
+fn note(all: &mut Vec<Outside>, passed_over: Option<Outside>) {
+    all.extend(passed_over.filter(|_| all.len() < MOST_OUTSIDE));
+}
+
+/// Characters of a text outside the data sets that are kept.
+const MOST_SHOWN: usize = 60;
+
+/// Bytes before a `-1` that ends a line of other text, where the next line is the number of a data set: a program wrote its own text
+/// before the file and no end of line behind it.
+fn before_delimiter(line: &[u8], lines: &Lines<'_>) -> Option<usize> {
+    let text = line.trim_ascii_end().strip_suffix(b"    -1")?;
+    let (_, next) = lines.clone().next()?;
+    let number = next.trim_ascii_start();
+    let digits = number.iter().take_while(|b| b.is_ascii_digit()).count();
+    let rest = &number[digits..];
+    let is_number =
+        (1..=6).contains(&digits) && (rest.trim_ascii().is_empty() || set58_header::is_binary(rest));
+    is_number.then_some(text.len())
 }
 
 /// Moves behind the next line of `-1` and gives the offset where that line begins. At the very end of a file, without an end of

@@ -137,3 +137,45 @@ fn what_cannot_be_read_is_named_and_the_rest_is_read() {
     assert!(first.to_string().contains("is no number"), "{first}");
     assert!(second.reason.contains("IEEE"), "{second}");
 }
+
+#[test]
+fn a_byte_order_mark_and_text_outside_the_data_sets_hide_no_function() {
+    for encoded in [text().into_bytes(), binary(ByteOrder::Little)] {
+        let both = [&encoded[..], &encoded].concat();
+        for (before, said) in [
+            ("\u{feff}", None),
+            ("\u{feff}\r\n\r\n", None),
+            ("exported by a front end", Some("exported by a front end")),
+            ("exported by a front end\n", Some("exported by a front end")),
+            ("\u{feff}two lines\r\nof text", Some("two lines")),
+        ] {
+            let read = read(&[before.as_bytes(), &both].concat());
+            assert_eq!(read.functions().count(), 2, "{before:?}");
+            assert!(read.faults.is_empty(), "{before:?}: {:?}", read.faults);
+            let outside: Vec<&str> = read.outside.iter().map(|text| text.text.as_str()).collect();
+            assert_eq!(outside, said.into_iter().collect::<Vec<_>>(), "{before:?}");
+        }
+        let between = read(&[&encoded[..], b"a remark\n\nof two lines\n", &encoded, b"the end"].concat());
+        let place = |at: usize| (between.outside[at].offset, between.outside[at].lines);
+        assert_eq!((place(0), place(1).1), ((encoded.len(), 2), 1));
+        assert_eq!(between.functions().count(), 2);
+    }
+    // a data set whose opening line is lost is told, and the next one is read
+    let lost = text().replacen("    -1\n", "", 1);
+    let read = read(&[lost.as_bytes(), text().as_bytes()].concat());
+    assert_eq!((read.functions().count(), read.outside[0].text.as_str()), (1, "58"));
+}
+
+#[test]
+fn zeros_that_fill_up_the_last_line_are_no_values_and_other_numbers_are_refused() {
+    let last = "  1.500000000000e+00 -2.250000000000e+00  0.000000000000e+00  1.000000000000e-09\n";
+    let fill = |more: &str| text().replacen(last, &format!("{}{more}\n", last.trim_end()), 1);
+    for zeros in ["\n  0.000000000000e+00", "\n0 0 0 0", " 0.0 0.0 0.0", "\n -0.000000000000e+00  0.0"] {
+        assert_ne!(fill(zeros), text());
+        assert_eq!(only(fill(zeros).as_bytes()), small(), "{zeros:?}");
+    }
+    for more in ["\n  1.000000000000e+00", "\n0 0 0 0 0 0", "\n0 nan", "\n0 1"] {
+        let read = read(fill(more).as_bytes());
+        assert!(read.faults[0].reason.contains("or more numbers are there"), "{more:?}: {:?}", read.faults);
+    }
+}

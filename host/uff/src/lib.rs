@@ -38,11 +38,15 @@
 //! # Ok::<(), jointrig_uff::WriteError>(())
 //! ```
 //!
-//! Reading forgives what other programs do: line ends of any kind (also a false one between binary data and the closing `-1`), Latin-1 and
-//! UTF-8 texts, trailing blanks or none, `e`, `E`, `d` and `D` exponents, columns that do not stand where they should, 4- and 8-byte
-//! floats of either byte order, byte counts in 58b headers that are wrong. What cannot be read is a [`Fault`] with the data set, its byte
-//! offset and the reason; all else is still read. No input makes it panic, and memory stays within a small multiple of the input: a file of
-//! more data sets than its size can hold is read in part, which its last fault says. [`read_functions`] passes everything else over.
+//! Reading accepts what other programs write: line ends of any kind (also one too many between
+//! binary data and the closing `-1`), Latin-1 and UTF-8 texts, a byte order mark, text outside the
+//! data sets ([`Contents::outside`] says where), trailing blanks or none, zeros that fill up the last
+//! line of values, `e`, `E`, `d` and `D` exponents, numbers outside their columns, 4- and 8-byte
+//! floats of either byte order, wrong byte counts in the headers of 58b. What cannot be read is a
+//! [`Fault`] with the data set, its byte offset and the reason; everything else is still read. No
+//! input makes it panic, and memory stays within a small multiple of the input: of a file with more
+//! data sets than its size can hold a part is read, which its last fault says. [`read_functions`]
+//! and [`read_only`] pass over all other data sets.
 //!
 //! The structs of the data sets mirror a format that has been fixed for decades, so all their fields are public. The feature `parallel`
 //! (off by default) reads and writes large files on all processors.
@@ -152,6 +156,18 @@ pub struct Skipped {
     pub offset: usize,
 }
 
+/// Text outside the data sets, which is passed over.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Outside {
+    /// Where it begins, in bytes from the start of the file.
+    pub offset: usize,
+    /// The beginning of its first line.
+    pub text: String,
+    /// Its lines, blank ones not counted.
+    pub lines: usize,
+}
+
 /// What a universal file holds.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
@@ -160,8 +176,10 @@ pub struct Contents {
     pub sets: Vec<DataSet>,
     /// Every one that could not.
     pub faults: Vec<Fault>,
-    /// Every one of a type that is not known here.
+    /// Every one of a type that is not known here, or that was not asked for.
     pub skipped: Vec<Skipped>,
+    /// Text before the first data set, between two or after the last.
+    pub outside: Vec<Outside>,
 }
 
 impl Contents {
@@ -188,7 +206,12 @@ pub fn read(bytes: &[u8]) -> Contents {
 
 /// Reads the functions (58 and 58b) alone; every other data set is passed over as one that is not known.
 pub fn read_functions(bytes: &[u8]) -> Contents {
-    read_those(bytes, |number| number == 58)
+    read_only(bytes, &[58])
+}
+
+/// Reads the data sets of these numbers alone (58 stands for 58b too); every other one is passed over as one that is not known.
+pub fn read_only(bytes: &[u8], numbers: &[u32]) -> Contents {
+    read_those(bytes, |number| numbers.contains(&number))
 }
 
 fn read_those(bytes: &[u8], wanted: impl Fn(u32) -> bool + Sync) -> Contents {
@@ -197,6 +220,7 @@ fn read_those(bytes: &[u8], wanted: impl Fn(u32) -> bool + Sync) -> Contents {
     let (mut blocks, mut place) = (blocks::Blocks::of(bytes), 0);
     loop {
         let batch: Vec<_> = blocks.by_ref().take(BATCH).collect();
+        contents.outside.append(&mut blocks.outside);
         if batch.is_empty() {
             return contents;
         }

@@ -68,7 +68,7 @@ impl<'a> Lines<'a> {
         let offset = self.offset();
         let (offset, line) =
             self.next().ok_or_else(|| Wrong { offset, reason: format!("the line of {what} is missing") })?;
-        Ok(Record { offset, text: decode(shortened(line, LONGEST_LINE)) })
+        Ok(Record::of(offset, line))
     }
 }
 
@@ -120,7 +120,12 @@ pub(super) struct Record<'a> {
     text: Cow<'a, str>,
 }
 
-impl Record<'_> {
+impl<'a> Record<'a> {
+    /// A line that begins at this offset of the file.
+    pub fn of(offset: usize, line: &'a [u8]) -> Self {
+        Record { offset, text: decode(shortened(line, LONGEST_LINE)) }
+    }
+
     /// The whole line without blanks around it; `NONE` means nothing.
     pub fn label(&self) -> String {
         unless_none(self.text.trim())

@@ -129,11 +129,16 @@ pub(super) fn read_text(lines: Lines<'_>, shape: &Shape) -> Result<(Abscissa, Va
     Ok((abscissa(shape, found.places), values, Encoding::Ascii))
 }
 
+/// Most zeros that fill up a line: one less than the numbers that a line of the standard holds.
+const MOST_FILL: usize = 5;
+
 /// Numbers in the order of the file, put where they belong: there is never a second copy of all of them.
 struct Numbers<'s> {
     shape: &'s Shape,
     wanted: usize,
     count: usize,
+    /// Zeros behind the last number that is wanted.
+    fill: usize,
     part: usize,
     half: f64,
     places: Vec<f64>,
@@ -149,6 +154,7 @@ impl<'s> Numbers<'s> {
             shape,
             wanted,
             count: 0,
+            fill: 0,
             part: 0,
             half: 0.0,
             places: Vec::with_capacity(room(!shape.even)),
@@ -157,8 +163,12 @@ impl<'s> Numbers<'s> {
         }
     }
 
-    /// Takes the next number; false when there are more than wanted.
+    /// Takes the next number; false when there are more than wanted. Zeros that fill up a last line are none of them.
     fn take(&mut self, number: f64) -> bool {
+        if self.count == self.wanted && number == 0.0 && self.fill < MOST_FILL {
+            self.fill += 1;
+            return true;
+        }
         self.count += 1;
         if self.count > self.wanted {
             return false;

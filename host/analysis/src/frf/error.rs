@@ -105,6 +105,20 @@ pub enum FrfError {
         /// What was given.
         variance: f64,
     },
+    /// A coherence is not between 0 and 1.
+    #[error(
+        "the coherence of the FRF from `{input}` to `{output}` is {coherence} at {frequency_hz} Hz: a coherence is from 0 to 1, NaN where it is not known; estimate it again or leave it out"
+    )]
+    Coherence {
+        /// The row's name.
+        output: String,
+        /// The column's name.
+        input: String,
+        /// The line, Hz.
+        frequency_hz: f64,
+        /// What was given.
+        coherence: f64,
+    },
     /// A line at s = 0 cannot be divided by s.
     #[error("line {line} is at s = 0: a {} has no receptance there; cut the line out", quantity.frf_name())]
     DivisionByZero {

@@ -20,7 +20,7 @@ pub struct Frf {
     inputs: Vec<String>,
     lines: Vec<DMatrix<Complex<f64>>>,
     pub(super) variance: Option<Vec<DMatrix<f64>>>,
-    coherence: Option<Vec<DMatrix<f64>>>,
+    pub(super) coherence: Option<Vec<DMatrix<f64>>>,
 }
 
 impl Frf {
@@ -110,6 +110,21 @@ impl Frf {
     pub fn with_values(&self, lines: Vec<DMatrix<Complex<f64>>>) -> Result<Frf, FrfError> {
         let (outputs, inputs) = (self.outputs.clone(), self.inputs.clone());
         Frf::new(self.frequency_hz.clone(), self.sigma_per_s, self.quantity, outputs, inputs, lines)
+    }
+
+    /// The same under other names, each a name of its own.
+    ///
+    /// # Errors
+    /// [`FrfError::Shape`] for another number of names, [`FrfError::RepeatedName`].
+    pub fn renamed(self, outputs: Vec<String>, inputs: Vec<String>) -> Result<Frf, FrfError> {
+        if (outputs.len(), inputs.len()) != (self.outputs.len(), self.inputs.len()) {
+            let (rows, columns) = (self.outputs.len(), self.inputs.len());
+            let (outputs, inputs) = (outputs.len(), inputs.len());
+            return Err(FrfError::Shape { line: 0, rows, columns, outputs, inputs });
+        }
+        places(&outputs, "outputs")?;
+        places(&inputs, "inputs")?;
+        Ok(Frf { outputs, inputs, ..self })
     }
 
     /// The same with every line's values changed by `change`, which is told the line's index.
@@ -338,6 +353,11 @@ mod tests {
         assert_eq!(z.lines[0][(0, 0)], y.lines[0][(1, 1)]);
         let error = y.select(&["c".into()], &[]).expect_err("no such row");
         assert!(error.to_string().contains("`c`"));
+        let names = |names: [&str; 2]| names.map(String::from).to_vec();
+        let renamed = y.clone().renamed(names(["p", "q"]), names(["u", "v"])).expect("two and two");
+        assert_eq!((renamed.lines(), renamed.outputs()[1].as_str()), (y.lines(), "q"));
+        assert!(y.clone().renamed(names(["p", "p"]), names(["u", "v"])).is_err());
+        assert!(y.renamed(names(["p", "q"]), vec!["u".into()]).is_err());
     }
 
     #[test]

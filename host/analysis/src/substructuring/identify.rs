@@ -12,6 +12,7 @@ use super::reduced::{Reduced, RefusedReason};
 use super::rooms::Rooms;
 use super::solve::{Solution, Solutions};
 use crate::band::Band;
+use crate::frf::common_lines::{self, CommonLines, OtherLines};
 use crate::frf::{Frf, MotionQuantity};
 use crate::parallel::prelude::*;
 use crate::structure::{Abc, Structure};
@@ -296,6 +297,19 @@ fn above_zero(file: &Frf) -> Cow<'_, Frf> {
     }
 }
 
+fn other_lines(file: Structure, apart: OtherLines) -> IdentifyError {
+    IdentifyError::Axes { file, detail: format!("{} Hz against {} Hz", apart.other_hz, apart.one_hz) }
+}
+
+/// Leaves FRFs of A, B and the assembly with the lines that all three have, and says what was left
+/// where that is less than there was: [`identify`] wants the same lines in all three.
+///
+/// # Errors
+/// [`IdentifyError::Axes`] where they are on other lines; nothing is changed then.
+pub fn keep_common_lines(files: &mut [Frf; 3]) -> Result<Option<CommonLines>, IdentifyError> {
+    common_lines::keep_common_lines(files).map_err(|(file, apart)| other_lines(file, apart))
+}
+
 fn check_alike(a: &Frf, b: &Frf, ajb: &Frf) -> Result<(), IdentifyError> {
     for (file, y) in (Abc { a, b, ajb }).each() {
         if y.quantity() != a.quantity() {
@@ -308,12 +322,7 @@ fn check_alike(a: &Frf, b: &Frf, ajb: &Frf) -> Result<(), IdentifyError> {
             let detail = format!("{} lines against {}", y.frequency_hz().len(), a.frequency_hz().len());
             return Err(IdentifyError::Axes { file, detail });
         }
-        // A text format may have rounded the axis to seven digits.
-        let differs =
-            y.frequency_hz().iter().zip(a.frequency_hz()).find(|(f, g)| (*f - *g).abs() > 1e-6 * *g);
-        if let Some((f, g)) = differs {
-            return Err(IdentifyError::Axes { file, detail: format!("{f} Hz against {g} Hz") });
-        }
+        common_lines::same(a.frequency_hz(), y.frequency_hz()).map_err(|apart| other_lines(file, apart))?;
     }
     Ok(())
 }

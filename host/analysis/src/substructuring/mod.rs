@@ -53,10 +53,13 @@ pub mod vpt;
 mod with_care;
 
 pub use crate::band::Band;
+pub use crate::frf::common_lines::CommonLines;
 pub use crate::frf::{Frf, FrfError, MotionQuantity};
 pub use crate::structure::{Abc, Structure};
 pub use geometry::{Configuration, Geometry, Grouping, Point};
-pub use identify::{Decoupled, Identification, IdentifyError, Refused, decouple, identify, line_noise};
+pub use identify::{
+    Decoupled, Identification, IdentifyError, Refused, decouple, identify, keep_common_lines, line_noise,
+};
 pub use idm::{Dof, IdmSet};
 pub use joint_over_bands::{BandStatistic, JointRow, JointSpectrum};
 pub use method::Method;

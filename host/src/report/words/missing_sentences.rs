@@ -1,6 +1,7 @@
 //! What an analysis had to do without, in sentences.
 
 use crate::analyse::{CellName, Missing};
+use crate::results::rounded;
 use crate::structure::Structure;
 
 /// One sentence.
@@ -44,6 +45,10 @@ pub fn sentence(missing: &Missing) -> String {
             let names: Vec<&str> = absent.iter().map(|structure| structure.name()).collect();
             format!("Substructuring needs A, B and AJB; missing: {}.", names.join(", "))
         }
+        Missing::LinesLeftOut(left) => format!(
+            "Only the {} lines from {} to {} Hz that A, B and AJB have in common are used: A has {} lines, B {}, AJB {}.",
+            left.lines, rounded(left.low_hz, 7), rounded(left.high_hz, 7), left.of.a, left.of.b, left.of.ajb
+        ),
         Missing::Substructuring(error) => format!("Substructuring was not possible: {error}."),
         Missing::Cmif(error) => format!("No CMIF: {error}."),
         Missing::Bootstrap(error) => format!("No bootstrap over hits: {error}."),
