@@ -29,7 +29,6 @@ use jointrig::device::session::Session;
 use jointrig::device::transport::Transport;
 use jointrig_logs::example::{WARNING, image, line};
 use jointrig_logs::file_name;
-use jointrig_protocol::shot::{Phase, Shot};
 
 pub fn plan() -> String {
     SMALL
@@ -238,80 +237,6 @@ fn a_vanished_device_is_an_error_that_loses_nothing() {
     let summary = run_on(&path, Fake::default(), &options(), &mut ByShotSummary).expect("runs");
     assert_eq!(summary.kept, 14);
     assert!(content(&path)[..before.len()] == before[..]);
-}
-
-fn cancelled(number: u32) -> Shot {
-    Shot {
-        number,
-        phase: Phase::Cancelled,
-        fired_at: 0,
-        trigger: 0,
-        pulse_us: 0,
-        peak_n: 0.0,
-        width_us: 0.0,
-        rebound_ratio: 0.0,
-        rebound_after: 0,
-        friction_peak_n: 0.0,
-        quiet_ratio: 0.0,
-    }
-}
-
-#[test]
-fn shots_and_events_of_an_earlier_host_are_not_taken_for_own_ones() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let clean = create(&folder, "clean.jrig", &plan());
-    let own = Fake::default();
-    let orders = own.orders.clone();
-    run_on(&clean, own, &options(), &mut ByShotSummary).expect("runs");
-    // a host was killed while its shot 37 waited; the device has cancelled it, and says so to whoever comes
-    for (last_shot, number) in [(0, 1), (37, 38)] {
-        let path = create(&folder, &format!("{last_shot}.jrig"), &plan());
-        let fake = Fake::scripted(|fake| {
-            fake.last_shot = last_shot;
-            fake.stale = Some(cancelled(number));
-        });
-        let again = fake.orders.clone();
-        let summary = run_on(&path, fake, &options(), &mut ByShotSummary).expect("runs");
-        assert_eq!(summary.kept, 14);
-        assert_eq!(again.load(Ordering::Relaxed), orders.load(Ordering::Relaxed), "no shot more or less");
-        assert!(content(&path) == content(&clean), "no hit lost, none repeated");
-    }
-}
-
-/// Judges a record with missing samples by what is left of it: nothing.
-struct WithoutPeak;
-
-impl Judge for WithoutPeak {
-    fn judge(
-        &mut self,
-        cell: &Cell,
-        plan: &Plan,
-        channels: &ChannelMap,
-        recording: &Recording,
-        others: &Others,
-    ) -> Verdict {
-        let verdict = ByShotSummary.judge(cell, plan, channels, recording, others);
-        let peak_n = if verdict.kind == Kind::Gap { 0.0 } else { verdict.peak_n };
-        Verdict { peak_n, ..verdict }
-    }
-}
-
-#[test]
-fn a_record_that_the_link_spoilt_does_not_make_the_next_hit_harder() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let clean = create(&folder, "clean.jrig", &plan());
-    run_on(&clean, Fake::default(), &options(), &mut WithoutPeak).expect("runs");
-    let clean = rows(&Store::open_read_only(&clean).expect("opens"));
-    let spoilt = clean.len() - 3;
-    let lost = clean[spoilt].first_scan + 960;
-    let path = create(&folder, "lost.jrig", &plan());
-    let fake = Fake::scripted(|fake| fake.drops = lost..lost + 480);
-    run_on(&path, fake, &options(), &mut WithoutPeak).expect("runs");
-    let after = rows(&Store::open_read_only(&path).expect("opens"));
-    assert_eq!(after[spoilt].verdict, Kind::Gap);
-    for row in &after[spoilt..] {
-        assert_eq!(row.shot.pulse_us, clean[spoilt].shot.pulse_us, "{:?}", row.place());
-    }
 }
 
 #[test]

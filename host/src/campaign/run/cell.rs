@@ -201,7 +201,6 @@ impl Runner<'_> {
     /// Brings hammer and laser to a cell. The acknowledgement is held meanwhile, so that the first shot is at a
     /// fixed distance from the scan at which they are in place.
     fn go(&mut self, row: &CellRow, attempt: u32) -> Result<Moved, RunError> {
-        self.announce()?;
         let by_hand = !matches!(self.stage, Stage::Device | Stage::Auto);
         let (standing, left) = (self.standing(row), self.left(row));
         self.saw(&Seen::Moving { row, standing, by_hand, left });

@@ -34,7 +34,7 @@ use crate::campaign::store::simulated::is_simulated_board;
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::judge::Judge;
 use crate::campaign::verdict::{Kind, Verdict};
-use crate::campaign::watch::{Left, Seen, Watchers};
+use crate::campaign::watch::{Seen, Watchers};
 use crate::device::channels::ChannelMap;
 use crate::device::recording::Recording;
 use crate::device::session::Session;
@@ -138,7 +138,7 @@ pub fn run(
         None => true,
     });
     let mut forces = Forces::new(plan.force.get_ref(), info.coil_cap_us);
-    for record in records.iter().flatten().filter(|record| teaches_force(record.verdict)) {
+    for record in records.iter().flatten() {
         forces.learn(Hit { pulse_us: record.shot.pulse_us, peak_n: record.peak_n });
     }
     session.set_load_cells([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])?;
@@ -166,8 +166,6 @@ pub fn run(
         tally,
         reopened: BTreeSet::new(),
         hits: 0,
-        simulated,
-        stored: None,
     };
     let walked = runner.walk();
     runner.end(walked)
@@ -198,25 +196,6 @@ pub(super) struct Runner<'a> {
     /// Cells that lost a good hit to a person in this run.
     reopened: BTreeSet<i64>,
     pub(super) hits: u64,
-    /// Whether the rig is simulated: it strikes many times a second, and storing goes on meanwhile.
-    simulated: bool,
-    /// The last hit, which is handed over to the keeper and not announced yet.
-    stored: Option<Stored>,
-}
-
-/// A hit that is announced when it is in the file.
-struct Stored {
-    row: CellRow,
-    verdict: Verdict,
-    kept: u64,
-    left: Left,
-    accounts: Accounts,
-}
-
-/// Whether a record tells what a pulse of the coil does. One with missing samples does not: its peak may be among
-/// them, and a pulse must not grow because the link lost something.
-fn teaches_force(verdict: Kind) -> bool {
-    verdict != Kind::Gap
 }
 
 /// Where to go after a cell.
@@ -286,7 +265,6 @@ impl Runner<'_> {
         let asked = Instant::now();
         let next_scan = self.session.status()?.next_scan;
         self.clock.mark(next_scan, asked, Instant::now());
-        self.shooter.clock_is_at(next_scan);
         Ok(())
     }
 
@@ -302,14 +280,13 @@ impl Runner<'_> {
         }
         self.hits += 1;
         let shot = recording.shot;
-        if self.plan.by_hand().is_none() && teaches_force(verdict.kind) {
+        if self.plan.by_hand().is_none() {
             self.forces.learn(Hit { pulse_us: shot.pulse_us, peak_n: verdict.peak_n });
         }
-        self.announce()?;
         let attempt = self.tally.add(row.id, verdict.kind == Kind::Good);
         let (kept, left) = (self.tally.kept(), self.left(row));
-        let accounts = self.session.accounts();
-        self.stored = Some(Stored { row: row.clone(), verdict: verdict.clone(), kept, left, accounts });
+        self.saw(&Seen::Judged { row, verdict: &verdict, kept, left });
+        self.saw(&Seen::Link(self.session.accounts()));
         log::debug!("{:?} attempt {attempt}: {} ({})", row.cell, verdict.kind, verdict.sentence);
         if self.plan.by_hand().is_some() && self.plan.sync.is_some() {
             // the device does not know of this hit, and another recorder is to
@@ -327,18 +304,7 @@ impl Runner<'_> {
             recording,
             verdict,
         };
-        still(self.keeper.record(record, counters(self.session)))?;
-        // a rig takes seconds for the next hit: waiting for the disk costs nothing
-        if self.simulated { Ok(()) } else { self.announce() }
-    }
-
-    /// Announces the last hit as kept or refused, once it is in the file: what was announced is never lost.
-    pub(super) fn announce(&mut self) -> Result<(), RunError> {
-        let Some(Stored { row, verdict, kept, left, accounts }) = self.stored.take() else { return Ok(()) };
-        still(self.keeper.catch_up())?;
-        self.saw(&Seen::Judged { row: &row, verdict: &verdict, kept, left });
-        self.saw(&Seen::Link(accounts));
-        Ok(())
+        still(self.keeper.record(record, counters(self.session)))
     }
 
     /// Keeps the specimen's temperature, where the device measures it.
@@ -366,8 +332,6 @@ impl Runner<'_> {
 
     /// Ends stream and file; of two errors the first one counts.
     fn end(mut self, walked: Result<(), RunError>) -> Result<Summary, RunError> {
-        let announced = self.announce();
-        let walked = walked.and(announced);
         self.saw(&Seen::Ended);
         let walked = walked.and_then(|()| if self.hits > 0 { self.keep_temperature() } else { Ok(()) });
         let accounts = if walked.is_ok() {
