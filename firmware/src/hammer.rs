@@ -151,10 +151,10 @@ impl Hammer {
         self.shot
     }
 
-    /// Forgets the last shot: a new session. The number of the last shot stays, so that no number comes twice
-    /// between two starts of the device, and nothing said of an old shot can be taken for a new one's.
+    /// Forgets shots and numbers: a new session.
     pub fn forget(&mut self) {
         self.shot = None;
+        self.last_number = 0;
     }
 
     /// How the pulse is recognised.

@@ -5,13 +5,8 @@
 
 #![expect(clippy::inline_always, reason = "built for size, each would be a call or three for every block")]
 
-use heapless::Deque;
 use jointrig_protocol::block::{GAP, Header};
-use jointrig_protocol::event::Loss;
 use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
-
-/// Ranges of lost scans that wait to be reported.
-const LOSSES: usize = 4;
 
 /// One block in the ring; the samples first, so that they are aligned and copied by words.
 #[derive(Clone, Copy)]
@@ -58,8 +53,7 @@ pub struct Ring<'a> {
     tail_place: usize,
     /// Sequence number of the next block to send.
     cursor: u64,
-    /// Losses that have not been reported yet, the oldest first.
-    unreported: Deque<(Range, Loss), LOSSES>,
+    unreported: Option<Range>,
     /// Whether the next block to be sent follows a loss.
     gap: bool,
 }
@@ -75,7 +69,7 @@ impl<'a> Ring<'a> {
             tail: 0,
             tail_place: 0,
             cursor: 0,
-            unreported: Deque::new(),
+            unreported: None,
             gap: false,
         }
     }
@@ -85,7 +79,7 @@ impl<'a> Ring<'a> {
         self.epoch = epoch;
         (self.tail, self.tail_place) = (self.head, self.place(self.head));
         self.cursor = self.head;
-        self.unreported.clear();
+        self.unreported = None;
         self.gap = false;
     }
 
@@ -126,7 +120,7 @@ impl<'a> Ring<'a> {
             if self.cursor == self.tail {
                 self.cursor += 1;
                 dropped = range.scans;
-                self.report(range, Loss::LinkSlow);
+                self.report(range);
             }
             (self.tail, self.tail_place) = (self.tail + 1, self.place(self.tail + 1));
         }
@@ -140,31 +134,27 @@ impl<'a> Ring<'a> {
         dropped
     }
 
-    /// Notes a loss that the host must be told; adjoining ranges become one. When more ranges wait than there
-    /// is memory for, the newest one grows over what was delivered between two losses: better a scan too
-    /// many reported as lost than a lost one not reported.
-    pub fn report(&mut self, range: Range, why: Loss) {
+    /// Notes a loss that the host must hear of; adjoining ranges become one.
+    pub fn report(&mut self, range: Range) {
         self.gap = true;
-        let full = self.unreported.is_full();
-        match self.unreported.back_mut() {
-            Some((known, reason))
-                if full || *reason == why && known.first_scan + known.scans == range.first_scan =>
-            {
-                known.scans = range.first_scan + range.scans - known.first_scan;
+        self.unreported = Some(match self.unreported {
+            Some(known) if known.first_scan + known.scans == range.first_scan => {
+                Range { first_scan: known.first_scan, scans: known.scans + range.scans }
             }
-            // there is room
-            _ => drop(self.unreported.push_back((range, why))),
-        }
+            // a hole between two losses was delivered: widening over it would be untrue, so the older one
+            // must have been taken by then; `take_loss` runs before every block that is sent
+            _ => range,
+        });
     }
 
-    /// Takes the oldest loss that has not been reported yet.
-    pub fn take_loss(&mut self) -> Option<(Range, Loss)> {
-        self.unreported.pop_front()
+    /// Takes the loss that has not been reported yet.
+    pub fn take_loss(&mut self) -> Option<Range> {
+        self.unreported.take()
     }
 
     /// Whether a loss waits to be reported.
     pub fn has_loss(&self) -> bool {
-        !self.unreported.is_empty()
+        self.unreported.is_some()
     }
 
     /// Blocks that have not been sent.

@@ -9,7 +9,7 @@ use embassy_time::Instant;
 use heapless::{Deque, String};
 use jointrig_protocol::answer::{self, Counters, Info, Refusal, Reset};
 use jointrig_protocol::channel::{Channel, Name, Role};
-use jointrig_protocol::event::{self, Event, Reason};
+use jointrig_protocol::event::{self, Event, Loss, Reason};
 use jointrig_protocol::limits;
 use jointrig_protocol::shot::Phase;
 use jointrig_protocol::slow::Slow;
@@ -226,61 +226,12 @@ impl<'a, M: RawMutex> Core<'a, M> {
 }
 
 impl State<'_> {
-    /// Queues an event. When the queue is full, the oldest event of less weight makes room for it, or an older
-    /// state of the same input; without one the new event is dropped. What is dropped is counted.
+    /// Queues an event; when the queue is full the new one is dropped and counted.
     pub fn say(&mut self, event: Event) {
-        if self.events.is_full() {
-            self.counters.events_dropped += 1;
-            let Some(place) = self.place_to_free(&event) else {
-                // its number is used up, so that the host sees that an event is missing
-                self.next_event = self.next_event.wrapping_add(1);
-                return;
-            };
-            self.remove_event(place);
-        }
         let numbered = event::Numbered { number: self.next_event, at_scan: self.next_scan, event };
         self.next_event = self.next_event.wrapping_add(1);
-        // there is room by now
-        let _ = self.events.push_back(numbered);
-    }
-
-    /// The event of a full queue that `event` is more important than.
-    fn place_to_free(&self, event: &Event) -> Option<usize> {
-        let lighter = self.events.iter().position(|queued| weight(&queued.event) < weight(event));
-        lighter.or_else(|| match event {
-            Event::Interlock(_) => {
-                self.events.iter().position(|queued| matches!(queued.event, Event::Interlock(_)))
-            }
-            Event::EmergencyStop(_) => {
-                self.events.iter().position(|queued| matches!(queued.event, Event::EmergencyStop(_)))
-            }
-            _ => None,
-        })
-    }
-
-    /// Takes the queued event at `place` out; the others keep their order.
-    fn remove_event(&mut self, place: usize) {
-        for at in 0..self.events.len() {
-            if let Some(event) = self.events.pop_front()
-                && at != place
-            {
-                // one was taken out just now
-                let _ = self.events.push_back(event);
-            }
-        }
-    }
-
-    /// Drops the events that only concern the session that ends: a new host must not take them for its own. What
-    /// the board itself reports (faults, panics, guard, emergency stop) waits for the next host.
-    pub fn forget_events_of_session(&mut self) {
-        for _ in 0..self.events.len() {
-            if let Some(event) = self.events.pop_front()
-                && weight(&event.event) == Weight::Board
-                && !matches!(event.event, Event::Lost { .. } | Event::Clock(_))
-            {
-                // one was taken out just now
-                let _ = self.events.push_back(event);
-            }
+        if self.events.push_back(numbered).is_err() {
+            self.counters.events_dropped += 1;
         }
     }
 
@@ -401,48 +352,13 @@ impl State<'_> {
         self.friction_n
     }
 
-    /// Queues the reports of scans that were lost, as far as the queue has room for them: the others stay in the
-    /// ring and are reported later.
-    pub fn report_losses(&mut self) {
-        let room = |state: &Self| {
-            !state.events.is_full() || state.events.iter().any(|queued| weight(&queued.event) < Weight::Board)
-        };
-        while room(self)
-            && let Some((range, why)) = self.ring.take_loss()
-        {
+    /// Queues the report of scans that were lost, if any.
+    pub fn report_loss(&mut self, why: Loss) {
+        if let Some(range) = self.ring.take_loss() {
             let scans = u32::try_from(range.scans).unwrap_or(u32::MAX);
             warning!("{} scans from {} were lost", scans, range.first_scan);
             self.say(Event::Lost { epoch: self.epoch, first_scan: range.first_scan, scans, why });
         }
-    }
-}
-
-/// What an event gives way to when the queue is full.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Weight {
-    /// Comes again by itself.
-    Periodic,
-    /// What came of an order; the status tells the same.
-    Order,
-    /// Lost scans, safety inputs and faults.
-    Board,
-}
-
-fn weight(event: &Event) -> Weight {
-    match event {
-        Event::Counters(_) | Event::Edge(_) => Weight::Periodic,
-        Event::Armed
-        | Event::Disarmed(_)
-        | Event::Shot(_)
-        | Event::ShakerRuns
-        | Event::ShakerStops(_)
-        | Event::ShakerRests => Weight::Order,
-        Event::Lost { .. }
-        | Event::EmergencyStop(_)
-        | Event::Interlock(_)
-        | Event::Fault(_)
-        | Event::Panic(_)
-        | Event::Clock(_) => Weight::Board,
     }
 }
 

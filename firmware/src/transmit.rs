@@ -6,6 +6,7 @@
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use jointrig_protocol::block::{HEADER_PAYLOAD, RESENT};
+use jointrig_protocol::event::Loss;
 use jointrig_protocol::frame::{Kind, Writer};
 use jointrig_protocol::hello::Hello;
 
@@ -115,7 +116,7 @@ impl State<'_> {
             }
         }
         if self.ring.has_loss() {
-            self.report_losses();
+            self.report_loss(Loss::LinkSlow);
         }
         while let Some(event) = self.events.pop_front() {
             writer.restart(Kind::Event);

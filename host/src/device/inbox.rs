@@ -50,8 +50,6 @@ pub struct Inbox {
     /// Events that were lost on the way, from the jumps of their numbers.
     pub events_lost: u64,
     next_event: Option<u32>,
-    /// The session of the last introduction.
-    greeted: Option<u32>,
     /// Numbers of the newest edges of the input and of the output.
     edge_numbers: [Option<u32>; 2],
     /// Sample blocks of another stream, or unreadable ones.
@@ -95,26 +93,10 @@ impl Inbox {
                 Ok(event) => self.take_event(event),
                 Err(error) => log::warn!("an event that cannot be read was dropped: {error}"),
             },
-            Kind::Hello => {
-                let hello = Hello::from_bytes(frame.payload);
-                if let Ok(hello) = &hello
-                    && self.greeted.replace(hello.session) != Some(hello.session)
-                {
-                    self.forget_events();
-                }
-                self.hello = Some(hello);
-            }
+            Kind::Hello => self.hello = Some(Hello::from_bytes(frame.payload)),
             Kind::Log => self.log.take(frame.payload),
             Kind::Request | Kind::Acknowledge => log::debug!("a frame that only a host sends was ignored"),
         }
-    }
-
-    /// What was said before a session began concerns an earlier one.
-    fn forget_events(&mut self) {
-        self.answers.clear();
-        self.events.clear();
-        self.edges.clear();
-        (self.shot, self.counters, self.clock_fault) = (None, None, None);
     }
 
     fn take_answer(&mut self, answer: answer::Numbered) {
@@ -243,50 +225,5 @@ fn rank(phase: Phase) -> u8 {
         Phase::Firing => 1,
         Phase::Listening => 2,
         Phase::Done | Phase::Missed | Phase::NotQuiet | Phase::Cancelled => 3,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_was_said_before_a_session_began_is_forgotten() {
-        let mut inbox = Inbox::default();
-        let mut number = 0;
-        let mut say = |inbox: &mut Inbox, event| {
-            let numbered = event::Numbered { number, at_scan: 0, event };
-            number += 1;
-            let mut payload = [0; 256];
-            let length = numbered.write(&mut payload).expect("fits");
-            inbox.take(Frame { kind: Kind::Event, payload: &payload[..length] });
-        };
-        let shot = |number| {
-            Event::Shot(Shot {
-                number,
-                phase: Phase::Cancelled,
-                fired_at: 0,
-                trigger: 0,
-                pulse_us: 0,
-                peak_n: 0.0,
-                width_us: 0.0,
-                rebound_ratio: 0.0,
-                rebound_after: 0,
-                friction_peak_n: 0.0,
-                quiet_ratio: 0.0,
-            })
-        };
-        let hello = |inbox: &mut Inbox, session| {
-            let payload = Hello::device(session, 1, 10_000).to_bytes();
-            inbox.take(Frame { kind: Kind::Hello, payload: &payload });
-        };
-        say(&mut inbox, shot(1));
-        say(&mut inbox, Event::Armed);
-        hello(&mut inbox, 7);
-        assert!(inbox.shot.is_none() && inbox.events.is_empty());
-        say(&mut inbox, shot(2));
-        // the answer to a hello that was sent twice
-        hello(&mut inbox, 7);
-        assert_eq!(inbox.shot.map(|shot| shot.number), Some(2));
     }
 }

@@ -65,10 +65,6 @@ pub struct Fake {
     pub loses: Option<Range<u64>>,
     /// It waits so long before each block, and sends one at a time.
     pub slow: Option<Duration>,
-    /// The number of the last shot that an earlier host ordered.
-    pub last_shot: u32,
-    /// An event of an earlier host's session that is still on its way when the next host says hello.
-    pub stale: Option<Shot>,
     /// Shots that it was ordered, whatever became of them.
     pub orders: Arc<AtomicU32>,
     accumulator: Accumulator,
@@ -95,8 +91,6 @@ impl Default for Fake {
     fn default() -> Self {
         Self {
             drops: 0..0,
-            last_shot: 0,
-            stale: None,
             reach_us: 1_000,
             newtons_per_us: 0.025,
             coil_cap_us: 8_000,
@@ -150,9 +144,6 @@ impl Fake {
                     self.last_number = 0;
                 }
                 self.hello.session = theirs.session;
-                if let Some(shot) = self.stale.take() {
-                    self.event(Event::Shot(shot));
-                }
                 let bytes = self.hello.to_bytes();
                 self.send(Kind::Hello, &bytes);
             }
@@ -304,12 +295,8 @@ impl Fake {
                 if !self.armed {
                     return Err(Refusal::NotArmed);
                 }
-                if fire.number <= self.last_shot {
-                    return Err(Refusal::ShotRepeated { last: self.last_shot });
-                }
                 assert!(fire.not_before >= self.next_scan, "the device has passed not_before");
                 let number = fire.number;
-                self.last_shot = number;
                 self.orders.fetch_add(1, Ordering::Relaxed);
                 self.shot = Some(shot(&fire, Phase::Waiting));
                 self.fire = Some(fire);

@@ -8,7 +8,6 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::limits::ARM_VALID_CAP_MS;
 use jointrig_protocol::request::{Fire, Trigger};
 use jointrig_protocol::shot::{Phase, Shot};
@@ -70,8 +69,6 @@ pub struct Shooter {
     patience: u64,
     pub(super) number: u32,
     pub(super) ready_at: u64,
-    /// The device's next scan when it was asked last.
-    now: u64,
 }
 
 impl Shooter {
@@ -103,7 +100,6 @@ impl Shooter {
             patience: u64::from(scans(settle.bound_s)),
             number: 0,
             ready_at: 0,
-            now: 0,
         })
     }
 
@@ -111,12 +107,6 @@ impl Shooter {
     /// that was asked: the next shot may begin at a fixed distance from it.
     pub fn staged(&mut self, at_scan: u64) {
         self.ready_at = at_scan + self.ring / 2 + MARGIN;
-    }
-
-    /// The device's next scan is at least `next_scan`. After a stall of the host it is far beyond the scan from
-    /// which the next shot may begin.
-    pub(super) fn clock_is_at(&mut self, next_scan: u64) {
-        self.now = self.now.max(next_scan);
     }
 
     /// Fires once and waits for what comes of it. The acknowledgement is held when this returns.
@@ -132,37 +122,20 @@ impl Shooter {
         watch: &Watchers,
     ) -> Result<Outcome, DeviceError> {
         self.number += 1;
-        // what a virtual board has reached is always before `ready_at`
-        let not_before = self.ready_at.max(self.now);
+        let not_before = self.ready_at;
         let last = not_before + self.patience + self.flight(pulse_us);
         // arming outlives everything that the shot may wait for, and not more
-        let wait = (last + self.ring).saturating_sub(session.expected()?);
+        let wait = last + self.ring - session.expected()?;
         let valid_ms = (wait as f64 / self.rate_hz * 1000.0) as u32 + 1_000;
         session.arm(valid_ms.min(ARM_VALID_CAP_MS))?;
-        let order = Fire {
+        session.fire(Fire {
             number: self.number,
             pulse_us,
             not_before,
             quiet_limits: quiet.iter().copied().take(jointrig_protocol::limits::MAX_CHANNELS).collect(),
             quiet_window: if quiet.iter().any(|limit| *limit > 0.0) { self.window } else { 0 },
             quiet_patience: self.patience as u32,
-        };
-        let fired = session.fire(order.clone());
-        let repeated = match &fired {
-            Err(DeviceError::Refused { refusal, .. }) => match **refusal {
-                // the device counts shots since its start, and earlier hosts have ordered some
-                Refusal::ShotRepeated { last } => Some(last),
-                _ => None,
-            },
-            _ => None,
-        };
-        match repeated {
-            Some(last) => {
-                self.number = last + 1;
-                session.fire(Fire { number: self.number, ..order })?;
-            }
-            None => fired?,
-        }
+        })?;
         let step = (self.ring / STEPS_PER_RING).max(1);
         let rest = STEPS_TO_KNOW * step + u64::from(self.trigger.hold_off_scans) + MARGIN;
         let mut reach = not_before + step;
