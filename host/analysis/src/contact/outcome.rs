@@ -74,9 +74,7 @@ pub fn of(
         .flat_map(|i| (0..2).map(move |j| (i, j)))
         .map(|(i, j)| slopes[i] * slopes[j] * covariance[(at[i], at[j])])
         .sum();
-    // the hammer's gain scales c_T as it scales k_T
-    let of_gain = (input.priors.hammer_gain * beta * k).powi(2);
-    let spread = NORMAL_95 * (of_damping.max(0.0) * misfit + of_gain).sqrt();
+    let spread = NORMAL_95 * (of_damping.max(0.0) * misfit).sqrt();
     let c_t = Interval { mean: beta * k, ci95: [beta * k - spread, beta * k + spread] };
 
     let diagnosis = diagnose(blocks, parameters, solution);
