@@ -230,10 +230,8 @@ impl State<'_> {
         self.bring_to_rest(Reason::FrontEnd);
         self.counters.scans_missed += u64::from(missed);
         if self.streaming {
-            // what waited to be sent may still hold an unreported loss of its own
-            self.report_loss(Loss::LinkSlow);
-            self.ring.report(Range { first_scan: self.next_scan, scans: u64::from(missed) });
-            self.report_loss(Loss::FrontEnd);
+            let range = Range { first_scan: self.next_scan, scans: u64::from(missed) };
+            self.ring.report(range, Loss::FrontEnd);
         }
         self.next_scan += u64::from(missed);
     }

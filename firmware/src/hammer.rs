@@ -146,15 +146,10 @@ impl Hammer {
         }
     }
 
-    /// The last shot.
+    /// The last shot since the device started, of whichever session: its number and all below are used up,
+    /// so that no word of an old shot is taken for one of a new shot.
     pub fn shot(&self) -> Option<Shot> {
         self.shot
-    }
-
-    /// Forgets shots and numbers: a new session.
-    pub fn forget(&mut self) {
-        self.shot = None;
-        self.last_number = 0;
     }
 
     /// How the pulse is recognised.

@@ -19,6 +19,7 @@
 pub mod acquire;
 pub mod ad7606b;
 pub mod board;
+mod events;
 pub mod feed;
 mod fmt;
 pub mod friction;

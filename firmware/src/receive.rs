@@ -69,7 +69,7 @@ impl<M: RawMutex> Core<'_, M> {
 
     /// Answers any Hello of a host, so that even a mismatched one can name both versions; agrees on a
     /// session only when they match. A new session forgets the old one's requests and stops its doings.
-    fn greet(&self, payload: &[u8]) {
+    pub(crate) fn greet(&self, payload: &[u8]) {
         let Ok(theirs) = Hello::from_bytes(payload) else {
             self.with(|state| state.counters.frames_bad += 1);
             return;
@@ -86,8 +86,10 @@ impl<M: RawMutex> Core<'_, M> {
             state.streaming = false;
             state.answers.clear();
             state.resends.clear();
+            // after the hammer and the shaker have said how they came to rest
+            state.events.begin_session();
+            state.ring.forget_losses();
             state.memory = Memory::new();
-            state.hammer.forget();
             state.forget_scales(self.facts.channels);
             state.forget_clock();
             state.session = agreed.then_some(theirs.session);

@@ -5,8 +5,13 @@
 
 #![expect(clippy::inline_always, reason = "built for size, each would be a call or three for every block")]
 
+use heapless::Vec;
 use jointrig_protocol::block::{GAP, Header};
+use jointrig_protocol::event::Loss;
 use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
+
+/// Ranges of lost scans that wait to be reported.
+const LOSSES: usize = 8;
 
 /// One block in the ring; the samples first, so that they are aligned and copied by words.
 #[derive(Clone, Copy)]
@@ -53,7 +58,8 @@ pub struct Ring<'a> {
     tail_place: usize,
     /// Sequence number of the next block to send.
     cursor: u64,
-    unreported: Option<Range>,
+    /// Losses that the host does not know of, the oldest first.
+    unreported: Vec<(Range, Loss), LOSSES>,
     /// Whether the next block to be sent follows a loss.
     gap: bool,
 }
@@ -69,7 +75,7 @@ impl<'a> Ring<'a> {
             tail: 0,
             tail_place: 0,
             cursor: 0,
-            unreported: None,
+            unreported: Vec::new(),
             gap: false,
         }
     }
@@ -79,7 +85,7 @@ impl<'a> Ring<'a> {
         self.epoch = epoch;
         (self.tail, self.tail_place) = (self.head, self.place(self.head));
         self.cursor = self.head;
-        self.unreported = None;
+        self.unreported.clear();
         self.gap = false;
     }
 
@@ -120,7 +126,7 @@ impl<'a> Ring<'a> {
             if self.cursor == self.tail {
                 self.cursor += 1;
                 dropped = range.scans;
-                self.report(range);
+                self.report(range, Loss::LinkSlow);
             }
             (self.tail, self.tail_place) = (self.tail + 1, self.place(self.tail + 1));
         }
@@ -134,27 +140,37 @@ impl<'a> Ring<'a> {
         dropped
     }
 
-    /// Notes a loss that the host must hear of; adjoining ranges become one.
-    pub fn report(&mut self, range: Range) {
+    /// Notes a loss for the host. Adjoining ranges of one cause become one. When no further range can be
+    /// noted, the newest one is widened over the scans between: every lost scan is reported, and some that
+    /// arrived are reported too, which changes nothing for a host that has them.
+    #[inline(never)]
+    pub fn report(&mut self, range: Range, why: Loss) {
         self.gap = true;
-        self.unreported = Some(match self.unreported {
-            Some(known) if known.first_scan + known.scans == range.first_scan => {
-                Range { first_scan: known.first_scan, scans: known.scans + range.scans }
+        let full = self.unreported.is_full();
+        match self.unreported.last_mut() {
+            Some((last, cause))
+                if full || (*cause == why && last.first_scan + last.scans == range.first_scan) =>
+            {
+                last.scans = (range.first_scan + range.scans).saturating_sub(last.first_scan);
             }
-            // a hole between two losses was delivered: widening over it would be untrue, so the older one
-            // must have been taken by then; `take_loss` runs before every block that is sent
-            _ => range,
-        });
+            // not full
+            _ => drop(self.unreported.push((range, why))),
+        }
     }
 
-    /// Takes the loss that has not been reported yet.
-    pub fn take_loss(&mut self) -> Option<Range> {
-        self.unreported.take()
+    /// Takes the oldest loss that has not been reported yet, and its cause.
+    pub fn take_loss(&mut self) -> Option<(Range, Loss)> {
+        (!self.unreported.is_empty()).then(|| self.unreported.remove(0))
+    }
+
+    /// Forgets the losses of a stream whose session has ended.
+    pub fn forget_losses(&mut self) {
+        self.unreported.clear();
     }
 
     /// Whether a loss waits to be reported.
     pub fn has_loss(&self) -> bool {
-        self.unreported.is_some()
+        !self.unreported.is_empty()
     }
 
     /// Blocks that have not been sent.

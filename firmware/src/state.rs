@@ -9,12 +9,13 @@ use embassy_time::Instant;
 use heapless::{Deque, String};
 use jointrig_protocol::answer::{self, Counters, Info, Refusal, Reset};
 use jointrig_protocol::channel::{Channel, Name, Role};
-use jointrig_protocol::event::{self, Event, Loss, Reason};
+use jointrig_protocol::event::{self, Event, Reason};
 use jointrig_protocol::limits;
 use jointrig_protocol::shot::Phase;
 use jointrig_protocol::slow::Slow;
 use jointrig_protocol::sync::Line;
 
+use crate::events::Events;
 use crate::fmt::{info, warning};
 use crate::friction::Friction;
 use crate::hammer::{CoilOrder, Hammer, Outcome};
@@ -24,8 +25,6 @@ use crate::memory::Memory;
 use crate::ring::{Range, Ring, Slot};
 use crate::shaker::Shaker;
 
-/// Events that wait for the link.
-const EVENTS: usize = 16;
 /// Answers that wait for the link.
 const ANSWERS: usize = 8;
 /// Ranges that wait to be sent again.
@@ -86,8 +85,7 @@ pub(crate) struct State<'a> {
     /// The host reads packets, and is sent them.
     pub packets: bool,
     pub answers: Deque<answer::Numbered, ANSWERS>,
-    pub events: Deque<event::Numbered, EVENTS>,
-    pub next_event: u32,
+    pub events: Events,
     pub resends: Deque<Range, RESENDS>,
     pub counters: Counters,
     pub streaming: bool,
@@ -137,8 +135,7 @@ impl<'a, M: RawMutex> Core<'a, M> {
             hello_due: None,
             packets: false,
             answers: Deque::new(),
-            events: Deque::new(),
-            next_event: 0,
+            events: Events::new(),
             resends: Deque::new(),
             counters: Counters::default(),
             streaming: false,
@@ -226,13 +223,9 @@ impl<'a, M: RawMutex> Core<'a, M> {
 }
 
 impl State<'_> {
-    /// Queues an event; when the queue is full the new one is dropped and counted.
+    /// Queues an event; what a full queue drops is counted.
     pub fn say(&mut self, event: Event) {
-        let numbered = event::Numbered { number: self.next_event, at_scan: self.next_scan, event };
-        self.next_event = self.next_event.wrapping_add(1);
-        if self.events.push_back(numbered).is_err() {
-            self.counters.events_dropped += 1;
-        }
+        self.counters.events_dropped += self.events.push(self.next_scan, event);
     }
 
     /// Says what came of a step of the hammer, and keeps its order for the coil.
@@ -352,13 +345,13 @@ impl State<'_> {
         self.friction_n
     }
 
-    /// Queues the report of scans that were lost, if any.
-    pub fn report_loss(&mut self, why: Loss) {
-        if let Some(range) = self.ring.take_loss() {
-            let scans = u32::try_from(range.scans).unwrap_or(u32::MAX);
-            warning!("{} scans from {} were lost", scans, range.first_scan);
-            self.say(Event::Lost { epoch: self.epoch, first_scan: range.first_scan, scans, why });
-        }
+    /// The report of the oldest loss of scans that the host does not know of.
+    pub fn take_loss(&mut self) -> Option<event::Numbered> {
+        let (range, why) = self.ring.take_loss()?;
+        let scans = u32::try_from(range.scans).unwrap_or(u32::MAX);
+        warning!("{} scans from {} were lost", scans, range.first_scan);
+        let lost = Event::Lost { epoch: self.epoch, first_scan: range.first_scan, scans, why };
+        Some(self.events.number(self.next_scan, lost))
     }
 }
 

@@ -4,11 +4,15 @@ extern crate std;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use jointrig_protocol::answer::Answer;
 use jointrig_protocol::channel::{Axis, Quantity, Role};
+use jointrig_protocol::frame::{Accumulator, Kind};
+use jointrig_protocol::hello::Hello;
 use jointrig_protocol::request::Request;
 use std::vec::Vec;
 
 use super::*;
 use crate::board::NoStage;
+use crate::events::EVENTS;
+use jointrig_protocol::event::Loss;
 
 /// A device that streams and whose hammer is armed.
 fn armed<'a>(channels: &'a [Channel], slots: &'a mut [Slot]) -> Core<'a, NoopRawMutex> {
@@ -47,7 +51,7 @@ fn channel(role: Role) -> Channel {
 }
 
 fn said(core: &Core<'_, NoopRawMutex>) -> Vec<Event> {
-    core.with(|state| core::iter::from_fn(|| state.events.pop_front()).map(|event| event.event).collect())
+    core.with(|state| core::iter::from_fn(|| state.events.pop()).map(|event| event.event).collect())
 }
 
 #[test]
@@ -110,4 +114,150 @@ fn no_two_streams_of_some_starts_have_one_epoch() {
     epochs.sort_unstable();
     epochs.dedup();
     assert_eq!(epochs.len(), 9);
+}
+
+/// A link that takes everything.
+struct Wire<'a>(&'a RefCell<Vec<u8>>);
+
+impl crate::board::ByteSink for Wire<'_> {
+    async fn write(&mut self, frame: &[u8]) {
+        self.0.borrow_mut().extend_from_slice(frame);
+    }
+}
+
+/// All frames that wait for the link, in order.
+fn transmits(core: &Core<'_, NoopRawMutex>) -> Vec<(Kind, Vec<u8>)> {
+    let wire = RefCell::new(Vec::new());
+    let mut sink = Wire(&wire);
+    let mut task = core::pin::pin!(crate::transmit::transmit(core, &mut sink));
+    let mut context = core::task::Context::from_waker(core::task::Waker::noop());
+    assert!(task.as_mut().poll(&mut context).is_pending(), "it runs for ever");
+    let (mut accumulator, bytes) = (Accumulator::new(), wire.borrow().clone());
+    let (mut rest, mut frames) = (&bytes[..], Vec::new());
+    while !rest.is_empty() {
+        let (used, found) = accumulator.feed(rest);
+        rest = &rest[used..];
+        if let Some(frame) = found {
+            let frame = frame.expect("whole");
+            frames.push((frame.kind, frame.payload.to_vec()));
+        }
+    }
+    frames
+}
+
+/// The events among them.
+fn events(frames: &[(Kind, Vec<u8>)]) -> Vec<event::Numbered> {
+    let own = frames.iter().filter(|(kind, _)| *kind == Kind::Event);
+    own.map(|(_, payload)| postcard::from_bytes(payload).expect("an event")).collect()
+}
+
+/// A host shakes hands in a session of its own.
+fn greet(core: &Core<'_, NoopRawMutex>, session: u32) {
+    core.greet(&Hello::host(session).to_bytes());
+}
+
+/// The same in a session whose host reads COBS.
+fn in_session<'a>(channels: &'a [Channel], slots: &'a mut [Slot]) -> Core<'a, NoopRawMutex> {
+    let core = armed(channels, slots);
+    core.with(|state| state.session = Some(1));
+    core
+}
+
+fn fire(number: u32) -> Request {
+    Request::Fire(jointrig_protocol::request::Fire {
+        number,
+        pulse_us: 3_000,
+        not_before: 1_000_000,
+        quiet_limits: heapless::Vec::new(),
+        quiet_window: 0,
+        quiet_patience: 51_200,
+    })
+}
+
+#[test]
+fn a_new_session_receives_no_shot_of_the_session_before_and_every_fault() {
+    let channels = [channel(Role::HammerForce)];
+    let mut slots = [Slot::EMPTY; 2];
+    let core = in_session(&channels, &mut slots);
+    core.report_fault("a converter");
+    core.carry_out(&fire(37), &mut NoStage).expect("armed");
+    // this session reads nothing, and its host is killed while the shot waits
+    core.with(|state| {
+        state.say(Event::Armed);
+        state.say(Event::Counters(state.counters));
+    });
+    greet(&core, 2);
+    let frames = transmits(&core);
+    assert_eq!(frames[0].0, Kind::Hello);
+    let events: Vec<Event> = events(&frames).into_iter().map(|event| event.event).collect();
+    assert_eq!(events, [Event::Fault("a converter".try_into().expect("short"))]);
+    assert_eq!(core.with(|state| state.hammer.state()), answer::Hammer::Disarmed);
+}
+
+#[test]
+fn a_shot_number_is_used_once_in_all_sessions_of_a_start() {
+    let channels = [channel(Role::HammerForce)];
+    let mut slots = [Slot::EMPTY; 2];
+    let core = armed(&channels, &mut slots);
+    core.carry_out(&fire(1), &mut NoStage).expect("armed");
+    greet(&core, 2);
+    core.carry_out(&Request::Start, &mut NoStage).expect("a stream");
+    core.carry_out(&Request::Arm { valid_ms: 1_000 }, &mut NoStage).expect("at rest");
+    assert_eq!(core.carry_out(&fire(1), &mut NoStage), Err(Refusal::ShotRepeated { last: 1 }));
+    let Ok(Answer::Status(status)) = core.carry_out(&Request::Status, &mut NoStage) else {
+        panic!("a status can always be asked for");
+    };
+    // by this a host knows which numbers are free
+    assert_eq!(status.shot.map(|shot| (shot.number, shot.phase)), Some((1, Phase::Cancelled)));
+    assert_eq!(core.carry_out(&fire(2), &mut NoStage), Ok(Answer::Scheduled { number: 2 }));
+}
+
+#[test]
+fn counters_displace_no_other_event() {
+    let channels = [channel(Role::HammerForce)];
+    let mut slots = [Slot::EMPTY; 2];
+    let core = armed(&channels, &mut slots);
+    core.with(|state| {
+        state.session = Some(1);
+        // a minute of a link that takes nothing
+        for _ in 0..60 {
+            state.say(Event::Counters(Counters::default()));
+        }
+        for _ in 0..3 {
+            state.ring.push(state.next_scan, 0, 15, &[0; limits::BLOCK_SAMPLE_BYTES]);
+            state.next_scan += 15;
+        }
+    });
+    assert!(core.see_inputs(false, true));
+    let events: Vec<Event> = events(&transmits(&core)).into_iter().map(|event| event.event).collect();
+    for wanted in
+        [Event::Interlock(false), Event::EmergencyStop(true), Event::Disarmed(Reason::EmergencyStop)]
+    {
+        assert!(events.contains(&wanted), "{wanted:?} of {events:?}");
+    }
+    let lost =
+        |event: &&Event| matches!(event, Event::Lost { first_scan: 0, scans: 15, why: Loss::LinkSlow, .. });
+    assert_eq!(events.iter().filter(lost).count(), 1, "{events:?}");
+}
+
+#[test]
+fn a_loss_is_reported_however_many_events_wait() {
+    let channels = [channel(Role::HammerForce)];
+    let mut slots = [Slot::EMPTY; 2];
+    let core = in_session(&channels, &mut slots);
+    for _ in 0..EVENTS {
+        core.report_fault("a converter");
+    }
+    core.with(|state| {
+        for _ in 0..4 {
+            state.ring.push(state.next_scan, 0, 15, &[0; limits::BLOCK_SAMPLE_BYTES]);
+            state.next_scan += 15;
+        }
+    });
+    assert!(core.see_inputs(false, false));
+    let events: Vec<Event> = events(&transmits(&core)).into_iter().map(|event| event.event).collect();
+    let lost =
+        |event: &&Event| matches!(event, Event::Lost { first_scan: 0, scans: 30, why: Loss::LinkSlow, .. });
+    assert_eq!(events.iter().filter(lost).count(), 1, "{events:?}");
+    assert!(events.contains(&Event::Interlock(false)), "{events:?}");
 }

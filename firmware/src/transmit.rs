@@ -1,4 +1,4 @@
-//! Transmitting: answers first, then events, then blocks sent again, then new blocks, then log lines.
+//! Transmitting: answers first, then lost scans, then other events, then blocks sent again, then new blocks, then log lines.
 //!
 //! A request is therefore never starved by samples: it waits for at most the one frame that is on its
 //! way. When the link is slower than the samples, blocks wait in the ring, and what leaves it unsent is
@@ -6,7 +6,6 @@
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use jointrig_protocol::block::{HEADER_PAYLOAD, RESENT};
-use jointrig_protocol::event::Loss;
 use jointrig_protocol::frame::{Kind, Writer};
 use jointrig_protocol::hello::Hello;
 
@@ -115,10 +114,7 @@ impl State<'_> {
                 return Some(length);
             }
         }
-        if self.ring.has_loss() {
-            self.report_loss(Loss::LinkSlow);
-        }
-        while let Some(event) = self.events.pop_front() {
+        while let Some(event) = self.take_loss().or_else(|| self.events.pop()) {
             writer.restart(Kind::Event);
             if let Ok(length) = event.write(writer.payload_mut()) {
                 return Some(length);

@@ -13,7 +13,8 @@ use crate::device::stream::Accounts;
 
 /// Somebody who watches.
 pub trait Watch {
-    /// Something happened. Called by the thread that measures: to be brief, without waiting for anything.
+    /// Something happened. Called by the thread that measures, and by the one that stores: to be brief, without
+    /// waiting for anything.
     fn saw(&self, seen: &Seen<'_>);
 }
 
@@ -82,7 +83,8 @@ pub enum Seen<'a> {
     Recording,
     /// The record is looked at.
     Judging,
-    /// It was kept or refused.
+    /// A hit was kept or refused, and is in the file: a process that is killed does not lose it any more. The
+    /// next cell or hit may have begun meanwhile.
     Judged {
         /// In which cell.
         row: &'a CellRow,

@@ -24,9 +24,16 @@ const ANSWERS_KEPT: usize = 64;
 /// Edges that wait to be taken: more than an input gives in a minute. Those of a session that takes none are not wanted.
 const EDGES_KEPT: usize = 1 << 18;
 
-/// Everything that arrived and was not used yet.
+/// Everything that arrived in a session and was not used yet.
+///
+/// What arrives before the device has greeted this session is left over from the session before, and is
+/// dropped: a cancelled shot or a failed clock of that session says nothing about this one.
 #[derive(Default)]
 pub struct Inbox {
+    /// The number of this session.
+    session: u32,
+    /// Whether the device has greeted this session.
+    greeted: bool,
     /// The other end's introduction, or why it is none.
     pub hello: Option<Result<Hello, Mismatch>>,
     /// The stream being put together.
@@ -76,13 +83,17 @@ pub struct Starting {
 }
 
 impl Inbox {
-    /// Empty, for a device that logs.
-    pub fn with_log(log: DeviceLog) -> Self {
-        Self { log, ..Self::default() }
+    /// Empty, for the session of this number with a device that logs.
+    pub fn new(session: u32, log: DeviceLog) -> Self {
+        Self { session, log, ..Self::default() }
     }
 
     /// Sorts one frame.
     pub fn take(&mut self, frame: Frame<'_>) {
+        if !self.greeted && matches!(frame.kind, Kind::Samples | Kind::Answer | Kind::Event) {
+            log::debug!("a frame of an earlier session was ignored");
+            return;
+        }
         match frame.kind {
             Kind::Samples => self.take_block(frame.payload),
             Kind::Answer => match postcard::from_bytes(frame.payload) {
@@ -93,7 +104,11 @@ impl Inbox {
                 Ok(event) => self.take_event(event),
                 Err(error) => log::warn!("an event that cannot be read was dropped: {error}"),
             },
-            Kind::Hello => self.hello = Some(Hello::from_bytes(frame.payload)),
+            Kind::Hello => {
+                let hello = Hello::from_bytes(frame.payload);
+                self.greeted |= hello.as_ref().is_ok_and(|theirs| theirs.session == self.session);
+                self.hello = Some(hello);
+            }
             Kind::Log => self.log.take(frame.payload),
             Kind::Request | Kind::Acknowledge => log::debug!("a frame that only a host sends was ignored"),
         }

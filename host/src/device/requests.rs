@@ -289,6 +289,13 @@ impl Session {
             .ok_or_else(|| DeviceError::NoStream { address: self.address.clone() })
     }
 
+    /// How many scans of `range` are lost for good.
+    pub fn lost_in(&self, range: &Range<u64>) -> u64 {
+        let lost = self.inbox.stream.as_ref().map_or(&[][..], Stream::lost);
+        let within = |lost: &Range<u64>| lost.end.min(range.end).saturating_sub(lost.start.max(range.start));
+        lost.iter().map(within).sum()
+    }
+
     /// The samples before `scan` are not needed any more.
     pub fn forget_before(&mut self, scan: u64) {
         if let Some(stream) = &mut self.inbox.stream {

@@ -98,12 +98,13 @@ impl Session {
         let log = DeviceLog::of(address, transport.image());
         let simulated = transport.simulated();
         let packets = transport.keeps_packets();
+        let hello = Hello { packets, ..Hello::host(nonce()) };
         let mut session = Self {
             link: Link::new(transport),
-            inbox: Inbox::with_log(log),
+            inbox: Inbox::new(hello.session, log),
             address: address.into(),
             simulated,
-            hello: Hello { packets, ..Hello::host(nonce()) },
+            hello,
             next_number: 1,
             waiting: None,
             reply: None,

@@ -7,8 +7,8 @@ use std::collections::VecDeque;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
 use std::ops::Range;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use jointrig_protocol::acknowledge::Acknowledge;
@@ -65,6 +65,14 @@ pub struct Fake {
     pub loses: Option<Range<u64>>,
     /// It waits so long before each block, and sends one at a time.
     pub slow: Option<Duration>,
+    /// Its time goes on whatever the host acknowledges, as that of a real device on USB does.
+    pub free_running: bool,
+    /// A minute passes without the host while the shot of this order waits, counted from 1.
+    pub stalls_at_order: Option<u32>,
+    /// A minute passes without the host before the arming after this order.
+    pub stalls_after_order: Option<u32>,
+    /// The link breaks once while the shot of this order waits.
+    pub cut_at_order: Option<u32>,
     /// Shots that it was ordered, whatever became of them.
     pub orders: Arc<AtomicU32>,
     accumulator: Accumulator,
@@ -104,6 +112,10 @@ impl Default for Fake {
             tells_shot: |_| (),
             loses: None,
             slow: None,
+            free_running: false,
+            stalls_at_order: None,
+            stalls_after_order: None,
+            cut_at_order: None,
             orders: Arc::default(),
             accumulator: Accumulator::new(),
             out: VecDeque::new(),
@@ -142,6 +154,9 @@ impl Fake {
                 if theirs.session != self.hello.session {
                     self.memory.clear();
                     self.last_number = 0;
+                    // on its way when the link broke, and received by the next host before the hello
+                    self.cancel();
+                    self.streaming = false;
                 }
                 self.hello.session = theirs.session;
                 let bytes = self.hello.to_bytes();
@@ -240,26 +255,33 @@ impl Fake {
             }
             Request::Slow => Answer::Slow(Slow::default()),
             Request::Sync => Answer::Sync(Sync::default()),
-            Request::Status => Answer::Status(Status {
-                epoch: self.epoch,
-                streaming: self.streaming,
-                next_scan: self.next_scan,
-                oldest_scan: self.ring.front().map_or(0, |(first, _)| *first),
-                hammer: if self.armed { Hammer::Armed } else { Hammer::Disarmed },
-                armed_for_ms: 0,
-                interlock_closed: true,
-                emergency_stop: false,
-                friction_n: 0.0,
-                shot: self.shot,
-                shaker: Shaker::Resting,
-                drive_v: 0.0,
-                controlled: 0.0,
-                counters: Counters {
-                    scans_produced: self.next_scan,
-                    scans_dropped: self.dropped,
-                    ..Counters::default()
-                },
-            }),
+            Request::Status => {
+                let ordered = self.orders.load(Ordering::Relaxed);
+                let idle = self.shot.is_none_or(|shot| shot.phase == Phase::Done);
+                if idle && self.stalls_after_order.take_if(|at| *at == ordered).is_some() {
+                    self.stall();
+                }
+                Answer::Status(Status {
+                    epoch: self.epoch,
+                    streaming: self.streaming,
+                    next_scan: self.next_scan,
+                    oldest_scan: self.ring.front().map_or(0, |(first, _)| *first),
+                    hammer: if self.armed { Hammer::Armed } else { Hammer::Disarmed },
+                    armed_for_ms: 0,
+                    interlock_closed: true,
+                    emergency_stop: false,
+                    friction_n: 0.0,
+                    shot: self.shot,
+                    shaker: Shaker::Resting,
+                    drive_v: 0.0,
+                    controlled: 0.0,
+                    counters: Counters {
+                        scans_produced: self.next_scan,
+                        scans_dropped: self.dropped,
+                        ..Counters::default()
+                    },
+                })
+            }
             Request::Start => {
                 self.epoch += 1;
                 self.streaming = true;
@@ -288,6 +310,9 @@ impl Fake {
                 Answer::Resending { first_scan, scans }
             }
             Request::Arm { .. } => {
+                if self.fire.is_some() {
+                    return Err(Refusal::Busy);
+                }
                 self.armed = true;
                 Answer::Done
             }
@@ -295,7 +320,14 @@ impl Fake {
                 if !self.armed {
                     return Err(Refusal::NotArmed);
                 }
-                assert!(fire.not_before >= self.next_scan, "the device has passed not_before");
+                assert!(
+                    self.free_running || fire.not_before >= self.next_scan,
+                    "the device has passed not_before"
+                );
+                let last = self.shot.map_or(0, |shot| shot.number);
+                if fire.number <= last {
+                    return Err(Refusal::ShotRepeated { last });
+                }
                 let number = fire.number;
                 self.orders.fetch_add(1, Ordering::Relaxed);
                 self.shot = Some(shot(&fire, Phase::Waiting));
@@ -338,10 +370,37 @@ impl Fake {
         self.out.extend(wire);
     }
 
+    /// Takes a waiting shot back.
+    fn cancel(&mut self) {
+        self.armed = false;
+        if self.fire.take().is_some()
+            && let Some(shot) = &mut self.shot
+        {
+            shot.phase = Phase::Cancelled;
+            let shot = *shot;
+            self.event(Event::Shot(shot));
+        }
+    }
+
+    /// The host stalls for a minute: all scans leave the ring unsent, and the silence cancels a waiting shot.
+    fn stall(&mut self) {
+        let (first, scans) = (self.next_scan, 60 * RATE);
+        self.next_scan += u64::from(scans);
+        self.dropped += u64::from(scans);
+        self.ring.clear();
+        self.event(Event::Lost { epoch: self.epoch, first_scan: first, scans, why: Loss::LinkSlow });
+        self.cancel();
+    }
+
     /// One more block of scans, if the acknowledgement allows.
     fn advance(&mut self) -> bool {
-        if !self.streaming || self.next_scan + BLOCK > self.acknowledged + u64::from(RING) / 2 {
+        let held = !self.free_running && self.next_scan + BLOCK > self.acknowledged + u64::from(RING) / 2;
+        if !self.streaming || held {
             return false;
+        }
+        let ordered = self.orders.load(Ordering::Relaxed);
+        if self.fire.is_some() && self.stalls_at_order.take_if(|at| *at == ordered).is_some() {
+            self.stall();
         }
         let first = self.next_scan;
         if let Some(lost) = self.loses.clone() {
@@ -376,7 +435,7 @@ impl Fake {
             self.fired_attempt = self.attempt;
             self.attempt += 1;
             let peak = (fire.pulse_us as f32 - self.reach_us as f32) * self.newtons_per_us;
-            let at = fire.not_before;
+            let at = fire.not_before.max(scan);
             let mut shot = Shot { fired_at: at, ..shot(&fire, Phase::Firing) };
             if peak > 0.0 {
                 (shot.trigger, shot.peak_n) = (at + FLIGHT, peak);
@@ -440,6 +499,10 @@ impl Transport for Fake {
         if self.dies_after == Some(0) {
             return Err(io::ErrorKind::BrokenPipe.into());
         }
+        let ordered = self.orders.load(Ordering::Relaxed);
+        if self.fire.is_some() && self.cut_at_order.take_if(|at| *at == ordered).is_some() {
+            return Err(io::ErrorKind::BrokenPipe.into());
+        }
         let blocks = if let Some(wait) = self.slow.filter(|_| self.streaming) {
             std::thread::sleep(wait);
             1
@@ -475,5 +538,25 @@ impl Transport for Fake {
             self.accumulator = accumulator;
         }
         Ok(())
+    }
+}
+
+/// A device that outlives its session: the next one speaks with the same device.
+#[derive(Clone, Default)]
+pub struct Shared(Arc<Mutex<Fake>>);
+
+impl Shared {
+    pub fn new(fake: Fake) -> Self {
+        Self(Arc::new(Mutex::new(fake)))
+    }
+}
+
+impl Transport for Shared {
+    fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        self.0.lock().expect("one session at a time").read(buf, timeout)
+    }
+
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.0.lock().expect("one session at a time").write_all(bytes)
     }
 }

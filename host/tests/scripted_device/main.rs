@@ -6,5 +6,6 @@ mod fake;
 mod faulty;
 mod following;
 mod hostile;
+mod link_faults;
 mod runner;
 mod session;

@@ -69,12 +69,12 @@ pub fn create(folder: &tempfile::TempDir, name: &str, text: &str) -> std::path::
 }
 
 /// The rows of all records, every one whole.
-fn rows(store: &Store) -> Vec<RecordRow> {
+pub fn rows(store: &Store) -> Vec<RecordRow> {
     store.records().expect("rows").into_iter().collect::<Result<_, _>>().expect("whole")
 }
 
 /// What two equal runs have in common: everything but absolute scans and times.
-fn content(path: &Path) -> Vec<(i64, u32, Kind, usize, u32, Vec<i16>)> {
+pub fn content(path: &Path) -> Vec<(i64, u32, Kind, usize, u32, Vec<i16>)> {
     let store = Store::open_read_only(path).expect("opens");
     assert_eq!(store.verify().expect("checked"), []);
     let rows = self::rows(&store);

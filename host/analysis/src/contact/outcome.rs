@@ -66,7 +66,7 @@ pub fn of(
     let variances = of_sum(&row, parameters, &solution.certainty, misfit);
     let (k_t, budget) = stiffness_of(compliance, variances, input.priors.hammer_gain)?;
     let k = k_t.mean;
-    // c = β/c₀
+    // c = β/c₀, which the hammer's gain scales as it scales k
     let beta = solution.p[RETARDATION];
     let slopes = [-beta * k * k, k];
     let at = [COMPLIANCE, RETARDATION];
@@ -74,7 +74,8 @@ pub fn of(
         .flat_map(|i| (0..2).map(move |j| (i, j)))
         .map(|(i, j)| slopes[i] * slopes[j] * covariance[(at[i], at[j])])
         .sum();
-    let spread = NORMAL_95 * (of_damping.max(0.0) * misfit).sqrt();
+    let of_gain = (input.priors.hammer_gain * beta * k).powi(2);
+    let spread = NORMAL_95 * (of_damping.max(0.0) * misfit + of_gain).sqrt();
     let c_t = Interval { mean: beta * k, ci95: [beta * k - spread, beta * k + spread] };
 
     let diagnosis = diagnose(blocks, parameters, solution);

@@ -299,3 +299,19 @@ fn what_is_missing_is_named() {
     assert_eq!(only(&|cell| !cell.on_specimen), Err(ContactError::NoRotation));
     assert_eq!(only(&|cell| cell.structure == Structure::B), Err(ContactError::NoRotation));
 }
+
+#[test]
+fn the_gain_of_the_hammer_widens_the_intervals_of_stiffness_and_damping_alike() {
+    let cells = measured(QUIET);
+    let exact = input(&cells);
+    let mut uncertain = input(&cells);
+    uncertain.priors.hammer_gain = 0.05;
+    let (exact, uncertain) = (stiffness(&exact).expect("found"), stiffness(&uncertain).expect("found"));
+    let half = |interval: Interval| 0.5 * (interval.ci95[1] - interval.ci95[0]) / interval.mean;
+    let added =
+        |of: fn(&Stiffness) -> Interval| (half(of(&uncertain)).powi(2) - half(of(&exact)).powi(2)).sqrt();
+    // 95 % of a normal distribution of 5 % standard deviation
+    assert!((added(|found| found.c_t_n_s_per_m) / (1.96 * 0.05) - 1.0).abs() < 1e-3);
+    // that of k_T is inverted from the compliance's, which is wider on one side
+    assert!((added(|found| found.k_t_n_per_m) / (1.96 * 0.05) - 1.0).abs() < 0.02);
+}

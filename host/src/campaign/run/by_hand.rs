@@ -41,7 +41,7 @@ impl Shooter {
         watch: &Watchers,
     ) -> Result<Outcome, DeviceError> {
         self.number += 1;
-        let begin = self.ready_at;
+        let begin = self.begin(session)?;
         let last = begin + (patience_s * self.rate_hz) as u64;
         let step = (self.ring / STEPS_PER_RING).max(1);
         let before = (BEFORE_S * self.rate_hz) as u64;

@@ -122,10 +122,15 @@ impl Runner<'_> {
                     // whoever went for lunch finds the cell as it was
                     return Err(RunError::NobodyStruck { cell: name(&row.cell), seconds: most_s });
                 }
-                Outcome::Missed(shot) => {
+                Outcome::Missed { shot, lost } => {
                     let limit = self.plan.limits.get_ref().weak_n;
                     let sentence = format!("the bolt did not arrive with a pulse of {pulse_us} us");
-                    let verdict = Verdict::without_pulse(Kind::Weak, 0.0, limit, sentence);
+                    let verdict = if lost == 0 {
+                        Verdict::without_pulse(Kind::Weak, 0.0, limit, sentence)
+                    } else {
+                        let sentence = format!("{sentence}, and {lost} scans were lost meanwhile");
+                        Verdict::without_pulse(Kind::Gap, lost as f64, 0.0, sentence)
+                    };
                     let recording = Recording {
                         epoch: 0,
                         first_scan: shot.fired_at,
@@ -258,7 +263,7 @@ impl Runner<'_> {
 fn crc_of(outcome: &Outcome) -> Option<u32> {
     match outcome {
         Outcome::Recorded(recording) => Some(codec::checksum(&recording.codes)),
-        Outcome::Missed(_) => Some(codec::checksum(&[])),
+        Outcome::Missed { .. } => Some(codec::checksum(&[])),
         _ => None,
     }
 }

@@ -3,6 +3,7 @@
 
 use super::pulse::{FIRST_SLOPE, Hit, PulseLoop};
 use crate::campaign::plan::Force;
+use crate::campaign::verdict::Kind;
 
 /// The closed loops of all forces.
 #[derive(Clone, Debug)]
@@ -27,8 +28,16 @@ impl Forces {
         self.0[kept as usize % self.0.len()].pulse_us()
     }
 
+    /// Learns from a hit that was judged. A record with missing samples says nothing about the pulse: its peak
+    /// may be what is missing, and a longer pulse would be the answer to a fault of the link.
+    pub fn learn_judged(&mut self, judged: Kind, hit: Hit) {
+        if judged != Kind::Gap {
+            self.learn(hit);
+        }
+    }
+
     /// Learns from a hit. It belongs to the loop whose pulse is nearest, so that a stored campaign teaches what the running one did.
-    pub fn learn(&mut self, hit: Hit) {
+    fn learn(&mut self, hit: Hit) {
         if let Some(own) = self.0.iter_mut().min_by_key(|own| own.pulse_us().abs_diff(hit.pulse_us)) {
             own.learn(hit);
         }

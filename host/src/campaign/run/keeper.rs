@@ -11,9 +11,11 @@ use jointrig_protocol::sync::Edge;
 
 use super::edits::{Edits, Recount};
 use crate::campaign::store::Store;
+use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::error::StoreError;
 use crate::campaign::store::record_row::NewRecord;
 use crate::campaign::store::session_table::Counters;
+use crate::campaign::watch::{Left, Seen, Watchers};
 
 /// Records under way to the disk.
 const QUEUE: usize = 2;
@@ -21,9 +23,20 @@ const QUEUE: usize = 2;
 /// How often it looks whether a person wants something changed.
 const EDITS: Duration = Duration::from_millis(50);
 
+/// What is announced of a record as soon as it is in the file.
+#[derive(Debug)]
+pub struct Announced {
+    /// Its cell.
+    pub row: CellRow,
+    /// Good hits in all, this one included.
+    pub kept: u64,
+    /// Good hits that are still wanted.
+    pub left: Left,
+}
+
 /// What is to be stored.
 enum Entry {
-    Record(Box<NewRecord>, Counters),
+    Record(Box<(NewRecord, Announced)>, Counters),
     GivenUp {
         cell: i64,
         reason: String,
@@ -61,13 +74,13 @@ pub struct Keeper {
 }
 
 impl Keeper {
-    /// Takes the store over until [`Keeper::finish`].
-    pub fn start(store: Store, edits: Option<Edits>) -> Self {
+    /// Takes the store over until [`Keeper::finish`]; the watchers are told of each record once it is stored.
+    pub fn start(store: Store, edits: Option<Edits>, watch: Watchers) -> Self {
         let ((queue, entries), (to, recounts)) = (sync_channel(QUEUE), channel());
         let thread = std::thread::spawn(move || {
             let kept = match edits {
-                Some(edits) => keep_and_edit(&store, &entries, &edits, &to),
-                None => entries.iter().try_for_each(|entry| keep(&store, entry)),
+                Some(edits) => keep_and_edit(&store, &entries, &edits, &to, &watch),
+                None => entries.iter().try_for_each(|entry| keep(&store, entry, &watch)),
             };
             (store, kept)
         });
@@ -79,11 +92,11 @@ impl Keeper {
         self.recounts.try_iter().collect()
     }
 
-    /// Stores a record, with the link's counters so far; waits only when the disk is two records behind. Returns whether the
-    /// keeper still works: if not, [`Keeper::finish`] says why.
+    /// Stores a record, with the link's counters so far, and then announces it; waits only when the disk is two
+    /// records behind. Returns whether the keeper still works: if not, [`Keeper::finish`] says why.
     #[must_use]
-    pub fn record(&self, record: NewRecord, counters: Counters) -> bool {
-        self.send(Entry::Record(Box::new(record), counters))
+    pub fn record(&self, record: NewRecord, counters: Counters, announced: Announced) -> bool {
+        self.send(Entry::Record(Box::new((record, announced)), counters))
     }
 
     /// A cell is done with what it has. Returns as [`Keeper::record`] does.
@@ -166,9 +179,14 @@ impl Drop for Keeper {
     }
 }
 
-fn keep(store: &Store, entry: Entry) -> Result<(), StoreError> {
+fn keep(store: &Store, entry: Entry, watch: &Watchers) -> Result<(), StoreError> {
     match entry {
-        Entry::Record(record, counters) => store.insert(&record, &counters).map(drop),
+        Entry::Record(record, counters) => {
+            let (record, Announced { row, kept, left }) = &*record;
+            store.insert(record, &counters)?;
+            watch.saw(&Seen::Judged { row, verdict: &record.verdict, kept: *kept, left: *left });
+            Ok(())
+        }
         Entry::Settled { cell, reason } => store.settle(cell, &reason),
         Entry::Redo { cell, reason } => store.redo(cell, &reason).map(drop),
         Entry::Link { session, counters } => store.note_link(session, &counters),
@@ -190,12 +208,13 @@ fn keep_and_edit(
     entries: &Receiver<Entry>,
     edits: &Edits,
     recounts: &Sender<Recount>,
+    watch: &Watchers,
 ) -> Result<(), StoreError> {
     loop {
         let next = entries.recv_timeout(EDITS);
         let over = matches!(next, Err(RecvTimeoutError::Disconnected));
         if let Ok(entry) = next {
-            keep(store, entry)?;
+            keep(store, entry, watch)?;
         }
         for recount in edits.work_off(store)? {
             // a runner that has ended counts no more

@@ -18,7 +18,7 @@ use super::edits::{Edits, Recount};
 use super::error::RunError;
 use super::fit::fitted;
 use super::forces::Forces;
-use super::keeper::Keeper;
+use super::keeper::{Announced, Keeper};
 use super::pulse::Hit;
 use super::shot::Shooter;
 use super::stage::Stage;
@@ -79,7 +79,7 @@ pub struct Summary {
 /// Runs the campaign in `store` on the device behind `session` until it is complete, given up or stopped.
 ///
 /// # Errors
-/// File, device or stage failed; everything accepted so far is in the file, and a later run goes on from there.
+/// File, device or stage failed; every hit that was judged so far is in the file, and a later run goes on from there.
 pub fn run(
     mut store: Store,
     session: &mut Session,
@@ -139,7 +139,7 @@ pub fn run(
     });
     let mut forces = Forces::new(plan.force.get_ref(), info.coil_cap_us);
     for record in records.iter().flatten() {
-        forces.learn(Hit { pulse_us: record.shot.pulse_us, peak_n: record.peak_n });
+        forces.learn_judged(record.verdict, Hit { pulse_us: record.shot.pulse_us, peak_n: record.peak_n });
     }
     session.set_load_cells([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])?;
     let (epoch, _) = session.start(channels.len())?;
@@ -161,7 +161,7 @@ pub fn run(
         shooter,
         forces,
         clock: ScanClock::new(f64::from(channels.rate_hz), block),
-        keeper: Keeper::start(store, options.edits.clone()),
+        keeper: Keeper::start(store, options.edits.clone(), options.watch.clone()),
         session_id: id,
         tally,
         reopened: BTreeSet::new(),
@@ -281,11 +281,10 @@ impl Runner<'_> {
         self.hits += 1;
         let shot = recording.shot;
         if self.plan.by_hand().is_none() {
-            self.forces.learn(Hit { pulse_us: shot.pulse_us, peak_n: verdict.peak_n });
+            self.forces.learn_judged(verdict.kind, Hit { pulse_us: shot.pulse_us, peak_n: verdict.peak_n });
         }
         let attempt = self.tally.add(row.id, verdict.kind == Kind::Good);
-        let (kept, left) = (self.tally.kept(), self.left(row));
-        self.saw(&Seen::Judged { row, verdict: &verdict, kept, left });
+        let standing = Announced { row: row.clone(), kept: self.tally.kept(), left: self.left(row) };
         self.saw(&Seen::Link(self.session.accounts()));
         log::debug!("{:?} attempt {attempt}: {} ({})", row.cell, verdict.kind, verdict.sentence);
         if self.plan.by_hand().is_some() && self.plan.sync.is_some() {
@@ -304,7 +303,7 @@ impl Runner<'_> {
             recording,
             verdict,
         };
-        still(self.keeper.record(record, counters(self.session)))
+        still(self.keeper.record(record, counters(self.session), standing))
     }
 
     /// Keeps the specimen's temperature, where the device measures it.

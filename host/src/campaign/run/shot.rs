@@ -8,6 +8,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use jointrig_protocol::answer::Hammer;
 use jointrig_protocol::limits::ARM_VALID_CAP_MS;
 use jointrig_protocol::request::{Fire, Trigger};
 use jointrig_protocol::shot::{Phase, Shot};
@@ -24,6 +25,10 @@ const MARGIN: u64 = 1_024;
 /// Steps in which the acknowledgement follows a shot that is not decided yet, per ring.
 pub(super) const STEPS_PER_RING: u64 = 8;
 
+/// A shot that an earlier session fired ends within this time of the device, s: flight and record are bounded by
+/// a minute each.
+const SHOT_ENDS_S: f64 = 125.0;
+
 /// A shot's end is known at the latest this many steps after it.
 const STEPS_TO_KNOW: u64 = 3;
 
@@ -33,7 +38,12 @@ pub enum Outcome {
     /// The hammer hit, and this is the record.
     Recorded(Box<Recording>),
     /// The bolt did not arrive.
-    Missed(Shot),
+    Missed {
+        /// The shot.
+        shot: Shot,
+        /// Scans that were lost while the bolt should have arrived: with any, nobody knows whether it did.
+        lost: u64,
+    },
     /// The structure did not become quiet in time; the coil stayed off.
     NotQuiet(Shot),
     /// The device took the shot back (arming expired, link lost, interlock, emergency stop).
@@ -86,6 +96,7 @@ impl Shooter {
             listen_scans: scans(times.listen_s),
             hold_off_scans: scans(times.hold_off_s),
         };
+        let number = Self::last_number(session, rate_hz)?;
         session.set_trigger(trigger)?;
         session.hold_acknowledgement(Some(session.expected()?));
         Ok(Self {
@@ -98,9 +109,34 @@ impl Shooter {
             trigger,
             window: settle.window_samples,
             patience: u64::from(scans(settle.bound_s)),
-            number: 0,
+            number,
             ready_at: 0,
         })
+    }
+
+    /// The number of the last shot since the device started: shots of this session have larger ones. Waits
+    /// until a shot that an earlier session fired is over, because until then the device is busy.
+    fn last_number(session: &mut Session, rate_hz: f64) -> Result<u32, DeviceError> {
+        let begin = session.expected()?;
+        loop {
+            let status = session.status()?;
+            let fires = matches!(status.hammer, Hammer::Waiting | Hammer::Firing | Hammer::Listening);
+            let now = session.expected()?;
+            if !fires || now.saturating_sub(begin) > (SHOT_ENDS_S * rate_hz) as u64 {
+                return Ok(status.shot.map_or(0, |shot| shot.number));
+            }
+            session.wait_for(now + (session.ring_scans() / STEPS_PER_RING).max(1))?;
+        }
+    }
+
+    /// The scan from which on the next shot may be fired or awaited: `ready_at`, unless scans went on for
+    /// longer than a ring since then. That happens where nothing holds the device and the host stalled; a
+    /// virtual board never runs on for so long.
+    pub(super) fn begin(&self, session: &mut Session) -> Result<u64, DeviceError> {
+        if session.expected()? <= self.ready_at.saturating_add(self.ring) {
+            return Ok(self.ready_at);
+        }
+        Ok(session.status()?.next_scan.max(self.ready_at))
     }
 
     /// Hammer and laser are in place from `at_scan` on, and the acknowledgement was held at or before it when
@@ -122,10 +158,10 @@ impl Shooter {
         watch: &Watchers,
     ) -> Result<Outcome, DeviceError> {
         self.number += 1;
-        let not_before = self.ready_at;
+        let not_before = self.begin(session)?;
         let last = not_before + self.patience + self.flight(pulse_us);
         // arming outlives everything that the shot may wait for, and not more
-        let wait = last + self.ring - session.expected()?;
+        let wait = (last + self.ring).saturating_sub(session.expected()?);
         let valid_ms = (wait as f64 / self.rate_hz * 1000.0) as u32 + 1_000;
         session.arm(valid_ms.min(ARM_VALID_CAP_MS))?;
         session.fire(Fire {
@@ -163,7 +199,12 @@ impl Shooter {
                 }
                 _ => {}
             }
-            if session.expected()? >= reach {
+            let expected = session.expected()?;
+            if expected > reach + self.ring {
+                // the host stalled: what was to be waited for has passed
+                reach = expected;
+            }
+            if expected >= reach {
                 reach += step;
             }
             session.forget_before(reach.saturating_sub(self.pre + 5 * step));
@@ -181,7 +222,10 @@ impl Shooter {
         session.wait_for(decision)?;
         self.ready_at = decision + self.ring / 2 + MARGIN;
         let outcome = match shot.phase {
-            Phase::Missed => Outcome::Missed(shot),
+            Phase::Missed => {
+                let flight = shot.fired_at..shot.fired_at + self.flight(pulse_us);
+                Outcome::Missed { shot, lost: session.lost_in(&flight) }
+            }
             Phase::NotQuiet => Outcome::NotQuiet(shot),
             Phase::Cancelled => Outcome::Cancelled(shot),
             _ => Outcome::Recorded(Box::new(self.collect_shot(session, &shot)?)),

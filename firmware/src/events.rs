@@ -1,0 +1,193 @@
+//! Events that wait for the link, and which of them give way when the queue is full.
+//!
+//! The queue has a fixed length, and a link may be slower than what happens. When the queue is full, the oldest event of
+//! the lowest rank is dropped, so that counters never displace the state of guard or emergency stop. Lost
+//! scans do not wait here but in the ring ([`crate::ring::Ring::take_loss`]), and are numbered as they are sent.
+
+use heapless::Vec;
+use jointrig_protocol::event::{Event, Numbered};
+
+/// Events that wait for the link.
+pub const EVENTS: usize = 16;
+
+/// How much is lost with an event; the lowest is dropped first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Rank {
+    /// Sent again within a second, or counted by its own numbers.
+    Repeated,
+    /// The result of an order, which the status tells as well.
+    Ordered,
+    /// A fault of the board, reported once.
+    Fault,
+    /// The state of guard or emergency stop.
+    Safety,
+}
+
+fn rank(event: &Event) -> Rank {
+    match event {
+        Event::Counters(_) | Event::Edge(_) => Rank::Repeated,
+        Event::Armed
+        | Event::Disarmed(_)
+        | Event::Shot(_)
+        | Event::ShakerRuns
+        | Event::ShakerStops(_)
+        | Event::ShakerRests => Rank::Ordered,
+        Event::Fault(_) | Event::Panic(_) | Event::Clock(_) => Rank::Fault,
+        Event::Interlock(_) | Event::EmergencyStop(_) | Event::Lost { .. } => Rank::Safety,
+    }
+}
+
+/// Whether an event says the same kind of thing as another one.
+fn same_kind(one: &Event, other: &Event) -> bool {
+    core::mem::discriminant(one) == core::mem::discriminant(other)
+}
+
+/// An event that waits, and the scan at which it happened.
+struct Waiting {
+    at_scan: u64,
+    event: Event,
+}
+
+/// The queue, the oldest event first.
+pub struct Events {
+    waiting: Vec<Waiting, EVENTS>,
+    /// Number of the next event to be sent. A dropped event uses up a number, so that the host sees a jump.
+    next: u32,
+}
+
+impl Events {
+    /// An empty queue.
+    pub const fn new() -> Self {
+        Self { waiting: Vec::new(), next: 0 }
+    }
+
+    /// Whether no event waits.
+    pub fn is_empty(&self) -> bool {
+        self.waiting.is_empty()
+    }
+
+    /// Queues an event; returns how many were dropped for lack of space: 0 or 1, this one or an older one.
+    pub fn push(&mut self, at_scan: u64, event: Event) -> u32 {
+        if matches!(event, Event::Counters(_)) {
+            // only the newest counters say anything: older ones that still wait lose nothing
+            self.waiting.retain(|waiting| !same_kind(&waiting.event, &event));
+        }
+        let mut dropped = 0;
+        if self.waiting.is_full() {
+            dropped = 1;
+            self.next = self.next.wrapping_add(1);
+            match self.dispensable(&event) {
+                Some(place) => drop(self.waiting.remove(place)),
+                None => return dropped,
+            }
+        }
+        // a full queue has dropped one above
+        drop(self.waiting.push(Waiting { at_scan, event }));
+        dropped
+    }
+
+    /// The place of the event that gives way to `event` in a full queue; none where `event` itself is to be
+    /// dropped.
+    fn dispensable(&self, event: &Event) -> Option<usize> {
+        let ranks = self.waiting.iter().map(|waiting| rank(&waiting.event)).enumerate();
+        // of equal ranks the first one, which is the oldest
+        let (place, lowest) = ranks.min_by_key(|(_, rank)| *rank)?;
+        if lowest < rank(event) {
+            return Some(place);
+        }
+        if rank(event) < Rank::Safety {
+            return None;
+        }
+        // nothing but states of guard and stop: the oldest one that a newer one of its kind replaces
+        let after = |place: usize| self.waiting.iter().skip(place + 1).map(|waiting| &waiting.event);
+        (0..self.waiting.len()).find(|place| {
+            let own = &self.waiting[*place].event;
+            same_kind(own, event) || after(*place).any(|newer| same_kind(own, newer))
+        })
+    }
+
+    /// Takes the oldest event, numbered for the link.
+    pub fn pop(&mut self) -> Option<Numbered> {
+        if self.waiting.is_empty() {
+            return None;
+        }
+        let Waiting { at_scan, event } = self.waiting.remove(0);
+        Some(self.number(at_scan, event))
+    }
+
+    /// Numbers an event that is sent without waiting here.
+    pub fn number(&mut self, at_scan: u64, event: Event) -> Numbered {
+        let number = self.next;
+        self.next = self.next.wrapping_add(1);
+        Numbered { number, at_scan, event }
+    }
+
+    /// A new session begins: what concerned the session before is dropped, because the new host would take
+    /// it for the result of its own orders. Faults and the states of guard and stop wait for the new host.
+    pub fn begin_session(&mut self) {
+        self.waiting.retain(|waiting| match rank(&waiting.event) {
+            Rank::Repeated | Rank::Ordered => false,
+            Rank::Fault | Rank::Safety => !matches!(waiting.event, Event::Clock(_)),
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use heapless::String;
+    use jointrig_protocol::answer::Counters;
+    use jointrig_protocol::event::Reason;
+
+    extern crate std;
+
+    fn sent(events: &mut Events) -> std::vec::Vec<(u32, Event)> {
+        core::iter::from_fn(|| events.pop()).map(|event| (event.number, event.event)).collect()
+    }
+
+    #[test]
+    fn only_the_newest_counters_wait() {
+        let mut events = Events::new();
+        for frames_in in 0..100 {
+            let counters = Counters { frames_in, ..Counters::default() };
+            assert_eq!(events.push(0, Event::Counters(counters)), 0);
+        }
+        let newest = Counters { frames_in: 99, ..Counters::default() };
+        assert_eq!(sent(&mut events), [(0, Event::Counters(newest))]);
+    }
+
+    #[test]
+    fn a_full_queue_drops_the_oldest_of_the_lowest_rank_and_the_numbers_show_it() {
+        let mut events = Events::new();
+        for scan in 0..EVENTS as u64 - 1 {
+            assert_eq!(events.push(scan, Event::Fault(String::new())), 0);
+        }
+        assert_eq!(events.push(20, Event::Armed), 0);
+        // the result of an order gives way, and is itself dropped where nothing is less important
+        assert_eq!(events.push(21, Event::Interlock(false)), 1);
+        assert_eq!(events.push(22, Event::Disarmed(Reason::Interlock)), 1);
+        assert_eq!(events.push(23, Event::EmergencyStop(true)), 1);
+        let sent = sent(&mut events);
+        assert_eq!(sent.len(), EVENTS);
+        assert_eq!((sent[0].0, sent[EVENTS - 2].1.clone()), (3, Event::Interlock(false)));
+        assert_eq!(sent[EVENTS - 1].1, Event::EmergencyStop(true));
+    }
+
+    #[test]
+    fn the_newest_states_of_guard_and_stop_are_kept_whatever_waits() {
+        let mut events = Events::new();
+        events.push(0, Event::EmergencyStop(true));
+        for change in 0..100 {
+            events.push(change, Event::Interlock(change % 2 == 0));
+        }
+        let sent = sent(&mut events);
+        assert_eq!(sent[0].1, Event::EmergencyStop(true));
+        assert_eq!(sent[EVENTS - 1].1, Event::Interlock(false));
+        let states = sent[1..].iter().map(|(_, event)| event);
+        assert!(
+            states
+                .zip([true, false].iter().cycle().skip(1))
+                .all(|(event, closed)| *event == Event::Interlock(*closed))
+        );
+    }
+}
