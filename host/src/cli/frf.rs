@@ -9,9 +9,11 @@ use super::error::CliError;
 use super::frf_matrix::{Wishes, average};
 use super::output;
 use crate::campaign::verdict::{Kind, Limits, Verdict, judge_all};
+use crate::exchange::frf_npz::direction_extras;
 use crate::exchange::npz::Array;
+use crate::exchange::record_file::RecordFile;
 use crate::exchange::record_uff::read_record_file;
-use crate::exchange::{Extra, write_frf};
+use crate::exchange::{Extra, StatedUnits, write_frf};
 use crate::outside::tell_line;
 use crate::spectra::{
     CrossSpectra, ForceWeighting, FrfSettings, ImpactRecords, MotionQuantity, Origin, Windowing, estimate,
@@ -73,6 +75,9 @@ pub struct Frf {
     /// Ratio of noise powers for Hv, response over force, (SI/N)²; noise in proportion to the signals when absent.
     #[arg(long, value_name = "RATIO")]
     noise_ratio: Option<f64>,
+    /// Units that count instead of those of the file's labels: response=mm/s,force=lbf,time=ms.
+    #[arg(long, value_name = "UNITS", default_value = "")]
+    units: StatedUnits,
     /// Names of the responses (repeat, or a list with commas).
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     outputs: Vec<String>,
@@ -116,17 +121,17 @@ impl Frf {
         if self.records.is_dir() {
             return self.of_folder();
         }
-        let (records, warnings) =
-            read_record_file(&self.records).map_err(|e| CliError::Bad(e.to_string()))?;
-        for warning in &warnings {
-            tell_line!("{}: {warning}", self.records.display());
+        let read = read_record_file(&self.records, &self.units).map_err(|e| CliError::Bad(e.to_string()))?;
+        let RecordFile { records, delay_s, directions, taken, notes } = read.along_axes();
+        for line in std::iter::once(&taken).chain(&notes) {
+            tell_line!("{}: {line}", self.records.display());
         }
         let names = self.names(records.response.first().map_or(0, Vec::len))?;
         let verdicts = judge_all(&records, &Limits::default(), None);
         let used: Vec<bool> = verdicts.iter().map(|v| v.kind == Kind::Good).collect();
         if !used.contains(&true) {
             if self.json {
-                output::json(&self.document(&records, &verdicts, None))?;
+                output::json(&self.document(&records, &verdicts, &self.settings(&delay_s), None))?;
             }
             let why: Vec<String> = verdicts
                 .iter()
@@ -139,7 +144,7 @@ impl Frf {
                 why.join("\n  ")
             )));
         }
-        let settings = self.settings();
+        let settings = self.settings(&delay_s);
         let found = estimate(&records, &used, &settings)
             .map_err(|e| CliError::Bad(format!("{}: {e}", self.records.display())))?;
         let excited = usable_band(found.frequency_hz(), &found.force_spectrum(), 6.0);
@@ -156,13 +161,15 @@ impl Frf {
         if let Some(path) = &self.out {
             let matrix = (found.to_matrix(quantity, names.clone(), self.input.clone()))
                 .map_err(|e| CliError::Bad(format!("{}: {e}", self.records.display())))?;
-            write_frf(path, &matrix, &extras(&found, self.noise_ratio))
-                .map_err(|e| CliError::Bad(e.to_string()))?;
+            let mut further = extras(&found, self.noise_ratio);
+            further.extend(direction_extras(&directions.responses, &[directions.force]));
+            write_frf(path, &matrix, &further).map_err(|e| CliError::Bad(e.to_string()))?;
         }
         if self.json {
             return output::json(&self.document(
                 &records,
                 &verdicts,
+                &settings,
                 Some((&found, excited, quantity, &names)),
             ));
         }
@@ -179,7 +186,8 @@ impl Frf {
             )));
         };
         let quantity = self.quantity.map(MotionQuantity::from);
-        average(&self.records, out, &Wishes { settings: &self.settings(), quantity, band: self.band })
+        let (settings, units) = (self.settings(&[]), &self.units);
+        average(&self.records, out, &Wishes { settings: &settings, quantity, band: self.band, units })
     }
 
     /// What cannot be meant.
@@ -222,7 +230,14 @@ impl Frf {
         }
     }
 
-    fn settings(&self) -> FrfSettings {
+    /// `of_file_s` is how late each response is against the force by the file itself.
+    fn settings(&self, of_file_s: &[f64]) -> FrfSettings {
+        let late = of_file_s.iter().any(|s| *s != 0.0);
+        let delay_s = match (self.delay.is_empty(), late) {
+            (true, false) => Vec::new(),
+            (true, true) => of_file_s.to_vec(),
+            (false, _) => self.delay.iter().zip(of_file_s).map(|(own, file)| own + file).collect(),
+        };
         FrfSettings {
             windowing: Windowing {
                 force_before_s: self.force_before,
@@ -236,7 +251,7 @@ impl Frf {
                 },
             },
             origin: self.origin.map_or(Origin::PulseStart, Origin::At),
-            delay_s: self.delay.clone(),
+            delay_s,
             band_hz: None,
             transform_samples: self.pad_to,
             jackknife: self.jackknife,
@@ -248,6 +263,7 @@ impl Frf {
         &self,
         records: &ImpactRecords,
         verdicts: &[Verdict],
+        settings: &FrfSettings,
         found: Option<(&CrossSpectra, Option<Band>, MotionQuantity, &[String])>,
     ) -> Value {
         let hits: Vec<Value> = verdicts
@@ -265,7 +281,7 @@ impl Frf {
             "fs_hz": records.fs_hz,
             "hits": hits,
             "used": found.map_or(0, |(y, ..)| y.hits()),
-            "settings": self.settings(),
+            "settings": settings,
         });
         if let Some((y, band, quantity, names)) = found {
             document["quantity"] = json!(quantity.frf_name());

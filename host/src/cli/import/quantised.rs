@@ -11,9 +11,10 @@ const TOP_CODE: f64 = 32_000.0;
 /// The records as 16-bit codes, channel after channel for each hit, with the scales that belong to them.
 pub(super) fn quantised(records: &ImpactRecords, axes: usize) -> Result<(ChannelMap, Vec<Vec<i16>>), String> {
     let rate_hz = records.fs_hz.round();
-    if !(1.0..=f64::from(u32::MAX)).contains(&rate_hz) || (rate_hz - records.fs_hz).abs() > 1e-6 * rate_hz {
-        return Err(format!("the sampling rate of {} Hz is no whole number: resample", records.fs_hz));
+    if !(1.0..=f64::from(u32::MAX)).contains(&rate_hz) {
+        return Err(format!("the sampling rate is {} Hz: 1 Hz or more is needed", records.fs_hz));
     }
+    let exact_hz = (rate_hz != records.fs_hz).then_some(records.fs_hz);
     let channels = records.response.first().map_or(0, Vec::len);
     if channels != axes {
         return Err(format!(
@@ -35,7 +36,7 @@ pub(super) fn quantised(records: &ImpactRecords, axes: usize) -> Result<(Channel
     let signal = |hit: usize, place: usize| -> &[f64] {
         if place == 0 { &records.force_n[hit] } else { &records.response[hit][place - 1] }
     };
-    let mut map = ChannelMap { id: 0, rate_hz: rate_hz as u32, channels: Vec::new() };
+    let mut map = ChannelMap { id: 0, rate_hz: rate_hz as u32, exact_hz, channels: Vec::new() };
     for (place, (name, role, quantity)) in kinds.into_iter().take(1 + axes).enumerate() {
         let mut largest = 0.0f64;
         for hit in 0..records.force_n.len() {

@@ -7,10 +7,11 @@ use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use jointrig_protocol::shot::{Phase, Shot};
 use sha2::{Digest, Sha256};
+use toml::Spanned;
 
 use super::bad;
 use super::quantised::quantised;
-use crate::campaign::plan::{Cell, configuration_name};
+use crate::campaign::plan::{Cell, Plan, configuration_name};
 use crate::campaign::store::Store;
 use crate::campaign::store::notes::utc_now;
 use crate::campaign::store::record_row::{NewRecord, RecordRow};
@@ -23,10 +24,12 @@ use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::device::channels::ChannelMap;
 use crate::device::recording::Recording;
+use crate::exchange::StatedUnits;
+use crate::exchange::record_file::{PlannedPlace, RecordFile};
 use crate::exchange::record_uff::read_record_file;
 use crate::foreign;
 use crate::outside::tell_line;
-use crate::spectra::{ImpactRecords, Pulse};
+use crate::spectra::Pulse;
 
 /// The cell that the records belong to.
 pub(super) struct CellName<'n> {
@@ -75,6 +78,8 @@ pub(super) struct Brought {
     pub(super) already: usize,
     /// How the last ones are stored.
     map: Option<ChannelMap>,
+    /// What was taken of the last ones' file, in one line.
+    pub(super) taken: String,
 }
 
 impl Brought {
@@ -87,19 +92,28 @@ impl Brought {
 }
 
 /// One file, for the user's eyes.
-pub(super) fn import(file: &Path, into: &Path, name: &CellName<'_>, replace: bool) -> Result<(), CliError> {
-    let (records, warnings) = read_record_file(file).map_err(bad)?;
-    for warning in &warnings {
-        tell_line!("{}: {warning}", file.display());
+pub(super) fn import(
+    file: &Path,
+    into: &Path,
+    name: &CellName<'_>,
+    replace: bool,
+    units: &StatedUnits,
+) -> Result<(), CliError> {
+    let read = read_record_file(file, units).map_err(bad)?;
+    for note in &read.notes {
+        tell_line!("{}: {note}", file.display());
     }
     let mut store = Store::open(into)?;
     let called = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
     let origin = Origin::of(file, &called)?;
-    let Brought { hits, kept, already, map, .. } =
-        bring(&mut store, &origin, name, &records, replace, &mut |line| tell_line!("{line}"))?;
+    let Brought { hits, kept, already, map, taken, .. } =
+        bring(&mut store, &origin, name, read, replace, &mut |line| tell_line!("{line}"))?;
     store.log(&format!("imported {hits} hits from {}", file.display()))?;
     store.close()?;
-    let mut lines = vec![format!("{}: {kept} of {hits} hits are good", into.display())];
+    let mut lines = vec![
+        format!("{}: {taken}", file.display()),
+        format!("{}: {kept} of {hits} hits are good", into.display()),
+    ];
     if already > 0 {
         lines.push(format!("{already} of them were there already, from an earlier import of the same file"));
     }
@@ -120,16 +134,18 @@ pub(super) fn bring(
     store: &mut Store,
     origin: &Origin,
     name: &CellName<'_>,
-    records: &ImpactRecords,
+    read: RecordFile,
     replace: bool,
     tell: &mut dyn FnMut(String),
 ) -> Result<Brought, CliError> {
     let plan = store.plan()?;
     let (id, cell, attempt) = find(store, name)?;
-    let place = plan.geometry.response.iter().map(toml::Spanned::get_ref).find(|p| p.name == cell.response);
-    let axes = place.map_or(3, |place| place.axes().len());
-    let (map, codes) =
-        quantised(records, axes).map_err(|reason| bad(format!("{}: {reason}", origin.name)))?;
+    let wrong = |reason: String| bad(format!("{}: {reason}", origin.name));
+    let (read, axes) = along_plan(&plan, &cell, read).map_err(wrong)?;
+    let RecordFile { records, delay_s, taken, .. } = read;
+    let records = &records;
+    let (mut map, codes) = quantised(records, axes).map_err(wrong)?;
+    put_in_step(&mut map, &delay_s);
     let recordings: Vec<Recording> = codes
         .into_iter()
         .zip(&records.force_n)
@@ -142,7 +158,8 @@ pub(super) fn bring(
     let there = already_there(store, origin, id, replace)?;
     let missing = (0..recordings.len() as u32).any(|hit| !there.contains(&hit));
     let session = missing.then(|| store.begin_session(&session(origin), &map)).transpose()?;
-    let mut brought = Brought { cells: 1, hits: recordings.len(), kept: 0, already: there.len(), map: None };
+    let mut brought =
+        Brought { cells: 1, hits: recordings.len(), already: there.len(), taken, ..Brought::default() };
     let mut others = Others::of(map.responses().unwrap_or_default());
     for (hit, recording) in (0..).zip(recordings) {
         let verdict = ByRecord.judge(&cell, &plan, &map, &recording, &others);
@@ -166,6 +183,32 @@ pub(super) fn bring(
         }
     }
     Ok(Brought { map: Some(map), ..brought })
+}
+
+/// The records along the directions that the plan has for the cell, and how many axes its location has.
+fn along_plan(plan: &Plan, cell: &Cell, read: RecordFile) -> Result<(RecordFile, usize), String> {
+    let points = |name: &str| plan.geometry.response.iter().map(Spanned::get_ref).find(|p| p.name == name);
+    let hammer = plan.geometry.impact.iter().map(Spanned::get_ref).find(|p| p.name == cell.impact);
+    let (Some(sensor), Some(hammer)) = (points(&cell.response), hammer) else { return Ok((read, 3)) };
+    let axes: Vec<[f64; 3]> = sensor.axes().into_iter().map(|(_, axis)| axis).collect();
+    let place = PlannedPlace {
+        impact: &cell.impact,
+        push: hammer.direction,
+        response: &cell.response,
+        axes: &axes,
+        own_axes: sensor.axes.is_some(),
+    };
+    Ok((read.along_plan(&place)?, axes.len()))
+}
+
+/// Notes how late each channel is, the earliest as in time: delays of channels are not negative.
+fn put_in_step(map: &mut ChannelMap, delay_s: &[f64]) {
+    let earliest = delay_s.iter().copied().fold(0.0, f64::min);
+    let late = std::iter::once(0.0).chain(delay_s.iter().copied());
+    for (channel, late) in map.channels.iter_mut().zip(late) {
+        // less than a sample
+        channel.delay_ns = (1e9 * (late - earliest)).round() as u32;
+    }
 }
 
 /// The hits of this very file that the cell has; those of another file of the same name are dropped, or refused.
