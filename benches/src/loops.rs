@@ -112,7 +112,7 @@ fn channels() -> Outcome<ChannelMap> {
         Ok(Channel { name, role, quantity, units_per_volt: scale, range_v: 10.0, delay_ns: 0, bits: 16 })
     };
     let channels = roles.into_iter().map(channel).collect::<Outcome<Vec<Channel>>>()?;
-    Ok(ChannelMap { id: 0, rate_hz: RATE_HZ, channels })
+    Ok(ChannelMap { id: 0, rate_hz: RATE_HZ, exact_hz: None, channels })
 }
 
 /// x_A, x_B and T of a contact of 180 N/µm that loses some energy, with noise on everything.

@@ -47,7 +47,7 @@ fn map(channels: &[rig::Channel]) -> ChannelMap {
         delay_ns: 0,
         bits: 16,
     });
-    ChannelMap { id: 0, rate_hz: 51_200, channels: channels.collect() }
+    ChannelMap { id: 0, rate_hz: 51_200, exact_hz: None, channels: channels.collect() }
 }
 
 /// One hit as it would be recorded: 5 ms before the trigger, then half a second; channel after channel.

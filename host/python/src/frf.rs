@@ -2,9 +2,12 @@
 
 use std::path::PathBuf;
 
-use jointrig::exchange::{read_frf_file, write_frf};
+use jointrig::exchange::frf_npz::direction_extras;
+use jointrig::exchange::labelled_frf::{Label, LabelledFrf};
+use jointrig::exchange::{StatedUnits, read_frf_file, write_frf};
 use jointrig::frf::MotionQuantity;
 use jointrig::report;
+use jointrig::substructuring::Configuration;
 use nalgebra::DMatrix;
 use numpy::ndarray::ArrayView3;
 use numpy::{
@@ -18,17 +21,33 @@ use crate::raised;
 #[pyclass(module = "jointrig._native", frozen)]
 pub struct Frf {
     frf: jointrig::frf::Frf,
+    /// What the labels of its file say of outputs and inputs; nothing of FRFs from arrays.
+    labels: Option<(Vec<Label>, Vec<Label>)>,
     /// Hits in each average, outputs × inputs; unknown of FRFs from elsewhere.
     hits: Option<DMatrix<usize>>,
 }
 
 impl Frf {
     pub fn of(frf: jointrig::frf::Frf) -> Self {
-        Self { frf, hits: None }
+        Self { frf, labels: None, hits: None }
+    }
+
+    /// The FRFs along the directions of these points, and what was turned; labels of a file count for it.
+    ///
+    /// # Errors
+    /// A label and its point have different axes: both are named.
+    pub fn along(&self, points: &Configuration) -> Result<(jointrig::frf::Frf, Vec<String>), String> {
+        let read = LabelledFrf::unlabelled(self.frf.clone(), String::new(), Vec::new());
+        match &self.labels {
+            Some((outputs, inputs)) => {
+                LabelledFrf { outputs: outputs.clone(), inputs: inputs.clone(), ..read }.along(points)
+            }
+            None => Ok((self.frf.clone(), Vec::new())),
+        }
     }
 
     pub fn with_hits(frf: jointrig::frf::Frf, hits: DMatrix<usize>) -> Self {
-        Self { frf, hits: Some(hits) }
+        Self { frf, labels: None, hits: Some(hits) }
     }
 
     pub fn matrix(&self) -> &jointrig::frf::Frf {
@@ -101,9 +120,9 @@ impl Frf {
     /// The FRFs of an npz or a universal file, and what was left out of it.
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<(Self, Vec<String>)> {
-        let read = py.detach(|| read_frf_file(&path));
-        let (frf, notes) = read.map_err(|error| raised::reading(py, &path, &error.to_string()))?;
-        Ok((Self::of(frf), notes.iter().map(ToString::to_string).collect()))
+        let read = py.detach(|| read_frf_file(&path, &StatedUnits::default()));
+        let read = read.map_err(|error| raised::reading(py, &path, &error.to_string()))?;
+        Ok((Self { frf: read.frf, labels: Some((read.outputs, read.inputs)), hits: None }, read.notes))
     }
 
     /// (line,) float64, Hz.
@@ -173,12 +192,13 @@ impl Frf {
     /// The same as receptances, m/N: divided by s once or twice.
     fn to_receptance(&self, py: Python<'_>) -> PyResult<Self> {
         let converted = self.frf.to_receptance().map_err(|error| raised::refused(py, &error.to_string()))?;
-        Ok(Self { frf: converted, hits: self.hits.clone() })
+        Ok(Self { frf: converted, labels: self.labels.clone(), hits: self.hits.clone() })
     }
 
     /// The lines from `low_hz` to `high_hz`, ends included.
     fn band(&self, low_hz: f64, high_hz: f64) -> Self {
-        Self { frf: self.frf.band(low_hz, high_hz), hits: self.hits.clone() }
+        let (labels, hits) = (self.labels.clone(), self.hits.clone());
+        Self { frf: self.frf.band(low_hz, high_hz), labels, hits }
     }
 
     /// The rows and columns with these names, in this order.
@@ -190,12 +210,18 @@ impl Frf {
         };
         let (rows, columns) = (of(&outputs, self.frf.outputs()), of(&inputs, self.frf.inputs()));
         let hits = self.hits.as_ref().map(|hits| hits.select_rows(&rows).select_columns(&columns));
-        Ok(Self { frf: chosen, hits })
+        let of = |all: &[Label], at: &[usize]| at.iter().map(|at| all[*at].clone()).collect::<Vec<_>>();
+        let labels = self.labels.as_ref().map(|(own, others)| (of(own, &rows), of(others, &columns)));
+        Ok(Self { frf: chosen, labels, hits })
     }
 
     /// Writes an npz that `identify` and `import` take.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        py.detach(|| write_frf(&path, &self.frf, &[]))
+        let directions = self.labels.as_ref().map_or_else(Vec::new, |(outputs, inputs)| {
+            let along = |labels: &[Label]| labels.iter().map(|label| label.direction).collect::<Vec<_>>();
+            direction_extras(&along(outputs), &along(inputs))
+        });
+        py.detach(|| write_frf(&path, &self.frf, &directions))
             .map_err(|error| raised::reading(py, &path, &error.to_string()))
     }
 

@@ -78,10 +78,16 @@ pub fn identify(
         noise,
         mounting: mounting_error.unwrap_or(usual.mounting),
     };
-    let (geometry, notes) = py
+    let (geometry, mut notes) = py
         .detach(|| read_geometry(&geometry))
         .map_err(|error| raised::reading(py, &geometry, &error.to_string()))?;
-    let frfs = [a, b, ajb].map(|frf| frf.get().matrix().clone());
+    let mut frfs = Vec::new();
+    for (name, frf, points) in [("A", a, &geometry.a), ("B", b, &geometry.b), ("AJB", ajb, &geometry.ajb)] {
+        let (own, told) = frf.get().along(points).map_err(|what| refused(format!("{name}: {what}")))?;
+        notes.extend(told.iter().map(|line| format!("{name}: {line}")));
+        frfs.push(own);
+    }
+    let frfs: [_; 3] = frfs.try_into().map_err(|_| refused("three FRFs are needed".into()))?;
     let asked = question.clone();
     let source = Source { kind: "frf".into(), ..Source::default() };
     let found = interruptible::run(py, move |_| asked.answered(source, frfs, &geometry))?;

@@ -143,7 +143,7 @@ impl Record {
     fn fs_hz(&self, py: Python<'_>) -> PyResult<f64> {
         let store =
             Store::open_read_only(&self.path).map_err(|error| raised::file(py, &self.path, &error))?;
-        Ok(f64::from(self.map(py, &store)?.rate_hz))
+        Ok(self.map(py, &store)?.fs_hz())
     }
 
     /// Names of the channels, in the order of `codes`.

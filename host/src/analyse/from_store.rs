@@ -259,7 +259,7 @@ impl CampaignFile {
     ) -> Result<f64, AnalyseError> {
         let missing = |role| AnalyseError::NoChannel { record: record.id, role };
         let map = self.channels.get(&record.session).ok_or(missing("anything"))?;
-        let rate = f64::from(map.rate_hz);
+        let rate = map.fs_hz();
         let force = map.place(Role::HammerForce).ok_or(missing("the hammer's force"))?;
         let responses = response_places(&self.plan, cell, record, map).ok_or(missing("the response"))?;
         let is_velocity = |place: usize| map.channels[place].quantity == Quantity::Velocity;

@@ -44,7 +44,7 @@ fn map(late_ns: u32) -> ChannelMap {
     for name in ["lc1", "lc2", "lc3"] {
         channels.push(channel(name, Role::LoadCell, Quantity::Force, 20.0));
     }
-    ChannelMap { id: 0, rate_hz: RATE, channels }
+    ChannelMap { id: 0, rate_hz: RATE, exact_hz: None, channels }
 }
 
 /// A hit at the trigger, and a decay at 208 Hz in everything else, late by the channel's delay; T and Δx in phase with the slope

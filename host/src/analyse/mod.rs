@@ -57,7 +57,7 @@ pub use from_store::{AnalysedLength, CampaignFile, analyse};
 pub use impact_loops::{ImpactLoops, SlopeIs};
 pub use level_stiffness::NoLevelStiffness;
 pub use missing::Missing;
-pub use plan_geometry::{geometry, places};
+pub use plan_geometry::{geometry, geometry_as_planned, places};
 pub use question::{Asked, IdmSets, Question, QuestionError};
 pub use shaker_levels::RecordLoops;
 pub use wanted::{BANDS, Progress, Wanted};

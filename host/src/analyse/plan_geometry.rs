@@ -10,7 +10,15 @@ use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
 pub fn geometry(plan: &Plan) -> Geometry {
     let rows = plan.to_interface();
     // where z slides, not even rounding may move anything
-    let to_interface = |v: [f64; 3]| if plan.slides_along_z() { v } else { turned(&rows, v) };
+    in_coordinates(plan, &|v| if plan.slides_along_z() { v } else { turned(&rows, v) })
+}
+
+/// The same in the plan's own coordinates, which labels of files are in.
+pub fn geometry_as_planned(plan: &Plan) -> Geometry {
+    in_coordinates(plan, &|v| v)
+}
+
+fn in_coordinates(plan: &Plan, to_interface: &dyn Fn([f64; 3]) -> [f64; 3]) -> Geometry {
     let mut geometry = Geometry {
         a: Configuration::default(),
         b: Configuration::default(),

@@ -236,7 +236,7 @@ fn hit(store: &Store, plan: &Plan, row: &RecordRow) -> Result<Option<Hit>, Store
 
 /// Force times velocity along the hit, summed over the pulse, as a part of what it could be at most.
 fn power_sign(hit: &Hit, place: usize, felt: [f64; 3]) -> Option<f64> {
-    let rate = f64::from(hit.map.rate_hz);
+    let rate = hit.map.fs_hz();
     let channel = hit.map.channels.get(place)?;
     let late = (f64::from(channel.delay_ns) * 1e-9 * rate) as usize;
     let (force, signal) = (hit.signals.get(hit.map.place(Role::HammerForce)?)?, hit.signals.get(place)?);
@@ -276,7 +276,7 @@ fn differences(values: impl Iterator<Item = f64>) -> Vec<f64> {
 
 /// The mean over the rms of a channel in the first millisecond, positive along the hit (the force itself: positive at all).
 fn early_sign(hit: &Hit, place: usize, felt: Option<[f64; 3]>) -> Option<f64> {
-    let rate = f64::from(hit.map.rate_hz);
+    let rate = hit.map.fs_hz();
     let channel = &hit.map.channels[place];
     let late = (f64::from(channel.delay_ns) * 1e-9 * rate) as usize;
     let (signal, from) = (hit.signals.get(place)?, hit.pulse.start + late);
@@ -291,7 +291,7 @@ fn early_sign(hit: &Hit, place: usize, felt: Option<[f64; 3]>) -> Option<f64> {
 
 /// ∫F dt / (m Δv) along the hit.
 fn momentum_ratio(hit: &Hit, mass_kg: f64) -> Option<f64> {
-    let rate = f64::from(hit.map.rate_hz);
+    let rate = hit.map.fs_hz();
     let samples = |seconds: f64| (seconds * rate) as usize;
     let force = &hit.signals[hit.map.place(Role::HammerForce)?];
     let Pulse { start, end, offset_n, .. } = hit.pulse;

@@ -30,6 +30,7 @@ fn map(force_error: f64, z_sign: f32) -> ChannelMap {
     ChannelMap {
         id: 0,
         rate_hz: RATE as u32,
+        exact_hz: None,
         channels: vec![
             channel("force", Role::HammerForce, Quantity::Force, (44.6 * force_error) as f32),
             velocity("vib_x", Axis::X, 1.0),

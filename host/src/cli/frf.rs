@@ -10,9 +10,11 @@ use super::frf_matrix::{Wishes, average};
 use super::hit_agreement::Agreement;
 use super::output;
 use crate::campaign::verdict::{Kind, Limits, Verdict, judge_all};
+use crate::exchange::frf_npz::direction_extras;
 use crate::exchange::npz::Array;
+use crate::exchange::record_file::RecordFile;
 use crate::exchange::record_uff::read_record_file;
-use crate::exchange::{Extra, write_frf};
+use crate::exchange::{Extra, StatedUnits, write_frf};
 use crate::outside::tell_line;
 use crate::spectra::{
     CrossSpectra, ForceWeighting, FrfSettings, ImpactRecords, MotionQuantity, Origin, Pulse, PulseSamples,
@@ -74,6 +76,9 @@ pub struct Frf {
     /// Ratio of noise powers for Hv, response over force, (SI/N)²; noise in proportion to the signals when absent.
     #[arg(long, value_name = "RATIO")]
     noise_ratio: Option<f64>,
+    /// Units that count instead of those of the file's labels: response=mm/s,force=lbf,time=ms.
+    #[arg(long, value_name = "UNITS", default_value = "")]
+    units: StatedUnits,
     /// Names of the responses (repeat, or a list with commas).
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     outputs: Vec<String>,
@@ -117,21 +122,21 @@ impl Frf {
         if self.records.is_dir() {
             return self.of_folder();
         }
-        let (records, warnings) =
-            read_record_file(&self.records).map_err(|e| CliError::Bad(e.to_string()))?;
-        for warning in &warnings {
-            tell_line!("{}: {warning}", self.records.display());
+        let read = read_record_file(&self.records, &self.units).map_err(|e| CliError::Bad(e.to_string()))?;
+        let RecordFile { records, delay_s, directions, taken, notes } = read.along_axes();
+        for line in std::iter::once(&taken).chain(&notes) {
+            tell_line!("{}: {line}", self.records.display());
         }
         let names = self.names(records.response.first().map_or(0, Vec::len))?;
         let verdicts = judge_all(&records, &Limits::default(), None);
         let used: Vec<bool> = verdicts.iter().map(|v| v.kind == Kind::Good).collect();
         if !used.contains(&true) {
             if self.json {
-                output::json(&self.document(&records, &verdicts, None))?;
+                output::json(&self.document(&records, &verdicts, &self.settings(&delay_s), None))?;
             }
             return Err(CliError::Bad(self.nothing_good(&records, &verdicts)));
         }
-        let settings = self.settings();
+        let settings = self.settings(&delay_s);
         let found = estimate(&records, &used, &settings)
             .map_err(|e| CliError::Bad(format!("{}: {e}", self.records.display())))?;
         let excited = usable_band(found.frequency_hz(), &found.force_spectrum(), 6.0);
@@ -150,13 +155,15 @@ impl Frf {
         if let Some(path) = &self.out {
             let matrix = (found.to_matrix(quantity, names.clone(), self.input.clone()))
                 .map_err(|e| CliError::Bad(format!("{}: {e}", self.records.display())))?;
-            write_frf(path, &matrix, &extras(&found, self.noise_ratio))
-                .map_err(|e| CliError::Bad(e.to_string()))?;
+            let mut further = extras(&found, self.noise_ratio);
+            further.extend(direction_extras(&directions.responses, &[directions.force]));
+            write_frf(path, &matrix, &further).map_err(|e| CliError::Bad(e.to_string()))?;
         }
         if self.json {
             return output::json(&self.document(
                 &records,
                 &verdicts,
+                &settings,
                 Some((&found, excited, quantity, &names, &agreement)),
             ));
         }
@@ -204,7 +211,7 @@ impl Frf {
 
     /// What is to be said of the force windows of the hits that are used.
     fn about_window(&self, records: &ImpactRecords, used: &[bool]) -> Vec<String> {
-        let windows = force_windows(records, &self.settings());
+        let windows = force_windows(records, &self.settings(&[]));
         let of_used = || {
             windows
                 .iter()
@@ -244,7 +251,8 @@ impl Frf {
             )));
         };
         let quantity = self.quantity.map(MotionQuantity::from);
-        average(&self.records, out, &Wishes { settings: &self.settings(), quantity, band: self.band })
+        let (settings, units) = (self.settings(&[]), &self.units);
+        average(&self.records, out, &Wishes { settings: &settings, quantity, band: self.band, units })
     }
 
     /// What cannot be meant.
@@ -287,7 +295,14 @@ impl Frf {
         }
     }
 
-    fn settings(&self) -> FrfSettings {
+    /// `of_file_s` is how late each response is against the force by the file itself.
+    fn settings(&self, of_file_s: &[f64]) -> FrfSettings {
+        let late = of_file_s.iter().any(|s| *s != 0.0);
+        let delay_s = match (self.delay.is_empty(), late) {
+            (true, false) => Vec::new(),
+            (true, true) => of_file_s.to_vec(),
+            (false, _) => self.delay.iter().zip(of_file_s).map(|(own, file)| own + file).collect(),
+        };
         FrfSettings {
             windowing: Windowing {
                 force_before_s: self.force_before,
@@ -301,7 +316,7 @@ impl Frf {
                 },
             },
             origin: self.origin.map_or(Origin::PulseStart, Origin::At),
-            delay_s: self.delay.clone(),
+            delay_s,
             band_hz: None,
             transform_samples: self.pad_to,
             jackknife: self.jackknife,
@@ -313,9 +328,10 @@ impl Frf {
         &self,
         records: &ImpactRecords,
         verdicts: &[Verdict],
+        settings: &FrfSettings,
         found: Option<(&CrossSpectra, Option<Band>, MotionQuantity, &[String], &Agreement)>,
     ) -> Value {
-        let windows = force_windows(records, &self.settings());
+        let windows = force_windows(records, &self.settings(&[]));
         let hits: Vec<Value> = verdicts
             .iter()
             .enumerate()
@@ -334,7 +350,7 @@ impl Frf {
             "fs_hz": records.fs_hz,
             "hits": hits,
             "used": found.map_or(0, |(y, ..)| y.hits()),
-            "settings": self.settings(),
+            "settings": settings,
         });
         if let Some((y, band, quantity, names, agreement)) = found {
             document["quantity"] = json!(quantity.frf_name());

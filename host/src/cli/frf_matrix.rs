@@ -11,9 +11,14 @@ use super::import::universal_files;
 use super::output;
 use super::waiting::Waiting;
 use crate::campaign::verdict::{Kind, Limits, judge_all};
-use crate::exchange::record_uff::{LabelledRecords, by_label};
-use crate::exchange::{frf_uff, write_frf};
+use crate::exchange::direction::axis_name;
+use crate::exchange::frf_npz::direction_extras;
+use crate::exchange::record_file::{Directions, RecordFile};
+use crate::exchange::record_uff::{LabelledRecords, by_label, record_contents};
+use crate::exchange::{StatedUnits, write_frf};
 use crate::frf::Frf;
+use crate::frf::common_lines::same;
+use crate::outside::tell_line;
 use crate::spectra::{CrossSpectra, FrfSettings, MotionQuantity, estimate, usable_band};
 
 /// How the records become FRFs.
@@ -23,6 +28,8 @@ pub(super) struct Wishes<'w> {
     pub(super) quantity: Option<MotionQuantity>,
     /// Lines to give, Hz.
     pub(super) band: Option<(f64, f64)>,
+    /// What counts instead of the units of labels.
+    pub(super) units: &'w StatedUnits,
 }
 
 /// One place of impact with one sensor.
@@ -30,6 +37,8 @@ struct Pair {
     impact: String,
     response: String,
     spectra: CrossSpectra,
+    /// Along which axes force and channels are.
+    directions: Directions,
 }
 
 /// Averages the good hits of every file in `folder` and writes the matrix to `out`.
@@ -42,17 +51,20 @@ pub(super) fn average(folder: &Path, out: &Path, wishes: &Wishes<'_>) -> Result<
     let waiting = Waiting::of("averaging files");
     let (mut pairs, mut told, mut quantity) = (Vec::<Pair>::new(), Vec::new(), wishes.quantity);
     let mut worst: Vec<(f64, String)> = Vec::new();
+    let mut took = Vec::<(String, String)>::new();
     for (done, path) in files.iter().enumerate() {
         waiting.at(done, files.len());
         let wrong = |what: String| bad(format!("{}: {what}", path.display()));
-        let contents = frf_uff::contents(path).map_err(|error| bad(error.to_string()))?;
-        let (rows, warnings) = by_label(&contents).map_err(wrong)?;
+        let contents = record_contents(path).map_err(|error| bad(error.to_string()))?;
+        let (rows, notes) = by_label(&contents, wishes.units, &|_| false).map_err(wrong)?;
         drop(contents);
-        warnings
-            .iter()
-            .map(|warning| format!("{}: {warning}", path.display()))
-            .for_each(|line| told.push(line));
-        for LabelledRecords { impact, response, records } in rows {
+        told.extend(notes.iter().map(|note| format!("{}: {note}", path.display())));
+        for LabelledRecords { impact, response, read } in rows {
+            let RecordFile { records, delay_s, directions, taken, notes } = read.along_axes();
+            told.extend(notes.iter().map(|note| format!("{}: {note}", path.display())));
+            if !took.iter().any(|(known, _)| *known == taken) {
+                took.push((taken, path.display().to_string()));
+            }
             if pairs.iter().any(|pair| (&pair.impact, &pair.response) == (&impact, &response)) {
                 return Err(wrong(format!("{impact} to {response} stands in an earlier file too")));
             }
@@ -72,10 +84,11 @@ pub(super) fn average(folder: &Path, out: &Path, wishes: &Wishes<'_>) -> Result<
                 continue;
             }
             let of = |what: String| wrong(format!("{impact} to {response}: {what}"));
-            let found = estimate(&records, &used, wishes.settings).map_err(|error| of(error.to_string()))?;
+            let settings = FrfSettings { delay_s, ..wishes.settings.clone() };
+            let found = estimate(&records, &used, &settings).map_err(|error| of(error.to_string()))?;
             let excited = usable_band(found.frequency_hz(), &found.force_spectrum(), 6.0);
-            let channels = outputs_of(&response, found.outputs());
-            let agreement = Agreement::of(&records, &used, wishes.settings, &found, excited, &channels)
+            let channels = outputs_of(&response, found.outputs(), &directions);
+            let agreement = Agreement::of(&records, &used, &settings, &found, excited, &channels)
                 .map_err(|error| of(error.to_string()))?;
             told.extend(agreement.suspicions.iter().map(|what| format!("{impact} to {response}: {what}")));
             worst.extend(agreement.worst().map(|(o, median, lowest, hz)| {
@@ -95,10 +108,12 @@ pub(super) fn average(folder: &Path, out: &Path, wishes: &Wishes<'_>) -> Result<
             if spectra.lines() == 0 {
                 return Err(CliError::Usage("--band holds no line: widen it".into()));
             }
-            if pairs.first().is_some_and(|first| first.spectra.frequency_hz() != spectra.frequency_hz()) {
+            let same_lines =
+                |first: &Pair| same(first.spectra.frequency_hz(), spectra.frequency_hz()).is_ok();
+            if !pairs.first().is_none_or(same_lines) {
                 return Err(of("it has other frequency lines than the files before it: records must be of one length and rate".into()));
             }
-            pairs.push(Pair { impact, response, spectra });
+            pairs.push(Pair { impact, response, spectra, directions });
         }
     }
     drop(waiting);
@@ -110,9 +125,15 @@ pub(super) fn average(folder: &Path, out: &Path, wishes: &Wishes<'_>) -> Result<
             why.concat()
         )));
     };
+    for (taken, file) in &took {
+        tell_line!(
+            "{file}{}: {taken}",
+            if took.len() == 1 && files.len() > 1 { " and all others" } else { "" }
+        );
+    }
     let lines = first.spectra.lines();
-    let frf = matrix(&pairs, quantity)?;
-    write_frf(out, &frf, &[]).map_err(|error| bad(error.to_string()))?;
+    let (frf, outputs, inputs) = matrix(&pairs, quantity)?;
+    write_frf(out, &frf, &direction_extras(&outputs, &inputs)).map_err(|error| bad(error.to_string()))?;
     let (rows, columns) = (frf.outputs().len(), frf.inputs().len());
     worst.sort_by(|a, b| a.0.total_cmp(&b.0));
     if let (Some((_, lowest)), Some((median, _))) = (worst.first(), worst.get(worst.len() / 2)) {
@@ -128,25 +149,49 @@ pub(super) fn average(folder: &Path, out: &Path, wishes: &Wishes<'_>) -> Result<
     output::lines(told)
 }
 
-/// The outputs are called `NAME:x`, `NAME:y`, `NAME:z` where a sensor has three channels, `NAME` where it has one, else `NAME:1`, `NAME:2`.
-fn outputs_of(name: &str, channels: usize) -> Vec<String> {
+/// The outputs are called `NAME` where a sensor has one channel. Several are called by their axes, `NAME:x`;
+/// where labels name none, three are x, y and z, and others `NAME:1`, `NAME:2`.
+fn outputs_of(name: &str, channels: usize, directions: &Directions) -> Vec<String> {
+    let axes = &directions.responses;
+    let apart = (0..axes.len()).all(|i| (1..=3).contains(&axes[i]) && !axes[..i].contains(&axes[i]));
     match channels {
         1 => vec![name.to_owned()],
+        _ if apart => {
+            axes.iter().map(|axis| format!("{name}:{}", ["x", "y", "z"][*axis as usize - 1])).collect()
+        }
         3 => ["x", "y", "z"].map(|axis| format!("{name}:{axis}")).to_vec(),
         channels => (1..=channels).map(|channel| format!("{name}:{channel}")).collect(),
     }
 }
 
+/// A matrix, and the directions of its outputs and inputs.
+type Whole = (Frf, Vec<i64>, Vec<i64>);
+
 /// All pairs in one matrix; what was not measured is not a number.
-fn matrix(pairs: &[Pair], quantity: MotionQuantity) -> Result<Frf, CliError> {
+fn matrix(pairs: &[Pair], quantity: MotionQuantity) -> Result<Whole, CliError> {
     let (mut outputs, mut inputs) = (Vec::<String>::new(), Vec::<String>::new());
+    let (mut along, mut push) = (Vec::new(), Vec::new());
     for pair in pairs {
-        if !inputs.contains(&pair.impact) {
-            inputs.push(pair.impact.clone());
+        match inputs.iter().position(|own| *own == pair.impact) {
+            None => {
+                inputs.push(pair.impact.clone());
+                push.push(pair.directions.force);
+            }
+            Some(at) if push[at] != pair.directions.force => {
+                return Err(CliError::Bad(format!(
+                    "{}: files have its hammer along {} and along {}: correct the labels",
+                    pair.impact,
+                    axis_name(push[at]).unwrap_or_else(|| "no axis".into()),
+                    axis_name(pair.directions.force).unwrap_or_else(|| "no axis".into())
+                )));
+            }
+            Some(_) => {}
         }
-        for name in outputs_of(&pair.response, pair.spectra.outputs()) {
+        let names = outputs_of(&pair.response, pair.spectra.outputs(), &pair.directions);
+        for (name, axis) in names.into_iter().zip(&pair.directions.responses) {
             if !outputs.contains(&name) {
                 outputs.push(name);
+                along.push(*axis);
             }
         }
     }
@@ -158,7 +203,9 @@ fn matrix(pairs: &[Pair], quantity: MotionQuantity) -> Result<Frf, CliError> {
     for pair in pairs {
         let y = &pair.spectra;
         let column = inputs.iter().position(|name| *name == pair.impact).unwrap_or(0);
-        for (channel, name) in outputs_of(&pair.response, pair.spectra.outputs()).iter().enumerate() {
+        for (channel, name) in
+            outputs_of(&pair.response, pair.spectra.outputs(), &pair.directions).iter().enumerate()
+        {
             let at = (outputs.iter().position(|own| own == name).unwrap_or(0), column);
             for line in 0..y.lines() {
                 values[line][at] = y.h1(line, channel);
@@ -170,5 +217,5 @@ fn matrix(pairs: &[Pair], quantity: MotionQuantity) -> Result<Frf, CliError> {
     let whole =
         Frf::new(first.frequency_hz().to_vec(), first.sigma_per_s(), quantity, outputs, inputs, values);
     let whole = whole.and_then(|frf| frf.with_variance(variance)?.with_coherence(coherence));
-    whole.map_err(|error| CliError::Bad(error.to_string()))
+    whole.map(|frf| (frf, along, push)).map_err(|error| CliError::Bad(error.to_string()))
 }

@@ -9,13 +9,13 @@ use super::analyse::{where_to_look, write_into};
 use super::error::CliError;
 use super::output;
 use crate::analyse::{Asked, IdmSets, Question};
-use crate::exchange::{read_frf_file, read_geometry};
+use crate::exchange::{StatedUnits, read_frf_file, read_geometry};
 use crate::outside::tell_line;
 use crate::report::{document, words};
 use crate::results::Source;
 use crate::substructuring::averaged::Priors;
 use crate::substructuring::fit;
-use crate::substructuring::{Band, Frf};
+use crate::substructuring::{Band, Configuration, Frf};
 
 /// Identify a joint from FRFs of A, B and the assembly, measured anywhere.
 ///
@@ -63,6 +63,9 @@ pub struct Identify {
     /// For `fit`: how much A and B alone may differ from A and B in the assembly (standard deviation), as a fraction of their admittance.
     #[arg(long, value_name = "FRACTION", default_value_t = fit::Options::default().mounting, value_parser = not_negative)]
     mounting_error: f64,
+    /// Units that count instead of those of the files' labels: response=mm/s,force=lbf,frequency=rad/s.
+    #[arg(long, value_name = "UNITS", default_value = "")]
+    units: StatedUnits,
     /// Folder for results.json and report.html.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -73,11 +76,13 @@ pub struct Identify {
 
 impl Identify {
     pub fn run(self) -> Result<(), CliError> {
-        let [a, b, ajb] = [read(&self.a)?, read(&self.b)?, read(&self.ajb)?];
         let (geometry, notes) = read_geometry(&self.geometry).map_err(bad)?;
         for note in notes {
             tell_line!("jointrig: {note}");
         }
+        let read = |path, points| read(path, points, &self.units);
+        let [a, b, ajb] =
+            [read(&self.a, &geometry.a)?, read(&self.b, &geometry.b)?, read(&self.ajb, &geometry.ajb)?];
         let question = self.question();
         let found = question.answered(self.source(), [a, b, ajb], &geometry).map_err(bad)?;
         let results = document(found);
@@ -128,11 +133,15 @@ fn bad(error: impl std::fmt::Display) -> CliError {
     CliError::Bad(error.to_string())
 }
 
-/// FRFs from an npz or a universal file; what was left out is said.
-fn read(path: &Path) -> Result<Frf, CliError> {
-    let (frf, warnings) = read_frf_file(path).map_err(bad)?;
-    for warning in &warnings {
-        tell_line!("jointrig: {}: {warning}", path.display());
+/// FRFs from an npz or a universal file along the directions of the geometry's points; what was taken, left
+/// out or turned is said.
+fn read(path: &Path, points: &Configuration, units: &StatedUnits) -> Result<Frf, CliError> {
+    let read = read_frf_file(path, units).map_err(bad)?;
+    let (taken, notes) = (read.taken.clone(), read.notes.clone());
+    let (frf, turned) = read.along(points).map_err(|what| bad(format!("{}: {what}", path.display())))?;
+    tell_line!("jointrig: {}: {}", path.display(), [&[taken], &turned[..]].concat().join(", "));
+    for note in &notes {
+        tell_line!("jointrig: {}: {note}", path.display());
     }
     Ok(frf)
 }

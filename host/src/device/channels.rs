@@ -7,13 +7,20 @@ use jointrig_protocol::channel::{Axis, Channel, Role};
 pub struct ChannelMap {
     /// The map's id on the wire.
     pub id: u8,
-    /// Scans per second, Hz.
+    /// Scans per second, Hz; the nearest whole number where `exact_hz` has another rate.
     pub rate_hz: u32,
+    /// The rate where it is no whole number, Hz: records from elsewhere may have any.
+    pub exact_hz: Option<f64>,
     /// The channels in the order of the scan.
     pub channels: Vec<Channel>,
 }
 
 impl ChannelMap {
+    /// Scans per second, Hz.
+    pub fn fs_hz(&self) -> f64 {
+        self.exact_hz.unwrap_or(f64::from(self.rate_hz))
+    }
+
     /// How many channels a scan has.
     pub fn len(&self) -> usize {
         self.channels.len()
@@ -88,6 +95,7 @@ mod tests {
         let map = ChannelMap {
             id: 0,
             rate_hz: 51_200,
+            exact_hz: None,
             channels: vec![
                 channel("a", Role::HammerForce, 44.64),
                 channel("b", Role::SpecimenA, -0.001),

@@ -122,7 +122,7 @@ impl Session {
                 other => return Err(self.wrong("channel", &other)),
             }
         }
-        Ok(ChannelMap { id: 0, rate_hz: info.scan_rate_hz, channels })
+        Ok(ChannelMap { id: 0, rate_hz: info.scan_rate_hz, exact_hz: None, channels })
     }
 
     /// From now on the device judges trigger, quiet, limits and amplitudes by the scales of these channels, whatever sensitivities it was

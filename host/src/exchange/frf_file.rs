@@ -1,9 +1,11 @@
-//! An FRF file of either form: npz, or a universal file. What it is, its first bytes tell, not its name.
+//! An FRF file of either form: npz, or a universal file. Its first bytes tell which, not its name.
 
-use super::frf_npz::read_frf;
+use super::frf_npz::read_labelled;
 use super::frf_uff::{FrfUffError, read_frf_uff};
+use super::labelled_frf::LabelledFrf;
 use super::npz_error::NpzError;
-use crate::frf::Frf;
+use super::other_formats::{Contents, not_read_here};
+use super::units::StatedUnits;
 use crate::{advice, foreign};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -18,6 +20,14 @@ pub enum FrfFileError {
         path: PathBuf,
         /// Why.
         source: io::Error,
+    },
+    /// It is of a format that is known and not read.
+    #[error("{}: {said}", path.display())]
+    OtherFormat {
+        /// The file.
+        path: PathBuf,
+        /// What it is, and how to make an npz of it.
+        said: String,
     },
     /// It is an npz file that holds no FRFs.
     #[error(transparent)]
@@ -40,10 +50,26 @@ pub fn is_npz(path: &Path) -> Result<bool, FrfFileError> {
     Ok(first.starts_with(b"PK\x03\x04") || first.starts_with(b"PK\x05\x06"))
 }
 
-/// Reads FRFs from an npz or a universal file. The second value says what was left out or is missing.
+/// Refuses a file of another program's format, naming it and how to make an npz of it.
+///
+/// # Errors
+/// [`FrfFileError::OtherFormat`], [`FrfFileError::Open`].
+pub(super) fn refuse_other_formats(path: &Path, wanted: Contents) -> Result<(), FrfFileError> {
+    match not_read_here(path, wanted) {
+        Ok(None) => Ok(()),
+        Ok(Some(said)) => Err(FrfFileError::OtherFormat { path: path.into(), said }),
+        Err(source) => Err(FrfFileError::Open { path: path.into(), source }),
+    }
+}
+
+/// Reads FRFs from an npz or a universal file, in SI. `stated` units count instead of the file's.
 ///
 /// # Errors
 /// [`FrfFileError`] with the file and what is wrong in it.
-pub fn read_frf_file(path: &Path) -> Result<(Frf, Vec<String>), FrfFileError> {
-    if is_npz(path)? { Ok((read_frf(path)?, Vec::new())) } else { Ok(read_frf_uff(path)?) }
+pub fn read_frf_file(path: &Path, stated: &StatedUnits) -> Result<LabelledFrf, FrfFileError> {
+    if is_npz(path)? {
+        return Ok(read_labelled(path, stated)?);
+    }
+    refuse_other_formats(path, Contents::Frfs)?;
+    Ok(read_frf_uff(path, stated)?)
 }

@@ -1,11 +1,15 @@
-//! FRFs in npz: `frequency` (line) Hz, `frf` (line, output, input), `quantity`, `outputs`, `inputs`, and optionally `sigma`, the
-//! damping of the exponential window in 1/s (absent means 0), `variance` of the real part of each value and `coherence`, both shaped like
-//! `frf`.
+//! FRFs in npz: `frequency` (line) Hz, `frf` (line, output, input), `quantity`, `outputs`, `inputs`.
+//! Optional are `sigma`, the damping of the exponential window in 1/s (absent means 0); `variance` of the
+//! real part of each value and `coherence`, both shaped like `frf`; `unit` of the values, `unit_frequency`;
+//! and `output_direction`, `input_direction`: ±1, 2, 3 along x, y, z, 0 where none is told.
 
+use super::direction::turned_words;
+use super::labelled_frf::{Label, LabelledFrf};
 use super::npz::{Array, NpzFile};
 use super::npz_error::NpzError;
 use super::npz_output::NpzOutput;
-use crate::frf::{Frf, MotionQuantity};
+use super::units::{Dimension, StatedUnits, Unit};
+use crate::frf::{COHERENCE_ROUNDING, Frf, MotionQuantity};
 use nalgebra::DMatrix;
 use num_complex::Complex;
 use std::path::Path;
@@ -22,14 +26,23 @@ pub enum Extra {
 /// Bytes of memory of a line's matrix beside its values.
 const LINE: u64 = 64;
 
-/// Reads an FRF file, with the variance where it has one. Values may be NaN; whoever uses a cell checks it. A coherence of another
-/// shape than the FRFs' is no ordinary one, and is passed over.
+/// Reads an FRF file in SI, with variance and coherence where it has them. Values may be NaN: they are
+/// checked where a cell is used. A coherence of another shape than the FRFs' is passed over.
 ///
 /// # Errors
 /// [`NpzError`] naming the array that is missing or does not fit.
 pub fn read_frf(path: &Path) -> Result<Frf, NpzError> {
+    read_labelled(path, &StatedUnits::default()).map(|read| read.frf)
+}
+
+/// The same with what the file says of directions; `stated` units count instead of the file's.
+///
+/// # Errors
+/// As [`read_frf`]; also for units that are not known or contradict the quantity.
+pub fn read_labelled(path: &Path, stated: &StatedUnits) -> Result<LabelledFrf, NpzError> {
     let mut file = NpzFile::open(path)?;
-    let frequency_hz = file.real("frequency", "the frequency of each line, Hz")?.values;
+    file.refuse_other_units(&["unit", "unit_frf", "unit_frequency"])?;
+    let mut frequency_hz = file.real("frequency", "the frequency of each line, Hz")?.values;
     let outputs = file.text("outputs", "the names of the outputs")?.values;
     let inputs = file.text("inputs", "the names of the inputs")?.values;
     let word = file.word("quantity", "receptance, mobility or accelerance")?;
@@ -38,18 +51,26 @@ pub fn read_frf(path: &Path) -> Result<Frf, NpzError> {
     })?;
     let sigma_per_s =
         if file.has("sigma") { file.number("sigma", "the exponential window's damping, 1/s")? } else { 0.0 };
+    let (factor, mut taken) = frf_factor(&mut file, quantity, stated)?;
+    if let Some(unit) = file.unit("unit_frequency", stated.frequency.as_deref(), Unit::of_frequency)? {
+        frequency_hz.iter_mut().for_each(|f| *f *= unit.factor);
+        taken = format!("{taken}, frequency in {}", unit.label);
+    }
     let expected = format!(
         "shape (line, output, input) = ({}, {}, {}), complex",
         frequency_hz.len(),
         outputs.len(),
         inputs.len()
     );
-    let frf = file.complex("frf", &expected)?;
+    let mut frf = file.complex("frf", &expected)?;
     let (rows, columns) = (outputs.len(), inputs.len());
     if frf.shape != [frequency_hz.len(), rows, columns] {
         return Err(file.unexpected("frf", &format!("has shape {:?}", frf.shape), &expected));
     }
     file.charge("frf", frequency_hz.len(), LINE + 16 * (rows * columns) as u64, &expected)?;
+    if factor != 1.0 {
+        frf.values.iter_mut().for_each(|v| *v *= factor);
+    }
     // chunks of zero length are not allowed; an FRF without rows or columns has empty matrices
     let lines = if rows * columns == 0 {
         vec![DMatrix::zeros(rows, columns); frequency_hz.len()]
@@ -58,14 +79,18 @@ pub fn read_frf(path: &Path) -> Result<Frf, NpzError> {
     };
     let mut whole = Frf::new(frequency_hz, sigma_per_s, quantity, outputs, inputs, lines)
         .map_err(|e| file.content(e.to_string()))?;
+    let mut notes = Vec::new();
     if file.has("variance") {
         let (lines, rows, columns) = shape(&whole);
         let expected = format!("the variance of each value's real part, shape ({lines}, {rows}, {columns})");
-        let array = file.real("variance", &expected)?;
+        let mut array = file.real("variance", &expected)?;
         if !fits(&array, &whole) {
             return Err(file.unexpected("variance", &format!("has shape {:?}", array.shape), &expected));
         }
         file.charge("variance", lines, LINE + 8 * (rows * columns) as u64, &expected)?;
+        if factor != 1.0 {
+            array.values.iter_mut().for_each(|v| *v *= factor * factor);
+        }
         whole =
             whole.with_variance(by_line(&array, rows, columns)).map_err(|e| file.content(e.to_string()))?;
         whole.check_variance().map_err(|e| file.content(e.to_string()))?;
@@ -77,9 +102,97 @@ pub fn read_frf(path: &Path) -> Result<Frf, NpzError> {
         let expected = "the coherence of each value";
         file.charge("coherence", array.values.len() / (rows * columns), LINE, expected)?;
         let coherence = by_line(&array, rows, columns);
-        whole = whole.with_coherence(coherence).map_err(|e| file.content(e.to_string()))?;
+        let checked = whole.with_coherence(coherence).and_then(Frf::with_coherence_in_range);
+        let (checked, rounded) = checked.map_err(|e| file.content(e.to_string()))?;
+        whole = checked;
+        if rounded > 0 {
+            notes.push(format!(
+                "{rounded} coherences are outside 0 to 1 by no more than {COHERENCE_ROUNDING}: they are set to the end of the range"
+            ));
+        }
     }
-    Ok(whole)
+    let [outputs, inputs] = [
+        directions(&mut file, "output_direction", whole.outputs())?,
+        directions(&mut file, "input_direction", whole.inputs())?,
+    ];
+    let read = LabelledFrf { outputs, inputs, ..LabelledFrf::unlabelled(whole, String::new(), notes) };
+    let (read, turned) = read.turned_to_axes();
+    let taken = std::iter::once(taken).chain(turned_words(&turned)).collect::<Vec<_>>().join(", ");
+    Ok(LabelledFrf { taken, ..read })
+}
+
+/// The factor of the values to SI, and what they are for a person.
+fn frf_factor(
+    file: &mut NpzFile,
+    quantity: MotionQuantity,
+    stated: &StatedUnits,
+) -> Result<(f64, String), NpzError> {
+    let motion = Dimension::of(quantity);
+    let wanted = [motion.per_force(), motion, motion.rotating().per_force()];
+    let parse = |label: &str| Unit::parse(label, &wanted);
+    let array = if file.has("unit_frf") { "unit_frf" } else { "unit" };
+    let own = file.unit(array, stated.response.as_deref(), parse)?;
+    let force = stated.force.as_deref().and_then(|label| Unit::parse(label, &[Dimension::FORCE]).ok());
+    let name = quantity.frf_name();
+    let Some(own) = own else {
+        let per = force.as_ref().map_or(1.0, |force| 1.0 / force.factor);
+        let words = force.map_or_else(
+            || format!("{name} in SI"),
+            |force| format!("{name} in SI, force in {}", force.label),
+        );
+        return Ok((per, words));
+    };
+    match force {
+        Some(force) if own.dimension == motion => {
+            Ok((own.factor / force.factor, format!("{name}: {} per {}", own.label, force.label)))
+        }
+        Some(force) if (own.of_force * force.factor - 1.0).abs() > 1e-3 => Err(file.content(format!(
+            "the values are in {} and the force is stated in {}: these are two units of force",
+            own.label, force.label
+        ))),
+        _ if own.dimension == motion => Ok((own.factor, format!("{name}: {} per N", own.label))),
+        _ => Ok((own.factor, format!("{name} in {}", own.label))),
+    }
+}
+
+/// What an array of directions says, one for each name.
+fn directions(file: &mut NpzFile, array: &str, names: &[String]) -> Result<Vec<Label>, NpzError> {
+    let expected = "±1, 2 or 3 along x, y or z for each name, 0 where none is told";
+    let all = if file.has(array) { file.real(array, expected)?.values } else { vec![0.0; names.len()] };
+    if all.len() != names.len() {
+        return Err(file.unexpected(
+            array,
+            &format!("has {} values for {} names", all.len(), names.len()),
+            expected,
+        ));
+    }
+    let label = |(name, direction): (&String, f64)| {
+        if direction.fract() != 0.0 || direction.abs() > 6.0 {
+            return Err(file.unexpected(array, &format!("has {direction} for {name}"), expected));
+        }
+        let sensor = match name.rsplit_once(':') {
+            Some((sensor, "x" | "y" | "z" | "rx" | "ry" | "rz")) => sensor,
+            _ => name,
+        };
+        Ok(Label { entity: String::new(), name: sensor.into(), direction: direction as i64 })
+    };
+    names.iter().zip(all).map(label).collect()
+}
+
+/// The directions of a file's labels as arrays beside the FRFs; none where no label says any.
+pub fn direction_arrays(read: &LabelledFrf) -> Vec<Extra> {
+    let along = |labels: &[Label]| labels.iter().map(|label| label.direction).collect::<Vec<_>>();
+    direction_extras(&along(&read.outputs), &along(&read.inputs))
+}
+
+/// Directions of outputs and inputs as arrays beside the FRFs, where any is told.
+pub fn direction_extras(outputs: &[i64], inputs: &[i64]) -> Vec<Extra> {
+    let array = |name: &str, directions: &[i64]| {
+        let values: Vec<f64> = directions.iter().map(|direction| *direction as f64).collect();
+        let told = directions.iter().any(|direction| *direction != 0);
+        told.then(|| Extra::Real(name.into(), Array { shape: vec![values.len()], values }))
+    };
+    [array("output_direction", outputs), array("input_direction", inputs)].into_iter().flatten().collect()
 }
 
 fn shape(frf: &Frf) -> (usize, usize, usize) {
@@ -156,6 +269,80 @@ mod tests {
         write_frf(&path, &frf, &[Extra::Real("coherence".into(), coherence)]).expect("written");
         assert_eq!(read_frf(&path).expect("read"), frf);
         assert!(NpzFile::open(&path).expect("open").has("coherence"));
+    }
+
+    /// A small file with these arrays beside those that every file has.
+    fn with(path: &Path, quantity: &str, write: impl FnOnce(&mut NpzOutput)) {
+        let mut out = NpzOutput::create(path).expect("writable");
+        out.real("frequency", &[2], [1.0, 2.0]).expect("written");
+        out.text("outputs", &[1], &["A1:z".into()]).expect("written");
+        out.text("inputs", &[1], &["f".into()]).expect("written");
+        out.text("quantity", &[], &[quantity.into()]).expect("written");
+        out.complex("frf", &[2, 1, 1], [Complex::new(1.0, 0.5); 2]).expect("written");
+        write(&mut out);
+        out.finish().expect("closed");
+    }
+
+    #[test]
+    fn units_and_directions_of_the_file_are_applied() {
+        let dir = tempfile::tempdir().expect("a temporary folder");
+        let path = dir.path().join("frf.npz");
+        for (quantity, unit, factor) in [
+            ("mobility", "(mm/s)/N", 1e-3),
+            ("mobility", "mm/s", 1e-3),
+            ("accelerance", "g/lbf", 9.80665 / 4.448_221_615_260_5),
+            ("receptance", "µm/N", 1e-6),
+        ] {
+            with(&path, quantity, |out| {
+                out.text("unit", &[], &[unit.into()]).expect("written");
+                out.text("unit_frequency", &[], &["kHz".into()]).expect("written");
+                out.real("output_direction", &[1], [-3.0]).expect("written");
+                out.real("input_direction", &[1], [-1.0]).expect("written");
+                out.real("variance", &[2, 1, 1], [4.0, 4.0]).expect("written");
+            });
+            let read = read_labelled(&path, &StatedUnits::default()).expect(unit);
+            assert!((read.frf.lines()[1][(0, 0)].re / -factor - 1.0).abs() < 1e-12, "{unit}");
+            assert!(
+                (read.frf.variance().expect("told")[0][(0, 0)] / (4.0 * factor * factor) - 1.0).abs() < 1e-12
+            );
+            assert_eq!(read.frf.frequency_hz(), [1e3, 2e3]);
+            assert_eq!((read.outputs[0].direction, read.inputs[0].direction), (3, -1));
+            assert!(
+                read.taken.contains("kHz") && read.taken.ends_with("A1 along −z turned"),
+                "{}",
+                read.taken
+            );
+            let stated = "response=m/s".parse().expect("a unit");
+            assert_eq!(read_labelled(&path, &stated).is_ok(), quantity == "mobility", "{unit}");
+        }
+        for (array, text, part) in [
+            ("unit", "m/s^2", "a mobility"),
+            ("unit", "V/N", "electrical"),
+            ("units", "m/s", "units are read from"),
+        ] {
+            with(&path, "mobility", |out| out.text(array, &[], &[text.into()]).expect("written"));
+            let said = read_frf(&path).expect_err("refused").to_string();
+            assert!(said.contains(&format!("{array}")) && said.contains(part), "{said}");
+        }
+        with(&path, "mobility", |out| out.real("input_direction", &[1], [0.5]).expect("written"));
+        assert!(read_frf(&path).expect_err("no axis").to_string().contains("`input_direction` has 0.5"));
+    }
+
+    #[test]
+    fn a_coherence_above_one_is_refused_and_a_rounded_one_said() {
+        let dir = tempfile::tempdir().expect("a temporary folder");
+        let path = dir.path().join("frf.npz");
+        let coherent = |value: f64| {
+            with(&path, "mobility", |out| out.real("coherence", &[2, 1], [0.5, value]).expect("written"));
+            read_labelled(&path, &StatedUnits::default())
+        };
+        let said = coherent(1.246).expect_err("no coherence").to_string();
+        for part in ["frf.npz", "coherence", "`f`", "`A1:z`", "2 Hz", "1.246"] {
+            assert!(said.contains(part), "{said} lacks {part}");
+        }
+        let read = coherent(1.000_000_1).expect("rounding");
+        assert_eq!(read.frf.coherence().expect("kept")[1][(0, 0)], 1.0);
+        assert!(read.notes[0].contains("1 coherences"), "{:?}", read.notes);
     }
 
     #[test]

@@ -1,27 +1,34 @@
 //! Formats of other programs, in and out: the only room between analysis and foreign files.
 //!
-//! [`npz`] and [`npz_output`] are the array layer; [`frf_npz`] and [`record_npz`] say which arrays make an FRF matrix, impact records or a
-//! hysteresis record; [`positions`] reads the pyFBS workbook, as xlsx or as a folder of csv tables; [`uff`] is the universal file,
-//! [`frf_uff`] says which of its functions make an FRF matrix, [`frf_file`] takes either form. A [`typed_table::Table`] becomes text with commas, or,
-//! with the feature `parquet`, columns for engines.
+//! [`npz`] and [`npz_output`] are the array layer; [`frf_npz`] and [`record_npz`] say which arrays make an
+//! FRF matrix, impact records or a hysteresis record; [`positions`] reads the pyFBS workbook, as xlsx or
+//! as a folder of csv tables. [`uff`] is the universal file; [`frf_uff`] and [`record_uff`] say which of
+//! its functions make FRFs or records, [`frf_file`] takes either form. [`units`] is the one table of
+//! units, [`direction`] the one rule for signed directions; [`labelled_frf`] and [`record_file`] hold
+//! what was read with both. A [`typed_table::Table`] becomes text with commas, or, with the feature
+//! `parquet`, columns for engines.
 
 #[cfg(test)]
 mod any_bytes_tests;
 mod archive;
 pub mod channel_records;
+pub mod direction;
 pub mod frf_file;
 pub mod frf_npz;
 pub mod frf_uff;
 pub mod geometry_file;
+pub mod labelled_frf;
 mod npy_header;
 mod npy_values;
 pub mod npz;
 mod npz_error;
 pub mod npz_output;
+mod other_formats;
 #[cfg(feature = "parquet")]
 pub mod parquet;
 pub mod positions;
 pub mod positions_output;
+pub mod record_file;
 pub mod record_npz;
 pub mod record_uff;
 #[cfg(test)]
@@ -29,7 +36,9 @@ mod round_trip_tests;
 mod tables;
 pub mod tables_output;
 pub mod typed_table;
+mod uff_axes;
 pub mod uff_output;
+pub mod units;
 mod workbook_parts;
 
 pub use jointrig_uff as uff;
@@ -38,8 +47,10 @@ pub use frf_file::{FrfFileError, read_frf_file};
 pub use frf_npz::{Extra, read_frf, write_frf};
 pub use frf_uff::FrfUffError;
 pub use geometry_file::{GeometryFileError, read_geometry};
+pub use labelled_frf::LabelledFrf;
 pub use npz_error::NpzError;
 pub use positions::{PositionsError, read_positions};
 pub use record_npz::{
     is_beside_the_contact, read_hysteresis, read_impacts, write_hysteresis, write_impacts, write_level,
 };
+pub use units::StatedUnits;

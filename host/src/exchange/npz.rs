@@ -8,6 +8,7 @@ use super::archive;
 use super::npy_header::Header;
 use super::npy_values::{in_c_order, letters, number_of};
 use super::npz_error::NpzError;
+use super::units::{self, Unit, UnitError};
 use crate::foreign;
 use npyz::npz::{array_name_from_file_name, file_name_from_array_name};
 use num_complex::Complex;
@@ -169,6 +170,59 @@ impl NpzFile {
             [word] => Ok(word.clone()),
             words => Err(self.unexpected(array, &format!("has {} values", words.len()), expected)),
         }
+    }
+
+    /// The unit that a person states, or else the one that the array names; none where neither says any.
+    ///
+    /// # Errors
+    /// It is not known, or of something else.
+    pub fn unit(
+        &mut self,
+        array: &str,
+        stated: Option<&str>,
+        parse: impl Fn(&str) -> Result<Unit, UnitError>,
+    ) -> Result<Option<Unit>, NpzError> {
+        if let Some(label) = stated {
+            let unit = parse(label)
+                .map_err(|error| self.content(format!("the unit `{label}` that is stated: {error}")))?;
+            return Ok(Some(unit));
+        }
+        if !self.has(array) {
+            return Ok(None);
+        }
+        let label = self.word(array, "a unit, e.g. mm/s")?;
+        let Some(label) = units::told(&label) else { return Ok(None) };
+        let unit = parse(label);
+        unit.map(Some).map_err(|error| {
+            self.content(format!(
+                "array `{array}` is `{label}`: {error}; correct it, or state the unit with --units"
+            ))
+        })
+    }
+
+    /// Refuses arrays that are called after a unit, but not as one of `known`: they would be passed over,
+    /// and the values taken for SI.
+    ///
+    /// # Errors
+    /// [`NpzError::Content`] with the names.
+    pub fn refuse_other_units(&self, known: &[&str]) -> Result<(), NpzError> {
+        let mut others: Vec<String> = self
+            .archive
+            .file_names()
+            .flatten()
+            .filter_map(|name| array_name_from_file_name(&name).map(String::from))
+            .filter(|name| name.to_lowercase().contains("unit") && !known.contains(&name.as_str()))
+            .take(MOST_NAMED)
+            .collect();
+        others.sort_unstable();
+        if others.is_empty() {
+            return Ok(());
+        }
+        Err(self.content(format!(
+            "its arrays {} may name units, and are not known here: units are read from {}",
+            others.join(", "),
+            known.join(", ")
+        )))
     }
 
     /// An [`NpzError::Unexpected`] of this file.

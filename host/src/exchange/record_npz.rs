@@ -3,6 +3,9 @@
 use super::npz::NpzFile;
 use super::npz_error::NpzError;
 use super::npz_output::NpzOutput;
+use super::other_formats::{Contents, not_read_here};
+use super::record_file::{Directions, RecordFile};
+use super::units::{Dimension, StatedUnits, Unit};
 use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 use crate::spectra::{ImpactRecords, MotionQuantity};
 use std::path::Path;
@@ -17,9 +20,22 @@ pub(super) const MOST_CHANNELS: usize = 1000;
 /// # Errors
 /// [`NpzError`] naming the array that is missing or does not fit.
 pub fn read_impacts(path: &Path) -> Result<ImpactRecords, NpzError> {
+    read_records(path, &StatedUnits::default()).map(|read| read.records)
+}
+
+/// The same with what was taken: `unit_force`, `unit_response` and `unit_fs` may name other units, and
+/// `stated` ones count instead.
+///
+/// # Errors
+/// As [`read_impacts`]; also for units that are not known or contradict the quantity.
+pub fn read_records(path: &Path, stated: &StatedUnits) -> Result<RecordFile, NpzError> {
     let mut file = NpzFile::open(path)?;
-    let fs_hz = positive(&mut file, "fs", "the sampling rate, Hz (positive)")?;
-    let force = file.real("force", "the hammer force (hit, sample), N")?;
+    file.refuse_other_units(&["unit_force", "unit_response", "unit_fs"])?;
+    let mut fs_hz = positive(&mut file, "fs", "the sampling rate, Hz (positive)")?;
+    if let Some(unit) = file.unit("unit_fs", None, Unit::of_frequency)? {
+        fs_hz *= unit.factor;
+    }
+    let mut force = file.real("force", "the hammer force (hit, sample), N")?;
     let (hits, samples) = match force.shape[..] {
         [samples] => (1, samples),
         [hits, samples] => (hits, samples),
@@ -30,7 +46,7 @@ pub fn read_impacts(path: &Path) -> Result<ImpactRecords, NpzError> {
         return Err(file.unexpected("force", &found, "(hit, sample): is the first axis the hit?"));
     }
     let expected = format!("(hit, channel, sample) = ({hits}, channels, {samples})");
-    let response = file.real("response", &expected)?;
+    let mut response = file.real("response", &expected)?;
     let channels = match response.shape[..] {
         [h, c, n] if h == hits && n == samples => c,
         [h, n] if h == hits && n == samples => 1,
@@ -55,7 +71,26 @@ pub fn read_impacts(path: &Path) -> Result<ImpactRecords, NpzError> {
     let quantity = MotionQuantity::from_name(&word).ok_or_else(|| {
         file.unexpected("quantity", &format!("is `{word}`"), "velocity, acceleration or displacement")
     })?;
-    Ok(ImpactRecords {
+    let motion = Dimension::of(quantity);
+    let of_response =
+        file.unit("unit_response", stated.response.as_deref(), |label| Unit::parse(label, &[motion]))?;
+    let of_force =
+        file.unit("unit_force", stated.force.as_deref(), |label| Unit::parse(label, &[Dimension::FORCE]))?;
+    for (unit, values) in [(&of_response, &mut response.values), (&of_force, &mut force.values)] {
+        if let Some(unit) = unit {
+            values.iter_mut().for_each(|v| *v *= unit.factor);
+        }
+    }
+    let word = |unit: &Option<Unit>, si: &str| {
+        unit.as_ref().map_or_else(|| si.to_owned(), |unit| unit.label.clone())
+    };
+    let taken = format!(
+        "{} in {}, force in {}",
+        quantity.name(),
+        word(&of_response, si_unit(quantity)),
+        word(&of_force, "N")
+    );
+    let records = ImpactRecords {
         fs_hz,
         force_n: apart(force.values, samples),
         response: apart(response.values, samples * channels)
@@ -63,7 +98,23 @@ pub fn read_impacts(path: &Path) -> Result<ImpactRecords, NpzError> {
             .map(|hit| apart(hit, samples))
             .collect(),
         quantity,
+    };
+    Ok(RecordFile {
+        records,
+        delay_s: vec![0.0; channels],
+        directions: Directions { force: 0, responses: vec![0; channels] },
+        taken,
+        notes: Vec::new(),
     })
+}
+
+/// The SI unit of a motion.
+fn si_unit(quantity: MotionQuantity) -> &'static str {
+    match quantity {
+        MotionQuantity::Displacement => "m",
+        MotionQuantity::Velocity => "m/s",
+        MotionQuantity::Acceleration => "m/s²",
+    }
 }
 
 /// Signals of `each` samples, from the last to the first, so that there is never a second copy of all.
@@ -101,14 +152,22 @@ pub fn write_impacts(path: &Path, records: &ImpactRecords) -> Result<(), NpzErro
 }
 
 /// Reads a hysteresis record: `fs`, `velocity_a` and `velocity_b` (m/s) or `displacement_a` and `displacement_b` (m), `force` (N)
-/// or `load_cells` (cell, sample; summed), optional `excitation` (Hz) and `normal_load` (N). The motions are taken for the contact's own, unless
+/// or `load_cells` (cell, sample; summed), optional `excitation` (Hz) and `normal_load` (N). Other units may be named by `unit_velocity`,
+/// `unit_displacement`, `unit_force` (also of the load) and `unit_fs`. The motions are taken for the contact's own, unless
 /// `measured` says "beside the contact" ([`is_beside_the_contact`]).
 ///
 /// # Errors
 /// [`NpzError`] naming the array that is missing or does not fit.
 pub fn read_hysteresis(path: &Path) -> Result<HysteresisRecord, NpzError> {
+    if let Ok(Some(reason)) = not_read_here(path, Contents::Loop) {
+        return Err(NpzError::Content { path: path.into(), reason });
+    }
     let mut file = NpzFile::open(path)?;
-    let fs_hz = positive(&mut file, "fs", "the sampling rate, Hz (positive)")?;
+    file.refuse_other_units(&["unit_force", "unit_velocity", "unit_displacement", "unit_fs"])?;
+    let mut fs_hz = positive(&mut file, "fs", "the sampling rate, Hz (positive)")?;
+    if let Some(unit) = file.unit("unit_fs", None, Unit::of_frequency)? {
+        fs_hz *= unit.factor;
+    }
     let velocities = file.has("velocity_a") || file.has("velocity_b");
     if velocities && (file.has("displacement_a") || file.has("displacement_b")) {
         return Err(file.content("it has both velocities and displacements: keep the pair that was measured"));
@@ -119,9 +178,9 @@ pub fn read_hysteresis(path: &Path) -> Result<HysteresisRecord, NpzError> {
         ["displacement_a", "displacement_b"]
     };
     let expected = "the motion beside the contact (sample), velocity_* in m/s or displacement_* in m";
-    let a = one_axis(&mut file, names[0], expected)?;
-    let b = one_axis(&mut file, names[1], expected)?;
-    let force_n = if file.has("force") {
+    let mut a = one_axis(&mut file, names[0], expected)?;
+    let mut b = one_axis(&mut file, names[1], expected)?;
+    let mut force_n = if file.has("force") {
         one_axis(&mut file, "force", "the tangential force (sample), N")?
     } else {
         let cells = file.real("load_cells", "the load cells (cell, sample), N, where there is no `force`")?;
@@ -159,7 +218,18 @@ pub fn read_hysteresis(path: &Path) -> Result<HysteresisRecord, NpzError> {
         return Err(file.content(format!("sample {at} is not a number: cut the record before it")));
     }
     let excitation_hz = optional(&mut file, "excitation", "the excitation frequency, Hz (positive)")?;
-    let normal_load_n = optional(&mut file, "normal_load", "the normal load, N (positive)")?;
+    let mut normal_load_n = optional(&mut file, "normal_load", "the normal load, N (positive)")?;
+    let (unit_motion, dimension) = if velocities {
+        ("unit_velocity", Dimension::VELOCITY)
+    } else {
+        ("unit_displacement", Dimension::DISPLACEMENT)
+    };
+    if let Some(unit) = file.unit(unit_motion, None, |label| Unit::parse(label, &[dimension]))? {
+        a.iter_mut().chain(&mut b).for_each(|v| *v *= unit.factor);
+    }
+    if let Some(unit) = file.unit("unit_force", None, |label| Unit::parse(label, &[Dimension::FORCE]))? {
+        force_n.iter_mut().chain(&mut normal_load_n).for_each(|v| *v *= unit.factor);
+    }
     let motion = if velocities {
         RelativeMotion::Velocity { a_m_per_s: a, b_m_per_s: b }
     } else {
@@ -268,6 +338,54 @@ mod tests {
         };
         write_hysteresis(&path, &record).expect("written");
         assert_eq!(read_hysteresis(&path).expect("read"), record);
+    }
+
+    #[test]
+    fn other_units_are_applied_and_unknown_ones_refused() {
+        let dir = tempfile::tempdir().expect("a temporary folder");
+        let path = dir.path().join("records.npz");
+        let write = |units: &[(&str, &str)]| {
+            let mut out = NpzOutput::create(&path).expect("writable");
+            out.real("fs", &[], [10.0]).expect("written");
+            out.real("force", &[2], [1.0, 2.0]).expect("written");
+            out.real("response", &[2], [3.0, 4.0]).expect("written");
+            out.text("quantity", &[], &["velocity".into()]).expect("written");
+            out.real("displacement_a", &[2], [3.0, 4.0]).expect("written");
+            out.real("displacement_b", &[2], [0.0, 0.0]).expect("written");
+            out.real("normal_load", &[], [5.0]).expect("written");
+            for (name, unit) in units {
+                out.text(name, &[], &[(*unit).into()]).expect("written");
+            }
+            out.finish().expect("closed");
+        };
+        let near =
+            |found: f64, wanted: f64| assert!((found / wanted - 1.0).abs() < 1e-12, "{found} {wanted}");
+        write(&[("unit_force", "lbf"), ("unit_response", "mm/s"), ("unit_fs", "kHz")]);
+        let read = read_records(&path, &StatedUnits::default()).expect("units");
+        near(read.records.force_n[0][1], 2.0 * 4.448_221_615_260_5);
+        near(read.records.response[0][0][1], 4e-3);
+        near(read.records.fs_hz, 1e4);
+        assert_eq!(read.taken, "velocity in mm/s, force in lbf");
+        let stated = "response=in/s,force=N".parse().expect("units");
+        near(read_records(&path, &stated).expect("stated").records.response[0][0][1], 4.0 * 0.0254);
+
+        write(&[("unit_force", "kN"), ("unit_displacement", "µm"), ("unit_fs", "Hz")]);
+        let record = read_hysteresis(&path).expect("units");
+        let RelativeMotion::Displacement { a_m, .. } = &record.motion else { panic!("{record:?}") };
+        near(a_m[1], 4e-6);
+        near(record.force_n[0], 1e3);
+        near(record.normal_load_n.expect("told"), 5e3);
+
+        for (units, part) in [
+            (("unit_force", "mV"), "sensitivity"),
+            (("unit_response", "m/s^2"), "a velocity is wanted"),
+            (("units", "mm/s"), "units are read from unit_force"),
+            (("unit_force", "stone"), "`stone`"),
+        ] {
+            write(&[units]);
+            let said = read_records(&path, &StatedUnits::default()).expect_err("refused").to_string();
+            assert!(said.contains(units.0) && said.contains(part), "{said}");
+        }
     }
 
     #[test]

@@ -5,6 +5,7 @@ use super::frf_uff::{read_frf_uff, to_functions, write_uff};
 use super::positions_output::write_positions;
 use super::record_uff::read_record_file;
 use super::uff::{ByteOrder, Encoding};
+use super::units::StatedUnits;
 use super::{
     read_frf, read_hysteresis, read_impacts, read_positions, uff_output, write_frf, write_hysteresis,
     write_impacts,
@@ -152,7 +153,8 @@ proptest! {
         let encoding =
             [Encoding::Ascii, Encoding::Binary(ByteOrder::Little), Encoding::Binary(ByteOrder::Big)][encoding];
         write_uff(&path, &to_functions(&y, &[-3; 3], encoding).expect("consistent")).expect("written");
-        prop_assert_eq!(read_frf_uff(&path).expect("read"), (y, vec![]));
+        let read = read_frf_uff(&path, &StatedUnits::default()).expect("read");
+        prop_assert_eq!((read.frf, read.notes), (y, vec![]));
     }
 
     #[test]
@@ -162,7 +164,9 @@ proptest! {
         write_impacts(&npz, &records).expect("written");
         prop_assert_eq!(&read_impacts(&npz).expect("read"), &records);
         uff_output::write_records(&uff, &records, "A1", "AZ1").expect("written");
-        prop_assert_eq!(&read_record_file(&uff).expect("read").0, &records);
+        let read = read_record_file(&uff, &StatedUnits::default()).expect("read");
+        prop_assert_eq!(&read.records, &records);
+        prop_assert!(read.delay_s.iter().all(|late| *late == 0.0));
     }
 
     #[test]

@@ -184,8 +184,9 @@ pub(super) fn csv_tables(path: &Path, wanted: &[&str]) -> Result<Tables, String>
 }
 
 fn csv_table(text: &str, room: &mut Room) -> Result<Table, String> {
+    let delimiter = delimiter(text);
     // a row is held as a whole, with a place for each column, before anybody can count them
-    let wide = |line: &str| line.bytes().filter(|byte| *byte == b',').count() >= MOST_COLUMNS;
+    let wide = |line: &str| line.bytes().filter(|byte| *byte == delimiter).count() >= MOST_COLUMNS;
     if let Some(at) = text.split('\n').position(wide) {
         return Err(format!(
             "row {}: column {} of at most {MOST_COLUMNS}; a geometry has some ten columns: clear what is beside its table",
@@ -194,7 +195,8 @@ fn csv_table(text: &str, room: &mut Room) -> Result<Table, String> {
         ));
     }
     let from = BufReader::new(text.as_bytes().take(text.len() as u64));
-    let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(from);
+    let mut reader =
+        csv::ReaderBuilder::new().delimiter(delimiter).has_headers(false).flexible(true).from_reader(from);
     let mut table: Table = Vec::new();
     // lines are counted on from the row before: counting all of them for every row would take its time
     let (mut counted, mut line) = (0, 1);
@@ -214,13 +216,34 @@ fn csv_table(text: &str, room: &mut Room) -> Result<Table, String> {
         for (column, text) in record.iter().enumerate() {
             let cell = match text.trim_start_matches('\u{feff}').trim() {
                 "" => Cell::Empty,
-                text => Cell::Text(text.into()),
+                // what a spreadsheet writes first to say its delimiter
+                text if table.is_empty() && text.to_lowercase().starts_with("sep=") => Cell::Empty,
+                text => match decimal(text, delimiter) {
+                    Some(number) => Cell::Number(number),
+                    None => Cell::Text(text.into()),
+                },
             };
             room.put(&mut cells, column, cell, at)?;
         }
         table.push((line, cells));
     }
     Ok(table)
+}
+
+/// What stands between the cells of a table, by the line of its headings: a comma, or a semicolon or a tab
+/// where there are more of these.
+fn delimiter(text: &str) -> u8 {
+    let heading = text.lines().find(|line| line.contains([',', ';', '\t'])).unwrap_or_default();
+    let count = |delimiter: u8| heading.bytes().filter(|byte| *byte == delimiter).count();
+    [b',', b';', b'\t'].into_iter().rev().max_by_key(|delimiter| count(*delimiter)).unwrap_or(b',')
+}
+
+/// A number with a decimal comma, in a table whose cells are not parted by commas.
+fn decimal(text: &str, delimiter: u8) -> Option<f64> {
+    let comma = delimiter != b',' && text.matches(',').count() == 1 && !text.contains('.');
+    let digits =
+        text.bytes().all(|byte| byte.is_ascii_digit() || matches!(byte, b',' | b'-' | b'+' | b'e' | b'E'));
+    if comma && digits { text.replace(',', ".").parse().ok() } else { None }
 }
 
 fn told(error: &std::io::Error) -> String {

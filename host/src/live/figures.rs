@@ -151,11 +151,7 @@ pub fn channels(store: &Store, record: i64) -> Result<Option<Figure>, StoreError
     )
     .across(2);
     for (place, channel) in map.channels.iter().enumerate() {
-        figure.panels.extend(envelope(
-            channel,
-            &map.to_si(place, samples.channel(place)),
-            f64::from(map.rate_hz),
-        ));
+        figure.panels.extend(envelope(channel, &map.to_si(place, samples.channel(place)), map.fs_hz()));
     }
     Ok((!figure.panels.is_empty()).then_some(figure))
 }

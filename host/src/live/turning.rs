@@ -69,6 +69,7 @@ mod tests {
         let channels = ChannelMap {
             id: 0,
             rate_hz: 51_200,
+            exact_hz: None,
             channels: vec![
                 channel(Role::SpecimenA, Quantity::Velocity, 1e-3),
                 channel(Role::SpecimenB, Quantity::Velocity, 1e-3),

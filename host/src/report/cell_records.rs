@@ -52,7 +52,7 @@ impl Shown {
             record: record.id,
             kept: record.kept(),
             verdict: record.standing().name(),
-            rate_hz: f64::from(channels.rate_hz),
+            rate_hz: channels.fs_hz(),
             trigger: record.trigger_index,
             force_n: si(force),
             quantity: channels.channels[responses[0]].quantity,

@@ -71,7 +71,10 @@ fn spacing(axis: &[f64], line: usize) -> f64 {
 }
 
 /// Whether two axes are the same but for what six printed digits leave open.
-pub(crate) fn same(one: &[f64], other: &[f64]) -> Result<(), OtherLines> {
+///
+/// # Errors
+/// [`OtherLines`] with the first lines that differ.
+pub fn same(one: &[f64], other: &[f64]) -> Result<(), OtherLines> {
     let tolerance = |i: usize, j: usize| PRINTED * one[i].max(other[j]);
     let pairs = shared(one, other, tolerance)?;
     if pairs.len() == one.len() && pairs.len() == other.len() {

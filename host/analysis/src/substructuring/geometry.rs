@@ -60,6 +60,14 @@ impl From<Grouping> for u8 {
     }
 }
 
+/// No rig is larger, m: coordinates in mm are beyond it.
+pub const FARTHEST_M: f64 = 5.0;
+
+/// The first coordinate of a place that no rig has, m.
+pub fn too_far(position_m: [f64; 3]) -> Option<f64> {
+    position_m.into_iter().find(|x| !x.is_finite() || x.abs() > FARTHEST_M)
+}
+
 /// One response channel or one impact: a line of a geometry table.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Point {
@@ -124,6 +132,18 @@ pub struct Geometry {
 }
 
 impl Geometry {
+    /// Name and first coordinate (m) of a point that is further away than any rig is large: the
+    /// positions look like mm.
+    pub fn too_far(&self) -> Option<(&str, f64)> {
+        let centres = [self.virtual_point_a_m, self.virtual_point_b_m];
+        let centres = centres.into_iter().map(|at| ("the virtual point", at));
+        let points = Structure::ALL.into_iter().flat_map(|structure| {
+            let own = self.points(structure);
+            own.channels.iter().chain(&own.impacts).map(|point| (point.name.as_str(), point.position_m))
+        });
+        centres.chain(points).find_map(|(name, at)| Some((name, too_far(at)?)))
+    }
+
     /// The points of one structure.
     pub fn points(&self, structure: Structure) -> &Configuration {
         match structure {
@@ -176,6 +196,21 @@ mod tests {
         };
         assert_eq!(table.output_names(), ["A1:x", "A1:y", "L"]);
         assert_eq!(table.input_names(), ["AZ1"]);
+    }
+
+    #[test]
+    fn positions_in_millimetres_are_further_than_any_rig() {
+        let at = |position_m| {
+            let own = Configuration {
+                channels: vec![Point { position_m, ..point("A1", "A1:x") }],
+                impacts: vec![],
+            };
+            let (b, ajb) = (Configuration::default(), Configuration::default());
+            Geometry { a: own, b, ajb, virtual_point_a_m: [0.0; 3], virtual_point_b_m: [0.0; 3] }
+        };
+        assert_eq!(at([0.02, -0.03, 5.0]).too_far(), None);
+        assert_eq!(at([20.0, -30.0, 0.0]).too_far(), Some(("A1", 20.0)));
+        assert!(at([0.0, f64::NAN, 0.0]).too_far().is_some());
     }
 
     #[test]

@@ -168,18 +168,19 @@ impl Plan {
     }
 
     fn check_geometry(&self, faults: &mut Faults) {
-        let mut seen = HashSet::new();
+        // a hammer and a sensor at one point may share its name: nothing takes one for the other
+        let (mut sensors, mut hammers) = (HashSet::new(), HashSet::new());
         let responses = self
             .geometry
             .response
             .iter()
-            .map(|point| (point.span().start, &point.get_ref().name, point.get_ref().grouping));
+            .map(|point| (true, point.span().start, &point.get_ref().name, point.get_ref().grouping));
         let impacts = self
             .geometry
             .impact
             .iter()
-            .map(|point| (point.span().start, &point.get_ref().name, point.get_ref().grouping));
-        for (at, name, grouping) in responses.chain(impacts) {
+            .map(|point| (false, point.span().start, &point.get_ref().name, point.get_ref().grouping));
+        for (is_response, at, name, grouping) in responses.chain(impacts) {
             faults.unless(
                 !name.is_empty() && name.len() <= NAME_BYTES,
                 at,
@@ -190,7 +191,13 @@ impl Plan {
                 at,
                 format!("geometry: grouping of `{name}` must be 1 to 6"),
             );
-            faults.unless(seen.insert(name), at, format!("geometry: the name `{name}` stands twice"));
+            let (seen, kind) =
+                if is_response { (&mut sensors, "response") } else { (&mut hammers, "impact") };
+            faults.unless(
+                seen.insert(name),
+                at,
+                format!("geometry: the name `{name}` stands twice: every {kind} needs a name of its own"),
+            );
         }
         for point in &self.geometry.response {
             let ResponsePoint { name, sigma_m, .. } = point.get_ref();

@@ -51,7 +51,7 @@ mod tests {
             delay_ns: 0,
         };
         let channels = ["lc_1", "lc_2", "lc_3", "lc_4"].map(channel).to_vec();
-        ChannelMap { id: 0, rate_hz: 51_200, channels }
+        ChannelMap { id: 0, rate_hz: 51_200, exact_hz: None, channels }
     }
 
     #[test]

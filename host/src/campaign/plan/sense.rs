@@ -4,9 +4,8 @@
 use super::faults::Faults;
 use super::structure::dot;
 use super::{PRINTABLE, Plan, printable};
+use crate::substructuring::geometry::{FARTHEST_M, too_far};
 
-/// No rig is larger, m: coordinates in mm are caught here.
-const FARTHEST_M: f64 = 5.0;
 /// Nobody places anything worse than this, m: errors of position in mm are caught here.
 const WORST_PLACING_M: f64 = 0.05;
 /// Nobody holds a hammer worse than this, rad: degrees are caught here.
@@ -101,13 +100,13 @@ impl Plan {
     fn check_places(&self, faults: &mut Faults) {
         let geometry = &self.geometry;
         let mut place = |at: usize, name: &str, position_m: [f64; 3]| {
-            let far = position_m.iter().find(|x| !x.is_finite() || x.abs() > FARTHEST_M);
+            let far = too_far(position_m);
             faults.unless(
                 far.is_none(),
                 at,
                 format!(
                     "geometry: `{name}` stands at {} m, and no place may be further than {FARTHEST_M} m from the origin: positions are in m, not in mm",
-                    far.unwrap_or(&0.0)
+                    far.unwrap_or(0.0)
                 ),
             );
         };

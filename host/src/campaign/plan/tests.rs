@@ -77,6 +77,20 @@ fn blocks_of_a_configuration_add_up_and_no_cell_stands_twice() {
 }
 
 #[test]
+fn a_hammer_and_a_sensor_at_one_point_may_share_its_name() {
+    let shared = SMALL.replace("\"AZ1\"", "\"1\"").replace("\"A1\"", "\"1\"");
+    let plan = Plan::parse(&shared, "my.toml").expect("a hammer and a sensor");
+    let cells = plan.cells();
+    assert!(
+        cells.iter().any(|cell| (cell.impact.as_str(), cell.response.as_str()) == ("1", "1")),
+        "{cells:?}"
+    );
+    let twice = SMALL.replace("\"A2\"", "\"A1\"");
+    let said = Plan::parse(&twice, "my.toml").expect_err("two sensors").to_string();
+    assert!(said.contains("`A1` stands twice: every response needs a name of its own"), "{said}");
+}
+
+#[test]
 fn errors_point_at_line_and_field() {
     for (from, to, word) in [
         ("rate_hz = 51200", "rate_hz = \"fast\"", "fast"),

@@ -30,7 +30,7 @@ fn map() -> ChannelMap {
     };
     let channels =
         vec![channel("force", Role::HammerForce, 44.64), channel("z", Role::Response(Axis::Z), -0.005)];
-    ChannelMap { id: 0, rate_hz: 51_200, channels }
+    ChannelMap { id: 0, rate_hz: 51_200, exact_hz: None, channels }
 }
 
 fn record(cell: i64, attempt: u32, session: i64, kind: Kind) -> NewRecord {

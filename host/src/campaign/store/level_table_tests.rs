@@ -17,7 +17,7 @@ fn session(store: &mut Store) -> i64 {
         build: Hex(1),
         schema_hash: Hex(2),
     };
-    let map = ChannelMap { id: 0, rate_hz: 51_200, channels: vec![] };
+    let map = ChannelMap { id: 0, rate_hz: 51_200, exact_hz: None, channels: vec![] };
     store.begin_session(&info, &map).expect("noted")
 }
 

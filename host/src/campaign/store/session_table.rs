@@ -103,6 +103,12 @@ pub(super) fn write_link(connection: &Connection, session: i64, counters: &Count
         .map(|_| ())
 }
 
+/// Under which name the notes of the file have a session's rate that is no whole number, Hz: the column of
+/// the table holds whole ones alone.
+fn exact_rate(session: i64) -> String {
+    format!("exact_rate_hz of session {session}")
+}
+
 fn write_session(
     connection: &Connection,
     info: &SessionInfo,
@@ -114,6 +120,11 @@ fn write_session(
         [("utc", &utc_now()), ("software_version", &software), ("rate_hz", &map.rate_hz)];
     info.clone().insert(connection, &beside)?;
     let session = connection.last_insert_rowid();
+    if let Some(exact_hz) = map.exact_hz {
+        // all digits, so that the same number is read
+        let row = (exact_rate(session), exact_hz.to_string());
+        connection.execute("INSERT INTO meta VALUES (?1, ?2)", row)?;
+    }
     for (place, channel) in map.channels.iter().enumerate() {
         let columns = ChannelColumns {
             name: channel.name.as_str().into(),
@@ -165,7 +176,15 @@ impl Store {
             Ok(Channel { name, role, quantity, units_per_volt, range_v, delay_ns, bits })
         };
         let channels = rows.into_iter().map(channel).collect::<Result<_, StoreError>>()?;
-        Ok(ChannelMap { id: 0, rate_hz, channels })
+        let exact_hz = match self.meta(&exact_rate(session))? {
+            None => None,
+            Some(text) => {
+                let rate = text.parse().ok().filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
+                let wrong = || self.content(format!("session {session}: `{text}` is no sampling rate"));
+                Some(rate.ok_or_else(wrong)?)
+            }
+        };
+        Ok(ChannelMap { id: 0, rate_hz, exact_hz, channels })
     }
 
     /// The versions of this program that wrote the sessions, each once.

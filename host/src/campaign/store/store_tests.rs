@@ -24,6 +24,7 @@ fn map() -> ChannelMap {
     ChannelMap {
         id: 0,
         rate_hz: 51_200,
+        exact_hz: None,
         channels: vec![
             channel("force", Role::HammerForce, 44.642_857),
             channel("z", Role::Response(jointrig_protocol::channel::Axis::Z), -0.005),
@@ -231,4 +232,20 @@ fn a_full_disk_is_told_in_words() {
     assert!(said.contains("free some space"), "{said}");
     assert_eq!(store.records().expect("rows").len(), stored, "all of a record or nothing");
     assert_eq!(store.verify().expect("checked"), []);
+}
+
+#[test]
+fn a_rate_that_is_no_whole_number_comes_back_with_all_its_digits() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("c.jrig");
+    let mut store = Store::create(&path, SMALL, "small.toml").expect("created");
+    let whole = store.begin_session(&info(), &map()).expect("a session");
+    let own = ChannelMap { rate_hz: 17_067, exact_hz: Some(51_200.0 / 3.0), ..map() };
+    let third = store.begin_session(&info(), &own).expect("a session");
+    store.close().expect("closed");
+    let store = Store::open_read_only(&path).expect("opened");
+    let rate = |session| store.channels(session).expect("channels").fs_hz();
+    assert_eq!((rate(whole), rate(third)), (51_200.0, 51_200.0 / 3.0));
+    assert_eq!(store.channels(third).expect("channels"), own);
+    assert!(store.verify().expect("read").is_empty());
 }

@@ -51,12 +51,12 @@ impl Judge for ByRecord {
             strong_fraction: given.strong_n / wanted.target_n,
             force_range_n: channels.place(Role::HammerForce).map(|place| range(&channels.channels[place])),
             response_range: None,
-            expected_start_s: Some(recording.trigger_index as f64 / f64::from(channels.rate_hz)),
+            expected_start_s: Some(recording.trigger_index as f64 / channels.fs_hz()),
             ..Limits::default()
         };
         let missing = recording.gaps.iter().map(ExactSizeIterator::len).sum::<usize>() as u64;
         let hit = RawHit {
-            fs_hz: f64::from(channels.rate_hz),
+            fs_hz: channels.fs_hz(),
             force_n: &force_n,
             responses: &responses,
             missing_samples: missing,

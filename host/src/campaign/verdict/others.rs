@@ -72,7 +72,7 @@ impl Others {
 
     fn add_to_sums(&mut self, plan: &Plan, enough: &Enough, channels: &ChannelMap, codes: Codes<'_>) {
         let Some(force) = channels.place(Role::HammerForce) else { return };
-        let fs_hz = f64::from(channels.rate_hz);
+        let fs_hz = channels.fs_hz();
         let si = |place: usize| channels.to_si(place, codes.channel(place));
         let force_n = si(force);
         let Some(pulse) = Pulse::locate(&force_n) else { return };

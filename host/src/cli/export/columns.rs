@@ -275,7 +275,8 @@ fn scales(records: &[Sampled<'_>]) -> serde_json::Value {
                 })
             })
             .collect();
-        json!({ "session": session, "rate_hz": map.rate_hz, "channels": channels })
+        let rate_hz = map.exact_hz.map_or(json!(map.rate_hz), |rate| json!(rate));
+        json!({ "session": session, "rate_hz": rate_hz, "channels": channels })
     };
     maps.into_iter().map(of_session).collect()
 }

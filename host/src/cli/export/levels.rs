@@ -62,7 +62,7 @@ pub(super) fn table(
     let mut table = Table::new(&COLUMNS);
     for level in &store.levels()? {
         table.push(match level {
-            Ok(row) => line(row, f64::from(store.channels(row.session)?.rate_hz), file(row)?),
+            Ok(row) => line(row, store.channels(row.session)?.fs_hz(), file(row)?),
             Err(damaged) => damaged_line(damaged),
         });
     }

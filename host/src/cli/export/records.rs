@@ -83,7 +83,7 @@ impl Files<'_> {
             let (Some(force), Some(axes)) = (map.place(Role::HammerForce), axes) else {
                 return wrong("has no hammer force or no response");
             };
-            let fs_hz = f64::from(map.rate_hz);
+            let fs_hz = map.fs_hz();
             let quantity = match map.channels[axes[0]].quantity {
                 Quantity::Displacement => MotionQuantity::Displacement,
                 Quantity::Acceleration => MotionQuantity::Acceleration,

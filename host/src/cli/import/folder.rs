@@ -5,13 +5,14 @@ use std::path::Path;
 use super::names::{Named, Source, from_folder, from_table};
 use super::records::{Brought, CellName, Origin, bring, length_notice};
 use super::{Frfs, bad, frfs};
+use crate::campaign::plan::{Cell, Plan, configuration_name};
 use crate::campaign::store::Store;
 use crate::campaign::verdict::{Kind, Verdict};
 use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::cli::waiting::Waiting;
-use crate::exchange::frf_uff;
-use crate::exchange::record_uff::{by_label, read_record_file};
+use crate::exchange::StatedUnits;
+use crate::exchange::record_uff::{LabelledRecords, by_label, read_record_file, record_contents};
 use crate::outside::tell_line;
 
 /// How files are named, and whether what came from a file of the same name before is dropped.
@@ -19,6 +20,29 @@ pub(super) struct Wishes<'w> {
     pub(super) configuration: Option<&'w str>,
     pub(super) names: Option<&'w Path>,
     pub(super) replace: bool,
+    pub(super) units: &'w StatedUnits,
+}
+
+/// What was taken of each file, told once for all files of which it is the same.
+#[derive(Default)]
+struct Taken(Vec<(String, String, usize)>);
+
+impl Taken {
+    fn add(&mut self, file: &Path, taken: &str) {
+        match self.0.iter_mut().find(|(known, ..)| known == taken) {
+            Some((.., count)) => *count += 1,
+            None => self.0.push((taken.into(), file.display().to_string(), 1)),
+        }
+    }
+
+    fn tell(&self) {
+        for (taken, first, count) in &self.0 {
+            match count - 1 {
+                0 => tell_line!("{first}: {taken}"),
+                more => tell_line!("{first} and {more} more: {taken}"),
+            }
+        }
+    }
 }
 
 /// Brings in all of `folder`.
@@ -36,7 +60,7 @@ pub(super) fn import(folder: &Path, into: &Path, wishes: &Wishes<'_>) -> Result<
         tell_line!("{}: left out, it is neither .npz nor a universal file", path.display());
     }
     let waiting = Waiting::of("importing files");
-    let (mut all, mut matrices) = (Brought::default(), 0);
+    let (mut all, mut matrices, mut taken) = (Brought::default(), 0, Taken::default());
     for (done, source) in sources.iter().enumerate() {
         waiting.at(done, sources.len());
         let told = |error: CliError| match error {
@@ -46,12 +70,13 @@ pub(super) fn import(folder: &Path, into: &Path, wishes: &Wishes<'_>) -> Result<
             )),
             other => other,
         };
-        match one(&mut store, source, wishes.replace).map_err(told)? {
+        match one(&mut store, &plan, source, wishes, &mut taken).map_err(told)? {
             Some(brought) => all.add(&brought),
             None => matrices += 1,
         }
     }
     drop(waiting);
+    taken.tell();
     store.log(&format!("imported {} files from {}", sources.len(), folder.display()))?;
     let length = length_notice(&store)?;
     store.close()?;
@@ -88,39 +113,95 @@ fn say_refused(of: &str, hit: u32, verdict: &Verdict) {
 }
 
 /// What came of a file of records; none of FRFs.
-fn one(store: &mut Store, source: &Source, replace: bool) -> Result<Option<Brought>, CliError> {
+fn one(
+    store: &mut Store,
+    plan: &Plan,
+    source: &Source,
+    wishes: &Wishes<'_>,
+    taken: &mut Taken,
+) -> Result<Option<Brought>, CliError> {
     let Source { path, name, holds } = source;
+    let Wishes { replace, units, .. } = *wishes;
     match holds {
         Named::Frfs(configuration) => {
-            let told = frfs(store, &Frfs { file: path, name, configuration, replace })?;
+            let told = frfs(store, &Frfs { file: path, name, configuration, replace, units })?;
             for line in told {
                 tell_line!("{line}");
             }
             Ok(None)
         }
         Named::Cell { configuration, impact, response } => {
-            let (records, warnings) = read_record_file(path).map_err(bad)?;
-            say(path, &warnings);
+            let read = read_record_file(path, units).map_err(bad)?;
+            say(path, &read.notes);
             let origin = Origin::of(path, name)?;
             let cell = CellName { configuration, impact, response };
-            Ok(Some(bring(store, &origin, &cell, &records, replace, &mut |hit, verdict| {
+            let brought = bring(store, &origin, &cell, read, replace, &mut |hit, verdict| {
                 say_refused(name, hit, verdict);
-            })?))
+            })?;
+            taken.add(path, &brought.taken);
+            Ok(Some(brought))
         }
         Named::Labelled(configuration) => {
             let origin = Origin::of(path, name)?;
             let wrong = |what: String| bad(format!("{}: {what}", path.display()));
-            let (rows, warnings) = by_label(&frf_uff::contents(path).map_err(bad)?).map_err(wrong)?;
-            say(path, &warnings);
+            let geometry = &plan.geometry;
+            let is_known = |name: &str| {
+                geometry.impact.iter().any(|point| point.get_ref().name == name)
+                    || geometry.response.iter().any(|point| point.get_ref().name == name)
+            };
+            let contents = record_contents(path).map_err(bad)?;
+            let (rows, notes) = by_label(&contents, units, &is_known).map_err(wrong)?;
+            drop(contents);
+            say(path, &notes);
+            check_labels(plan, configuration, &rows).map_err(wrong)?;
             let mut all = Brought::default();
-            for row in rows {
-                let cell = CellName { configuration, impact: &row.impact, response: &row.response };
-                let of_cell = format!("{name}: {} to {}", row.impact, row.response);
-                all.add(&bring(store, &origin, &cell, &row.records, replace, &mut |hit, verdict| {
+            for LabelledRecords { impact, response, read } in rows {
+                let cell = CellName { configuration, impact: &impact, response: &response };
+                say(path, &read.notes);
+                let of_cell = format!("{name}: {impact} to {response}");
+                let brought = bring(store, &origin, &cell, read, replace, &mut |hit, verdict| {
                     say_refused(&of_cell, hit, verdict);
-                })?);
+                })?;
+                taken.add(path, &brought.taken);
+                all.add(&brought);
             }
             Ok(Some(all))
         }
     }
 }
+
+/// Labels that name no cell are listed beside what the plan has, before anything is stored.
+fn check_labels(plan: &Plan, configuration: &str, rows: &[LabelledRecords]) -> Result<(), String> {
+    let own = plan.configuration(configuration).map_or(configuration, |own| configuration_name(own));
+    let cells: Vec<Cell> =
+        plan.cells().into_iter().filter(|cell| configuration_name(cell.configuration) == own).collect();
+    let is_cell = |row: &LabelledRecords| {
+        cells.iter().any(|c| (&c.impact, &c.response) == (&row.impact, &row.response))
+    };
+    if rows.iter().all(is_cell) {
+        return Ok(());
+    }
+    let listed = |names: &mut dyn Iterator<Item = &String>| {
+        let mut all: Vec<&str> = Vec::new();
+        for name in names {
+            if !all.contains(&name.as_str()) {
+                all.push(name);
+            }
+        }
+        let more = all.len().saturating_sub(MOST_LISTED);
+        all.truncate(MOST_LISTED);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        format!("{}{more}", all.join(", "))
+    };
+    Err(format!(
+        "its labels name the impacts {} and the responses {}, which are not all cells of {configuration} in the plan (impacts {}, responses \
+         {}): rename them in one of the two, or give --names TABLE.csv with the columns file, configuration, impact, response",
+        listed(&mut rows.iter().map(|row| &row.impact)),
+        listed(&mut rows.iter().map(|row| &row.response)),
+        listed(&mut cells.iter().map(|cell| &cell.impact)),
+        listed(&mut cells.iter().map(|cell| &cell.response)),
+    ))
+}
+
+/// Most names of a list in a message.
+const MOST_LISTED: usize = 12;

@@ -17,7 +17,8 @@ use crate::analyse;
 use crate::campaign::plan::{configuration_name, structure};
 use crate::campaign::store::Store;
 use crate::campaign::verdict::Kind;
-use crate::exchange::{read_frf_file, write_frf};
+use crate::exchange::frf_npz::direction_arrays;
+use crate::exchange::{LabelledFrf, StatedUnits, read_frf_file, write_frf};
 use crate::frf::Frf;
 use crate::outside::tell_line;
 use crate::substructuring::geometry::Configuration as Points;
@@ -57,6 +58,9 @@ pub struct Import {
     /// Folder: a csv table with the columns file, configuration, impact, response.
     #[arg(long, value_name = "TABLE.csv", requires = "into")]
     names: Option<PathBuf>,
+    /// Units that count instead of those of the file's labels: response=mm/s,force=lbf,time=ms,frequency=rad/s.
+    #[arg(long, value_name = "UNITS", default_value = "")]
+    units: StatedUnits,
     /// Drop what came from a file of the same name before, and FRFs that are there; the file keeps both, and says so.
     #[arg(long, requires = "into")]
     replace: bool,
@@ -70,20 +74,21 @@ fn bad(error: impl std::fmt::Display) -> CliError {
 
 impl Import {
     pub fn run(self) -> Result<(), CliError> {
-        let replace = self.replace;
+        let (replace, units) = (self.replace, &self.units);
         match (&self.out, &self.into, &self.configuration, &self.impact, &self.response) {
             (None, Some(into), configuration, None, None) if self.file.is_dir() => {
                 let (configuration, names) = (configuration.as_deref(), self.names.as_deref());
-                folder::import(&self.file, into, &Wishes { configuration, names, replace })
+                folder::import(&self.file, into, &Wishes { configuration, names, replace, units })
             }
             (Some(out), ..) => self.convert(out),
             (None, Some(into), Some(configuration), Some(impact), Some(response)) => {
-                records::import(&self.file, into, &CellName { configuration, impact, response }, replace)
+                let cell = CellName { configuration, impact, response };
+                records::import(&self.file, into, &cell, replace, units)
             }
             (None, Some(into), Some(configuration), ..) => {
                 let store = Store::open(into)?;
                 let name = self.file.file_name().unwrap_or(self.file.as_os_str()).to_string_lossy();
-                let told = frfs(&store, &Frfs { file: &self.file, name: &name, configuration, replace })?;
+                let told = frfs(&store, &Frfs { file: &self.file, name: &name, configuration, replace, units })?;
                 store.close()?;
                 output::lines(told)
             }
@@ -96,18 +101,21 @@ impl Import {
     }
 
     fn convert(&self, out: &Path) -> Result<(), CliError> {
-        let frf = read(&self.file)?;
-        write_frf(out, &frf, &[]).map_err(bad)?;
-        output::lines([format!("{}: {}", out.display(), described(&frf))])
+        let read = read(&self.file, &self.units)?;
+        write_frf(out, &read.frf, &direction_arrays(&read)).map_err(bad)?;
+        output::lines([
+            format!("{}: {}", self.file.display(), read.taken),
+            format!("{}: {}", out.display(), described(&read.frf)),
+        ])
     }
 }
 
-fn read(file: &Path) -> Result<Frf, CliError> {
-    let (frf, warnings) = read_frf_file(file).map_err(bad)?;
-    for warning in &warnings {
-        tell_line!("{}: {warning}", file.display());
+fn read(file: &Path, units: &StatedUnits) -> Result<LabelledFrf, CliError> {
+    let read = read_frf_file(file, units).map_err(bad)?;
+    for note in &read.notes {
+        tell_line!("{}: {note}", file.display());
     }
-    Ok(frf)
+    Ok(read)
 }
 
 /// FRFs of a whole configuration.
@@ -118,6 +126,8 @@ struct Frfs<'f> {
     configuration: &'f str,
     /// Whether they may count instead of others.
     replace: bool,
+    /// What counts instead of the units of its labels.
+    units: &'f StatedUnits,
 }
 
 /// Takes them into a campaign file; what is to be said of it.
@@ -132,9 +142,11 @@ fn frfs(store: &Store, from: &Frfs<'_>) -> Result<Vec<String>, CliError> {
         ))
     })?;
     let name = configuration_name(configuration);
-    let frf = read(from.file)?;
-    let geometry = analyse::geometry(&plan);
+    let geometry = analyse::geometry_as_planned(&plan);
     let points = geometry.points(structure(configuration));
+    let read = read(from.file, from.units)?;
+    let taken = read.taken.clone();
+    let (frf, turned) = read.along(points).map_err(|what| bad(format!("{}: {what}", from.file.display())))?;
     check_names(from.file, &frf, name, points).map_err(CliError::Bad)?;
     let cells = store.cells()?;
     let own =
@@ -162,7 +174,9 @@ fn frfs(store: &Store, from: &Frfs<'_>) -> Result<Vec<String>, CliError> {
     }
     store.insert_frf(configuration, from.name, &frf)?;
     store.log(&format!("imported FRFs of {name} from {}", from.file.display()))?;
-    let mut told = vec![format!("{into}: {name}: {}", described(&frf))];
+    let taken = [&[taken], &turned[..]].concat().join(", ");
+    let mut told =
+        vec![format!("{}: {taken}", from.file.display()), format!("{into}: {name}: {}", described(&frf))];
     if frf.variance().is_none() {
         told.push(
             "the file tells no variance of its values: what is identified from them has no interval from their noise"

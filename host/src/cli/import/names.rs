@@ -7,7 +7,7 @@ use serde::Deserialize;
 use super::bad;
 use crate::campaign::plan::{Cell, Plan, configuration_name};
 use crate::cli::error::CliError;
-use crate::exchange::{frf_file, frf_uff, record_uff};
+use crate::exchange::{frf_file, record_uff};
 use crate::foreign;
 use crate::outside::file_name;
 
@@ -155,7 +155,7 @@ fn with_labels_or_frfs(path: &Path, configuration: String) -> Result<Named, CliE
     if frf_file::is_npz(path).map_err(bad)? {
         return Ok(Named::Frfs(configuration));
     }
-    let records = record_uff::holds_records(&frf_uff::contents(path).map_err(bad)?);
+    let records = record_uff::holds_records(&record_uff::record_contents(path).map_err(bad)?);
     Ok(if records { Named::Labelled(configuration) } else { Named::Frfs(configuration) })
 }
 

@@ -1,19 +1,40 @@
 //! Records from elsewhere as 16-bit codes, which is what a campaign file holds.
+//!
+//! Hits of about the same size share their scales. A hit that is far larger than the others in a channel (a spike, an
+//! overload) has scales of its own, so that it does not coarsen theirs.
 
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
 
 use crate::device::channels::ChannelMap;
+use crate::median::middle;
 use crate::spectra::{ImpactRecords, MotionQuantity};
 
 /// Codes on either side of zero that the largest value of a channel becomes: full scale stays free, so that nothing reads as overload.
 const TOP_CODE: f64 = 32_000.0;
 
-/// The records as 16-bit codes, channel after channel for each hit, with the scales that belong to them.
-pub(super) fn quantised(records: &ImpactRecords, axes: usize) -> Result<(ChannelMap, Vec<Vec<i16>>), String> {
+/// A hit belongs to the others while no channel is larger than this many times the channel's median over the hits.
+const LARGER: f64 = 8.0;
+
+/// Hits with the same scales.
+pub(super) struct Quantised {
+    /// The scales.
+    pub(super) map: ChannelMap,
+    /// Which hits of the records.
+    pub(super) hits: Vec<usize>,
+    /// Their codes, channel after channel.
+    pub(super) codes: Vec<Vec<i16>>,
+}
+
+/// The records as 16-bit codes with the scales that belong to them; every hit is in one group.
+///
+/// # Errors
+/// Another number of responses than the plan's, or values that are not numbers.
+pub(super) fn quantised(records: &ImpactRecords, axes: usize) -> Result<Vec<Quantised>, String> {
     let rate_hz = records.fs_hz.round();
-    if !(1.0..=f64::from(u32::MAX)).contains(&rate_hz) || (rate_hz - records.fs_hz).abs() > 1e-6 * rate_hz {
-        return Err(format!("the sampling rate of {} Hz is no whole number: resample", records.fs_hz));
+    if !(1.0..=f64::from(u32::MAX)).contains(&rate_hz) {
+        return Err(format!("the sampling rate is {} Hz: 1 Hz or more is needed", records.fs_hz));
     }
+    let exact_hz = (rate_hz != records.fs_hz).then_some(records.fs_hz);
     let channels = records.response.first().map_or(0, Vec::len);
     if channels != axes {
         return Err(format!(
@@ -35,39 +56,56 @@ pub(super) fn quantised(records: &ImpactRecords, axes: usize) -> Result<(Channel
     let signal = |hit: usize, place: usize| -> &[f64] {
         if place == 0 { &records.force_n[hit] } else { &records.response[hit][place - 1] }
     };
-    let mut map = ChannelMap { id: 0, rate_hz: rate_hz as u32, channels: Vec::new() };
-    for (place, (name, role, quantity)) in kinds.into_iter().take(1 + axes).enumerate() {
-        let mut largest = 0.0f64;
-        for hit in 0..records.force_n.len() {
+    let kinds: Vec<_> = kinds.into_iter().take(1 + axes).collect();
+    let hits = records.force_n.len();
+    // the largest value of each channel in each hit
+    let mut largest = vec![vec![0.0f64; kinds.len()]; hits];
+    for (hit, largest) in largest.iter_mut().enumerate() {
+        for (place, largest) in largest.iter_mut().enumerate() {
             if let Some(sample) = signal(hit, place).iter().position(|v| !v.is_finite()) {
+                let name = kinds[place].0;
                 return Err(format!("hit {hit}, {name}, sample {sample} is not a number: take the hit out"));
             }
-            largest = signal(hit, place).iter().fold(largest, |m, v| m.max(v.abs()));
+            *largest = signal(hit, place).iter().fold(0.0, |m, v| m.max(v.abs()));
         }
-        let range_v = 10.0f32;
-        // code 32000 for the largest value, rounded up to what a float holds
-        let units_per_volt = (largest.max(1e-30) * 32_768.0 / TOP_CODE / f64::from(range_v)) as f32;
-        map.channels.push(Channel {
-            name: name.parse().map_err(|_| format!("`{name}` is too long a name"))?,
-            role,
-            quantity,
-            units_per_volt,
-            range_v,
-            delay_ns: 0,
-            bits: 16,
-        });
     }
-    let codes = (0..records.force_n.len())
-        .map(|hit| {
-            (0..map.len())
-                .flat_map(|place| {
-                    let unit = map.channels[place].units_per_code();
-                    signal(hit, place).iter().map(move |v| (v / unit).round() as i16)
-                })
-                .collect()
-        })
+    let usual: Vec<f64> = (0..kinds.len())
+        .map(|place| middle(&largest.iter().map(|of_hit| of_hit[place]).collect::<Vec<_>>()).unwrap_or(0.0))
         .collect();
-    Ok((map, codes))
+    let alike = |hit: &usize| largest[*hit].iter().zip(&usual).all(|(own, usual)| *own <= LARGER * usual);
+    let (together, alone): (Vec<usize>, Vec<usize>) = (0..hits).partition(alike);
+    let groups = std::iter::once(together).chain(alone.into_iter().map(|hit| vec![hit]));
+    groups
+        .filter(|group| !group.is_empty())
+        .map(|group| {
+            let mut map = ChannelMap { id: 0, rate_hz: rate_hz as u32, exact_hz, channels: Vec::new() };
+            for (place, (name, role, quantity)) in kinds.iter().copied().enumerate() {
+                let largest = group.iter().fold(0.0f64, |m, hit| m.max(largest[*hit][place]));
+                let range_v = 10.0f32;
+                // code 32000 for the largest value, rounded up to what a float holds
+                let units_per_volt = (largest.max(1e-30) * 32_768.0 / TOP_CODE / f64::from(range_v)) as f32;
+                map.channels.push(Channel {
+                    name: name.parse().map_err(|_| format!("`{name}` is too long a name"))?,
+                    role,
+                    quantity,
+                    units_per_volt,
+                    range_v,
+                    delay_ns: 0,
+                    bits: 16,
+                });
+            }
+            let of_hit = |hit: &usize| {
+                (0..map.len())
+                    .flat_map(|place| {
+                        let unit = map.channels[place].units_per_code();
+                        signal(*hit, place).iter().map(move |v| (v / unit).round() as i16)
+                    })
+                    .collect()
+            };
+            let codes = group.iter().map(of_hit).collect();
+            Ok(Quantised { map, hits: group, codes })
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -82,7 +120,8 @@ mod tests {
             response: vec![vec![vec![1e-6, -2e-3, 0.0], vec![0.0; 3], vec![1.0, 2.0, 3.0]]; 2],
             quantity: MotionQuantity::Velocity,
         };
-        let (map, codes) = quantised(&records, 3).expect("three axes");
+        let groups = quantised(&records, 3).expect("three axes");
+        let Quantised { map, codes, .. } = &groups[0];
         for (place, wanted) in
             [(0, &records.force_n[0]), (1, &records.response[0][0]), (3, &records.response[0][2])]
         {
@@ -93,6 +132,29 @@ mod tests {
             }
         }
         let two = ImpactRecords { response: vec![vec![vec![0.0; 3]; 2]; 2], ..records };
-        assert!(quantised(&two, 3).expect_err("two axes").contains("x, y, z"));
+        assert!(quantised(&two, 3).err().expect("two axes").contains("x, y, z"));
+    }
+    #[test]
+    fn a_spike_in_one_hit_does_not_coarsen_the_others() {
+        let clean: Vec<f64> = (0..200).map(|i| (0.1 * f64::from(i)).sin()).collect();
+        let mut spiked = clean.clone();
+        spiked[50] = 1000.0;
+        let records = ImpactRecords {
+            fs_hz: 51_200.0,
+            force_n: vec![clean.clone(); 3],
+            response: vec![vec![clean.clone()], vec![spiked.clone()], vec![clean.clone()]],
+            quantity: MotionQuantity::Velocity,
+        };
+        let groups = quantised(&records, 1).expect("one axis");
+        assert_eq!(groups.iter().map(|group| group.hits.clone()).collect::<Vec<_>>(), [vec![0, 2], vec![1]]);
+        for (group, largest) in groups.iter().zip([1.0, 1000.0]) {
+            let unit = group.map.channels[1].units_per_code();
+            assert!((unit * TOP_CODE / largest - 1.0).abs() < 1e-2, "{unit}");
+            let hit = group.hits[0];
+            let codes = &group.codes[0][clean.len()..];
+            for (code, value) in codes.iter().zip(&records.response[hit][0]) {
+                assert!((f64::from(*code) * unit - value).abs() <= 0.5001 * unit);
+            }
+        }
     }
 }

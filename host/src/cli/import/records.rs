@@ -7,11 +7,12 @@ use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use jointrig_protocol::shot::{Phase, Shot};
 use sha2::{Digest, Sha256};
+use toml::Spanned;
 
 use super::bad;
 use super::quantised::quantised;
 use crate::analyse::AnalysedLength;
-use crate::campaign::plan::{Cell, configuration_name};
+use crate::campaign::plan::{Cell, Plan, configuration_name};
 use crate::campaign::store::Store;
 use crate::campaign::store::notes::utc_now;
 use crate::campaign::store::record_row::{NewRecord, RecordRow};
@@ -24,10 +25,12 @@ use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::device::channels::ChannelMap;
 use crate::device::recording::Recording;
+use crate::exchange::StatedUnits;
+use crate::exchange::record_file::{PlannedPlace, RecordFile};
 use crate::exchange::record_uff::read_record_file;
 use crate::foreign;
 use crate::outside::tell_line;
-use crate::spectra::{ImpactRecords, Pulse, reversed_peak_n};
+use crate::spectra::{Pulse, reversed_peak_n};
 
 /// The cell that the records belong to.
 pub(super) struct CellName<'n> {
@@ -76,6 +79,8 @@ pub(super) struct Brought {
     pub(super) already: usize,
     /// How the last ones are stored.
     map: Option<ChannelMap>,
+    /// What was taken of the last ones' file, in one line.
+    pub(super) taken: String,
 }
 
 impl Brought {
@@ -88,16 +93,22 @@ impl Brought {
 }
 
 /// One file, for the user's eyes.
-pub(super) fn import(file: &Path, into: &Path, name: &CellName<'_>, replace: bool) -> Result<(), CliError> {
-    let (records, warnings) = read_record_file(file).map_err(bad)?;
-    for warning in &warnings {
-        tell_line!("{}: {warning}", file.display());
+pub(super) fn import(
+    file: &Path,
+    into: &Path,
+    name: &CellName<'_>,
+    replace: bool,
+    units: &StatedUnits,
+) -> Result<(), CliError> {
+    let read = read_record_file(file, units).map_err(bad)?;
+    for note in &read.notes {
+        tell_line!("{}: {note}", file.display());
     }
     let mut store = Store::open(into)?;
     let called = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
     let origin = Origin::of(file, &called)?;
-    let Brought { hits, kept, already, map, .. } =
-        bring(&mut store, &origin, name, &records, replace, &mut |hit, verdict| {
+    let Brought { hits, kept, already, map, taken, .. } =
+        bring(&mut store, &origin, name, read, replace, &mut |hit, verdict| {
             tell_line!("hit {hit}: {} ({})", verdict.kind, verdict.sentence);
         })?;
     store.log(&format!("imported {hits} hits from {}", file.display()))?;
@@ -109,7 +120,10 @@ pub(super) fn import(file: &Path, into: &Path, name: &CellName<'_>, replace: boo
             file.display()
         )));
     }
-    let mut lines = vec![format!("{}: {kept} of {hits} hits are good", into.display())];
+    let mut lines = vec![
+        format!("{}: {taken}", file.display()),
+        format!("{}: {kept} of {hits} hits are good", into.display()),
+    ];
     lines.extend(length);
     if already > 0 {
         lines.push(format!("{already} of them were there already, from an earlier import of the same file"));
@@ -137,50 +151,59 @@ pub(super) fn bring(
     store: &mut Store,
     origin: &Origin,
     name: &CellName<'_>,
-    records: &ImpactRecords,
+    read: RecordFile,
     replace: bool,
     tell: &mut dyn FnMut(u32, &Verdict),
 ) -> Result<Brought, CliError> {
     let plan = store.plan()?;
     let (id, cell, attempt) = find(store, name)?;
-    let place = plan.geometry.response.iter().map(toml::Spanned::get_ref).find(|p| p.name == cell.response);
-    let axes = place.map_or(3, |place| place.axes().len());
-    let (map, codes) =
-        quantised(records, axes).map_err(|reason| bad(format!("{}: {reason}", origin.name)))?;
+    let wrong = |reason: String| bad(format!("{}: {reason}", origin.name));
+    let (read, axes) = along_plan(&plan, &cell, read).map_err(wrong)?;
+    let RecordFile { records, delay_s, taken, .. } = read;
+    let records = &records;
+    let mut groups = quantised(records, axes).map_err(wrong)?;
+    groups.iter_mut().for_each(|group| put_in_step(&mut group.map, &delay_s));
     let reversed: Vec<Option<f64>> = records.force_n.iter().map(|f| reversed_peak_n(f)).collect();
     if let (Some(peak_n), true) = (reversed.first().copied().flatten(), reversed.iter().all(Option::is_some))
     {
-        return Err(bad(format!(
-            "{}: the force's sign is the wrong way round: peak {peak_n:.1} N; a push is positive, so multiply the force by -1",
-            origin.name
+        return Err(wrong(format!(
+            "the force's sign is the wrong way round: peak {peak_n:.1} N; a push is positive, so multiply the force by -1"
         )));
     }
-    let recordings: Vec<Recording> = codes
-        .into_iter()
-        .zip(&records.force_n)
-        .enumerate()
-        .map(|(hit, (codes, force_n))| {
-            let no_pulse = || bad(format!("{}: hit {hit} has no force pulse: take it out", origin.name));
-            let pulse = match Pulse::locate(force_n) {
-                None if reversed[hit].is_none() => return Err(no_pulse()),
-                pulse => pulse,
-            };
-            Ok(recording(hit, codes, map.len(), pulse.as_ref(), records.fs_hz))
-        })
-        .collect::<Result<_, CliError>>()?;
+    let mut recordings: Vec<(usize, usize, Recording)> = Vec::new();
+    for (of_scale, group) in groups.iter().enumerate() {
+        for (hit, codes) in group.hits.iter().zip(&group.codes) {
+            let force_n = &records.force_n[*hit];
+            let pulse = Pulse::locate(force_n);
+            if pulse.is_none() && reversed[*hit].is_none() {
+                return Err(wrong(format!("hit {hit} has no force pulse: take it out")));
+            }
+            let own = recording(*hit, codes.clone(), group.map.len(), pulse.as_ref(), records.fs_hz);
+            recordings.push((*hit, of_scale, own));
+        }
+    }
+    recordings.sort_by_key(|(hit, ..)| *hit);
     let there = already_there(store, origin, id, replace)?;
-    let missing = (0..recordings.len() as u32).any(|hit| !there.contains(&hit));
-    let session = missing.then(|| store.begin_session(&session(origin), &map)).transpose()?;
-    let mut brought = Brought { cells: 1, hits: recordings.len(), kept: 0, already: there.len(), map: None };
-    let mut others = Others::of(map.responses().unwrap_or_default());
-    for (hit, recording) in (0..).zip(recordings) {
-        let verdict = ByRecord.judge(&cell, &plan, &map, &recording, &others);
+    // hits of one scale share a session
+    let mut sessions: Vec<Option<i64>> = vec![None; groups.len()];
+    let mut brought =
+        Brought { cells: 1, hits: recordings.len(), already: there.len(), taken, ..Brought::default() };
+    let mut others = Others::of(groups.first().and_then(|group| group.map.responses()).unwrap_or_default());
+    for (hit, of_scale, recording) in recordings {
+        let (hit, map) = (hit as u32, &groups[of_scale].map);
+        let verdict = ByRecord.judge(&cell, &plan, map, &recording, &others);
         if verdict.kind == Kind::Good {
-            others.learn(&plan, &map, recording.view());
+            others.learn(&plan, map, recording.view());
             brought.kept += 1;
+            brought.map = Some(map.clone());
         }
         tell(hit, &verdict);
-        if let (Some(session), false) = (session, there.contains(&hit)) {
+        if !there.contains(&hit) {
+            let session = match sessions[of_scale] {
+                Some(session) => session,
+                None => store.begin_session(&session(origin), map)?,
+            };
+            sessions[of_scale] = Some(session);
             let record = NewRecord {
                 cell: id,
                 attempt: attempt + hit,
@@ -194,7 +217,33 @@ pub(super) fn bring(
             store.insert(&record, &Counters::default())?;
         }
     }
-    Ok(Brought { map: Some(map), ..brought })
+    Ok(brought)
+}
+
+/// The records along the directions that the plan has for the cell, and how many axes its location has.
+fn along_plan(plan: &Plan, cell: &Cell, read: RecordFile) -> Result<(RecordFile, usize), String> {
+    let points = |name: &str| plan.geometry.response.iter().map(Spanned::get_ref).find(|p| p.name == name);
+    let hammer = plan.geometry.impact.iter().map(Spanned::get_ref).find(|p| p.name == cell.impact);
+    let (Some(sensor), Some(hammer)) = (points(&cell.response), hammer) else { return Ok((read, 3)) };
+    let axes: Vec<[f64; 3]> = sensor.axes().into_iter().map(|(_, axis)| axis).collect();
+    let place = PlannedPlace {
+        impact: &cell.impact,
+        push: hammer.direction,
+        response: &cell.response,
+        axes: &axes,
+        own_axes: sensor.axes.is_some(),
+    };
+    Ok((read.along_plan(&place)?, axes.len()))
+}
+
+/// Notes how late each channel is, the earliest as in time: delays of channels are not negative.
+fn put_in_step(map: &mut ChannelMap, delay_s: &[f64]) {
+    let earliest = delay_s.iter().copied().fold(0.0, f64::min);
+    let late = std::iter::once(0.0).chain(delay_s.iter().copied());
+    for (channel, late) in map.channels.iter_mut().zip(late) {
+        // less than a sample
+        channel.delay_ns = (1e9 * (late - earliest)).round() as u32;
+    }
 }
 
 /// The hits of this very file that the cell has; those of another file of the same name are dropped, or refused.

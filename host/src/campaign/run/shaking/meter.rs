@@ -121,6 +121,7 @@ mod tests {
         ChannelMap {
             id: 0,
             rate_hz: 51_200,
+            exact_hz: None,
             channels: vec![
                 channel("a", Role::SpecimenA, Quantity::Velocity, 1e-3, 20_000),
                 channel("b", Role::SpecimenB, Quantity::Velocity, -1e-3, 0),

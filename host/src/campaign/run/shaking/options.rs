@@ -86,6 +86,7 @@ mod tests {
         let channels = ChannelMap {
             id: 0,
             rate_hz: 51_200,
+            exact_hz: None,
             channels: vec![
                 channel("hammer", Role::HammerForce),
                 channel("LDV_A", Role::SpecimenA),
