@@ -26,7 +26,7 @@ const STEPS: usize = 21;
 const AROUND: usize = 64;
 
 /// A delay is known no better than to this part of the time between points, however little noise there is.
-const BETWEEN_POINTS: f64 = 0.02;
+const BETWEEN_POINTS: f64 = 0.05;
 
 /// Second differences of the residual are taken over this part of a cycle, or this time (s), whichever is longer.
 const PROBE_CYCLES: f64 = 1e-4;

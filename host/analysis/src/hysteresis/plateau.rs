@@ -145,7 +145,7 @@ fn flat_part(cycle: &Cycle, stroke: &[usize]) -> Option<f64> {
         let (begin, low, high, end) = (begin?, low?, high?, end?);
         let own = (high - low) / (to - from);
         let (before, after) = ((low - begin) / BESIDE, (end - high) / BESIDE);
-        (own > FLAT * before.max(after)).then(|| (own - 0.5 * (before + after)) * (to - from))
+        (own > FLAT * before.max(after)).then_some((own - 0.5 * (before + after)) * (to - from))
     };
     (0..=steps).filter_map(window).max_by(f64::total_cmp)
 }

@@ -39,6 +39,10 @@ const SHORTEST: f64 = 0.01;
 /// and be no longer than this part: beyond it, the force's sign may as well be wrong.
 const LONGEST: f64 = 0.25;
 
+/// Friction alone that leaves this part of the force (rms) or less explains a loop. It may take a delay for friction of short reach,
+/// and then leaves little.
+const ALONE: f64 = 0.003;
+
 /// What a search for a delay over the whole cycle said.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Delay {
@@ -69,7 +73,9 @@ pub(super) fn delay(mean: &Cycle, dt_s: f64, play_m: f64) -> Delay {
     }
     // friction and a dashpot may explain it as well
     let alone_s = fit.undamped_s;
-    if !explains(fit.friction_alone) || part(alone_s) < SHORTEST || unexplained(left, &mean.force_n) {
+    let squares: f64 = mean.force_n.iter().map(|t| t * t).sum();
+    let alone_explains = fit.friction_alone < ALONE.powi(2) * squares || left > EXPLAINS * fit.friction_alone;
+    if alone_explains || part(alone_s) < 0.5 * SHORTEST || unexplained(left, &mean.force_n) {
         Delay::None
     } else {
         Delay::OrDamped(alone_s, std_s)
@@ -87,7 +93,7 @@ impl Repair {
         let needed = more_s.abs() > LATE_S.max(SIGNIFICANT * std_s).max(LATE_SAMPLES * dt_s)
             && without_delay > BETTER * left;
         if needed || late_s != 0.0 {
-            let by_s = late_s + if needed { more_s } else { 0.0 };
+            let by_s = late_s + more_s;
             repair.late_points = by_s / dt_s;
             repair.unsure = std_s / by_s.abs();
             said.push(LoopFinding::LateForce { by_s, std_s, at_least: false, corrected: true });

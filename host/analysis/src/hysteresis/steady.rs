@@ -16,7 +16,8 @@ use super::record::HysteresisRecord;
 use super::repair::{Delay, Repair, delay};
 use super::shape::{Shape, ShapeEvidence, shape};
 use super::stick::{
-    Part, bends, first_part, flank_part, friction_limit, slope_over, strokes, tangent_at_reversal,
+    BEFORE_PLAY, Part, bends, first_part, flank_part, friction_limit, slope_over, strokes,
+    tangent_at_reversal,
 };
 use super::timing::{Timing, runs_at};
 use crate::median::middle;
@@ -136,9 +137,12 @@ fn scatter(values: &[f64]) -> f64 {
 /// The cycles that are alike, and what is to be said of the others.
 fn steady_part<'a>(
     cycles: Steady<'a>,
-    each: &[Harmonics],
+    summed: &Summed,
 ) -> Result<(Steady<'a>, Option<LoopFinding>), HysteresisError> {
-    let used = alike(each);
+    let measured = if summed.as_measured.is_empty() { &summed.harmonics } else { &summed.as_measured };
+    let (with_drift, without) = (alike(measured), alike(&summed.harmonics));
+    let (used, each) =
+        if without.len() > with_drift.len() { (without, &summed.harmonics) } else { (with_drift, measured) };
     if used.len() == each.len() {
         return Ok((cycles, None));
     }
@@ -198,7 +202,7 @@ pub(super) fn shaker<const N: usize>(
     let mut unsteady = None;
     // all forces share the cycles of the first
     if let Some(first) = summed.first() {
-        (cycles, unsteady) = steady_part(cycles, &first.harmonics)?;
+        (cycles, unsteady) = steady_part(cycles, first)?;
     }
     if unsteady.is_some() {
         summed = cycles.summed(forces);
@@ -207,7 +211,7 @@ pub(super) fn shaker<const N: usize>(
     let said = [off, unsteady, hum].into_iter().flatten().collect();
     let steady = SteadyRecord { record, cycles, frequency_hz, said };
     let mut forces = forces.into_iter();
-    Ok(summed.map(|all| steady.loops(forces.next().flatten(), all)))
+    Ok(summed.map(|all| steady.loops(forces.next().flatten(), &all)))
 }
 
 /// What the loops of a steady record have in common, whichever force they show.
@@ -220,11 +224,11 @@ struct SteadyRecord<'a> {
 }
 
 impl SteadyRecord<'_> {
-    fn loops(&self, force: Force<'_>, summed: Summed) -> LoopAnalysis {
+    fn loops(&self, force: Force<'_>, summed: &Summed) -> LoopAnalysis {
         let Self { record, cycles, frequency_hz, said } = self;
         let (frequency_hz, dt_s) = (*frequency_hz, cycles.dt_s());
         let mut findings = said.clone();
-        let Summed { mean, slopes, energies, harmonics, of_mean, scatter, .. } = &summed;
+        let Summed { mean, slopes, energies, harmonics, of_mean, scatter, .. } = summed;
         let (mut slopes, mut energies) = (slopes.clone(), energies.clone());
         let raw = OverCycles::of(&slopes).expect("Steady::new() gives at least one cycle");
         let quadratures = Quadratures::of(of_mean, harmonics);
@@ -283,7 +287,7 @@ impl SteadyRecord<'_> {
             in_step_by
         };
         if repair.is_late() {
-            let both = cycles.each(force, &summed, |cycle| {
+            let both = cycles.each(force, summed, |cycle| {
                 let cycle = repair.in_step(cycle);
                 (equivalent_stiffness(&cycle), energy(&cycle))
             });
@@ -294,6 +298,7 @@ impl SteadyRecord<'_> {
         let stick_part: Option<Part> = match shape {
             Shape::Stuck | Shape::Elliptical => None,
             Shape::Microslip => Some(first_part(&friction, &strokes)),
+            Shape::GrossSlip if play.is_some() => Some(BEFORE_PLAY),
             Shape::GrossSlip => Some(flank_part(&friction, &strokes)),
         };
         let k_t = match (shape, stick_part) {
@@ -316,9 +321,9 @@ impl SteadyRecord<'_> {
                     }
                 };
                 let values: Vec<Option<f64>> = if repair.is_some() {
-                    cycles.each(force, &summed, |cycle| read(&repair.friction(cycle)))
+                    cycles.each(force, summed, |cycle| read(&repair.friction(cycle)))
                 } else {
-                    cycles.each(force, &summed, read)
+                    cycles.each(force, summed, read)
                 };
                 let values: Vec<f64> = values.into_iter().flatten().collect();
                 if values.len() < slopes.len() {

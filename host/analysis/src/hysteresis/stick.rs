@@ -22,6 +22,9 @@ const FLANK: Part = [0.10, 0.90];
 /// Its halves.
 const HALVES: [Part; 2] = [[0.10, 0.50], [0.50, 0.90]];
 
+/// Where a flank with play is read: the play comes where the force is zero, half the swing after the reversal.
+pub(super) const BEFORE_PLAY: Part = [0.10, 0.40];
+
 /// A flank counts as straight with this much of the earlier half's slope in the later one: ringing alone leaves 0.95 and more, an Iwan
 /// contact's halves differ by a third.
 const STRAIGHT_FLANK: f64 = 0.9;
