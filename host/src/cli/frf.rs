@@ -329,7 +329,7 @@ impl Frf {
         records: &ImpactRecords,
         verdicts: &[Verdict],
         settings: &FrfSettings,
-        found: Option<(&CrossSpectra, Option<Band>, MotionQuantity, &[String], &Agreement)>,
+        found: Option<Averaged<'_>>,
     ) -> Value {
         let windows = force_windows(records, &self.settings(&[]));
         let hits: Vec<Value> = verdicts
@@ -423,6 +423,9 @@ fn force_windows(records: &ImpactRecords, settings: &FrfSettings) -> Vec<Option<
     records.force_n.iter().map(of).collect()
 }
 
+/// Spectra, the band that was excited, what the FRFs are, the responses' names, and how well the hits agree.
+type Averaged<'a> = (&'a CrossSpectra, Option<Band>, MotionQuantity, &'a [String], &'a Agreement);
+
 /// Lines of Python that cut one record with several hits.
 fn cut_lines(file: &str, records: &ImpactRecords, hits_s: &[f64]) -> String {
     let gap_s = hits_s.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
@@ -433,7 +436,7 @@ fn cut_lines(file: &str, records: &ImpactRecords, hits_s: &[f64]) -> String {
     let starts: Vec<String> =
         hits_s.iter().map(|t| (((t - before_s) * records.fs_hz) as usize).to_string()).collect();
     let channels = records.response.first().map_or(0, Vec::len);
-    if !file.ends_with(".npz") {
+    if !std::path::Path::new(file).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("npz")) {
         return format!(
             "write one record of {length} samples for each hit, from the samples {} on",
             starts.join(", ")

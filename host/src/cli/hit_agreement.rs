@@ -55,15 +55,14 @@ impl Agreement {
                 let one: Vec<bool> = (0..used.len()).map(|other| other == *hit).collect();
                 each.push(inside(&estimate(records, &one, settings)?));
             }
-            match odd_hit(&each) {
-                Some(odd) => suspicions.push(sentence(&odd, &hits, names)),
-                None => {
-                    let of: Vec<&str> = low.iter().map(|o| name(names, *o)).collect();
-                    suspicions.push(format!(
-                        "the hits disagree in {}: their FRFs differ from hit to hit, or there is mostly noise",
-                        of.join(", ")
-                    ));
-                }
+            if let Some(odd) = odd_hit(&each) {
+                suspicions.push(sentence(&odd, &hits, names));
+            } else {
+                let of: Vec<&str> = low.iter().map(|o| name(names, *o)).collect();
+                suspicions.push(format!(
+                    "the hits disagree in {}: their FRFs differ from hit to hit, or there is mostly noise",
+                    of.join(", ")
+                ));
             }
             if turned_axes_agree(records, settings, excited) {
                 suspicions.push(

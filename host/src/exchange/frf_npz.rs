@@ -53,7 +53,9 @@ pub fn read_labelled(path: &Path, stated: &StatedUnits) -> Result<LabelledFrf, N
         if file.has("sigma") { file.number("sigma", "the exponential window's damping, 1/s")? } else { 0.0 };
     let (factor, mut taken) = frf_factor(&mut file, quantity, stated)?;
     if let Some(unit) = file.unit("unit_frequency", stated.frequency.as_deref(), Unit::of_frequency)? {
-        frequency_hz.iter_mut().for_each(|f| *f *= unit.factor);
+        for f in &mut frequency_hz {
+            *f *= unit.factor;
+        }
         taken = format!("{taken}, frequency in {}", unit.label);
     }
     let expected = format!(

@@ -226,6 +226,9 @@ fn side<'l>(known: &mut Option<&'l Label>, own: &'l Label) -> Option<f64> {
 const MOST_WORDS: usize = 8;
 const MOST_AXES: usize = 64;
 
+/// Lines that several axes share, Hz, and the places of these lines in each axis.
+type CommonAxis = (Vec<f64>, Vec<Vec<usize>>);
+
 /// The lines that all of the distinct axes share, Hz, as the most precise of them has them; and for each
 /// axis the places of these lines in it. What is left out is noted.
 ///
@@ -234,7 +237,7 @@ const MOST_AXES: usize = 64;
 fn common_axis(
     axes: &[(Places<'_>, usize)],
     notes: &mut Vec<String>,
-) -> Result<(Vec<f64>, Vec<Vec<usize>>), (usize, OtherLines)> {
+) -> Result<CommonAxis, (usize, OtherLines)> {
     let all: Vec<Vec<f64>> =
         axes.iter().map(|(places, lines)| (0..*lines).map(|i| places.at(i)).collect()).collect();
     let error = |axis: usize, line: usize| axes[axis].0.error(line);

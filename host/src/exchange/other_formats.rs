@@ -55,6 +55,9 @@ enum Format {
 /// The signature of HDF5.
 const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
 
+/// A line of Python that opens a file, and the expression for one of its arrays.
+type PythonLines = (String, fn(&str) -> String);
+
 impl Format {
     fn of(first: &[u8]) -> Option<Format> {
         let begins = |with: &[u8]| first.starts_with(with);
@@ -92,7 +95,7 @@ impl Format {
     }
 
     /// The line of Python that opens it as `m`, and what reads an array of `m` by its name.
-    fn python(self, file: &str) -> Option<(String, fn(&str) -> String)> {
+    fn python(self, file: &str) -> Option<PythonLines> {
         Some(match self {
             Format::Matlab5 => (format!("import numpy, scipy.io; m = scipy.io.loadmat({file})"), |name| {
                 format!("m[\"{name}\"]")

@@ -24,7 +24,7 @@ impl RecordFile {
     /// axis.
     #[must_use]
     pub fn along_axes(mut self) -> Self {
-        let turned = self.directions.to_axes(&mut self.records, &mut self.delay_s);
+        let turned = self.directions.turn_to_axes(&mut self.records, &mut self.delay_s);
         let turned: Vec<(String, i64)> = turned.into_iter().map(|d| ("response".to_owned(), d)).collect();
         self.taken.extend(turned_words(&turned).map(|words| format!(", {words}")));
         self
@@ -66,7 +66,7 @@ fn turn(records: &mut ImpactRecords, channel: usize) {
 impl Directions {
     /// Puts responses that are along different axes in the order x, y, z, and turns what is along a
     /// negative axis; gives what was turned.
-    pub(super) fn to_axes(&mut self, records: &mut ImpactRecords, delay_s: &mut [f64]) -> Vec<i64> {
+    pub(super) fn turn_to_axes(&mut self, records: &mut ImpactRecords, delay_s: &mut [f64]) -> Vec<i64> {
         let mut order: Vec<usize> = (0..self.responses.len()).collect();
         let axes: Vec<i64> = self.responses.iter().map(|d| d.saturating_abs()).collect();
         let apart = (1..axes.len()).all(|i| !axes[..i].contains(&axes[i]));
@@ -273,7 +273,7 @@ mod tests {
             let mut records = hit(1.0, own.len());
             let mut delay_s: Vec<f64> = (1..=own.len()).map(|channel| channel as f64).collect();
             let mut directions = labels(-3, own);
-            let turned = directions.to_axes(&mut records, &mut delay_s);
+            let turned = directions.turn_to_axes(&mut records, &mut delay_s);
             assert_eq!(values(&records), wanted, "{own:?}");
             assert_eq!(turned, own.iter().copied().filter(|d| *d < 0).collect::<Vec<_>>());
             assert!(delay_s.iter().zip(wanted).all(|(late, value)| *late == value.abs()), "{own:?}");

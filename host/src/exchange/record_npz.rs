@@ -78,7 +78,9 @@ pub fn read_records(path: &Path, stated: &StatedUnits) -> Result<RecordFile, Npz
         file.unit("unit_force", stated.force.as_deref(), |label| Unit::parse(label, &[Dimension::FORCE]))?;
     for (unit, values) in [(&of_response, &mut response.values), (&of_force, &mut force.values)] {
         if let Some(unit) = unit {
-            values.iter_mut().for_each(|v| *v *= unit.factor);
+            for v in &mut *values {
+                *v *= unit.factor;
+            }
         }
     }
     let word = |unit: &Option<Unit>, si: &str| {

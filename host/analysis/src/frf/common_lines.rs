@@ -104,7 +104,7 @@ pub struct CommonLines {
 /// # Errors
 /// The structure whose lines are not those of A, and the first that differ (A's, then its own).
 pub fn keep_common_lines(files: &mut [Frf; 3]) -> Result<Option<CommonLines>, (Structure, OtherLines)> {
-    let [a, b, ajb] = files.each_ref().map(|frf| frf.frequency_hz());
+    let [a, b, ajb] = files.each_ref().map(super::matrix::Frf::frequency_hz);
     let with_a = |other: &[f64], structure: Structure| {
         let tolerance = |i: usize, j: usize| PRINTED * a[i].max(other[j]);
         shared(a, other, tolerance).map_err(|apart| (structure, apart))

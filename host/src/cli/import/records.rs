@@ -162,7 +162,9 @@ pub(super) fn bring(
     let RecordFile { records, delay_s, taken, .. } = read;
     let records = &records;
     let mut groups = quantised(records, axes).map_err(wrong)?;
-    groups.iter_mut().for_each(|group| put_in_step(&mut group.map, &delay_s));
+    for group in &mut groups {
+        put_in_step(&mut group.map, &delay_s);
+    }
     let reversed: Vec<Option<f64>> = records.force_n.iter().map(|f| reversed_peak_n(f)).collect();
     if let (Some(peak_n), true) = (reversed.first().copied().flatten(), reversed.iter().all(Option::is_some))
     {
