@@ -4,7 +4,8 @@
 
 use jointrig::exchange::uff_output::write_records;
 use jointrig::exchange::{
-    read_frf_file, read_hysteresis, read_impacts, read_positions, record_uff::read_record_file, write_impacts,
+    StatedUnits, read_frf_file, read_hysteresis, read_impacts, read_positions, record_uff::read_record_file,
+    write_impacts,
 };
 use jointrig::spectra::{ImpactRecords, MotionQuantity};
 use peak_alloc::PeakAlloc;
@@ -91,10 +92,10 @@ fn damaged_and_lying_files_cost_a_small_multiple_of_their_size() {
             std::fs::write(&at, &bytes).expect("written");
             let used = allocated(|| {
                 // one after the other: each gives back what it read
-                drop(read_frf_file(&at));
+                drop(read_frf_file(&at, &StatedUnits::default()));
                 drop(read_impacts(&at));
                 drop(read_hysteresis(&at));
-                drop(read_record_file(&at));
+                drop(read_record_file(&at, &StatedUnits::default()));
                 drop(read_positions(&at));
             });
             most = most.max(used);
@@ -119,7 +120,11 @@ fn damaged_and_lying_files_cost_a_small_multiple_of_their_size() {
     }
     archive.finish().expect("closed");
     let used = allocated(|| {
-        assert!(read_frf_file(&at).is_err() && read_impacts(&at).is_err() && read_hysteresis(&at).is_err());
+        assert!(
+            read_frf_file(&at, &StatedUnits::default()).is_err()
+                && read_impacts(&at).is_err()
+                && read_hysteresis(&at).is_err()
+        );
     });
     assert!(used <= BUFFERS, "{used}");
 }
