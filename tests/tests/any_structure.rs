@@ -205,7 +205,7 @@ fn measure(part: Part, folder: &Path, rng: &mut Xoshiro256PlusPlus) {
     let mut planner = RealFftPlanner::<f64>::new();
     let (there, back) = (planner.plan_fft_forward(SCANS), planner.plan_fft_inverse(SCANS));
     let mut normal = || -> f64 { (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0 };
-    for ((node, ..), of_channels) in hits.iter().zip(all) {
+    for ((node, _, direction), of_channels) in hits.iter().zip(all) {
         let mut sets: Vec<DataSet> = Vec::new();
         for hit in 1..=HITS {
             let peak = 50.0 * (1.0 + 0.002 * normal());
@@ -228,7 +228,8 @@ fn measure(part: Part, folder: &Path, rng: &mut Xoshiro256PlusPlus) {
             };
             let dof = |node: i64, direction: i64| Dof { entity: "NONE".into(), node, direction };
             let noisy = pulse.iter().map(|f| f + 0.01 * normal()).collect();
-            add(noisy, dof(*node, 3), quantity::FORCE);
+            // the label says along which side of its own axis the hammer pushes
+            add(noisy, dof(*node, if direction[2] < 0.0 { -3 } else { 3 }), quantity::FORCE);
             for (channel, h) in of_channels.iter().enumerate() {
                 let mut product: Vec<Complex<f64>> =
                     h.iter().zip(&spectrum).map(|(h, f)| h * f / SCANS as f64).collect();

@@ -43,6 +43,8 @@ mod workbook_parts;
 
 pub use jointrig_uff as uff;
 
+pub(crate) use tables::delimiter;
+
 pub use frf_file::{FrfFileError, read_frf_file};
 pub use frf_npz::{Extra, read_frf, write_frf};
 pub use frf_uff::FrfUffError;

@@ -32,7 +32,7 @@ pub fn read_records(path: &Path, stated: &StatedUnits) -> Result<RecordFile, Npz
     let mut file = NpzFile::open(path)?;
     file.refuse_other_units(&["unit_force", "unit_response", "unit_fs"])?;
     let mut fs_hz = positive(&mut file, "fs", "the sampling rate, Hz (positive)")?;
-    if let Some(unit) = file.unit("unit_fs", None, Unit::of_frequency)? {
+    if let Some(unit) = file.unit("unit_fs", stated.frequency.as_deref(), Unit::of_frequency)? {
         fs_hz *= unit.factor;
     }
     let mut force = file.real("force", "the hammer force (hit, sample), N")?;

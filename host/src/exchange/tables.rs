@@ -232,7 +232,7 @@ fn csv_table(text: &str, room: &mut Room) -> Result<Table, String> {
 
 /// What stands between the cells of a table, by the line of its headings: a comma, or a semicolon or a tab
 /// where there are more of these.
-fn delimiter(text: &str) -> u8 {
+pub(crate) fn delimiter(text: &str) -> u8 {
     let heading = text.lines().find(|line| line.contains([',', ';', '\t'])).unwrap_or_default();
     let count = |delimiter: u8| heading.bytes().filter(|byte| *byte == delimiter).count();
     [b',', b';', b'\t'].into_iter().rev().max_by_key(|delimiter| count(*delimiter)).unwrap_or(b',')

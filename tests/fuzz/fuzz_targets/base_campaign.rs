@@ -89,7 +89,7 @@ fn eventful(path: &Path) {
         channel("y", Role::Response(Axis::Y), Quantity::Velocity, 0.005),
         channel("z", Role::Response(Axis::Z), Quantity::Velocity, -0.005),
     ];
-    let map = ChannelMap { id: 0, rate_hz: 51_200, channels };
+    let map = ChannelMap { id: 0, rate_hz: 51_200, exact_hz: None, channels };
     let mut store = Store::create(path, SMALL, "small.toml").expect("created");
     let text = || "x".to_owned();
     let info = SessionInfo {

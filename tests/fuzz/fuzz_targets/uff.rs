@@ -2,11 +2,12 @@
 #![no_main]
 
 use jointrig::exchange::uff::{Contents, read, write};
-use jointrig::exchange::{frf_uff, record_uff};
+use jointrig::exchange::{StatedUnits, frf_uff, record_uff};
 use libfuzzer_sys::fuzz_target;
 
 fn made_of(contents: &Contents) {
-    drop((frf_uff::from_contents(contents), record_uff::from_contents(contents)));
+    let stated = StatedUnits::default();
+    drop((frf_uff::from_contents(contents, &stated), record_uff::from_contents(contents, &stated)));
 }
 
 fuzz_target!(|bytes: &[u8]| {

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use super::bad;
 use crate::campaign::plan::{Cell, Plan, configuration_name};
 use crate::cli::error::CliError;
-use crate::exchange::{frf_file, record_uff};
+use crate::exchange::{delimiter, frf_file, record_uff};
 use crate::foreign;
 use crate::outside::file_name;
 
@@ -59,7 +59,10 @@ pub(super) fn from_table(folder: &Path, table: &Path) -> Result<Vec<Source>, Cli
         doing: "reading the table of names",
         source,
     })?;
-    let mut rows = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+    let mut rows = csv::ReaderBuilder::new()
+        .delimiter(delimiter(&text))
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes());
     let mut sources = Vec::new();
     for row in rows.deserialize::<Row>() {
         let Row { file, configuration, impact, response } = row.map_err(told)?;
