@@ -2,9 +2,12 @@
 
 use jointrig::exchange::frf_uff::{to_functions, write_uff};
 use jointrig::exchange::uff::Encoding;
-use jointrig::exchange::{read_frf, write_frf};
+use jointrig::exchange::{read_frf, write_frf, write_impacts};
+use jointrig::spectra::{ImpactRecords, MotionQuantity};
 use jointrig::substructuring::Frf;
+use num_complex::Complex;
 use serde_json::Value;
+use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -157,4 +160,165 @@ fn hits_and_frfs_of_one_configuration_do_not_stand_side_by_side() {
     let results = String::from_utf8_lossy(&out.stdout);
     assert_eq!(out.status.code(), Some(1), "{results}");
     assert!(results.contains("the FRFs imported from AJB.npz are not used"), "{results}");
+}
+
+/// A plan with one cell, A/AZ1/A1, whose sensor has one axis.
+const ONE_CELL: &str = r#"version = 1
+name = "one cell"
+[record]
+rate_hz = 2048
+length_s = 8.0
+pre_trigger_scans = 40
+[hits]
+wanted = 2
+minimum = 1
+most = 8
+[force]
+target_n = 25.0
+tolerance = 0.05
+pulse_us = 3500
+pulse_bounds_us = [2500, 6000]
+[trigger]
+level_n = 3.0
+flight_s = 0.05
+listen_s = 0.15
+hold_off_s = 0.05
+[limits]
+weak_n = 10.0
+strong_n = 40.0
+rebound_ratio = 0.02
+rebound_after_s = 0.001
+noise_ratio = 3.0
+[settle]
+quiet_relative = 0.003
+quiet_floor_m_per_s = 1e-6
+window_samples = 128
+bound_s = 25.0
+[window]
+exponential_per_s = 0.0
+[[configuration]]
+name = "A"
+impacts = ["AZ1"]
+responses = ["A1"]
+[geometry]
+virtual_point_m = [0.0, 0.0, 0.0]
+response = [{ name = "A1", grouping = 1, position_m = [-0.02, 0.02, 0.03], axes = [[0.0, 0.0, 1.0]] }]
+impact = [{ name = "AZ1", grouping = 1, position_m = [-0.015, 0.028, 0.03], direction = [0, 0, -1] }]
+"#;
+
+const CELL: [&str; 8] = ["--into", "c.jrig", "--configuration", "A", "--impact", "AZ1", "--response", "A1"];
+
+/// Two hits of a Hann pulse of 24 and 25 N on an oscillator of 1 kg, 20 Hz, 2 %: its acceleration, exactly.
+fn soft_hits(fs_hz: f64, length_s: f64, begin_s: f64, width_s: f64) -> ImpactRecords {
+    let (w, zeta) = (40.0 * PI, 0.02);
+    let pole = Complex::new(-zeta * w, w * f64::sqrt(1.0 - zeta * zeta));
+    let hit = |peak_n: f64| -> (Vec<f64>, Vec<f64>) {
+        let sample = |i: usize| {
+            let t = i as f64 / fs_hz - begin_s;
+            if t <= 0.0 {
+                return (0.0, 0.0);
+            }
+            let during = t.min(width_s);
+            let turn = 2.0 * PI / width_s;
+            let force = if t < width_s { 0.5 * peak_n * (1.0 - (turn * t).cos()) } else { 0.0 };
+            let terms = [(0.5, 0.0), (-0.25, turn), (-0.25, -turn)].map(|(part, turn)| {
+                let m = Complex::new(0.0, turn);
+                ((m * during).exp() - (pole * during).exp()) * (part * peak_n) / (m - pole)
+            });
+            let answer = terms.iter().sum::<Complex<f64>>() * (pole * (t - during)).exp() / pole.im;
+            (force, force - 2.0 * zeta * w * (pole * answer).im - w * w * answer.im)
+        };
+        (0..(fs_hz * length_s) as usize).map(sample).unzip()
+    };
+    let (force_n, response): (Vec<_>, Vec<_>) = [24.0, 25.0].map(hit).into_iter().unzip();
+    ImpactRecords {
+        fs_hz,
+        force_n,
+        response: response.into_iter().map(|x| vec![x]).collect(),
+        quantity: MotionQuantity::Acceleration,
+    }
+}
+
+/// Accelerance at 20 Hz by `frf`, and by a campaign and its export.
+fn both_ways(records: &ImpactRecords) -> [f64; 2] {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    write_impacts(&folder.join("hits.npz"), records).expect("written");
+    std::fs::write(folder.join("plan.toml"), ONE_CELL).expect("written");
+    done(folder, &["frf", "hits.npz", "--sigma", "0", "--out", "h.npz"]);
+    done(folder, &["campaign", "new", "c.jrig", "--plan", "plan.toml"]);
+    done(folder, &[&["import", "hits.npz"], &CELL[..]].concat());
+    done(folder, &["export", "c.jrig", "--format", "npz", "--out", "x"]);
+    ["h.npz", "x/frf/A.npz"].map(|file| {
+        let frf = read_frf(&folder.join(file)).expect("written");
+        let line = frf.frequency_hz().iter().position(|f| (f - 20.0).abs() < 1e-6).expect("a line at 20 Hz");
+        frf.lines()[line][(0, 0)].norm()
+    })
+}
+
+#[test]
+fn soft_tips_give_the_exact_frf_and_long_records_are_used_whole() {
+    // the plan's records are longer, these are 4 s
+    for width_s in [2e-3, 4e-3, 10e-3, 25e-3] {
+        for found in both_ways(&soft_hits(2048.0, 4.0, 0.05, width_s)) {
+            // (2πf)² / (2 ζ ω²) at the resonance
+            assert!((found / 25.0 - 1.0).abs() < 5e-3, "{width_s} s: {found}");
+        }
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    write_impacts(&folder.join("hits.npz"), &soft_hits(2048.0, 4.0, 0.05, 2e-3)).expect("written");
+    std::fs::write(folder.join("plan.toml"), ONE_CELL.replace("length_s = 8.0", "length_s = 1.0"))
+        .expect("written");
+    done(folder, &["campaign", "new", "c.jrig", "--plan", "plan.toml"]);
+    let told = done(folder, &[&["import", "hits.npz"], &CELL[..]].concat());
+    assert!(told.contains("the plan's length_s is 1 s: they are used whole"), "{told}");
+    done(folder, &["export", "c.jrig", "--format", "npz", "--out", "x"]);
+    let frf = read_frf(&folder.join("x/frf/A.npz")).expect("exported");
+    let most = frf.lines().iter().map(|line| line[(0, 0)].norm()).fold(0.0, f64::max);
+    assert!((most / 25.0 - 1.0).abs() < 1e-2, "{most}");
+}
+
+#[test]
+fn frf_and_import_refuse_the_same_hits_for_the_same_reasons() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    std::fs::write(folder.join("plan.toml"), ONE_CELL).expect("written");
+    let both = |name: &str, records: &ImpactRecords| -> [String; 2] {
+        let file = format!("{name}.npz");
+        write_impacts(&folder.join(&file), records).expect("written");
+        let campaign = format!("{name}.jrig");
+        done(folder, &["campaign", "new", &campaign, "--plan", "plan.toml"]);
+        let into = [&["import", &file, "--into", &campaign], &CELL[2..]].concat();
+        [jointrig(folder, &["frf", &file, "--sigma", "0"]), jointrig(folder, &into)].map(|out| {
+            format!(
+                "{} {}{}",
+                out.status.code().unwrap_or(-1),
+                String::from_utf8_lossy(&out.stdout),
+                String::from_utf8_lossy(&out.stderr)
+            )
+        })
+    };
+    for (name, begin_s) in [("half", -1e-3), ("third", -0.7e-3)] {
+        for said in both(name, &soft_hits(10_240.0, 2.0, begin_s, 2e-3)) {
+            assert!(said.starts_with("1 ") && said.contains("begins within the pulse"), "{said}");
+        }
+    }
+    let mut turned = soft_hits(10_240.0, 2.0, 0.01, 2e-3);
+    turned.force_n.iter_mut().flatten().for_each(|f| *f = -*f);
+    for said in both("turned", &turned) {
+        assert!(
+            said.starts_with("1 ") && said.contains("sign is the wrong way round: peak -24.0 N"),
+            "{said}"
+        );
+        assert!(!said.contains("weak"), "{said}");
+    }
+    // an acceleration that drops out for 10 ms, and comes back with a jump
+    let mut dropout = soft_hits(10_240.0, 2.0, 0.01, 2e-3);
+    dropout.response[1][0][2000..2100].fill(0.0);
+    dropout.response[1][0][2100..2120].iter_mut().for_each(|v| *v += 30.0);
+    for said in both("dropout", &dropout) {
+        assert!(said.starts_with("0 ") && said.contains("hit 0: good"), "{said}");
+        assert!(said.contains("hit 1: noisy") && said.contains("a dropout or spike"), "{said}");
+    }
 }

@@ -256,3 +256,26 @@ fn the_plan_becomes_a_geometry() {
     assert_eq!(geometry.ajb.input_names(), ["AZ1", "AY1"]);
     assert_eq!(geometry.b.impacts[0].direction, [0.0, 0.0, -1.0]);
 }
+
+#[test]
+fn records_from_files_are_used_whole_where_nothing_was_measured() {
+    let lengths = |imported_s, measured| AnalysedLength { plan_s: 1.0, imported_s, measured };
+    // nothing from a file, and records of the plan's length with the lead beside it: as planned, without a word
+    for alone in [lengths(None, true), lengths(Some([1.0, 1.001]), false), lengths(Some([1.0; 2]), true)] {
+        assert_eq!((alone.length_s(), alone.notice()), (1.0, None));
+    }
+    let said = |length: AnalysedLength| length.notice().expect("something to say");
+    let longer = lengths(Some([4.0; 2]), false);
+    assert_eq!(longer.length_s(), 4.0);
+    assert!(said(longer).contains("last 4.000 s") && said(longer).contains("used whole"));
+    let shorter = lengths(Some([0.5; 2]), false);
+    assert_eq!(shorter.length_s(), 0.5);
+    assert!(said(shorter).contains("every 2.000 Hz"));
+    // FRFs of one campaign have the same lines
+    let several = lengths(Some([2.0, 4.0]), false);
+    assert_eq!(several.length_s(), 2.0);
+    assert!(said(several).contains("from 2.000 to 4.000 s"));
+    let beside = lengths(Some([4.0; 2]), true);
+    assert_eq!(beside.length_s(), 1.0);
+    assert!(said(beside).contains("cut to the plan's length_s of 1 s"));
+}

@@ -506,4 +506,20 @@ mod tests {
             assert!(band(text).is_err(), "{text}");
         }
     }
+
+    #[test]
+    fn a_row_of_hits_is_cut_between_them() {
+        let records = ImpactRecords {
+            fs_hz: 1000.0,
+            force_n: vec![vec![0.0; 3000]],
+            response: vec![vec![vec![0.0; 3000]; 2]],
+            quantity: MotionQuantity::Velocity,
+        };
+        let said = cut_lines("row.npz", &records, &[0.3, 1.3, 2.4]);
+        // 50 ms before each hit; the last one has 600 ms after it
+        assert!(said.contains("starts, n = [250, 1250, 2350], 650"), "{said}");
+        assert!(said.contains("reshape(2, -1)") && said.contains("row-cut.npz"), "{said}");
+        let said = cut_lines("row.uff", &records, &[0.3, 1.3, 2.4]);
+        assert!(said.contains("650 samples") && said.contains("250, 1250, 2350"), "{said}");
+    }
 }

@@ -181,3 +181,58 @@ fn sentence(odd: &OddHit, hits: &[usize], names: &[String]) -> String {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_makes_a_hit_fit_is_said_with_its_number_in_the_file() {
+        let names = ["a", "b", "c"].map(str::to_owned);
+        let say = |hit, fit| sentence(&OddHit { hit, difference: 0.85, fit }, &[0, 2, 3], &names);
+        let text = say(1, Some(Fit::Channels(vec![(1, false), (2, true), (0, false)])));
+        assert!(text.contains("hit 2") && text.contains("85 %"), "{text}");
+        assert!(text.contains("in the order b, −c, a (y, −z, x)"), "{text}");
+        let text = say(2, Some(Fit::Channels(vec![(0, false), (1, true), (2, false)])));
+        assert!(text.contains("hit 3") && text.contains("sign of b turned round"), "{text}");
+        assert!(say(0, Some(Fit::Scaled(0.5))).contains("divided by 0.500"));
+        assert!(say(0, None).contains("look whether"));
+    }
+
+    #[test]
+    fn coherence_and_turned_axes_are_told() {
+        let ring = |part: f64| -> Vec<f64> {
+            (0..2048)
+                .map(|i| {
+                    let t = (f64::from(i) - 44.0) / 4096.0;
+                    if t > 0.0 { part * (-20.0 * t).exp() * (750.0 * t).sin() } else { 0.0 }
+                })
+                .collect()
+        };
+        let force: Vec<f64> = (0..2048)
+            .map(|i| if (40..48).contains(&i) { (f64::from(i - 39) * 0.35).sin() } else { 0.0 })
+            .collect();
+        // (channel, hit, sample), of three channels that see different parts of the same motion
+        let records = ImpactRecords {
+            fs_hz: 4096.0,
+            force_n: vec![force; 3],
+            response: [1.0, 0.5, 0.2].map(|part| vec![ring(part); 3]).to_vec(),
+            quantity: crate::spectra::MotionQuantity::Velocity,
+        };
+        let names = ["a", "b", "c"].map(str::to_owned);
+        let settings = FrfSettings::default();
+        let found = estimate(&records, &[true; 3], &settings).expect("three hits");
+        let told = Agreement::of(&records, &[true; 3], &settings, &found, None, &names).expect("three hits");
+        let lines = told.lines(&names).join("\n");
+        // (Σ p)² / (3 Σ p²) of 1, 0.5, 0.2
+        assert!(lines.contains("coherence of a: median 0.747"), "{lines}");
+        assert!(lines.contains("(channel, hit, sample)"), "{lines}");
+        // in order, all is well
+        let in_order = vec![[1.0, 0.5, 0.2].map(ring).to_vec(); 3];
+        let records = ImpactRecords { response: in_order, ..records };
+        let found = estimate(&records, &[true; 3], &settings).expect("three hits");
+        let told = Agreement::of(&records, &[true; 3], &settings, &found, None, &names).expect("three hits");
+        assert!(told.suspicions.is_empty(), "{:?}", told.suspicions);
+        assert!(told.lines(&names)[0].contains("median 1.000"));
+    }
+}

@@ -197,3 +197,138 @@ fn a_saturated_amplifier_below_full_scale_is_an_overload_and_a_round_top_is_not(
         assert!((v.measure.abs() / (0.85 * top) - 1.0).abs() < 0.01, "{v:?}");
     }
 }
+
+/// A pulse of a Hann window, 25 N high and `width_s` long, that begins at `start_s`, and what an oscillator of 1 kg does under it: its
+/// velocity and its acceleration, exactly, as the sum of the answers to the pulse's three exponentials.
+fn hann_hit(fs_hz: f64, n: usize, start_s: f64, width_s: f64, f0_hz: f64) -> [Vec<f64>; 3] {
+    type C = num_complex::Complex<f64>;
+    let (w, zeta) = (TAU * f0_hz, 0.02);
+    let pole = C::new(-zeta * w, w * (1.0f64 - zeta * zeta).sqrt());
+    let terms = [(12.5, 0.0), (-6.25, TAU / width_s), (-6.25, -TAU / width_s)];
+    let mut all = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
+    for i in 0..n {
+        let t = i as f64 / fs_hz - start_s;
+        if t <= 0.0 {
+            continue;
+        }
+        let during = t.min(width_s);
+        let force = if t < width_s { 12.5 * (1.0 - (TAU * t / width_s).cos()) } else { 0.0 };
+        let answer: C = terms
+            .iter()
+            .map(|(c, turn)| {
+                let m = C::new(0.0, *turn);
+                ((m * during).exp() - (pole * during).exp()) * *c / (m - pole)
+            })
+            .sum();
+        let answer = answer * (pole * (t - during)).exp() / pole.im;
+        let (x, v) = (answer.im, (pole * answer).im);
+        all[0][i] = force;
+        all[1][i] = v;
+        all[2][i] = force - 2.0 * zeta * w * v - w * w * x;
+    }
+    all
+}
+
+fn judged(fs_hz: f64, force_n: &[f64], responses: &[Vec<f64>]) -> Verdict {
+    judge(RawHit { fs_hz, force_n, responses, missing_samples: 0 }, &Limits::default(), None)
+}
+
+#[test]
+fn a_clean_record_is_good_however_quiet_and_slow_it_is_and_a_spike_in_it_is_found() {
+    let mut dice = Dice::new();
+    for fs_hz in [2048.0, 5120.0, 25_600.0, 102_400.0] {
+        for samples_of_pulse in [4.3, 12.0, 80.0] {
+            for noise in [0.0, 1e-6, 1e-4] {
+                let width_s = samples_of_pulse / fs_hz;
+                let (f0_hz, n) = (0.6 / width_s / dice.uniform(1.0, 4.0), 16_384);
+                let start_s = 0.01 + dice.uniform(0.0, 1.0) / fs_hz;
+                let [force, v, a] = hann_hit(fs_hz, n, start_s, width_s, f0_hz);
+                for x in [v, a] {
+                    let most = x.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+                    let force: Vec<f64> = force.iter().map(|f| f + noise * 25.0 * dice.gauss()).collect();
+                    let mut x: Vec<f64> = x.iter().map(|x| x + noise * most * dice.gauss()).collect();
+                    let found = judged(fs_hz, &force, &[x.clone()]);
+                    let what = format!("{fs_hz} Hz, {samples_of_pulse} samples, noise {noise}: {found:?}");
+                    assert_eq!(found.kind, Kind::Good, "{what}");
+                    x[n / 2] += 0.3 * most;
+                    let found = judged(fs_hz, &force, &[x]);
+                    assert_eq!(found.kind, Kind::Noisy, "a spike, {what}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_pulse_that_the_record_holds_only_in_part_is_mistimed() {
+    let n = 8192;
+    for part in [0.2, 0.33, 0.5, 0.8] {
+        let [force, v, _] = hann_hit(10_240.0, n, -part * 1.5e-3, 1.5e-3, 200.0);
+        let found = judged(10_240.0, &force, &[v]);
+        assert_eq!(found.kind, Kind::Mistimed, "{part}: {found:?}");
+        assert!(found.sentence.contains("begins within the pulse"), "{found:?}");
+        let [force, v, _] = hann_hit(10_240.0, n, n as f64 / 10_240.0 - part * 1.5e-3, 1.5e-3, 200.0);
+        let found = judged(10_240.0, &force, &[v]);
+        assert!(found.kind == Kind::Mistimed && found.sentence.contains("ends within"), "{found:?}");
+    }
+    // a record that begins with the pulse holds all of it
+    let [force, v, _] = hann_hit(10_240.0, n, 0.0, 1.5e-3, 200.0);
+    assert_eq!(judged(10_240.0, &force, &[v]).kind, Kind::Good);
+}
+
+#[test]
+fn a_force_of_the_wrong_sign_is_named() {
+    for offset in [0.0, 2.0, -2.0] {
+        let [force, v, _] = hann_hit(10_240.0, 4096, 5e-3, 1.5e-3, 200.0);
+        let mut force: Vec<f64> = force.iter().map(|f| offset - f).collect();
+        // what the cell does afterwards
+        for (i, f) in force.iter_mut().enumerate().skip(70) {
+            *f += 1.2 * (-((i - 70) as f64) / 30.0).exp();
+        }
+        let found = judged(10_240.0, &force, &[v]);
+        assert!(
+            found.kind == Kind::Mistimed && found.sentence.contains("sign is the wrong way round"),
+            "{found:?}"
+        );
+        assert!(found.sentence.contains("peak -2"), "{found:?}");
+    }
+}
+
+#[test]
+fn hits_in_one_row_are_counted_and_a_bounce_is_a_double_hit() {
+    let (fs_hz, n) = (5120.0, 25_600);
+    let mut row = vec![0.0; n];
+    for start_s in [0.3, 1.3, 2.4] {
+        let [force, ..] = hann_hit(fs_hz, n, start_s, 1.5e-3, 200.0);
+        row.iter_mut().zip(force).for_each(|(sum, f)| *sum += f);
+    }
+    let found = judged(fs_hz, &row, &[]);
+    assert_eq!(found.kind, Kind::DoubleHit);
+    assert!(
+        found.sentence.contains("holds 3 hits, at 0.30") && found.sentence.contains("cut it"),
+        "{found:?}"
+    );
+    for after_s in [0.01, 0.03, 0.1] {
+        let [mut force, ..] = hann_hit(fs_hz, n, 0.3, 1.5e-3, 200.0);
+        let [second, ..] = hann_hit(fs_hz, n, 0.3 + after_s, 1.6e-3, 200.0);
+        force.iter_mut().zip(second).for_each(|(sum, f)| *sum += 0.6 * f);
+        let found = judged(fs_hz, &force, &[]);
+        assert!(found.kind == Kind::DoubleHit && found.sentence.contains("second pulse"), "{found:?}");
+    }
+}
+
+#[test]
+fn a_soft_pulse_is_one_hit_at_any_rate() {
+    let mut dice = Dice::new();
+    for fs_hz in [2048.0, 10_240.0, 51_200.0] {
+        for width_s in [4e-3, 10e-3, 30e-3] {
+            let n = (1.5 * fs_hz) as usize;
+            let [force, v, _] = hann_hit(fs_hz, n, 0.1, width_s, 20.0);
+            for noise in [0.0, 1e-3] {
+                let force: Vec<f64> = force.iter().map(|f| f + 25.0 * noise * dice.gauss()).collect();
+                let found = judged(fs_hz, &force, &[v.clone()]);
+                assert_eq!(found.kind, Kind::Good, "{fs_hz} Hz, {width_s} s: {found:?}");
+            }
+        }
+    }
+}
