@@ -38,6 +38,9 @@ const OWN: usize = 4;
 /// ... and so many beside them say what is usual there.
 const NEXT: usize = 12;
 
+/// A jump is this part of the limit times the largest of them: of noise, the largest of twelve is 2.5 times the median.
+const JUMP: f64 = 1.0 / 3.0;
+
 /// Surroundings: this many differences, s of record for single samples.
 const SURROUNDINGS: usize = 512;
 
@@ -67,7 +70,7 @@ pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<B
                 let near = block == 1 && from >= quiet;
                 let ratio = d / s;
                 let worse = ratio > limit && worst.as_ref().is_none_or(|w| ratio > w.ratio);
-                if worse && (far && d / next_to(&differences, i).max(whole) > limit || near && !moves(x, i)) {
+                if worse && (far && d / next_to(&differences, i) > limit * JUMP || near && !moves(x, i)) {
                     worst = Some(Burst { sample: from + 2 * block, ratio });
                 }
             }
@@ -76,14 +79,15 @@ pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<B
     worst
 }
 
-/// Median of the differences next to the one at `i`, on the side where it is smaller: before a jump all is quiet, or after it.
+/// The largest of the differences next to the one at `i`, on the side where it is smaller: before a jump all is
+/// quiet, or after it. 0 where neither side is there.
 fn next_to(differences: &[f64], i: usize) -> f64 {
     let before = &differences[i.saturating_sub(OWN + NEXT)..i.saturating_sub(OWN)];
-    let after =
-        &differences[(i + OWN + 1).min(differences.len())..(i + OWN + 1 + NEXT).min(differences.len())];
-    let side = |part: &[f64]| (part.len() == NEXT).then(|| middle(part)).flatten().unwrap_or(f64::INFINITY);
-    let quieter = side(before).min(side(after));
-    if quieter.is_finite() { quieter } else { 0.0 }
+    let from = (i + OWN + 1).min(differences.len());
+    let after = &differences[from..(from + NEXT).min(differences.len())];
+    let sides = [before, after].into_iter().filter(|part| part.len() == NEXT);
+    let largest = sides.map(|part| part.iter().fold(0.0f64, |most, d| most.max(*d)));
+    largest.reduce(f64::min).unwrap_or(0.0)
 }
 
 /// Whether the structure itself moves so where this third difference is.
