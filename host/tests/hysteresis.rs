@@ -190,7 +190,7 @@ fn the_text_has_every_figure_and_finding_and_calls_the_contacts_own_slope_k_t() 
         "± 5.00 µm",
         "gross-slip",
         "k_T: 100 ± 0",
-        "k_eq: 14.2",
+        "k_eq: 14",
         "energy: 1.60 mJ",
         "friction limit μN: 100 N",
         "μ = 0.400",
