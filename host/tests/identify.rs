@@ -273,7 +273,7 @@ fn files_on_other_lines_are_refused() {
 
 #[test]
 fn files_of_overlapping_bands_are_answered_from_their_common_lines_and_it_is_said() {
-    let asked = ["--method", "inverse", "--idms", "6", "--band", "300:500"];
+    let asked = ["--method", "inverse", "--idms", "6", "--band", "299:501"];
     let joint = |files: &Files| {
         let out = files.identify(&[&asked[..], &["--json"]].concat());
         assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));

@@ -20,7 +20,7 @@ use crate::raised;
 /// A matrix of FRFs with its noise.
 #[pyclass(module = "jointrig._native", frozen)]
 pub struct Frf {
-    frf: jointrig::frf::Frf,
+    matrix: jointrig::frf::Frf,
     /// What the labels of its file say of outputs and inputs; nothing of FRFs from arrays.
     labels: Option<(Vec<Label>, Vec<Label>)>,
     /// Hits in each average, outputs × inputs; unknown of FRFs from elsewhere.
@@ -29,7 +29,7 @@ pub struct Frf {
 
 impl Frf {
     pub fn of(frf: jointrig::frf::Frf) -> Self {
-        Self { frf, labels: None, hits: None }
+        Self { matrix: frf, labels: None, hits: None }
     }
 
     /// The FRFs along the directions of these points, and what was turned; labels of a file count for it.
@@ -37,25 +37,25 @@ impl Frf {
     /// # Errors
     /// A label and its point have different axes: both are named.
     pub fn along(&self, points: &Configuration) -> Result<(jointrig::frf::Frf, Vec<String>), String> {
-        let read = LabelledFrf::unlabelled(self.frf.clone(), String::new(), Vec::new());
+        let read = LabelledFrf::unlabelled(self.matrix.clone(), String::new(), Vec::new());
         match &self.labels {
             Some((outputs, inputs)) => {
                 LabelledFrf { outputs: outputs.clone(), inputs: inputs.clone(), ..read }.along(points)
             }
-            None => Ok((self.frf.clone(), Vec::new())),
+            None => Ok((self.matrix.clone(), Vec::new())),
         }
     }
 
     pub fn with_hits(frf: jointrig::frf::Frf, hits: DMatrix<usize>) -> Self {
-        Self { frf, labels: None, hits: Some(hits) }
+        Self { matrix: frf, labels: None, hits: Some(hits) }
     }
 
     pub fn matrix(&self) -> &jointrig::frf::Frf {
-        &self.frf
+        &self.matrix
     }
 
     fn shape(&self) -> [usize; 3] {
-        [self.frf.lines().len(), self.frf.outputs().len(), self.frf.inputs().len()]
+        [self.matrix.lines().len(), self.matrix.outputs().len(), self.matrix.inputs().len()]
     }
 
     /// Values of all lines in C order: nalgebra keeps columns together.
@@ -122,19 +122,19 @@ impl Frf {
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<(Self, Vec<String>)> {
         let read = py.detach(|| read_frf_file(&path, &StatedUnits::default()));
         let read = read.map_err(|error| raised::reading(py, &path, &error.to_string()))?;
-        Ok((Self { frf: read.frf, labels: Some((read.outputs, read.inputs)), hits: None }, read.notes))
+        Ok((Self { matrix: read.frf, labels: Some((read.outputs, read.inputs)), hits: None }, read.notes))
     }
 
     /// (line,) float64, Hz.
     #[getter]
     fn frequency_hz<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.frf.frequency_hz().to_vec().into_pyarray(py)
+        self.matrix.frequency_hz().to_vec().into_pyarray(py)
     }
 
     /// (line, output, input) complex128 in SI per N, on s = sigma + i 2 pi f.
     #[getter]
     fn frf<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<Complex64>>> {
-        let y = self.frf.lines();
+        let y = self.matrix.lines();
         self.in_order(|l, o, i| Complex64::new(y[l][(o, i)].re, y[l][(o, i)].im))
             .into_pyarray(py)
             .reshape(self.shape())
@@ -143,7 +143,7 @@ impl Frf {
     /// (line, output, input) float64, or None where it is not known.
     #[getter]
     fn coherence<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<f64>>>> {
-        let all = self.frf.coherence();
+        let all = self.matrix.coherence();
         all.map(|all| self.in_order(|l, o, i| all[l][(o, i)]).into_pyarray(py).reshape(self.shape()))
             .transpose()
     }
@@ -151,7 +151,7 @@ impl Frf {
     /// (line, output, input) float64, of the real part (the imaginary part has as much), or None where it is not known.
     #[getter]
     fn variance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<f64>>>> {
-        let all = self.frf.variance();
+        let all = self.matrix.variance();
         all.map(|all| self.in_order(|l, o, i| all[l][(o, i)]).into_pyarray(py).reshape(self.shape()))
             .transpose()
     }
@@ -168,51 +168,51 @@ impl Frf {
     /// Names of the responses.
     #[getter]
     fn outputs(&self) -> Vec<String> {
-        self.frf.outputs().to_vec()
+        self.matrix.outputs().to_vec()
     }
 
     /// Names of the impacts.
     #[getter]
     fn inputs(&self) -> Vec<String> {
-        self.frf.inputs().to_vec()
+        self.matrix.inputs().to_vec()
     }
 
     /// `receptance`, `mobility` or `accelerance`.
     #[getter]
     fn quantity(&self) -> &'static str {
-        self.frf.quantity().frf_name()
+        self.matrix.quantity().frf_name()
     }
 
     /// The exponential window's damping, which is part of s, 1/s.
     #[getter]
     fn sigma_per_s(&self) -> f64 {
-        self.frf.sigma_per_s()
+        self.matrix.sigma_per_s()
     }
 
     /// The same as receptances, m/N: divided by s once or twice.
     fn to_receptance(&self, py: Python<'_>) -> PyResult<Self> {
-        let converted = self.frf.to_receptance().map_err(|error| raised::refused(py, &error.to_string()))?;
-        Ok(Self { frf: converted, labels: self.labels.clone(), hits: self.hits.clone() })
+        let converted = self.matrix.to_receptance().map_err(|error| raised::refused(py, &error.to_string()))?;
+        Ok(Self { matrix: converted, labels: self.labels.clone(), hits: self.hits.clone() })
     }
 
     /// The lines from `low_hz` to `high_hz`, ends included.
     fn band(&self, low_hz: f64, high_hz: f64) -> Self {
         let (labels, hits) = (self.labels.clone(), self.hits.clone());
-        Self { frf: self.frf.band(low_hz, high_hz), labels, hits }
+        Self { matrix: self.matrix.band(low_hz, high_hz), labels, hits }
     }
 
     /// The rows and columns with these names, in this order.
     fn select(&self, py: Python<'_>, outputs: Vec<String>, inputs: Vec<String>) -> PyResult<Self> {
         let chosen =
-            self.frf.select(&outputs, &inputs).map_err(|error| raised::refused(py, &error.to_string()))?;
+            self.matrix.select(&outputs, &inputs).map_err(|error| raised::refused(py, &error.to_string()))?;
         let of = |wanted: &[String], names: &[String]| -> Vec<usize> {
             wanted.iter().filter_map(|name| names.iter().position(|own| own == name)).collect()
         };
-        let (rows, columns) = (of(&outputs, self.frf.outputs()), of(&inputs, self.frf.inputs()));
+        let (rows, columns) = (of(&outputs, self.matrix.outputs()), of(&inputs, self.matrix.inputs()));
         let hits = self.hits.as_ref().map(|hits| hits.select_rows(&rows).select_columns(&columns));
         let of = |all: &[Label], at: &[usize]| at.iter().map(|at| all[*at].clone()).collect::<Vec<_>>();
         let labels = self.labels.as_ref().map(|(own, others)| (of(own, &rows), of(others, &columns)));
-        Ok(Self { frf: chosen, labels, hits })
+        Ok(Self { matrix: chosen, labels, hits })
     }
 
     /// Writes an npz that `identify` and `import` take.
@@ -221,7 +221,7 @@ impl Frf {
             let along = |labels: &[Label]| labels.iter().map(|label| label.direction).collect::<Vec<_>>();
             direction_extras(&along(outputs), &along(inputs))
         });
-        py.detach(|| write_frf(&path, &self.frf, &directions))
+        py.detach(|| write_frf(&path, &self.matrix, &directions))
             .map_err(|error| raised::reading(py, &path, &error.to_string()))
     }
 
@@ -234,12 +234,12 @@ impl Frf {
     }
 
     fn _repr_svg_(&self) -> Option<String> {
-        report::frf_figure(&self.frf, "FRFs").as_ref().map(report::notebook_figure)
+        report::frf_figure(&self.matrix, "FRFs").as_ref().map(report::notebook_figure)
     }
 
     fn __repr__(&self) -> String {
         let [lines, outputs, inputs] = self.shape();
-        let hz = self.frf.frequency_hz();
+        let hz = self.matrix.frequency_hz();
         let over = match (hz.first(), hz.last()) {
             (Some(first), Some(last)) => format!(" from {first} to {last} Hz"),
             _ => String::new(),

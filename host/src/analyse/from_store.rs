@@ -37,10 +37,21 @@ const LEAD_S: f64 = 1.25e-3;
 pub struct AnalysedLength {
     /// The plan's length, s.
     plan_s: f64,
-    /// Shortest and longest kept record that came from a file, from its lead on, s.
-    imported_s: Option<[f64; 2]>,
+    /// Of the kept records that came from files.
+    imported: Option<ImportedLengths>,
     /// Whether records were measured here, which have the plan's length.
     measured: bool,
+}
+
+/// Lengths of the kept records that came from files, s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct ImportedLengths {
+    /// Of the shortest record, from its first sample on.
+    least_s: f64,
+    /// Of the longest record, from its first sample on.
+    most_s: f64,
+    /// Least and most of what follows a record's lead.
+    from_lead_s: [f64; 2],
 }
 
 impl AnalysedLength {
@@ -55,7 +66,7 @@ impl AnalysedLength {
             .map(|(id, _)| *id)
             .collect();
         let mut found =
-            AnalysedLength { plan_s: plan.record.get_ref().length_s, imported_s: None, measured: false };
+            AnalysedLength { plan_s: plan.record.get_ref().length_s, imported: None, measured: false };
         if imported.is_empty() {
             return Ok(AnalysedLength { measured: true, ..found });
         }
@@ -68,52 +79,66 @@ impl AnalysedLength {
                 found.measured = true;
                 continue;
             };
-            let own_s = record.scans.saturating_sub(first_sample(record, *rate_hz)) as f64 / rate_hz;
-            let [least, most] = found.imported_s.unwrap_or([own_s; 2]);
-            found.imported_s = Some([least.min(own_s), most.max(own_s)]);
+            let own_s = record.scans as f64 / rate_hz;
+            let after_s = record.scans.saturating_sub(first_sample(record, *rate_hz)) as f64 / rate_hz;
+            found.imported = Some(found.imported.map_or(
+                ImportedLengths { least_s: own_s, most_s: own_s, from_lead_s: [after_s; 2] },
+                |so_far| ImportedLengths {
+                    least_s: so_far.least_s.min(own_s),
+                    most_s: so_far.most_s.max(own_s),
+                    from_lead_s: [so_far.from_lead_s[0].min(after_s), so_far.from_lead_s[1].max(after_s)],
+                },
+            ));
         }
         Ok(found)
     }
 
-    /// The analysed part of every record, s. Records from files are used whole where nothing was measured here.
-    fn length_s(&self) -> f64 {
-        match self.imported_s {
-            // a record of the plan's length has the lead beside it
-            Some([least, _]) if !self.measured && !(0.0..=LEAD_S).contains(&(least - self.plan_s)) => least,
-            _ => self.plan_s,
-        }
+    /// The length of records that are used whole; `None` where the plan's length counts.
+    fn whole_s(&self) -> Option<f64> {
+        let imported = self.imported.filter(|_| !self.measured)?;
+        // a record of the plan's length has the lead beside it
+        let as_planned = (0.0..=LEAD_S).contains(&(imported.from_lead_s[0] - self.plan_s));
+        (!as_planned).then_some(imported.least_s)
     }
 
-    /// The samples of a record that are analysed, as far as it has them.
+    /// The samples of a record that are analysed, as far as it has them. Records that are used whole begin with their first sample,
+    /// so that their lines are those of their own length; of longer ones the end counts less than what is before the hit.
     pub fn samples(&self, record: &RecordRow, rate_hz: f64) -> Range<usize> {
-        let from = first_sample(record, rate_hz);
-        from..from + (self.length_s() * rate_hz).round() as usize
+        let length = |seconds: f64| (seconds * rate_hz).round() as usize;
+        let lead = first_sample(record, rate_hz);
+        match self.whole_s().map(length) {
+            Some(whole) => {
+                let from = lead.min(record.scans.saturating_sub(whole));
+                from..from + whole
+            }
+            None => lead..lead + length(self.plan_s),
+        }
     }
 
     /// What is to be said of records from files that do not have the plan's length.
     pub fn notice(&self) -> Option<String> {
-        let [least, most] = self.imported_s?;
+        let ImportedLengths { least_s, most_s, from_lead_s } = self.imported?;
         let plan_s = self.plan_s;
         if self.measured {
-            return (most > plan_s + LEAD_S).then(|| {
+            return (from_lead_s[1] > plan_s + LEAD_S).then(|| {
                 format!(
-                    "imported records last up to {most:.3} s from the hit on: they are cut to the plan's length_s of {plan_s} s, which the \
-                     measured records have"
+                    "imported records last up to {:.3} s from the hit on: they are cut to the plan's length_s of {plan_s} s, which the \
+                     measured records have",
+                    from_lead_s[1]
                 )
             });
         }
-        if most - least > LEAD_S {
+        if most_s - least_s > LEAD_S {
             return Some(format!(
-                "imported records last from {least:.3} to {most:.3} s from the hit on: the analysis cuts all of them to {:.3} s, so that \
-                 their FRFs have the same lines",
-                self.length_s()
+                "imported records last from {least_s:.3} to {most_s:.3} s: the analysis cuts all of them to {:.3} s, so that their FRFs have \
+                 the same lines",
+                self.whole_s().unwrap_or(plan_s)
             ));
         }
-        ((least - plan_s).abs() > LEAD_S).then(|| {
+        self.whole_s().map(|whole_s| {
             format!(
-                "imported records last {least:.3} s from the hit on, and the plan's length_s is {plan_s} s: they are used whole, with a line \
-                 every {:.3} Hz",
-                1.0 / least
+                "imported records last {whole_s:.3} s, and the plan's length_s is {plan_s} s: they are used whole, with a line every {:.3} Hz",
+                1.0 / whole_s
             )
         })
     }

@@ -259,23 +259,32 @@ fn the_plan_becomes_a_geometry() {
 
 #[test]
 fn records_from_files_are_used_whole_where_nothing_was_measured() {
-    let lengths = |imported_s, measured| AnalysedLength { plan_s: 1.0, imported_s, measured };
+    let lengths = |range: Option<[f64; 2]>, measured| AnalysedLength {
+        plan_s: 1.0,
+        // 10 ms before the lead
+        imported: range.map(|own| ImportedLengths {
+            least_s: own[0] + 0.01,
+            most_s: own[1] + 0.01,
+            from_lead_s: own,
+        }),
+        measured,
+    };
     // nothing from a file, and records of the plan's length with the lead beside it: as planned, without a word
     for alone in [lengths(None, true), lengths(Some([1.0, 1.001]), false), lengths(Some([1.0; 2]), true)] {
-        assert_eq!((alone.length_s(), alone.notice()), (1.0, None));
+        assert_eq!((alone.whole_s(), alone.notice()), (None, None));
     }
     let said = |length: AnalysedLength| length.notice().expect("something to say");
     let longer = lengths(Some([4.0; 2]), false);
-    assert_eq!(longer.length_s(), 4.0);
-    assert!(said(longer).contains("last 4.000 s") && said(longer).contains("used whole"));
+    assert_eq!(longer.whole_s(), Some(4.01));
+    assert!(said(longer).contains("last 4.010 s") && said(longer).contains("used whole"));
     let shorter = lengths(Some([0.5; 2]), false);
-    assert_eq!(shorter.length_s(), 0.5);
-    assert!(said(shorter).contains("every 2.000 Hz"));
+    assert_eq!(shorter.whole_s(), Some(0.51));
+    assert!(said(shorter).contains("every 1.961 Hz"));
     // FRFs of one campaign have the same lines
     let several = lengths(Some([2.0, 4.0]), false);
-    assert_eq!(several.length_s(), 2.0);
-    assert!(said(several).contains("from 2.000 to 4.000 s"));
+    assert_eq!(several.whole_s(), Some(2.01));
+    assert!(said(several).contains("from 2.010 to 4.010 s"));
     let beside = lengths(Some([4.0; 2]), true);
-    assert_eq!(beside.length_s(), 1.0);
+    assert_eq!(beside.whole_s(), None);
     assert!(said(beside).contains("cut to the plan's length_s of 1 s"));
 }

@@ -55,11 +55,11 @@ pub fn shared(
         }
     }
     match (of_one, of_other) {
-        (Some(apart), Some(_)) => Err(apart),
         _ if pairs.is_empty() => {
             let first = |axis: &[f64]| axis.first().copied().unwrap_or(f64::NAN);
             Err(OtherLines { one_hz: first(one), other_hz: first(other) })
         }
+        (Some(apart), Some(_)) => Err(apart),
         _ => Ok(pairs),
     }
 }
