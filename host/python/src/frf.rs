@@ -191,7 +191,8 @@ impl Frf {
 
     /// The same as receptances, m/N: divided by s once or twice.
     fn to_receptance(&self, py: Python<'_>) -> PyResult<Self> {
-        let converted = self.matrix.to_receptance().map_err(|error| raised::refused(py, &error.to_string()))?;
+        let converted =
+            self.matrix.to_receptance().map_err(|error| raised::refused(py, &error.to_string()))?;
         Ok(Self { matrix: converted, labels: self.labels.clone(), hits: self.hits.clone() })
     }
 

@@ -625,7 +625,7 @@ mod tests {
             }
         });
         let said = read_back(&sets).expect_err("another grid");
-        assert!(said.contains("another frequency axis") && said.contains("321 Hz against 320 Hz"), "{said}");
+        assert!(said.contains("another frequency axis") && said.contains("301 Hz against 300 Hz"), "{said}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! What the axes of a universal file's functions measure: type and label of ordinate, denominator and
 //! abscissa, the units that data set 164 gives, and how many digits the places were printed with.
 
-use super::uff::{Abscissa, Axis, Contents, DataSet, Encoding, Function, Precision, Units, quantity};
+use super::uff::{Abscissa, Axis, Contents, DataSet, Encoding, Function, Units, quantity};
 use super::units::{Dimension, StatedUnits, Unit, told};
 use crate::spectra::MotionQuantity;
 
@@ -359,20 +359,18 @@ pub(super) fn motion_scale(
 pub(super) struct Places<'f> {
     abscissa: &'f Abscissa,
     encoding: Encoding,
-    precision: Precision,
     factor: f64,
 }
 
 impl<'f> Places<'f> {
     /// Of a function whose abscissa has this factor to SI.
     pub fn of(f: &'f Function, factor: f64) -> Self {
-        Places { abscissa: &f.abscissa, encoding: f.encoding, precision: f.precision, factor }
+        Places { abscissa: &f.abscissa, encoding: f.encoding, factor }
     }
 
     /// Whether two are written alike.
     pub fn are(&self, other: &Places<'_>) -> bool {
-        (self.factor, self.precision, self.encoding) == (other.factor, other.precision, other.encoding)
-            && self.abscissa == other.abscissa
+        (self.factor, self.encoding) == (other.factor, other.encoding) && self.abscissa == other.abscissa
     }
 
     /// The place of value `i`.
@@ -382,8 +380,10 @@ impl<'f> Places<'f> {
 
     /// By how much the place of value `i` may be off.
     pub fn error(&self, i: usize) -> f64 {
-        let of = |number: f64| match (self.abscissa, self.encoding, self.precision) {
-            (Abscissa::Uneven(_), Encoding::Binary(_), Precision::Single) => SINGLE * number.abs(),
+        let is_single = |number: f64| f64::from(number as f32) == number;
+        let of = |number: f64| match (self.abscissa, self.encoding) {
+            // places next to values of double precision may be single
+            (Abscissa::Uneven(_), Encoding::Binary(_)) if is_single(number) => single_precision(number),
             _ => half_of_last_digit(number),
         };
         let own = match self.abscissa {
@@ -396,6 +396,20 @@ impl<'f> Places<'f> {
 
 /// Rounding of a number in single precision.
 const SINGLE: f64 = 6e-8;
+
+/// By how much a number that was kept in single precision may be off: by this rounding, and where its digits are few
+/// enough to have been printed before, by that of the last of them.
+fn single_precision(number: f64) -> f64 {
+    let single = number as f32;
+    let digits =
+        format!("{:e}", single.abs()).bytes().take_while(|b| *b != b'e').filter(u8::is_ascii_digit).count();
+    let rounding = SINGLE * number.abs();
+    if digits > LEAST_DIGITS as usize {
+        return rounding;
+    }
+    let printed = format!("{single:e}").parse().map_or(0.0, half_of_last_digit);
+    rounding + printed
+}
 
 /// Digits that columns of 13 hold at least; trailing zeros among them are not seen in the number.
 const LEAST_DIGITS: i32 = 6;

@@ -97,6 +97,11 @@ impl<'a> Iterator for Blocks<'a> {
         let mut block = Block { number, offset, identifier, body: body(start), binary: None };
         let closed = if number == 58 && set58_header::is_binary(identifier.bytes) {
             let header_end = (0..set58_header::LINES).all(|_| lines.next_unless(is_delimiter).is_some());
+            // where lines end with CR alone, an LF after the header is the first byte of the data
+            let before_data = lines.offset();
+            if bytes[..start].ends_with(b"\r") && bytes[..before_data].ends_with(b"\r\n") {
+                lines.jump(before_data - 1);
+            }
             block.body = body(lines.offset());
             if header_end { close_binary(bytes, lines, &mut block) } else { skip_to_end(lines).is_some() }
         } else {

@@ -102,6 +102,24 @@ fn binary_data_that_look_like_a_delimiter_are_data() {
 }
 
 #[test]
+fn a_first_byte_of_lf_after_a_header_whose_lines_end_with_cr_is_data() {
+    for first in [*b"\n2345678", *b"\n\n\r\n5678"] {
+        let f = Function {
+            values: Values::Real(vec![f64::from_le_bytes(first); 3]),
+            encoding: Encoding::Binary(ByteOrder::Little),
+            ..small()
+        };
+        let bytes = write(&[DataSet::Function(Box::new(f.clone()))]).expect("writable");
+        let data = bytes.len() - b"    -1\n".len() - 24;
+        for end in ["\n", "\r", "\r\n"] {
+            let head = String::from_utf8(bytes[..data].to_vec()).expect("ASCII").replace('\n', end);
+            let all = [head.as_bytes(), &bytes[data..]].concat();
+            assert_eq!(only(&all), f, "{end:?}");
+        }
+    }
+}
+
+#[test]
 fn narrow_places_beside_double_values() {
     let head = binary(ByteOrder::Little);
     let start = head.len() - b"    -1\n".len() - 32;

@@ -5,7 +5,8 @@
 //! means remove smooth motion; blocks of 1, 4, 8 and 16 samples make steps stand out of noise. Each difference is compared
 //! with the median of its surroundings, so that neither the level of noise nor a decaying mode counts. Where there is hardly any noise
 //! (simulations, 24-bit recordings), a mode that decays fast stands out of those, too: a jump must also stand out of the
-//! few differences before or after it, which a smooth motion does not.
+//! few differences before or after it, which a smooth motion does not, and must not be smaller than those on the other
+//! side, which the differences of a decaying mode are.
 
 use super::motion::{LOOKED_AT, is_motion};
 use crate::median::middle;
@@ -70,7 +71,7 @@ pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<B
                 let near = block == 1 && from >= quiet;
                 let ratio = d / s;
                 let worse = ratio > limit && worst.as_ref().is_none_or(|w| ratio > w.ratio);
-                if worse && (far && d / next_to(&differences, i) > limit * JUMP || near && !moves(x, i)) {
+                if worse && (far && is_jump(&differences, i, limit * JUMP) || near && !moves(x, i)) {
                     worst = Some(Burst { sample: from + 2 * block, ratio });
                 }
             }
@@ -79,15 +80,15 @@ pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<B
     worst
 }
 
-/// The largest of the differences next to the one at `i`, on the side where it is smaller: before a jump all is
-/// quiet, or after it. 0 where neither side is there.
-fn next_to(differences: &[f64], i: usize) -> f64 {
+/// Whether the difference at `i` is over `times` the largest of those on its quieter side (before a jump the
+/// motion is smooth, or after it) and no smaller than the largest on the other side.
+fn is_jump(differences: &[f64], i: usize, times: f64) -> bool {
     let before = &differences[i.saturating_sub(OWN + NEXT)..i.saturating_sub(OWN)];
     let from = (i + OWN + 1).min(differences.len());
     let after = &differences[from..(from + NEXT).min(differences.len())];
-    let sides = [before, after].into_iter().filter(|part| part.len() == NEXT);
-    let largest = sides.map(|part| part.iter().fold(0.0f64, |most, d| most.max(*d)));
-    largest.reduce(f64::min).unwrap_or(0.0)
+    let largest = |part: &[f64]| part.iter().fold(0.0f64, |most, d| most.max(*d));
+    let quieter = [before, after].into_iter().filter(|part| part.len() == NEXT).map(largest).reduce(f64::min);
+    differences[i] > times * quieter.unwrap_or(0.0) && differences[i] >= largest(before).max(largest(after))
 }
 
 /// Whether the structure itself moves so where this third difference is.
