@@ -186,7 +186,10 @@ impl Known {
     }
 }
 
-/// As [`stiffness`], and returns all other results of the fit.
+/// As [`stiffness`], with all other results of the fit.
+///
+/// # Errors
+/// As [`stiffness`].
 pub fn read(input: &Input<'_>) -> Result<(Stiffness, Known), ContactError> {
     let mut input = input.clone();
     loop {

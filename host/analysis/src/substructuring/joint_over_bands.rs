@@ -79,8 +79,8 @@ pub fn median(values: &[f64]) -> f64 {
     0.5 * (lower + *upper)
 }
 
-/// Stiffness and damping of one diagonal entry of Z^J on s = σ + iω: a spring–damper joint is Z = K
-/// + sC, so C = Im Z / ω and K = Re Z − σ C.
+/// Stiffness and damping of one diagonal entry of Z^J on s = σ + iω: a spring–damper joint is Z =
+/// K + sC, so C = Im Z / ω and K = Re Z − σ C.
 pub fn stiffness_and_damping(z: Complex<f64>, s: Complex<f64>) -> (f64, f64) {
     let damping = z.im / s.im;
     (z.re - s.re * damping, damping)

@@ -1,8 +1,8 @@
 //! Inverses and full-rank pseudo-inverses that never truncate.
 //!
 //! A pseudo-inverse with a tolerance silently drops the small singular values, and in decoupling
-//! those are the joint: 1e-6 of the largest, where a truncated inverse turned 180 N/µm into 106 ±
-//! 221. Therefore a matrix either has full rank to rounding and is inverted completely, or it is
+//! those are the joint: 1e-6 of the largest, where a truncated inverse turned 180 N/µm into 106
+//! ± 221. Therefore a matrix either has full rank to rounding and is inverted completely, or it is
 //! refused.
 //!
 //! Thousands of lines are inverted several times each. If the pivots leave no doubt about the rank,

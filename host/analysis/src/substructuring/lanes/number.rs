@@ -190,7 +190,8 @@ impl<S: Simd> Mul<Lanes<S>> for Cell<S> {
     }
 }
 
-/// The lines at which the rank of everything computed so far is beyond doubt.
+/// The lines at which everything computed so far is reliable: finite, and inverted with a clear
+/// rank.
 #[derive(Clone, Copy)]
 pub(crate) struct Sure<S: Simd> {
     of: Lanes<S>,
