@@ -1,4 +1,4 @@
-//! All lines of all blocks, summed bin by bin of frequency.
+//! Sums over all lines of all blocks, by frequency bin.
 
 use super::ContactError;
 use super::block::Block;
@@ -10,24 +10,24 @@ use num_complex::Complex;
 /// Width of the bins whose lines are summed and judged together, Hz.
 pub const BIN_HZ: f64 = 25.0;
 
-/// Motion of every line of every block.
+/// Motion at every line of every block.
 pub type Motion = Vec<Vec<DVector<Complex<f64>>>>;
 
 /// The lines of one block in one bin.
 #[derive(Debug, Clone)]
 pub struct Bin {
-    /// Which block.
+    /// Index of the block.
     pub block: usize,
     /// Its lowest frequency, Hz.
     pub low_hz: f64,
-    /// What its lines say.
+    /// Normal equations of its lines.
     pub normal: Normal,
-    /// What is left of each row, line by line, over the noise.
+    /// Residuals of each row at each line, divided by the noise.
     pub residuals: Vec<Residual>,
     motion: Vec<DVector<Complex<f64>>>,
 }
 
-/// All blocks, bin by bin.
+/// Evaluates all blocks, bin by bin.
 pub fn evaluate(blocks: &[Block], p: &[f64], before: Option<&Motion>) -> Result<Vec<Bin>, ContactError> {
     let mut tasks: Vec<(usize, std::ops::Range<usize>)> = Vec::new();
     for (b, block) in blocks.iter().enumerate() {
@@ -77,7 +77,7 @@ fn bin(
     Some(Bin { block: b, low_hz, normal, residuals, motion })
 }
 
-/// What they make of the motion.
+/// The best-fitting motion of each line, by block.
 pub fn motions(blocks: &[Block], bins: &[Bin]) -> Motion {
     let mut all: Motion = vec![Vec::new(); blocks.len()];
     for bin in bins {
@@ -86,7 +86,7 @@ pub fn motions(blocks: &[Block], bins: &[Bin]) -> Motion {
     all
 }
 
-/// Information and slope of the bins together, for `count` parameters.
+/// Information matrix and gradient of all bins together, for `count` parameters.
 pub fn summed<'a>(
     blocks: &[Block],
     bins: impl Iterator<Item = (usize, &'a Normal)>,

@@ -1,4 +1,4 @@
-//! The cells of one impact: their rows, their lines, and which parameters they know.
+//! The cells of one impact: rows, frequency lines and the parameters that they depend on.
 
 use super::cell::{self, CHANNELS, ContactCell, Values};
 use super::parameters::{DELAYS, FORM, GAINS, Parameter, Parameters, SPOTS, along_z};
@@ -16,7 +16,7 @@ pub enum Group {
     ArmB,
     /// Specimen A.
     SpecimenA,
-    /// Specimen B, where it has points of its own.
+    /// Specimen B, if it has points of its own.
     SpecimenB,
 }
 
@@ -34,28 +34,29 @@ impl Group {
 /// One cell of a block.
 #[derive(Debug, Clone)]
 pub struct BlockCell {
-    /// What its point is on.
+    /// The body that its point is on.
     pub group: Group,
-    /// Place of the point's coordinates among the parameters.
+    /// Index of the point's first coordinate among the parameters.
     pub point: usize,
-    /// Of its own error of aim.
+    /// Index of the cell's own aim error (three parameters), if it has one.
     pub aim: Option<usize>,
-    /// Of the two errors of the hammer's aim.
+    /// Index of the two aim errors of the hammer, if any.
     pub shift: Option<usize>,
-    /// Part of the signal that the model does not explain, of load cells and spots, and of the point: noise that goes with it.
+    /// Fraction of the signal that the model does not explain, for load cells and spots and for the
+    /// point: counted as noise proportional to the signal.
     pub unexplained: [f64; 2],
 }
 
 /// One row: a channel of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Row {
-    /// Which cell of the block.
+    /// Index of the cell in the block.
     pub cell: usize,
-    /// T 0, spot B 1, spot A 2, the point's x, y, z 3 to 5.
+    /// T is 0, spot B 1, spot A 2, the point's x, y, z 3 to 5.
     pub channel: usize,
 }
 
-/// One line of a block.
+/// One frequency line of a block.
 #[derive(Debug, Clone)]
 pub struct BlockLine {
     /// s = σ + i2πf, 1/s.
@@ -64,58 +65,60 @@ pub struct BlockLine {
     pub frequency_hz: f64,
     /// Values by row.
     pub value: Vec<Complex<f64>>,
-    /// The noise's standard deviation, by row.
+    /// Standard deviation of the noise, by row.
     pub sigma: Vec<f64>,
-    /// One over that of the noise and all else that is not explained, by row.
+    /// Reciprocal standard deviation of noise and unexplained signal together, by row.
     pub weight: Vec<f64>,
 }
 
 /// All cells of one impact.
 #[derive(Debug, Clone)]
 pub struct Block {
-    /// What it hits.
+    /// The body that it hits.
     pub grouping: Grouping,
-    /// Where, m.
+    /// Position of the impact, m.
     pub at_m: [f64; 3],
-    /// Along which unit vector.
+    /// Unit vector of its direction.
     pub direction: [f64; 3],
-    /// Whether impacts on the same body tell what its shifts do; else those of another body stand in.
+    /// True if the effect of shifting the impact is derived from impacts on the same body;
+    /// otherwise impacts on another body are used.
     pub aim_known: bool,
-    /// On B alone: place of the hammer's part along z among the parameters.
+    /// On B alone: index of the parameter for the z component of the hammer force.
     pub along_z: Option<usize>,
     /// The cells.
     pub cells: Vec<BlockCell>,
-    /// Their channels.
+    /// The rows, one for each channel of each cell.
     pub rows: Vec<Row>,
-    /// The lines that every channel of every cell has.
+    /// The lines that are usable in every channel of every cell.
     pub lines: Vec<BlockLine>,
-    /// By how much of which other block's motion a shift of the impact moves everything, per metre along two axes.
+    /// Other blocks and their weights: a shift of the impact by one metre along either of two axes
+    /// adds this weighted sum of their motions.
     pub shifted_by: Vec<(usize, [f64; 2])>,
-    /// The block's parameters among all.
+    /// The parameters that the block depends on.
     pub parameters: Vec<usize>,
     local: Vec<usize>,
     has_specimen_b: bool,
 }
 
 impl Block {
-    /// Where specimen B's coordinates begin, if it has any.
+    /// Index of specimen B's first coordinate, if it has any.
     pub fn specimen_b(&self) -> Option<usize> {
         self.has_specimen_b.then_some(if self.along_z.is_some() { 6 } else { 12 })
     }
 
-    /// Coordinates of the motion.
+    /// Number of coordinates of the motion.
     pub fn latent(&self) -> usize {
         let own = if self.along_z.is_some() { 6 } else { 12 };
         if self.has_specimen_b { own + 6 } else { own }
     }
 
-    /// Place of a parameter within the block.
+    /// Index of a parameter within the block.
     pub fn local(&self, parameter: usize) -> usize {
         self.local[parameter]
     }
 }
 
-/// One impact's place, direction and cells.
+/// Position, direction and cells of one impact.
 struct Impact<'a> {
     structure: Structure,
     name: &'a str,
@@ -125,10 +128,10 @@ struct Impact<'a> {
     cells: Vec<(Group, &'a ContactCell<'a>)>,
 }
 
-/// Groups the cells by impact, and gives every unknown of theirs its place among the parameters.
+/// Groups the cells by impact and adds their unknowns to the parameters.
 ///
 /// # Errors
-/// What is measured does not tell the motion of arm B and specimen A.
+/// The measured cells do not determine the motion of arm B and specimen A.
 pub fn blocks(input: &Input<'_>, parameters: &mut Parameters) -> Result<Vec<Block>, ContactError> {
     let impacts = impacts(input);
     let chosen = chosen_lines(input)?;
@@ -152,7 +155,7 @@ pub fn blocks(input: &Input<'_>, parameters: &mut Parameters) -> Result<Vec<Bloc
     for impact in &impacts {
         all.push(block(impact, &impacts, &points, input, &chosen, parameters)?);
     }
-    // a shift of one impact is formed from the others' motion, line by line
+    // a shift of one impact is formed from the motion of other impacts, line by line
     let everywhere: Vec<Vec<f64>> =
         all.iter().map(|block| block.lines.iter().map(|line| line.frequency_hz).collect()).collect();
     for block in &mut all {
@@ -175,7 +178,7 @@ fn relative(at: [f64; 3], origin: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|axis| at[axis] - origin[axis])
 }
 
-/// The impacts that can be used, B alone first; cells of other points left out.
+/// The usable impacts, those on B alone first; cells of other points are left out.
 fn impacts<'a>(input: &'a Input<'a>) -> Vec<Impact<'a>> {
     let mut found: Vec<Impact<'a>> = Vec::new();
     for structure in [Structure::B, Structure::Ajb] {
@@ -212,7 +215,7 @@ fn impacts<'a>(input: &'a Input<'a>) -> Vec<Impact<'a>> {
     found
 }
 
-/// The lines of the band, as far apart as the window leaves them something of their own to say.
+/// The lines of the band, spaced so that the window leaves them nearly independent.
 fn chosen_lines(input: &Input<'_>) -> Result<Vec<usize>, ContactError> {
     let first = input.cells.first().ok_or(ContactError::NoCells)?;
     let frequency_hz = first.spectra.frequency_hz();
@@ -225,7 +228,8 @@ fn chosen_lines(input: &Input<'_>) -> Result<Vec<usize>, ContactError> {
     Ok(inside.step_by(stride).collect())
 }
 
-/// Distance of the lines used over the window's σ, Hz s: nearer ones say what their neighbours said.
+/// Spacing of the lines used, divided by the window's σ, Hz s: closer lines only repeat the
+/// information of their neighbours.
 const LINE_DISTANCE: f64 = 0.4;
 
 fn block(
@@ -301,9 +305,11 @@ fn block(
     })
 }
 
-/// The motion that a shift of the impact adds, from the differences between impacts that push the same way: a shift across the
-/// direction is a moment on the same body, and so are they. Impacts on the same body are taken if there are three, else those of the
-/// same structure. Empty where no three of them span both axes; and whether they are on the same body.
+/// The motion that a shift of the impact adds, from the differences between impacts of the same
+/// direction: a shift across the direction is a moment on the same body, and so are those
+/// differences. Impacts on the same body are used if there are three, otherwise all impacts on the
+/// same structure. The list is empty if no three of them span both axes. The flag states whether
+/// they are on the same body.
 fn shifted_by(impact: &Impact<'_>, impacts: &[Impact<'_>]) -> (Vec<(usize, [f64; 2])>, bool) {
     let parallel = |other: &Impact<'_>| {
         let cosine: f64 = (0..3).map(|i| other.direction[i] * impact.direction[i]).sum();
@@ -325,7 +331,8 @@ fn shifted_by(impact: &Impact<'_>, impacts: &[Impact<'_>]) -> (Vec<(usize, [f64;
         let product = |a: usize, b: usize| chosen.iter().map(|i| at(*i)[a] * at(*i)[b]).sum::<f64>();
         let (xx, xy, yy) = (product(0, 0), product(0, 1), product(1, 1));
         let determinant = xx * yy - xy * xy;
-        // less than a tenth of a right angle between the lines that they lie on tells no second axis
+        // squared correlation above 0.99: the impacts lie almost on a line and determine no second
+        // axis
         if determinant <= 1e-2 * xx * yy || determinant == 0.0 {
             return None;
         }

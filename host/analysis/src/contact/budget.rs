@@ -1,4 +1,4 @@
-//! Where the uncertainty of a compliance comes from.
+//! Sources of the uncertainty of a compliance.
 
 use super::ContactError;
 use super::covariance::Certainty;
@@ -10,13 +10,14 @@ use crate::substructuring::joint_over_bands::NORMAL_95;
 use nalgebra::DVector;
 use std::collections::BTreeMap;
 
-/// Variances by cause, in the square of what is uncertain; they add up.
+/// Variances by cause, in the squared unit of the uncertain quantity; they add up.
 pub type Variances = BTreeMap<Cause, f64>;
 
-/// Of Σ row_i p_i.
+/// Variances of Σ row_i p_i by cause.
 pub fn of_sum(row: &DVector<f64>, parameters: &Parameters, certainty: &Certainty, misfit: f64) -> Variances {
     let variance = (&certainty.covariance * row).dot(row);
-    // the estimate's answer to an error of the prior, whose precision is that of half an inverse
+    // the estimate's response to an error of a prior, whose precision enters as half an inverse
+    // variance
     let answer = &certainty.answer * row;
     let mut variances = Variances::new();
     let mut noise = variance;
@@ -33,10 +34,11 @@ pub fn of_sum(row: &DVector<f64>, parameters: &Parameters, certainty: &Certainty
     variances
 }
 
-/// k_T of a compliance in m/N with these variances, and their relative standard deviations; the hammer's gain, which k_T is in proportion to, added.
+/// k_T of a compliance in m/N with these variances, and its relative standard deviation by cause.
+/// The hammer's gain, to which k_T is proportional, is added.
 ///
 /// # Errors
-/// [`ContactError::NotIdentified`] where the compliance cannot be told from none.
+/// [`ContactError::NotIdentified`] if the compliance cannot be distinguished from zero.
 pub fn stiffness_of(
     compliance: f64,
     mut variances: Variances,

@@ -1,4 +1,4 @@
-//! How well the parameters are known, from a motion that is itself known through noise only.
+//! Uncertainty of the parameters when the motion itself is known from noisy signals only.
 
 use super::ContactError;
 use super::bins::{Bin, summed};
@@ -8,34 +8,37 @@ use crate::errors_in_variables::Feigned;
 use crate::parallel::prelude::*;
 use nalgebra::{DMatrix, DVector};
 
-/// A parameter that nothing tells stays finite by this part of its own unit.
+/// Relative regularisation, which keeps a parameter without any information finite.
 pub const REGULAR: f64 = 1e-13;
-/// Of what seems known of a combination of parameters, so much may be noise; the sums of so few lines scatter themselves, and tell no more.
+/// Upper limit of the fraction of information that is attributed to noise. The sums over so few
+/// lines scatter themselves, so that a larger fraction is not significant.
 const MOSTLY_NOISE: f64 = 0.8;
 
-/// How parameters answer, and how they scatter.
+/// Response of the parameters to data and priors, and their covariance.
 #[derive(Debug, Clone)]
 pub struct Certainty {
-    /// How they answer to what is measured and stated: half the inverse of the posterior's curvature.
+    /// Response to measured data and priors: half the inverse of the posterior's curvature.
     pub answer: DMatrix<f64>,
-    /// Their covariance, before any misfit is counted.
+    /// Covariance of the parameters, without any factor for misfit.
     pub covariance: DMatrix<f64>,
 }
 
-/// Parameters in metres beside parameters in kilograms: in units of their own they can be factorised.
+/// Scale of each parameter. Metres and kilograms occur together: only the scaled matrix can be
+/// factorised.
 pub fn units(information: &DMatrix<f64>) -> DVector<f64> {
     information.diagonal().map(|d| if d > 0.0 { d.sqrt().recip() } else { 1.0 })
 }
 
-/// `matrix` in these units.
+/// `matrix` in these scales.
 pub fn scaled(matrix: &DMatrix<f64>, unit: &DVector<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(unit.len(), unit.len(), |i, j| matrix[(i, j)] * unit[i] * unit[j])
 }
 
-/// Of the most likely parameters `p`, whose `information` holds that of the noise.
+/// Certainty of the most likely parameters `p`, whose `information` includes the contribution of
+/// noise.
 ///
 /// # Errors
-/// [`ContactError::NotIdentified`] if the information is not positive.
+/// [`ContactError::NotIdentified`] if the information matrix is not positive definite.
 pub fn certainty(
     blocks: &[Block],
     bins: &[Bin],

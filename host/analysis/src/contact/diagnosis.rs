@@ -1,4 +1,4 @@
-//! Whether what the estimate assumes is so: tested on the residuals that it leaves.
+//! Tests the assumptions of the estimate on its residuals.
 
 use super::bins::Bin;
 use super::block::Block;
@@ -9,26 +9,27 @@ use crate::substructuring::geometry::Grouping;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-/// χ² per degree of freedom above which a kind of signal contradicts the model, once the noise's own uncertainty is allowed for.
+/// χ² per degree of freedom above which a kind of signal contradicts the model, allowing for the
+/// uncertainty of the noise itself.
 const CONTRADICTED: f64 = 10.0;
-/// Standard deviations by which one of some hundred stated quantities may be off.
+/// Standard deviations by which one of about a hundred stated quantities may be off.
 const BEYOND: f64 = 5.0;
 /// Standard deviations by which two readings of k_T may differ.
 const APART: f64 = 4.0;
 
-/// What the model leaves of some signals.
+/// The residual of some signals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Left {
     /// χ² per degree of freedom: 1 where only noise is left.
     pub chi_square: f64,
-    /// Rms of what is left over the signals' own, both over the noise.
+    /// Rms of the residual relative to the signals' rms, both weighted by the noise.
     pub part: f64,
 }
 
 /// Signals that are judged together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Signals {
-    /// All of the hits on B alone: the force's form.
+    /// All signals of the hits on B alone: they test the force's form.
     Calibration,
     /// The points on specimen A.
     SpecimenA,
@@ -37,10 +38,10 @@ pub enum Signals {
 }
 
 impl Signals {
-    /// All of them.
+    /// All kinds of signals.
     pub const ALL: [Self; 3] = [Self::Calibration, Self::SpecimenA, Self::Spots];
 
-    /// Kinds of rows.
+    /// Indices of their kinds of rows.
     fn kinds(self) -> &'static [usize] {
         match self {
             Self::Calibration => &[0, 1, 3, 5],
@@ -49,7 +50,7 @@ impl Signals {
         }
     }
 
-    /// What they say of an assumption that does not hold.
+    /// The assumption that they contradict.
     fn doubt(self) -> Doubt {
         match self {
             Self::Calibration => Doubt::Force,
@@ -58,8 +59,9 @@ impl Signals {
         }
     }
 
-    /// Part of them that may be left unexplained beside noise: errors of aim leave about a per cent of a strong local mode, and the misfit widens
-    /// the interval; a point that is misplaced or loose leaves more.
+    /// Fraction of the signal that may remain unexplained in addition to noise. Aim errors leave
+    /// about a per cent of a strong local mode, which the misfit in the interval covers; a
+    /// misplaced or loose point leaves more.
     fn unexplained(self) -> f64 {
         match self {
             Self::Calibration => 0.01,
@@ -68,10 +70,11 @@ impl Signals {
         }
     }
 
-    /// Of these signals in some bins, what the model leaves.
+    /// The model's residual of these signals in some bins.
     pub fn left<'a>(self, blocks: &[Block], bins: impl Iterator<Item = &'a Bin>) -> Left {
         let alone = self == Self::Calibration;
-        // where the hammer's aim is known by halves only, its errors are not the points'
+        // if the effect of the hammer's aim is only partly known, its errors are not the points'
+        // fault: such impacts are left out
         let judged =
             |block: &Block| block.aim_known || !blocks.iter().any(|b| b.aim_known && b.along_z.is_none());
         let own = bins.filter(|bin| {
@@ -87,35 +90,37 @@ impl Signals {
         }
     }
 
-    /// Whether that contradicts the model.
+    /// Whether this residual contradicts the model.
     pub fn contradict(self, left: Left) -> bool {
         left.chi_square > CONTRADICTED && left.part > self.unexplained()
     }
 }
 
-/// What is furthest from what is stated of it.
+/// The quantity that deviates most from its stated value.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Farthest {
-    /// Which position, angle, gain or delay.
+    /// Name of the position, angle, gain or delay.
     pub what: String,
-    /// Its distance, in its stated standard deviations.
+    /// Its deviation, in stated standard deviations.
     pub deviations: f64,
 }
 
 /// How well each assumption holds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
-    /// Of the force's form in the hits on B alone.
+    /// Residual of the force's form in the hits on B alone.
     pub calibration: Left,
-    /// Of specimen A's points, as points of a rigid body.
+    /// Residual of specimen A's points as points of a rigid body.
     pub specimen_a: Left,
-    /// Of the spots.
+    /// Residual of the spots.
     pub spots: Left,
-    /// Of k_T(f) as one number.
+    /// χ² per degree of freedom of k_T(f) being a single number.
     pub flatness_chi_square: f64,
-    /// The position, angle, gain or delay that is furthest from what is stated of it; none if nothing is stated.
+    /// The position, angle, gain or delay that deviates most from its stated value; none if nothing
+    /// is stated.
     pub farthest: Option<Farthest>,
-    /// How far the compliance from hits on A is from that of hits on the moving mass, in standard deviations; none where only one was hit.
+    /// Difference between the compliance from hits on A and from hits on the moving mass, in
+    /// standard deviations; none if only one was hit.
     pub sides_apart: Option<f64>,
 }
 
@@ -123,13 +128,14 @@ pub struct Diagnosis {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Doubt {
-    /// The form does not give the force in the hits on B alone.
+    /// The form does not reproduce the force in the hits on B alone.
     Force,
     /// Specimen A does not move as a rigid body, or a point is misplaced.
     SpecimenA,
     /// A spot does not move with its body.
     Spots,
-    /// A position, angle, gain or delay is further from what is stated than its stated error allows.
+    /// A position, angle, gain or delay deviates from its stated value by more than its stated
+    /// error allows.
     Stated,
     /// k_T changes with frequency.
     Flatness,
@@ -137,7 +143,8 @@ pub enum Doubt {
     Sides,
 }
 
-/// The compliance of some of the lines, all else being what all lines say: how far it is from the whole's, and its standard deviation.
+/// The compliance from a subset of the lines, with all other parameters from all lines: its
+/// difference from the overall estimate, and its standard deviation.
 #[derive(Debug, Clone, Copy)]
 pub struct Part {
     /// Deviation, m/N.
@@ -146,7 +153,8 @@ pub struct Part {
     pub sigma: f64,
 }
 
-/// The compliance of the lines that `of` chooses by block and bin, as a parameter of its own beside all others (score test).
+/// The compliance of the lines that `of` selects by block and bin, as an additional parameter next
+/// to all others (score test).
 pub fn part(blocks: &[Block], solution: &Solution, of: impl Fn(&Block, f64) -> bool) -> Option<Part> {
     let mut own = 0.0;
     let mut slope = 0.0;
@@ -174,7 +182,8 @@ fn quadratic(matrix: &DMatrix<f64>, v: &DVector<f64>) -> f64 {
     (matrix * v).dot(v)
 }
 
-/// Asks every assumption. Aims are left out of what may stray from the plan: on the moving mass they take up what shifts of the hammer do there.
+/// Tests every assumption. Aims are not candidates for the largest deviation: on the moving mass
+/// they absorb the effect of shifts of the hammer.
 pub fn diagnose(blocks: &[Block], parameters: &Parameters, solution: &Solution) -> Diagnosis {
     let stated = parameters
         .all()
@@ -205,7 +214,7 @@ pub fn diagnose(blocks: &[Block], parameters: &Parameters, solution: &Solution) 
 }
 
 impl Diagnosis {
-    /// What does not hold.
+    /// The assumptions that do not hold.
     pub fn doubts(&self) -> Vec<Doubt> {
         let left = [self.calibration, self.specimen_a, self.spots];
         let contradicting =

@@ -1,11 +1,14 @@
-//! How arm B and the specimens move per newton of T at one frequency, driven from where the shaker pushes: read off the hits there.
+//! How arm B and the specimens move per newton of T at one frequency when driven from where the
+//! shaker pushes: read from the hits there.
 //!
-//! A hit is seen at s = σ + iω, a steady level is at s = iω. The ratios of two motions of one hit are analytic functions of s, so a
-//! polynomial through the lines around a frequency, as a function of s, gives them at iω as well. The lines are those of a lightly damped
-//! window: from σ = 50 /s, where k_T is read, a mode of the specimen 10 Hz away is too near for that.
+//! A hit is evaluated at s = σ + iω, a steady level at s = iω. The ratio of two motions of one hit
+//! is an analytic function of s, so a polynomial in s through the lines around a frequency gives it
+//! at iω as well. The lines come from a lightly damped window: from σ = 50 /s, where k_T is read, a
+//! mode of the specimen 10 Hz away is too near for that.
 //!
-//! The motion of each line is the one that fits its signals best, as in `line`; but here specimen A's z is a coordinate of its own, not
-//! what the contact makes of T: what is formed shall tell the contact, and not repeat what the hits said of it.
+//! The motion at each line is the one that fits its signals best, as in `line`. Here, however,
+//! specimen A's z is an independent coordinate and does not follow from T and the contact: the
+//! result must depend on the contact as measured, not on the contact that the hits found.
 
 use super::block::{Block, Group};
 use super::line::{Eliminated, eliminated};
@@ -17,18 +20,21 @@ use std::collections::BTreeMap;
 
 type C = Complex<f64>;
 
-/// The motions that matter: z, θ_x, θ_y of arm B, then of specimen B (the same where it has no points of its own), then θ_x, θ_y of A.
+/// The motions used: z, θ_x, θ_y of arm B, then of specimen B (the same if it has no points of its
+/// own), then θ_x, θ_y of A.
 pub const MOTIONS: usize = 8;
 
-/// Lines this far from the frequency count, Hz: some twelve of them tell the middle of a quartic with half of a line's noise, and a mode twice
-/// as far off leaves a thirtieth of what it does there.
+/// Lines within this distance of the frequency are used, Hz. About twelve of them determine the
+/// middle of a quartic with half the noise of a single line, and the polynomial misses a thirtieth
+/// of the contribution of a mode twice as far away.
 pub const REACH_HZ: f64 = 6.0;
-/// Order of the polynomial. An odd one more would change nothing in the middle of lines that lie alike on both sides.
+/// Order of the polynomial. The next odd order would not change the value in the middle of lines
+/// that are symmetric about it.
 const ORDER: usize = 4;
-/// The next that does.
+/// The next order that does change it.
 const HIGHER: usize = ORDER + 2;
 
-/// One line of one impact: its motion, and what is needed to say how it changes.
+/// One line of one impact: its motion, and the quantities for its derivatives.
 struct Line {
     s: C,
     x: DVector<C>,
@@ -36,18 +42,18 @@ struct Line {
     r: DMatrix<C>,
     derivatives: Vec<Sparse>,
     weight: Vec<f64>,
-    /// What a shift of the impact by a metre along two axes adds to the motion.
+    /// The motion that a shift of the impact by one metre along each of two axes adds.
     shifts: Option<[DVector<C>; 2]>,
 }
 
 /// An impact that takes part in driving the contact.
 #[derive(Debug, Clone, Copy)]
 pub struct Part {
-    /// Which block.
+    /// Index of its block.
     pub block: usize,
-    /// By how much of it.
+    /// Its weight.
     pub weight: f64,
-    /// Variance of where its line of action is, m² along each axis across it.
+    /// Variance of the position of its line of action, m² along each axis across it.
     pub place_m2: f64,
 }
 
@@ -57,39 +63,41 @@ pub struct Driven<'a> {
     parts: &'a [Part],
     /// By line and part.
     lines: Vec<Vec<Line>>,
-    /// The parts' motion together, by line.
+    /// The combined motion of the parts, by line.
     motion: Vec<DVector<C>>,
     /// Complex weight of each line's ratio in the ratio at the frequency.
     weights: Vec<C>,
-    /// The same with the higher polynomial.
+    /// The same for the higher-order polynomial.
     higher: Vec<C>,
-    /// How much more the sum of neighbouring lines scatters than that of independent ones.
+    /// Factor by which the variance of a sum over neighbouring lines exceeds that of independent
+    /// lines.
     shared: f64,
     /// The motions per newton of T.
     pub per_t: [C; MOTIONS],
 }
 
-/// How something formed from the motions is known: δ = Σ g_k δ(motion_k).
+/// Uncertainty of a quantity formed from the motions: δ = Σ g_k δ(motion_k).
 pub struct Known {
-    /// Its derivatives by the block's parameters: (parameter among all, value).
+    /// Derivatives by the block's parameters: (index among all parameters, value).
     pub by_parameter: Vec<(usize, C)>,
-    /// Variance E|δ|² of the lines' noise; the polynomial's misfit is counted.
+    /// Variance E|δ|² due to the lines' noise, including the polynomial's misfit.
     pub noise: f64,
-    /// |δ|² of what the polynomial may miss: twice the way to the higher one.
+    /// |δ|² of what the polynomial may miss: twice the difference from the higher-order one.
     pub bend: f64,
-    /// E|δ|² of where the impacts' lines of action are; none where no other impacts tell what that does.
+    /// E|δ|² due to the position of the impacts' lines of action; none if no other impacts
+    /// determine that effect.
     pub place: Option<f64>,
 }
 
-/// Which coordinates of the motion the [`MOTIONS`] are.
+/// Coordinates of the motion that [`MOTIONS`] refers to.
 fn places(block: &Block) -> [usize; MOTIONS] {
     let base = block.specimen_b().unwrap_or(0);
     [2, 3, 4, base + 2, base + 3, base + 4, A + 2, A + 3]
 }
 
 impl<'a> Driven<'a> {
-    /// Motions of the parts' impacts together at `frequency_hz`, from lines of a lightly damped window; none where the lines do not reach
-    /// around it or do not tell the motion.
+    /// Combined motion of the parts' impacts at `frequency_hz`, from lines of a lightly damped
+    /// window; none if the lines do not lie on both sides of it or do not determine the motion.
     pub fn of(
         blocks: &'a [Block],
         parts: &'a [Part],
@@ -103,9 +111,9 @@ impl<'a> Driven<'a> {
             .collect();
         let at = |l: usize| block.lines[l].frequency_hz;
         let (first, last) = (*near.first()?, *near.last()?);
-        // an interpolation, whatever was lost at the band's ends
+        // interpolate only, even if lines at the ends of the band were lost
         let spans = at(first) < frequency_hz && frequency_hz < at(last);
-        // so many that something is left to tell the polynomial's misfit by
+        // enough lines that degrees of freedom remain for the polynomial's misfit
         if near.len() < HIGHER + 4 || !spans {
             return None;
         }
@@ -130,7 +138,7 @@ impl<'a> Driven<'a> {
         Some(Driven { blocks, parts, lines, motion, weights, higher, shared: shared(step_hz), per_t })
     }
 
-    /// How well Σ g_k motion_k is known.
+    /// The uncertainty of Σ g_k motion_k.
     pub fn known(&self, g: &[C; MOTIONS]) -> Known {
         let coordinates = places(&self.blocks[self.parts[0].block]);
         let (mut noise, mut expected, mut bend) = (0.0, 0.0, C::default());
@@ -172,7 +180,7 @@ impl<'a> Driven<'a> {
                 }
             }
         }
-        // what the polynomial leaves of the lines, against their noise
+        // residual of the polynomial over the lines, compared with their noise
         let nodes: Vec<C> = self.lines.iter().map(|own| own[0].s).collect();
         let left = residual(&nodes, &values, ORDER) / (values.len() - ORDER - 1) as f64;
         expected /= values.len() as f64;
@@ -183,7 +191,8 @@ impl<'a> Driven<'a> {
         Known {
             by_parameter: by_parameter.into_iter().collect(),
             noise: noise * self.shared * misfit,
-            // two orders halve what is missing at least, or the next two would show more
+            // two more orders are taken to halve the error at least; otherwise their difference
+            // would be larger
             bend: 4.0 * bend.norm_sqr(),
             place: tells_place.then(|| {
                 let of = |(axes, part): (&[C; 2], &Part)| {
@@ -195,14 +204,14 @@ impl<'a> Driven<'a> {
     }
 }
 
-/// Powers of the nodes up to `order`, over the largest of them.
+/// Powers of the nodes up to `order`, the nodes divided by the largest of them.
 fn powers(nodes: &[C], order: usize) -> DMatrix<C> {
     let mean = nodes.iter().sum::<C>() / nodes.len() as f64;
     let largest = nodes.iter().map(|x| (x - mean).norm()).fold(f64::MIN_POSITIVE, f64::max);
     DMatrix::from_fn(nodes.len(), order + 1, |l, m| (nodes[l] / largest).powu(m as u32))
 }
 
-/// By how much each value at a node counts in the least-squares polynomial's value at 0.
+/// Weight of each node's value in the least-squares polynomial's value at 0.
 fn extrapolating(nodes: &[C], order: usize) -> Option<Vec<C>> {
     let factors = powers(nodes, order).qr();
     let mut unit = DVector::<C>::zeros(order + 1);
@@ -221,7 +230,7 @@ fn residual(nodes: &[C], values: &[C], order: usize) -> f64 {
     (values - found).norm_squared()
 }
 
-/// The motion of one line. Shifts of the hammer are taken out as far as the hits told them.
+/// The motion of one line, with the hammer's shifts removed as far as the fit determined them.
 fn line(blocks: &[Block], which: usize, line: usize, p: &[f64]) -> Option<Line> {
     let block = &blocks[which];
     let shifts = if block.shifted_by.is_empty() {
@@ -243,7 +252,7 @@ fn line(blocks: &[Block], which: usize, line: usize, p: &[f64]) -> Option<Line> 
     solved(block, line, p, shifts)
 }
 
-/// Eliminates one line with specimen A's z set free.
+/// Eliminates the motion of one line with specimen A's z as a free coordinate.
 fn solved(block: &Block, line: usize, p: &[f64], shifts: Option<[DVector<C>; 2]>) -> Option<Line> {
     let line = &block.lines[line];
     let mut free = p.to_vec();
@@ -262,7 +271,7 @@ fn solved(block: &Block, line: usize, p: &[f64], shifts: Option<[DVector<C>; 2]>
     }
     let Eliminated { q, r, motion: x, .. } = eliminated(block, line, &map, &offsets, p, shifts.as_ref())?;
     let mut derivatives = model.derivatives(&x, shifts.as_ref(), &map);
-    // specimen A's z is free: what the contact would make of it does not count
+    // specimen A's z is free: its dependence on the contact does not count
     let freed = block.local(COMPLIANCE);
     for row in &mut derivatives {
         row.retain(|(i, _)| *i != freed);

@@ -1,18 +1,19 @@
-//! How large the coefficients of the force's form may be, from what the load cells say of their own stiffness.
+//! Expected size of the coefficients of the force's form, from the stiffness that the load cells
+//! show.
 
 use super::block::{Block, Group};
 use super::parameters::{FORM, Parameters};
 use std::f64::consts::TAU;
 
-/// Stiffness beside the load cells over theirs, K = |T/z_B|.
+/// Stiffness parallel to the load cells, relative to theirs, K = |T/z_B|.
 const BESIDE: f64 = 0.5;
 /// Damping over K, s.
 const DAMPING_S: f64 = 3e-5;
-/// Arm B's mass resonates on K above this, Hz.
+/// Arm B's mass resonates on K above this frequency, Hz.
 const LOWEST_HZ: f64 = 250.0;
 
-/// States priors of the form: for z_B these, for rotations the same at the lever of arm B's points. They keep the form from following noise
-/// where the hits tell it little.
+/// Sets the priors of the form: for z_B these values, for rotations the same times the lever arm of
+/// arm B's points. They keep the form from fitting noise where the hits hardly determine it.
 pub fn scale_form(parameters: &mut Parameters, blocks: &[Block]) {
     let mut stiffness: Vec<f64> = Vec::new();
     let mut lever_m: f64 = 0.0;

@@ -1,4 +1,4 @@
-//! A value with its interval.
+//! A value with its confidence interval.
 
 use serde::Serialize;
 
@@ -7,6 +7,6 @@ use serde::Serialize;
 pub struct Interval {
     /// The value.
     pub mean: f64,
-    /// Its interval.
+    /// Its 95 % interval, lower and upper end.
     pub ci95: [f64; 2],
 }

@@ -1,9 +1,10 @@
 //! One k_T from the hits and the shaker's levels together.
 //!
-//! A level's compliance rests on the hits as well: on the force's form, on the spots, on gains and on how the bodies turn. So the readings are
-//! not independent, and are averaged with their whole covariance (generalised least squares). What they share is known: each
-//! is a sum over the parameters of the hits' fit and of something of its own. No reading counts against its sign: of readings
-//! whose errors are nearly the same, exact weights would trust the covariance more than it deserves.
+//! A level's compliance also depends on the hits: on the force's form, the spots, gains and the
+//! rotation of the bodies. The readings are therefore not independent, and are averaged with their
+//! full covariance (generalised least squares). What they share is known: each is a sum over the
+//! parameters of the hits' fit plus an independent part. No weight is negative: for readings with
+//! nearly the same errors, negative weights would trust the covariance more than it deserves.
 
 use super::budget::{Variances, stiffness_of};
 use super::driven::REACH_HZ;
@@ -23,11 +24,11 @@ pub struct Joint {
     pub k_t_n_per_m: Interval,
     /// Relative standard deviation of k_T by cause; the squares add up.
     pub budget: BTreeMap<Cause, f64>,
-    /// Levels that count.
+    /// Number of levels with a positive weight.
     pub levels: usize,
 }
 
-/// Averages them; none where no level makes the interval of the hits narrower.
+/// Averages hits and levels; none if no level narrows the interval of the hits.
 pub fn joint(hits: &Stiffness, known: &Known, levels: &[&LevelStiffness]) -> Option<Joint> {
     let readings: Vec<&Reading> = levels.iter().map(|level| &level.reading).collect();
     let values: Vec<f64> =
@@ -64,23 +65,25 @@ pub fn joint(hits: &Stiffness, known: &Known, levels: &[&LevelStiffness]) -> Opt
     })
 }
 
-/// What two levels have in common beside the parameters.
+/// Covariance of two levels in addition to that from the parameters.
 fn shared(a: &Reading, b: &Reading, same: bool) -> f64 {
     turning(a, b) + place(a, b) + if same { a.level } else { 0.0 }
 }
 
-/// The motions per newton are read from the lines around each frequency: nearer than those reach, two levels share some.
+/// The motions per newton are read from lines within a reach of each frequency, so nearby levels
+/// share some of these lines.
 fn turning(a: &Reading, b: &Reading) -> f64 {
     let overlap = (1.0 - (a.frequency_hz - b.frequency_hz).abs() / (2.0 * REACH_HZ)).max(0.0);
     overlap * (a.turning * b.turning).sqrt()
 }
 
-/// The shaker pushes at one place, whatever the frequency; with which sign that counts is not kept, so the worst is taken.
+/// The shaker pushes at one place at all frequencies. The sign of the effect is not kept, so full
+/// correlation is assumed as the worst case.
 fn place(a: &Reading, b: &Reading) -> f64 {
     (a.place * b.place).sqrt()
 }
 
-/// Weights of the smallest variance among those that are not negative and add up to one.
+/// Weights of the smallest variance among those that are non-negative and add up to one.
 fn weights(covariance: &DMatrix<f64>) -> Option<Vec<f64>> {
     let scale = covariance[(0, 0)];
     let mut kept: Vec<usize> = (0..covariance.nrows()).collect();
@@ -107,12 +110,13 @@ mod tests {
 
     #[test]
     fn readings_of_shared_errors_count_by_what_is_their_own() {
-        // independent: by one over the variance
+        // independent: weights proportional to 1/variance
         let independent = weights(&DMatrix::from_diagonal_element(2, 2, 1.0)).expect("positive");
         assert_eq!(independent, [0.5, 0.5]);
         let unequal = weights(&DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.0, 4.0])).expect("positive");
         assert!((unequal[0] - 0.8).abs() < 1e-12);
-        // the second has all of the first's error and some of its own: it says nothing more, and may not count against its sign
+        // the second has all of the first's error and some more: it adds no information, and must
+        // not get a negative weight
         let contained = weights(&DMatrix::from_row_slice(2, 2, &[1.0, 1.2, 1.2, 2.0])).expect("positive");
         assert_eq!(contained, [1.0, 0.0]);
     }

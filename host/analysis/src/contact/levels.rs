@@ -1,9 +1,11 @@
-//! k_T from a steady level of the shaker: force and Δx at the contact instead of T and Δx at the spots.
+//! k_T from a steady level of the shaker: from force and Δx at the contact instead of T and Δx at
+//! the spots.
 //!
-//! A level shows T and both spots. What it does not show, how arm B and the specimens turn per newton of T at its frequency, the hits on
-//! the moving mass do (`driven`): they push it where the shaker does. All else (the force's form, where the spots are, gains, delays) is
-//! what the fit of all hits made of it, with its covariance. So
-//! F = (a₀ + a₁s) T + Σ (b₀ + b₁s + b₂s²)(z_B, θ_x, θ_y), Δx = x_A − x_B − r_A × θ_A + r_B × θ_B at s = iω, and F/Δx = k_T + iω c_T.
+//! A level contains T and both spots. It does not contain how arm B and the specimens move per
+//! newton of T at its frequency. That comes from the hits on the moving mass (`driven`), which push
+//! it where the shaker does. Everything else (the force's form, spot positions, gains, delays)
+//! comes from the fit of all hits, with its covariance. So F = (a₀ + a₁s) T + Σ (b₀ + b₁s +
+//! b₂s²)(z_B, θ_x, θ_y), Δx = x_A − x_B − r_A × θ_A + r_B × θ_B at s = iω, and F/Δx = k_T + iω c_T.
 
 use super::block::{Block, blocks};
 use super::driven::{Driven, MOTIONS, Part, REACH_HZ};
@@ -24,11 +26,13 @@ use std::f64::consts::TAU;
 
 type C = Complex<f64>;
 
-/// The light lines that are needed beside the band in which levels can be read.
+/// The band that the lightly damped lines must cover: wider than the band in which levels can be
+/// read.
 pub const LEVEL_LINES: Band =
     Band { low_hz: BAND.low_hz - REACH_HZ - 1.0, high_hz: BAND.high_hz + REACH_HZ + 1.0 };
 
-/// Relative step of differences: F/Δx is a ratio of two bilinear forms, so that rounding and curvature both stay below 1e-8.
+/// Relative step of finite differences: F/Δx is a ratio of two bilinear forms, so that rounding and
+/// curvature both stay below 1e-8.
 const STEP: f64 = 1e-4;
 
 /// One steady level.
@@ -36,23 +40,25 @@ const STEP: f64 = 1e-4;
 pub struct SteadyLevel {
     /// Its frequency, Hz.
     pub frequency_hz: f64,
-    /// Complex amplitudes of T (N) and of the spots' displacements on A and B (m), in step with one another; one for each of several
-    /// stretches of the record as long as one another, whose scatter is its noise.
+    /// Complex amplitudes of T (N) and of the spots' displacements on A and B (m), on a common time
+    /// base. One set for each of several stretches of the record of equal length; their scatter is
+    /// the noise.
     pub stretches: Vec<[C; 3]>,
 }
 
-/// Relative standard deviations of a level's k_T by what they come from.
+/// Relative standard deviations of a level's k_T by source.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Shares {
     /// The fit of the hits: spots, points, gains, delays, form.
     pub fit: f64,
     /// The gain of the hammer's force cell.
     pub hammer_gain: f64,
-    /// The motions per newton at this frequency: noise of the hits there, and the way to s = iω.
+    /// The motions per newton at this frequency: noise of the hits there, and the extrapolation to
+    /// s = iω.
     pub turning: f64,
-    /// Where the shaker pushes, against where the hammer hits.
+    /// The difference between the shaker's line of action and the hammer's.
     pub place: f64,
-    /// The level's own scatter.
+    /// Scatter of the level itself.
     pub level: f64,
 }
 
@@ -65,38 +71,38 @@ pub struct LevelStiffness {
     pub std_n_per_m: f64,
     /// c_T, N s/m.
     pub c_t_n_s_per_m: Interval,
-    /// Where the interval of k_T comes from.
+    /// Sources of the uncertainty of k_T.
     pub shares: Shares,
-    /// By how many standard deviations of their difference it is apart from the hits' own k_T.
+    /// Difference from the hits' k_T, in standard deviations of that difference.
     pub apart: f64,
-    /// What it is averaged by.
+    /// The compliance and its uncertainties, for averaging.
     pub(super) reading: Reading,
-    /// By how much of the contact's own motion Δx at the spots and T in place of F are wrong together, |k_T/(T/Δx) − 1|.
+    /// Combined relative error of using Δx at the spots and T in place of F, |k_T/(T/Δx) − 1|.
     pub correction: f64,
 }
 
-/// Why a level has no k_T.
+/// The reason why a level has no k_T.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LevelError {
-    /// Its frequency is not one at which the bodies are rigid and the hits tell something.
+    /// Its frequency is outside the band in which the bodies are rigid and the hits have data.
     #[error("its frequency is outside {low:.0}–{high:.0} Hz, where the contact is read", low = BAND.low_hz, high = BAND.high_hz)]
     OutOfBand,
-    /// Nothing was hit that drives the contact.
+    /// No impact drives the contact.
     #[error("no impact along z on the moving mass (grouping 3) says where the shaker pushes")]
     NoImpact,
-    /// The hits have no lines around it.
+    /// The hits have no lines around its frequency.
     #[error("the hits have no usable lines around its frequency")]
     NoLines,
-    /// Where the shaker pushes matters, and nobody knows by how much.
+    /// The effect of the shaker's position matters, and its size is unknown.
     #[error(
         "what a tilt of the hammer does is not known: hit A along z at three places that are not in a line"
     )]
     NoPlace,
-    /// A single stretch tells no scatter.
+    /// A single stretch has no scatter.
     #[error("its record is too short: its scatter is not known")]
     Short,
-    /// The compliance cannot be told from none.
+    /// The compliance cannot be distinguished from zero.
     #[error("the specimens' rotation makes so much of Δx here that nothing is known of the contact")]
     NotIdentified,
     /// The spectra do not belong together.
@@ -104,8 +110,9 @@ pub enum LevelError {
     Contact(#[from] ContactError),
 }
 
-/// Corrects levels by what the hits told. `light` is the input of the fit with spectra of a light window in place of the heavy one's, of
-/// the same cells in the same order; `known` what the fit found.
+/// Corrects levels with the result of the hits. `light` is the input of the fit with spectra of a
+/// lightly damped window instead of the heavily damped one, for the same cells in the same order;
+/// `known` is the result of the fit.
 pub fn level_stiffness(
     light: &Input<'_>,
     known: &Known,
@@ -123,11 +130,12 @@ pub fn level_stiffness(
     levels.par_iter().map(read).collect()
 }
 
-/// What may stand for the shaker: each impact on the moving mass, and those on arm A put together to push along the same line. A rod between
-/// mass and arm hands on little else than the push.
+/// Impacts that can replace the shaker: each impact on the moving mass, and those on arm A combined
+/// to push along the same line. A rod between mass and arm transmits little besides the axial push.
 ///
-/// A hit's line of action is known by where it hits and how it is tilted: a tilted hit pushes across as well, and turns what it hits about
-/// wherever its supports hold it. Nobody states where that is, so it is taken to be anywhere along the structure.
+/// A hit's line of action is known from where it hits and how it is tilted. A tilted hit also
+/// pushes sideways, and rotates the structure about its supports. Their position is not stated, so
+/// it is taken to be anywhere along the structure.
 fn stand_ins(light: &Input<'_>, blocks: &[Block]) -> Vec<Vec<Part>> {
     let positions = &light.priors.positions;
     let assembly = |grouping: fn(Grouping) -> bool| -> Vec<usize> {
@@ -139,7 +147,7 @@ fn stand_ins(light: &Input<'_>, blocks: &[Block]) -> Vec<Vec<Part>> {
         .fold([light.contact_m[2]; 2], |[low, high]: [f64; 2], z| [low.min(z), high.max(z)]);
     let place_m2 = |b: usize| {
         let [below, above] = [blocks[b].at_m[2] - low, high - blocks[b].at_m[2]];
-        // mean square of the distance to a point that is anywhere between both ends
+        // mean square distance to a point that is equally likely anywhere between both ends
         let lever_m2 = (below.powi(3) + above.powi(3)) / (3.0 * (high - low)).max(f64::MIN_POSITIVE);
         positions.position_m.powi(2) + positions.aim_m.powi(2) + positions.hammer_angle_rad.powi(2) * lever_m2
     };
@@ -155,29 +163,31 @@ fn stand_ins(light: &Input<'_>, blocks: &[Block]) -> Vec<Vec<Part>> {
     all
 }
 
-/// The smallest weights of parallel pushes at `from` whose sum pushes along the line through `to`; none where they do not span it.
+/// The smallest weights for parallel pushes at `from` such that their sum pushes along the line
+/// through `to`; none if the pushes do not span it.
 fn along(from: &[[f64; 3]], to: [f64; 3]) -> Option<Vec<f64>> {
     let rows = DMatrix::from_fn(3, from.len(), |r, c| if r == 0 { 1.0 } else { from[c][r - 1] - to[r - 1] });
     let gram = &rows * rows.transpose();
     let wanted = DVector::from_column_slice(&[1.0, 0.0, 0.0]);
     let solved = gram.cholesky()?.solve(&wanted);
     let weights: Vec<f64> = (rows.transpose() * solved).iter().copied().collect();
-    // on a line they span nothing, and what remains is rounding
+    // for positions on a line the Gram matrix is singular, and the weights are rounding
     weights.iter().all(|w| w.abs() < 10.0).then_some(weights)
 }
 
-/// A compliance at the contact as one stand-in's motions give it, with what is not known of it.
+/// The compliance at the contact from one replacement of the shaker, with its uncertainties.
 struct Found {
     compliance: C,
     by_parameter: DVector<C>,
-    /// E|δ|² of what the motions per newton are not known by, and of where the shaker pushes.
+    /// E|δ|² of the motions per newton, and of where the shaker pushes.
     turning: f64,
     place: f64,
-    /// One of each stretch.
+    /// One per stretch.
     stretches: Vec<C>,
 }
 
-/// The mean of what the stand-ins give, each counted by what it knows. Where they are further apart than that, none knew so much.
+/// The mean over the replacements of the shaker, each weighted by its certainty. If they differ by
+/// more than their uncertainties, these are widened.
 fn together(found: &[Found]) -> Found {
     let certainty = |one: &Found| (one.turning + one.place).max(f64::MIN_POSITIVE).recip();
     let whole: f64 = found.iter().map(certainty).sum();
@@ -234,7 +244,8 @@ fn one(
     let omega = TAU * level.frequency_hz;
     let stiffness = compliance.inv();
     let k = stiffness.re;
-    // dK = −K² dC. Of a complex noise without preferred phase half the variance is in the real part; what a shift does may be all in it
+    // dK = −K² dC. For complex noise without a preferred phase half of the variance is in the real
+    // part; the effect of a shift may be entirely real
     let slope = -stiffness * stiffness;
     let unknown = slope.norm_sqr() * (0.5 * turning + place);
     let real = by_parameter.map(|d| (slope * d).re);
@@ -297,7 +308,8 @@ fn through(driven: &Driven<'_>, known: &Known, level: &SteadyLevel) -> Option<Fo
     let tones = mean_of(&level.stretches);
     let u = driven.per_t;
     let compliance = contact(p, s, &u, tones);
-    // a body moves by some 1/K of the cells per newton: no motion is so small that a part of all would not move it
+    // a body moves by about 1/K of the load cells per newton, so that a fraction of the largest
+    // motion is a suitable step for every motion
     let largest = u.iter().map(|u| u.norm()).fold(0.0, f64::max);
     let g: [C; MOTIONS] = std::array::from_fn(|k| {
         let step = STEP * largest;

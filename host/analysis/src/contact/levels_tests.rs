@@ -1,4 +1,4 @@
-//! Levels written down from the same motions as the hits: the contact that was put in must come out at each.
+//! Levels computed from the same motions as the hits: each must give the contact that was put in.
 
 use super::tests::{ARM, BESIDE, DAMPING, K, LEVER_M, MASS, NAMES, SPECIMEN, SPOTS};
 use super::*;
@@ -24,13 +24,15 @@ const HITS: [([f64; 3], f64, Grouping); 4] = [
     ([0.0, 0.035, -0.31], 1.0, Grouping::InternalA),
 ];
 
-/// Motions of B and A at the contact that nobody solved for: z_B, T and z_A follow from force and contact.
+/// Prescribed motions of B and A at the contact, without solving a model: z_B is given, T and z_A
+/// follow from force and contact.
 struct World {
     draw: Vec<f64>,
-    /// By how much the hit on the mass acts elsewhere than it is said to, m along x.
+    /// Distance between the line of action of the hit on the mass and its stated position, m along
+    /// x.
     aside_m: f64,
     noise_m_per_s: f64,
-    /// Of the noise.
+    /// Seed of the noise.
     seed: u64,
 }
 
@@ -52,7 +54,7 @@ impl World {
         scale * (0.3 + self.draw[72 + n]) / (1.0 + s * s / (w * w) + s * 3e-5)
     }
 
-    /// A push of a newton along z at (x, y) of structure A.
+    /// A push of one newton along z at (x, y) of structure A.
     fn assembly(&self, x: f64, y: f64, s: C) -> State {
         let of = |n: usize, translation: f64, rotation: f64| -> [C; 6] {
             std::array::from_fn(|i| {
@@ -161,7 +163,7 @@ fn input(cells: &[Cell], hammer_angle_rad: f64) -> Input<'_> {
     Input { cells: cells.collect(), contact_m: [0.0; 3], spots_m: SPOTS, priors, band_hz: BAND }
 }
 
-/// Twenty newtons at the mass, where the plan says that it is hit.
+/// Twenty newtons at the mass, at the stated position of its hit.
 fn level(world: &World, frequency_hz: f64) -> SteadyLevel {
     let ([x, y, _], ..) = HITS[3];
     let State { t, b, a } = world.assembly(x, y, C::new(0.0, TAU * frequency_hz));
@@ -189,7 +191,7 @@ fn without_noise_every_level_is_the_contact_whatever_lies_between_the_spots() {
         let found = found.as_ref().expect("inside the band");
         let f = level.frequency_hz;
         let error = (found.k_t_n_per_m.mean / K - 1.0).abs();
-        // a mode that nothing damps lies within the lines around 150 Hz
+        // an almost undamped mode is within the lines around 150 Hz
         assert!(error < if f == 150.0 { 0.02 } else { 5e-3 }, "{f}: {found:?}");
         assert!((found.c_t_n_s_per_m.mean / DAMPING - 1.0).abs() < 0.2, "{f}: {found:?}");
         let [low, high] = found.k_t_n_per_m.ci95;
@@ -215,7 +217,7 @@ fn hits_and_levels_together_know_more_than_hits_alone_and_no_more_than_is_true()
         })
         .collect();
     let rms = (draws.iter().map(|(z, _)| z * z).sum::<f64>() / draws.len() as f64).sqrt();
-    // of 24 draws the rms scatters by 0.14; three of these above
+    // the rms of 24 draws scatters by 0.14; three standard deviations above
     assert!(rms < 1.42, "{rms}: {draws:?}");
     let narrower = draws.iter().map(|(_, narrower)| narrower).sum::<f64>() / draws.len() as f64;
     assert!(narrower < 0.97, "{draws:?}");
@@ -223,7 +225,7 @@ fn hits_and_levels_together_know_more_than_hits_alone_and_no_more_than_is_true()
 
 #[test]
 fn a_hammer_that_was_tilted_on_the_mass_is_inside_the_interval() {
-    // 6 mm: what a tilt of a degree makes of the distance between mass and contact
+    // 6 mm: a tilt of one degree over the distance between mass and contact
     let world = World::new(6e-3, 2e-8);
     let (heavy, light) = (measured(&world, SIGMA_PER_S), measured(&world, LIGHT_PER_S));
     let (_, known) = read(&input(&heavy, 0.02)).expect("all is there");
@@ -235,7 +237,7 @@ fn a_hammer_that_was_tilted_on_the_mass_is_inside_the_interval() {
     };
     let stated: Vec<(f64, bool)> = level_stiffness(&light, &known, &levels).iter().map(half).collect();
     assert!(stated.iter().all(|(_, covers)| *covers), "{stated:?}");
-    // who states no tilt has a narrower interval from the same signals
+    // without a stated tilt the same signals give a narrower interval
     let unstated: Vec<(f64, bool)> = level_stiffness(&exact, &known, &levels).iter().map(half).collect();
     assert!(
         stated.iter().zip(&unstated).all(|(with, without)| with.0 > without.0),

@@ -1,51 +1,53 @@
-//! One line of a block: the motion is eliminated, and what is left tells the parameters.
+//! One line of a block: the motion is eliminated, and the residual determines the parameters.
 
 use super::block::{Block, BlockLine};
 use super::model::{LineModel, Sparse};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex;
 
-/// Kinds of rows whose residuals are told apart.
+/// Kinds of rows whose residuals are summed separately.
 pub const KINDS: usize = 6;
 
-/// Normal equations of some lines of one block: r is the residual left by the motion that fits best, J its derivative by the block's
-/// parameters, all over the noise's standard deviation.
+/// Normal equations of some lines of one block: r is the residual of the best-fitting motion, J its
+/// derivative by the block's parameters, all divided by the noise's standard deviation.
 #[derive(Debug, Clone)]
 pub struct Normal {
-    /// Re(Jᴴ J), parameters of the block.
+    /// Re(Jᴴ J), over the block's parameters.
     pub information: DMatrix<f64>,
     /// Re(Jᴴ r).
     pub gradient: DVector<f64>,
     /// Σ |r|².
     pub chi_square: f64,
-    /// Complex numbers in r that are free.
+    /// Number of complex degrees of freedom in r.
     pub freedom: f64,
-    /// Σ |r|², what it should be, and the signals' own Σ, by kind of row: T, spot B, spot A, arm B, specimen A, specimen B.
+    /// Σ |r|², its expected value, and Σ |signal|², by kind of row: T, spot B, spot A, arm B,
+    /// specimen A, specimen B.
     pub kinds: [[f64; 3]; KINDS],
 }
 
-/// What is left at one line.
+/// The residual at one line.
 #[derive(Debug, Clone)]
 pub struct Residual {
-    /// Which of the block's lines.
+    /// Index of the block's line.
     pub line: usize,
-    /// r over the noise's standard deviation, and what |r|² should be, by row.
+    /// r divided by the noise's standard deviation, and the expected value of |r|², by row.
     pub rows: Vec<(Complex<f64>, f64)>,
 }
 
-/// One line with the motion eliminated, over the noise.
+/// One line with the motion eliminated, divided by the noise.
 pub struct Eliminated {
-    /// Q of the map over the noise.
+    /// Q of the weighted map.
     pub q: DMatrix<Complex<f64>>,
-    /// R of it.
+    /// R of the weighted map.
     pub r: DMatrix<Complex<f64>>,
-    /// The motion that fits best.
+    /// The best-fitting motion.
     pub motion: DVector<Complex<f64>>,
-    /// What it leaves.
+    /// Its residual.
     pub residual: DVector<Complex<f64>>,
 }
 
-/// Eliminates the motion that `map` tells of, after what the shifts of the hammer make is taken out; none where the rows do not tell it.
+/// Eliminates the motion described by `map` after removing the effect of the hammer's shifts; none
+/// if the rows do not determine the motion.
 pub fn eliminated(
     block: &Block,
     line: &BlockLine,
@@ -73,7 +75,7 @@ pub fn eliminated(
     Some(Eliminated { q, r, motion, residual })
 }
 
-/// Q and R of the map over the noise.
+/// Q and R of the map divided by the noise.
 fn factors(map: &DMatrix<Complex<f64>>, line: &BlockLine) -> (DMatrix<Complex<f64>>, DMatrix<Complex<f64>>) {
     let weighed = DMatrix::from_fn(map.nrows(), map.ncols(), |r, c| map[(r, c)] * line.weight[r]);
     let factors = weighed.qr();
@@ -81,7 +83,7 @@ fn factors(map: &DMatrix<Complex<f64>>, line: &BlockLine) -> (DMatrix<Complex<f6
 }
 
 impl Normal {
-    /// Nothing yet, for `parameters` of them.
+    /// Zero sums for this many `parameters`.
     pub fn none(parameters: usize) -> Self {
         Normal {
             information: DMatrix::zeros(parameters, parameters),
@@ -92,7 +94,8 @@ impl Normal {
         }
     }
 
-    /// Adds one line; the motion that fits best, and what it leaves. None where the rows do not tell the motion.
+    /// Adds one line; returns the best-fitting motion and its residual. None if the rows do not
+    /// determine the motion.
     pub fn add(
         &mut self,
         block: &Block,
@@ -112,7 +115,7 @@ impl Normal {
         for (r, row) in block.rows.iter().enumerate() {
             let kind = if row.channel < 3 { row.channel } else { 3 + block.cells[row.cell].group as usize };
             let (left, free) = (residual[r].norm_sqr(), 1.0 - q.row(r).norm_squared());
-            // against the noise alone, whatever else the weights allow for
+            // compared with the noise alone, without the allowance for unexplained signal
             self.kinds[kind][0] += left * (line.weight[r] * line.sigma[r]).powi(-2);
             self.kinds[kind][1] += free;
             left_of_rows.push((residual[r], free));
@@ -122,15 +125,16 @@ impl Normal {
         Some((motion, Residual { line: index, rows: left_of_rows }))
     }
 
-    /// Adds what noise alone gives to the information of one line: the motion is known through noise only, so that a product with it looks larger
-    /// than it is. Nothing where the rows do not tell the motion.
+    /// Adds what noise alone contributes to the information of one line: the motion is estimated
+    /// from noisy signals, which enlarges products with it. Adds nothing if the rows do not
+    /// determine the motion.
     pub fn add_of_noise(&mut self, block: &Block, line: usize, p: &[f64]) {
         let line = &block.lines[line];
         let model = LineModel::new(block, p, line.s).of_motion();
         let (map, _) = model.map();
         let (rows, latent) = (map.nrows(), map.ncols());
         let (q, r) = factors(&map, line);
-        // the motion's covariance is R⁻¹ R⁻ᴴ: each column of R⁻¹ is a motion that noise makes
+        // the motion's covariance is R⁻¹ R⁻ᴴ: each column of R⁻¹ is a motion due to noise
         let identity = DMatrix::identity(latent, latent);
         let Some(made) = r.solve_upper_triangular(&identity) else { return };
         let nothing = DVector::zeros(rows);
@@ -162,7 +166,8 @@ impl Normal {
                 }
             }
         }
-        // real parts above imaginary ones: one product, of a kind that is fast
+        // real parts stacked above imaginary parts, so that a single real matrix product suffices,
+        // which is fast
         let height = seen.nrows();
         let stacked = DMatrix::from_fn(2 * height, parameters, |r, c| {
             if r < height { seen[(r, c)].re } else { seen[(r - height, c)].im }

@@ -1,20 +1,36 @@
-//! The contact's own tangential stiffness k_T, from hits: what lies between the specimens, whatever their clamps do.
+//! The contact's own tangential stiffness k_T, from hits: the stiffness between the specimens,
+//! independent of their clamps.
 //!
-//! T/Δx, read at spots beside the contact, is no k_T: the load cells' sum lacks arm B's inertia and what stands beside the cells, and a
-//! specimen that turns in its clamp moves its spot. Both are measured here instead of assumed:
+//! T/Δx, read at spots next to the contact, is not k_T: the load cells' sum lacks arm B's inertia
+//! and the forces parallel to the cells, and a specimen that rotates in its clamp moves its spot.
+//! Both are measured here instead of assumed:
 //!
-//! 1. **Force.** In hits on B alone the force on B is the hammer's. Its part along z is a form of T and of arm B's motion at the contact
-//!    (z_B, θ_x, θ_y), with terms in 1, s and s²; whatever mass, rod or load-cell gain there is, the form holds it. In the assembly the same
-//!    form gives the contact's force.
-//! 2. **Rotation.** Points on specimen A show how it moves as a rigid body; arm B's points show B.
-//! 3. **One fit.** z_A − z_B = F/(k_T + s c_T) at the contact, for all lines, impacts and cells together. The motion of the bodies is
-//!    eliminated at every line (`line`), so that noise in what the force is formed from does not pull k_T down. Spots, points, gains, delays, the
-//!    hammer's tilt and each cell's aim are unknowns with priors ([`ContactPriors`]); the local resonances of the specimen calibrate them.
+//! 1. **Force.** In hits on B alone the force on B is the hammer's. Its z component is a linear
+//!    form of T and of arm B's motion at the contact (z_B, θ_x, θ_y), with terms in 1, s and s²,
+//!    which covers any mass, rod and load-cell gain. In the assembly the same form gives the
+//!    contact's force.
+//! 2. **Rotation.** Points on specimen A show its motion as a rigid body; arm B's points show that
+//!    of B.
+//! 3. **One fit.** z_A − z_B = F/(k_T + s c_T) at the contact, for all lines, impacts and cells
+//!    together. The motion of the bodies is eliminated at every line (`line`), so that noise in the
+//!    signals that the force is formed from does not pull k_T down. Spots, points, gains, delays,
+//!    the hammer's tilt and each cell's aim are unknowns with priors ([`ContactPriors`]); the local
+//!    resonances of the specimen calibrate them.
 //!
-//! The way through the room: `cell` what is measured, `block` the cells of an impact, `parameters` the unknowns, `form_scale` how large the form's may be, `model` the signals as
-//! a linear map of the motion, `line` its elimination, `bins` their sums, `solver` the most likely parameters, `covariance` how well they are known, `unexplained` what the model leaves of a cell beyond
-//! its noise, `trusted_band` where the bodies are rigid, `diagnosis` whether the assumptions hold, `outcome` the answer. `budget` where its interval comes from. `levels` reads the shaker's levels by what the hits
-//! told, `driven` how bodies turn there, `joint` averages both.
+//! Modules, in order of use:
+//!
+//! - `cell`: the measured signals
+//! - `block`: the cells of an impact
+//! - `parameters`: the unknowns; `form_scale`: the expected size of the form's coefficients
+//! - `model`: the signals as a linear map of the motion; `line`: its elimination; `bins`: sums over
+//!   lines
+//! - `solver`: the most likely parameters; `covariance`: their uncertainty
+//! - `unexplained`: residuals of a cell beyond its noise; `trusted_band`: where the bodies are
+//!   rigid
+//! - `diagnosis`: tests of the assumptions
+//! - `outcome`: the result; `budget`: the sources of its uncertainty
+//! - `levels`: k_T of the shaker's levels, given the result of the hits; `driven`: the rotation of
+//!   the bodies there; `joint`: the average of both
 
 mod bins;
 mod block;
@@ -59,57 +75,59 @@ use parameters::Parameters;
 use solver::Solution;
 use trusted_band::trusted;
 
-/// Where the contact is looked for, Hz: above the drift of hammer and windows, below the first bending modes of the paper's arms and specimens. Where
-/// others bend sooner, the band ends there ([`Stiffness::band_hz`]).
+/// The band in which the contact is evaluated, Hz: above the drift of hammer and windows, below the
+/// first bending modes of the paper's arms and specimens. If others bend at lower frequencies, the
+/// band ends there ([`Stiffness::band_hz`]).
 pub const BAND: Band = Band { low_hz: 100.0, high_hz: 600.0 };
 
-/// Where the search for the compliance begins: a contact of 150 N/µm, m/N.
+/// Start value of the compliance: a contact of 150 N/µm, m/N.
 const START_M_PER_N: f64 = 1.0 / 150e6;
 
-/// Lines of the hits on the assembly without which nothing is fitted: k_T and c_T are two numbers, and k_T(f) is to be compared with k_T.
+/// Fewest lines of the hits on the assembly for a fit: k_T and c_T are two numbers, and k_T(f) is
+/// compared with k_T.
 const FEWEST_LINES: usize = 8;
 
-/// What the contact is read from.
+/// Input of the estimate.
 #[derive(Debug, Clone)]
 pub struct Input<'a> {
-    /// The cells; those that are of no use here are left out.
+    /// The cells; those that are not usable here are left out.
     pub cells: Vec<ContactCell<'a>>,
-    /// The contact, m: the virtual point.
+    /// Position of the contact, m: the virtual point.
     pub contact_m: [f64; 3],
-    /// Where the vibrometers beside the contact look, on A and on B, m.
+    /// Positions of the vibrometer spots next to the contact, on A and on B, m.
     pub spots_m: [[f64; 3]; 2],
-    /// What is known beforehand.
+    /// Prior knowledge.
     pub priors: ContactPriors,
-    /// The lines used.
+    /// The band of the lines used.
     pub band_hz: Band,
 }
 
-/// Why there is no k_T.
+/// The reason why there is no k_T.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ContactError {
-    /// Nothing at all.
+    /// No usable cell.
     #[error(
         "no cell shows the contact: hits along z on the assembly are needed, with load cells and both spots"
     )]
     NoCells,
-    /// What the force is calibrated with.
+    /// The impacts that calibrate the force are missing.
     #[error(
         "the force at the contact is not known: hit B alone along z at three points or more, each with three points of arm B's interface (grouping 2)"
     )]
     NoForce,
-    /// What the specimen's rotation is told from.
+    /// The points that determine the specimen's rotation are missing.
     #[error(
         "the specimen's rotation is not known: its tilt between contact and spot cannot be told from the contact's own compliance. Measure three points \
          or more on specimen A (grouping 5) in the assembly, with three of arm B's interface (grouping 2), from hits along z on A or on the moving mass"
     )]
     NoRotation,
-    /// The spots' places.
+    /// The positions of the spots are missing.
     #[error(
         "the plan does not say where the vibrometers beside the contact look: give the sensors LDV_A and LDV_B in [geometry]"
     )]
     NoSpots,
-    /// One hit tells no noise.
+    /// A single hit does not determine its noise.
     #[error(
         "every cell of {impact} has a single hit, so that the noise is not known: keep two or more in some"
     )]
@@ -125,13 +143,13 @@ pub enum ContactError {
         /// The point.
         point: String,
     },
-    /// The fit found nothing.
+    /// The data do not determine the contact.
     #[error("not identified: {0}")]
     NotIdentified(String),
 }
 
 impl ContactError {
-    /// The hits on B alone leave the force open.
+    /// The hits on B alone do not determine the force.
     fn no_force() -> Self {
         ContactError::NotIdentified("the hits do not tell the force at the contact".into())
     }
@@ -140,18 +158,18 @@ impl ContactError {
 /// Finds k_T and c_T.
 ///
 /// # Errors
-/// [`ContactError`]: cells are missing, or the data do not tell it.
+/// [`ContactError`] if cells are missing or the data do not determine the contact.
 pub fn stiffness(input: &Input<'_>) -> Result<Stiffness, ContactError> {
     read(input).map(|(found, _)| found)
 }
 
-/// All parameters as the hits leave them: what a level of the shaker is corrected by.
+/// All parameters as fitted to the hits, for the correction of the shaker's levels.
 #[derive(Debug, Clone)]
 pub struct Known {
     p: Vec<f64>,
     parameters: Parameters,
     certainty: Certainty,
-    /// By how much χ² exceeds what it should be; 1 at least.
+    /// Ratio of χ² to its expected value, at least 1.
     misfit: f64,
     hammer_gain: f64,
 }
@@ -162,13 +180,13 @@ impl Known {
         of_sum(row, &self.parameters, &self.certainty, self.misfit)
     }
 
-    /// Variance of Σ row_i p_i, the misfit counted.
+    /// Variance of Σ row_i p_i, including misfit.
     fn variance(&self, row: &DVector<f64>) -> f64 {
         (&self.certainty.covariance * row).dot(row) * self.misfit
     }
 }
 
-/// As [`stiffness`], with everything else that the fit found.
+/// As [`stiffness`], with all other results of the fit.
 ///
 /// # Errors
 /// As [`stiffness`].
@@ -180,12 +198,12 @@ pub fn read(input: &Input<'_>) -> Result<(Stiffness, Known), ContactError> {
         if band_hz == input.band_hz {
             return fit.told(&input);
         }
-        // what strayed at an end has pulled the rest: the next fit tells more of it
+        // lines at the ends that contradict the model biased this fit: the next fit judges again
         input.band_hz = band_hz;
     }
 }
 
-/// What the hits in a band say.
+/// The fit of the hits in a band.
 struct Fit {
     parameters: Parameters,
     blocks: Vec<Block>,
@@ -225,7 +243,7 @@ fn fit(input: &Input<'_>) -> Result<Fit, ContactError> {
     Ok(Fit { parameters, blocks, solution })
 }
 
-/// Whether a response point is of any use here.
+/// Whether a response point is used here.
 pub fn serves(grouping: Grouping) -> bool {
     matches!(grouping, Grouping::InterfaceB | Grouping::SpecimenA | Grouping::SpecimenB)
 }

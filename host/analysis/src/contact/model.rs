@@ -1,8 +1,11 @@
-//! The signals of one line as a linear map of the motion that nobody sees, and how that map changes with every parameter.
+//! The signals of one line as a linear map of the unobserved motion, and the derivatives of that
+//! map by every parameter.
 //!
-//! The motion is that of rigid bodies: arm B (t, θ), specimen A (t, θ) and, where it has points of its own, specimen B. What ties them
-//! together is the contact: z_A − z_B = F/(k_T + s c_T) at the contact itself, with F = (a₀ + a₁ s) T + Σ (b₀ + b₁ s + b₂ s²) (z_B, θ_x, θ_y).
-//! So z_A is no motion of its own but a consequence of T and B's, and on B alone, where F is the hammer's, T is one of B's.
+//! The motion is that of rigid bodies: arm B (t, θ), specimen A (t, θ) and, if it has points of its
+//! own, specimen B. The contact couples them: z_A − z_B = F/(k_T + s c_T) at the contact itself,
+//! with F = (a₀ + a₁ s) T + Σ (b₀ + b₁ s + b₂ s²) (z_B, θ_x, θ_y). So z_A is not an independent
+//! coordinate but follows from T and B's motion; on B alone, where F is the hammer's, T follows
+//! from B's motion.
 
 use super::block::{Block, BlockCell, Group};
 use super::parameters::{
@@ -13,13 +16,13 @@ use num_complex::Complex;
 
 type C = Complex<f64>;
 
-/// Coordinates of the motion, at most.
+/// Largest number of coordinates of the motion.
 const MOST: usize = 18;
-/// A number formed linearly from the motion.
+/// Coefficients of a quantity that is linear in the motion.
 type Linear = [C; MOST];
-/// Where T stands among the assembly's coordinates, and where specimen A's x, y and rotations begin.
+/// Index of T among the assembly's coordinates.
 pub const T: usize = 6;
-/// As [`T`].
+/// Index of the first of specimen A's coordinates: x, y and rotations.
 pub const A: usize = 7;
 
 /// Derivatives of one row: (parameter within the block, value).
@@ -36,7 +39,7 @@ pub struct LineModel<'a> {
     t: Linear,
     t_offset: C,
     a_t: C,
-    /// The hammer's own unit of force on B alone; none where only motion is asked for.
+    /// Unit force of the hammer on B alone; 0 if only the effect of motion is wanted.
     hammer: f64,
 }
 
@@ -54,7 +57,7 @@ fn dot(of: &Linear, x: &DVector<C>) -> C {
     of.iter().zip(x.iter()).map(|(a, b)| a * b).sum()
 }
 
-/// Displacement along `axis` of a body's point: t + θ × r, with the body's rotation θ.
+/// Displacement along `axis` of a point of a body: t + θ × r, with the body's rotation θ.
 fn turned(translation: &Linear, theta: [usize; 3], r: [f64; 3], axis: usize) -> Linear {
     let mut moved = *translation;
     // (θ × r): x = θ_y z − θ_z y, y = θ_z x − θ_x z, z = θ_x y − θ_y x
@@ -65,7 +68,7 @@ fn turned(translation: &Linear, theta: [usize; 3], r: [f64; 3], axis: usize) -> 
 }
 
 impl<'a> LineModel<'a> {
-    /// With the parameters `p` at s.
+    /// The map with the parameters `p` at s.
     pub fn new(block: &'a Block, p: &'a [f64], s: C) -> Self {
         let z_arm = unit(2);
         let z_b = block.specimen_b().map_or(z_arm, |at| unit(at + 2));
@@ -98,7 +101,7 @@ impl<'a> LineModel<'a> {
         LineModel { block, p, s, z_b, force, z_a, t, t_offset, a_t, hammer: 1.0 }
     }
 
-    /// Without the hammer: what a motion alone gives.
+    /// The map without the hammer's force: the effect of motion alone.
     pub fn of_motion(self) -> Self {
         LineModel { t_offset: C::default(), hammer: 0.0, ..self }
     }
@@ -112,7 +115,7 @@ impl<'a> LineModel<'a> {
         std::array::from_fn(|axis| self.p[cell.point + axis] + cell.aim.map_or(0.0, |aim| self.p[aim + axis]))
     }
 
-    /// Where the motion of the body under a cell's point begins, along `axis`, and its rotations.
+    /// Translation along `axis` of the body under a cell's point, and the indices of its rotations.
     fn body(&self, group: Group, axis: usize) -> (Linear, [usize; 3]) {
         match group {
             Group::ArmB => (unit(axis), [3, 4, 5]),
@@ -124,7 +127,8 @@ impl<'a> LineModel<'a> {
         }
     }
 
-    /// Spot A or B along z, without its sensor: the body's z at the contact, its rotations, the spot's place.
+    /// Spot A or B along z, without its sensor: the body's z at the contact, its rotations, the
+    /// spot's position.
     fn spot(&self, of_a: bool) -> (Linear, [usize; 3], [f64; 3]) {
         let at = SPOTS + if of_a { 0 } else { 2 };
         let place = [self.p[at], self.p[at + 1], 0.0];
@@ -136,7 +140,7 @@ impl<'a> LineModel<'a> {
         }
     }
 
-    /// The map: one row for each of the block's rows; and what they read without any motion.
+    /// The map, with one row for each of the block's rows, and the rows' values without any motion.
     pub fn map(&self) -> (DMatrix<C>, Vec<C>) {
         let rows: Vec<Linear> = self.block.rows.iter().map(|row| self.row(row.cell, row.channel)).collect();
         let map = DMatrix::from_fn(rows.len(), self.block.latent(), |r, c| rows[r][c]);
@@ -161,8 +165,8 @@ impl<'a> LineModel<'a> {
         }
     }
 
-    /// Derivatives of every row by the block's parameters, at the motion `x`; `shifts` is the motion that moving the impact by a metre
-    /// along each of two axes across it would add.
+    /// Derivatives of every row by the block's parameters, at the motion `x`; `shifts` is the
+    /// motion added by moving the impact by one metre along each of two axes across it.
     pub fn derivatives(
         &self,
         x: &DVector<C>,
@@ -174,7 +178,7 @@ impl<'a> LineModel<'a> {
         let force = dot(&self.force, x);
         let damped = 1.0 + self.s * self.p[RETARDATION];
         let compliance = self.p[COMPLIANCE] / damped;
-        // how the contact's z on A changes, over everything that it depends on
+        // derivatives of z_A at the contact by everything that it depends on
         let of_z_a = |factor: C, row: &mut Sparse| {
             row.push((local(COMPLIANCE), factor * force / damped));
             row.push((local(RETARDATION), -factor * compliance * self.s / damped * force));
@@ -238,7 +242,7 @@ impl<'a> LineModel<'a> {
         all
     }
 
-    /// What each coefficient of the form, and specimen B's inertia, stands before.
+    /// The factor of each coefficient of the form, and of specimen B's inertia.
     fn form_terms(&self, x: &DVector<C>) -> [C; FORM_TERMS + INERTIA_TERMS] {
         let (s, t) = (self.s, dot(&self.t, x) + self.t_offset);
         let (z, turn_x, turn_y) = (x[2], x[3], x[4]);

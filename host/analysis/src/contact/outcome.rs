@@ -1,4 +1,4 @@
-//! The answer: k_T and c_T with their intervals, where these come from, and k_T(f).
+//! The result: k_T and c_T with their intervals, the sources of their uncertainty, and k_T(f).
 
 use super::bins::BIN_HZ;
 use super::block::Block;
@@ -16,16 +16,16 @@ use nalgebra::DVector;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// k_T of one bin of frequencies, N/m.
+/// k_T of one frequency bin, N/m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct OfFrequency {
-    /// The bin's middle, Hz.
+    /// Centre of the bin, Hz.
     pub frequency_hz: f64,
-    /// k_T there.
+    /// k_T in the bin, N/m.
     pub k_t_n_per_m: Interval,
 }
 
-/// What the contact is.
+/// Stiffness and damping of the contact, with diagnostics.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Stiffness {
     /// k_T, N/m. The interval is that of the compliance, inverted.
@@ -40,18 +40,18 @@ pub struct Stiffness {
     pub budget: BTreeMap<Cause, f64>,
     /// k_T bin by bin.
     pub of_frequency: Vec<OfFrequency>,
-    /// Whether the assumptions hold.
+    /// Tests of the assumptions.
     pub diagnosis: Diagnosis,
-    /// Those that do not.
+    /// The assumptions that do not hold.
     pub doubts: Vec<Doubt>,
     /// χ² per degree of freedom over all signals.
     pub chi_square: f64,
 }
 
-/// Puts the answer together.
+/// Assembles the result.
 ///
 /// # Errors
-/// [`ContactError::NotIdentified`] where the compliance cannot be told from none.
+/// [`ContactError::NotIdentified`] if the compliance cannot be distinguished from zero.
 pub fn of(
     input: &Input<'_>,
     blocks: &[Block],

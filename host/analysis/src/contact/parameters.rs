@@ -1,4 +1,5 @@
-//! What the fit may choose: the contact, the form that gives its force, and everything that nobody at the rig knows, each with its prior.
+//! The unknowns of the fit: the contact, the form that gives its force, and all rig quantities that
+//! are not known exactly, each with its prior.
 
 use super::priors::{Cause, ContactPriors};
 
@@ -6,14 +7,14 @@ use super::priors::{Cause, ContactPriors};
 pub const COMPLIANCE: usize = 0;
 /// c_T/k_T, s.
 pub const RETARDATION: usize = 1;
-/// The first coefficient of the force's form.
+/// Index of the first coefficient of the force's form.
 pub const FORM: usize = 2;
-/// Its coefficients: 1 and s of T, then 1, s and s² of z_B, θ_x and θ_y.
+/// Number of its coefficients: 1 and s of T, then 1, s and s² of z_B, θ_x and θ_y.
 pub const FORM_TERMS: usize = 11;
-/// Specimen B's inertia where it moves against its arm: its mass (kg), then the mass times y and times x of its centre of gravity against the
-/// contact (kg m).
+/// Index of specimen B's inertia as it moves relative to its arm: its mass (kg), then mass times y
+/// and mass times x of its centre of gravity relative to the contact (kg m).
 pub const INERTIA_B: usize = FORM + FORM_TERMS;
-/// Its parameters.
+/// Number of its parameters.
 pub const INERTIA_TERMS: usize = 3;
 /// x and y of spot A, then of spot B, m.
 pub const SPOTS: usize = INERTIA_B + INERTIA_TERMS;
@@ -21,7 +22,7 @@ pub const SPOTS: usize = INERTIA_B + INERTIA_TERMS;
 pub const GAINS: usize = SPOTS + 4;
 /// Errors of delay of the same channels, s.
 pub const DELAYS: usize = GAINS + 5;
-/// The first of the points' coordinates.
+/// Index of the first coordinate of the points.
 const POINTS: usize = DELAYS + 5;
 
 /// The sensors with a gain and a delay, in order.
@@ -32,39 +33,44 @@ const SENSORS: [&str; 5] = [
     "the 3-D vibrometer along y",
     "the 3-D vibrometer along z",
 ];
-/// The load cells' springs make T a form of z_B, θ_x and θ_y of its own, so that most of what its gain and delay are wrong by may go into
-/// theirs. The priors alone hold them then: at this at least, so that no combination of them is left open where they are stated as exact.
+/// Smallest prior standard deviation of the load cells' gain, relative. The load cells are springs,
+/// so that T is itself a form of z_B, θ_x and θ_y, and the coefficients of these can absorb most of
+/// an error of its gain and delay. Then only the priors determine gain and delay. This minimum
+/// keeps every combination of them determined when they are stated as exact.
 const LOAD_CELL_GAIN: f64 = 1e-3;
-/// Of its delay, s.
+/// The same for its delay, s.
 const LOAD_CELL_SKEW_S: f64 = 1e-7;
-/// A specimen weighs no more than this, kg.
+/// Upper bound of a specimen's mass, kg.
 const SPECIMEN_KG: f64 = 0.5;
-/// Its centre of gravity is no further from the contact than this, m.
+/// Upper bound of the distance of its centre of gravity from the contact, m.
 const SPECIMEN_M: f64 = 0.03;
 
-/// One parameter: where it starts, how far it may go, and what its share of the uncertainty is called.
+/// One parameter: start value, prior width, and the cause under which its share of the uncertainty
+/// is listed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameter {
-    /// What it is, for people.
+    /// Name for messages.
     pub name: String,
     /// Prior mean, in the parameter's unit.
     pub start: f64,
-    /// Prior standard deviation; infinite where nothing is known.
+    /// Prior standard deviation; infinite if nothing is known.
     pub sigma: f64,
-    /// What it is called in the budget.
+    /// The cause in the budget.
     pub cause: Cause,
-    /// Of a part of a hit along z: the direction's own, and how far the hammer may be tilted, rad.
+    /// For the z component of a hit: that of the nominal direction, and the standard deviation of
+    /// the hammer's tilt, rad.
     pub tilted: Option<[f64; 2]>,
 }
 
 impl Parameter {
-    /// One with a Gaussian prior.
+    /// A parameter with a Gaussian prior.
     pub fn new(name: String, start: f64, sigma: f64, cause: Cause) -> Self {
         Parameter { name, start, sigma, cause, tilted: None }
     }
 
-    /// How far `value` is from what is stated, in standard deviations. For the hammer that is the tilt it would take: the part along z of a hit
-    /// along z falls with the tilt's square, whose tail is long.
+    /// Distance of `value` from its stated value, in standard deviations. For the hammer it is
+    /// computed from the tilt: the z component of a hit along z falls with the square of the tilt,
+    /// which has a long tail.
     pub fn deviations(&self, value: f64) -> f64 {
         match self.tilted {
             Some([z, tilt_rad]) if value.abs() <= 1.0 => (value.acos() - z.acos()).abs() / tilt_rad,
@@ -78,7 +84,8 @@ impl Parameter {
 pub struct Parameters(Vec<Parameter>);
 
 impl Parameters {
-    /// Those that every fit has. The spots are where `spots_m` says, against the contact.
+    /// The parameters that every fit has. `spots_m` are the positions of the spots relative to the
+    /// contact.
     pub fn new(priors: &ContactPriors, compliance_m_per_n: f64, spots_m: [[f64; 3]; 2]) -> Self {
         let named = |name: &str, start, sigma, cause| Parameter::new(name.to_owned(), start, sigma, cause);
         let free = |name: &str, start| named(name, start, f64::INFINITY, Cause::Noise);
@@ -104,14 +111,14 @@ impl Parameters {
         Parameters(all)
     }
 
-    /// Adds parameters in a row; the place of the first.
+    /// Appends parameters; returns the index of the first.
     pub fn add(&mut self, own: impl IntoIterator<Item = Parameter>) -> usize {
         let at = self.0.len();
         self.0.extend(own);
         at
     }
 
-    /// States how far a parameter may go.
+    /// Sets the prior standard deviation of a parameter.
     pub fn narrow(&mut self, at: usize, sigma: f64) {
         self.0[at].sigma = sigma;
     }
@@ -127,8 +134,9 @@ impl Parameters {
     }
 }
 
-/// Force along z that a hit on B alone gives per newton of the hammer: the direction's z with the tilt's prior. A tilt σ about each
-/// of two axes turns a hit along z by σ² in the mean, and one across it by σ.
+/// z component of the force of a hit on B alone, per newton of the hammer: the direction's z with
+/// the prior of the tilt. A tilt σ about each of two axes changes the z component of a hit along z
+/// by σ² on average, and of one across z by σ.
 pub fn along_z(impact: &str, direction: [f64; 3], tilt_rad: f64) -> Parameter {
     let z = direction[2];
     let across = (1.0 - z * z).max(0.0).sqrt();

@@ -1,28 +1,30 @@
-//! What is known beforehand of positions, angles, gains and delays: standard deviations.
+//! Prior standard deviations of positions, angles, gains and delays.
 
 use crate::substructuring::averaged::Priors as Positions;
 use serde::Serialize;
 
-/// Standard deviations of what nobody at the rig knows. They are the experiment's own, and k_T's interval rests on them.
+/// Standard deviations of quantities that are not known exactly. They belong to the experiment, and
+/// k_T's interval depends on them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ContactPriors {
-    /// Sensors and hits on the arms: position, aim, and the hammer's tilt.
+    /// Sensors and hits on the arms: position, aim and the hammer's tilt.
     #[serde(flatten)]
     pub positions: Positions,
-    /// A spot of the vibrometers beside the contact, m along each axis: where it is against the contact.
+    /// Position of a vibrometer spot relative to the contact, m along each axis.
     pub spot_m: f64,
-    /// A point of the 3-D vibrometer on a specimen, m along each axis.
+    /// Position of a point of the 3-D vibrometer on a specimen, m along each axis.
     pub specimen_point_m: f64,
     /// Gain of each vibrometer and axis, relative.
     pub gain: f64,
-    /// Gain of the hammer's force cell, relative: k_T is in proportion to it.
+    /// Gain of the hammer's force cell, relative: k_T is proportional to it.
     pub hammer_gain: f64,
-    /// Delay of each vibrometer and axis against the hammer beyond what the device tells, s.
+    /// Delay of each vibrometer and axis relative to the hammer, beyond what the device reports, s.
     pub skew_s: f64,
 }
 
 impl Default for ContactPriors {
-    /// Spots placed to 0.05 mm, points on specimens to 0.3 mm, gains calibrated to 0.5 %, delays known to 2 µs.
+    /// Spots placed to 0.05 mm, points on specimens to 0.3 mm, gains calibrated to 0.5 %, delays
+    /// known to 2 µs.
     fn default() -> Self {
         ContactPriors {
             positions: Positions::default(),
@@ -35,19 +37,19 @@ impl Default for ContactPriors {
     }
 }
 
-/// Where an estimate's uncertainty comes from.
+/// Source of an estimate's uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Cause {
     /// Noise of the signals.
     Noise,
-    /// Where the spots beside the contact are.
+    /// Positions of the spots next to the contact.
     Spots,
-    /// Where the points on the specimens are.
+    /// Positions of the points on the specimens.
     SpecimenPoints,
-    /// Where the points on arm B are.
+    /// Positions of the points on arm B.
     ArmPoints,
-    /// How well hammer and vibrometer were aimed in each cell.
+    /// Aim of hammer and vibrometer in each cell.
     Aim,
     /// The tilt of the hammer in the hits on B alone.
     HammerTilt,

@@ -1,10 +1,11 @@
-//! One reading of the contact's compliance: what it says, and what it is uncertain by.
+//! One reading of the contact's compliance: its value and its uncertainties.
 
 use super::Known;
 use super::parameters::COMPLIANCE;
 use nalgebra::DVector;
 
-/// A level's compliance as it depends on the parameters of the hits' fit, and what else it is uncertain by.
+/// A level's compliance, its dependence on the parameters of the hits' fit, and its other
+/// uncertainties.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reading {
     /// The level's frequency, Hz.
@@ -15,13 +16,14 @@ pub struct Reading {
     pub row: DVector<f64>,
     /// Variance of the motions per newton at this frequency.
     pub turning: f64,
-    /// Of where the shaker pushes.
+    /// Variance due to where the shaker pushes.
     pub place: f64,
-    /// Of the level's own scatter.
+    /// Variance due to the scatter of the level itself.
     pub level: f64,
 }
 
-/// By how many standard deviations of the difference a level's compliance is apart from that of the hits.
+/// Difference between a level's compliance and that of the hits, in standard deviations of the
+/// difference.
 pub fn apart(known: &Known, reading: &Reading) -> f64 {
     let difference = &reading.row - unit(known);
     let own = reading.turning + reading.place + reading.level;
@@ -29,7 +31,7 @@ pub fn apart(known: &Known, reading: &Reading) -> f64 {
     (reading.compliance - known.p[COMPLIANCE]) / variance.sqrt()
 }
 
-/// The hits' own reading: the parameter itself.
+/// The derivatives of the hits' own reading, which is the parameter itself.
 pub fn unit(known: &Known) -> DVector<f64> {
     let mut unit = DVector::zeros(known.p.len());
     unit[COMPLIANCE] = 1.0;

@@ -1,4 +1,5 @@
-//! The most likely parameters: Gauss–Newton steps on the posterior, with the motion eliminated at every line.
+//! The most likely parameters: Gauss–Newton steps on the posterior, with the motion eliminated at
+//! every line.
 
 use super::ContactError;
 use super::bins::{Bin, Motion, evaluate, motions, summed};
@@ -10,54 +11,60 @@ use super::unexplained;
 use crate::frf::noise::shared_by_lines;
 use nalgebra::{DMatrix, DVector};
 
-/// Steps at most.
+/// Largest number of steps.
 const STEPS: usize = 60;
-/// The compliance moves less than this part of its standard deviation, and all parameters together lower the cost by less than this: done. One
-/// step alone can leave the compliance where it belongs by chance, and others, which it follows later, many standard deviations away.
+/// Convergence: the step changes the compliance by less than this fraction of its standard
+/// deviation, and all parameters together lower the cost by less than this. The first condition
+/// alone can hold by chance while others, which the compliance follows later, are many standard
+/// deviations away.
 const SETTLED: f64 = 0.01;
-/// Steps that leave the compliance where it is, after which what is left of the cost is that of the shifts' motion, which is always a pass old.
+/// Number of consecutive steps with an unchanged compliance after which the search ends: any
+/// further decrease of the cost then comes from the shifts' motion, which always lags by one pass.
 const AT_REST: usize = 4;
-/// A cost may rise by this part between passes: the shifts' motion is that of the pass before.
+/// Relative rise of the cost that is accepted between passes: the shifts' motion is that of the
+/// previous pass.
 const SLACK: f64 = 1e-3;
-/// A step damped by no more than this is the whole step.
+/// Damping up to which a step counts as undamped.
 const HARDLY_DAMPED: f64 = 1e-6;
 
-/// How often the noise is widened by what is left, at most.
+/// Largest number of times that the noise is widened by the residuals.
 const WIDENED: usize = 6;
 
-/// The most likely parameters, and how well they are known.
+/// The most likely parameters and their uncertainty.
 #[derive(Debug, Clone)]
 pub struct Solution {
     /// The parameters.
     pub p: Vec<f64>,
-    /// How well they are known.
+    /// Their uncertainty.
     pub certainty: Certainty,
-    /// What each block says in each bin, at these parameters.
+    /// Normal equations of each block and bin at these parameters.
     pub bins: Vec<Bin>,
-    /// By how much neighbouring lines share their noise.
+    /// Variance factor for the noise that neighbouring lines share.
     pub shared: f64,
     /// χ² per degree of freedom over all blocks.
     pub chi_square: f64,
 }
 
-/// A place on the way.
+/// A point of the search.
 struct Place {
     p: Vec<f64>,
     bins: Vec<Bin>,
     cost: f64,
 }
 
-/// The posterior with the noise as it stands.
+/// The posterior with the current noise.
 struct Posterior<'a> {
     blocks: &'a [Block],
     parameters: &'a Parameters,
     shared: f64,
 }
 
-/// Finds them. What the model leaves of a cell beyond its noise is counted as noise of that cell from then on.
+/// Finds the most likely parameters. Residuals of a cell beyond its noise are then counted as noise
+/// of that cell.
 ///
 /// # Errors
-/// [`ContactError::NotIdentified`] if the rows do not tell the motion or the parameters, or no minimum is reached.
+/// [`ContactError::NotIdentified`] if the rows do not determine the motion or the parameters, or no
+/// minimum is reached.
 pub fn solve(
     blocks: &mut [Block],
     parameters: &Parameters,
@@ -83,7 +90,7 @@ pub fn solve(
     Ok(Solution { p: here.p, certainty, bins: here.bins, shared, chi_square })
 }
 
-/// Where a search from `p` on ends, with the noise as it stands, and whether it came to rest.
+/// End of a search from `p` with the current noise, and whether it converged.
 #[cfg(test)]
 pub fn settled_from(
     blocks: &[Block],
@@ -96,9 +103,11 @@ pub fn settled_from(
 }
 
 impl Posterior<'_> {
-    /// Steps from `p` to the nearest minimum. The shifts' motion is that of the last place taken, so that a place's cost is not that of the
-    /// next one's motion: where a step seems to lead uphill, the place it left is asked again. And whether it is there: before the noise is
-    /// widened, cells that stray can keep it from coming to rest.
+    /// Steps from `p` to the nearest minimum; the flag states whether it converged. The shifts'
+    /// motion is that of the last accepted point, so the cost of a point is not computed with the
+    /// motion of the next. If a step seems to increase the cost, the current point is therefore
+    /// evaluated again with the new motion. Before the noise is widened, outlying cells can prevent
+    /// convergence.
     fn settle(&self, p: Vec<f64>) -> Result<(Place, bool), ContactError> {
         let mut motion = motions(self.blocks, &evaluate(self.blocks, &p, None)?);
         let mut here = self.place(p, &motion)?;
@@ -143,7 +152,8 @@ impl Posterior<'_> {
         Ok(Place { cost: prior + noise / self.shared, p, bins })
     }
 
-    /// Half the posterior's curvature, and its slope. |r|² is minus the logarithm of a complex noise's likelihood, half of (p/σ)² that of a prior's.
+    /// Half the posterior's curvature, and its gradient. |r|² is minus the log-likelihood of
+    /// complex noise; a prior contributes half of (p/σ)².
     fn normal(&self, at: &Place) -> (DMatrix<f64>, DVector<f64>) {
         let bins = at.bins.iter().map(|bin| (bin.block, &bin.normal));
         let (mut information, mut gradient) = summed(self.blocks, bins, at.p.len(), self.shared);
@@ -151,7 +161,7 @@ impl Posterior<'_> {
             if own.sigma.is_infinite() {
                 continue;
             }
-            // what is known exactly may not move at all
+            // an exactly known parameter must not move
             let precision = 0.5 / (own.sigma * own.sigma).max(f64::MIN_POSITIVE.sqrt());
             information[(i, i)] += precision;
             gradient[i] += precision * (p - own.start);

@@ -1,4 +1,5 @@
-//! Signals written down from motions that nobody solved for: the estimate must find the contact that was put in.
+//! Signals computed from prescribed motions, without solving a model: the estimate must recover the
+//! contact that was put in.
 
 use super::*;
 use crate::frf::MotionQuantity;
@@ -14,7 +15,8 @@ type C = Complex<f64>;
 
 pub(super) const K: f64 = 140e6;
 pub(super) const DAMPING: f64 = 2000.0;
-/// Of the force's form: stiffness beside the cells, mass and the lever of its centre, as no prior knows them.
+/// Terms of the force's form: stiffness parallel to the load cells, mass and the lever arm of its
+/// centre. No prior contains them.
 pub(super) const BESIDE: f64 = 6e6;
 pub(super) const MASS: f64 = 2.3;
 pub(super) const LEVER_M: f64 = -0.038;
@@ -29,17 +31,17 @@ pub(super) const SPECIMEN: [[f64; 3]; 6] = [
 ];
 pub(super) const SPOTS: [[f64; 3]; 2] = [[0.0006, 0.0005, 0.0], [0.0006, -0.0005, 0.0]];
 
-/// What may be wrong.
+/// The errors that a test introduces.
 #[derive(Clone, Copy)]
 struct World {
     noise_m_per_s: f64,
     /// Error of the spot on A, m.
     spot_m: f64,
-    /// A point on specimen A that stands this far from where it is said to be, m.
+    /// Distance of a point on specimen A from its stated position, m.
     misplaced_m: f64,
-    /// A bending mode that the first point on specimen A takes part in, Hz.
+    /// Frequency of a bending mode that the first point on specimen A takes part in, Hz.
     bends_hz: Option<f64>,
-    /// Of the noise.
+    /// Seed of the noise.
     seed: u64,
 }
 
@@ -69,7 +71,7 @@ fn measured(world: World) -> Vec<Cell> {
     for structure in [Structure::B, Structure::Ajb] {
         for impact in 0..if structure == Structure::B { 6 } else { 3 } {
             let along_z = if impact < 3 { -1.0 } else { 0.0 };
-            // compliances of six motions of B and six of A, and where each resonates
+            // compliances and resonance frequencies of six motions of B and six of A
             let draw: Vec<f64> = (0..24).map(|_| random.random::<f64>()).collect();
             let mode = |n: usize, s: C, scale: f64| {
                 let w = TAU * (150.0 + 900.0 * draw[n]);
@@ -102,7 +104,8 @@ fn measured(world: World) -> Vec<Cell> {
                         if on_specimen { moved(of_a, turn_a, at) } else { moved(of_b, turn_b, at) };
                     if let Some(bends) = world.bends_hz.filter(|_| on_specimen && point == points) {
                         let w = TAU * bends;
-                        // some per cent of the body's motion well below it, and as much as that beside it
+                        // a few per cent of the body's motion well below the mode, and about as
+                        // much as the body's motion near it
                         seen[2] -= 0.03 * seen[2] * s * s / (w * w + s * s + 0.02 * w * s);
                     }
                     let mut spot_a = SPOTS[0];
@@ -137,7 +140,7 @@ fn measured(world: World) -> Vec<Cell> {
     cells
 }
 
-/// What a single hit would give.
+/// The same cell with a single hit.
 fn single(spectra: &CrossSpectra) -> CrossSpectra {
     let lines = spectra.lines();
     let outputs = (0..spectra.outputs())
@@ -174,7 +177,7 @@ fn of(cell: &Cell) -> ContactCell<'_> {
 }
 
 fn input(cells: &[Cell]) -> Input<'_> {
-    // aims are exact here, and so are gains: what is tested is what the fit makes of spots, points and noise
+    // aims and gains are exact here: the test is of spots, points and noise
     let mut priors = ContactPriors { gain: 0.0, hammer_gain: 0.0, skew_s: 0.0, ..ContactPriors::default() };
     priors.positions.aim_m = 0.0;
     priors.positions.position_m = 1e-5;
@@ -201,7 +204,7 @@ fn without_noise_the_contact_is_found_to_a_thousandth() {
     let budget: f64 = found.budget.values().map(|share| share * share).sum();
     let [low, high] = found.k_t_n_per_m.ci95;
     let sigma = (low.recip() - high.recip()) / (2.0 * 1.96) * found.k_t_n_per_m.mean;
-    // 1.96 for the exact quantile
+    // 1.96 instead of the exact quantile
     assert!((sigma / budget.sqrt() - 1.0).abs() < 1e-3, "the budget adds up: {sigma} {budget}");
 }
 
@@ -216,7 +219,7 @@ fn a_spot_that_is_not_where_it_is_said_to_be_is_inside_the_interval() {
 
 #[test]
 fn the_interval_is_what_repeated_measurements_scatter_by() {
-    // noise of some fifth of the motions at a line, so that the motion itself is known through noise
+    // noise of about a fifth of the motion at each line, so that the motion itself is uncertain
     let deviations: Vec<f64> = (0..24)
         .map(|seed| {
             let world = World { noise_m_per_s: 2e-6, spot_m: 0.0, misplaced_m: 0.0, bends_hz: None, seed };
@@ -230,7 +233,7 @@ fn the_interval_is_what_repeated_measurements_scatter_by() {
         })
         .collect();
     let rms = (deviations.iter().map(|z| z * z).sum::<f64>() / deviations.len() as f64).sqrt();
-    // of 24 draws the rms scatters by 0.14; three of these either way
+    // the rms of 24 draws scatters by 0.14; three standard deviations either way
     assert!((0.58..1.42).contains(&rms), "{rms}: {deviations:?}");
 }
 
@@ -259,7 +262,7 @@ fn a_point_that_is_millimetres_off_is_doubted() {
     let cells = measured(World { misplaced_m: 4e-3, ..QUIET });
     let found = stiffness(&input(&cells)).expect("a fit, if a bad one");
     assert!(found.doubts.contains(&Doubt::SpecimenA), "{:?}", found.diagnosis);
-    // it weighs less, and the other five hold
+    // the point gets less weight, and the other five suffice
     assert!((found.k_t_n_per_m.mean / K - 1.0).abs() < 0.01, "{found:?}");
 }
 
@@ -273,7 +276,7 @@ fn where_a_specimen_bends_the_band_ends() {
     assert!(found.doubts.is_empty(), "{:?}", found.diagnosis);
     let [low, high] = found.k_t_n_per_m.ci95;
     assert!(low < K && K < high && high - low < 0.2 * K, "{found:?}");
-    // and what bends nowhere loses nothing
+    // a specimen that does not bend keeps the whole band
     assert_eq!(stiffness(&input(&measured(QUIET))).expect("all is there").band_hz, BAND);
 }
 
@@ -310,8 +313,8 @@ fn the_gain_of_the_hammer_widens_the_intervals_of_stiffness_and_damping_alike() 
     let half = |interval: Interval| 0.5 * (interval.ci95[1] - interval.ci95[0]) / interval.mean;
     let added =
         |of: fn(&Stiffness) -> Interval| (half(of(&uncertain)).powi(2) - half(of(&exact)).powi(2)).sqrt();
-    // 95 % of a normal distribution of 5 % standard deviation
+    // 95 % interval of a normal distribution with a standard deviation of 5 %
     assert!((added(|found| found.c_t_n_s_per_m) / (1.96 * 0.05) - 1.0).abs() < 1e-3);
-    // that of k_T is inverted from the compliance's, which is wider on one side
+    // the interval of k_T is that of the compliance, inverted, so one side is wider
     assert!((added(|found| found.k_t_n_per_m) / (1.96 * 0.05) - 1.0).abs() < 0.02);
 }

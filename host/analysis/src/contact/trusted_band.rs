@@ -1,19 +1,23 @@
-//! The band in which the model holds: beyond it an arm or a specimen bends, or the load cells' calibration ends.
+//! The band in which the model holds: beyond it an arm or a specimen bends, or the load cells'
+//! calibration ends.
 //!
-//! The bodies are rigid up to their first bending mode, and nobody knows where that is before it is measured. What the fit of the
-//! whole band leaves tells: where it contradicts the model at one end of the band, the lines there say nothing of the contact, and are left
-//! out. Only ends are: a contradiction in the middle is a point that is not where it is said to be, or a loose one, and stays a doubt.
+//! The bodies are rigid up to their first bending mode, whose frequency is unknown before the
+//! measurement. The residuals of a fit over the whole band show it: if they contradict the model at
+//! one end of the band, the lines there carry no information on the contact and are left out. Only
+//! the ends are removed. A contradiction in the middle means that a point is misplaced or loose,
+//! and stays a doubt.
 
 use super::bins::{BIN_HZ, Bin};
 use super::block::Block;
 use super::diagnosis::Signals;
 use crate::band::Band;
 
-/// Less than this of a band says too little of a stiffness and a damping, Hz; what strays everywhere is no matter of the band.
+/// A narrower band hardly determines a stiffness and a damping, Hz. A contradiction at all
+/// frequencies is not a matter of the band.
 const NARROWEST_HZ: f64 = 200.0;
 
-/// The band without the ends in which what the hits leave contradicts the model; the whole where too little would remain, or nothing
-/// strays.
+/// The band without the ends at which the residuals contradict the model; the whole band if too
+/// little would remain or nothing contradicts.
 pub fn trusted(blocks: &[Block], bins: &[Bin], whole: Band) -> Band {
     let mut lows: Vec<f64> = bins.iter().map(|bin| bin.low_hz).collect();
     lows.sort_by(f64::total_cmp);

@@ -1,21 +1,26 @@
-//! What the model leaves of a cell beyond its noise: errors of aim that other impacts do not show, a bad hit, a point that is not where it is said to be.
+//! Residuals of a cell beyond its noise: aim errors that other impacts do not show, a bad hit, a
+//! misplaced point.
 //!
-//! It goes with the signal, so it is counted as noise in proportion to it, cell by cell and instrument by instrument, as much as makes the
-//! residual what it should be. A cell that strays thus weighs less; the others say what they said.
+//! Such residuals are proportional to the signal. They are therefore counted as noise proportional
+//! to it, separately for each cell and instrument, with the fraction that brings the residual to
+//! its expected value. An outlying cell thus gets less weight; the weights of the others stay the
+//! same.
 
 use super::block::Block;
 use super::line::Residual;
 
-/// χ² per degree of freedom above which a cell is not described down to its noise. A cell has some fifty degrees of freedom, so that its χ²
-/// scatters by 0.2.
+/// χ² per degree of freedom above which the noise does not explain the residuals of a cell. A cell
+/// has about fifty degrees of freedom, so its χ² scatters by 0.2.
 const STRAYS: f64 = 1.6;
-/// The part of the signal is found to this relative accuracy.
+/// Relative accuracy to which the fraction of the signal is found.
 const ACCURACY: f64 = 0.03;
 
-/// One row of one line: |r|², what it should be over the noise's variance, the noise's variance without any addition, |value|².
+/// One row of one line: |r|², its expected value divided by the noise variance, the noise variance
+/// without any addition, |value|².
 type Seen = [f64; 4];
 
-/// Widens the noise where it is needed, from what is left of each block's lines; whether anything changed by enough to fit again.
+/// Widens the noise where needed, from the residuals of each block's lines; returns whether a
+/// change was large enough to fit again.
 pub fn widen(blocks: &mut [Block], left: &[(usize, &Residual)]) -> bool {
     let mut changed = false;
     for (b, block) in blocks.iter_mut().enumerate() {
@@ -53,7 +58,8 @@ pub fn widen(blocks: &mut [Block], left: &[(usize, &Residual)]) -> bool {
     changed
 }
 
-/// The part of the signal that must be added to the noise for χ² to be what it should be; none while it is near enough.
+/// The fraction of the signal to be added to the noise so that χ² has its expected value; 0 if χ²
+/// is close enough already.
 fn part_of_signal(seen: &[Seen]) -> f64 {
     let expected: f64 = seen.iter().map(|[_, free, ..]| free).sum();
     let chi = |part: f64| -> f64 {
@@ -84,7 +90,7 @@ mod tests {
 
     #[test]
     fn what_is_left_in_proportion_to_the_signal_is_found() {
-        // variance 1, signals of 10 to 1000, 2 % of them left beside the noise
+        // variance 1, signals of 10 to 1000, a residual of 2 % of the signal in addition to noise
         let seen: Vec<[f64; 4]> = (0..60)
             .map(|i| {
                 let signal: f64 = 10_f64.powf(1.0 + f64::from(i) / 30.0);

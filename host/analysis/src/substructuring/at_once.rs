@@ -1,5 +1,5 @@
-//! All methods at several lines at once: what they share is read and computed once, and what is near rank loss is left to the
-//! careful way, line by line.
+//! All methods at several lines simultaneously: shared intermediate results are read and computed
+//! once; lines near rank loss are recomputed one by one with pivoted decompositions.
 
 use super::decoupling::{InverseBlock, PrimalBlock};
 use super::interface_data::{balance, scaled};
@@ -16,28 +16,28 @@ use std::cell::OnceCell;
 
 type Line = DMatrix<Complex<f64>>;
 
-/// What was found at all lines.
+/// Results of all lines.
 pub(super) struct Found {
-    /// Y^A and Y^B, rotations in metres; nothing where they were not asked for.
+    /// Y^A and Y^B, rotations in metres; empty if not requested.
     pub(super) alone: Vec<Vec<Line>>,
-    /// Z^J by each work.
+    /// Z^J of each work item.
     pub(super) z: Vec<Result<Vec<Line>, RefusedReason>>,
 }
 
-/// What is to be found.
+/// The requested results.
 pub(super) struct Job<'a> {
     pub(super) reduced: &'a Reduced,
     pub(super) rooms: &'a Rooms<'a>,
     pub(super) works: Vec<&'a Work<'a>>,
-    /// Whether Y^A and Y^B are wanted too.
+    /// Whether Y^A and Y^B are requested too.
     pub(super) alone: bool,
 }
 
 impl Job<'_> {
-    /// Z^J of every line by every work.
+    /// Z^J of every line for every work item.
     ///
     /// # Errors
-    /// Y^A or Y^B has a value that is no number.
+    /// Y^A or Y^B contains a value that is not finite.
     pub(super) fn found(&self) -> Result<Found, RefusedReason> {
         let lines = self.rooms.a.frf.lines().len();
         let places = |count| vec![vec![Line::zeros(0, 0); lines]; count];
@@ -50,7 +50,7 @@ impl Job<'_> {
         }
         let mut z: Vec<Result<Vec<Line>, RefusedReason>> = z.into_iter().map(Ok).collect();
         for (work, z) in z.iter_mut().enumerate() {
-            // the first line of those that have the earliest stage
+            // the first line among those with the earliest stage
             let of_work = refused.iter().flat_map(|refused| &refused.z).filter(|(of, _)| *of == work);
             if let Some((_, refusal)) = of_work.min_by_key(|(_, refusal)| refusal.stage) {
                 *z = Err(refusal.reason.clone());
@@ -60,24 +60,25 @@ impl Job<'_> {
     }
 }
 
-/// What could not be found at some lines: which of Y^A and Y^B, and by which work.
+/// Lines without a result: for Y^A and Y^B, and by work item.
 #[derive(Default)]
 pub(super) struct RefusedLines {
     alone: [Vec<usize>; 2],
     z: Vec<(usize, Refusal)>,
 }
 
-/// Where to put what is found.
+/// Destination of the results.
 struct Into<'a> {
     job: &'a Job<'a>,
     alone: &'a mut [Vec<Line>],
     z: &'a mut [Vec<Line>],
 }
 
-/// So many vectors are one share of the work: enough for the memory that it asks for to pay, few enough for all cores to have some.
+/// Vectors per parallel task: enough to be worth the memory that a task allocates, few enough that
+/// all cores get some.
 const SHARE: usize = 16;
 
-/// The places of some lines in each of several results.
+/// The entries of some lines in each of several results.
 type Places<'a> = Vec<&'a mut [Line]>;
 
 impl WithSimd for Into<'_> {
@@ -101,7 +102,8 @@ impl WithSimd for Into<'_> {
             .enumerate()
             .map(|(share, [mut alone, mut z])| {
                 let (pool, mut refused) = (Pool::new(simd), RefusedLines::default());
-                // what is one after the other in a result is so in memory, too: whoever goes through it later need not jump
+                // allocate the matrices of a result one after the other, so that later passes read
+                // memory sequentially
                 let n = self.job.reduced.idms.count();
                 for place in alone.iter_mut().chain(&mut z).flat_map(|places| places.iter_mut()) {
                     *place = Line::zeros(n, n);
@@ -118,19 +120,19 @@ impl WithSimd for Into<'_> {
     }
 }
 
-/// A matrix of each line, and where it is beyond doubt.
+/// A matrix of each line, and the lines at which its rank is beyond doubt.
 type Surely<'p, S> = (Matrix<'p, S>, Sure<S>);
 
 /// The lines of one vector.
 struct AtOnce<'a, S: Simd> {
     pool: &'a Pool<S>,
     job: &'a Job<'a>,
-    /// The first line, and how many there are.
+    /// The first line, and the number of lines.
     first: usize,
     count: usize,
     /// Y^A and Y^B.
     alone: [Matrix<'a, S>; 2],
-    /// Y^AJB_cc and its inverse: five methods share them.
+    /// Y^AJB_cc and its inverse, shared by five methods.
     assembly: OnceCell<Option<Matrix<'a, S>>>,
     impedance: OnceCell<Option<Surely<'a, S>>>,
 }
@@ -150,7 +152,7 @@ impl<'a, S: Simd> AtOnce<'a, S> {
         Some(AtOnce { pool, job, first, count, alone, assembly: OnceCell::new(), impedance: OnceCell::new() })
     }
 
-    /// Puts what is found at the places from `at` on.
+    /// Stores the results in the entries from `at` on.
     fn put(&self, at: usize, alone: &mut Places<'_>, z: &mut Places<'_>, refused: &mut RefusedLines) {
         let Job { reduced, rooms, works, .. } = self.job;
         let mut numbers = Sure::all(self.pool.simd);
@@ -189,7 +191,8 @@ impl<'a, S: Simd> AtOnce<'a, S> {
         }
     }
 
-    /// What a method finds; nothing where the careful way shall say why.
+    /// The result of a method; none if the line-by-line computation has to find the reason of a
+    /// refusal.
     fn by(&self, work: &Work<'_>) -> Option<Surely<'a, S>> {
         let n = self.job.reduced.idms.count();
         let [y_a, y_b] = &self.alone;
@@ -244,7 +247,7 @@ impl<'a, S: Simd> AtOnce<'a, S> {
         Some((inverse(without(g), &mut sure), sure))
     }
 
-    /// Y^AJB_cc; nothing where a virtual point cannot be formed.
+    /// Y^AJB_cc; none if a virtual point cannot be formed.
     fn assembly(&self) -> Option<&Matrix<'a, S>> {
         let found = self.assembly.get_or_init(|| {
             let Job { reduced, rooms, .. } = self.job;

@@ -1,4 +1,5 @@
-//! The proof of the pudding: A and B coupled by the identified joint must be the measured assembly.
+//! Check of the result: A and B coupled by the identified joint must reproduce the measured
+//! assembly.
 
 use super::coupling::{boolean_difference, couple};
 use super::joint_over_bands::stiffness_and_damping;
@@ -10,18 +11,20 @@ use nalgebra::{Complex, DMatrix};
 
 type Line = DMatrix<Complex<f64>>;
 
-/// How far the coupled assembly is from the measured one, line by line.
+/// Difference between the coupled and the measured assembly, line by line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BackCoupling {
     /// Lines, Hz.
     pub frequency_hz: Vec<f64>,
-    /// (coupled − measured) / ‖measured‖ at both virtual points (2n_c × 2n_c), rotations in metres over 40 mm.
+    /// (coupled − measured) / ‖measured‖ at both virtual points (2n_c × 2n_c), rotations in metres
+    /// over 40 mm.
     pub difference: Vec<Line>,
 }
 
 impl BackCoupling {
-    /// Couples Y^A and Y^B (n_c × n_c) by Eq. (1) with one spring and damper for all lines, K + sC: the mean of `z` over `band`.
-    /// Admittances are of the quantity of `axis`. None when no line lies in the band, or the mean joint has no inverse.
+    /// Couples Y^A and Y^B (n_c × n_c) by Eq. (1) with one spring and damper for all lines, K + sC:
+    /// the mean of `z` over `band`. Admittances are in the quantity of `axis`. None if no line lies
+    /// in the band or the mean joint has no inverse.
     pub fn of(
         axis: &Frf,
         y_a: &[Line],

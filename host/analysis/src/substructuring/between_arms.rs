@@ -1,29 +1,36 @@
-//! The stiffness between the arms along z: one of two estimates, or a reason why neither can be given.
+//! The stiffness between the arms along z: one of two estimates, or the reason why neither can be
+//! given.
 //!
-//! `fit` knows more: what is wrong alike in all cells and configurations, and the noise of all three; and its model fails loudly. The
-//! recommended estimate (Eq. A.1, averaged) needs the assembly only. It answers where the fit's model holds but leaves too wide an
-//! interval. Where the fit's model failed, or no fit looked, it does not: on random rigs with a lever between clamp and contact, or whose
-//! specimen resonates between the arms, it was wrong by up to a third, with an interval of 4 %.
+//! `fit` uses more information: errors that are common to all cells and configurations, and the
+//! noise of all three configurations. If its model does not hold, the fit detects it. The
+//! recommended estimate (Eq. A.1, averaged) needs the assembly only. It is used if the fit's model
+//! holds but its interval is too wide. It is not used if the fit's model failed or no fit was made:
+//! on random rigs with a lever between clamp and contact, or with a specimen that resonates between
+//! the arms, it was wrong by up to a third, with an interval of 4 %.
 //!
-//! What both estimate is the static compliance along z of everything between the virtual points, contact and clamps in series, their
-//! tilts with their levers included: 1/C_zz. The form of the joint in `fit` is the diagonal one: against the arms' inertia the
-//! joint's rotations push back with next to nothing, so that z feels the couplings of a leaning clamp through a lever of hundredths
-//! of a millimetre, and the full form spends thirty parameters more on it.
+//! Both estimate the static compliance along z of everything between the virtual points, contact
+//! and clamps in series, including the tilt of the clamps with their lever arms: 1/C_zz. `fit` uses
+//! the diagonal form of the joint. The joint's rotational stiffnesses are negligible against the
+//! arms' inertia, so the couplings of a leaning clamp act on z through a lever arm of hundredths of
+//! a millimetre only, and the full form would spend thirty more parameters on them.
 
 use super::averaged::Averaged;
 use super::fit::{FitError, Fitted};
 use super::idm::Dof;
 use serde::Serialize;
 
-/// χ² per degree of freedom up to which a fit is believed; its interval is widened by the root of it.
+/// χ² per degree of freedom up to which a fit is accepted; its interval is widened by the square
+/// root of it.
 pub const BELIEVED: f64 = 4.0;
-/// The recommended estimate is given up where noise alone would have moved it by more than this fraction of it: a correction that large
-/// is drawn at FRFs that are as noisy as itself, and there it has been wrong by as much.
+/// The recommended estimate is rejected if noise alone would have changed it by more than this
+/// fraction. A correction that large is computed from FRFs with noise of the same size, and was
+/// found to be wrong by as much.
 pub const MOVED: f64 = 0.05;
-/// Two answers further apart than this many standard deviations of their difference contradict each other.
+/// Two results contradict each other if they differ by more than this many standard deviations of
+/// their difference.
 const APART: f64 = 4.0;
 
-/// Which estimate the answer is.
+/// The estimate that the result is taken from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Basis {
@@ -36,15 +43,15 @@ pub enum Basis {
 /// The stiffness between the arms along z.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct BetweenArms {
-    /// N/m.
+    /// Stiffness, N/m.
     pub stiffness_n_per_m: f64,
     /// Its 95 % interval, N/m.
     pub ci95: [f64; 2],
-    /// Which estimate it is.
+    /// The estimate that it is taken from.
     pub basis: Basis,
 }
 
-/// Why an estimate gives no stiffness along z.
+/// The reason why an estimate gives no stiffness along z.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Unfit {
@@ -63,12 +70,12 @@ pub enum Unfit {
         /// χ² per degree of freedom.
         chi_square: f64,
     },
-    /// Nobody looked whether its model holds.
+    /// No fit has tested its model.
     #[error(
         "nothing says whether a spring and a damper are all that lies between the arms: measure A and B alone as well"
     )]
     Unchecked,
-    /// It stands on the model that failed in the fit.
+    /// It relies on the model that failed in the fit.
     #[error("it would be the mean of what is no spring and damper")]
     SameModel,
     /// Noise or errors of geometry leave no narrow interval.
@@ -77,34 +84,34 @@ pub enum Unfit {
         /// The lower limit that is left, N/m.
         low_n_per_m: f64,
     },
-    /// The noise of the FRFs is not known, so the interval would hold half of the errors only.
+    /// The noise of the FRFs is not known, so the interval would contain only part of the errors.
     #[error("the noise of the FRFs is not known")]
     NoiseUnknown,
-    /// Noise moves the estimate by more than can be corrected.
+    /// Noise changes the estimate by more than can be corrected.
     #[error("noise alone moves it by {:.0} %, and so large a correction is not known", fraction * 100.0)]
     Moved {
-        /// Of the stiffness.
+        /// Fraction of the stiffness.
         fraction: f64,
     },
 }
 
 impl Unfit {
-    /// Whether the model failed, and not the data's precision.
+    /// Whether the model failed, as opposed to the data being too imprecise.
     fn is_model(&self) -> bool {
         matches!(self, Unfit::Misfit { .. } | Unfit::Failed(FitError::Misfit { .. }))
     }
 }
 
-/// Why there is no stiffness between the arms.
+/// The reason why there is no stiffness between the arms.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoStiffness {
     /// Neither estimate holds.
     #[error("not identified: by the fit, {fit}; by the assembly alone, {recommended}")]
     Neither {
-        /// Why not by the fit.
+        /// Why the fit gives none.
         fit: Unfit,
-        /// Why not by the recommended estimate.
+        /// Why the recommended estimate gives none.
         recommended: Unfit,
     },
     /// Both hold, and contradict each other.
@@ -113,24 +120,25 @@ pub enum NoStiffness {
         fit_n_per_m * 1e-6, recommended_n_per_m * 1e-6
     )]
     Contradiction {
-        /// N/m.
+        /// Stiffness from the fit, N/m.
         fit_n_per_m: f64,
-        /// N/m.
+        /// The recommended estimate, N/m.
         recommended_n_per_m: f64,
     },
 }
 
-/// Decides between the outcome of [`fit`](super::fit::fit) and the recommended estimate, of the same band and modes; `None` where one was not
-/// made.
+/// Decides between the outcome of [`fit`](super::fit::fit) and the recommended estimate for the
+/// same band and modes; `None` if one was not made.
 ///
 /// # Errors
-/// [`NoStiffness`] where neither holds, or both contradict each other.
+/// [`NoStiffness`] if neither holds, or both contradict each other.
 pub fn between_arms(
     fit: Option<Result<&Fitted, &FitError>>,
     recommended: Option<&Averaged>,
 ) -> Result<BetweenArms, NoStiffness> {
     match (by_fit(fit), by_assembly(recommended)) {
-        // a specimen that resonates between the arms leaves the mean of a compliance narrow and wrong
+        // with a specimen that resonates between the arms the mean compliance has a narrow interval
+        // and is wrong
         (Err(misfit), _) if misfit.is_model() => {
             Err(NoStiffness::Neither { fit: misfit, recommended: Unfit::SameModel })
         }
@@ -174,7 +182,8 @@ fn by_assembly(recommended: Option<&Averaged>) -> Result<BetweenArms, Unfit> {
     Ok(BetweenArms { stiffness_n_per_m: z.stiffness, ci95: z.ci95, basis: Basis::Recommended })
 }
 
-/// The difference of the two compliances in its standard deviations: in compliance both are nearly normal.
+/// The difference of the two compliances in standard deviations: as compliances both are nearly
+/// normally distributed.
 fn apart(one: &BetweenArms, other: &BetweenArms) -> f64 {
     let compliance = |b: &BetweenArms| {
         let [low, high] = b.ci95.map(f64::recip);

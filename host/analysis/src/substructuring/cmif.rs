@@ -1,7 +1,9 @@
-//! The CMIF of the paper's Eq. (B.1): which motions the joint adds, and so which interface deformation modes it needs.
+//! The CMIF of the paper's Eq. (B.1): which motions the joint adds, and so which interface
+//! deformation modes it needs.
 //!
-//! The singular values of Y^AJB − blkdiag(Y^A, Y^B) show per line how many independent motions the coupling changes; each left
-//! vector, projected onto the rigid motions of both virtual points, says which.
+//! The singular values of Y^AJB − blkdiag(Y^A, Y^B) show per line how many independent motions the
+//! coupling changes; the projection of each left vector onto the rigid motions of both virtual
+//! points shows which.
 
 use super::geometry::{Geometry, Grouping};
 use super::idm::{Dof, IdmSet, rigid_row};
@@ -13,29 +15,31 @@ use nalgebra::{Complex, DMatrix, DVector, Vector3};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// A set that explains this fraction of what all six motions explain is enough.
+/// A set is sufficient if it explains this fraction of what all six motions explain.
 const ENOUGH: f64 = 0.95;
 
-/// Singular values and what they are made of, line by line.
+/// Singular values and participation of the motions, line by line.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cmif {
     /// Lines, Hz.
     pub frequency_hz: Vec<f64>,
     /// Singular values per line, m/N, largest first.
     pub singular_values: Vec<Vec<f64>>,
-    /// Participation \[line\]\[vector\]\[motion x, y, z, rx, ry, rz\] of each left vector: by how much its square shrinks when both virtual
-    /// points lose that motion; 0…1.
+    /// Participation \[line\]\[vector\]\[motion x, y, z, rx, ry, rz\] of each left vector: the
+    /// decrease of its squared projection if both virtual points lose that motion; 0…1.
     pub participation: Vec<Vec<[f64; 6]>>,
-    /// What the sets explain of the whole, by size 2, 4, 6, weighted with the squares of the singular values; 0…1.
+    /// Fraction of the whole that sets of size 2, 4, 6 explain, weighted with the squares of the
+    /// singular values; 0…1.
     pub explained: BTreeMap<usize, f64>,
     /// Number of modes suggested.
     pub suggested: usize,
-    /// Why.
+    /// The reason, as a sentence.
     pub reason: String,
 }
 
 impl Cmif {
-    /// Mean participation of each vector over the lines of `band`, over all lines where it has none.
+    /// Mean participation of each vector over the lines of `band`, or over all lines if it contains
+    /// none.
     pub fn participation_over(&self, band: Band) -> Vec<[f64; 6]> {
         let inside: Vec<&Vec<[f64; 6]>> = (self.frequency_hz.iter().zip(&self.participation))
             .filter(|(f, _)| band.contains(**f))
@@ -49,20 +53,21 @@ impl Cmif {
     }
 }
 
-/// Singular values, participation of their left vectors, and what the three sets and everything explain of the whole.
+/// Singular values, participation of their left vectors, and the power explained by the three sets
+/// and in total.
 type OneLine = (Vec<f64>, Vec<[f64; 6]>, [f64; 4]);
 
-/// Left vectors per line that are looked at: twelve interface motions at most.
+/// Left vectors evaluated per line: there are at most twelve interface motions.
 const VECTORS: usize = 12;
 
-/// The CMIF of the assembly against its parts; rows and columns are matched by name, and the substructures' internals count too.
-/// Responses that only the assembly has are left out, and so are spare ones (Grouping 3), which no virtual point uses, and points on
-/// specimens (5 and 6).
+/// The CMIF of the assembly minus its parts; rows and columns are matched by name, and the
+/// substructures' internals count too. Left out are responses that only the assembly has, spare
+/// responses (Grouping 3), which no virtual point uses, and points on specimens (5 and 6).
 ///
 /// Implements Eq. (B.1).
 ///
 /// # Errors
-/// A value that is not a number, a name that stands twice, or lines that differ in number.
+/// A value that is not a number, a duplicate name, or a different number of lines.
 pub fn cmif(a: &Frf, b: &Frf, ajb: &Frf, geometry: &Geometry) -> Result<Cmif, FrfError> {
     let difference = difference(a, b, ajb)?;
     let rigid = rigid_motions(difference.outputs(), geometry);
@@ -100,7 +105,7 @@ pub fn cmif(a: &Frf, b: &Frf, ajb: &Frf, geometry: &Geometry) -> Result<Cmif, Fr
         .collect();
     let mut total = [0.0; 4];
     for (_, _, explained) in &lines {
-        // every line counts alike, or resonances would decide alone
+        // every line has the same weight, otherwise resonances would dominate
         if explained[3] > 0.0 {
             total
                 .iter_mut()
@@ -166,7 +171,8 @@ fn difference(a: &Frf, b: &Frf, ajb: &Frf) -> Result<Frf, FrfError> {
     Ok(difference)
 }
 
-/// Rigid motions of both virtual points at the assembly's channels: one column per point and motion.
+/// Rigid motions of both virtual points at the assembly's channels: one column per point and
+/// motion.
 struct Rigid {
     columns: DMatrix<f64>,
 }
@@ -180,7 +186,7 @@ fn rigid_motions(outputs: &[String], geometry: &Geometry) -> Rigid {
         let (side, origin) = match point.grouping {
             Grouping::InterfaceA | Grouping::InternalA => (0, geometry.virtual_point_a_m),
             Grouping::InterfaceB | Grouping::InternalB => (6, geometry.virtual_point_b_m),
-            // moves with no virtual point
+            // belongs to no virtual point
             Grouping::SpecimenA | Grouping::SpecimenB => continue,
         };
         let motion = rigid_row(point.direction(), point.position() - Vector3::from(origin));

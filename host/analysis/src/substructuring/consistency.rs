@@ -1,8 +1,10 @@
-//! How rigid the interface is: what a virtual point keeps of the measured motion and force.
+//! How rigid the interface is: the part of the measured motion and force that a virtual point
+//! retains.
 //!
-//! u = Y 1 (the responses of a group to the sum of its impacts) is filtered through the virtual point,
-//! u_f = R_u T_u u; impacts likewise with y = 1ᵀ Y, y_f = y T_f R_fᵀ. Overall consistency is |u_f| / |u| of a line,
-//! specific consistency of a channel the mean over lines of coh(u_f, u). This is pyFBS's definition.
+//! u = Y 1 (the responses of a group to the sum of its impacts) is filtered through the virtual
+//! point, u_f = R_u T_u u; impacts likewise with y = 1ᵀ Y, y_f = y T_f R_fᵀ. Overall consistency is
+//! |u_f| / |u| of a line, specific consistency of a channel the mean over lines of coh(u_f, u).
+//! This is pyFBS's definition.
 
 use super::product::product;
 use super::vpt::Transformation;
@@ -10,7 +12,8 @@ use crate::parallel;
 use nalgebra::{Complex, DMatrix, DVector};
 use serde::Serialize;
 
-/// Consistency of one group of channels and impacts. All values lie between 0 and 1 (to rounding, unweighted).
+/// Consistency of one group of channels and impacts. All values lie between 0 and 1 (to rounding,
+/// unweighted).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Consistency {
     /// |u_f| / |u| per line.
@@ -23,8 +26,8 @@ pub struct Consistency {
     pub specific_impact: Vec<f64>,
 }
 
-/// Consistency of FRFs `lines` (channel × impact each, any of the three quantities) with the transformations
-/// of the same channels and impacts.
+/// Consistency of FRFs `lines` (channel × impact each, any of the three quantities) with the
+/// transformations of the same channels and impacts.
 pub fn consistency(
     lines: &[DMatrix<Complex<f64>>],
     responses: &Transformation,
@@ -39,13 +42,15 @@ pub fn consistency(
     Consistency { overall_sensor, overall_impact, specific_sensor, specific_impact }
 }
 
-/// coh(x, y) = (x+y)(x+y)* / (2 (xx* + yy*)): 1 when equal, 0 when opposite, ½ when one of them is zero.
+/// coh(x, y) = (x+y)(x+y)* / (2 (xx* + yy*)): 1 when equal, 0 when opposite, ½ when one of them is
+/// zero.
 pub fn coherence_of(x: Complex<f64>, y: Complex<f64>) -> f64 {
     let power = 2.0 * (x.norm_sqr() + y.norm_sqr());
     if power == 0.0 { 1.0 } else { (x + y).norm_sqr() / power }
 }
 
-/// Overall consistency per line, and specific consistency per point, of the motions or forces `measured`.
+/// Overall consistency per line, and specific consistency per point, of the motions or forces
+/// `measured`.
 fn side(
     filter: &DMatrix<f64>,
     measured: impl Iterator<Item = DVector<Complex<f64>>>,

@@ -4,11 +4,11 @@ use super::pseudo_inverse::{RankLost, full_rank_inverse};
 use crate::frf::{Frf, FrfError};
 use nalgebra::{Complex, DMatrix};
 
-/// Why parts cannot be coupled.
+/// The reason why parts cannot be coupled.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CouplingError {
-    /// A name is missing or stands twice.
+    /// A name is missing or occurs twice.
     #[error(transparent)]
     Frf(#[from] FrfError),
     /// The parts are on different lines, in different quantities, or under different windows.
@@ -21,7 +21,7 @@ pub enum CouplingError {
         /// What differs.
         what: &'static str,
     },
-    /// A matrix has another shape than the others ask for.
+    /// A matrix does not have the required shape.
     #[error("{what} is {rows} × {columns}, {wanted_rows} × {wanted_columns} is needed")]
     Shape {
         /// Which matrix.
@@ -35,7 +35,7 @@ pub enum CouplingError {
         /// Columns needed.
         wanted_columns: usize,
     },
-    /// The interface flexibility is singular: one constraint says what others say already.
+    /// The interface flexibility is singular: a constraint is redundant.
     #[error(transparent)]
     Singular(#[from] RankLost),
 }
@@ -44,9 +44,9 @@ pub enum CouplingError {
 ///
 /// Implements Eq. (1).
 ///
-/// `y` (outputs × inputs) holds the uncoupled parts, `b_u` (m × outputs) and `b_f` (m × inputs) the signed Boolean
-/// matrices of the m couplings. With `joint` = Y^J (m × m) the interface gives way; without it this is the rigid coupling
-/// of LM-FBS, the limit Y^J = 0.
+/// `y` (outputs × inputs) holds the uncoupled parts, `b_u` (m × outputs) and `b_f` (m × inputs) the
+/// signed Boolean matrices of the m couplings. With `joint` = Y^J (m × m) the interface is
+/// compliant; without it this is the rigid coupling of LM-FBS, the limit Y^J = 0.
 ///
 /// # Errors
 /// Shapes that do not fit; redundant couplings.
@@ -80,10 +80,10 @@ pub fn couple(
     Ok(y - push * full_rank_inverse(&flexibility, "the interface flexibility B Y Bᵀ + Y^J")? * gap)
 }
 
-/// Parts in block-diagonal form; every output and input is called `part/name` afterwards.
+/// Combines parts in block-diagonal form; every output and input is named `part/name`.
 ///
 /// # Errors
-/// Parts that differ in lines, quantity or window; names that stand twice.
+/// Parts that differ in lines, quantity or window; duplicate names.
 pub fn block_diagonal(parts: &[(&str, &Frf)]) -> Result<Frf, CouplingError> {
     let (mut frequency_hz, mut sigma_per_s, mut quantity) =
         (&[][..], 0.0, super::MotionQuantity::Displacement);
@@ -120,15 +120,15 @@ pub fn block_diagonal(parts: &[(&str, &Frf)]) -> Result<Frf, CouplingError> {
     Ok(Frf::new(frequency_hz.to_vec(), sigma_per_s, quantity, outputs, inputs, lines)?)
 }
 
-/// \[I, −I\]: the first `n` degrees of freedom against the next.
+/// \[I, −I\]: the first `n` degrees of freedom minus the next `n`.
 pub fn boolean_difference(n: usize) -> DMatrix<f64> {
     DMatrix::from_fn(n, 2 * n, |r, c| f64::from(i8::from(c == r)) - f64::from(i8::from(c == n + r)))
 }
 
-/// The signed Boolean matrix whose row k says: `pairs[k].0` minus `pairs[k].1`, among `names`.
+/// The signed Boolean matrix whose row k is `pairs[k].0` minus `pairs[k].1`, among `names`.
 ///
 /// # Errors
-/// A name that is not there.
+/// A name that does not exist.
 pub fn boolean(names: &[String], pairs: &[(&str, &str)]) -> Result<DMatrix<f64>, CouplingError> {
     let mut b = DMatrix::zeros(pairs.len(), names.len());
     for (k, (plus, minus)) in pairs.iter().enumerate() {
@@ -150,7 +150,7 @@ mod tests {
     use super::*;
     use std::f64::consts::TAU;
 
-    /// Receptance of springs (n × n) and masses at f: (K − ω²M)⁻¹.
+    /// Receptance of springs (n × n) and masses at frequency f: (K − ω²M)⁻¹.
     fn receptance(k: &DMatrix<f64>, m: &DMatrix<f64>, f: f64) -> DMatrix<Complex<f64>> {
         let w = TAU * f;
         let z = DMatrix::from_fn(k.nrows(), k.ncols(), |r, c| {
@@ -173,7 +173,8 @@ mod tests {
         .expect("all agree")
     }
 
-    /// Two chains of two masses, coupled at one end of each, against the matrices of the whole.
+    /// Two chains of two masses, coupled at one end of each, compared with the matrices of the
+    /// whole.
     #[test]
     fn coupling_is_direct_assembly() {
         let lines = [40.0, 95.0, 210.0];

@@ -1,38 +1,41 @@
-//! T/Δx at the specimens as a joint of its own: the contact itself, whatever the clamp does.
+//! T/Δx at the specimens as a separate joint estimate: the contact itself, without the clamp in
+//! series.
 
 use super::joint_over_bands::{BandStatistic, stiffness_and_damping};
 use crate::band::Band;
 use num_complex::Complex;
 use std::f64::consts::TAU;
 
-/// Where T/Δx is looked for: above the drift of hammer and windows, below the first bending modes of the paper's arms.
+/// Band in which T/Δx is evaluated: above the drift of hammer and windows, below the first bending
+/// modes of the paper's arms.
 const SEARCH: Band = Band { low_hz: 100.0, high_hz: 600.0 };
-/// Width of the band that it is read over, Hz.
+/// Width of the band that is averaged, Hz.
 const WIDTH_HZ: f64 = 150.0;
-/// Lines averaged before a stiffness is read: 5 Hz at half-hertz lines.
+/// Lines averaged before the stiffness is computed: 5 Hz at half-hertz lines.
 const LINES: usize = 10;
-/// More scatter than this part of the mean is noise.
+/// Scatter relative to the mean above which the result is noise.
 const DROWNED: f64 = 0.5;
 
 /// Stiffness and damping of the contact along z.
 ///
-/// The band is the flattest: of all bands of 150 Hz between 100 and 600 Hz the one over which the stiffness scatters least against its mean. A
-/// local mode of a specimen, its tails, and noise all make it scatter, so that none has to be known beforehand.
+/// The band is the flattest one: of all bands of 150 Hz between 100 and 600 Hz, the one in which
+/// the stiffness scatters least relative to its mean. A local mode of a specimen, its tails, and
+/// noise all increase the scatter, so none of them has to be known beforehand.
 ///
-/// T is the load cells' sum: the static arm's inertia adds some per cent to it, growing with f².
+/// T is the load cells' sum: the static arm's inertia adds a few per cent to it, growing with f².
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Direct {
     /// K, N/m.
     pub stiffness_n_per_m: BandStatistic,
     /// C, N s/m.
     pub damping_n_s_per_m: BandStatistic,
-    /// Where it was read, Hz.
+    /// The band used, Hz.
     pub band_hz: Band,
     /// Lines used.
     pub lines: usize,
 }
 
-/// What some neighbouring lines say together.
+/// The mean of some neighbouring lines.
 struct Piece {
     band_hz: Band,
     stiffness: f64,
@@ -40,10 +43,11 @@ struct Piece {
 }
 
 impl Direct {
-    /// Z^J_z = 1/D from the compliance D = Δx/T (m/N, \[line\]) at the lines `frequency_hz` (Hz) on s = σ + iω; none where the band
-    /// holds too few lines.
+    /// Z^J_z = 1/D from the compliance D = Δx/T (m/N, \[line\]) at the lines `frequency_hz` (Hz) on
+    /// s = σ + iω; none if the band holds too few lines.
     ///
-    /// Δx is averaged over some lines before it is divided by, because 1/(D + n) falls where noise prevails.
+    /// Δx is averaged over some lines before the division, because 1/(D + n) falls where noise
+    /// prevails.
     pub fn of(frequency_hz: &[f64], compliance_m_per_n: &[Complex<f64>], sigma_per_s: f64) -> Option<Self> {
         let inside: Vec<usize> =
             (0..frequency_hz.len()).filter(|&l| SEARCH.contains(frequency_hz[l])).collect();
@@ -61,7 +65,7 @@ impl Direct {
         };
         let pieces: Vec<Piece> =
             inside.chunks(LINES).filter(|lines| lines.len() == LINES).filter_map(piece).collect();
-        // so many of them are as wide as the band; fewer lines than that are all that there is
+        // number of pieces that spans the width of the band; all pieces if they span less
         let wide = |pieces: &[Piece]| match pieces {
             [first, .., last] => last.band_hz.high_hz - first.band_hz.low_hz >= WIDTH_HZ,
             _ => false,
@@ -82,12 +86,12 @@ impl Direct {
             .min_by(|one, other| one.scatter().total_cmp(&other.scatter()))
     }
 
-    /// Standard deviation of the stiffness over its mean.
+    /// Standard deviation of the stiffness divided by its mean.
     fn scatter(&self) -> f64 {
         self.stiffness_n_per_m.std / self.stiffness_n_per_m.mean.abs()
     }
 
-    /// Whether Δx is buried in noise, so that no stiffness can be read from it.
+    /// Whether noise in Δx is so large that no stiffness can be determined.
     pub fn is_drowned(&self) -> bool {
         self.scatter() > DROWNED
     }
@@ -106,7 +110,8 @@ mod tests {
 
     const SIGMA: f64 = 2.3;
 
-    /// A contact of 180 N/µm with a resonance of strength `a` at 192 Hz between A and B, seen from one impact.
+    /// A contact of 180 N/µm with a resonance of strength `a` at 192 Hz between A and B, measured
+    /// from one impact.
     fn seen(a: f64) -> ContactCompliance {
         seen_at(a, 192.0)
     }
@@ -138,7 +143,7 @@ mod tests {
         let found = seen(0.05);
         let peak = found.imaginary_peak().expect("lines");
         assert!((peak.frequency_hz - 192.0).abs() < 1.5, "{peak:?}");
-        // far above the resonance its tail makes the contact look a little stiffer
+        // far above the resonance its tail makes the contact look slightly stiffer
         let k = direct(&found).stiffness_n_per_m.mean;
         assert!((180e6..184e6).contains(&k), "{k}");
         assert!(peak.stands_out(), "{peak:?}");
@@ -166,7 +171,7 @@ mod tests {
         let peak = found.imaginary_peak().expect("lines");
         assert!(!peak.stands_out() && peak.over_level < 0.01, "{peak:?}");
         let direct = direct(&found);
-        // exact but for rounding
+        // exact except for rounding
         assert!((direct.stiffness_n_per_m.mean / 180e6 - 1.0).abs() < 1e-9);
         assert_eq!(direct.lines, 310);
         assert_eq!(ContactCompliance::of_impacts(&[]), None);

@@ -1,4 +1,4 @@
-//! What tests start from: exact FRFs of two rigid bodies on suspensions, alone and joined by a known contact.
+//! Test data: exact FRFs of two rigid bodies on suspensions, alone and joined by a known contact.
 
 use super::geometry::{Configuration, Geometry, Grouping, Point};
 use crate::frf::{Frf, MotionQuantity};
@@ -9,10 +9,11 @@ type Line = DMatrix<Complex<f64>>;
 
 const SIGMA_PER_S: f64 = 2.3;
 const AXES: [(&str, [f64; 3]); 3] = [("x", [1.0, 0.0, 0.0]), ("y", [0.0, 1.0, 0.0]), ("z", [0.0, 0.0, 1.0])];
-/// Of the contact, N/m and N m/rad; its damping is 1.5e-5 s times as much.
+/// Stiffness of the contact, N/m and N m/rad; its damping is 1.5e-5 s times the stiffness.
 pub(super) const CONTACT: [f64; 6] = [180e6, 260e6, 180e6, 22.0, 10.0, 22.0];
 
-/// FRFs of A, B and AJB from 250 to 650 Hz, and the geometry of three sensors and nine impacts on each body.
+/// FRFs of A, B and AJB from 250 to 650 Hz, and the geometry of three sensors and nine impacts on
+/// each body.
 pub(super) fn rig() -> ([Frf; 3], Geometry) {
     let (a, b) = (side("A", Grouping::InterfaceA, 1.0), side("B", Grouping::InterfaceB, -1.0));
     let ajb = Configuration {
@@ -42,7 +43,7 @@ fn side(letter: &str, grouping: Grouping, z: f64) -> Configuration {
     Configuration { channels, impacts }
 }
 
-/// Motion of a point along its direction by the six motions of its body.
+/// Motion of a point along its direction for each of the six motions of its body.
 fn row(point: &Point, bodies: &std::ops::Range<usize>) -> Vec<Complex<f64>> {
     let (direction, moment) = (point.direction(), point.position().cross(&point.direction()));
     let of_body = [direction, moment].map(|v: Vector3<f64>| v.iter().copied().collect::<Vec<_>>()).concat();
@@ -50,7 +51,8 @@ fn row(point: &Point, bodies: &std::ops::Range<usize>) -> Vec<Complex<f64>> {
     bodies.clone().map(|d| Complex::from(if d / 6 * 6 == first { of_body[d - first] } else { 0.0 })).collect()
 }
 
-/// Mobilities of the bodies that these degrees of freedom belong to; both are joined by the contact.
+/// Mobilities of the bodies that have these degrees of freedom; if there are two, the contact joins
+/// them.
 fn frf(points: &Configuration, bodies: std::ops::Range<usize>) -> Frf {
     let matrix = |points: &[Point]| {
         let rows: Vec<_> = points.iter().flat_map(|p| row(p, &bodies)).collect();
@@ -71,7 +73,7 @@ fn frf(points: &Configuration, bodies: std::ops::Range<usize>) -> Frf {
                 z[(d + 6 * body, d + 6 - 6 * body)] = -joint;
             }
         }
-        // alone each body is a block of its own
+        // each body alone is a separate block
         let y = z.try_inverse().expect("damped");
         let y = y.view((bodies.start, bodies.start), (bodies.len(), bodies.len()));
         &seen * y * hit.transpose() * s

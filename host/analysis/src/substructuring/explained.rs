@@ -1,9 +1,12 @@
-//! Whether A and B, coupled by the joint found, are the measured assembly as well as noise and errors of geometry let them be.
+//! Whether A and B, coupled by the identified joint, reproduce the measured assembly within noise
+//! and errors of geometry.
 //!
-//! FBS takes A and B to be uncoupled but for the joint. Where another path couples them (springs to a common ground: the paper's
-//! rig above 800 Hz) or the joint is no spring and damper, back-coupling fails; but it also fails, by tens of per cent, when sensors and hits
-//! are half a millimetre off. So the same is done again with positions, aims, angles and noise drawn anew from what is assumed of
-//! them: by as much as the difference between coupled and measured assembly then moves, such errors may have made it.
+//! FBS assumes that A and B are coupled by the joint only. If another path couples them (springs to
+//! a common ground: the paper's rig above 800 Hz), or if the joint is not a spring and damper,
+//! back-coupling fails. It also fails, by tens of per cent, if sensors and hits are half a
+//! millimetre off. Therefore the calculation is repeated with positions, aims, angles and noise
+//! drawn from their assumed distributions. The resulting change of the difference between coupled
+//! and measured assembly is the part that such errors explain.
 
 use super::averaged::Priors;
 use super::geometry::{Configuration, Geometry, Point};
@@ -19,35 +22,38 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::collections::HashMap;
 
-/// Lines that are looked at: resonances are wider than their distance.
+/// Largest number of lines evaluated: resonances are wider than their spacing.
 const LINES: usize = 400;
-/// Draws: their mean square is known to a quarter or so.
+/// Number of draws: their mean square is then known to about a quarter.
 const DRAWS: u64 = 12;
-/// Fixed, so that the same data give the same figures.
+/// Fixed seed, so that the same data give the same values.
 const SEED: u64 = 0x6261_636b;
-/// Lines within ± this many Hz are judged together by their median: a single resonance, which errors of position move, decides nothing.
+/// Lines within ± this many Hz are judged together by their median, so that a single resonance,
+/// which errors of position shift, does not decide.
 const AROUND_HZ: f64 = 75.0;
-/// An error up to this many times what is explained is nothing: a dozen draws and a handful of resonances know no better.
+/// An error up to this many times the explained one is not significant: a dozen draws and a few
+/// resonances allow no finer distinction.
 pub const USUAL: f64 = 2.0;
-/// An error this many times what is explained is another thing.
+/// An error of more than this many times the explained one has another cause.
 pub const BEYOND: f64 = 6.0;
-/// An error below this part of the assembly's admittance matters to nobody.
+/// An error below this fraction of the assembly's admittance is negligible.
 const SMALL: f64 = 0.05;
 
-/// Error of back-coupling, and how much of it noise and errors of geometry explain.
+/// Error of back-coupling, and the part of it that noise and errors of geometry explain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Explained {
     /// Lines, Hz.
     pub frequency_hz: Vec<f64>,
-    /// ‖coupled − measured‖ / ‖measured‖ at both virtual points, the median around each line.
+    /// ‖coupled − measured‖ / ‖measured‖ at both virtual points, median around each line.
     pub error: Vec<f64>,
-    /// What drawn errors change the difference by, root mean square, in the same unit.
+    /// Root mean square change of the difference due to the drawn errors, in the same unit.
     pub explained: Vec<f64>,
 }
 
 impl Explained {
-    /// Couples A and B by the mean of Eq. (A.1) over `band`, at the nominal geometry and at drawn ones. Noise that is not known is not
-    /// drawn. None where the virtual points cannot be formed or no line lies in the band.
+    /// Couples A and B by the mean of Eq. (A.1) over `band`, at the nominal geometry and at drawn
+    /// ones. Noise is drawn only if it is known. None if the virtual points cannot be formed or no
+    /// line lies in the band.
     pub fn of(
         frfs: [&Frf; 3],
         geometry: &Geometry,
@@ -57,7 +63,7 @@ impl Explained {
     ) -> Option<Explained> {
         let [a, b, ajb] = frfs.map(thinned);
         let nominal = back_coupled([&a, &b, &ajb], geometry, idms, band)?;
-        // per draw and line: the square of what the difference changes by
+        // squared change of the difference, per draw and line
         let changes: Vec<Vec<f64>> = (0..DRAWS)
             .into_par_iter()
             .map(|draw| {
@@ -80,14 +86,14 @@ impl Explained {
         Some(Explained { frequency_hz, error, explained })
     }
 
-    /// Whether the error at a line is no larger than `times` what is explained.
+    /// Whether the error at a line is at most `times` the explained one.
     fn agrees(&self, line: usize, times: f64) -> bool {
         let (e, x) = (self.error[line], self.explained[line]);
         e <= (times * x).hypot(SMALL)
     }
 
-    /// From where to where, around the middle of `band`, every line's error is at most `times` what is explained, Hz; none where the
-    /// middle's is not.
+    /// The range around the middle of `band` in which every line's error is at most `times` the
+    /// explained one, Hz; none if the middle's is not.
     pub fn range(&self, band: Band, times: f64) -> Option<[f64; 2]> {
         let middle = self.frequency_hz.partition_point(|f| *f < 0.5 * (band.low_hz + band.high_hz));
         let middle = middle.min(self.frequency_hz.len().checked_sub(1)?);
@@ -100,7 +106,7 @@ impl Explained {
         Some([self.frequency_hz[low], self.frequency_hz[high]])
     }
 
-    /// Medians of error and explained error over a band; none without a line in it.
+    /// Medians of error and explained error over a band; none if it contains no line.
     pub fn medians(&self, band: Band) -> Option<[f64; 2]> {
         let inside: Vec<usize> =
             (0..self.frequency_hz.len()).filter(|&l| band.contains(self.frequency_hz[l])).collect();
@@ -109,7 +115,7 @@ impl Explained {
     }
 }
 
-/// Medians within ± 75 Hz.
+/// Medians over ± [`AROUND_HZ`].
 fn medians_around(frequency_hz: &[f64], values: &[f64]) -> Vec<f64> {
     (frequency_hz.iter())
         .map(|f| {
@@ -133,7 +139,7 @@ fn thinned(frf: &Frf) -> Frf {
     thin.with_variance(kept).expect("smoothing keeps the shape")
 }
 
-/// The FRFs with noise drawn once more.
+/// The FRFs with drawn noise added.
 fn drawn(frf: &Frf, stream: &mut Xoshiro256PlusPlus) -> Frf {
     let Some(variance) = frf.variance() else { return frf.clone() };
     frf.clone().map_lines(|line, mut y| {
@@ -150,10 +156,10 @@ fn normal(stream: &mut Xoshiro256PlusPlus) -> f64 {
     StandardNormal.sample(stream)
 }
 
-/// Draws a geometry that may as well be the true one.
+/// Draws a geometry that could equally be the true one.
 struct Wrong<'a> {
     priors: &'a Priors,
-    /// Offset and tilt that a sensor or impact has in every configuration, by its name.
+    /// Offset and tilt of a sensor or impact in every configuration, by its name.
     common: HashMap<String, [Vector3<f64>; 2]>,
     stream: &'a mut Xoshiro256PlusPlus,
 }
@@ -185,11 +191,12 @@ impl Wrong<'_> {
     fn configuration(&mut self, points: &mut Configuration) {
         let aim_m = self.priors.aim_m;
         let mut aims: HashMap<String, Vector3<f64>> = HashMap::new();
-        // points on specimens are in no coupling: drawing them too would only shift the stream of the others
+        // points on specimens are in no coupling: drawing them too would only shift the random
+        // stream of the others
         let on_arms = |points: &&mut Point| !points.grouping.is_specimen();
         for channel in points.channels.iter_mut().filter(on_arms) {
             let [offset, _] = self.common("sensor", &channel.name);
-            // the three axes of a sensor are aimed at once
+            // the three axes of a sensor share one aim
             let aim = match aims.get(&channel.name) {
                 Some(aim) => *aim,
                 None => self.vector(aim_m),

@@ -1,11 +1,12 @@
-//! Where sensors and hits are, which way they point, and what each is for.
+//! Positions and directions of sensors and hits, and the purpose of each.
 
 use crate::structure::Structure;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
-/// What a row is for. The number stands in the workbook's `Grouping` column; roles are never read from names.
+/// Purpose of a row: the number in the workbook's `Grouping` column. It is never derived from
+/// names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "u8", into = "u8")]
 pub enum Grouping {
@@ -13,18 +14,20 @@ pub enum Grouping {
     InterfaceA,
     /// 2: interface of B.
     InterfaceB,
-    /// 3: internal of A (a response here is a spare: it never enters a virtual point).
+    /// 3: internal of A (a response here is a spare: it is never part of a virtual point).
     InternalA,
     /// 4: internal of B.
     InternalB,
-    /// 5: on specimen A, which may move in its clamp: no point of arm A, and never part of substructuring.
+    /// 5: on specimen A, which may move in its clamp: not a point of arm A, and never part of
+    /// substructuring.
     SpecimenA,
     /// 6: on specimen B, likewise.
     SpecimenB,
 }
 
 impl Grouping {
-    /// Whether the point is on a specimen: it tells of the contact, and substructuring leaves it out.
+    /// Whether the point is on a specimen: such points describe the contact and are left out of
+    /// substructuring.
     pub fn is_specimen(self) -> bool {
         matches!(self, Grouping::SpecimenA | Grouping::SpecimenB)
     }
@@ -60,26 +63,26 @@ impl From<Grouping> for u8 {
     }
 }
 
-/// No rig is larger, m: coordinates in mm are beyond it.
+/// Upper bound of coordinates, m: no rig is larger, and coordinates given in mm exceed it.
 pub const FARTHEST_M: f64 = 5.0;
 
-/// The first coordinate of a place that no rig has, m.
+/// The first coordinate that is not finite or exceeds [`FARTHEST_M`], m.
 pub fn too_far(position_m: [f64; 3]) -> Option<f64> {
     position_m.into_iter().find(|x| !x.is_finite() || x.abs() > FARTHEST_M)
 }
 
-/// One response channel or one impact: a line of a geometry table.
+/// One response channel or one impact: one row of a geometry table.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Point {
     /// The sensor's or impact's name; the three axes of one sensor share it.
     pub name: String,
-    /// A text of its own for each line, e.g. `A1:x`.
+    /// A text that is unique to each row, e.g. `A1:x`.
     pub description: String,
-    /// What it is for.
+    /// Its purpose.
     pub grouping: Grouping,
     /// Position, m.
     pub position_m: [f64; 3],
-    /// Unit vector: along it a response counts positive, and a hit pushes.
+    /// Unit vector: the positive direction of a response, or the direction of a hit's force.
     pub direction: [f64; 3],
 }
 
@@ -105,7 +108,8 @@ pub struct Configuration {
 }
 
 impl Configuration {
-    /// Names of the FRF's outputs: the description where the name repeats in the sheet, else the name.
+    /// Names of the FRF's outputs: the description if the name repeats in the sheet, otherwise the
+    /// name.
     pub fn output_names(&self) -> Vec<String> {
         frf_names(&self.channels)
     }
@@ -132,8 +136,8 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// Name and first coordinate (m) of a point that is further away than any rig is large: the
-    /// positions look like mm.
+    /// Name and first coordinate (m) of a point that is further away than any rig is large, which
+    /// suggests positions in mm.
     pub fn too_far(&self) -> Option<(&str, f64)> {
         let centres = [self.virtual_point_a_m, self.virtual_point_b_m];
         let centres = centres.into_iter().map(|at| ("the virtual point", at));
@@ -153,7 +157,7 @@ impl Geometry {
         }
     }
 
-    /// The points of one structure, to be changed.
+    /// The points of one structure, mutable.
     pub fn points_mut(&mut self, structure: Structure) -> &mut Configuration {
         match structure {
             Structure::A => &mut self.a,

@@ -1,4 +1,5 @@
-//! The front door: three FRF matrices and the geometry in, the joint's stiffness by every method asked for out.
+//! The entry point: from three FRF matrices and the geometry to the joint's stiffness by every
+//! requested method.
 
 use super::back_coupling::BackCoupling;
 use super::geometry::Geometry;
@@ -20,7 +21,7 @@ use nalgebra::{Complex, DMatrix};
 use serde::Serialize;
 use std::borrow::Cow;
 
-/// Why nothing at all can be identified from these files.
+/// The reason why these files allow no identification at all.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IdentifyError {
@@ -59,14 +60,14 @@ pub enum IdentifyError {
         /// A's σ, 1/s.
         expected: f64,
     },
-    /// A band has no line.
+    /// A band contains no line.
     #[error(
         "no line lies in the band {low_hz}–{high_hz} Hz: the files cover {from_hz}–{to_hz} Hz in {lines} lines above 0 Hz; choose a band within"
     )]
     EmptyBand {
-        /// Lowest frequency asked for, Hz.
+        /// Lowest frequency requested, Hz.
         low_hz: f64,
-        /// Highest frequency asked for, Hz.
+        /// Highest frequency requested, Hz.
         high_hz: f64,
         /// First line, Hz.
         from_hz: f64,
@@ -75,23 +76,23 @@ pub enum IdentifyError {
         /// Number of lines.
         lines: usize,
     },
-    /// No method, IDM set or band was asked for.
+    /// No method, IDM set or band was given.
     #[error("nothing to do: at least one method, one IDM set and one band are needed")]
     NothingAsked,
 }
 
-/// A method and IDM set that gave no result, and why.
+/// A method and IDM set without a result, and the reason.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Refused {
     /// The method.
     pub method: Method,
     /// Number of interface deformation modes.
     pub idms: usize,
-    /// Why, as a sentence.
+    /// The reason, as a sentence.
     pub reason: String,
 }
 
-/// All that was identified.
+/// All results of an identification.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Identification {
     /// One row per method, IDM set and band that gave a result.
@@ -102,19 +103,20 @@ pub struct Identification {
     pub refused: Vec<Refused>,
     /// Quality of A's and B's virtual points.
     pub virtual_points: Vec<VirtualPointQuality>,
-    /// n_i, n_c and ranks of the forms of Eq. (3) that were asked for.
+    /// n_i, n_c and ranks for the requested forms of Eq. (3).
     pub internals: Vec<Internals>,
 }
 
-/// Identifies the joint from FRFs of A, B and AJB (all three alike in lines, quantity and window).
+/// Identifies the joint from FRFs of A, B and AJB (all three with the same lines, quantity and
+/// window).
 ///
-/// `internal` uses all impacts on A (Grouping 1 and 3) and all responses on B (2 and 4) as internals,
-/// `internal-printed` the Grouping 3 impacts and the Grouping 4 responses. A row or column is used when the geometry
-/// has it and the files have it. A line at 0 Hz is left out.
+/// `internal` uses all impacts on A (Grouping 1 and 3) and all responses on B (2 and 4) as
+/// internals, `internal-printed` the Grouping 3 impacts and the Grouping 4 responses. A row or
+/// column is used if both the geometry and the files have it. A line at 0 Hz is left out.
 ///
 /// # Errors
-/// [`IdentifyError`] when the files do not fit together. A method that cannot work on them is listed in
-/// [`Identification::refused`] instead, so that the others still answer.
+/// [`IdentifyError`] if the files do not fit together. A method that cannot use them is listed in
+/// [`Identification::refused`] instead, so that the others still give results.
 pub fn identify(
     a: &Frf,
     b: &Frf,
@@ -183,14 +185,15 @@ pub fn identify(
     Ok(out)
 }
 
-/// Z^J per line (n_c × n_c), or why there is none.
+/// Z^J per line (n_c × n_c), or the reason why there is none.
 pub type Decoupled = Result<Vec<DMatrix<Complex<f64>>>, Refused>;
 
-/// Z^J of every line above 0 Hz by every method asked for (n_c × n_c; N/m, N m/rad between rotations): what [`identify`] takes its
-/// statistics of, without them.
+/// Z^J of every line above 0 Hz by every requested method (n_c × n_c; N/m, N m/rad between
+/// rotations): the matrices that [`identify`] takes its statistics of.
 ///
 /// # Errors
-/// [`IdentifyError`] when the files do not fit together; [`Refused`] of a method that cannot work on them.
+/// [`IdentifyError`] if the files do not fit together; [`Refused`] for a method that cannot use
+/// them.
 pub fn decouple(
     a: &Frf,
     b: &Frf,
@@ -207,14 +210,15 @@ pub fn decouple(
     Ok(solutions.into_iter().map(|(method, found)| (method, found.map(|solution| solution.z))).collect())
 }
 
-/// The noise of a method's lines, or why there is none.
+/// The noise of a method's lines, or the reason why there is none.
 pub type Propagated = Result<LineNoise, Refused>;
 
-/// What the FRFs' noise does to every line above 0 Hz by every method asked for: linear propagation of the variances, smoothed over
-/// ± 10 Hz, through virtual points and method.
+/// Effect of the FRFs' noise on every line above 0 Hz by every requested method: linear propagation
+/// of the variances, smoothed over ± 10 Hz, through virtual points and method.
 ///
 /// # Errors
-/// [`IdentifyError`] when files or variances do not fit together; [`Refused`] of a method that cannot work on them.
+/// [`IdentifyError`] if files or variances do not fit together; [`Refused`] for a method that
+/// cannot use them.
 pub fn line_noise(
     [a, b, ajb]: [&Frf; 3],
     geometry: &Geometry,
@@ -234,8 +238,8 @@ pub fn line_noise(
     Ok(methods.iter().map(|&method| (method, noise(method))).collect())
 }
 
-/// A and B coupled by the mean over `band` of what Eq. (A.1) gives, against the measured assembly. None where the files do not fit
-/// together, a virtual point cannot be formed, or no line lies in the band.
+/// A and B coupled by the mean of Eq. (A.1) over `band`, compared with the measured assembly. None
+/// if the files do not fit together, a virtual point cannot be formed, or no line lies in the band.
 pub fn back_coupled(
     [a, b, ajb]: [&Frf; 3],
     geometry: &Geometry,
@@ -263,7 +267,7 @@ fn rooms<'a>(files: &'a [Cow<'_, Frf>; 3], geometry: &'a Geometry) -> Rooms<'a> 
 type Line = DMatrix<Complex<f64>>;
 type Solved = (Method, Result<Solution, Refused>);
 
-/// Every method's solution or refusal, and Y^A and Y^B where `alone` asks for them and they are there.
+/// Every method's solution or refusal, and Y^A and Y^B if `alone` requests them and they exist.
 fn solve(
     rooms: &Rooms<'_>,
     reduced: &Result<Reduced, InterfaceError>,
@@ -288,7 +292,7 @@ fn solve(
     }
 }
 
-/// The file without a line at 0 Hz, where no receptance can be told from a mobility.
+/// The file without a line at 0 Hz, where a mobility cannot be converted to a receptance.
 fn above_zero(file: &Frf) -> Cow<'_, Frf> {
     if file.frequency_hz().first().is_some_and(|f| *f > 0.0) {
         Cow::Borrowed(file)
@@ -301,11 +305,11 @@ fn other_lines(file: Structure, apart: OtherLines) -> IdentifyError {
     IdentifyError::Axes { file, detail: format!("{} Hz against {} Hz", apart.other_hz, apart.one_hz) }
 }
 
-/// Leaves FRFs of A, B and the assembly with the lines that all three have, and says what was left
-/// where that is less than there was: [`identify`] wants the same lines in all three.
+/// Reduces FRFs of A, B and the assembly to the lines that all three have, and returns these if any
+/// line was dropped: [`identify`] needs the same lines in all three.
 ///
 /// # Errors
-/// [`IdentifyError::Axes`] where they are on other lines; nothing is changed then.
+/// [`IdentifyError::Axes`] if they are on different lines; nothing is changed then.
 pub fn keep_common_lines(files: &mut [Frf; 3]) -> Result<Option<CommonLines>, IdentifyError> {
     common_lines::keep_common_lines(files).map_err(|(file, apart)| other_lines(file, apart))
 }

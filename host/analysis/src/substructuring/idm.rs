@@ -1,16 +1,18 @@
 //! Interface deformation modes: which motions of the interface a virtual point carries.
 //!
-//! Six rigid ones, and the eighteen simple flexible ones that the pyFBS workbook names: extension, torsion, skewing and bending.
+//! Six rigid ones, and the eighteen simple flexible ones that the pyFBS workbook names: extension,
+//! torsion, skewing and bending.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// One degree of freedom of a virtual point. The house's order: x, y, z, rx, ry, rz, then the flexible ones as pyFBS has them.
+/// One degree of freedom of a virtual point. They are ordered x, y, z, rx, ry, rz, then the
+/// flexible ones in pyFBS's order.
 ///
-/// With r = (x, y, z) from the virtual point to where the motion is seen, a flexible mode of unit size moves that place by the
-/// vector given beside its name.
+/// With r = (x, y, z) from the virtual point to a place on the interface, a flexible mode of unit
+/// size moves that place by the vector given next to its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Dof {
@@ -111,7 +113,7 @@ impl Dof {
         self > Dof::Rz
     }
 
-    /// To which power of a length its motion grows with the distance from the virtual point: 0, 1 or 2.
+    /// Power of the distance from the virtual point with which its motion grows: 0, 1 or 2.
     pub fn power_of_length(self) -> i32 {
         if self.is_translation() {
             0
@@ -130,7 +132,7 @@ impl Dof {
         ][self as usize]
     }
 
-    /// How a place at `offset_m` from the virtual point moves when this mode has size one.
+    /// Displacement of a place at `offset_m` from the virtual point for unit size of this mode.
     pub fn displacement(self, offset_m: Vector3<f64>) -> Vector3<f64> {
         let [x, y, z] = offset_m.into();
         let (xx, yy, zz) = (x * x / 2.0, y * y / 2.0, z * z / 2.0);
@@ -171,7 +173,7 @@ impl fmt::Display for Dof {
 
 impl FromStr for Dof {
     type Err = String;
-    /// Our names, and the workbook's for translations and for forces (`ux`, `fx`, `mx`).
+    /// The names used here, and the workbook's for translations and for forces (`ux`, `fx`, `mx`).
     fn from_str(text: &str) -> Result<Self, String> {
         let plain = text.trim().to_lowercase();
         let ours = match plain.split_at_checked(1) {
@@ -185,20 +187,21 @@ impl FromStr for Dof {
     }
 }
 
-/// Modes of one virtual point: the paper's sets (its Sec. 2.4; 2 = {z, y}, 4 = {z, y, rx, ry}, 6 = all rigid ones), or any other.
+/// Modes of one virtual point: the paper's sets (Sec. 2.4; 2 = {z, y}, 4 = {z, y, rx, ry}, 6 = all
+/// rigid ones), or any other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum IdmSet {
     /// Two translations: y and z.
     Two,
     /// y, z and the rotations about x and y.
     Four,
-    /// The whole rigid body.
+    /// All six rigid modes.
     Six,
     /// Another choice, made by [`IdmSet::of`].
     Chosen(Modes),
 }
 
-/// A choice of modes that is none of the paper's.
+/// A choice of modes that is not one of the paper's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Modes(u32);
 
@@ -211,7 +214,7 @@ impl IdmSet {
         IdmSet::ALL.into_iter().find(|set| set.count() == count)
     }
 
-    /// The set of these modes, whatever their order; none of no modes, or where one stands twice.
+    /// The set of these modes, in any order; none if it is empty or a mode occurs twice.
     pub fn of(modes: &[Dof]) -> Option<Self> {
         let bits = modes.iter().fold(0u32, |bits, mode| bits | 1 << *mode as u32);
         if modes.is_empty() || bits.count_ones() as usize != modes.len() {
@@ -221,7 +224,7 @@ impl IdmSet {
         Some(IdmSet::ALL.into_iter().find(|set| set.dofs() == chosen.dofs()).unwrap_or(chosen))
     }
 
-    /// Its degrees of freedom, in the house's order.
+    /// Its degrees of freedom, in the order of [`Dof::ALL`].
     pub fn dofs(self) -> Vec<Dof> {
         match self {
             IdmSet::Two => vec![Dof::Y, Dof::Z],
@@ -243,7 +246,7 @@ impl IdmSet {
         }
     }
 
-    /// Where `dof` stands in this set.
+    /// Index of `dof` in this set.
     pub fn position(self, dof: Dof) -> Option<usize> {
         self.dofs().iter().position(|&d| d == dof)
     }
@@ -260,10 +263,12 @@ impl fmt::Display for IdmSet {
     }
 }
 
-/// Motion along `direction` (unit vector) at `offset_m` from the virtual point, per unit of each rigid degree of
-/// freedom: eᵀ \[I, −skew(r)\], that is e for the translations and r × e for the rotations.
+/// Motion along `direction` (unit vector) at `offset_m` from the virtual point, per unit of each
+/// rigid degree of freedom: eᵀ \[I, −skew(r)\], that is e for the translations and r × e for the
+/// rotations.
 ///
-/// The same row, read as a column, gives the virtual point's forces and moments per newton of an impact.
+/// The same row, read as a column, gives the virtual point's forces and moments per newton of an
+/// impact.
 pub fn rigid_row(direction: Vector3<f64>, offset_m: Vector3<f64>) -> [f64; 6] {
     Dof::RIGID.map(|dof| dof.displacement(offset_m).dot(&direction))
 }
@@ -276,7 +281,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 64, rng_seed: proptest::test_runner::RngSeed::Fixed(1), ..ProptestConfig::default() })]
 
-        /// The row times a rigid motion is that motion's velocity at the point, along the direction.
+        /// The row times a rigid motion is the velocity of the point along the direction.
         #[test]
         fn row_agrees_with_rigid_body_kinematics(v in prop::array::uniform12(-1.0..1.0f64)) {
             let e = Vector3::new(v[0], v[1], v[2]);

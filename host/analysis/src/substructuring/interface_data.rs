@@ -1,4 +1,5 @@
-//! Which rows and columns of the three FRF files a virtual point and the internals take, and the reduced blocks.
+//! The rows and columns of the three FRF files that virtual points and internals use, and the
+//! reduced blocks.
 
 use super::geometry::{Configuration, Geometry, Grouping, Point};
 use super::idm::IdmSet;
@@ -10,7 +11,7 @@ use nalgebra::{Complex, DMatrix, Vector3};
 
 type Line = DMatrix<Complex<f64>>;
 
-/// Why the data of an interface cannot be formed.
+/// The reason why the data of an interface cannot be formed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InterfaceError {
@@ -24,7 +25,7 @@ pub enum InterfaceError {
         /// Why.
         source: VptError,
     },
-    /// The geometry's points for it are not in the file at all.
+    /// None of the geometry's points for it are in the file.
     #[error(
         "virtual point of {substructure}: {file} has none of its {kind} ({wanted}); the file has: {available}. Names must agree between geometry and file"
     )]
@@ -35,12 +36,12 @@ pub enum InterfaceError {
         file: Structure,
         /// `responses` or `impacts`.
         kind: &'static str,
-        /// Names the geometry gives them.
+        /// Their names in the geometry.
         wanted: String,
         /// Names in the file.
         available: String,
     },
-    /// The chosen cells hold a NaN.
+    /// The selected cells contain a NaN.
     #[error("{file}: {source}")]
     Frf {
         /// Which FRF file.
@@ -50,7 +51,7 @@ pub enum InterfaceError {
     },
 }
 
-/// Points of the geometry that an FRF file really has, with their places in it.
+/// Points of the geometry that an FRF file contains, with their indices in it.
 #[derive(Default)]
 pub(crate) struct Found {
     pub(crate) names: Vec<String>,
@@ -58,7 +59,8 @@ pub(crate) struct Found {
     pub(crate) at: Vec<usize>,
 }
 
-/// The rows (or columns) of `available` whose geometry line has one of these groupings, in the geometry's order.
+/// The rows (or columns) of `available` whose row in the geometry has one of these groupings, in
+/// the geometry's order.
 pub(crate) fn found(
     points: &[Point],
     names: &[String],
@@ -79,7 +81,7 @@ pub(crate) fn found(
     found
 }
 
-/// A virtual point in one file: the rows and columns it is made of, and both transformations.
+/// A virtual point in one file: its rows and columns, and both transformations.
 pub(crate) struct VirtualPoint {
     pub(crate) rows: Found,
     pub(crate) columns: Found,
@@ -87,7 +89,7 @@ pub(crate) struct VirtualPoint {
     pub(crate) impacts: Transformation,
 }
 
-/// Which file of the three, with what it holds.
+/// One of the three files, with its FRFs and points.
 #[derive(Clone, Copy)]
 pub(crate) struct Measured<'a> {
     pub(crate) file: Structure,
@@ -144,18 +146,18 @@ impl Measured<'_> {
         Ok(VirtualPoint { rows, columns, responses, impacts })
     }
 
-    /// The named block of every line, refusing values that are not numbers.
+    /// The given block of every line; refuses values that are not finite.
     pub(crate) fn block(&self, rows: &Found, columns: &Found) -> Result<Vec<Line>, InterfaceError> {
         (0..self.frf.lines().len()).map(|l| self.cells(l, rows, columns)).collect()
     }
 
-    /// The named block of one line, refusing values that are not numbers.
+    /// The given block of one line; refuses values that are not finite.
     pub(crate) fn cells(&self, line: usize, rows: &Found, columns: &Found) -> Result<Line, InterfaceError> {
         let y = block(&self.frf.lines()[line], &rows.at, &columns.at);
         if finite(&y) { Ok(y) } else { Err(self.not_finite(line, rows, columns)) }
     }
 
-    /// T times the named block of one line, refusing values that are not numbers.
+    /// T times the given block of one line; refuses values that are not finite.
     pub(crate) fn reduced_outputs(
         &self,
         line: usize,
@@ -164,14 +166,14 @@ impl Measured<'_> {
         columns: &Found,
     ) -> Result<Line, InterfaceError> {
         let reduced = product_of_block(t, &self.frf.lines()[line], &rows.at, &columns.at);
-        // every value is in some sum, and even 0 times what is not a number is none
+        // every value enters some sum, and NaN or infinity times 0 is NaN
         if finite(&reduced) { Ok(reduced) } else { Err(self.not_finite(line, rows, columns)) }
     }
 
-    /// The refusal of the first cell of the block that is not a number.
+    /// The refusal, naming the first cell of the block that is not finite.
     fn not_finite(&self, line: usize, rows: &Found, columns: &Found) -> InterfaceError {
         let y = block(&self.frf.lines()[line], &rows.at, &columns.at);
-        // storage is by columns
+        // storage is column-major
         let bad = y.iter().position(|v| !v.is_finite()).unwrap_or_default();
         let source = FrfError::NotFinite {
             output: rows.names[bad % y.nrows()].clone(),
@@ -182,12 +184,13 @@ impl Measured<'_> {
     }
 }
 
-/// Whether all are numbers; looking at all of them is faster than a way out in the middle.
+/// Whether all values are finite; checking all of them is faster than an early exit.
 fn finite(y: &Line) -> bool {
     y.as_slice().iter().fold(true, |all, v| all & v.is_finite())
 }
 
-/// 1 for translations, the scaling length for rotations (its square for modes that grow so): after D Y D all entries are m/N.
+/// 1 for translations, the scaling length for rotations (its square for modes that grow with the
+/// square): all entries of D Y D are in m/N.
 pub(crate) fn balance(idms: IdmSet) -> Vec<f64> {
     idms.dofs().iter().map(|d| ROTATION_LENGTH_M.powi(d.power_of_length())).collect()
 }

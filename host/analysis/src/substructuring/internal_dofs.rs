@@ -1,4 +1,5 @@
-//! P, Q and M of Eq. (3) and its sisters: which internal points they take, and their values line by line.
+//! P, Q and M of Eq. (3) and the related rearrangements: the internal points used, and the matrices
+//! line by line.
 
 use super::geometry::Grouping;
 use super::interface_data::{Found, InterfaceError, Measured};
@@ -10,12 +11,13 @@ use pulp::Simd;
 
 type Line = DMatrix<Complex<f64>>;
 
-/// Which points count as internal.
+/// The points that count as internal.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Which {
-    /// All that was measured on the substructure, its interface points too; A's internal responses are spares and stay out.
+    /// All points measured on the substructure, including its interface points; A's internal
+    /// responses are spares and are left out.
     All,
-    /// Grouping 3 and 4 only, as the paper has them.
+    /// Grouping 3 and 4 only, as in the paper.
     Printed,
 }
 
@@ -37,16 +39,17 @@ impl Side {
     }
 }
 
-/// One rearrangement of Eq. (1): responses on `seen`, hits on `hit`, at the points that are in the assembly's file too.
+/// One rearrangement of Eq. (1): responses on `seen`, hits on `hit`, at the points that the
+/// assembly's file has too.
 pub(super) struct Rearrangement<'a> {
     pub(super) seen: Side,
     pub(super) hit: Side,
     /// Whether M is inverted (Eq. 3 as printed) instead of P and Q.
     pub(super) printed: bool,
-    /// Rows in the file of `seen`, and the same in the assembly's.
+    /// Rows in the file of `seen`, and the same in the assembly's file.
     pub(super) rows: Found,
     pub(super) rows_ajb: Found,
-    /// Columns in the file of `hit`, and the same in the assembly's.
+    /// Columns in the file of `hit`, and the same in the assembly's file.
     pub(super) columns: Found,
     pub(super) columns_ajb: Found,
     rooms: &'a Rooms<'a>,
@@ -100,7 +103,8 @@ impl<'a> Rearrangement<'a> {
         [p, m, q]
     }
 
-    /// M: between them in the assembly; where both are of one substructure, alone minus in the assembly.
+    /// M: from the internal impacts to the internal responses in the assembly; if both are on one
+    /// substructure, its value alone minus that in the assembly.
     pub(super) fn m(&self, l: usize) -> Result<Line, InterfaceError> {
         let assembled = self.rooms.ajb.cells(l, &self.rows_ajb, &self.columns_ajb)?;
         if self.seen == self.hit {
@@ -111,7 +115,7 @@ impl<'a> Rearrangement<'a> {
     }
 }
 
-/// Those rows (or columns) that both files have, in the order of the first.
+/// The rows (or columns) that both files have, in the order of the first.
 fn shared(first: &Found, second: &Found) -> (Found, Found) {
     let mut one = Found { names: vec![], points: vec![], at: vec![] };
     let mut two = Found { names: vec![], points: vec![], at: vec![] };

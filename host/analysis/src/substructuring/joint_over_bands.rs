@@ -1,4 +1,5 @@
-//! From Z^J per line to stiffness and damping over a band, with what can honestly be said of their scatter.
+//! From Z^J per line to stiffness and damping over a band, with a realistic statement of their
+//! scatter.
 
 use super::idm::{Dof, IdmSet};
 use crate::band::Band;
@@ -12,10 +13,11 @@ pub const NORMAL_95: f64 = 1.96;
 
 /// One quantity over the lines of a band.
 ///
-/// `ci95` is an interval for the *mean over this band*, by a delete-one-block jackknife over contiguous sub-bands with
-/// Student's t: neighbouring lines share resonances and leakage, so that treating them as independent would make the
-/// interval far too narrow. It covers scatter that differs between sub-bands, and nothing else: not the bias of noise
-/// (Re Z → 0 when the noise exceeds the joint's admittance), not position errors, not a flexible clamp.
+/// `ci95` is an interval for the *mean over this band*, by a delete-one-block jackknife over
+/// contiguous sub-bands with Student's t: neighbouring lines share resonances and leakage, so that
+/// treating them as independent would make the interval far too narrow. It covers scatter between
+/// sub-bands only. It does not cover the bias of noise (Re Z → 0 when the noise exceeds the joint's
+/// admittance), position errors or a flexible clamp.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct BandStatistic {
     /// Mean over the lines.
@@ -32,7 +34,7 @@ pub struct BandStatistic {
 const STUDENT_T: [f64; 9] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262];
 
 impl BandStatistic {
-    /// Statistics of the values of consecutive lines; none of no lines.
+    /// Statistics of the values of consecutive lines; none without lines.
     pub fn of(values: &[f64]) -> Option<BandStatistic> {
         if values.is_empty() {
             return None;
@@ -77,8 +79,8 @@ pub fn median(values: &[f64]) -> f64 {
     0.5 * (lower + *upper)
 }
 
-/// Stiffness and damping of one diagonal entry of Z^J on s = σ + iω: a spring–damper joint is Z = K + sC, so
-/// C = Im Z / ω and K = Re Z − σ C.
+/// Stiffness and damping of one diagonal entry of Z^J on s = σ + iω: a spring–damper joint is Z =
+/// K + sC, so C = Im Z / ω and K = Re Z − σ C.
 pub fn stiffness_and_damping(z: Complex<f64>, s: Complex<f64>) -> (f64, f64) {
     let damping = z.im / s.im;
     (z.re - s.re * damping, damping)
@@ -91,16 +93,18 @@ pub struct JointSpectrum {
     pub method: String,
     /// Number of interface deformation modes.
     pub idms: usize,
-    /// Which ones.
+    /// The modes.
     pub modes: Vec<Dof>,
     /// Frequency of each line, Hz.
     pub frequency_hz: Vec<f64>,
-    /// K per degree of freedom and line, N/m (N m/rad for rotations, N m for extensions, N m² for the other flexible modes).
+    /// K per degree of freedom and line, N/m (N m/rad for rotations, N m for extensions, N m² for
+    /// the other flexible modes).
     pub stiffness_n_per_m: BTreeMap<Dof, Vec<f64>>,
     /// C per degree of freedom and line, N s/m (N m s/rad for rotations).
     pub damping_n_s_per_m: BTreeMap<Dof, Vec<f64>>,
-    /// K between two degrees of freedom (`y-z` and so on, each pair once, the mean of both places) per line: N/m between
-    /// translations, N/rad (N m/m) between a translation and a rotation, N m/rad between rotations.
+    /// K between two degrees of freedom (`y-z` and so on, each pair once, the mean of both entries)
+    /// per line: N/m between translations, N/rad (N m/m) between a translation and a rotation, N
+    /// m/rad between rotations.
     pub coupling_si: BTreeMap<String, Vec<f64>>,
     /// C between them, in the same units times seconds.
     pub coupling_damping_si: BTreeMap<String, Vec<f64>>,
@@ -115,7 +119,7 @@ impl JointSpectrum {
         sigma_per_s: f64,
         z: &[DMatrix<Complex<f64>>],
     ) -> JointSpectrum {
-        // mean of both places of an entry, along all lines
+        // mean of the entry and its transpose, over all lines
         let entry = |i: usize, j: usize| -> (Vec<f64>, Vec<f64>) {
             let parts = z.iter().zip(frequency_hz).map(|(z, f)| {
                 let s = Complex::new(sigma_per_s, std::f64::consts::TAU * f);
@@ -148,7 +152,7 @@ impl JointSpectrum {
         }
     }
 
-    /// Statistics over a band; none when no line lies in it.
+    /// Statistics over a band; none if no line lies in it.
     pub fn over(&self, band: Band) -> Option<JointRow> {
         let lines: Vec<usize> =
             (0..self.frequency_hz.len()).filter(|&l| band.contains(self.frequency_hz[l])).collect();
@@ -193,7 +197,7 @@ pub struct JointRow {
     pub method: String,
     /// Number of interface deformation modes.
     pub idms: usize,
-    /// Which ones.
+    /// The modes.
     pub modes: Vec<Dof>,
     /// The band, Hz.
     pub band_hz: Band,
@@ -201,17 +205,17 @@ pub struct JointRow {
     pub stiffness_n_per_m: BTreeMap<Dof, BandStatistic>,
     /// C of each degree of freedom, N s/m (N m s/rad for rotations).
     pub damping_n_s_per_m: BTreeMap<Dof, BandStatistic>,
-    /// K between each two degrees of freedom, as in [`JointSpectrum::coupling_si`].
+    /// K between each pair of degrees of freedom, as in [`JointSpectrum::coupling_si`].
     pub coupling_si: BTreeMap<String, BandStatistic>,
     /// C between them.
     pub coupling_damping_si: BTreeMap<String, BandStatistic>,
     /// Lines in the band.
     pub lines: usize,
-    /// What a reader must know before using the figures.
+    /// Warnings to read before using the values.
     pub warnings: Vec<String>,
 }
 
-/// What the scatter of k_z alone already says against its mean.
+/// Warnings that follow from the scatter of k_z relative to its mean.
 fn scatter_warnings(k: &BandStatistic) -> Vec<String> {
     let mut warnings = Vec::new();
     if k.std > 0.5 * k.mean.abs() {
@@ -259,7 +263,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 64, rng_seed: proptest::test_runner::RngSeed::Fixed(7), ..ProptestConfig::default() })]
 
-        /// K and C come back from K + sC on any s.
+        /// K and C are recovered from K + sC on any s.
         #[test]
         fn spring_and_damper_come_back(k in 1e5..1e9f64, c in 0.0..1e4f64, f in 10.0..1000.0f64, sigma in 0.0..20.0f64) {
             let s = Complex::new(sigma, std::f64::consts::TAU * f);

@@ -23,14 +23,14 @@ pub enum Method {
     InverseBa,
     /// Tol and Özgüven's rearrangement of Eq. (1) for hits and responses on A.
     InternalAa,
-    /// Theirs for hits on B and responses on A.
+    /// The same for hits on B and responses on A.
     InternalAb,
-    /// Theirs for hits and responses on B.
+    /// The same for hits and responses on B.
     InternalBb,
 }
 
 impl Method {
-    /// Those of the paper, in the order of the results.
+    /// The paper's methods, in the order of the results.
     pub const PAPER: [Method; 7] = [
         Method::Internal,
         Method::InternalPrinted,

@@ -1,21 +1,30 @@
-//! Frequency-based substructuring: the joint's dynamic stiffness from FRFs of A, B and the assembly AJB.
+//! Frequency-based substructuring: the joint's dynamic stiffness from FRFs of A, B and the assembly
+//! AJB.
 //!
-//! Pure functions of arrays and geometry. The way through the room:
+//! Pure functions of arrays and geometry. The modules, in order of use:
 //!
-//! 1. [`frf`](crate::frf): FRF matrices with named rows and columns, turned into receptances by dividing by s = σ + iω.
-//! 2. [`geometry`]: where the points are and what each is for (`Grouping`).
-//! 3. [`idm`], [`vpt`]: measured points onto the motions of a virtual point ([`virtual_points`]: of any number of them);
-//!    [`consistency`] says what is lost.
-//! 4. [`decoupling`]: one file per method, all returning Z^J per line; [`pseudo_inverse`] inverts without truncating.
+//! 1. [`frf`](crate::frf): FRF matrices with named rows and columns, converted to receptances by
+//!    dividing by s = σ + iω.
+//! 2. [`geometry`]: positions of the points and their purpose (`Grouping`).
+//! 3. [`idm`], [`vpt`]: measured points onto the motions of a virtual point ([`virtual_points`]:
+//!    any number of virtual points); [`consistency`] measures what is lost.
+//! 4. [`decoupling`]: one file per method, all returning Z^J per line; [`pseudo_inverse`] inverts
+//!    without truncating.
 //! 5. [`joint_over_bands`]: K and C per line and over bands, with scatter, interval and warnings.
-//! 6. [`identify`](mod@identify): the front door that does all of it; [`line_noise`](mod@line_noise): what the FRFs' noise does to each of its lines.
-//! 7. [`averaged`](mod@averaged): the estimate to quote, with its interval; the bootstrap over hits. [`noise`](crate::frf::noise) is what they start from.
-//! 8. [`fit`]: K and C by maximum likelihood over all measured blocks; [`between_arms`](mod@between_arms): which of the two is the answer.
-//! 9. [`coupling`]: the other way round, from parts to the assembly; [`cmif`](mod@cmif): how many modes the interface needs;
-//!    [`back_coupling`]: whether the joint found gives the measured assembly, and [`explained`] what may keep it from that; [`plausibility`]: passivity and reciprocity; [`semm`](mod@semm): a model corrected by a measurement.
+//! 6. [`identify`](mod@identify): the entry point for all of the above;
+//!    [`line_noise`](mod@line_noise): the effect of the FRFs' noise on each line of a result.
+//! 7. [`averaged`](mod@averaged): the recommended estimate with its interval, and the bootstrap
+//!    over hits. Both start from [`noise`](crate::frf::noise).
+//! 8. [`fit`]: K and C by maximum likelihood over all measured blocks;
+//!    [`between_arms`](mod@between_arms): chooses between the two estimates.
+//! 9. [`coupling`]: the inverse problem, from parts to the assembly; [`cmif`](mod@cmif): how many
+//!    modes the interface needs; [`back_coupling`]: whether the identified joint reproduces the
+//!    measured assembly, and [`explained`]: which errors may prevent it; [`plausibility`]:
+//!    passivity and reciprocity; [`semm`](mod@semm): a model corrected by a measurement.
 //!
-//! All FRFs of a campaign must share one exponential window: every method is algebraic in s, so it is exact on
-//! s = σ + iω, but only if A, B and AJB are on the same s. Degrees of freedom are ordered x, y, z, rx, ry, rz.
+//! All FRFs of a campaign must share one exponential window: every method is algebraic in s, so it
+//! is exact on s = σ + iω, but only if A, B and AJB are on the same s. Degrees of freedom are
+//! ordered x, y, z, rx, ry, rz.
 
 mod at_once;
 pub mod averaged;

@@ -1,11 +1,14 @@
-//! What every structure obeys: driving points take energy in, and cause and effect may change places.
+//! Properties of every passive linear structure: driving points absorb energy, and cause and effect
+//! can be exchanged.
 
 use nalgebra::{Complex, DMatrix};
 
-/// Per degree of freedom the fraction of lines, 0…1, at which the driving-point mobility s Y_dd has no negative real part.
+/// Fraction of lines, 0…1, at which the real part of the driving-point mobility s Y_dd is not
+/// negative, by degree of freedom.
 ///
-/// On s = σ + iω with σ ≥ 0 a passive structure has none at all; lines that do are wrong in phase, sign or position.
-/// `lines` are receptances with equal rows and columns; none without lines.
+/// On s = σ + iω with σ ≥ 0 this holds at every line of a passive structure; lines at which it
+/// fails have a wrong phase, sign or position. `lines` are receptances with the same rows and
+/// columns; the result is empty without lines.
 pub fn passivity(lines: &[DMatrix<Complex<f64>>], s: &[Complex<f64>]) -> Vec<f64> {
     let n = lines.first().map_or(0, DMatrix::nrows);
     (0..n)
@@ -16,10 +19,11 @@ pub fn passivity(lines: &[DMatrix<Complex<f64>>], s: &[Complex<f64>]) -> Vec<f64
         .collect()
 }
 
-/// Mean over lines of Σ |Y_ij + Y_ji|² / Σ 2(|Y_ij|² + |Y_ji|²) over all pairs i < j, 0…1: 1 for a reciprocal structure.
+/// Mean over lines of Σ |Y_ij + Y_ji|² / Σ 2(|Y_ij|² + |Y_ji|²) over all pairs i < j, 0…1: 1 for a
+/// reciprocal structure.
 ///
-/// The pairs of a line are taken together, so that a coupling which symmetry makes zero, and rounding does not, counts for
-/// nothing. Rows and columns should have one unit. NaN without pairs or lines.
+/// The pairs of a line are summed first, so that couplings that are zero by symmetry except for
+/// rounding have no weight. Rows and columns should have one unit. NaN without pairs or lines.
 pub fn reciprocity(lines: &[DMatrix<Complex<f64>>]) -> f64 {
     let mut values = Vec::new();
     for y in lines {

@@ -1,5 +1,5 @@
-//! Products of the small complex matrices of one line, about twice as fast as the general ones: those are made for large
-//! matrices, and scale every term once more.
+//! Products of the small complex matrices of one line, about twice as fast as the general ones,
+//! which are optimised for large matrices and scale every term once more.
 
 use crate::vectors::wide;
 use nalgebra::{Complex, DMatrix, Scalar};
@@ -19,7 +19,7 @@ where
     out
 }
 
-/// T Y of those rows and columns of Y that are named.
+/// T times the given rows and columns of Y.
 pub(crate) fn product_of_block(
     t: &DMatrix<f64>,
     y: &DMatrix<Complex<f64>>,
@@ -42,7 +42,7 @@ pub(crate) fn product_of_block(
     out
 }
 
-/// out + A B, all by columns.
+/// out + A B, all column-major.
 struct Sums<'a, A, B> {
     out: &'a mut [Complex<f64>],
     rows: usize,
@@ -83,7 +83,7 @@ where
     }
 }
 
-/// Three at once spare two loads and stores of the sum in three.
+/// Adds three columns at a time, which saves two of three loads and stores of the sum.
 #[expect(clippy::inline_always, reason = "only there the size is known")]
 #[inline(always)]
 fn add_columns_of<A, B>(rows: usize, sum: &mut [Complex<f64>], columns: &[A], factors: &[B])
@@ -112,7 +112,7 @@ mod tests {
 
     #[test]
     fn real_and_complex_factors_give_the_matrix_product() {
-        // every remainder of three, and nothing at all
+        // every remainder of three, and empty matrices
         for (rows, inner, columns) in [(1, 1, 1), (2, 3, 4), (5, 4, 2), (3, 5, 6), (2, 0, 3), (0, 2, 2)] {
             let y = DMatrix::from_fn(rows, inner, |r, c| Complex::new(r as f64 - 1.0, c as f64 + 0.5));
             let x = DMatrix::from_fn(inner, columns, |r, c| Complex::new(c as f64 - 0.3, r as f64 - 2.0));

@@ -1,11 +1,13 @@
 //! Inverses and full-rank pseudo-inverses that never truncate.
 //!
-//! A pseudo-inverse with a tolerance silently drops the small singular values, and in decoupling those are
-//! the joint: 1e-6 of the largest, where a truncated inverse turned 180 N/µm into 106 ± 221. So here a matrix
-//! either has full rank to rounding, and is inverted whole, or it is refused.
+//! A pseudo-inverse with a tolerance silently drops the small singular values, and in decoupling
+//! those are the joint: 1e-6 of the largest, where a truncated inverse turned 180 N/µm into 106
+//! ± 221. Therefore a matrix either has full rank to rounding and is inverted completely, or it is
+//! refused.
 //!
-//! Thousands of lines are inverted several times each. Where the pivots leave no doubt, elimination and Gram–Schmidt do it in a
-//! third of the time; whatever is near the edge goes through QR with column pivoting, whose pivots tell the rank.
+//! Thousands of lines are inverted several times each. If the pivots leave no doubt about the rank,
+//! elimination and Gram–Schmidt take a third of the time; otherwise QR with column pivoting is
+//! used, whose pivots determine the rank.
 
 use crate::vectors::wide;
 use nalgebra::{ColPivQR, Complex, DMatrix, Dyn};
@@ -14,13 +16,14 @@ use std::cmp::Ordering;
 
 type Line = DMatrix<Complex<f64>>;
 
-/// A pivot below this fraction of the largest is rounding: a dozen operations on doubles leave some 1e-15,
-/// while the weakest true direction seen in exact data is about 1e-8.
+/// A pivot below this fraction of the largest is rounding: a dozen operations on doubles leave
+/// about 1e-15, while the weakest true direction in exact data is about 1e-8.
 const ROUNDING: f64 = 1e-13;
-/// With all pivots above this fraction of the largest nobody doubts the rank, and the quick ways are exact enough.
+/// With all pivots above this fraction of the largest the rank is beyond doubt, and the fast
+/// methods are accurate enough.
 pub(super) const CLEAR: f64 = 1e-8;
 
-/// A matrix that ought to have full rank has not.
+/// A matrix that should have full rank does not.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{name} ({rows} × {columns}) has rank {rank}, {needed} is needed: {advice}")]
 pub struct RankLost {
@@ -49,7 +52,7 @@ pub fn condition(a: &Line) -> f64 {
     values.max() / values.min()
 }
 
-/// The (pseudo-)inverse of a matrix of full rank: A⁻¹, (AᴴA)⁻¹Aᴴ when tall, Aᴴ(AAᴴ)⁻¹ when wide.
+/// The (pseudo-)inverse of a matrix of full rank: A⁻¹, (AᴴA)⁻¹Aᴴ if tall, Aᴴ(AAᴴ)⁻¹ if wide.
 ///
 /// # Errors
 /// [`RankLost`] naming the matrix.
@@ -68,9 +71,11 @@ pub fn full_rank_inverse(a: &Line, name: &'static str) -> Result<Line, RankLost>
     }
 }
 
-/// A⁻¹ by Gauss–Jordan elimination with row pivoting; none when a pivot is not clearly above rounding.
+/// A⁻¹ by Gauss–Jordan elimination with row pivoting; none if a pivot is not clearly above
+/// rounding.
 fn elimination(a: &Line) -> Option<Line> {
-    // sizes known beforehand are loops without counters: one virtual point's motions, and both of an assembly
+    // sizes known at compile time let the loops be unrolled: one virtual point's motions, and both
+    // of an assembly
     match a.nrows() {
         6 => wide(Elimination::<6> { a, scratch: &mut [Complex::default(); 12] }),
         12 => wide(Elimination::<12> { a, scratch: &mut [Complex::default(); 24] }),
@@ -78,7 +83,7 @@ fn elimination(a: &Line) -> Option<Line> {
     }
 }
 
-/// Of a matrix of N rows, or of [`ANY`] number.
+/// Elimination of a matrix with N rows, or with any number of rows for [`ANY`].
 struct Elimination<'a, const N: usize> {
     a: &'a Line,
     /// Two columns.
@@ -111,7 +116,8 @@ impl<const N: usize> NullaryFnOnce for Elimination<'_, N> {
                 return None;
             }
             swaps.push(row);
-            // column k makes room for that of the inverse, which starts as the unit vector; −1 puts row k itself in its place
+            // column k is overwritten by that of the inverse, which starts as the unit vector; −1
+            // lets the update below scale row k too
             x.copy_from_slice(column);
             x.swap(k, row);
             let minus_inverse = -x[k].inv();
@@ -137,8 +143,8 @@ impl<const N: usize> NullaryFnOnce for Elimination<'_, N> {
     }
 }
 
-/// A⁺ = R⁻¹Qᴴ of a tall matrix by Gram–Schmidt, done again where much cancels, so that Q is orthogonal to rounding; none
-/// when a diagonal entry of R is not clearly above it.
+/// A⁺ = R⁻¹Qᴴ of a tall matrix by Gram–Schmidt, repeated if much cancels, so that Q is orthogonal
+/// to rounding; none if a diagonal entry of R is not clearly above rounding.
 fn orthogonalisation(a: &Line) -> Option<Line> {
     wide(Orthogonalisation { a })
 }
@@ -172,7 +178,8 @@ impl NullaryFnOnce for Orthogonalisation<'_> {
                     }
                 }
                 let before = std::mem::replace(&mut square, square_of(v));
-                // where little was taken away, little of the rounding's direction along the others is left
+                // if little was subtracted, the component along the other columns that rounding
+                // leaves is small
                 if square > 0.1 * before {
                     break;
                 }
@@ -181,7 +188,7 @@ impl NullaryFnOnce for Orthogonalisation<'_> {
             if !clear(square, largest) {
                 return None;
             }
-            // the diagonal holds 1/Rₖₖ: many products instead of quotients
+            // the diagonal holds 1/Rₖₖ: multiplications instead of divisions
             let inverse = 1.0 / square.sqrt();
             r[k] = Complex::from(inverse);
             for v in v {
@@ -206,12 +213,13 @@ fn square_of(v: &[Complex<f64>]) -> f64 {
     v.iter().map(Complex::norm_sqr).sum()
 }
 
-/// Whether a pivot leaves no doubt about the rank; both squared. NaN compares false.
+/// Whether a pivot leaves no doubt about the rank; both are squared. NaN compares false.
 fn clear(pivot: f64, largest: f64) -> bool {
     pivot > largest * (CLEAR * CLEAR) && largest < f64::INFINITY
 }
 
-/// The inverse of a square or tall matrix by a QR decomposition with column pivoting, which decides about the rank.
+/// The inverse of a square or tall matrix by a QR decomposition with column pivoting, which
+/// determines the rank.
 fn careful_inverse(a: &Line, name: &'static str) -> Result<Line, RankLost> {
     let needed = a.ncols();
     let lost = |rank| RankLost {
@@ -256,7 +264,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 48, rng_seed: proptest::test_runner::RngSeed::Fixed(2), ..ProptestConfig::default() })]
 
-        /// The two Penrose identities that do not follow from the construction: A⁺A = I (tall), AA⁺A = A.
+        /// The two Penrose identities that do not follow from the construction: A⁺A = I (tall),
+        /// AA⁺A = A.
         #[test]
         fn inverse_of_a_tall_or_wide_matrix(v in prop::collection::vec(-1.0..1.0f64, 2 * 7 * 4)) {
             let a = matrix(7, 4, &v);
@@ -269,7 +278,7 @@ mod tests {
         }
     }
 
-    /// Both sides of the edge between the quick ways and the careful one.
+    /// Both sides of the limit between the fast methods and pivoted QR.
     #[test]
     fn weak_directions_are_inverted_whole_however_weak() {
         let v: Vec<f64> = (0..72).map(|i| (1.0 + 0.7 * f64::from(i * i)).sin()).collect();

@@ -1,4 +1,4 @@
-//! How well virtual points and internals stand for what was measured.
+//! How well virtual points and internals represent the measurement.
 
 use super::consistency::Consistency;
 use super::idm::Dof;
@@ -6,24 +6,25 @@ use super::method::Method;
 use crate::structure::Structure;
 use serde::Serialize;
 
-/// What a form of Eq. (3) had for internals: n_i against n_c, and whether P and Q see every interface motion.
+/// Internals used by a form of Eq. (3): n_i and n_c, and whether P and Q cover every interface
+/// motion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Internals {
-    /// Which form.
+    /// The form of Eq. (3).
     pub method: Method,
-    /// n_c.
+    /// n_c, number of interface deformation modes.
     pub idms: usize,
-    /// n_i of the impacts.
+    /// n_i, number of internal impacts.
     pub impacts: usize,
-    /// n_i of the responses.
+    /// n_i, number of internal responses.
     pub responses: usize,
-    /// The line that ranks and condition numbers are of, Hz.
+    /// The line at which ranks and condition numbers are computed, Hz.
     pub frequency_hz: f64,
     /// Rank of P to rounding.
     pub rank_p: usize,
     /// Rank of Q to rounding.
     pub rank_q: usize,
-    /// Condition number of P, rotations scaled by 40 mm: by how much noise may be blown up.
+    /// Condition number of P, rotations scaled by 40 mm: upper bound of the noise amplification.
     pub condition_p: f64,
     /// Condition number of Q.
     pub condition_q: f64,
@@ -36,7 +37,7 @@ pub struct VirtualPointQuality {
     pub substructure: Structure,
     /// Number of interface deformation modes.
     pub idms: usize,
-    /// Which ones.
+    /// The modes.
     pub modes: Vec<Dof>,
     /// Condition number of R_u, rotations scaled by 40 mm.
     pub condition_responses: f64,
@@ -48,10 +49,10 @@ pub struct VirtualPointQuality {
     pub impacts: Vec<String>,
     /// Frequency of each line of `consistency.overall_*`, Hz.
     pub frequency_hz: Vec<f64>,
-    /// What the virtual point keeps of motion and force.
+    /// The part of motion and force that the virtual point retains.
     pub consistency: Consistency,
     /// Fraction of lines with a passive driving point, by degree of freedom in the set's order.
     pub passivity: Vec<f64>,
-    /// How far Y_ij equals Y_ji at the virtual point, 0…1; rotations in metres over 40 mm.
+    /// Agreement of Y_ij and Y_ji at the virtual point, 0…1; rotations in metres over 40 mm.
     pub reciprocity: f64,
 }

@@ -20,7 +20,7 @@ use std::sync::OnceLock;
 
 type Line = DMatrix<Complex<f64>>;
 
-/// Why one method with one IDM set gave no result.
+/// The reason why one method with one IDM set gave no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RefusedReason {
@@ -37,9 +37,9 @@ pub enum RefusedReason {
     },
 }
 
-/// What a method is made of.
+/// The kind of computation behind a method.
 pub(super) enum Kind {
-    /// Responses on the first, hits on the second.
+    /// Responses on the first side, hits on the second.
     Internal(Side, Side, Which),
     Interface,
     Primal(PrimalBlock),
@@ -63,16 +63,17 @@ impl From<Method> for Kind {
     }
 }
 
-/// Virtual points of A and B for one IDM set, alone and in the assembly (rotations scaled to metres).
+/// Virtual points of A and B for one IDM set, alone and in the assembly (rotations scaled to
+/// metres).
 ///
-/// Admittances stay in the files' quantity, receptance times sᵏ: every method turns it into Z^J over sᵏ, and one factor at the
-/// end makes up for it.
+/// Admittances stay in the files' quantity, receptance times sᵏ: every method then gives Z^J
+/// divided by sᵏ, and one factor at the end corrects this.
 pub(super) struct Reduced {
     pub(super) idms: IdmSet,
     pub(super) a: Balanced,
     pub(super) b: Balanced,
     assembled: Result<[Balanced; 2], InterfaceError>,
-    /// Of all lines, for those who ask for them more than once: Y^A and Y^B, Y^AJB_cc, and its inverse.
+    /// For all lines, kept for repeated use: Y^A and Y^B, Y^AJB_cc, and its inverse.
     alone: OnceLock<Result<[Vec<Line>; 2], RefusedReason>>,
     assembly: OnceLock<Result<Vec<Line>, RefusedReason>>,
     impedance: OnceLock<Result<Vec<Line>, RefusedReason>>,
@@ -92,7 +93,7 @@ impl Reduced {
         [(Structure::A, rooms.a, &self.a.vp, y_a), (Structure::B, rooms.b, &self.b.vp, y_b)]
             .into_par_iter()
             .filter_map(|(substructure, file, vp, y)| {
-                // what times a driving-point admittance is a mobility
+                // factor from driving-point admittance to mobility
                 let order = file.frf.quantity().order_of_s();
                 let s: Vec<Complex<f64>> = (0..y.len()).map(|l| file.frf.s(l).powi(1 - order)).collect();
                 let lines = every_line(y.len(), |l| file.cells(l, &vp.rows, &vp.columns)).ok()?;
@@ -113,7 +114,8 @@ impl Reduced {
             .collect()
     }
 
-    /// How well A and B, coupled by this joint (mean over `band`), give the measured assembly; none where that cannot be said.
+    /// How well A and B, coupled by this joint (mean over `band`), reproduce the measured assembly;
+    /// none if it cannot be computed.
     pub(super) fn back_coupling(&self, rooms: &Rooms<'_>, z: &[Line], band: Band) -> Option<BackCoupling> {
         let d: Vec<f64> = balance(self.idms).iter().map(|d| 1.0 / d).collect();
         let z: Vec<Line> = z.par_iter().map(|z| scaled(z.clone(), &d, Complex::from(1.0))).collect();
@@ -170,7 +172,7 @@ impl Reduced {
         found.as_deref().map_err(Clone::clone)
     }
 
-    /// (Y^AJB_cc)⁻¹ at one line, where `y` is Y^AJB_cc.
+    /// (Y^AJB_cc)⁻¹ at one line, with `y` = Y^AJB_cc.
     pub(super) fn impedance_of(rooms: &Rooms<'_>, l: usize, y: &Line) -> Result<Line, RefusedReason> {
         full_rank_inverse(y, ASSEMBLY).map_err(|lost| Self::refused(rooms, l, lost.into()))
     }
@@ -188,7 +190,7 @@ impl Reduced {
     }
 }
 
-/// What `of` gives for each line, in parallel; the first line's refusal if there are some.
+/// The result of `of` for each line, in parallel; if some refuse, the refusal of the first of them.
 pub(super) fn every_line<T: Send, E>(
     lines: usize,
     of: impl Fn(usize) -> Result<T, E> + Sync,
@@ -196,7 +198,7 @@ pub(super) fn every_line<T: Send, E>(
     let found: Vec<Option<T>> = (0..lines).into_par_iter().with_min_len(16).map(|l| of(l).ok()).collect();
     match found.into_iter().collect() {
         Some(all) => Ok(all),
-        // which refusal is the first shows when they are asked in order
+        // run in order to find the first refusal
         None => (0..lines).map(of).collect(),
     }
 }

@@ -33,7 +33,8 @@ impl<'a> Rooms<'a> {
     }
 }
 
-/// A virtual point in one file with its rotations in metres: T_u and T_f between measured points and D u, D⁻¹ f.
+/// A virtual point in one file with its rotations in metres: T_u and T_f between measured points
+/// and D u, D⁻¹ f.
 pub(super) struct Balanced {
     pub(super) vp: VirtualPoint,
     pub(super) t_u: DMatrix<f64>,
@@ -53,7 +54,7 @@ impl Balanced {
         Ok(Balanced { vp, t_u, t_f })
     }
 
-    /// T_u Y T_f of one line, responses at this virtual point and forces at the other.
+    /// T_u Y T_f of one line, with responses at this virtual point and forces at the other.
     pub(super) fn admittance(
         &self,
         file: Measured<'_>,

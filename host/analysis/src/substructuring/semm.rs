@@ -1,15 +1,17 @@
-//! System equivalent model mixing (SEMM): a model's admittance at many points, corrected by a measurement at a few.
+//! System equivalent model mixing (SEMM): a model's admittance at many points, corrected by a
+//! measurement at a few.
 //!
-//! The numerical parent Y^par spans all points; its part at the measured ones (removed model Y^rem) is decoupled, and the
-//! measurement (overlay Y^ov) is coupled in its place (Klaassen, van der Seijs, de Klerk, MSSP 105 (2018), Eqs. 21 and 31).
-//! With all points g and the measured ones b:
+//! The numerical parent Y^par spans all points; its part at the measured ones (removed model Y^rem)
+//! is decoupled, and the measurement (overlay Y^ov) is coupled in its place (Klaassen, van der
+//! Seijs, de Klerk, MSSP 105 (2018), Eqs. 21 and 31). With all points g and the measured ones b:
 //!
 //! - basic: Y^par − Y^par_gb (Y^rem)⁻¹ (Y^rem − Y^ov) (Y^rem)⁻¹ Y^par_bg,
 //! - fully extended: Y^par − Y^par (Y^par_bg)⁺ (Y^rem − Y^ov) (Y^par_gb)⁺ Y^par.
 //!
-//! In the extended form the smallest singular values of either inverse can be left out: directions in which noise of the overlay
-//! would be blown up. pyFBS 1.0.7 has that option too (`fully-extend-svd`), but never reaches it: its condition
-//! `semm_type == "fully-extend" or "extended"` is always true. Here it truncates.
+//! In the extended form the smallest singular values of either inverse can be left out: directions
+//! in which noise of the overlay would be amplified. pyFBS 1.0.7 has that option too
+//! (`fully-extend-svd`), but never reaches it: its condition `semm_type == "fully-extend" or
+//! "extended"` is always true. Here it truncates.
 
 use super::pseudo_inverse::{RankLost, full_rank_inverse};
 use crate::frf::{Frf, FrfError, block};
@@ -21,16 +23,17 @@ type Line = DMatrix<Complex<f64>>;
 /// Singular values below this fraction of the largest are rounding.
 const ROUNDING: f64 = 1e-13;
 
-/// Which DoFs compatibility and equilibrium are asked of.
+/// The DoFs at which compatibility and equilibrium are required.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
     /// The measured ones only.
     Basic,
-    /// All of the parent's, with so many of the smallest singular values left out of each inverse.
+    /// All of the parent's, with the given number of smallest singular values left out of each
+    /// inverse.
     FullyExtended {
-        /// Left out of (Y^par_bg)⁺, compatibility.
+        /// Number left out of (Y^par_bg)⁺, compatibility.
         drop_compatibility: usize,
-        /// Left out of (Y^par_gb)⁺, equilibrium.
+        /// Number left out of (Y^par_gb)⁺, equilibrium.
         drop_equilibrium: usize,
     },
 }
@@ -38,17 +41,18 @@ pub enum Form {
 /// The fully extended form with nothing left out.
 pub const FULLY_EXTENDED: Form = Form::FullyExtended { drop_compatibility: 0, drop_equilibrium: 0 };
 
-/// Why models cannot be mixed.
+/// The reason why models cannot be mixed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SemmError {
-    /// A name of the overlay that the parent does not have, or a matrix that is wrong in itself.
+    /// The overlay has a name that the parent lacks, or a matrix is invalid.
     #[error(transparent)]
     Frf(#[from] FrfError),
-    /// Parent and overlay are on different lines, in different quantities, or under different windows.
+    /// Parent and overlay are on different lines, in different quantities, or under different
+    /// windows.
     #[error("overlay and parent differ in {0}: mix FRFs of the same lines, quantity and window only")]
     Unlike(&'static str),
-    /// The overlay's shape is not that of the places given.
+    /// The overlay's shape does not match the given rows and columns.
     #[error(
         "the overlay is {rows} × {columns}, but {outputs} outputs and {inputs} inputs of the parent were named"
     )]
@@ -62,24 +66,25 @@ pub enum SemmError {
         /// Columns named.
         inputs: usize,
     },
-    /// The parent cannot tell the measured points apart.
+    /// The parent cannot distinguish the measured points.
     #[error("{0}; or leave out its smallest singular values")]
     Singular(#[from] RankLost),
-    /// Nothing, or only rounding, would be left of an inverse.
+    /// Only rounding, or nothing, would remain of an inverse.
     #[error(
         "with {dropped} of {all} singular values left out, {left} remain that are no rounding: leave out fewer, or others"
     )]
     Truncation {
-        /// Asked to leave out.
+        /// Number to be left out.
         dropped: usize,
-        /// Singular values there are.
+        /// Number of singular values.
         all: usize,
-        /// Usable ones among those that would remain.
+        /// Number of usable ones among those that remain.
         left: usize,
     },
 }
 
-/// One line mixed: `parent` (g × g'), `overlay` measured at its rows `outputs` and columns `inputs`.
+/// Mixes one line: `parent` (g × g'), and `overlay` measured at its rows `outputs` and columns
+/// `inputs`.
 ///
 /// # Errors
 /// [`SemmError`]: shapes, or a parent without the rank that the form needs.
@@ -114,7 +119,7 @@ pub fn mix(
     })
 }
 
-/// All lines mixed; the overlay's outputs and inputs are found among the parent's by name.
+/// Mixes all lines; the overlay's outputs and inputs are found among the parent's by name.
 ///
 /// # Errors
 /// [`SemmError`].
@@ -151,7 +156,8 @@ pub fn semm(parent: &Frf, overlay: &Frf, form: Form) -> Result<Frf, SemmError> {
     Ok(parent.with_values(lines)?)
 }
 
-/// The pseudo-inverse with the `dropped` smallest singular values left out; without any it must have full rank.
+/// The pseudo-inverse without the `dropped` smallest singular values; if `dropped` is 0, full rank
+/// is required.
 fn pseudo_inverse(a: &Line, dropped: usize, name: &'static str) -> Result<Line, SemmError> {
     if dropped == 0 {
         return Ok(full_rank_inverse(a, name)?);
@@ -188,7 +194,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 48, rng_seed: proptest::test_runner::RngSeed::Fixed(8), ..ProptestConfig::default() })]
 
-        /// An overlay that says what the parent says changes nothing; another one is met where it was measured.
+        /// An overlay equal to the parent changes nothing; any other one is reproduced where it was
+        /// measured.
         #[test]
         fn the_hybrid_is_the_measurement_where_there_is_one(v in prop::collection::vec(-1.0..1.0f64, 50 + 18)) {
             let (parent, overlay) = (matrix(5, &v[..50], 3.0), matrix(3, &v[50..], 2.0));
@@ -202,7 +209,7 @@ mod tests {
             }
         }
 
-        /// With singular values left out, the correction has exactly the rank that is left.
+        /// With singular values left out, the correction has exactly the remaining rank.
         #[test]
         fn truncation_truncates(v in prop::collection::vec(-1.0..1.0f64, 50 + 18)) {
             let (parent, overlay) = (matrix(5, &v[..50], 3.0), matrix(3, &v[50..], 2.0));

@@ -1,4 +1,4 @@
-//! Z^J of every line by every method asked for.
+//! Z^J of every line by every requested method.
 
 use super::at_once::{Found, Job};
 use super::decoupling::{DecouplingError, observed_rank};
@@ -13,22 +13,22 @@ use nalgebra::{Complex, DMatrix};
 
 type Line = DMatrix<Complex<f64>>;
 
-/// Z^J per line, and what is to be said about it.
+/// Z^J per line, with notes for the user.
 pub(super) struct Solution {
     pub(super) z: Vec<Line>,
     pub(super) notes: Vec<String>,
     pub(super) internals: Option<Internals>,
 }
 
-/// What all methods gave.
+/// Results of all methods.
 pub(super) struct Solutions {
-    /// Y^A and Y^B, rotations in metres; nothing where they were not asked for.
+    /// Y^A and Y^B, rotations in metres; empty if not requested.
     pub(super) alone: Vec<Vec<Line>>,
     /// In the order of the methods.
     pub(super) by_method: Vec<Result<Solution, RefusedReason>>,
 }
 
-/// A method with what is to be said about it.
+/// A method with notes for the user.
 struct Plan<'a> {
     work: Work<'a>,
     notes: Vec<String>,
@@ -36,10 +36,10 @@ struct Plan<'a> {
 }
 
 impl Reduced {
-    /// Every method, its refusal where it cannot work on the data; and Y^A and Y^B where they are asked for.
+    /// The result or refusal of every method, and Y^A and Y^B if requested.
     ///
     /// # Errors
-    /// Y^A or Y^B has a value that is no number: then no method works.
+    /// Y^A or Y^B contains a value that is not finite: then no method works.
     pub(super) fn solve(
         &self,
         rooms: &Rooms<'_>,
@@ -76,7 +76,8 @@ impl Reduced {
         Ok(Plan { work, notes: Vec::new(), internals: None })
     }
 
-    /// Both forms of Eq. (3) and its sisters: P, Q from the substructures, M from the assembly, at the internals that both have.
+    /// Both forms of Eq. (3) and the related rearrangements: P, Q from the substructures, M from
+    /// the assembly, at the internals that both have.
     fn with_internals<'a>(
         &self,
         rooms: &Rooms<'_>,

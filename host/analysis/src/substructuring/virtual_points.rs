@@ -1,4 +1,5 @@
-//! Any number of virtual points in one FRF matrix, each with modes of its own; channels and impacts of none pass through.
+//! Any number of virtual points in one FRF matrix, each with its own modes; channels and impacts
+//! that belong to none are passed through.
 
 use super::geometry::{Configuration, Grouping, Point};
 use super::idm::IdmSet;
@@ -7,23 +8,23 @@ use crate::frf::{Frf, FrfError};
 use crate::parallel::prelude::*;
 use nalgebra::{DMatrix, Vector3};
 
-/// One virtual point: where it is, what it carries, and what it is made of.
+/// One virtual point: its position, modes, outputs and inputs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VirtualPoint {
-    /// Its name; its degrees of freedom are called `name:x` and so on.
+    /// Its name; its degrees of freedom are named `name:x` and so on.
     pub name: String,
-    /// Where it is, m.
+    /// Its position, m.
     pub position_m: [f64; 3],
     /// Its modes.
     pub idms: IdmSet,
-    /// Names of its outputs; none for a point of forces only.
+    /// Names of its outputs; empty for a point of forces only.
     pub outputs: Vec<String>,
-    /// Names of its inputs; none for a point of motions only.
+    /// Names of its inputs; empty for a point of motions only.
     pub inputs: Vec<String>,
 }
 
 impl VirtualPoint {
-    /// Of all channels and impacts of one grouping.
+    /// A virtual point of all channels and impacts of one grouping.
     pub fn of_grouping(
         name: &str,
         position_m: [f64; 3],
@@ -44,24 +45,25 @@ impl VirtualPoint {
     }
 }
 
-/// Diagonals of W_u and W_f: one row for all lines, or one for each line, of a positive weight for every output and input of
-/// the matrix. A large W_u trusts a channel more, a large W_f an impact less.
+/// Diagonals of W_u and W_f: one row for all lines, or one row per line, each with a positive
+/// weight for every output or input of the matrix. A large W_u means more trust in a channel, a
+/// large W_f less trust in an impact.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Weights {
-    /// \[line\]\[output\]; empty for even weights.
+    /// \[line\]\[output\]; empty for equal weights.
     pub outputs: Vec<Vec<f64>>,
-    /// \[line\]\[input\]; empty for even weights.
+    /// \[line\]\[input\]; empty for equal weights.
     pub inputs: Vec<Vec<f64>>,
 }
 
-/// Why virtual points cannot be formed.
+/// The reason why virtual points cannot be formed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VirtualPointsError {
-    /// The matrix is wrong in itself, or lacks a name.
+    /// The matrix is invalid, or lacks a name.
     #[error(transparent)]
     Frf(#[from] FrfError),
-    /// The points cannot carry the modes.
+    /// The points cannot determine the modes.
     #[error("virtual point `{name}`: {source}")]
     Vpt {
         /// Its name.
@@ -87,31 +89,33 @@ pub enum VirtualPointsError {
         /// The name.
         name: String,
     },
-    /// Another number of weights than lines or names.
+    /// The number of weights does not match that of lines or names.
     #[error("the weights of the {side} are {rows} rows of {columns}, {lines} (or one) of {names} are needed")]
     Weights {
         /// `outputs` or `inputs`.
         side: &'static str,
         /// Rows given.
         rows: usize,
-        /// Length of the first row that does not fit, or of the first.
+        /// Length of the first row with a wrong length, otherwise of the first row.
         columns: usize,
-        /// Lines of the matrix.
+        /// Number of lines of the matrix.
         lines: usize,
-        /// Names of the matrix.
+        /// Number of names of the matrix.
         names: usize,
     },
 }
 
-/// One side of the matrix: the transformation as a whole, T_u (new × old) or T_f (old × new), and the new names.
+/// One side of the matrix: the overall transformation, T_u (new × old) or T_f (old × new), and the
+/// new names.
 struct Side {
     t: DMatrix<f64>,
     names: Vec<String>,
 }
 
-/// Y_vp = T_u Y T_f of the whole matrix: the degrees of freedom of the virtual points in their order, then what belongs to none.
+/// Y_vp = T_u Y T_f of the whole matrix: the degrees of freedom of the virtual points in their
+/// order, then the outputs and inputs that belong to none.
 ///
-/// Names of matrix and geometry must agree. Weights may differ from line to line.
+/// Names in matrix and geometry must agree. Weights may differ from line to line.
 ///
 /// # Errors
 /// [`VirtualPointsError`].
@@ -273,7 +277,7 @@ mod tests {
         }
     }
 
-    /// A matrix that consists of these motions of these points only comes back as what it was made of.
+    /// A matrix built from these motions of these points only is reproduced.
     #[test]
     fn three_points_with_modes_of_their_own_come_back() {
         let origins = [[0.0; 3], [0.5, 0.0, 0.0], [0.0, 0.7, 0.1]];
@@ -322,11 +326,12 @@ mod tests {
             assert_eq!(found.outputs()[..2], ["one:x".to_owned(), "one:y".to_owned()]);
             assert_eq!(found.inputs()[dofs.len() - 1], "three:ry");
             for line in found.lines() {
-                // bending of unit size moves a corner by 5e-4: that many digits are lost on either side
+                // bending of unit size moves a corner by 5e-4: this many digits are lost on either
+                // side
                 assert!((line - &truth).norm() < 1e-8 * truth.norm(), "{}", (line - &truth).norm());
             }
         }
-        // two points: the third's channels pass through
+        // two points: the third's channels are passed through
         let two = transform(&frf, &geometry, &plans[..2], &Weights::default()).expect("enough points");
         assert_eq!((two.outputs().len(), two.inputs().len()), (6 + 9 + 12, 6 + 9 + 12));
         assert_eq!(two.lines()[0][(20, 20)], frf.lines()[0][(29, 29)]);

@@ -1,28 +1,29 @@
-//! The virtual point transformation: measured responses and impacts onto the interface's deformation modes.
+//! The virtual point transformation: measured responses and impacts onto the interface's
+//! deformation modes.
 //!
-//! Each response is a row of R_u, eᵀ \[I, −skew(r)\] for rigid modes (channel × degree of freedom), each impact one of R_f. With
-//! weights W: T_u = (R_uᵀ W R_u)⁻¹ R_uᵀ W and T_f = W⁻¹ R_f (R_fᵀ W⁻¹ R_f)⁻¹, and Y_vp = T_u Y T_f
-//! (the paper's Sec. 2.4; van der Seijs et al.).
+//! Each response is a row of R_u, eᵀ \[I, −skew(r)\] for rigid modes (channel × degree of freedom),
+//! each impact one of R_f. With weights W: T_u = (R_uᵀ W R_u)⁻¹ R_uᵀ W and T_f = W⁻¹ R_f (R_fᵀ W⁻¹
+//! R_f)⁻¹, and Y_vp = T_u Y T_f (the paper's Sec. 2.4; van der Seijs et al.).
 
 use super::geometry::Point;
 use super::idm::IdmSet;
 use super::product::product;
 use nalgebra::{Complex, DMatrix, Vector3};
 
-/// Rotations are compared with translations through this length, m: about the distance of the rig's sensors
-/// from the contact. Without a length a condition number mixes metres with radians and means nothing. It
-/// changes no result, only that number and the rounding.
+/// Length by which rotations are compared with translations, m: about the distance of the rig's
+/// sensors from the contact. Without a length a condition number mixes metres with radians and
+/// means nothing. The length affects only that number and the rounding, not the result.
 pub const ROTATION_LENGTH_M: f64 = 0.040;
 
-/// Scaled singular values below this fraction of the largest are no information: at 40 mm it is a
-/// displacement of 40 nm over the sensor's distance, far below any position's accuracy.
+/// Scaled singular values below this fraction of the largest carry no information: at 40 mm this is
+/// a displacement of 40 nm over the sensor's distance, far below any position's accuracy.
 const RANK_FLOOR: f64 = 1e-6;
 
-/// Why a set of channels or impacts cannot carry a virtual point.
+/// The reason why a set of channels or impacts cannot form a virtual point.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VptError {
-    /// Too few points, or points that cannot tell two motions apart.
+    /// Too few points, or points that cannot distinguish two motions.
     #[error(
         "the {kind} ({names}) fix {rank} of {needed} motions of the virtual point (scaled singular values {singular_values:.6?}): \
          add points off the line of the others, or use fewer IDMs"
@@ -32,9 +33,9 @@ pub enum VptError {
         kind: &'static str,
         /// Names of the points.
         names: String,
-        /// Motions fixed.
+        /// Number of motions determined.
         rank: usize,
-        /// Motions wanted.
+        /// Number of motions required.
         needed: usize,
         /// Singular values of R with rotations scaled by [`ROTATION_LENGTH_M`].
         singular_values: Vec<f64>,
@@ -54,7 +55,7 @@ pub enum VptError {
 /// One side (responses or impacts) of a virtual point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transformation {
-    /// The modes carried.
+    /// The modes.
     pub idms: IdmSet,
     /// R (point × degree of freedom): m per m, m per rad.
     pub r: DMatrix<f64>,
@@ -67,7 +68,7 @@ pub struct Transformation {
 /// T_u of these channels about `virtual_point_m`; `weights` are the diagonal of W.
 ///
 /// # Errors
-/// [`VptError`] when the channels cannot tell the motions apart.
+/// [`VptError`] if the channels cannot distinguish the motions.
 pub fn responses(
     channels: &[Point],
     virtual_point_m: Vector3<f64>,
@@ -81,10 +82,11 @@ pub fn responses(
     Ok(Transformation { idms, r, t, condition })
 }
 
-/// T_f of these impacts about `virtual_point_m`; `weights` are the diagonal of W (large = trusted little).
+/// T_f of these impacts about `virtual_point_m`; `weights` are the diagonal of W (a large weight
+/// means little trust).
 ///
 /// # Errors
-/// [`VptError`] when the impacts cannot excite the motions apart.
+/// [`VptError`] if the impacts cannot excite the motions independently.
 pub fn impacts(
     points: &[Point],
     virtual_point_m: Vector3<f64>,
@@ -99,12 +101,12 @@ pub fn impacts(
     Ok(Transformation { idms, r, t, condition })
 }
 
-/// T_u Y: outputs onto the virtual point.
+/// T_u Y: outputs reduced to the virtual point.
 pub fn reduce_outputs(t_u: &DMatrix<f64>, y: &DMatrix<Complex<f64>>) -> DMatrix<Complex<f64>> {
     product(t_u, y)
 }
 
-/// Y T_f: inputs onto the virtual point.
+/// Y T_f: inputs reduced to the virtual point.
 pub fn reduce_inputs(y: &DMatrix<Complex<f64>>, t_f: &DMatrix<f64>) -> DMatrix<Complex<f64>> {
     product(y, t_f)
 }
@@ -197,7 +199,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 48, rng_seed: proptest::test_runner::RngSeed::Fixed(3), ..ProptestConfig::default() })]
 
-        /// T_u R_u = I and R_fᵀ T_f = I for any weights: a rigid motion comes back as itself.
+        /// T_u R_u = I and R_fᵀ T_f = I for any weights: a rigid motion is reproduced.
         #[test]
         fn transformations_are_left_inverses(
             v in prop::collection::vec(-0.05..0.05f64, 12),

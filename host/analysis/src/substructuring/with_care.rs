@@ -1,4 +1,4 @@
-//! Z^J of one line by itself, by one method: where it is near rank loss, and where it is refused.
+//! Z^J of one separate line by one method, for lines near rank loss or with a refusal.
 
 use super::decoupling::{
     InverseBlock, PrimalBlock, interface, internal, internal_printed, inverse_of, primal_of,
@@ -10,7 +10,7 @@ use nalgebra::{Complex, DMatrix};
 
 type Line = DMatrix<Complex<f64>>;
 
-/// What a method does with a line.
+/// The operation that a method applies to a line.
 pub(super) enum Work<'a> {
     Internals(Box<Rearrangement<'a>>),
     Interface,
@@ -18,7 +18,8 @@ pub(super) enum Work<'a> {
     Inverse(InverseBlock),
 }
 
-/// What is asked of all lines before the next: which refusal is the first.
+/// Order of the computation: each stage is done for all lines before the next, which decides the
+/// refusal that is reported.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Stage {
     Assembly,
@@ -26,7 +27,7 @@ pub(super) enum Stage {
     Method,
 }
 
-/// A line's refusal.
+/// The refusal of a line.
 pub(super) struct Refusal {
     pub(super) stage: Stage,
     pub(super) reason: RefusedReason,
@@ -39,7 +40,7 @@ impl Stage {
 }
 
 impl Reduced {
-    /// One line by itself: where it is near rank loss, and where it is refused. Rotations in metres.
+    /// Z^J of one separate line, for lines near rank loss or with a refusal. Rotations in metres.
     pub(super) fn with_care(&self, rooms: &Rooms<'_>, work: &Work<'_>, l: usize) -> Result<Line, Refusal> {
         let alone = |side| self.alone_at(rooms, side, l).map_err(Stage::Method.refuses());
         let assembly = || self.assembly_at(rooms, l).map_err(Stage::Assembly.refuses());

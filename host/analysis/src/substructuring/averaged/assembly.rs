@@ -1,4 +1,5 @@
-//! The assembly's interface cells over a band: receptances, their noise, and the two virtual points they reduce to.
+//! The assembly's interface cells over a band: receptances, their noise, and their reduction to two
+//! virtual points.
 
 use super::layout::Layout;
 use super::{AveragedError, Line};
@@ -10,7 +11,8 @@ use crate::substructuring::idm::IdmSet;
 use crate::substructuring::interface_data::{Found, Measured};
 use nalgebra::{Complex, DMatrix};
 
-/// The assembly's FRFs reduced to its two virtual points, with what is needed to trace an error back to its cell.
+/// The assembly's FRFs reduced to its two virtual points, with the data needed to relate an error
+/// to its cell.
 pub(super) struct Assembly {
     pub(super) frequency_hz: Vec<f64>,
     pub(super) s: Vec<Complex<f64>>,
@@ -48,14 +50,15 @@ impl Assembly {
         let cells = cells.iter().zip(&s).map(|(y, s)| y * s.powi(-order)).collect();
         let variance = ajb
             .receptance_variance(&in_band, &rows.at, &columns.at)
-            // a cell without any known variance makes the whole unknown: half an interval is none
+            // if the variance of one cell is unknown, the whole is unknown: an interval of part of
+            // the errors would be useless
             .filter(|v| v.iter().all(|line| line.iter().all(|v| v.is_finite())));
         let frequency_hz = in_band.iter().map(|&l| ajb.frequency_hz()[l]).collect();
         let layout = Layout::new(&a, &b, &rows, &columns, geometry, idms);
         Ok(Assembly { frequency_hz, s, cells, variance, layout, outputs: rows.names, inputs: columns.names })
     }
 
-    /// Mean distance of the lines, Hz.
+    /// Mean spacing of the lines, Hz.
     pub(super) fn step_hz(&self) -> f64 {
         let n = self.frequency_hz.len();
         if n < 2 { f64::INFINITY } else { (self.frequency_hz[n - 1] - self.frequency_hz[0]) / (n - 1) as f64 }

@@ -1,8 +1,9 @@
-//! Bootstrap over hits: the scatter that the hits themselves show, with no model of the noise at all.
+//! Bootstrap over hits: the scatter of the hits themselves, without any model of the noise.
 //!
-//! Every replicate draws the hits of each cell anew, with replacement, forms H1, reduces, decouples and averages as the estimate does, with
-//! the estimate's own weights. Hits of different cells are independent; the axes of one sensor share theirs. What repeats in
-//! every hit (positions, angles) does not show here: the estimate's geometric part has to be added.
+//! Every replicate draws the hits of each cell again, with replacement, forms H1, reduces,
+//! decouples and averages as the estimate does, with the estimate's weights. Hits of different
+//! cells are independent; the axes of one sensor share theirs. Errors that repeat in every hit
+//! (positions, angles) do not appear here: the estimate's geometric part has to be added.
 
 use super::{AveragedError, DofEstimate, Line, Prepared, compliance, invert};
 use crate::parallel::prelude::*;
@@ -15,7 +16,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Spectra of the hits of one impact seen by one sensor, on the lines of the FRFs.
+/// Spectra of the hits of one impact measured by one sensor, on the lines of the FRFs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellHits {
     /// Name of the input.
@@ -28,16 +29,18 @@ pub struct CellHits {
     pub cross: Vec<Vec<Vec<Complex<f64>>>>,
 }
 
-/// What the replicates say of one degree of freedom. N/m; N m/rad for rotations.
+/// Statistics of the replicates for one degree of freedom. N/m; N m/rad for rotations.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Replicates {
-    /// Mean of the replicates minus the estimate from all hits, before any correction: the noise's bias.
+    /// Mean of the replicates minus the estimate from all hits, before any correction: the bias due
+    /// to noise.
     pub bias: f64,
     /// Standard deviation of the replicates.
     pub std: f64,
-    /// Their median.
+    /// Median of the replicates.
     pub median: f64,
-    /// Middle 95 % of the replicates, mirrored about the estimate (basic bootstrap): where the truth is, as far as hits can tell.
+    /// Middle 95 % of the replicates, mirrored about the estimate (basic bootstrap): interval of
+    /// the true value as far as the hits determine it.
     pub ci95: [f64; 2],
 }
 
@@ -45,7 +48,8 @@ fn hits(cell: &CellHits) -> usize {
     cell.auto.first().map_or(0, Vec::len)
 }
 
-/// How often a replicate uses each hit: \[replicate\]\[hit\], the cells' hits one after the other.
+/// How often a replicate uses each hit: \[replicate\]\[hit\], with the hits of all cells one after
+/// the other.
 struct Draws {
     counts: Vec<Vec<f64>>,
 }
@@ -72,12 +76,13 @@ impl Draws {
 }
 
 impl Prepared {
-    /// The bootstrap of this estimate; `cells` must hold every cell of the interface on the lines of the estimate's band.
+    /// The bootstrap of this estimate; `cells` must hold every cell of the interface on the lines
+    /// of the estimate's band.
     ///
     /// Deterministic in `seed`; parallel over lines.
     ///
     /// # Errors
-    /// [`AveragedError::Hits`] when a cell is missing, or its spectra have other lines.
+    /// [`AveragedError::Hits`] if a cell is missing, or its spectra have other lines.
     pub fn bootstrap(
         &self,
         cells: &[CellHits],
@@ -110,7 +115,7 @@ impl Prepared {
                     }
                     let z = invert(&self.assembly.layout.reduce(&y));
                     for d in 0..n {
-                        // a replicate that is singular at a line keeps what all hits gave there
+                        // a replicate that is singular at a line takes the value of all hits there
                         let value = z
                             .as_ref()
                             .map_or_else(|_| compliance(&self.impedance[l], d), |z| compliance(z, d));
@@ -204,7 +209,7 @@ impl Replicates {
 }
 
 impl DofEstimate {
-    /// The estimate with the bootstrap's scatter in place of the propagated noise.
+    /// The estimate with the bootstrap's scatter instead of the propagated noise.
     #[must_use]
     pub fn with_hits(self, hits: &Replicates) -> DofEstimate {
         self.with_noise(hits.std)

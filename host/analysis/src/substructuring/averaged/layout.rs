@@ -1,4 +1,5 @@
-//! Where the cells of the assembly's interface are, and how they reduce to its two virtual points.
+//! Positions of the cells of the assembly's interface, and their reduction to its two virtual
+//! points.
 
 use super::Line;
 use crate::substructuring::geometry::{Geometry, Point};
@@ -7,17 +8,17 @@ use crate::substructuring::interface_data::{Found, VirtualPoint, balance};
 use crate::substructuring::vpt::{reduce_inputs, reduce_outputs};
 use nalgebra::{DMatrix, Vector3};
 
-/// A channel or impact as the propagation needs it.
+/// A channel or impact with the data that the propagation needs.
 pub(super) struct Place {
     pub(super) direction: Vector3<f64>,
     pub(super) offset: Vector3<f64>,
     /// 0 for A's virtual point, 1 for B's.
     pub(super) side: usize,
-    /// Which sensor: its axes share one error of position.
+    /// Index of the sensor: its axes share one error of position.
     pub(super) point: usize,
 }
 
-/// Transformations of both virtual points as one, and where everything is.
+/// The transformations of both virtual points combined, and the places of channels and impacts.
 pub(super) struct Layout {
     /// 2n_c × channels and impacts × 2n_c, rotations scaled.
     pub(super) t_u: DMatrix<f64>,
@@ -29,7 +30,8 @@ pub(super) struct Layout {
     pub(super) rotations: Axes,
 }
 
-/// Where the degree of freedom along each axis stands in the IDM set, and its scale; none where the set does not carry it.
+/// Index of the degree of freedom along each axis in the IDM set, and its scale; none if the set
+/// does not contain it.
 pub(super) type Axes = [Option<(usize, f64)>; 3];
 
 impl Layout {
@@ -82,7 +84,7 @@ impl Layout {
         Layout { t_u, t_f, channels, impacts, points: names.len(), translations, rotations }
     }
 
-    /// T_u Y T_f: cells onto both virtual points, rotations scaled.
+    /// T_u Y T_f: reduces cells to both virtual points, rotations scaled.
     pub(super) fn reduce(&self, cells: &Line) -> Line {
         reduce_inputs(&reduce_outputs(&self.t_u, cells), &self.t_f)
     }

@@ -1,13 +1,17 @@
-//! The recommended estimate: Eq. (A.1) line by line, averaged as a compliance before it is inverted, with an interval.
+//! The recommended estimate: Eq. (A.1) line by line, averaged as a compliance before it is
+//! inverted, with an interval.
 //!
-//! Eq. (A.1) needs neither Y^A nor Y^B, so a clamp that changes between the configurations cannot touch it. Of every line the
-//! joint's compliance along one degree of freedom, 1/Z^J_dd, is taken: noise enters it almost linearly, while Z^J_dd =
-//! 1/(y + n) falls towards zero where |n| > |y|, so that a mean of stiffness over lines is pulled down by noise alone. The compliance of a
-//! spring and a damper hardly changes over a band; it is averaged with the weights that each line's noise deserves, and
-//! inverted once. Whether noise leaves anything to average is asked at the band's typical compliance (`typical`).
+//! Eq. (A.1) needs neither Y^A nor Y^B, so a clamp that changes between the configurations does not
+//! affect it. From every line the joint's compliance along one degree of freedom, 1/Z^J_dd, is
+//! taken: noise enters it almost linearly, while Z^J_dd = 1/(y + n) falls towards zero where |n| >
+//! |y|, so that noise alone lowers a mean of stiffness over lines. The compliance of a spring and a
+//! damper hardly changes over a band; it is averaged with weights according to each line's noise,
+//! and inverted once. Whether the noise is small enough for an average is decided at the band's
+//! typical compliance (`typical`).
 //!
-//! `sensitivity` holds the linear propagation: dy/dY of every cell, from which noise and errors of position, aim and angle
-//! follow alike. What noise does in second order (the bias) is drawn, in pairs ±n whose linear parts cancel.
+//! `sensitivity` holds the linear propagation: dy/dY of every cell, which gives the effect of noise
+//! and of errors of position, aim and angle alike. The second-order effect of noise (the bias) is
+//! simulated, with pairs ±n whose linear parts cancel.
 
 mod assembly;
 mod bias;
@@ -37,30 +41,36 @@ use typical::Typical;
 
 type Line = DMatrix<Complex<f64>>;
 
-/// Above this the even mean of the lines tells nothing, so that weights have nothing to choose from either.
+/// Largest relative half-width of the lines' unweighted mean, at the typical compliance: above it
+/// the lines contain no information that weights could select.
 const HIDDEN: f64 = 2.0;
-/// Of rotations, which may be far softer than the arms' inertia, the even mean itself must tell.
+/// The same for rotations, whose stiffness may be far below the arms' inertia: for them the
+/// unweighted mean itself must be significant.
 const HIDDEN_ROTATION: f64 = 0.3;
 
-/// Standard deviations of what nobody at the rig knows. They belong to the experiment and are stated with the result.
+/// Standard deviations of quantities that are not known exactly. They belong to the experiment and
+/// are stated with the result.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Priors {
-    /// Where a sensor or an impact really is, m along each axis; the same in all its cells.
+    /// Error of the position of a sensor or an impact, m along each axis; the same in all its
+    /// cells.
     pub position_m: f64,
-    /// Added anew at each re-aim of a cell, m along each axis, for the sensor and for the hammer.
+    /// Additional error of each re-aiming of a cell, m along each axis, for the sensor and for the
+    /// hammer.
     pub aim_m: f64,
-    /// The hammer's tilt about each axis across its direction, rad; the same in all cells of an impact.
+    /// Tilt of the hammer about each axis across its direction, rad; the same in all cells of an
+    /// impact.
     pub hammer_angle_rad: f64,
 }
 
 impl Default for Priors {
-    /// 0.5 mm, 0.2 mm, 2°: a careful campaign by hand.
+    /// 0.5 mm, 0.2 mm, 2°: a careful manual campaign.
     fn default() -> Self {
         Priors { position_m: 0.5e-3, aim_m: 0.2e-3, hammer_angle_rad: 2f64.to_radians() }
     }
 }
 
-/// Why the estimate cannot be made.
+/// The reason why the estimate cannot be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AveragedError {
@@ -75,15 +85,15 @@ pub enum AveragedError {
         /// Why.
         source: RankLost,
     },
-    /// Modes whose errors of position are not propagated.
+    /// Modes for which errors of position are not propagated.
     #[error(
         "an estimate with an interval is made of rigid interface modes only, not of {0}: errors of position are not propagated for flexible ones"
     )]
     Flexible(Dof),
-    /// Spectra of hits that do not belong to the FRFs.
+    /// Spectra of hits that do not match the FRFs.
     #[error("the hits' spectra do not fit the FRFs: {reason}")]
     Hits {
-        /// What does not fit.
+        /// The mismatch.
         reason: String,
     },
     /// No line in the band.
@@ -96,25 +106,27 @@ pub enum AveragedError {
     },
 }
 
-/// One degree of freedom of the joint with its uncertainty. N/m and N s/m; N m/rad and N m s/rad for rotations.
+/// One degree of freedom of the joint with its uncertainty. N/m and N s/m; N m/rad and N m s/rad
+/// for rotations.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DofEstimate {
-    /// Stiffness, the noise's bias taken out.
+    /// Stiffness, corrected for the bias of noise.
     pub stiffness: f64,
-    /// Standard deviation of the stiffness: linear propagation, and the size of the bias.
+    /// Standard deviation of the stiffness: from linear propagation, and the size of the bias.
     pub std: f64,
-    /// Of it, from the FRFs' noise.
+    /// The part due to the FRFs' noise.
     pub std_noise: f64,
-    /// Of it, from errors of position, aim and angle.
+    /// The part due to errors of position, aim and angle.
     pub std_geometry: f64,
-    /// 95 % interval: the compliance's, inverted, so it reaches further up than down.
+    /// 95 % interval: that of the compliance, inverted, so it reaches further up than down.
     pub ci95: [f64; 2],
-    /// What noise alone added to the stiffness: expectation with noise minus value without; already taken out. It is drawn at the noisy
-    /// FRFs, so it is not known better than by its own size, and the interval holds that.
+    /// Bias due to noise: expectation of the stiffness with noise minus value without, already
+    /// subtracted. It is simulated at the noisy FRFs, so its uncertainty is its own size, which the
+    /// interval contains.
     pub bias: f64,
     /// Damping.
     pub damping: f64,
-    /// Whether the compliance differs from zero clearly enough for a number to be given.
+    /// Whether the compliance differs from zero clearly enough to give a value.
     pub identified: bool,
 }
 
@@ -127,16 +139,16 @@ pub struct Averaged {
     pub lines: usize,
     /// The interface deformation modes.
     pub idms: usize,
-    /// What was assumed of positions and angles.
+    /// Assumed errors of positions and angles.
     pub priors: Priors,
     /// Whether the FRFs' noise was known.
     pub noise_known: bool,
-    /// By degree of freedom.
+    /// Estimates by degree of freedom.
     pub joint: BTreeMap<Dof, DofEstimate>,
 }
 
 impl Averaged {
-    /// The result for the sliding direction in a sentence; never a bare number.
+    /// The result for the sliding direction as a sentence, always with an interval or a limit.
     pub fn statement(&self) -> Option<String> {
         let z = self.joint.get(&Dof::Z)?;
         let micro = |k: f64| k * 1e-6;
@@ -161,7 +173,8 @@ impl Averaged {
     }
 }
 
-/// The inverse of one line's interface admittance, and the joint's compliance along `d` by Eq. (A.1), both blocks averaged.
+/// The joint's compliance along `d` by Eq. (A.1) from the inverse `z` of one line's interface
+/// admittance, averaged over both blocks.
 fn compliance(z: &Line, d: usize) -> Complex<f64> {
     let n = z.nrows() / 2;
     -(0.5 * (z[(d, n + d)] + z[(n + d, d)])).inv()
@@ -173,7 +186,7 @@ fn invert(y: &Line) -> Result<Line, RankLost> {
 
 /// The recommended estimate of the joint over `band` from the assembly alone.
 ///
-/// Every degree of freedom gets its own weights.
+/// Every degree of freedom has its own weights.
 ///
 /// # Errors
 /// [`AveragedError`]: an interface that cannot be formed, a NaN, a singular line, an empty band.
@@ -187,7 +200,8 @@ pub fn averaged(
     Ok(Prepared::of(ajb, geometry, idms, band, priors)?.estimate())
 }
 
-/// The assembly decoupled line by line, and the weights of its lines: what estimate and bootstrap share.
+/// The assembly decoupled line by line, and the weights of its lines: shared by estimate and
+/// bootstrap.
 pub struct Prepared {
     band_hz: Band,
     priors: Priors,
@@ -197,18 +211,19 @@ pub struct Prepared {
     assembly: Assembly,
     /// Inverse of the interface admittance per line.
     impedance: Vec<Line>,
-    /// What noise adds to the compliance \[degree of freedom\]\[line\].
+    /// Bias of the compliance due to noise \[degree of freedom\]\[line\].
     bias: Vec<Vec<Complex<f64>>>,
     /// Sensitivities \[degree of freedom\]\[line\].
     sums: Vec<Vec<Sums>>,
-    /// Normalised \[degree of freedom\]\[line\].
+    /// Normalised weights \[degree of freedom\]\[line\].
     weights: Vec<Vec<f64>>,
     /// Relative standard deviation at the typical compliance \[degree of freedom\].
     typical: Vec<f64>,
 }
 
 impl Prepared {
-    /// Decouples `ajb` over `band` and weighs its lines; arguments as of [`averaged`].
+    /// Decouples `ajb` over `band` and computes the weights of its lines; arguments as of
+    /// [`averaged`].
     ///
     /// # Errors
     /// As [`averaged`].
@@ -266,7 +281,8 @@ impl Prepared {
             .map(|(d, &dof)| {
                 // N/m for translations, N m/rad for rotations
                 let found = self.estimate_of(d).scaled(balance(self.idms)[d].powi(2));
-                // against the arms' inertia noise makes a soft rotation look stiff: a limit that it seems to give is none
+                // noise makes a rotation that is soft compared with the arms' inertia look stiff,
+                // so no lower limit is given for it
                 let limited = found.identified || !dof.is_rotation();
                 let low = if limited { found.ci95[0] } else { 0.0 };
                 (dof, DofEstimate { ci95: [low, found.ci95[1]], ..found })
@@ -282,7 +298,7 @@ impl Prepared {
         }
     }
 
-    /// How many independent lines one line's noise is worth less than: see [`shared_by_lines`].
+    /// Variance factor for the noise that neighbouring lines share: see [`shared_by_lines`].
     fn shared(&self) -> f64 {
         shared_by_lines(self.sigma_per_s, self.assembly.step_hz())
     }
@@ -291,7 +307,8 @@ impl Prepared {
         self.assembly.s.iter().zip(&self.weights[d]).map(|(s, w)| s * *w).sum()
     }
 
-    /// One degree of freedom, rotations scaled: averages the compliance, propagates, inverts.
+    /// One degree of freedom, rotations scaled: averages the compliance, propagates errors,
+    /// inverts.
     fn estimate_of(&self, d: usize) -> DofEstimate {
         let (mut y, mut drawn) = (Complex::<f64>::default(), Complex::<f64>::default());
         for (l, w) in self.weights[d].iter().enumerate() {
@@ -301,7 +318,7 @@ impl Prepared {
         let s = self.mean_s(d);
         let (stiffness, damping) = stiffness_and_damping((y - drawn).inv(), s);
         let total = Sums::weighted(&self.sums[d], self.weights[d].iter().copied());
-        // dK = −K² dy, to the loss factor's square
+        // dK = −K² dy, to second order in the loss factor
         let to_stiffness = stiffness * stiffness;
         let enough = if self.idms.dofs()[d].is_rotation() { HIDDEN_ROTATION } else { HIDDEN };
         DofEstimate {
@@ -309,7 +326,7 @@ impl Prepared {
             std: 0.0,
             std_noise: 0.0,
             std_geometry: to_stiffness * total.geometry_variance(&self.priors).sqrt(),
-            // of what noise hides, not even a limit is known
+            // if noise dominates, not even a limit is known
             ci95: [0.0, f64::INFINITY],
             bias: stiffness_and_damping(y.inv(), s).0 - stiffness,
             damping,
@@ -319,7 +336,8 @@ impl Prepared {
     }
 }
 
-/// The 95 % interval of a stiffness whose compliance is normally distributed, and whether the upper end is a number.
+/// The 95 % interval of a stiffness whose compliance is normally distributed, and whether the upper
+/// end is finite.
 fn interval(stiffness: f64, std: f64) -> ([f64; 2], bool) {
     let relative = NORMAL_95 * std / stiffness.abs();
     let identified = relative < COMPLIANCE_HALF_WIDTH && stiffness > 0.0;
@@ -328,7 +346,8 @@ fn interval(stiffness: f64, std: f64) -> ([f64; 2], bool) {
 }
 
 impl DofEstimate {
-    /// The same with this standard deviation of the noise; what is not identified stays so.
+    /// The estimate with this standard deviation of the noise; an unidentified one stays
+    /// unidentified.
     fn with_noise(self, std_noise: f64) -> DofEstimate {
         let std = std_noise.hypot(self.std_geometry).hypot(self.bias);
         let same = DofEstimate { std, std_noise, ..self };
@@ -339,7 +358,7 @@ impl DofEstimate {
         DofEstimate { ci95, identified, ..same }
     }
 
-    /// The same with rotations in N m/rad: all but the verdict times `scale`.
+    /// The estimate with rotations in N m/rad: everything except `identified` times `scale`.
     fn scaled(self, scale: f64) -> DofEstimate {
         DofEstimate {
             stiffness: scale * self.stiffness,
@@ -354,7 +373,8 @@ impl DofEstimate {
     }
 }
 
-/// Normalised weights: the inverse of what each line's noise leaves after averaging, plus what geometry does to it.
+/// Normalised weights: inverse of each line's noise variance after averaging plus its variance due
+/// to geometry.
 fn weights(lines: &[Sums], shared: f64, priors: &Priors) -> Vec<f64> {
     let averaging = (lines.len() as f64 / shared).max(1.0);
     let raw: Vec<f64> = lines
@@ -366,7 +386,7 @@ fn weights(lines: &[Sums], shared: f64, priors: &Priors) -> Vec<f64> {
     if sum > 0.0 {
         raw.iter().map(|w| w / sum).collect()
     } else {
-        // neither noise nor geometry: every line is as good as the other
+        // neither noise nor geometry errors: all lines are equivalent
         vec![1.0 / lines.len() as f64; lines.len()]
     }
 }

@@ -1,9 +1,11 @@
-//! Linear propagation: what an error of one cell, one position or one angle does to the joint's compliance.
+//! Linear propagation: the effect of an error of one cell, one position or one angle on the joint's
+//! compliance.
 //!
-//! δ(Y⁻¹) = −Y⁻¹ δY Y⁻¹, so the sensitivity of y = 1/Z^J_dd to the cells is a sum of two dyads, Φ = −y²/2 Σ (T_uᵀ u)(T_f v)ᵀ with u a row and
-//! v a column of Y⁻¹. A sensor wrong by δ reads e·(θ × δ) more, where θ is the rotation of its virtual point; a hit wrong
-//! by δ adds the moment δ × e; a hammer tilted by α pushes along e + α × e. All three are errors of cells, so one Φ
-//! serves them all.
+//! δ(Y⁻¹) = −Y⁻¹ δY Y⁻¹, so the sensitivity of y = 1/Z^J_dd to the cells is a sum of two dyads, Φ =
+//! −y²/2 Σ (T_uᵀ u)(T_f v)ᵀ with u a row and v a column of Y⁻¹. A sensor misplaced by δ measures
+//! e·(θ × δ) more, where θ is the rotation of its virtual point; a hit misplaced by δ adds the
+//! moment δ × e; a hammer tilted by α pushes along e + α × e. All three are errors of cells, so one
+//! Φ covers them all.
 
 use super::assembly::Assembly;
 use super::layout::Axes;
@@ -13,7 +15,8 @@ use nalgebra::{Complex, Vector3};
 
 type C = Complex<f64>;
 
-/// Weighted sums over lines of the sensitivities to what is common to all lines, and of the noise's variance.
+/// Weighted sums over lines: the sensitivities to errors common to all lines, and the variance of
+/// the noise.
 #[derive(Clone)]
 pub(super) struct Sums {
     pub(super) noise_variance: f64,
@@ -60,7 +63,8 @@ impl Sums {
         ]
     }
 
-    /// Variance of the real part from errors of position, aim and angle: each error's sensitivity is in standard deviations of its prior.
+    /// Variance of the real part due to errors of position, aim and angle: the square of each
+    /// sensitivity times the standard deviation of its prior.
     pub(super) fn geometry_variance(&self, priors: &Priors) -> f64 {
         let Priors { position_m, aim_m, hammer_angle_rad } = *priors;
         let deviations = [position_m, position_m, aim_m, aim_m, hammer_angle_rad];
@@ -72,7 +76,8 @@ impl Sums {
 }
 
 impl Assembly {
-    /// Sensitivities of the joint's compliance along every degree of freedom at line `l`, whose inverse admittance is `z`.
+    /// Sensitivities of the joint's compliance along every degree of freedom at line `l`, whose
+    /// inverse admittance is `z`.
     pub(super) fn sums(&self, l: usize, z: &Line) -> Vec<Sums> {
         let layout = &self.layout;
         let n = z.nrows() / 2;
@@ -88,7 +93,7 @@ impl Assembly {
             impact_aim: zeros(layout.points * impacts),
         };
         let mut sums = vec![none; n];
-        // u and v of every degree of freedom, carried to the cells
+        // u and v of every degree of freedom, transformed to the cells
         let (to_channels, to_impacts) =
             (product(&layout.t_u.transpose(), &z.transpose()), product(&layout.t_f, z));
         let scales: Vec<C> = (0..n).map(|d| -compliance(z, d).powi(2) * 0.5).collect();
@@ -99,7 +104,8 @@ impl Assembly {
         };
         let (motion, wrench) = (product(&layout.t_u, cells), product(cells, &layout.t_f));
         let sides = [0, 1].map(|side| side * n);
-        // of each impact at either virtual point, and of either virtual point at each channel
+        // rotations due to each impact at both virtual points; below, forces and moments of both
+        // virtual points at each channel
         let rotations: Vec<[Vector3<C>; 2]> = (0..impacts)
             .map(|i| sides.map(|from| along(&layout.rotations, |at| motion[(from + at, i)])))
             .collect();
@@ -129,8 +135,8 @@ impl Assembly {
     }
 }
 
-/// The three translations or rotations of a virtual point out of its degrees of freedom, in metres or radians; zero where
-/// the IDM set does not carry one.
+/// The three translations or rotations of a virtual point from its degrees of freedom, in metres or
+/// radians; zero for those that the IDM set does not contain.
 fn along(axes: &Axes, of: impl Fn(usize) -> C) -> Vector3<C> {
     Vector3::from(axes.map(|axis| axis.map_or(C::default(), |(at, scale)| of(at) / scale)))
 }

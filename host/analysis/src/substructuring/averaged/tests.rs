@@ -4,11 +4,12 @@ use crate::substructuring::exact_rig_tests::rig;
 const BAND: Band = Band { low_hz: 300.0, high_hz: 600.0 };
 const NOWHERE_WRONG: Priors = Priors { position_m: 0.0, aim_m: 0.0, hammer_angle_rad: 0.0 };
 
-/// The propagation against what moving sensors and impacts by hand really does, for a degree of freedom where it matters.
+/// The propagation compared with the effect of actually moving sensors and impacts, for a degree of
+/// freedom where it matters.
 #[test]
 fn the_sensitivity_is_the_difference_quotient() {
     let ([_, _, ajb], geometry) = rig();
-    // without priors all weights are even, whatever is moved
+    // without priors all weights are equal, whatever is moved
     let estimate = |geometry: &Geometry, dof: Dof| {
         averaged(&ajb, geometry, IdmSet::Six, BAND, &NOWHERE_WRONG).expect("exact data").joint[&dof].stiffness
     };
@@ -41,9 +42,11 @@ fn the_sensitivity_is_the_difference_quotient() {
         k * k * y * balance(IdmSet::Six)[d].powi(2)
     };
     let quotient = squares[&Dof::Rx].sqrt();
-    // a one-sided quotient with steps of 1e-7 m over 4 cm, and the loss factor's square
+    // a one-sided difference quotient with steps of 1e-7 m over 4 cm, and the square of the loss
+    // factor
     assert!((propagated(3) / quotient - 1.0).abs() < 1e-2, "{} against {quotient}", propagated(3));
-    // k_z is the force without any rotation: a position wrong alike in every cell cannot touch it, 40 mm or not
+    // k_z is the force without any rotation: a position error common to all cells does not affect
+    // it, in spite of the 40 mm
     assert!(
         propagated(2) < 1e-6 * 180e6 / 0.04 && squares[&Dof::Z].sqrt() < 1e-3 * 180e6 / 0.04,
         "{squares:?}"

@@ -1,42 +1,46 @@
-//! Whether noise leaves anything of a joint to average: asked at the compliance that the band's lines scatter about.
+//! Whether the noise is small enough to average a joint's compliance, judged at the typical
+//! compliance of the band's lines.
 //!
-//! Of one degree of freedom the measurement sees κ = W / (W + y), W being the admittance of A and B together and y the
-//! joint's compliance: noise moves κ, and so moves y by (W + y)² / W as much. Where the joint is far softer than A and B, as the rotations
-//! of a small contact are, noise makes lines stiff by chance; at its own small y such a line looks well known, and a mean that weighs
-//! lines by that follows such lines alone: half a million N m/rad, "20 %", where 10 are true. At the typical y they are what they
-//! are: noise.
+//! For one degree of freedom the measurement gives κ = W / (W + y), with W the admittance of A and
+//! B together and y the joint's compliance. Noise changes κ, and so changes y by (W + y)² / W as
+//! much. If the joint is far softer than A and B, as for the rotations of a small contact, noise
+//! makes some lines stiff by chance. At its own small y such a line appears accurate, and a mean
+//! weighted accordingly follows these lines alone: half a million N m/rad, "20 %", where 10 are
+//! true. At the typical y they are recognised as noise.
 
 use super::sensitivity::Sums;
 use super::{Line, Priors, compliance};
 use crate::substructuring::joint_over_bands::median;
 use nalgebra::Complex;
 
-/// κ of a joint that is hardly there, and of one that hardly gives way.
+/// Range of κ: from a joint with hardly any stiffness to one with hardly any compliance.
 const ENDS: [f64; 2] = [1e-6, 1.0 - 1e-6];
 
-/// On fewer lines than this fraction the joint pushing back is chance: half of them do where there is noise only, and of hundreds that is
-/// known to some per cent.
+/// If the joint's compliance is positive on less than this fraction of the lines, its sign is due
+/// to chance: with noise only it is positive on half of them, and over hundreds of lines this
+/// fraction is known to a few per cent.
 const PUSHING: f64 = 0.6;
 
-/// Sizes of one degree of freedom over the lines of a band.
+/// Typical magnitudes of one degree of freedom over the lines of a band.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Typical {
     /// |W|, m/N (rotations scaled).
     structures: f64,
-    /// |y|, the same.
+    /// |y|, in the same unit.
     joint: f64,
-    /// Fraction of lines on which the joint pushes back.
+    /// Fraction of lines on which the joint's compliance is positive.
     pushing: f64,
 }
 
 impl Typical {
-    /// Medians over lines of the inverse interface admittance (2n_c × 2n_c), along `d`: of |W|, and of κ, which no line can spoil.
+    /// Medians over lines along `d`, from the inverse interface admittance (2n_c × 2n_c): of |W|,
+    /// and of κ, which is robust against single lines.
     pub(super) fn of(impedance: &[Line], d: usize) -> Typical {
         let structures: Vec<f64> = impedance
             .iter()
             .map(|z| {
                 let n = z.nrows() / 2;
-                // the diagonal blocks hold A or B and the joint, the others minus the joint
+                // the diagonal blocks hold A or B plus the joint, the others minus the joint
                 let [a, b] = [z[(d, d)] + z[(d, n + d)], z[(n + d, n + d)] + z[(n + d, d)]];
                 (a.inv() + b.inv()).norm()
             })
@@ -53,8 +57,9 @@ impl Typical {
         }
     }
 
-    /// The relative standard deviation of the lines' even mean at the typical compliance, given the sensitivities of each line at its own;
-    /// infinite where noise decides the sign.
+    /// The relative standard deviation of the lines' unweighted mean at the typical compliance,
+    /// from the sensitivities of each line at its own compliance; infinite if noise decides the
+    /// sign.
     pub(super) fn known(
         &self,
         lines: &[Sums],
@@ -69,7 +74,7 @@ impl Typical {
         if self.pushing < PUSHING { f64::INFINITY } else { variance.sqrt() / self.joint }
     }
 
-    /// The factor by which a sensitivity at the compliance `y` becomes that at the typical one.
+    /// The factor that converts a sensitivity at the compliance `y` to that at the typical one.
     fn instead_of(&self, y: Complex<f64>) -> f64 {
         ((self.structures + self.joint) / (self.structures + y.norm())).powi(2)
     }
@@ -90,13 +95,14 @@ mod tests {
         for joint in [1e3, 1e6, 1e8] {
             let lines: Vec<Line> = [joint, joint, 50.0 * joint, joint, joint].map(line).into();
             let typical = Typical::of(&lines, 0);
-            // W is 2 µm/N, and the odd one does not count
+            // W is 2 µm/N, and the outlier has no influence
             assert!((typical.structures / 2e-6 - 1.0).abs() < 1e-9, "{typical:?}");
             assert!((typical.joint * joint - 1.0).abs() < 1e-9, "{typical:?}");
             let [here, odd] = [1, 2].map(|l| typical.instead_of(compliance(&lines[l], 0)));
             assert!((here - 1.0).abs() < 1e-9 && odd >= 1.0, "{here} {odd}");
         }
-        // a soft joint fifty times too stiff by chance: its compliance's scatter is 50² times what it claims
+        // a soft joint that is fifty times too stiff by chance: the scatter of its compliance is
+        // 50² times what it seems
         let soft: Vec<Line> = [1e3, 1e3, 5e4].map(line).into();
         let factor = Typical::of(&soft, 0).instead_of(compliance(&soft[2], 0));
         assert!((factor / 2500.0 - 1.0).abs() < 0.25, "{factor}");

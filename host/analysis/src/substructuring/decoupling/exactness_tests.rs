@@ -1,4 +1,5 @@
-//! Known joint in, the same joint out: every method on a random pair of substructures coupled by Eq. (1).
+//! A known joint is put in and must be returned: every method on a random pair of substructures
+//! coupled by Eq. (1).
 
 use super::*;
 use nalgebra::{Complex, DMatrix};
@@ -9,7 +10,8 @@ type M = DMatrix<Complex<f64>>;
 const C: usize = 3;
 const EXTRA: usize = 2;
 
-/// A random symmetric admittance (reciprocal structure) of n DoFs, diagonally dominant so that it is regular.
+/// A random symmetric admittance (reciprocal structure) of n DoFs, diagonally dominant so that it
+/// is regular.
 fn admittance(n: usize, v: &[f64]) -> M {
     M::from_fn(n, n, |r, c| {
         let (lo, hi) = (r.min(c), r.max(c));
@@ -18,7 +20,8 @@ fn admittance(n: usize, v: &[f64]) -> M {
     })
 }
 
-/// The assembly by Eq. (1): Ỹ = Y − Y Bᵀ (B Y Bᵀ + Y^J)⁻¹ B Y, with A's and B's first C DoFs as the interface.
+/// The assembly by Eq. (1): Ỹ = Y − Y Bᵀ (B Y Bᵀ + Y^J)⁻¹ B Y, with A's and B's first C DoFs as the
+/// interface.
 fn couple(y_a: &M, y_b: &M, y_j: &M) -> M {
     let (n, m) = (y_a.nrows(), y_b.nrows());
     let mut y = M::zeros(n + m, n + m);
@@ -84,7 +87,7 @@ fn too_few_internals_are_refused_with_the_count() {
     let error =
         internal(&one, &one, &M::identity(2, 3), &M::identity(2, 5), &M::identity(3, 5)).expect_err("2 < 3");
     assert_eq!(error, DecouplingError::TooFewInternals { impacts: 5, responses: 2, needed: 3 });
-    // rank, not only number: two of the four responses on B are copies
+    // rank matters, not only the number: two of the four responses on B are copies
     let p = M::from_fn(4, 3, |r, c| Complex::from(if r % 2 == c { 1.0 } else { 0.0 }));
     let error = internal(&one, &one, &p, &M::identity(4, 4), &M::identity(3, 4)).expect_err("rank 2");
     assert!(matches!(error, DecouplingError::RankLost(_)), "{error}");

@@ -1,9 +1,10 @@
-//! The transmission simulator: a fixture stands in for the partner while A is measured, and is taken off again.
+//! The transmission simulator: a fixture replaces the partner while A is measured, and is removed
+//! numerically.
 //!
-//! A alone has a free, unloaded interface. Measured with a fixture clamped to it as the partner will be, A deforms and is
-//! loaded as in the assembly; the fixture's own FRFs, measured alone, are then decoupled (Mayes and Arviso 2010; with a
-//! virtual point Pasma et al. 2018, the paper's Refs. 45 and 46). For this rig it is the way to a substructure A whose clamp is the
-//! assembly's.
+//! A alone has a free, unloaded interface. Measured with a fixture clamped to it as the partner
+//! will be, A deforms and is loaded as in the assembly; the fixture's own FRFs, measured alone, are
+//! then decoupled (Mayes and Arviso 2010; with a virtual point Pasma et al. 2018, the paper's Refs.
+//! 45 and 46). For this rig it gives a substructure A with the same clamping as in the assembly.
 
 use super::super::pseudo_inverse::full_rank_inverse;
 use super::DecouplingError;
@@ -11,10 +12,11 @@ use nalgebra::{Complex, DMatrix};
 
 type Line = DMatrix<Complex<f64>>;
 
-/// Which motions of the fixture compatibility and equilibrium are asked of.
+/// The motions of the fixture for which compatibility and equilibrium are required.
 #[derive(Debug, Clone, Copy)]
 pub struct Weakening<'a> {
-    /// T_u (motion × output on the fixture), for instance of [`crate::substructuring::vpt::responses`].
+    /// T_u (motion × output on the fixture), for instance from
+    /// [`crate::substructuring::vpt::responses`].
     pub outputs: &'a DMatrix<f64>,
     /// T_f (input on the fixture × force).
     pub inputs: &'a DMatrix<f64>,
@@ -22,13 +24,15 @@ pub struct Weakening<'a> {
 
 /// The admittance of A at all its measured points, from A with the fixture and the fixture alone.
 ///
-/// `with_fixture` is outputs × inputs; its rows `outputs` and columns `inputs` are on the fixture, in the order of
-/// `fixture`. Dual disassembly: Y − Y_f (Y_ff − Y^F)⁻¹ Y_f, the coupling of minus the fixture. Points on the fixture beyond its
-/// interface (the extended interface) say the same things over and over; then Y_ff − Y^F is singular, and
-/// the conditions are asked of the fixture's own motions only, through `weakening`.
+/// `with_fixture` is outputs × inputs; its rows `outputs` and columns `inputs` are on the fixture,
+/// in the order of `fixture`. Dual disassembly: Y − Y_f (Y_ff − Y^F)⁻¹ Y_f, the coupling of the
+/// negative fixture. Points on the fixture beyond its interface (the extended interface) are
+/// redundant; then Y_ff − Y^F is singular, and the conditions are required for the fixture's own
+/// motions only, through `weakening`.
 ///
 /// # Errors
-/// [`DecouplingError::RankLost`]: the fixture's points are more than its motions and no weakening was given, or less.
+/// [`DecouplingError::RankLost`]: the fixture has more points than motions and no weakening was
+/// given, or fewer.
 pub fn remove_fixture(
     with_fixture: &Line,
     fixture: &Line,
@@ -95,7 +99,8 @@ mod tests {
         let e = vpt::impacts(&points, Vector3::zeros(), IdmSet::Six, None).expect("three points");
         let r = u.r.map(Complex::from);
         for f in [80.0, 150.0, 420.0] {
-            // A: two bodies, an inner one (unknown) and the interface; the fixture is rigidly joined to the latter
+            // A: two bodies, an inner one (unknown) and the interface; the fixture is rigidly
+            // joined to the latter
             let (inner, outer, fixture) =
                 (body(2.0, 3e-3, 4e6, f), body(1.1, 2e-3, 1e5, f), body(0.7, 8e-4, 1e2, f));
             let link = body(0.0, 0.0, 3e6, f);
@@ -108,7 +113,7 @@ mod tests {
                 z.try_inverse().expect("damped")
             };
             let seen = |y: &Line| {
-                // six inner DoFs as they are, the interface through nine channels and nine hits
+                // six inner DoFs unchanged, the interface through nine channels and nine hits
                 let mut rows = Line::zeros(15, 12);
                 rows.view_mut((0, 0), (6, 6)).fill_with_identity();
                 rows.view_mut((6, 6), (9, 6)).copy_from(&r);

@@ -4,12 +4,14 @@ use super::super::pseudo_inverse::full_rank_inverse;
 use super::DecouplingError;
 use nalgebra::{Complex, DMatrix};
 
-/// Z^J with W = Y^A + Y^B and D = Y^AJB_AA − Y^AJB_AB − Y^AJB_BA + Y^AJB_BB: Y^J = −W + W (W − D)⁻¹ W.
+/// Z^J with W = Y^A + Y^B and D = Y^AJB_AA − Y^AJB_AB − Y^AJB_BA + Y^AJB_BB: Y^J = −W + W (W − D)⁻¹
+/// W.
 ///
 /// Implements Eqs. (A.3) and (A.4), sign corrected.
 ///
-/// It is evaluated in Z, where the same identity reads Z^J = D⁻¹ − W⁻¹: the relative motion in the assembly is
-/// held by the joint and the two substructures in parallel. `y_ajb` is 2n_c × 2n_c, A's virtual point first.
+/// It is evaluated in Z, where the same identity is Z^J = D⁻¹ − W⁻¹: the relative motion in the
+/// assembly is resisted by the joint and the two substructures in parallel. `y_ajb` is 2n_c × 2n_c,
+/// A's virtual point first.
 ///
 /// # Errors
 /// D or W is singular.

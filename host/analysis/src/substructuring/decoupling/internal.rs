@@ -9,13 +9,15 @@ use nalgebra::{Complex, DMatrix};
 ///
 /// Implements Eq. (3), solved for G by least squares.
 ///
-/// `p` = Y^B_{i,c} (responses on B × n_c), `q` = Y^A_{c,i} (n_c × impacts on A), `m` = Y^AJB_{i(B),i(A)}; because
-/// M = P G⁻¹ Q exactly, P and Q are inverted whole and M, which is singular for n_i > n_c, never is.
+/// `p` = Y^B_{i,c} (responses on B × n_c), `q` = Y^A_{c,i} (n_c × impacts on A), `m` =
+/// Y^AJB_{i(B),i(A)}. Because M = P G⁻¹ Q exactly, P and Q are inverted without truncation, and M,
+/// which is singular for n_i > n_c, is never inverted.
 ///
-/// Tol and Özgüven's other three rearrangements of Eq. (1) are the same sentence with other factors, and are evaluated here
-/// too: hits and responses on A with M = Y^A_ii − Y^AJB_ii, P = Y^A_ic, Q = Y^A_ci; hits on B seen on A with
-/// M = Y^AJB_{i(A),i(B)}, P = Y^A_ic, Q = Y^B_ci; both on B with M = Y^B_ii − Y^AJB_ii, P = Y^B_ic, Q = Y^B_ci. Where M is a difference
-/// of two measurements it is small against both, and noise tells.
+/// Tol and Özgüven's other three rearrangements of Eq. (1) have the same form with other factors,
+/// and are evaluated here too: hits and responses on A with M = Y^A_ii − Y^AJB_ii, P = Y^A_ic, Q =
+/// Y^A_ci; hits on B and responses on A with M = Y^AJB_{i(A),i(B)}, P = Y^A_ic, Q = Y^B_ci; both on
+/// B with M = Y^B_ii − Y^AJB_ii, P = Y^B_ic, Q = Y^B_ci. If M is a difference of two measurements
+/// it is small compared with both, and therefore sensitive to noise.
 ///
 /// # Errors
 /// Too few internals, or P or Q without full rank.
@@ -29,7 +31,7 @@ pub fn internal(
     Ok(factors(y_a, y_b, p, m, q)?.z)
 }
 
-/// Z^J and what it is made of.
+/// Z^J and the matrices that it is computed from.
 pub(crate) struct Factors {
     pub(crate) p_plus: DMatrix<Complex<f64>>,
     pub(crate) q_plus: DMatrix<Complex<f64>>,

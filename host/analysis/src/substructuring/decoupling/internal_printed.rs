@@ -1,4 +1,4 @@
-//! Eq. (3) as the paper prints it.
+//! Eq. (3) as printed in the paper.
 
 use super::super::product::product;
 use super::super::pseudo_inverse::{full_rank_inverse, rank};
@@ -9,8 +9,9 @@ use nalgebra::{Complex, DMatrix};
 ///
 /// Implements Eq. (3), as printed.
 ///
-/// `p` = Y^B_{i,c}, `q` = Y^A_{c,i}, `m` = Y^AJB_{i(B),i(A)}. Exact only for n_i = n_c. With n_i < n_c what comes back is
-/// Y^J − G (I − Π) with Π of rank n_i ([`observed_rank`]): right for the forces that the internals generate, −(Y^A + Y^B) elsewhere.
+/// `p` = Y^B_{i,c}, `q` = Y^A_{c,i}, `m` = Y^AJB_{i(B),i(A)}. Exact only for n_i = n_c. With n_i <
+/// n_c the result is Y^J − G (I − Π) with Π of rank n_i ([`observed_rank`]): correct for the forces
+/// that the internals generate, −(Y^A + Y^B) elsewhere.
 ///
 /// # Errors
 /// M, or the resulting admittance, is singular.
@@ -38,8 +39,8 @@ pub(crate) fn with_m_inverse(
     Ok([full_rank_inverse(&admittance, "the joint's admittance")?, m_inverse])
 }
 
-/// Rank of Π: how many directions of interface force these internals see, of n_c. It cannot exceed the rank
-/// of P or Q, whatever the joint is.
+/// Rank of Π: the number of directions of interface force, of n_c, that these internals observe. It
+/// cannot exceed the rank of P or Q, whatever the joint is.
 pub fn observed_rank(p: &DMatrix<Complex<f64>>, q: &DMatrix<Complex<f64>>) -> usize {
     rank(p).min(rank(q))
 }

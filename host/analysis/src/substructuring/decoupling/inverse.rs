@@ -4,7 +4,8 @@ use super::super::pseudo_inverse::full_rank_inverse;
 use super::{ASSEMBLY, DecouplingError};
 use nalgebra::{Complex, DMatrix};
 
-/// Which off-diagonal block of Eq. (A.1) is read. For exact data of a reciprocal structure they are equal.
+/// The off-diagonal block of Eq. (A.1) that is used. For exact data of a reciprocal structure they
+/// are equal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InverseBlock {
     /// c(A), c(B).
@@ -14,7 +15,7 @@ pub enum InverseBlock {
 }
 
 /// Z^J = minus an off-diagonal block of (Y^AJB_cc)⁻¹. Needs neither Y^A nor Y^B, so it does not
-/// care whether A changes between configurations. `y_ajb` is 2n_c × 2n_c, A's virtual point first.
+/// depend on changes of A between configurations. `y_ajb` is 2n_c × 2n_c, A's virtual point first.
 ///
 /// Implements Eq. (A.1).
 ///
@@ -27,7 +28,7 @@ pub fn inverse(
     Ok(inverse_of(block, &full_rank_inverse(y_ajb, ASSEMBLY)?))
 }
 
-/// The same where (Y^AJB_cc)⁻¹ is at hand.
+/// The same from a given (Y^AJB_cc)⁻¹.
 pub fn inverse_of(block: InverseBlock, z_ajb: &DMatrix<Complex<f64>>) -> DMatrix<Complex<f64>> {
     let n = z_ajb.nrows() / 2;
     let at = match block {

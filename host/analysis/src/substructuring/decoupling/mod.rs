@@ -1,9 +1,11 @@
-//! Decoupling: the joint's dynamic stiffness Z^J from FRFs of A, B and the assembly AJB, one file per method.
+//! Decoupling: the joint's dynamic stiffness Z^J from FRFs of A, B and the assembly AJB, one file
+//! per method.
 //!
-//! Every function takes receptances of one line and returns Z^J (n_c × n_c, N/m in consistent units). They work
-//! in Z, not in Y, because a massless joint has no finite admittance on degrees of freedom it does not couple.
-//! c stands for the interface (virtual point) degrees of freedom, i for internal ones. Rows and columns of
-//! rotations may be scaled by a length before: the methods are equivariant, and rounding likes it.
+//! Every function takes receptances of one line and returns Z^J (n_c × n_c, N/m in consistent
+//! units). They work in Z, not in Y, because a massless joint has no finite admittance on degrees
+//! of freedom that it does not couple. c denotes the interface (virtual point) degrees of freedom,
+//! i the internal ones. Rows and columns of rotations may be scaled by a length beforehand: the
+//! methods are equivariant, and it reduces rounding.
 
 mod fixture;
 mod interface;
@@ -24,13 +26,13 @@ pub use primal::{PrimalBlock, primal, primal_of};
 
 use super::pseudo_inverse::RankLost;
 
-/// What a singular Y^AJB_cc is called.
+/// Name of Y^AJB_cc in errors.
 pub(super) const ASSEMBLY: &str = "the assembly's interface admittance";
 
-/// What a singular Y^A_cc or Y^B_cc is called.
+/// Name of Y^A_cc or Y^B_cc in errors.
 pub(super) const SUBSTRUCTURE: &str = "the substructure's interface admittance";
 
-/// Why a method cannot be applied to this data.
+/// The reason why a method cannot be applied to this data.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DecouplingError {

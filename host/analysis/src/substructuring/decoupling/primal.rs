@@ -4,12 +4,13 @@ use super::super::pseudo_inverse::full_rank_inverse;
 use super::{ASSEMBLY, DecouplingError, SUBSTRUCTURE};
 use nalgebra::{Complex, DMatrix};
 
-/// Which diagonal block of Eq. (A.2) is read. (The off-diagonal ones are Eq. (A.1) again.)
+/// The diagonal block of Eq. (A.2) that is used. (The off-diagonal ones are Eq. (A.1) again.)
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PrimalBlock {
     /// c(A), c(A): needs Y^A only.
     A,
-    /// c(B), c(B): needs Y^B only, so a clamp that changes A between configurations cannot touch it.
+    /// c(B), c(B): needs Y^B only, so a clamp that changes A between configurations does not affect
+    /// it.
     B,
 }
 
@@ -17,7 +18,8 @@ pub enum PrimalBlock {
 ///
 /// Implements Eq. (A.2), one diagonal block; the printed lower-right subscript is a misprint.
 ///
-/// `y_s` is the admittance of the substructure of that block (n_c × n_c), `y_ajb` 2n_c × 2n_c, A's virtual point first.
+/// `y_s` is the admittance of the substructure of that block (n_c × n_c), `y_ajb` 2n_c × 2n_c, A's
+/// virtual point first.
 ///
 /// # Errors
 /// Y^AJB or Y^S is singular.
@@ -29,7 +31,7 @@ pub fn primal(
     primal_of(block, y_s, &full_rank_inverse(y_ajb, ASSEMBLY)?)
 }
 
-/// The same where (Y^AJB_cc)⁻¹ is at hand.
+/// The same from a given (Y^AJB_cc)⁻¹.
 ///
 /// # Errors
 /// Y^S is singular.

@@ -1,7 +1,8 @@
-//! What aims at the assembly's cells do to a band's residual, without writing it out.
+//! Effect of aims at the assembly's cells on a band's residual, in factored form.
 //!
-//! A cell of impact i reaches the residual through its row tᵢ of T_f, which is real and the same at every line. So what an aim does is
-//! v ⊗ tᵢ, where v has an entry for each measured row only, and the products with N⁻¹ that the fit needs are made of these short columns: two
+//! A cell of impact i reaches the residual through its row tᵢ of T_f, which is real and the same at
+//! every line. The effect of an aim is therefore v ⊗ tᵢ, where v has one entry per measured row
+//! only, and the products with N⁻¹ that the fit needs are computed from these short columns. Two
 //! thirds of all nuisance parameters are such aims.
 
 use super::narrow::{MOST_LANES, add_product};
@@ -10,10 +11,10 @@ use nalgebra::{Complex, DMatrix, DMatrixView};
 
 /// The aims of all cells of the assembly, impact by impact.
 pub(super) struct AssemblyAims {
-    /// v of every aim at an impact's cells, sensor by sensor, in standard deviations of the aim: real parts of the measured rows above imaginary
-    /// ones.
+    /// v of every aim at an impact's cells, sensor by sensor, in standard deviations of the aim:
+    /// real parts of the measured rows on top of imaginary parts.
     pub(super) by_impact: Vec<DMatrix<f64>>,
-    /// Their transposes, with rows of zeros below up to whole vectors.
+    /// Their transposes, padded with rows of zeros to whole vectors.
     turned: Vec<DMatrix<f64>>,
 }
 
@@ -33,12 +34,13 @@ impl Pushes {
         DMatrixView::from_slice(values, inner, self.t.ncols()) * &self.turned
     }
 
-    /// Columns of real parts above imaginary ones as each impact meets them: per impact (2 · rows) × columns.
+    /// Contracts columns (real parts on top of imaginary parts) with tᵢ of each impact: per impact
+    /// (2 · rows) × columns.
     fn met(&self, columns: &DMatrix<f64>) -> Vec<DMatrix<f64>> {
         let (height, count) = columns.shape();
         let met = height / self.t.ncols();
         let rows = met / 2;
-        // all that one measured column holds stands in one column
+        // all values of one measured column are moved to one column
         let mut values = DMatrix::zeros(met * count, self.t.ncols());
         for (part, own) in columns.as_slice().chunks_exact((height / 2).max(1)).enumerate() {
             for (own, to) in own.chunks_exact(rows).zip(values.as_mut_slice().chunks_exact_mut(met * count)) {
@@ -58,13 +60,13 @@ impl AssemblyAims {
         AssemblyAims { turned: by_impact.iter().map(turned).collect(), by_impact }
     }
 
-    /// The difference of these and others, times `scale`.
+    /// The difference between these and others, times `scale`.
     pub(super) fn apart(&self, other: &AssemblyAims, scale: f64) -> AssemblyAims {
         let pairs = self.by_impact.iter().zip(&other.by_impact);
         AssemblyAims::of(pairs.map(|(one, other)| (one - other) * scale).collect())
     }
 
-    /// The covariance of the residual where every aim has variance one.
+    /// The covariance of the residual if every aim has unit variance.
     pub(super) fn covariance(&self, pushes: &Pushes) -> ByImpact {
         let rows = self.by_impact.first().map_or(0, |v| v.nrows() / 2);
         let mut by_rows = DMatrix::zeros(rows * rows, self.by_impact.len());
@@ -102,7 +104,8 @@ impl AssemblyAims {
         sum
     }
 
-    /// Gᵀ x of these aims per impact (aims × columns, then rows of zeros); x = N⁻¹ of something, unwhitened.
+    /// Gᵀ x of these aims per impact (aims × columns, then rows of zeros); x = N⁻¹ times some
+    /// columns, unwhitened.
     pub(super) fn pulled(&self, pushes: &Pushes, x: &DMatrix<f64>) -> Vec<DMatrix<f64>> {
         let pulled = |(turned, x): (&DMatrix<f64>, DMatrix<f64>)| {
             let mut pulled = DMatrix::zeros(turned.nrows(), x.ncols());
@@ -113,26 +116,28 @@ impl AssemblyAims {
     }
 }
 
-/// What the information of one band is made of.
+/// The factors of one band's information matrix.
 pub(super) struct Met {
-    /// N⁻¹ of the written-out columns as each impact meets it: columns × (2 · rows).
+    /// N⁻¹ times the explicitly stored columns, contracted with each impact's tᵢ: columns × (2 ·
+    /// rows).
     written: Vec<DMatrix<f64>>,
-    /// N⁻¹ between two impacts; per impact (rows · impacts) × (2 · rows), upper block beside the lower.
+    /// N⁻¹ contracted with the tᵢ of two impacts; per impact (rows · impacts) × (2 · rows), upper
+    /// block next to the lower.
     inverse: Vec<DMatrix<f64>>,
     /// Transposes of the aims' columns.
     turned: Vec<DMatrix<f64>>,
 }
 
-/// Sums over bands of the information of one impact's aims.
+/// Information of one impact's aims, summed over bands.
 pub(super) struct OfImpact {
-    /// With the written-out columns: columns × aims.
+    /// With the explicitly stored columns: columns × aims.
     pub(super) written: DMatrix<f64>,
     /// With the aims of this impact and of each later one: later aims × aims.
     pub(super) later: Vec<DMatrix<f64>>,
 }
 
 impl Met {
-    /// From the whitened columns that are written out.
+    /// From the explicitly stored, whitened columns.
     pub(super) fn of(
         whitening: &Whitening,
         pushes: &Pushes,
@@ -159,7 +164,7 @@ impl Met {
 }
 
 impl OfImpact {
-    /// Of impact `i`, summed over bands.
+    /// The information of impact `i`, summed over bands.
     pub(super) fn sum<'a>(
         i: usize,
         bands: impl Iterator<Item = (&'a AssemblyAims, &'a Met)>,
@@ -168,7 +173,8 @@ impl OfImpact {
         for (aims, met) in bands {
             let v = &aims.by_impact[i];
             let (rows, count) = (v.nrows() / 2, v.ncols());
-            // upper · v and lower · v, as real and imaginary parts of a later impact's aims meet them
+            // upper · v and lower · v, arranged for the products with the real and imaginary parts
+            // of a later impact's aims
             let mut both = DMatrix::zeros(2 * rows, 2 * count);
             both.view_mut((0, 0), (2 * rows, count)).copy_from(v);
             both.view_mut((0, count), (rows, count)).copy_from(&v.rows(rows, rows));

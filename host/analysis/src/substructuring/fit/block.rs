@@ -1,7 +1,9 @@
-//! One configuration as the fit reads it: cells, their noise, and where every sensor and impact is.
+//! One configuration as input of the fit: cells, their noise, and the geometry of every sensor and
+//! impact.
 //!
-//! Ports are what cells are reduced to: the n_c degrees of freedom of a virtual point (rotations scaled), then the internal
-//! channels or impacts as they are. The assembly's ports are A's and then B's.
+//! Ports are what cells are reduced to: the n_c degrees of freedom of a virtual point (rotations
+//! scaled), followed by the internal channels or impacts without change. The assembly's ports are
+//! A's and then B's.
 
 use super::{FitError, Internals};
 use crate::band::Band;
@@ -23,7 +25,7 @@ pub(super) struct Sensor {
     pub(super) directions: Vec<Vector3<f64>>,
     pub(super) offset: Vector3<f64>,
     pub(super) side: usize,
-    /// First port of its channels if it is an internal one.
+    /// First port of its channels if it is internal.
     pub(super) port: Option<usize>,
 }
 
@@ -31,7 +33,7 @@ pub(super) struct Sensor {
 pub(super) struct Impact {
     pub(super) name: String,
     pub(super) direction: Vector3<f64>,
-    /// Two directions across it: a shift along the blow, or a turn about it, changes nothing.
+    /// Two directions across it: a shift along the hit, or a rotation about it, has no effect.
     pub(super) across: [Vector3<f64>; 2],
     pub(super) offset: Vector3<f64>,
     pub(super) side: usize,
@@ -50,7 +52,7 @@ impl Impact {
     }
 }
 
-/// Where virtual points and internals stand among the ports of a block.
+/// Positions of virtual points and internals among the ports of a block.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Ports {
     /// First port of each side's virtual point; a substructure alone has one side.
@@ -73,14 +75,14 @@ pub(super) struct Block {
 }
 
 impl Block {
-    /// The lines of `band` at which the file has something, s > 0.
+    /// The lines of the file in `band` with a frequency above 0.
     pub(super) fn lines(file: &Measured<'_>, band: Band) -> Vec<usize> {
         (0..file.frf.frequency_hz().len())
             .filter(|&l| file.frf.frequency_hz()[l] > 0.0 && band.contains(file.frf.frequency_hz()[l]))
             .collect()
     }
 
-    /// The block of `file` made of these sides' virtual points and of the internals named.
+    /// The block of `file` with these sides' virtual points and the given internals.
     pub(super) fn of(
         file: &Measured<'_>,
         geometry: &Geometry,
@@ -98,7 +100,7 @@ impl Block {
                 Side::B => geometry.virtual_point_b_m,
             });
             let (interface, internal) = side.groupings();
-            // in the order of `names`, which is that of every block
+            // in the order of `names`, which is the same in every block
             let only = |found: Found, names: &[String]| {
                 let kept: Vec<usize> =
                     names.iter().filter_map(|name| found.names.iter().position(|n| n == name)).collect();
@@ -135,7 +137,7 @@ impl Block {
         let variance = (file.frf.receptance_variance(&lines, at, to))
             .unwrap_or_else(|| vec![DMatrix::from_element(at.len(), to.len(), f64::NAN); lines.len()]);
         for line in &variance {
-            // a cell without noise would be weighed as infinitely good
+            // a cell without noise would get an infinite weight
             if let Some(bad) = line.iter().position(|v| !(v.is_finite() && *v > 0.0)) {
                 let (row, column) = (bad % line.nrows(), bad / line.nrows());
                 return Err(FitError::NoiseUnknown {
@@ -188,11 +190,11 @@ impl Side {
     }
 }
 
-/// Rows or columns while they are gathered.
+/// Rows or columns while they are collected.
 #[derive(Default)]
 struct Axis {
     found: Found,
-    /// Per point: its side and, of an internal one, its port.
+    /// Per point: its side and, for an internal one, its port.
     places: Vec<(usize, Option<usize>)>,
     origins: Vec<Vector3<f64>>,
     /// Per side: its first port, its first point, and T of its virtual point.

@@ -1,7 +1,8 @@
-//! One cell's geometry, right or wrong: what its sensor sees of the ports' motions, and how its blow acts on them.
+//! The geometry of one cell, nominal or with errors: the response of its sensor to the ports'
+//! motions, and the port forces of its hit.
 //!
-//! A sensor wrong by δ reads e·(θ × δ) more, where θ is the rotation of its virtual point; a blow wrong by δ adds the moment δ × e; one
-//! tilted pushes along another e.
+//! A sensor misplaced by δ measures e·(θ × δ) more, where θ is the rotation of its virtual point; a
+//! hit misplaced by δ adds the moment δ × e; a tilted one pushes along another e.
 
 use super::block::{Block, Impact, Ports, Sensor};
 use crate::substructuring::vpt::ROTATION_LENGTH_M;
@@ -15,20 +16,20 @@ pub(super) struct CellError {
     pub(super) tilt: [f64; 2],
 }
 
-/// One cell at some geometry, as it acts on motions and forces of the ports.
+/// One cell with some geometry, as a map from motions and forces of the ports.
 pub(super) struct CellGeometry {
-    /// The sensor's axes × output ports.
+    /// Response of the sensor's axes to the output ports: axes × ports.
     pub(super) seen: DMatrix<f64>,
-    /// Its derivative by a shift along x, y and z.
+    /// Its derivatives by a shift along x, y and z.
     pub(super) turned: [DMatrix<f64>; 3],
-    /// Input ports × 1: the forces of a unit blow.
+    /// Input ports × 1: the port forces of a unit hit.
     pub(super) pushed: DMatrix<f64>,
     /// Its derivatives by two shifts and two tilts: input ports × 4.
     pub(super) slopes: DMatrix<f64>,
 }
 
 impl Block {
-    /// The cell of these two with an error of its geometry.
+    /// The cell of this sensor and impact with an error of its geometry.
     pub(super) fn cell(&self, sensor: &Sensor, impact: &Impact, error: &CellError) -> CellGeometry {
         let (pushed, slopes) = self.pushed(impact, error);
         CellGeometry {
@@ -39,7 +40,8 @@ impl Block {
         }
     }
 
-    /// What a unit of each output port shows on the sensor's axes when it sits `shift` away from where it should be: axes × ports.
+    /// Response of the sensor's axes to a unit of each output port if it is `shift` away from its
+    /// nominal position: axes × ports.
     fn seen(&self, sensor: &Sensor, shift: Vector3<f64>) -> DMatrix<f64> {
         let rows = &self.rows;
         let mut seen = self.turned(sensor, shift);
@@ -56,7 +58,8 @@ impl Block {
         seen
     }
 
-    /// What a shift adds to it: an internal sensor counts as sitting on its side's interface body.
+    /// The part of it due to a shift: an internal sensor is assumed to be on its side's interface
+    /// body.
     fn turned(&self, sensor: &Sensor, shift: Vector3<f64>) -> DMatrix<f64> {
         let rows = &self.rows;
         let mut turned = DMatrix::zeros(sensor.directions.len(), rows.count);
@@ -68,7 +71,8 @@ impl Block {
         turned
     }
 
-    /// The port forces of a unit blow with this error of geometry, and their derivatives by two shifts and two tilts.
+    /// The port forces of a unit hit with this error of geometry, and their derivatives by two
+    /// shifts and two tilts.
     fn pushed(&self, impact: &Impact, error: &CellError) -> (DMatrix<f64>, DMatrix<f64>) {
         let columns = &self.columns;
         let turn: Vector3<f64> = impact.across[0] * error.tilt[0] + impact.across[1] * error.tilt[1];
@@ -97,7 +101,8 @@ impl Block {
         (force, slopes)
     }
 
-    /// Puts a force and a moment (or an axis and its lever) into the places that the IDM set has.
+    /// Writes a force and a moment (or an axis and its lever arm) to the degrees of freedom of the
+    /// IDM set.
     fn wrench(
         &self,
         force: Vector3<f64>,
@@ -114,13 +119,14 @@ impl Block {
     }
 }
 
-/// What makes the ports' admittance y (by columns) the derivatives of all cells' readings, cell by cell: by three shifts of
-/// the sensor, two of the impact, and two tilts. They are real, and the same at every line.
+/// The matrix from the ports' admittance y (column-major) to the derivatives of all cells' values,
+/// cell by cell: by three shifts of the sensor, two of the impact, and two tilts. It is real, and
+/// the same at every line.
 pub(super) fn factors(cells: &[CellGeometry]) -> DMatrix<f64> {
     let (rows, columns) = cells.first().map_or((0, 0), |cell| (cell.seen.ncols(), cell.pushed.nrows()));
     let count: usize =
         cells.iter().map(|cell| cell.seen.nrows() * (cell.turned.len() + cell.slopes.ncols())).sum();
-    // transposed, so that the factors of one value stand together
+    // transposed, so that the factors of one value are contiguous
     let mut factors = DMatrix::<f64>::zeros(rows * columns, count);
     let mut values = factors.column_iter_mut();
     for cell in cells {

@@ -1,30 +1,33 @@
-//! The joint K + sC as parameters, in a chart that neither a soft nor a stiff joint leaves.
+//! The joint K + sC as parameters, in a chart that covers both very soft and very stiff joints.
 //!
-//! Of one degree of freedom, Eq. (1) sees k through k W / (1 + k W) only, W being the admittance of A and B together: linear in
-//! k where the joint is soft against them, linear in 1/k where it is stiff. So the diagonal's parameter is
-//! κ = k u / (1 + k u) with u the size of W: 0 for no joint, 1 for a rigid one, nothing dividing by zero at either end. The damper's parameter is the loss factor λ at mid band, c = k λ / ω.
+//! For one degree of freedom, Eq. (1) depends on k only through k W / (1 + k W), with W the
+//! admittance of A and B together: linear in k if the joint is soft compared with them, linear in
+//! 1/k if it is stiff. So the diagonal's parameter is κ = k u / (1 + k u) with u the magnitude of
+//! W: 0 for no joint, 1 for a rigid one, without a division by zero at either end. The damper's
+//! parameter is the loss factor λ at mid band, c = k λ / ω.
 //!
-//! The full matrices are K = S⁻¹ L Lᵀ S⁻¹, C = S⁻¹ M Mᵀ S⁻¹ / ω with lower triangles L and M and S = diag(√u): symmetric, not negative.
+//! The full matrices are K = S⁻¹ L Lᵀ S⁻¹, C = S⁻¹ M Mᵀ S⁻¹ / ω with lower triangles L and M and
+//! S = diag(√u): symmetric and positive semidefinite.
 
 use super::block::Line;
 use nalgebra::{Complex, DMatrix, DVector};
 
 type C = Complex<f64>;
 
-/// Which entries of K and C are free.
+/// The entries of K and C that are free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Shape {
-    /// Each degree of freedom by itself.
+    /// Diagonal: each degree of freedom independently.
     #[default]
     Diagonal,
-    /// Symmetric, positive.
+    /// Full matrices, symmetric and positive semidefinite.
     Full,
 }
 
-/// Bounds of κ: a joint does not push back with less than nothing, nor is it stiffer than rigid.
+/// Bounds of κ: the stiffness of a joint is between zero and infinity.
 const KAPPA: [f64; 2] = [0.0, 1.0];
-/// Bounds of the loss factor: a joint does not give energy.
+/// Bounds of the loss factor: a joint does not supply energy.
 const LOSS: [f64; 2] = [0.0, 2.0];
 
 /// The parametrisation of one problem.
@@ -35,7 +38,7 @@ pub(super) struct Chart {
     pub(super) unit: Vec<f64>,
     /// Middle of the band, rad/s.
     pub(super) omega: f64,
-    /// Of the full form: the size of each row of L, from the diagonal's fit.
+    /// For the full form: the magnitude of each row of L, from the diagonal's fit.
     size: Vec<f64>,
 }
 
@@ -43,13 +46,14 @@ pub(super) struct Chart {
 pub(super) struct At {
     pub(super) d: Line,
     pub(super) e: Line,
-    /// Their derivatives, if asked for.
+    /// Their derivatives, if requested.
     pub(super) slopes: Option<Slopes>,
 }
 
 /// The derivatives of D and E by each parameter, as sums of dyads left dᵀ and left eᵀ.
 ///
-/// Each matrix has a column for each dyad. Every parameter has as many as the others, side by side.
+/// Each matrix has a column for each dyad. Every parameter has the same number of dyads, in
+/// contiguous columns.
 pub(super) struct Slopes {
     pub(super) left: Line,
     pub(super) d: Line,
@@ -61,7 +65,7 @@ impl Chart {
         Chart { shape: Shape::Diagonal, size: vec![1.0; unit.len()], unit, omega }
     }
 
-    /// The full form around a fitted diagonal, and its start.
+    /// The full form around a fitted diagonal, and its start values.
     pub(super) fn full(&self, diagonal: &DVector<f64>) -> (Chart, DVector<f64>) {
         let n = self.n();
         let floor = 1e-4;
@@ -93,8 +97,9 @@ impl Chart {
         }
     }
 
-    /// Inverse variances of the parameters' priors about zero. A loss factor is of the order of one at most; the
-    /// couplings of a positive matrix are at most as large as its diagonal. Stiffness has none.
+    /// Inverse variances of the parameters' priors about zero. A loss factor is at most of the
+    /// order of one; the couplings of a positive matrix are at most as large as its diagonal.
+    /// Stiffness has no prior.
     pub(super) fn prior(&self) -> DVector<f64> {
         let n = self.n();
         match self.shape {
@@ -122,7 +127,8 @@ impl Chart {
         }
     }
 
-    /// Whether the parameter stands at a bound and `up` (the sign of the step asked for) points past it.
+    /// Whether the parameter is at a bound and `up` (the sign of the intended step) points beyond
+    /// it.
     pub(super) fn held(&self, p: &DVector<f64>, i: usize, up: bool) -> bool {
         let [low, high] = match self.shape {
             Shape::Diagonal if i < self.n() => KAPPA,
@@ -199,7 +205,7 @@ impl Chart {
         (l, m)
     }
 
-    /// K and ωC in units of 1/u (dimensionless, n × n), of the full form.
+    /// K and ωC in units of 1/u (dimensionless, n × n), for the full form.
     pub(super) fn matrices(&self, p: &DVector<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
         let (l, m) = self.roots(p);
         (&l * l.transpose(), &m * m.transpose())
@@ -213,7 +219,7 @@ impl Slopes {
     }
 }
 
-/// Places of a lower triangle, row by row.
+/// Indices of a lower triangle, row by row.
 fn triangle(n: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..n).flat_map(|r| (0..=r).map(move |c| (r, c)))
 }

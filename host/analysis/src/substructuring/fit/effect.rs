@@ -1,4 +1,4 @@
-//! What every error of geometry does to a band's residual, at one set of Y^A and Y^B.
+//! Effect of every error of geometry on a band's residual, at one set of Y^A and Y^B.
 
 use super::FitError;
 use super::assembly_aims::AssemblyAims;
@@ -14,30 +14,32 @@ use std::ops::Range;
 
 type C = Complex<f64>;
 
-/// A band's means at one set of Y^A and Y^B: real parts of the measured entries above imaginary ones.
+/// A band's means at one set of Y^A and Y^B: real parts of the measured entries, followed by the
+/// imaginary parts.
 pub(super) struct Evaluated {
-    /// The model, then its derivatives by the joint where they were asked for.
+    /// The model, then its derivatives by the joint if requested.
     pub(super) model: DMatrix<f64>,
     pub(super) effect: Effect,
 }
 
 /// ∂r/∂η, η in standard deviations.
 pub(super) struct Effect {
-    /// Of positions, tilts and the aims at A's and B's cells: one column for each.
+    /// For positions, tilts and the aims at A's and B's cells: one column each.
     pub(super) written: DMatrix<f64>,
-    /// Of the aims at the assembly's cells, the last of all nuisance parameters.
+    /// For the aims at the assembly's cells, which are the last nuisance parameters.
     pub(super) aims: AssemblyAims,
 }
 
-/// From a block's cells to the residual: left · cells · right. The cells read what the ports' admittance y makes them.
+/// From a block's cells to the residual: left · cells · right. The cells' values follow from the
+/// ports' admittance y.
 struct Way {
     y: Line,
-    /// Real parts above imaginary ones.
+    /// Real parts, followed by the imaginary parts.
     left: DMatrix<f64>,
     right: Line,
 }
 
-/// Real parts above imaginary ones.
+/// Stacks the real parts on top of the imaginary parts.
 fn stacked(y: &Line) -> DMatrix<f64> {
     let columns = y.column_iter().flat_map(|column| {
         let (re, im): (Vec<f64>, Vec<f64>) = column.iter().map(|v| (v.re, v.im)).unzip();
@@ -79,7 +81,7 @@ impl Point<'_> {
         problem.add_measured(model.column_mut(0).as_mut_slice(), &mean, 1.0);
         problem.put_slopes(&mut model.as_mut_slice()[2 * m..], &lines_slopes, share);
         for (side, ways) in ways.iter().enumerate() {
-            // Y^A and Y^B stand on the model's side of the residual: minus
+            // Y^A and Y^B enter through the model, which the residual subtracts: minus
             self.aims(side, ways, &factors[side], -share, &mut written);
         }
         self.positions(&mut written);
@@ -90,7 +92,8 @@ impl Point<'_> {
         Ok(Evaluated { model, effect: Effect { written, aims } })
     }
 
-    /// The aims at the assembly's cells, whose ports move by `y`; adds what they do together, the positions and tilts (unscaled).
+    /// The aims at the assembly's cells, with the ports' admittance `y`; adds their sums, which are
+    /// the effects of positions and tilts (unscaled).
     fn assembly_aims(&self, y: &Line, written: &mut DMatrix<f64>) -> AssemblyAims {
         let problem = self.problem;
         let block = &problem.ajb;
@@ -110,7 +113,7 @@ impl Point<'_> {
                 }
             };
             let mut shown = DMatrix::<f64>::zeros(2 * rows, AIMS * sensors);
-            // what all cells of the impact show: two shifts and two tilts
+            // sum over all cells of the impact: two shifts and two tilts
             let mut together = DMatrix::<f64>::zeros(2 * rows, 4);
             for (s, (cell, sensor)) in cells.iter().zip(&block.sensors).enumerate() {
                 let at = problem.nuisances.of_cell(2, block, s, i);
@@ -145,11 +148,11 @@ impl Point<'_> {
         AssemblyAims::of(by_impact)
     }
 
-    /// Adds ∂(left · cells · right)/∂η (unscaled) of A or B, summed over `ways` and times `share`: of the aims, and of the tilts,
-    /// which are no aims.
+    /// Adds ∂(left · cells · right)/∂η (unscaled) of A or B, summed over `ways` and times `share`:
+    /// for the aims, and for the tilts.
     ///
-    /// An impact's cells have one row of `right`, so the sum over lines is a product of matrices: what the cells show through
-    /// `left`, by what comes of the impact through `right`.
+    /// All cells of an impact share one row of `right`, so the sum over lines is a matrix product:
+    /// the effects on the cells, transformed by `left`, times the rows of `right`.
     fn aims(&self, side: usize, ways: &[Way], factors: &DMatrix<f64>, share: f64, effect: &mut DMatrix<f64>) {
         let problem = self.problem;
         let block: &Block = &problem.parts[side];
@@ -158,7 +161,7 @@ impl Point<'_> {
         let effects = effects(factors, ways);
         let mut first = 0;
         for (i, cells) in self.cells[side].chunks_exact(sensors.max(1)).enumerate() {
-            // per cell its five aims, then both tilts of all cells together
+            // five aims per cell, then both tilts of all cells together
             let count = AIMS * sensors + 2;
             let height = rows * count;
             let mut shown = DMatrix::<f64>::zeros(height, 2 * lines);
@@ -192,7 +195,7 @@ impl Point<'_> {
                 }
             }
             first += (AIMS + 2) * cells.iter().map(|cell| cell.seen.nrows()).sum::<usize>();
-            // real parts in the first columns, imaginary ones in the others
+            // real parts in the first half of the columns, imaginary parts in the second
             let seen: DMatrix<f64> = shown * come;
             let mut add = |j: usize, parameter: usize| {
                 let mut to = effect.column_mut(j);
@@ -214,7 +217,8 @@ impl Point<'_> {
         }
     }
 
-    /// A position acts as the aims of all its cells do, each alike: their sum, here of A's and B's cells.
+    /// A position error acts like the same aim error at all its cells: its effect is the sum of
+    /// theirs, here over A's and B's cells.
     fn positions(&self, effect: &mut DMatrix<f64>) {
         let problem = self.problem;
         let height = effect.nrows();
@@ -225,7 +229,7 @@ impl Point<'_> {
                     let own = [at.sensor.map(|own| (own, 0, 3)), at.impact.map(|own| (own, 3, 2))];
                     for (own, first, count) in own.into_iter().flatten() {
                         for k in 0..count {
-                            // positions stand before all aims
+                            // positions come before all aims
                             let (positions, aims) =
                                 effect.as_mut_slice().split_at_mut((at.aim + first + k) * height);
                             let to = &mut positions[(own + k) * height..][..height];
@@ -238,8 +242,9 @@ impl Point<'_> {
     }
 }
 
-/// The derivatives of all cells' readings at some lines, in the order of [`factors`](super::cell::factors); each line's real parts in its
-/// column, then the imaginary parts.
+/// The derivatives of all cells' values at some lines, in the order of
+/// [`factors`](super::cell::factors); one column per line with the real parts, then one per line
+/// with the imaginary parts.
 fn effects(factors: &DMatrix<f64>, ways: &[Way]) -> DMatrix<f64> {
     let mut y = DMatrix::zeros(factors.ncols(), 2 * ways.len());
     for (l, way) in ways.iter().enumerate() {
@@ -251,8 +256,8 @@ fn effects(factors: &DMatrix<f64>, ways: &[Way]) -> DMatrix<f64> {
     factors * y
 }
 
-/// The derivatives of one cell's reading (axes × 7, where the ports' admittance is y): by three shifts of the sensor, two of the impact, and
-/// two tilts.
+/// The derivatives of one cell's values (axes × 7) at the ports' admittance y: by three shifts of
+/// the sensor, two of the impact, and two tilts.
 fn of_cell(cell: &CellGeometry, y: &Line) -> Line {
     let motion = product(y, &cell.pushed);
     let by_impact = product(&cell.seen, &product(y, &cell.slopes));
@@ -265,7 +270,7 @@ fn of_cell(cell: &CellGeometry, y: &Line) -> Line {
 }
 
 impl Problem {
-    /// What the cells of A or B pass through on their way to the residual: L T_u and T_f R.
+    /// The transformations from the cells of A or B to the residual: L T_u and T_f R.
     pub(super) fn through(&self, side: usize, predicted: &Predicted) -> (Line, Line) {
         let block = &self.parts[side];
         let left = self.layout.left(predicted, side).select_rows(&self.rows);

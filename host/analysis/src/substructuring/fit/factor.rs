@@ -1,14 +1,18 @@
-//! Cholesky's factor of a large symmetric matrix, block by block, so that nearly all of the work is products of matrices.
+//! Cholesky factor of a large symmetric matrix, computed block by block, so that nearly all of the
+//! work is matrix products.
 //!
-//! Column by column, as small matrices are factorised, a thousand columns take most of a second; in blocks, a small part of it.
+//! Column by column, as for small matrices, a thousand columns take most of a second; in blocks, a
+//! small part of it.
 
 use super::narrow::{NARROW, add_product, crossed};
 use nalgebra::DMatrix;
 
-/// Columns of a block: few enough for the processor's cache, enough for a product to be worth its start.
+/// Columns of a block: few enough for the processor's cache, enough that a matrix product is worth
+/// its overhead.
 const BLOCK: usize = 64;
 
-/// These rows in memory of their own, column by column: a view of them is copied value by value.
+/// Copies these rows to a separate matrix, column by column: copying a view proceeds value by
+/// value.
 pub(super) fn rows(x: &DMatrix<f64>, first: usize, count: usize) -> DMatrix<f64> {
     let mut values = Vec::with_capacity(count * x.ncols());
     for column in x.as_slice().chunks_exact(x.nrows().max(1)) {
@@ -19,22 +23,24 @@ pub(super) fn rows(x: &DMatrix<f64>, first: usize, count: usize) -> DMatrix<f64>
 
 /// L of A = L Lᵀ.
 pub(super) struct Factor {
-    /// L, a block of columns at a time.
+    /// L, in blocks of columns.
     blocks: Vec<Block>,
 }
 
-/// Some columns of L. In memory of their own: views of few rows are slow to multiply, and their products read past their end.
+/// Some columns of L. Stored as separate matrices: views of few rows are slow to multiply, and
+/// their products read past their end.
 struct Block {
-    /// Inverse of what stands on the diagonal, and its transpose.
+    /// Inverse of the diagonal block, and its transpose.
     inverse: DMatrix<f64>,
     inverse_turned: DMatrix<f64>,
-    /// What stands below it, and its transpose.
+    /// The part below it, and its transpose.
     below: DMatrix<f64>,
     below_turned: DMatrix<f64>,
 }
 
 impl Factor {
-    /// Of a symmetric matrix, of which only the lower triangle is read; none where it is not positive.
+    /// Factorises a symmetric matrix, of which only the lower triangle is read; none if it is not
+    /// positive definite.
     pub(super) fn of(mut a: DMatrix<f64>) -> Option<Factor> {
         let n = a.nrows();
         let mut blocks = Vec::with_capacity(n.div_ceil(BLOCK));
@@ -59,7 +65,7 @@ impl Factor {
         Some(Factor { blocks })
     }
 
-    /// L⁻¹X, in the place of X.
+    /// Replaces X by L⁻¹X.
     pub(super) fn forward(&self, x: &mut DMatrix<f64>) {
         let mut first = 0;
         for block in &self.blocks {
@@ -81,7 +87,7 @@ impl Factor {
         }
     }
 
-    /// L⁻ᵀX, in the place of X.
+    /// Replaces X by L⁻ᵀX.
     pub(super) fn backward(&self, x: &mut DMatrix<f64>) {
         let mut below = x.nrows();
         for block in self.blocks.iter().rev() {
@@ -103,7 +109,8 @@ impl Factor {
 mod tests {
     use super::*;
 
-    /// Sizes about the blocks' edges, against the factor that nalgebra makes column by column.
+    /// Sizes around the block size, compared with the factor that nalgebra computes column by
+    /// column.
     #[test]
     fn in_blocks_it_is_the_factor_of_single_columns() {
         for n in [1, BLOCK - 1, BLOCK, BLOCK + 1, 3 * BLOCK + 7] {

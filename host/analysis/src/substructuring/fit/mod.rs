@@ -1,15 +1,16 @@
 //! `fit`: the joint's K and C by maximum likelihood over all measured blocks.
 //!
-//! Eq. (1) is the model of the assembly: Y^AJB(θ) = Y − Y Bᵀ (B Y Bᵀ + Y^J(θ))⁻¹ B Y, with Y = blkdiag(Y^A, Y^B) as measured and
-//! Y^J = (K + sC)⁻¹. Nothing is inverted that noise could make singular, so a joint far stiffer or far softer than
-//! noise lets see spoils nobody but itself; and any set of rows and columns of the assembly will do, also fewer internals than interface
-//! degrees of freedom.
+//! Eq. (1) is the model of the assembly: Y^AJB(θ) = Y − Y Bᵀ (B Y Bᵀ + Y^J(θ))⁻¹ B Y, with Y =
+//! blkdiag(Y^A, Y^B) as measured and Y^J = (K + sC)⁻¹. No matrix is inverted that noise could make
+//! singular, so a degree of freedom that is far stiffer or softer than the noise can resolve
+//! affects only its own estimate. Any set of rows and columns of the assembly can be used, also
+//! fewer internals than interface degrees of freedom.
 //!
-//! The residual's covariance holds the noise of Y^AJB and, through Eq. (1)'s derivatives, of Y^A and Y^B, and errors of position,
-//! aim and angle with Gaussian priors. The way through the room: `block` what is measured, `cell` and `nuisance` how its
-//! geometry errs, `joint` the parameters,
-//! `model` Eq. (1) and its derivatives, `problem` the residuals, `weight` their covariance, `start`, `solver`,
-//! `outcome`.
+//! The residual's covariance contains the noise of Y^AJB and, through Eq. (1)'s derivatives, of Y^A
+//! and Y^B, and errors of position, aim and angle with Gaussian priors. The modules: `block`: the
+//! measured data; `cell` and `nuisance`: its errors of geometry; `chart`: the parameters; `model`:
+//! Eq. (1) and its derivatives; `problem`: the residuals; `weight`: their covariance; then `start`,
+//! `solver`, `outcome`.
 
 mod assembly_aims;
 mod block;
@@ -49,27 +50,29 @@ use std::collections::BTreeMap;
 /// The method's name in command lines and results.
 pub const NAME: &str = "fit";
 
-/// χ² per degree of freedom at which no other start is tried: a wrong minimum is far above it.
+/// χ² per degree of freedom below which no other start is tried: at a wrong minimum it is far
+/// higher.
 const ENOUGH: f64 = 2.0;
-/// χ² per degree of freedom above which no joint is given at all.
+/// χ² per degree of freedom above which no joint is returned.
 const HOPELESS: f64 = 10.0;
 
-/// Choices of a fit.
+/// Options of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// What is assumed of positions and angles.
+    /// Assumed errors of positions and angles.
     pub priors: Priors,
-    /// Which entries of K and C are free.
+    /// The entries of K and C that are free.
     pub shape: Shape,
-    /// Which points of the assembly are used.
+    /// The points of the assembly that are used.
     pub points: Points,
-    /// By how much A and B alone may differ from A and B in the assembly: a standard deviation, as a fraction of their admittance. Another
-    /// suspension, another mounting; a joint that is softer against the structures than this cannot be told from it.
+    /// Assumed difference between A and B alone and A and B in the assembly: a standard deviation,
+    /// as a fraction of their admittance, for a different suspension or mounting. A joint that is
+    /// softer relative to the structures than this cannot be distinguished from it.
     pub mounting: f64,
 }
 
 impl Default for Options {
-    /// Diagonal, interface points, and 0.5 % between the configurations.
+    /// Diagonal form, interface points, and 0.5 % between the configurations.
     fn default() -> Self {
         Options {
             priors: Priors::default(),
@@ -80,24 +83,25 @@ impl Default for Options {
     }
 }
 
-/// Which points of the assembly a fit uses.
+/// The points of the assembly that a fit uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Points {
-    /// The interface's, and the internal ones only where the assembly's file lacks the interface's.
+    /// The interface's, and internal ones only if the assembly's file lacks the interface's.
     #[default]
     Interface,
-    /// The interface's and all internal ones (Groupings 3 and 4) that the substructure's file has too.
+    /// The interface's and all internal ones (Groupings 3 and 4) that the substructure's file has
+    /// too.
     All,
 }
 
-/// Why there is no fit.
+/// The reason why there is no fit.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FitError {
     /// The virtual points cannot be formed, or a cell is not a number.
     #[error(transparent)]
     Interface(#[from] InterfaceError),
-    /// A cell has no variance, or none above zero.
+    /// A cell has no variance, or it is zero.
     #[error(
         "{file}: the noise of `{output}` from `{input}` is not known, and `fit` weighs every cell with it: store `variance` with the FRFs \
          (`jointrig frf --out` does, from two hits on) or state the noise"
@@ -136,12 +140,12 @@ pub enum FitError {
         /// The line, Hz.
         frequency_hz: f64,
     },
-    /// The noise's covariance cannot be factorised.
+    /// The covariance of the noise cannot be factorised.
     #[error(
         "the residuals' covariance is singular: two channels or impacts say the same, or variances differ by more than rounding bears"
     )]
     NoiseSingular,
-    /// The cost has no minimum that can be seen.
+    /// The cost has no clear minimum.
     #[error(
         "not identified: the likelihood has no clear maximum; use fewer IDMs, a wider band, or the diagonal form"
     )]
@@ -152,7 +156,7 @@ pub enum FitError {
          between the configurations, a point is misplaced, or the stated noise or errors of geometry are too small"
     )]
     Misfit {
-        /// The best of all starts.
+        /// χ² per degree of freedom of the best start.
         chi_square: f64,
     },
 }
@@ -166,22 +170,24 @@ pub struct Fitted {
     pub lines: usize,
     /// The interface deformation modes.
     pub idms: usize,
-    /// What was assumed of positions and angles.
+    /// Assumed errors of positions and angles.
     pub priors: Priors,
-    /// What was assumed of A and B alone and in the assembly.
+    /// Assumed difference of A and B alone from the assembly, as a fraction.
     pub mounting: f64,
-    /// Which entries were free.
+    /// The entries that were free.
     pub shape: Shape,
     /// The diagonal by degree of freedom.
     pub joint: BTreeMap<Dof, FittedDof>,
-    /// Stiffness between two degrees of freedom and its standard deviation, of the full form: N/m, N/rad or N m/rad.
+    /// Stiffness between two degrees of freedom and its standard deviation, of the full form: N/m,
+    /// N/rad or N m/rad.
     pub coupling_si: BTreeMap<String, [f64; 2]>,
-    /// χ² of the residuals per degree of freedom: about 1 where model, noise and priors describe the data; the bands' noise is a
-    /// little correlated, which lowers it to some 0.8 under a strong exponential window.
+    /// χ² of the residuals per degree of freedom: about 1 if model, noise and priors describe the
+    /// data. The noise of neighbouring bands is slightly correlated, which lowers it to about 0.8
+    /// with a strong exponential window.
     pub chi_square_per_dof: f64,
-    /// The largest error of geometry that the fit believes in, in standard deviations of its prior.
+    /// The largest estimated error of geometry, in standard deviations of its prior.
     pub largest_error: f64,
-    /// Whether the search settled.
+    /// Whether the search converged.
     pub converged: bool,
 }
 
@@ -192,10 +198,12 @@ struct Internals {
     inputs: Vec<String>,
 }
 
-/// Fits K + sC to `ajb` over `band`, given A and B (all three alike in lines, quantity and window).
+/// Fits K + sC to `ajb` over `band`, given A and B (all three with the same lines, quantity and
+/// window).
 ///
 /// # Errors
-/// [`FitError`]; a joint that the data cannot tell is no error but `identified: false`.
+/// [`FitError`]; a joint that the data do not determine is not an error but has `identified:
+/// false`.
 pub fn fit(
     a: &Frf,
     b: &Frf,
@@ -211,7 +219,7 @@ pub fn fit(
     for candidate in start::candidates(&problem, &chart, idms) {
         let found = match solver::search(&problem, &chart, &candidate) {
             Ok(found) => found,
-            // another start may find its way
+            // another start may succeed
             Err(FitError::NoMinimum | FitError::NoiseSingular | FitError::Singular { .. }) => continue,
             Err(error) => return Err(error),
         };
@@ -268,7 +276,7 @@ fn problem(
         outputs: internals.iter().flat_map(|i| i.outputs.clone()).collect(),
         inputs: internals.iter().flat_map(|i| i.inputs.clone()).collect(),
     };
-    // A and B alone need whole virtual points
+    // A and B alone need complete virtual points
     files[0].virtual_point(Grouping::InterfaceA, geometry, idms)?;
     files[1].virtual_point(Grouping::InterfaceB, geometry, idms)?;
     let of = |file: usize, sides: &[Side], internals: &Internals| {
@@ -299,7 +307,8 @@ fn problem(
     Ok(problem)
 }
 
-/// The internal points of a side that the assembly and the substructure both have, where they are wanted.
+/// The internal points of a side that the assembly and the substructure both have, if they are
+/// used.
 fn internals(side: Side, files: &[Measured<'_>; 3], points: Points) -> Internals {
     let (interface, internal) = side.groupings();
     let (own, ajb) = (&files[usize::from(side == Side::B)], &files[2]);

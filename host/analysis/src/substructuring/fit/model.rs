@@ -1,7 +1,8 @@
-//! Eq. (1) as the model of the assembly, with its derivatives by the joint and by what A and B were measured as.
+//! Eq. (1) as the model of the assembly, with its derivatives by the joint and by the measured Y^A
+//! and Y^B.
 //!
-//! Y^AJB = Y − P G⁻¹ Q with P = Y Bᵀ, Q = B Y and G = B Y Bᵀ + Y^J. A change of Y alone gives L δY R with L = I − P G⁻¹ B and
-//! R = I − Bᵀ G⁻¹ Q; a change of the joint −P δ(G⁻¹) Q.
+//! Y^AJB = Y − P G⁻¹ Q with P = Y Bᵀ, Q = B Y and G = B Y Bᵀ + Y^J. A change of Y alone gives L δY
+//! R with L = I − P G⁻¹ B and R = I − Bᵀ G⁻¹ Q; a change of the joint gives −P δ(G⁻¹) Q.
 
 use super::block::{Line, Ports};
 use super::chart::{self, At};
@@ -21,7 +22,7 @@ pub(super) struct Layout {
     pub(super) columns: [Ports; 2],
 }
 
-/// What is to be computed of the model.
+/// The parts of the model to be computed.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Wanted {
     /// Y^AJB.
@@ -32,7 +33,7 @@ pub(super) struct Wanted {
     pub(super) slopes: bool,
 }
 
-/// The model at one line; empty where it was not wanted.
+/// The model at one line; parts that were not requested are empty.
 pub(super) struct Predicted {
     /// All output ports × all input ports.
     pub(super) y: Line,
@@ -42,9 +43,10 @@ pub(super) struct Predicted {
     pub(super) slopes: Slopes,
 }
 
-/// The derivatives of Y^AJB by the parameters of the joint, as sums of dyads: a column of `moved` times that of `by`, transposed.
+/// The derivatives of Y^AJB by the parameters of the joint, as sums of dyads: a column of `moved`
+/// times the transpose of that of `by`.
 ///
-/// Every parameter has as many dyads as the others, side by side.
+/// Every parameter has the same number of dyads, in contiguous columns.
 pub(super) struct Slopes {
     /// All output ports × dyads.
     pub(super) moved: Line,
@@ -72,7 +74,8 @@ impl Layout {
         w
     }
 
-    /// The model at some lines, given the joint, Y^A and Y^B at each; none where G is singular.
+    /// The model at some lines, given the joint, Y^A and Y^B at each; none for lines with a
+    /// singular G.
     pub(super) fn predict(
         &self,
         joint: &[At],
@@ -83,7 +86,7 @@ impl Layout {
         wide(Predictions { layout: self, joint, parts, wanted })
     }
 
-    /// The columns of L that a side's output ports pass through: all output ports × the side's.
+    /// The columns of L for a side's output ports: all output ports × the side's.
     pub(super) fn left(&self, at: &Predicted, side: usize) -> Line {
         let (ports, row) = (&self.rows[side], self.corner(side).0);
         let mut left = Line::zeros(self.shape().0, ports.count);
@@ -93,7 +96,7 @@ impl Layout {
         left
     }
 
-    /// The rows of R that its input ports pass through: the side's input ports × all.
+    /// The rows of R for a side's input ports: the side's input ports × all.
     pub(super) fn right(&self, at: &Predicted, side: usize) -> Line {
         let (ports, column) = (&self.columns[side], self.corner(side).1);
         let mut right = Line::zeros(ports.count, self.shape().1);
@@ -104,12 +107,12 @@ impl Layout {
     }
 }
 
-/// B's entry of a side: what A's interface moves less B's.
+/// The sign of a side in B: A's interface motion minus B's.
 fn sign(side: usize) -> C {
     C::from(if side == 0 { 1.0 } else { -1.0 })
 }
 
-/// The model at as many lines at once as the processor's vectors hold.
+/// The model at as many lines simultaneously as the processor's vectors hold.
 struct Predictions<'a> {
     layout: &'a Layout,
     joint: &'a [At],
@@ -199,7 +202,7 @@ impl Predictions<'_> {
     }
 }
 
-/// H = (D W + E)⁻¹, and at which of the lines it is one.
+/// H = (D W + E)⁻¹, and the lines at which it exists.
 fn held<'p, S: Simd>(pool: &Pool<S>, interface: &Matrix<'p, S>, lanes: usize) -> (Matrix<'p, S>, Vec<bool>) {
     let mut sure = Sure::all(pool.simd);
     let mut h = inverse(interface.copy(), &mut sure);

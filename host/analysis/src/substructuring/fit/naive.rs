@@ -1,4 +1,5 @@
-//! The weights as the formulas say them, line by line and cell by cell: what the fast ones are trusted by.
+//! The weights computed naively from the formulas, line by line and cell by cell: the reference for
+//! the fast ones.
 
 use super::block::Line;
 use super::cell::CellGeometry;
@@ -12,11 +13,11 @@ use std::ops::Range;
 
 type C = Complex<f64>;
 
-/// Lines per band and seed of `weight`, whose draws these must be.
+/// Lines per band and seed of `weight`: the draws must be the same.
 const SAMPLED: usize = 4;
 const NOISE_SEED: u64 = 0x6669_7422;
 
-/// What the cells of A or B pass through on their way to the residual: L T_u and T_f R.
+/// The transformations from the cells of A or B to the residual: L T_u and T_f R.
 fn through(problem: &Problem, side: usize, predicted: &model::Predicted) -> (Line, Line) {
     let block = &problem.parts[side];
     let left = problem.layout.left(predicted, side).select_rows(&problem.rows);
@@ -24,14 +25,14 @@ fn through(problem: &Problem, side: usize, predicted: &model::Predicted) -> (Lin
     (left * block.t_u.map(C::from), block.t_f.map(C::from) * right)
 }
 
-/// The model at a line where Y^A and Y^B are `y`.
+/// The model at a line with Y^A and Y^B equal to `y`.
 fn predicted(point: &Point<'_>, l: usize, [a, b]: [Line; 2]) -> model::Predicted {
     let all = model::Wanted { y: true, gains: true, slopes: false };
     let found = point.problem.predict(point.chart, point.p, [&[a], &[b]], l..l + 1, all);
     found.expect("regular").remove(0)
 }
 
-/// Adds ∂(left · cells · right)/∂η (unscaled) of a block whose ports move by `y`.
+/// Adds ∂(left · cells · right)/∂η (unscaled) of a block with the ports' admittance `y`.
 fn add_effect(point: &Point<'_>, place: usize, y: &Line, way: (&Line, &Line, f64), effect: &mut Line) {
     let problem = point.problem;
     let block = problem.blocks()[place];
@@ -92,7 +93,7 @@ fn effect(point: &Point<'_>, lines: &Range<usize>, part: impl Fn(usize, usize) -
     effect
 }
 
-/// Adds scale · Σ v_oi x xᴴ, x = (column o of left) ⊗ (row i of right) by columns.
+/// Adds scale · Σ v_oi x xᴴ, x = (column o of left) ⊗ (row i of right), column-major.
 fn spread(noise: &mut Line, left: &Line, right: &Line, variance: &DMatrix<f64>, scale: f64) {
     for i in 0..variance.ncols() {
         for o in 0..variance.nrows() {
@@ -149,7 +150,7 @@ struct Case {
 }
 
 impl Case {
-    /// The exact rig, said to have this noise, away from nominal geometry.
+    /// The exact rig with this stated noise, away from nominal geometry.
     fn new() -> Case {
         let (frf, geometry) = rig();
         let [a, b, ajb] = frf.map(|frf| frf.with_relative_noise(1e-3));
@@ -185,7 +186,7 @@ fn the_fast_weights_are_the_naive_ones() {
     let largest = naive.amax();
     for r in 0..naive.nrows() {
         for c in 0..=r {
-            // rounding, through a covariance whose condition is some 1e6
+            // rounding, through a covariance with a condition number of about 1e6
             assert!((fast[(r, c)] - naive[(r, c)]).abs() < 1e-9 * largest, "{r} {c}");
         }
     }
@@ -200,7 +201,7 @@ fn geometry_taken_out_of_the_data_is_what_moved_cells_read() {
     for place in 0..2 {
         let (block, nominal) = (&problem.parts[place], problem.cells(place, &none));
         for l in [0, problem.s.len() - 1] {
-            // cells of these ports, as moved sensors and blows show them
+            // cells for these port admittances, as moved sensors and hits measure them
             let y = &data.parts[place][l];
             let mut more = Line::zeros(block.t_u.ncols(), block.t_f.nrows());
             let at = |cell: &CellGeometry| cell.seen.map(C::from) * (y * cell.pushed.map(C::from));
@@ -211,7 +212,8 @@ fn geometry_taken_out_of_the_data_is_what_moved_cells_read() {
                 }
             }
             let measured = block.reduce(&block.cells[l]);
-            // the fixed point's remainder after six steps that each take away four fifths or more
+            // remainder of the fixed point after six steps, each of which removes four fifths or
+            // more
             assert!((y + block.reduce(&more) - &measured).norm() < 1e-3 * measured.norm(), "{place} {l}");
         }
     }

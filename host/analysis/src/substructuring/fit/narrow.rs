@@ -1,14 +1,15 @@
-//! Products of large matrices with a few columns, as every step of the search needs them.
+//! Products of large matrices with a few columns, as needed in every step of the search.
 //!
-//! Products made for large matrices first copy both into an order that suits them. With a dozen columns the copy of the large one takes as long as
-//! the product; here it is read once, as it stands. Sums run in vectors as wide as the processor has, so that they differ from those of
-//! single numbers in rounding.
+//! Products optimised for large matrices first copy both into a suitable order. With a dozen
+//! columns the copy of the large matrix takes as long as the product; here it is read once in its
+//! own order. Sums run in vectors of the processor's width, so the results differ from scalar sums
+//! by rounding.
 
 use crate::vectors::wide;
 use nalgebra::DMatrix;
 use pulp::{Simd, WithSimd};
 
-/// Columns up to which these products are the quicker ones.
+/// Number of columns up to which these products are faster.
 pub(super) const NARROW: usize = 48;
 
 /// AᵀB.
@@ -41,7 +42,7 @@ pub(super) fn add_product(
     wide(Added { to: to.as_mut_slice(), stride, first, factor, a, rows, x, inner });
 }
 
-/// Columns of `a` and `b` of the same height, and AᵀB by columns.
+/// Columns of `a` and `b` of the same height, and AᵀB column-major.
 struct Crossed<'a> {
     a: &'a [f64],
     b: &'a [f64],
@@ -55,7 +56,7 @@ impl WithSimd for Crossed<'_> {
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        // as many sums as there are registers for them and for what they are made of
+        // as many sums as the registers hold together with their operands
         if S::REGISTER_COUNT >= 32 { self.by::<S, 6, 4>(simd) } else { self.by::<S, 4, 2>(simd) }
     }
 }
@@ -144,11 +145,11 @@ fn dots<'a, S: Simd, const I: usize, const J: usize>(
     dots
 }
 
-/// No processor's vectors hold more.
+/// Upper bound of the lanes of a processor's vectors.
 pub(super) const MOST_LANES: usize = 8;
 
-/// The sum of a vector's numbers. By way of memory: the processor's own way is not inlined where vectors are of eight, and costs more than the
-/// products.
+/// The sum of a vector's lanes. It goes through memory: the intrinsic is not inlined for vectors of
+/// eight, and takes longer than the products.
 #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
 #[inline(always)]
 fn sum_of_lanes<S: Simd>(vector: S::f64s) -> f64 {
@@ -160,7 +161,8 @@ fn sum_of_lanes<S: Simd>(vector: S::f64s) -> f64 {
     ((a + b) + (c + d)) + ((e + f) + (g + h))
 }
 
-/// A of `rows` × `inner`, X of `inner` rows, and where `factor` times their product goes, all by columns.
+/// A with `rows` × `inner`, X with `inner` rows, and the destination of `factor` times their
+/// product, all column-major.
 struct Added<'a> {
     to: &'a mut [f64],
     stride: usize,
@@ -172,7 +174,7 @@ struct Added<'a> {
     inner: usize,
 }
 
-/// Vectors of a column that are summed at once.
+/// Vectors of a column that are summed simultaneously.
 const HIGH: usize = 4;
 
 impl WithSimd for Added<'_> {

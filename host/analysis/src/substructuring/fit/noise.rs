@@ -1,24 +1,27 @@
-//! The covariance of one band's residual. Noise of a line is circular, so it is one Hermitian matrix N.
+//! The covariance of one band's residual. Noise of a line is circular, so it is one Hermitian
+//! matrix N.
 
 use super::block::Line;
 use super::factor::{Factor, rows};
 use crate::substructuring::product::product;
 use nalgebra::DMatrix;
 
-/// N, gathered from real products, which are the fast ones.
+/// N, computed with real matrix products, which are the fast ones.
 #[derive(Clone)]
 pub(super) struct Noise {
-    /// Rows and columns of the residual; its entries stand by columns.
+    /// Rows and columns of the residual; its entries are column-major.
     shape: (usize, usize),
     re: DMatrix<f64>,
     im: DMatrix<f64>,
 }
 
-/// A part Σᵢ Uᵢ ⊗ (ρᵢ ρᵢᴴ) of N: what the cells of one impact do to the rows, by what comes of it in the columns.
+/// A part Σᵢ Uᵢ ⊗ (ρᵢ ρᵢᴴ) of N: the effect of one impact's cells on the rows times that of the
+/// impact on the columns.
 ///
-/// Written out, each cell is a column as long as the residual; in this form all cells of an impact are one small matrix.
+/// Written out, each cell is a column as long as the residual; in this form all cells of an impact
+/// are one small matrix.
 pub(super) struct ByImpact {
-    /// Uᵢ by columns, one column for each impact: rows² × impacts.
+    /// Uᵢ column-major, one column for each impact: rows² × impacts.
     pub(super) by_rows: Line,
     /// ρᵢ: impacts × columns.
     pub(super) by_columns: Line,
@@ -44,7 +47,7 @@ impl Noise {
         Noise { shape: (rows, columns), re: none(), im: none() }
     }
 
-    /// Adds these parts: one product of matrices, and its entries put where they belong.
+    /// Adds these parts: one matrix product, whose entries are then added at their positions.
     pub(super) fn add_by_impact(&mut self, parts: &[ByImpact]) {
         let (rows, columns) = self.shape;
         let (height, width) = (rows * rows, columns * columns);
@@ -80,10 +83,10 @@ impl Noise {
         }
     }
 
-    /// Adds X Xᴴ of an X whose real parts stand above its imaginary ones.
+    /// Adds X Xᴴ for X with its real parts on top of its imaginary parts.
     pub(super) fn add(&mut self, x: &DMatrix<f64>) {
         let m = self.re.nrows();
-        // beside each other, in memory of their own: products of views with few rows read past their end
+        // copied to separate matrices: products of views with few rows read past their end
         let (re, im) = (rows(x, 0, m), rows(x, m, m));
         let re_t = re.transpose();
         let crossed: DMatrix<f64> = &im * &re_t;
@@ -101,7 +104,7 @@ impl Noise {
         // real and imaginary part have half the variance each
         let part = |of: &DMatrix<f64>| DMatrix::from_fn(m, m, |r, c| 0.5 * of[(r, c)] * scale[r] * scale[c]);
         let (re, im) = (part(&self.re), part(&self.im));
-        // the lower triangle is enough
+        // the lower triangle is sufficient
         let mut both = DMatrix::zeros(2 * m, 2 * m);
         both.view_mut((0, 0), (m, m)).copy_from(&re);
         both.view_mut((m, m), (m, m)).copy_from(&re);
@@ -110,31 +113,33 @@ impl Noise {
     }
 }
 
-/// What makes residuals and derivatives ones of unit variance.
+/// Converts residuals and derivatives to unit variance.
 pub(super) struct Whitening {
-    /// Units of one size, or rounding fails the factorisation.
+    /// Scales entries to a similar magnitude; without it rounding makes the factorisation fail.
     scale: Vec<f64>,
-    /// Of the covariance of (real parts, imaginary parts) in these units.
+    /// Factor of the covariance of (real parts, imaginary parts) in these units.
     factor: Factor,
 }
 
 impl Whitening {
-    /// Columns of real parts above imaginary ones in units of their noise.
+    /// Whitens columns of real parts on top of imaginary parts.
     pub(super) fn of(&self, mut x: DMatrix<f64>) -> DMatrix<f64> {
         self.scaled(&mut x);
         self.factor.forward(&mut x);
         x
     }
 
-    /// Whitened columns weighed once more: what the transpose of unwhitened columns has to be multiplied by.
+    /// Applies the transposed whitening to whitened columns: the result can be multiplied by the
+    /// transpose of unwhitened columns.
     pub(super) fn back(&self, mut x: DMatrix<f64>) -> DMatrix<f64> {
         self.factor.backward(&mut x);
         self.scaled(&mut x);
         x
     }
 
-    /// The left half of N's inverse as it acts on (real parts, imaginary parts): the upper block, and the lower one. The right half is
-    /// the same two, the lower one with its sign turned, above and below.
+    /// The left half of N's inverse acting on (real parts, imaginary parts): the upper and the
+    /// lower block. The right half consists of the same two: the negated lower one on top, the
+    /// upper one below.
     pub(super) fn inverse(&self) -> [DMatrix<f64>; 2] {
         let m = self.scale.len();
         let left = self.back(self.of(DMatrix::identity(2 * m, m)));

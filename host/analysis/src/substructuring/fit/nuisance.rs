@@ -1,27 +1,29 @@
-//! The errors of geometry as nuisance parameters: which there are, and which of them a cell has.
+//! The errors of geometry as nuisance parameters, and their assignment to cells.
 
 use super::block::Block;
 use super::cell::CellError;
 use crate::substructuring::averaged::Priors;
 use nalgebra::Vector3;
 
-/// Nuisance parameters of a cell's own aim: three of the sensor, two of the impact.
+/// Nuisance parameters for the aim of a cell: three of the sensor, two of the impact.
 pub(super) const AIMS: usize = 5;
 
-/// Every error of geometry that is not known, with its prior: the nuisance parameters.
+/// All unknown errors of geometry with their priors: the nuisance parameters.
 ///
-/// A sensor's position (three) and an impact's position and tilt (two each) are one error in all configurations; of each cell
-/// there are five more from the aim. An internal point's own error cancels between the substructure and the assembly.
+/// A sensor's position (three) and an impact's position and tilt (two each) are common to all
+/// configurations; each cell has five more for its aim. An internal point's own error cancels
+/// between the substructure and the assembly.
 pub(super) struct Nuisances {
     /// Standard deviations, m or rad.
     pub(super) std: Vec<f64>,
     sensors: Vec<(String, usize)>,
     impacts: Vec<(String, usize)>,
-    /// First aim error of each block.
+    /// Index of the first aim error of each block.
     aims: Vec<usize>,
 }
 
-/// Places of one cell's nuisance parameters: own position (3), impact's position and tilt (4), aim (5).
+/// Indices of one cell's nuisance parameters: sensor's position (3), impact's position and tilt
+/// (4), aim (5).
 pub(super) struct CellNuisances {
     pub(super) sensor: Option<usize>,
     pub(super) impact: Option<usize>,
@@ -54,7 +56,8 @@ impl Nuisances {
         n
     }
 
-    /// First aim error of the assembly, the last block; all after it are aims at its cells.
+    /// Index of the first aim error of the assembly, the last block; all later ones are aims at its
+    /// cells.
     pub(super) fn of_assembly(&self) -> usize {
         self.aims.last().copied().unwrap_or_default()
     }
@@ -69,7 +72,7 @@ impl Nuisances {
         }
     }
 
-    /// The cell's error where every nuisance parameter has this many standard deviations.
+    /// The cell's error for nuisance parameters `eta` in standard deviations.
     pub(super) fn error(&self, at: &CellNuisances, eta: &[f64]) -> CellError {
         let value = |i: usize| eta[i] * self.std[i];
         let mut error = CellError {

@@ -1,4 +1,4 @@
-//! From parameters to K and C with intervals, and to words where the data do not say enough.
+//! From parameters to K and C with intervals, and to warnings where the data do not determine them.
 
 use super::chart::{Chart, Shape};
 use super::solver::Found;
@@ -12,33 +12,36 @@ use nalgebra::DVector;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// A loss factor known no better than this is its prior's, not the data's.
+/// A loss factor with at least this standard deviation is determined by its prior, not by the data.
 const LOSS_UNKNOWN: f64 = 0.5;
-/// χ² per degree of freedom above which a reader must be told, and intervals are widened: of thousands of residuals it scatters by a
-/// few per cent only, and a model that describes them gives 0.8 to 1.
+/// χ² per degree of freedom above which a warning is given and intervals are widened: with
+/// thousands of residuals it scatters by a few per cent only, and a model that describes them gives
+/// 0.8 to 1.
 pub(super) const POOR: f64 = 1.15;
 
 /// One degree of freedom of the fitted joint. N/m and N s/m; N m/rad and N m s/rad for rotations.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FittedDof {
-    /// Stiffness; infinite at a rigid joint.
+    /// Stiffness; infinite for a rigid joint.
     pub stiffness: f64,
     /// Its standard deviation, to first order.
     pub std: f64,
-    /// 95 % interval: that of κ, which is normal, carried over. It may reach below zero, or to infinity.
+    /// 95 % interval: that of κ, which is normally distributed, converted. It may reach below zero,
+    /// or to infinity.
     pub ci95: [f64; 2],
-    /// Whether the interval is narrow enough for the stiffness to be quoted as a number.
+    /// Whether the interval is narrow enough to quote the stiffness as a number.
     pub identified: bool,
     /// Damping.
     pub damping: f64,
     /// Its standard deviation.
     pub damping_std: f64,
-    /// Whether the damping comes from the data and not from its prior.
+    /// Whether the damping is determined by the data and not by its prior.
     pub damping_identified: bool,
 }
 
 impl FittedDof {
-    /// From κ and its standard deviation, and the loss factor and its own, in the chart's unit `u` (m/N or rad/(N m)).
+    /// From κ and the loss factor with their standard deviations, in the chart's unit `u` (m/N or
+    /// rad/(N m)).
     fn of(kappa: f64, kappa_std: f64, loss: [f64; 2], unit: f64, omega: f64) -> FittedDof {
         let stiffness = |kappa: f64| if kappa < 1.0 { kappa / (1.0 - kappa) / unit } else { f64::INFINITY };
         let k = stiffness(kappa);
@@ -57,7 +60,8 @@ impl FittedDof {
     }
 }
 
-/// All degrees of freedom, and the stiffness between them of the full form (`y-z`: N/m, N/rad or N m/rad).
+/// All degrees of freedom, and for the full form the stiffness between them (`y-z`: N/m, N/rad or N
+/// m/rad).
 pub(super) fn joint(
     chart: &Chart,
     found: &Found,
@@ -66,10 +70,10 @@ pub(super) fn joint(
 ) -> (BTreeMap<Dof, FittedDof>, BTreeMap<String, [f64; 2]>) {
     let n = chart.n();
     let d = balance(idms);
-    // a fit worse than its noise is less certain than the noise says
+    // if the residuals exceed the noise, the result is less certain than the noise suggests
     let widen = if found.chi_square > POOR { found.chi_square.sqrt() } else { 1.0 };
     let unit = |i: usize| chart.unit[i] / (d[i] * d[i]);
-    // what is held against W (1 + g) instead of W looks like another joint: κ + g (1 − κ)
+    // if the admittance is W (1 + g) instead of W, κ appears as κ + g (1 − κ)
     let mounted = |kappa: f64, std: f64| std.hypot(mounting * (1.0 - kappa));
     match chart.shape {
         Shape::Diagonal => {
@@ -125,7 +129,8 @@ pub(super) fn joint(
 }
 
 impl Fitted {
-    /// The fit as a row of the results: only what the data say. What they do not is in the warnings, with its limits.
+    /// The fit as a row of the results, with identified values only. The others are in the
+    /// warnings, with their limits.
     pub fn row(&self) -> JointRow {
         let known = |value: f64, std: f64, ci95: [f64; 2]| BandStatistic {
             mean: value,
@@ -147,14 +152,15 @@ impl Fitted {
                 .map(|(dof, j)| (*dof, around(j.damping, j.damping_std)))
                 .collect(),
             coupling_si: self.coupling_si.iter().map(|(k, [v, std])| (k.clone(), around(*v, *std))).collect(),
-            // the damping between degrees of freedom is a parameter of the full joint, and no figure to quote
+            // the damping between degrees of freedom is a parameter of the full joint, and not a
+            // value to quote
             coupling_damping_si: BTreeMap::new(),
             lines: self.lines,
             warnings: self.warnings(),
         }
     }
 
-    /// What a reader must know before using the figures.
+    /// Warnings to read before using the values.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         if self.chi_square_per_dof > POOR {
@@ -192,7 +198,7 @@ impl Fitted {
     }
 }
 
-/// The fit over `lines` lines of `band_hz` in the form that is handed out.
+/// The public result for a fit over `lines` lines of `band_hz`.
 pub(super) fn fitted(
     chart: &Chart,
     found: &Found,

@@ -1,4 +1,5 @@
-//! What is measured, corrected for what is believed of the geometry, and its residuals against the model.
+//! The measured data, corrected for the estimated errors of geometry, and its residuals against the
+//! model.
 
 use super::FitError;
 use super::assembly_aims::Pushes;
@@ -18,17 +19,19 @@ use std::ops::Range;
 
 type C = Complex<f64>;
 
-/// Residuals are averaged over about this many Hz: fewer of them, whose noise is known better.
+/// Approximate width over which residuals are averaged, Hz: fewer residuals, whose noise is known
+/// more accurately.
 const WIDTH_HZ: f64 = 15.0;
-/// Steps of the fixed point that takes an error of geometry out of a substructure's admittance. Tilts mix directions
-/// whose admittances differ tenfold, so one is not enough; the error falls at least fivefold with each.
+/// Steps of the fixed-point iteration that removes an error of geometry from a substructure's
+/// admittance. Tilts mix directions whose admittances differ tenfold, so one step is not enough;
+/// each reduces the error at least fivefold.
 const CORRECTIONS: usize = 6;
 /// Pairs of draws per line for the bias of noise.
 const PAIRS: u64 = 4;
-/// Fixed, so that the same data give the same figures.
+/// Fixed seed, so that the same data give the same values.
 const SEED: u64 = 0x6669_7421;
 
-/// The measurement and the model's frame.
+/// The measurement, and the layout of the model.
 pub(super) struct Problem {
     /// A, B.
     pub(super) parts: [Block; 2],
@@ -37,11 +40,11 @@ pub(super) struct Problem {
     pub(super) s: Vec<C>,
     /// Lines of each band.
     pub(super) bands: Vec<Range<usize>>,
-    /// Output and input ports that the assembly's file measures.
+    /// Output and input ports that the assembly's file contains.
     pub(super) rows: Vec<usize>,
     pub(super) columns: Vec<usize>,
     pub(super) nuisances: Nuisances,
-    /// The assembly's own noise in each band's mean, which no parameter moves.
+    /// Noise of the assembly itself in each band's mean, which does not depend on the parameters.
     pub(super) own_noise: Vec<Noise>,
     /// T_u and T_f of the measured ports.
     pub(super) reductions: (Line, Line),
@@ -50,7 +53,8 @@ pub(super) struct Problem {
     pub(super) shared: f64,
 }
 
-/// The admittances with the believed errors of geometry taken out, and what noise adds to the model.
+/// The admittances without the estimated errors of geometry, and the bias of the model due to
+/// noise.
 pub(super) struct Corrected {
     pub(super) parts: [Vec<Line>; 2],
     pub(super) ajb: Vec<Line>,
@@ -104,17 +108,18 @@ impl Problem {
         }
     }
 
-    /// A, B and AJB, with the place of each among the nuisance parameters.
+    /// A, B and AJB, in the order of the nuisance parameters' blocks.
     pub(super) fn blocks(&self) -> [&Block; 3] {
         [&self.parts[0], &self.parts[1], &self.ajb]
     }
 
-    /// Entries of a residual.
+    /// Number of entries of a residual.
     pub(super) fn entries(&self) -> usize {
         self.rows.len() * self.columns.len()
     }
 
-    /// Every cell of a block (by impact, then sensor) with the believed errors `eta`, in standard deviations.
+    /// All cells of a block (by impact, then sensor) with the estimated errors `eta`, in standard
+    /// deviations.
     pub(super) fn cells(&self, place: usize, eta: &[f64]) -> Vec<CellGeometry> {
         let block = self.blocks()[place];
         let mut cells = Vec::with_capacity(block.impacts.len() * block.sensors.len());
@@ -127,7 +132,8 @@ impl Problem {
         cells
     }
 
-    /// Takes the believed errors `eta` (in standard deviations) out of the data, and draws the model's bias.
+    /// Removes the estimated errors `eta` (in standard deviations) from the data, and computes the
+    /// model's bias from random draws.
     pub(super) fn corrected(
         &self,
         chart: &Chart,
@@ -160,7 +166,8 @@ impl Problem {
         Ok(Corrected { parts, ajb, bias })
     }
 
-    /// The nuisance parameter that is aim `k` at the assembly's cells of an impact, sensor by sensor.
+    /// Index of the nuisance parameter for aim `k` at the assembly's cells of an impact, sensor by
+    /// sensor.
     pub(super) fn assembly_aim(&self, impact: usize, k: usize) -> usize {
         let (sensor, own) = (k / AIMS, k % AIMS);
         self.nuisances.of_assembly() + AIMS * (sensor * self.ajb.impacts.len() + impact) + own
@@ -170,7 +177,8 @@ impl Problem {
         self.s[line].im / std::f64::consts::TAU
     }
 
-    /// A draw of the noise of Y^A and Y^B at a line; a stream of its own for every line, so the order of threads cannot matter.
+    /// A draw of the noise of Y^A and Y^B at a line; every line has a separate random stream, so
+    /// that the order of threads does not matter.
     pub(super) fn noise(&self, l: usize, seed: u64) -> [Line; 2] {
         let mut stream = Xoshiro256PlusPlus::seed_from_u64(seed ^ ((l as u64) << 20));
         let mut normal = || -> f64 { StandardNormal.sample(&mut stream) };
@@ -180,8 +188,8 @@ impl Problem {
         })
     }
 
-    /// E\[model(Y + n)\] − model(Y) per line: Eq. (1) bends, so the noise of Y^A and Y^B moves its mean. Pairs ±n cancel the
-    /// linear part.
+    /// E\[model(Y + n)\] − model(Y) per line: Eq. (1) is nonlinear, so the noise of Y^A and Y^B
+    /// changes its mean. Pairs ±n cancel the linear part.
     fn bias(&self, chart: &Chart, p: &DVector<f64>, parts: &[Vec<Line>; 2]) -> Result<Vec<Line>, FitError> {
         let by_band: Vec<Vec<Line>> = (self.bands.par_iter())
             .map(|band| {
@@ -201,7 +209,8 @@ impl Problem {
                     for ((sum, still), both) in
                         sums.iter_mut().zip(&still).zip(at(1.0).into_iter().zip(at(-1.0)))
                     {
-                        // a draw that makes G singular to rounding has probability zero, and says nothing
+                        // a draw that makes G singular to rounding has probability zero and is
+                        // skipped
                         if let (Some(plus), Some(minus)) = both {
                             *sum += ((plus.y + minus.y) * C::from(0.5) - still) / C::from(PAIRS as f64);
                         }
@@ -231,7 +240,7 @@ impl Problem {
         Ok(self.predict(chart, p, own, lines, wanted)?.into_iter().map(|line| line.y).collect())
     }
 
-    /// The model at some lines, at which Y^A and Y^B are `parts`.
+    /// The model at some lines, with Y^A and Y^B equal to `parts`.
     pub(super) fn predict(
         &self,
         chart: &Chart,
@@ -246,7 +255,7 @@ impl Problem {
             .collect()
     }
 
-    /// Measured minus model, averaged over a band: real parts above imaginary ones.
+    /// Measured minus model, averaged over a band: real parts on top of imaginary parts.
     pub(super) fn residual(
         &self,
         chart: &Chart,
@@ -282,9 +291,9 @@ impl Problem {
         Ok(sums)
     }
 
-    /// Puts the derivatives of lines, summed and times `share`, into one column after the other.
+    /// Writes the derivatives of lines, summed and times `share`, to consecutive columns.
     ///
-    /// Each is a column times a row, so their sum over lines is one product of matrices.
+    /// Each is a column times a row, so their sum over lines is one matrix product.
     pub(super) fn put_slopes(&self, sums: &mut [f64], lines: &[Slopes], share: f64) {
         let (rows, columns) = (self.rows.len(), self.columns.len());
         let height = (2 * rows * columns).max(1);
@@ -314,7 +323,8 @@ impl Problem {
         }
     }
 
-    /// Adds the measured ports of `y` times `share` to a column of real parts above imaginary ones.
+    /// Adds the measured ports of `y` times `share` to a column of real parts on top of imaginary
+    /// parts.
     pub(super) fn add_measured(&self, column: &mut [f64], y: &Line, share: f64) {
         let (re, im) = column.split_at_mut(self.entries());
         let places = self.columns.iter().flat_map(|c| self.rows.iter().map(move |r| (*r, *c)));

@@ -1,20 +1,21 @@
-//! What errors of geometry add to the admittances that a block's cells reduce to.
+//! Effect of errors of geometry on the admittances that a block's cells reduce to.
 //!
-//! A cell reads (what its sensor sees) · Y · (what its blow pushes), linear in the ports' admittance Y, and so does what the reduction
-//! makes of all cells: one real matrix on the entries of Y, the same for every line.
+//! A cell's value is (response of its sensor) · Y · (port forces of its hit), linear in the ports'
+//! admittance Y, and so is the reduction of all cells: one real matrix acting on the entries of Y,
+//! the same for every line.
 
 use super::block::{Block, Line};
 use super::cell::CellGeometry;
 use nalgebra::{Complex, DMatrix};
 
-/// That matrix, on Y's entries by columns.
+/// That matrix, acting on Y's entries in column-major order.
 pub(super) struct Shift {
     matrix: DMatrix<f64>,
     shape: (usize, usize),
 }
 
 impl Shift {
-    /// How much more the reduction of `block` gives where its cells are at `moved` than where they are at `nominal`.
+    /// Difference of the reduction of `block` between cells at `moved` and cells at `nominal`.
     pub(super) fn of(block: &Block, moved: &[CellGeometry], nominal: &[CellGeometry]) -> Shift {
         let (rows, columns) = (block.rows.count, block.columns.count);
         let mut matrix = DMatrix::zeros(rows * columns, rows * columns);
@@ -39,11 +40,11 @@ impl Shift {
         Shift { matrix, shape: (rows, columns) }
     }
 
-    /// What it adds to each of `lines`.
+    /// The change of each of `lines`.
     pub(super) fn added_to(&self, lines: &[Line]) -> Vec<Line> {
         let (rows, columns) = self.shape;
         let count = lines.len();
-        // real parts of all lines, then imaginary ones
+        // real parts of all lines, then imaginary parts
         let mut stacked = DMatrix::zeros(rows * columns, 2 * count);
         for (l, y) in lines.iter().enumerate() {
             for (at, v) in y.iter().enumerate() {

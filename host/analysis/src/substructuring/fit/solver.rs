@@ -1,4 +1,5 @@
-//! Levenberg–Marquardt on the joint, with the errors of geometry integrated out and linearised anew where they are believed to be.
+//! Levenberg–Marquardt on the joint, with the errors of geometry integrated out and linearised
+//! again at their current estimate.
 
 use super::FitError;
 use super::chart::{Chart, Shape};
@@ -10,46 +11,53 @@ use crate::errors_in_variables::Feigned;
 use crate::parallel::{join, prelude::*};
 use nalgebra::{DMatrix, DVector};
 
-/// How often geometry, weights and bias are evaluated anew. Tilts act in second order too, which the second pass takes out. Many
-/// passes would do harm: the derivatives hold the noise of the FRFs, and what it feigns adds up.
+/// Number of evaluations of geometry, weights and bias. Tilts have a second-order effect too, which
+/// the second pass removes. Many passes do harm: the derivatives contain the noise of the FRFs, and
+/// the spurious information from it accumulates.
 const PASSES: usize = 4;
-/// Steps of one pass; a handful do from a fair start.
+/// Largest number of steps of one pass; a few suffice from a good start.
 const STEPS: usize = 40;
-/// A step that gains less than this in χ² is the last: a hundredth of a standard deviation is left.
+/// The search ends if a step gains less than this in χ²: a hundredth of a standard deviation is
+/// left.
 const GAIN: f64 = 1e-4;
-/// The same where another pass follows, which starts from there: a tenth.
+/// The same if another pass follows, which continues from there: a tenth.
 const COARSE_GAIN: f64 = 1e-2;
-/// A descent whose steps gain less than this fraction of χ² has shown how much too steep its weights are.
+/// Gain relative to χ² below which a descent with too small variances ends: χ² then shows by which
+/// factor to enlarge them.
 const SHOWN: f64 = 1e-3;
-/// χ² per degree of freedom above which geometry is far from linear at these weights: they are made milder for the pass.
+/// χ² per degree of freedom above which geometry is far from linear with these weights: variances
+/// are enlarged for the pass, at most `MILDER` times.
 const STEEP: f64 = 1.5;
 const MILDER: usize = 4;
-/// χ² per degree of freedom after the second pass that no further one will mend.
+/// χ² per degree of freedom after the second pass that no further pass would improve sufficiently.
 const HOPELESS: f64 = 100.0;
-/// A κ whose standard deviation is below this fraction of κ (1 − κ) tells its stiffness to some 60 %.
+/// A κ whose standard deviation is below this fraction of κ (1 − κ) determines its stiffness to
+/// about 60 %.
 const TOLD: f64 = 0.3;
 
-/// A direction of which noise feigns more than this fraction of the information is as good as not measured: its interval is
-/// widened tenfold, and it is not corrected, because tenfold noise is no correction.
+/// A direction in which noise contributes more than this fraction of the information counts as not
+/// measured: its interval is widened tenfold, and it is not corrected, because the correction would
+/// amplify noise tenfold.
 const FEIGNED_MOST: f64 = 0.9;
 
-/// Where a search ended.
+/// Result of a search.
 #[derive(Debug, Clone)]
 pub(super) struct Found {
     pub(super) p: DVector<f64>,
     pub(super) covariance: DMatrix<f64>,
     /// χ² per degree of freedom.
     pub(super) chi_square: f64,
-    /// Largest error of geometry found, in standard deviations of its prior.
+    /// Largest estimated error of geometry, in standard deviations of its prior.
     pub(super) largest_error: f64,
-    /// Whether the last pass moved no parameter by more than half a standard deviation, and no weight was made milder.
+    /// Whether the last pass changed no parameter by more than half a standard deviation, without
+    /// enlarged variances.
     pub(super) settled: bool,
 }
 
 /// Parameters and their covariance.
 type Estimate = (DVector<f64>, DMatrix<f64>);
 
-/// The cost at one point, without its derivatives: all that it takes to refuse a step.
+/// The cost at one point without its derivatives, which suffices to reject a step.
 struct Tried {
     cost: f64,
     residual: Products,
@@ -61,7 +69,7 @@ struct Score {
     chi: f64,
     gradient: DVector<f64>,
     hessian: DMatrix<f64>,
-    /// L⁻¹Gᵀ N⁻¹ r, where L Lᵀ is what the nuisance parameters are integrated out with.
+    /// L⁻¹Gᵀ N⁻¹ r, where L Lᵀ is the matrix with which the nuisance parameters are integrated out.
     pulled: DMatrix<f64>,
 }
 
@@ -71,7 +79,7 @@ struct Linear<'a> {
     chart: &'a Chart,
     data: &'a Corrected,
     weight: &'a Weight,
-    /// G η₀ per band: the residual is that of η₀, while the prior is about zero.
+    /// G η₀ per band: the residual is evaluated at η₀, while the prior is about zero.
     believed: Vec<DMatrix<f64>>,
 }
 
@@ -80,13 +88,13 @@ struct Linear<'a> {
 struct Sums {
     /// In units of their noise, one matrix for each band.
     columns: Vec<DMatrix<f64>>,
-    /// Gᵀ N⁻¹ of them.
+    /// Gᵀ N⁻¹ times the columns.
     pulled: DMatrix<f64>,
-    /// Each column with each.
+    /// Products of each column with each.
     all: DMatrix<f64>,
 }
 
-/// Where a descent begins.
+/// Residual and derivatives at the start of a descent.
 #[derive(Clone)]
 struct Start {
     residual: Sums,
@@ -94,7 +102,7 @@ struct Start {
 }
 
 impl Linear<'_> {
-    /// Of columns that `of` makes for each band, in units of their noise.
+    /// Sums for the columns that `of` returns for each band, in units of their noise.
     fn sums(
         &self,
         of: impl Fn(usize) -> Result<DMatrix<f64>, FitError> + Send + Sync,
@@ -121,7 +129,7 @@ impl Linear<'_> {
 
     fn residual(&self, p: &DVector<f64>) -> Result<Sums, FitError> {
         self.sums(|band| {
-            // r falls where the model rises
+            // r falls if the model rises
             let residual =
                 self.problem.residual(self.chart, p, self.data, self.problem.bands[band].clone())?;
             Ok(self.weight.bands[band].whitening.of(residual) + &self.believed[band])
@@ -139,7 +147,8 @@ impl Linear<'_> {
         Ok(Start { residual: self.residual(p)?, slopes: self.slopes(p)? })
     }
 
-    /// What the nuisance parameters are integrated out with where variances are larger by the factor `mild`: of I + Gᵀ N⁻¹ G / mild.
+    /// The factor of I + Gᵀ N⁻¹ G / mild, with which the nuisance parameters are integrated out if
+    /// variances are larger by the factor `mild`.
     fn marginal(&self, mild: f64) -> Result<Factor, FitError> {
         let mut marginal = self.weight.information.map(|v| v / mild);
         for i in 0..marginal.nrows() {
@@ -149,10 +158,10 @@ impl Linear<'_> {
     }
 }
 
-/// Everything that stays fixed while the joint moves.
+/// Everything that stays fixed while the joint changes.
 struct Pass<'a> {
     linear: &'a Linear<'a>,
-    /// Variances are larger by this factor.
+    /// Factor by which variances are enlarged.
     mild: f64,
     /// See [`Linear::marginal`].
     marginal: Factor,
@@ -163,9 +172,9 @@ struct Pass<'a> {
 struct Products {
     /// In units of their noise, one matrix for each band.
     columns: Vec<DMatrix<f64>>,
-    /// L⁻¹Gᵀ N⁻¹ of them.
+    /// L⁻¹Gᵀ N⁻¹ times the columns.
     pulled: DMatrix<f64>,
-    /// Each column with each.
+    /// Products of each column with each.
     all: DMatrix<f64>,
 }
 
@@ -177,7 +186,7 @@ impl Pass<'_> {
         Products { columns, pulled, all }
     }
 
-    /// Sums of products without what the nuisance parameters explain of them.
+    /// Sums of products without the part that the nuisance parameters explain.
     fn integrated(&self, all: DMatrix<f64>, one: &DMatrix<f64>, other: &DMatrix<f64>) -> DMatrix<f64> {
         (all - crossed(one, other) / self.mild) / self.mild
     }
@@ -187,7 +196,7 @@ impl Pass<'_> {
         Tried { cost: residual.all[(0, 0)] + p.dot(&self.prior.component_mul(p)), residual }
     }
 
-    /// At `p`, which was tried.
+    /// The score at `p`, given its cost.
     fn score(&self, p: &DVector<f64>, tried: Tried, slopes: Sums) -> Score {
         let Tried { cost, residual } = tried;
         let slopes = self.products(slopes);
@@ -205,15 +214,15 @@ impl Pass<'_> {
         }
     }
 
-    /// The nuisance parameters' own estimate there, in standard deviations of their priors.
+    /// The estimate of the nuisance parameters there, in standard deviations of their priors.
     fn eta(&self, at: &Score) -> DVector<f64> {
         let mut eta = at.pulled.clone();
         self.marginal.backward(&mut eta);
         eta.column(0) / self.mild
     }
 
-    /// The minimum without what noise feigns in the derivatives (errors in variables), and its covariance; none where noise is
-    /// all there is.
+    /// The minimum corrected for the spurious information from noise in the derivatives (errors in
+    /// variables), and its covariance; none if the information is noise only.
     fn corrected(&self, p: &DVector<f64>, at: &Score) -> Result<Option<Estimate>, FitError> {
         let count = p.len();
         let weight = self.linear.weight;
@@ -233,14 +242,14 @@ impl Pass<'_> {
             let left = 1.0 - f.clamp(0.0, FEIGNED_MOST);
             1.0 / (left * left)
         });
-        // one draw and the first order: the correction is not known better than by its own size
+        // from one draw and first order only: the uncertainty of the correction is its own size
         for (i, step) in (&next - p).iter().enumerate() {
             covariance[(i, i)] += step * step;
         }
         Ok(Some((next, covariance)))
     }
 
-    /// Goes downhill from `p` until a step's gain is `enough`.
+    /// Descends from `p` until `enough` accepts a step's gain.
     fn descend(
         &self,
         p: &DVector<f64>,
@@ -255,7 +264,8 @@ impl Pass<'_> {
             let mut downhill = here.gradient.clone();
             for i in 0..p.len() {
                 damped[(i, i)] *= 1.0 + damping;
-                // what stands at its bound and would leave stays, and the others know
+                // a parameter at its bound whose step points beyond it is fixed, and the other
+                // steps take this into account
                 if self.linear.chart.held(&p, i, here.gradient[i] > 0.0) {
                     damped.row_mut(i).fill(0.0);
                     damped.column_mut(i).fill(0.0);
@@ -270,14 +280,15 @@ impl Pass<'_> {
             match tried {
                 Some((Ok(tried), next)) if tried.cost <= here.cost => {
                     let gain = here.cost - tried.cost;
-                    // two steps in five lead uphill: derivatives are for those that do not
+                    // about two steps in five increase the cost: derivatives are computed for
+                    // accepted steps only
                     (here, p) = (self.score(&next, tried, self.linear.slopes(&next)?), next);
                     damping = (damping / 10.0f64).max(1e-9);
                     if enough(gain, &here) {
                         break;
                     }
                 }
-                // uphill, or off the map: a shorter step
+                // the cost increased or cannot be computed: a shorter step
                 _ => damping *= 10.0,
             }
             if damping > 1e9 {
@@ -322,7 +333,7 @@ pub(super) fn search(problem: &Problem, chart: &Chart, start: &DVector<f64>) -> 
             mild *= score.chi / freedom;
             marginal = linear.marginal(mild);
         };
-        // what a pass still moves is not known better than that
+        // the change by this pass adds to the uncertainty
         let mut covariance = covariance;
         if found.is_some() {
             for i in 0..p.len() {
@@ -332,7 +343,7 @@ pub(super) fn search(problem: &Problem, chart: &Chart, start: &DVector<f64>) -> 
         if (0..p.len()).any(|i| covariance[(i, i)].is_nan() || covariance[(i, i)] <= 0.0) {
             return Err(FitError::NoMinimum);
         }
-        // what the data do not tell may wander
+        // parameters that the data do not determine may change
         let told = |i: usize| match chart.shape {
             Shape::Diagonal => i < chart.n() && covariance[(i, i)].sqrt() < TOLD * next[i] * (1.0 - next[i]),
             Shape::Full => true,
@@ -348,7 +359,7 @@ pub(super) fn search(problem: &Problem, chart: &Chart, start: &DVector<f64>) -> 
         });
         p = next;
         if pass > 0 && found.as_ref().is_some_and(|f| f.chi_square > HOPELESS) {
-            // geometry had its chance
+            // errors of geometry have been corrected, and the model still does not fit
             break;
         }
     }

@@ -1,4 +1,4 @@
-//! Where the search begins.
+//! Start values of the search.
 
 use super::block::Line;
 use super::chart::Chart;
@@ -9,10 +9,10 @@ use crate::substructuring::joint_over_bands::median;
 use crate::substructuring::pseudo_inverse::full_rank_inverse;
 use nalgebra::{Complex, DVector};
 
-/// κ of a joint that is hardly there, and of one that hardly gives way.
+/// Range of κ: from a joint with hardly any stiffness to one with hardly any compliance.
 const ENDS: [f64; 2] = [1e-3, 0.999];
 
-/// The chart whose unit is the size of Y^A + Y^B in the middle of the band.
+/// The chart whose unit is the magnitude of Y^A + Y^B, the median over the lines of the band.
 pub(super) fn chart(problem: &Problem) -> Chart {
     let w: Vec<Line> = (0..problem.s.len())
         .map(|l| {
@@ -30,11 +30,13 @@ pub(super) fn chart(problem: &Problem) -> Chart {
     Chart::diagonal(unit, omega)
 }
 
-/// Starts to be tried in this order until one fits.
+/// Start values to be tried in this order until one fits.
 ///
-/// Where the assembly's virtual points are measured, translations start from `inverse`: the median over lines of κ, which no
-/// single line spoils. Rotations start soft, then from `inverse` too: of a small contact they hardly show against the arms' inertia, and
-/// noise makes `inverse` call them stiff. Without virtual points in the assembly, translations start at three sizes.
+/// If the assembly's virtual points are measured, translations start from `inverse`: the median of
+/// κ over lines, which is robust against single lines. Rotations start soft, then from `inverse`
+/// too: for a small contact they have hardly any effect compared with the arms' inertia, and noise
+/// makes them look stiff in `inverse`. Without virtual points in the assembly, translations start
+/// at three sizes.
 pub(super) fn candidates(problem: &Problem, chart: &Chart, idms: IdmSet) -> Vec<DVector<f64>> {
     let n = chart.n();
     let rotation = |d: usize| idms.dofs()[d].is_rotation();
@@ -54,7 +56,7 @@ pub(super) fn candidates(problem: &Problem, chart: &Chart, idms: IdmSet) -> Vec<
     }
 }
 
-/// κ of each degree of freedom by Eq. (A.1); none where a virtual point is missing or a line singular.
+/// κ of each degree of freedom by Eq. (A.1); none if a virtual point is missing or a line singular.
 fn inverse(problem: &Problem, chart: &Chart) -> Option<Vec<f64>> {
     let n = chart.n();
     let Layout { rows, columns, .. } = &problem.layout;

@@ -11,7 +11,7 @@ struct Case {
 }
 
 impl Case {
-    /// The rig's exact FRFs, said to have this noise, relative to their mean size.
+    /// The rig's exact FRFs with this stated noise, relative to their mean magnitude.
     fn rigid(relative: f64) -> Case {
         let (frf, geometry) = rig();
         let frf = frf.map(|frf| {
@@ -26,7 +26,7 @@ impl Case {
     }
 }
 
-/// Jacobian of Eq. (1) by the joint, in both charts, against difference quotients.
+/// Jacobian of Eq. (1) by the joint, in both charts, compared with difference quotients.
 #[test]
 fn the_analytic_derivatives_are_the_difference_quotients() {
     let case = Case::rigid(1e-3);
@@ -60,13 +60,13 @@ fn the_analytic_derivatives_are_the_difference_quotients() {
             up[i] += step;
             down[i] -= step;
             let quotient = (at(&up).y - at(&down).y) / nalgebra::Complex::from(2.0 * step);
-            // third order of a step of 1e-5, and rounding over it
+            // third order of a step of 1e-5, and rounding divided by it
             assert!(
                 (&slope - &quotient).norm() < 1e-5 * quotient.norm() + 1e-9 * here.y.norm(),
                 "parameter {i}"
             );
         }
-        // L δY R is what a change of Y^A does
+        // L δY R is the effect of a change of Y^A
         let change = &parts[0] * nalgebra::Complex::from(1e-6);
         let moved = with(p, [&(&parts[0] + &change), &parts[1]]).y;
         let left = problem.layout.left(&here, 0);
@@ -76,7 +76,8 @@ fn the_analytic_derivatives_are_the_difference_quotients() {
     }
 }
 
-/// Lines of one vector: one as usual, one whose inverse takes the careful way, one that has none, and one as usual again.
+/// Lines of one vector: a regular one, one that needs pivoted QR, a singular one, and a regular one
+/// again.
 #[test]
 fn a_line_of_the_model_in_doubt_is_inverted_with_care_and_leaves_its_neighbours_alone() {
     let case = Case::rigid(1e-3);
@@ -97,7 +98,7 @@ fn a_line_of_the_model_in_doubt_is_inverted_with_care_and_leaves_its_neighbours_
         };
         chart::At { d: of(1.0, last[0]), e: of(1.0, last[1]), slopes: None }
     };
-    // beyond doubt, below what the quick way trusts, singular
+    // beyond doubt, below the limit of the fast method, singular
     let joint = [[1.0, 1.0], [0.0, 1e-10], [0.0, 0.0], [1.0, 1.0]].map(diagonal);
     let wanted = model::Wanted { y: true, ..model::Wanted::default() };
     let found = layout.predict(&joint, parts.each_ref().map(Vec::as_slice), wanted);
@@ -115,12 +116,12 @@ fn a_line_of_the_model_in_doubt_is_inverted_with_care_and_leaves_its_neighbours_
                 b[(i, layout.corner(side).0 + layout.rows[side].first[0] + i)] = sign;
             }
         }
-        // rows and columns are the interface's alone here, so that one B serves both
+        // rows and columns are the interface's only here, so that one B serves both
         assert_eq!(rows, columns);
         let At { d, e, .. } = &joint[l];
         let held = (d * layout.interface(own) + e).try_inverse().expect("regular");
         let y = &apart - &apart * b.transpose() * held * d * &b * &apart;
-        // rounding, for the last degree of freedom is loose where its inverse is in doubt
+        // rounding, because the last degree of freedom is almost free where its inverse is in doubt
         assert!((found.y - &y).norm() < 1e-12 * y.norm(), "line {l}");
     }
 }

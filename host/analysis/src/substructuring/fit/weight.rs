@@ -1,8 +1,10 @@
-//! The residuals' covariance: noise of all three measurements, and what every error of geometry does to all bands at once.
+//! The residuals' covariance: noise of all three measurements, and the effect of every error of
+//! geometry, common to all bands.
 //!
-//! Noise of a band is circular, so its covariance is one Hermitian matrix N; that of Y^A and Y^B reaches the residual through L and
-//! R. The nuisance parameters η (in standard deviations) act through G = ∂r/∂η and are integrated out: Σ = N + G Gᵀ, never formed;
-//! with S = I + Gᵀ N⁻¹ G, rᵀ Σ⁻¹ r = rᵀ N⁻¹ r − (Gᵀ N⁻¹ r)ᵀ S⁻¹ (Gᵀ N⁻¹ r), and η's own estimate is S⁻¹ Gᵀ N⁻¹ r.
+//! Noise of a band is circular, so its covariance is one Hermitian matrix N; that of Y^A and Y^B
+//! reaches the residual through L and R. The nuisance parameters η (in standard deviations) act
+//! through G = ∂r/∂η and are integrated out: Σ = N + G Gᵀ, which is never formed; with S = I + Gᵀ
+//! N⁻¹ G, rᵀ Σ⁻¹ r = rᵀ N⁻¹ r − (Gᵀ N⁻¹ r)ᵀ S⁻¹ (Gᵀ N⁻¹ r), and the estimate of η is S⁻¹ Gᵀ N⁻¹ r.
 
 use super::FitError;
 use super::assembly_aims::{AssemblyAims, Met, OfImpact};
@@ -22,28 +24,28 @@ type C = Complex<f64>;
 
 /// Lines per band at which the noise that passes through L and R is evaluated: it varies slowly.
 const SAMPLED: usize = 4;
-/// Of the noise that the derivatives hold; another than that of the model's bias.
+/// Seed for the noise in the derivatives; different from that of the model's bias.
 const NOISE_SEED: u64 = 0x6669_7422;
-/// Columns of G that are multiplied at once.
+/// Columns of G that are multiplied in one product.
 const TILE: usize = 128;
 
-/// The noise of one band, and the nuisance parameters' effect in units of it.
+/// The noise of one band, and the effect of the nuisance parameters in units of it.
 pub(super) struct BandWeight {
     pub(super) whitening: Whitening,
     pub(super) g: Whitened,
-    /// One draw of the noise of Y^A and Y^B as it shows in a band's mean, in units of the residual's noise: in the residual (first
-    /// column) and in ∂model/∂joint.
+    /// Effect of one draw of the noise of Y^A and Y^B on a band's mean, in units of the residual's
+    /// noise: on the residual (first column) and on ∂model/∂joint.
     ///
-    /// J is evaluated at noisy Y^A and Y^B, so JᵀJ is too large by δJᵀδJ and Jᵀr by δJᵀδr: the estimate and its interval are
-    /// corrected by both.
+    /// J is evaluated at noisy Y^A and Y^B, so JᵀJ is too large by δJᵀδJ and Jᵀr by δJᵀδr: the
+    /// estimate and its interval are corrected for both.
     pub(super) feigned: DMatrix<f64>,
 }
 
-/// G, the nuisance parameters' effect.
+/// G, the effect of the nuisance parameters.
 pub(super) struct Whitened {
-    /// In units of the noise: 2m × those before the assembly's aims.
+    /// In units of the noise: 2m × the number of parameters before the assembly's aims.
     pub(super) written: DMatrix<f64>,
-    /// The assembly's aims as they are.
+    /// The assembly's aims, not whitened.
     pub(super) aims: AssemblyAims,
 }
 
@@ -53,13 +55,13 @@ pub(super) struct Weight {
     pub(super) information: DMatrix<f64>,
 }
 
-/// Where the model is linearised.
+/// The point at which the model is linearised.
 #[derive(Clone, Copy)]
 pub(super) struct Point<'a> {
     pub(super) problem: &'a Problem,
     pub(super) chart: &'a Chart,
     pub(super) p: &'a DVector<f64>,
-    /// A's, B's and the assembly's cells where their geometry is believed to be.
+    /// A's, B's and the assembly's cells at their currently estimated geometry.
     pub(super) cells: &'a [Vec<CellGeometry>; 3],
     pub(super) data: &'a Corrected,
 }
@@ -85,7 +87,7 @@ impl Weight {
     }
 }
 
-/// The lower triangle of Σ gᵀg of the columns that are written out, tile by tile.
+/// The lower triangle of Σ gᵀg for the explicitly stored columns, tile by tile.
 fn put_written(bands: &[BandWeight], information: &mut DMatrix<f64>) {
     let count = bands.first().map_or(0, |band| band.g.written.ncols());
     let tile = |first: usize| first..(first + TILE).min(count);
@@ -100,7 +102,7 @@ fn put_written(bands: &[BandWeight], information: &mut DMatrix<f64>) {
             let mut sum = DMatrix::zeros(rows.len(), columns.len());
             for (band, turned) in bands.iter().zip(&turned) {
                 let right = band.g.written.columns(columns.start, columns.len());
-                // a copy of its own: products of views with few rows read past their end
+                // copied to a separate matrix: products of views with few rows read past their end
                 sum.gemm(1.0, &own_rows(turned, rows.start, rows.len()), &right, 1.0);
             }
             sum
@@ -137,7 +139,7 @@ fn put_aims(problem: &Problem, bands: &[BandWeight], met: &[Met], information: &
 }
 
 impl Point<'_> {
-    /// Of one band; `factors` of A's and B's cells.
+    /// The weight of one band; `factors` are those of A's and B's cells.
     fn weight(
         &self,
         band: usize,
@@ -169,9 +171,10 @@ impl Point<'_> {
         };
         let here = self.evaluated(&lines, false, factors, |side, l| data.parts[side][l].clone())?.effect;
         let (plus, minus) = (moved(1.0)?, moved(-1.0)?);
-        // neighbouring lines share their noise, the draws do not
+        // neighbouring lines share their noise, but the draws are independent
         let half = 0.5 * problem.shared.sqrt();
-        // an error of geometry whose effect is known only to δG leaves δG η behind, and η has variance one
+        // if the effect of an error of geometry is uncertain by δG, δG η remains in the residual,
+        // with η of unit variance
         parts.push(plus.effect.aims.apart(&minus.effect.aims, half).covariance(&problem.pushes));
         let mut noise = problem.own_noise[band].clone();
         noise.add_by_impact(&parts);
@@ -179,7 +182,7 @@ impl Point<'_> {
         let whitening = noise.whitening().ok_or(FitError::NoiseSingular)?;
         let g = Whitened { written: whitening.of(here.written), aims: here.aims };
         let mut feigned = (plus.model - minus.model) * half;
-        // what raises the model lowers the residual
+        // what increases the model decreases the residual
         feigned.column_mut(0).neg_mut();
         let feigned = whitening.of(feigned);
         Ok(BandWeight { whitening, g, feigned })
@@ -194,7 +197,7 @@ impl Whitened {
         whitening.of(aims) + &self.written * DMatrix::from_column_slice(written.len(), 1, written)
     }
 
-    /// Gᵀ N⁻¹ of what these columns are in units of the noise.
+    /// Gᵀ N⁻¹ times the columns, which are given in units of the noise.
     pub(super) fn pulled(
         &self,
         problem: &Problem,

@@ -1,4 +1,4 @@
-//! A⁻¹ by Gauss–Jordan elimination with row pivoting, every line with its own pivots.
+//! A⁻¹ by Gauss–Jordan elimination with row pivoting, with separate pivots for every line.
 
 use super::super::pseudo_inverse::CLEAR;
 use super::matrix::Matrix;
@@ -17,7 +17,7 @@ struct Elimination<'a, S: Simd> {
     simd: S,
     n: usize,
     a: &'a mut [Cell<S>],
-    /// The column at work.
+    /// The current column.
     x: &'a mut [Cell<S>],
     swaps: &'a mut Vec<Swap<S>>,
     sure: &'a mut Sure<S>,
@@ -45,7 +45,8 @@ impl<S: Simd> NullaryFnOnce for Elimination<'_, S> {
             sure.only(all(f64::INFINITY).exceeds(largest));
             let swap = Swap::of(simd, k, row);
             swap.in_column(column);
-            // column k makes room for that of the inverse, which starts as the unit vector; −1 puts row k itself in its place
+            // column k is overwritten by that of the inverse, which starts as the unit vector; −1
+            // lets the update below scale row k too
             x.copy_from_slice(column);
             let minus_inverse = -x[k].inv();
             x[k] = Cell::all(simd, -1.0);
@@ -68,14 +69,15 @@ impl<S: Simd> NullaryFnOnce for Elimination<'_, S> {
     }
 }
 
-/// No processor's vectors hold more.
+/// Upper bound of the lanes of a processor's vectors.
 const MOST_LANES: usize = 8;
 
-/// The exchange of row (or column) k with another one of each line.
+/// The exchange of row (or column) k with another one for each line.
 struct Swap<S: Simd> {
     simd: S,
     k: usize,
-    /// The other one of each line, and all that there are: neighbours mostly have the same.
+    /// The other row of each line, and the distinct ones among them: neighbouring lines mostly have
+    /// the same.
     row: Lanes<S>,
     others: [usize; MOST_LANES],
     count: usize,
@@ -104,7 +106,7 @@ impl<S: Simd> Swap<S> {
         for &other in &self.others[..self.count] {
             let here = self.row.equals(Lanes::all(self.simd, other as f64));
             let (one, two) = (column[self.k], column[other]);
-            // where the other is k itself, both are the same
+            // if the other is k itself, both are the same
             column[self.k] = two.where_or(here, one);
             column[other] = one.where_or(here, two);
         }

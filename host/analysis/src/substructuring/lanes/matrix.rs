@@ -1,4 +1,4 @@
-//! A matrix of each line, by columns.
+//! A matrix for each line, column-major.
 
 use super::number::{Cell, Lanes, Sure};
 use super::pool::Pool;
@@ -7,7 +7,7 @@ use pulp::{NullaryFnOnce, Simd};
 
 type Line = DMatrix<Complex<f64>>;
 
-/// A matrix of as many lines as a vector holds.
+/// A matrix for each of as many lines as a vector holds.
 pub(crate) struct Matrix<'p, S: Simd> {
     pub(super) pool: &'p Pool<S>,
     rows: usize,
@@ -21,25 +21,25 @@ impl<S: Simd> Drop for Matrix<'_, S> {
     }
 }
 
-/// The lines of a vector from `first` on; where they end, the last one again.
+/// The lines of a vector from `first` on; beyond the end, the last one is repeated.
 pub(crate) fn lines<'a, S: Simd, T>(_: &Pool<S>, of: &'a [T], first: usize) -> Vec<&'a T> {
     (first..first + S::F64_LANES).filter_map(|line| of.get(line).or(of.last())).collect()
 }
 
 impl<'p, S: Simd> Matrix<'p, S> {
-    /// A matrix of any values.
+    /// A matrix with arbitrary values.
     pub(crate) fn any(pool: &'p Pool<S>, rows: usize, columns: usize) -> Self {
         Matrix { pool, rows, columns, cells: pool.cells(rows * columns) }
     }
 
-    /// The named rows and columns of a vector's lines.
+    /// The given rows and columns of a vector's lines.
     pub(crate) fn read(pool: &'p Pool<S>, lines: &[&Line], rows: &[usize], columns: &[usize]) -> Self {
         let mut matrix = Matrix::any(pool, rows.len(), columns.len());
         pool.simd.vectorize(Read { into: &mut matrix.cells, lines, rows, columns });
         matrix
     }
 
-    /// Whole matrices of a vector's lines, all of the first one's size.
+    /// Whole matrices of a vector's lines, all of the same size.
     pub(crate) fn whole(pool: &'p Pool<S>, lines: &[&Line]) -> Self {
         let (rows, columns) = lines.first().map_or((0, 0), |line| line.shape());
         assert!(lines.iter().all(|line| line.shape() == (rows, columns)), "matrices of one size");
@@ -76,7 +76,7 @@ impl<'p, S: Simd> Matrix<'p, S> {
         block
     }
 
-    /// Puts a block of as many rows as it has at (`row`, `column`).
+    /// Writes `block` at (`row`, `column`).
     pub(crate) fn put(&mut self, (row, column): (usize, usize), block: &Self) {
         let rows = self.rows.max(1);
         let to = self.cells[column * self.rows..].chunks_exact_mut(rows);
@@ -104,7 +104,7 @@ impl<'p, S: Simd> Matrix<'p, S> {
         turned
     }
 
-    /// The same again.
+    /// A copy.
     pub(crate) fn copy(&self) -> Self {
         self.block((0, 0), (self.rows, self.columns))
     }
@@ -116,7 +116,8 @@ impl<'p, S: Simd> Matrix<'p, S> {
         self
     }
 
-    /// diag(d) Z diag(d) times `factor`, as [`scaled`](super::super::interface_data::scaled) does it.
+    /// diag(d) Z diag(d) times `factor`, computed as in
+    /// [`scaled`](super::super::interface_data::scaled).
     #[must_use]
     pub(crate) fn scaled(mut self, d: &[f64], factor: Cell<S>) -> Self {
         let (simd, rows) = (self.pool.simd, self.rows.max(1));
@@ -124,18 +125,18 @@ impl<'p, S: Simd> Matrix<'p, S> {
         self
     }
 
-    /// Where all cells are numbers.
+    /// The lines at which all cells are finite.
     pub(crate) fn finite(&self) -> Sure<S> {
         let simd = self.pool.simd;
         simd.vectorize(Finite { simd, cells: &self.cells })
     }
 
-    /// Puts one line's matrix, of its size, in its lane.
+    /// Writes one line's matrix, of the same size, to its lane.
     pub(crate) fn put_line(&mut self, lane: usize, line: &Line) {
         self.pool.simd.vectorize(PutLine { cells: &mut self.cells, lane, line: line.as_slice() });
     }
 
-    /// Writes the matrix of one line to one of its size.
+    /// Copies the matrix of one line to `to`, of the same size.
     pub(crate) fn line_to(&self, lane: usize, to: &mut Line) {
         self.pool.simd.vectorize(OneLine { cells: &self.cells, lane, to: to.as_mut_slice() });
     }
@@ -162,7 +163,7 @@ impl<S: Simd> NullaryFnOnce for Read<'_, S> {
     #[inline(always)]
     fn call(self) {
         self.bring_near();
-        // a column of all lines at a time stays in the first cache
+        // a column of all lines at a time stays in the first-level cache
         for (into, &c) in self.into.chunks_exact_mut(self.rows.len().max(1)).zip(self.columns) {
             for (lane, y) in self.lines.iter().enumerate() {
                 let column = &y.as_slice()[c * y.nrows()..][..y.nrows()];
@@ -177,15 +178,15 @@ impl<S: Simd> NullaryFnOnce for Read<'_, S> {
 }
 
 impl<S: Simd> Read<'_, S> {
-    /// Looks at every column once, one line after the other: so the memory delivers many pieces at the same time, which it does not
-    /// where each of them is waited for to be put into its lane.
+    /// Prefetches every column, one line after the other: the memory then delivers many cache lines
+    /// in parallel, which it does not if each is awaited to be written to its lane.
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     fn bring_near(&self) {
         let mut seen = 0.0;
         for y in self.lines {
             for &c in self.columns {
-                // four complex numbers are one piece
+                // four complex numbers fill one cache line
                 for value in y.as_slice()[c * y.nrows()..][..y.nrows()].iter().step_by(4) {
                     seen += value.re;
                 }
@@ -270,7 +271,7 @@ impl<S: Simd> NullaryFnOnce for Finite<'_, S> {
         let none = Lanes::all(self.simd, 0.0);
         let mut sum = none;
         for cell in self.cells {
-            // what is no number stays none
+            // NaN or infinity times 0 is NaN
             sum = sum + (cell.re * none + cell.im * none);
         }
         let mut sure = Sure::all(self.simd);

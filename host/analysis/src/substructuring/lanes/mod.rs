@@ -1,9 +1,11 @@
-//! The small matrices of several lines at once.
+//! The small matrices of several lines simultaneously.
 //!
-//! A vector of the processor holds the same cell of as many lines as it has places, lanes: eight, four, two or one. What is done to one
-//! line is then done to all of them by the same instructions, without a loop too short for vectors. Every number is computed by the
-//! operations of [`pseudo_inverse`](super::pseudo_inverse) and [`product`](super::product) in their order, so that it is theirs to
-//! the last bit. An inverse says at which lines its pivots leave no doubt of the rank; all others are for the careful way.
+//! A processor vector holds the same cell of as many lines as it has lanes: eight, four, two or
+//! one. Each operation is then applied to all these lines by the same instructions, without loops
+//! that are too short for vectors. Every number is computed by the operations of
+//! [`pseudo_inverse`](super::pseudo_inverse) and [`product`](super::product) in the same order, so
+//! that it is identical to the last bit. An inverse reports the lines at which its pivots leave no
+//! doubt of the rank; all others are left to the line-by-line computation.
 
 mod elimination;
 mod matrix;
@@ -22,7 +24,8 @@ use orthogonalisation::orthogonalised;
 use pulp::Simd;
 use std::cmp::Ordering;
 
-/// As [`full_rank_inverse`](super::pseudo_inverse::full_rank_inverse), at those lines that are sure.
+/// As [`full_rank_inverse`](super::pseudo_inverse::full_rank_inverse), at the lines whose rank is
+/// beyond doubt.
 pub(super) fn inverse<'p, S: Simd>(a: Matrix<'p, S>, sure: &mut Sure<S>) -> Matrix<'p, S> {
     match a.rows().cmp(&a.columns()) {
         Ordering::Equal => eliminated(a, sure),

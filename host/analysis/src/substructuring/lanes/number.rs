@@ -1,9 +1,9 @@
-//! One number of several lines, real or complex.
+//! One number for each of several lines, real or complex.
 
 use pulp::{Simd, bytemuck};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
-/// A real number of each line.
+/// A real number for each line.
 #[derive(Clone, Copy)]
 pub(crate) struct Lanes<S: Simd> {
     simd: S,
@@ -40,7 +40,7 @@ impl<S: Simd> Lanes<S> {
         Lanes { of: self.simd.sqrt_f64s(self.of), ..self }
     }
 
-    /// Where this is larger; nowhere where one of both is no number.
+    /// True where this is larger; false where either is NaN.
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     pub(crate) fn exceeds(self, other: Self) -> S::m64s {
@@ -53,14 +53,14 @@ impl<S: Simd> Lanes<S> {
         self.simd.equal_f64s(self.of, other.of)
     }
 
-    /// This where `mask` says so, the other elsewhere.
+    /// This where `mask` is true, the other elsewhere.
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     pub(crate) fn where_or(self, mask: S::m64s, other: Self) -> Self {
         Lanes { of: self.simd.select_f64s(mask, self.of, other.of), ..self }
     }
 
-    /// The smallest and the largest.
+    /// The smallest and the largest value.
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     pub(crate) fn range(self) -> [f64; 2] {
@@ -119,7 +119,7 @@ impl<S: Simd> Neg for Lanes<S> {
     }
 }
 
-/// A complex number of each line: a cell of their matrices.
+/// A complex number for each line: a cell of their matrices.
 #[derive(Clone, Copy)]
 pub(crate) struct Cell<S: Simd> {
     pub(crate) re: Lanes<S>,
@@ -190,7 +190,8 @@ impl<S: Simd> Mul<Lanes<S>> for Cell<S> {
     }
 }
 
-/// At which lines all that was computed so far is beyond doubt.
+/// The lines at which everything computed so far is reliable: finite, and inverted with a clear
+/// rank.
 #[derive(Clone, Copy)]
 pub(crate) struct Sure<S: Simd> {
     of: Lanes<S>,
@@ -203,14 +204,14 @@ impl<S: Simd> Sure<S> {
         Sure { of: Lanes::all(simd, 1.0) }
     }
 
-    /// Only where `mask` says so.
+    /// Restricts it to the lines where `mask` is true.
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     pub(crate) fn only(&mut self, mask: S::m64s) {
         self.of = self.of.where_or(mask, Lanes::all(self.of.simd, 0.0));
     }
 
-    /// Only where the other is, too.
+    /// Restricts it to the lines of the other.
     #[inline]
     pub(crate) fn and(&mut self, other: Self) {
         for (one, other) in self.of.each_mut().iter_mut().zip(other.of.each()) {
@@ -218,7 +219,7 @@ impl<S: Simd> Sure<S> {
         }
     }
 
-    /// At this line.
+    /// Whether this line is included.
     #[inline]
     pub(crate) fn at(&self, lane: usize) -> bool {
         self.of.each()[lane] > 0.0

@@ -1,4 +1,4 @@
-//! A⁺ = R⁻¹Qᴴ of a tall matrix by Gram–Schmidt, done again at those lines where much cancels.
+//! A⁺ = R⁻¹Qᴴ of a tall matrix by Gram–Schmidt, repeated at the lines where much cancels.
 
 use super::super::pseudo_inverse::CLEAR;
 use super::matrix::Matrix;
@@ -38,7 +38,7 @@ impl<S: Simd> NullaryFnOnce for Orthogonalisation<'_, S> {
             let (v, r) = (&mut rest[..m], &mut r[k * n..=k * n + k]);
             r.fill(none);
             let mut square = square_of(simd, v);
-            // all lines at first, then those where much was taken away
+            // first all lines, then those where much was subtracted
             let mut at = all(0.0).equals(all(0.0));
             for _ in 0..2 {
                 for (q, r) in done.chunks_exact(m).zip(r.iter_mut()) {
@@ -54,7 +54,8 @@ impl<S: Simd> NullaryFnOnce for Orthogonalisation<'_, S> {
                 }
                 let (before, after) = (square, square_of(simd, v));
                 square = after.where_or(at, before);
-                // where little was taken away, little of the rounding's direction along the others is left
+                // if little was subtracted, the component along the other columns that rounding
+                // leaves is small
                 let enough = all(1.0).where_or(square.exceeds(all(0.1) * before), all(0.0));
                 if enough.range() == [1.0; 2] {
                     break;
@@ -64,7 +65,7 @@ impl<S: Simd> NullaryFnOnce for Orthogonalisation<'_, S> {
             largest = square.where_or(square.exceeds(largest), largest);
             sure.only(square.exceeds(largest * all(CLEAR * CLEAR)));
             sure.only(all(f64::INFINITY).exceeds(largest));
-            // the diagonal holds 1/Rₖₖ: many products instead of quotients
+            // the diagonal holds 1/Rₖₖ: multiplications instead of divisions
             let inverse = all(1.0).over(square.sqrt());
             r[k] = Cell { re: inverse, im: all(0.0) };
             for v in v {
@@ -74,7 +75,7 @@ impl<S: Simd> NullaryFnOnce for Orthogonalisation<'_, S> {
     }
 }
 
-/// R⁻¹ of each column.
+/// Multiplies each column by R⁻¹.
 struct Substitution<'a, S: Simd> {
     n: usize,
     x: &'a mut [Cell<S>],

@@ -1,10 +1,11 @@
-//! The memory of matrices that come and go.
+//! Reusable memory for temporary matrices.
 
 use super::number::Cell;
 use pulp::{NullaryFnOnce, Simd};
 use std::cell::RefCell;
 
-/// Lends cells to matrices: to ask the system for them every time takes as long as some of the products.
+/// Provides matrices with cells that are reused: allocating them each time takes as long as some of
+/// the products.
 pub(crate) struct Pool<S: Simd> {
     pub(crate) simd: S,
     free: RefCell<Vec<Vec<Cell<S>>>>,
@@ -15,7 +16,7 @@ impl<S: Simd> Pool<S> {
         Pool { simd, free: RefCell::default() }
     }
 
-    /// So many cells, of any value.
+    /// `count` cells with arbitrary values.
     pub(super) fn cells(&self, count: usize) -> Vec<Cell<S>> {
         let mut cells = self.free.borrow_mut().pop().unwrap_or_default();
         if cells.len() < count {
@@ -25,7 +26,7 @@ impl<S: Simd> Pool<S> {
         cells
     }
 
-    /// They are not needed any more.
+    /// Returns cells for reuse.
     pub(super) fn back(&self, cells: Vec<Cell<S>>) {
         self.free.borrow_mut().push(cells);
     }

@@ -1,4 +1,4 @@
-//! Sums and products, as [`product`](super::super::product) has them.
+//! Sums and products, computed as in [`product`](super::super::product).
 
 use super::matrix::Matrix;
 use super::number::{Cell, Lanes};
@@ -14,13 +14,13 @@ pub(crate) fn product<'p, S: Simd>(a: &Matrix<'p, S>, b: &Matrix<'p, S>) -> Matr
     sums(a.pool, [rows, inner, b.columns()], a.cells(), b.cells())
 }
 
-/// Y T with the real T.
+/// Y T with a real T.
 pub(crate) fn times<'p, S: Simd>(y: &Matrix<'p, S>, t: &DMatrix<f64>) -> Matrix<'p, S> {
     assert_eq!(y.columns(), t.nrows(), "Y has as many columns as T has rows");
     sums(y.pool, [y.rows(), y.columns(), t.ncols()], y.cells(), t.as_slice())
 }
 
-/// T Y with the real T.
+/// T Y with a real T.
 pub(crate) fn to_left_of<'p, S: Simd>(t: &DMatrix<f64>, y: &Matrix<'p, S>) -> Matrix<'p, S> {
     assert_eq!(t.ncols(), y.rows(), "T has as many columns as Y has rows");
     sums(y.pool, [t.nrows(), t.ncols(), y.columns()], t.as_slice(), y.cells())
@@ -70,7 +70,7 @@ impl<S: Simd, const PLUS: bool> NullaryFnOnce for Added<'_, S, PLUS> {
     }
 }
 
-/// A factor of a product: a cell, or a real number for all lines.
+/// A factor of a product: a cell, or a real number common to all lines.
 pub(crate) trait Factor<S: Simd>: Copy {
     type In: Copy;
     fn ready(self, simd: S) -> Self::In;
@@ -106,7 +106,7 @@ impl<S: Simd> Mul<Cell<S>> for Lanes<S> {
     }
 }
 
-/// A B, all by columns.
+/// A B, all column-major.
 struct Sums<'a, S: Simd, A, B> {
     simd: S,
     out: &'a mut [Cell<S>],
@@ -116,7 +116,7 @@ struct Sums<'a, S: Simd, A, B> {
     inner: usize,
 }
 
-/// So many rows of a sum stay in the processor's registers.
+/// Number of rows of a sum that are kept in the processor's registers.
 const TILE: usize = 3;
 
 impl<S: Simd, A: Factor<S>, B: Factor<S>> NullaryFnOnce for Sums<'_, S, A, B>
@@ -144,7 +144,7 @@ where
     }
 }
 
-/// R rows of a column, three terms at a time: the order of [`product`](super::super::product).
+/// R rows of a column, three terms at a time, in the order of [`product`](super::super::product).
 #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
 #[inline(always)]
 fn add<S: Simd, A: Factor<S>, B: Factor<S>, const R: usize>(

@@ -1,4 +1,4 @@
-//! The lines of a vector against one line after the other.
+//! Vectors of lines compared with one line at a time.
 
 use super::super::product::product as product_of_one;
 use super::super::pseudo_inverse::full_rank_inverse;
@@ -10,7 +10,7 @@ use pulp::{Scalar, WithSimd};
 
 type Line = DMatrix<Complex<f64>>;
 
-/// The inverses of all these matrices; none where they are not sure.
+/// The inverses of all these matrices; none where the rank is not beyond doubt.
 struct Inverses<'a>(&'a [Line]);
 
 impl WithSimd for Inverses<'_> {
@@ -31,7 +31,8 @@ impl WithSimd for Inverses<'_> {
     }
 }
 
-/// Products of these with their adjoints, and with the real parts of those to the right and to the left.
+/// Products of these with their adjoints, and of the adjoints with a real matrix on the right and
+/// on the left.
 struct Products<'a>(&'a [Line]);
 
 impl WithSimd for Products<'_> {
@@ -55,10 +56,11 @@ impl WithSimd for Products<'_> {
 
 const SHAPES: [(usize, usize); 9] =
     [(1, 1), (2, 2), (6, 6), (7, 7), (12, 12), (5, 2), (12, 6), (6, 15), (3, 7)];
-/// More than a vector of eight, and the last one not full.
+/// More than a vector of eight, with the last vector not full.
 const LINES: usize = 11;
 
-/// Matrices that may be equal but for their size, whose pivots are then in the same rows, or not.
+/// Matrices of different lines: if `alike`, equal except for a factor, so that their pivots are in
+/// the same rows.
 fn matrices((rows, columns): (usize, usize), alike: bool, v: &[f64]) -> Vec<Line> {
     let one = |line: usize| {
         let at = if alike { 0 } else { line };
@@ -73,7 +75,7 @@ fn matrices((rows, columns): (usize, usize), alike: bool, v: &[f64]) -> Vec<Line
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, rng_seed: proptest::test_runner::RngSeed::Fixed(11), ..ProptestConfig::default() })]
 
-    /// To the last bit, whatever the vectors and whoever the neighbours.
+    /// Identical to the last bit, for any vector width and any neighbouring lines.
     #[test]
     fn inverses_are_those_of_each_line_by_itself(v in prop::collection::vec(-1.0..1.0f64, 1301), alike: bool) {
         for shape in SHAPES {
@@ -106,7 +108,8 @@ proptest! {
     }
 }
 
-/// One line near rank loss, one with a value that is no number, one of zeros: they are not sure, and their neighbours are as ever.
+/// One line near rank loss, one with a NaN, one with an infinity, one of zeros: they are reported
+/// as doubtful, and their neighbours are unchanged.
 #[test]
 fn a_line_in_doubt_does_not_touch_its_neighbours() {
     for shape in SHAPES {
@@ -119,7 +122,7 @@ fn a_line_in_doubt_does_not_touch_its_neighbours() {
         all[6].fill(Complex::default());
         if shape.0.min(shape.1) > 1 {
             let (rows, columns) = shape;
-            // the last row or column of the smaller side is nearly the first one
+            // the last row or column of the smaller side is nearly equal to the first one
             for i in 0..rows.max(columns) {
                 let (from, to) =
                     if rows < columns { ((0, i), (rows - 1, i)) } else { ((i, 0), (i, columns - 1)) };

@@ -1,4 +1,4 @@
-//! What moves Z_dd, as sums of dyads over the cells of measured blocks.
+//! The derivatives of Z_dd, as sums of dyads over the cells of measured blocks.
 
 use crate::substructuring::product::product;
 use crate::substructuring::rooms::{Balanced, Side};
@@ -9,10 +9,10 @@ use pulp::NullaryFnOnce;
 type C = Complex<f64>;
 type Line = DMatrix<C>;
 
-/// A, B, AJB: places of their files.
+/// Index of AJB's file; A and B are 0 and 1.
 pub(super) const ASSEMBLED: usize = 2;
 
-/// A measured block with what carries it to a reduced one: T_l Y\[rows, columns\] T_r.
+/// A measured block with the transformations to a reduced one: T_l Y\[rows, columns\] T_r.
 pub(super) struct Source<'a> {
     pub(super) file: usize,
     pub(super) rows: &'a [usize],
@@ -21,10 +21,11 @@ pub(super) struct Source<'a> {
     pub(super) t_r: Option<&'a DMatrix<f64>>,
 }
 
-/// leftᵈ of the rows times rightᵈ of the columns is what a cell does to Z_dd.
+/// Derivative of Z_dd by a cell: row d of `left` at the cell's row times row d of `right` at its
+/// column.
 struct Dyad<'a> {
     source: &'a Source<'a>,
-    /// Whether it belongs to h* instead of g.
+    /// Whether it contributes to h* instead of g.
     conjugate: bool,
     /// Degree of freedom × row.
     left: Line,
@@ -32,26 +33,26 @@ struct Dyad<'a> {
     right: Line,
 }
 
-/// All that moves one line.
+/// All dyads of one line.
 #[derive(Default)]
 pub(super) struct Dyads<'a>(Vec<Dyad<'a>>);
 
 impl<'a> Dyads<'a> {
-    /// L δA R.
+    /// Adds L δA R.
     pub(super) fn linear(&mut self, source: &'a Source<'a>, l: &Line, r: &Line) {
         let left = source.t_l.map_or_else(|| l.clone(), |t| product(l, t));
         let right = source.t_r.map_or_else(|| r.clone(), |t| product(t, r));
         self.0.push(Dyad { source, conjugate: false, left, right: right.transpose() });
     }
 
-    /// X δAᴴ W.
+    /// Adds X δAᴴ W.
     fn adjoint(&mut self, source: &'a Source<'a>, x: &Line, w: &Line) {
         let rows = source.t_l.map_or_else(|| w.clone(), |t| product(&t.transpose(), w));
         let columns = source.t_r.map_or_else(|| x.clone(), |t| product(x, &t.transpose()));
         self.0.push(Dyad { source, conjugate: true, left: rows.adjoint(), right: columns.conjugate() });
     }
 
-    /// L δ(A⁺) R.
+    /// Adds L δ(A⁺) R.
     pub(super) fn inverse(&mut self, source: &'a Source<'a>, l: &Line, [a, plus]: [&Line; 2], r: &Line) {
         let (rows, columns) = a.shape();
         self.linear(source, &(-product(l, plus)), &product(plus, r));
@@ -65,26 +66,27 @@ impl<'a> Dyads<'a> {
         }
     }
 
-    /// Variances of K and of ωC of every degree of freedom, where Z is its factor times what the dyads move, from those of the files'
-    /// cells at this line.
+    /// Variances of K and of ωC of every degree of freedom, where Z is its factor times the sum of
+    /// the dyads, from the variances of the files' cells at this line.
     pub(super) fn variances(&self, factors: &[C], variance: [&DMatrix<f64>; 3], tau: f64) -> Vec<[f64; 2]> {
         let dofs = factors.len();
-        // of K, and of ωC
+        // factors of K, and of ωC
         let factors: Vec<[C; 2]> =
             factors.iter().map(|factor| [factor * C::new(1.0, tau), *factor]).collect();
         let mut sums = vec![[0.0; 2]; dofs];
         for (file, variance) in variance.into_iter().enumerate() {
-            // the matrix column by column, so that only one is at hand; what moves a column stays in the dyads' order
+            // column by column, so that only one column is held at a time; within a column the
+            // order of the dyads is kept
             let mut places: Vec<(usize, &Dyad<'_>, usize)> = Vec::new();
             for dyad in self.0.iter().filter(|dyad| dyad.source.file == file) {
                 places.extend(dyad.source.columns.iter().enumerate().map(|(j, column)| (*column, dyad, j)));
             }
             places.sort_by_key(|(column, ..)| *column);
             let mut by_dof = vec![0.0; dofs];
-            // g and h* of every row, all degrees of freedom side by side
+            // g and h* of every row, with all degrees of freedom contiguous
             let mut moved = [false, true].map(|_| vec![C::default(); dofs * variance.nrows()]);
             for column in places.chunk_by(|a, b| a.0 == b.0) {
-                // most dyads are none of h*
+                // most dyads do not contribute to h*
                 let mixed = column.iter().any(|(_, dyad, _)| dyad.conjugate);
                 for to in &mut moved[..=usize::from(mixed)] {
                     to.fill(C::default());
@@ -113,11 +115,11 @@ impl<'a> Dyads<'a> {
     }
 }
 
-/// Adds left times right of every row and degree of freedom.
+/// Adds left times right for every row and degree of freedom.
 struct Add<'a> {
-    /// Of all rows, the degrees of freedom of each side by side.
+    /// Sums of all rows, with the degrees of freedom of each contiguous.
     to: &'a mut [C],
-    /// Those that are moved, and their left sides.
+    /// Indices of the rows, and their left factors.
     rows: (&'a [usize], &'a [C]),
     right: &'a [C],
 }
@@ -139,7 +141,8 @@ impl NullaryFnOnce for Add<'_> {
     }
 }
 
-/// Adds the variance of what a column of cells does by g alone to the sums of the degrees of freedom, which stand side by side.
+/// Adds the variance from a column of cells by g alone to the sums of the degrees of freedom, which
+/// are contiguous.
 struct Squares<'a> {
     g: &'a [C],
     variance: &'a [f64],
@@ -154,19 +157,19 @@ impl NullaryFnOnce for Squares<'_> {
     fn call(self) {
         for (g, v) in self.g.chunks_exact(self.sums.len()).zip(self.variance) {
             for (sum, g) in self.sums.iter_mut().zip(g) {
-                // a cell that does not count may be unknown
+                // the variance of a cell without influence may be unknown
                 *sum += if *g == C::default() { 0.0 } else { g.norm_sqr() * v };
             }
         }
     }
 }
 
-/// The same of K and of ωC, by g and h* together.
+/// The same for K and for ωC, from g and h* together.
 struct Mixed<'a> {
     g: &'a [C],
     h: &'a [C],
     variance: &'a [f64],
-    /// Of K and of ωC.
+    /// Factors of K and of ωC.
     factors: &'a [[C; 2]],
     sums: &'a mut [[f64; 2]],
 }
@@ -191,7 +194,7 @@ impl NullaryFnOnce for Mixed<'_> {
     }
 }
 
-/// Both virtual points of the assembly as one.
+/// Both virtual points of the assembly combined.
 pub(super) struct Both {
     rows: Vec<usize>,
     columns: Vec<usize>,

@@ -1,10 +1,12 @@
-//! What the FRFs' noise does to every line of a method: linear propagation through virtual points and method.
+//! Effect of the FRFs' noise on every line of a method: linear propagation through virtual points
+//! and method.
 //!
-//! Each method is made of sums, products and inverses of the measured blocks, so a small δY moves Z_dd by Σ g δY + Σ h δY* over the
-//! cells. Both g and h are sums of dyads: δ(A⁻¹) = −A⁻¹ δA A⁻¹ takes a row and a column of A⁻¹, T_u and T_f carry
-//! them on to the cells. h is there where P or Q is inverted by least squares and the data do not fit (Golub and Pereyra's
-//! derivative of A⁺). Noise is independent between cells, and real and imaginary part have the variance v each:
-//! then var K = Σ |(1 + iτ) g + (1 − iτ) h*|² v with τ = σ/ω, and ω² var C = Σ |g − h*|² v.
+//! Each method consists of sums, products and inverses of the measured blocks, so a small δY
+//! changes Z_dd by Σ g δY + Σ h δY* over the cells. Both g and h are sums of dyads: δ(A⁻¹) = −A⁻¹
+//! δA A⁻¹ takes a row and a column of A⁻¹, which T_u and T_f transform to the cells. h is not zero
+//! if P or Q is inverted by least squares and the data do not fit (Golub and Pereyra's derivative
+//! of A⁺). Noise is independent between cells, and real and imaginary part have the variance v
+//! each: then var K = Σ |(1 + iτ) g + (1 − iτ) h*|² v with τ = σ/ω, and ω² var C = Σ |g − h*|² v.
 
 mod dyads;
 mod over_band;
@@ -27,18 +29,19 @@ use std::collections::BTreeMap;
 
 type Line = DMatrix<Complex<f64>>;
 
-/// Standard deviations of one line's stiffness and damping from the FRFs' noise alone, \[line\]; NaN where the variance of a cell
-/// that counts is not known.
+/// Standard deviations of one line's stiffness and damping due to the FRFs' noise alone, \[line\];
+/// NaN if the variance of a cell with influence is not known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LineNoise {
-    /// Of K, N/m (N m/rad for rotations).
+    /// Standard deviation of K, N/m (N m/rad for rotations).
     pub stiffness_n_per_m: BTreeMap<Dof, Vec<f64>>,
-    /// Of C, N s/m (N m s/rad for rotations).
+    /// Standard deviation of C, N s/m (N m s/rad for rotations).
     pub damping_n_s_per_m: BTreeMap<Dof, Vec<f64>>,
 }
 
 impl Reduced {
-    /// The noise of every line by `method`; `noises`, the variances, are of A, B and AJB and have the files' lines.
+    /// The noise of every line by `method`; `noises` are the variances of A, B and AJB at the
+    /// files' lines.
     pub(super) fn line_noise(
         &self,
         rooms: &Rooms<'_>,
@@ -107,7 +110,7 @@ impl Reduced {
         Ok(LineNoise { stiffness_n_per_m: column(0), damping_n_s_per_m: column(1) })
     }
 
-    /// One virtual point's rows and another's columns of both points' impedance.
+    /// The rows of one virtual point and the columns of another in the impedance of both points.
     fn cross(&self, z: &Line, row: usize, column: usize) -> (Line, Line) {
         let n = self.idms.count();
         (z.rows(row, n).clone_owned(), z.columns(column, n).clone_owned())
@@ -169,7 +172,8 @@ impl Reduced {
         Ok(dyads)
     }
 
-    /// Standard deviations of K and C by degree of freedom, the rotations' scale and the files' quantity taken out.
+    /// Standard deviations of K and C by degree of freedom, in the original units of rotations and
+    /// after removing the files' quantity.
     fn deviations(
         &self,
         rooms: &Rooms<'_>,
@@ -191,12 +195,12 @@ fn refused<'a>(rooms: &'a Rooms<'_>, l: usize) -> impl Fn(DecouplingError) -> Re
     move |source| Reduced::refused(rooms, l, source)
 }
 
-/// The blocks that P, Q and M are made of.
+/// The blocks that P, Q and M consist of.
 struct Sources<'a> {
     p: Source<'a>,
     q: Source<'a>,
     m: Vec<Source<'a>>,
-    /// Of M's blocks.
+    /// Signs of M's blocks.
     signs: [f64; 2],
 }
 

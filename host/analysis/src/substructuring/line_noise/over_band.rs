@@ -7,8 +7,8 @@ use crate::substructuring::joint_over_bands::median;
 use std::collections::BTreeMap;
 
 impl LineNoise {
-    /// Median of the translations' stiffness noise over the lines of a band, N/m; `frequency_hz` are the lines, Hz. Directions without
-    /// a known value are left out.
+    /// Median of the translations' stiffness noise over the lines of a band, N/m; `frequency_hz`
+    /// are the lines, Hz. Directions without a known value are left out.
     pub fn stiffness_over(&self, frequency_hz: &[f64], band: Band) -> BTreeMap<Dof, f64> {
         let translations = self.stiffness_n_per_m.iter().filter(|(dof, _)| dof.is_translation());
         translations
