@@ -3,7 +3,7 @@
 //! Seconds here are seconds of processor time, all threads together, so that the figure is that of one core.
 
 #[allow(missing_docs, reason = "test support")]
-#[path = "../../hil-sim/tests/support/mod.rs"]
+#[path = "../../hil-sim/tests/it/support/mod.rs"]
 mod support;
 
 use super::row::{Row, in_turns};

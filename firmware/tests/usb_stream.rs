@@ -2,10 +2,10 @@
 //! a bus that is reset, cost. Time stands still in here; what needs it to pass is tested in hil-sim.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
-#[path = "usb/bus.rs"]
+#[path = "it/usb/bus.rs"]
 #[allow(dead_code, reason = "shared with the device's own tests, which use all of it")]
 mod bus;
-#[path = "usb/host.rs"]
+#[path = "it/usb/host.rs"]
 #[allow(dead_code, reason = "shared with the device's own tests, which use all of it")]
 mod host;
 

@@ -160,7 +160,7 @@ impl Ring {
             w.set_master(Master::MASTER);
             w.set_cpol(Cpol::IDLE_HIGH);
             // The converter puts a bit out on a rising edge, and the next falling one comes before it is valid: it is taken with the
-            // rising edge after that, which puts the next one out (timing in firmware/tests/front_end/timing.rs).
+            // rising edge after that, which puts the next one out (timing in firmware/tests/it/front_end/timing.rs).
             w.set_cpha(Cpha::SECOND_EDGE);
             // the pins stay driven while the port is off (RM0456, SPI_CFG2, AFCNTR)
             w.set_afcntr(true);

@@ -1,0 +1,25 @@
+//! Integration tests of the simulator, one program so that it is linked once.
+
+mod board;
+mod clamp_b;
+mod config;
+mod contact;
+mod desk;
+mod fixed;
+mod flaws;
+mod frf;
+mod hammer;
+mod impact_record;
+mod own_structure;
+mod qemu;
+mod records;
+mod reference;
+mod rigs_page;
+mod sensors;
+mod serve;
+mod shaker;
+mod stepping;
+mod supplies;
+mod support;
+mod sync;
+mod wakes;

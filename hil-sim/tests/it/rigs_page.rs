@@ -1,0 +1,66 @@
+//! docs/rigs.md has every field of a rig, and none that there is not.
+#![allow(clippy::unwrap_used)]
+
+use std::collections::BTreeSet;
+use toml::Value;
+
+const PAGE: &str = include_str!("../../../docs/rigs.md");
+const DEFAULT: &str = include_str!("../../rigs/default.toml");
+/// With a structure of its own.
+const OWN: &str = include_str!("../../rigs/clamped-tips.toml");
+/// With a hammer by hand, and vibrometers that stay.
+const BY_HAND: &str = include_str!("../../rigs/by-hand.toml");
+
+/// Every field, with dots between its tables; lists of tables are one.
+fn fields(path: &str, value: &Value, found: &mut BTreeSet<String>) {
+    match value {
+        Value::Table(table) if !table.is_empty() => {
+            for (name, inner) in table {
+                let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+                fields(&path, inner, found);
+            }
+        }
+        Value::Array(all) if all.first().is_some_and(Value::is_table) => {
+            for inner in all {
+                fields(path, inner, found);
+            }
+        }
+        _ => {
+            found.insert(path.into());
+        }
+    }
+}
+
+/// What the first column of the page's tables names.
+fn patterns() -> Vec<String> {
+    let rows = PAGE.lines().filter(|line| line.starts_with("| `"));
+    let first = rows.map(|line| line.split('|').nth(1).unwrap());
+    first.flat_map(|cell| cell.split('`').skip(1).step_by(2).map(String::from)).collect()
+}
+
+fn is_meant(pattern: &str, path: &str) -> bool {
+    match pattern.split_once('*') {
+        Some((head, tail)) => {
+            path.len() >= head.len() + tail.len() && path.starts_with(head) && path.ends_with(tail)
+        }
+        None => pattern == path,
+    }
+}
+
+#[test]
+fn the_page_and_the_rig_have_the_same_fields() {
+    let mut known = BTreeSet::new();
+    fields("", &toml::from_str(DEFAULT).unwrap(), &mut known);
+    assert!(known.len() > 100, "{}", known.len());
+    fields("", &toml::from_str(OWN).unwrap(), &mut known);
+    fields("", &toml::from_str(BY_HAND).unwrap(), &mut known);
+    // what that example does without: every spring in all configurations, and no load cell
+    known.extend(["structure.springs.in", "structure.load_cells_on"].map(String::from));
+    let patterns = patterns();
+    for path in &known {
+        assert!(patterns.iter().any(|pattern| is_meant(pattern, path)), "`{path}` is not on the page");
+    }
+    for pattern in &patterns {
+        assert!(known.iter().any(|path| is_meant(pattern, path)), "`{pattern}` is no field of a rig");
+    }
+}

@@ -1,0 +1,27 @@
+//! Integration tests of the library and the command, one program so that it is linked once.
+
+mod accuracy;
+mod averaged;
+mod between_arms;
+mod cmif;
+mod decoupling_reference;
+mod doors;
+mod explained;
+mod fit;
+mod hammer_slip;
+mod hysteresis;
+mod hysteresis_reference;
+mod identify;
+mod identities;
+mod imported;
+mod line_noise;
+mod malformed;
+mod records;
+mod rewrites;
+mod scripted_device;
+mod shaker;
+mod simulated;
+mod spectra_reference;
+mod verdict;
+mod verdict_reference;
+mod words;

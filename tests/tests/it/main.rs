@@ -1,0 +1,37 @@
+//! Integration tests of whole systems across the packages, one program so that it is linked once.
+
+mod another_structure;
+mod any_structure;
+mod between_arms_accuracy;
+mod calibration;
+mod compare;
+mod contact_accuracy;
+mod damage;
+mod demo;
+mod export_everything;
+mod faults;
+mod import_folder;
+mod killed;
+mod level_accuracy;
+mod live_load;
+mod live_measuring;
+mod live_page;
+mod live_spectra;
+mod load_cells;
+mod mishaps;
+mod own_rig;
+mod plan_command;
+mod python;
+mod quiet;
+mod rebounds;
+mod recheck;
+mod report_gaps;
+mod report_page;
+mod rows_of_cells;
+mod same_records;
+mod shaker;
+mod simulated_truth;
+mod sync;
+mod troubleshooting;
+mod tutorial;
+mod wrong_files;

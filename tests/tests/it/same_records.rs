@@ -1,0 +1,62 @@
+//! The same seed gives the same records, whatever carries them and whatever the link loses.
+#![allow(clippy::unwrap_used)]
+
+use jointrig::device::address::Address;
+use jointrig::device::transport::Transport;
+use jointrig_tests::campaign::{Kept, plan, run};
+use jointrig_tests::command::Served;
+
+#[path = "../../../host/tests/it/scripted_device/faulty.rs"]
+mod faulty;
+use faulty::{Faults, Faulty};
+
+/// Four cells of all three configurations, two good hits each; A must wait until it is quiet.
+fn few_cells() -> String {
+    plan(2, &[("A", &["AZ3"], &["A3"]), ("B", &["BY1"], &["B4"]), ("AJB", &["AZ3"], &["A3", "B3"])])
+}
+
+fn open(address: &str, seed: u64) -> Box<dyn Transport> {
+    address.parse::<Address>().unwrap().open(seed).unwrap()
+}
+
+fn over(transport: Box<dyn Transport>) -> Vec<Kept> {
+    let folder = tempfile::tempdir().unwrap();
+    let (summary, records) = run(&folder.path().join("c.jrig"), &few_cells(), transport);
+    assert_eq!((summary.kept, summary.given_up), (8, 0));
+    assert_eq!(summary.accounts.unexplained(), 0, "{:?}", summary.accounts);
+    records
+}
+
+#[test]
+fn the_same_seed_gives_the_same_records_and_another_does_not() {
+    let first = over(open("sim:", 7));
+    assert_eq!(first, over(open("sim:", 7)));
+    assert_ne!(first, over(open("sim:", 8)));
+}
+
+#[test]
+fn a_link_that_drops_and_damages_one_frame_in_a_hundred_changes_nothing() {
+    let faults = Faults { drop: 0.005, corrupt: 0.005, ..Faults::default() };
+    let spoilt = Faulty::new(open("sim:", 7), faults, 99);
+    let folder = tempfile::tempdir().unwrap();
+    let (summary, records) = run(&folder.path().join("c.jrig"), &few_cells(), Box::new(spoilt));
+    let accounts = summary.accounts;
+    assert_eq!(accounts.unexplained(), 0, "{accounts:?}");
+    assert!(accounts.recovered > 0, "the link must have lost something: {accounts:?}");
+    assert_eq!(accounts.lost, 0, "{accounts:?}");
+    assert_eq!(records, over(open("sim:", 7)));
+}
+
+#[test]
+#[cfg(unix)]
+fn a_pseudo_terminal_carries_the_same_records() {
+    let served = Served::start(&["--pty", "--seed", "7"]);
+    assert!(served.address.starts_with("serial:/dev/"), "{}", served.address);
+    assert_eq!(over(open(&served.address, 0)), over(open("sim:", 7)));
+}
+
+#[test]
+fn a_socket_carries_the_same_records() {
+    let served = Served::start(&["--tcp", "127.0.0.1:0", "--seed", "7"]);
+    assert_eq!(over(open(&served.address, 0)), over(open("sim:", 7)));
+}

@@ -1,0 +1,108 @@
+//! Pages with commands, one by one, as somebody would type them.
+#![allow(clippy::unwrap_used)]
+
+use jointrig_tests::command::jointrig;
+use std::path::Path;
+
+const TUTORIAL: &str = include_str!("../../../docs/tutorial.md");
+const ANOTHER_TOOL: &str = include_str!("../../../examples/another-tool/README.md");
+const FROM_PYFBS: &str = include_str!("../../../docs/coming-from-pyfbs.md");
+
+/// A fenced block: its kind and its lines.
+fn blocks(page: &str) -> Vec<(String, Vec<String>)> {
+    let mut blocks = Vec::new();
+    let mut open: Option<(String, Vec<String>)> = None;
+    for line in page.lines() {
+        match (line.strip_prefix("```"), &mut open) {
+            (Some(kind), None) => open = Some((kind.into(), Vec::new())),
+            (Some(_), Some(_)) => blocks.extend(open.take()),
+            (None, Some((_, lines))) => lines.push(line.into()),
+            (None, None) => {}
+        }
+    }
+    assert!(open.is_none(), "a block is not closed");
+    blocks
+}
+
+/// Whether a line is what the page says; `…` stands for anything.
+fn is_like(line: &str, pattern: &str) -> bool {
+    let mut rest = line;
+    let mut parts = pattern.split('…').enumerate().peekable();
+    while let Some((number, part)) = parts.next() {
+        let Some(at) = rest.find(part) else { return false };
+        if number == 0 && at > 0 || parts.peek().is_none() && !part.is_empty() && !rest.ends_with(part) {
+            return false;
+        }
+        rest = &rest[at + part.len()..];
+    }
+    true
+}
+
+/// Runs a page's commands in a folder, and holds what they print to what the page shows; how many there were.
+fn run(page: &str, folder: &Path) -> usize {
+    let (mut said, mut commands) = (String::new(), 0);
+    for (kind, lines) in blocks(page) {
+        match kind.as_str() {
+            "sh" => {
+                for line in lines {
+                    let mut words = shlex::split(&line).unwrap().into_iter();
+                    assert_eq!(words.next().as_deref(), Some("jointrig"), "{line}");
+                    let out = jointrig().args(words).current_dir(folder).output().unwrap();
+                    let errors = String::from_utf8_lossy(&out.stderr);
+                    assert!(out.status.success(), "{line}: {errors}");
+                    said = format!("{errors}{}", String::from_utf8(out.stdout).unwrap());
+                    commands += 1;
+                }
+            }
+            "text" => {
+                let mut from = 0;
+                let all: Vec<&str> = said.lines().collect();
+                for pattern in lines {
+                    let place = all[from..].iter().position(|line| is_like(line, &pattern));
+                    let Some(place) = place else { panic!("`{pattern}` is not in:\n{said}") };
+                    from += place + 1;
+                }
+            }
+            other => panic!("a block of kind `{other}`"),
+        }
+    }
+    commands
+}
+
+#[test]
+fn every_command_of_the_tutorial_does_what_the_page_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let commands = run(TUTORIAL, folder.path());
+    assert!(commands >= 12, "{commands} commands");
+}
+
+#[test]
+fn files_of_another_tool_give_their_joint() {
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/another-tool");
+    let folder = tempfile::tempdir().unwrap();
+    for of in ["", "frfs", "positions"] {
+        std::fs::create_dir_all(folder.path().join(of)).unwrap();
+        for entry in std::fs::read_dir(example.join(of)).unwrap().flatten() {
+            if entry.file_type().unwrap().is_file() {
+                std::fs::copy(entry.path(), folder.path().join(of).join(entry.file_name())).unwrap();
+            }
+        }
+    }
+    assert_eq!(run(ANOTHER_TOOL, folder.path()), 6);
+}
+
+#[test]
+fn the_code_for_newcomers_from_pyfbs_stands_in_an_example_that_runs() {
+    let example = include_str!("../../../host/examples/frf_of_records.rs");
+    let (_, after) = FROM_PYFBS.split_once("host/examples/frf_of_records.rs)):\n").unwrap();
+    let code: Vec<&str> = after.lines().skip(1).take_while(|line| line.starts_with("    ")).collect();
+    assert!(code.len() >= 4, "{code:?}");
+    for line in code {
+        assert!(example.lines().any(|own| own == line), "`{line}` is not in the example");
+    }
+}
+
+#[test]
+fn anything_may_stand_for_an_ellipsis_and_nothing_else() {
+    assert!(is_like("a 12 b", "a … b") && !is_like("a 12 c", "a … b") && !is_like("x a 1 b", "a … b"));
+}
