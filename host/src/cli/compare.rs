@@ -1,4 +1,4 @@
-//! `compare`: two campaigns against each other.
+//! `compare`: compares two campaigns.
 
 use std::path::PathBuf;
 
