@@ -73,8 +73,8 @@ pub struct Info {
     /// Device address, e.g. sim:, usb:, serial:/dev/ttyACM0, tcp:127.0.0.1:4000.
     #[arg(long, value_name = "ADDR")]
     device: String,
-    /// Folder with the tables that decode the controller's log lines [default:
-    /// JOINTRIG_LOG_TABLES].
+    /// Folder with the tables that decode the controller's log lines [default: that of the
+    /// environment variable JOINTRIG_LOG_TABLES].
     #[arg(long, value_name = "DIR")]
     log_tables: Option<PathBuf>,
     /// Print one JSON document on stdout.

@@ -20,7 +20,7 @@ use crate::device::logs::Tables;
 use crate::device::session::Session;
 use crate::outside::tell_line;
 
-/// Interval between updates on the state of the link.
+/// Interval between updates of the link's accounting.
 const LINK: Duration = Duration::from_secs(1);
 
 /// Show a campaign in the browser: while another process measures it, or afterwards. With FILE and

@@ -80,8 +80,8 @@ pub struct Shaker {
     /// Seed of a simulated rig.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Folder with the tables that decode the controller's log lines [default:
-    /// JOINTRIG_LOG_TABLES].
+    /// Folder with the tables that decode the controller's log lines [default: that of the
+    /// environment variable JOINTRIG_LOG_TABLES].
     #[arg(long, value_name = "DIR")]
     log_tables: Option<PathBuf>,
     #[command(flatten)]

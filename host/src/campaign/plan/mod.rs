@@ -173,7 +173,7 @@ pub struct TriggerPlan {
     pub flight_s: f64,
     /// How long the force is monitored for rebounds, s.
     pub listen_s: f64,
-    /// How long no shot is fired afterwards, s.
+    /// How long the hammer rests after a shot, s.
     pub hold_off_s: f64,
 }
 

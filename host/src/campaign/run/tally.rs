@@ -158,7 +158,7 @@ impl Tally {
         self.struck().filter(|count| count.given_up).count() as u64
     }
 
-    /// Whether every cell has the hits that it wants, or enough.
+    /// Whether every cell has all wanted hits, or enough of them.
     pub fn complete(&self) -> bool {
         self.cells.values().all(Count::done)
     }

@@ -27,8 +27,8 @@ table! {
 }
 
 impl Store {
-    /// Overrules a record's verdict; the original one is kept in the file. A settled cell that
-    /// thereby has fewer good hits than it was settled with is reopened.
+    /// Overrules a record's verdict; the original one is kept in the file. A settled cell that is
+    /// left with fewer good hits than it was settled with is reopened.
     pub fn overrule(&self, record: i64, verdict: Kind, reason: &str) -> Result<(), StoreError> {
         self.change("overruling a verdict", |connection| write_overrule(connection, record, verdict, reason))
     }

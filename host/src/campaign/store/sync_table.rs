@@ -38,8 +38,8 @@ table! {
             session: i64 = "session INTEGER NOT NULL REFERENCES sessions(id)",
             /// `input`, or the reason for an output edge: `fired`, `trigger`, `asked`.
             line: String = "line TEXT NOT NULL",
-            /// Its number since the device started; a jump is the number of edges that came too
-            /// fast to be reported.
+            /// Its number since the device started; a gap in the numbers is the number of edges
+            /// that came too fast to be reported.
             number: u32 = "number INTEGER NOT NULL",
             /// The last scan at or before the edge, in the device's count.
             scan: u64 = "scan INTEGER NOT NULL",

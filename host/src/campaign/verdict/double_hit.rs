@@ -18,8 +18,8 @@ pub(super) struct Second {
     pub(super) limit: f64,
 }
 
-/// A valley below this fraction of a hump's height makes two pulses of it, even if the force does
-/// not fall to zero between them.
+/// A valley below this fraction of a hump's height separates it from the main pulse, even if the
+/// force does not fall to zero in it.
 const VALLEY: f64 = 0.7;
 
 /// Block length for the median baseline: no pulse fills half a block, and slow drift of the

@@ -84,8 +84,8 @@ pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<B
     worst
 }
 
-/// The largest of the differences next to the one at `i`, on the side where that is smaller: a jump
-/// is quiet before or after it. 0 if neither side is complete.
+/// The largest of the differences next to the one at `i`, on the side where that is smaller: before
+/// or after a jump the signal is quiet. 0 if neither side is complete.
 fn next_to(differences: &[f64], i: usize) -> f64 {
     let before = &differences[i.saturating_sub(OWN + NEXT)..i.saturating_sub(OWN)];
     let from = (i + OWN + 1).min(differences.len());
