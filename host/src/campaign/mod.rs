@@ -1,18 +1,20 @@
-//! Campaigns: the plan, the file that keeps every record, why a record is kept or refused, and the runner that fills the file.
+//! Campaigns: the plan, the campaign file that stores every record, the verdicts that accept or
+//! refuse a record, and the runner that fills the file.
 //!
 //! | to add or change | where |
 //! |---|---|
 //! | a field of the plan | [`plan`], its rule in `plan/check.rs` |
-//! | a column, a table | [`store`]: beside the row's type in its `*_table.rs` or `record_row.rs` |
+//! | a column, a table | [`store`]: next to the row's type in its `*_table.rs` or `record_row.rs` |
 //! | a verdict, the double-hit threshold | [`verdict`] |
 //! | what happens between two hits | [`run`]: `cell.rs` |
 //! | a level of the shaker | [`run::shaking`] |
-//! | what whoever watches is told | [`watch`] |
-//! | what `verify --deep` computes anew | [`recheck`] |
+//! | what observers are notified of | [`watch`] |
+//! | what `verify --deep` recomputes | [`recheck`] |
 //!
-//! [`run::runner::run`] walks the cells of the plan: hammer and laser are brought there ([`run::stage`]), shots are fired at repeatable
-//! scans ([`run::shot`]) with a pulse that finds the target force ([`run::pulse`]), each record is judged ([`verdict::judge`](mod@verdict::judge)) and stored on
-//! a thread of its own (`run/keeper.rs`).
+//! [`run::runner::run`] walks the cells of the plan: hammer and laser are moved there
+//! ([`run::stage`]), shots are fired at repeatable scans ([`run::shot`]) with a pulse length
+//! controlled to the target force ([`run::pulse`]), each record is judged
+//! ([`verdict::judge`](mod@verdict::judge)) and stored on a separate thread (`run/keeper.rs`).
 
 pub mod plan;
 pub mod recheck;

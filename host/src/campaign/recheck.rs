@@ -1,10 +1,11 @@
-//! What follows from the raw codes, against what the file says was found: verdicts with their measure, limit and peak, and the amplitudes of
-//! the shaker's levels.
+//! Compares what the raw codes yield with what the file states: verdicts with their measure, limit
+//! and peak, and the amplitudes of the shaker's levels.
 //!
-//! Checksums tell whether a row is as it was written. This tells whether it was right: each record is judged anew, as it was then, with the
-//! plan, the scales and the good records before it that counted at the time. The chain of rows gives the order of all that. A file of an
-//! older version has none, and in another order things may have happened while somebody worked on it from two sides: so a verdict also
-//! holds that follows with what the file says by now.
+//! Checksums show whether a row is as it was written. This shows whether it was right: each record
+//! is judged again as it was at the time, with the plan, the scales and the earlier good records
+//! that were valid then. The chain of rows gives that order. A file of an older version has no
+//! chain, and the order may be different if two persons worked on the campaign concurrently; so a
+//! verdict is also accepted if it follows from the current content of the file.
 
 use std::collections::HashMap;
 
@@ -25,23 +26,24 @@ use super::verdict::{Kind, Verdict};
 use crate::device::channels::ChannelMap;
 use crate::device::recording::Recording;
 
-/// Numbers that differ by less are the same: another machine's sine may end in another digit.
+/// Relative difference below which numbers are equal: another machine's sine may differ in the last
+/// digit.
 const ALIKE: f64 = 1e-9;
 
-/// What was found.
+/// Result of the recheck.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Rechecked {
-    /// Records that were judged anew; those without samples cannot be.
+    /// Records that were judged again; those without samples cannot be.
     pub records: usize,
-    /// Levels whose amplitude was measured anew: steps that hold a motion or a force.
+    /// Levels whose amplitude was measured again: steps that control a displacement or a force.
     pub levels: usize,
-    /// What differs, a sentence each.
+    /// The differences, one sentence each.
     pub different: Vec<String>,
-    /// Another version of this program that wrote a part of the file.
+    /// Another version of jointrig that wrote a part of the file.
     pub other_version: Option<String>,
 }
 
-/// Computes everything anew, telling how many records are done, of how many.
+/// Recomputes everything; `at` is called with the number of records done and their total.
 ///
 /// # Errors
 /// The file cannot be read, or a record is damaged: [`Store::verify`] names it.
@@ -89,7 +91,7 @@ fn alike(one: f64, other: f64) -> bool {
         || (one.is_nan() && other.is_nan())
 }
 
-/// Whether the file says of a record what was found in it.
+/// Whether the stored verdict of a record matches the recomputed one.
 fn agrees(record: &RecordRow, found: &Verdict) -> bool {
     let peak = alike(record.peak_n, found.peak_n);
     if record.verdict == Kind::Noisy && record.sentence.starts_with(TOO_EARLY) {
@@ -100,10 +102,10 @@ fn agrees(record: &RecordRow, found: &Verdict) -> bool {
         && alike(record.limit, found.limit)
 }
 
-/// What was in the file when.
+/// The file's content as a function of time.
 struct Past<'s> {
     store: &'s Store,
-    /// When each row was stored, by table and key.
+    /// Position of each row in the order of storing, by table and key.
     order: HashMap<(String, String), usize>,
     plans: Vec<(i64, Plan)>,
     overrules: Vec<Overrule>,
@@ -115,7 +117,7 @@ impl<'s> Past<'s> {
     fn of(store: &'s Store) -> Result<Self, StoreError> {
         let mut plans = store.plans()?;
         for (_, plan) in &mut plans {
-            // whether the FRFs are good enough is no matter of a verdict, and takes long
+            // early stopping does not affect verdicts, and evaluating it is slow
             plan.enough = None;
         }
         Ok(Self {
@@ -128,18 +130,19 @@ impl<'s> Past<'s> {
         })
     }
 
-    /// When a row was stored. Without a chain, as if before everything.
+    /// Position of a row in the order of storing; 0 if there is no chain.
     fn at(&self, table: &str, id: i64) -> usize {
         self.order.get(&(table.to_owned(), id.to_string())).copied().unwrap_or(0)
     }
 
-    /// The plan that counted then, and the one that counts by now.
+    /// The plan that was valid then, and the current one.
     fn plans(&self, then: usize) -> impl Iterator<Item = &Plan> {
         let known = self.plans.iter().rev().find(|(id, _)| self.at("plan", *id) <= then);
         known.into_iter().chain(self.plans.last()).map(|(_, plan)| plan)
     }
 
-    /// The channels of a session: as they were calibrated when it began, as they were measured, as they are calibrated by now.
+    /// The channels of a session with three calibrations: valid at its beginning, as measured,
+    /// current.
     fn channels(&self, session: i64) -> Result<Vec<ChannelMap>, StoreError> {
         let measured = self.store.channels_as_measured(session)?;
         let imported = self.sessions.get(&session).is_some_and(|info| info.board == SessionInfo::IMPORTED);
@@ -166,7 +169,7 @@ impl<'s> Past<'s> {
         last.map_or(record.verdict == Kind::Good, |(overrule, _)| overrule.verdict == Kind::Good.name())
     }
 
-    /// A sentence, when no verdict that could have been given then is the one in the file.
+    /// A sentence if none of the verdicts that were possible at the time matches the stored one.
     fn differs(
         &self,
         cell: &Cell,
@@ -218,7 +221,7 @@ impl<'s> Past<'s> {
         }))
     }
 
-    /// Hits from files were judged with those of their own file alone.
+    /// Imported hits were judged only against those of the same file.
     fn one_import(&self, one: &RecordRow, other: &RecordRow) -> bool {
         let info = |record: &RecordRow| self.sessions.get(&record.session);
         match info(other).filter(|info| info.board == SessionInfo::IMPORTED) {
@@ -227,13 +230,14 @@ impl<'s> Past<'s> {
         }
     }
 
-    /// The amplitude of a level, for each way in which its session may have been calibrated; none where none was held.
+    /// The amplitude of a level for each possible calibration of its session; `None` if no
+    /// amplitude was controlled.
     fn amplitudes(&self, level: &LevelRow) -> Result<Option<Vec<f64>>, StoreError> {
         if level.end_hz.is_some() || level.held == Held::Drive || !level.whole() {
             return Ok(None);
         }
         let samples = self.store.level_samples(level)?;
-        // the meter hears scan after scan
+        // the meter expects codes interleaved scan by scan
         let codes: Vec<i16> = (0..level.scans)
             .flat_map(|scan| (0..level.channels).map(move |place| (scan, place)))
             .map(|(scan, place)| samples.channel(place).get(scan).copied().unwrap_or(0))

@@ -1,16 +1,20 @@
-//! Checks on stored records: does every channel have the sign that its role promises, and do hammer and vibrometer agree on a
-//! mass that is known?
+//! Checks on stored records: whether every channel has the sign that its role requires, and whether
+//! hammer and vibrometer agree on a known mass.
 //!
-//! **Polarity.** A hit gives energy to the place that it strikes: over the pulse, force times velocity along it is positive, whatever
-//! the structure. So a response's sign is Σ F v / √(Σ F² Σ v²), in −1 … 1, over the kept hits along its axis, nearest first (on the
-//! paper's campaign, simulated, 0.6 to 0.96 within 31 mm); a wrong plug or a turned head gives a clear negative. A sensor that stays
-//! is judged at its own point, in every record of its part that was struck along what it feels. Vibrometers on the specimens
-//! and load cells are further off, and follow hits along the sliding direction on A within the first millisecond: their sign is its mean
-//! over its rms; a load cell is positive when arm B moves along the sliding direction. So is the force's own: it pushes.
+//! **Polarity.** A hit transfers energy to the point that it strikes: over the pulse, force times
+//! velocity along it is positive, whatever the structure. The sign of a response is therefore Σ F v
+//! / √(Σ F² Σ v²), in −1 … 1, over the kept hits along its axis, nearest first (on the paper's
+//! campaign, simulated, 0.6 to 0.96 within 31 mm); a wrong plug or a turned head gives a clearly
+//! negative value. A fixed sensor is judged at its own point, in every record of its part that was
+//! struck along its measurement direction. Vibrometers on the specimens and load cells are further
+//! away, and follow hits along the sliding direction on A within the first millisecond: their sign
+//! is the mean over the rms in that time; a load cell is positive when arm B moves along the
+//! sliding direction. The same holds for the force itself: it pushes.
 //!
-//! **Ratio calibration.** On a free, rigid mass m the hammer's impulse is the change of momentum: ∫F dt = m Δv, whatever the shape of
-//! the pulse. The ratio ∫F dt / (m Δv) is 1 when the sensitivities of hammer and vibrometer fit each other; else one of them is wrong by
-//! that factor. (Handbook practice: ISO 7626-5, ratio calibration.)
+//! **Ratio calibration.** On a free, rigid mass m the hammer's impulse is the change of momentum:
+//! ∫F dt = m Δv, whatever the shape of the pulse. The ratio ∫F dt / (m Δv) is 1 if the
+//! sensitivities of hammer and vibrometer are consistent; otherwise one of them is wrong by that
+//! factor. (Established practice: ISO 7626-5, ratio calibration.)
 
 use jointrig_protocol::channel::{Axis, Quantity, Role};
 use jointrig_protocol::request::Configuration;
@@ -24,15 +28,15 @@ use crate::spectra::Pulse;
 
 /// The structure follows the force for about this long, s.
 const EARLY_S: f64 = 1e-3;
-/// A sign is clear from this mean over rms on.
+/// A sign is clear if mean over rms is at least this in magnitude.
 const CLEAR: f64 = 0.2;
-/// Hits that are looked at per channel.
+/// Maximum number of hits evaluated per channel.
 const HITS: usize = 12;
-/// A free mass moves evenly in this time after the pulse's end, s.
+/// Time after the pulse's end in which a free mass moves uniformly, s.
 const EVEN_S: [f64; 2] = [0.5e-3, 5e-3];
 /// Rest before the pulse, s.
 const REST_S: f64 = 2e-3;
-/// Impact and hit direction count as along an axis from this cosine on.
+/// Two directions count as parallel if the magnitude of their cosine is at least this.
 const ALONG: f64 = 0.9;
 
 /// The sign of one channel.
@@ -40,14 +44,14 @@ const ALONG: f64 = 0.9;
 pub struct Polarity {
     /// The channel.
     pub channel: String,
-    /// Early mean over rms along the hits, −1 … 1: the mean over hits. None where no kept hit tells.
+    /// Sign measure, −1 … 1, averaged over the hits; `None` if no kept hit is usable.
     pub sign: Option<f64>,
-    /// Records that it rests on.
+    /// Records that it is based on.
     pub records: Vec<i64>,
 }
 
 impl Polarity {
-    /// Right, wrong, or not told by these records.
+    /// Whether the sign is right; `None` if these records do not determine it.
     pub fn right(&self) -> Option<bool> {
         self.sign.filter(|sign| sign.abs() >= CLEAR).map(|sign| sign > 0.0)
     }
@@ -60,23 +64,23 @@ pub struct Ratio {
     pub mean: f64,
     /// Its standard deviation from hit to hit; 0 for one hit.
     pub deviation: f64,
-    /// Records that it rests on.
+    /// Records that it is based on.
     pub records: Vec<i64>,
 }
 
-/// What a channel feels.
+/// What a channel measures.
 enum Felt<'a> {
     /// The hammer's force.
     Force,
-    /// The motion along a unit vector, where the vibrometer looks in that cell.
+    /// The motion along a unit vector, at the point that the vibrometer measures in that cell.
     Aimed([f64; 3]),
-    /// The motion along a unit vector, at the point where the sensor stays.
+    /// The motion along a unit vector, at the point of a fixed sensor.
     Fixed(&'a ResponsePoint, [f64; 3]),
     /// The contact's motion or force along the sliding direction.
     Contact,
 }
 
-/// A kept record in SI units with where it was struck.
+/// A kept record in SI units, and its hit direction.
 struct Hit {
     record: i64,
     direction: [f64; 3],
@@ -85,7 +89,7 @@ struct Hit {
     pulse: Pulse,
 }
 
-/// The sign of every channel that the kept records tell of.
+/// The sign of every channel that the kept records determine.
 ///
 /// # Errors
 /// The file cannot be read.
@@ -104,7 +108,8 @@ pub fn polarity(store: &Store) -> Result<Vec<Polarity>, StoreError> {
             (None, Role::SpecimenA | Role::SpecimenB | Role::LoadCell) => Felt::Contact,
             _ => continue,
         };
-        // which way a load cell is mounted is the plan's to say; one across the sliding direction tells nothing
+        // the plan defines a load cell's orientation; a cell perpendicular to the sliding direction
+        // yields no sign
         let sense = match cells.iter().find(|(cell, _)| *cell == place) {
             Some((_, part)) => part.signum(),
             None if channel.role == Role::LoadCell => continue,
@@ -134,7 +139,8 @@ pub fn polarity(store: &Store) -> Result<Vec<Polarity>, StoreError> {
     Ok(found)
 }
 
-/// Hammer against vibrometer in the cell of that id, struck on a free mass of `mass_kg`; none without a kept hit.
+/// Hammer against vibrometer in the cell with that id, struck on a free mass of `mass_kg`; `None`
+/// without a kept hit.
 ///
 /// # Errors
 /// The file cannot be read.
@@ -163,7 +169,8 @@ fn kept(store: &Store, wanted: impl Fn(&RecordRow) -> bool) -> Result<Vec<Record
     Ok(store.records()?.into_iter().flatten().filter(|row| row.kept() && wanted(row)).collect())
 }
 
-/// Records whose hits go along what the channel feels, the nearest to its place first.
+/// Records whose hits are parallel to the channel's measurement direction, the nearest to its
+/// position first.
 fn candidates<'a>(
     store: &Store,
     plan: &Plan,
@@ -180,16 +187,16 @@ fn candidates<'a>(
             let assembly = cell.configuration == Configuration::Ajb;
             let (told, at) = match felt {
                 Felt::Force => (true, looked_at),
-                // a sensor that stays leaves nothing for the vibrometer to look at in its cells
+                // in the cells of a fixed sensor the vibrometer is aimed nowhere
                 Felt::Aimed(direction) => {
                     (looked_at.channels.is_none() && along(&impact.direction, direction), looked_at)
                 }
-                // beyond the contact the first motion is not the hit's
+                // on the other side of the contact, the first motion need not have the hit's sign
                 Felt::Fixed(point, direction) => {
                     let same_part = impact.grouping % 2 == point.grouping % 2;
                     (same_part && along(&impact.direction, direction), *point)
                 }
-                // these see anything in the assembly only, and the force path goes from A's side to B
+                // these respond only in the assembly, where the force path leads from A's side to B
                 Felt::Contact => {
                     let slides = along(&impact.direction, &plan.sliding());
                     (slides && assembly && impact.grouping % 2 == 1, looked_at)
@@ -215,7 +222,7 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// A record in SI units; none where a damaged one or one without pulse tells nothing.
+/// A record in SI units; `None` if it is damaged or has no pulse.
 fn hit(store: &Store, plan: &Plan, row: &RecordRow) -> Result<Option<Hit>, StoreError> {
     let Some(cell) = store.cells()?.into_iter().find(|cell| cell.id == row.cell) else { return Ok(None) };
     let samples = match store.samples(row) {
@@ -234,7 +241,7 @@ fn hit(store: &Store, plan: &Plan, row: &RecordRow) -> Result<Option<Hit>, Store
     Ok(found.map(|(pulse, impact)| Hit { record: row.id, direction: impact.direction, map, signals, pulse }))
 }
 
-/// Force times velocity along the hit, summed over the pulse, as a part of what it could be at most.
+/// Force times velocity along the hit, summed over the pulse and normalised to −1 … 1.
 fn power_sign(hit: &Hit, place: usize, felt: [f64; 3]) -> Option<f64> {
     let rate = hit.map.fs_hz();
     let channel = hit.map.channels.get(place)?;
@@ -244,7 +251,7 @@ fn power_sign(hit: &Hit, place: usize, felt: [f64; 3]) -> Option<f64> {
     let before = signal.get((start + late).checked_sub((REST_S * rate) as usize)?..start + late)?;
     let rest = before.iter().sum::<f64>() / before.len().max(1) as f64;
     let moved = signal.get(start + late..end + late)?.iter().map(|value| value - rest);
-    // the scale does not matter to a sign
+    // the scale does not affect the sign
     let velocity: Vec<f64> = match channel.quantity {
         Quantity::Velocity => moved.collect(),
         Quantity::Acceleration => running_sum(moved),
@@ -274,7 +281,8 @@ fn differences(values: impl Iterator<Item = f64>) -> Vec<f64> {
     values.scan(0.0, |before, value| Some(value - std::mem::replace(before, value))).collect()
 }
 
-/// The mean over the rms of a channel in the first millisecond, positive along the hit (the force itself: positive at all).
+/// The mean over the rms of a channel in the first millisecond, positive along the hit (for the
+/// force itself: positive for a push).
 fn early_sign(hit: &Hit, place: usize, felt: Option<[f64; 3]>) -> Option<f64> {
     let rate = hit.map.fs_hz();
     let channel = &hit.map.channels[place];
@@ -295,7 +303,7 @@ fn momentum_ratio(hit: &Hit, mass_kg: f64) -> Option<f64> {
     let samples = |seconds: f64| (seconds * rate) as usize;
     let force = &hit.signals[hit.map.place(Role::HammerForce)?];
     let Pulse { start, end, offset_n, .. } = hit.pulse;
-    // the foot below 2 % of the peak belongs to the impulse too
+    // the foot below 2 % of the peak contributes to the impulse too
     let margin = (end - start) / 4;
     let impulse: f64 =
         force.get(start.saturating_sub(margin)..end + margin)?.iter().map(|f| f - offset_n).sum::<f64>()

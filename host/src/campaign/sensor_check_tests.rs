@@ -14,7 +14,7 @@ const RATE: f64 = 51_200.0;
 const TRIGGER: usize = 256;
 const MASS_KG: f64 = 0.9;
 
-/// Hammer and vibrometer; the channels' scales carry the errors to be found.
+/// Hammer and vibrometer; the channels' scales contain the errors to be found.
 fn map(force_error: f64, z_sign: f32) -> ChannelMap {
     let channel = |name: &str, role, quantity, units_per_volt| Channel {
         name: name.try_into().expect("short"),
@@ -40,14 +40,14 @@ fn map(force_error: f64, z_sign: f32) -> ChannelMap {
     }
 }
 
-/// A free mass struck along −z: the codes that sensors without error give.
+/// A free mass struck along −z: the codes of sensors without error.
 fn recording(peak_n: f64) -> Recording {
     let true_map = map(1.0, 1.0);
     let width = 0.41e-3;
     let scans = TRIGGER + 4_096;
     let t = |scan: usize, late: f64| (scan as f64 - TRIGGER as f64) / RATE - late;
     let force = |t: f64| if (0.0..width).contains(&t) { peak_n * (PI * t / width).sin() } else { 0.0 };
-    // the momentum so far over the mass
+    // the impulse up to t over the mass
     let velocity = |t: f64| {
         let share = (t / width).clamp(0.0, 1.0);
         -peak_n * width / PI * (1.0 - (PI * share).cos()) / MASS_KG

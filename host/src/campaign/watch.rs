@@ -1,6 +1,8 @@
-//! What happens while a campaign is measured, for whoever watches: the bar in the terminal, the live page.
+//! Notifies observers of the events of a running campaign: the progress bar in the terminal, the
+//! live page.
 //!
-//! Measuring tells, and does not ask: a watcher must return at once, and nothing that it does comes back.
+//! Notifications are one-way: an observer must return immediately, and cannot influence the
+//! measurement.
 
 use std::fmt;
 use std::sync::Arc;
@@ -11,14 +13,14 @@ use super::verdict::Verdict;
 use crate::device::channels::ChannelMap;
 use crate::device::stream::Accounts;
 
-/// Somebody who watches.
+/// An observer.
 pub trait Watch {
-    /// Something happened. Called by the thread that measures, and by the one that stores: to be brief, without
-    /// waiting for anything.
+    /// Called for each event, by the measuring and the storing thread: must be short and must not
+    /// block.
     fn saw(&self, seen: &Seen<'_>);
 }
 
-/// Good hits that are still wanted.
+/// Number of good hits still wanted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Left {
     /// In the cell.
@@ -29,128 +31,130 @@ pub struct Left {
     pub campaign: u64,
 }
 
-/// How far a cell is.
+/// Progress of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Standing {
-    /// Good hits that it has.
+    /// Good hits so far.
     pub kept: u32,
-    /// Hits that were tried: the number of its next attempt.
+    /// Hits so far, good or not: the number of its next attempt.
     pub attempts: u32,
 }
 
-/// What happened.
+/// An event.
 #[derive(Clone, Copy, Debug)]
 pub enum Seen<'a> {
-    /// A stream of scans begins.
+    /// A stream of scans starts.
     Stream {
-        /// Of these channels.
+        /// Its channels.
         channels: &'a ChannelMap,
         /// Whether the rig is simulated.
         simulated: bool,
     },
-    /// A campaign begins or goes on: good hits wanted, and those that are there.
+    /// A campaign starts or is resumed.
     Begun {
-        /// Good hits wanted in all.
+        /// Good hits wanted in total.
         wanted: u64,
-        /// Good hits that are there.
+        /// Good hits already in the file.
         kept: u64,
     },
-    /// Hammer and vibrometer go to a cell.
+    /// Hammer and vibrometer are being moved to a cell.
     Moving {
-        /// Which.
+        /// The cell.
         row: &'a CellRow,
-        /// How far it is.
+        /// Its progress.
         standing: Standing,
-        /// Whether somebody or something outside moves them, and not the device itself.
+        /// Whether a person or an external command moves them, not the device itself.
         by_hand: bool,
-        /// Good hits that are still wanted.
+        /// Good hits still wanted.
         left: Left,
     },
-    /// They are there, or it was decided otherwise.
+    /// They are in place, or the move was skipped.
     Moved,
     /// A shot waits until the structure is at rest.
     Settling {
-        /// In which cell.
+        /// The cell.
         row: &'a CellRow,
-        /// How far it is.
+        /// Its progress.
         standing: Standing,
-        /// The longest that it waits, s of the device.
+        /// Longest wait, s of the device's clock.
         most_s: f64,
-        /// Whether a person strikes, who is waited for.
+        /// Whether a person strikes, and is waited for.
         by_hand: bool,
     },
-    /// The hammer has struck, and its record comes in.
+    /// The hammer has struck, and the record is being received.
     Recording,
-    /// The record is looked at.
+    /// The record is being judged.
     Judging,
-    /// A hit was kept or refused, and is in the file: a process that is killed does not lose it any more. The
-    /// next cell or hit may have begun meanwhile.
+    /// A hit was accepted or refused, and is in the file: it survives if the process is killed. The
+    /// next cell or hit may already have started.
     Judged {
-        /// In which cell.
+        /// The cell.
         row: &'a CellRow,
-        /// Why.
+        /// The verdict.
         verdict: &'a Verdict,
-        /// Good hits in all.
+        /// Good hits in total.
         kept: u64,
-        /// Good hits that are still wanted.
+        /// Good hits still wanted.
         left: Left,
     },
-    /// Where the scans of the stream went so far.
+    /// Accounting of the stream's scans so far.
     Link(Accounts),
-    /// Something worth a line of its own.
+    /// A message to be shown.
     Remark(&'a str),
-    /// The shaker is told to bring a level about.
+    /// The shaker is ordered to drive a level.
     Level {
-        /// Which.
+        /// The level.
         level: &'a Level,
-        /// Magnitude of each channel that stops the shaker, SI, in the order of the scan; 0 where there is none.
+        /// Limit of each channel above which the shaker stops, SI, in the order of the scan; 0 for
+        /// none.
         limits: &'a [f64],
         /// The drive's largest amplitude, V.
         most_drive_v: f64,
-        /// The load cells whose sum is T: place in the scan, and by what each is multiplied.
+        /// The load cells whose sum is T: index in the scan, and the factor of each.
         load_cells: &'a [(usize, f64)],
     },
-    /// A piece of a level on its way: some whole cycles.
+    /// Some whole cycles of a level in progress.
     Shaking(Shaking<'a>),
-    /// The level is over: recorded, not reached, or the shaker has stopped. What is to be said of it.
+    /// The level has ended: recorded, not reached, or the shaker has stopped.
     LevelOver {
         /// Whether it was recorded.
         recorded: bool,
-        /// In words.
+        /// The result, as text.
         say: &'a str,
     },
-    /// Measuring is over.
+    /// The measurement has ended.
     Ended,
 }
 
-/// A piece of a level on its way.
+/// A part of a level in progress.
 #[derive(Clone, Copy, Debug)]
 pub struct Shaking<'a> {
-    /// Since the order, s of the device.
+    /// Time since the order, s of the device's clock.
     pub at_s: f64,
-    /// Amplitude of what is held, m or N; for a held drive the relative displacement, m.
+    /// Amplitude of the controlled quantity, m or N; with an open-loop drive that of the relative
+    /// displacement, m.
     pub amplitude: f64,
     /// The drive's amplitude, V.
     pub drive_v: f64,
-    /// Whether it has settled by now.
+    /// Whether it has settled.
     pub settled: bool,
-    /// Codes of these cycles, scan after scan.
+    /// Codes of these cycles, interleaved scan by scan.
     pub codes: &'a [i16],
 }
 
-/// All who watch.
+/// All observers.
 #[derive(Clone, Default)]
 pub struct Watchers(Vec<Arc<dyn Watch + Send + Sync>>);
 
 impl Watchers {
-    /// One more.
+    /// Adds an observer.
     #[must_use]
     pub fn and(mut self, watcher: Arc<dyn Watch + Send + Sync>) -> Self {
         self.0.push(watcher);
         self
     }
 
-    /// Tells each of them.
+    /// Notifies each observer.
     pub fn saw(&self, seen: &Seen<'_>) {
         self.0.iter().for_each(|watcher| watcher.saw(seen));
     }

@@ -22,16 +22,18 @@ pub struct Analyse {
     /// Folder for results.json and report.html.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Effective mass of the static arm at the contact, kg; identified from the records without it.
+    /// Effective mass of the static arm at the contact, kg [default: identified from the records].
     #[arg(long, value_name = "KG", value_parser = not_negative)]
     effective_mass: Option<f64>,
-    /// Stiffness to ground beside the load cells, over theirs [default: the plan's].
+    /// Stiffness to ground in parallel with the load cells, relative to theirs [default: the
+    /// plan's].
     #[arg(long, value_name = "RATIO", value_parser = not_negative)]
     parallel_path: Option<f64>,
     /// Normal load, N, for the friction coefficient [default: the plan's].
     #[arg(long, value_name = "N", value_parser = positive)]
     normal_load: Option<f64>,
-    /// Draw the hits of every interface cell anew this often, for an interval that needs no model of the noise (1000 is usual).
+    /// Number of bootstrap resamplings of the hits of every interface cell, for an interval that
+    /// needs no noise model (1000 is usual).
     #[arg(long, value_name = "N", default_value_t = 0)]
     bootstrap: usize,
     /// Print every method, check and loop too.
@@ -69,25 +71,26 @@ impl Analyse {
     }
 }
 
-/// The answer in a few lines, and where the report is.
+/// Prints the result in a few lines, and where the report is.
 pub fn ending(found: &Results, folder: &Path) -> Result<(), CliError> {
     output::lines(words::brief::terminal(found, 1))?;
     output::lines([where_to_look(folder)])
 }
 
-/// The last line of whatever wrote a report.
+/// Last line of every command that writes a report.
 pub fn where_to_look(folder: &Path) -> String {
     format!("Open {} for figures and tables.", folder.join(report::REPORT_FILE).display())
 }
 
-/// Analyses what the file holds, with a bar for whoever waits.
+/// Analyses the file's content, with a progress bar.
 pub fn analysed(store: &Store, wanted: Wanted) -> Result<Results, CliError> {
     let waiting = Waiting::of("analysing");
     let results = report::analysed(store, wanted, &|progress| waiting.at(progress.done, progress.total))?;
     Ok(results)
 }
 
-/// Analyses what the file holds and writes `results.json`, `report.html` and the figures asked for into `folder`.
+/// Analyses the file's content and writes `results.json`, `report.html` and the requested figures
+/// into `folder`.
 pub fn analyse_into(
     store: &Store,
     wanted: Wanted,
@@ -99,7 +102,7 @@ pub fn analyse_into(
     Ok(results)
 }
 
-/// Writes `results.json`, `report.html` and the figures asked for into `folder`.
+/// Writes `results.json`, `report.html` and the requested figures into `folder`.
 pub fn write_into(results: &Results, folder: &Path, formats: &[report::Format]) -> Result<(), CliError> {
     report::write(results, folder, formats).map_err(|source| CliError::File {
         path: folder.into(),

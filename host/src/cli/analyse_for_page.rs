@@ -1,4 +1,5 @@
-//! `analyse-for-page`: what the live page's process starts to have a campaign analysed beside it. Hidden: nobody types it.
+//! `analyse-for-page`: started by the live page's process to analyse a campaign in a separate
+//! process. Hidden, since users do not call it.
 
 use std::path::PathBuf;
 
@@ -7,7 +8,7 @@ use clap::Args;
 use super::error::CliError;
 use crate::live::forming::analyse_for_another;
 
-/// Print what an analysis found, for the live page; end when the input is closed.
+/// Print the result of an analysis, for the live page; ends when the input is closed.
 #[derive(Debug, Args)]
 pub struct AnalyseForPage {
     /// The campaign file.

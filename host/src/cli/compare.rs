@@ -1,4 +1,4 @@
-//! `compare`: two campaigns against each other.
+//! `compare`: compares two campaigns.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,8 @@ use crate::analyse::Wanted;
 use crate::campaign::store::Store;
 use crate::report;
 
-/// Compare two campaigns: before and after wear, or under two loads. Writes compare.json and compare.html.
+/// Compare two campaigns: before and after wear, or under two loads. Writes compare.json and
+/// compare.html.
 #[derive(Debug, Args)]
 pub struct Compare {
     /// The first campaign file.

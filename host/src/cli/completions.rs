@@ -1,4 +1,4 @@
-//! `completions`: what a shell needs to complete commands and options.
+//! `completions`: prints a shell's completion script.
 
 use std::io::Write;
 
@@ -8,7 +8,7 @@ use clap_complete::Shell;
 /// Print completions for a shell.
 #[derive(Debug, Args)]
 pub struct Completions {
-    /// Which shell.
+    /// The shell.
     shell: Shell,
 }
 
@@ -16,7 +16,7 @@ impl Completions {
     pub fn run(self) {
         let mut text = Vec::new();
         clap_complete::generate(self.shell, &mut super::Cli::command(), "jointrig", &mut text);
-        // a shell that stops reading has what it wants
+        // a closed pipe is no error: the shell has read enough
         drop(std::io::stdout().write_all(&text));
     }
 }

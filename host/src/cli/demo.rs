@@ -1,4 +1,4 @@
-//! `demo`: the whole job on the built-in simulator.
+//! `demo`: the complete workflow on the built-in simulator.
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,7 @@ use crate::device::address::Address;
 use crate::outside::tell_line;
 use crate::report::words;
 
-/// The whole job on the built-in simulator: campaign, analysis, report.
+/// The complete workflow on the built-in simulator: campaign, analysis, report.
 #[derive(Debug, Args)]
 pub struct Demo {
     /// Folder for campaign.jrig, results.json and report.html.
@@ -26,10 +26,10 @@ pub struct Demo {
     /// The paper's 2016 impacts instead of a short campaign.
     #[arg(long)]
     full: bool,
-    /// Another rig than the built-in one.
+    /// A rig description to use in place of the built-in one.
     #[arg(long, value_name = "FILE.toml")]
     rig: Option<PathBuf>,
-    /// Decides noise, scatter and every error of position.
+    /// Seed of noise, scatter and position errors.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Print every method, check and loop too.
@@ -39,7 +39,7 @@ pub struct Demo {
     page: crate::cli::page::Page,
 }
 
-/// Notes in the file that tell one demo from another: key and value.
+/// Notes in the file that identify a demo: key and value.
 type Marks = [(&'static str, String); 3];
 
 impl Demo {
@@ -70,7 +70,7 @@ impl Demo {
             output::lines(words::summary(&found))?;
             output::lines([String::new()])?;
         }
-        // two more lines follow
+        // two more lines are printed after this
         output::lines(words::brief::terminal(&found, 2))?;
         let (stored, raw) = store.sample_bytes()?;
         output::lines([
@@ -84,7 +84,7 @@ impl Demo {
         ])
     }
 
-    /// The same command once more.
+    /// The command that repeats this one.
     fn again(&self) -> String {
         let full = if self.full { " --full" } else { "" };
         let rig = self.rig.as_ref().map(|path| format!(" --rig {}", path.display())).unwrap_or_default();
@@ -102,7 +102,7 @@ impl Demo {
         Ok([("demo_plan", plan.into()), ("demo_seed", self.seed.to_string()), ("demo_rig", rig)])
     }
 
-    /// The campaign file: a new one, or an earlier run of the very same demo.
+    /// The campaign file: a new one, or that of an earlier run with the same options.
     fn open(&self, file: &Path) -> Result<Store, CliError> {
         let marks = self.marks()?;
         if !file.exists() {

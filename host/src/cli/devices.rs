@@ -1,4 +1,5 @@
-//! `devices`: what is attached. Controllers and ports are listed, not opened: opening could reset a stranger's device.
+//! `devices`: lists connected controllers and ports without opening them: opening a port could
+//! reset an unrelated device.
 
 use clap::Args;
 use jointrig_protocol::usb::PRODUCT;
@@ -9,10 +10,10 @@ use super::error::CliError;
 use super::output;
 use crate::device::usb;
 
-/// List what is attached.
+/// List connected devices.
 #[derive(Debug, Args)]
 pub struct Devices {
-    /// One JSON document on stdout.
+    /// Print one JSON document on stdout.
     #[arg(long)]
     json: bool,
 }

@@ -1,5 +1,5 @@
-//! What a command ends with, and the exit code that follows: 0 done, 1 the work could not be done,
-//! 2 the command line was wrong.
+//! Result of a command, and its exit code: 0 done, 1 the work could not be done, 2 the command line
+//! was wrong.
 
 use std::io;
 use std::path::PathBuf;
@@ -15,7 +15,7 @@ use crate::device::error::DeviceError;
 /// Why a command could not do its work.
 #[derive(Debug, thiserror::Error)]
 pub enum CliError {
-    /// The command line says something that cannot be meant.
+    /// The command line is invalid.
     #[error("{0}")]
     Usage(String),
     /// The plan.
@@ -43,30 +43,30 @@ pub enum CliError {
     /// A file that is read.
     #[error("{path}: {doing}: {source}; {}", advice::reading(source))]
     Read {
-        /// Which.
+        /// The path.
         path: PathBuf,
-        /// What was being done.
+        /// The operation that failed.
         doing: &'static str,
-        /// What the operating system said.
+        /// The operating system's error.
         source: io::Error,
     },
     /// A file or folder that is written.
     #[error("{path}: {doing}: {source}; {}", advice::writing(source))]
     File {
-        /// Which.
+        /// The path.
         path: PathBuf,
-        /// What was being done.
+        /// The operation that failed.
         doing: &'static str,
-        /// What the operating system said.
+        /// The operating system's error.
         source: io::Error,
     },
-    /// The work was done and its result is bad.
+    /// The work was done and its result is negative.
     #[error("{0}")]
     Bad(String),
 }
 
 impl From<DeviceError> for CliError {
-    /// An address that cannot be read is a wrong command line, not a device fault.
+    /// An address that cannot be parsed is an error of the command line, not of the device.
     fn from(error: DeviceError) -> Self {
         match error {
             DeviceError::Address { .. } | DeviceError::NotBuilt { .. } => Self::Usage(error.to_string()),

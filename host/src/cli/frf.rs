@@ -1,4 +1,4 @@
-//! `frf`: FRFs of impact records from anywhere, good hits only.
+//! `frf`: computes FRFs from any impact records, using good hits only.
 
 use std::path::PathBuf;
 
@@ -22,11 +22,12 @@ use crate::spectra::{
 };
 use crate::substructuring::Band;
 
-/// FRFs of impact records from anywhere: verdict on every hit, average of the good ones.
+/// Compute FRFs from any impact records: a verdict on every hit, and the average of the good ones.
 ///
-/// RECORDS is an npz that holds `fs` (Hz), `force` (hit, sample) in N, `response` (hit, channel, sample) in SI and `quantity`
-/// (velocity, acceleration or displacement), or a universal file of time responses, each hit's force first. FRFs are on s = sigma + i 2 pi f: the exponential window's damping is part of s,
-/// not an error of the result.
+/// RECORDS is an npz that contains `fs` (Hz), `force` (hit, sample) in N, `response` (hit, channel,
+/// sample) in SI and `quantity` (velocity, acceleration or displacement), or a universal file of
+/// time responses, with each hit's force first. FRFs are on s = sigma + i 2 pi f: the exponential
+/// window's damping is part of s, not an error of the result.
 ///
 /// A folder of universal files becomes one matrix (--out): their labels name impacts and sensors.
 #[derive(Debug, Args)]
@@ -40,46 +41,51 @@ pub struct Frf {
     /// Write the FRFs: frequency, frf (H1), h2, hv, coherence, variance.
     #[arg(long, value_name = "FILE.npz")]
     out: Option<PathBuf>,
-    /// Quantity of the FRFs; that of the records when absent.
+    /// Quantity of the FRFs [default: that of the records].
     #[arg(long, value_enum)]
     quantity: Option<FrfQuantity>,
     /// Damping of the exponential window, 1/s; 0 for none.
     #[arg(long, value_name = "PER_S", default_value_t = Windowing::default().sigma_per_s)]
     sigma: f64,
-    /// The force is kept from this long before the pulse's start, s, and always from its foot on.
+    /// The force is kept from this long before the pulse's start, s, or from its foot if that is
+    /// earlier.
     #[arg(long, value_name = "S", default_value_t = Windowing::default().force_before_s)]
     force_before: f64,
-    /// The force is kept until this long after the pulse's start, s, and always until the pulse is over.
+    /// The force is kept until this long after the pulse's start, s, or until the pulse's end if
+    /// that is later.
     #[arg(long, value_name = "S", default_value_t = Windowing::default().force_after_s)]
     force_after: f64,
-    /// After that it falls to zero along half a cosine of this length, s.
+    /// After that the force is tapered to zero with half a cosine of this length, s.
     #[arg(long, value_name = "S", default_value_t = 0.0)]
     force_taper: f64,
-    /// Leave the force rectangular and weight the response alone (the widespread habit, not exact).
+    /// Keep the force window rectangular and weight only the response (common practice, but not
+    /// exact).
     #[arg(long)]
     plain_force: bool,
-    /// Time of the hits from the records' start, s; where each pulse starts when absent.
+    /// Time of the hits from the records' start, s [default: the start of each pulse].
     #[arg(long, value_name = "S")]
     origin: Option<f64>,
-    /// Length of the transform, samples; longer than the records pads them with zeros.
+    /// Length of the transform, samples; if longer than the records, they are padded with zeros.
     #[arg(long, value_name = "SAMPLES")]
     pad_to: Option<usize>,
-    /// How late each response is against the force, s (repeat, or a list with commas).
+    /// Delay of each response relative to the force, s (repeat the option, or give a
+    /// comma-separated list).
     #[arg(long, value_name = "S", value_delimiter = ',', allow_hyphen_values = true)]
     delay: Vec<f64>,
-    /// Lines to give, Hz; all when absent.
+    /// Frequency lines to output, Hz [default: all].
     #[arg(long, value_name = "LO:HI", value_parser = band)]
     band: Option<(f64, f64)>,
-    /// Give the variance of leaving out each hit in turn, too (array `variance_jackknife`).
+    /// Also output the variance by leaving out each hit in turn (array `variance_jackknife`).
     #[arg(long)]
     jackknife: bool,
-    /// Ratio of noise powers for Hv, response over force, (SI/N)²; noise in proportion to the signals when absent.
+    /// Ratio of noise powers for Hv, response over force, (SI/N)² [default: noise in proportion to
+    /// the signals].
     #[arg(long, value_name = "RATIO")]
     noise_ratio: Option<f64>,
-    /// Units that count instead of those of the file's labels: response=mm/s,force=lbf,time=ms.
+    /// Units that override those of the file's labels: response=mm/s,force=lbf,time=ms.
     #[arg(long, value_name = "UNITS", default_value = "")]
     units: StatedUnits,
-    /// Names of the responses (repeat, or a list with commas).
+    /// Names of the responses (repeat the option, or give a comma-separated list).
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     outputs: Vec<String>,
     /// Name of the impact.
@@ -87,7 +93,7 @@ pub struct Frf {
     input: String,
 }
 
-/// What an FRF's numerator is.
+/// Quantity of an FRF's numerator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum FrfQuantity {
     Receptance,
@@ -105,7 +111,7 @@ impl From<FrfQuantity> for MotionQuantity {
     }
 }
 
-/// A band of frequencies, Hz.
+/// Parses a frequency band, Hz.
 pub(super) fn band(text: &str) -> Result<(f64, f64), String> {
     let wrong = || format!("`{text}` is no band: give two frequencies in Hz, the lower first, as in 300:600");
     let (low, high) = text.split_once(':').ok_or_else(wrong)?;
@@ -168,14 +174,14 @@ impl Frf {
             ));
         }
         let mut lines = self.words(&verdicts, &found, excited);
-        // before the last line, which names the file
+        // insert before the last line, which names the output file
         let last = lines.len() - 1;
         let told = [agreement.lines(&names), self.about_window(&records, &used)].concat();
         lines.splice(last..last, told);
         output::lines(lines)
     }
 
-    /// Why there is nothing to average, and what to do.
+    /// Explains why there is nothing to average, with advice.
     fn nothing_good(&self, records: &ImpactRecords, verdicts: &[Verdict]) -> String {
         let file = self.records.display();
         let reversed: Vec<Option<f64>> = records.force_n.iter().map(|force| reversed_peak_n(force)).collect();
@@ -209,7 +215,7 @@ impl Frf {
         )
     }
 
-    /// What is to be said of the force windows of the hits that are used.
+    /// Messages about the force windows of the hits used.
     fn about_window(&self, records: &ImpactRecords, used: &[bool]) -> Vec<String> {
         let windows = force_windows(records, &self.settings(&[]));
         let of_used = || {
@@ -255,7 +261,7 @@ impl Frf {
         average(&self.records, out, &Wishes { settings: &settings, quantity, band: self.band, units })
     }
 
-    /// What cannot be meant.
+    /// Refuses invalid options.
     fn check(&self) -> Result<(), CliError> {
         let wrong = |text: String| Err(CliError::Usage(text));
         for (name, value) in [
@@ -295,7 +301,8 @@ impl Frf {
         }
     }
 
-    /// `of_file_s` is how late each response is against the force by the file itself.
+    /// Settings of the estimate. `of_file_s`: delay of each response relative to the force
+    /// according to the file, s.
     fn settings(&self, of_file_s: &[f64]) -> FrfSettings {
         let late = of_file_s.iter().any(|s| *s != 0.0);
         let delay_s = match (self.delay.is_empty(), late) {
@@ -386,22 +393,22 @@ impl Frf {
     }
 }
 
-/// Told from this part of the pulse's impulse on.
+/// Fraction of the pulse's impulse outside the window from which a message is printed.
 const OUTSIDE: f64 = 0.01;
 
-/// Where the force of a hit is kept.
+/// The force window of a hit.
 struct ForceWindow {
-    /// From the windows' origin, s.
+    /// Start, relative to the windows' origin, s.
     from_s: f64,
-    /// The same of its end.
+    /// End, relative to the windows' origin, s.
     to_s: f64,
     /// Length of the pulse, s.
     pulse_s: f64,
-    /// The force's impulse beside the window, as a part of the pulse's.
+    /// The force's impulse outside the window, as a fraction of the pulse's.
     outside: f64,
 }
 
-/// The windows of all hits; none of a hit without a pulse.
+/// The windows of all hits; `None` for a hit without a pulse.
 fn force_windows(records: &ImpactRecords, settings: &FrfSettings) -> Vec<Option<ForceWindow>> {
     let fs_hz = records.fs_hz;
     let of = |force: &Vec<f64>| {
@@ -423,10 +430,10 @@ fn force_windows(records: &ImpactRecords, settings: &FrfSettings) -> Vec<Option<
     records.force_n.iter().map(of).collect()
 }
 
-/// Spectra, the band that was excited, what the FRFs are, the responses' names, and how well the hits agree.
+/// Spectra, excited band, quantity of the FRFs, names of the responses, and agreement of the hits.
 type Averaged<'a> = (&'a CrossSpectra, Option<Band>, MotionQuantity, &'a [String], &'a Agreement);
 
-/// Lines of Python that cut one record with several hits.
+/// Python code that cuts a record with several hits.
 fn cut_lines(file: &str, records: &ImpactRecords, hits_s: &[f64]) -> String {
     let gap_s = hits_s.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
     let first_s = hits_s.first().copied().unwrap_or(0.0);
@@ -457,7 +464,7 @@ fn cut_lines(file: &str, records: &ImpactRecords, hits_s: &[f64]) -> String {
     )
 }
 
-/// Median coherence of each response over the lines that were excited; none for a single hit.
+/// Median coherence of each response over the excited lines; `None` for a single hit.
 fn median_coherence(y: &CrossSpectra, band: Option<Band>) -> Option<Vec<f64>> {
     let band = band?;
     let inside = y.band(band.low_hz, band.high_hz);
@@ -473,7 +480,7 @@ fn median_coherence(y: &CrossSpectra, band: Option<Band>) -> Option<Vec<f64>> {
         .collect()
 }
 
-/// The arrays beside H1.
+/// The arrays in addition to H1.
 fn extras(y: &CrossSpectra, noise_ratio: Option<f64>) -> Vec<Extra> {
     let real = |name: &str, rows: &[Vec<f64>]| {
         let shape = vec![rows.len(), rows.first().map_or(0, Vec::len)];
@@ -516,7 +523,7 @@ mod tests {
             quantity: MotionQuantity::Velocity,
         };
         let said = cut_lines("row.npz", &records, &[0.3, 1.3, 2.4]);
-        // 50 ms before each hit; the last one has 600 ms after it
+        // 50 ms before each hit; the last one is followed by 600 ms
         assert!(said.contains("starts, n = [250, 1250, 2350], 650"), "{said}");
         assert!(said.contains("reshape(2, -1)") && said.contains("row-cut.npz"), "{said}");
         let said = cut_lines("row.uff", &records, &[0.3, 1.3, 2.4]);

@@ -1,4 +1,5 @@
-//! `frf` of a folder: universal files whose labels name impacts and sensors become one matrix of FRFs, as `import` and `identify` take it.
+//! `frf` of a folder: universal files whose labels name impacts and sensors become one matrix of
+//! FRFs, in the form that `import` and `identify` read.
 
 use std::path::Path;
 
@@ -21,30 +22,30 @@ use crate::frf::common_lines::same;
 use crate::outside::tell_line;
 use crate::spectra::{CrossSpectra, FrfSettings, MotionQuantity, estimate, usable_band};
 
-/// How the records become FRFs.
+/// Options for converting records to FRFs.
 pub(super) struct Wishes<'w> {
     pub(super) settings: &'w FrfSettings,
-    /// None: as measured.
+    /// Quantity of the FRFs; `None` keeps that of the records.
     pub(super) quantity: Option<MotionQuantity>,
-    /// Lines to give, Hz.
+    /// Frequency lines to output, Hz.
     pub(super) band: Option<(f64, f64)>,
-    /// What counts instead of the units of labels.
+    /// Units that override those of the labels.
     pub(super) units: &'w StatedUnits,
 }
 
-/// One place of impact with one sensor.
+/// One impact position with one sensor.
 struct Pair {
     impact: String,
     response: String,
     spectra: CrossSpectra,
-    /// Along which axes force and channels are.
+    /// Axes of force and channels.
     directions: Directions,
 }
 
 /// Averages the good hits of every file in `folder` and writes the matrix to `out`.
 ///
 /// # Errors
-/// A file that cannot be read, names that are missing, records that do not fit together.
+/// A file cannot be read, names are missing, or records are inconsistent with each other.
 pub(super) fn average(folder: &Path, out: &Path, wishes: &Wishes<'_>) -> Result<(), CliError> {
     let bad = |what: String| CliError::Bad(what);
     let files = universal_files(folder)?;
@@ -149,8 +150,9 @@ pub(super) fn average(folder: &Path, out: &Path, wishes: &Wishes<'_>) -> Result<
     output::lines(told)
 }
 
-/// The outputs are called `NAME` where a sensor has one channel. Several are called by their axes, `NAME:x`;
-/// where labels name none, three are x, y and z, and others `NAME:1`, `NAME:2`.
+/// Names of a sensor's outputs: `NAME` for a single channel; for several, `NAME` with the axis,
+/// `NAME:x`; if the labels give no axes, three channels are x, y and z, and any other number
+/// `NAME:1`, `NAME:2`.
 fn outputs_of(name: &str, channels: usize, directions: &Directions) -> Vec<String> {
     let axes = &directions.responses;
     let apart = (0..axes.len()).all(|i| (1..=3).contains(&axes[i]) && !axes[..i].contains(&axes[i]));
@@ -167,7 +169,7 @@ fn outputs_of(name: &str, channels: usize, directions: &Directions) -> Vec<Strin
 /// A matrix, and the directions of its outputs and inputs.
 type Whole = (Frf, Vec<i64>, Vec<i64>);
 
-/// All pairs in one matrix; what was not measured is not a number.
+/// All pairs in one matrix; unmeasured elements are NaN.
 fn matrix(pairs: &[Pair], quantity: MotionQuantity) -> Result<Whole, CliError> {
     let (mut outputs, mut inputs) = (Vec::<String>::new(), Vec::<String>::new());
     let (mut along, mut push) = (Vec::new(), Vec::new());

@@ -1,4 +1,4 @@
-//! Whether the hits of a set agree: coherence, and what is suspected where one differs from the others.
+//! Agreement of a set's hits: coherence, and the probable cause if one hit differs from the others.
 
 use serde_json::{Value, json};
 
@@ -7,10 +7,10 @@ use crate::spectra::{
 };
 use crate::substructuring::Band;
 
-/// Below this median coherence the hits of a response are compared one by one.
+/// Median coherence below which the hits of a response are compared individually.
 const LOW: f64 = 0.95;
 
-/// From this on, another order of the file's axes is believed.
+/// Median coherence above which a different order of the file's axes is assumed.
 const HIGH: f64 = 0.98;
 
 /// Coherence of one response over the excited lines.
@@ -21,19 +21,20 @@ struct Coherence {
     lowest_hz: f64,
 }
 
-/// What is known of a set's agreement.
+/// Agreement of a set's hits.
 pub(super) struct Agreement {
-    /// Of each response; none with a single hit, or without lines.
+    /// Coherence of each response; `None` with a single hit, or without lines.
     coherence: Vec<Option<Coherence>>,
-    /// What may be wrong, in sentences.
+    /// Probable causes of disagreement, as sentences.
     pub(super) suspicions: Vec<String>,
 }
 
 impl Agreement {
-    /// Of the hits that are `used`, of which `found` are the spectra; the responses have these names.
+    /// Evaluates the hits that are `used`, whose spectra are `found`; `names` are those of the
+    /// responses.
     ///
     /// # Errors
-    /// As of [`estimate`].
+    /// As for [`estimate`].
     pub(super) fn of(
         records: &ImpactRecords,
         used: &[bool],
@@ -93,14 +94,15 @@ impl Agreement {
         lines
     }
 
-    /// The response with the lowest median: its index, its median, its lowest value and where that is, Hz.
+    /// The response with the lowest median: its index, its median, its lowest value and the
+    /// frequency of that, Hz.
     pub(super) fn worst(&self) -> Option<(usize, f64, f64, f64)> {
         (self.coherence.iter().enumerate())
             .filter_map(|(o, c)| c.map(|c| (o, c.median, c.lowest, c.lowest_hz)))
             .min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// Of each response, as in the document.
+    /// Coherence of each response, for the JSON document.
     pub(super) fn document(&self) -> Value {
         let of = |coherence: &Option<Coherence>| {
             coherence.map(|c| json!({ "median": c.median, "lowest": c.lowest, "lowest_hz": c.lowest_hz }))
@@ -126,7 +128,8 @@ fn coherence(y: &CrossSpectra) -> Vec<Option<Coherence>> {
         .collect()
 }
 
-/// Whether the file may have its hits and channels in the other order: as many of each, and then they agree.
+/// Whether the file may have its hits and channels in the wrong order: there are equally many of
+/// each, and exchanging them gives high coherence.
 fn turned_axes_agree(records: &ImpactRecords, settings: &FrfSettings, excited: Option<Band>) -> bool {
     let hits = records.response.len();
     if hits < 2 || records.response.iter().any(|responses| responses.len() != hits) {
@@ -141,7 +144,8 @@ fn turned_axes_agree(records: &ImpactRecords, settings: &FrfSettings, excited: O
     coherence(&found).iter().all(|coherence| coherence.is_some_and(|coherence| coherence.median > HIGH))
 }
 
-/// What is said of a hit that differs from the others; `hits` are the indices of those that were compared.
+/// The message about a hit that differs from the others; `hits` are the indices of the hits
+/// compared.
 fn sentence(odd: &OddHit, hits: &[usize], names: &[String]) -> String {
     let hit = hits.get(odd.hit).copied().unwrap_or(odd.hit);
     let others = match hits {
@@ -212,7 +216,8 @@ mod tests {
         let force: Vec<f64> = (0..2048)
             .map(|i| if (40..48).contains(&i) { (f64::from(i - 39) * 0.35).sin() } else { 0.0 })
             .collect();
-        // (channel, hit, sample), of three channels that see different parts of the same motion
+        // (channel, hit, sample), with three channels that measure different fractions of the same
+        // motion
         let records = ImpactRecords {
             fs_hz: 4096.0,
             force_n: vec![force; 3],
@@ -227,7 +232,7 @@ mod tests {
         // (Σ p)² / (3 Σ p²) of 1, 0.5, 0.2
         assert!(lines.contains("coherence of a: median 0.747"), "{lines}");
         assert!(lines.contains("(channel, hit, sample)"), "{lines}");
-        // in order, all is well
+        // in the right order the coherence is high
         let in_order = vec![[1.0, 0.5, 0.2].map(ring).to_vec(); 3];
         let records = ImpactRecords { response: in_order, ..records };
         let found = estimate(&records, &[true; 3], &settings).expect("three hits");

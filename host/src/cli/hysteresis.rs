@@ -1,4 +1,4 @@
-//! `hysteresis`: the loops of any time record.
+//! `hysteresis`: computes the loops of any time record.
 
 use std::path::PathBuf;
 
@@ -13,10 +13,11 @@ use crate::hysteresis::{Correction, HysteresisRecord, analyse};
 use crate::report::{document, words};
 use crate::results::{BESIDE_THE_CONTACT, Hysteresis, RECORD, Source};
 
-/// Loops of a time record measured anywhere: stiffness, energy, shape, friction.
+/// Compute the loops of any time record: stiffness, energy, shape, friction.
 ///
-/// RECORD.npz holds `fs` (Hz), `velocity_a` and `velocity_b` (m/s) or `displacement_a` and `displacement_b` (m), `force` (N) or
-/// `load_cells` (cell, sample), and where known `excitation` (Hz; an impact has none) and `normal_load` (N).
+/// RECORD.npz contains `fs` (Hz), `velocity_a` and `velocity_b` (m/s) or `displacement_a` and
+/// `displacement_b` (m), `force` (N) or `load_cells` (cell, sample), and if known `excitation` (Hz;
+/// none for an impact) and `normal_load` (N).
 #[derive(Debug, Args)]
 pub struct Loops {
     /// The record.
@@ -25,13 +26,14 @@ pub struct Loops {
     /// Print results.json on stdout instead of the figures, findings and warnings as text.
     #[arg(long)]
     json: bool,
-    /// Normal load, N, for the friction coefficient; that of the record without it.
+    /// Normal load, N, for the friction coefficient [default: that of the record].
     #[arg(long, value_name = "N", value_parser = positive)]
     normal_load: Option<f64>,
-    /// Effective mass of the static arm at the contact, kg: with it, loops of the corrected force stand beside the raw ones.
+    /// Effective mass of the static arm at the contact, kg; if given, loops of the corrected force
+    /// are shown in addition to the raw ones.
     #[arg(long, value_name = "KG", value_parser = not_negative)]
     effective_mass: Option<f64>,
-    /// Stiffness to ground beside the load cells, over theirs (a lower push rod).
+    /// Stiffness to ground in parallel with the load cells, relative to theirs (a lower push rod).
     #[arg(long, value_name = "RATIO", value_parser = not_negative)]
     parallel_path: Option<f64>,
 }
@@ -56,7 +58,7 @@ impl Loops {
         let mut results =
             document(Findings { source: self.source(&record), record: Some(loops), ..Findings::default() });
         if is_beside_the_contact(&self.record).map_err(|error| CliError::Bad(error.to_string()))? {
-            // its slope is that of whatever lies between the spots
+            // the loop's slope is the stiffness of everything between the measurement spots
             results.hysteresis = results.hysteresis.into_iter().map(Hysteresis::between_spots).collect();
             results.source.settings.insert(BESIDE_THE_CONTACT.into(), "beside the contact".into());
         }

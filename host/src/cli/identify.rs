@@ -17,10 +17,11 @@ use crate::substructuring::averaged::Priors;
 use crate::substructuring::fit;
 use crate::substructuring::{Band, Configuration, Frf};
 
-/// Identify a joint from FRFs of A, B and the assembly, measured anywhere.
+/// Identify a joint from any FRFs of A, B and the assembly.
 ///
-/// The first line is the number; what could not be applied to these files comes after. Exits with 1 and the reasons when nothing was
-/// identified, or when a method or a set of modes that was named gave nothing.
+/// The first line is the result; messages about parts of the files that could not be used follow.
+/// Exits with 1 and the reasons if nothing was identified, or if a method or set of modes that was
+/// named gave no result.
 #[derive(Debug, Args)]
 pub struct Identify {
     /// FRFs of substructure A alone: .npz, or a universal file (58 or 58b; .uff, .unv).
@@ -32,38 +33,45 @@ pub struct Identify {
     /// FRFs of the assembly.
     #[arg(long, value_name = "FILE")]
     ajb: PathBuf,
-    /// Where sensors and impacts are: the pyFBS workbook (.xlsx), a folder of its tables as .csv, or .toml.
+    /// Positions of sensors and impacts: the pyFBS workbook (.xlsx), a folder of its tables as
+    /// .csv, or .toml.
     #[arg(long, value_name = "FILE")]
     geometry: PathBuf,
-    /// Decoupling methods, by name [default: all that work line by line]; `fit`, which takes a few seconds for each band, where asked for.
+    /// Decoupling methods, by name [default: all that work line by line]; `fit`, which takes a few
+    /// seconds for each band, runs only if named.
     #[arg(long = "method", value_name = "METHOD", value_delimiter = ',')]
     methods: Vec<Asked>,
-    /// For `fit`: K and C full and symmetric instead of diagonal.
+    /// For `fit`: full symmetric K and C instead of diagonal ones.
     #[arg(long)]
     full_joint: bool,
-    /// For `fit` of files without `variance`: noise of each value's real and of its imaginary part, as a fraction of the file's rms at the line.
+    /// For `fit` of files without `variance`: noise of each value's real and imaginary part, as a
+    /// fraction of the file's rms at the line.
     #[arg(long, value_name = "FRACTION", value_parser = not_negative)]
     noise: Option<f64>,
-    /// Interface deformation modes of each virtual point: 2, 4 or 6 (several with commas), or one set by the names of its modes, for
-    /// example x,z,ry; x…rz are rigid, ex…bzy flexible as in pyFBS. Repeats [default: 2,4,6].
+    /// Interface deformation modes of each virtual point: 2, 4 or 6 (several with commas), or one
+    /// set by the names of its modes, for example x,z,ry; x…rz are rigid, ex…bzy flexible as in
+    /// pyFBS. May be repeated [default: 2,4,6].
     #[arg(long, value_name = "N|MODES")]
     idms: Vec<IdmSets>,
-    /// Bands in Hz, ends included [default: 300:600, 100:800 and 100:300, as far as the files reach].
+    /// Bands in Hz, ends included [default: 300:600, 100:800 and 100:300, limited to the files'
+    /// range].
     #[arg(long = "band", value_name = "LO:HI", value_delimiter = ',', value_parser = band)]
     bands: Vec<Band>,
-    /// How far a sensor or impact may be from where the geometry has it, m (standard deviation along each axis).
+    /// Position error of sensors and impacts relative to the geometry, m (standard deviation along
+    /// each axis).
     #[arg(long, value_name = "M", default_value_t = Priors::default().position_m, value_parser = not_negative)]
     position_error: f64,
-    /// What each new aim at a cell adds to that, m.
+    /// Additional position error of each new aim at a cell, m.
     #[arg(long, value_name = "M", default_value_t = Priors::default().aim_m, value_parser = not_negative)]
     aim_error: f64,
-    /// The hammer's tilt, rad.
+    /// The hammer's tilt error, rad.
     #[arg(long, value_name = "RAD", default_value_t = Priors::default().hammer_angle_rad, value_parser = not_negative)]
     angle_error: f64,
-    /// For `fit`: how much A and B alone may differ from A and B in the assembly (standard deviation), as a fraction of their admittance.
+    /// For `fit`: difference of A and B alone from A and B in the assembly (standard deviation), as
+    /// a fraction of their admittance.
     #[arg(long, value_name = "FRACTION", default_value_t = fit::Options::default().mounting, value_parser = not_negative)]
     mounting_error: f64,
-    /// Units that count instead of those of the files' labels: response=mm/s,force=lbf,frequency=rad/s.
+    /// Units that override those of the files' labels: response=mm/s,force=lbf,frequency=rad/s.
     #[arg(long, value_name = "UNITS", default_value = "")]
     units: StatedUnits,
     /// Folder for results.json and report.html.
@@ -133,8 +141,8 @@ fn bad(error: impl std::fmt::Display) -> CliError {
     CliError::Bad(error.to_string())
 }
 
-/// FRFs from an npz or a universal file along the directions of the geometry's points; what was taken, left
-/// out or turned is said.
+/// Reads FRFs from an npz or a universal file, along the directions of the geometry's points;
+/// prints what was used, left out or reversed.
 fn read(path: &Path, points: &Configuration, units: &StatedUnits) -> Result<Frf, CliError> {
     let read = read_frf_file(path, units).map_err(bad)?;
     let (taken, notes) = (read.taken.clone(), read.notes.clone());

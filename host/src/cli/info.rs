@@ -1,4 +1,4 @@
-//! `info`: who a device is and how it is.
+//! `info`: shows a device's identity and state.
 
 use std::path::PathBuf;
 
@@ -18,17 +18,17 @@ use crate::device::session::Session;
 /// This program's version.
 const HOST_VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// Whether firmware and program are of one release.
+/// Whether firmware and program are of the same release.
 fn fits(firmware: &str) -> bool {
     firmware == HOST_VERSION
 }
 
-/// The channel that a supply feeds.
+/// Name of the channel that a supply feeds.
 fn name_of(supply: Supply, map: &ChannelMap) -> &str {
     map.channels.get(usize::from(supply.channel)).map_or("?", |channel| channel.name.as_str())
 }
 
-/// The supplies for a program.
+/// The supplies, as JSON.
 fn supplies(slow: &Slow, map: &ChannelMap) -> Vec<serde_json::Value> {
     let one = |supply: &Supply| {
         let fault = supply.fault().map(|fault| format!("{fault:?}").to_lowercase());
@@ -37,7 +37,7 @@ fn supplies(slow: &Slow, map: &ChannelMap) -> Vec<serde_json::Value> {
     slow.supplies.iter().map(one).collect()
 }
 
-/// Clock and edges for a program.
+/// Clock and edges, as JSON.
 fn sync_value(sync: &Sync) -> serde_json::Value {
     let (clock, rate_hz) = match sync.clock {
         Clock::Internal => ("internal", None),
@@ -54,7 +54,7 @@ fn sync_value(sync: &Sync) -> serde_json::Value {
     })
 }
 
-/// Clock and edges for a person.
+/// Clock and edges, as text.
 fn sync_line(sync: &Sync) -> String {
     let clock = match (sync.clock, sync.fault) {
         (Clock::Internal, _) => "its own".into(),
@@ -73,10 +73,11 @@ pub struct Info {
     /// Device address, e.g. sim:, usb:, serial:/dev/ttyACM0, tcp:127.0.0.1:4000.
     #[arg(long, value_name = "ADDR")]
     device: String,
-    /// Folder of the tables by which the controller's log lines are read (else JOINTRIG_LOG_TABLES).
+    /// Folder with the tables that decode the controller's log lines [default: that of the
+    /// environment variable JOINTRIG_LOG_TABLES].
     #[arg(long, value_name = "DIR")]
     log_tables: Option<PathBuf>,
-    /// One JSON document on stdout.
+    /// Print one JSON document on stdout.
     #[arg(long)]
     json: bool,
 }

@@ -1,22 +1,22 @@
-//! Ctrl-C: the first one ends the work after the shot in hand, the second one ends the program.
+//! Ctrl-C: the first one ends the work after the current shot, the second one ends the program.
 
 use crate::outside::tell_line;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A flag that Ctrl-C (or a polite kill) sets.
+/// Returns a flag that Ctrl-C (or a termination signal) sets.
 pub fn flag() -> Arc<AtomicBool> {
     let stop = Arc::default();
     catch(&stop);
     stop
 }
 
-/// Has Ctrl-C (or a polite kill) set this flag.
+/// Makes Ctrl-C (or a termination signal) set this flag.
 pub fn catch(stop: &Arc<AtomicBool>) {
     let raised = stop.clone();
     let set = ctrlc::set_handler(move || {
         if raised.swap(true, Ordering::Relaxed) {
-            // everything accepted is in the file already
+            // everything accepted is already in the file
             std::process::exit(1);
         }
         tell_line!("\nstopping after the shot in hand; Ctrl-C again ends at once");

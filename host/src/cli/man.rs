@@ -1,4 +1,4 @@
-//! `man`: the manual page, and one for each command.
+//! `man`: prints the manual page, or writes one for each command.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use super::error::CliError;
 /// Print the manual page, or write it and one for each command into a folder.
 #[derive(Debug, Args)]
 pub struct Man {
-    /// Folder for jointrig.1, jointrig-analyse.1 and so on; made when it is not there.
+    /// Folder for jointrig.1, jointrig-analyse.1 and so on; created if it does not exist.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -22,7 +22,7 @@ impl Man {
             let mut text = Vec::new();
             let rendered = clap_mangen::Man::new(command).render(&mut text);
             rendered.map_err(|error| CliError::Bad(format!("the manual page: {error}")))?;
-            // a pager that is closed has what it wants
+            // a closed pipe is no error: the pager has read enough
             drop(std::io::stdout().write_all(&text));
             return Ok(());
         };

@@ -1,4 +1,4 @@
-//! Running a campaign from the command line: `campaign run` and `demo` share it.
+//! Runs a campaign from the command line: shared by `campaign run` and `demo`.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -17,16 +17,16 @@ use crate::device::logs::Tables;
 use crate::device::session::Session;
 use crate::outside::tell_line;
 
-/// What measures.
+/// The measuring device.
 pub struct Device<'a> {
     pub address: &'a Address,
     /// Seed of a simulated rig.
     pub seed: u64,
-    /// Folder of the tables of log strings, where one is named.
+    /// Folder of the log string tables, if given.
     pub log_tables: Option<PathBuf>,
 }
 
-/// Who stands at the rig.
+/// Interaction with the person at the rig.
 pub struct Who {
     /// Who moves hammer and laser.
     pub stage: Stage,
@@ -34,11 +34,11 @@ pub struct Who {
     pub yes: bool,
     /// Whether another structure than that of the file's records is accepted.
     pub new_structure: bool,
-    /// Set to end after the shot in hand.
+    /// Set to end after the current shot.
     pub stop: Arc<AtomicBool>,
 }
 
-/// Runs what is left of the campaign in `store`. `again` is the command that resumes it.
+/// Measures what is missing in the campaign in `store`. `again` is the command that resumes it.
 pub fn measure(
     store: Store,
     device: Device<'_>,
@@ -62,7 +62,7 @@ pub fn measure(
     Ok(summary)
 }
 
-/// How large the file is, and what compression made of its samples.
+/// Prints the file's size, and the compression ratio of its samples.
 fn tell_size(path: &Path) -> Result<(), CliError> {
     let (stored, raw) = Store::open_read_only(path)?.sample_bytes()?;
     let whole = std::fs::metadata(path).map_or(0, |file| file.len());

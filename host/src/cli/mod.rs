@@ -1,7 +1,7 @@
-//! The command line: one file per subcommand; the contract is in each one's documentation.
+//! The command line: one file per subcommand, whose documentation is its contract.
 //!
-//! `--json` prints exactly one document to stdout and nothing else goes there; progress, prompts and messages go
-//! to stderr. An error is one to a few lines: what, where, what to do.
+//! `--json` prints exactly one document to stdout and nothing else; progress, prompts and messages
+//! go to stderr. An error is one to a few lines: what failed, where, what to do.
 
 mod analyse;
 #[cfg(feature = "dashboard")]
@@ -48,7 +48,7 @@ use crate::outside::visible;
 #[derive(Debug, Parser)]
 #[command(name = "jointrig", version, about, propagate_version = true)]
 pub struct Cli {
-    /// Say more (-v: info, -vv: debug, -vvv: trace); JOINTRIG_LOG does the same, finer.
+    /// Print more messages (-v: info, -vv: debug, -vvv: trace); JOINTRIG_LOG gives finer control.
     #[arg(short, long, global = true, action = ArgAction::Count)]
     verbose: u8,
     #[command(subcommand)]
@@ -57,21 +57,21 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// The whole job on the built-in simulator: campaign, analysis, report.
+    /// The complete workflow on the built-in simulator: campaign, analysis, report.
     Demo(demo::Demo),
-    /// List what is attached.
+    /// List connected devices.
     Devices(devices::Devices),
     /// Show a device: handshake, channels, firmware version, counters.
     Info(info::Info),
     /// Impact campaigns.
     Campaign(campaign::Campaign),
-    /// Plans: write one to begin with, and see what is wrong with it.
+    /// Plans: write a template, and check a plan.
     Plan(plan::Plan),
     /// Measure levels of the shaker into a campaign file.
     Shaker(shaker::Shaker),
     /// Analyse a campaign file: results.json and report.html.
     Analyse(analyse::Analyse),
-    /// Make the report of a campaign file, and its figures as files.
+    /// Write the report of a campaign file, and its figures as files.
     Report(report::Report),
     /// Show a campaign in the browser.
     #[cfg(feature = "dashboard")]
@@ -82,15 +82,15 @@ enum Command {
     AnalyseForPage(analyse_for_page::AnalyseForPage),
     /// Compare two campaigns.
     Compare(compare::Compare),
-    /// Write everything that a campaign file holds for other programs.
+    /// Write everything that a campaign file contains in formats for other programs.
     Export(export::Export),
-    /// FRFs of impact records from anywhere.
+    /// Compute FRFs from any impact records.
     Frf(frf::Frf),
-    /// Loops of a time record from anywhere.
+    /// Compute the hysteresis loops of any time record.
     Hysteresis(hysteresis::Loops),
-    /// Bring FRFs or impact records from elsewhere into jointrig's own files.
+    /// Import FRFs or impact records measured with other systems.
     Import(import::Import),
-    /// Identify a joint from FRFs measured anywhere.
+    /// Identify a joint from any FRFs.
     Identify(identify::Identify),
     /// Print completions for a shell.
     Completions(completions::Completions),
@@ -98,7 +98,7 @@ enum Command {
     Man(man::Man),
 }
 
-/// Reads the command line, does what it says, and returns the exit code.
+/// Parses the command line, runs the command, and returns the exit code.
 pub fn main() -> ExitCode {
     // clap prints help and usage errors itself, and exits with 0 and 2
     let cli = Cli::parse();
@@ -114,7 +114,7 @@ pub fn main() -> ExitCode {
 }
 
 impl Cli {
-    /// Does what the command line says.
+    /// Runs the command.
     pub(crate) fn run(self) -> Result<(), error::CliError> {
         match self.command {
             Command::Demo(command) => command.run(),
@@ -156,7 +156,8 @@ fn start_log(verbose: u8) {
     if verbose > 0 {
         builder.parse_filters(level);
     }
-    // what a device logs is told too; a stderr that is closed is env_logger's own business, and ends nothing
+    // device log messages are made printable; env_logger handles a closed stderr without ending the
+    // program
     builder.format(|to, record| {
         let time = to.timestamp_seconds();
         let (level, from) = (record.level(), record.target());

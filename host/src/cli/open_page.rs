@@ -1,7 +1,8 @@
-//! `--open`: the live page in the browser of whoever sits at this machine.
+//! `--open`: opens the live page in the browser on this machine.
 //!
-//! A program's arguments are for every user of the machine to read, and the address holds a secret. So the browser is given the name of a file
-//! that its owner alone can read; that file leads on to the address, and goes when the page does.
+//! A program's arguments are readable by every user of the machine, and the address contains a
+//! secret. Therefore the browser is given the name of a file that only its owner can read; that
+//! file redirects to the address, and is removed with the page.
 
 use crate::outside::tell_line;
 use std::fs::{File, OpenOptions};
@@ -9,13 +10,14 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// The file that leads on, as long as the page is served.
+/// The redirecting file, which exists as long as the page is served.
 pub struct Opened {
     file: PathBuf,
 }
 
 impl Opened {
-    /// Has the browser open `url`. A machine without one is told so; the page is served all the same.
+    /// Opens `url` in the browser. If that fails, a message is printed, and the page is served
+    /// anyway.
     pub fn new(url: &str) -> Option<Self> {
         match Self::try_new(url) {
             Ok(opened) => Some(opened),
@@ -30,11 +32,12 @@ impl Opened {
         let mut random = [0; 8];
         getrandom::fill(&mut random).map_err(io::Error::other)?;
         let name = format!("jointrig-page-{:016x}.html", u64::from_le_bytes(random));
-        // that of this session is cleared when it ends; a browser in a box of its own may see neither
+        // the session's folder is cleared when the session ends; a sandboxed browser may see
+        // neither folder
         let folder = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from).filter(|folder| folder.is_dir());
         let opened = Self { file: folder.unwrap_or_else(std::env::temp_dir).join(name) };
         let mut file = private(&opened.file)?;
-        // an address of ours: digits, letters and `:/#=.`
+        // our own address contains only digits, letters and `:/#=.`, so no escaping is needed
         write!(
             file,
             "<!doctype html><meta charset=\"utf-8\"><meta name=\"referrer\" content=\"no-referrer\">\
@@ -54,7 +57,7 @@ impl Drop for Opened {
     }
 }
 
-/// A new file that nobody else can read.
+/// Creates a new file that only its owner can read.
 fn private(path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);
@@ -63,7 +66,7 @@ fn private(path: &Path) -> io::Result<File> {
     options.open(path)
 }
 
-/// What opens a file as its user would.
+/// The system's command for opening a file.
 fn opener(file: &Path) -> Command {
     let mut command = if cfg!(windows) {
         let mut command = Command::new("explorer");

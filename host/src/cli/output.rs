@@ -1,4 +1,4 @@
-//! Printing: one JSON document, or lines for people, on stdout; a closed pipe is no error.
+//! Printing on stdout: one JSON document, or lines of text; a closed pipe is no error.
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
@@ -9,14 +9,14 @@ use serde::Serialize;
 use super::error::CliError;
 use crate::outside::{printed_json, visible};
 
-/// Prints one JSON document and nothing else.
+/// Prints one JSON document.
 pub fn json<T: Serialize>(value: &T) -> Result<(), CliError> {
     let text = serde_json::to_string_pretty(value)
         .map_err(|error| CliError::Bad(format!("the answer could not be written as JSON: {error}")))?;
     print([printed_json(&text)])
 }
 
-/// Prints lines, with whatever names they hold.
+/// Prints lines, with the names in them made printable.
 pub fn lines(lines: impl IntoIterator<Item = String>) -> Result<(), CliError> {
     print(lines.into_iter().map(|line| visible(&line).into_owned()))
 }

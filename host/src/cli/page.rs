@@ -1,4 +1,4 @@
-//! `--serve`: the live page beside a command that measures.
+//! `--serve`: a live page for a command that measures.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -18,10 +18,11 @@ use crate::device::tap::Tap;
 #[cfg(feature = "dashboard")]
 use crate::outside::tell_line;
 
-/// Whether a page shows what is measured.
+/// Options for the live page.
 #[derive(Clone, Copy, Debug, Default, Args)]
 pub struct Page {
-    /// Show a live page on this port of 127.0.0.1 meanwhile [default port: a free one].
+    /// Show a live page on this port of 127.0.0.1 during the measurement [default port: a free
+    /// one].
     #[cfg(feature = "dashboard")]
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0")]
     pub serve: Option<u16>,
@@ -31,27 +32,28 @@ pub struct Page {
     pub open: bool,
 }
 
-/// Who looks on while a command measures. Without a page nobody does.
+/// The live page's connections to a command that measures. Empty without a page.
 #[derive(Default)]
 pub struct Onlooker {
-    /// What it is told of the campaign.
+    /// Receives the events of the campaign.
     pub watch: Watchers,
-    /// Its look at the stream.
+    /// Receives the stream.
     pub tap: Option<Tap>,
-    /// What it wants changed in the file.
+    /// Edits of the file that it requests.
     pub edits: Option<Edits>,
-    /// What it answers for hammer and laser.
+    /// Its answers to prompts for hammer and laser.
     pub answers: Option<Answers>,
     #[cfg(feature = "dashboard")]
     _page: Option<(Dashboard, Option<Opened>)>,
 }
 
 impl Page {
-    /// Serves the page of this file (or of a device's channels alone) as long as the value lives, if it was asked for. `stop` is set by a page that
-    /// wants to end after the shot in hand; `control` says whether a page may answer for hammer and laser.
+    /// If requested, serves the page of this file (or of a device's channels alone) as long as the
+    /// returned value exists. `stop` is set by a page that ends the run after the current shot;
+    /// `control` states whether a page may answer the prompts for hammer and laser.
     ///
     /// # Errors
-    /// The port cannot be had: nothing is measured then.
+    /// The port is not available: nothing is measured then.
     #[cfg(feature = "dashboard")]
     pub fn start(
         self,
@@ -76,7 +78,7 @@ impl Page {
         })
     }
 
-    /// Nobody looks on: this build has no page.
+    /// No live page: this build does not contain it.
     #[cfg(not(feature = "dashboard"))]
     #[allow(clippy::unnecessary_wraps, clippy::unused_self, reason = "with a page it may fail")]
     pub fn start(

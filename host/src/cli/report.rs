@@ -1,4 +1,4 @@
-//! `report`: every figure and table of a campaign file.
+//! `report`: writes every figure and table of a campaign file.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,8 @@ use crate::analyse::Wanted;
 use crate::campaign::store::Store;
 use crate::report::Format;
 
-/// Make the report of a campaign file: results.json, report.html, and each figure as a file of its own.
+/// Write the report of a campaign file: results.json, report.html, and optionally each figure as a
+/// separate file.
 #[derive(Debug, Args)]
 pub struct Report {
     /// The campaign file.
@@ -19,7 +20,7 @@ pub struct Report {
     /// Folder for results.json, report.html and figures/.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Write each figure as figures/NAME too, in these formats.
+    /// Also write each figure as figures/NAME, in these formats.
     #[arg(long, value_name = "FORMAT", value_delimiter = ',')]
     figures: Vec<Format>,
 }

@@ -1,4 +1,5 @@
-//! `serve`: the live page of a campaign file, of a device's channels, or of both while it measures.
+//! `serve`: the live page of a campaign file, of a device's channels, or of both during a
+//! measurement.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -19,11 +20,12 @@ use crate::device::logs::Tables;
 use crate::device::session::Session;
 use crate::outside::tell_line;
 
-/// Between two words on the link.
+/// Interval between updates of the link's accounting.
 const LINK: Duration = Duration::from_secs(1);
 
-/// Show a campaign in the browser: while another process measures it, or afterwards. With --device too: measure it, as `campaign run` does.
-/// With --device alone: its channels, and nothing is struck.
+/// Show a campaign in the browser: while another process measures it, or afterwards. With FILE and
+/// --device: measure it, as `campaign run` does. With --device alone: show its channels; nothing is
+/// struck.
 #[derive(Debug, Args)]
 pub struct Serve {
     /// The campaign file.
@@ -32,13 +34,14 @@ pub struct Serve {
     /// Device address, e.g. sim:, usb:, serial:/dev/ttyACM0, tcp:127.0.0.1:4000.
     #[arg(long, value_name = "ADDR")]
     device: Option<String>,
-    /// Port on 127.0.0.1; 0 takes a free one.
+    /// Port on 127.0.0.1; 0 chooses a free one.
     #[arg(long, value_name = "N", default_value_t = 0)]
     port: u16,
     /// Open the page in the browser.
     #[arg(long)]
     open: bool,
-    /// While it measures: let a page answer for hammer and laser too. Whoever answers must see the rig.
+    /// During a measurement: let a page answer the prompts for hammer and laser. The person who
+    /// answers must see the rig.
     #[arg(long, requires = "device", requires = "file")]
     allow_control: bool,
 }
@@ -55,7 +58,7 @@ impl Serve {
     }
 }
 
-/// A file alone.
+/// Shows a file, without a device.
 fn show(file: &Path, page: Page) -> Result<(), CliError> {
     let stop = interrupt::flag();
     let dashboard = Dashboard::of_file(file, page.serve.unwrap_or(0))?;
@@ -70,7 +73,7 @@ fn show(file: &Path, page: Page) -> Result<(), CliError> {
     Ok(())
 }
 
-/// A device alone: its stream is started and looked at.
+/// Shows a device, without a file: its stream is started and displayed.
 fn show_channels(device: &str, page: Page) -> Result<(), CliError> {
     let address: Address = device.parse()?;
     let stop = interrupt::flag();
@@ -90,7 +93,7 @@ fn show_channels(device: &str, page: Page) -> Result<(), CliError> {
         let expected = session.expected()?;
         session.forget_before(expected);
         if session.simulated().is_some() {
-            // a simulated rig's time would run as fast as the machine can
+            // otherwise a simulated rig's time would run as fast as the machine allows
             let now = first + (begun.elapsed().as_secs_f64() * f64::from(channels.rate_hz)) as u64;
             session.hold_acknowledgement(Some(now.saturating_sub(session.ring_scans() / 2).max(first)));
         }

@@ -1,4 +1,4 @@
-//! `shaker`: closed-loop sine levels, stored in the campaign file.
+//! `shaker`: measures closed-loop sine levels and stores them in the campaign file.
 
 use std::io::{BufRead, Write};
 use std::path::PathBuf;
@@ -24,10 +24,11 @@ use crate::outside::{tell, tell_line};
 use crate::report::words;
 use crate::report::words::number::{decimals, micro};
 
-/// Measure levels of the shaker: each is brought to its amplitude, recorded in steady state and stored.
+/// Measure levels of the shaker: each is controlled to its amplitude, recorded in steady state and
+/// stored.
 ///
-/// Without --freq and --amplitude: the plan's levels. Levels that the file holds already are skipped, so that the same command
-/// resumes. The structure on the table must be the assembly.
+/// Without --freq and --amplitude: the plan's levels. Levels that are already in the file are
+/// skipped, so the same command resumes. The structure on the table must be the assembly.
 #[derive(Debug, Args)]
 pub struct Shaker {
     /// The campaign file.
@@ -36,46 +37,51 @@ pub struct Shaker {
     /// Device address, e.g. sim:, usb:, serial:/dev/ttyACM0, tcp:127.0.0.1:4000.
     #[arg(long, value_name = "ADDR")]
     device: String,
-    /// Frequencies, Hz; those of the plan without it.
+    /// Frequencies, Hz [default: those of the plan].
     #[arg(long = "freq", value_name = "HZ", num_args = 1.., value_delimiter = ',', value_parser = positive)]
     frequencies: Vec<f64>,
-    /// Amplitudes of what is held: m, N or V; those of the plan (relative displacement) without it.
+    /// Amplitudes of the controlled quantity: m, N or V [default: those of the plan (relative
+    /// displacement)].
     #[arg(long = "amplitude", value_name = "M", num_args = 1.., value_delimiter = ',', value_parser = positive)]
     amplitudes: Vec<f64>,
-    /// What is held: displacement (of specimen A against B), force (of the excitation) or drive (open loop).
+    /// Controlled quantity: displacement (of specimen A relative to B), force (of the excitation)
+    /// or drive (open loop).
     #[arg(long, value_name = "WHAT", default_value = "displacement")]
     control: Held,
     /// Sweep from LO to HI Hz in place of single frequencies.
     #[arg(long, value_name = "LO:HI", conflicts_with = "frequencies", value_parser = range, requires = "amplitudes")]
     sweep: Option<[f64; 2]>,
-    /// How fast a sweep goes, Hz/s.
+    /// Sweep rate, Hz/s.
     #[arg(long, value_name = "HZ_PER_S", default_value_t = 20.0, value_parser = positive)]
     rate: f64,
     /// Before or after the hammer's cells [default: before, as long as no hit is recorded].
     #[arg(long, value_name = "MOMENT")]
     when: Option<Moment>,
-    /// Shortest record in steady state, s; twenty cycles at least.
+    /// Shortest record in steady state, s; at least twenty cycles.
     #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = positive)]
     seconds: f64,
     /// The drive's largest amplitude, V [default: its full scale].
     #[arg(long, value_name = "V", value_parser = positive)]
     max_drive: Option<f64>,
-    /// Magnitude of a channel (SI) that stops the shaker [default: 95 % of full scale for load cells and excitation]; may be given again.
+    /// Magnitude of a channel (SI) that stops the shaker [default: 95 % of full scale for load
+    /// cells and excitation]; may be repeated.
     #[arg(long = "limit", value_name = "CHANNEL=VALUE", value_parser = limit)]
     limits: Vec<(String, f64)>,
     /// Answer every prompt with yes.
     #[arg(long)]
     yes: bool,
-    /// Go on even where the device tells of another structure than that of the file's records; the report says so.
+    /// Continue even if the device indicates another structure than that of the file's records; the
+    /// report notes it.
     #[arg(long)]
     new_structure: bool,
-    /// Print what was measured as one JSON document.
+    /// Print the results as one JSON document.
     #[arg(long)]
     json: bool,
     /// Seed of a simulated rig.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Folder of the tables by which the controller's log lines are read (else JOINTRIG_LOG_TABLES).
+    /// Folder with the tables that decode the controller's log lines [default: that of the
+    /// environment variable JOINTRIG_LOG_TABLES].
     #[arg(long, value_name = "DIR")]
     log_tables: Option<PathBuf>,
     #[command(flatten)]
@@ -200,7 +206,7 @@ impl Shaker {
     }
 }
 
-/// What a person reads of a level, and what a script does.
+/// A level as text for a person, and as JSON for a script.
 fn told(store: &Store, outcome: &Outcome) -> (String, Value) {
     let (row, is_new) = match outcome {
         Outcome::Known(row) => (row, false),
@@ -263,7 +269,7 @@ fn told(store: &Store, outcome: &Outcome) -> (String, Value) {
     (line, value)
 }
 
-/// A first look at the loop, with the raw force; none for a sweep, which has none.
+/// Preview of the loop with the raw force; `None` for a sweep, which has no loop.
 fn look(store: &Store, row: &LevelRow) -> Option<Result<LoopAnalysis, String>> {
     if row.level().end_hz.is_some() {
         return None;
@@ -279,7 +285,7 @@ fn look(store: &Store, row: &LevelRow) -> Option<Result<LoopAnalysis, String>> {
     Some(read())
 }
 
-/// Asks whoever stands at the rig, before anything moves.
+/// Asks the person at the rig for confirmation before anything moves.
 fn prompt(yes: bool, levels: usize) -> Result<(), CliError> {
     tell(&format!(
         "\n{levels} levels of the shaker. On the table: the assembly, under its normal load; the stinger attached, the amplifier on, \
@@ -290,7 +296,7 @@ fn prompt(yes: bool, levels: usize) -> Result<(), CliError> {
         return Ok(());
     }
     tell("Enter when ready; q quit: ");
-    // a closed screen is no reason to stop: without an answer there is an error below
+    // write errors are ignored: without an answer there is an error below
     let _ = std::io::stderr().flush();
     let mut line = String::new();
     match std::io::stdin().lock().read_line(&mut line) {

@@ -1,4 +1,5 @@
-//! For whoever waits: a bar on a terminal, and a line every ten seconds elsewhere, so that a log shows that work goes on.
+//! Progress of a long task: a bar on a terminal, otherwise a line every ten seconds, so that a log
+//! shows that work continues.
 
 use std::io::IsTerminal;
 
@@ -7,16 +8,16 @@ use indicatif::{ProgressBar, ProgressDrawTarget};
 use crate::campaign::run::progress::Pace;
 use crate::outside::tell_line;
 
-/// How far a piece of work is.
+/// Progress of a task.
 pub struct Waiting {
     what: &'static str,
     bar: ProgressBar,
-    /// None on a terminal.
+    /// `None` on a terminal.
     pace: Option<Pace>,
 }
 
 impl Waiting {
-    /// For `what`, such as "analysing".
+    /// Starts the display for `what`, such as "analysing".
     pub fn of(what: &'static str) -> Self {
         if std::io::stderr().is_terminal() {
             let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr());
@@ -26,7 +27,7 @@ impl Waiting {
         }
     }
 
-    /// Tells that `done` of `total` parts are done.
+    /// Reports that `done` of `total` parts are done.
     pub fn at(&self, done: usize, total: usize) {
         self.bar.set_length(total as u64);
         self.bar.set_position(done as u64);

@@ -1,4 +1,5 @@
-//! What a plan's measurements can answer, and what they lack for it: told before anybody strikes a structure for an hour.
+//! Which results a plan's measurements can yield, and what is missing for each; reported before the
+//! measurement starts.
 
 use std::collections::BTreeSet;
 
@@ -7,13 +8,14 @@ use toml::Spanned;
 
 use super::{ConfigurationPlan, Plan, configuration_name, configuration_named, turned};
 
-/// Points that tell how a rigid body moves, and impacts that tell how it answers.
+/// Response points needed to determine a rigid body's motion, and impacts needed to determine its
+/// response.
 const BODY: usize = 3;
-/// A hit whose direction is this much along z is one along z.
+/// An impact counts as along z if the z component of its unit direction exceeds this.
 const ALONG_Z: f64 = 0.9;
 
 impl Plan {
-    /// What the contact's own k_T still needs; empty where nothing is missing.
+    /// What is missing for the contact's own k_T; empty if nothing is.
     pub fn contact_needs(&self) -> Vec<String> {
         let mut needs = Vec::new();
         let struck_b = self.blocks(Configuration::B).filter(|block| self.seen(block, &[2]) >= BODY);
@@ -40,7 +42,7 @@ impl Plan {
         needs
     }
 
-    /// What the stiffness between the arms still needs; empty where nothing is missing.
+    /// What is missing for the stiffness between the arms; empty if nothing is.
     pub fn between_arms_needs(&self) -> Vec<String> {
         let mut needs = Vec::new();
         for (configuration, groupings) in
@@ -74,7 +76,7 @@ impl Plan {
         self.configuration.iter().filter(move |block| configuration_named(block.name.get_ref()) == Some(of))
     }
 
-    /// How many names of these lists in a configuration are wanted.
+    /// Number of distinct names in these lists of a configuration that satisfy `wanted`.
     fn names<'p>(
         &'p self,
         of: Configuration,
@@ -85,12 +87,12 @@ impl Plan {
         names.filter(|name| wanted(name)).collect::<BTreeSet<&str>>().len()
     }
 
-    /// How many responses of a block are of these groupings.
+    /// Number of responses of a block that belong to these groupings.
     fn seen(&self, block: &ConfigurationPlan, groupings: &[u8]) -> usize {
         block.responses.iter().filter(|name| self.response_is(name.get_ref(), groupings)).count()
     }
 
-    /// The impacts of a block that push along z on these groupings.
+    /// The impacts of a block on these groupings that push along z.
     fn hit_along_z<'p>(&self, block: &'p ConfigurationPlan, groupings: &[u8]) -> Vec<&'p str> {
         let along = |name: &str| {
             let mut points = self.geometry.impact.iter().map(Spanned::get_ref);

@@ -6,11 +6,12 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 use toml::Spanned;
 
-/// Most cells of a plan; the paper's campaign has 252, and a cell takes minutes.
+/// Maximum number of cells in a plan; the paper's campaign has 252, and a cell takes minutes.
 pub const MOST_CELLS: usize = 20_000;
 
-/// Where a plan's text begins to make more cells than [`MOST_CELLS`], and what is wrong there: every impact of a configuration makes a cell with
-/// every response, and two long lists are soon more than any memory holds. So this is asked before anything else is.
+/// Position in the text where a plan exceeds [`MOST_CELLS`], and the error message. Every impact of
+/// a configuration forms a cell with every response, so two long lists soon exceed any memory. This
+/// is therefore checked before anything else.
 pub(super) fn too_many(text: &str) -> Option<(usize, String)> {
     #[derive(Deserialize)]
     struct Lists {
@@ -24,7 +25,7 @@ pub(super) fn too_many(text: &str) -> Option<(usize, String)> {
         #[serde(default)]
         responses: Vec<IgnoredAny>,
     }
-    // what else is wrong is said where it is read as a plan
+    // other errors are reported when the text is parsed as a plan
     let lists: Lists = toml::from_str(text).ok()?;
     let mut cells = 0usize;
     lists.configuration.iter().find_map(|list| {
@@ -43,20 +44,21 @@ pub(super) fn too_many(text: &str) -> Option<(usize, String)> {
 /// One impact position with one response location, in one structure.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cell {
-    /// The structure.
+    /// The configuration.
     pub configuration: Configuration,
     /// Name of the impact point.
     pub impact: String,
     /// Name of the response point.
     pub response: String,
-    /// Good hits wanted.
+    /// Number of good hits wanted.
     pub wanted: u32,
 }
 
 impl Plan {
-    /// The cells in the order that moves hammer and laser least: the hammer goes to each impact once, and
-    /// the laser goes through the responses there and back (boustrophedon). What further blocks of a configuration add at an impact
-    /// comes before the last response of its first block, where the next impact begins.
+    /// The cells in the order that moves hammer and laser least: the hammer goes to each impact
+    /// once, and the laser goes through the responses back and forth (boustrophedon). Responses
+    /// that further blocks of a configuration add at an impact come before the last response of its
+    /// first block, because the next impact starts at that last response.
     pub fn cells(&self) -> Vec<Cell> {
         let mut names: Vec<&str> = Vec::new();
         for block in &self.configuration {
@@ -90,7 +92,8 @@ impl Plan {
     }
 }
 
-/// The responses of the blocks that have the impact at this place, in the order in which the laser visits them.
+/// The responses of the blocks that contain the impact with this index, in the order in which the
+/// laser visits them.
 fn there_and_back<'p>(blocks: impl Iterator<Item = &'p ConfigurationPlan>, place: usize) -> Vec<&'p str> {
     let mut of_blocks = blocks.map(|block| {
         let mut names: Vec<&str> = block.responses.iter().map(|name| name.get_ref().as_str()).collect();

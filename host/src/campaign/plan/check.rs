@@ -1,4 +1,4 @@
-//! What a plan must hold beyond its grammar.
+//! Rules that a plan must satisfy beyond its grammar.
 
 use std::collections::HashSet;
 
@@ -10,7 +10,7 @@ use super::faults::Faults;
 use super::geometry::ResponsePoint;
 use super::sensor::check_sensors;
 
-/// No contact is shaken further than this, m: a plan in µm is caught here.
+/// Largest plausible amplitude at the contact, m: catches a plan written in µm.
 const LARGEST_AMPLITUDE_M: f64 = 1e-3;
 
 impl Plan {
@@ -122,7 +122,7 @@ impl Plan {
     fn check_shaker(&self, faults: &mut Faults) {
         let Some(shaker) = &self.shaker else { return };
         let (levels, at) = (shaker.get_ref(), shaker.span().start);
-        // the device refuses more than a tenth of the scan rate
+        // the device refuses frequencies above a tenth of the scan rate
         let highest = f64::from(self.record.get_ref().rate_hz) / f64::from(SHAKE_SCANS_PER_CYCLE);
         let within = |values: &[f64], most: f64| {
             !values.is_empty() && values.iter().all(|value| *value > 0.0 && *value <= most)
@@ -168,7 +168,7 @@ impl Plan {
     }
 
     fn check_geometry(&self, faults: &mut Faults) {
-        // a hammer and a sensor at one point may share its name: nothing takes one for the other
+        // an impact and a sensor at one point may share a name: they are never confused
         let (mut sensors, mut hammers) = (HashSet::new(), HashSet::new());
         let responses = self
             .geometry
@@ -226,7 +226,8 @@ impl Plan {
         }
     }
 
-    /// A sensor that stays has a channel for each axis, and no two sensors have the same one.
+    /// Checks that a fixed sensor has one channel per axis, and that no two sensors share a
+    /// channel.
     fn check_own_channels(&self, faults: &mut Faults) {
         let mut taken = HashSet::new();
         for point in &self.geometry.response {
@@ -274,7 +275,7 @@ impl Plan {
             let known: HashSet<&str> =
                 self.geometry.response.iter().map(|point| &*point.get_ref().name).collect();
             check_names(&structure.responses, &known, "responses", faults);
-            // a name that stands twice in one list is told there
+            // a name that occurs twice in one list is reported there
             let (impacts, responses) = (once(&structure.impacts), once(&structure.responses));
             for impact in &impacts {
                 for response in &responses {
@@ -289,7 +290,7 @@ impl Plan {
     }
 }
 
-/// Each name once.
+/// The distinct names, in their order.
 fn once(names: &[Spanned<String>]) -> Vec<&String> {
     let mut seen = HashSet::new();
     names.iter().map(Spanned::get_ref).filter(|name| seen.insert(*name)).collect()

@@ -1,26 +1,26 @@
-//! Everything that is wrong with a plan, in the order in which it stands there.
+//! All errors of a plan, in the order in which they occur in the text.
 
 use serde::de::DeserializeOwned;
 
 use super::cells::too_many;
 use super::{Plan, PlanError, field};
 
-/// Unknown fields that are told at once, at most: more are another kind of file.
+/// Maximum number of unknown fields reported together: with more, it is another kind of file.
 const MOST_UNKNOWN: usize = 50;
 
-/// What is wrong, and where in the text.
+/// Error messages, each with its position in the text.
 #[derive(Debug, Default)]
 pub(super) struct Faults(Vec<(usize, String)>);
 
 impl Faults {
-    /// Notes that something is wrong, unless it is `good`.
+    /// Records an error unless `good`.
     pub fn unless(&mut self, good: bool, at: usize, what: impl Into<String>) {
         if !good {
             self.0.push((at, what.into()));
         }
     }
 
-    /// By place, as errors of the text called `source_name`.
+    /// Sorted by position, as errors of the text called `source_name`.
     fn told(mut self, text: &str, source_name: &str) -> Vec<PlanError> {
         self.0.sort_by_key(|(at, _)| *at);
         let error = |(at, what): (usize, String)| PlanError {
@@ -34,20 +34,20 @@ impl Faults {
 }
 
 impl Plan {
-    /// Reads a plan that a campaign was made of: what was accepted once is not refused when its file is opened again. `source_name` is what
-    /// errors call it.
+    /// Reads the plan of an existing campaign: a plan that was accepted once is not refused when
+    /// its file is reopened. Errors call the text `source_name`.
     ///
     /// # Errors
-    /// The first thing that is wrong, with line and field.
+    /// The first error, with line and field.
     pub fn parse(text: &str, source_name: &str) -> Result<Self, PlanError> {
         few_cells(text, source_name)?;
         read(text, source_name, Self::check).map(Self::with_usual_names).map_err(first)
     }
 
-    /// Reads a plan for a new campaign: everything must also be such that it can be meant.
+    /// Reads a plan for a new campaign: its values must also be plausible.
     ///
     /// # Errors
-    /// The first thing that is wrong, with line and field, and how much more there is.
+    /// The first error, with line and field, and the number of further ones.
     pub fn parse_new(text: &str, source_name: &str) -> Result<Self, PlanError> {
         Self::parse_all(text, source_name).map_err(first)
     }
@@ -55,7 +55,8 @@ impl Plan {
     /// As [`Plan::parse_new`].
     ///
     /// # Errors
-    /// All that is wrong. A value of the wrong kind, or a field that is missing, hides what a reader would find after it.
+    /// All errors. A value of the wrong type or a missing field prevents the checks that follow
+    /// parsing.
     pub fn parse_all(text: &str, source_name: &str) -> Result<Self, Vec<PlanError>> {
         few_cells(text, source_name).map_err(|error| vec![error])?;
         read(text, source_name, |plan: &Self, faults| {
@@ -74,10 +75,10 @@ fn few_cells(text: &str, source_name: &str) -> Result<(), PlanError> {
     faults.told(text, source_name).pop().map_or(Ok(()), Err)
 }
 
-/// Reads a TOML document and has it checked.
+/// Parses a TOML document and checks it.
 ///
 /// # Errors
-/// All that is wrong.
+/// All errors.
 pub(super) fn read<T: DeserializeOwned>(
     text: &str,
     source_name: &str,
@@ -90,7 +91,8 @@ pub(super) fn read<T: DeserializeOwned>(
             Ok(document) => break Some(document),
             Err(wrong) => {
                 let at = wrong.span().map_or(0, |span| span.start);
-                // a field that is missing beside one that is unknown is the same one, misspelt
+                // a field reported as missing after an unknown one is probably that one misspelt:
+                // report it once
                 let misspelt = wrong.message().starts_with("missing field") && !faults.0.is_empty();
                 faults.unless(misspelt, at, field(text, &wrong));
                 let unknown = wrong.message().starts_with("unknown field");
@@ -109,12 +111,13 @@ pub(super) fn read<T: DeserializeOwned>(
     }
 }
 
-/// Takes the line of a key and its value out, so that what comes after it can be read; whether it is one.
+/// Blanks the line at `at` if it holds one key and its value, so that parsing can continue after
+/// it. Returns whether it did.
 fn blank_line(text: &mut String, at: usize) -> bool {
     let from = text[..at].rfind('\n').map_or(0, |end| end + 1);
     let to = text[at..].find('\n').map_or(text.len(), |length| at + length);
     let line = &text[from..to];
-    // a point's table in one line loses the field, not the point
+    // a point written as an inline table must not be blanked as a whole because of one field
     let alone = line.split_once('=').is_some_and(|(key, _)| !key.contains(['{', '[', '#']));
     if alone {
         let spaces = " ".repeat(line.len());
@@ -123,7 +126,7 @@ fn blank_line(text: &mut String, at: usize) -> bool {
     alone
 }
 
-/// The first of them, which says how many more there are.
+/// The first error, with the number of further ones.
 pub(super) fn first(mut all: Vec<PlanError>) -> PlanError {
     let more = all.len() - 1;
     let mut first = all.swap_remove(0);

@@ -1,19 +1,20 @@
-//! Where impacts, responses and fixed sensors of a plan are.
+//! Positions of the impacts, responses and fixed sensors of a plan.
 
 use serde::Deserialize;
 use toml::Spanned;
 
-/// Where everything is: x lateral, y vertical, z sliding (or as `[structure]` says); origin at the contact centre.
+/// The geometry: x lateral, y vertical, z sliding (unless `[structure]` states otherwise); origin
+/// at the contact centre.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GeometryPlan {
-    /// Both virtual points, m.
+    /// Position of both virtual points, m.
     pub virtual_point_m: [f64; 3],
-    /// Response points, each measured along x, y and z or along axes of its own.
+    /// Response points, each measured along x, y and z or along the axes it lists.
     pub response: Vec<Spanned<ResponsePoint>>,
     /// Impact points.
     pub impact: Vec<Spanned<ImpactPoint>>,
-    /// Sensors that stay where they are.
+    /// Fixed sensors.
     #[serde(default)]
     pub sensor: Vec<Spanned<SensorPoint>>,
 }
@@ -24,22 +25,26 @@ pub struct GeometryPlan {
 pub struct ResponsePoint {
     /// Its name.
     pub name: String,
-    /// 1 interface of A, 2 interface of B, 3 internal of A, 4 internal of B, 5 on specimen A, 6 on specimen B.
+    /// 1 interface of A, 2 interface of B, 3 internal of A, 4 internal of B, 5 on specimen A, 6 on
+    /// specimen B.
     pub grouping: u8,
-    /// Where it is, m.
+    /// Its position, m.
     pub position_m: [f64; 3],
-    /// How well that is known, standard deviation along each axis, m; without it, as `[priors]` says of its kind.
+    /// Standard deviation of the position along each axis, m; if absent, the value in `[priors]`
+    /// for its kind of point applies.
     pub sigma_m: Option<f64>,
-    /// What each channel of the sensor feels, one to three unit vectors; along x, y and z without it. Records hold the channels in this
-    /// order.
+    /// Measurement direction of each channel of the sensor, one to three unit vectors; x, y and z
+    /// if absent. Records hold the channels in this order.
     pub axes: Option<Vec<[f64; 3]>>,
-    /// Names of the device's channels on which a sensor that stays here is, one for each axis: every hit is measured by all such sensors
-    /// at once. Without it, the vibrometer comes here.
+    /// Names of the device's channels, one for each axis, to which a fixed sensor at this point is
+    /// connected: all such sensors measure every hit simultaneously. If absent, the vibrometer is
+    /// aimed at this point.
     pub channels: Option<Vec<String>>,
 }
 
 impl ResponsePoint {
-    /// The channels' names and directions: `A1:x`, `A1:y`, `A1:z`; with axes of its own `A1` where it is one, else `A1:1`, `A1:2`, …
+    /// The channels' names and directions: `A1:x`, `A1:y`, `A1:z`; with listed axes `A1` if there
+    /// is one, else `A1:1`, `A1:2`, …
     pub fn axes(&self) -> Vec<(String, [f64; 3])> {
         let name = &self.name;
         match &self.axes {
@@ -58,22 +63,23 @@ impl ResponsePoint {
 pub struct ImpactPoint {
     /// Its name.
     pub name: String,
-    /// 1 interface of A, 2 interface of B, 3 internal of A, 4 internal of B, 5 on specimen A, 6 on specimen B.
+    /// 1 interface of A, 2 interface of B, 3 internal of A, 4 internal of B, 5 on specimen A, 6 on
+    /// specimen B.
     pub grouping: u8,
-    /// Where it is, m.
+    /// Its position, m.
     pub position_m: [f64; 3],
-    /// Where the hammer pushes, a unit vector.
+    /// Direction in which the hammer pushes, a unit vector.
     pub direction: [f64; 3],
 }
 
-/// A sensor that stays where it is.
+/// A fixed sensor.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorPoint {
     /// Its name.
     pub name: String,
-    /// Where it is, m.
+    /// Its position, m.
     pub position_m: [f64; 3],
-    /// What it feels, a unit vector.
+    /// Its measurement direction, a unit vector.
     pub direction: [f64; 3],
 }

@@ -6,18 +6,18 @@ use toml::Spanned;
 use super::Plan;
 use super::faults::Faults;
 
-/// How long a person is waited for without a word otherwise, s.
+/// Default waiting time for a person to strike, s.
 const PATIENCE_S: f64 = 600.0;
-/// Longest time that a person may be waited for, s: a day.
+/// Longest permitted waiting time for a person to strike, s: a day.
 const LONGEST_S: f64 = 86_400.0;
 
-/// The hammer; without it, the device's coil swings it.
+/// The hammer; if absent, the device's coil swings it.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HammerPlan {
     /// Who swings it.
     pub by: Swung,
-    /// How long a person is waited for, s; ten minutes without it.
+    /// How long to wait for a person to strike, s; ten minutes if absent.
     pub patience_s: Option<f64>,
 }
 
@@ -25,14 +25,14 @@ pub struct HammerPlan {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Swung {
-    /// The device's coil, as the host orders.
+    /// The device's coil, commanded by the host.
     Coil,
     /// A person: the host waits for the force.
     Hand,
 }
 
 impl Plan {
-    /// How long a person is waited for, s; none where the coil swings the hammer.
+    /// How long to wait for a person to strike, s; `None` if the coil swings the hammer.
     pub fn by_hand(&self) -> Option<f64> {
         let own = self.hammer.as_ref().map(Spanned::get_ref).filter(|own| own.by == Swung::Hand)?;
         Some(own.patience_s.unwrap_or(PATIENCE_S))

@@ -1,11 +1,12 @@
-//! A level of the shaker: what is held at which amplitude, at one frequency or over a sweep, before or after the hammer's cells.
+//! A level of the shaker: the controlled quantity and its amplitude, at one frequency or over a
+//! sweep, before or after the hammer's cells.
 
 use std::fmt;
 use std::str::FromStr;
 
 use jointrig_protocol::request::Control;
 
-/// What is held constant.
+/// The quantity that is held constant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Held {
     /// The relative displacement of the specimens, m.
@@ -26,7 +27,7 @@ impl Held {
         }
     }
 
-    /// An amplitude of it with a unit that suits its size.
+    /// Formats an amplitude of it with a unit that suits its size.
     pub fn show(self, amplitude: f64) -> String {
         match self {
             Self::Displacement => format!("{} µm", brief(amplitude * 1e6)),
@@ -35,7 +36,7 @@ impl Held {
         }
     }
 
-    /// As the device is told.
+    /// The command for the device.
     pub fn control(self, amplitude: f64) -> Control {
         match self {
             Self::Displacement => Control::Displacement { amplitude_m: amplitude as f32 },
@@ -56,7 +57,7 @@ impl FromStr for Held {
     }
 }
 
-/// When a level is measured, so that wear shows.
+/// When a level is measured: before and after, so that wear shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Moment {
     /// Before the hammer's cells.
@@ -89,18 +90,18 @@ impl FromStr for Moment {
 /// One level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Level {
-    /// Its frequency, or the first one of a sweep, Hz.
+    /// Its frequency, or the first frequency of a sweep, Hz.
     pub frequency_hz: f64,
-    /// The last frequency of a sweep, Hz; none for a step.
+    /// The last frequency of a sweep, Hz; `None` for a step.
     pub end_hz: Option<f64>,
-    /// What is held.
+    /// The quantity that is held constant.
     pub held: Held,
-    /// At which amplitude, m, N or V.
+    /// Its amplitude, m, N or V.
     pub amplitude: f64,
 }
 
 impl Level {
-    /// Whether both are the same to the accuracy of a command line.
+    /// Whether both are equal to within the precision of a command line (1e-6 relative).
     pub fn same(&self, other: &Self) -> bool {
         let near = |a: f64, b: f64| (a - b).abs() <= 1e-6 * a.abs().max(b.abs());
         self.held == other.held

@@ -1,4 +1,4 @@
-//! What the load cells say of the force along the sliding direction.
+//! The load cells' measurement of the force along the sliding direction.
 
 use jointrig_protocol::channel::Role;
 
@@ -6,12 +6,14 @@ use super::Plan;
 use super::structure::{dot, unit};
 use crate::device::channels::ChannelMap;
 
-/// A cell that feels less than this part of the force along the sliding direction is not there for it.
+/// A load cell is left out if the cosine between its direction and the sliding direction is below
+/// this.
 const FEELS: f64 = 1e-3;
 
 impl Plan {
-    /// The load cells that feel the sliding direction: place in the map, and by what its reading is multiplied in their sum. A cell's
-    /// direction is that of the plan's sensor of its name (`LC1` is the channel `lc_1`); the sliding direction without one.
+    /// The load cells that measure along the sliding direction: index in the map, and the factor of
+    /// its reading in their sum. A cell's direction is that of the plan's sensor of the same name
+    /// (`LC1` is the channel `lc_1`), or the sliding direction if the plan has none.
     pub fn load_cells(&self, map: &ChannelMap) -> Vec<(usize, f64)> {
         let places = map.places(Role::LoadCell).into_iter();
         places
@@ -20,7 +22,8 @@ impl Plan {
             .collect()
     }
 
-    /// Cosine between what the sensor of this channel feels and the sliding direction; 1 for a channel that the plan does not name.
+    /// Cosine between the measurement direction of this channel's sensor and the sliding direction;
+    /// 1 for a channel that the plan does not name.
     fn sliding_part(&self, channel: &str) -> f64 {
         let named = |name: &str| letters(name).eq(letters(channel));
         let mut sensors = self.geometry.sensor.iter().map(toml::Spanned::get_ref);
@@ -29,7 +32,7 @@ impl Plan {
     }
 }
 
-/// Letters and digits of a name, small.
+/// Letters and digits of a name, in lower case.
 fn letters(name: &str) -> impl Iterator<Item = char> {
     name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase)
 }

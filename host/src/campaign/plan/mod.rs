@@ -1,7 +1,8 @@
-//! The plan of a campaign: what is hit and measured, how often, and what counts as a good hit.
+//! The plan of a campaign: what is struck and measured, how often, and what counts as a good hit.
 //!
-//! A plan is a TOML file (`docs/plans/paper.toml` is the example). Unknown fields are refused, and every
-//! error names file, line and field. Lengths are in m, forces in N, times in s unless a name says otherwise.
+//! A plan is a TOML file (`docs/plans/paper.toml` is the example). Unknown fields are refused, and
+//! every error names file, line and field. Lengths are in m, forces in N, times in s unless a name
+//! states otherwise.
 
 mod answers;
 mod cells;
@@ -33,16 +34,16 @@ use toml::Spanned;
 
 /// The paper's campaign: 252 cells of 8 hits.
 pub const PAPER: &str = include_str!("../../../../docs/plans/paper.toml");
-/// All cells of the paper's campaign with those on the specimen, three good hits in each.
+/// All cells of the paper's campaign and those on the specimen, three good hits in each.
 pub const DEMO: &str = include_str!("../../../../docs/plans/demo.toml");
-/// What the contact's own stiffness needs, and no more: 63 cells of two hits.
+/// The minimum for the contact's own stiffness: 63 cells of two hits.
 pub const CONTACT: &str = include_str!("../../../../docs/plans/contact.toml");
-/// The paper's campaign with the cells on the specimen: both stiffnesses.
+/// The paper's campaign and the cells on the specimen: yields both stiffnesses.
 pub const PAPER_CONTACT: &str = include_str!("../../../../docs/plans/paper-contact.toml");
-/// A few cells.
+/// A plan of a few cells.
 pub const SMALL: &str = include_str!("../../../../docs/plans/small.toml");
 
-/// What is wrong with a plan, and where.
+/// An error in a plan, with its place.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "{source_name}:{line}: {what} (docs/campaigns.md explains every field{})",
@@ -51,23 +52,23 @@ pub const SMALL: &str = include_str!("../../../../docs/plans/small.toml");
 pub struct PlanError {
     /// The file.
     pub source_name: String,
-    /// Line in it, from 1.
+    /// Line in the file, from 1.
     pub line: usize,
-    /// What is wrong, with the field's name.
+    /// The error, with the field's name.
     pub what: String,
-    /// How much else is wrong.
+    /// Number of further errors.
     pub more: usize,
 }
 
-/// What names must have.
+/// What a valid name consists of.
 const PRINTABLE: &str = "one printable character or more, and no others";
 
-/// Whether a name shows as what it is, wherever it is printed.
+/// Whether a name is unambiguous when printed.
 fn printable(name: &str) -> bool {
     !name.trim().is_empty() && !name.chars().any(|c| c.is_control() || directs(c))
 }
 
-/// Characters that turn the direction of what stands after them.
+/// Characters that change the writing direction of the text after them.
 fn directs(c: char) -> bool {
     matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
@@ -80,40 +81,41 @@ pub struct Plan {
     pub version: Spanned<u32>,
     /// Name of the plan.
     pub name: Spanned<String>,
-    /// What the structures are called, and the sliding direction; A, B, AJB and z without it.
+    /// Names of the structures, and the sliding direction; A, B, AJB and z if absent.
     pub structure: Option<Spanned<StructurePlan>>,
     /// How a record is cut.
     pub record: Spanned<RecordPlan>,
-    /// How many hits.
+    /// Number of hits.
     pub hits: Spanned<Hits>,
-    /// Who swings the hammer; the device's coil, without it.
+    /// Who swings the hammer; the device's coil if absent.
     pub hammer: Option<Spanned<HammerPlan>>,
-    /// How hard.
+    /// Force of the hits.
     pub force: Spanned<Force>,
-    /// How the device recognises a hit.
+    /// How the device detects a hit.
     pub trigger: Spanned<TriggerPlan>,
-    /// Why a record is refused.
+    /// Limits beyond which a record is refused.
     pub limits: Spanned<Limits>,
     /// How long the hammer waits between hits.
     pub settle: Spanned<Settle>,
-    /// How the FRFs are to be windowed.
+    /// How the FRFs are windowed.
     pub window: Spanned<Window>,
-    /// When a cell's FRFs are good enough to stop before all wanted hits; never, without it.
+    /// When a cell's FRFs are good enough to stop before all wanted hits; never if absent.
     pub enough: Option<Spanned<Enough>>,
-    /// In step with another recorder; by itself, without it.
+    /// Synchronisation with another recorder; none if absent.
     pub sync: Option<Spanned<SyncPlan>>,
-    /// The shaker's levels before and after the campaign; none, without it.
+    /// The shaker's levels before and after the campaign; none if absent.
     pub shaker: Option<Spanned<ShakerPlan>>,
-    /// What is known of contact and static arm; without it, only what the records say.
+    /// Prior knowledge of contact and static arm; if absent, only the records count.
     pub contact: Option<Spanned<ContactPlan>>,
-    /// What the laboratory knows of its own errors; without it, what careful work by hand leaves.
+    /// The laboratory's measurement errors; if absent, the usual values for careful manual work.
     pub priors: Option<Spanned<PriorsPlan>>,
-    /// What is behind the device's channels; those that are not named are taken as the device describes them.
+    /// The sensors on the device's channels; channels that are not listed are taken as the device
+    /// describes them.
     #[serde(default)]
     pub channel: Vec<Spanned<SensorPlan>>,
-    /// The structures, in the order in which they are measured. Blocks of the same name add up.
+    /// The structures, in the order in which they are measured. Blocks of the same name are merged.
     pub configuration: Vec<ConfigurationPlan>,
-    /// Where everything is.
+    /// Positions and directions.
     pub geometry: GeometryPlan,
 }
 
@@ -123,57 +125,59 @@ pub struct Plan {
 pub struct RecordPlan {
     /// Scans per second, Hz.
     pub rate_hz: u32,
-    /// Length from the trigger on, s.
+    /// Length from the trigger onwards, s.
     pub length_s: f64,
     /// Scans before the trigger.
     pub pre_trigger_scans: u32,
 }
 
-/// How many hits a cell gets.
+/// Number of hits per cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Hits {
-    /// Good ones wanted.
+    /// Good hits wanted.
     pub wanted: u32,
-    /// Good ones that are enough, if the attempts run out or the FRFs are good enough; below it a cell cannot be used.
+    /// Good hits that suffice if the attempts run out or the FRFs are good enough; with fewer, the
+    /// cell cannot be used.
     pub minimum: u32,
-    /// Attempts after which a cell ends: settled with the minimum or more, given up with less.
+    /// Attempts after which a cell ends: settled with at least the minimum, given up with fewer.
     pub most: u32,
 }
 
-/// How hard the hammer hits.
+/// Force of the hits.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Force {
     /// Peak force wanted, N.
     pub target_n: f64,
-    /// Part of it that every second good hit of a cell is to have: hits of two forces tell whether the contact slips. Without it all are alike.
+    /// Peak force of every second good hit of a cell, as a fraction of the target: hits of two
+    /// forces show whether the contact slips. If absent, all hits have the target force.
     pub softer: Option<f64>,
-    /// Part of the target within which the pulse is left alone.
+    /// Relative deviation from the target within which the pulse is not changed.
     pub tolerance: f64,
-    /// First coil pulse, µs; a hammer by hand needs none.
+    /// First coil pulse, µs; not needed if a person swings the hammer.
     #[serde(default)]
     pub pulse_us: u32,
-    /// Shortest and longest coil pulse to try, µs; a hammer by hand needs none.
+    /// Shortest and longest coil pulse to try, µs; not needed if a person swings the hammer.
     #[serde(default)]
     pub pulse_bounds_us: [u32; 2],
 }
 
-/// How the device recognises a hit.
+/// How the device detects a hit.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TriggerPlan {
     /// Force that counts as contact, N.
     pub level_n: f32,
-    /// How long the bolt may fly, s.
+    /// Maximum flight time of the bolt, s.
     pub flight_s: f64,
-    /// How long rebounds are looked for, s.
+    /// How long the force is monitored for rebounds, s.
     pub listen_s: f64,
-    /// How long the hammer rests afterwards, s.
+    /// How long the hammer rests after a shot, s.
     pub hold_off_s: f64,
 }
 
-/// Why a record is refused.
+/// Limits beyond which a record is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limits {
@@ -181,11 +185,11 @@ pub struct Limits {
     pub weak_n: f64,
     /// A stronger peak is refused, N.
     pub strong_n: f64,
-    /// A later contact of this part of the peak is a double hit.
+    /// A later contact of at least this fraction of the peak is a double hit.
     pub rebound_ratio: f64,
-    /// A later contact counts from this long after the first one on (start to start), s.
+    /// A later contact counts from this long after the first one onwards (start to start), s.
     pub rebound_after_s: f64,
-    /// A record this many times noisier than the cell's others is refused.
+    /// A record is refused if it is this many times noisier than the cell's others.
     pub noise_ratio: f64,
 }
 
@@ -193,17 +197,18 @@ pub struct Limits {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settle {
-    /// Residual motion allowed, as a part of the motion right after the last hit.
+    /// Residual motion allowed, as a fraction of the motion right after the last hit.
     pub quiet_relative: f64,
     /// Residual velocity that is always allowed, m/s rms.
     pub quiet_floor_m_per_s: f64,
-    /// Length of the windows in which the device judges residual motion, in its decimated samples.
+    /// Length of the windows in which the device evaluates residual motion, in its decimated
+    /// samples.
     pub window_samples: u16,
     /// Longest wait, s.
     pub bound_s: f64,
 }
 
-/// How the FRFs are to be windowed; the analysis reads it.
+/// How the FRFs are windowed; used by the analysis.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Window {
@@ -211,7 +216,8 @@ pub struct Window {
     pub exponential_per_s: f64,
 }
 
-/// The shaker's levels: every frequency at every amplitude, measured before and after the hammer's cells so that wear shows.
+/// The shaker's levels: every frequency at every amplitude, measured before and after the hammer's
+/// cells so that wear shows.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ShakerPlan {
@@ -222,12 +228,12 @@ pub struct ShakerPlan {
 }
 
 impl ShakerPlan {
-    /// How many levels there are, each time.
+    /// Number of levels before the cells, and again after them.
     pub fn levels(&self) -> usize {
         self.frequencies_hz.len() * self.amplitudes_m.len()
     }
 
-    /// What is to be done about them, for whoever counts on them.
+    /// Instruction for measuring them, for a user whose plan contains levels.
     pub fn remark(&self, file: &std::path::Path) -> String {
         format!(
             "the plan's {} levels of the shaker, before and after the cells: `jointrig shaker {} --device ADDR` measures them",
@@ -237,15 +243,15 @@ impl ShakerPlan {
     }
 }
 
-/// What is known of contact and static arm beforehand, from drawings or a balance.
+/// Prior knowledge of contact and static arm, from drawings or a balance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ContactPlan {
     /// The normal load, N.
     pub normal_load_n: Option<f64>,
-    /// Stiffness to ground beside the load cells, over theirs.
+    /// Stiffness to ground in parallel with the load cells, relative to theirs.
     pub parallel_path: Option<f64>,
-    /// Effective mass of the static arm at the contact, kg; identified where it is not given.
+    /// Effective mass of the static arm at the contact, kg; identified if absent.
     pub effective_mass_kg: Option<f64>,
 }
 
@@ -253,9 +259,10 @@ pub struct ContactPlan {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Enough {
-    /// Random error of the averaged FRFs as a part of them; with `hits.minimum` good hits or more, less than this ends a cell.
+    /// Relative random error of the averaged FRFs below which a cell ends, once it has at least
+    /// `hits.minimum` good hits.
     pub random_error: f64,
-    /// The band that counts, Hz.
+    /// The band in which the error is evaluated, Hz.
     pub band_hz: [f64; 2],
 }
 
@@ -263,7 +270,7 @@ pub struct Enough {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConfigurationPlan {
-    /// `A`, `B` or `AJB`, or what `[structure]` calls it.
+    /// `A`, `B` or `AJB`, or the name that `[structure]` gives it.
     pub name: Spanned<String>,
     /// Names of impact points.
     pub impacts: Vec<Spanned<String>>,
@@ -271,7 +278,7 @@ pub struct ConfigurationPlan {
     pub responses: Vec<Spanned<String>>,
 }
 
-/// What the controller calls a configuration, as the analysis calls it.
+/// The analysis' structure for the controller's configuration.
 pub fn structure(configuration: Configuration) -> Structure {
     match configuration {
         Configuration::A => Structure::A,
@@ -285,20 +292,20 @@ pub fn configuration_name(configuration: Configuration) -> &'static str {
     structure(configuration).name()
 }
 
-/// The configuration of that name.
+/// The configuration with that name.
 pub fn configuration_named(name: &str) -> Option<Configuration> {
     structure::ALL.into_iter().find(|c| configuration_name(*c) == name)
 }
 
 impl Plan {
-    /// Samples of a record from the trigger on.
+    /// Samples of a record from the trigger onwards.
     pub fn post_trigger_scans(&self) -> u64 {
         let record = self.record.get_ref();
         (record.length_s * f64::from(record.rate_hz)).round() as u64
     }
 }
 
-/// What toml says, with the line that it points at.
+/// The parser's message, with the line that it refers to.
 fn field(text: &str, wrong: &toml::de::Error) -> String {
     let said = wrong.message().to_owned();
     let line = wrong.span().and_then(|span| {

@@ -1,9 +1,9 @@
-//! What the laboratory knows of its own errors: the plan's `[priors]`.
+//! The laboratory's measurement errors: the plan's `[priors]`.
 
 use crate::contact::ContactPriors;
 use serde::Deserialize;
 
-/// Standard deviations; what is not stated is taken as careful work by hand leaves it.
+/// Standard deviations; values that are absent default to those of careful manual work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PriorsPlan {
@@ -13,7 +13,7 @@ pub struct PriorsPlan {
     pub aim_m: Option<f64>,
     /// The hammer's tilt about each axis across its direction, rad.
     pub hammer_angle_rad: Option<f64>,
-    /// The spots beside the contact, m along each axis.
+    /// The spots next to the contact, m along each axis.
     pub spot_m: Option<f64>,
     /// Points on the specimens, m along each axis.
     pub specimen_point_m: Option<f64>,
@@ -21,12 +21,12 @@ pub struct PriorsPlan {
     pub gain: Option<f64>,
     /// Gain of the hammer's force cell, relative.
     pub hammer_gain: Option<f64>,
-    /// Delays beyond those that the device tells, s.
+    /// Delays in addition to those that the device reports, s.
     pub skew_s: Option<f64>,
 }
 
 impl PriorsPlan {
-    /// All of them.
+    /// The priors: the stated values, defaults for the others.
     pub fn known(&self) -> ContactPriors {
         let mut known = ContactPriors::default();
         for (stated, at) in [
@@ -46,7 +46,7 @@ impl PriorsPlan {
         known
     }
 
-    /// What is stated, by name.
+    /// The stated values, by name.
     pub fn stated(&self) -> [(&'static str, Option<f64>); 8] {
         [
             ("position_m", self.position_m),

@@ -1,4 +1,5 @@
-//! On which channels a response is: the vibrometer's, which goes from point to point, or those of a sensor that stays where it is.
+//! Channels of a response: those of the vibrometer, which moves from point to point, or those of a
+//! fixed sensor.
 
 use std::collections::HashSet;
 
@@ -6,12 +7,12 @@ use super::{Cell, Plan, ResponsePoint, configuration_name};
 use crate::device::channels::ChannelMap;
 
 impl Plan {
-    /// The response point of that name.
+    /// The response point with that name.
     pub fn response(&self, name: &str) -> Option<&ResponsePoint> {
         self.geometry.response.iter().map(toml::Spanned::get_ref).find(|point| point.name == name)
     }
 
-    /// Good hits wanted in all: one that fills a row of cells counts once.
+    /// Total number of good hits wanted: a hit that fills a row of cells counts once.
     pub fn hits_wanted(&self) -> u32 {
         let mut rows = HashSet::new();
         let mut struck = |cell: &Cell| {
@@ -26,12 +27,14 @@ impl Plan {
         self.configuration.iter().flat_map(|block| &block.responses).any(|name| name.get_ref() == response)
     }
 
-    /// Names of the channels of the sensor that stays at this response point; none where the vibrometer comes to it.
+    /// Names of the channels of the fixed sensor at this response point; `None` if the vibrometer
+    /// measures it.
     pub fn own_channels(&self, response: &str) -> Option<&[String]> {
         self.response(response)?.channels.as_deref()
     }
 
-    /// The point where the sensor with this channel stays, and what the channel feels there; none for the vibrometer's channels.
+    /// The point of the fixed sensor with this channel, and the channel's measurement direction;
+    /// `None` for the vibrometer's channels.
     pub fn sensor_on(&self, channel: &str) -> Option<(&ResponsePoint, [f64; 3])> {
         self.geometry.response.iter().map(toml::Spanned::get_ref).find_map(|point| {
             let place = point.channels.as_ref()?.iter().position(|name| name == channel)?;
@@ -39,14 +42,15 @@ impl Plan {
         })
     }
 
-    /// Places in `map` of the sensor that stays at this response point, in the order of its axes; none without one, or where a channel of
-    /// it is missing.
+    /// Indices in `map` of the channels of the fixed sensor at this response point, in the order of
+    /// its axes; `None` if there is no such sensor or one of its channels is missing.
     pub fn own_places(&self, response: &str, map: &ChannelMap) -> Option<Vec<usize>> {
         self.own_channels(response)?.iter().map(|name| map.named(name)).collect()
     }
 
-    /// Places in `map` of what measures at this response point in a record of its own cell: its own sensor's, or the vibrometer's. A
-    /// record from elsewhere holds the point's signals alone, by whatever names.
+    /// Indices in `map` of the channels that measure this response point in a record of its own
+    /// cell: those of its fixed sensor, or the vibrometer's. An imported record holds only the
+    /// point's signals, with arbitrary names.
     pub fn response_places(&self, response: &str, map: &ChannelMap) -> Option<Vec<usize>> {
         self.own_places(response, map).or_else(|| map.responses())
     }

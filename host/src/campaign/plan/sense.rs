@@ -1,24 +1,26 @@
-//! What no plan can mean: lengths in mm, angles in degrees, numbers without end. A new campaign is refused with it; one that was measured with it
-//! can still be read.
+//! Implausible values in a plan: lengths in mm, angles in degrees, excessive numbers. A new
+//! campaign is refused with them; an existing campaign that was measured with them can still be
+//! read.
 
 use super::faults::Faults;
 use super::structure::dot;
 use super::{PRINTABLE, Plan, printable};
 use crate::substructuring::geometry::{FARTHEST_M, too_far};
 
-/// Nobody places anything worse than this, m: errors of position in mm are caught here.
+/// Largest plausible position error, m: catches values in mm.
 const WORST_PLACING_M: f64 = 0.05;
-/// Nobody holds a hammer worse than this, rad: degrees are caught here.
+/// Largest plausible tilt of the hammer, rad: catches degrees.
 const WORST_TILT_RAD: f64 = 0.5;
-/// No gain is known worse than this.
+/// Largest plausible relative gain error.
 const WORST_GAIN: f64 = 0.5;
-/// No delay is known worse than this, s: µs and ms are caught here.
+/// Largest plausible delay error, s: catches µs and ms.
 const WORST_SKEW_S: f64 = 0.01;
-/// No hammer of this kind hits harder, N.
+/// Largest plausible force of a hammer of this kind, N.
 const HARDEST_N: f64 = 1e5;
-/// Damping by the window that leaves nothing after a millisecond, 1/s.
+/// Exponential window that leaves nothing after a millisecond, 1/s.
 const STRONGEST_WINDOW_PER_S: f64 = 1e3;
-/// Longest window in which residual motion is judged, in the device's decimated samples: more is an order of magnitude beyond any use.
+/// Longest window in which residual motion is evaluated, in the device's decimated samples: an
+/// order of magnitude longer than is useful.
 const LONGEST_QUIET_SAMPLES: u16 = 4096;
 
 impl Plan {

@@ -1,4 +1,4 @@
-//! The sensor behind a channel: what a plan, or a laboratory's calibration file, says of it.
+//! The sensor on a channel, as described by a plan or a laboratory's calibration file.
 
 use std::collections::HashSet;
 
@@ -8,7 +8,7 @@ use toml::Spanned;
 use super::PlanError;
 use super::faults::{Faults, first, read};
 
-/// What is behind a channel of the device.
+/// The sensor on a channel of the device.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorPlan {
@@ -24,7 +24,7 @@ pub struct SensorPlan {
     pub sensitivity_v: Option<f64>,
     /// 1, or -1 where a positive quantity gives a negative voltage.
     pub polarity: Option<i8>,
-    /// By how much its signal is late, s.
+    /// Delay of its signal, s.
     pub delay_s: Option<f64>,
     /// Relative standard uncertainty of the sensitivity.
     pub uncertainty: Option<f64>,
@@ -41,16 +41,16 @@ pub struct CalibrationFile {
 }
 
 impl CalibrationFile {
-    /// Reads one; `source_name` is what errors call it.
+    /// Reads one; errors call the text `source_name`.
     ///
     /// # Errors
-    /// It is no such file, or what it says of a sensor cannot be.
+    /// The text is not a calibration file, or a value of a sensor is impossible.
     pub fn parse(text: &str, source_name: &str) -> Result<Self, PlanError> {
         read(text, source_name, |file: &Self, faults| check_sensors(&file.channel, faults)).map_err(first)
     }
 }
 
-/// What is wrong with a sensor, and where.
+/// Records the errors of all sensors.
 pub(super) fn check_sensors(channels: &[Spanned<SensorPlan>], faults: &mut Faults) {
     let mut seen = HashSet::new();
     for channel in channels {

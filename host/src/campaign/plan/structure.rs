@@ -1,4 +1,4 @@
-//! What the laboratory calls its structures, and the direction in which the contact slides.
+//! The laboratory's names of the structures, and the sliding direction of the contact.
 
 use jointrig_protocol::request::Configuration;
 use serde::Deserialize;
@@ -9,17 +9,17 @@ use super::{PRINTABLE, Plan, configuration_name, configuration_named, printable}
 /// Longest name of a structure, characters.
 const LONGEST: usize = 40;
 
-/// Names instead of A, B and AJB, and the sliding direction instead of z.
+/// Names in place of A, B and AJB, and the sliding direction in place of z.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StructurePlan {
-    /// What A is called: the substructure that the shaker drives, or either where there is none.
+    /// Name of A: the substructure that the shaker drives, or either one if there is no shaker.
     pub a: Option<String>,
-    /// What B is called.
+    /// Name of B.
     pub b: Option<String>,
-    /// What A joined to B is called.
+    /// Name of A joined to B.
     pub assembly: Option<String>,
-    /// The sliding direction in the geometry's coordinates, a unit vector; z without it.
+    /// The sliding direction in the geometry's coordinates, a unit vector; z if absent.
     pub sliding: Option<[f64; 3]>,
 }
 
@@ -33,22 +33,22 @@ impl StructurePlan {
     }
 }
 
-/// All three.
+/// All configurations.
 pub(super) const ALL: [Configuration; 3] = [Configuration::A, Configuration::B, Configuration::Ajb];
 
 impl Plan {
-    /// What people call a configuration.
+    /// The plan's name of a configuration.
     pub fn called(&self, configuration: Configuration) -> &str {
         let own = self.structure.as_ref().and_then(|own| own.get_ref().own(configuration));
         own.unwrap_or(configuration_name(configuration))
     }
 
-    /// The configuration that is called so, by the plan's name or as A, B or AJB.
+    /// The configuration with that name: the plan's name, or A, B or AJB.
     pub fn configuration(&self, name: &str) -> Option<Configuration> {
         ALL.into_iter().find(|own| self.called(*own) == name).or_else(|| configuration_named(name))
     }
 
-    /// The names that differ from A, B and AJB: `A is the frame, …`; none where all are these.
+    /// The names that differ from A, B and AJB: `A is the frame, …`; `None` if none differs.
     pub fn own_names(&self) -> Option<String> {
         let named: Vec<String> = ALL
             .into_iter()
@@ -63,8 +63,9 @@ impl Plan {
         self.structure.as_ref().and_then(|own| own.get_ref().sliding).unwrap_or([0.0, 0.0, 1.0])
     }
 
-    /// The rows of the rotation from the geometry's coordinates to those of the interface, whose z is the sliding direction and whose y
-    /// lies as near to the geometry's as it can (to its x, where that one slides). The identity where z slides.
+    /// The rows of the rotation from the geometry's coordinates to those of the interface: z is the
+    /// sliding direction, and y is as close as possible to the geometry's y (to its x if the
+    /// sliding direction is close to y). The identity if z is the sliding direction.
     pub fn to_interface(&self) -> [[f64; 3]; 3] {
         let z = unit(self.sliding());
         let guide = if z[1].abs() > 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
@@ -74,7 +75,7 @@ impl Plan {
         [x, y, z]
     }
 
-    /// Whether the sliding direction is z, so that what is measured needs no turning.
+    /// Whether the sliding direction is z, so that measured data need no rotation.
     pub fn slides_along_z(&self) -> bool {
         self.sliding() == [0.0, 0.0, 1.0]
     }
@@ -107,7 +108,8 @@ impl Plan {
         }
     }
 
-    /// The same with A, B and AJB for the plan's own names in the list of configurations: the names by which files know them.
+    /// The same plan with A, B and AJB in place of the plan's own names in the list of
+    /// configurations, since files use these.
     pub(super) fn with_usual_names(mut self) -> Self {
         let known: Vec<Option<Configuration>> =
             self.configuration.iter().map(|block| self.configuration(block.name.get_ref())).collect();

@@ -118,7 +118,7 @@ fn errors_point_at_line_and_field() {
         let wrong = Plan::parse(&text, "my.toml").expect_err(to);
         let said = wrong.to_string();
         assert!(said.contains(word), "{to}: {said}");
-        // a range between fields is told at the table that holds them
+        // an error between two fields is reported at the table that contains them
         let near = if word.contains('.') || word.contains('<') || word.contains("bounds") { 6 } else { 0 };
         assert!(wrong.line <= line && wrong.line + near >= line, "{to}: line {line}, said {said}");
         assert!(said.starts_with("my.toml:"), "{said}");
@@ -143,7 +143,7 @@ fn sensors_that_stay_and_a_hammer_by_hand() {
     }
     assert_eq!(of("[force]", "[force]").expect("good").by_hand(), None);
     assert_eq!(of("[force]", "[hammer]\nby = \"hand\"\n[force]").expect("good").by_hand(), Some(600.0));
-    // no pulse is needed then, and no second force can be asked for
+    // then no pulse is needed, and no second force may be requested
     let pulses = "pulse_us = 3500\npulse_bounds_us = [2500, 6000]";
     assert!(of(pulses, "").expect_err("a coil").to_string().contains("pulse_bounds_us"));
     let hand = |more: &str| of(pulses, &format!("{more}\n[hammer]\nby = \"hand\""));
@@ -240,7 +240,7 @@ fn everything_that_is_wrong_is_told_at_once_by_line() {
     }
     let first = Plan::parse_new(&text, "my.toml").expect_err("five faults").to_string();
     assert!(first.contains("`jointrig plan check` tells 4 more"), "{first}");
-    // a value of the wrong kind hides what only a whole plan shows
+    // a value of the wrong type hides the errors that only a complete plan shows
     let unreadable = text.replace("version = 1", "version = \"one\"");
     let all = Plan::parse_all(&unreadable, "my.toml").expect_err("it cannot be read");
     assert_eq!((all.len(), all[0].line), (3, line("version")), "{all:?}");

@@ -1,17 +1,17 @@
-//! Answers to the stage's questions from elsewhere than the terminal. An answer names the cell and the attempt that it is about: one that was meant
-//! for another question moves nothing.
+//! Answers to the stage's questions that come from other places than the terminal. An answer names
+//! the cell and the attempt that it refers to: an answer to another question has no effect.
 
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// What a person may answer.
+/// The possible answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Key {
     /// Hammer and laser are in place.
     Accept,
-    /// Strike the cell's good hits anew.
+    /// Strike the cell's good hits again.
     Redo,
     /// Leave the cell for a later run.
     Skip,
@@ -19,7 +19,7 @@ pub enum Key {
     Back,
 }
 
-/// What is asked about: a cell's id, and the number of its next attempt.
+/// Identifies a question: a cell's id, and the number of its next attempt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Question {
     /// The cell.
@@ -28,25 +28,25 @@ pub struct Question {
     pub attempt: u32,
 }
 
-/// Where answers are given.
+/// The end where answers are given.
 #[derive(Clone)]
 pub struct Answerer(SyncSender<(Question, Key)>);
 
-/// Where they are heard.
+/// The end where answers are received.
 #[derive(Clone)]
 pub struct Answers {
     queue: Arc<Mutex<Receiver<(Question, Key)>>>,
     stop: Arc<AtomicBool>,
 }
 
-/// Both ends; `stop` ends the waiting.
+/// Creates both ends; `stop` ends the waiting.
 pub fn answers(stop: Arc<AtomicBool>) -> (Answerer, Answers) {
     let (to, from) = sync_channel(1);
     (Answerer(to), Answers { queue: Arc::new(Mutex::new(from)), stop })
 }
 
 impl Answerer {
-    /// Gives an answer; returns whether it could be taken.
+    /// Gives an answer; returns whether it was accepted.
     pub fn give(&self, question: Question, key: Key) -> bool {
         self.0.try_send((question, key)).is_ok()
     }
@@ -57,17 +57,17 @@ impl Answers {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Forgets what was answered before the question.
+    /// Discards answers that were given before the question.
     pub(super) fn forget(&self) {
         self.queue().try_iter().for_each(drop);
     }
 
-    /// The answer to this question, if it was given.
+    /// The answer to this question, if it has been given.
     pub(super) fn heard(&self, question: Question) -> Option<Key> {
         self.queue().try_iter().find(|(about, _)| *about == question).map(|(_, key)| key)
     }
 
-    /// Whether nobody wants an answer any more.
+    /// Whether the run is being stopped, so that no answer is needed any more.
     pub(super) fn stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }

@@ -1,7 +1,8 @@
-//! A hit by hand: nothing is ordered, the host watches the force until somebody strikes.
+//! A manual hit: no shot is ordered; the host monitors the force until a person strikes.
 //!
-//! Nothing is armed, and the coil stays off. Nobody can be held back until the structure is at rest, so that the motion before each hit
-//! is measured: a hit that came too early is kept as one, and refused.
+//! Nothing is armed, and the coil stays off. A person cannot be prevented from striking before the
+//! structure is at rest, so the motion before each hit is measured: a hit that came too early is
+//! stored with that verdict, and refused.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,22 +16,27 @@ use crate::device::channels::ChannelMap;
 use crate::device::error::DeviceError;
 use crate::device::session::Session;
 
-/// The motion before a hit is measured over this long, s: two periods of the slowest mode that matters.
+/// Time over which the motion before a hit is measured, s: two periods of the slowest mode of
+/// interest.
 const BEFORE_S: f64 = 0.075;
-/// What ends so long before the trigger is free of the hit: the force rises for less than that to the trigger's level, s.
+/// Samples up to this long before the trigger are free of the hit, s: the force rises to the
+/// trigger's level in less.
 const CLEAR_S: f64 = 0.001;
-/// Samples in one mean: the converter's noise goes, and motion below 1 kHz stays.
+/// Samples in one mean: suppresses the converter's noise and keeps motion below 1 kHz.
 const MEAN: usize = 24;
-/// A person cannot tell when the last of the motion is gone: so many times what a coil would wait for is let pass.
+/// Factor on the limits that apply to the coil: a person cannot see when the last residual motion
+/// has decayed.
 pub(super) const ALLOWANCE: f64 = 3.0;
-/// How the sentence of a hit that came too early begins: its verdict rests on what was heard before it, and not on its record.
+/// Start of the sentence for a hit that came too early: its verdict depends on the motion before
+/// the record, not on the record itself.
 pub(in crate::campaign) const TOO_EARLY: &str = "struck before the structure was at rest";
 
 impl Shooter {
-    /// Waits until somebody strikes, for `patience_s` of the device's time at most. The acknowledgement is held when this returns.
+    /// Waits until a person strikes, for at most `patience_s` of the device's time. The
+    /// acknowledgement is held when this returns.
     ///
     /// # Errors
-    /// The device refuses or is gone.
+    /// The device refuses or is disconnected.
     pub fn await_hand(
         &mut self,
         session: &mut Session,
@@ -77,7 +83,7 @@ impl Shooter {
         })
     }
 
-    /// The first scan of the range at which the force is at the trigger's level.
+    /// The first scan of the range at which the force reaches the trigger's level.
     fn contact(
         &self,
         session: &Session,
@@ -92,7 +98,8 @@ impl Shooter {
         Ok(found.map(|scan| range.start + scan as u64))
     }
 
-    /// The channel that moves most of all that move more than they may, and how many times that; none where all are quiet enough.
+    /// The channel with the largest ratio of motion to its limit, and that ratio; `None` if no
+    /// channel exceeds its limit.
     fn moving(
         &self,
         session: &Session,
@@ -109,7 +116,7 @@ impl Shooter {
         Ok(bounded.map(ratio).filter(|(_, ratio)| *ratio > 1.0).max_by(|a, b| a.1.total_cmp(&b.1)))
     }
 
-    /// What a device would tell of it.
+    /// The shot summary that a device would report for this hit.
     fn struck(&self, session: &Session, channels: &ChannelMap, trigger: u64) -> Result<Shot, DeviceError> {
         let listened = trigger..trigger + u64::from(self.trigger.listen_scans).min(self.post);
         let peak_n = match channels.place(Role::HammerForce) {
@@ -125,7 +132,8 @@ impl Shooter {
     }
 }
 
-/// Rms of the means of neighbouring samples about their own mean: slow motion, without offset and without broadband noise.
+/// Rms of the means of neighbouring samples about their overall mean: slow motion, without offset
+/// and broadband noise.
 fn rms_of_means(signal: &[f64]) -> f64 {
     let means: Vec<f64> =
         signal.chunks_exact(MEAN).map(|part| part.iter().sum::<f64>() / MEAN as f64).collect();

@@ -1,4 +1,5 @@
-//! One cell: from the hammer in place to enough good hits, or a reason why not.
+//! Measures one cell: from the hammer in place until it has enough good hits or is given up with a
+//! reason.
 
 use jointrig_protocol::shot::Shot;
 
@@ -17,15 +18,15 @@ use crate::campaign::verdict::{Kind, Verdict};
 use crate::campaign::watch::Seen;
 use crate::device::recording::Recording;
 
-/// Shots of one cell that may be cancelled or find no quiet, before the cell is given up.
+/// Shots of one cell that may be cancelled or find no quiet before the cell is given up.
 const SETBACKS: u32 = 4;
 
 impl Runner<'_> {
-    /// Brings one cell to its end: enough good hits, or a reason why not.
+    /// Measures one cell until it has enough good hits or is given up with a reason.
     pub(super) fn cell(&mut self, row: &CellRow) -> Result<Next, RunError> {
         let responses = self.responses(row);
         let (mut others, mut again) = self.earlier.of(row.id, &responses, self.plan, self.channels)?;
-        // nobody repeats a hit by hand
+        // manual hits cannot be repeated
         if self.stage != Stage::Device || self.plan.by_hand().is_some() {
             again.clear();
         }
@@ -45,7 +46,8 @@ impl Runner<'_> {
         let mut setbacks = 0;
         while (self.tally.open(row.id) || !again.is_empty()) && !self.stopped() {
             if self.recount(Some(row.id)) {
-                // a person overruled one of this cell's hits: what the good ones have in common is another
+                // a person overruled one of this cell's hits: recompute the statistics of the good
+                // ones
                 still(self.keeper.catch_up())?;
                 others = self.earlier.others_now(row.id, &responses, self.plan, self.channels)?;
             }
@@ -119,7 +121,7 @@ impl Runner<'_> {
                     self.keep(row, *recording, verdict)?;
                 }
                 Outcome::NobodyStruck => {
-                    // whoever went for lunch finds the cell as it was
+                    // a timeout leaves the cell unchanged
                     return Err(RunError::NobodyStruck { cell: name(&row.cell), seconds: most_s });
                 }
                 Outcome::Missed { shot, lost } => {
@@ -166,7 +168,8 @@ impl Runner<'_> {
         Ok(Next::On)
     }
 
-    /// Places of the channels that measure when this cell is struck: its own, and those of the cells that its hits fill.
+    /// Indices of the channels that measure when this cell is struck: its own, and those of the
+    /// cells that the same hits fill.
     fn responses(&self, row: &CellRow) -> Vec<usize> {
         let measured = std::iter::once(row).chain(self.filled.get(&row.id).into_iter().flatten());
         measured
@@ -175,7 +178,8 @@ impl Runner<'_> {
             .collect()
     }
 
-    /// Ends a cell whose attempts run out, or whose FRFs are good enough; returns whether it did.
+    /// Ends a cell if its attempts have run out or its FRFs are good enough; returns whether it
+    /// did.
     fn ended(&mut self, row: &CellRow, others: &Others) -> Result<bool, RunError> {
         let hits = self.plan.hits.get_ref();
         let (kept, attempts) = (self.tally.kept_in(row.id), self.tally.attempts(row.id));
@@ -203,8 +207,8 @@ impl Runner<'_> {
         Ok(true)
     }
 
-    /// Brings hammer and laser to a cell. The acknowledgement is held meanwhile, so that the first shot is at a
-    /// fixed distance from the scan at which they are in place.
+    /// Moves hammer and laser to a cell. The acknowledgement is held meanwhile, so that the first
+    /// shot is at a fixed distance from the scan at which they are in place.
     fn go(&mut self, row: &CellRow, attempt: u32) -> Result<Moved, RunError> {
         let by_hand = !matches!(self.stage, Stage::Device | Stage::Auto);
         let (standing, left) = (self.standing(row), self.left(row));
@@ -222,7 +226,8 @@ impl Runner<'_> {
         Ok(moved)
     }
 
-    /// The device did not repeat a stored record: it is another rig, or another seed.
+    /// Handles a device that did not reproduce a stored record: it is another rig, or has another
+    /// seed.
     fn differs(&mut self, row: &CellRow, record: i64) -> Result<(), RunError> {
         let text = format!(
             "{}: struck once more, record {record} came out otherwise: another rig, or another seed, than it was measured with; \
@@ -239,14 +244,14 @@ impl Runner<'_> {
         still(self.keeper.give_up(row.id, reason))
     }
 
-    /// Notes a setback; returns whether it is worth trying again.
+    /// Logs a setback; returns whether to try again.
     fn set_back(&self, row: &CellRow, setbacks: u32, why: &str) -> Result<bool, RunError> {
         self.saw(&Seen::Remark(&format!("{}: {why}", name(&row.cell))));
         still(self.keeper.log(format!("{}: {why}", name(&row.cell))))?;
         Ok(setbacks < SETBACKS)
     }
 
-    /// Ends the run where the rig must not be struck: giving cells up one by one would help nobody.
+    /// Ends the run if the rig must not be struck: giving up every remaining cell would be useless.
     fn check_safe(&mut self) -> Result<(), RunError> {
         let status = self.session.status()?;
         if status.emergency_stop {
@@ -259,7 +264,7 @@ impl Runner<'_> {
     }
 }
 
-/// The checksum of what a shot left behind, if it was fired: a missed one has no samples.
+/// The checksum of a shot's samples, if it was fired: a missed shot has no samples.
 fn crc_of(outcome: &Outcome) -> Option<u32> {
     match outcome {
         Outcome::Recorded(recording) => Some(codec::checksum(&recording.codes)),

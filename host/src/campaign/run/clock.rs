@@ -1,28 +1,31 @@
-//! When a scan was, in UTC, and how well that is known.
+//! The time of a scan in UTC, and its uncertainty.
 //!
-//! The device's clock is its scan index. Every status answer is a mark: its `next_scan` was true at some moment between question
-//! and answer. Two things follow.
+//! The device's clock is its scan index. Every status answer yields a mark: its `next_scan` was
+//! true at some moment between question and answer. From the marks follow two estimates.
 //!
-//! - A **bracket** that needs nothing but order: scan s was sampled after the question of a mark that had not passed it, and
-//!   before the answer of a mark that had.
-//! - A **line** through the marks, where the clock runs at its rate: then the marks average, and what remains is their scatter. A virtual
-//!   board's time stands still and leaps; there the line does not fit, and the bracket is all that is known.
+//! - A **bracket** that relies on order alone: scan s was sampled after the question of a mark that
+//!   had not passed it, and before the answer of a mark that had.
+//! - A **line** through the marks if the clock runs at its rate: averaging over the marks reduces
+//!   the uncertainty to their scatter. The time of a virtual board stands still and jumps; there
+//!   the line does not fit, and only the bracket remains.
 
 use std::collections::VecDeque;
 use std::time::Instant;
 
 use jiff::{SignedDuration, Timestamp};
 
-/// Marks that count: some minutes of hits, over which a crystal drifts by less than a millisecond.
+/// Number of marks kept: some minutes of hits, over which a crystal drifts by less than a
+/// millisecond.
 const MEMORY: usize = 64;
 
-/// Marks from which on a line is drawn.
+/// Minimum number of marks for a line.
 const ENOUGH: usize = 6;
 
-/// A crystal is not further off than this, as a part of its rate.
+/// Largest relative rate error of a crystal.
 const OFF: f64 = 5e-4;
 
-/// At some moment between `asked` and `answered` (s since the start) `scan` was the next to be sampled.
+/// At some moment between `asked` and `answered` (s since the start), `scan` was the next to be
+/// sampled.
 #[derive(Clone, Copy, Debug)]
 struct Mark {
     scan: u64,
@@ -34,7 +37,8 @@ struct Mark {
 #[derive(Debug)]
 pub(super) struct ScanClock {
     rate_hz: f64,
-    /// The device counts whole blocks: a scan may be sampled this long before it is counted, s.
+    /// The device counts whole blocks: a scan may have been sampled this long before it is counted,
+    /// s.
     block_s: f64,
     start: Instant,
     start_utc: Timestamp,
@@ -53,7 +57,7 @@ impl ScanClock {
         }
     }
 
-    /// The device answered `next_scan` to a question.
+    /// Adds a mark: the device answered `next_scan` to a question.
     pub(super) fn mark(&mut self, next_scan: u64, asked: Instant, answered: Instant) {
         let since = |moment: Instant| moment.saturating_duration_since(self.start).as_secs_f64();
         let mark = Mark { scan: next_scan, asked: since(asked), answered: since(answered) };
@@ -63,7 +67,8 @@ impl ScanClock {
         self.marks.push_back(mark);
     }
 
-    /// When `scan` was sampled, and ± how many seconds. Without a mark before and after it: now, and unknown.
+    /// When `scan` was sampled, and the uncertainty ± s. Without a mark before and after it: the
+    /// current time, and `None`.
     pub(super) fn utc(&self, scan: u64) -> (Timestamp, Option<f64>) {
         match self.moment(scan) {
             Some((seconds, error)) => {
@@ -74,7 +79,7 @@ impl ScanClock {
         }
     }
 
-    /// Seconds since the start, and ± s.
+    /// Time of `scan` in seconds since the start, and its uncertainty ± s.
     fn moment(&self, scan: u64) -> Option<(f64, f64)> {
         let earliest =
             self.marks.iter().filter(|mark| mark.scan <= scan).map(|mark| mark.asked).reduce(f64::max)?;
@@ -88,7 +93,7 @@ impl ScanClock {
         }
     }
 
-    /// Least squares through the marks' middles, if the clock runs at its rate.
+    /// Least-squares line through the marks' midpoints, if the clock runs at its rate.
     fn line(&self, scan: u64) -> Option<(f64, f64)> {
         if self.marks.len() < ENOUGH {
             return None;
@@ -97,7 +102,7 @@ impl ScanClock {
         let first = self.marks.front()?.scan as f64;
         let points = || {
             self.marks.iter().map(|mark| {
-                // a block is counted at its end, and on the average half of it is under way
+                // a block is counted at its end, so on average half a block is in progress
                 let middle = f64::midpoint(mark.asked, mark.answered) - self.block_s / 2.0;
                 ((mark.scan as f64 - first) / self.rate_hz, middle)
             })
@@ -111,7 +116,8 @@ impl ScanClock {
         }
         let worst = points().map(|(x, y)| (y - my - slope * (x - mx)).abs()).fold(0.0, f64::max);
         let x = (scan as f64 - first) / self.rate_hz;
-        // the answer's way may be longer than the question's, always by as much: half the shortest round is unknown
+        // a constant difference between the delays of question and answer does not average out: at
+        // most half the shortest round trip is unknown
         let round = self.marks.iter().map(|mark| mark.answered - mark.asked).fold(f64::INFINITY, f64::min);
         Some((my + slope * (x - mx), worst + round / 2.0 + self.block_s / 2.0))
     }
@@ -130,7 +136,7 @@ mod tests {
     fn a_crystals_clock_is_known_better_than_its_brackets() {
         let mut clock = ScanClock::new(51_200.0, 48);
         let start = clock.start;
-        // 30 ppm fast, begun 0.25 s after the clock; answers take 2 to 8 ms
+        // 30 ppm fast, started 0.25 s after the clock; answers take 2 to 8 ms
         let truth = |scan: f64| 0.25 + scan / (51_200.0 * 1.000_03);
         for hit in 0..40_u32 {
             let at = 1.0 + 3.0 * f64::from(hit) + 0.01 * f64::from(hit % 7);
@@ -152,7 +158,7 @@ mod tests {
         let mut clock = ScanClock::new(51_200.0, 48);
         let start = clock.start;
         for hit in 0..40_u32 {
-            // 300 000 virtual scans in 50 ms, then nothing for 20 ms
+            // 300 000 virtual scans in 50 ms, then a pause of 20 ms
             let at = 0.07 * f64::from(hit);
             let scan = u64::from(hit) * 300_000 + u64::from(hit % 3) * 77_000;
             clock.mark(scan, after(start, at), after(start, at + 0.001));

@@ -1,4 +1,5 @@
-//! What the person at the rig is told of a cell: what belongs where, and how much is left to do.
+//! Instructions for the person at the rig: where hammer and laser go for a cell, and how much is
+//! left to do.
 
 use super::runner::Runner;
 use crate::campaign::plan::{Cell, configuration_name};
@@ -6,7 +7,7 @@ use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::watch::{Left, Standing};
 
 impl Runner<'_> {
-    /// What a person is told before a cell: what belongs where, and how far the cell is.
+    /// Text shown to a person before a cell: where hammer and laser go, and the cell's progress.
     pub(super) fn directions(&self, row: &CellRow) -> String {
         let millimetres =
             |at: [f64; 3]| format!("x {:.1}, y {:.1}, z {:.1} mm", 1e3 * at[0], 1e3 * at[1], 1e3 * at[2]);
@@ -32,12 +33,12 @@ impl Runner<'_> {
         )
     }
 
-    /// How far a cell is.
+    /// A cell's progress.
     pub(super) fn standing(&self, row: &CellRow) -> Standing {
         Standing { kept: self.tally.kept_in(row.id), attempts: self.tally.attempts(row.id) }
     }
 
-    /// Good hits that are still wanted here, in this structure, and in all.
+    /// Good hits still wanted in this cell, in this structure, and in total.
     pub(super) fn left(&self, row: &CellRow) -> Left {
         let mut left = Left::default();
         for other in self.cells.iter().filter(|other| self.tally.open(other.id)) {
@@ -51,7 +52,7 @@ impl Runner<'_> {
     }
 }
 
-/// A cell in a line of the log.
+/// A cell's name in a line of the log.
 pub(super) fn name(cell: &Cell) -> String {
     format!("{} {}, {}", configuration_name(cell.configuration), cell.impact, cell.response)
 }

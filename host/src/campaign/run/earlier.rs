@@ -1,4 +1,4 @@
-//! What earlier runs left behind of a cell: its records, and what the good ones have in common.
+//! A cell's records from earlier runs, and the statistics of the good ones.
 
 use std::collections::{HashMap, VecDeque};
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ pub(super) struct Earlier {
 }
 
 impl Earlier {
-    /// Those of the file at `path`.
+    /// The records of the file at `path`.
     pub(super) fn new(path: &Path, rows: Vec<Result<RecordRow, Damaged>>) -> Self {
         let mut records: HashMap<i64, Vec<Result<RecordRow, Damaged>>> = HashMap::new();
         for row in rows {
@@ -27,13 +27,13 @@ impl Earlier {
         Self { path: path.into(), records }
     }
 
-    /// A cell's good records count no more.
+    /// Drops a cell's records.
     pub(super) fn forget(&mut self, cell: i64) {
         self.records.remove(&cell);
     }
 
-    /// What the cell's good records have in common, and its attempts from the first on, so that they can be struck once more;
-    /// none of those if one is missing or damaged.
+    /// Statistics of the cell's good records, and its attempts from the first onwards so that they
+    /// can be repeated; no attempts if one is missing or damaged.
     pub(super) fn of(
         &self,
         cell: i64,
@@ -44,7 +44,8 @@ impl Earlier {
         let Some(records) = self.records.get(&cell) else {
             return Ok((Others::of(responses.into()), VecDeque::new()));
         };
-        // the writer is on a thread of its own; a cell's earlier records are in the file since before it began
+        // the writer runs on another thread; a cell's earlier records were in the file before it
+        // started
         let store = Store::open_read_only(&self.path)?;
         let others = learnt(&store, records, responses, plan, channels)?;
         let mut again: Vec<RecordRow> = records.iter().flatten().cloned().collect();
@@ -54,7 +55,7 @@ impl Earlier {
         Ok((others, if whole { again.into() } else { VecDeque::new() }))
     }
 
-    /// What the good records of a cell that are in the file by now have in common.
+    /// Statistics of a cell's good records that are in the file at present.
     pub(super) fn others_now(
         &self,
         cell: i64,
@@ -67,7 +68,7 @@ impl Earlier {
     }
 }
 
-/// What the good ones of these records have in common.
+/// Statistics of the good ones among these records.
 fn learnt(
     store: &Store,
     records: &[Result<RecordRow, Damaged>],

@@ -1,5 +1,6 @@
-//! What a person changes from elsewhere while a campaign is measured: notes, and verdicts that are overruled. The campaign file has one writer, so
-//! that what is wanted is handed to it and done between two records; the runner hears which cells it concerns.
+//! Changes that a person requests while a campaign is measured: notes, and overruled verdicts. The
+//! campaign file has one writer, so requests are queued and carried out between two records; the
+//! runner is notified of the affected cells.
 
 use std::fmt;
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
@@ -9,67 +10,67 @@ use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
 use crate::campaign::verdict::Kind;
 
-/// Edits that may wait.
+/// Maximum number of queued edits.
 const QUEUE: usize = 16;
 
-/// What is wanted.
+/// A requested change.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Edit {
     /// A line in the campaign's log.
     Note(String),
-    /// Another verdict for a record: [`Kind::Good`] keeps it, [`Kind::Dropped`] leaves it out.
+    /// A different verdict for a record: [`Kind::Good`] keeps it, [`Kind::Dropped`] leaves it out.
     Overrule {
-        /// Which record.
+        /// The record.
         record: i64,
-        /// What it counts as from now on.
+        /// The new verdict.
         verdict: Kind,
-        /// Why.
+        /// The reason.
         reason: String,
     },
-    /// The verdict that a record had before it was overruled last.
+    /// Restores the verdict that a record had before it was last overruled.
     Undo {
-        /// Which record.
+        /// The record.
         record: i64,
     },
 }
 
-/// What became of it, for whoever wanted it: a sentence, or why not.
+/// The result reported to the requester: a sentence, or the reason for failure.
 pub type Told = Result<String, String>;
 
-/// What is wanted, and who is told what became of it.
+/// A requested change, and the callback for its result.
 pub struct Request {
     edit: Edit,
     tell: Box<dyn FnOnce(Told) + Send>,
 }
 
-/// Why an edit is not taken.
+/// Why an edit is not accepted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotTaken {
-    /// Too many wait.
+    /// The queue is full.
     Busy,
-    /// Nothing is measured any more.
+    /// The measurement has ended.
     Over,
 }
 
-/// Where edits are handed in.
+/// The end where edits are submitted.
 #[derive(Clone)]
 pub struct Desk(SyncSender<Request>);
 
-/// Where they are taken up. Whoever writes the campaign file has it.
+/// The end where edits are received, held by the writer of the campaign file.
 #[derive(Clone)]
 pub struct Edits(Arc<Mutex<Receiver<Request>>>);
 
-/// Both ends.
+/// Creates both ends.
 pub fn edits() -> (Desk, Edits) {
     let (to, from) = sync_channel(QUEUE);
     (Desk(to), Edits(Arc::new(Mutex::new(from))))
 }
 
 impl Desk {
-    /// Hands an edit in; `tell` hears what became of it, on the thread that writes.
+    /// Submits an edit; `tell` is called with its result on the writer's thread.
     ///
     /// # Errors
-    /// It cannot be taken.
+    /// The edit cannot be accepted.
     pub fn hand_in(&self, edit: Edit, tell: impl FnOnce(Told) + Send + 'static) -> Result<(), NotTaken> {
         self.0.try_send(Request { edit, tell: Box::new(tell) }).map_err(|error| match error {
             TrySendError::Full(_) => NotTaken::Busy,
@@ -84,20 +85,20 @@ impl fmt::Debug for Edits {
     }
 }
 
-/// A cell whose count has changed: by how many good hits.
+/// A cell whose number of good hits changed by one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Recount {
-    /// Its id.
+    /// The cell's id.
     pub cell: i64,
-    /// A good hit more, or less.
+    /// Whether it has one good hit more; otherwise one less.
     pub more: bool,
 }
 
 impl Edits {
-    /// Does what waits, and tells which cells it concerns.
+    /// Carries out the queued edits, and returns the affected cells.
     ///
     /// # Errors
-    /// The file cannot be written; what an edit itself is wrong about is told to whoever wanted it.
+    /// The file cannot be written; an invalid edit is reported to its requester only.
     pub fn work_off(&self, store: &Store) -> Result<Vec<Recount>, StoreError> {
         let queue = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let mut changed = Vec::new();
@@ -110,7 +111,8 @@ impl Edits {
     }
 }
 
-/// Does one edit. A record that is not there, or has no samples, is the wish's fault; a file that cannot be written is everybody's.
+/// Carries out one edit. A record that is missing or has no samples makes the edit invalid; a file
+/// that cannot be written is an error of the run.
 fn done(store: &Store, edit: Edit) -> Result<(Told, Option<Recount>), StoreError> {
     let (record, wanted, reason) = match edit {
         Edit::Note(text) => {
@@ -143,7 +145,8 @@ fn done(store: &Store, edit: Edit) -> Result<(Told, Option<Recount>), StoreError
     Ok((Ok(format!("record {record}: {}, now {verdict}: {reason}", row.standing())), recount))
 }
 
-/// The verdict that counted before a record was overruled last; none where nobody has overruled `judged`.
+/// The verdict that was valid before a record was last overruled; `None` if `judged` was never
+/// overruled.
 fn before_last(store: &Store, record: i64, judged: Kind) -> Result<Option<Kind>, StoreError> {
     let all = store.overrules()?;
     let mut own = all.iter().rev().filter(|overrule| overrule.record == record);
@@ -174,7 +177,7 @@ mod tests {
         assert_eq!(hand_in(Edit::Note("one too many".into())), Err(NotTaken::Busy));
         assert_eq!(edits.work_off(&store).expect("written"), []);
         assert_eq!(told.lock().expect("whole").len(), QUEUE);
-        // what cannot be done is told, and ends nothing
+        // an edit that fails is reported, and does not end the run
         for edit in
             [Edit::Undo { record: 1 }, Edit::Overrule { record: 1, verdict: Kind::Good, reason: "x".into() }]
         {

@@ -13,7 +13,7 @@ pub enum RunError {
     /// The device.
     #[error(transparent)]
     Device(#[from] DeviceError),
-    /// Hammer and laser.
+    /// Moving hammer or laser.
     #[error(transparent)]
     Stage(#[from] StageError),
     /// The device does not fit the plan.
@@ -24,20 +24,20 @@ pub enum RunError {
         /// What does not fit, and what to do.
         what: String,
     },
-    /// The file's records are of another structure.
+    /// The file's records belong to another structure.
     #[error("{0}")]
     AnotherStructure(String),
-    /// The thread that stores records ended without saying why.
+    /// The thread that stores records ended without a reason.
     #[error("records can no longer be stored; run the same command again")]
     KeeperGone,
-    /// The hammer is a person's, and nobody struck.
+    /// The hammer is swung by a person, and nobody struck.
     #[error(
         "{cell}: nobody struck within {seconds} s (hammer.patience_s); run the same command again to go on"
     )]
     NobodyStruck {
-        /// Where.
+        /// The cell.
         cell: String,
-        /// How long somebody was waited for, s.
+        /// How long the run waited, s.
         seconds: f64,
     },
     /// The rig is not safe to strike.

@@ -1,4 +1,4 @@
-//! Does the device fit the plan? Asked before anything moves.
+//! Checks whether the device fits the plan, before anything moves.
 
 use jointrig_protocol::channel::{Quantity, Role};
 
@@ -7,12 +7,15 @@ use crate::campaign::plan::Plan;
 use crate::campaign::store::calibration_table::Calibration;
 use crate::device::channels::ChannelMap;
 
-/// A sensitivity that differs by more than this factor from what the device says is another sensor's, or a slip of the pen.
+/// A sensitivity that differs from the device's by more than this factor belongs to another sensor
+/// or is mistyped.
 const ANOTHER_SENSOR: f64 = 1.25;
 
-/// The channels as the plan calibrates them, with a sentence for each that the device describes otherwise.
+/// The channels as the plan calibrates them, with a sentence for each that the device describes
+/// differently.
 ///
-/// `coil_cap_us` is the device's longest pulse. Refuses a device of another rate, with too short a pulse, without the channels of a hit, or with other sensors than the plan's.
+/// `coil_cap_us` is the device's longest pulse. Refuses a device with another rate, with too short
+/// a pulse, without the channels of a hit, or with other sensors than the plan's.
 pub(super) fn fitted(
     address: &str,
     plan: &Plan,
@@ -42,7 +45,7 @@ pub(super) fn fitted(
     with_sensors(plan, channels).or_else(unfit)
 }
 
-/// Whether something measures at each response point: a sensor of its own, or the vibrometer that comes to it.
+/// Checks that every response point is measured: by a fixed sensor, or by the vibrometer.
 fn measured_at_every_point(plan: &Plan, channels: &ChannelMap) -> Result<(), String> {
     let points = plan.geometry.response.iter().map(toml::Spanned::get_ref);
     for point in points.filter(|point| plan.is_measured(&point.name)) {
@@ -82,8 +85,8 @@ fn measured_at_every_point(plan: &Plan, channels: &ChannelMap) -> Result<(), Str
     Ok(())
 }
 
-/// The channels with the sensors that the plan names, and a sentence for each that the device describes otherwise; or why they do not
-/// fit.
+/// The channels with the sensors that the plan names, and a sentence for each that the device
+/// describes differently; or why they do not fit.
 pub(super) fn with_sensors(plan: &Plan, channels: &ChannelMap) -> Result<(ChannelMap, Vec<String>), String> {
     let (mut map, mut remarks) = (channels.clone(), Vec::new());
     for sensor in plan.channel.iter().map(toml::Spanned::get_ref) {
@@ -101,7 +104,7 @@ pub(super) fn with_sensors(plan: &Plan, channels: &ChannelMap) -> Result<(Channe
         let device = channel.clone();
         Calibration::of_sensor(sensor).apply(channel);
         let range = f64::from(channel.range_v) * f64::from(channel.units_per_volt).abs();
-        // the range of a certificate is rounded
+        // certificates state rounded ranges
         if sensor.range.is_some_and(|given| (range / given - 1.0).abs() > 0.01) {
             return Err(format!("its channel `{name}` ends at {range:.6} {unit} (channel.range)"));
         }

@@ -1,5 +1,5 @@
-//! How hard each hit of a cell is to be: as the plan wants it, and every second one softer where it asks for that. Each force has a closed
-//! loop of its own.
+//! Target force of each hit of a cell: the plan's force, and a lower one for every second hit if
+//! the plan requests it. Each force has a separate closed loop.
 
 use super::pulse::{FIRST_SLOPE, Hit, PulseLoop};
 use crate::campaign::plan::Force;
@@ -10,11 +10,11 @@ use crate::campaign::verdict::Kind;
 pub struct Forces(Vec<PulseLoop>);
 
 impl Forces {
-    /// One loop, or two. `cap_us` is the device's own bound.
+    /// Creates one loop, or two. `cap_us` is the device's longest pulse.
     pub fn new(force: &Force, cap_us: u32) -> Self {
         let mut loops = vec![PulseLoop::new(force, cap_us)];
         if let Some(softer) = force.softer {
-            // the first guess; the loop finds the rest
+            // a first guess that the loop corrects
             let pulse = f64::from(force.pulse_us) * softer.powf(FIRST_SLOPE.recip());
             let pulse_us = (pulse.round() as u32).max(force.pulse_bounds_us[0]);
             let soft = Force { target_n: softer * force.target_n, pulse_us, ..*force };
@@ -23,20 +23,22 @@ impl Forces {
         Self(loops)
     }
 
-    /// The pulse for the next shot in a cell that has so many good hits, µs.
+    /// The pulse for the next shot in a cell with `kept` good hits, µs.
     pub fn pulse_us(&self, kept: u32) -> u32 {
         self.0[kept as usize % self.0.len()].pulse_us()
     }
 
-    /// Learns from a hit that was judged. A record with missing samples says nothing about the pulse: its peak
-    /// may be what is missing, and a longer pulse would be the answer to a fault of the link.
+    /// Updates the loop after a hit was judged. A record with missing samples is ignored: its peak
+    /// may be among the missing samples, and the loop would lengthen the pulse because of a fault
+    /// of the link.
     pub fn learn_judged(&mut self, judged: Kind, hit: Hit) {
         if judged != Kind::Gap {
             self.learn(hit);
         }
     }
 
-    /// Learns from a hit. It belongs to the loop whose pulse is nearest, so that a stored campaign teaches what the running one did.
+    /// Updates the loop whose pulse is nearest to the hit's, so that replaying a stored campaign
+    /// reproduces the state of the running one.
     fn learn(&mut self, hit: Hit) {
         if let Some(own) = self.0.iter_mut().min_by_key(|own| own.pulse_us().abs_diff(hit.pulse_us)) {
             own.learn(hit);
@@ -76,7 +78,7 @@ mod tests {
     fn a_stored_campaign_teaches_what_the_running_one_did() {
         let mut forces = Forces::new(&FORCE, 8_000);
         let mut stored = Vec::new();
-        // a hit that is refused is struck again as hard
+        // a refused hit is repeated with the same force
         for kept in [0, 0, 1, 2, 3, 3, 4, 5] {
             let pulse_us = forces.pulse_us(kept);
             stored.push(Hit { pulse_us, peak_n: (f64::from(pulse_us) - 1_500.0) * 0.025 });

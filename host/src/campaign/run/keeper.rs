@@ -1,7 +1,8 @@
-//! Storing goes on while the next hit is measured: compression, insertion and sync on a thread of their own.
+//! Stores records while the next hit is measured: compression, insertion and sync run on a separate
+//! thread.
 //!
-//! The queue is short, so that a slow disk slows the campaign instead of filling the memory, and the first
-//! error ends it: nothing is measured that cannot be kept.
+//! The queue is short, so that a slow disk slows the campaign down instead of filling the memory.
+//! The first error ends the campaign: nothing is measured that cannot be stored.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
 use std::thread::JoinHandle;
@@ -17,24 +18,24 @@ use crate::campaign::store::record_row::NewRecord;
 use crate::campaign::store::session_table::Counters;
 use crate::campaign::watch::{Left, Seen, Watchers};
 
-/// Records under way to the disk.
+/// Records that may wait for the disk.
 const QUEUE: usize = 2;
 
-/// How often it looks whether a person wants something changed.
+/// Interval at which requested edits are checked.
 const EDITS: Duration = Duration::from_millis(50);
 
-/// What is announced of a record as soon as it is in the file.
+/// What observers are notified of when a record has been stored.
 #[derive(Debug)]
 pub struct Announced {
     /// Its cell.
     pub row: CellRow,
-    /// Good hits in all, this one included.
+    /// Good hits in total, including this one.
     pub kept: u64,
-    /// Good hits that are still wanted.
+    /// Good hits still wanted.
     pub left: Left,
 }
 
-/// What is to be stored.
+/// An entry to be stored.
 enum Entry {
     Record(Box<(NewRecord, Announced)>, Counters),
     GivenUp {
@@ -62,7 +63,7 @@ enum Entry {
         session: i64,
         edges: Vec<Edge>,
     },
-    /// Somebody waits until all before this is stored.
+    /// Somebody waits until everything before this is stored.
     Waited(SyncSender<()>),
 }
 
@@ -74,7 +75,8 @@ pub struct Keeper {
 }
 
 impl Keeper {
-    /// Takes the store over until [`Keeper::finish`]; the watchers are told of each record once it is stored.
+    /// Takes over the store until [`Keeper::finish`]; the watchers are notified of each record once
+    /// it is stored.
     pub fn start(store: Store, edits: Option<Edits>, watch: Watchers) -> Self {
         let ((queue, entries), (to, recounts)) = (sync_channel(QUEUE), channel());
         let thread = std::thread::spawn(move || {
@@ -87,31 +89,33 @@ impl Keeper {
         Self { queue: Some(queue), thread: Some(thread), recounts }
     }
 
-    /// Cells whose count persons have changed since this was asked last.
+    /// Cells whose count changed through edits since the last call.
     pub fn recounts(&self) -> Vec<Recount> {
         self.recounts.try_iter().collect()
     }
 
-    /// Stores a record, with the link's counters so far, and then announces it; waits only when the disk is two
-    /// records behind. Returns whether the keeper still works: if not, [`Keeper::finish`] says why.
+    /// Stores a record, with the link's counters so far, and then announces it; blocks only if the
+    /// disk is two records behind. Returns whether the keeper still works: if not,
+    /// [`Keeper::finish`] returns the error.
     #[must_use]
     pub fn record(&self, record: NewRecord, counters: Counters, announced: Announced) -> bool {
         self.send(Entry::Record(Box::new((record, announced)), counters))
     }
 
-    /// A cell is done with what it has. Returns as [`Keeper::record`] does.
+    /// Marks a cell as done with the hits that it has. Returns as [`Keeper::record`] does.
     #[must_use]
     pub fn settle(&self, cell: i64, reason: &str) -> bool {
         self.send(Entry::Settled { cell, reason: reason.into() })
     }
 
-    /// A person wants a cell struck anew: its good records are overruled. Returns as [`Keeper::record`] does.
+    /// Overrules a cell's good records because a person wants the cell struck again. Returns as
+    /// [`Keeper::record`] does.
     #[must_use]
     pub fn redo(&self, cell: i64, reason: &str) -> bool {
         self.send(Entry::Redo { cell, reason: reason.into() })
     }
 
-    /// The link's counters at the end of a session. Returns as [`Keeper::record`] does.
+    /// Stores the link's counters at the end of a session. Returns as [`Keeper::record`] does.
     #[must_use]
     pub fn link(&self, session: i64, counters: Counters) -> bool {
         self.send(Entry::Link { session, counters })
@@ -129,19 +133,19 @@ impl Keeper {
         self.send(Entry::Log(text))
     }
 
-    /// Notes the specimen's temperature, °C. Returns as [`Keeper::record`] does.
+    /// Stores the specimen's temperature, °C. Returns as [`Keeper::record`] does.
     #[must_use]
     pub fn temperature(&self, session: i64, celsius: f64) -> bool {
         self.send(Entry::Temperature { session, celsius })
     }
 
-    /// Notes edges of the sync input and output. Returns as [`Keeper::record`] does.
+    /// Stores edges of the sync input and output. Returns as [`Keeper::record`] does.
     #[must_use]
     pub fn edges(&self, session: i64, edges: Vec<Edge>) -> bool {
         self.send(Entry::Edges { session, edges })
     }
 
-    /// Waits until all that was handed over is in the file. Returns as [`Keeper::record`] does.
+    /// Waits until everything handed over is in the file. Returns as [`Keeper::record`] does.
     #[must_use]
     pub fn catch_up(&self) -> bool {
         let (to, done) = sync_channel(1);
@@ -152,7 +156,7 @@ impl Keeper {
         self.queue.as_ref().is_some_and(|queue| queue.send(entry).is_ok())
     }
 
-    /// Stores what is left, closes the file, and tells how it went.
+    /// Stores what is left, closes the file, and returns the first error.
     pub fn finish(mut self) -> Result<(), StoreError> {
         self.end().unwrap_or(Ok(()))
     }
@@ -168,7 +172,7 @@ impl Keeper {
 }
 
 impl Drop for Keeper {
-    /// What was handed over is stored even when the runner ends early.
+    /// Entries handed over are stored even if the runner ends early.
     fn drop(&mut self) {
         if self.thread.is_some()
             && !std::thread::panicking()
@@ -195,14 +199,14 @@ fn keep(store: &Store, entry: Entry, watch: &Watchers) -> Result<(), StoreError>
         Entry::Temperature { session, celsius } => store.note_temperature(session, celsius),
         Entry::Edges { session, edges } => store.note_edges(session, &edges),
         Entry::Waited(by) => {
-            // who waited may have ended
+            // the waiting thread may have ended
             let _ = by.send(());
             Ok(())
         }
     }
 }
 
-/// Keeps what comes, and in between does what persons want changed.
+/// Stores incoming entries, and carries out requested edits in between.
 fn keep_and_edit(
     store: &Store,
     entries: &Receiver<Entry>,
@@ -217,7 +221,7 @@ fn keep_and_edit(
             keep(store, entry, watch)?;
         }
         for recount in edits.work_off(store)? {
-            // a runner that has ended counts no more
+            // a runner that has ended needs no counts
             let _ = recounts.send(recount);
         }
         if over {

@@ -1,9 +1,11 @@
-//! A campaign under way: cell after cell with the hammer ([`runner`]), level after level with the shaker ([`shaking`]).
+//! A running campaign: cell after cell with the hammer ([`runner`]), level after level with the
+//! shaker ([`shaking`]).
 //!
-//! `runner.rs` walks the cells and keeps what comes, `cell.rs` brings one cell to its end, `shot.rs` fires once, `stage.rs` moves hammer and
-//! laser, `by_hand.rs` waits for a person who strikes, `forces.rs` says how hard (by the closed loops of `pulse.rs`),
-//! `edits.rs` takes notes and overruled verdicts from elsewhere, `answers.rs` the stage's answers,
-//! `fit.rs` asks before all that whether the device fits the plan.
+//! `runner.rs` walks the cells and stores the records, `cell.rs` measures one cell, `shot.rs` fires
+//! one shot, `stage.rs` moves hammer and laser, `by_hand.rs` waits for a person to strike,
+//! `forces.rs` determines the target force and its pulse (with the closed loops of `pulse.rs`),
+//! `edits.rs` receives notes and overruled verdicts, `answers.rs` receives answers to the stage's
+//! questions, `fit.rs` checks beforehand that the device fits the plan.
 
 pub mod answers;
 pub(in crate::campaign) mod by_hand;

@@ -1,4 +1,4 @@
-//! What the person at the rig sees while a campaign runs; always on stderr.
+//! Progress display for the person at the rig; always on stderr.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -9,19 +9,19 @@ use crate::campaign::plan::{Cell as PlanCell, configuration_name};
 use crate::campaign::watch::{Left, Seen, Watch};
 use crate::outside::{tell_line, visible};
 
-/// A bar over the hits of the campaign, with the time that is left of cell, configuration and campaign; without a terminal, a line of it
-/// every ten seconds.
+/// A bar over the hits of the campaign, with the remaining time of cell, configuration and
+/// campaign; without a terminal, a line of text every ten seconds.
 #[derive(Default)]
 pub struct Progress {
     state: Mutex<Option<State>>,
 }
 
-/// Says when it is time for another line where there is no terminal.
+/// Determines when the next line is due if there is no terminal.
 pub struct Pace {
     last: Mutex<Instant>,
 }
 
-/// Without a terminal, a line so often.
+/// Interval between lines without a terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
 impl Default for Pace {
@@ -31,7 +31,7 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// Whether ten seconds have passed since the beginning, or since this was true last.
+    /// Whether ten seconds have passed since the start, or since this last returned true.
     pub fn is_due(&self) -> bool {
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
         let due = last.elapsed() >= LINE_EVERY;
@@ -42,15 +42,15 @@ impl Pace {
     }
 }
 
-/// What it shows, once the campaign has begun.
+/// State of the display, once the campaign has started.
 struct State {
     bar: ProgressBar,
     pace: Pace,
     wanted: u64,
-    /// Good hits that were there at the beginning.
+    /// Good hits that existed at the start.
     before: u64,
     begun: Instant,
-    /// Time that a person took to move things, and since when one does.
+    /// Total time that a person spent moving things, and the start of the current move.
     aside: Duration,
     aside_since: Option<Instant>,
 }
@@ -100,7 +100,7 @@ impl Watch for Progress {
 
 impl Progress {
     fn state(&self) -> MutexGuard<'_, Option<State>> {
-        // a bar that a panic left half drawn is drawn anew
+        // a bar that a panic left half drawn is redrawn
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -118,7 +118,7 @@ impl State {
         }
     }
 
-    /// A prompt takes the bar's place.
+    /// Hides the bar while a prompt is shown.
     fn step_aside(&mut self) {
         self.aside_since = Some(Instant::now());
         self.bar.finish_and_clear();
@@ -132,7 +132,8 @@ impl State {
         }
     }
 
-    /// `left: cell 9 s, AJB 4 min, all 1 h 10 min`, from the time that a good hit took so far.
+    /// `left: cell 9 s, AJB 4 min, all 1 h 10 min`, estimated from the mean time per good hit so
+    /// far.
     fn time_left(&self, cell: &PlanCell, left: Left) -> String {
         let good = self.bar.position().saturating_sub(self.before);
         if good == 0 {
@@ -150,7 +151,7 @@ impl State {
     }
 }
 
-/// A bar over `wanted` hits, of which `kept` are there.
+/// A bar over `wanted` hits, of which `kept` are done.
 fn bar(wanted: u64, kept: u64) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(wanted), ProgressDrawTarget::stderr()).with_position(kept);
     if let Ok(style) = ProgressStyle::with_template("{bar:24} {pos}/{len} hits  {wide_msg}") {
@@ -160,7 +161,7 @@ fn bar(wanted: u64, kept: u64) -> ProgressBar {
     bar
 }
 
-/// A time as people say it.
+/// A duration in a convenient unit.
 fn duration(seconds: f64) -> String {
     let whole = seconds.round() as u64;
     match whole {

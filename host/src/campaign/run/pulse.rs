@@ -1,34 +1,35 @@
-//! The hammer's closed loop: which coil pulse gives the force that is wanted.
+//! The hammer's closed loop: which coil pulse gives the target force.
 //!
-//! Peak force grows with pulse length, with scatter of a few per cent and a slow drift as the coil warms. The
-//! next pulse follows from the hits so far and from nothing else, so that a resumed campaign goes on as if it
-//! had never stopped.
+//! Peak force grows with pulse length, with a scatter of a few per cent and a slow drift as the
+//! coil warms up. The next pulse depends only on the hits so far, so that a resumed campaign
+//! continues as if it had never stopped.
 
 use crate::campaign::plan::Force;
 
-/// Hits that count: older ones belong to a colder coil.
+/// Number of hits used: older ones belong to a colder coil.
 const MEMORY: usize = 6;
 
-/// Part of the correction that one hit may cause: scatter must not be chased.
+/// Fraction of the correction that one hit may cause: the loop must not follow scatter.
 const DAMPING: f64 = 0.7;
 
-/// Largest change of the pulse in one step, as a part of it.
+/// Largest relative change of the pulse in one step.
 const STEP: f64 = 0.15;
 
-/// How much longer the pulse gets when the bolt did not arrive.
+/// Relative increase of the pulse if the bolt did not arrive.
 const REACH: f64 = 0.12;
 
-/// Bounds of d ln(peak) / d ln(pulse): near the shortest pulse that arrives the peak is very sensitive.
+/// Bounds of d ln(peak) / d ln(pulse): near the shortest pulse that arrives, the peak is very
+/// sensitive.
 const SLOPES: (f64, f64) = (0.5, 8.0);
 
-/// The slope assumed before there is one to measure.
+/// Slope assumed until it can be measured.
 pub(super) const FIRST_SLOPE: f64 = 3.0;
 
-/// A peak this far (ln) from what the same pulse gave before is an accident of the bolt and no news of the coil, unless the next
-/// one is as far off.
+/// A peak that differs by this much (ln) from earlier peaks of the same pulse is an outlier and
+/// says nothing about the coil, unless the next one differs as much.
 const ODD: f64 = 0.2;
 
-/// One hit as the loop sees it.
+/// A hit as the loop uses it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Coil pulse, µs.
@@ -44,12 +45,13 @@ pub struct PulseLoop {
     cap_us: u32,
     hits: Vec<Hit>,
     pulse_us: f64,
-    /// Whether the last hit was an odd one.
+    /// Whether the last hit was an outlier.
     odd: bool,
 }
 
 impl PulseLoop {
-    /// A loop that starts at the plan's pulse and never passes `cap_us`, the device's own bound.
+    /// A loop that starts at the plan's pulse and never exceeds `cap_us`, the device's longest
+    /// pulse.
     pub fn new(force: &Force, cap_us: u32) -> Self {
         let pulse_us = f64::from(force.pulse_us.min(cap_us));
         Self { force: *force, cap_us, hits: Vec::new(), pulse_us, odd: false }
@@ -60,7 +62,7 @@ impl PulseLoop {
         self.pulse_us.round() as u32
     }
 
-    /// Learns from a hit.
+    /// Updates the loop with a hit.
     pub fn learn(&mut self, hit: Hit) {
         let [shortest, longest] = self.force.pulse_bounds_us;
         let pulse = f64::from(hit.pulse_us);
@@ -70,11 +72,12 @@ impl PulseLoop {
             return;
         }
         if self.odd {
-            // twice in a row: it is the coil after all, and what was known of it is out of date
+            // two in a row: the coil has changed, and the earlier hits are out of date
             self.hits.clear();
         }
         let next = if hit.peak_n <= 0.0 {
-            // from the failed pulse, not from ours: several failures in hand must not add up
+            // relative to the failed pulse, not to the current one: several failed shots must not
+            // add up
             self.pulse_us.max(pulse * (1.0 + REACH))
         } else {
             if self.hits.len() == MEMORY {
@@ -86,7 +89,8 @@ impl PulseLoop {
         self.pulse_us = next.clamp(f64::from(shortest), f64::from(longest.min(self.cap_us)));
     }
 
-    /// The mean peak over hits with (nearly) this pulse, so that scatter averages out, and how many there are.
+    /// The mean peak over hits with (nearly) this pulse, which averages the scatter, and their
+    /// number.
     fn usual(&self, pulse: f64) -> (f64, f64) {
         let near = |hit: &&Hit| (f64::from(hit.pulse_us) / pulse - 1.0).abs() < 0.01;
         let (sum, count) =
@@ -103,7 +107,7 @@ impl PulseLoop {
         let (usual, count) = self.usual(pulse);
         let mean = if count > 0.0 { usual } else { peak };
         let error = (self.force.target_n / mean).ln();
-        // a mean over n hits scatters less by √n: it may be held closer to the target
+        // a mean over n hits scatters less by √n, so its tolerance is tighter
         if error.abs() <= (1.0 + self.force.tolerance).ln() / count.max(1.0).sqrt() {
             return pulse;
         }
@@ -118,7 +122,7 @@ impl PulseLoop {
         let (mx, my) = points().fold((0.0, 0.0), |(x, y), (px, py)| (x + px / n, y + py / n));
         let (sxx, sxy) = points()
             .fold((0.0, 0.0), |(xx, xy), (px, py)| (xx + (px - mx).powi(2), xy + (px - mx) * (py - my)));
-        // pulses that hardly differ tell only of scatter
+        // pulses that hardly differ show only scatter
         if sxx < n * 1e-4 { FIRST_SLOPE } else { (sxy / sxx).clamp(SLOPES.0, SLOPES.1) }
     }
 }
@@ -174,9 +178,9 @@ mod tests {
         for peak in [50.5, 49.0, 50.0] {
             assert_eq!(strike(peak), 3_000);
         }
-        // the bolt slipped; the next one is as ever
+        // the bolt slipped; the next hit is normal
         assert_eq!((strike(15.0), strike(50.2)), (3_000, 3_000));
-        // the supply sagged: twice is no accident
+        // the supply sagged: two in a row are not outliers
         assert_eq!(strike(35.0), 3_000);
         assert!(strike(35.5) > 3_100);
     }
@@ -188,7 +192,7 @@ mod tests {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
         };
-        // scatter of 2 % rms, every tenth hit an accident
+        // scatter of 2 % rms, every tenth hit an outlier
         let mut pulse = PulseLoop::new(&FORCE, 8_000);
         let mut peaks = Vec::new();
         for shot in 0..400 {

@@ -1,4 +1,4 @@
-//! How quiet the structure must be before the next hit, from how it moved after the last one.
+//! How quiet the structure must be before the next hit, relative to its motion after the last one.
 
 use std::f64::consts::PI;
 
@@ -9,20 +9,22 @@ use crate::campaign::plan::Settle;
 use crate::device::channels::ChannelMap;
 use crate::device::recording::Recording;
 
-/// The motion right after a hit is judged from here on (s after the trigger), when the pulse is over …
+/// Start of the window in which the motion right after a hit is evaluated (s after the trigger),
+/// when the pulse is over …
 const FROM_S: f64 = 0.002;
-/// … for this long, s: so many periods of the slowest mode that matters.
+/// … and its length, s: `PERIODS` periods of the slowest mode of interest.
 const FOR_S: f64 = 0.075;
 const PERIODS: f64 = 2.0;
 
-/// Limits for the first hit of a cell: nothing is known, everything is allowed.
+/// Limits for the first hit of a cell: without an earlier hit, any motion is allowed.
 pub fn unknown(channels: &ChannelMap) -> QuietLimits {
     vec![0.0; channels.len()]
 }
 
-/// Limits after `recording`: for each channel of a velocity or an acceleration a part of its rms right after the hit, at least the floor;
-/// `allowance` (1 or more) loosens them. Other channels are left out. As an acceleration, the floor is that of the slowest mode that
-/// matters.
+/// Limits after `recording`: for each velocity or acceleration channel a fraction of its rms right
+/// after the hit, but at least the floor; `allowance` (1 or more) loosens them. Other channels are
+/// not limited. For an acceleration, the velocity floor is converted at the frequency of the
+/// slowest mode of interest.
 pub fn after(recording: &Recording, channels: &ChannelMap, settle: &Settle, allowance: f64) -> QuietLimits {
     let rate = f64::from(channels.rate_hz);
     let from = recording.trigger_index + (FROM_S * rate) as usize;

@@ -1,10 +1,12 @@
-//! The runner: brings every cell to its wanted number of good hits, keeps each record, resumes where it stopped.
+//! The runner: measures the wanted number of good hits in every cell, stores each record, and
+//! resumes where it stopped.
 //!
-//! A cell begins with the structure at rest, and each later hit finds what the ones before left behind (within the plan's limit).
-//! So a cell that was broken off is resumed, on a device that moves hammer and laser by itself (a virtual rig), by striking its
-//! attempts once more at the same scans with the same pulses: nothing of that is stored, each is held against its stored record, and
-//! the next hit is the one that an undisturbed run would have made, to the last bit. A real structure is not struck in vain: it
-//! settles, and goes on.
+//! A cell starts with the structure at rest, and each later hit is affected by the residual motion
+//! of the earlier ones (within the plan's limit). On a device that moves hammer and laser by itself
+//! (a virtual rig), an interrupted cell is therefore resumed by repeating its attempts at the same
+//! scans with the same pulses: these hits are not stored, each is compared with its stored record,
+//! and the next hit is bit-identical to that of an uninterrupted run. A real structure is not
+//! struck again: it comes to rest, and the cell continues.
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
@@ -47,15 +49,15 @@ pub struct Options {
     pub stage: Stage,
     /// Answer every prompt with yes.
     pub yes: bool,
-    /// Go on even where device or rig tell that it is another structure than that of the file's records.
+    /// Continue even if device or rig indicate another structure than that of the file's records.
     pub new_structure: bool,
-    /// Who watches.
+    /// The observers.
     pub watch: Watchers,
-    /// What persons elsewhere want changed in the file.
+    /// Changes to the file that persons request during the run.
     pub edits: Option<Edits>,
-    /// Answers to the stage's questions from elsewhere than the terminal.
+    /// Answers to the stage's questions from other places than the terminal.
     pub answers: Option<Answers>,
-    /// Set to end the run after the shot in hand.
+    /// Set to end the run after the current shot.
     pub stop: Arc<AtomicBool>,
 }
 
@@ -66,20 +68,22 @@ pub struct Summary {
     pub interrupted: bool,
     /// Good records in the file.
     pub kept: u64,
-    /// Good records wanted in all.
+    /// Good records wanted in total.
     pub wanted: u64,
-    /// Cells given up in all.
+    /// Total number of cells given up.
     pub given_up: u64,
     /// Hits of this run.
     pub hits: u64,
-    /// Where every scan of the stream went.
+    /// Accounting of every scan of the stream.
     pub accounts: Accounts,
 }
 
-/// Runs the campaign in `store` on the device behind `session` until it is complete, given up or stopped.
+/// Runs the campaign in `store` on the device behind `session` until every cell is complete or
+/// given up, or the run is stopped.
 ///
 /// # Errors
-/// File, device or stage failed; every hit that was judged so far is in the file, and a later run goes on from there.
+/// File, device or stage failed; every hit that was judged so far is in the file, and a later run
+/// continues from there.
 pub fn run(
     mut store: Store,
     session: &mut Session,
@@ -128,7 +132,7 @@ pub fn run(
     let (mut cells, records) = (store.cells()?, store.records()?);
     let rows = Rows::new(&plan, &cells);
     let tally = Tally::new(&cells, rows.clone(), &records);
-    // what the hits of another cell fill is not gone to
+    // cells that are filled by the hits of another cell are not visited
     let mut filled: HashMap<i64, Vec<CellRow>> = HashMap::new();
     cells.retain(|row| match rows.lead(row.id) {
         Some(lead) => {
@@ -171,16 +175,17 @@ pub fn run(
     runner.end(walked)
 }
 
-/// Hits between two notes of the temperature: some minutes, in which a laboratory's changes by less than it matters.
+/// Hits between two readings of the temperature: some minutes, in which a laboratory's temperature
+/// changes negligibly.
 const HITS_PER_TEMPERATURE: u64 = 100;
 
-/// A run under way.
+/// A running campaign.
 pub(super) struct Runner<'a> {
     pub(super) plan: &'a Plan,
     pub(super) channels: &'a ChannelMap,
-    /// Those that are struck.
+    /// The cells that are struck.
     pub(super) cells: &'a [CellRow],
-    /// Those that the hits of one of them fill, by its id.
+    /// The cells that are filled by the hits of a struck cell, by its id.
     pub(super) filled: HashMap<i64, Vec<CellRow>>,
     pub(super) earlier: Earlier,
     pub(super) stage: Stage,
@@ -193,12 +198,12 @@ pub(super) struct Runner<'a> {
     pub(super) keeper: Keeper,
     pub(super) session_id: i64,
     pub(super) tally: Tally,
-    /// Cells that lost a good hit to a person in this run.
+    /// Cells that lost a good hit in this run because a person overruled it.
     reopened: BTreeSet<i64>,
     pub(super) hits: u64,
 }
 
-/// Where to go after a cell.
+/// Which cell comes next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Next {
     On,
@@ -220,7 +225,7 @@ impl Runner<'_> {
         while !self.stopped() {
             self.recount(None);
             let Some(row) = cells.get(at) else {
-                // a cell behind us that lost a hit to a person gets another one
+                // an earlier cell that lost an overruled hit is measured again
                 let tally = &self.tally;
                 let lost = cells.iter().find(|row| self.reopened.contains(&row.id) && tally.open(row.id));
                 let Some(row) = lost else { break };
@@ -228,7 +233,7 @@ impl Runner<'_> {
                 self.cell(row)?;
                 continue;
             };
-            // a cell that somebody went back to is shown whatever its state
+            // a cell that the user went back to is shown whatever its state
             if !self.tally.open(row.id) && !back {
                 at += 1;
                 continue;
@@ -247,7 +252,7 @@ impl Runner<'_> {
         Ok(())
     }
 
-    /// Counts what persons elsewhere have overruled since; returns whether it concerns this cell.
+    /// Counts the verdicts overruled since the last call; returns whether one belongs to this cell.
     pub(super) fn recount(&mut self, concerned: Option<i64>) -> bool {
         let mut it_does = false;
         for Recount { cell, more } in self.keeper.recounts() {
@@ -260,7 +265,7 @@ impl Runner<'_> {
         it_does
     }
 
-    /// Notes where the scan clock is.
+    /// Marks the position of the scan clock.
     pub(super) fn mark(&mut self) -> Result<(), RunError> {
         let asked = Instant::now();
         let next_scan = self.session.status()?.next_scan;
@@ -288,7 +293,7 @@ impl Runner<'_> {
         self.saw(&Seen::Link(self.session.accounts()));
         log::debug!("{:?} attempt {attempt}: {} ({})", row.cell, verdict.kind, verdict.sentence);
         if self.plan.by_hand().is_some() && self.plan.sync.is_some() {
-            // the device does not know of this hit, and another recorder is to
+            // the device does not detect a manual hit, but another recorder needs a pulse for it
             self.session.pulse_output()?;
         }
         self.keep_edges()?;
@@ -306,7 +311,7 @@ impl Runner<'_> {
         still(self.keeper.record(record, counters(self.session), standing))
     }
 
-    /// Keeps the specimen's temperature, where the device measures it.
+    /// Stores the specimen's temperature, if the device measures it.
     fn keep_temperature(&mut self) -> Result<(), RunError> {
         match self.session.temperature_c()? {
             Some(celsius) => still(self.keeper.temperature(self.session_id, celsius)),
@@ -314,7 +319,7 @@ impl Runner<'_> {
         }
     }
 
-    /// Keeps edges of the sync input and output, where the plan wants them.
+    /// Stores edges of the sync input and output, if the plan requests them.
     fn keep_edges(&mut self) -> Result<(), RunError> {
         let edges = self.session.edges();
         if self.plan.sync.is_none() || edges.is_empty() {
@@ -323,20 +328,20 @@ impl Runner<'_> {
         still(self.keeper.edges(self.session_id, edges))
     }
 
-    /// Keeps what the controller has logged.
+    /// Stores the controller's log lines.
     pub(super) fn keep_log(&mut self) -> Result<(), RunError> {
         let lines = self.session.log_lines();
         lines.into_iter().try_for_each(|line| still(self.keeper.log(format!("controller: {line}"))))
     }
 
-    /// Ends stream and file; of two errors the first one counts.
+    /// Ends stream and file; of two errors the first one is returned.
     fn end(mut self, walked: Result<(), RunError>) -> Result<Summary, RunError> {
         self.saw(&Seen::Ended);
         let walked = walked.and_then(|()| if self.hits > 0 { self.keep_temperature() } else { Ok(()) });
         let accounts = if walked.is_ok() {
             self.session.disarm().and_then(|()| self.session.finish())
         } else {
-            // the device may be gone; its arming expires by itself
+            // the device may be disconnected; its arming expires by itself
             drop(self.session.disarm());
             Ok(self.session.accounts())
         };
@@ -356,11 +361,11 @@ impl Runner<'_> {
             if accounts.unexplained() > 0 {
                 log::error!("scans are missing without a reason: {text}");
             }
-            // a keeper that is gone says so below
+            // an error of the keeper is reported below
             let _ = self.keeper.log(text);
             let _ = self.keeper.link(self.session_id, counters(self.session));
         }
-        // here too a keeper that is gone says so below
+        // here too, an error of the keeper is reported below
         let _ = self.keep_edges();
         let _ = self.keep_log();
         let closed = self.keeper.finish();
@@ -395,7 +400,7 @@ fn counters(session: &Session) -> Counters {
     .into()
 }
 
-/// Whether the keeper still works; why it does not is told when it is joined.
+/// Converts whether the keeper still works into a result; the cause is reported when it is joined.
 pub(super) fn still(works: bool) -> Result<(), RunError> {
     if works { Ok(()) } else { Err(RunError::KeeperGone) }
 }

@@ -1,10 +1,11 @@
-//! One shot: armed, fired, waited for, cut from the stream — at scans that depend on the shots before and on
-//! nothing else.
+//! One shot: armed, fired, awaited, and cut from the stream, at scans that depend only on the shots
+//! before.
 //!
-//! A virtual board's time stands still half a ring beyond the held acknowledgement, so whatever is asked while it
-//! is held at scan `D` reaches the device before scan `D + ring/2`. Every shot ends at such a decision scan `D`,
-//! which is a fixed distance from the shot's own events, and the next one may begin at
-//! `D + ring/2 + MARGIN`: however long host, link or disk took, two runs fire at the same scans.
+//! A virtual board's time stops half a ring beyond the held acknowledgement, so a request made
+//! while it is held at scan `D` reaches the device before scan `D + ring/2`. Every shot ends at
+//! such a decision scan `D`, which is a fixed distance from the shot's own events, and the next one
+//! may begin at `D + ring/2 + MARGIN`: two runs fire at the same scans, however long host, link or
+//! disk take.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -19,20 +20,20 @@ use crate::device::error::DeviceError;
 use crate::device::recording::{Recording, by_channel};
 use crate::device::session::Session;
 
-/// Scans between what the device can have reached and what it is asked for.
+/// Scans between the furthest scan that the device can have reached and the scan requested from it.
 const MARGIN: u64 = 1_024;
 
-/// Steps in which the acknowledgement follows a shot that is not decided yet, per ring.
+/// Steps per ring in which the acknowledgement follows an undecided shot.
 pub(super) const STEPS_PER_RING: u64 = 8;
 
-/// A shot that an earlier session fired ends within this time of the device, s: flight and record are bounded by
-/// a minute each.
+/// A shot fired by an earlier session ends within this time of the device, s: flight and record are
+/// bounded by a minute each.
 const SHOT_ENDS_S: f64 = 125.0;
 
-/// A shot's end is known at the latest this many steps after it.
+/// A shot's result is known at most this many steps after its end.
 const STEPS_TO_KNOW: u64 = 3;
 
-/// What came of a shot.
+/// Result of a shot.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// The hammer hit, and this is the record.
@@ -41,32 +42,34 @@ pub enum Outcome {
     Missed {
         /// The shot.
         shot: Shot,
-        /// Scans that were lost while the bolt should have arrived: with any, nobody knows whether it did.
+        /// Scans lost while the bolt should have arrived: if there are any, it is unknown whether
+        /// it did.
         lost: u64,
     },
     /// The structure did not become quiet in time; the coil stayed off.
     NotQuiet(Shot),
-    /// The device took the shot back (arming expired, link lost, interlock, emergency stop).
+    /// The device cancelled the shot (arming expired, link lost, interlock, emergency stop).
     Cancelled(Shot),
-    /// Somebody struck before the structure was at rest after the hit before.
+    /// A person struck before the structure was at rest after the previous hit.
     TooEarly {
-        /// What was measured.
+        /// The record.
         recording: Box<Recording>,
         /// The channel that moved most.
         place: usize,
-        /// How much more it moved than it may.
+        /// Ratio of its motion to its limit.
         ratio: f64,
     },
     /// Nobody struck in time.
     NobodyStruck,
-    /// The user asked to stop; the shot was taken back.
+    /// The user requested a stop; the shot was cancelled.
     Interrupted,
 }
 
-/// Residual motion that a shot waits for, per channel in its unit (rms); 0 leaves a channel out.
+/// Residual motion below which a shot is released, per channel in its unit (rms); 0 excludes a
+/// channel.
 pub type QuietLimits = Vec<f32>;
 
-/// Fires one shot after the other on a running stream.
+/// Fires shots on a running stream.
 pub struct Shooter {
     pub(super) ring: u64,
     pub(super) channels: usize,
@@ -82,10 +85,11 @@ pub struct Shooter {
 }
 
 impl Shooter {
-    /// Sets the device up for the plan's hits. `epoch` is the running stream's, of `channels` channels.
+    /// Configures the device for the plan's hits. `epoch` is that of the running stream, which has
+    /// `channels` channels.
     ///
     /// # Errors
-    /// The device refuses or is gone.
+    /// The device refuses or is disconnected.
     pub fn new(session: &mut Session, plan: &Plan, epoch: u32, channels: usize) -> Result<Self, DeviceError> {
         let (record, settle, times) = (plan.record.get_ref(), plan.settle.get_ref(), plan.trigger.get_ref());
         let rate_hz = f64::from(record.rate_hz);
@@ -114,8 +118,9 @@ impl Shooter {
         })
     }
 
-    /// The number of the last shot since the device started: shots of this session have larger ones. Waits
-    /// until a shot that an earlier session fired is over, because until then the device is busy.
+    /// The number of the last shot since the device started: shots of this session have larger
+    /// ones. Waits until a shot that an earlier session fired is over, because the device is busy
+    /// until then.
     fn last_number(session: &mut Session, rate_hz: f64) -> Result<u32, DeviceError> {
         let begin = session.expected()?;
         loop {
@@ -129,9 +134,9 @@ impl Shooter {
         }
     }
 
-    /// The scan from which on the next shot may be fired or awaited: `ready_at`, unless scans went on for
-    /// longer than a ring since then. That happens where nothing holds the device and the host stalled; a
-    /// virtual board never runs on for so long.
+    /// The first scan at which the next shot may be fired or awaited: `ready_at`, unless more than
+    /// a ring of scans has passed since then. That happens if nothing holds the device and the host
+    /// stalled; a virtual board never runs on that long.
     pub(super) fn begin(&self, session: &mut Session) -> Result<u64, DeviceError> {
         if session.expected()? <= self.ready_at.saturating_add(self.ring) {
             return Ok(self.ready_at);
@@ -139,16 +144,16 @@ impl Shooter {
         Ok(session.status()?.next_scan.max(self.ready_at))
     }
 
-    /// Hammer and laser are in place from `at_scan` on, and the acknowledgement was held at or before it when
-    /// that was asked: the next shot may begin at a fixed distance from it.
+    /// Hammer and laser are in place from `at_scan` on, and the acknowledgement was held at or
+    /// before it when that was requested: the next shot may begin at a fixed distance from it.
     pub fn staged(&mut self, at_scan: u64) {
         self.ready_at = at_scan + self.ring / 2 + MARGIN;
     }
 
-    /// Fires once and waits for what comes of it. The acknowledgement is held when this returns.
+    /// Fires once and waits for the result. The acknowledgement is held when this returns.
     ///
     /// # Errors
-    /// The device refuses or is gone.
+    /// The device refuses or is disconnected.
     pub fn shoot(
         &mut self,
         session: &mut Session,
@@ -160,7 +165,7 @@ impl Shooter {
         self.number += 1;
         let not_before = self.begin(session)?;
         let last = not_before + self.patience + self.flight(pulse_us);
-        // arming outlives everything that the shot may wait for, and not more
+        // arming lasts just longer than everything that the shot may wait for
         let wait = (last + self.ring).saturating_sub(session.expected()?);
         let valid_ms = (wait as f64 / self.rate_hz * 1000.0) as u32 + 1_000;
         session.arm(valid_ms.min(ARM_VALID_CAP_MS))?;
@@ -182,7 +187,7 @@ impl Shooter {
                 |session: &Session| session.shot().filter(|shot| shot.number == number && is_decided(shot));
             session
                 .wait_until(reach, |session| stop.load(Ordering::Relaxed) || decided(session).is_some())?;
-            // an event may be lost: what counts can be asked for
+            // an event may be lost, so query the status
             let known = match decided(session) {
                 Some(shot) => Some(shot),
                 None => session.status()?.shot.filter(|shot| shot.number == number),
@@ -193,7 +198,7 @@ impl Shooter {
                     session.disarm()?;
                     return Ok(Outcome::Interrupted);
                 }
-                // long after its time: the device forgot it
+                // long overdue: the device has forgotten the shot
                 _ if reach > last + self.ring => {
                     break Shot { phase: Phase::Cancelled, ..no_shot(number, pulse_us) };
                 }
@@ -201,7 +206,7 @@ impl Shooter {
             }
             let expected = session.expected()?;
             if expected > reach + self.ring {
-                // the host stalled: what was to be waited for has passed
+                // the host stalled: the scan to wait for has already passed
                 reach = expected;
             }
             if expected >= reach {
@@ -234,7 +239,7 @@ impl Shooter {
         Ok(outcome)
     }
 
-    /// Cuts the record of `shot`, whose last scan has arrived, and gets its final summary.
+    /// Cuts the record of `shot`, whose last scan has arrived, and fetches its final summary.
     fn collect_shot(&self, session: &mut Session, shot: &Shot) -> Result<Recording, DeviceError> {
         let is_final = |known: &Shot| known.number == shot.number && known.phase == Phase::Done;
         let summary = match session.shot().filter(is_final) {
@@ -259,13 +264,13 @@ impl Shooter {
         })
     }
 
-    /// Scans from the coil's beginning until the bolt counts as lost.
+    /// Scans from the start of the coil pulse until the bolt counts as lost.
     fn flight(&self, pulse_us: u32) -> u64 {
         (f64::from(pulse_us) * 1e-6 * self.rate_hz).ceil() as u64 + u64::from(self.trigger.flight_scans)
     }
 }
 
-/// Whether it is settled what becomes of the shot.
+/// Whether the shot's result is known.
 fn is_decided(shot: &Shot) -> bool {
     match shot.phase {
         Phase::Waiting | Phase::Firing => false,

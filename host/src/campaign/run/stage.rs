@@ -1,4 +1,4 @@
-//! Who moves hammer and laser: the device itself (virtual rigs), a person, or a command of the user's.
+//! Who moves hammer and laser: the device itself (virtual rigs), a person, or a user's command.
 
 use std::io::{BufRead, Write};
 use std::process::Command;
@@ -28,23 +28,23 @@ pub enum Stage {
     Exec(String),
 }
 
-/// What came of moving hammer and laser.
+/// Result of moving hammer and laser.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moved {
     /// They are in place from this scan on.
     InPlace(u64),
-    /// A person wants the good hits of this cell struck anew, and will be asked again.
+    /// A person wants the good hits of this cell struck again, and will be asked again.
     Redo,
     /// A person leaves this cell for a later run.
     Skip,
-    /// A person wants to go back to the cell before.
+    /// A person wants to go back to the previous cell.
     Back,
 }
 
 /// Why hammer and laser are not in place.
 #[derive(Debug, thiserror::Error)]
 pub enum StageError {
-    /// The device refused, or is gone.
+    /// The device refused, or is disconnected.
     #[error(transparent)]
     Device(#[from] DeviceError),
     /// The command failed.
@@ -52,7 +52,7 @@ pub enum StageError {
     Command {
         /// The command.
         command: String,
-        /// How it ended.
+        /// Its exit status.
         why: String,
     },
     /// Nobody answered.
@@ -85,7 +85,7 @@ impl FromStr for Stage {
 }
 
 impl Stage {
-    /// Who it is for a device that can (or cannot) be told where hammer and laser are.
+    /// Resolves [`Stage::Auto`] for a device that can (or cannot) move hammer and laser itself.
     #[must_use]
     pub fn decided(self, device_can: bool) -> Self {
         match self {
@@ -95,11 +95,12 @@ impl Stage {
         }
     }
 
-    /// Brings hammer and laser to `cell`, whose next attempt is `attempt`; `what` tells a person where they belong and how
-    /// far the cell is. In place, the acknowledgement is held at or before the scan that is returned. `who` answers a prompt.
+    /// Moves hammer and laser to `cell`, whose next attempt is `attempt`; `what` is the text shown
+    /// to a person: where they go and the cell's progress. When they are in place, the
+    /// acknowledgement is held at or before the returned scan. `who` answers a prompt.
     ///
     /// # Errors
-    /// They are not in place, and why.
+    /// They are not in place, with the reason.
     pub fn go(
         &self,
         session: &mut Session,
@@ -129,7 +130,7 @@ impl Stage {
     }
 }
 
-/// Keeps the stream going while somebody moves things; what is measured meanwhile is of no use.
+/// Keeps the stream running while things are moved; what is measured meanwhile is discarded.
 fn meanwhile<T: Send>(
     session: &mut Session,
     work: impl FnOnce() -> Result<T, StageError> + Send,
@@ -152,13 +153,13 @@ fn meanwhile<T: Send>(
 
 /// Who answers a prompt.
 pub struct Who<'a> {
-    /// Nobody is asked: everything is in place.
+    /// Answer yes without asking.
     pub yes: bool,
-    /// Somebody elsewhere may answer too, and what the question is about.
+    /// Another source of answers, and the question that they refer to.
     pub elsewhere: Option<(&'a Answers, Question)>,
 }
 
-/// How often somebody elsewhere is listened to.
+/// Interval at which the other source of answers is checked.
 const LISTEN: Duration = Duration::from_millis(50);
 
 const QUESTION: &str = "Enter when in place; r redo this cell, s skip it, b back one cell, q quit: ";
@@ -172,7 +173,8 @@ impl Who<'_> {
     }
 }
 
-/// What is typed, line by line, read on a thread of its own: it waits for the keyboard while an answer may come from elsewhere.
+/// Lines typed at the terminal, read on a separate thread: it blocks on the keyboard while an
+/// answer may come from the other source.
 fn keyboard() -> &'static Mutex<Receiver<String>> {
     static LINES: OnceLock<Mutex<Receiver<String>>> = OnceLock::new();
     LINES.get_or_init(|| {
@@ -188,10 +190,11 @@ fn keyboard() -> &'static Mutex<Receiver<String>> {
     })
 }
 
-/// Asks at the terminal and elsewhere; the first answer counts. Where there is no terminal, elsewhere alone.
+/// Asks at the terminal and at the other source; the first answer counts. Without a terminal, only
+/// the other source is asked.
 fn ask_both(what: &str, answers: &Answers, question: Question) -> Result<Key, StageError> {
     let lines = keyboard().lock().unwrap_or_else(PoisonError::into_inner);
-    // what was said before the question is no answer to it
+    // discard input from before the question
     answers.forget();
     lines.try_iter().for_each(drop);
     tell(&format!("\n{what}\n{QUESTION}"));
@@ -215,7 +218,7 @@ fn ask_both(what: &str, answers: &Answers, question: Question) -> Result<Key, St
     }
 }
 
-/// What a line means.
+/// The meaning of a line.
 enum Understood {
     Key(Key),
     Quit,
@@ -233,14 +236,14 @@ fn understood(line: &str) -> Understood {
     }
 }
 
-/// Asks until there is an answer that can be understood.
+/// Asks until the answer is valid.
 fn prompt(
     what: &str,
     yes: bool,
     keys: &mut impl BufRead,
     screen: &mut impl Write,
 ) -> Result<Key, StageError> {
-    // a closed screen is no reason to stop: without answers there is an error below
+    // write errors are ignored: without answers there is an error below
     let _ = write!(screen, "\n{what}\n");
     if yes {
         let _ = writeln!(screen, "in place? yes (--yes)");

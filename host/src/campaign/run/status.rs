@@ -1,4 +1,4 @@
-//! How far a campaign is, as `campaign status --json` tells it.
+//! Progress of a campaign, as shown by `campaign status --json`.
 
 use serde_json::{Map, Value, json};
 
@@ -9,7 +9,7 @@ use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::error::StoreError;
 use crate::campaign::store::sync_table::ClockRow;
 
-/// Per cell what is wanted, kept and refused, and why; and the FRFs that came from elsewhere.
+/// For each cell the hits wanted, kept and refused, and why; and the imported FRFs.
 ///
 /// # Errors
 /// The file cannot be read.
@@ -33,7 +33,7 @@ pub fn document(store: &Store) -> Result<Value, StoreError> {
     }))
 }
 
-/// Good hits that count, and those that are wanted.
+/// Number of good hits that count, and of those wanted.
 ///
 /// # Errors
 /// The file cannot be read.
@@ -42,7 +42,7 @@ pub fn counts(store: &Store) -> Result<(u64, u64), StoreError> {
     Ok((tally.kept(), tally.wanted()))
 }
 
-/// How many hits of a cell were refused, by verdict.
+/// Number of refused hits of a cell, by verdict.
 pub fn refusals(count: &Count) -> impl Iterator<Item = (&'static str, u32)> + '_ {
     count.refused.iter().map(|(kind, number)| (kind.name(), *number))
 }

@@ -1,4 +1,5 @@
-//! Is it the structure that the file's records were measured on? Asked before anything moves: records of two structures average to neither's.
+//! Checks, before anything moves, that the structure is the one that the file's records were
+//! measured on: averages over two structures are valid for neither.
 
 use jointrig_protocol::answer::Info;
 
@@ -7,7 +8,8 @@ use crate::campaign::store::error::StoreError;
 use crate::campaign::store::session_table::SessionInfo;
 use crate::device::transport::Simulated;
 
-/// What tells that it is another one than before, for the user's eyes; none where nothing does, or nothing was measured yet.
+/// Evidence, as text for the user, that this is another structure than before; `None` if there is
+/// none, or nothing was measured yet.
 pub(super) fn another(
     store: &Store,
     info: &Info,
@@ -39,10 +41,11 @@ pub(super) fn another(
     }))
 }
 
-/// Refuses another structure, unless it is accepted: then what told so is to be noted as soon as the session is.
+/// Refuses another structure, unless it is accepted: then returns the evidence, to be logged once
+/// the session exists.
 ///
 /// # Errors
-/// As `refuse` says it, or the file cannot be read.
+/// The error that `refuse` makes of it, or the file cannot be read.
 pub(super) fn same_or_accepted<E: From<StoreError>>(
     store: &Store,
     info: &Info,

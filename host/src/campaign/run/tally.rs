@@ -1,4 +1,4 @@
-//! How far a campaign is: per cell wanted, kept, tried.
+//! Progress of a campaign: hits wanted, kept and tried per cell.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -7,12 +7,12 @@ use crate::campaign::store::record_row::{Damaged, RecordRow};
 use crate::campaign::store::rows::Rows;
 use crate::campaign::verdict::Kind;
 
-/// How far one cell is.
+/// Progress of one cell.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Count {
     /// Good hits wanted.
     pub wanted: u32,
-    /// Good hits there.
+    /// Good hits present.
     pub kept: u32,
     /// Hits tried.
     pub attempts: u32,
@@ -27,13 +27,13 @@ pub struct Count {
 }
 
 impl Count {
-    /// Whether it has all that it needs.
+    /// Whether it has enough hits.
     pub fn done(&self) -> bool {
         self.kept >= self.wanted || self.settled
     }
 }
 
-/// How far a campaign is.
+/// Progress of a campaign.
 #[derive(Clone, Debug, Default)]
 pub struct Tally {
     cells: HashMap<i64, Count>,
@@ -41,7 +41,8 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Counts what a file holds. A hit that fills a row of cells counts in each of them, and once in all.
+    /// Counts the records of a file. A hit that fills a row of cells counts in each of them, and
+    /// once in total.
     pub fn new(cells: &[CellRow], rows: Rows, records: &[Result<RecordRow, Damaged>]) -> Self {
         let ended: HashMap<i64, (bool, bool)> =
             cells.iter().map(|row| (row.id, (row.given_up.is_some(), row.settled.is_some()))).collect();
@@ -70,14 +71,14 @@ impl Tally {
         Self { cells: counts, rows }
     }
 
-    /// The counts of every cell that a hit in this one fills.
+    /// Applies `change` to the count of every cell that a hit in this one fills.
     fn filled(&mut self, id: i64, change: impl Fn(&mut Count)) {
         for cell in self.rows.filled(id) {
             change(self.cells.entry(cell).or_default());
         }
     }
 
-    /// The cells that are struck themselves.
+    /// The counts of the cells that are struck, not just filled by another cell's hits.
     fn struck(&self) -> impl Iterator<Item = &Count> {
         self.cells.iter().filter(|(id, _)| self.rows.lead(**id).is_none()).map(|(_, count)| count)
     }
@@ -110,7 +111,8 @@ impl Tally {
         attempt
     }
 
-    /// A person overruled the verdict of a hit: one good hit more, or less. With less than it was settled with, a cell is open again.
+    /// Adjusts the count after a person overruled a verdict: one good hit more, or less. A settled
+    /// cell with fewer hits than it was settled with is open again.
     pub fn recount(&mut self, id: i64, more: bool) {
         self.filled(id, |count| {
             if more {
@@ -123,12 +125,12 @@ impl Tally {
         });
     }
 
-    /// A cell is done with what it has.
+    /// Marks a cell as done with the hits that it has.
     pub fn settle(&mut self, id: i64) {
         self.filled(id, |count| count.settled = true);
     }
 
-    /// A cell is struck anew: its good records count no more.
+    /// Restarts a cell: its good records are dropped.
     pub fn redo(&mut self, id: i64) {
         self.filled(id, |count| {
             *count.refused.entry(Kind::Dropped).or_default() += count.kept;
@@ -141,12 +143,12 @@ impl Tally {
         self.filled(id, |count| count.given_up = true);
     }
 
-    /// Good hits wanted in all.
+    /// Good hits wanted in total.
     pub fn wanted(&self) -> u64 {
         self.struck().map(|count| u64::from(count.wanted)).sum()
     }
 
-    /// Good hits there in all, those beyond a cell's wish not counted.
+    /// Good hits present in total; those beyond a cell's wanted number are not counted.
     pub fn kept(&self) -> u64 {
         self.struck().map(|count| u64::from(count.kept.min(count.wanted))).sum()
     }
@@ -156,7 +158,7 @@ impl Tally {
         self.struck().filter(|count| count.given_up).count() as u64
     }
 
-    /// Whether every cell has what it wants, or enough.
+    /// Whether every cell has all wanted hits, or enough of them.
     pub fn complete(&self) -> bool {
         self.cells.values().all(Count::done)
     }

@@ -1,4 +1,4 @@
-//! A copy of a campaign file, taken while it may be written.
+//! A copy of a campaign file, taken even while the file is being written.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -9,11 +9,11 @@ use super::error::{StoreError, sqlite};
 use super::{Store, WRITTEN};
 
 impl Store {
-    /// Copies everything that is accepted so far to `to`, checks the copy record by record, and only then gives it its
-    /// name; returns how many records it holds. A campaign that runs meanwhile goes on.
+    /// Copies everything accepted so far to `to`, checks the copy record by record, and only then
+    /// gives it its name; returns the number of records. A running campaign continues meanwhile.
     ///
     /// # Errors
-    /// Something is there already, it cannot be written, or the copy is damaged.
+    /// The target exists already, it cannot be written, or the copy is damaged.
     pub fn back_up(&self, to: &Path) -> Result<usize, StoreError> {
         if to.exists() {
             return Err(StoreError::Exists { path: to.into() });
@@ -26,7 +26,7 @@ impl Store {
         });
         if copied.is_err() {
             for ending in ["", "-wal", "-shm", "-journal"] {
-                // what is not there needs no removal
+                // ignore an error: the file may not exist
                 let _ = std::fs::remove_file(with_ending(&partial, ending));
             }
         }
@@ -38,7 +38,7 @@ impl Store {
         let mut copy = Connection::open(to).map_err(failed)?;
         {
             let backup = rusqlite::backup::Backup::new(&self.connection, &mut copy).map_err(failed)?;
-            // all pages in one step: a reader's view of one moment, which a writer does not disturb
+            // all pages in one step: a reader's snapshot, unaffected by a writer
             backup.step(-1).map_err(failed)?;
         }
         copy.execute("DELETE FROM meta WHERE key = ?1", [WRITTEN]).map_err(failed)?;

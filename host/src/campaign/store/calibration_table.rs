@@ -1,7 +1,9 @@
-//! Calibrations in the campaign file: what a person said of the sensors after the device and the plan had spoken.
+//! Calibrations in the campaign file: sensor data that a person entered after the device and the
+//! plan had defined them.
 //!
-//! Raw codes, and the scales that a session was measured with, stay as they are. A calibration is a row of its own, and the last one that says
-//! something of a channel counts, in every session from the one that it names on.
+//! Raw codes, and the scales that a session was measured with, stay unchanged. A calibration is a
+//! separate row; for each property of a channel the latest value applies, in every session from the
+//! stated one onwards.
 
 use std::cmp::max;
 
@@ -15,14 +17,14 @@ use crate::campaign::plan::SensorPlan;
 use crate::device::channels::ChannelMap;
 
 table! {
-    /// What a channel's sensor is calibrated to; none leaves what was known before.
+    /// New calibration of a channel's sensor; `None` leaves a property unchanged.
     #[derive(Clone, Debug, PartialEq)]
     pub struct Calibration {
         "calibrations" {
             "id INTEGER PRIMARY KEY",
             /// When it was entered, RFC 3339.
             utc: String = "utc TEXT NOT NULL",
-            /// The first session for which it counts.
+            /// The first session for which it applies.
             from_session: i64 = "from_session INTEGER NOT NULL",
             /// The channel's name.
             channel: String = "channel TEXT NOT NULL",
@@ -30,7 +32,7 @@ table! {
             sensitivity_v: Option<f64> = "sensitivity_v REAL",
             /// 1 or -1.
             polarity: Option<i64> = "polarity INTEGER",
-            /// By how much the signal is late, s.
+            /// Delay of the signal, s.
             delay_s: Option<f64> = "delay_s REAL",
             /// Relative standard uncertainty of the sensitivity.
             uncertainty: Option<f64> = "uncertainty REAL",
@@ -47,7 +49,7 @@ table! {
 }
 
 impl Calibration {
-    /// What is stated of a sensor; when, why and from when on are left open.
+    /// The properties stated for a sensor; time, reason and first session are left empty.
     pub fn of_sensor(sensor: &SensorPlan) -> Self {
         Self {
             utc: String::new(),
@@ -64,7 +66,7 @@ impl Calibration {
         }
     }
 
-    /// A channel as it is calibrated by this.
+    /// Applies this calibration to a channel.
     pub fn apply(&self, channel: &mut Channel) {
         if self.sensitivity_v.is_some() || self.polarity.is_some() {
             let now = f64::from(channel.units_per_volt);
@@ -72,15 +74,15 @@ impl Calibration {
             channel.units_per_volt = (sign * self.sensitivity_v.map_or(now.abs(), f64::recip)) as f32;
         }
         if let Some(delay_s) = self.delay_s {
-            // up to 1 s of whole nanoseconds
+            // at most 1 s, in whole nanoseconds
             channel.delay_ns = (delay_s * 1e9).round() as u32;
         }
     }
 }
 
 impl Store {
-    /// Enters calibrations, for every session from `from_session` on. Results are computed with them from then on; verdicts stay as they were
-    /// given.
+    /// Enters calibrations for every session from `from_session` onwards. Results are computed with
+    /// them from then on; verdicts stay as they were given.
     pub fn calibrate(
         &self,
         sensors: &[SensorPlan],
@@ -101,7 +103,7 @@ impl Store {
         })
     }
 
-    /// Every calibration that was entered, in that order.
+    /// Every calibration, in the order of entry.
     pub fn calibrations(&self) -> Result<Vec<Calibration>, StoreError> {
         let there = self.connection.table_exists(None, "calibrations");
         if !there.map_err(self.failed("looking for calibrations"))? {
@@ -111,7 +113,7 @@ impl Store {
         self.all(&sql, [], Calibration::read, "reading calibrations")
     }
 
-    /// The channels of a session as they are calibrated by now.
+    /// The channels of a session with all calibrations entered so far.
     pub fn calibrated(&self, session: i64, mut map: ChannelMap) -> Result<ChannelMap, StoreError> {
         for calibration in self.calibrations()? {
             if calibration.from_session > session {

@@ -1,4 +1,4 @@
-//! The cells of the plan in the campaign file, and what became of them.
+//! The cells of the plan in the campaign file, and their state.
 
 use jointrig_protocol::request::Configuration;
 use rusqlite::{Connection, params};
@@ -9,12 +9,12 @@ use super::table::{Row, table};
 use crate::campaign::plan::{Cell, MOST_CELLS, configuration_name};
 
 table! {
-    /// The columns of a cell.
+    /// The columns of the cell table.
     pub(super) struct CellColumns {
         "cells" {
             /// Its id in this file.
             id: i64 = "id INTEGER PRIMARY KEY",
-            /// The structure.
+            /// The configuration.
             configuration: Configuration = "configuration TEXT NOT NULL",
             /// Where the hammer strikes.
             impact: String = "impact TEXT NOT NULL",
@@ -24,7 +24,7 @@ table! {
             wanted: u32 = "wanted INTEGER NOT NULL",
             /// Why it was given up, if it was.
             given_up: Option<String> = "given_up TEXT",
-            /// Why it is done with fewer good hits than wanted, but enough, if it is.
+            /// Why it was settled with fewer good hits than wanted, if it was.
             settled: Option<String> = "settled TEXT",
             "UNIQUE (configuration, impact, response)",
         }
@@ -36,11 +36,11 @@ table! {
 pub struct CellRow {
     /// Its id in this file.
     pub id: i64,
-    /// What it is.
+    /// The plan's cell.
     pub cell: Cell,
     /// Why it was given up, if it was.
     pub given_up: Option<String>,
-    /// Why it is done with fewer good hits than wanted, but enough, if it is.
+    /// Why it was settled with fewer good hits than wanted, if it was.
     pub settled: Option<String>,
 }
 
@@ -51,7 +51,7 @@ impl From<CellColumns> for CellRow {
     }
 }
 
-/// Adds a cell; one that is there already gets another chance, with as many hits as are wanted now.
+/// Adds a cell; an existing one is reopened, with the number of hits that is wanted now.
 pub(super) fn write_cell(connection: &Connection, cell: &Cell) -> rusqlite::Result<()> {
     connection
         .prepare_cached(
@@ -64,7 +64,8 @@ pub(super) fn write_cell(connection: &Connection, cell: &Cell) -> rusqlite::Resu
 }
 
 impl Store {
-    /// Every cell, in the order of the plan. A file with more of them than a plan makes is not read.
+    /// Every cell, in the order of the plan. A file with more cells than a plan may have is
+    /// refused.
     pub fn cells(&self) -> Result<Vec<CellRow>, StoreError> {
         let count = |row: &rusqlite::Row<'_>| row.get::<_, usize>(0);
         let there = self
@@ -89,7 +90,7 @@ impl Store {
         })
     }
 
-    /// Notes that a cell is done with fewer good hits than wanted, and why.
+    /// Marks a cell as done with fewer good hits than wanted, with the reason.
     pub fn settle(&self, cell: i64, reason: &str) -> Result<(), StoreError> {
         self.change("closing a cell", |connection| {
             connection

@@ -1,12 +1,15 @@
-//! The chain: every row that was ever stored, changed or removed, in order, each entry sealed with the one before.
+//! The chain: every row that was ever stored, changed or removed, in order, each entry sealed
+//! together with the previous one.
 //!
-//! A record's own seal tells a damaged record. It does not tell a changed scale, a plan with other limits, a verdict that nobody gave, or a
-//! record that is gone. So every write of jointrig's adds an entry for each row that it touched, in the same transaction: the table, the
-//! row's key, and SHA-256 over all its columns; and SHA-256 over that and the entry before. What SQLite reports of a transaction decides
-//! what was touched, so that no writer can forget to say it. `verify` holds every row against its newest entry.
+//! A record's own seal reveals a damaged record. It does not reveal a changed scale, a plan with
+//! other limits, a forged verdict or a missing record. Therefore every write adds an entry for each
+//! row that it touched, in the same transaction: the table, the row's key, and SHA-256 over all its
+//! columns; and SHA-256 over that and the previous entry. The rows touched are those that SQLite
+//! reports for the transaction, so no writer can omit one. `verify` compares every row with its
+//! newest entry.
 //!
-//! It names what was changed, added or removed behind jointrig's back, by a damaged disk or by a hand. It is no signature: whoever knows
-//! this file can write a chain anew.
+//! It reveals what was changed, added or removed outside jointrig, by a damaged disk or manually.
+//! It is not a signature: anybody who knows this file can write a new chain.
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -30,15 +33,15 @@ CREATE TABLE chain (
 CREATE TABLE chain_head (id INTEGER PRIMARY KEY CHECK (id = 1), entries INTEGER NOT NULL, link BLOB NOT NULL) STRICT;
 ";
 
-/// Their names: no entry is made for these.
+/// Names of these tables: they are not chained themselves.
 pub(super) const OWN: [&str; 2] = ["chain", "chain_head"];
 
-/// The rows that the transaction under way has touched so far, by table and rowid.
+/// The rows that the current transaction has touched so far, by table and rowid.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Watch(Arc<Mutex<BTreeSet<(String, i64)>>>);
 
 impl Watch {
-    /// Watches what is written over this connection.
+    /// Watches all writes over this connection.
     pub(super) fn new(connection: &mut Connection) -> rusqlite::Result<Self> {
         let watch = Self::default();
         let seen = watch.clone();
@@ -51,25 +54,25 @@ impl Watch {
     }
 
     fn touched(&self) -> MutexGuard<'_, BTreeSet<(String, i64)>> {
-        // a set of rows is whole whoever panicked
+        // the set stays valid even after a poisoned lock
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Forgets what a transaction before has touched: it was rolled back.
+    /// Discards the rows touched by an earlier transaction, which was rolled back.
     pub(super) fn begin(&self) {
         self.touched().clear();
     }
 
-    /// Adds the entries of what was touched since [`Watch::begin`].
+    /// Adds the entries of the rows touched since [`Watch::begin`].
     pub(super) fn extend(&self, connection: &Connection) -> rusqlite::Result<()> {
-        // a row that was touched twice has one state at the end
+        // a row that was touched twice has one final state
         let touched = std::mem::take(&mut *self.touched());
         let mut entries = Vec::new();
         for (table, rowid) in touched {
             match read(connection, &table, rowid)? {
                 Some((key, _)) if table == "meta" && key == WRITTEN => {}
                 Some((key, digest)) => entries.push((table, key, Some(digest))),
-                // the note of being written is all that is ever removed from these
+                // the only row ever removed from `meta` is the note that the file is being written
                 None if table == "meta" => {}
                 None => entries.push((table, rowid.to_string(), None)),
             }
@@ -78,7 +81,7 @@ impl Watch {
     }
 }
 
-/// A row's key and digest; none where it is not there any more.
+/// A row's key and digest; `None` if the row no longer exists.
 fn read(connection: &Connection, table: &str, rowid: i64) -> rusqlite::Result<Option<(String, [u8; 32])>> {
     let keys = keys(connection, table)?;
     let sql = format!("SELECT * FROM \"{table}\" WHERE rowid = ?1");
@@ -88,7 +91,7 @@ fn read(connection: &Connection, table: &str, rowid: i64) -> rusqlite::Result<Op
         .optional()
 }
 
-/// Places of the columns of a table's primary key.
+/// Indices of the columns of a table's primary key.
 fn keys(connection: &Connection, table: &str) -> rusqlite::Result<Vec<usize>> {
     let mut statement =
         connection.prepare_cached("SELECT cid FROM pragma_table_info(?1) WHERE pk > 0 ORDER BY pk")?;
@@ -106,7 +109,7 @@ fn key_of(row: &Row<'_>, keys: &[usize]) -> rusqlite::Result<String> {
     Ok(keys.iter().map(one).collect::<rusqlite::Result<Vec<_>>>()?.join("/"))
 }
 
-/// SHA-256 over all columns of a row, each with its kind and length.
+/// SHA-256 over all columns of a row, each with its type and length.
 fn digest(row: &Row<'_>) -> rusqlite::Result<[u8; 32]> {
     let mut hasher = Sha256::new();
     for place in 0..row.as_ref().column_count() {
@@ -115,10 +118,10 @@ fn digest(row: &Row<'_>) -> rusqlite::Result<[u8; 32]> {
     Ok(hasher.finalize().into())
 }
 
-/// An entry: table, key, and digest, or none where the row was removed.
+/// An entry: table, key, and digest, or `None` if the row was removed.
 type Entry = (String, String, Option<[u8; 32]>);
 
-/// The chain's end: how many entries, and the last link.
+/// The chain's end: number of entries, and the last link.
 fn head(connection: &Connection) -> rusqlite::Result<(i64, Vec<u8>)> {
     let found = connection
         .query_row("SELECT entries, link FROM chain_head WHERE id = 1", [], |row| {
@@ -157,7 +160,7 @@ fn append(connection: &Connection, entries: &[Entry]) -> rusqlite::Result<()> {
         .map(|_| ())
 }
 
-/// Chains every row that is there: of a file from before there was a chain.
+/// Chains all existing rows, in a file from before the chain was introduced.
 pub(super) fn begin(connection: &Connection) -> rusqlite::Result<()> {
     for table in tables(connection)? {
         let entries = rows(connection, &table)?;
@@ -176,7 +179,7 @@ fn tables(connection: &Connection) -> rusqlite::Result<Vec<String>> {
     Ok(all.into_iter().filter(|name| !OWN.contains(&name.as_str())).collect())
 }
 
-/// Key and digest of every row of a table that counts.
+/// Key and digest of every chained row of a table.
 fn rows(connection: &Connection, table: &str) -> rusqlite::Result<Vec<(String, [u8; 32])>> {
     let keys = keys(connection, table)?;
     let mut statement = connection.prepare(&format!("SELECT * FROM \"{table}\""))?;
@@ -185,17 +188,17 @@ fn rows(connection: &Connection, table: &str) -> rusqlite::Result<Vec<(String, [
     Ok(all.into_iter().filter(|(key, _)| table != "meta" || key != WRITTEN).collect())
 }
 
-/// Table and key of every row, in the order in which they were stored for the first time.
+/// Table and key of every row, in the order in which they were first stored.
 pub(super) fn history(connection: &Connection) -> rusqlite::Result<Vec<(String, String)>> {
     let sql = "SELECT in_table, row_key FROM chain GROUP BY in_table, row_key ORDER BY min(id)";
     connection.prepare(sql)?.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?.collect()
 }
 
-/// Something that was done behind jointrig's back.
+/// A modification made outside jointrig.
 pub(super) struct Behind {
-    /// Which row, by table and key; none where it is the chain itself.
+    /// The row, by table and key; `None` if it is the chain itself.
     pub(super) row: Option<(String, String)>,
-    /// What, in words.
+    /// Description.
     pub(super) what: String,
 }
 
@@ -210,7 +213,7 @@ impl Behind {
     }
 }
 
-/// What was changed, added or removed behind jointrig's back.
+/// Rows that were changed, added or removed outside jointrig.
 ///
 /// # Errors
 /// The chain or a table cannot be read.

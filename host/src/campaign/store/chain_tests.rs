@@ -76,7 +76,7 @@ fn begin_session(store: &mut Store) -> i64 {
     store.begin_session(&info, &map()).expect("noted")
 }
 
-/// A campaign in which everything has happened that may.
+/// A campaign that contains every kind of event.
 fn eventful(path: &Path) -> Store {
     let mut store = Store::create(path, SMALL, "small.toml").expect("created");
     let session = begin_session(&mut store);
@@ -128,7 +128,7 @@ fn an_honest_history_raises_no_alarm() {
         reader.back_up(&copy).expect("copied");
         assert_eq!(said(&Store::open_read_only(&copy).expect("open")), "");
     }
-    // broken off: what was accepted is chained, what was not leaves nothing
+    // interrupted: accepted rows are chained, and a failed write leaves nothing
     let store = Store::open(&path).expect("again");
     assert!(
         store
@@ -141,7 +141,7 @@ fn an_honest_history_raises_no_alarm() {
     assert_eq!(said(&store), "");
 }
 
-/// One thing that the program does to its file, by dice; what could not be done leaves nothing behind either.
+/// One random modification by the program itself; a modification that fails leaves no trace either.
 fn deed(store: &mut Store, dice: &mut Xoshiro256PlusPlus) {
     let number = |dice: &mut Xoshiro256PlusPlus, below: u32| dice.next_u32() % below;
     let sessions = store.sessions().expect("sessions");
@@ -180,7 +180,7 @@ fn deed(store: &mut Store, dice: &mut Xoshiro256PlusPlus) {
             let own: Vec<_> = plan.channel.into_iter().map(toml::Spanned::into_inner).collect();
             store.calibrate(&own, 1, "certificate").expect("calibrated");
         }
-        // with a cell more or less; refused where that cell has hits
+        // with one cell more or less; refused if that cell has hits
         _ => drop(store.take_over(
             &SMALL.replace(
                 "impacts = [\"BZ1\"]",
@@ -193,7 +193,7 @@ fn deed(store: &mut Store, dice: &mut Xoshiro256PlusPlus) {
 
 #[test]
 fn two_hundred_honest_histories_raise_no_alarm() {
-    // in memory where there is such a folder: thousands of transactions wait for a disk otherwise
+    // in memory if there is such a folder: otherwise thousands of transactions wait for a disk
     let folder = tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir()).expect("a folder");
     for history in 0..200 {
         let mut dice = Xoshiro256PlusPlus::seed_from_u64(history);
@@ -204,7 +204,7 @@ fn two_hundred_honest_histories_raise_no_alarm() {
                 deed(&mut store, &mut dice);
             }
             match dice.next_u32() % 3 {
-                // as when a process is killed: nothing is closed in order
+                // as if the process was killed: nothing is closed properly
                 0 => drop(store),
                 _ => store.close().expect("closed"),
             }
@@ -263,7 +263,7 @@ fn what_is_done_behind_its_back_is_named_by_table_and_row() {
         let told = said(&Store::open_read_only(&path).expect("open"));
         assert!(told.contains(names), "{sql}: {told}");
     }
-    // every row and column, by dice
+    // random rows and columns
     let mut dice = Xoshiro256PlusPlus::seed_from_u64(20);
     let store = Store::open(&original).expect("open");
     let vandals = "PRAGMA foreign_keys = OFF; DROP TRIGGER records_stay; DROP TRIGGER seals_stay; DROP TRIGGER frfs_stay; \
@@ -292,7 +292,7 @@ fn what_is_done_behind_its_back_is_named_by_table_and_row() {
             0 => format!("DELETE FROM {table} WHERE rowid = {row}"),
             _ => format!("UPDATE {table} SET {column} = {value} WHERE rowid = {row}"),
         };
-        // the note of being written is nobody's result
+        // the note that the file is being written is not chained
         let noted = table == "meta"
             && row
                 == pick("SELECT CAST(rowid AS TEXT) FROM meta WHERE key = 'written_since'", &mut dice)
@@ -342,7 +342,7 @@ fn five_hundred_damaged_bytes_are_named_or_change_nothing() {
                 named += 1;
                 assert!(!what.is_empty());
             }
-            // a byte that holds nothing
+            // an unused byte
             Ok(rows) => assert!(rows == undamaged, "byte {at} was silent"),
         }
     }
@@ -367,7 +367,7 @@ fn a_file_without_a_chain_is_read_and_gets_one_when_it_is_written() {
         reader.log_lines(0).expect("log").iter().any(|(_, _, text)| text.contains("chained from here on"))
     );
     drop(reader);
-    // a version that was set back hides no chain
+    // resetting the version does not hide the chain
     Connection::open(&path)
         .expect("open")
         .execute_batch("PRAGMA user_version = 1; DELETE FROM log")

@@ -1,10 +1,12 @@
-//! Samples as bytes in the file: one pco chunk per channel, lossless, with a CRC-32 over the raw codes.
+//! Samples as bytes in the file: one pco chunk per channel, lossless, with a CRC-32 over the raw
+//! codes.
 //!
-//! The blob is, for each channel, the chunk's length (u32, little-endian) and the chunk; a chunk is a
-//! standalone pco file of `i16`. From Python: `pcodec.standalone.simple_decompress(chunk)`.
-//! `docs/compare_codecs.py` compares pco with zstd on a campaign's records. On the paper's campaign, simulated: pco 3.5 : 1; zstd at most
-//! 2.9 : 1 (level 19, a hundred times slower), and 2.6 : 1 at the level that is as fast as pco (3). Byte-wise tricks in front of zstd
-//! (differences, low bytes apart) make it worse: the low byte is noise.
+//! The blob is, for each channel, the chunk's length (u32, little-endian) and the chunk; a chunk is
+//! a standalone pco file of `i16`. From Python: `pcodec.standalone.simple_decompress(chunk)`.
+//! `docs/compare_codecs.py` compares pco with zstd on a campaign's records. On the paper's
+//! campaign, simulated: pco 3.5 : 1; zstd at most 2.9 : 1 (level 19, a hundred times slower), and
+//! 2.6 : 1 at the level that is as fast as pco (3). Byte-wise preprocessing before zstd
+//! (differences, separate low bytes) makes it worse: the low byte is noise.
 //!
 //! The CRC-32 (zlib's) runs over the codes as little-endian i16, channel after channel.
 
@@ -13,8 +15,8 @@ use pco::{ChunkConfig, DeltaSpec, ModeSpec};
 use rayon::prelude::*;
 use std::cell::Cell;
 
-/// Vibration is mostly noise over a slow ring-down: second differences and no other mode are as small as
-/// what pco finds by itself, at half the time.
+/// Vibration is mostly noise on a slow ring-down: with second differences and the classic mode
+/// fixed, the result is as small as with pco's own choice, in half the time.
 fn config() -> ChunkConfig {
     ChunkConfig::default()
         .with_compression_level(6)
@@ -22,13 +24,14 @@ fn config() -> ChunkConfig {
         .with_delta_spec(DeltaSpec::Auto)
 }
 
-/// Samples up to so many bytes are unpacked however small they are packed, …
+/// Samples up to this many bytes are unpacked whatever their compression ratio, …
 const ALWAYS_BYTES: usize = 64 << 20;
-/// … and larger ones up to this ratio: noise packs no better.
+/// … and larger ones up to this ratio: noise does not compress better.
 const MOST_RATIO: usize = 16;
 
 thread_local! {
-    /// Memory for one channel: fresh memory for each record costs a tenth of unpacking it.
+    /// Buffer for one channel, reused because fresh memory for each record costs a tenth of
+    /// unpacking it.
     static SPARE: Cell<Vec<i16>> = const { Cell::new(Vec::new()) };
 }
 
@@ -38,36 +41,36 @@ pub enum CodecError {
     /// The compressor refused.
     #[error("compression: {0}")]
     Pco(#[from] pco::errors::PcoError),
-    /// The blob ends in mid-channel, has bytes left, or its channels differ in length.
+    /// The blob ends within a channel, has bytes left over, or its channels differ in length.
     #[error("the samples' bytes are cut or overgrown")]
     Shape,
-    /// It says that it holds far more than its bytes can.
+    /// The row claims far more samples than its bytes can hold.
     #[error("{blob} bytes cannot hold {channels} channels of {scans} samples")]
     Bomb {
-        /// Channels, as its row says.
+        /// Channels, according to the row.
         channels: usize,
-        /// Samples of each, as its row says.
+        /// Samples of each, according to the row.
         scans: usize,
-        /// Bytes that it is packed in.
+        /// Size of the blob, bytes.
         blob: usize,
     },
-    /// The file system or the file's structure keeps them back.
+    /// The file system or the file's structure prevents reading.
     #[error("the samples cannot be read: {0}")]
     Unreadable(String),
-    /// The bytes are not those that were stored.
+    /// The bytes differ from those that were stored.
     #[error("checksum of the stored bytes {found:08x}, should be {stored:08x}")]
     Bytes {
-        /// Of what was read.
+        /// Checksum of the bytes read.
         found: u32,
-        /// Of what was written.
+        /// Checksum of the bytes stored.
         stored: u32,
     },
-    /// The codes are not those that were stored.
+    /// The codes differ from those that were stored.
     #[error("checksum {found:08x}, stored {stored:08x}")]
     Checksum {
-        /// Of what was read.
+        /// Checksum of the codes read.
         found: u32,
-        /// Of what was written.
+        /// Checksum of the codes stored.
         stored: u32,
     },
 }
@@ -98,12 +101,12 @@ pub fn decode(blob: &[u8], channels: usize, scans: usize, stored: u32) -> Result
     let mut codes = vec![0; chunks.len() * scans];
     let channel = scans.max(1);
     if rayon::current_thread_index().is_some() {
-        // other records are being read beside this one, and no worker may begin another of them within it
+        // called from a worker: other records are being read in parallel, so no nested parallelism
         for (chunk, channel) in chunks.into_iter().zip(codes.chunks_exact_mut(channel)) {
             unpack(chunk, channel)?;
         }
     } else {
-        // whoever wants one record waits for it: every core unpacks some of its channels
+        // a single record: all cores unpack its channels in parallel
         let parts = chunks.into_par_iter().zip(codes.par_chunks_exact_mut(channel));
         parts.try_for_each(|(chunk, channel)| unpack(chunk, channel))?;
     }
@@ -111,11 +114,12 @@ pub fn decode(blob: &[u8], channels: usize, scans: usize, stored: u32) -> Result
     if found == stored { Ok(codes) } else { Err(CodecError::Checksum { found, stored }) }
 }
 
-/// Shows `look` the codes of some channels, each with its place, in the order of `places`; none of a place beyond the last channel. The
-/// checksum over all codes cannot be compared: whoever asks has compared that of the blob.
+/// Passes the codes of some channels to `look`, each with its index, in the order of `places`; an
+/// empty slice for an index beyond the last channel. The checksum over all codes cannot be compared
+/// here: the caller has compared that of the blob.
 ///
 /// # Errors
-/// The blob is damaged. Some channels may have been shown then.
+/// The blob is damaged. `look` may have been called for some channels by then.
 pub fn decode_each(
     blob: &[u8],
     channels: usize,
@@ -139,7 +143,7 @@ pub fn decode_each(
     Ok(())
 }
 
-/// The chunk of each channel; none of a shot without contact, which has no samples.
+/// The chunk of each channel; empty for a shot without contact, which has no samples.
 fn chunks(blob: &[u8], channels: usize, scans: usize) -> Result<Vec<&[u8]>, CodecError> {
     let bytes = channels.checked_mul(scans).and_then(|codes| codes.checked_mul(2));
     let most = ALWAYS_BYTES + MOST_RATIO * blob.len();
@@ -194,16 +198,17 @@ mod tests {
         for place in (0..blob.len()).step_by(97) {
             let mut bad = blob.clone();
             bad[place] ^= 0x10;
-            // a bit of padding may be free; then the codes are whole (and the checksum over the stored bytes is not)
+            // a padding bit may be unused; then the codes are intact (and the checksum over the
+            // stored bytes is not)
             if let Ok(read) = decode(&bad, 3, 1_000, crc) {
                 assert_eq!(read, codes);
             }
         }
-        // chunks that are longer or shorter than the row says
+        // chunks that are longer or shorter than the row claims
         assert!(matches!(decode(&blob, 3, 999, crc), Err(CodecError::Shape)));
         assert!(matches!(decode(&blob, 3, 1_001, crc), Err(CodecError::Shape)));
         assert!(matches!(decode(&blob, 2, 1_000, crc), Err(CodecError::Shape)));
-        // and what no memory holds
+        // and sizes beyond any memory
         for (channels, scans) in
             [(usize::MAX, 2), (2, usize::MAX / 2), (1_000_000_000, 1_000_000_000), (16, 1 << 30)]
         {

@@ -1,4 +1,4 @@
-//! What can go wrong with a campaign file, and what to do.
+//! Errors of a campaign file, with advice.
 
 use std::fs::File;
 use std::io::ErrorKind;
@@ -9,10 +9,10 @@ use rusqlite::ErrorCode;
 use crate::advice;
 use crate::campaign::plan::PlanError;
 
-/// What can go wrong with a campaign file.
+/// An error of a campaign file.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// A new file was asked for and something is there.
+    /// A new file was requested, but the path exists.
     #[error("{path} exists already: choose another name, or continue it with `jointrig campaign run`")]
     Exists {
         /// The file.
@@ -24,7 +24,7 @@ pub enum StoreError {
         /// The file.
         path: PathBuf,
     },
-    /// A folder, where a file is wanted.
+    /// A folder was given where a file is needed.
     #[error("{path} is a folder: {}", holding(path))]
     Folder {
         /// The folder.
@@ -35,10 +35,10 @@ pub enum StoreError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What the operating system said.
+        /// The operating system's error.
         source: std::io::Error,
     },
-    /// Some other file.
+    /// It is not a campaign file.
     #[error("{path} is not a campaign file: give the .jrig file that `jointrig campaign new` made")]
     Foreign {
         /// The file.
@@ -53,7 +53,7 @@ pub enum StoreError {
         path: PathBuf,
         /// Its version.
         found: i32,
-        /// Ours.
+        /// The newest version that can be read.
         known: i32,
     },
     /// Written by an older program.
@@ -65,17 +65,17 @@ pub enum StoreError {
         path: PathBuf,
         /// Its version.
         found: i32,
-        /// Ours.
+        /// The oldest version that can be read.
         known: i32,
     },
-    /// Another process writes it.
+    /// Another process is writing it.
     #[error(
         "{path} is being written by another jointrig ({holder}): end that one first; reading it is always possible"
     )]
     Busy {
         /// The file.
         path: PathBuf,
-        /// Who writes it.
+        /// The process that is writing it.
         holder: String,
     },
     /// It cannot be locked for writing.
@@ -83,7 +83,7 @@ pub enum StoreError {
     Lock {
         /// The file.
         path: PathBuf,
-        /// What the operating system said.
+        /// The operating system's error.
         source: std::io::Error,
     },
     /// It lies on a network share.
@@ -97,7 +97,7 @@ pub enum StoreError {
         /// The kind of file system.
         kind: String,
     },
-    /// Records wait beside a file that cannot be written.
+    /// The file's log contains records, but the file cannot be written.
     #[error(
         "{path} was not closed in order and lies where nothing can be written: copy it to a local disk together with \
          {path}-wal, which holds its last records"
@@ -106,7 +106,7 @@ pub enum StoreError {
         /// The file.
         path: PathBuf,
     },
-    /// The file went away while it was written.
+    /// The file disappeared while it was being written.
     #[error(
         "{path} went away while it was written: {what}; {rescue}. Put the file back or go on with the copy"
     )]
@@ -115,7 +115,7 @@ pub enum StoreError {
         path: PathBuf,
         /// What happened to it.
         what: String,
-        /// What became of what it held.
+        /// What could be saved of its content.
         rescue: String,
     },
     /// It has several names.
@@ -126,7 +126,7 @@ pub enum StoreError {
     Links {
         /// The file.
         path: PathBuf,
-        /// How many.
+        /// Number of names.
         links: u64,
     },
     /// A record cannot be read.
@@ -139,18 +139,18 @@ pub enum StoreError {
         /// What is wrong with it.
         what: String,
     },
-    /// Something in the file makes no sense.
+    /// Some content of the file is invalid.
     #[error("{path}: {what}")]
     Content {
         /// The file.
         path: PathBuf,
-        /// What makes no sense.
+        /// The invalid content.
         what: String,
     },
     /// The plan cannot be read.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// A plan does not go on from what was measured.
+    /// A new plan is incompatible with what was measured.
     #[error("{source_name} cannot take over from the plan in {path}: {what}")]
     PlanChange {
         /// The file.
@@ -165,16 +165,17 @@ pub enum StoreError {
     Sqlite {
         /// The file.
         path: PathBuf,
-        /// What was being done.
+        /// The operation that failed.
         doing: &'static str,
-        /// What SQLite said.
+        /// SQLite's error.
         source: rusqlite::Error,
-        /// What to do, if it is known.
+        /// Advice; empty if there is none.
         hint: &'static str,
     },
 }
 
-/// What is there, a file, and may be read; SQLite's own words for all else say neither what nor why.
+/// Refuses a path that is missing, is not a regular file, or cannot be read; SQLite's own messages
+/// for these cases state neither what is wrong nor why.
 pub(super) fn refuse_what_is_no_file(path: &Path) -> Result<(), StoreError> {
     match std::fs::metadata(path) {
         Err(error) if error.kind() == ErrorKind::NotFound => Err(StoreError::Missing { path: path.into() }),
@@ -186,7 +187,7 @@ pub(super) fn refuse_what_is_no_file(path: &Path) -> Result<(), StoreError> {
     }
 }
 
-/// The campaign files of a folder, for somebody who named the folder.
+/// Lists the campaign files of a folder, for a user who gave the folder.
 fn holding(folder: &Path) -> String {
     let names = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     let mut files: Vec<String> = names
@@ -204,10 +205,10 @@ fn holding(folder: &Path) -> String {
     }
 }
 
-/// Files that are named in a message.
+/// Maximum number of files named in a message.
 const MOST_NAMED: usize = 5;
 
-/// SQLite's error with what was being done and, where it is known, what to do.
+/// SQLite's error with the operation that failed and, if known, advice.
 pub(super) fn sqlite(path: &Path, doing: &'static str, source: rusqlite::Error) -> StoreError {
     let hint = match source.sqlite_error_code() {
         Some(ErrorCode::DiskFull) => {

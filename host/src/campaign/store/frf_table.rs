@@ -1,8 +1,9 @@
-//! FRFs that were measured elsewhere: one matrix for a configuration, kept in the campaign file as it came.
+//! Imported FRFs: one matrix per configuration, kept in the campaign file as imported.
 //!
-//! Append-only like the records; the latest of a configuration counts. The values are f64, little-endian: `frf` holds (line,
-//! output, input) with real and imaginary part in turn, `variance` the same without parts. The checksum runs over every column
-//! that describes them.
+//! Append-only like the records; the latest matrix of a configuration counts. The values are f64,
+//! little-endian: `frf` holds (line, output, input) with real and imaginary part interleaved,
+//! `variance` the same order with one real value each. The checksum runs over every column that
+//! describes them.
 
 use jointrig_protocol::request::Configuration;
 use nalgebra::DMatrix;
@@ -15,7 +16,7 @@ use super::table::{Row, table};
 use crate::campaign::plan::configuration_name;
 use crate::frf::{Frf, MotionQuantity};
 
-/// FRFs from elsewhere, with the variance where their file told it.
+/// Imported FRFs, with the variance if their file contained it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportedFrf {
     /// The file that they came from, without its folder.
@@ -26,7 +27,7 @@ pub struct ImportedFrf {
     pub frf: Frf,
 }
 
-/// Which FRFs there are.
+/// Description of imported FRFs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FrfRow {
     /// The row.
@@ -40,7 +41,7 @@ pub struct FrfRow {
 }
 
 table! {
-    /// FRFs as they stand in the file; the latest row of a configuration counts.
+    /// The columns of the FRF table; the latest row of a configuration counts.
     pub(super) struct FrfColumns {
         "frfs" {
             "id INTEGER PRIMARY KEY",
@@ -50,7 +51,7 @@ table! {
             utc: String = "utc TEXT NOT NULL",
             /// The file that they came from, without its folder.
             source: String = "source TEXT NOT NULL",
-            /// Which kind of FRF.
+            /// Quantity of the FRFs.
             quantity: String = "quantity TEXT NOT NULL",
             /// Their shift from the imaginary axis, 1/s.
             sigma_per_s: f64 = "sigma_per_s REAL NOT NULL",
@@ -60,9 +61,9 @@ table! {
             inputs: String = "inputs TEXT NOT NULL",
             /// The lines, Hz.
             frequency: Vec<u8> = "frequency BLOB NOT NULL",
-            /// (line, output, input), real and imaginary part in turn.
+            /// (line, output, input), real and imaginary part interleaved.
             frf: Vec<u8> = "frf BLOB NOT NULL",
-            /// (line, output, input) of the real part.
+            /// (line, output, input), variance of the real part.
             variance: Option<Vec<u8>> = "variance BLOB",
             "crc32 INTEGER NOT NULL",
         }
@@ -84,7 +85,7 @@ impl FrfColumns {
         hasher.finalize()
     }
 
-    /// The FRFs of this row; the reason where it contradicts itself.
+    /// The FRFs of this row; an error message if it is inconsistent.
     fn decoded(self) -> Result<ImportedFrf, String> {
         let names = |text: &str| serde_json::from_str::<Vec<String>>(text).map_err(|e| e.to_string());
         let (outputs, inputs) = (names(&self.outputs)?, names(&self.inputs)?);
@@ -121,7 +122,7 @@ impl FrfColumns {
 }
 
 impl Store {
-    /// Stores FRFs of a configuration; they count instead of earlier ones.
+    /// Stores FRFs of a configuration; they replace earlier ones in the analysis.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -131,7 +132,7 @@ impl Store {
         source: &str,
         frf: &Frf,
     ) -> Result<(), StoreError> {
-        // rows of C order, which nalgebra's columns of the transpose are
+        // row-major order, obtained as the columns of the transpose in nalgebra
         let values = frf.lines().iter().flat_map(|y| y.transpose().iter().copied().collect::<Vec<_>>());
         let variances = |all: &[DMatrix<f64>]| {
             bytes(all.iter().flat_map(|v| v.transpose().iter().copied().collect::<Vec<_>>()))
@@ -152,7 +153,7 @@ impl Store {
         self.change("storing FRFs", |connection| row.insert(connection, &[("crc32", &crc)]))
     }
 
-    /// The FRFs that count, without their values: the latest of each configuration.
+    /// The latest FRFs of each configuration, without their values.
     pub fn frf_rows(&self) -> Result<Vec<FrfRow>, StoreError> {
         let sql = "SELECT max(id), configuration, source, utc FROM frfs GROUP BY configuration ORDER BY 1";
         let read = |row: &rusqlite::Row<'_>| {
@@ -161,7 +162,7 @@ impl Store {
         self.all(sql, [], read, "reading FRFs")
     }
 
-    /// The FRFs of a configuration that came from elsewhere, if there are any.
+    /// The imported FRFs of a configuration, if there are any.
     ///
     /// # Errors
     /// They are damaged, or the file cannot be read.
@@ -170,7 +171,7 @@ impl Store {
         found.map(|row| self.frf_of(row.id)).transpose()
     }
 
-    /// The FRFs of that row.
+    /// The FRFs of the row with that id.
     ///
     /// # Errors
     /// As [`Store::frf`].

@@ -68,7 +68,7 @@ fn every_flipped_bit_is_seen_and_named() {
         let error = store.frf("AJB").expect_err(column).to_string();
         assert!(error.contains("FRFs of AJB") && error.contains("import them again"), "{column}: {error}");
         let damage = store.verify().expect("checked");
-        // the triggers that were in the way
+        // except the triggers that had to be dropped
         let damage: Vec<_> = damage.into_iter().filter(|one| !one.what.starts_with("it lacks")).collect();
         assert!(damage.len() == 1 && damage[0].what.contains("damaged"), "{column}: {damage:?}");
         change(&format!("UPDATE frfs SET {column} = (SELECT value FROM kept)"));

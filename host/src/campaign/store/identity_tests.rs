@@ -83,7 +83,7 @@ fn a_log_that_is_emptied_takes_nothing_and_under_a_reader_it_is_missed() {
     };
     assert_eq!((lines(&store), store.verify().expect("checked")), (5, vec![]));
     drop(store);
-    // somebody who reads keeps the log in use: what it holds is not in the file yet, and is gone
+    // a reader keeps the log in use: its content is not yet in the file, and is lost
     let store = Store::open(&path).expect("again");
     store.log("line 5").expect("noted");
     let reader = rusqlite::Connection::open(&path).expect("a reader");

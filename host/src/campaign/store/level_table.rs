@@ -13,42 +13,42 @@ use super::table::{Row, insert, table};
 use crate::campaign::plan::level::{Held, Level, Moment};
 
 table! {
-    /// A stored level without its samples: what the seal runs over. One row per level that was recorded: a sine held in steady state,
-    /// or a sweep from rest to rest.
+    /// A stored level without its samples: the columns that the seal covers. One row per recorded
+    /// level: a sine in steady state, or a sweep from rest to rest.
     #[derive(Clone, Debug, PartialEq)]
     pub struct LevelRow {
         "levels" {
-            /// Its id, counted apart from the hammer's records.
+            /// Its id, counted separately from the hammer's records.
             id: i64 = "id INTEGER PRIMARY KEY",
-            /// Which session: its channels give the scales.
+            /// The session, whose channels define the scales.
             session: i64 = "session INTEGER NOT NULL REFERENCES sessions(id)",
             /// When it was stored, RFC 3339.
             utc: String = "utc TEXT NOT NULL",
             /// Before or after the hammer's cells.
             moment: Moment = "moment TEXT NOT NULL",
-            /// Its frequency, or the first one of a sweep, Hz.
+            /// Its frequency, or the first frequency of a sweep, Hz.
             frequency_hz: f64 = "frequency_hz REAL NOT NULL",
-            /// The last frequency of a sweep, Hz; none for a step.
+            /// The last frequency of a sweep, Hz; `None` for a step.
             end_hz: Option<f64> = "end_hz REAL",
-            /// What is held.
+            /// The quantity that is held constant.
             held: Held = "control TEXT NOT NULL",
-            /// At which amplitude, m, N or V.
+            /// Ordered amplitude, m, N or V.
             amplitude: f64 = "amplitude REAL NOT NULL",
             /// The amplitude over the record, m, N or V.
             reached: f64 = "reached REAL NOT NULL",
-            /// Largest amplitude on the way, over the ordered one.
+            /// Largest amplitude while settling, relative to the ordered one.
             overshoot: f64 = "overshoot REAL NOT NULL",
-            /// Time from the order to the record, s of the device.
+            /// Time from the order to the record, s of the device's clock.
             after_s: f64 = "settle_s REAL NOT NULL",
-            /// The drive's amplitude then, V.
+            /// The drive's amplitude during the record, V.
             drive_v: f64 = "drive_v REAL NOT NULL",
-            /// The stream that it was cut from.
+            /// Epoch of the stream that it was cut from.
             epoch: u32 = "epoch INTEGER NOT NULL",
             /// Scan index of its first sample.
             first_scan: u64 = "first_scan INTEGER NOT NULL",
             /// Samples per channel.
             scans: usize = "scans INTEGER NOT NULL",
-            /// Channels.
+            /// Number of channels.
             channels: usize = "channels INTEGER NOT NULL",
             /// Missing samples, as index ranges.
             gaps: Vec<Range<usize>> = "gaps TEXT NOT NULL",
@@ -62,35 +62,35 @@ table! {
     }
 }
 
-/// How a level came to its amplitude.
+/// How a level reached its amplitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settled {
-    /// Amplitude of what is held over the record, m, N or V.
+    /// Amplitude of the controlled quantity over the record, m, N or V.
     pub reached: f64,
-    /// Largest amplitude on the way, over the ordered one.
+    /// Largest amplitude while settling, relative to the ordered one.
     pub overshoot: f64,
-    /// Time from the order to the record, s of the device.
+    /// Time from the order to the record, s of the device's clock.
     pub after_s: f64,
-    /// The drive's amplitude then, V.
+    /// The drive's amplitude during the record, V.
     pub drive_v: f64,
 }
 
 /// A level to be stored.
 #[derive(Clone, Debug)]
 pub struct NewLevel {
-    /// Which session.
+    /// The session.
     pub session: i64,
     /// Before or after the hammer's cells.
     pub moment: Moment,
-    /// What was ordered.
+    /// The ordered level.
     pub level: Level,
-    /// What came of it.
+    /// How it settled.
     pub settled: Settled,
-    /// The stream that it was cut from.
+    /// Epoch of the stream that it was cut from.
     pub epoch: u32,
     /// Scan index of its first sample.
     pub first_scan: u64,
-    /// Channels.
+    /// Number of channels.
     pub channels: usize,
     /// Raw codes, channel after channel.
     pub codes: Vec<i16>,
@@ -114,19 +114,19 @@ impl fmt::Display for DamagedLevel {
 }
 
 impl LevelRow {
-    /// What was ordered.
+    /// The ordered level.
     pub fn level(&self) -> Level {
         let Self { frequency_hz, end_hz, held, amplitude, .. } = *self;
         Level { frequency_hz, end_hz, held, amplitude }
     }
 
-    /// What came of it.
+    /// How it settled.
     pub fn settled(&self) -> Settled {
         let Self { reached, overshoot, after_s, drive_v, .. } = *self;
         Settled { reached, overshoot, after_s, drive_v }
     }
 
-    /// Whether no sample of it is missing.
+    /// Whether it has no missing samples.
     pub fn whole(&self) -> bool {
         self.gaps.is_empty()
     }
@@ -161,7 +161,7 @@ impl NewLevel {
 }
 
 impl Store {
-    /// Stores one level for good; returns its id.
+    /// Stores one level permanently; returns its id.
     pub fn insert_level(&self, new: &NewLevel) -> Result<i64, StoreError> {
         let bytes = codec::encode(&new.codes, new.channels)
             .map_err(|error| self.content(format!("a level could not be compressed: {error}")))?;
@@ -186,10 +186,10 @@ impl Store {
         self.all(&sql, [], read, "reading the shaker's levels")
     }
 
-    /// The samples of one level, checked against their checksums.
+    /// The samples of one level, verified against their checksums.
     ///
     /// # Errors
-    /// They are damaged; the level is named.
+    /// They are damaged; the error names the level.
     pub fn level_samples(&self, row: &LevelRow) -> Result<Samples, StoreError> {
         let damaged =
             |what: CodecError| self.content(format!("the shaker's level {} is damaged: {what}", row.id));

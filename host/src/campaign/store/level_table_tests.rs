@@ -76,7 +76,7 @@ fn nothing_of_a_level_can_be_changed_unseen() {
     ] {
         change(&store, sql).expect("changed behind its back");
         let damage = store.verify().expect("verified");
-        // the triggers that were in the way
+        // except the triggers that had to be dropped
         let damage: Vec<_> = damage.into_iter().filter(|one| !one.what.starts_with("it lacks")).collect();
         assert_eq!(damage.len(), 1, "{sql}: {damage:?}");
         assert!(damage[0].what.contains("level 1"), "{damage:?}");
@@ -101,10 +101,10 @@ fn every_column_of_a_level_is_under_its_seal() {
             ))
             .expect("changed behind its back");
         let damage = store.verify().expect("verified");
-        // the triggers that were in the way
+        // except the triggers that had to be dropped
         let damage: Vec<_> = damage.into_iter().filter(|one| !one.what.starts_with("it lacks")).collect();
         let told = damage.iter().filter(|damage| damage.what.contains("description was changed")).count();
-        // another id is another row: the chain misses the one that was stored
+        // another id is another row: the original row is missing from the chain
         assert_eq!((told, damage.len()), (1, if name == "id" { 2 } else { 1 }), "{name}: {damage:?}");
         let back = format!("UPDATE levels SET {name} = (SELECT value FROM kept); DROP TABLE kept");
         store.connection.execute_batch(&back).expect("changed back");

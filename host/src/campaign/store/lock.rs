@@ -1,10 +1,13 @@
-//! One writer at a time: a lock beside the campaign file, held as long as it is open for writing.
+//! One writer at a time: a lock file next to the campaign file, held as long as the campaign file
+//! is open for writing.
 //!
-//! SQLite would let two writers take turns; two campaigns in one file would then strike the same cells. The operating system
-//! drops the lock with the process that holds it, however that ends, so that a file left behind locks nobody out.
+//! SQLite would let two writers alternate; two campaigns in one file would then strike the same
+//! cells. The operating system releases the lock when the process that holds it ends, for whatever
+//! reason, so a leftover lock file does not block anybody.
 //!
-//! A name is not the file: a symbolic link is followed first, a file with a second name is refused, and where the system lets a lock on the
-//! campaign file itself stand beside SQLite's own (Linux), that is held too, so that a lock file that somebody removed lets nobody in.
+//! A name does not identify a file: symbolic links are resolved first, and a file with several hard
+//! links is refused. Where a lock on the campaign file itself can coexist with SQLite's locks
+//! (Linux), that lock is held too, so that removing the lock file does not admit a second writer.
 
 use std::ffi::OsString;
 use std::fs::{File, TryLockError};
@@ -13,15 +16,16 @@ use std::path::{Path, PathBuf};
 
 use super::error::StoreError;
 
-/// How often a lock file that vanished in between is taken anew.
+/// Number of attempts if the lock file disappears while it is being locked.
 const TRIES: usize = 10;
 
-/// The lock; dropping it lets go.
+/// The lock; released when dropped.
 #[derive(Debug)]
 pub(super) struct WriteLock {
     file: File,
     path: PathBuf,
-    /// The campaign file itself. It is closed after SQLite has closed it: closing it sooner would drop SQLite's own locks.
+    /// The campaign file itself. It is closed after SQLite has closed it: closing it sooner would
+    /// release SQLite's own locks.
     #[cfg(target_os = "linux")]
     itself: Option<File>,
 }
@@ -48,13 +52,13 @@ impl WriteLock {
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) => {
                     let mut holder = String::new();
-                    // who it is only makes the message better
+                    // optional: the holder only improves the message
                     let _ = file.read_to_string(&mut holder);
                     return Err(StoreError::Busy { path: campaign.into(), holder: holder.trim().into() });
                 }
                 Err(TryLockError::Error(source)) => return Err(failed(source)),
             }
-            // its last holder may have removed it between our opening and locking
+            // its previous holder may have removed it after we opened and before we locked it
             if !still_there(&file, &path) {
                 continue;
             }
@@ -76,7 +80,7 @@ impl WriteLock {
 
 impl Drop for WriteLock {
     fn drop(&mut self) {
-        // removed while it is held: whoever opened it before notices
+        // removed while locked: another process that has already opened it checks for this
         let _ = std::fs::remove_file(&self.path);
         let _ = self.file.unlock();
         #[cfg(target_os = "linux")]
@@ -86,7 +90,8 @@ impl Drop for WriteLock {
     }
 }
 
-/// Locks the campaign file, if it is there already: a new one is locked by its name until it is opened again.
+/// Locks the campaign file, if it exists: a new one is protected by the lock file until it is
+/// opened again.
 #[cfg(target_os = "linux")]
 fn lock_itself(campaign: &Path) -> Result<Option<File>, StoreError> {
     let Ok(file) = File::open(campaign) else { return Ok(None) };
@@ -94,12 +99,12 @@ fn lock_itself(campaign: &Path) -> Result<Option<File>, StoreError> {
         Err(TryLockError::WouldBlock) => {
             Err(StoreError::Busy { path: campaign.into(), holder: "its lock file was removed".into() })
         }
-        // a file system without such locks has the lock beside the file
+        // a file system without such locks relies on the lock file
         Ok(()) | Err(TryLockError::Error(_)) => Ok(Some(file)),
     }
 }
 
-/// A second name of the same file would have a lock of its own.
+/// Refuses a file with a second name: that would have a separate lock file.
 #[cfg(unix)]
 fn refuse_second_names(campaign: &Path) -> Result<(), StoreError> {
     use std::os::unix::fs::MetadataExt;
@@ -129,7 +134,7 @@ fn still_there(file: &File, path: &Path) -> bool {
     }
 }
 
-/// Elsewhere an open file cannot be removed.
+/// On other systems an open file cannot be removed.
 #[cfg(not(unix))]
 fn still_there(_: &File, _: &Path) -> bool {
     true
@@ -148,7 +153,7 @@ mod tests {
         assert!(said.contains(&format!("process {}", std::process::id())), "{said}");
         drop(lock);
         assert!(!beside(&campaign).exists());
-        // left behind by a process that was killed
+        // left by a process that was killed
         std::fs::write(beside(&campaign), "process 1").expect("written");
         drop(WriteLock::take(&campaign).expect("nobody holds it"));
     }

@@ -1,14 +1,18 @@
-//! The campaign file: one SQLite file that holds everything, and is never left in an unclear state.
+//! The campaign file: one SQLite file that holds everything, and is never left in an inconsistent
+//! state.
 //!
-//! WAL with `synchronous=FULL` while it is written: once [`Store::insert`] returns, the record survives a power cut. Raw
-//! records are append-only (triggers refuse changes). Others may read while one writes; a second writer is refused, and so is a
-//! network share. A file that was closed in order is in no WAL mode any more: reading it leaves nothing beside it, even from
-//! read-only media. All that analysis needs is in the file: plan with geometry, channels with scales, every record with
-//! verdict and provenance.
+//! It uses WAL with `synchronous=FULL` while it is written: once [`Store::insert`] returns, the
+//! record survives a power cut. Raw records are append-only (triggers refuse changes). Others may
+//! read while one process writes; a second writer is refused, and so is a network share. A properly
+//! closed file is no longer in WAL mode: reading it creates no other files, even on read-only
+//! media. The file holds everything that the analysis needs: plan with geometry, channels with
+//! scales, every record with verdict and provenance.
 //!
-//! Each table's columns stand once, in `table.rs`, beside the type of its row: a new column is one new line there (and its value where
-//! the row is made). A new table is a new `*_table.rs` and a line in `schema.rs`. The rows are: `record_row.rs` (records and their seals),
-//! `overrules.rs`, `cell_table.rs`, `session_table.rs` (sessions, channels, sensors), `level_table.rs`, `frf_table.rs`, `notes.rs` (plans, log).
+//! Each table's columns are declared once, with the `table!` macro of `table.rs`, next to the type
+//! of its row: a new column is one new line there (and its value where the row is constructed). A
+//! new table is a new `*_table.rs` and a line in `schema.rs`. The rows are: `record_row.rs`
+//! (records and their seals), `overrules.rs`, `cell_table.rs`, `session_table.rs` (sessions,
+//! channels, sensors), `level_table.rs`, `frf_table.rs`, `notes.rs` (plans, log).
 
 mod backup;
 pub mod calibration_table;
@@ -48,13 +52,13 @@ use error::{StoreError, sqlite};
 use identity::Identity;
 use lock::WriteLock;
 
-/// Marks the file as ours (`JRIG`).
+/// Identifies a campaign file (`JRIG`).
 const APPLICATION_ID: i32 = i32::from_be_bytes(*b"JRIG");
 
 /// Version of the tables (`schema.rs`), in SQLite's `user_version`.
 const VERSION: i32 = 2;
 
-/// The oldest version that is read: without the chain.
+/// The oldest version that can be read: without the chain.
 const OLDEST: i32 = 1;
 
 /// How long to wait for another process's lock on the file.
@@ -65,18 +69,18 @@ const PATIENCE: Duration = Duration::from_secs(5);
 pub struct Store {
     connection: Connection,
     path: PathBuf,
-    /// Held as long as it is open for writing; let go after the connection.
+    /// Held as long as the file is open for writing; released after the connection is closed.
     lock: Option<WriteLock>,
-    /// Whether everything is in the one file.
+    /// Whether everything has been written into the one file.
     tidy: bool,
-    /// What is written over the connection.
+    /// Rows written over the connection.
     watch: chain::Watch,
-    /// Which file it was when it was opened for writing.
+    /// Identity of the file when it was opened for writing.
     identity: Option<Identity>,
 }
 
 impl Store {
-    /// A new, empty file, open for writing.
+    /// Creates a new, empty file, open for writing.
     fn empty(path: &Path) -> Result<Self, StoreError> {
         if path.exists() {
             return Err(StoreError::Exists { path: path.into() });
@@ -96,7 +100,8 @@ impl Store {
     /// Opens a campaign file to continue it.
     ///
     /// # Errors
-    /// It is not there, not ours, of another version, in use, on a network share, or cannot be written.
+    /// It does not exist, is not a campaign file, has another version, is in use, is on a network
+    /// share, or cannot be written.
     pub fn open(path: &Path) -> Result<Self, StoreError> {
         error::refuse_what_is_no_file(path)?;
         share::refuse(path)?;
@@ -114,14 +119,15 @@ impl Store {
     /// read-only.
     ///
     /// # Errors
-    /// It is not there, not ours or of another version; it was not closed in order and cannot be recovered where it is.
+    /// It does not exist, is not a campaign file or has another version; or it was not closed
+    /// properly and cannot be recovered in place.
     pub fn open_read_only(path: &Path) -> Result<Self, StoreError> {
         error::refuse_what_is_no_file(path)?;
         let flags = OpenFlags::SQLITE_OPEN_READ_ONLY;
         let waiting = has_log(path);
         let opened = Self::connect(path, path, flags).or_else(|error| match error {
             StoreError::Sqlite { .. } if waiting => Err(StoreError::Unfinished { path: path.into() }),
-            // where no shared memory can be created, nobody can be writing either
+            // if no shared memory can be created, no process can be writing either
             StoreError::Sqlite { .. } => {
                 let plain = path.display().to_string();
                 let escaped = plain.replace('%', "%25").replace('?', "%3f").replace('#', "%23");
@@ -159,7 +165,7 @@ impl Store {
             return Err(StoreError::Older { path: path.into(), found, known: OLDEST });
         }
         connection.pragma_update(None, "trusted_schema", false).map_err(open)?;
-        // otherwise SQLite plans a statement anew for each record that it is asked for
+        // otherwise SQLite prepares the query plan again for each record
         connection.set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_QPSG, true).map_err(open)?;
         if let Some(what) = own_schema::strange(&connection).map_err(open)? {
             return Err(StoreError::Content {
@@ -171,7 +177,7 @@ impl Store {
         Ok(Self { connection, path: path.into(), lock: None, tidy: true, watch, identity: None })
     }
 
-    /// Writes in one transaction, and chains every row that it touches.
+    /// Writes in one transaction, and adds every row that it touches to the chain.
     fn change<T>(
         &self,
         doing: &'static str,
@@ -190,7 +196,9 @@ impl Store {
         Ok(done)
     }
 
-    /// Nothing is claimed that stands in no file of this name. What the open file holds is copied beside it, as long as that is possible.
+    /// Fails if the open file no longer has its name, so that no record is reported as stored
+    /// without being in that file. The open file's content is copied next to it, if that is still
+    /// possible.
     fn still_there(&self) -> Result<(), StoreError> {
         // a new file has no log before its first transaction has ended
         let Some(what) = self.identity.as_ref().and_then(Identity::lost) else { return Ok(()) };
@@ -199,7 +207,7 @@ impl Store {
             Ok(records) => {
                 format!("all that was measured ({records} records) was copied to {}", to.display())
             }
-            // a log that was emptied under a reader: what stands in the file itself is left
+            // the log was emptied while being read: only the content of the file itself is left
             Err(error) => match std::fs::copy(&self.path, &to) {
                 Ok(_) => format!("what stood in the file without its log was copied to {}", to.display()),
                 Err(_) => format!("and what it held could not be copied ({error})"),
@@ -213,7 +221,8 @@ impl Store {
             self.connection.busy_timeout(PATIENCE)?;
             self.connection.pragma_update(None, "journal_mode", "WAL")?;
             self.connection.pragma_update(None, "synchronous", "FULL")?;
-            // every record goes on into the file itself at once: whoever empties or removes the log then takes nothing
+            // checkpoint after every record, so that nothing is lost if the log is emptied or
+            // removed
             self.connection.pragma_update(None, "wal_autocheckpoint", 1)?;
             self.connection.pragma_update(None, "foreign_keys", true)
         };
@@ -228,7 +237,7 @@ impl Store {
         StoreError::Content { path: self.path.clone(), what }
     }
 
-    /// The file.
+    /// The file's path.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -247,7 +256,8 @@ impl Store {
         run().map_err(self.failed(doing))
     }
 
-    /// Notes in the file itself that it is being written: a copy of it alone, without its log, can then be told from a whole file.
+    /// Notes in the file itself that it is being written: a copy without its log can then be
+    /// recognised as incomplete.
     fn mark_written(&self) -> Result<(), StoreError> {
         self.set_meta(WRITTEN, &notes::utc_now())?;
         self.connection
@@ -255,7 +265,7 @@ impl Store {
             .map_err(self.failed("opening for writing"))
     }
 
-    /// What is wrong if this was being written when it was copied, and its log was left behind.
+    /// Error message if the file was copied while it was being written, without its log.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -286,7 +296,7 @@ impl Store {
         let failed = self.failed("closing");
         self.connection.execute("DELETE FROM meta WHERE key = ?1", [WRITTEN]).map_err(&failed)?;
         self.connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(())).map_err(&failed)?;
-        // somebody who reads keeps it in WAL mode, in which it is as safe: the next writer's close will do
+        // a reader keeps it in WAL mode, which is just as safe; the next writer's close ends it
         if let Err(error) = self.connection.pragma_update(None, "journal_mode", "DELETE") {
             log::debug!("{}: still in WAL mode: {error}", self.path.display());
         }
@@ -295,7 +305,7 @@ impl Store {
 }
 
 impl Drop for Store {
-    /// Whoever returns early leaves a file in order too, as far as the disk lets it.
+    /// After an early return, the file is closed properly as well, as far as the disk permits.
     fn drop(&mut self) {
         if let Err(error) = self.put_in_order() {
             log::debug!("{error}");
@@ -303,10 +313,10 @@ impl Drop for Store {
     }
 }
 
-/// The note that the file is being written, and since when.
+/// Key of the note that the file is being written, and since when.
 const WRITTEN: &str = "written_since";
 
-/// Whether a log with something in it lies beside the file.
+/// Whether a non-empty log exists next to the file.
 fn has_log(path: &Path) -> bool {
     std::fs::metadata(log_of(path)).is_ok_and(|log| log.len() > 0)
 }
@@ -318,7 +328,7 @@ fn log_of(path: &Path) -> PathBuf {
     name.into()
 }
 
-/// Where a file that lost its name is copied to: beside it, under a name that is free.
+/// Where the content of a file that lost its name is copied: next to it, under an unused name.
 fn rescued(path: &Path) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let named = |number: u32| path.with_file_name(format!("{stem}-rescued-{number}.jrig"));

@@ -1,4 +1,4 @@
-//! What stands in the file about the whole campaign: its plans, its notes, its log.
+//! Data about the whole campaign: its plans, notes and log.
 
 use rusqlite::{Connection, OptionalExtension};
 
@@ -8,15 +8,15 @@ use super::table::{Row, table};
 use crate::campaign::plan::Plan;
 
 table! {
-    /// A plan; the last one counts.
+    /// A plan; the last one is in effect.
     pub(super) struct PlanText {
         "plan" {
             "id INTEGER PRIMARY KEY",
-            /// Since when, RFC 3339.
+            /// Start of its validity, RFC 3339.
             utc: String = "utc TEXT NOT NULL",
             /// The name of the file that it came from.
             source: String = "source TEXT NOT NULL",
-            /// All of it.
+            /// Its complete text.
             text: String = "text TEXT NOT NULL",
         }
     }
@@ -27,20 +27,20 @@ table! {
     pub(super) struct LogLine {
         "log" {
             "id INTEGER PRIMARY KEY",
-            /// When, RFC 3339.
+            /// Time, RFC 3339.
             utc: String = "utc TEXT NOT NULL",
-            /// What happened.
+            /// The event.
             text: String = "text TEXT NOT NULL",
         }
     }
 }
 
-/// Now, as it stands in the file: RFC 3339, UTC.
+/// Current time in the format of the file: RFC 3339, UTC.
 pub fn utc_now() -> String {
     jiff::Timestamp::now().to_string()
 }
 
-/// Notes that the plan in `text` counts from now on.
+/// Stores the plan in `text`, which is in effect from now on.
 pub(super) fn write_plan(connection: &Connection, text: &str, source: &str) -> rusqlite::Result<()> {
     PlanText { utc: utc_now(), source: source.into(), text: text.into() }.insert(connection, &[])
 }
@@ -50,11 +50,11 @@ pub(super) fn write_log(connection: &Connection, text: &str) -> rusqlite::Result
     LogLine { utc: utc_now(), text: text.into() }.insert(connection, &[])
 }
 
-/// The key under which accepted changes of the structure stand: a JSON list of sentences.
+/// Key of the note with the accepted changes of the structure: a JSON list of sentences.
 const STRUCTURES: &str = "structure_changes";
 
 impl Store {
-    /// Notes that the campaign goes on on another structure, and what told so.
+    /// Notes that the campaign continues on another structure, and the evidence for it.
     pub(crate) fn note_another_structure(&self, what: &str) -> Result<(), StoreError> {
         let mut all = self.structure_changes()?;
         all.push(format!("{}: {what}", utc_now()));
@@ -63,7 +63,7 @@ impl Store {
         self.log(&format!("another structure was accepted: {what}"))
     }
 
-    /// What told that the structure was another one than before, each time that it was accepted.
+    /// Evidence of a changed structure, for each time that it was accepted.
     ///
     /// # Errors
     /// The note cannot be read.
@@ -75,16 +75,16 @@ impl Store {
         Ok(self.meta(STRUCTURES)?.map(read).transpose()?.unwrap_or_default())
     }
 
-    /// The plan.
+    /// The current plan.
     pub fn plan(&self) -> Result<Plan, StoreError> {
         let (text, source) = self.plan_text()?;
         Ok(Plan::parse(&text, &source)?)
     }
 
-    /// Every plan that the file has had, by its id; the last one counts.
+    /// Every plan that the file has had, with its id; the last one is in effect.
     ///
     /// # Errors
-    /// The file cannot be read, or a text is no plan.
+    /// The file cannot be read, or a text is not a valid plan.
     pub fn plans(&self) -> Result<Vec<(i64, Plan)>, StoreError> {
         let sql = format!("SELECT {}, id FROM plan ORDER BY id", PlanText::list());
         let read = |row: &rusqlite::Row<'_>| Ok((row.get("id")?, PlanText::read(row)?));
@@ -99,7 +99,7 @@ impl Store {
         plan.map(|plan| (plan.text, plan.source)).map_err(self.failed("reading the plan"))
     }
 
-    /// A note on the whole campaign.
+    /// A note about the whole campaign.
     pub fn meta(&self, key: &str) -> Result<Option<String>, StoreError> {
         self.connection
             .query_row("SELECT value FROM meta WHERE key = ?1", [key], |row| row.get(0))
@@ -107,14 +107,14 @@ impl Store {
             .map_err(self.failed("reading notes"))
     }
 
-    /// Writes a note on the whole campaign.
+    /// Writes a note about the whole campaign.
     pub fn set_meta(&self, key: &str, value: &str) -> Result<(), StoreError> {
         self.change("writing notes", |connection| {
             connection.execute("INSERT OR REPLACE INTO meta VALUES (?1, ?2)", [key, value]).map(|_| ())
         })
     }
 
-    /// The lines of the log behind line `after`, in order: id, time (RFC 3339, UTC), text.
+    /// The lines of the log after line `after`, in order: id, time (RFC 3339, UTC), text.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -127,7 +127,8 @@ impl Store {
         )
     }
 
-    /// A number that changes whenever another connection, of this process or another, has written into the file.
+    /// A number that changes whenever another connection, of this process or another, has written
+    /// to the file.
     ///
     /// # Errors
     /// The file cannot be read.

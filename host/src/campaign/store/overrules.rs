@@ -1,4 +1,4 @@
-//! What a person made of a verdict: kept beside it, and the last one counts.
+//! Verdicts overruled by a person: stored in addition to the original; the last one counts.
 
 use rusqlite::Connection;
 
@@ -14,26 +14,27 @@ table! {
     pub struct Overrule {
         "overrules" {
             "id INTEGER PRIMARY KEY",
-            /// Which record.
+            /// The record.
             record: i64 = "record INTEGER NOT NULL REFERENCES records(id)",
-            /// When, RFC 3339.
+            /// Time, RFC 3339.
             utc: String = "utc TEXT NOT NULL",
-            /// What it counts as since then.
+            /// The new verdict.
             verdict: String = "verdict TEXT NOT NULL",
-            /// Why.
+            /// The reason.
             reason: String = "reason TEXT NOT NULL",
         }
     }
 }
 
 impl Store {
-    /// Overrules a record's verdict; the first one stays in the file too. A cell that a refusal leaves with less than it
-    /// was settled with is open again.
+    /// Overrules a record's verdict; the original one is kept in the file. A settled cell that is
+    /// left with fewer good hits than it was settled with is reopened.
     pub fn overrule(&self, record: i64, verdict: Kind, reason: &str) -> Result<(), StoreError> {
         self.change("overruling a verdict", |connection| write_overrule(connection, record, verdict, reason))
     }
 
-    /// Has a cell struck anew: its good records are dropped, and it is open again. Returns how many were dropped.
+    /// Restarts a cell: its good records are dropped, and it is reopened. Returns the number of
+    /// dropped records.
     pub fn redo(&self, cell: i64, reason: &str) -> Result<usize, StoreError> {
         let records = self.records_of(cell)?;
         let good = records.iter().flatten().filter(|record| record.standing() == Kind::Good);
@@ -47,7 +48,7 @@ impl Store {
         Ok(good.len())
     }
 
-    /// Every time that a person overruled a verdict.
+    /// Every overruled verdict.
     pub fn overrules(&self) -> Result<Vec<Overrule>, StoreError> {
         let sql = format!("SELECT {} FROM overrules ORDER BY id", Overrule::list());
         self.all(&sql, [], Overrule::read, "reading overrules")

@@ -1,6 +1,8 @@
-//! Whether a file's tables, triggers and indices are those that jointrig makes, and no others: asked before anything is read.
+//! Checks, before anything is read, that a file's tables, triggers and indices are exactly those
+//! that jointrig creates.
 //!
-//! A view that never ends, or a trigger that does more than refuse, would otherwise act with the first SELECT.
+//! Otherwise a view that never ends, or a trigger that does more than refuse, would take effect
+//! with the first SELECT.
 
 use std::collections::HashMap;
 use std::sync::OnceLock;
@@ -9,11 +11,11 @@ use rusqlite::Connection;
 
 use super::{schema, sync_table};
 
-/// What stands in the schema under a name: its kind and its SQL.
+/// The schema's objects by name: type and SQL.
 type Objects = HashMap<String, (String, String)>;
 
 fn objects(connection: &Connection) -> rusqlite::Result<Objects> {
-    // what SQLite makes by itself for UNIQUE and PRIMARY KEY has no SQL
+    // the indices that SQLite creates itself for UNIQUE and PRIMARY KEY have no SQL
     let mut statement = connection
         .prepare("SELECT name, type, sql FROM sqlite_schema WHERE name NOT LIKE 'sqlite!_%' ESCAPE '!'")?;
     let read = |row: &rusqlite::Row<'_>| {
@@ -23,7 +25,7 @@ fn objects(connection: &Connection) -> rusqlite::Result<Objects> {
     statement.query_map([], read)?.collect()
 }
 
-/// What jointrig makes. Asked for at every opening, so made once.
+/// The objects that jointrig creates. Needed whenever a file is opened, so computed once.
 fn ours() -> rusqlite::Result<&'static Objects> {
     static OURS: OnceLock<Objects> = OnceLock::new();
     if let Some(ours) = OURS.get() {
@@ -36,7 +38,8 @@ fn ours() -> rusqlite::Result<&'static Objects> {
     Ok(OURS.get_or_init(|| made))
 }
 
-/// What is in the schema that jointrig does not put there, or puts there otherwise; none where all is ours.
+/// An object of the schema that jointrig does not create, or creates differently; `None` if there
+/// is none.
 ///
 /// # Errors
 /// The schema cannot be read.
@@ -65,7 +68,8 @@ pub(super) fn strange(connection: &Connection) -> rusqlite::Result<Option<String
     Ok(None)
 }
 
-/// What jointrig puts into the schema and is not there. A file of version 1 may lack what came later.
+/// The objects that jointrig creates but the schema lacks. A file of version 1 may lack those
+/// introduced later.
 ///
 /// # Errors
 /// The schema cannot be read.
@@ -76,7 +80,7 @@ pub(super) fn missing(connection: &Connection) -> rusqlite::Result<Vec<String>> 
     let found = objects(connection)?;
     let mut names: Vec<String> = ours()?.keys().filter(|name| !found.contains_key(*name)).cloned().collect();
     names.retain(|name| version > super::OLDEST || !later(name));
-    // made when they are needed
+    // created on demand
     names.retain(|name| !["clocks", "edges"].contains(&name.as_str()));
     names.sort();
     Ok(names)

@@ -1,4 +1,4 @@
-//! A record of the campaign file: its columns, and what it is on its way into the file and out of it.
+//! A record of the campaign file: its columns, and its types before storing and after reading.
 
 use std::ops::Range;
 
@@ -9,20 +9,20 @@ use crate::campaign::verdict::{Kind, Verdict};
 use crate::device::recording::{Codes, Recording};
 
 table! {
-    /// A stored record without its samples: what the seal runs over. One row per firing of the hammer; without samples where the bolt
-    /// did not arrive.
+    /// A stored record without its samples: the columns that the seal covers. One row per shot of
+    /// the hammer; without samples if the bolt did not arrive.
     #[derive(Clone, Debug, PartialEq)]
     pub struct RecordRow {
         "records" {
             /// Its id.
             id: i64 = "id INTEGER PRIMARY KEY",
-            /// Which cell.
+            /// The cell.
             cell: i64 = "cell INTEGER NOT NULL REFERENCES cells(id)",
-            /// Which attempt in that cell, from 0.
+            /// Number of the attempt in that cell, from 0.
             attempt: u32 = "attempt INTEGER NOT NULL",
-            /// Which session: its channels give the scales.
+            /// The session, whose channels define the scales.
             session: i64 = "session INTEGER NOT NULL REFERENCES sessions(id)",
-            /// When its trigger was, RFC 3339.
+            /// Time of its trigger, RFC 3339.
             utc: String = "utc TEXT NOT NULL",
             /// Epoch of the stream that it was cut from.
             epoch: u32 = "epoch INTEGER NOT NULL",
@@ -32,37 +32,37 @@ table! {
             trigger_index: usize = "trigger_index INTEGER NOT NULL",
             /// Samples per channel.
             scans: usize = "scans INTEGER NOT NULL",
-            /// Channels.
+            /// Number of channels.
             channels: usize = "channels INTEGER NOT NULL",
             /// Duration of the coil's pulse, µs.
             pulse_us: u32 = "pulse_us INTEGER NOT NULL",
-            /// Peak of the force as the device saw it, N.
+            /// Peak of the force as measured by the device, N.
             device_peak_n: f64 = "peak_n REAL NOT NULL",
             /// The device's summary.
             shot: Shot = "shot TEXT NOT NULL",
             /// Missing samples, as index ranges.
             gaps: Vec<Range<usize>> = "gaps TEXT NOT NULL",
-            /// The verdict at the time.
+            /// The original verdict.
             verdict: Kind = "verdict TEXT NOT NULL",
-            /// What was measured for it.
+            /// The measured value that it is based on.
             measure: f64 = "measure REAL NOT NULL",
-            /// The limit it was held against.
+            /// The limit for that value.
             limit: f64 = "limit_value REAL NOT NULL",
-            /// Both in words.
+            /// Both as a sentence.
             sentence: String = "sentence TEXT NOT NULL",
             /// CRC-32 of the raw codes.
             crc: u32 = "crc32 INTEGER NOT NULL",
-            /// Always 0: the seal stands in `seals`.
+            /// Always 0: the seal is in `seals`.
             reserved: i64 = "seal INTEGER NOT NULL",
             "samples BLOB NOT NULL",
             "UNIQUE (cell, attempt)",
         }
-        // stored with the record: what was found in it
+        // stored with the record: results of judging it
         "seals" {
             "record INTEGER PRIMARY KEY REFERENCES records(id)",
-            /// Peak of the band-limited force, N; 0 where there was no pulse.
+            /// Peak of the band-limited force, N; 0 without a pulse.
             peak_n: f64 = "peak_n REAL NOT NULL",
-            /// How wrong `utc` may be, ± s; unknown without a clock to fit.
+            /// Uncertainty of `utc`, ± s; `None` without a clock fit.
             utc_error_s: Option<f64> = "utc_error_s REAL",
             /// CRC-32 of the bytes that hold the codes in the file.
             bytes_crc: u32 = "bytes_crc32 INTEGER NOT NULL",
@@ -70,43 +70,43 @@ table! {
         }
     }
     beside {
-        /// What a person made of it later.
+        /// A person's later verdict.
         overruled: Option<Kind>,
     }
 }
 
 impl RecordRow {
-    /// The verdict that counts: a person's, else the judge's.
+    /// The verdict in effect: a person's, else the original one.
     pub fn standing(&self) -> Kind {
         self.overruled.unwrap_or(self.verdict)
     }
 
-    /// Where it belongs.
+    /// Its identification.
     pub fn place(&self) -> Place {
         Place { id: self.id, cell: self.cell, attempt: self.attempt }
     }
 
-    /// Whether analysis uses it.
+    /// Whether the analysis uses it.
     pub fn kept(&self) -> bool {
         self.standing() == Kind::Good && self.scans > 0
     }
 }
 
-/// Where a record belongs.
+/// Identifies a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
     /// Its id.
     pub id: i64,
-    /// Which cell.
+    /// The cell.
     pub cell: i64,
-    /// Which attempt in that cell, from 0.
+    /// Number of the attempt in that cell, from 0.
     pub attempt: u32,
 }
 
-/// A record whose description is damaged: nothing of it can be trusted but its place in the index.
+/// A record whose description is damaged: only its place from the index is reliable.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Damaged {
-    /// Where it belongs.
+    /// Its identification.
     pub place: Place,
     /// What is wrong.
     pub what: String,
@@ -115,24 +115,25 @@ pub struct Damaged {
 /// A record to be stored.
 #[derive(Clone, Debug)]
 pub struct NewRecord {
-    /// Which cell.
+    /// The cell.
     pub cell: i64,
-    /// Which attempt in that cell, from 0.
+    /// Number of the attempt in that cell, from 0.
     pub attempt: u32,
-    /// Which session.
+    /// The session.
     pub session: i64,
-    /// When its trigger was, RFC 3339.
+    /// Time of its trigger, RFC 3339.
     pub utc: String,
-    /// How wrong that may be, ± s; unknown without a clock to fit.
+    /// Uncertainty of that time, ± s; `None` without a clock fit.
     pub utc_error_s: Option<f64>,
-    /// The raw samples; none where the bolt did not arrive.
+    /// The raw samples; empty if the bolt did not arrive.
     pub recording: Recording,
-    /// What it was judged to be.
+    /// The verdict.
     pub verdict: Verdict,
 }
 
 impl NewRecord {
-    /// Its row, stored as `id`; `crc` is that of its codes, `bytes_crc` that of the bytes that hold them.
+    /// The row to be stored with `id`; `crc` is that of its codes, `bytes_crc` that of the bytes
+    /// that hold them.
     pub(super) fn row(&self, id: i64, crc: u32, bytes_crc: u32) -> RecordRow {
         let Recording { epoch, first_scan, trigger_index, channels, shot, gaps, .. } = &self.recording;
         RecordRow {
@@ -169,17 +170,17 @@ impl NewRecord {
 pub struct Samples {
     /// Raw codes, channel after channel.
     pub codes: Vec<i16>,
-    /// Channels.
+    /// Number of channels.
     pub channels: usize,
 }
 
 impl Samples {
-    /// To look at.
+    /// A borrowed view.
     pub fn view(&self) -> Codes<'_> {
         Codes { codes: &self.codes, channels: self.channels }
     }
 
-    /// The raw codes of one channel; empty outside the map.
+    /// The raw codes of one channel; empty for an index beyond the last one.
     pub fn channel(&self, place: usize) -> &[i16] {
         self.view().channel(place)
     }

@@ -9,11 +9,11 @@ use super::session_table::{Counters, write_link};
 use super::table::{Row, insert};
 use crate::campaign::verdict::Kind;
 
-/// The index that knows every record's cell and attempt without its row.
+/// The index that holds every record's cell and attempt independently of its row.
 const INDEX: &str = "sqlite_autoindex_records_1";
 
 impl Store {
-    /// Stores one record for good, and with it the link's `counters` so far; returns its id.
+    /// Stores one record permanently, together with the link's `counters` so far; returns its id.
     pub fn insert(&self, record: &NewRecord, counters: &Counters) -> Result<i64, StoreError> {
         let recording = &record.recording;
         let bytes = codec::encode(&recording.codes, recording.channels)
@@ -37,7 +37,8 @@ impl Store {
         Ok(self.places()?.into_iter().map(|place| self.record_at(place)).collect())
     }
 
-    /// Those after record `last` without their samples, in order of measurement; and how many there are up to it.
+    /// The records after record `last` without their samples, in order of measurement; and the
+    /// number of records up to it.
     pub fn records_after(&self, last: i64) -> Result<(Vec<Result<RecordRow, Damaged>>, usize), StoreError> {
         let (before, after): (Vec<Place>, Vec<Place>) =
             self.places()?.into_iter().partition(|place| place.id <= last);
@@ -53,7 +54,7 @@ impl Store {
     /// One record without its samples.
     ///
     /// # Errors
-    /// There is none of that id, or it is damaged.
+    /// There is no record with that id, or it is damaged.
     pub fn record(&self, id: i64) -> Result<RecordRow, StoreError> {
         let place = self.places()?.into_iter().find(|place| place.id == id).ok_or_else(|| {
             self.content(format!("there is no record {id}: `jointrig campaign show` lists them"))
@@ -61,7 +62,8 @@ impl Store {
         self.record_at(place).map_err(|Damaged { what, .. }| self.damaged(id, what))
     }
 
-    /// Where every record belongs, from the index: so that a damaged row hides no other.
+    /// Identification of every record, read from the index so that a damaged row does not hide
+    /// others.
     pub fn places(&self) -> Result<Vec<Place>, StoreError> {
         let read =
             |row: &rusqlite::Row<'_>| Ok(Place { id: row.get(0)?, cell: row.get(1)?, attempt: row.get(2)? });
@@ -89,14 +91,14 @@ impl Store {
             Err(other) => Err(other.to_string()),
         };
         match found {
-            // the index and the row must agree on where it belongs
+            // index and row must agree on the record's place
             Ok(row) if row.place() != place => Err("its place was changed".into()),
             other => other,
         }
         .map_err(|what| Damaged { place, what })
     }
 
-    /// The samples of one record, checked against their checksums.
+    /// The samples of one record, verified against their checksums.
     ///
     /// # Errors
     /// [`StoreError::Damaged`] names the record.
@@ -107,11 +109,12 @@ impl Store {
         Ok(Samples { codes, channels: record.channels })
     }
 
-    /// Shows `look` the samples of some channels of one record, each with its place, in the order of `places`. They are checked against the
-    /// checksum of the stored bytes.
+    /// Passes the samples of some channels of one record to `look`, each with its index, in the
+    /// order of `places`. They are verified against the checksum of the stored bytes.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`] names the record. Some channels may have been shown then.
+    /// [`StoreError::Damaged`] names the record. `look` may have been called for some channels by
+    /// then.
     pub fn each_channel(
         &self,
         record: &RecordRow,
@@ -122,7 +125,7 @@ impl Store {
         self.with_checked_bytes(record, decode).map_err(|error| self.damaged(record.id, error.to_string()))
     }
 
-    /// Runs `work` on a record's bytes where they lie.
+    /// Runs `work` on a record's bytes without copying them.
     fn with_checked_bytes<T>(
         &self,
         record: &RecordRow,
@@ -131,7 +134,8 @@ impl Store {
         let read =
             self.connection.query_row("SELECT samples FROM records WHERE id = ?1", [record.id], |row| {
                 let bytes = row.get_ref(0)?.as_blob()?;
-                // a flipped bit in the compressor's padding changes no code, and yet the file is not what was stored
+                // a flipped padding bit of the compressor changes no code, but the file still
+                // differs from what was stored
                 let (found, stored) = (crc32fast::hash(bytes), record.bytes_crc);
                 Ok(if found == stored { work(bytes) } else { Err(CodecError::Bytes { found, stored }) })
             });
@@ -142,14 +146,14 @@ impl Store {
         StoreError::Damaged { path: self.path.clone(), record, what }
     }
 
-    /// The bytes that hold a record's samples in the file, unchecked.
+    /// The bytes that hold a record's samples in the file, unverified.
     pub fn stored_bytes(&self, id: i64) -> Result<Vec<u8>, StoreError> {
         self.connection
             .query_row("SELECT samples FROM records WHERE id = ?1", [id], |row| row.get(0))
             .map_err(self.failed("reading samples"))
     }
 
-    /// Bytes of all samples as stored, and as raw codes.
+    /// Total size of all samples, bytes: as stored, and as raw codes.
     pub fn sample_bytes(&self) -> Result<(u64, u64), StoreError> {
         let sql = "SELECT coalesce(sum(stored), 0), coalesce(sum(raw), 0) FROM \
                    (SELECT length(samples) AS stored, 2 * scans * channels AS raw FROM records \

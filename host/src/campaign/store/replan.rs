@@ -1,4 +1,4 @@
-//! Going on with an edited plan: what was measured stays valid, or the plan is refused.
+//! Continuing with an edited plan: measured records stay valid, or the plan is refused.
 
 use std::collections::HashSet;
 
@@ -9,12 +9,12 @@ use super::notes::{write_log, write_plan};
 use crate::campaign::plan::{Cell, Plan, configuration_name};
 
 impl Store {
-    /// Takes over the plan in `text`, which errors call `source`. Hits, force, limits and settling may change, and cells may be
-    /// added; cells without records may go. Cells that were given up or settled get another chance. The plans before stay in
-    /// the file.
+    /// Takes over the plan in `text`, which errors call `source`. Hits, force, limits and settling
+    /// may change, and cells may be added; cells without records may be removed. Cells that were
+    /// given up or settled are reopened. The earlier plans stay in the file.
     ///
     /// # Errors
-    /// The plan is wrong, or what was measured already would not fit it.
+    /// The plan is wrong, or existing records would not fit it.
     pub fn take_over(&mut self, text: &str, source: &str) -> Result<(), StoreError> {
         let (new, old) = (Plan::parse_new(text, source)?, self.plan()?);
         let refuse = |what: String| {
@@ -65,7 +65,7 @@ impl Store {
     }
 }
 
-/// A new cell whose response has a sensor of its own, in a row that was struck before.
+/// A new cell whose response has a fixed sensor, in a row that was struck before.
 fn filled_late(plan: &Plan, cells: &[Cell], rows: &[CellRow], measured: &HashSet<i64>) -> Option<String> {
     let fixed = |cell: &Cell| plan.own_channels(&cell.response).is_some();
     let struck = |cell: &Cell| {
@@ -85,7 +85,7 @@ fn same(one: &Cell, other: &Cell) -> bool {
     (one.configuration, &one.impact, &one.response) == (other.configuration, &other.impact, &other.response)
 }
 
-/// The first of the two points that the new plan puts elsewhere.
+/// The first of the two points that the new plan changes.
 fn moved<'a>(old: &Plan, new: &Plan, impact: &'a str, response: &'a str) -> Option<&'a str> {
     let impact_of = |plan: &Plan| {
         plan.geometry.impact.iter().map(toml::Spanned::get_ref).find(|point| point.name == impact).cloned()

@@ -1,8 +1,11 @@
-//! The seal of a row: a CRC-32 over every column that its type holds, so that no flipped bit goes unseen.
+//! The seal of a row: a CRC-32 over every column of its type, so that every flipped bit is
+//! detected.
 //!
-//! It runs over the columns in the order of the table ([`super::table`]); for a record over those of `records` and then of `seals`. For each
-//! value its kind (0 nothing, 1 whole number, 2 real, 3 text, 4 bytes), then eight bytes little-endian (the number, the real's bits, or
-//! the length), then the text or bytes themselves. The samples have checksums of their own among these columns: one over the codes, one over
+//! It runs over the columns in the order of the table ([`super::table`]); for a record over those
+//! of `records` and then of `seals`. Each value contributes its type (0 null, 1 integer, 2 real, 3
+//! text, 4 bytes), then eight bytes little-endian (the integer, the real's bits, or the length),
+//! then the text or bytes themselves. For the samples these columns contain separate checksums: one
+//! over the codes, one over the bytes as they are stored.
 //! the bytes as they are stored.
 
 use rusqlite::types::{Value, ValueRef};
@@ -14,7 +17,7 @@ pub(super) fn of(values: &[Value]) -> u32 {
     over(values.iter().map(ValueRef::from))
 }
 
-/// Reads a row that is followed by its seal; what is wrong with it where that does not fit.
+/// Reads a row that is followed by its seal; an error message if the seal does not match.
 pub(super) fn read<R: Row>(row: &rusqlite::Row<'_>) -> rusqlite::Result<Result<R, String>> {
     let columns = R::columns().count();
     let Some(stored) = row.get::<_, Option<u32>>(columns)? else {
@@ -36,7 +39,7 @@ fn over<'v>(values: impl Iterator<Item = ValueRef<'v>>) -> u32 {
     hasher.finalize()
 }
 
-/// Hands over kind, number and bytes of a value, in that order.
+/// Passes type, number and bytes of a value to `take`, in that order.
 pub(super) fn each(value: ValueRef<'_>, mut take: impl FnMut(&[u8])) {
     let (kind, number, bytes): (u8, [u8; 8], &[u8]) = match value {
         ValueRef::Null => (0, [0; 8], &[]),

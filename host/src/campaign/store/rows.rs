@@ -1,5 +1,5 @@
-//! Rows of cells that one hit fills: those of one structure and impact whose responses have sensors of their own, which all measure at
-//! once. Their hits are kept with the first cell of the row.
+//! Rows of cells that one hit fills: cells of one structure and impact whose responses have fixed
+//! sensors, which all measure simultaneously. Their hits are stored with the first cell of the row.
 
 use std::collections::HashMap;
 
@@ -10,14 +10,14 @@ use super::record_row::{Damaged, RecordRow};
 use crate::campaign::plan::{Cell, Plan, configuration_name};
 use crate::device::channels::ChannelMap;
 
-/// Which cells are filled by the hits of another one.
+/// The cells that are filled by the hits of another one.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Rows {
     lead: HashMap<i64, i64>,
 }
 
 impl Rows {
-    /// Those of a campaign.
+    /// The rows of a campaign.
     pub fn new(plan: &Plan, cells: &[CellRow]) -> Self {
         let mut first: HashMap<(&str, &str), i64> = HashMap::new();
         let mut lead = HashMap::new();
@@ -35,7 +35,7 @@ impl Rows {
         Self { lead }
     }
 
-    /// The cell whose hits fill this one; none where it is struck itself.
+    /// The cell whose hits fill this one; `None` if it is struck itself.
     pub fn lead(&self, cell: i64) -> Option<i64> {
         self.lead.get(&cell).copied()
     }
@@ -51,8 +51,8 @@ impl Rows {
     }
 }
 
-/// Where the response of `cell` is in a record with the channels of `map`, measured in the cell itself or in its row's first; none where the record
-/// has nothing of it.
+/// Channel indices of the response of `cell` in a record with the channels of `map`, measured in
+/// the cell itself or in the first cell of its row; `None` if the record does not contain it.
 pub fn places(plan: &Plan, cell: &CellRow, record: &RecordRow, map: &ChannelMap) -> Option<Vec<usize>> {
     if record.cell == cell.id {
         plan.response_places(&cell.cell.response, map)
@@ -62,7 +62,8 @@ pub fn places(plan: &Plan, cell: &CellRow, record: &RecordRow, map: &ChannelMap)
 }
 
 impl Store {
-    /// Where the response of a cell is in a record that counts for it; none where the record has nothing of it.
+    /// Channel indices of a cell's response in a record that counts for it; `None` if the record
+    /// does not contain it.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -77,7 +78,7 @@ impl Store {
         Ok(row.and_then(|row| places(&plan, row, record, map)))
     }
 
-    /// Which cells are filled by the hits of another one.
+    /// The cells that are filled by the hits of another one.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -85,7 +86,8 @@ impl Store {
         Ok(Rows::new(&self.plan()?, &self.cells()?))
     }
 
-    /// The records that count for a cell, its own and those of its row's first cell, in order of measurement.
+    /// The records that count for a cell, its own and those of the first cell of its row, in order
+    /// of measurement.
     ///
     /// # Errors
     /// The file cannot be read.

@@ -1,9 +1,10 @@
-//! A new campaign file: its tables, and what may never change in them.
+//! Creating a campaign file: its tables, and the triggers that protect their rows.
 //!
-//! The columns stand beside the type of their row; the tables of a key and a value stand here.
+//! The columns are declared next to the type of their row; the key-value tables are declared here.
 //!
-//! A file of a version that is not known is refused in words. A change of any column makes a new one; what brings older files up stands
-//! here ([`super::Store::bring_up`]), and is applied by [`super::Store::open`].
+//! A file with an unknown version is refused with an error message. Any change of a column makes a
+//! new version; the migration of older files is here ([`super::Store::bring_up`]), and is applied
+//! by [`super::Store::open`].
 
 use std::path::Path;
 
@@ -24,13 +25,14 @@ use super::temperature_table::TemperatureRow;
 use super::{APPLICATION_ID, Store, VERSION};
 use crate::campaign::plan::Plan;
 
-/// Notes on the whole campaign, and the counters of each session's link so far (a JSON object of numbers).
+/// Notes about the whole campaign, and the counters of each session's link so far (a JSON object of
+/// numbers).
 const PAIRS: &str = "
 CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
 CREATE TABLE links (session INTEGER PRIMARY KEY REFERENCES sessions(id), counters TEXT NOT NULL) STRICT;
 ";
 
-/// Tables whose rows stay as they were stored, and what their triggers call a row.
+/// Tables whose rows never change, and how their triggers' messages call a row.
 const APPEND_ONLY: [(&str, &str); 6] = [
     ("records", "a raw record is"),
     ("seals", "a record''s seal is"),
@@ -68,7 +70,7 @@ impl Store {
         transaction.commit()
     }
 
-    /// Brings an older file up to date: since version 2 every row is chained.
+    /// Migrates an older file: since version 2 every row is chained.
     pub(super) fn bring_up(&self) -> rusqlite::Result<()> {
         let version: i32 = self.connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
         if version == VERSION {
@@ -90,13 +92,14 @@ impl Store {
     }
 }
 
-/// The SQL that adds the table of calibrations to a file that was made before there were any; empty where it is there.
+/// The SQL that adds the table of calibrations to a file that was created without it; empty if it
+/// exists.
 pub(super) fn missing_calibrations(connection: &Connection) -> rusqlite::Result<String> {
     let there = connection.table_exists(None, "calibrations")?;
     Ok(if there { String::new() } else { create::<Calibration>() + &stay(APPEND_ONLY[4]) })
 }
 
-/// The triggers that keep the rows of a table as they were stored.
+/// The triggers that prevent changes to the rows of a table.
 fn stay((table, row): (&str, &str)) -> String {
     let one = |(name, event, done): (&str, &str, &str)| {
         format!(
@@ -107,7 +110,7 @@ fn stay((table, row): (&str, &str)) -> String {
     [("stay", "UPDATE", "changed"), ("remain", "DELETE", "deleted")].map(one).concat()
 }
 
-/// The SQL that makes an empty file.
+/// The SQL that creates an empty file.
 pub(super) fn tables() -> String {
     let tables = [
         PAIRS.to_owned(),

@@ -1,4 +1,4 @@
-//! Sessions in the campaign file: what was connected, the channels that it had, and the sensors behind them.
+//! Sessions in the campaign file: the connected device, its channels, and the sensors on them.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ use crate::campaign::plan::Plan;
 use crate::device::channels::ChannelMap;
 
 table! {
-    /// What was connected. One row per connection to a device.
+    /// The connected device. One row per connection.
     #[derive(Clone, Debug, PartialEq, Eq)]
     pub struct SessionInfo {
         "sessions" {
@@ -49,18 +49,18 @@ table! {
             "place INTEGER NOT NULL",
             /// Its name.
             name: String = "name TEXT NOT NULL",
-            /// What it serves as.
+            /// Its role.
             role: Role = "role TEXT NOT NULL",
-            /// What it measures.
+            /// The quantity that it measures.
             quantity: Quantity = "quantity TEXT NOT NULL",
             "unit TEXT NOT NULL",
             /// Units of the quantity per volt, with the sensor's polarity.
             units_per_volt: f32 = "units_per_volt REAL NOT NULL",
             /// Range of the converter, V.
             range_v: f32 = "range_v REAL NOT NULL",
-            /// How late it is, ns.
+            /// Its delay, ns.
             delay_ns: u32 = "delay_ns INTEGER NOT NULL",
-            /// Resolution of the converter.
+            /// Resolution of the converter, bits.
             bits: u8 = "bits INTEGER NOT NULL",
             "PRIMARY KEY (session, place)",
         }
@@ -68,7 +68,8 @@ table! {
 }
 
 table! {
-    /// What a plan says about the sensor behind a channel; sensitivity and polarity are in the channel's scale.
+    /// The plan's data on the sensor of a channel; sensitivity and polarity are part of the
+    /// channel's scale.
     #[derive(Clone, Debug, Default, PartialEq, Eq)]
     pub struct Sensor {
         "sensors" {
@@ -86,14 +87,14 @@ table! {
 }
 
 impl SessionInfo {
-    /// What stands for the board of records that came from a file.
+    /// Board name for records that were imported from a file.
     pub const IMPORTED: &str = "imported";
 }
 
 /// Counters of a link by name.
 pub type Counters = BTreeMap<String, u64>;
 
-/// Notes the counters of a session's link so far.
+/// Writes the counters of a session's link so far.
 pub(super) fn write_link(connection: &Connection, session: i64, counters: &Counters) -> rusqlite::Result<()> {
     let failed = |error| rusqlite::Error::ToSqlConversionFailure(Box::new(error));
     let text = serde_json::to_string(counters).map_err(failed)?;
@@ -103,8 +104,8 @@ pub(super) fn write_link(connection: &Connection, session: i64, counters: &Count
         .map(|_| ())
 }
 
-/// Under which name the notes of the file have a session's rate that is no whole number, Hz: the column of
-/// the table holds whole ones alone.
+/// Key of the note with a session's rate in Hz if it is not a whole number: the column of the table
+/// holds whole numbers only.
 fn exact_rate(session: i64) -> String {
     format!("exact_rate_hz of session {session}")
 }
@@ -121,7 +122,7 @@ fn write_session(
     info.clone().insert(connection, &beside)?;
     let session = connection.last_insert_rowid();
     if let Some(exact_hz) = map.exact_hz {
-        // all digits, so that the same number is read
+        // all digits, so that reading gives the same number
         let row = (exact_rate(session), exact_hz.to_string());
         connection.execute("INSERT INTO meta VALUES (?1, ?2)", row)?;
     }
@@ -148,18 +149,19 @@ fn write_session(
 }
 
 impl Store {
-    /// Notes a connection to a device, its channels, and the sensors that the plan names behind them; returns its id.
+    /// Stores a connection to a device, its channels, and the plan's sensors on them; returns its
+    /// id.
     pub fn begin_session(&mut self, info: &SessionInfo, channels: &ChannelMap) -> Result<i64, StoreError> {
         let plan = self.plan()?;
         self.change("noting the session", |connection| write_session(connection, info, channels, &plan))
     }
 
-    /// The channels of one session, as they are calibrated by now.
+    /// The channels of one session, with all calibrations entered so far.
     pub fn channels(&self, session: i64) -> Result<ChannelMap, StoreError> {
         self.calibrated(session, self.channels_as_measured(session)?)
     }
 
-    /// The channels of one session with the scales that it was measured with.
+    /// The channels of one session, with the scales that it was measured with.
     pub fn channels_as_measured(&self, session: i64) -> Result<ChannelMap, StoreError> {
         let rate_hz = self
             .connection
@@ -187,7 +189,7 @@ impl Store {
         Ok(ChannelMap { id: 0, rate_hz, exact_hz, channels })
     }
 
-    /// The versions of this program that wrote the sessions, each once.
+    /// The distinct versions of jointrig that wrote the sessions.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -196,7 +198,7 @@ impl Store {
         self.all(sql, [], |row| row.get(0), "reading the sessions")
     }
 
-    /// What is known of the sensors of one session's channels, in their order.
+    /// The sensors of one session's channels, in channel order.
     pub fn sensors(&self, session: i64) -> Result<Vec<Sensor>, StoreError> {
         let sql = format!(
             "SELECT {} FROM channels LEFT JOIN sensors USING (session, place) WHERE session = ?1 ORDER BY place",
@@ -205,12 +207,12 @@ impl Store {
         self.all(&sql, [session], Sensor::read, "reading sensors")
     }
 
-    /// Notes the counters of a session's link.
+    /// Stores the counters of a session's link.
     pub fn note_link(&self, session: i64, counters: &Counters) -> Result<(), StoreError> {
         self.change("noting the link's counters", |connection| write_link(connection, session, counters))
     }
 
-    /// The counters of the link, summed over all sessions that noted them.
+    /// The counters of the link, summed over all sessions that stored them.
     pub fn link_counters(&self) -> Result<Counters, StoreError> {
         let mut sum = Counters::new();
         let texts: Vec<String> =
@@ -225,7 +227,7 @@ impl Store {
         Ok(sum)
     }
 
-    /// The sessions of this file: id, and what was connected.
+    /// The sessions of this file: id and device.
     pub fn sessions(&self) -> Result<Vec<(i64, SessionInfo)>, StoreError> {
         let sql = format!("SELECT {}, id FROM sessions ORDER BY id", SessionInfo::list());
         let read = |row: &rusqlite::Row<'_>| Ok((row.get("id")?, SessionInfo::read(row)?));

@@ -1,10 +1,11 @@
-//! Network shares: SQLite's write-ahead log needs memory shared between processes, which no network file system has.
+//! Network shares: SQLite's write-ahead log needs memory shared between processes, which network
+//! file systems do not provide.
 
 use std::path::Path;
 
 use super::error::StoreError;
 
-/// File systems that another computer serves, by the names that Linux's mount table uses; `fuse.` may stand before them.
+/// Network file systems, by their names in Linux's mount table; these may have the prefix `fuse.`.
 const NETWORK: [&str; 22] = [
     "9p",
     "afs",
@@ -30,7 +31,8 @@ const NETWORK: [&str; 22] = [
     "virtiofs",
 ];
 
-/// Refuses to write a campaign on a network share. Only Linux says what is mounted where; elsewhere nothing is refused.
+/// Refuses to write a campaign on a network share. Only Linux provides a mount table; on other
+/// systems nothing is refused.
 pub(super) fn refuse(campaign: &Path) -> Result<(), StoreError> {
     let folder = campaign.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let (Ok(table), Ok(folder)) = (std::fs::read_to_string("/proc/self/mountinfo"), folder.canonicalize())
@@ -43,7 +45,8 @@ pub(super) fn refuse(campaign: &Path) -> Result<(), StoreError> {
     }
 }
 
-/// The kind of file system under `folder`, if it is a network's. `table` is Linux's `mountinfo`.
+/// The kind of file system under `folder`, if it is a network file system. `table` is Linux's
+/// `mountinfo`.
 fn network(table: &str, folder: &Path) -> Option<String> {
     let mounts = table.lines().filter_map(|line| {
         // "36 35 98:0 / /mnt rw,noatime shared:1 - ext3 /dev/root rw"
@@ -51,13 +54,13 @@ fn network(table: &str, folder: &Path) -> Option<String> {
         let point = unescaped(before.split(' ').nth(4)?);
         Some((point, after.split(' ').next()?.to_owned()))
     });
-    // the longest point counts, and the last mounted there
+    // the longest mount point applies, and the last one mounted there
     let (_, kind) =
         mounts.filter(|(point, _)| folder.starts_with(point)).max_by_key(|(point, _)| point.len())?;
     NETWORK.contains(&kind.trim_start_matches("fuse.")).then_some(kind)
 }
 
-/// The kernel writes space, tab, newline and backslash as octal numbers.
+/// Decodes space, tab, newline and backslash, which the kernel writes as octal numbers.
 fn unescaped(text: &str) -> String {
     [("\\040", " "), ("\\011", "\t"), ("\\012", "\n"), ("\\134", "\\")]
         .into_iter()

@@ -1,7 +1,8 @@
-//! What a campaign's device was known to be, when it was simulated in the process that ran the campaign.
+//! Data about the simulated rig, if the device was simulated in the process that ran the campaign.
 //!
-//! Two notes of the file: which rig it was, and what an ideal measurement of it would find. They are written by the runner from the
-//! rig's parameters; nothing of them crosses the protocol, and no estimator may read them.
+//! Two notes of the file: the rig, and the result that an ideal measurement of it would give. The
+//! runner writes them from the rig's parameters; nothing of them crosses the protocol, and no
+//! estimator may read them.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,19 +15,19 @@ use jointrig_protocol::answer::Info;
 const RIG: &str = "simulated_rig";
 const TRUTH: &str = "simulated_truth";
 
-/// Which simulated rig it was.
+/// Identifies a simulated rig.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SimulatedRig {
     /// The rig's name.
     pub name: String,
     /// Its seed.
     pub seed: u64,
-    /// SHA-256 of all its parameters, in base64; none in files from before it was noted.
+    /// SHA-256 of all its parameters, in base64; `None` in files from before this was stored.
     #[serde(default)]
     pub parameters: Option<String>,
 }
 
-/// How the contact answers.
+/// Force law of the contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ContactLaw {
@@ -38,20 +39,22 @@ pub enum ContactLaw {
     Iwan,
 }
 
-/// What an ideal measurement of the simulated rig would find. Stiffness along z.
+/// The result that an ideal measurement of the simulated rig would give. Stiffness along z.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SimulatedTruth {
-    /// The contact's own tangential stiffness k_T, all of it stuck, N/m.
+    /// The contact's own tangential stiffness k_T in full stick, N/m.
     pub contact_k_t_n_per_m: f64,
     /// The contact's own tangential damping c_T, N s/m.
     pub contact_c_t_n_s_per_m: f64,
-    /// Between the arms, as substructuring sees it at the virtual points: contact and clamps in series, N/m.
+    /// Stiffness between the arms as substructuring finds it at the virtual points: contact and
+    /// clamps in series, N/m.
     pub between_arms_k_n_per_m: f64,
-    /// Of the clamps alone, the same way, N/m; none when they are rigid.
+    /// Stiffness of the clamps alone, defined the same way, N/m; `None` if they are rigid.
     pub clamps_k_n_per_m: Option<f64>,
-    /// The contact's law.
+    /// The contact's force law.
     pub law: ContactLaw,
-    /// μN, beyond which the contact is in gross slip, N; none for the linear law. An Iwan contact slips in part below it.
+    /// μN, above which the contact is in gross slip, N; `None` for the linear law. An Iwan contact
+    /// slips partially below it.
     pub slip_limit_n: Option<f64>,
 }
 
@@ -61,7 +64,8 @@ pub fn is_simulated_board(name: &str) -> bool {
 }
 
 impl Store {
-    /// Notes which simulated rig the campaign is run on, and its truth; the last session's counts.
+    /// Stores which simulated rig the campaign is run on, and its truth; the last session's values
+    /// count.
     pub(crate) fn note_simulated(&self, simulated: &Simulated) -> Result<(), StoreError> {
         let rig = SimulatedRig {
             name: simulated.rig.clone(),
@@ -73,7 +77,8 @@ impl Store {
         self.set_meta(TRUTH, &simulated.truth.to_string())
     }
 
-    /// Which simulated rig the campaign was run on; none where the device was not simulated in the runner's own process.
+    /// The simulated rig that the campaign was run on; `None` if the device was not simulated in
+    /// the runner's own process.
     ///
     /// # Errors
     /// The note cannot be read.
@@ -81,7 +86,8 @@ impl Store {
         self.json(RIG)
     }
 
-    /// Whether any session's device was simulated, in the runner's own process or behind a wire.
+    /// Whether any session's device was simulated, in the runner's own process or over a
+    /// connection.
     ///
     /// # Errors
     /// The notes or sessions cannot be read.
@@ -90,8 +96,8 @@ impl Store {
         Ok(behind_a_wire || self.simulated_rig()?.is_some())
     }
 
-    /// What an ideal measurement of the simulated rig would find; none where the device was not simulated in the runner's own
-    /// process, and in files from before it was noted.
+    /// The result that an ideal measurement of the simulated rig would give; `None` if the device
+    /// was not simulated in the runner's own process, and in files from before this was stored.
     ///
     /// # Errors
     /// The note cannot be read.

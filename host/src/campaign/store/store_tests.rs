@@ -72,7 +72,7 @@ fn record(cell: i64, attempt: u32, session: i64, kind: Kind) -> NewRecord {
     NewRecord { cell, attempt, session, utc: utc_now(), utc_error_s: Some(0.003), recording, verdict }
 }
 
-/// The rows of all records, every one whole.
+/// The rows of all records, which must be undamaged.
 fn rows(store: &Store) -> Vec<RecordRow> {
     store.records().expect("rows").into_iter().collect::<Result<_, _>>().expect("whole")
 }
@@ -203,7 +203,7 @@ fn every_column_of_a_record_is_under_its_seal() {
             ))
             .expect("changed behind its back");
         let damage = store.verify().expect("checked");
-        // the triggers that were in the way
+        // except the triggers that had to be dropped
         let damage: Vec<_> = damage.into_iter().filter(|one| !one.what.starts_with("it lacks")).collect();
         assert!(damage.len() == 1 && damage[0].record == Some(id), "{table}.{name}: {damage:?}");
         let back = format!("UPDATE {table} SET {name} = (SELECT value FROM kept); DROP TABLE kept");

@@ -1,4 +1,4 @@
-//! How the program's types stand in a column: by name, as JSON, or as hexadecimal digits.
+//! Representation of the program's types in a column: a name, JSON, or hexadecimal digits.
 
 use std::ops::Range;
 
@@ -48,7 +48,7 @@ macro_rules! json {
 }
 json!(Shot, Role, Quantity, Vec<Range<usize>>);
 
-/// A 64-bit mark that is no number: 16 hexadecimal digits in the file.
+/// A 64-bit identifier: 16 hexadecimal digits in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Hex(pub u64);
 

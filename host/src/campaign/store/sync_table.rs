@@ -1,6 +1,7 @@
-//! Sync in the campaign file: what timed a session's scans, and edges that another recorder also saw.
+//! Synchronisation data in the campaign file: the clock that timed a session's scans, and edges
+//! that another recorder also records.
 //!
-//! Only a plan with `[sync]` stores them, and only then a file has these tables.
+//! They are stored only for a plan with `[sync]`; other files do not have these tables.
 
 use jointrig_protocol::sync::{Clock, Edge, Line, Sync};
 use rusqlite::Connection;
@@ -10,17 +11,18 @@ use super::error::StoreError;
 use super::table::{Row, create, table};
 
 table! {
-    /// What timed the scans of a session.
+    /// The clock that timed the scans of a session.
     #[derive(Clone, Debug, PartialEq)]
     pub struct ClockRow {
         "clocks" {
-            /// Which session.
+            /// The session.
             session: i64 = "session INTEGER PRIMARY KEY REFERENCES sessions(id)",
             /// `internal` or `external`.
             source: String = "source TEXT NOT NULL",
-            /// The external clock's nominal rate, Hz; none with the internal one.
+            /// The external clock's nominal rate, Hz; `None` for the internal one.
             rate_hz: Option<i64> = "rate_hz INTEGER",
-            /// How much faster than nominal it was by the controller's crystal when the session began, ppm.
+            /// Deviation of its rate from nominal, relative to the controller's crystal, when the
+            /// session began, ppm; positive is faster.
             ppm: Option<f64> = "ppm REAL",
         }
     }
@@ -32,22 +34,23 @@ table! {
     pub struct EdgeRow {
         "edges" {
             "id INTEGER PRIMARY KEY",
-            /// Which session.
+            /// The session.
             session: i64 = "session INTEGER NOT NULL REFERENCES sessions(id)",
-            /// `input`, or why the output rose: `fired`, `trigger`, `asked`.
+            /// `input`, or the reason for an output edge: `fired`, `trigger`, `asked`.
             line: String = "line TEXT NOT NULL",
-            /// Its number since the device started; a jump tells how many came too fast to be told.
+            /// Its number since the device started; a gap in the numbers is the number of edges
+            /// that came too fast to be reported.
             number: u32 = "number INTEGER NOT NULL",
-            /// The last scan at it or before it, in the count of the device.
+            /// The last scan at or before the edge, in the device's count.
             scan: u64 = "scan INTEGER NOT NULL",
-            /// The part of a scan since, in parts of 65536.
+            /// Fraction of a scan since then, in units of 1/65536.
             part: u32 = "part INTEGER NOT NULL",
         }
     }
 }
 
 impl EdgeRow {
-    /// When it was, in scans of the device.
+    /// Time of the edge, in scans of the device.
     pub fn at_scan(&self) -> f64 {
         self.scan as f64 + f64::from(self.part) / 65_536.0
     }
@@ -63,18 +66,18 @@ fn name(line: Line) -> &'static str {
     }
 }
 
-/// The SQL of both tables.
+/// The SQL that creates both tables.
 pub(super) fn tables() -> String {
     create::<ClockRow>() + &create::<EdgeRow>()
 }
 
-/// Makes the tables in a file that has none yet.
+/// Creates the tables if the file does not have them.
 fn make(connection: &Connection) -> rusqlite::Result<()> {
     if connection.table_exists(None, "clocks")? { Ok(()) } else { connection.execute_batch(&tables()) }
 }
 
 impl Store {
-    /// Notes what times a session's scans.
+    /// Stores the clock that times a session's scans.
     pub fn note_clock(&self, session: i64, sync: &Sync) -> Result<(), StoreError> {
         let row = match sync.clock {
             Clock::Internal => ClockRow { session, source: "internal".into(), rate_hz: None, ppm: None },
@@ -91,7 +94,7 @@ impl Store {
         })
     }
 
-    /// Notes edges of a session.
+    /// Stores edges of a session.
     pub fn note_edges(&self, session: i64, edges: &[Edge]) -> Result<(), StoreError> {
         if edges.is_empty() {
             return Ok(());
@@ -115,7 +118,7 @@ impl Store {
         self.connection.table_exists(None, "clocks").map_err(self.failed("looking for clocks"))
     }
 
-    /// What timed the sessions that noted it.
+    /// The clocks of the sessions that stored one.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -127,7 +130,7 @@ impl Store {
         self.all(&sql, [], ClockRow::read, "reading clocks")
     }
 
-    /// Every edge that was noted, in that order.
+    /// Every stored edge, in order.
     ///
     /// # Errors
     /// The file cannot be read.

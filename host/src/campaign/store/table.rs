@@ -1,8 +1,9 @@
-//! A table of the campaign file, written down once.
+//! Declaration of a table of the campaign file.
 //!
-//! [`table!`] takes the columns in the order of the table. Of a column with a field before it, the row's type gets that field; a bare
-//! one (a constraint, or what the type leaves out) is only created. CREATE, INSERT, SELECT and the order of the row's seal
-//! (`row_seal.rs`) all come from this list: a new column is one new line.
+//! [`table!`] takes the columns in the order of the table. A column with a field before it becomes
+//! a field of the row's type; one without (a constraint, or a column that the type omits) is only
+//! created. CREATE, INSERT, SELECT and the order of the row's seal (`row_seal.rs`) all follow from
+//! this list: a new column is one new line.
 
 use rusqlite::types::{FromSql, ToSql, Value, ValueRef};
 use rusqlite::{Connection, params_from_iter};
@@ -12,9 +13,9 @@ use rusqlite::{Connection, params_from_iter};
 pub struct Column {
     /// Its table.
     pub table: &'static str,
-    /// Its SQL, which begins with its name.
+    /// Its SQL, which starts with its name.
     pub declaration: &'static str,
-    /// Whether the row's type has it.
+    /// Whether the row's type contains it.
     pub in_row: bool,
 }
 
@@ -30,31 +31,33 @@ pub trait Row: Sized {
     /// All columns of all its tables.
     const ALL: &'static [Column];
 
-    /// Reads it from a row that begins with [`Row::columns`].
+    /// Reads it from a row that starts with [`Row::columns`].
     fn read(row: &rusqlite::Row<'_>) -> rusqlite::Result<Self>;
 
     /// Its values, in the order of [`Row::columns`].
     fn into_values(self) -> rusqlite::Result<Vec<Value>>;
 
-    /// The columns that it holds.
+    /// The columns that the type contains.
     fn columns() -> impl Iterator<Item = &'static Column> {
         Self::ALL.iter().filter(|column| column.in_row)
     }
 
-    /// The columns that it holds, as SELECT wants them.
+    /// The columns that the type contains, as a list for SELECT.
     fn list() -> String {
         let names: Vec<String> =
             Self::columns().map(|column| format!("{}.{}", column.table, column.name())).collect();
         names.join(", ")
     }
 
-    /// Stores it in its only table, with the columns `beside` that it does not hold.
+    /// Stores it in its only table, with the additional columns `beside` that the type does not
+    /// contain.
     fn insert(self, connection: &Connection, beside: &[(&str, &dyn ToSql)]) -> rusqlite::Result<()> {
         insert::<Self>(connection, Self::ALL[0].table, &self.into_values()?, beside)
     }
 }
 
-/// Stores those of a row's `values` that belong to `table`, with the columns `beside` that the row does not hold.
+/// Stores those of a row's `values` that belong to `table`, with the additional columns `beside`
+/// that the type does not contain.
 pub(super) fn insert<R: Row>(
     connection: &Connection,
     table: &str,
@@ -79,16 +82,16 @@ pub(super) fn create<R: Row>() -> String {
     tables.map(one).collect()
 }
 
-/// A value as a column holds it.
+/// A type that can be stored in a column.
 pub trait Stored: Sized {
-    /// As it is stored.
+    /// The value to be stored.
     fn store(self) -> rusqlite::Result<Value>;
 
-    /// As it was; none where the column holds no such thing.
+    /// The value read back; `None` if the column holds another type.
     fn load(value: ValueRef<'_>) -> Option<Self>;
 }
 
-/// Those that SQLite knows.
+/// Types that SQLite supports directly.
 macro_rules! plain {
     ($($type:ty),+) => {
         $(impl Stored for $type {
@@ -104,7 +107,7 @@ macro_rules! plain {
 }
 plain!(i64, u32, u8, f64, f32, String, Vec<u8>, Option<f64>, Option<i64>, Option<String>, Option<Vec<u8>>);
 
-/// Numbers that SQLite would have to sign.
+/// Unsigned integers, which SQLite stores as signed.
 macro_rules! unsigned {
     ($($type:ty),+) => {
         $(impl Stored for $type {
@@ -121,14 +124,15 @@ macro_rules! unsigned {
 }
 unsigned!(u64, usize);
 
-/// The value at `place`, which moves on.
+/// The value at `place`, which is advanced.
 pub(super) fn next<T: Stored>(row: &rusqlite::Row<'_>, place: &mut usize, name: &str) -> rusqlite::Result<T> {
     let (at, value) = (*place, row.get_ref(*place)?);
     *place += 1;
     T::load(value).ok_or_else(|| rusqlite::Error::InvalidColumnType(at, name.into(), value.data_type()))
 }
 
-/// A row's type and its tables. Fields in `beside` stand in no column of theirs: they are read with their default.
+/// Defines a row's type and its tables. Fields in `beside` have no column: they are read as their
+/// default.
 macro_rules! table {
     (
         $(#[$meta:meta])*

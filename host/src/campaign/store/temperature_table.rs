@@ -1,4 +1,4 @@
-//! The specimen's temperature in the campaign file, as the controller measured it.
+//! The specimen's temperature in the campaign file, as measured by the controller.
 
 use super::Store;
 use super::error::StoreError;
@@ -6,29 +6,29 @@ use super::notes::utc_now;
 use super::table::{Row, table};
 
 table! {
-    /// A temperature at some moment of a session.
+    /// A temperature at one time in a session.
     #[derive(Clone, Debug, PartialEq)]
     pub struct TemperatureRow {
         "temperatures" {
             "id INTEGER PRIMARY KEY",
-            /// Which session.
+            /// The session.
             session: i64 = "session INTEGER NOT NULL REFERENCES sessions(id)",
-            /// When, RFC 3339.
+            /// Time, RFC 3339.
             utc: String = "utc TEXT NOT NULL",
-            /// At the specimen, °C.
+            /// Temperature of the specimen, °C.
             celsius: f64 = "celsius REAL NOT NULL",
         }
     }
 }
 
 impl Store {
-    /// Notes the specimen's temperature now, °C.
+    /// Stores the specimen's current temperature, °C.
     pub fn note_temperature(&self, session: i64, celsius: f64) -> Result<(), StoreError> {
         let row = TemperatureRow { session, utc: utc_now(), celsius };
         self.change("noting a temperature", |connection| row.insert(connection, &[]))
     }
 
-    /// Every temperature that was noted, in that order.
+    /// Every stored temperature, in order.
     pub fn temperatures(&self) -> Result<Vec<TemperatureRow>, StoreError> {
         let there = self.connection.table_exists(None, "temperatures");
         if !there.map_err(self.failed("looking for temperatures"))? {

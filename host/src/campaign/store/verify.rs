@@ -1,14 +1,14 @@
-//! What is damaged in a campaign file.
+//! Finds damage in a campaign file.
 
 use std::collections::HashSet;
 
 use super::error::StoreError;
 use super::{Store, chain, own_schema};
 
-/// Something that is damaged in a file.
+/// One finding of damage.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Damage {
-    /// The record, or the file as a whole.
+    /// The record; `None` for the file as a whole.
     pub record: Option<i64>,
     /// What is wrong.
     pub what: String,
@@ -20,11 +20,12 @@ impl Damage {
     }
 }
 
-/// Rows that are named as damaged already, by table and key.
+/// Rows already reported as damaged, by table and key.
 type Named = HashSet<(String, String)>;
 
 impl Store {
-    /// Checks the file's structure, every checksum, and every row against the chain; what is damaged is named.
+    /// Checks the file's structure, every checksum, and every row against the chain; returns the
+    /// damage found.
     pub fn verify(&self) -> Result<Vec<Damage>, StoreError> {
         let mut damage: Vec<Damage> = self.lacks_its_log()?.map(Damage::of_file).into_iter().collect();
         match self.all("PRAGMA integrity_check", [], |row| row.get::<_, String>(0), "checking") {
@@ -40,7 +41,7 @@ impl Store {
         Ok(damage)
     }
 
-    /// Records, levels and FRFs whose own checksums do not fit.
+    /// Records, levels and FRFs whose own checksums do not match.
     fn damaged_samples(&self, named: &mut Named) -> Result<Vec<Damage>, StoreError> {
         let mut damage = Vec::new();
         let mut name = |tables: &[&str], id: i64| {
@@ -77,7 +78,8 @@ impl Store {
         Ok(damage)
     }
 
-    /// Rows that are not as jointrig left them, but for those that are named already. A file of version 1 has no chain.
+    /// Rows that were changed outside jointrig, except those already reported. A file of version 1
+    /// has no chain.
     fn behind_our_back(&self, named: &Named) -> Result<Vec<Damage>, StoreError> {
         if !self.has_chain()? {
             return Ok(Vec::new());
@@ -92,7 +94,8 @@ impl Store {
         })
     }
 
-    /// Table and key of every row, in the order in which they were stored; none in a file without a chain.
+    /// Table and key of every row, in the order in which they were stored; empty for a file without
+    /// a chain.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -103,7 +106,7 @@ impl Store {
         chain::history(&self.connection).map_err(self.failed("reading the chain"))
     }
 
-    /// Whether rows are chained: in files of version 2 on.
+    /// Whether rows are chained: in files from version 2 onwards.
     ///
     /// # Errors
     /// The file cannot be read.

@@ -1,5 +1,5 @@
-//! Overload: values at the range, or a flat top below it (an amplifier in front of the converter, or a foreign record whose
-//! range nobody wrote down).
+//! Overload: values at the end of the range, or a flat top below it (an amplifier before the
+//! converter, or an imported record with unknown range).
 
 use super::dropout::third_differences;
 use crate::median::middle;
@@ -7,9 +7,9 @@ use crate::spectra::Pulse;
 
 /// Evidence of clipping.
 pub(super) struct Clipped {
-    /// Level at which the signal stands, in its unit.
+    /// Level of the plateau, in the signal's unit.
     pub(super) level: f64,
-    /// Full scale where it is known, else the level again.
+    /// Full scale if it is known, else the same level.
     pub(super) limit: f64,
     samples: usize,
 }
@@ -23,13 +23,15 @@ impl Clipped {
     }
 }
 
-/// A converter's last step or two below full scale count as full scale.
+/// Fraction of full scale that counts as full scale: includes a converter's last step or two.
 const AT_RANGE: f64 = 0.999;
 
-/// Samples this close to the top, relative to it, are one flat top. The top of a half sine stays within it for 3 % of the pulse.
+/// Relative distance from the maximum within which samples belong to one flat top. The top of a
+/// half sine stays within it for 3 % of the pulse.
 const FLAT: f64 = 1e-3;
 
-/// Force at its range, or flat for three samples and an eighth of the pulse's width at half height.
+/// Force at its range, or flat for at least three samples and an eighth of the pulse's width at
+/// half height.
 pub(super) fn force(force_n: &[f64], pulse: &Pulse, range_n: Option<f64>) -> Option<Clipped> {
     if let Some(range) = range_n {
         let samples = force_n.iter().filter(|f| f.abs() >= AT_RANGE * range).count();
@@ -48,13 +50,14 @@ pub(super) fn force(force_n: &[f64], pulse: &Pulse, range_n: Option<f64>) -> Opt
     }
     let half =
         force_n[pulse.start..pulse.end].iter().filter(|f| **f - pulse.offset_n >= 0.5 * height).count();
-    // Wider slack under noise keeps more of a round top: its share of the width at half height is 0.95 √(slack / height).
+    // With noise the slack is wider and covers more of a round top: its share of the width at half
+    // height is 0.95 √(slack / height).
     let round = 0.95 * (slack / height).sqrt() * half as f64;
     let needed = (0.12 * half as f64).max(1.8 * round).max(3.0);
     (longest as f64 >= needed).then_some(Clipped { level: top, limit: top, samples: longest })
 }
 
-/// A response at its range.
+/// A response at the end of its range.
 pub(super) fn response(x: &[f64], range: f64) -> Option<Clipped> {
     let samples = x.iter().filter(|v| v.abs() >= AT_RANGE * range).count();
     (samples > 0).then_some(Clipped { level: range, limit: range, samples })
@@ -63,48 +66,55 @@ pub(super) fn response(x: &[f64], range: f64) -> Option<Clipped> {
 /// A plateau has at least this many samples ...
 const SHORTEST: usize = 4;
 
-/// ... and all plateaus together this many. A sharp top of a structure that was just hit may stand level for half as long: among 500
-/// clean simulated hits, three did for four to six samples.
+/// ... and all plateaus together this many. A sharp peak just after the hit may be level for half
+/// as long: among 500 clean simulated hits, three were so for four to six samples.
 const IN_ALL: usize = 12;
 
-/// A level that is reached so often is a limit, however short each visit ...
+/// A level that is reached this often is a limit, however short each visit ...
 const VISITS: usize = 3;
 
-/// ... of at least so many samples: three of a smooth top that are level fall by nine times that over the next two, and not by [`CORNER`].
+/// ... of at least this many samples: if three samples of a smooth peak are level, the next two
+/// fall by nine times the level's width, which is less than [`CORNER`].
 const SHORTEST_VISIT: usize = 3;
 
-/// Limits of both signs are one when they differ by less than this part: supplies of an amplifier are alike.
+/// Relative difference below which the positive and negative limits are equal: an amplifier's
+/// supplies are symmetric.
 const ALIKE: f64 = 0.02;
 
-/// Samples within this many steps of the converter are one level: rounding and the noise of what comes after the saturated stage.
+/// Samples within this many steps of the converter are one level: covers rounding and the noise of
+/// the stages after the saturated one.
 const LEVEL_STEPS: f64 = 3.0;
 
-/// A smooth top falls by three times the level's width over one more half of its length; a corner by far more.
+/// Minimum depth of a corner, in widths of the level: a smooth peak falls by three widths over
+/// another half of its length; a corner falls far more.
 const CORNER: f64 = 10.0;
 
-/// ... and by more than noise would, rms: where there is noise, its highest samples may stand level by chance.
+/// ... and at least this many times the noise's rms: with noise, the highest samples may be level
+/// by chance.
 const NOISE: f64 = 6.0;
 
-/// A response that stands at its highest or lowest value below full scale, with corners at both ends: an amplifier or decoder before
-/// the converter is saturated. `step` is the converter's step. A slow mode is flat at its top too, but round.
+/// Detects a response that stays at its highest or lowest value below full scale, with corners at
+/// both ends: an amplifier or decoder before the converter is saturated. `step` is the converter's
+/// step. A slow mode is flat at its peak too, but round.
 pub(super) fn plateau(x: &[f64], step: f64) -> Option<Clipped> {
     let largest = x.iter().fold(0.0f64, |most, v| most.max(v.abs()));
-    // a few steps in all: nothing can be told
+    // only a few steps in total: undecidable
     if largest < 100.0 * step {
         return None;
     }
     let slack = LEVEL_STEPS * step;
     let corner = CORNER * slack;
-    // whoever does not stand so with the lower corner does not with the higher one, and few do: only they are asked for their noise
+    // cheap test first: few signals pass it, and only for those the noise is estimated
     standing(x, largest, slack, corner)?;
     standing(x, largest, slack, corner.max(NOISE * noise(x)))
 }
 
-/// Whether the signal stands within `slack` of its highest or lowest value, with corners that are `fall` deep.
+/// Finds plateaus within `slack` of the signal's highest or lowest value, with corners at least
+/// `fall` deep.
 fn standing(x: &[f64], largest: f64, slack: f64, fall: f64) -> Option<Clipped> {
     let sides = [1.0, -1.0].map(|sign| Side::of(x, sign, slack, fall));
     let [above, below] = &sides;
-    // an amplifier has a limit above and one below, and a ring-down runs into both by turns
+    // an amplifier has a positive and a negative limit, and a ring-down reaches both alternately
     let alike = (above.top - below.top).abs() <= slack.max(ALIKE * largest);
     let both = [above.visits.as_slice(), &below.visits].concat();
     let found = [(above, alike.then_some(both.as_slice())), (below, None)];
@@ -117,15 +127,15 @@ fn standing(x: &[f64], largest: f64, slack: f64, fall: f64) -> Option<Clipped> {
     })
 }
 
-/// Samples that are passed over at once.
+/// Samples skipped together.
 const BLOCK: usize = 64;
 
-/// How a signal stands at its highest or lowest value.
+/// The plateaus of a signal at its highest or lowest value.
 struct Side {
     sign: f64,
-    /// The value, times the sign.
+    /// That value times the sign.
     top: f64,
-    /// Samples of each visit that has corners at both ends.
+    /// Length of each visit with corners at both ends, samples.
     visits: Vec<usize>,
 }
 
@@ -136,7 +146,7 @@ impl Side {
         let near = |v: &f64| top - sign * v <= slack;
         let mut i = 0;
         while i <= x.len() {
-            // few blocks come near the top: the others are passed over whole
+            // few blocks come near the extreme value: skip the others as a whole
             if start.is_none() {
                 let away = x[i..]
                     .chunks_exact(BLOCK)
@@ -167,7 +177,8 @@ impl Side {
     }
 }
 
-/// Rms of white noise under the motion: from the median of third differences, which have 20 times its power.
+/// Rms of white noise on the motion, from the median of third differences, which have 20 times its
+/// power.
 fn noise(x: &[f64]) -> f64 {
     // the median of |x| is 0.6745 σ
     middle(&third_differences(x, 1)).unwrap_or(0.0) / (20f64.sqrt() * 0.6745)
@@ -177,7 +188,8 @@ fn noise(x: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// A ring-down of 700 Hz at 51.2 kHz, hit at `peak`, that an amplifier cuts at ±`limit`, in steps of a converter.
+    /// A ring-down of 700 Hz at 51.2 kHz with amplitude `peak`, clipped at ±`limit`, quantised in
+    /// steps of a converter.
     fn ring_down(peak: f64, limit: f64, decay_per_s: f64, step: f64) -> Vec<f64> {
         let at = |i: usize| {
             let t = i as f64 / 51_200.0;
@@ -194,14 +206,15 @@ mod tests {
         for v in &mut x {
             *v *= 0.5;
         }
-        // three tops of 5, 3 and 10 samples at one level, two above and one below, each with corners
+        // three plateaus of 5, 3 and 10 samples at one level, two positive and one negative, each
+        // with corners
         for (from, samples, sign) in [(40, 5, 1.0), (120, 3, 1.0), (80, 10, -1.0)] {
             x[from - 4..from + samples + 4].fill(0.0);
             x[from..from + samples].fill(6.0 * sign);
         }
         let found = plateau(&x, step).expect("clipped");
         assert_eq!((found.samples, found.level), (18, 6.0));
-        // two of them are what a sharp top may be
+        // two of them may be a sharp peak
         x[120..123].fill(0.0);
         x[80..90].fill(-5.8);
         x[80..84].fill(0.0);

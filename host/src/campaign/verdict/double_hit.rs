@@ -1,8 +1,9 @@
 //! A second pulse in the force record.
 //!
-//! The force cell rings after the hit (about 3 % at 6 kHz), as high as the smallest rebound that must be found. But a rebound is a
-//! pulse of the bolt on the same structure, so it has the main pulse's width; a matched filter of that width answers to it fully and
-//! to ringing at several times its bandwidth hardly at all (a half sine of 0.41 ms passes 0.5 % at 6 kHz).
+//! The force cell rings after the hit (about 3 % at 6 kHz), as high as the smallest rebound that
+//! must be found. A rebound, however, is a pulse of the bolt on the same structure, so it has the
+//! main pulse's width; a matched filter of that width passes it fully and almost suppresses ringing
+//! at several times its bandwidth (a half sine of 0.41 ms passes 0.5 % at 6 kHz).
 
 use crate::spectra::Pulse;
 use std::f64::consts::PI;
@@ -11,20 +12,23 @@ use std::f64::consts::PI;
 pub(super) struct Second {
     /// Its first sample.
     pub(super) start: usize,
-    /// Its height over the main pulse's.
+    /// Its height relative to the main pulse.
     pub(super) fraction: f64,
-    /// The fraction from which it counts in this record.
+    /// The smallest fraction that counts in this record.
     pub(super) limit: f64,
 }
 
-/// A valley this deep between two humps makes them two pulses, even if the force never fell to zero between them.
+/// A valley below this fraction of a hump's height separates it from the main pulse, even if the
+/// force does not fall to zero in it.
 const VALLEY: f64 = 0.7;
 
-/// The baseline is the median of such blocks: no pulse fills half of one, and slow drift of the amplifier is no pulse.
+/// Block length for the median baseline: no pulse fills half a block, and slow drift of the
+/// amplifier is removed.
 const BASELINE_BLOCK: usize = 512;
 
-/// The strongest second pulse, if one reaches `limit` of the main pulse's height (and six times the noise). After the main pulse it
-/// counts from `from` samples after that pulse's start on (start to start, or peak to peak).
+/// The strongest second pulse, if one reaches `limit` of the main pulse's height (and six times the
+/// noise). After the main pulse it counts if it starts at least `from` samples after that pulse's
+/// start (start to start, or peak to peak).
 pub(super) fn find(force_n: &[f64], pulse: &Pulse, limit: f64, from: usize) -> Option<Second> {
     if let Some(second) = hump(force_n, pulse, limit) {
         return Some(second);
@@ -36,7 +40,7 @@ pub(super) fn find(force_n: &[f64], pulse: &Pulse, limit: f64, from: usize) -> O
     let rest = above_baseline(force_n);
     // Two samples of margin: the pulse's foot below 2 % is not a second pulse.
     let before = 0..(pulse.start.saturating_sub(2 + width));
-    // a pulse of another width than the filter's is found a little early
+    // a pulse whose width differs from the filter's is found slightly early
     let soonest = (pulse.start + from).saturating_sub(width / 8).max(pulse.end + 2);
     let after = soonest..rest.len().saturating_sub(width);
     let filtered = filtered(&rest, &shape);
@@ -48,10 +52,10 @@ pub(super) fn find(force_n: &[f64], pulse: &Pulse, limit: f64, from: usize) -> O
         .map(|(start, fraction)| Second { start, fraction, limit })
 }
 
-/// The products of `shape` with the record from each sample on, as far as it reaches.
+/// Correlation of `shape` with the record, from each sample at which it fits.
 fn filtered(rest: &[f64], shape: &[f64]) -> Vec<f64> {
     let mut products = vec![0.0; (rest.len() + 1).saturating_sub(shape.len())];
-    // block by block, so that the sums stay in the nearest cache and side by side in the processor
+    // in blocks, so that the sums stay in the L1 cache and vectorise
     for (at, sums) in products.chunks_mut(512).enumerate().map(|(n, sums)| (512 * n, sums)) {
         for (k, h) in shape.iter().enumerate() {
             for (sum, f) in sums.iter_mut().zip(&rest[at + k..]) {
@@ -62,7 +66,7 @@ fn filtered(rest: &[f64], shape: &[f64]) -> Vec<f64> {
     products
 }
 
-/// Two humps within the main pulse (the bolt was pressed on and struck again before it left).
+/// Two humps within the main pulse (the bolt stayed in contact and struck again before it left).
 fn hump(force_n: &[f64], pulse: &Pulse, limit: f64) -> Option<Second> {
     let inside = &force_n[pulse.start..pulse.end];
     let height = |i: usize| inside[i] - pulse.offset_n;
@@ -73,7 +77,8 @@ fn hump(force_n: &[f64], pulse: &Pulse, limit: f64) -> Option<Second> {
         for i in order {
             valley = valley.min(height(i));
             let rise = height(i) - valley;
-            // the rise must be a hump of its own, not ringing on a flank: well above the limit, and above the valley
+            // the rise must be a separate hump, not ringing on a flank: well above the limit, and
+            // above the valley
             if valley < VALLEY * height(i)
                 && rise > 5.0 * limit * pulse.peak_n
                 && best.is_none_or(|(_, h)| h < height(i))
@@ -92,7 +97,7 @@ fn hump(force_n: &[f64], pulse: &Pulse, limit: f64) -> Option<Second> {
     })
 }
 
-/// The record above a baseline that runs through the medians of its blocks.
+/// The record minus a baseline through the medians of its blocks.
 fn above_baseline(force_n: &[f64]) -> Vec<f64> {
     let centres: Vec<(f64, f64)> = force_n
         .chunks(BASELINE_BLOCK)

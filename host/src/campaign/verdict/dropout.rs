@@ -1,12 +1,13 @@
 //! Dropouts and spikes of a vibrometer: jumps that no structure makes.
 //!
-//! A lost beam leaves steps of milliseconds and spikes of single samples, on top of whatever broadband noise the spot has. Plain noise
-//! is no reason to refuse a hit (averaging takes it out, and some directions hardly move), jumps are. Third differences of block
-//! means remove smooth motion; blocks of 1, 4, 8 and 16 samples make steps stand out of noise. Each difference is compared
-//! with the median of its surroundings, so that neither the level of noise nor a decaying mode counts. Where there is hardly any noise
-//! (simulations, 24-bit recordings), a mode that decays fast stands out of those, too: a jump must also stand out of the
-//! few differences before or after it, which a smooth motion does not, and must not be smaller than those on the other
-//! side, which the differences of a decaying mode are.
+//! A lost beam causes steps of milliseconds and spikes of single samples, in addition to the
+//! broadband noise of the spot. Plain noise is no reason to refuse a hit (averaging reduces it, and
+//! some directions hardly move), jumps are. Third differences of block means remove smooth motion;
+//! with blocks of 1, 4, 8 and 16 samples, steps exceed the noise. Each difference is compared with
+//! the median of its surroundings, so that neither the noise level nor a decaying mode counts. With
+//! very little noise (simulations, 24-bit recordings), a mode that decays fast exceeds that median
+//! too: a jump must also exceed the few differences before or after it, which a smooth motion does
+//! not, and must not be smaller than those on the other side, as those of a decaying mode are.
 
 use super::motion::{LOOKED_AT, is_motion};
 use crate::median::middle;
@@ -14,35 +15,37 @@ use crate::spectra::Pulse;
 
 /// The strongest jump found.
 pub(super) struct Burst {
-    /// Where, sample.
+    /// Position, sample.
     pub(super) sample: usize,
-    /// How many times the robust scale around it.
+    /// Ratio to the robust scale of its surroundings.
     pub(super) ratio: f64,
 }
 
 /// Block lengths, samples.
 const BLOCKS: [usize; 4] = [1, 4, 8, 16];
 
-/// After the hit the structure itself moves in steps (contact, high modes); from here on it is smooth, s.
+/// Right after the hit the structure itself moves in steps (contact, high modes); from this time
+/// after the pulse its motion is smooth, s.
 const SETTLED_S: f64 = 0.010;
 
-/// Within that time only single-sample spikes are looked for, from this many milliseconds after the pulse on.
+/// Before that, only single-sample spikes are searched for, from this time after the pulse, s.
 const QUIET_AFTER_PULSE_S: f64 = 0.001;
 
-/// The pulse's foot, which is lost in the force's noise, already moves a quiet response: at least so many samples before the pulse are
-/// not looked at.
+/// The pulse's foot, which is below the force's noise, already moves a quiet response: at least
+/// this many samples before the pulse are skipped.
 const FOOT: usize = 16;
 
-/// Of the differences next to a jump these take part in it, ...
+/// Number of differences next to a jump that are part of it, ...
 const OWN: usize = 4;
 
-/// ... and so many beside them say what is usual there.
+/// ... and number of differences beyond them that define the usual size.
 const NEXT: usize = 12;
 
-/// A jump is this part of the limit times the largest of them: of noise, the largest of twelve is 2.5 times the median.
+/// A jump exceeds the largest of them by this fraction of the limit: for noise, the largest of
+/// twelve is 2.5 times the median.
 const JUMP: f64 = 1.0 / 3.0;
 
-/// Surroundings: this many differences, s of record for single samples.
+/// Length of the surroundings: this many differences for single samples, fewer for longer blocks.
 const SURROUNDINGS: usize = 512;
 
 /// The strongest jump whose ratio exceeds `limit`.
@@ -59,7 +62,8 @@ pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<B
         let width = (SURROUNDINGS / block).max(64);
         let hop = (width / 4).max(1);
         for (start, part) in differences.chunks(hop).enumerate().map(|(n, part)| (n * hop, part)) {
-            // no scale is below the whole record's: where nothing stands out of that, no surroundings need be looked at
+            // the scale is never below the whole record's: if nothing exceeds the limit with that
+            // one, the surroundings need not be evaluated
             if part.iter().fold(0.0, |most: f64, d| most.max(*d)) / whole <= limit {
                 continue;
             }
@@ -80,8 +84,8 @@ pub(super) fn find(x: &[f64], fs_hz: f64, pulse: &Pulse, limit: f64) -> Option<B
     worst
 }
 
-/// Whether the difference at `i` is over `times` the largest of those on its quieter side (before a jump the
-/// motion is smooth, or after it) and no smaller than the largest on the other side.
+/// Whether the difference at `i` exceeds `times` the largest of those on its quieter side (the
+/// signal is smooth before or after a jump) and is no smaller than the largest on the other side.
 fn is_jump(differences: &[f64], i: usize, times: f64) -> bool {
     let before = &differences[i.saturating_sub(OWN + NEXT)..i.saturating_sub(OWN)];
     let from = (i + OWN + 1).min(differences.len());
@@ -91,9 +95,9 @@ fn is_jump(differences: &[f64], i: usize, times: f64) -> bool {
     differences[i] > times * quieter.unwrap_or(0.0) && differences[i] >= largest(before).max(largest(after))
 }
 
-/// Whether the structure itself moves so where this third difference is.
+/// Whether the jump at this third difference is motion of the structure itself.
 fn moves(x: &[f64], third: usize) -> bool {
-    // it spans four samples
+    // the difference spans four samples
     let from = (third + 2).saturating_sub(LOOKED_AT / 2);
     x.get(from..from + LOOKED_AT).is_some_and(is_motion)
 }
@@ -111,7 +115,8 @@ fn thirds(x: &[f64]) -> Vec<f64> {
     x.windows(4).map(|w| (w[0] - 3.0 * w[1] + 3.0 * w[2] - w[3]).abs()).collect()
 }
 
-/// The converter's step: the smallest difference between neighbours. A quiet, coarse channel has a median difference of zero.
+/// The converter's step: the smallest nonzero difference between neighbours. For a quiet, coarse
+/// channel the median difference would be zero.
 pub(super) fn quantum(x: &[f64]) -> f64 {
     let largest = x.iter().fold(0.0f64, |m, v| m.max(v.abs()));
     x.windows(2)
@@ -121,7 +126,7 @@ pub(super) fn quantum(x: &[f64]) -> f64 {
         .min(largest)
 }
 
-/// Median of the differences around the `hop` ones from `start` on.
+/// Median of the differences around the `hop` ones that start at `start`.
 fn local_scale(differences: &[f64], start: usize, hop: usize, width: usize) -> f64 {
     let centre = start + hop / 2;
     let to = (centre + width / 2).min(differences.len());
@@ -134,7 +139,7 @@ mod tests {
 
     const FS: f64 = 51_200.0;
 
-    /// A decaying mode with a little noise, and something at 6 ms behind the pulse.
+    /// A decaying mode with a little noise, and a disturbance 6 ms after the pulse.
     fn found(odd: impl Fn(usize) -> f64) -> Option<Burst> {
         let pulse =
             Pulse { peak_sample: 210, start: 200, end: 220, peak_n: 50.0, offset_n: 0.0, noise_n: 0.01 };
@@ -159,13 +164,13 @@ mod tests {
         let spike = found(|i| if i == AT { 0.05 } else { 0.0 });
         assert!(spike.is_some_and(|burst| burst.sample.abs_diff(AT) < 4));
         assert!(found(|i| if i >= AT { 0.05 } else { 0.0 }).is_some());
-        // the contact stops to slide: from here on the acceleration is another one
+        // the contact stops sliding: the acceleration changes from here on
         assert!(found(|i| 0.05 * i.saturating_sub(AT) as f64).is_none());
         let between = |i: usize| if i > AT { 0.05 * ((i - AT) as f64 - 0.4) } else { 0.0 };
         assert!(found(between).is_none());
-        // the force changes at once
+        // the force changes abruptly
         assert!(found(|i| 0.02 * (i.saturating_sub(AT) as f64).powi(2).min(400.0)).is_none());
-        // a spike that the filter before the converter has spread
+        // a spike spread by the filter before the converter
         let spread = |i: usize| [0.2, 1.0, 0.2].get(i.wrapping_sub(AT)).map_or(0.0, |part| 0.08 * part);
         assert!(found(spread).is_some());
     }

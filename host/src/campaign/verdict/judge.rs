@@ -1,4 +1,4 @@
-//! Why a record is kept or refused, and by whom it is judged.
+//! Judging a record: the trait, and its implementation.
 
 use super::others::{self, Others};
 use super::{Kind, Limits, RawHit, Verdict};
@@ -7,10 +7,10 @@ use crate::device::channels::ChannelMap;
 use crate::device::recording::Recording;
 use jointrig_protocol::channel::{Channel, Quantity, Role};
 
-/// Whoever judges records. It works on the raw record, before anything is derived from it.
+/// Judges records. It works on the raw record, before anything is derived from it.
 pub trait Judge {
-    /// Judges one record of `cell`, of which `others` are the good records so far; called once per record, in order of
-    /// measurement.
+    /// Judges one record of `cell`; `others` are the cell's good records so far. Called once per
+    /// record, in order of measurement.
     fn judge(
         &mut self,
         cell: &Cell,
@@ -21,7 +21,8 @@ pub trait Judge {
     ) -> Verdict;
 }
 
-/// Judges by the raw record itself ([`super::judge`](fn@super::judge)): hammer force and every motion of the record, in SI.
+/// Judges by the raw record itself ([`super::judge`](fn@super::judge)): hammer force and all motion
+/// channels of the record, in SI units.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ByRecord;
 
@@ -44,7 +45,7 @@ impl Judge for ByRecord {
             places.map(|(place, channel)| (channel.name.as_str(), si(place))).unzip();
         let (wanted, given) = (plan.force.get_ref(), plan.limits.get_ref());
         let limits = Limits {
-            // so that noise does not hide a rebound of just the limit
+            // margin, so that noise does not hide a rebound exactly at the limit
             rebound_fraction: 0.6 * given.rebound_ratio,
             rebound_after_s: given.rebound_after_s,
             weak_fraction: given.weak_n / wanted.target_n,
@@ -64,8 +65,8 @@ impl Judge for ByRecord {
         let found = super::judge(hit, &limits, Some(wanted.target_n));
         let judged =
             |kind, measure, limit, sentence| Verdict { kind, measure, limit, sentence, ..found.clone() };
-        // a channel that runs into its converter's end spoils the record whatever the hammer did; channels
-        // differ in range, so that each is looked at in its own codes
+        // a channel at the end of its converter's range spoils the record whatever the hammer did;
+        // ranges differ between channels, so each is checked in its own codes
         if missing == 0
             && let Some((name, touched)) = over_range(channels, recording)
         {
@@ -90,7 +91,8 @@ impl Judge for ByRecord {
     }
 }
 
-/// The channel that is noisier than `limit` times its usual noise, and by what ratio; the worst of several.
+/// The channel whose noise exceeds `limit` times its usual noise, and the ratio; the worst if there
+/// are several.
 fn noisier<'a>(
     channels: &'a ChannelMap,
     recording: &Recording,
@@ -105,7 +107,7 @@ fn noisier<'a>(
     ratios.filter(|(_, ratio)| *ratio > limit).max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Whether a channel measures how something moves, and is judged for dropouts, spikes and plateaus.
+/// Whether a channel measures motion, and is checked for dropouts, spikes and plateaus.
 fn is_motion(quantity: Quantity) -> bool {
     matches!(quantity, Quantity::Velocity | Quantity::Acceleration | Quantity::Displacement)
 }
@@ -115,7 +117,8 @@ fn range(channel: &Channel) -> f64 {
     f64::from(channel.range_v) * f64::from(channel.units_per_volt).abs()
 }
 
-/// The first channel with more than one code at an end of its range, and how many. One may be chance.
+/// The first channel with more than one code at an end of its range, and their number. A single one
+/// may be chance.
 fn over_range<'a>(channels: &'a ChannelMap, recording: &Recording) -> Option<(&'a str, usize)> {
     channels.channels.iter().enumerate().find_map(|(place, channel)| {
         let extreme = |code: &&i16| **code == i16::MAX || **code == i16::MIN;
@@ -124,7 +127,7 @@ fn over_range<'a>(channels: &'a ChannelMap, recording: &Recording) -> Option<(&'
     })
 }
 
-/// Puts the channels' names where the analysis, which knows places only, says `response N`.
+/// Inserts the channels' names where the analysis, which knows only indices, writes `response N`.
 fn name_responses(sentence: &str, names: &[&str]) -> String {
     names.iter().enumerate().rev().fold(sentence.to_owned(), |text, (place, name)| {
         text.replace(&format!("response {place}"), &format!("response {name}"))

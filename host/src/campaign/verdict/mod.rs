@@ -1,13 +1,16 @@
-//! Why a hit is kept or refused, judged on the *raw* record.
+//! Accepts or refuses a hit, based on the *raw* record.
 //!
-//! Before windowing: the rectangular force window hides the second pulse of a double hit while the response keeps it, and
-//! averaging bad hits in cost a median FRF error of 25 % against 0.6 %. Each check stands in its own file and needs this one
-//! record only; the first that fails gives the verdict, in the order gap, mistimed (a force of the wrong sign, or a pulse that the record
-//! does not hold whole), overload, double hit, weak, strong, noisy, mistimed.
-//! (A refused hit needs one reason; the earlier checks would spoil the figures of the later ones.)
+//! It runs before windowing: the rectangular force window hides the second pulse of a double hit
+//! while the response contains it, and averaging bad hits increased the median FRF error from 0.6 %
+//! to 25 %. Each check has its own file and needs only this one record; the first that fails gives
+//! the verdict, in the order gap, mistimed (a force of the wrong sign, or a pulse that the record
+//! does not contain completely), overload, double hit, weak, strong, noisy, mistimed. (One reason
+//! suffices to refuse a hit; a defect found by an earlier check would corrupt the values of the
+//! later ones.)
 //!
-//! A new verdict is a new [`Kind`], a file with its check here, and its place in [`judge`](fn@judge). The limits are [`Limits`]: the double-hit
-//! threshold is `rebound_fraction`, which a plan sets (`limits.rebound_ratio`) and [`judge::ByRecord`] hands over.
+//! A new verdict is a new [`Kind`], a file with its check here, and its place in
+//! [`judge`](fn@judge). The limits are [`Limits`]: the double-hit threshold is `rebound_fraction`,
+//! which a plan sets (`limits.rebound_ratio`) and [`judge::ByRecord`] passes on.
 
 mod clipping;
 mod double_hit;
@@ -21,7 +24,7 @@ mod synthetic_tests;
 use crate::spectra::{ImpactRecords, Pulse, reversed_peak_n, several_hits_s};
 use serde::{Deserialize, Serialize};
 
-/// The kinds of verdict. Only [`Kind::Good`] hits enter an average.
+/// Kind of verdict. Only [`Kind::Good`] hits enter an average.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Kind {
     /// Usable.
@@ -30,7 +33,7 @@ pub enum Kind {
     /// More than one pulse.
     #[serde(rename = "double hit")]
     DoubleHit,
-    /// Force or response ran into its range.
+    /// Force or response reached the end of its range.
     #[serde(rename = "overload")]
     Overload,
     /// Dropouts or spikes in a response.
@@ -42,14 +45,14 @@ pub enum Kind {
     /// A pulse too high.
     #[serde(rename = "strong")]
     Strong,
-    /// The record does not hold the pulse as it should: at another time, only a part of it, or with the
-    /// wrong sign.
+    /// The record does not contain the pulse as it should: at another time, only a part of it, or
+    /// with the wrong sign.
     #[serde(rename = "mistimed")]
     Mistimed,
     /// Samples are missing.
     #[serde(rename = "gap")]
     Gap,
-    /// A person refused it; no check ever says so.
+    /// A person refused it; no check gives this verdict.
     #[serde(rename = "dropped")]
     Dropped,
 }
@@ -68,12 +71,12 @@ impl Kind {
         Self::Dropped,
     ];
 
-    /// The kind of that name.
+    /// The kind with that name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
 
-    /// The words used in results.
+    /// Its name in results.
     pub fn name(self) -> &'static str {
         match self {
             Kind::Good => "good",
@@ -95,16 +98,16 @@ impl std::fmt::Display for Kind {
     }
 }
 
-/// A verdict with what it rests on.
+/// A verdict with its evidence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
-    /// What the record is.
+    /// The kind.
     pub kind: Kind,
-    /// What was measured for it, in the unit that `sentence` says.
+    /// The measured value that it is based on, in the unit stated in `sentence`.
     pub measure: f64,
-    /// The limit that it was held against, in the same unit.
+    /// The limit for that value, in the same unit.
     pub limit: f64,
-    /// Both in words.
+    /// Both as a sentence.
     pub sentence: String,
     /// Peak of the band-limited force, N; 0 without a pulse.
     pub peak_n: f64,
@@ -123,25 +126,28 @@ impl Verdict {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Limits {
-    /// A second pulse counts from this fraction of the main one's height. Rebounds from 2 % on must be found; the ringing of a
-    /// force cell (3 % at 6 kHz) leaves less than 0.3 % in the matched filter.
+    /// A second pulse counts from this fraction of the main one's height. Rebounds of 2 % and more
+    /// must be found; the ringing of a force cell (3 % at 6 kHz) leaves less than 0.3 % in the
+    /// matched filter.
     pub rebound_fraction: f64,
-    /// A second pulse counts from this long after the start of the first on, s; 0 counts all.
+    /// A second pulse counts if it starts at least this long after the first, s; 0 counts all.
     pub rebound_after_s: f64,
     /// A pulse below this fraction of the reference peak is weak.
     pub weak_fraction: f64,
     /// A pulse above this fraction of the reference peak is strong.
     pub strong_fraction: f64,
-    /// A jump in a response counts as a dropout from this many times the robust scale of its surroundings. Gaussian noise
-    /// of 10⁵ samples reaches about 7, dropouts of a vibrometer 12 and more.
+    /// A jump in a response counts as a dropout from this multiple of the robust scale of its
+    /// surroundings. Gaussian noise of 10⁵ samples reaches about 7, dropouts of a vibrometer 12 and
+    /// more.
     pub dropout_ratio: f64,
-    /// Full scale of the force channel, N; unknown for foreign records.
+    /// Full scale of the force channel, N; `None` if unknown, as in imported records.
     pub force_range_n: Option<f64>,
-    /// Full scale of the response channels, SI; unknown for foreign records.
+    /// Full scale of the response channels, SI; `None` if unknown, as in imported records.
     pub response_range: Option<f64>,
-    /// Where the pulse should start, s from the record's start; unknown where the trigger follows the force itself.
+    /// Expected start of the pulse, s from the record's start; `None` if the trigger follows the
+    /// force itself.
     pub expected_start_s: Option<f64>,
-    /// How far from there it may start, s.
+    /// Tolerance of that start, s.
     pub start_tolerance_s: f64,
 }
 
@@ -174,7 +180,8 @@ pub struct RawHit<'a> {
     pub missing_samples: u64,
 }
 
-/// Judges one hit. `reference_peak_n` is the wanted peak (or the median of the set); without it, weak means no pulse above noise.
+/// Judges one hit. `reference_peak_n` is the target peak (or the median of the set); without it,
+/// weak means no pulse above noise.
 pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) -> Verdict {
     let pulse = Pulse::locate(hit.force_n);
     let verdict = |kind, measure, limit, sentence: String| Verdict {
@@ -200,7 +207,7 @@ pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) ->
     let Some(pulse) = pulse else {
         return verdict(Kind::Weak, 0.0, 0.0, "there is no force pulse at all".into());
     };
-    // Of some 10⁵ samples of noise the largest reaches 4.5 times its rms.
+    // The largest of about 10⁵ noise samples reaches 4.5 times the rms.
     let floor = 10.0 * pulse.noise_n;
     if pulse.peak_n < floor {
         let sentence =
@@ -281,7 +288,7 @@ pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) ->
     }
     if let Some(expected) = limits.expected_start_s {
         let late = pulse.start as f64 / hit.fs_hz - expected;
-        // a soft pulse passes the trigger's level anywhere on its flank
+        // a soft pulse may cross the trigger level anywhere on its flank
         let tolerance = limits.start_tolerance_s.max(pulse.width() as f64 / hit.fs_hz);
         if late.abs() > tolerance {
             let sentence = format!("the pulse starts {:.2} ms from where it should", 1e3 * late);

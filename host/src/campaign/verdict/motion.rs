@@ -1,17 +1,19 @@
-//! A jump in a response: the structure's own, or the vibrometer's.
+//! Decides whether a jump in a response is motion of the structure or an artefact of the
+//! vibrometer.
 //!
-//! A contact that begins or stops to slide changes the force, and with it the acceleration, at once: the velocity has a kink, or bends. A
-//! lost beam changes the reading itself, for a few samples or from then on. Both are put to the test: which of them leaves less
-//! of the samples around the jump, on top of a motion that is smooth there?
+//! A contact that starts or stops sliding changes the force, and with it the acceleration,
+//! abruptly: the velocity has a kink, or bends. A lost beam changes the reading itself, for a few
+//! samples or from then on. Both models are fitted to the samples around the jump, together with a
+//! smooth motion; the one with the smaller residual decides.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Samples that are looked at, the jump in their middle.
+/// Number of samples evaluated, with the jump in the middle.
 pub(super) const LOOKED_AT: usize = 12;
-/// The jump is looked for so far from the middle, samples.
+/// The jump is searched for up to this far from the middle, samples.
 const REACH: usize = 3;
 
-/// Whether the jump in the middle of these samples is a structure's motion.
+/// Whether the jump in the middle of these samples is motion of the structure.
 pub(super) fn is_motion(x: &[f64]) -> bool {
     if x.len() != LOOKED_AT {
         return false;
@@ -26,7 +28,7 @@ pub(super) fn is_motion(x: &[f64]) -> bool {
         let start = middle - (REACH as f64 - 0.5) + 0.5 * half as f64;
         left(&x, 2, |i, n| power(after(i, start), 1 + n))
     });
-    // a spike of a sample that the filter before the converter has spread over its neighbours
+    // a single-sample spike that the filter before the converter has spread over its neighbours
     let mut spikes = places().map(|at| left(&x, 3, |i, n| f64::from(u8::from(i + 1 == at + n))));
     // a step, within one sample
     let mut steps =
@@ -38,7 +40,8 @@ fn power(x: f64, n: usize) -> f64 {
     (0..n).map(|_| x).product()
 }
 
-/// What a cubic and `count` functions of the sample leave, as a variance per sample that is free.
+/// Residual of a fit with a cubic and `count` functions of the sample, as a variance per degree of
+/// freedom.
 fn left(x: &DVector<f64>, count: usize, function: impl Fn(usize, usize) -> f64) -> f64 {
     const CUBIC: usize = 4;
     let half = (LOOKED_AT - 1) as f64 / 2.0;
@@ -58,7 +61,8 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
-    /// How many of 200 are taken for motion: a jump of size 1 on a slow motion, in noise of a thirtieth.
+    /// How many of 200 are classified as motion: a jump of size 1 on a slow motion, with noise of a
+    /// thirtieth.
     fn taken(jump: impl Fn(f64) -> f64) -> usize {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(5);
         let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
@@ -77,7 +81,7 @@ mod tests {
 
     #[test]
     fn what_a_contact_does_is_motion_and_what_a_beam_does_is_not() {
-        // three in a hundred may be mistaken, so near the limit at which jumps are looked at
+        // three in a hundred may be misclassified this close to the limit
         for motion in
             [taken(|t| t.max(0.0)), taken(|t| (t + 0.4).max(0.0)), taken(|t| 0.5 * t.max(0.0).powi(2))]
         {

@@ -1,5 +1,5 @@
-//! What a cell's good records have in common, for judging the next one: how noisy each channel usually is, and how well the
-//! FRFs are known already.
+//! Statistics of a cell's good records, for judging the next one: the usual noise of each channel,
+//! and the uncertainty of the FRFs so far.
 
 use jointrig_protocol::channel::{Quantity, Role};
 
@@ -8,31 +8,31 @@ use crate::device::channels::ChannelMap;
 use crate::device::recording::Codes;
 use crate::spectra::{CrossSpectra, Pulse, Summing, Windowing};
 
-/// Good records from which on there is something usual.
+/// Number of good records needed for a usual noise.
 const FEW: usize = 3;
 
 /// Block whose rms is one estimate of the noise, samples.
 const BLOCK: usize = 64;
 
-/// A converter's rounding alone has this rms, codes: less noise than that cannot be told.
+/// Rms of a converter's rounding alone, codes: lower noise cannot be measured.
 const ROUNDING: f64 = 0.29;
 
 /// The good records of one cell so far.
 #[derive(Default)]
 pub struct Others {
-    /// Places of the channels whose FRFs are followed.
+    /// Indices of the channels whose FRFs are tracked.
     responses: Vec<usize>,
     noise: Vec<Vec<f64>>,
     sums: Option<Summing>,
 }
 
 impl Others {
-    /// None yet; the FRFs of the channels at these places will be followed.
+    /// No records yet; the FRFs of the channels with these indices will be tracked.
     pub fn of(responses: Vec<usize>) -> Self {
         Self { responses, ..Self::default() }
     }
 
-    /// Learns from a good record. The FRFs are followed only where the plan asks when they are good enough.
+    /// Adds a good record. The FRFs are tracked only if the plan defines when they are good enough.
     pub fn learn(&mut self, plan: &Plan, channels: &ChannelMap, codes: Codes<'_>) {
         self.noise.push(channel_noise(channels, codes));
         if let Some(enough) = &plan.enough {
@@ -40,12 +40,12 @@ impl Others {
         }
     }
 
-    /// How many there are.
+    /// Number of records.
     pub fn hits(&self) -> usize {
         self.noise.len()
     }
 
-    /// How noisy the channel at `place` usually is, in its unit: the median; none of a few records.
+    /// Usual noise of the channel at `place`, in its unit: the median; `None` with too few records.
     pub fn usual_noise(&self, place: usize) -> Option<f64> {
         if self.noise.len() < FEW {
             return None;
@@ -56,13 +56,13 @@ impl Others {
         (middle < of_channel.len()).then(|| *of_channel.select_nth_unstable_by(middle, f64::total_cmp).1)
     }
 
-    /// Random error of the averaged FRFs as a part of them, √(Σ var H1 / Σ |H1|²) over lines and axes of the band; none of
-    /// fewer than two hits.
+    /// Relative random error of the averaged FRFs, √(Σ var H1 / Σ |H1|²) over lines and axes of the
+    /// band; `None` with fewer than two hits.
     pub fn random_error(&self, enough: &Enough) -> Option<f64> {
         let found = self.sums.as_ref()?.finish(&[]).ok().filter(|found| found.hits() > 1)?;
         let [low_hz, high_hz] = enough.band_hz;
         let band = found.band(low_hz, high_hz);
-        // `variance` is the real part's; the imaginary part has as much
+        // `variance` is that of the real part; the imaginary part has the same
         let variance: f64 =
             band.rows(CrossSpectra::variance).into_iter().flatten().map(|variance| 2.0 * variance).sum();
         let power: f64 =
@@ -89,7 +89,8 @@ impl Others {
     }
 }
 
-/// Noise of every channel in its unit; 0 for those that measure neither velocity nor acceleration.
+/// Noise of every channel in its unit; 0 for channels that measure neither velocity nor
+/// acceleration.
 pub fn channel_noise(channels: &ChannelMap, codes: Codes<'_>) -> Vec<f64> {
     let of = |(place, channel): (usize, &jointrig_protocol::channel::Channel)| {
         if matches!(channel.quantity, Quantity::Velocity | Quantity::Acceleration) {
@@ -101,8 +102,9 @@ pub fn channel_noise(channels: &ChannelMap, codes: Codes<'_>) -> Vec<f64> {
     channels.channels.iter().enumerate().map(of).collect()
 }
 
-/// Rms of the broadband noise, codes: third differences (which remove smooth motion) over the second half of the record, where
-/// it has decayed; the median over blocks, so that a single spike, which has a check of its own, does not count.
+/// Rms of the broadband noise, codes: third differences (which remove smooth motion) over the
+/// second half of the record, where the motion has decayed; the median over blocks, so that a
+/// single spike, which has a separate check, does not count.
 fn noise_codes(codes: &[i16]) -> f64 {
     let late = &codes[codes.len() / 2..];
     // third differences of white noise have 1 + 9 + 9 + 1 times its power
@@ -131,7 +133,7 @@ mod tests {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (seed >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
         };
-        // even in ±17.3: rms 10
+        // uniform in ±17.3: rms 10
         let codes: Vec<i16> = (0..20_000)
             .map(|i| (3_000.0 * (f64::from(i) * 0.02).sin() + 34.64 * dice()).round() as i16)
             .collect();

@@ -1,4 +1,5 @@
-//! Verdicts on synthetic hits: a ringing force cell, noise, a 16-bit converter, rebounds of every size and delay.
+//! Verdicts on synthetic hits: a ringing force cell, noise, a 16-bit converter, rebounds of various
+//! sizes and delays.
 
 use super::*;
 use proptest::prelude::Rng;
@@ -6,7 +7,7 @@ use proptest::test_runner::{RngAlgorithm, TestRng};
 use std::f64::consts::{PI, TAU};
 
 const FS: f64 = 51_200.0;
-/// 50 N range over 16 bits of ±10 V at 22.4 mV/N.
+/// 50 N range over 16 bits of ±10 V at 22.4 mV/N, N per code.
 const STEP_N: f64 = 0.0136;
 const NOISE_N: f64 = 0.01;
 
@@ -37,7 +38,7 @@ fn force(pulses: &[(f64, f64, f64)], n: usize, dice: &mut Dice) -> Vec<f64> {
                     f += peak * (PI * u / width).sin();
                 }
                 if u >= 0.0 {
-                    // counted from the pulse's middle, where the cell is loaded most: the harder case
+                    // from the pulse's middle, where the cell's load is highest: the harder case
                     let since = (u - width / 2.0).max(0.0);
                     f += 0.03 * peak * (-since / 0.3e-3).exp() * (TAU * 6000.0 * u + phase).sin();
                 }
@@ -47,7 +48,7 @@ fn force(pulses: &[(f64, f64, f64)], n: usize, dice: &mut Dice) -> Vec<f64> {
         .collect()
 }
 
-/// A decaying 208 Hz response (m/s) with a vibrometer's white floor.
+/// A decaying 208 Hz response (m/s) with a vibrometer's white noise.
 fn response(start: f64, n: usize, dice: &mut Dice) -> Vec<f64> {
     (0..n)
         .map(|i| {
@@ -74,7 +75,7 @@ fn every_rebound_from_two_per_cent_on_is_found() {
         let (start, peak, width) = clean(&mut dice);
         for after_ms in [1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0] {
             let fraction = if dice.uniform(0.0, 1.0) < 0.5 { 0.02 } else { dice.uniform(0.02, 0.6) };
-            // a rebound is slower, and its contact somewhat longer
+            // a rebound is slower, and its contact lasts somewhat longer
             let second = (start + after_ms * 1e-3, fraction * peak, width * dice.uniform(0.9, 1.2));
             let force = force(&[(start, peak, width), second], 8192, &mut dice);
             let v = verdict(&force, &[], &Limits::default());
@@ -82,7 +83,7 @@ fn every_rebound_from_two_per_cent_on_is_found() {
             smallest = smallest.min(v.measure / fraction);
         }
     }
-    // what the matched filter makes of a 2 % rebound stays well above its limit of 1.2 %
+    // with a 2 % rebound, the matched filter's output stays well above its limit of 1.2 %
     assert!(smallest > 0.8, "{smallest}");
 }
 
@@ -95,7 +96,7 @@ fn ringing_and_noise_raise_no_alarm() {
         let responses = [response(pulse.0, 12_800, &mut dice)];
         let v = verdict(&force, &responses, &Limits::default());
         assert_eq!(v.kind, Kind::Good, "{v:?}");
-        // 1 % of ringing under the peak and half a per cent of interpolation
+        // 1 % of ringing under the peak and 0.5 % of interpolation
         assert!((v.peak_n / pulse.1 - 1.0).abs() < 0.04, "{} for {}", v.peak_n, pulse.1);
     }
 }
@@ -128,7 +129,8 @@ fn dropouts_and_spikes_are_noisy_but_plain_noise_is_not() {
         let mut x = response(pulse.0, 12_800, &mut dice);
         let at = dice.uniform(2000.0, 12_000.0) as usize;
         match case % 4 {
-            // a spike; a lost beam (the signal stays at zero, then jumps back); a step of milliseconds; plain noise
+            // a spike; a lost beam (the signal stays constant, then jumps back); a step of
+            // milliseconds; plain noise
             0 => x[at] += 3e-4,
             1 => x[at - 1500..at - 1000].fill(1.5e-3),
             2 => x[at..(at + 150).min(12_800)].iter_mut().for_each(|v| *v += 1e-3),
@@ -176,7 +178,7 @@ fn a_saturated_amplifier_below_full_scale_is_an_overload_and_a_round_top_is_not(
         let pulse = clean(&mut dice);
         let force = force(&[pulse], 12_800, &mut dice);
         let noise = [0.0, 1e-6, 8e-6][case % 3];
-        // slow modes have flat tops too
+        // slow modes have flat peaks too
         let hz = dice.uniform(20.0, 900.0);
         let motion: Vec<f64> = (0..12_800)
             .map(|i| {
@@ -198,8 +200,9 @@ fn a_saturated_amplifier_below_full_scale_is_an_overload_and_a_round_top_is_not(
     }
 }
 
-/// A pulse of a Hann window, 25 N high and `width_s` long, that begins at `start_s`, and what an oscillator of 1 kg does under it: its
-/// velocity and its acceleration, exactly, as the sum of the answers to the pulse's three exponentials.
+/// A Hann pulse, 25 N high and `width_s` long, that starts at `start_s`, and the response of a 1 kg
+/// oscillator to it: velocity and acceleration, exact, as the sum of the responses to the pulse's
+/// three exponentials.
 fn hann_hit(fs_hz: f64, n: usize, start_s: f64, width_s: f64, f0_hz: f64) -> [Vec<f64>; 3] {
     type C = num_complex::Complex<f64>;
     let (w, zeta) = (TAU * f0_hz, 0.02);
@@ -271,7 +274,7 @@ fn a_pulse_that_the_record_holds_only_in_part_is_mistimed() {
         let found = judged(10_240.0, &force, &[v]);
         assert!(found.kind == Kind::Mistimed && found.sentence.contains("ends within"), "{found:?}");
     }
-    // a record that begins with the pulse holds all of it
+    // a record that starts with the pulse contains all of it
     let [force, v, _] = hann_hit(10_240.0, n, 0.0, 1.5e-3, 200.0);
     assert_eq!(judged(10_240.0, &force, &[v]).kind, Kind::Good);
 }
@@ -281,7 +284,7 @@ fn a_force_of_the_wrong_sign_is_named() {
     for offset in [0.0, 2.0, -2.0] {
         let [force, v, _] = hann_hit(10_240.0, 4096, 5e-3, 1.5e-3, 200.0);
         let mut force: Vec<f64> = force.iter().map(|f| offset - f).collect();
-        // what the cell does afterwards
+        // ringing of the force cell after the pulse
         for (i, f) in force.iter_mut().enumerate().skip(70) {
             *f += 1.2 * (-((i - 70) as f64) / 30.0).exp();
         }

@@ -1,4 +1,4 @@
-//! `campaign backup`: a checked copy, also while the campaign runs.
+//! `campaign backup`: a verified copy, even while the campaign runs.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,8 @@ use crate::campaign::store::Store;
 use crate::cli::error::CliError;
 use crate::cli::output;
 
-/// Copy a campaign file, also while it is being written; the copy is checked before it gets its name.
+/// Copy a campaign file, even while it is being written; the copy is verified before it gets its
+/// name.
 #[derive(Debug, Args)]
 pub struct Backup {
     /// The campaign file.

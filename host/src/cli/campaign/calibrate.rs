@@ -1,4 +1,5 @@
-//! `campaign calibrate`: what the sensors are calibrated to. Raw codes and what was known before stay in the file.
+//! `campaign calibrate`: new calibrations of sensors. Raw codes and earlier calibrations stay in
+//! the file.
 
 use std::path::{Path, PathBuf};
 
@@ -11,19 +12,19 @@ use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::device::channels::ChannelMap;
 
-/// Which file, what counts in it, and why.
+/// File, calibrations and reason.
 #[derive(Debug, Args)]
 pub struct Calibrate {
     /// The campaign file.
     #[arg(value_name = "FILE.jrig")]
     file: PathBuf,
-    /// The laboratory's sensors: tables `[[channel]]` as in a plan.
+    /// The laboratory's sensors: `[[channel]]` tables as in a plan.
     #[arg(long, value_name = "LAB.toml")]
     calibration: PathBuf,
-    /// The first session for which it counts [default: all].
+    /// The first session to which the calibration applies [default: all].
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(i64).range(1..))]
     from_session: i64,
-    /// Why; it is kept with the calibration.
+    /// Reason, stored with the calibration.
     #[arg(long, value_name = "TEXT")]
     reason: String,
 }
@@ -68,7 +69,7 @@ impl Calibrate {
     }
 }
 
-/// A laboratory's calibration file.
+/// Reads a laboratory's calibration file.
 pub fn read(path: &Path) -> Result<Vec<SensorPlan>, CliError> {
     let text = crate::foreign::text(path, crate::foreign::SETTINGS).map_err(|source| CliError::Read {
         path: path.into(),
@@ -79,7 +80,7 @@ pub fn read(path: &Path) -> Result<Vec<SensorPlan>, CliError> {
     Ok(file.channel.into_iter().map(toml::Spanned::into_inner).collect())
 }
 
-/// Refuses sensors of channels that are not there.
+/// Refuses sensors of channels that do not exist.
 fn known(sensors: &[SensorPlan], channels: &ChannelMap, path: &Path) -> Result<(), CliError> {
     let there = |name: &str| channels.channels.iter().any(|channel| channel.name == name);
     match sensors.iter().find(|sensor| !there(&sensor.name)) {

@@ -11,23 +11,24 @@ use crate::cli::campaign::show::find;
 use crate::cli::error::CliError;
 use crate::cli::output;
 
-/// How far hammer and vibrometer may disagree: what a good calibration promises of both.
+/// Largest accepted relative difference between hammer and vibrometer: the usual uncertainty of
+/// both calibrations.
 const TOLERANCE: f64 = 0.05;
 
-/// Check the kept records: the sign of every channel, and hammer against vibrometer on a known mass; exits with 1
-/// when something is wrong.
+/// Check the kept records: the sign of every channel, and hammer against vibrometer on a known
+/// mass; exits with 1 if something is wrong.
 #[derive(Debug, Args)]
 pub struct Check {
     /// The campaign file.
     #[arg(value_name = "FILE.jrig")]
     file: PathBuf,
-    /// Mass of a free, rigid body that was struck through its centre, kg.
+    /// Mass of a free, rigid body that was struck through its centre of mass, kg.
     #[arg(long, value_name = "KG", requires = "cell")]
     mass: Option<f64>,
     /// The cell in which it was struck, as CONFIGURATION/IMPACT/RESPONSE.
     #[arg(long, value_name = "CELL", requires = "mass")]
     cell: Option<String>,
-    /// One JSON document on stdout.
+    /// Print one JSON document on stdout.
     #[arg(long)]
     json: bool,
 }

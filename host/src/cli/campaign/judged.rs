@@ -1,4 +1,4 @@
-//! `campaign drop` and `campaign keep`: a person overrules a verdict. The judge's own stays in the file beside it.
+//! `campaign drop` and `campaign keep`: overrule verdicts. The original verdict stays in the file.
 
 use std::path::PathBuf;
 
@@ -9,27 +9,27 @@ use crate::campaign::verdict::Kind;
 use crate::cli::error::CliError;
 use crate::cli::output;
 
-/// Which records, and why.
+/// Records and reason.
 #[derive(Debug, Args)]
 pub struct Overrule {
     /// The campaign file.
     #[arg(value_name = "FILE.jrig")]
     file: PathBuf,
-    /// Records by number, as `campaign show` lists them.
+    /// Records by number, as listed by `campaign show`.
     #[arg(value_name = "RECORD", required = true)]
     records: Vec<i64>,
-    /// Why; it is kept with the verdict.
+    /// Reason, stored with the verdict.
     #[arg(long, value_name = "TEXT")]
     reason: Option<String>,
 }
 
 impl Overrule {
-    /// Leaves the records out of the analysis; `campaign run` then strikes what is missing.
+    /// Excludes the records from the analysis; `campaign run` then measures the missing hits.
     pub fn drop(self) -> Result<(), CliError> {
         self.overrule(Kind::Dropped, "a person dropped it")
     }
 
-    /// Takes the records into the analysis.
+    /// Includes the records in the analysis.
     pub fn keep(self) -> Result<(), CliError> {
         self.overrule(Kind::Good, "a person kept it")
     }
@@ -38,7 +38,7 @@ impl Overrule {
         let store = Store::open(&self.file)?;
         let reason = self.reason.as_deref().unwrap_or(otherwise);
         let mut said = Vec::new();
-        // all or none: a wrong number must not leave half of it done
+        // all or none: a wrong number must not leave the command half done
         for id in &self.records {
             let record = store.record(*id)?;
             if verdict == Kind::Good && record.scans == 0 {

@@ -25,23 +25,23 @@ pub struct Campaign {
 enum Command {
     /// Create a campaign file from a plan.
     New(new::New),
-    /// Measure what is left of it; resumes where it stopped.
+    /// Measure what is missing; resumes where it stopped.
     Run(run::Run),
-    /// Show, per cell, what is wanted, kept and refused, and why.
+    /// Show, per cell, the hits wanted, kept and refused, and why.
     Status(status::Status),
     /// Show a cell: its records, their verdicts, and a figure.
     Show(show::Show),
-    /// Leave records out of the analysis, whatever their verdict.
+    /// Exclude records from the analysis, whatever their verdict.
     Drop(judged::Overrule),
-    /// Take records into the analysis, whatever their verdict.
+    /// Include records in the analysis, whatever their verdict.
     Keep(judged::Overrule),
-    /// Say what the sensors are calibrated to, also after the campaign; results are computed anew with it.
+    /// Enter calibrations of sensors, even after the campaign; results are recomputed with them.
     Calibrate(calibrate::Calibrate),
     /// Check the sign of every channel, and hammer against vibrometer on a known mass.
     Check(check::Check),
-    /// Check every record's checksum; exits with 1 on any damage.
+    /// Check every record's checksum; exits with 1 if anything is damaged.
     Verify(verify::Verify),
-    /// Copy a campaign file, also while it is being written.
+    /// Copy a campaign file, even while it is being written.
     Backup(backup::Backup),
 }
 

@@ -1,4 +1,4 @@
-//! `campaign new`: a file from a plan.
+//! `campaign new`: creates a campaign file from a plan.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `campaign run`: measures what is left.
+//! `campaign run`: measures what is missing.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ use crate::device::channels::ChannelMap;
 use crate::device::recording::Recording;
 use crate::outside::tell_line;
 
-/// Measure what is left of a campaign.
+/// Measure what is missing in a campaign.
 #[derive(Debug, Args)]
 #[allow(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub struct Run {
@@ -38,34 +38,38 @@ pub struct Run {
     /// Answer every prompt with yes.
     #[arg(long)]
     yes: bool,
-    /// Go on with this edited plan from now on.
+    /// Continue with this edited plan.
     #[arg(long, value_name = "PLAN.toml")]
     plan: Option<PathBuf>,
-    /// The laboratory's sensors: they count in this session and those after it, instead of what device and plan say.
+    /// The laboratory's sensors: from this session onwards they replace the data of device and
+    /// plan.
     #[arg(long, value_name = "LAB.toml")]
     calibration: Option<PathBuf>,
-    /// Go on even where the device tells of another structure than that of the file's records; the report says so.
+    /// Continue even if the device indicates another structure than that of the file's records; the
+    /// report notes it.
     #[arg(long)]
     new_structure: bool,
-    /// Ring the terminal's bell at every verdict, twice at a refusal.
+    /// Ring the terminal's bell at every verdict, twice if the hit is refused.
     #[arg(long)]
     bell: bool,
     /// Seed of a simulated rig.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Folder of the tables by which the controller's log lines are read (else JOINTRIG_LOG_TABLES).
+    /// Folder with the tables that decode the controller's log lines [default: that of the
+    /// environment variable JOINTRIG_LOG_TABLES].
     #[arg(long, value_name = "DIR")]
     log_tables: Option<PathBuf>,
     #[command(flatten)]
     page: Page,
-    /// Let a page answer for hammer and laser too: in place, redo, skip, back. Whoever answers must see the rig.
+    /// Let a live page answer the prompts for hammer and laser: in place, redo, skip, back. The
+    /// person who answers must see the rig.
     #[cfg(feature = "dashboard")]
     #[arg(long, requires = "serve")]
     allow_control: bool,
 }
 
 impl Run {
-    /// The plain command with a page beside it.
+    /// The command without options, with a live page.
     #[cfg(feature = "dashboard")]
     pub fn with_page(file: PathBuf, device: String, page: Page, allow_control: bool) -> Self {
         Self {
@@ -117,7 +121,8 @@ impl Run {
         false
     }
 
-    /// The shaker's levels are a command of their own: says so as long as some of the plan's are missing.
+    /// The shaker's levels are measured by another command: prints a reminder as long as some of
+    /// the plan's levels are missing.
     fn mention_shaker(&self, store: &Store) -> Result<(), CliError> {
         if let Some(shaker) = &store.plan()?.shaker
             && store.levels()?.len() < 2 * shaker.get_ref().levels()
@@ -127,14 +132,15 @@ impl Run {
         Ok(())
     }
 
-    /// Takes an edited plan over; without being told to, says that there is one.
+    /// Takes over the edited plan given by --plan; without it, reports if the plan's file was
+    /// edited.
     fn settle_plan(&self, store: &mut Store) -> Result<(), CliError> {
         if let Some(path) = &self.plan {
             let text = plan_file::read(path)?;
             return Ok(store.take_over(&text, &path.display().to_string())?);
         }
         let (text, source) = store.plan_text()?;
-        // a plan that is gone, or was built in, was not edited
+        // a plan file that no longer exists, or a built-in plan, was not edited
         if plan_file::read(Path::new(&source)).is_ok_and(|now| now != text) {
             tell_line!(
                 "{source} was edited since: going on with the plan in {}; `--plan {source}` takes the new one over",
@@ -145,7 +151,7 @@ impl Run {
     }
 }
 
-/// Judges by the record, and lets a person at the rig hear it.
+/// Judges by the record, and rings the bell for a person at the rig.
 struct Ringing {
     rings: bool,
 }
@@ -162,7 +168,7 @@ impl Judge for Ringing {
         let verdict = ByRecord.judge(cell, plan, channels, recording, others);
         if self.rings {
             let rings: &[u8] = if verdict.kind == Kind::Good { b"\x07" } else { b"\x07\x07" };
-            // nobody hears it where stderr is closed
+            // errors on stderr are ignored
             let _ = std::io::stderr().write_all(rings);
         }
         verdict

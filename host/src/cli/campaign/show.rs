@@ -1,4 +1,5 @@
-//! `campaign show`: the records of one cell, why each is kept or refused, and what they look like.
+//! `campaign show`: the records of one cell, why each was accepted or refused, and a figure of
+//! them.
 
 use std::path::PathBuf;
 
@@ -26,13 +27,14 @@ pub struct Show {
     /// The cell as CONFIGURATION/IMPACT/RESPONSE, for example AJB/AZ1/B2.
     #[arg(value_name = "CELL")]
     cell: String,
-    /// Where to write the figure; without it FILE-CONFIGURATION-IMPACT-RESPONSE.svg in the current folder.
+    /// Where to write the figure [default: FILE-CONFIGURATION-IMPACT-RESPONSE.svg in the current
+    /// folder].
     #[arg(long, value_name = "FILE.svg", conflicts_with = "no_figure")]
     figure: Option<PathBuf>,
     /// Write no figure.
     #[arg(long)]
     no_figure: bool,
-    /// One JSON document on stdout.
+    /// Print one JSON document on stdout.
     #[arg(long)]
     json: bool,
 }
@@ -49,7 +51,7 @@ impl Show {
         } else {
             self.draw(&store, row, records.iter().flatten())
         };
-        // a figure that cannot be written costs nobody the list
+        // the list is printed even if the figure cannot be written
         let figure = drawn.as_ref().ok().and_then(Option::as_ref);
         if self.json {
             let records: Vec<Value> = records
@@ -92,7 +94,7 @@ impl Show {
         drawn.map(|_| ())
     }
 
-    /// Draws what can be read; a damaged record is in the list only.
+    /// Draws the readable records; a damaged record is only listed.
     fn draw<'r>(
         &self,
         store: &Store,
@@ -126,7 +128,7 @@ impl Show {
     }
 }
 
-/// The cell of that name.
+/// The cell with that name.
 pub(super) fn find<'a>(cells: &'a [CellRow], name: &str) -> Result<&'a CellRow, CliError> {
     let called = |row: &CellRow| {
         let cell = &row.cell;

@@ -1,4 +1,4 @@
-//! `campaign status`: how far a campaign is, and why records were refused.
+//! `campaign status`: progress of a campaign, and why records were refused.
 
 use std::path::PathBuf;
 
@@ -12,13 +12,13 @@ use crate::campaign::store::cell_table::CellRow;
 use crate::cli::error::CliError;
 use crate::cli::output;
 
-/// Show, per cell, what is wanted, kept and refused, and why; and the FRFs that came from elsewhere.
+/// Show, per cell, the hits wanted, kept and refused, and why; and the imported FRFs.
 #[derive(Debug, Args)]
 pub struct Status {
     /// The campaign file.
     #[arg(value_name = "FILE.jrig")]
     file: PathBuf,
-    /// One JSON document on stdout.
+    /// Print one JSON document on stdout.
     #[arg(long)]
     json: bool,
 }

@@ -1,4 +1,4 @@
-//! `campaign verify`: every checksum, and every row as it was left.
+//! `campaign verify`: checks every checksum, and that every row is unchanged.
 
 use std::path::PathBuf;
 
@@ -10,13 +10,15 @@ use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::cli::waiting::Waiting;
 
-/// Check every checksum, and that no row was changed, added or removed by anything but jointrig; exits with 1 on any damage.
+/// Check every checksum, and that no row was changed, added or removed by anything but jointrig;
+/// exits with 1 if anything is damaged.
 #[derive(Debug, Args)]
 pub struct Verify {
     /// The campaign file.
     #[arg(value_name = "FILE.jrig")]
     file: PathBuf,
-    /// Judge every record anew from its raw codes, measure every level anew, and compare with what the file says of them.
+    /// Judge every record and measure every level again from the raw codes, and compare the results
+    /// with the file.
     #[arg(long)]
     deep: bool,
 }

@@ -1,4 +1,5 @@
-//! FRFs and results of the file, from one reading of its records wherever the analysis has all lines that are asked for.
+//! FRFs and results of the file; its records are read once if the analysis forms all requested
+//! lines.
 
 use std::collections::HashMap;
 
@@ -12,7 +13,8 @@ use crate::frf::Frf;
 use crate::report::{self, WithFrfs};
 use crate::structure::Structure;
 
-/// Analyses the file, with the FRFs between two frequencies, Hz, of each structure that has any.
+/// Analyses the file and returns its results, with the FRFs between two frequencies, Hz, of each
+/// structure that has any.
 pub(super) fn analysed(store: &Store, (low_hz, high_hz): (f64, f64)) -> Result<WithFrfs, CliError> {
     let waiting = Waiting::of("analysing");
     let progress = |progress: Progress| waiting.at(progress.done, progress.total);
@@ -34,10 +36,10 @@ pub(super) fn analysed(store: &Store, (low_hz, high_hz): (f64, f64)) -> Result<W
     Ok(found)
 }
 
-/// FRFs, and what is said about records that cannot be used.
+/// FRFs, and messages about records that cannot be used.
 type Measured = (Vec<(Structure, Frf)>, Vec<String>);
 
-/// At lines that the analysis does not form.
+/// FRFs at lines that the analysis does not form, computed from the records.
 fn measured_anew(store: &Store, lines_hz: [f64; 2]) -> Result<Measured, CliError> {
     let file = CampaignFile::open(store, KnownContact::default())?;
     let (mut frfs, mut told) = (Vec::new(), Vec::new());
@@ -49,7 +51,7 @@ fn measured_anew(store: &Store, lines_hz: [f64; 2]) -> Result<Measured, CliError
     Ok((frfs, told))
 }
 
-/// FRFs from elsewhere; their coherence is not known, and their variance need not be.
+/// Imported FRFs; their coherence is unknown, and their variance may be.
 fn imported(frf: Frf) -> Frf {
     let unknown =
         vec![DMatrix::from_element(frf.outputs().len(), frf.inputs().len(), f64::NAN); frf.lines().len()];

@@ -1,4 +1,5 @@
-//! The campaign as columns for engines: a Parquet file for each table, and samples in files of sixty-four records.
+//! The campaign in columnar form for query engines: a Parquet file for each table, and samples in
+//! files of 64 records.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -28,13 +29,13 @@ use crate::report;
 use crate::report::WithFrfs;
 use crate::structure::Structure;
 
-/// Records in a file of samples: some hundred megabytes, one row group each.
+/// Records in a file of samples: a few hundred megabytes, one row group per record.
 const RECORDS_A_FILE: usize = 64;
 
-/// The version of this layout.
+/// Version of this layout.
 const LAYOUT: u32 = 1;
 
-/// Columns of `frf.parquet`: one row for each line of each FRF that was measured.
+/// Columns of `frf.parquet`: one row for each line of each measured FRF.
 const FRF: [(&str, Stored); 10] = [
     ("configuration", Stored::Of(Kind::Text)),
     ("output", Stored::Of(Kind::Text)),
@@ -48,7 +49,7 @@ const FRF: [(&str, Stored); 10] = [
     ("variance", Stored::Of(Kind::Real)),
 ];
 
-/// An export in columns.
+/// A columnar export.
 pub(super) struct Columns<'a> {
     pub(super) what: &'a What,
     /// Whether samples are written in SI.
@@ -57,7 +58,7 @@ pub(super) struct Columns<'a> {
 
 /// Records that share a file.
 struct Part<'a> {
-    /// From the export's folder.
+    /// Path relative to the export's folder.
     file: String,
     configuration: &'static str,
     /// Names of the channels.
@@ -65,7 +66,7 @@ struct Part<'a> {
     records: Vec<Sampled<'a>>,
 }
 
-/// A record, and what its channels are.
+/// A record, and its channels.
 #[derive(Clone, Copy)]
 struct Sampled<'a> {
     row: &'a RecordRow,
@@ -127,7 +128,8 @@ impl Columns<'_> {
         output::lines(told)
     }
 
-    /// Which records share a file: of one configuration, with the same channels, in the order in which they were measured.
+    /// Groups the records that share a file: one configuration, same channels, in the order of
+    /// measurement.
     fn parts<'r>(
         &self,
         store: &Store,
@@ -137,7 +139,7 @@ impl Columns<'_> {
         let cells: BTreeMap<i64, Cell> = store.cells()?.into_iter().map(|row| (row.id, row.cell)).collect();
         let mut together: BTreeMap<(&'static str, Vec<&str>), Vec<Sampled<'_>>> = BTreeMap::new();
         for row in rows.iter().filter(|row| self.what.counts(row)) {
-            // neither can be missing: the file refers to both by foreign keys
+            // foreign keys of the file guarantee that both exist
             let (Some(cell), Some(map)) = (cells.get(&row.cell), maps.get(&row.session)) else { continue };
             let channels = map.channels.iter().map(|channel| channel.name.as_str()).collect();
             let of = (configuration_name(cell.configuration), channels);
@@ -173,7 +175,7 @@ impl Columns<'_> {
     }
 
     fn write_part(&self, part: &Part<'_>, tell: &dyn Fn()) -> Result<Written, CliError> {
-        // a connection belongs to its thread
+        // connections cannot be shared between threads
         let store = Store::open_read_only(&self.what.file)?;
         let of_channel = if self.si { Stored::Single } else { Stored::Code };
         let mut columns = vec![("record", Stored::Id), ("scan", Stored::Index)];
@@ -199,7 +201,8 @@ impl Columns<'_> {
         file.finish().map_err(bad)
     }
 
-    /// The table of the shaker's levels; the samples of each that is whole go into a file of their own.
+    /// The table of the shaker's levels; the samples of each complete level are written to a
+    /// separate file.
     fn write_levels(&self, store: &Store, files: &mut BTreeMap<String, Written>) -> Result<Table, CliError> {
         levels::table(store, |row| {
             if self.what.without_records || !row.whole() {
@@ -221,7 +224,7 @@ impl Columns<'_> {
         })
     }
 
-    /// What the folder is, written last: where it is missing, the export did not end.
+    /// Description of the folder, written last: if it is missing, the export did not finish.
     fn write_campaign(&self, store: &Store, files: &BTreeMap<String, Written>) -> Result<(), CliError> {
         let (plan, source) = store.plan_text()?;
         let sessions: Vec<_> = store
@@ -261,7 +264,7 @@ fn too_long(row: &RecordRow) -> CliError {
     CliError::Bad(format!("record {} has {} samples, more than can be counted in 32 bits", row.id, row.scans))
 }
 
-/// What a reader of codes needs: SI value = code × units_per_code, by session.
+/// Data needed to convert codes: SI value = code × units_per_code, by session.
 fn scales(records: &[Sampled<'_>]) -> serde_json::Value {
     let maps: BTreeMap<i64, &ChannelMap> = records.iter().map(|one| (one.row.session, one.map)).collect();
     let of_session = |(session, map): (i64, &ChannelMap)| {
@@ -285,7 +288,7 @@ fn known(all: &[f64]) -> Values {
     Values::MaybeReal(all.iter().map(|value| (!value.is_nan()).then_some(*value)).collect())
 }
 
-/// A row for each line of each FRF, one group of rows for each impact; what was not measured is left out.
+/// One row for each line of each FRF, one row group for each impact; unmeasured FRFs are left out.
 fn write_frfs(path: &Path, frfs: &[(Structure, Frf)]) -> Result<Written, CliError> {
     let mut file = ParquetFile::create(path, &FRF, &[]).map_err(bad)?;
     for (structure, frf) in frfs {

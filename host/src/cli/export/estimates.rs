@@ -1,12 +1,13 @@
-//! Every stiffness that was found, one row each.
+//! Every stiffness estimate, one row each.
 
 use crate::exchange::typed_table::{Kind, Table, Value};
 use crate::results::{Joint, Results};
 use crate::substructuring::Band;
 use crate::substructuring::Dof;
 
-/// `method` is `contact` and `between-arms` for the answer, `recommended`, or a decoupling method; `ci95_low`, `ci95_high` are missing where no
-/// interval is known; `identified` is 1 or 0, and missing where only the sliding direction is judged.
+/// `method` is `contact` and `between-arms` for the result, `recommended`, or a decoupling method;
+/// `ci95_low`, `ci95_high` are missing if no interval is known; `identified` is 1 or 0, and missing
+/// in directions other than the sliding direction, which are not judged.
 const ESTIMATES: [(&str, Kind); 10] = [
     ("method", Kind::Text),
     ("idms", Kind::Whole),
@@ -20,7 +21,7 @@ const ESTIMATES: [(&str, Kind); 10] = [
     ("why", Kind::Text),
 ];
 
-/// The answer, the recommended estimates, every method, and what was refused.
+/// The result, the recommended estimates, every method, and refused estimates.
 pub(super) fn table(results: &Results) -> Table {
     let mut table = Table::new(&ESTIMATES);
     if let Some(answer) = &results.answer {
@@ -65,7 +66,7 @@ pub(super) fn table(results: &Results) -> Table {
     table
 }
 
-/// Only the sliding direction is judged.
+/// Whether it is identified; only the sliding direction is judged.
 fn judged(joint: &Joint, dof: &str) -> Option<bool> {
     (dof == Dof::Z.name()).then(|| joint.identified())
 }

@@ -1,4 +1,5 @@
-//! The shaker's levels for other programs: the time record of each, and a table of what was ordered and what came of it.
+//! Exports the shaker's levels: the time record of each, and a table of ordered and reached
+//! amplitudes.
 
 use std::path::Path;
 
@@ -30,8 +31,8 @@ const COLUMNS: [(&str, Kind); 15] = [
     ("file", Kind::Text),
 ];
 
-/// Writes `levels.csv` and, if they are wanted, the records into `folder`; how many levels there are. What is damaged or has lost samples
-/// stands in the table without a file.
+/// Writes `levels.csv` and, if requested, the records into `folder`; returns the number of levels.
+/// Damaged levels and those with lost samples are in the table but have no file.
 pub(super) fn write(
     store: &Store,
     folder: &Path,
@@ -54,7 +55,7 @@ pub(super) fn write(
     Ok(table.rows().len())
 }
 
-/// What was ordered and reached, level by level; `file` is where the samples of each went.
+/// Ordered and reached amplitudes, level by level; `file` returns the file of each level's samples.
 pub(super) fn table(
     store: &Store,
     mut file: impl FnMut(&LevelRow) -> Result<Option<String>, CliError>,
@@ -69,7 +70,7 @@ pub(super) fn table(
     Ok(table)
 }
 
-/// The velocities and the force of a level, in step.
+/// The velocities and the force of a level, aligned in time.
 pub(super) fn record(store: &Store, row: &LevelRow) -> Result<HysteresisRecord, CliError> {
     let channels = store.channels(row.session)?;
     let samples = store.level_samples(row)?;
@@ -88,7 +89,7 @@ fn one(path: &Path, format: Format, record: &HysteresisRecord, level: i64) -> Re
     }
 }
 
-/// Of a damaged level only its number and what is wrong can be told.
+/// Row of a damaged level: only its number and the damage.
 fn damaged_line(damaged: &DamagedLevel) -> Vec<Value> {
     let mut line = vec![Value::Missing; COLUMNS.len()];
     line[0] = damaged.id.into();

@@ -1,4 +1,4 @@
-//! `export`: what a campaign file holds, in forms that other programs read.
+//! `export`: writes a campaign file's content in formats that other programs read.
 
 mod analysed;
 #[cfg(feature = "parquet")]
@@ -28,70 +28,75 @@ use crate::structure::Structure;
 use crate::substructuring::geometry::Configuration;
 use analysed::analysed;
 
-/// Write everything that a campaign file holds for other programs.
+/// Write everything that a campaign file contains in formats for other programs.
 ///
-/// DIR/geometry: csv tables in the form of the pyFBS workbook. DIR/frf: one file for each configuration, H1 of the good hits
-/// with coherence and variance, or what was imported. DIR/records: one file for each cell with force and response of the hits that count
-/// (--all: of every hit); DIR/channels: the same with all other channels. DIR/records.csv: every record with verdict, standing, when and why
-/// it was overruled, and its place in these files; DIR/channels.csv and calibrations.csv: scales, delays, sensors. DIR/levels: one file for each
-/// level of the shaker (velocities of both specimens and the load cells' sum, in step; npz as `jointrig hysteresis` reads it) and
-/// levels.csv, which says what was ordered and reached. DIR/results.json and report.html.
+/// DIR/geometry: csv tables in the form of the pyFBS workbook. DIR/frf: one file for each
+/// configuration, H1 of the good hits with coherence and variance, or the imported FRFs.
+/// DIR/records: one file for each cell with force and response of the hits that count (--all: of
+/// every hit); DIR/channels: the same with all other channels. DIR/records.csv: every record with
+/// its original and current verdict, when and why it was overruled, and its place in these files;
+/// DIR/channels.csv and calibrations.csv: scales, delays, sensors. DIR/levels: one file for each
+/// level of the shaker (velocities of both specimens and the load cells' sum, aligned in time; npz
+/// as `jointrig hysteresis` reads it) and levels.csv with ordered and reached amplitudes.
+/// DIR/results.json and report.html.
 ///
-/// --format parquet: columns for engines such as DuckDB, Polars and Spark. The tables are Parquet files, frf.parquet has a row for each line,
-/// estimates.parquet one for each stiffness, and DIR/samples a row for each sample, the channels side by side. docs/columns.md has the queries.
+/// --format parquet: columns for engines such as DuckDB, Polars and Spark. The tables are Parquet
+/// files, frf.parquet has one row for each line, estimates.parquet one for each stiffness, and the
+/// files in DIR/samples one row for each scan, with one column for each channel. docs/columns.md
+/// has example queries.
 #[derive(Debug, Args)]
 pub struct Export {
-    /// Form of FRFs and records.
+    /// Format of FRFs and records.
     #[arg(long, value_enum)]
     format: Form,
-    /// Parquet: write samples in SI, 32 bit floats, instead of the converter's codes.
+    /// Parquet: write samples in SI units as 32-bit floats instead of the converter's codes.
     #[arg(long)]
     si: bool,
     #[command(flatten)]
     what: What,
 }
 
-/// What is exported, and where to.
+/// What is exported, and to which folder.
 #[derive(Debug, Args)]
 struct What {
     /// The campaign file.
     #[arg(value_name = "FILE.jrig")]
     file: PathBuf,
-    /// Folder for all of it; made when it is not there.
+    /// Output folder; created if it does not exist.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Lines of the FRFs, Hz.
     #[arg(long, value_name = "LO:HI", value_parser = frf::band, default_value = "10:1000")]
     band: (f64, f64),
-    /// Leave the time records out (they are the bulk).
+    /// Omit the time records (most of the data).
     #[arg(long)]
     without_records: bool,
-    /// Write the time records of refused and dropped hits too, not only of those that count.
+    /// Also write the time records of refused and dropped hits.
     #[arg(long, conflicts_with = "without_records")]
     all: bool,
 }
 
 impl What {
-    /// The records whose samples are written.
+    /// Whether a record's samples are written.
     fn counts(&self, row: &RecordRow) -> bool {
         row.scans > 0 && (self.all || row.kept())
     }
 }
 
-/// Forms that can be asked for.
+/// Formats of the command line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Form {
     /// Universal files with data sets 58b, 2411, 151 and 164.
     Uff58,
-    /// numpy archives.
+    /// NumPy archives.
     Npz,
-    /// Text with commas.
+    /// Comma-separated text.
     Csv,
-    /// Columns for engines.
+    /// Columns for query engines.
     Parquet,
 }
 
-/// Forms in which each cell has files of its own.
+/// Formats with separate files for each cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
     Uff58,
@@ -109,7 +114,7 @@ impl Format {
     }
 }
 
-/// A file for each cell.
+/// An export with one file for each cell.
 struct Files<'a> {
     what: &'a What,
     format: Format,
@@ -133,7 +138,7 @@ impl Export {
         Files { what: &self.what, format }.write()
     }
 
-    /// None for columns.
+    /// The format with one file per cell; `None` for the columnar format.
     fn form(&self) -> Result<Option<Format>, CliError> {
         let format = match self.format {
             Form::Uff58 => Format::Uff58,
@@ -177,7 +182,8 @@ impl Files<'_> {
         let written = if *without_records { Vec::new() } else { self.write_records(&store)? };
         tables::write(&store, out, &written)?;
         let WithFrfs { frfs, mut told, results } = analysed(&store, self.what.band)?;
-        // each file is packed on one core: all of them at once, beside the report, and the last, the assembly's, which is the largest, first
+        // each file is compressed on one core: write all in parallel, together with the report,
+        // starting with the last, the assembly's, which is the largest
         let write = |(structure, frf): &(Structure, Frf)| -> Result<String, CliError> {
             let path = folders[1].join(structure.name()).with_extension(self.format.extension());
             self.write_frf(&path, frf, geometry.points(*structure))?;

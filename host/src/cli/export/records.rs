@@ -1,4 +1,5 @@
-//! The impact records for other programs: a file of force and response for each cell, one of its other channels, and a table of all.
+//! Exports the impact records: for each cell one file with force and response and one with its
+//! other channels, and a table of all records.
 
 use std::path::{Path, PathBuf};
 
@@ -17,22 +18,22 @@ use crate::exchange::{tables_output, uff_output, write_impacts};
 use crate::outside::file_name;
 use crate::spectra::{ImpactRecords, MotionQuantity};
 
-/// A record in a file of its cell.
+/// Place of a record in its cell's file.
 pub(super) struct Written {
     pub(super) record: i64,
     pub(super) file: String,
-    /// Which hit of the file it is, from 0.
+    /// Index of the hit in the file, from 0.
     pub(super) hit: usize,
 }
 
-/// Force and response of a cell's hits, and what else was measured.
+/// Force and response of a cell's hits, and the other channels.
 struct OfCell {
     impacts: ImpactRecords,
     others: Option<ChannelRecords>,
 }
 
 impl Files<'_> {
-    /// One file for each cell with hits that count, or with any where all are wanted, and where each record went.
+    /// Writes one file for each cell that has hits to be written; returns the place of each record.
     pub(super) fn write_records(&self, store: &Store) -> Result<Vec<Written>, CliError> {
         let [folder, others] = ["records", "channels"].map(|name| self.what.out.join(name));
         let (rows, cells, shared) = (store.records()?, store.cells()?, store.rows()?);
@@ -46,10 +47,10 @@ impl Files<'_> {
                 .filter(|row| struck.contains(&Some(row.cell)) && self.what.counts(row))
                 .collect();
             let Some(of_cell) = self.of_cell(store, &plan, cell, &own)? else { continue };
-            // a name may have dots: the extension is put behind it
+            // names may contain dots: append the extension instead of replacing one
             let name = format!("{}.{}", stem(cell), self.format.extension());
             self.write_impacts(&folder.join(&name), &of_cell.impacts, cell)?;
-            // what else was measured stands with the cell that was struck
+            // the other channels are written only for the cell that was struck
             if let Some(all) = of_cell.others.as_ref().filter(|_| shared.lead(cell.id).is_none()) {
                 self.write_others(&others, &name, all)?;
             }
@@ -64,7 +65,7 @@ impl Files<'_> {
         Ok(written)
     }
 
-    /// All records of a cell in SI, as they were measured; none when it has none.
+    /// All records of a cell in SI units; `None` if it has none.
     fn of_cell(
         &self,
         store: &Store,
@@ -77,7 +78,7 @@ impl Files<'_> {
             let wrong = |what: &str| {
                 Err(CliError::Bad(format!("{}: record {} {what}", self.what.file.display(), row.id)))
             };
-            // scales belong to the session: one cell may have several
+            // scales belong to the session, and one cell may have several
             let map = store.channels(row.session)?;
             let axes = places(plan, cell, row, &map);
             let (Some(force), Some(axes)) = (map.place(Role::HammerForce), axes) else {

@@ -1,5 +1,5 @@
-//! What stands in the campaign file beside signals: every record with its verdict and standing, every channel with its scale, every
-//! calibration.
+//! The campaign file's data other than signals: every record with its original and current verdict,
+//! every channel with its scale, every calibration.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -54,7 +54,7 @@ const CELLS: [(&str, Kind); 7] = [
     ("settled", Kind::Text),
 ];
 
-/// One row for each time that a person overruled a verdict.
+/// One row for each overruled verdict.
 #[cfg(feature = "parquet")]
 const OVERRULES: [(&str, Kind); 4] =
     [("record", Kind::Whole), ("utc", Kind::Utc), ("verdict", Kind::Text), ("reason", Kind::Text)];
@@ -122,7 +122,7 @@ pub(super) fn cells(store: &Store) -> Result<Table, CliError> {
     Ok(table)
 }
 
-/// Every time that a person overruled a verdict, in order.
+/// Every overruled verdict, in order.
 #[cfg(feature = "parquet")]
 pub(super) fn overrules(store: &Store) -> Result<Table, CliError> {
     let mut table = Table::new(&OVERRULES);
@@ -132,7 +132,8 @@ pub(super) fn overrules(store: &Store) -> Result<Table, CliError> {
     Ok(table)
 }
 
-/// Every edge of the sync input and output, with the record in which it lies and its place among the record's samples.
+/// Every edge of the sync input and output, with the record that contains it and its position among
+/// the record's samples.
 pub(super) fn edges(store: &Store) -> Result<Table, CliError> {
     let mut table = Table::new(&EDGES);
     let (edges, clocks) = (store.edges()?, store.clocks()?);
@@ -143,7 +144,7 @@ pub(super) fn edges(store: &Store) -> Result<Table, CliError> {
     records.sort_by_key(|record| (record.session, record.first_scan));
     for row in edges {
         let clock = clocks.iter().find(|clock| clock.session == row.session);
-        // the last record that begins before the edge is the only one that may hold it
+        // only the last record that starts before the edge can contain it
         let begun = records.partition_point(|r| (r.session, r.first_scan) <= (row.session, row.scan));
         let inside = |record: &&RecordRow| {
             record.session == row.session && row.scan < record.first_scan + record.scans as u64
@@ -162,7 +163,7 @@ pub(super) fn edges(store: &Store) -> Result<Table, CliError> {
     Ok(table)
 }
 
-/// Every calibration that was entered.
+/// Every calibration.
 pub(super) fn calibrations(store: &Store) -> Result<Table, CliError> {
     let mut table = Table::new(&CALIBRATIONS);
     for row in store.calibrations()? {
@@ -204,7 +205,7 @@ pub(super) fn records(store: &Store, written: &[Written]) -> Result<Table, CliEr
         ];
         match &record {
             Ok(row) => {
-                // the last one counts
+                // the last one applies
                 let last = overrules.iter().rfind(|overrule| overrule.record == id);
                 line.extend(of_record(row, last));
             }
@@ -274,7 +275,7 @@ pub(super) fn channels(store: &Store) -> Result<Table, CliError> {
     Ok(table)
 }
 
-/// Writes `records.csv`, `channels.csv` and, where there are any, `calibrations.csv` and `edges.csv`.
+/// Writes `records.csv`, `channels.csv` and, if there are any, `calibrations.csv` and `edges.csv`.
 pub(super) fn write(store: &Store, folder: &Path, written: &[Written]) -> Result<(), CliError> {
     records(store, written)?.write_csv(&folder.join("records.csv")).map_err(bad)?;
     channels(store)?.write_csv(&folder.join("channels.csv")).map_err(bad)?;

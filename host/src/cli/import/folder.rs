@@ -1,4 +1,5 @@
-//! Every file of a folder into a campaign file, in one command that may be repeated: what is there already is not stored twice.
+//! Imports every file of a folder into a campaign file, with a command that may be repeated:
+//! records already present are not stored again.
 
 use std::path::Path;
 
@@ -15,7 +16,7 @@ use crate::exchange::StatedUnits;
 use crate::exchange::record_uff::{LabelledRecords, by_label, read_record_file, record_contents};
 use crate::outside::tell_line;
 
-/// How files are named, and whether what came from a file of the same name before is dropped.
+/// How files are named, and whether earlier records of a file with the same name are dropped.
 pub(super) struct Wishes<'w> {
     pub(super) configuration: Option<&'w str>,
     pub(super) names: Option<&'w Path>,
@@ -23,7 +24,7 @@ pub(super) struct Wishes<'w> {
     pub(super) units: &'w StatedUnits,
 }
 
-/// What was taken of each file, told once for all files of which it is the same.
+/// Summaries of what was used of each file, printed once for all files with the same summary.
 #[derive(Default)]
 struct Taken(Vec<(String, String, usize)>);
 
@@ -45,10 +46,11 @@ impl Taken {
     }
 }
 
-/// Brings in all of `folder`.
+/// Imports all files of `folder`.
 ///
 /// # Errors
-/// Before anything is stored: a file without a name. Later: a file that cannot be read or does not fit; what came before it is stored.
+/// Before anything is stored: a file has no name. Later: a file cannot be read or does not fit; the
+/// files before it are stored.
 pub(super) fn import(folder: &Path, into: &Path, wishes: &Wishes<'_>) -> Result<(), CliError> {
     let mut store = Store::open(into)?;
     let plan = store.plan()?;
@@ -112,7 +114,7 @@ fn say_refused(of: &str, hit: u32, verdict: &Verdict) {
     }
 }
 
-/// What came of a file of records; none of FRFs.
+/// Imports one file; returns counts for records, `None` for FRFs.
 fn one(
     store: &mut Store,
     plan: &Plan,
@@ -170,7 +172,8 @@ fn one(
     }
 }
 
-/// Labels that name no cell are listed beside what the plan has, before anything is stored.
+/// Checks, before anything is stored, that the labels name cells of the plan; the error lists the
+/// labels and the plan's names.
 fn check_labels(plan: &Plan, configuration: &str, rows: &[LabelledRecords]) -> Result<(), String> {
     let own = plan.configuration(configuration).map_or(configuration, |own| configuration_name(own));
     let cells: Vec<Cell> =
@@ -203,5 +206,5 @@ fn check_labels(plan: &Plan, configuration: &str, rows: &[LabelledRecords]) -> R
     ))
 }
 
-/// Most names of a list in a message.
+/// Maximum number of names listed in a message.
 const MOST_LISTED: usize = 12;

@@ -1,4 +1,4 @@
-//! `import`: FRFs and impact records from elsewhere.
+//! `import`: imports FRFs and impact records measured with other systems.
 
 mod folder;
 mod names;
@@ -25,16 +25,20 @@ use crate::substructuring::geometry::Configuration as Points;
 use folder::Wishes;
 use records::CellName;
 
-/// Bring FRFs or impact records from elsewhere into jointrig's own files.
+/// Import FRFs or impact records measured with other systems.
 ///
-/// FRFs (npz, or universal file 58, 58b) become an npz FRF file with --out, or go into a campaign file with --into and
-/// --configuration: they stand in for that configuration, as if it had been measured here. Impact records of one impact position
-/// and one response location along x, y, z (npz, or time responses in a universal file) go into a cell of a campaign file
-/// with --impact and --response too, where every hit is judged like a measured one.
+/// FRFs (npz, or universal file 58, 58b) are converted to an npz FRF file with --out, or imported
+/// into a campaign file with --into and --configuration: they are used for that configuration as if
+/// it had been measured with jointrig. Impact records of one impact position and one response
+/// location along x, y, z (npz, or time responses in a universal file) are imported into a cell of
+/// a campaign file, with --impact and --response in addition; every hit is judged like a measured
+/// one.
 ///
-/// A folder goes into a campaign file with --into alone: files called CONFIGURATION_IMPACT_RESPONSE are cells, files called CONFIGURATION
-/// hold FRFs, and universal files may name impact and response in their labels; a table (--names) says it for all others. It adds to what
-/// is there; what is there already is not stored twice, so that the command may be repeated.
+/// A folder is imported into a campaign file with --into alone: files named
+/// CONFIGURATION_IMPACT_RESPONSE are cells, files named CONFIGURATION contain FRFs, and universal
+/// files may name impact and response in their labels; for all others a table (--names) states the
+/// content. The import adds to existing data; what is already present is not stored again, so the
+/// command may be repeated.
 #[derive(Debug, Args)]
 pub struct Import {
     /// An npz or universal file, or a folder of them.
@@ -43,7 +47,7 @@ pub struct Import {
     /// FRFs: the npz file to write.
     #[arg(long, value_name = "FILE.npz", conflicts_with = "into", required_unless_present = "into")]
     out: Option<PathBuf>,
-    /// The campaign file that they go into (`jointrig campaign new` makes one).
+    /// The campaign file to import into (`jointrig campaign new` creates one).
     #[arg(long, value_name = "FILE.jrig")]
     into: Option<PathBuf>,
     /// The configuration that was measured (A, B or AJB).
@@ -58,10 +62,12 @@ pub struct Import {
     /// Folder: a csv table with the columns file, configuration, impact, response.
     #[arg(long, value_name = "TABLE.csv", requires = "into")]
     names: Option<PathBuf>,
-    /// Units that count instead of those of the file's labels: response=mm/s,force=lbf,time=ms,frequency=rad/s.
+    /// Units that override those of the file's labels:
+    /// response=mm/s,force=lbf,time=ms,frequency=rad/s.
     #[arg(long, value_name = "UNITS", default_value = "")]
     units: StatedUnits,
-    /// Drop what came from a file of the same name before, and FRFs that are there; the file keeps both, and says so.
+    /// Drop earlier records of a file with the same name, and existing FRFs; the file keeps both
+    /// and logs the replacement.
     #[arg(long, requires = "into")]
     replace: bool,
 }
@@ -121,16 +127,16 @@ fn read(file: &Path, units: &StatedUnits) -> Result<LabelledFrf, CliError> {
 /// FRFs of a whole configuration.
 struct Frfs<'f> {
     file: &'f Path,
-    /// What the file is called in the campaign file.
+    /// Name of the file in the campaign file.
     name: &'f str,
     configuration: &'f str,
-    /// Whether they may count instead of others.
+    /// Whether they may replace others.
     replace: bool,
-    /// What counts instead of the units of its labels.
+    /// Units that override those of its labels.
     units: &'f StatedUnits,
 }
 
-/// Takes them into a campaign file; what is to be said of it.
+/// Imports them into a campaign file; returns messages for the user.
 fn frfs(store: &Store, from: &Frfs<'_>) -> Result<Vec<String>, CliError> {
     let into = store.path().display();
     let plan = store.plan()?;
@@ -186,7 +192,7 @@ fn frfs(store: &Store, from: &Frfs<'_>) -> Result<Vec<String>, CliError> {
     Ok(told)
 }
 
-/// Whether they are the same FRFs. A pair that is missing holds NaN, which no number equals, itself included.
+/// Whether both are the same FRFs. A missing pair contains NaN, which does not equal itself.
 fn same(one: &Frf, other: &Frf) -> bool {
     fn alike(one: f64, other: f64) -> bool {
         one == other || (one.is_nan() && other.is_nan())
@@ -213,7 +219,8 @@ fn same(one: &Frf, other: &Frf) -> bool {
         && all(one.coherence(), other.coherence(), alike)
 }
 
-/// Names that the plan does not have are a mistake; points of the plan that were not measured are said.
+/// Checks names: those that the plan does not have are an error; points of the plan that were not
+/// measured are reported.
 fn check_names(file: &Path, frf: &Frf, name: &str, points: &Points) -> Result<(), String> {
     let sides =
         [("outputs", frf.outputs(), points.output_names()), ("inputs", frf.inputs(), points.input_names())];

@@ -1,4 +1,5 @@
-//! Which file is which: from a table, from the file's name as `export` gives it, or from the labels in a universal file.
+//! Identifies each file's content: by a table, by the file's name as `export` writes it, or by the
+//! labels in a universal file.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +12,7 @@ use crate::exchange::{delimiter, frf_file, record_uff};
 use crate::foreign;
 use crate::outside::file_name;
 
-/// What a file holds.
+/// Content of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Named {
     /// FRFs of a configuration.
@@ -22,10 +23,10 @@ pub(super) enum Named {
     Labelled(String),
 }
 
-/// A file and what it holds.
+/// A file and its content.
 pub(super) struct Source {
     pub(super) path: PathBuf,
-    /// What it is called in the campaign file: its path inside the folder.
+    /// Name in the campaign file: the path inside the folder.
     pub(super) name: String,
     pub(super) holds: Named,
 }
@@ -42,10 +43,10 @@ struct Row {
     response: String,
 }
 
-/// Endings of files that can be read.
+/// Extensions of readable files.
 const ENDINGS: [&str; 4] = ["npz", "uff", "unv", "uf"];
 
-/// Every file that the table names.
+/// Every file named in the table.
 pub(super) fn from_table(folder: &Path, table: &Path) -> Result<Vec<Source>, CliError> {
     let told = |error: csv::Error| {
         bad(format!(
@@ -85,10 +86,11 @@ pub(super) fn from_table(folder: &Path, table: &Path) -> Result<Vec<Source>, Cli
     Ok(sources)
 }
 
-/// Every readable file of the folder and those in it, named by `configuration` where neither its name nor its folder tells one.
+/// Every readable file of the folder and its subfolders; `configuration` applies if neither the
+/// file's nor its folder's name gives one.
 ///
 /// # Errors
-/// A folder cannot be read, or files have no name: all of them are listed.
+/// A folder cannot be read, or files could not be identified: all of them are listed.
 pub(super) fn from_folder(
     folder: &Path,
     plan: &Plan,
@@ -129,12 +131,12 @@ fn named(
     configuration: Option<&str>,
 ) -> Result<Option<Named>, CliError> {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    // names of points may have an underscore themselves
+    // names of points may contain an underscore
     let called = |cell: &Cell| {
         [configuration_name(cell.configuration), plan.called(cell.configuration)]
             .into_iter()
             .map(|name| format!("{name}_{}_{}", cell.impact, cell.response))
-            // as it is, or as `export` writes it where a file cannot be called so
+            // as it is, or as `export` writes names that are not valid file names
             .any(|name| name == *stem || file_name(&name) == *stem)
     };
     if let Some(Cell { configuration, impact, response, .. }) = plan.cells().into_iter().find(called) {
@@ -153,7 +155,7 @@ fn named(
     told.map(|configuration| with_labels_or_frfs(path, configuration)).transpose()
 }
 
-/// A universal file with forces over time holds records; everything else is taken for FRFs.
+/// A universal file with forces over time contains records; everything else is treated as FRFs.
 fn with_labels_or_frfs(path: &Path, configuration: String) -> Result<Named, CliError> {
     if frf_file::is_npz(path).map_err(bad)? {
         return Ok(Named::Frfs(configuration));
@@ -162,7 +164,7 @@ fn with_labels_or_frfs(path: &Path, configuration: String) -> Result<Named, CliE
     Ok(if records { Named::Labelled(configuration) } else { Named::Frfs(configuration) })
 }
 
-/// The universal files of a folder and those in it.
+/// The universal files of a folder and its subfolders.
 pub(in crate::cli) fn universal_files(folder: &Path) -> Result<Vec<PathBuf>, CliError> {
     let universal = |path: &PathBuf| {
         let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
@@ -175,7 +177,7 @@ pub(in crate::cli) fn universal_files(folder: &Path) -> Result<Vec<PathBuf>, Cli
     Ok(found)
 }
 
-/// All files, in order of their names.
+/// All files, sorted by name.
 fn files(folder: &Path) -> Result<Vec<PathBuf>, CliError> {
     let failed = |source| CliError::Read { path: folder.into(), doing: "reading the folder", source };
     let mut found = Vec::new();

@@ -1,7 +1,7 @@
-//! Records from elsewhere as 16-bit codes, which is what a campaign file holds.
+//! Converts imported records to 16-bit codes, the format of a campaign file.
 //!
-//! Hits of about the same size share their scales. A hit that is far larger than the others in a channel (a spike, an
-//! overload) has scales of its own, so that it does not coarsen theirs.
+//! Hits of about the same size share their scales. A hit that is far larger than the others in a
+//! channel (a spike, an overload) has separate scales, so that it does not coarsen theirs.
 
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
 
@@ -9,26 +9,28 @@ use crate::device::channels::ChannelMap;
 use crate::median::middle;
 use crate::spectra::{ImpactRecords, MotionQuantity};
 
-/// Codes on either side of zero that the largest value of a channel becomes: full scale stays free, so that nothing reads as overload.
+/// Magnitude of the code for a channel's largest value: below full scale, so that nothing is taken
+/// for an overload.
 const TOP_CODE: f64 = 32_000.0;
 
-/// A hit belongs to the others while no channel is larger than this many times the channel's median over the hits.
+/// A hit shares the common scales if none of its channels exceeds this many times the channel's
+/// median over the hits.
 const LARGER: f64 = 8.0;
 
 /// Hits with the same scales.
 pub(super) struct Quantised {
     /// The scales.
     pub(super) map: ChannelMap,
-    /// Which hits of the records.
+    /// Indices of the hits in the records.
     pub(super) hits: Vec<usize>,
     /// Their codes, channel after channel.
     pub(super) codes: Vec<Vec<i16>>,
 }
 
-/// The records as 16-bit codes with the scales that belong to them; every hit is in one group.
+/// The records as 16-bit codes with their scales; every hit is in exactly one group.
 ///
 /// # Errors
-/// Another number of responses than the plan's, or values that are not numbers.
+/// The number of responses differs from the plan's, or values are not finite.
 pub(super) fn quantised(records: &ImpactRecords, axes: usize) -> Result<Vec<Quantised>, String> {
     let rate_hz = records.fs_hz.round();
     if !(1.0..=f64::from(u32::MAX)).contains(&rate_hz) {
@@ -82,7 +84,7 @@ pub(super) fn quantised(records: &ImpactRecords, axes: usize) -> Result<Vec<Quan
             for (place, (name, role, quantity)) in kinds.iter().copied().enumerate() {
                 let largest = group.iter().fold(0.0f64, |m, hit| m.max(largest[*hit][place]));
                 let range_v = 10.0f32;
-                // code 32000 for the largest value, rounded up to what a float holds
+                // code 32000 for the largest value; the scale is rounded to a float
                 let units_per_volt = (largest.max(1e-30) * 32_768.0 / TOP_CODE / f64::from(range_v)) as f32;
                 map.channels.push(Channel {
                     name: name.parse().map_err(|_| format!("`{name}` is too long a name"))?,

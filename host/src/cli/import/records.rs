@@ -1,4 +1,4 @@
-//! Impact records from elsewhere into one cell of a campaign file.
+//! Imports impact records into one cell of a campaign file.
 
 use std::io::Read;
 use std::path::Path;
@@ -39,11 +39,11 @@ pub(super) struct CellName<'n> {
     pub(super) response: &'n str,
 }
 
-/// Where records come from.
+/// Source of the records.
 pub(super) struct Origin {
-    /// What the file is called in the campaign file.
+    /// Name of the file in the campaign file.
     name: String,
-    /// What tells its content from any other.
+    /// Digest that identifies its content.
     digest: String,
 }
 
@@ -69,17 +69,17 @@ impl Origin {
     }
 }
 
-/// What came of records.
+/// Result of an import of records.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Brought {
     pub(super) cells: usize,
     pub(super) hits: usize,
     pub(super) kept: usize,
-    /// Hits that an earlier import of the same file had stored.
+    /// Hits that were already stored by an earlier import of the same file.
     pub(super) already: usize,
-    /// How the last ones are stored.
+    /// Channels of the last records as stored.
     map: Option<ChannelMap>,
-    /// What was taken of the last ones' file, in one line.
+    /// What was used of the last file, in one line.
     pub(super) taken: String,
 }
 
@@ -92,7 +92,7 @@ impl Brought {
     }
 }
 
-/// One file, for the user's eyes.
+/// Imports one file, and prints what was done.
 pub(super) fn import(
     file: &Path,
     into: &Path,
@@ -137,16 +137,18 @@ pub(super) fn import(
     output::lines(lines)
 }
 
-/// What is to be said of the length of the records that were imported into a campaign.
+/// Message about the length of the records that were imported into a campaign.
 pub(super) fn length_notice(store: &Store) -> Result<Option<String>, CliError> {
     let notice = AnalysedLength::of(store, &store.plan()?)?.notice();
     Ok(notice.map(|notice| format!("{}: {notice}", store.path().display())))
 }
 
-/// Judges the hits like measured ones and stores those that are not there yet; tells each verdict.
+/// Judges the hits like measured ones and stores those that are not yet present; reports each
+/// verdict.
 ///
 /// # Errors
-/// There is no such cell, a hit has no pulse, the force has the wrong sign in all of them, or hits of another file of this name are there and shall not be replaced.
+/// There is no such cell, a hit has no pulse, the force has the wrong sign in all hits, or hits of
+/// another file with this name exist and must not be replaced.
 pub(super) fn bring(
     store: &mut Store,
     origin: &Origin,
@@ -186,7 +188,7 @@ pub(super) fn bring(
     }
     recordings.sort_by_key(|(hit, ..)| *hit);
     let there = already_there(store, origin, id, replace)?;
-    // hits of one scale share a session
+    // hits with the same scales share a session
     let mut sessions: Vec<Option<i64>> = vec![None; groups.len()];
     let mut brought =
         Brought { cells: 1, hits: recordings.len(), already: there.len(), taken, ..Brought::default() };
@@ -211,7 +213,7 @@ pub(super) fn bring(
                 attempt: attempt + hit,
                 session,
                 utc: utc_now(),
-                // when it was measured is not known here
+                // the time of measurement is unknown
                 utc_error_s: None,
                 recording,
                 verdict,
@@ -222,7 +224,8 @@ pub(super) fn bring(
     Ok(brought)
 }
 
-/// The records along the directions that the plan has for the cell, and how many axes its location has.
+/// The records along the directions that the plan defines for the cell, and the number of axes of
+/// its location.
 fn along_plan(plan: &Plan, cell: &Cell, read: RecordFile) -> Result<(RecordFile, usize), String> {
     let points = |name: &str| plan.geometry.response.iter().map(Spanned::get_ref).find(|p| p.name == name);
     let hammer = plan.geometry.impact.iter().map(Spanned::get_ref).find(|p| p.name == cell.impact);
@@ -238,7 +241,8 @@ fn along_plan(plan: &Plan, cell: &Cell, read: RecordFile) -> Result<(RecordFile,
     Ok((read.along_plan(&place)?, axes.len()))
 }
 
-/// Notes how late each channel is, the earliest as in time: delays of channels are not negative.
+/// Stores the delay of each channel relative to the earliest, since delays of channels are not
+/// negative.
 fn put_in_step(map: &mut ChannelMap, delay_s: &[f64]) {
     let earliest = delay_s.iter().copied().fold(0.0, f64::min);
     let late = std::iter::once(0.0).chain(delay_s.iter().copied());
@@ -248,7 +252,8 @@ fn put_in_step(map: &mut ChannelMap, delay_s: &[f64]) {
     }
 }
 
-/// The hits of this very file that the cell has; those of another file of the same name are dropped, or refused.
+/// The hits of exactly this file that the cell contains; those of another file with the same name
+/// are dropped, or refused.
 fn already_there(store: &Store, origin: &Origin, cell: i64, replace: bool) -> Result<Vec<u32>, CliError> {
     let sessions = store.sessions()?;
     let imported = |row: &RecordRow| {
@@ -278,7 +283,7 @@ fn already_there(store: &Store, origin: &Origin, cell: i64, replace: bool) -> Re
     Ok(same)
 }
 
-/// The cell's id, the cell, and the first attempt that is free in it.
+/// The cell's id, the cell, and its first free attempt number.
 fn find(store: &Store, name: &CellName<'_>) -> Result<(i64, Cell, u32), CliError> {
     let configuration = store
         .plan()?
@@ -330,7 +335,7 @@ fn recording(hit: usize, codes: Vec<i16>, channels: usize, pulse: Option<&Pulse>
             trigger: start as u64,
             pulse_us: 0,
             peak_n: pulse.map_or(0.0, |pulse| pulse.peak_n as f32),
-            // how much of the record before its trigger the pulse needs
+            // the pulse's width determines how much of the record before its trigger is needed
             width_us: pulse.map_or(0.0, |pulse| (1e6 * pulse.width() as f64 / fs_hz) as f32),
             rebound_ratio: 0.0,
             rebound_after: 0,

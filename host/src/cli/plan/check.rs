@@ -1,4 +1,4 @@
-//! `plan check`: everything that is wrong with a plan, what it answers, and a picture of it.
+//! `plan check`: lists all errors of a plan and the results that it yields, and draws it.
 
 use std::path::{Path, PathBuf};
 
@@ -14,13 +14,14 @@ use crate::outside::tell_line;
 use crate::report::{self, Format};
 use crate::structure::Structure;
 
-/// Say everything that is wrong with a plan, what it answers, and draw where hammer and vibrometer go.
+/// List all errors of a plan and the results that it yields, and draw the positions of hammer and
+/// vibrometer.
 #[derive(Debug, Args)]
 pub struct Check {
     /// The plan.
     #[arg(value_name = "PLAN.toml")]
     file: PathBuf,
-    /// Where the picture goes: .svg or .png. PLAN-geometry.svg beside the plan where nothing is said.
+    /// Where to write the picture, .svg or .png [default: PLAN-geometry.svg next to the plan].
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
     /// Draw nothing.
@@ -55,7 +56,7 @@ fn refused(all: &[PlanError]) -> CliError {
     ))
 }
 
-/// How much is to be measured, and what it will answer.
+/// The amount of measurement, and the results that it yields.
 fn told(plan: &Plan) -> Vec<String> {
     let cells = plan.cells();
     let of = |structure: Structure| {

@@ -1,4 +1,5 @@
-//! A plan's file, with the workbook that its geometry may stand in written out: a campaign file holds all that it needs.
+//! Reads a plan's file and writes out a referenced geometry workbook, since a campaign file must be
+//! self-contained.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -13,7 +14,7 @@ use crate::structure::Structure;
 use crate::substructuring::Geometry;
 use crate::substructuring::geometry::{Configuration, Point};
 
-/// What is looked at before the plan is read as one.
+/// Parts that are read before the text is parsed as a plan.
 #[derive(Deserialize)]
 struct Peek {
     geometry: Option<PeekGeometry>,
@@ -26,18 +27,20 @@ struct PeekGeometry {
     workbook: Option<Spanned<String>>,
 }
 
-/// The text of the plan at `path`. `workbook = "positions.xlsx"` under `[geometry]` (beside the plan; or a folder of csv tables) is
-/// replaced by what the workbook says: the virtual point, the points and, where the plan has none, the configurations.
+/// The text of the plan at `path`. `workbook = "positions.xlsx"` under `[geometry]` (path relative
+/// to the plan; or a folder of csv tables) is replaced by the workbook's content: the virtual
+/// point, the points and, if the plan has none, the configurations.
 ///
 /// # Errors
-/// The plan or the workbook cannot be read, or the workbook describes what no plan can hold.
+/// The plan or the workbook cannot be read, or the workbook contains something that a plan cannot
+/// represent.
 pub fn read(path: &Path) -> Result<String, CliError> {
     let text = crate::foreign::text(path, crate::foreign::SETTINGS).map_err(|source| CliError::Read {
         path: path.into(),
         doing: "reading the plan",
         source,
     })?;
-    // what is wrong with the plan itself is said where it is read as one
+    // errors of the plan itself are reported when it is parsed as a plan
     let Ok(peek) = toml::from_str::<Peek>(&text) else { return Ok(text) };
     let Some(workbook) = peek.geometry.and_then(|geometry| geometry.workbook) else { return Ok(text) };
     let from = text[..workbook.span().start].rfind('\n').map_or(0, |end| end + 1);
@@ -65,7 +68,7 @@ pub fn read(path: &Path) -> Result<String, CliError> {
     Ok(format!("{}\n{described}", out.trim_end()))
 }
 
-/// The points, and the configurations where they are asked for, as tables of a plan.
+/// The points, and if requested the configurations, as tables of a plan.
 fn tables(geometry: &Geometry, configurations: bool) -> Result<String, String> {
     let mut out = String::new();
     let (mut responses, mut impacts) = (Vec::<Point>::new(), Vec::<Point>::new());
@@ -133,7 +136,7 @@ fn locations(configuration: &str, points: &Configuration) -> Result<Vec<Point>, 
     Ok(found)
 }
 
-/// Adds points by name; one that stands elsewhere in another configuration is refused.
+/// Adds points by name; a point with another position in another configuration is refused.
 fn merge(all: &mut Vec<Point>, points: &[Point], configuration: &str) -> Result<(), String> {
     for point in points {
         match all.iter().find(|p| p.name == point.name) {

@@ -1,4 +1,4 @@
-//! `plan`: a plan's file before there is a campaign.
+//! `plan`: working with a plan's file before a campaign exists.
 
 mod check;
 pub mod file;
@@ -8,7 +8,7 @@ use clap::{Args, Subcommand};
 
 use crate::cli::error::CliError;
 
-/// Plans: write one to begin with, and see what is wrong with it.
+/// Plans: write a template, and check a plan.
 #[derive(Debug, Args)]
 pub struct Plan {
     #[command(subcommand)]
@@ -17,9 +17,10 @@ pub struct Plan {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Write a plan to begin with.
+    /// Write a plan from a template.
     New(new::New),
-    /// Say everything that is wrong with a plan, what it answers, and draw where hammer and vibrometer go.
+    /// List all errors of a plan and the results that it yields, and draw the positions of hammer
+    /// and vibrometer.
     Check(check::Check),
 }
 

@@ -1,4 +1,4 @@
-//! `plan new`: a plan to begin with.
+//! `plan new`: writes a plan from a template.
 
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write as _};
@@ -11,18 +11,18 @@ use crate::campaign::plan;
 use crate::cli::error::CliError;
 use crate::outside::tell_line;
 
-/// Write a plan to begin with.
+/// Write a plan from a template.
 #[derive(Debug, Args)]
 pub struct New {
     /// The plan's file, which must not exist yet.
     #[arg(value_name = "PLAN.toml")]
     file: PathBuf,
-    /// What the plan is to answer.
+    /// What the plan should determine.
     #[arg(long, value_enum, default_value = "contact")]
     template: Template,
 }
 
-/// The plans to begin with.
+/// The templates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Template {
     /// The contact's own k_T: 63 cells of two hits.
@@ -31,7 +31,7 @@ enum Template {
     Paper,
     /// Both: 276 cells.
     PaperContact,
-    /// A few cells, to try a rig.
+    /// A few cells, for trying a rig.
     Small,
 }
 

@@ -1,4 +1,4 @@
-//! Why levels cannot be measured, in the words of whoever stands at the shaker.
+//! Why levels cannot be measured, worded for the operator of the shaker.
 
 use jointrig_protocol::answer::Info;
 use jointrig_protocol::channel::Role;
@@ -11,10 +11,10 @@ use crate::campaign::store::error::StoreError;
 use crate::device::channels::ChannelMap;
 use crate::device::error::DeviceError;
 
-/// Why one level was not brought about; the others may be all the same.
+/// Why one level was not reached; other levels may still be reachable.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Shortfall {
-    /// The largest drive does not reach it.
+    /// The largest drive does not reach the level.
     #[error(
         "out of reach: the largest drive of {drive_v} V gives less; allow more (--max-drive), or order less"
     )]
@@ -22,31 +22,31 @@ pub enum Shortfall {
         /// The largest drive, V.
         drive_v: f64,
     },
-    /// It does not come to rest at what was ordered.
+    /// The amplitude does not settle at the ordered value.
     #[error(
         "never settled: after {seconds} s its amplitude still goes between {:.1} and {:.1} % of the order; go further from the \
          resonance, or look for what is loose", 100.0 * least, 100.0 * most
     )]
     NeverSettled {
-        /// How long it had, s.
+        /// How long the device waited, s.
         seconds: f64,
-        /// Smallest of the last windows, over the order.
+        /// Smallest amplitude of the last windows, relative to the ordered one.
         least: f64,
-        /// Largest of them.
+        /// Largest amplitude of them, relative to the ordered one.
         most: f64,
     },
-    /// A channel at the contact reached the end of its range while it was recorded.
+    /// A channel at the contact reached the end of its range during the record.
     #[error(
         "channel `{channel}` reached the end of its range: set a wider one at the sensor, or order a smaller amplitude"
     )]
     Clipped {
-        /// Its name.
+        /// The channel's name.
         channel: String,
     },
-    /// It settled and left again while it was recorded.
+    /// The amplitude settled, then drifted during the record.
     #[error("settled, but drifted to {:.1} % of the order while it was recorded; run the same command again", 100.0 * ratio)]
     Strayed {
-        /// Amplitude over the record, over the order.
+        /// Amplitude over the record, relative to the ordered one.
         ratio: f64,
     },
 }
@@ -54,7 +54,7 @@ pub enum Shortfall {
 /// Why the run ended.
 #[derive(Debug, thiserror::Error)]
 pub enum ShakeError {
-    /// The file's records are of another structure.
+    /// The file's records belong to another structure.
     #[error("{0}")]
     AnotherStructure(String),
     /// The campaign file.
@@ -71,7 +71,7 @@ pub enum ShakeError {
         /// What is missing, and what to do.
         what: String,
     },
-    /// There is nothing to shake.
+    /// The plan has no assembly to shake.
     #[error("the plan has no assembly (a configuration AJB): the shaker's levels are measured in it")]
     NoAssembly,
     /// The shaker stopped by itself.
@@ -79,12 +79,12 @@ pub enum ShakeError {
         "the shaker stopped at {level}: {why}\nthe levels before it are in the file; run the same command again to go on"
     )]
     Stopped {
-        /// At which level.
+        /// The level.
         level: String,
-        /// Why, and what to do.
+        /// The cause, and what to do.
         why: String,
     },
-    /// It was told to rest and does not.
+    /// The shaker was ordered to rest and does not.
     #[error("{address}: the shaker does not come to rest; press the emergency stop")]
     DoesNotRest {
         /// The device.
@@ -93,10 +93,10 @@ pub enum ShakeError {
     /// A level that was stored cannot be found.
     #[error("level {0} was stored and cannot be read back: check the file with `jointrig campaign verify`")]
     Lost(i64),
-    /// This level only; the run goes on.
+    /// This level failed; the run continues.
     #[error(transparent)]
     Short(Shortfall),
-    /// The user wants to end.
+    /// The user interrupted the run.
     #[error("interrupted")]
     Interrupted,
 }

@@ -1,4 +1,5 @@
-//! How large what is held is, from the samples, and whether it has settled.
+//! Measures the amplitude of the controlled quantity from the samples, and decides whether it has
+//! settled.
 
 use std::f64::consts::TAU;
 
@@ -11,22 +12,23 @@ use crate::device::channels::ChannelMap;
 /// Shortest window, s.
 const WINDOW_S: f64 = 0.1;
 
-/// Fewest cycles of a window.
+/// Minimum number of cycles in a window.
 const WINDOW_CYCLES: f64 = 3.0;
 
-/// So many windows in a row must agree.
+/// Number of consecutive windows that must agree.
 pub const SETTLED_WINDOWS: usize = 6;
 
-/// Each within this part of what was ordered.
+/// Relative deviation of each window from the ordered amplitude.
 pub const WITHIN: f64 = 0.02;
 
-/// And the mean of the later half within this part of that of the earlier one.
+/// Relative deviation of the later half's mean from the earlier half's.
 const DRIFT: f64 = 0.01;
 
-/// What counts as settled, for people.
+/// The criterion for settled, as text.
 pub const CRITERION: &str = "settled: six windows of 0.1 s in a row within 2 % of the order, their later half within 1 % of the earlier";
 
-/// Whether the last windows say so. Without a target (the drive is held) they must agree among themselves.
+/// Whether the last windows satisfy the criterion. Without a target (open-loop drive) they must
+/// agree with each other.
 pub fn is_settled(amplitudes: &[f64], target: Option<f64>) -> bool {
     let Some(from) = amplitudes.len().checked_sub(SETTLED_WINDOWS) else { return false };
     let last = &amplitudes[from..];
@@ -38,10 +40,11 @@ pub fn is_settled(amplitudes: &[f64], target: Option<f64>) -> bool {
         && (mean(late) - mean(early)).abs() < DRIFT * level
 }
 
-/// One term of what is measured: place in the scan, SI units per code, and the phase that its delay costs.
+/// One term of the measured quantity: index in the scan, SI units per code, and the phase
+/// correction for its delay.
 type Term = (usize, Complex<f64>);
 
-/// A lock-in on what is held.
+/// A lock-in amplifier for the controlled quantity.
 pub struct Meter {
     terms: Vec<Term>,
     frequency_hz: f64,
@@ -50,8 +53,8 @@ pub struct Meter {
 }
 
 impl Meter {
-    /// For the channels of this device; for a held drive the specimens' relative displacement shows whether the structure has
-    /// settled.
+    /// Creates a meter for the channels of this device; with an open-loop drive, it measures the
+    /// specimens' relative displacement to determine whether the structure has settled.
     pub fn new(channels: &ChannelMap, held: Held, frequency_hz: f64) -> Self {
         let omega = TAU * frequency_hz;
         let term = |role: Role, gain: f64| {
@@ -76,13 +79,13 @@ impl Meter {
         }
     }
 
-    /// Scans of one window: whole cycles, as near as scans allow.
+    /// Scans of one window: whole cycles, rounded to scans.
     pub fn window_scans(&self) -> u64 {
         let cycles = (WINDOW_S * self.frequency_hz).ceil().max(WINDOW_CYCLES);
         (cycles * self.cycle_scans).round() as u64
     }
 
-    /// Amplitude in these codes (scan after scan): m for velocities, N for a force.
+    /// Amplitude in these codes (interleaved scan by scan): m for velocities, N for a force.
     pub fn amplitude(&self, codes: &[i16], channels: usize) -> f64 {
         let scans = codes.len() / channels;
         let cycles = (scans as f64 / self.cycle_scans).floor();
@@ -130,7 +133,8 @@ mod tests {
         }
     }
 
-    /// x_A = 0.2 µm at 0°, x_B = 0.1 µm at 60°: their difference has 0.173 µm, whatever delays and polarity do to the codes.
+    /// x_A = 0.2 µm at 0°, x_B = 0.1 µm at 60°: their difference is 0.173 µm, independent of the
+    /// effect of delays and polarity on the codes.
     #[test]
     fn the_relative_displacement_is_measured_whatever_delay_and_polarity() {
         let map = map();

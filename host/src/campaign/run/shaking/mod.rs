@@ -1,8 +1,10 @@
-//! The shaker's levels: each is brought to its amplitude by the device, recorded in steady state, stored, and left by a ramp to rest.
+//! The shaker's levels: the device controls each to its amplitude; it is recorded in steady state
+//! and stored, and the shaker then ramps down to rest.
 //!
-//! Nothing moves without a host that wants it now: an order holds for ten seconds of the device's clock and is renewed every three
-//! (`order`); an interrupt, an error and the end of the session send the shaker to rest. Levels that are in the file already are
-//! skipped, so a run that was broken off is resumed by running it again.
+//! The shaker moves only as long as a host requests it: an order is valid for ten seconds of the
+//! device's clock and is renewed every three (`order`); an interrupt, an error and the end of the
+//! session bring the shaker to rest. Levels that are already in the file are skipped, so an
+//! interrupted run is resumed by running it again.
 
 mod error;
 mod meter;
@@ -39,39 +41,41 @@ use crate::device::session::Session;
 use meter::{SETTLED_WINDOWS, WITHIN, is_settled};
 use order::Orders;
 
-/// A level that is not settled by then never will be, s of the device.
+/// Longest settling time of a level, s of the device's clock.
 const SETTLE_BOUND_S: f64 = 40.0;
 
-/// Between two levels the structure rests, s.
+/// Rest between two levels, s.
 const PAUSE_S: f64 = 0.3;
 
-/// Fewest cycles of a record.
+/// Minimum number of cycles in a record.
 const FEWEST_CYCLES: f64 = 20.0;
 
-/// What came of one level.
+/// Result of one level.
 #[derive(Clone, Debug)]
 pub enum Outcome {
     /// It was in the file already.
     Known(LevelRow),
     /// It was measured and stored.
     Stored(LevelRow),
-    /// The shaker does not bring it about; the others may be measured all the same.
+    /// The shaker does not reach it; the other levels may still be measured.
     Short(Level, Shortfall),
 }
 
 /// How a run ended.
 #[derive(Clone, Debug)]
 pub struct Summary {
-    /// What came of each level that was come to, in order.
+    /// Result of each level that was started, in order.
     pub outcomes: Vec<Outcome>,
     /// Whether the user ended it early.
     pub interrupted: bool,
 }
 
-/// Measures what is missing of the levels. `tell` hears of each level when it begins (`None`) and when it is over.
+/// Measures the missing levels. `tell` is called for each level when it begins (with `None`) and
+/// when it is over.
 ///
 /// # Errors
-/// File or device failed, the device does not fit, or the shaker was stopped; the levels before that are in the file.
+/// File or device failed, the device does not fit, or the shaker was stopped; the levels before
+/// that are in the file.
 pub fn run(
     store: &mut Store,
     session: &mut Session,
@@ -81,7 +85,7 @@ pub fn run(
     run_watched(store, session, options, &Onlookers::default(), tell)
 }
 
-/// The same, and others look on.
+/// As [`run`], with observers.
 ///
 /// # Errors
 /// As [`run`].
@@ -147,7 +151,7 @@ pub fn run_watched(
         } else {
             tell(store, level, None);
             if plan.sync.is_some() {
-                // a level begins
+                // marks the start of a level
                 bench.session.pulse_output()?;
             }
             let outcome = bench.measure(store, level);
@@ -174,7 +178,8 @@ pub fn run_watched(
             }
         }
     }
-    // of two errors the first one counts; a device that is gone rests by itself
+    // of two errors the first one is returned; a shaker whose device is disconnected comes to rest
+    // by itself
     let rested = bench.come_to_rest();
     let ended = bench.session.finish();
     onlookers.watch.saw(&Seen::Ended);
@@ -196,7 +201,7 @@ fn clipped(channels: &ChannelMap, codes: &[i16]) -> Option<String> {
         .map(|place| channels.channels[place].name.to_string())
 }
 
-/// Puts the assembly on a virtual rig's table.
+/// Selects the assembly on a virtual rig.
 fn assemble(session: &mut Session, plan: &Plan) -> Result<(), ShakeError> {
     let cells = plan.cells();
     let Some(cell) = cells.iter().find(|cell| cell.configuration == Configuration::Ajb) else {
@@ -215,7 +220,7 @@ fn assemble(session: &mut Session, plan: &Plan) -> Result<(), ShakeError> {
     Ok(())
 }
 
-/// Everything at hand for one level after the other.
+/// Context shared by all levels.
 struct Bench<'a> {
     session: &'a mut Session,
     channels: &'a ChannelMap,
@@ -227,7 +232,7 @@ struct Bench<'a> {
     epoch: u32,
 }
 
-/// What was cut, and how the level came to its amplitude.
+/// The recorded range, and how the level reached its amplitude.
 struct Taken {
     first_scan: u64,
     scans: u64,
@@ -239,7 +244,7 @@ impl Bench<'_> {
         f64::from(self.channels.rate_hz)
     }
 
-    /// Tells who watches how a level ended.
+    /// Notifies the observers of a level's result.
     fn over(&self, outcome: &Result<Outcome, ShakeError>) {
         let (recorded, say) = match outcome {
             Ok(Outcome::Stored(row) | Outcome::Known(row)) => {
@@ -253,7 +258,7 @@ impl Bench<'_> {
         self.onlookers.watch.saw(&Seen::Link(self.session.accounts()));
     }
 
-    /// Brings the level about, records and stores it, and comes to rest.
+    /// Drives, records and stores the level, and comes to rest.
     fn measure(&mut self, store: &mut Store, level: &Level) -> Result<Outcome, ShakeError> {
         let taken = match self.take(level) {
             Ok(taken) => taken,
@@ -270,7 +275,7 @@ impl Bench<'_> {
         };
         self.come_to_rest()?;
         let first_scan = taken.first_scan;
-        // the ramp to rest belongs to a sweep's record
+        // the ramp down to rest is part of a sweep's record
         let end = if level.end_hz.is_some() { self.session.expected()? } else { first_scan + taken.scans };
         let (codes, gaps) = self.session.cut(first_scan..end)?;
         let channels = self.channels.len();
@@ -340,7 +345,7 @@ impl Bench<'_> {
             return Ok(Taken { first_scan: before, scans: 0, settled });
         }
         let cycles = (options.seconds * level.frequency_hz).ceil().max(FEWEST_CYCLES);
-        // one more than the cycles last, so that cutting finds them all
+        // one scan more than the cycles take, so that whole cycles can be cut
         let scans = (cycles * self.rate_hz() / level.frequency_hz).ceil() as u64 + 1;
         orders.go_on(self.session, at + scans)?;
         orders.still_runs(self.session)?;
@@ -349,7 +354,8 @@ impl Bench<'_> {
             return Err(ShakeError::Short(Shortfall::Clipped { channel }));
         }
         let moved = meter.amplitude(&codes, self.channels.len());
-        // the meter looks at what moves; an open loop reaches its drive by itself
+        // the meter measures the motion; with an open-loop drive the reached amplitude is that of
+        // the drive
         let reached = if target.is_some() { moved } else { drive_v };
         if let Some(target) = target
             && (reached / target - 1.0).abs() > WITHIN
@@ -360,7 +366,7 @@ impl Bench<'_> {
         Ok(Taken { first_scan: at, scans, settled })
     }
 
-    /// Comes to rest, and waits until the structure does so too.
+    /// Brings the shaker to rest, and waits until the structure is at rest too.
     fn come_to_rest(&mut self) -> Result<(), ShakeError> {
         self.session.rest()?;
         self.session.hold_acknowledgement(None);
@@ -376,7 +382,7 @@ impl Bench<'_> {
                 return Err(ShakeError::DoesNotRest { address: self.session.address().into() });
             }
         }
-        // that it stopped is no news here
+        // discard the stop event, which is expected here
         let _ = self.session.shaker_stopped();
         let next = self.session.status()?.next_scan + pause;
         Ok(self.session.wait_for(next)?)

@@ -1,4 +1,4 @@
-//! How levels are measured, and what stops the shaker.
+//! How levels are measured, and the limits that stop the shaker.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -10,46 +10,47 @@ use crate::campaign::run::edits::Edits;
 use crate::campaign::watch::Watchers;
 use crate::device::channels::ChannelMap;
 
-/// Load cells and excitation stop the shaker at this part of their full scale. The vibrometers do not: they go beyond theirs for a moment
-/// when a contact lets go, and what they measure is held by the device.
+/// Fraction of full scale at which load cells and excitation stop the shaker. The vibrometers do
+/// not stop it: they briefly exceed their range when a contact slips, and the device controls the
+/// quantity that they measure.
 const OF_FULL_SCALE: f64 = 0.95;
 
 /// How levels are measured.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Which levels, in their order.
+    /// The levels, in order.
     pub levels: Vec<Level>,
     /// Before or after the hammer's cells.
     pub moment: Moment,
-    /// Shortest record, s; it is lengthened to whole cycles, twenty at least.
+    /// Shortest record, s; it is extended to whole cycles, at least twenty.
     pub seconds: f64,
-    /// How fast a sweep goes, Hz/s.
+    /// Rate of a sweep, Hz/s.
     pub sweep_hz_per_s: f64,
-    /// The drive's largest amplitude, V; its full scale without it.
+    /// The drive's largest amplitude, V; its full scale if absent.
     pub most_drive_v: Option<f64>,
-    /// What stops the shaker.
+    /// Limits that stop the shaker.
     pub limits: Limits,
-    /// Go on even where device or rig tell that it is another structure than that of the file's records.
+    /// Continue even if device or rig indicate another structure than that of the file's records.
     pub new_structure: bool,
-    /// Set to come to rest and end.
+    /// Set to bring the shaker to rest and end the run.
     pub stop: Arc<AtomicBool>,
 }
 
-/// Who looks on; nobody by default.
+/// Observers and editors; none by default.
 #[derive(Clone, Debug, Default)]
 pub struct Onlookers {
-    /// Who watches.
+    /// The observers.
     pub watch: Watchers,
-    /// What persons elsewhere want changed in the file; done between two levels.
+    /// Changes to the file that persons request during the run; carried out between two levels.
     pub edits: Option<Edits>,
 }
 
-/// Limits by channel name, SI units; those of a whole level.
+/// Limits by channel name, SI units; they apply throughout a level.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Limits(pub Vec<(String, f64)>);
 
 impl Limits {
-    /// The limit of each channel, in the order of the scan; 0 where there is none.
+    /// The limit of each channel, in the order of the scan; 0 for no limit.
     pub fn of(&self, channels: &ChannelMap) -> Vec<f64> {
         (0..channels.len())
             .map(|place| {

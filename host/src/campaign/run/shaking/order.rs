@@ -1,4 +1,4 @@
-//! The orders of one level: what the device is told, renewed as long as the level lasts.
+//! The orders of one level: sent to the device, and renewed as long as the level lasts.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,16 +13,17 @@ use crate::device::channels::ChannelMap;
 use crate::device::session::Session;
 use jointrig_protocol::event::Reason;
 
-/// How long an order holds, ms of the device.
+/// Validity of an order, ms of the device's clock.
 const VALID_MS: u32 = 10_000;
 
-/// After this much of the device's clock it is renewed, s. A virtual board may be half its ring further than its host knows.
+/// Interval between renewals, s of the device's clock. A virtual board may be ahead of the host by
+/// half its ring buffer.
 const RENEW_S: f64 = 3.0;
 
-/// The drive's amplitude changes at most by its full scale in half a second.
+/// Slew rate: the drive's amplitude changes by at most its full scale in half a second.
 const SLEW_PER_S: f64 = 2.0;
 
-/// The order that holds, and when it is renewed.
+/// The current order, and when it is renewed.
 pub struct Orders {
     order: Shake,
     level: Level,
@@ -58,7 +59,7 @@ impl Orders {
         }
     }
 
-    /// Gives the first order; returns a scan from which on it holds.
+    /// Sends the first order; returns a scan from which it is in effect.
     pub fn begin(&mut self, session: &mut Session) -> Result<u64, ShakeError> {
         let _ = session.shaker_stopped();
         session.shake(self.order.clone())?;
@@ -77,17 +78,18 @@ impl Orders {
         f64::from(self.rate_hz)
     }
 
-    /// Another frequency, with the phase going on.
+    /// Changes the frequency with continuous phase.
     pub fn tune(&mut self, session: &mut Session, frequency_hz: f64) -> Result<(), ShakeError> {
         self.order.step = Shake::step_of(frequency_hz, self.rate_hz);
         self.renew(session)
     }
 
-    /// Waits for `scan`, and keeps the order alive meanwhile. It is renewed by what has arrived and not by what was looked at, so that a
-    /// program that lags behind does not let it expire; a virtual board waits for such a program.
+    /// Waits for `scan`, and keeps renewing the order meanwhile. Renewal follows the scans that
+    /// have arrived, not those that were evaluated, so that the order does not expire if the host
+    /// lags behind; a virtual board waits for such a host.
     ///
     /// # Errors
-    /// The user interrupts, the shaker stopped, or the device is gone.
+    /// The user interrupts, the shaker stopped, or the device is disconnected.
     pub fn go_on(&mut self, session: &mut Session, scan: u64) -> Result<(), ShakeError> {
         session.hold_acknowledgement(Some(scan));
         loop {
@@ -108,7 +110,8 @@ impl Orders {
         }
     }
 
-    /// A shaker that stopped unheard must not be started again by a renewal.
+    /// Renews the order, unless the shaker has stopped unnoticed: a renewal must not start it
+    /// again.
     fn renew(&mut self, session: &mut Session) -> Result<(), ShakeError> {
         self.still_runs(session)?;
         session.shake(self.order.clone())?;
@@ -116,7 +119,7 @@ impl Orders {
         Ok(())
     }
 
-    /// Whether the shaker runs as ordered.
+    /// Checks that the shaker runs as ordered.
     pub fn still_runs(&self, session: &mut Session) -> Result<(), ShakeError> {
         match session.status()?.shaker {
             Shaker::Slewing | Shaker::Steady => Ok(()),

@@ -1,4 +1,4 @@
-//! A stored level as a hysteresis record: scales, sums and delays applied, nothing else.
+//! A stored level as a hysteresis record: only scales, sums and delays are applied.
 
 use jointrig_protocol::channel::{Quantity, Role};
 use rayon::prelude::*;
@@ -9,12 +9,13 @@ use crate::device::channels::ChannelMap;
 use crate::hysteresis::delays::in_step;
 use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 
-/// Why a level's channels make no hysteresis record.
+/// Why a level's channels do not yield a hysteresis record.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("its session has no {0}")]
 pub struct Unusable(&'static str);
 
-/// v_A, v_B and the load cells' sum, in step with one another; `cells` are [`Plan::load_cells`](crate::campaign::plan::Plan::load_cells).
+/// v_A, v_B and the load cells' sum, aligned in time; `cells` are
+/// [`Plan::load_cells`](crate::campaign::plan::Plan::load_cells).
 ///
 /// # Errors
 /// A channel is missing.
@@ -36,7 +37,7 @@ pub fn record(
     let late = |place: usize| f64::from(channels.channels[place].delay_ns) * 1e-9;
     let fs_hz = f64::from(channels.rate_hz);
     let signals = [&[(a, 1.0)][..], &[(b, 1.0)], cells].map(|places| sum(channels, samples, places));
-    // one amplifier: the cells are alike
+    // all load cells share one amplifier and have the same delay
     let [a_m_per_s, b_m_per_s, force_n] = in_step(signals, [late(a), late(b), late(first)], fs_hz);
     Ok(HysteresisRecord {
         fs_hz,
@@ -47,10 +48,10 @@ pub fn record(
     })
 }
 
-/// Samples that are converted at once, so that a sum of channels stays in the core's cache.
+/// Samples converted per step, so that a sum of channels stays in the core's cache.
 const CHUNK: usize = 1 << 14;
 
-/// The sum of these channels in SI units, each with its factor, on all cores.
+/// The sum of these channels in SI units, each weighted by its factor, computed on all cores.
 fn sum(channels: &ChannelMap, samples: &Samples, places: &[(usize, f64)]) -> Vec<f64> {
     let Some((first, _)) = places.first() else { return Vec::new() };
     let mut sum = vec![0.0; samples.channel(*first).len()];
@@ -62,7 +63,8 @@ fn sum(channels: &ChannelMap, samples: &Samples, places: &[(usize, f64)]) -> Vec
             let cell = |code: &i16| f64::from(*code) * scale;
             let pairs = sum.iter_mut().zip(codes);
             if n == 0 {
-                // fresh memory that is read before it is written is mapped twice, and every core is told
+                // write without reading: reading fresh memory before the first write maps each page
+                // twice, with an interrupt to every core
                 pairs.for_each(|(sum, code)| *sum = 0.0 + cell(code));
             } else {
                 pairs.for_each(|(sum, code)| *sum += cell(code));

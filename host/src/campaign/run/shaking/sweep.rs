@@ -1,19 +1,19 @@
-//! A sweep: the frequency goes on in small steps without a break in phase.
+//! A sweep: the frequency changes in small steps with continuous phase.
 //!
-//! The record of a sweep holds everything from rest to rest, so that the ratio of its spectra is the structure's, however
-//! fast it was swept and wherever the steps fell.
+//! The record of a sweep spans from rest to rest, so that the ratio of its spectra is the
+//! structure's FRF, independent of the sweep rate and of the steps.
 
 use super::error::ShakeError;
 use super::order::Orders;
 use crate::device::session::Session;
 
-/// Time on one frequency, s: the device's lock-in measures over 80 ms and begins anew with each order.
+/// Time at one frequency, s: the device's lock-in measures over 80 ms and restarts with each order.
 const STEP_S: f64 = 0.12;
 
-/// Goes from the first to the last frequency (Hz) at `hz_per_s`.
+/// Sweeps from the first to the last frequency (Hz) at `hz_per_s`.
 ///
 /// # Errors
-/// The user interrupts, the shaker stopped, or the device is gone.
+/// The user interrupts, the shaker stopped, or the device is disconnected.
 pub fn go(
     session: &mut Session,
     orders: &mut Orders,
