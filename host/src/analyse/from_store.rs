@@ -47,11 +47,11 @@ pub struct AnalysedLength {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ImportedLengths {
     /// Of the shortest record, from its first sample on.
-    least_s: f64,
+    shortest: f64,
     /// Of the longest record, from its first sample on.
-    most_s: f64,
+    longest: f64,
     /// Least and most of what follows a record's lead.
-    from_lead_s: [f64; 2],
+    from_lead: [f64; 2],
 }
 
 impl AnalysedLength {
@@ -82,11 +82,11 @@ impl AnalysedLength {
             let own_s = record.scans as f64 / rate_hz;
             let after_s = record.scans.saturating_sub(first_sample(record, *rate_hz)) as f64 / rate_hz;
             found.imported = Some(found.imported.map_or(
-                ImportedLengths { least_s: own_s, most_s: own_s, from_lead_s: [after_s; 2] },
+                ImportedLengths { shortest: own_s, longest: own_s, from_lead: [after_s; 2] },
                 |so_far| ImportedLengths {
-                    least_s: so_far.least_s.min(own_s),
-                    most_s: so_far.most_s.max(own_s),
-                    from_lead_s: [so_far.from_lead_s[0].min(after_s), so_far.from_lead_s[1].max(after_s)],
+                    shortest: so_far.shortest.min(own_s),
+                    longest: so_far.longest.max(own_s),
+                    from_lead: [so_far.from_lead[0].min(after_s), so_far.from_lead[1].max(after_s)],
                 },
             ));
         }
@@ -97,8 +97,8 @@ impl AnalysedLength {
     fn whole_s(&self) -> Option<f64> {
         let imported = self.imported.filter(|_| !self.measured)?;
         // a record of the plan's length has the lead beside it
-        let as_planned = (0.0..=LEAD_S).contains(&(imported.from_lead_s[0] - self.plan_s));
-        (!as_planned).then_some(imported.least_s)
+        let as_planned = (0.0..=LEAD_S).contains(&(imported.from_lead[0] - self.plan_s));
+        (!as_planned).then_some(imported.shortest)
     }
 
     /// The samples of a record that are analysed, as far as it has them. Records that are used whole begin with their first sample,
@@ -117,20 +117,20 @@ impl AnalysedLength {
 
     /// What is to be said of records from files that do not have the plan's length.
     pub fn notice(&self) -> Option<String> {
-        let ImportedLengths { least_s, most_s, from_lead_s } = self.imported?;
+        let ImportedLengths { shortest, longest, from_lead } = self.imported?;
         let plan_s = self.plan_s;
         if self.measured {
-            return (from_lead_s[1] > plan_s + LEAD_S).then(|| {
+            return (from_lead[1] > plan_s + LEAD_S).then(|| {
                 format!(
                     "imported records last up to {:.3} s from the hit on: they are cut to the plan's length_s of {plan_s} s, which the \
                      measured records have",
-                    from_lead_s[1]
+                    from_lead[1]
                 )
             });
         }
-        if most_s - least_s > LEAD_S {
+        if longest - shortest > LEAD_S {
             return Some(format!(
-                "imported records last from {least_s:.3} to {most_s:.3} s: the analysis cuts all of them to {:.3} s, so that their FRFs have \
+                "imported records last from {shortest:.3} to {longest:.3} s: the analysis cuts all of them to {:.3} s, so that their FRFs have \
                  the same lines",
                 self.whole_s().unwrap_or(plan_s)
             ));

@@ -263,9 +263,9 @@ fn records_from_files_are_used_whole_where_nothing_was_measured() {
         plan_s: 1.0,
         // 10 ms before the lead
         imported: range.map(|own| ImportedLengths {
-            least_s: own[0] + 0.01,
-            most_s: own[1] + 0.01,
-            from_lead_s: own,
+            shortest: own[0] + 0.01,
+            longest: own[1] + 0.01,
+            from_lead: own,
         }),
         measured,
     };
