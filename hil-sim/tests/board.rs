@@ -134,7 +134,8 @@ fn a_repeated_request_fires_once() {
 fn arming_expires_and_a_waiting_shot_is_cancelled_by_it() {
     let (board, mut host) = board(1);
     host.start();
-    // the board may be half a ring ahead, and that must not be all of the time that the arming is good for
+    // the board may be half a ring ahead, and that must not be all of the time that the arming is
+    // good for
     assert_eq!(host.ask(Request::Arm { valid_ms: 20_000 }), Ok(Answer::Done));
     let far = host.next_scan + 50 * 51_200;
     assert_eq!(host.ask(Request::Fire(SmallHost::order(1, 3000, far))), Ok(Answer::Scheduled { number: 1 }));

@@ -101,7 +101,8 @@ fn the_truth_of_the_default_rig() {
     let truth = RigConfig::default().truth();
     assert_eq!(truth.contact_k_t_n_per_m, 180e6);
     assert!((truth.contact_c_t_n_s_per_m - 2700.0).abs() < 1e-9);
-    // 1/60 + 10² mm²/6500 N m/rad, and 12.5 µm aside on a soft yaw, which is a thousandth; that in series with 180.
+    // 1/60 + 10² mm²/6500 N m/rad, and 12.5 µm aside on a soft yaw, which is a thousandth; that in
+    // series with 180.
     let clamp = 1.0 / (1.0 / 60e6 + 1e-4 / 6500.0 + 1.25e-5_f64.powi(2) / 4.95);
     assert!((truth.clamps_k_n_per_m.unwrap() / clamp - 1.0).abs() < 1e-12, "{truth:?}");
     let series = 1.0 / (1.0 / clamp + 1.0 / 180e6);
@@ -126,7 +127,8 @@ fn the_truth_of_other_rigs() {
     assert_eq!(toml::from_str::<jointrig_hil_sim::rig::Truth>(&json).unwrap(), two);
 }
 
-/// The truth is what a quasi-static pull shows: the specimens' arms held, a force between them at the contact.
+/// The truth is what a quasi-static pull shows: the specimens' arms held, a force between them at
+/// the contact.
 #[test]
 fn the_stiffness_between_the_arms_is_what_a_slow_pull_shows() {
     let mut config = with_clamp_b();
@@ -148,7 +150,8 @@ fn the_stiffness_between_the_arms_is_what_a_slow_pull_shows() {
     let at = |body| Probe { body, position_m: [0.0; 3], direction: z };
     let pair = [at(BodyName::SpecimenA), at(BodyName::SpecimenB)];
     let y = structure.frf(s, Quantity::Receptance, &pair, &pair).unwrap();
-    // With the contact between them that is in parallel to the clamps; without it, the clamps alone.
+    // With the contact between them that is in parallel to the clamps; without it, the clamps
+    // alone.
     let mut open = config.clone();
     open.contact.stiffness_n_per_m = [0.0; 3];
     open.contact.rotation_nm_per_rad = [0.0; 3];

@@ -132,7 +132,8 @@ fn contacts_that_cannot_be_are_refused_with_their_field() {
         let error = complaint(&format!("[contact]\nlaw = \"iwan\"\n{lines}\n"));
         assert!(error.contains(field) && error.contains("line 3") && error.contains(words), "{error}");
     }
-    // A light body on a stiff contact, scanned slowly: the step is too long, and that is said when the rig is built.
+    // A light body on a stiff contact, scanned slowly: the step is too long, and that is said when
+    // the rig is built.
     let text = "[contact]\nlaw = \"jenkins\"\nslip_step_s = 1.0\n[bodies.specimen_a]\nmass_kg = 1e-4\n";
     let error = Rig::new(&RigConfig::from_toml(text).unwrap(), 1).unwrap_err().to_string();
     assert!(error.contains("contact.slip_step_s") && error.contains("try"), "{error}");

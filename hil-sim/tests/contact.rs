@@ -35,7 +35,8 @@ fn shake(rig: &mut Rig, hz: f64, volts: f64, cycles: u32, mut seen: impl FnMut(&
     }
 }
 
-/// Amplitude (m) of the relative displacement, and what friction takes in a cycle (J), over the last half of a drive.
+/// Amplitude (m) of the relative displacement, and what friction takes in a cycle (J), over the
+/// last half of a drive.
 fn steady(config: &RigConfig, stepping: Stepping, hz: f64, volts: f64, cycles: u32) -> (f64, f64) {
     let mut rig = Rig::with_stepping(config, 1, stepping).unwrap();
     let (mut low, mut high, mut from) = (f64::INFINITY, f64::NEG_INFINITY, None);

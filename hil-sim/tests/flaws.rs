@@ -1,4 +1,5 @@
-//! Errors of the instruments: drawn once per campaign, of the stated size, and acting on what is read.
+//! Errors of the instruments: drawn once per campaign, of the stated size, and acting on what is
+//! read.
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
 
@@ -30,7 +31,8 @@ fn perfect() -> RigConfig {
     config
 }
 
-/// Amplitude of every channel's reading and of its true signal at `hz`, over steady cycles of the shaker.
+/// Amplitude of every channel's reading and of its true signal at `hz`, over steady cycles of the
+/// shaker.
 fn shaken(
     rig: &mut Rig,
     hz: f64,
@@ -251,7 +253,8 @@ fn points_on_a_specimen_err_by_their_own_error_and_never_by_aim() {
     assert!(error.contains("\"S1\"") && error.contains("B1, B2, B3, B4"), "{error}");
 }
 
-/// Shakes into gross slip: of every scan in which the contact slips, the force and the displacement.
+/// Shakes into gross slip: of every scan in which the contact slips, the force and the
+/// displacement.
 fn slipping(config: &RigConfig) -> Vec<(f64, f64)> {
     let mut rig = Rig::new(config, 1).unwrap();
     let mut codes = [0; CHANNELS];

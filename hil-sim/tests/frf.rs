@@ -13,8 +13,9 @@ use jointrig_hil_sim::rig::structure::Structure;
 use jointrig_hil_sim::rig::{Configuration, Probe, Quantity, RigConfig, exact_frf};
 use num_complex::Complex;
 
-/// Two implementations in double precision of the same 24 equations. The worst conditioned is the free clamp (3e9 N/m) beside
-/// the 27 and 40 Hz modes of A, which takes six of the sixteen digits; elsewhere they agree to 1e-11.
+/// Two implementations in double precision of the same 24 equations. The worst conditioned is the
+/// free clamp (3e9 N/m) beside the 27 and 40 Hz modes of A, which takes six of the sixteen digits;
+/// elsewhere they agree to 1e-11.
 const TOLERANCE: f64 = 1e-9;
 
 const RIGID: &str = include_str!("../rigs/rigid-clamp.toml");
@@ -120,8 +121,8 @@ fn eigenfrequencies_are_the_reference() {
         for (found, expected) in found.iter().zip(&expected) {
             assert!((found - expected).abs() < 5.1e-4, "{configuration}: {found} Hz for {expected} Hz");
         }
-        // Damping is light: each damped mode lies within ζ² of its undamped one, and non-proportional damping moves it
-        // by no more than that.
+        // Damping is light: each damped mode lies within ζ² of its undamped one, and
+        // non-proportional damping moves it by no more than that.
         let modes = modes(&space).unwrap();
         for expected in expected {
             let nearest = modes.iter().map(|mode| (mode.lambda.norm() / (2.0 * PI) - expected).abs());

@@ -1,4 +1,5 @@
-//! The hammer: calibration, monotony, what a pulse too short or too long does, and how often it goes wrong.
+//! The hammer: calibration, monotony, what a pulse too short or too long does, and how often it
+//! goes wrong.
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
 

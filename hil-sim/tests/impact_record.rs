@@ -54,7 +54,8 @@ fn a_hit_on_az3_is_the_reference_record_but_for_its_noise() {
     };
     let period_s = 1.0 / 51_200.0;
     let mut stepper = ModalStepper::new(&Arc::new(modes(&space).unwrap()), &aimed, period_s);
-    // The record's statement: half-sine of 50 N and 0.41 ms on AZ3 at t = 2 ms, sample n at t = n / fs.
+    // The record's statement: half-sine of 50 N and 0.41 ms on AZ3 at t = 2 ms, sample n at t = n /
+    // fs.
     let hit = [ForceSegment::half_sine(2e-3, 4.1e-4, 50.0)];
     let mut errors = vec![Vec::new(); 5];
     for (n, row) in record.iter().enumerate() {
@@ -64,7 +65,8 @@ fn a_hit_on_az3_is_the_reference_record_but_for_its_noise() {
         let (from_s, to_s) = (n as f64 * period_s, (n + 1) as f64 * period_s);
         stepper.advance(Span::Scan, &ScanForces { from_s, to_s, hammer: &hit, shaker_n: 0.0 });
     }
-    // The record's noise: 0.05 µm/s/√Hz up to 25.6 kHz, 0.02 N; whatever offset it has is taken out here.
+    // The record's noise: 0.05 µm/s/√Hz up to 25.6 kHz, 0.02 N; whatever offset it has is taken out
+    // here.
     let noise = [8e-6, 8e-6, 0.02, 0.02, 0.02];
     for (channel, error) in errors.iter().enumerate() {
         let mean = error.iter().sum::<f64>() / error.len() as f64;

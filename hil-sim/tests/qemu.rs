@@ -1,7 +1,8 @@
-//! The emulated board: the firmware's binary gives the native board's records, and breaks down safely.
+//! The emulated board: the firmware's binary gives the native board's records, and breaks down
+//! safely.
 //!
-//! These tests need the image and QEMU; `cargo xtask test` builds and names the first and installs the
-//! second. Without `JOINTRIG_MPS2_IMAGE` they say so and pass.
+//! These tests need the image and QEMU; `cargo xtask test` builds and names the first and installs
+//! the second. Without `JOINTRIG_MPS2_IMAGE` they say so and pass.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used)]
 
@@ -320,7 +321,8 @@ fn the_uart_is_a_link_too() {
     let _ = std::fs::remove_file(socket);
 }
 
-/// Converters that fall out of step, in every way and with a program that looks late: nothing that was skewed is ever sent.
+/// Converters that fall out of step, in every way and with a program that looks late: nothing that
+/// was skewed is ever sent.
 #[test]
 fn converters_out_of_step_are_found_before_anything_is_sent() {
     let options = Options { seed: 7, ..Options::default() };

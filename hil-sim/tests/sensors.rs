@@ -13,7 +13,8 @@ fn silent() -> RigConfig {
     sensors.ldv_b.floor = 0.0;
     sensors.load_cells.noise_n = 0.0;
     sensors.excitation.noise_n = 0.0;
-    // Codes are held against the very signals here: the sensors' own errors have tests of their own (flaws.rs).
+    // Codes are held against the very signals here: the sensors' own errors have tests of their own
+    // (flaws.rs).
     config.errors.gain = 0.0;
     config.errors.skew_s = 0.0;
     config.errors.load_cell_cross_talk = 0.0;
@@ -89,8 +90,8 @@ fn signals_have_the_sizes_of_the_real_rig() {
         total_n = total_n.max(rig.truth()[6..9].iter().sum::<f64>().abs());
     }
     println!("{largest:?} {total_n}");
-    // Published for a 50 N hit: T of ±16–19 N over the hits on A; single-point spots below 4.2 mm/s, the scanner's points
-    // below 28 mm/s. Widths as wide as those figures are loose.
+    // Published for a 50 N hit: T of ±16–19 N over the hits on A; single-point spots below 4.2
+    // mm/s, the scanner's points below 28 mm/s. Widths as wide as those figures are loose.
     assert!((12.0..24.0).contains(&total_n), "{total_n}");
     assert!(largest[4] > 2e-4 && largest[4] < 4.2e-3 && largest[5] < 4.2e-3, "{largest:?}");
     assert!(largest[3] > 1e-3 && largest[3] < 28e-3, "{largest:?}");
@@ -117,7 +118,8 @@ fn noise_has_the_stated_size_and_an_absent_part_reads_only_noise() {
         let channel = &rig.channels()[at];
         let step = channel.units_per_volt * 10.0 / 32768.0;
         let rms = (sums[at] / f64::from(scans)).sqrt() * step;
-        // Rounding adds step²/12 (for the force channels, whose step is near σ, to a per cent); 40000 draws give 0.35 %.
+        // Rounding adds step²/12 (for the force channels, whose step is near σ, to a per cent);
+        // 40000 draws give 0.35 %.
         let expected = (sigma * sigma + step * step / 12.0).sqrt();
         assert!((rms / expected - 1.0).abs() < 0.03, "{}: {rms} for {expected}", channel.name);
     }

@@ -1,4 +1,5 @@
-//! The shaker under control, on the simulated rig: the amplitude that was ordered is the one that the structure has.
+//! The shaker under control, on the simulated rig: the amplitude that was ordered is the one that
+//! the structure has.
 #![allow(clippy::unwrap_used)]
 
 mod support;
@@ -29,7 +30,8 @@ fn order(frequency_hz: f64, control: Control) -> Shake {
     }
 }
 
-/// Amplitude (m) of the specimens' relative displacement in the last `scans` scans, whole cycles of `frequency_hz`.
+/// Amplitude (m) of the specimens' relative displacement in the last `scans` scans, whole cycles of
+/// `frequency_hz`.
 fn relative_m(host: &SmallHost, frequency_hz: f64, scans: usize) -> f64 {
     let rig = Rig::new(&RigConfig::default(), 1).unwrap();
     let unit = LDV.map(|place| {
@@ -76,8 +78,9 @@ fn the_specimens_move_as_far_as_was_ordered() {
     }
 }
 
-/// Amplitudes (m) of the specimens' relative displacement and of specimen A's own, in the last `scans` scans, whole cycles of
-/// `frequency_hz`; `volts` is what the two vibrometers give over what their scales say.
+/// Amplitudes (m) of the specimens' relative displacement and of specimen A's own, in the last
+/// `scans` scans, whole cycles of `frequency_hz`; `volts` is what the two vibrometers give over
+/// what their scales say.
 fn true_motions_m(host: &SmallHost, frequency_hz: f64, scans: usize, volts: [f64; 2]) -> [f64; 2] {
     let rig = Rig::new(&RigConfig::default(), 1).unwrap();
     let unit = [0, 1].map(|at: usize| {
@@ -214,8 +217,8 @@ fn the_force_can_be_held_too() {
     assert!((status.drive_v - 0.5).abs() < 0.02, "{status:?}");
 }
 
-/// The joint from the last cycles of the streamed records: Δx (m) and T (N), a cycle of scans each, the mean velocity of each
-/// cycle taken out. A cycle is a whole number of scans.
+/// The joint from the last cycles of the streamed records: Δx (m) and T (N), a cycle of scans each,
+/// the mean velocity of each cycle taken out. A cycle is a whole number of scans.
 fn loops(host: &SmallHost, cycle: usize, cycles: usize) -> Vec<Vec<(f64, f64)>> {
     let rig = Rig::new(&RigConfig::default(), 1).unwrap();
     let unit: Vec<f64> = rig
@@ -245,7 +248,8 @@ fn area(one: &[(f64, f64)]) -> f64 {
     one.iter().zip(next).map(|(a, b)| 0.5 * (a.1 + b.1) * (b.0 - a.0)).sum()
 }
 
-/// Slope of T on Δx over 20 to 40 % of T's swing after each reversal, and the median of |T| over the last 30 % of each stroke.
+/// Slope of T on Δx over 20 to 40 % of T's swing after each reversal, and the median of |T| over
+/// the last 30 % of each stroke.
 fn stick_and_plateau(loops: &[Vec<(f64, f64)>]) -> (f64, f64) {
     let (mut products, mut squares, mut plateau) = (0.0, 0.0, Vec::new());
     for one in loops {
@@ -290,7 +294,8 @@ fn a_contact_that_slips_moves_as_far_as_was_ordered_and_its_records_show_it() {
         (IWAN, 32.0, 6e-6),
     ];
     for (text, frequency_hz, amplitude_m) in cases {
-        // The records are held against the joint itself: errors of spots and sensors would be in between.
+        // The records are held against the joint itself: errors of spots and sensors would be in
+        // between.
         let text = format!("{text}\n[errors]\nnone = true\n");
         let config = RigConfig::from_toml(&text).unwrap();
         let (board, link) = VirtualBoard::start(Some(&text), 4).unwrap();
@@ -333,8 +338,9 @@ fn a_contact_that_slips_moves_as_far_as_was_ordered_and_its_records_show_it() {
         assert!((seen_j / energy_j - 1.0).abs() < 0.03, "{case}: {seen_j} for {energy_j}");
         assert!((mu / config.contact.friction_coefficient - 1.0).abs() < 0.03, "{case}: {mu}");
         if config.contact.law == ContactLaw::Jenkins {
-            // Raw: the spots see 1.4 % of tilt, the lower push rod takes 1.3 % of T, and what rings while the contact sticks some per
-            // cent more or less: 174 N/um in most runs at 32 Hz and 3 um, and 183 at 10 um.
+            // Raw: the spots see 1.4 % of tilt, the lower push rod takes 1.3 % of T, and what rings
+            // while the contact sticks some per cent more or less: 174 N/um in most runs at 32 Hz
+            // and 3 um, and 183 at 10 um.
             let off = k_t / config.contact.stiffness_n_per_m[2] - 1.0;
             assert!(off.abs() < 0.05, "{case}: {k_t}");
         } else {

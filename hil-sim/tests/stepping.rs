@@ -77,8 +77,9 @@ fn a_hit_carries_the_exact_frfs() {
         let structure = Structure::new(&config, configuration);
         let contacts = &rig.last_hit().unwrap().contacts;
         assert_eq!(contacts.len(), 1);
-        // A sum at the scans is the transform with its images at multiples of the scan rate (Poisson). Velocity falls as
-        // f³ there, so that beyond 32 images a two-thousandth of the first is left, which is 1e-3 of a stiff low line.
+        // A sum at the scans is the transform with its images at multiples of the scan rate
+        // (Poisson). Velocity falls as f³ there, so that beyond 32 images a two-thousandth of the
+        // first is left, which is 1e-3 of a stiff low line.
         let folded = |s: Complex<f64>, quantity, outputs: &[Probe]| {
             (-32..=32)
                 .map(|image| s + Complex::new(0.0, 2.0 * PI * f64::from(image) / period_s))
@@ -112,8 +113,8 @@ fn a_hit_carries_the_exact_frfs() {
         }
         println!("{configuration} {impact} {response}: {worst:.1e}");
         assert!(worst < 2e-6, "{configuration} {impact} {response}: {worst:.1e}");
-        // The force cell is right within its own ringing, g (f / 6 kHz)² with g = 0.15, and within what twenty samples
-        // of a half-sine say of its area, (Ω T)² / 12 = 0.19 %.
+        // The force cell is right within its own ringing, g (f / 6 kHz)² with g = 0.15, and within
+        // what twenty samples of a half-sine say of its area, (Ω T)² / 12 = 0.19 %.
         for (line, f_khz) in [(0, 0.02), (3, 0.208), (5, 1.0)] {
             let seen = sums[line][0] / transform(&contacts[0], lines[line]);
             let tolerance = 2e-3 + 0.15 * f_khz * f_khz / 36.0;
@@ -153,15 +154,18 @@ fn the_shaker_moves_the_structure_as_its_frf_says() {
     let input = Probe { body: config.shaker.body, position_m: config.shaker.position_m, direction: Z };
     let exact =
         &exact_frf(&config, Configuration::Ajb, Quantity::Mobility, &[s], &outputs, &[input]).unwrap()[0];
-    // Holding delays by half a scan and shrinks by sinc; the excitation channel reads the held value a scan later.
+    // Holding delays by half a scan and shrinks by sinc; the excitation channel reads the held
+    // value a scan later.
     let held =
         Complex::cis(omega * period_s / 2.0) * ((omega * period_s / 2.0).sin() / (omega * period_s / 2.0));
     for spot in 0..2 {
         let seen = sums[4 + spot] / sums[9] / held;
-        // Left over: the start's e^{−12}, and the steps' images at 51 kHz, (200/51000)² of the drive.
+        // Left over: the start's e^{−12}, and the steps' images at 51 kHz, (200/51000)² of the
+        // drive.
         assert!((seen / exact[(spot, 0)] - 1.0).norm() < 1e-3, "{seen} for {}", exact[(spot, 0)]);
     }
-    // What the loop shows there: an ellipse of 86 N/µm slope, T ahead of Δx by 65°, not the contact's 180 N/µm.
+    // What the loop shows there: an ellipse of 86 N/µm slope, T ahead of Δx by 65°, not the
+    // contact's 180 N/µm.
     let force: Complex<f64> = sums[6..9].iter().sum();
     let k = force / ((sums[4] - sums[5]) / s);
     assert!((k.re / 1e6 - 86.0).abs() < 6.0 && (k.arg().to_degrees().abs() - 65.0).abs() < 3.0, "{k}");
@@ -221,7 +225,8 @@ fn overdamped_modes_are_real() {
 
 #[test]
 fn critical_damping_falls_back_to_the_exponential() {
-    // Arm B on one bushing at its centre of gravity, critically damped along z: two modes become one.
+    // Arm B on one bushing at its centre of gravity, critically damped along z: two modes become
+    // one.
     let mut config = no_mishaps();
     for cell in &mut config.load_cells {
         cell.stiffness_n_per_m = [0.0; 3];

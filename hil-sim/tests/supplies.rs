@@ -1,4 +1,5 @@
-//! Sensors fed with a constant current: without one nothing moves that needs it. And the specimen's temperature.
+//! Sensors fed with a constant current: without one nothing moves that needs it. And the specimen's
+//! temperature.
 #![allow(clippy::unwrap_used)]
 
 mod support;
@@ -23,7 +24,8 @@ fn slow(host: &mut SmallHost) -> Slow {
     }
 }
 
-/// Goes on until the device has measured this at the supply of a channel: a virtual board runs up to half a second ahead of its host.
+/// Goes on until the device has measured this at the supply of a channel: a virtual board runs up
+/// to half a second ahead of its host.
 fn until_measured(host: &mut SmallHost, channel: u8, fault: Option<SupplyFault>) {
     let own = |slow: &Slow| slow.supplies.iter().find(|supply| supply.channel == channel).map(Supply::fault);
     while own(&slow(host)) != Some(fault) {

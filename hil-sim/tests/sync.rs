@@ -1,4 +1,5 @@
-//! In step with another recorder: its edges and ours on one time, its clock for our scans, and what happens when that clock fails.
+//! In step with another recorder: its edges and ours on one time, its clock for our scans, and what
+//! happens when that clock fails.
 #![allow(clippy::unwrap_used)]
 
 mod support;
@@ -46,8 +47,8 @@ fn keeps_its_promises(start: impl Fn(&RigConfig) -> Started) {
     a_lost_clock_stops_the_shaker(start(&RigConfig::default()));
 }
 
-/// The other recorder's samples lie at times of their own, of a clock that is 80 ppm faster and began elsewhere. Two edges of its tell
-/// where all of them lie among the scans.
+/// The other recorder's samples lie at times of their own, of a clock that is 80 ppm faster and
+/// began elsewhere. Two edges of its tell where all of them lie among the scans.
 fn another_recorder_is_aligned((_board, controls, link): Started) {
     // a board runs ahead of its host: what is to come is told before the start
     let mut host = SmallHost::new(link);
@@ -83,7 +84,8 @@ fn fast_edges_are_counted((_board, controls, link): Started) {
     assert_eq!((told.edges, told.edges_lost), (4, 2));
 }
 
-/// The output rises when the coil is switched on and when the force is felt; both recorders know when.
+/// The output rises when the coil is switched on and when the force is felt; both recorders know
+/// when.
 fn a_shot_is_marked((_board, controls, link): Started) {
     let mut host = SmallHost::new(link);
     host.start();

@@ -1,6 +1,8 @@
-//! Nobody sleeps through a byte, whatever order the device's thread and the host's take. Every order is tried:
+//! Nobody sleeps through a byte, whatever order the device's thread and the host's take. Every
+//! order is tried:
 //!
-//!     RUSTFLAGS="--cfg every_order" cargo test --release -p jointrig-hil-sim --test wakes --target-dir target/loom
+//!     RUSTFLAGS="--cfg every_order" cargo test --release -p jointrig-hil-sim --test wakes
+//!     --target-dir target/loom
 //!
 //! Without that flag there is nothing here.
 #![cfg(every_order)]

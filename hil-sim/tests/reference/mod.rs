@@ -12,7 +12,8 @@ pub struct Reference {
     pub lines: Vec<(f64, DMatrix<Complex<f64>>)>,
 }
 
-/// Reads `tests/data/<name>.csv`: a header `f_hz,output,<input>:re,<input>:im,…`, then one row per line and output.
+/// Reads `tests/data/<name>.csv`: a header `f_hz,output,<input>:re,<input>:im,…`, then one row per
+/// line and output.
 pub fn load(name: &str) -> Reference {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(format!("{name}.csv"));
     let text = std::fs::read_to_string(&path).unwrap();

@@ -177,8 +177,9 @@ impl SmallHost {
                         && shot.phase == Phase::Listening
                         && self.shooting
                     {
-                        // Events overtake the blocks they tell of. Acknowledged beyond the record's end, the board
-                        // might pass the next shot's scan before it hears of that shot.
+                        // Events overtake the blocks they tell of. Acknowledged beyond the record's
+                        // end, the board might pass the next shot's scan before it hears of that
+                        // shot.
                         self.hold_at = self.hold_at.min(end_of_record(shot));
                     }
                     self.events.push(event);
@@ -276,7 +277,8 @@ impl SmallHost {
         }
     }
 
-    /// Scans by which `not_before` must lie ahead of a held acknowledgement so that the device cannot have passed it.
+    /// Scans by which `not_before` must lie ahead of a held acknowledgement so that the device
+    /// cannot have passed it.
     pub fn lead(&self) -> u64 {
         u64::from(self.hello.unwrap().ring_scans / 2) + 64
     }
@@ -320,7 +322,8 @@ impl SmallHost {
         self.codes[at(shot.trigger - BEFORE)..at(end)].to_vec()
     }
 
-    /// Two hits in one cell and one in another: their records. A host that dawdles leaves the board waiting.
+    /// Two hits in one cell and one in another: their records. A host that dawdles leaves the board
+    /// waiting.
     pub fn three_shots(&mut self, dawdle: bool) -> Vec<Vec<i16>> {
         self.start();
         let mut records = Vec::new();

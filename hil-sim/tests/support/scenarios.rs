@@ -1,4 +1,5 @@
-//! What must hold on every virtual board, native or emulated: each scenario takes a board's buttons and a host.
+//! What must hold on every virtual board, native or emulated: each scenario takes a board's buttons
+//! and a host.
 
 use jointrig_hil_sim::board::Controls;
 use jointrig_hil_sim::rig::RigConfig;
@@ -164,8 +165,8 @@ fn a_limit_brings_the_shaker_to_rest(controls: &Controls, host: &mut SmallHost) 
 fn a_stop_in_mid_pulse_takes_the_coil_away(controls: &Controls, host: &mut SmallHost) {
     host.start();
     host.stage(Configuration::Ajb, "AZ3", "A3", 0);
-    // A held board halts half a ring on. The order is given while it stands, and it is let run to a second halt, a hundred
-    // scans (2 ms) or a few blocks after the coil went on.
+    // A held board halts half a ring on. The order is given while it stands, and it is let run to a
+    // second halt, a hundred scans (2 ms) or a few blocks after the coil went on.
     let half = u64::from(host.hello.unwrap().ring_scans / 2);
     let (first, second) = (host.hold_at, host.hold_at + 10_240);
     host.until("the first halt", |host| host.next_scan >= first + half);
@@ -238,7 +239,8 @@ pub fn lost_scans_take_the_drive_away(lose: impl Fn(u64, u64), controls: &Contro
     lose(from, scans);
     host.until("the loss", |host| host.latest > from + scans);
     the_drive_rests_within_100_ms_of(from, controls, host);
-    // what it had been given for one block was all that it played: it did not go on when scans came again
+    // what it had been given for one block was all that it played: it did not go on when scans came
+    // again
     let seen = controls.seen();
     assert!((from..=from + 48).contains(&seen.driven_until), "{seen:?} from {from}");
     for event in [Event::ShakerStops(Reason::FrontEnd), Event::ShakerRests] {
@@ -258,7 +260,8 @@ pub fn a_host_that_is_gone_leaves_nothing_moving(controls: &Controls, host: &mut
     let status = host.status();
     assert_eq!((status.shaker, status.drive_v), (Shaker::Resting, 0.0));
     assert!(host.events.contains(&Event::ShakerStops(Reason::LinkLost)), "{:?}", host.events);
-    // a second of silence, the tenth in which it is noticed, a tenth of a second to rest, and one until the word was heard
+    // a second of silence, the tenth in which it is noticed, a tenth of a second to rest, and one
+    // until the word was heard
     let seen = controls.seen();
     let bound = u64::from(RATE / 10 * 13);
     assert!(seen.driven_until > 0 && seen.driven_until < last_word + bound, "{seen:?} after {last_word}");
