@@ -114,8 +114,8 @@ impl Sliders {
     fn bound(&mut self) {
         self.holds = (f64::NEG_INFINITY, f64::INFINITY);
         for (slip, reach) in self.slip.as_flattened().iter().zip(self.reach.as_flattened()) {
-            // |y − w| = reach (1 + c y), solved for y; padding is excluded because its infinities would
-            // give NaN.
+            // |y − w| = reach (1 + c y), solved for y; padding is excluded because its infinities
+            // would give NaN.
             if *reach < NEVER_SLIPS {
                 let grows = reach * self.load_slope_per_m;
                 self.holds.0 = self.holds.0.max((slip - reach) / (1.0 + grows));
