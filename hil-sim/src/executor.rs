@@ -135,7 +135,7 @@ impl Wake for Woken {
 #[unsafe(export_name = "__pender")]
 fn pender(context: *mut ()) {
     // SAFETY: the only executors of this program are made by `Tasks::new`, which passes a pointer
-    // to a `Woken` that is leaked and so lives for ever; `Woken` is atomic and may be used from any
+    // to a `Woken` that is leaked and so never freed; `Woken` is atomic and may be used from any
     // thread.
     let woken = unsafe { &*context.cast::<Woken>() };
     woken.set();

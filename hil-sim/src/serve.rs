@@ -244,8 +244,8 @@ pub fn pseudo_terminal(board: &mut HostEnd, name: impl FnOnce(&str)) -> io::Resu
     // while open here, the slave is locked to this process; the peer must be able to open it by
     // name
     drop(slave);
-    // held open as a plain, non-exclusive file: a terminal that nobody has open returns an error on
-    // reading, and a peer that disconnects must not end the service
+    // held open as a plain, non-exclusive file: a terminal that is not open anywhere returns an
+    // error on reading, and a peer that disconnects must not end the service
     let keeper = File::options().read(true).write(true).open(&path)?;
     let mut reader = master.try_clone_native()?;
     reader.set_timeout(POLL)?;

@@ -82,8 +82,8 @@ fn check_case(name: &str) {
             close("std", z.std, number(row, "std"), 5e-3);
         }
         assert_eq!(got.lines as f64, number(row, "lines"));
-        // Three internals for two, four or six interface DoFs: the printed form always says so
-        // here.
+        // Three internals for two, four or six interface DoFs: the printed form always reports
+        // it here.
         assert_eq!(method == "internal-printed", got.warnings.iter().any(|w| w.contains("Π has rank")));
     }
     for quality in &result.virtual_points {

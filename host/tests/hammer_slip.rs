@@ -95,7 +95,7 @@ fn rig(seed: u64) -> RigConfig {
     config
 }
 
-/// Two good hits in each cell, the second while the first still decays.
+/// Two good hits in each cell, the second on the residual motion of the first.
 fn measured(config: &RigConfig, seed: u64) -> Campaign {
     let mut rig = Rig::new(config, seed).expect("a rig");
     let scale: Vec<f64> = rig.channels().iter().map(|c| c.step() * f64::from(c.polarity)).collect();

@@ -56,8 +56,8 @@ pub fn allowed(results: &Value, origin: &Value) -> Vec<f64> {
 /// Whether a six-digit number is among these sorted ones.
 #[must_use]
 pub fn among(known: &[f64], value: f64) -> bool {
-    // six digits in 32 bits: half of the last digit, plus the f32 rounding; the sixth digit of
-    // 1.00000 is worth most
+    // six digits stored as f32: half of the sixth digit, which is at most 5e-6 (at 1.00000), plus
+    // the f32 rounding
     let near = |k: &f64| (k - value).abs() <= 6e-6 * value.abs().max(1e-30);
     let at = known.partition_point(|k| *k < value);
     known[at.saturating_sub(1)..known.len().min(at + 2)].iter().any(near)

@@ -58,7 +58,7 @@ fn the_rigid_clamp_shows_the_contact() {
     let results = demo(folder.path(), &["--rig", rig.to_str().unwrap()]);
     let k = sliding_stiffness(&results, "internal");
     assert!((k / 180.0 - 1.0).abs() < 0.05, "{k} N/µm");
-    // only noise deviates these lines, and its size is the noise reported for each: the median of
+    // only noise changes these lines, and its size is the noise reported for each: the median of
     // the absolute value of a normal distribution is 0.674 σ; three hits determine a variance to
     // some tens of per cent
     let spectrum = &results["joint_spectrum"];

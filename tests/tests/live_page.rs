@@ -116,7 +116,8 @@ fn a_campaign_is_seen_while_it_is_measured() {
     assert_eq!(page.errors(), Vec::<String>::new());
 }
 
-/// The test itself sends the server's message about a hit with each verdict.
+/// The test passes to the page the message that the server would send about a hit with each
+/// verdict.
 #[test]
 fn every_verdict_has_a_sign_a_pattern_and_its_reason() {
     let (_folder, file) = campaign();

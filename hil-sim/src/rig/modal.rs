@@ -10,7 +10,7 @@ use num_complex::Complex;
 
 use super::state_space::StateSpace;
 
-/// A basis with a larger condition number loses more digits than the eight promised allow.
+/// With a larger condition number the result would have fewer than the eight digits required.
 const WORST_CONDITION: f64 = 1e7;
 /// Largest deviation of the basis' transfer functions from a direct solve, relative to the largest
 /// entry.
