@@ -1,5 +1,5 @@
-//! The algebra of the methods on random well-posed structures: masses, dampers and springs on s = σ
-//! + iω, assembled directly.
+//! The algebra of the methods on random well-posed structures: masses, dampers and springs on
+//! s = σ + iω, assembled directly.
 
 use jointrig::substructuring::coupling::couple;
 use jointrig::substructuring::decoupling::{InverseBlock, PrimalBlock, interface, internal, inverse, primal};

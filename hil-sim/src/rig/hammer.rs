@@ -2,8 +2,8 @@
 //! freely after the pulse.
 //!
 //! m x'' = coil − preload − k x while the current is on, m x'' = −preload − k x after it. Both are
-//! solved in closed form, as are the arrival times, so a pulse has no step size. At the surface (x
-//! = gap) the structure counts as rigid: the tip's spring reverses the bolt in a half-sine of
+//! solved in closed form, as are the arrival times, so a pulse has no step size. At the surface
+//! (x = gap) the structure counts as rigid: the tip's spring reverses the bolt in a half-sine of
 //! duration π √(m/k_tip) and peak v √(m k_tip), and a fraction of the speed is left. With too short
 //! a pulse the bolt turns back before it arrives. With a longer one it is faster, until it arrives
 //! with the current still on; with a still longer one the coil pushes it on: it strikes again, and

@@ -197,8 +197,8 @@ impl Contents {
 
 /// Number of data sets that any file may have.
 const LEAST_SETS: usize = 32_768;
-/// One more data set is allowed for each of this many bytes: the header of a function alone has
-/// 400.
+/// One more data set is allowed for each of this many bytes: the header of a function alone
+/// has 400.
 const BYTES_OF_SET: usize = 512;
 /// Number of data sets that are read at a time.
 const BATCH: usize = 1024;
