@@ -1,4 +1,4 @@
-//! Tells the crate what it is built for, so that a virtual board can say it in its handshake.
+//! Passes the build target to the crate, so that a virtual board can report it in its handshake.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");

@@ -1,4 +1,5 @@
-//! A campaign's analysis against unpacking and transforming what it must read; and how time and memory grow with hits and cells.
+//! A campaign's analysis compared with unpacking and transforming its data; and the growth of time
+//! and memory with hits and cells.
 
 use super::growth::{Cost, Growth, TIMES, measured};
 use super::row::{Row, quickest};
@@ -55,7 +56,8 @@ fn simulated() -> Result<Box<dyn Transport>, Box<dyn Error>> {
     Ok("sim:".parse::<Address>()?.open(1)?)
 }
 
-/// Each record out of the file, and each of its channels unpacked and transformed once: no analysis can do with much less.
+/// Reads each record from the file, and unpacks and transforms each of its channels once: the
+/// minimum work of an analysis.
 fn unpacked_and_transformed(path: &Path, records: &[i64]) {
     records.par_chunks(records.len().div_ceil(rayon::current_num_threads())).for_each(|records| {
         let store = Store::open_read_only(path).expect("just measured");
@@ -67,7 +69,7 @@ fn unpacked_and_transformed(path: &Path, records: &[i64]) {
                 let (chunk, after) = after.split_at(u32::from_le_bytes(*length) as usize);
                 rest = after;
                 let codes: Vec<i16> = pco::standalone::simple_decompress(chunk).expect("just written");
-                // two seconds, as the analysis transforms them
+                // two seconds, as in the analysis
                 let mut signal: Vec<f64> = codes.iter().take(102_400).copied().map(f64::from).collect();
                 let fft = planner.plan_fft_forward(signal.len());
                 let mut spectrum = fft.make_output_vec();
@@ -105,7 +107,7 @@ fn campaign(folder: &Path, wanted: u32, impacts: usize, responses: usize) -> Res
     Ok(path)
 }
 
-/// Time and memory of the FRFs of a file of each size.
+/// Time and memory to compute the FRFs of a file of each size.
 fn of_files(heap: PeakAlloc, paths: &[PathBuf; TIMES.len()]) -> [Cost; TIMES.len()] {
     let stores = paths.each_ref().map(|path| Store::open_read_only(path).expect("just measured"));
     let jobs = stores.each_ref().map(|store| {

@@ -1,4 +1,5 @@
-//! A minute of ten channels from bytes on the wire to the tape, against a copy of the bytes and their CRC.
+//! Decoding a minute of ten channels from the bytes on the link to samples, compared with a copy of
+//! the bytes and their CRC.
 
 use super::noise::numbers;
 use super::row::{RUNS, Row, quickest};
@@ -18,7 +19,7 @@ use std::time::Duration;
 const CHANNELS: usize = 10;
 const SCANS: usize = 60 * 51_200;
 
-/// Bytes that are there already.
+/// A transport over bytes in memory.
 struct Tape {
     bytes: Arc<Vec<u8>>,
     at: usize,
@@ -68,13 +69,13 @@ pub fn rows() -> Result<Vec<Row>, Box<dyn Error>> {
     Ok(rows)
 }
 
-/// What a device sends.
+/// The bytes that a device sends.
 fn wire(packets: bool) -> Result<Vec<u8>, Box<dyn Error>> {
     let each = scans_per_block(CHANNELS).ok_or("a block holds no scan")?;
     let noise: Vec<u8> =
         numbers(each * CHANNELS, 1).iter().flat_map(|v| ((v * 3e3) as i16).to_le_bytes()).collect();
     let mut bytes = Vec::new();
-    // a reader takes COBS until the device's Hello says otherwise
+    // a reader expects COBS until the device's Hello announces packets
     let hello = Hello { role: Role::Device, packets, ..Hello::host(1) };
     bytes.extend(encode(Kind::Hello, &hello.to_bytes(), &mut [0; MAX_WIRE])?);
     let mut writer = Writer::new(Kind::Samples);
@@ -91,7 +92,7 @@ fn wire(packets: bool) -> Result<Vec<u8>, Box<dyn Error>> {
     Ok(bytes)
 }
 
-/// Scans that arrive.
+/// Number of decoded scans.
 fn decoded(bytes: &Arc<Vec<u8>>, packets: bool) -> u64 {
     let mut link = Link::new(Box::new(Tape { bytes: bytes.clone(), at: 0, packets }));
     let mut stream = Stream::new(1, 0, 0, CHANNELS, 51_200);

@@ -1,4 +1,5 @@
-//! The same work at 1, 4 and 16 times the size: time and memory, and the power of the size that they go with.
+//! The same work at 1, 4 and 16 times the size: time and memory, and their exponents as powers of
+//! the size.
 
 use super::row::{RUNS, in_turns};
 use peak_alloc::PeakAlloc;
@@ -7,33 +8,35 @@ use std::time::Instant;
 
 /// The largest exponent of time.
 const TIME: f64 = 1.05;
-/// Memory that does not grow with the size stays within this factor over the whole range; threads meet at different moments.
+/// Memory that does not grow with the size stays within this factor over the whole range; it is not
+/// constant because the timing of threads varies.
 const FLAT: f64 = 1.5;
 
-/// How many times the first size.
+/// Sizes, relative to the first.
 pub const TIMES: [usize; 3] = [1, 4, 16];
 
-/// What one size takes.
+/// Cost of one size.
 #[derive(Clone, Copy)]
 pub struct Cost {
-    /// The quickest run, s.
+    /// The fastest run, s.
     pub seconds: f64,
-    /// The heap's peak above what was there before, MB.
+    /// Peak of the heap above the initial usage, MB.
     pub megabytes: f64,
 }
 
-/// A work at several sizes.
+/// Work measured at several sizes.
 pub struct Growth {
-    /// What is done, and what grows.
+    /// Description of the work, and of what grows.
     pub what: String,
-    /// What each size of [`TIMES`] took.
+    /// Costs at the sizes [`TIMES`].
     pub steps: [Cost; TIMES.len()],
-    /// Whether memory must not grow with it.
+    /// Whether memory must stay constant.
     pub flat_memory: bool,
 }
 
-/// The cost of the same job at each size, in a program whose allocator is `heap`. The sizes take turns: none finds its data in the
-/// processor's cache because it is small, and a busy spell of the machine falls on all of them.
+/// The cost of the same job at each size, in a program whose allocator is `heap`. The sizes
+/// alternate, so that a small one does not find its data in the processor's cache, and temporary
+/// load on the machine affects all of them.
 pub fn measured(heap: PeakAlloc, mut jobs: [impl FnMut(); TIMES.len()]) -> [Cost; TIMES.len()] {
     let mut costs = [Cost { seconds: f64::INFINITY, megabytes: f64::INFINITY }; TIMES.len()];
     in_turns(RUNS, jobs.len(), |job| {
@@ -54,7 +57,7 @@ impl Growth {
         (of(last) / of(first)).ln() / (TIMES[2] as f64).ln()
     }
 
-    /// What grows faster than wanted, in words.
+    /// Messages about what grows faster than its limit.
     pub fn short(&self) -> Vec<String> {
         let (time, memory) = (self.exponent(|c| c.seconds), self.exponent(|c| c.megabytes));
         let mut short = Vec::new();

@@ -1,4 +1,4 @@
-//! What the tables of docs/performance.md are measured with.
+//! Measurements for the tables of docs/performance.md.
 #![cfg(feature = "table")]
 #![allow(clippy::missing_panics_doc, reason = "a benchmark that cannot go on stops")]
 

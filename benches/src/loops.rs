@@ -1,5 +1,6 @@
-//! Loops and all their figures from 60 s of ten channels at 51.2 kHz, against numpy, which must find the same numbers, and against one
-//! pass over the samples of the five channels that are needed.
+//! Loops and all their quantities from 60 s of ten channels at 51.2 kHz, compared with numpy, which
+//! must find the same numbers, and with one pass over the samples of the five channels that are
+//! needed.
 
 use super::peers::{self, Peers};
 use super::row::{RUNS, Row, quickest};
@@ -17,16 +18,16 @@ use std::path::Path;
 
 const RATE_HZ: u32 = 51_200;
 const SECONDS: usize = 60;
-/// A cycle of no whole number of samples: 204.8.
+/// A cycle is 204.8 samples, not a whole number.
 const FREQUENCY_HZ: f64 = 250.0;
 const MASS_KG: f64 = 1.56;
 const PATH: f64 = 0.0133;
-/// Both sides' figures agree to this: they interpolate between samples in different ways.
+/// Relative tolerance between both results: they interpolate between samples in different ways.
 const ALIKE: f64 = 2e-3;
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
-/// The one row.
+/// The single row of this part.
 pub fn rows(all: &Peers) -> Outcome<Vec<Row>> {
     let map = channels()?;
     let samples = Samples { codes: codes(&map), channels: map.len() };
@@ -63,7 +64,7 @@ pub fn rows(all: &Peers) -> Outcome<Vec<Row>> {
     ])
 }
 
-/// Sums of the samples of the five channels, as numbers.
+/// Sums of the samples of the five channels.
 fn one_pass(map: &ChannelMap, samples: &Samples) -> f64 {
     let wanted = |role| matches!(role, Role::SpecimenA | Role::SpecimenB | Role::LoadCell);
     let places: Vec<usize> = (0..map.len()).filter(|place| wanted(map.channels[*place].role)).collect();
@@ -73,7 +74,7 @@ fn one_pass(map: &ChannelMap, samples: &Samples) -> f64 {
         .sum()
 }
 
-/// Loops of the raw and of the corrected force.
+/// Loops with the raw and with the corrected force.
 fn both(map: &ChannelMap, samples: &Samples, level: &Level) -> Outcome<[LoopAnalysis; 2]> {
     let cells: Vec<(usize, f64)> = map.places(Role::LoadCell).into_iter().map(|place| (place, 1.0)).collect();
     let raw = record(map, &cells, samples, level)?;
@@ -81,7 +82,7 @@ fn both(map: &ChannelMap, samples: &Samples, level: &Level) -> Outcome<[LoopAnal
     Ok(analyse_both(&raw, &correction)?)
 }
 
-/// The figures that both sides must agree in.
+/// The quantities in which both must agree.
 fn figures(found: &[LoopAnalysis; 2]) -> Vec<(&'static str, f64)> {
     let [raw, corrected] = found;
     vec![
@@ -115,7 +116,7 @@ fn channels() -> Outcome<ChannelMap> {
     Ok(ChannelMap { id: 0, rate_hz: RATE_HZ, exact_hz: None, channels })
 }
 
-/// x_A, x_B and T of a contact of 180 N/µm that loses some energy, with noise on everything.
+/// x_A, x_B and T of a contact of 180 N/µm with some energy dissipation, with noise on all signals.
 fn codes(map: &ChannelMap) -> Vec<i16> {
     let n = SECONDS * RATE_HZ as usize;
     let w = TAU * FREQUENCY_HZ;

@@ -1,4 +1,4 @@
-//! Numbers to measure with.
+//! Pseudo-random input data.
 
 /// Uniform numbers in −1 … 1, the same in every run.
 pub fn numbers(count: usize, seed: u64) -> Vec<f64> {

@@ -1,15 +1,15 @@
-//! The peers' side: scripts for the Python that `JOINTRIG_PYTHON` names.
+//! Runs the peers' scripts with the Python given by `JOINTRIG_PYTHON`.
 
 use super::row::{RUNS, SPELL};
 use serde_json::Value;
 use std::error::Error;
 use std::process::Command;
 
-/// A Python with the peers' packages; none where nobody named one.
+/// A Python with the peers' packages, if one is configured.
 pub struct Peers(Option<String>);
 
 impl Peers {
-    /// As the environment says.
+    /// Reads the environment variable.
     pub fn found() -> Self {
         Peers(std::env::var("JOINTRIG_PYTHON").ok())
     }
@@ -19,7 +19,8 @@ impl Peers {
         self.0.is_some()
     }
 
-    /// Runs a script of the folder `peers`, which is told how long our own jobs run, and gives the document that it prints; none without a Python.
+    /// Runs a script of the folder `peers` and returns the document that it prints; `None` without
+    /// a Python. The script receives the number and duration of our own runs.
     pub fn run(&self, script: &str, job: &str) -> Result<Option<Value>, Box<dyn Error>> {
         let Some(python) = &self.0 else { return Ok(None) };
         let path = format!("{}/peers/{script}", env!("CARGO_MANIFEST_DIR"));
@@ -37,7 +38,7 @@ impl Peers {
     }
 }
 
-/// The quickest of the runs that a script tells, s.
+/// The fastest of the runs that a script reports, s.
 pub fn quickest(seconds: &Value) -> Option<f64> {
     seconds.as_array()?.iter().filter_map(Value::as_f64).reduce(f64::min)
 }

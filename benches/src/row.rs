@@ -1,57 +1,61 @@
-//! A line of the table: our time beside a peer's and beside the least that this machine needs.
+//! A row of the table: our time compared with a peer's and with the minimum that this machine
+//! needs.
 
 use std::fmt::Write;
 use std::time::{Duration, Instant};
 
-/// Runs of each side at least; the quickest counts, because all else that a machine does can only add to a time.
+/// Minimum number of runs of each side. The fastest counts, because other load on the machine can
+/// only add to a time.
 pub const RUNS: usize = 15;
 
-/// All sides run for as long at least: who shares the cache with a virtual machine has busy spells of some seconds.
+/// Minimum duration of the runs: on a virtual machine, load from others that share the cache can
+/// last some seconds.
 pub const SPELL: Duration = Duration::from_secs(15);
 
-/// One work, and how long each side takes.
+/// One kind of work, and the time that each side needs.
 pub struct Row {
-    /// What is done, and to how much.
+    /// Description and size of the work.
     pub work: String,
-    /// Our quickest run, s.
+    /// Our fastest run, s.
     pub ours_s: f64,
-    /// The program that laboratories use for it; none without Python, or where there is none.
+    /// The program that laboratories use for it; `None` without Python, or if there is none.
     pub peer: Option<Other>,
-    /// What no program can do without.
+    /// The minimum that any program needs.
     pub limit: Option<Other>,
 }
 
 /// The other side of a ratio.
 pub struct Other {
-    /// Who, or what.
+    /// Its name.
     pub name: String,
-    /// Its quickest run, s.
+    /// Its fastest run, s.
     pub seconds: f64,
-    /// For a peer, how many times as fast we want to be; for a limit, how many times its time we may take.
+    /// Target: for a peer, how many times as fast we must be; for a limit, how many times its time
+    /// we may take.
     pub wanted: Option<f64>,
 }
 
 impl Row {
-    /// Ours alone.
+    /// A row with our time only.
     pub fn of(work: impl Into<String>, ours_s: f64) -> Self {
         Row { work: work.into(), ours_s, peer: None, limit: None }
     }
 
-    /// Beside a peer, where it was run.
+    /// Adds the comparison with a peer, if it was run.
     #[must_use]
     pub fn beside(mut self, name: &str, seconds: Option<f64>, wanted: f64) -> Self {
         self.peer = seconds.map(|seconds| Other { name: name.into(), seconds, wanted: Some(wanted) });
         self
     }
 
-    /// Beside the limit.
+    /// Adds the comparison with the limit.
     #[must_use]
     pub fn against(mut self, name: &str, seconds: f64, wanted: Option<f64>) -> Self {
         self.limit = Some(Other { name: name.into(), seconds, wanted });
         self
     }
 
-    /// What is slower than wanted, in words.
+    /// Messages about what is slower than its target.
     pub fn short(&self) -> Vec<String> {
         let mut short = Vec::new();
         if let Some(Other { name, seconds, wanted: Some(wanted) }) = &self.peer {
@@ -90,13 +94,14 @@ pub fn table(rows: &[Row]) -> String {
     text
 }
 
-/// Three digits.
+/// Formats seconds with three digits.
 pub fn brief(seconds: f64) -> String {
     let digits = (2 - seconds.abs().log10().floor() as i32).clamp(0, 6) as usize;
     format!("{seconds:.digits$}")
 }
 
-/// The quickest of the runs of several jobs, s, in their order. The jobs take turns, so that a busy spell of the machine falls on all of them.
+/// The fastest run of each job, s, in order. The jobs alternate, so that temporary load on the
+/// machine affects all of them.
 pub fn quickest<const N: usize>(runs: usize, mut jobs: [&mut dyn FnMut(); N]) -> [f64; N] {
     let mut best = [f64::INFINITY; N];
     in_turns(runs, N, |job| {
@@ -107,7 +112,8 @@ pub fn quickest<const N: usize>(runs: usize, mut jobs: [&mut dyn FnMut(); N]) ->
     best
 }
 
-/// Calls `run` with the number of each job in turn, so many times and for long enough.
+/// Calls `run` with the number of each job in turn, at least `runs` times and for at least
+/// [`SPELL`].
 pub fn in_turns(runs: usize, jobs: usize, mut run: impl FnMut(usize)) {
     let begun = Instant::now();
     let mut done = 0;

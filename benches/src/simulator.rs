@@ -1,6 +1,8 @@
-//! The whole simulated device (rig, firmware, frames, link, a host that decodes every frame) against its rig alone.
+//! The whole simulated device (rig, firmware, frames, link, a host that decodes every frame)
+//! compared with its rig alone.
 //!
-//! Seconds here are seconds of processor time, all threads together, so that the figure is that of one core.
+//! Seconds here are seconds of processor time of all threads together, so that the result is that
+//! of one core.
 
 #[allow(missing_docs, reason = "test support")]
 #[path = "../../hil-sim/tests/it/support/mod.rs"]
@@ -18,10 +20,10 @@ use support::SmallHost;
 const SIMULATED_S: u64 = 40;
 const RATE_HZ: u64 = 51_200;
 const RUNS: usize = 3;
-/// Simulated seconds per processor second that are wanted of the whole.
+/// Target for the whole device: simulated seconds per processor second.
 const WANTED: f64 = 120.0;
 
-/// A row for each way of framing; and what falls short of the pace that is wanted.
+/// A row for each way of framing, and messages about what misses the target.
 pub fn rows() -> Result<(Vec<Row>, Vec<String>), Box<dyn Error>> {
     let config = RigConfig::default();
     let (mut best, mut failed) = ([f64::INFINITY; 3], None);
@@ -54,7 +56,7 @@ pub fn rows() -> Result<(Vec<Row>, Vec<String>), Box<dyn Error>> {
     Ok((vec![row("packets", packets), row("COBS", cobs)], short.into_iter().collect()))
 }
 
-/// Processor time of this process in s where the system tells it, else wall time since `begun`.
+/// Processor time of this process in s if the system reports it, otherwise wall time since `begun`.
 fn processor_s(begun: Instant) -> f64 {
     let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
     let nanoseconds: u64 = tasks
@@ -64,7 +66,7 @@ fn processor_s(begun: Instant) -> f64 {
     if nanoseconds > 0 { nanoseconds as f64 * 1e-9 } else { begun.elapsed().as_secs_f64() }
 }
 
-/// Seconds of `run`.
+/// Processor seconds of `run`.
 fn measure(run: impl FnOnce()) -> f64 {
     let begun = Instant::now();
     let before = processor_s(begun);
@@ -87,7 +89,7 @@ fn rig(config: &RigConfig) -> Result<f64, Box<dyn Error>> {
     }))
 }
 
-/// Frames in packets, as USB and `sim:` carry them, or in COBS.
+/// With frames in packets, as over USB and `sim:`, or in COBS.
 fn chain(packets: bool) -> Result<f64, Box<dyn Error>> {
     let (board, link) = VirtualBoard::start(None, 1)?;
     let mut host = SmallHost::reading(link, packets);
@@ -100,7 +102,7 @@ fn chain(packets: bool) -> Result<f64, Box<dyn Error>> {
             host.codes.clear();
             host.first_scan = host.next_scan;
         }
-        // the last shot's record is held to its end
+        // the last shot held the board at the end of its record
         host.release();
         let end = SIMULATED_S * RATE_HZ;
         while host.next_scan < end {

@@ -1,4 +1,5 @@
-//! H1 and coherence of many hits, against pyFRF and against the bare transforms of the same records.
+//! H1 and coherence of many hits, compared with pyFRF and with only the transforms of the same
+//! records.
 
 use super::noise::numbers;
 use super::peers::{self, Peers};
@@ -16,7 +17,7 @@ const HITS: usize = 100;
 const RESPONSES: usize = 10;
 const SAMPLES: usize = 102_400;
 
-/// The one row.
+/// The single row of this part.
 pub fn rows(all: &Peers) -> Result<Vec<Row>, Box<dyn Error>> {
     let records = ImpactRecords {
         fs_hz: 51_200.0,
@@ -26,7 +27,7 @@ pub fn rows(all: &Peers) -> Result<Vec<Row>, Box<dyn Error>> {
             .collect(),
         quantity: MotionQuantity::Velocity,
     };
-    // the whole record, as the peer takes it
+    // the whole record, as the peer uses it
     let settings = FrfSettings {
         windowing: Windowing {
             force_before_s: 1.0,
@@ -66,8 +67,8 @@ pub fn rows(all: &Peers) -> Result<Vec<Row>, Box<dyn Error>> {
     ])
 }
 
-/// Every channel of every hit through the same library's transform and nothing else. It works in place, and the records are
-/// wanted again: one copy of each belongs to it.
+/// Only the transform of every channel of every hit, with the same library. It works in place and
+/// the records are needed again, so each is copied once, which is included.
 fn transforms(records: &ImpactRecords) {
     let fft = RealFftPlanner::<f64>::new().plan_fft_forward(SAMPLES);
     let signals: Vec<&Vec<f64>> = records.force_n.iter().chain(records.response.iter().flatten()).collect();

@@ -1,5 +1,6 @@
-//! Virtual points and the paper's seven methods on 3600 lines, 27 × 24 → 12 × 12, against a numpy notebook and against the bare inverses
-//! that they need; and the bootstrap of 1000 replicates of the paper's campaign.
+//! Virtual points and the paper's seven methods on 3600 lines, 27 × 24 → 12 × 12, compared with a
+//! numpy notebook and with only the inverses that they need; and the bootstrap of 1000 replicates
+//! of the paper's campaign.
 
 use super::growth::{Growth, TIMES, measured};
 use super::noise::numbers;
@@ -19,15 +20,15 @@ use std::hint::black_box;
 use std::path::{Path, PathBuf};
 
 const LINES: usize = 3600;
-/// How many times as fast as numpy it must be.
+/// Target: how many times as fast as numpy it must be.
 const WANTED: f64 = 8.0;
-/// Both must find the same stiffness to this part.
+/// Relative tolerance between the stiffnesses of both.
 const SAME: f64 = 1e-6;
 const BAND: Band = Band { low_hz: 300.0, high_hz: 3000.0 };
 
 const REPLICATES: usize = 1000;
 const HITS: usize = 8;
-/// 300–600 Hz at half-hertz lines.
+/// 300–600 Hz with lines every 0.5 Hz.
 const MAIN_LINES: usize = 601;
 /// Seconds that the bootstrap may take on two cores.
 const BOOTSTRAP_S: f64 = 60.0;
@@ -40,8 +41,8 @@ fn both(a: impl Fn(Grouping) -> bool) -> impl Fn(&Point) -> bool {
     move |p| a(p.grouping)
 }
 
-/// One more sensor and three more impacts on A: 27 channels and 24 impacts in the assembly. A is rigid where they are, so their FRFs
-/// follow from the others.
+/// One more sensor and three more impacts on A: 27 channels and 24 impacts in the assembly. A is
+/// rigid there, so their FRFs follow from the others.
 fn widened(frf: &Frf, points: &mut Configuration) -> Result<Frf, Box<dyn Error>> {
     let on_a = both(|g| g == Grouping::InterfaceA);
     let own = |points: &[Point]| points.iter().filter(|p| on_a(p)).cloned().collect::<Vec<Point>>();
@@ -99,7 +100,7 @@ fn widened(frf: &Frf, points: &mut Configuration) -> Result<Frf, Box<dyn Error>>
     Ok(Frf::new(frequency_hz, sigma_per_s, frf.quantity(), outputs, inputs, lines)?)
 }
 
-/// The exact FRFs of a rigid clamp, repeated until there are `lines` of them from 300 Hz on.
+/// The exact FRFs of a rigid clamp, repeated to give `lines` lines from 300 Hz on.
 fn tiled(file: &str, lines: usize) -> Result<Frf, Box<dyn Error>> {
     let exact = read_frf(&data("frf_rigid").join(file))?;
     let step = (BAND.high_hz - BAND.low_hz) / lines as f64;
@@ -114,7 +115,7 @@ fn on_axis(exact: &Frf, frequency_hz: Vec<f64>) -> Result<Frf, Box<dyn Error>> {
     Ok(Frf::new(frequency_hz, exact.sigma_per_s(), exact.quantity(), outputs, inputs, lines)?)
 }
 
-/// Everything at hand for the methods: A, B and AJB of as many lines, and their geometry.
+/// The input data of the methods: A, B and AJB with `lines` lines each, and their geometry.
 fn case(lines: usize) -> Result<([Frf; 3], Geometry), Box<dyn Error>> {
     let mut geometry = read_positions(&data("positions/positions.xlsx"))?.geometry;
     let a = widened(&tiled("A.npz", lines)?, &mut geometry.a)?;
@@ -122,7 +123,7 @@ fn case(lines: usize) -> Result<([Frf; 3], Geometry), Box<dyn Error>> {
     Ok(([a, tiled("B.npz", lines)?, ajb], geometry))
 }
 
-/// The rows, and what falls short beside them.
+/// The rows, and messages about what misses its target in addition.
 pub fn rows(all: &Peers) -> Result<(Vec<Row>, Vec<String>), Box<dyn Error>> {
     let ([a, b, ajb], geometry) = case(LINES)?;
     let mut found = stiffness(&a, &b, &ajb, &geometry)?;
@@ -178,7 +179,7 @@ pub fn rows(all: &Peers) -> Result<(Vec<Row>, Vec<String>), Box<dyn Error>> {
     Ok((rows, short))
 }
 
-/// With more lines.
+/// Growth with the number of lines.
 pub fn growth(heap: PeakAlloc) -> Result<Growth, Box<dyn Error>> {
     let cases = TIMES.map(|times| case(times * LINES / 4).expect("it fits, as that of the rows"));
     let jobs = cases.each_ref().map(|([a, b, ajb], geometry)| {
@@ -193,7 +194,8 @@ pub fn growth(heap: PeakAlloc) -> Result<Growth, Box<dyn Error>> {
     })
 }
 
-/// What every line needs at least: one inverse of 12 × 12 and nine of 6 × 6 (two of the nine are pseudo-inverses, which cost more).
+/// The minimum for every line: one inverse of 12 × 12 and nine of 6 × 6 (two of the nine are
+/// pseudo-inverses, which cost more).
 struct Inverses {
     large: Vec<[f64; 288]>,
     small: Vec<[f64; 72]>,
@@ -237,7 +239,7 @@ fn complex(parts: &[f64], place: usize) -> Complex<f64> {
     Complex::new(parts[2 * place], parts[2 * place + 1])
 }
 
-/// What the notebook does: Z^J by all methods, and mean, scatter and median of k_z.
+/// The same work as the notebook: Z^J by all methods, and mean, scatter and median of k_z.
 fn stiffness(
     a: &Frf,
     b: &Frf,
@@ -269,7 +271,7 @@ fn for_numpy(file: &Path, a: &Frf, b: &Frf, ajb: &Frf, geometry: &Geometry) -> R
         Extra::Real(name, Array { shape: vec![points.len(), 3], values })
     };
     let mut extras = Vec::new();
-    // the notebook takes the interface first
+    // the notebook expects the interface first
     let interface_first = |y: &Frf, points: &Configuration, own: Grouping| -> Result<Frf, Box<dyn Error>> {
         let ordered = |points: &[Point], names: Vec<String>| -> Vec<String> {
             let of = |want: bool| {
@@ -287,7 +289,7 @@ fn for_numpy(file: &Path, a: &Frf, b: &Frf, ajb: &Frf, geometry: &Geometry) -> R
         )?)
     };
     let a = interface_first(a, &geometry.a, Grouping::InterfaceA)?;
-    // A's spare response is no internal
+    // A's spare response is not used as an internal point
     let spare = |name: &String| {
         geometry.a.channels.iter().any(|c| c.description == *name && c.grouping == Grouping::InternalA)
     };
@@ -323,7 +325,8 @@ fn for_numpy(file: &Path, a: &Frf, b: &Frf, ajb: &Frf, geometry: &Geometry) -> R
     Ok(())
 }
 
-/// Seconds of the quickest run for all replicates; the hits' spectra are at hand, as the analysis has them.
+/// Seconds of the fastest run for all replicates; the hits' spectra are already in memory, as in
+/// the analysis.
 fn bootstrap() -> Result<f64, Box<dyn Error>> {
     let geometry = read_positions(&data("positions/positions.xlsx"))?.geometry;
     let exact = read_frf(&data("frf_rigid").join("AJB.npz"))?;
@@ -358,7 +361,7 @@ fn bootstrap() -> Result<f64, Box<dyn Error>> {
     let mut again = || {
         black_box(prepared.bootstrap(&cells, REPLICATES, 1).expect("it did before"));
     };
-    // one run takes seconds: fifteen seconds hold enough of them
+    // one run takes seconds, so fifteen seconds contain enough runs
     let [seconds] = quickest(1, [&mut again]);
     Ok(seconds)
 }

@@ -1,4 +1,5 @@
-//! Universal files: 288 FRFs of 3600 complex lines, against pyuff and against a copy of the same bytes.
+//! Universal files: 288 FRFs of 3600 complex lines, compared with pyuff and with a copy of the same
+//! bytes.
 
 use super::noise::numbers;
 use super::peers::{self, Peers};

@@ -1,7 +1,8 @@
-//! Simulated seconds per second of a whole scan: modes against the matrix exponential, the named baseline.
+//! Throughput of a whole scan, in simulated seconds per second: the modal stepper compared with the
+//! baseline, the matrix exponential.
 //!
-//! `cargo bench -p jointrig-hil-sim --bench rig`; an item is a simulated second, so items per second is
-//! the ratio to real time at 51.2 kHz.
+//! Run with `cargo bench -p jointrig-hil-sim --bench rig`. One item is one simulated second, so
+//! items per second is the ratio to real time at 51.2 kHz.
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
@@ -20,13 +21,13 @@ fn record_modal(bencher: Bencher, configuration: &str) {
     record(bencher, configuration, Stepping::Fastest, 2);
 }
 
-/// The same by the matrix exponential; half as long.
+/// The same with the matrix exponential, for half the time.
 #[divan::bench(args = ["A", "B", "AJB"], sample_count = 10)]
 fn record_exponential(bencher: Bencher, configuration: &str) {
     record(bencher, configuration, Stepping::Exponential, 1);
 }
 
-/// Every mode driven in every scan: nothing has died away.
+/// Every mode is driven in every scan, so that no mode decays.
 #[divan::bench]
 fn shaker_modal(bencher: Bencher) {
     let mut rig = Rig::new(&RigConfig::default(), 1).expect("the default rig stands");
@@ -40,7 +41,7 @@ fn shaker_modal(bencher: Bencher) {
     });
 }
 
-/// The contact in gross slip, at 30 Hz: every scan is done in steps.
+/// The contact in gross slip at 30 Hz: every scan is divided into steps.
 #[divan::bench(args = ["stuck", "jenkins", "iwan"])]
 fn shaker_slip(bencher: Bencher, case: &str) {
     let text =

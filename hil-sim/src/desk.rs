@@ -1,27 +1,29 @@
-//! Words for whoever stands at the virtual rig: its normal load and its safety chain, line by line.
+//! Commands for the operator of the virtual rig, one per line: normal load and safety chain.
 //!
 //! ```text
-//! load 150         normal load, N: the contact carries at most μN from the next block on (a linear contact has no limit)
+//! load 150         normal load, N: the contact carries at most μN from the next block on
+//!                  (a linear contact has no limit)
 //! guard open       the guard over the hammer; guard shut
 //! emergency press  the emergency stop; emergency release, and then reset turns its key
 //! ```
 //!
-//! The link to the host knows nothing of them: in a laboratory, too, they are not the computer's.
+//! They are not available over the link to the host: in a laboratory, too, the computer does not
+//! control them.
 
 use std::io::{BufRead, Write};
 
 use crate::board::Controls;
 
-/// What may be said.
+/// The valid commands.
 const WORDS: &str = "load NEWTONS, guard open|shut, emergency press|release, reset";
 
-/// The longest line that is looked at, bytes.
+/// Maximum length of a line, bytes.
 const LONGEST: u64 = 256;
 
-/// Does what a line says; what has been done, or why it was not.
+/// Executes one command; returns what has been done, or why it was not.
 ///
 /// # Errors
-/// A line that is none of the words, or a load that is negative or no number.
+/// An unknown command, or a load that is negative or not a number.
 pub fn obey(controls: &Controls, line: &str) -> Result<String, String> {
     let words: Vec<&str> = line.split_whitespace().collect();
     match words[..] {
@@ -41,15 +43,16 @@ pub fn obey(controls: &Controls, line: &str) -> Result<String, String> {
     Ok(words.join(" "))
 }
 
-/// Obeys every line of `input` until it ends, and answers each on `output`; empty ones are passed over.
+/// Executes every line of `input` until it ends, and writes one response to `output` for each;
+/// empty lines are skipped.
 ///
 /// # Errors
-/// What reading or writing failed with.
+/// The I/O error of reading or writing.
 pub fn listen(controls: &Controls, mut input: impl BufRead, mut output: impl Write) -> std::io::Result<()> {
     let mut line = String::new();
     loop {
         line.clear();
-        // what is longer comes as several lines, none of which is a word
+        // a longer line is split, and none of its parts is a command
         if std::io::Read::take(&mut input, LONGEST).read_line(&mut line)? == 0 {
             return Ok(());
         }

@@ -1,14 +1,15 @@
 //! Virtual time: embassy's time driver and two executors that the simulator advances.
 //!
-//! embassy's time driver is one symbol of the whole program, so this one keeps its clock per thread: one
-//! simulated device is one thread, many devices are many threads, and none sees another's time. Time
-//! stands still while anything can run and jumps to the next wake-up when nothing can; wake-ups at the
-//! same instant happen in the order in which they were asked for. An empty queue means that the device
-//! waits for something that cannot come, and is an error that says so.
+//! embassy's time driver is one symbol of the whole program, so this one keeps its clock per
+//! thread: one simulated device is one thread, many devices are many threads, and their clocks are
+//! independent. Time does not advance while any task can run, and jumps to the next wake-up when
+//! none can; wake-ups at the same time happen in the order in which they were requested. An empty
+//! queue means that the device waits for something that cannot happen; this is reported as an
+//! error.
 //!
-//! Two ways of polling the same futures exist, because results must not depend on the order of polling:
-//! [`Polling::Join`] polls them all in turn, [`Polling::Tasks`] runs each as a task of embassy's own raw
-//! executor, as a board does.
+//! There are two ways of polling the same futures, because results must not depend on the order of
+//! polling: [`Polling::Join`] polls all of them in order, [`Polling::Tasks`] runs each as a task of
+//! embassy's own raw executor, as a board does.
 #![allow(
     unsafe_code,
     reason = "the time driver, the pender and the raw executor's poll are unsafe symbols of embassy"
@@ -26,7 +27,7 @@ use embassy_executor::raw::{Executor, TaskStorage};
 
 use crate::sync::AtomicBool;
 
-/// A wake-up that somebody asked for.
+/// A requested wake-up.
 struct Alarm {
     at_us: u64,
     sequence: u64,
@@ -68,7 +69,7 @@ impl embassy_time_driver::Driver for VirtualTime {
 
     fn schedule_wake(&self, at: u64, waker: &Waker) {
         ALARMS.with_borrow_mut(|alarms| {
-            // a future that is polled again asks again
+            // a future that is polled again requests the same wake-up again
             if alarms.iter().any(|Reverse(alarm)| alarm.at_us == at && alarm.waker.will_wake(waker)) {
                 return;
             }
@@ -100,17 +101,17 @@ pub fn now_us() -> u64 {
     NOW_US.get()
 }
 
-/// Set whenever some future can go on. Shared with the wakers, which other threads may use.
+/// Set when a future can continue. Shared with the wakers, which other threads may use.
 #[derive(Debug, Default)]
 pub struct Woken(AtomicBool);
 
 impl Woken {
-    /// Whether something was woken since the last time.
+    /// Whether something was woken since the last call.
     pub fn take(&self) -> bool {
         self.0.swap(false, Ordering::AcqRel)
     }
 
-    /// Whether something is woken, left as it is.
+    /// Whether something was woken, without clearing the flag.
     pub fn peek(&self) -> bool {
         self.0.load(Ordering::Acquire)
     }
@@ -133,16 +134,17 @@ impl Wake for Woken {
 /// embassy's executor calls this when one of its tasks was woken, from any thread.
 #[unsafe(export_name = "__pender")]
 fn pender(context: *mut ()) {
-    // SAFETY: the only executors of this program are made by `Tasks::new`, which passes a pointer to a
-    // `Woken` that is leaked and so lives for ever; `Woken` is atomic and may be used from any thread.
+    // SAFETY: the only executors of this program are made by `Tasks::new`, which passes a pointer
+    // to a `Woken` that is leaked and so never freed; `Woken` is atomic and may be used from any
+    // thread.
     let woken = unsafe { &*context.cast::<Woken>() };
     woken.set();
 }
 
-/// In which order a device's futures are polled.
+/// The order in which a device's futures are polled.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Polling {
-    /// All in turn, whenever any was woken.
+    /// All of them in order, whenever any was woken.
     #[default]
     Join,
     /// Each as a task of embassy's raw executor, when it was woken itself.
@@ -151,7 +153,7 @@ pub enum Polling {
 
 /// A set of endless futures of one device, and a way to poll them.
 pub enum Poller {
-    /// Polled in turn.
+    /// Polled in order.
     Join {
         /// The futures.
         futures: Vec<Pin<Box<dyn Future<Output = ()>>>>,
@@ -163,11 +165,11 @@ pub enum Poller {
 }
 
 impl Poller {
-    /// Takes the futures of one device. With [`Polling::Tasks`], executor and tasks are leaked: embassy
-    /// asks for `'static`, and a device that was run so lives until its program ends.
+    /// Takes the futures of one device. With [`Polling::Tasks`], executor and tasks are leaked:
+    /// embassy requires `'static`, so the device's futures remain in memory until the program ends.
     ///
     /// # Panics
-    /// Never: a task storage that was just made is free.
+    /// Never: a newly created task storage is free.
     pub fn new(
         polling: Polling,
         futures: Vec<Pin<Box<dyn Future<Output = ()>>>>,
@@ -190,7 +192,7 @@ impl Poller {
         }
     }
 
-    /// Polls once; the flag says whether to do it again.
+    /// Polls once; the flag indicates whether to poll again.
     pub fn poll(&mut self) {
         match self {
             Self::Join { futures, waker } => {
@@ -200,7 +202,7 @@ impl Poller {
                     let _ = future.as_mut().poll(&mut context);
                 }
             }
-            // SAFETY: this executor is polled from here alone, by the one thread that made it, and never
+            // SAFETY: this executor is polled only here, by the thread that created it, and never
             // from within one of its own tasks.
             Self::Tasks(executor) => unsafe { executor.poll() },
         }

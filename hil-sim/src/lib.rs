@@ -1,9 +1,10 @@
 //! The friction rig in software, and the virtual board that runs the real firmware over it.
 //!
-//! [`rig`] is the physics: structure, contact, hammer and sensors, one converter code per channel and scan.
-//! [`board`] runs the firmware library over it in virtual time ([`executor`]) behind a [`link`], which
-//! [`serve`] can put behind a pseudo-terminal or a socket. The simulator replaces volts, not code: it never
-//! imports the host, and the host cannot tell it from a rig except by its name.
+//! [`rig`] is the physics: structure, contact, hammer and sensors, one converter code per channel
+//! and scan. [`board`] runs the firmware library over it in virtual time ([`executor`]) with a
+//! [`link`], which [`serve`] can connect to a pseudo-terminal or a socket. The simulator replaces
+//! the voltages, not the code: it never imports the host, and the host can distinguish it from a
+//! rig only by its name.
 
 pub mod board;
 pub mod desk;

@@ -1,8 +1,9 @@
 //! The two ends of an in-process link: bytes to the device, bytes to the host.
 //!
-//! The device's end is asynchronous and wakes its executor; the host's end blocks with a timeout, as a
-//! serial port does. Closing either end closes both. The host is woken when a few packets have gathered or
-//! when the device has nothing more to do, so that a fast device does not wake it for every frame.
+//! The device's end is asynchronous and wakes its executor; the host's end blocks with a timeout,
+//! as a serial port does. Closing either end closes both. The host is woken when several packets
+//! have accumulated or when the device is idle, so that a fast device does not wake it for every
+//! frame.
 
 use std::collections::VecDeque;
 use std::io;
@@ -15,11 +16,12 @@ use jointrig_firmware::board::{ByteSink, ByteSource};
 use crate::executor::Woken;
 use crate::sync::{Condvar, Mutex, MutexGuard};
 
-/// Bytes that may wait for the host: beyond it the device's link is stalled, as a real one would be.
+/// Maximum number of bytes queued for the host: beyond it the device's link stalls, as a real one
+/// would.
 const TO_HOST_BYTES: usize = 1 << 20;
-/// Bytes that may wait for the device; a host that writes more is told to wait.
+/// Maximum number of bytes queued for the device; a host that writes more must wait.
 const TO_DEVICE_BYTES: usize = 1 << 16;
-/// Bytes at which a sleeping host is woken.
+/// Number of bytes at which a sleeping host is woken.
 const WORTH_WAKING_BYTES: usize = 16 << 10;
 
 #[derive(Default)]
@@ -29,7 +31,7 @@ struct Pipes {
     reader: Option<Waker>,
     writer: Option<Waker>,
     host_waits: bool,
-    /// The device has not heard yet that the link was cut.
+    /// The link was cut, and the device has not been notified yet.
     cut: bool,
     closed: bool,
 }
@@ -43,7 +45,7 @@ struct Shared {
 
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, Pipes> {
-        // bytes in a queue are whole after any panic elsewhere
+        // the byte queue is valid even after a panic in another thread
         self.pipes.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -77,7 +79,7 @@ fn gone() -> io::Error {
 }
 
 impl HostEnd {
-    /// Reads what is there, waiting up to `timeout` for the first byte; 0 when none came.
+    /// Reads the available bytes, waiting up to `timeout` for the first; 0 when none came.
     ///
     /// # Errors
     /// [`io::ErrorKind::BrokenPipe`] when the device has stopped and nothing is left to read.
@@ -112,8 +114,8 @@ impl HostEnd {
     /// Writes all bytes.
     ///
     /// # Errors
-    /// [`io::ErrorKind::BrokenPipe`] when the device has stopped; [`io::ErrorKind::WouldBlock`] when it
-    /// has not read for so long that nothing more fits.
+    /// [`io::ErrorKind::BrokenPipe`] when the device has stopped; [`io::ErrorKind::WouldBlock`]
+    /// when the queue is full because the device has not read for too long.
     pub fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
         let waker = {
             let mut pipes = self.0.lock();
@@ -135,8 +137,8 @@ impl HostEnd {
         Ok(())
     }
 
-    /// Cuts the link, as when the cable is pulled or the host's program ends: what the device has not read is lost, and it hears of
-    /// the cut. This end goes on as the next host's.
+    /// Cuts the link, as when the cable is pulled or the host's program ends: bytes that the device
+    /// has not read are lost, and it is notified. This end then serves the next host.
     pub fn cut(&mut self) {
         let waker = {
             let mut pipes = self.0.lock();
@@ -160,7 +162,7 @@ impl Drop for HostEnd {
 }
 
 impl DeviceEnd {
-    /// Closes the link: the host reads what is left, then hears that the device is gone.
+    /// Closes the link: the host reads what is left, then gets an error that the device is gone.
     pub fn close(&self) {
         self.0.close();
     }
@@ -170,7 +172,7 @@ impl DeviceEnd {
         self.0.lock().closed
     }
 
-    /// Sleeps until something of the device was woken or the link was closed.
+    /// Sleeps until a task of the device is woken or the link is closed.
     pub fn sleep(&self, woken: &Woken) {
         let mut pipes = self.0.lock();
         if !pipes.to_host.is_empty() {

@@ -1,4 +1,4 @@
-//! `jointrig-hil-sim`: the virtual board behind a pseudo-terminal or a socket.
+//! `jointrig-hil-sim`: serves the virtual board on a pseudo-terminal or a socket.
 #![forbid(unsafe_code)]
 
 use std::net::TcpListener;
@@ -21,28 +21,31 @@ struct Command {
 
 #[derive(Subcommand)]
 enum Action {
-    /// Serve one virtual board; its time stands still while no host listens.
+    /// Serve one virtual board; its time does not advance while no host is connected.
     ///
-    /// Lines on stdin are orders to whoever stands at the rig: `load NEWTONS` sets the normal load, `guard open|shut`,
-    /// `emergency press|release` and `reset` work the safety chain. Each is answered on stderr.
+    /// Lines on stdin are commands of the rig's operator: `load NEWTONS` sets the normal load,
+    /// `guard open|shut`, `emergency press|release` and `reset` work the safety chain. The response
+    /// to each is written to stderr.
     Serve(Serve),
 }
 
 #[derive(Args)]
 struct Serve {
-    /// Behind a new pseudo-terminal, whose path is printed: open it as serial:PATH.
+    /// Serve on a new pseudo-terminal and print its path: open it as serial:PATH.
     #[arg(long, conflicts_with = "tcp", required_unless_present = "tcp")]
     pty: bool,
-    /// On this TCP address, for example 127.0.0.1:4000: open it as tcp:ADDR. Port 0 takes a free one.
+    /// Serve on this TCP address, for example 127.0.0.1:4000: open it as tcp:ADDR. Port 0 takes a
+    /// free one.
     #[arg(long, value_name = "ADDR")]
     tcp: Option<String>,
     /// The rig's description; the built-in rig if left out.
     #[arg(long, value_name = "FILE.toml")]
     rig: Option<PathBuf>,
-    /// The firmware's image, to run under QEMU in place of the native board; it talks over its UART at the TCP address.
+    /// The firmware's image, to run under QEMU instead of the native board; its UART is served at
+    /// the TCP address.
     #[arg(long, value_name = "IMAGE", requires = "tcp", conflicts_with = "pty")]
     image: Option<PathBuf>,
-    /// Decides noise, scatter and every error of position.
+    /// Seed of noise, scatter and every position error.
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
@@ -83,7 +86,7 @@ fn run(options: &Serve) -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Listens to stdin as long as it lasts; its end does not end the service.
+/// Reads commands from stdin until it ends; the service continues after that.
 fn stand_at(controls: &Arc<Controls>) {
     let controls = Arc::clone(controls);
     std::thread::spawn(move || {
@@ -93,7 +96,7 @@ fn stand_at(controls: &Arc<Controls>) {
     });
 }
 
-/// Runs the image until it ends: QEMU itself listens at the address.
+/// Runs the image until it ends: QEMU itself listens on the address.
 #[cfg(unix)]
 fn serve_image(
     image: &Path,
@@ -111,7 +114,7 @@ fn serve_image(
     let (board, mut link) = QemuBoard::start_with(image, &config, &options)?;
     stand_at(board.controls());
     println!("tcp:{address}");
-    // nothing comes this way; it ends with the board
+    // no data comes this way; reading fails when the board ends
     while link.read(&mut [0; 64], Duration::from_secs(1)).is_ok() {}
     Err(board.failure().unwrap_or_else(|| "the emulated board has ended".into()).into())
 }

@@ -1,8 +1,9 @@
-//! Puts a virtual board behind a pseudo-terminal or a TCP socket, byte for byte.
+//! Connects a virtual board to a pseudo-terminal or a TCP socket, byte for byte.
 //!
-//! The board's time stands still while nobody acknowledges, so a peer may come and go; each new peer starts
-//! with a handshake of its own. Whoever comes by TCP may be anybody: who does not shake hands is let go, and who is silent makes room for the
-//! next. Whatever a peer sends, or does not read, is its own loss; only the end of the board ends the service.
+//! The board's time stops while its data is not acknowledged, so a peer may connect and disconnect;
+//! each new peer starts with its own handshake. A TCP peer may be any program: one that does not
+//! shake hands is disconnected, and a silent one is disconnected when another waits. Whatever a
+//! peer sends or fails to read affects only that peer; only the end of the board ends the service.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -15,34 +16,36 @@ use jointrig_protocol::hello::Hello;
 
 use crate::link::HostEnd;
 
-/// How long the bridge waits for either side before it looks at the other.
+/// How long the bridge waits for one side before it polls the other.
 const POLL: Duration = Duration::from_millis(20);
 
-/// A peer's first frame must be a good Hello within this time; a host sends it at once, and again after a fifth of a second.
+/// A peer's first frame must be a valid Hello within this time; a host sends it immediately, and
+/// again after 0.2 s.
 const HANDSHAKE: Duration = Duration::from_secs(5);
-/// … and within this while others wait.
+/// The same limit while others wait.
 const HANDSHAKE_BEFORE_OTHERS: Duration = Duration::from_secs(1);
-/// A peer that is silent for so long makes room when another one waits. A host may be silent while somebody moves hammer and laser.
+/// A peer that is silent for this long is disconnected if another one waits. A host may be silent
+/// while an operator moves hammer and laser.
 const SILENCE: Duration = Duration::from_mins(1);
 
-/// Peers that may wait for their turn; further ones are turned away.
+/// Maximum number of waiting peers; further ones are refused.
 const QUEUE: usize = 16;
 
-/// Why a peer is served no longer.
+/// Why a connection to a peer ended.
 #[derive(Debug, PartialEq, Eq)]
 enum End {
-    /// It went away.
+    /// It disconnected.
     Went,
     /// It did not shake hands.
     Stranger,
-    /// It was silent, and somebody else waits.
+    /// It was silent, and another peer waits.
     Silent,
 }
 
-/// How long peers are waited for; `None` for one that has the line to itself.
+/// Returns whether other peers wait; `None` for a peer with exclusive use of the line.
 type Waiting<'w> = Option<&'w mut dyn FnMut() -> bool>;
 
-/// Carries bytes both ways until the peer goes away, or has to.
+/// Carries bytes both ways until the peer disconnects or is disconnected.
 ///
 /// # Errors
 /// The board has stopped.
@@ -56,7 +59,7 @@ fn bridge(
     let gone = AtomicBool::new(false);
     let outcome = std::thread::scope(|scope| {
         let gone = &gone;
-        // dropped with this closure: a sender that waits for room hears of it
+        // dropped with this closure, so that a blocked sender gets an error
         let receiver = receiver;
         scope.spawn(move || {
             let mut bytes = [0; 4096];
@@ -79,7 +82,7 @@ fn bridge(
         gone.store(true, Ordering::Release);
         outcome
     });
-    // whoever comes next begins anew
+    // the next peer starts with an empty link
     board.cut();
     outcome
 }
@@ -101,7 +104,7 @@ fn carry(
             handshake.hear(&chunk);
             match board.write_all(&chunk) {
                 Ok(()) => (heard, heard_at) = (true, Instant::now()),
-                // the board reads when it has time; until then the peer waits
+                // the board's queue is full; the peer waits until the board reads
                 Err(error) if error.kind() == ErrorKind::WouldBlock => {
                     to_board = Some(chunk);
                     break;
@@ -110,7 +113,7 @@ fn carry(
             }
         }
         if from == to {
-            // bytes from the peer come first; while there were some, do not sleep on the board
+            // bytes from the peer come first; while there were some, do not block on the board
             let wait = if heard { Duration::ZERO } else { Duration::from_millis(1) };
             (from, to) = (0, board.read(&mut bytes, wait)?);
         }
@@ -118,7 +121,8 @@ fn carry(
             match to_peer.write(&bytes[from..to]) {
                 Ok(0) => return Ok(End::Went),
                 Ok(count) => from += count,
-                // a peer that does not read stalls the link, as a real one would; the board's time then stands still
+                // a peer that does not read stalls the link, as a real one would; the board's time
+                // then stops
                 Err(error) if is_pause(&error) => {}
                 Err(_) => return Ok(End::Went),
             }
@@ -157,24 +161,24 @@ impl Handshake {
     }
 }
 
-/// Whether there is nothing just now, or no room.
+/// Whether there is no data at present, or no space.
 fn is_pause(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted | ErrorKind::WouldBlock)
 }
 
-/// A line on stderr; nobody listening there ends no service.
+/// Writes a line to stderr; errors of stderr are ignored.
 fn tell(line: &str) {
     let _ = writeln!(io::stderr(), "{line}");
 }
 
-/// Serves one TCP peer after the other, for ever.
+/// Serves one TCP peer after the other, indefinitely.
 ///
 /// # Errors
-/// When the board has stopped, or nobody can be listened for.
+/// When the board has stopped, or listening fails.
 pub fn tcp(board: &mut HostEnd, listener: &TcpListener) -> io::Result<()> {
     let door = listener.try_clone()?;
     let (sender, peers) = sync_channel::<(TcpStream, SocketAddr)>(QUEUE);
-    // it ends with the process, or when nobody is served any more
+    // it ends with the process, or when no peer is served any more
     std::thread::spawn(move || {
         loop {
             match door.accept() {
@@ -185,7 +189,8 @@ pub fn tcp(board: &mut HostEnd, listener: &TcpListener) -> io::Result<()> {
                     }
                     Ok(()) => {}
                 },
-                // a peer that went before it was let in, or no more files just now
+                // the peer disconnected before it was accepted, or the process has no free file
+                // descriptor at present
                 Err(error) => {
                     tell(&format!("a peer could not be let in: {error}"));
                     std::thread::sleep(POLL);
@@ -216,7 +221,7 @@ pub fn tcp(board: &mut HostEnd, listener: &TcpListener) -> io::Result<()> {
     }
 }
 
-/// Both halves of a connection, neither of which waits for long.
+/// Both halves of a connection, with short timeouts.
 fn halves(stream: TcpStream) -> io::Result<(TcpStream, TcpStream)> {
     stream.set_nodelay(true)?;
     stream.set_read_timeout(Some(POLL))?;
@@ -224,10 +229,10 @@ fn halves(stream: TcpStream) -> io::Result<(TcpStream, TcpStream)> {
     Ok((stream.try_clone()?, stream))
 }
 
-/// Serves a pseudo-terminal, for ever. `name` hears the path to open.
+/// Serves a pseudo-terminal, indefinitely. `name` is called with the path to open.
 ///
 /// # Errors
-/// When no pseudo-terminal can be made or the board has stopped.
+/// When no pseudo-terminal can be created or the board has stopped.
 #[cfg(unix)]
 pub fn pseudo_terminal(board: &mut HostEnd, name: impl FnOnce(&str)) -> io::Result<()> {
     use std::fs::File;
@@ -236,10 +241,11 @@ pub fn pseudo_terminal(board: &mut HostEnd, name: impl FnOnce(&str)) -> io::Resu
 
     let (master, slave) = TTYPort::pair()?;
     let path = slave.name().unwrap_or_default();
-    // while open here the slave is locked to this process; the peer must be able to open it by name
+    // while open here, the slave is locked to this process; the peer must be able to open it by
+    // name
     drop(slave);
-    // held open as a plain file, exclusive to nobody: a terminal without any opener reads as an error, and
-    // a peer that goes must not end the service
+    // held open as a plain, non-exclusive file: a terminal that is not open anywhere returns an
+    // error on reading, and a peer that disconnects must not end the service
     let keeper = File::options().read(true).write(true).open(&path)?;
     let mut reader = master.try_clone_native()?;
     reader.set_timeout(POLL)?;

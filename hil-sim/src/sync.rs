@@ -1,5 +1,5 @@
-//! Locks and flags between the device's thread and the host's: the standard library's, or those of a model that tries every order of two
-//! threads (`tests/wakes.rs`).
+//! Locks and flags between the device's thread and the host's: the standard library's, or those of
+//! a model checker that tries every interleaving of two threads (`tests/wakes.rs`).
 
 #[cfg(every_order)]
 pub use loom::sync::{Condvar, Mutex, MutexGuard, atomic::AtomicBool};

@@ -1,4 +1,5 @@
-//! The hot paths of substructuring: all methods on a campaign's lines, the fit, and the bootstrap of 1000 replicates.
+//! The hot paths of substructuring: all methods on a campaign's lines, the fit, and the bootstrap
+//! of 1000 replicates.
 //!
 //!     cargo bench -p jointrig --bench substructuring
 
@@ -28,7 +29,8 @@ fn geometry() -> Geometry {
     read_positions(&data("positions/positions.xlsx")).expect("test data").geometry
 }
 
-/// The exact FRFs of a rigid clamp, repeated until there are `lines` of them from 300 Hz on, half a hertz apart.
+/// The exact FRFs of a rigid clamp, repeated to give `lines` lines from 300 Hz on, spaced by 0.5
+/// Hz.
 fn frf(file: &str, lines: usize) -> Frf {
     let exact = read_frf(&data("frf_rigid").join(file)).expect("test data");
     let frequency_hz = (0..lines).map(|l| 300.0 + 0.5 * l as f64).collect();
@@ -45,9 +47,10 @@ fn all_methods_on_3600_lines(bencher: Bencher) {
     bencher.bench(|| identify(&a, &b, &ajb, &geometry, &Method::PAPER, &[IdmSet::Six], &[band]));
 }
 
-/// `fit` of a simulated campaign over 300–600 Hz: 162 cells of the interface, 20 bands of 30 lines, 900 errors of geometry. What its weights
-/// alone gain over the formulas as they are written is printed by
-/// `cargo test --release -p jointrig-analysis --lib speed_of_the_weights -- --ignored --nocapture`.
+/// `fit` of a simulated campaign over 300–600 Hz: 162 cells of the interface, 20 bands of 30 lines,
+/// 900 geometry errors. The gain of its optimised weights over a direct implementation of the
+/// formulas is printed by `cargo test --release -p jointrig-analysis --lib speed_of_the_weights --
+/// --ignored --nocapture`.
 #[cfg(feature = "sim")]
 #[divan::bench(sample_count = 3)]
 fn fit_over_the_main_band(bencher: Bencher) {

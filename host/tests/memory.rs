@@ -1,6 +1,6 @@
-//! No reader allocates more than a small multiple of the file, whatever the file says of itself.
+//! No reader allocates more than a small multiple of the file's size, whatever the file declares.
 //!
-//! One test in a program of its own: the allocator that counts is everybody's.
+//! A single test in a separate program, because the counting allocator is global.
 
 use jointrig::exchange::uff_output::write_records;
 use jointrig::exchange::{
@@ -15,15 +15,16 @@ use std::path::{Path, PathBuf};
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
 
-/// Bytes allocated for each byte of a file of arrays or functions: a 4-byte float becomes two 8-byte ones (complex), once in the
-/// order of the file and once in ours, and text of a number is at least two bytes.
+/// Bytes allocated per byte of a file of arrays or functions: a 4-byte float becomes two 8-byte
+/// ones (complex), once in the order of the file and once in ours, and the text of a number has at
+/// least two bytes.
 const OF_ARRAYS: usize = 16;
 /// The same for a workbook, whose text is compressed and becomes a string for each of its cells.
 const OF_WORKBOOKS: usize = 32;
 /// Buffers that do not depend on the file.
 const BUFFERS: usize = 1 << 20;
 
-/// Uniform numbers, the same in every run.
+/// Uniform random numbers, the same in every run.
 struct Uniform(u64);
 
 impl Uniform {
@@ -37,7 +38,7 @@ fn data(file: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file)
 }
 
-/// The most that was allocated at one time while `work` ran, beyond what was there before.
+/// Peak of the memory allocated while `work` ran, beyond the initial usage.
 fn allocated(work: impl FnOnce()) -> usize {
     let before = MEMORY.current_usage();
     MEMORY.reset_peak_usage();
@@ -46,7 +47,7 @@ fn allocated(work: impl FnOnce()) -> usize {
 }
 
 fn write_noise(folder: &Path) {
-    // noise, which no archive makes smaller
+    // noise, which cannot be compressed
     let signal = |seed: usize| {
         let mut uniform = Uniform(seed as u64);
         (0..500).map(|_| uniform.below(1 << 30) as f64 / 1e9).collect::<Vec<f64>>()
@@ -79,7 +80,7 @@ fn damaged_and_lying_files_cost_a_small_multiple_of_their_size() {
         let mut most = 0;
         for trial in 0..60 {
             let mut bytes = whole.clone();
-            // the first as it is; then a few bytes changed, most of them where headers are; some cut off
+            // the first unchanged; then a few bytes changed, mostly in the headers; some truncated
             for _ in 0..trial.min(1) * (1 + uniform.below(4)) {
                 let near_an_end = uniform.below(bytes.len().min(600));
                 let place = [near_an_end, bytes.len() - 1 - near_an_end, uniform.below(bytes.len())];
@@ -91,7 +92,7 @@ fn damaged_and_lying_files_cost_a_small_multiple_of_their_size() {
             }
             std::fs::write(&at, &bytes).expect("written");
             let used = allocated(|| {
-                // one after the other: each gives back what it read
+                // one after the other: each frees its result
                 drop(read_frf_file(&at, &StatedUnits::default()));
                 drop(read_impacts(&at));
                 drop(read_hysteresis(&at));
@@ -109,7 +110,7 @@ fn damaged_and_lying_files_cost_a_small_multiple_of_their_size() {
             whole.len()
         );
     }
-    // headers that promise terabytes
+    // headers that declare terabytes
     let mut archive = zip::ZipWriter::new(std::fs::File::create(&at).expect("writable"));
     for name in ["fs.npy", "force.npy", "frf.npy", "frequency.npy", "velocity_a.npy"] {
         archive.start_file(name, zip::write::SimpleFileOptions::default()).expect("entry");

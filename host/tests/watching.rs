@@ -1,6 +1,7 @@
-//! Being watched costs the measuring thread no memory: neither the tap on the stream nor the live page's watcher asks for any.
+//! Observers do not allocate memory in the measuring thread: neither the tap on the stream nor the
+//! live page's watcher.
 //!
-//! One test in a program of its own: the allocator that counts is everybody's.
+//! A single test in a separate program, because the counting allocator is global.
 #![cfg(feature = "dashboard")]
 #![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
 
@@ -17,7 +18,8 @@ use std::time::Duration;
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
 
-/// The most that was allocated at one time while `work` ran, beyond what was there before: one byte that was asked for and given back counts.
+/// Peak of the memory allocated while `work` ran, beyond the initial usage: even one byte that was
+/// allocated and freed counts.
 fn allocated(work: impl FnOnce()) -> usize {
     let before = MEMORY.current_usage();
     MEMORY.reset_peak_usage();
@@ -29,7 +31,8 @@ fn allocated(work: impl FnOnce()) -> usize {
 fn watching_allocates_nothing_on_the_measuring_thread() {
     assert!(allocated(|| drop(std::hint::black_box(vec![0_u8; 64]))) >= 64, "the allocator counts");
 
-    // ten channels, blocks of 24 scans, ten seconds; a page takes an envelope whenever there is one, on its own thread
+    // ten channels, blocks of 24 scans, ten seconds; a page takes an envelope on its own thread
+    // whenever there is one
     let (mut tap, mut view) = tap();
     tap.begin(10, 0, 51_200.0);
     let block: Vec<i16> = (0..240).map(|n| n * 7 - 800).collect();
@@ -42,7 +45,7 @@ fn watching_allocates_nothing_on_the_measuring_thread() {
             }
             looks
         });
-        // until the other thread has begun, it still allocates
+        // the other thread allocates while it starts
         std::thread::sleep(Duration::from_millis(50));
         let used = allocated(|| {
             for n in 0..21_333 {
@@ -78,7 +81,7 @@ fn watching_allocates_nothing_on_the_measuring_thread() {
                 settled: false,
                 codes: &codes,
             }));
-            // sometimes somebody hears, mostly nobody: the queue is full
+            // messages are received now and then; most of the time the queue is full
             if attempts % 100 == 0 {
                 assert!(ear.cycles(&mut cycles) && ear.queue.try_recv().is_ok());
             }

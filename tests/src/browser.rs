@@ -1,7 +1,8 @@
-//! A browser for the tests: headless Chromium over its own pipe, with a DevTools client of a hundred lines.
+//! A browser for the tests: headless Chromium connected by pipes, with a small DevTools client.
 //!
-//! The pipe needs no port and no network. Chromium reads commands from its file 3 and answers on file 4, each message one JSON text that
-//! ends with a zero byte; two named pipes stand for these, so that nothing unsafe is needed to hand them over.
+//! Pipes need no port and no network. Chromium reads commands from file descriptor 3 and writes
+//! replies to descriptor 4; each message is one JSON text that ends with a zero byte. Two named
+//! pipes are used, so that no unsafe code is needed to pass the descriptors.
 
 use serde_json::{Value, json};
 use std::fs::{File, OpenOptions};
@@ -11,7 +12,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// The program's names, as distributions have them.
+/// Names of the program in different distributions.
 const PROGRAMS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
 /// A running browser.
@@ -21,27 +22,27 @@ pub struct Browser {
     from: BufReader<File>,
     last: u64,
     events: Vec<Value>,
-    // its profile and pipes; gone with it
+    // its profile and pipes; deleted with it
     folder: TempDir,
 }
 
-/// How a page is opened.
+/// Window and settings with which a page is opened.
 #[derive(Debug, Clone, Copy)]
 pub struct Look {
     /// Width of the window, px.
     pub width: u32,
     /// Height of the window, px.
     pub height: u32,
-    /// Whether the system is dark.
+    /// Whether the system uses a dark colour scheme.
     pub dark: bool,
-    /// Whether scripts run.
+    /// Whether scripts are enabled.
     pub scripts: bool,
 }
 
 impl Look {
-    /// A desk's window, light.
+    /// A desktop window, light.
     pub const DESK: Look = Look { width: 1440, height: 900, dark: false, scripts: true };
-    /// A telephone's, light.
+    /// A phone's window, light.
     pub const HAND: Look = Look { width: 400, height: 800, dark: false, scripts: true };
 }
 
@@ -89,13 +90,13 @@ impl Browser {
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
-        // each of these waits until the shell has opened the other end
+        // each of these blocks until the shell has opened the other end
         let to = OpenOptions::new().write(true).open(&input).unwrap();
         let from = BufReader::new(File::open(&output).unwrap());
         Browser { child, to, from, last: 0, events: Vec::new(), folder }
     }
 
-    /// A command, and its answer. Events that come meanwhile are kept.
+    /// Sends a command and returns its reply. Events that arrive meanwhile are kept.
     #[allow(clippy::needless_pass_by_value, reason = "every caller makes them on the spot")]
     fn call(&mut self, session: Option<&str>, method: &str, params: Value) -> Value {
         self.last += 1;
@@ -120,12 +121,12 @@ impl Browser {
         }
     }
 
-    /// Opens a file and waits until it is drawn.
+    /// Opens a file and waits until it has been drawn.
     pub fn open(&mut self, file: &Path, look: Look) -> Page<'_> {
         self.open_url(&format!("file://{}", file.canonicalize().unwrap().display()), look)
     }
 
-    /// Opens an address and waits until it is drawn.
+    /// Opens an address and waits until it has been drawn.
     pub fn open_url(&mut self, url: &str, look: Look) -> Page<'_> {
         self.events.clear();
         let target = self.call(None, "Target.createTarget", json!({ "url": "about:blank" }))["targetId"]
@@ -152,7 +153,7 @@ impl Browser {
         page
     }
 
-    /// The folder of its profile, where downloads of a test may go too.
+    /// The folder of its profile, which a test may also use for downloads.
     pub fn folder(&self) -> &Path {
         self.folder.path()
     }
@@ -160,7 +161,7 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // a browser that has gone by itself is no fault of the test's end
+        // the browser may already have ended, which is not an error here
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -172,7 +173,7 @@ impl Page<'_> {
         self.browser.call(Some(&session), method, params)
     }
 
-    /// Has another tab in front of it, or comes to the front again.
+    /// Puts the page behind another tab, or back in front.
     pub fn hide(&mut self, hidden: bool) {
         self.call("Emulation.setFocusEmulationEnabled", json!({ "enabled": !hidden }));
         let front = if hidden {
@@ -185,13 +186,13 @@ impl Page<'_> {
         self.until(&format!("document.hidden === {hidden}"));
     }
 
-    /// Another size of the window, px.
+    /// Changes the size of the window, px.
     pub fn resize(&mut self, width: u32, height: u32) {
         let metrics = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": false });
         self.call("Emulation.setDeviceMetricsOverride", metrics);
     }
 
-    /// The value of an expression; a promise is waited for.
+    /// The value of an expression; waits for a promise.
     pub fn eval(&mut self, expression: &str) -> Value {
         let ask = json!({ "expression": expression, "awaitPromise": true, "returnByValue": true });
         let mut answer = self.call("Runtime.evaluate", ask);
@@ -199,7 +200,8 @@ impl Page<'_> {
         answer["result"]["value"].take()
     }
 
-    /// Waits until the expression is true. On a machine with much else to do an analysis alone takes half a minute.
+    /// Waits until the expression is true. On a loaded machine an analysis alone takes half a
+    /// minute.
     pub fn until(&mut self, expression: &str) {
         let end = Instant::now() + Duration::from_mins(2);
         while self.eval(expression) != Value::Bool(true) {
@@ -208,7 +210,7 @@ impl Page<'_> {
         }
     }
 
-    /// Pulls the mouse from one place of the window to another.
+    /// Drags the mouse from one position in the window to another.
     pub fn drag(&mut self, from: [f64; 2], to: [f64; 2]) {
         let middle = [f64::midpoint(from[0], to[0]), f64::midpoint(from[1], to[1])];
         self.mouse("mouseMoved", from, 0);
@@ -230,7 +232,7 @@ impl Page<'_> {
         }
     }
 
-    /// Turns the wheel; negative comes nearer.
+    /// Turns the wheel; negative zooms in.
     pub fn wheel(&mut self, at: [f64; 2], by: f64) {
         let params = json!({ "type": "mouseWheel", "x": at[0], "y": at[1], "deltaX": 0, "deltaY": by });
         self.call("Input.dispatchMouseEvent", params);
@@ -253,7 +255,7 @@ impl Page<'_> {
         }
     }
 
-    /// A counter of the browser's own, such as `TaskDuration` (s of the page's main thread).
+    /// A performance metric of the browser, such as `TaskDuration` (s of the page's main thread).
     pub fn metric(&mut self, name: &str) -> f64 {
         self.call("Performance.enable", json!({}));
         let metrics = self.call("Performance.getMetrics", json!({}));
@@ -261,7 +263,7 @@ impl Page<'_> {
         own.unwrap()["value"].as_f64().unwrap()
     }
 
-    /// What the window shows, as a PNG file in base64.
+    /// A screenshot of the window as a PNG file in base64.
     pub fn picture(&mut self) -> String {
         self.call("Page.captureScreenshot", json!({}))["data"].as_str().unwrap().to_owned()
     }
@@ -272,7 +274,7 @@ impl Page<'_> {
         self.call("Page.printToPDF", how)["data"].as_str().unwrap().to_owned()
     }
 
-    /// What went wrong so far: exceptions, messages of the console, refusals of the policy.
+    /// All errors so far: exceptions, console messages, violations of the content security policy.
     pub fn errors(&mut self) -> Vec<String> {
         self.eval("0");
         let wrong = ["Runtime.exceptionThrown", "Log.entryAdded", "Runtime.consoleAPICalled"];
@@ -280,7 +282,7 @@ impl Page<'_> {
         events.map(|e| e["params"].to_string()).collect()
     }
 
-    /// Everything that was asked of disk or network, but for the page itself and data within it.
+    /// All requests to disk or network, except for the page itself and data URLs.
     pub fn requests(&mut self) -> Vec<String> {
         self.eval("0");
         let asked = self.browser.events.iter().filter(|e| e["method"] == "Network.requestWillBeSent");

@@ -1,4 +1,4 @@
-//! A small campaign over any transport, and its records as they can be compared.
+//! A small campaign over any transport, and its records in a comparable form.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -15,14 +15,14 @@ use jointrig::campaign::watch::Watchers;
 use jointrig::device::session::Session;
 use jointrig::device::transport::Transport;
 
-/// A plan of few cells: the geometry and limits of the demo's plan, other cells and hits.
+/// A plan of few cells: geometry and limits of the demo plan, with other cells and hits.
 #[must_use]
 pub fn plan(wanted: u32, cells: &[(&str, &[&str], &[&str])]) -> String {
     let demo = include_str!("../../docs/plans/demo.toml");
     with_cells(&demo.replace("wanted = 3", &format!("wanted = {wanted}")), cells)
 }
 
-/// A cut of the small plan: all that it says, but for these cells.
+/// The small plan with only these cells.
 #[must_use]
 pub fn small_plan(cells: &[(&str, &[&str], &[&str])]) -> String {
     with_cells(include_str!("../../docs/plans/small.toml"), cells)
@@ -55,7 +55,7 @@ pub struct Kept {
     pub codes: Vec<i16>,
 }
 
-/// Runs the plan over `transport`, to its end or to what ends it before.
+/// Runs the plan over `transport`, to its end or to the first error.
 pub fn attempt(file: &Path, plan: &str, transport: Box<dyn Transport>) -> Result<Summary, RunError> {
     let store = Store::create(file, plan, "test plan").unwrap();
     let mut session = Session::open(transport, "test").unwrap();
@@ -71,13 +71,13 @@ pub fn attempt(file: &Path, plan: &str, transport: Box<dyn Transport>) -> Result
     runner::run(store, &mut session, &mut ByRecord, &options)
 }
 
-/// The same to its end: the summary and all records.
+/// Runs the plan to its end: the summary and all records.
 pub fn run(file: &Path, plan: &str, transport: Box<dyn Transport>) -> (Summary, Vec<Kept>) {
     (attempt(file, plan, transport).unwrap(), records(file))
 }
 
-/// For each record the first scan of its cell's first one: scans are comparable within a cell alone, because a cell is staged when the
-/// order for it arrives.
+/// For each record, the first scan of the first record of its cell: scans are only comparable
+/// within a cell, because a cell is staged when the order for it arrives.
 pub fn origins<'a>(rows: impl IntoIterator<Item = &'a RecordRow>) -> Vec<u64> {
     let mut origin = (0, 0);
     let of = |row: &RecordRow| {
@@ -89,7 +89,7 @@ pub fn origins<'a>(rows: impl IntoIterator<Item = &'a RecordRow>) -> Vec<u64> {
     rows.into_iter().map(of).collect()
 }
 
-/// The rows of all records, in order; every one must be whole.
+/// The rows of all records, in order; every one must be intact.
 pub fn rows(store: &Store) -> Vec<RecordRow> {
     store.records().unwrap().into_iter().collect::<Result<_, _>>().unwrap()
 }

@@ -1,10 +1,10 @@
-//! The binaries, as a user runs them.
+//! The binaries, run as a user runs them.
 
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
-/// The binary that `cargo xtask test` built, by the environment variable that names it.
+/// Path of the binary that `cargo xtask test` built, from the environment variable `variable`.
 ///
 /// # Panics
 /// When the variable is not set: run the scenarios through `cargo xtask test`.
@@ -45,7 +45,7 @@ impl Served {
 
 impl Drop for Served {
     fn drop(&mut self) {
-        // it may have ended by itself, which its test has seen by then
+        // it may already have ended, which the test has noticed by then
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -1,6 +1,7 @@
-//! How often stated intervals cover what is true, over many campaigns, and the tables of `docs/accuracy.md` that say so.
+//! How often stated intervals cover the truth, over many campaigns, and the tables of
+//! `docs/accuracy.md` with the counts.
 
-/// One answer against the truth.
+/// One estimate compared with the truth.
 #[derive(Debug, Clone, Copy)]
 pub struct Answer {
     /// Relative error.
@@ -12,7 +13,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// Of a value with its interval.
+    /// From a value with its interval.
     pub fn new(mean: f64, [low, high]: [f64; 2], truth: f64) -> Self {
         Answer {
             error: mean / truth - 1.0,
@@ -22,21 +23,21 @@ impl Answer {
     }
 }
 
-/// What many answers show together.
+/// Statistics of many estimates.
 #[derive(Debug, Clone, Copy)]
 pub struct Coverage {
-    /// How many there are.
+    /// Number of estimates.
     pub answers: usize,
-    /// How many of them cover the truth.
+    /// Number of estimates whose interval covers the truth.
     pub covered: usize,
-    /// Root of the mean square of the errors, relative; 0 of none.
+    /// Root mean square of the errors, relative; 0 if there are no estimates.
     pub rms: f64,
-    /// Median half width, relative; NaN of none.
+    /// Median half width, relative; NaN if there are no estimates.
     pub half: f64,
 }
 
 impl Coverage {
-    /// Of these answers.
+    /// Statistics of these estimates.
     pub fn of(all: &[Answer]) -> Self {
         let errors: Vec<f64> = all.iter().map(|answer| answer.error).collect();
         let mut half: Vec<f64> = all.iter().map(|answer| answer.half).collect();
@@ -49,7 +50,7 @@ impl Coverage {
         }
     }
 
-    /// As cells of a table: how many cover, rms error, median half width.
+    /// As cells of a table: number of intervals that cover, rms error, median half width.
     pub fn cells(&self) -> String {
         let Coverage { answers, covered, .. } = self;
         let share = 100.0 * *covered as f64 / (*answers).max(1) as f64;
@@ -58,15 +59,16 @@ impl Coverage {
     }
 }
 
-/// What [`Coverage::cells`] stand under.
+/// Column headings of [`Coverage::cells`].
 pub const COLUMNS: &str = "covered | rms error | half width (median)";
 
-/// Root of the mean square; 0 of none.
+/// Root mean square; 0 if there are none.
 pub fn rms(errors: &[f64]) -> f64 {
     (errors.iter().map(|error| error * error).sum::<f64>() / errors.len().max(1) as f64).sqrt()
 }
 
-/// Prints a table where `cargo xtask accuracy` finds it. `columns` are the names of the columns with ` | ` between them.
+/// Prints a table in the form that `cargo xtask accuracy` reads. `columns` are the column names,
+/// separated by ` | `.
 pub fn print_table(name: &str, columns: &str, rows: &[String]) {
     let rule = "---|".repeat(columns.split(" | ").count());
     println!("table: {name}\n| {columns} |\n|{rule}\n{}\n", rows.join("\n"));

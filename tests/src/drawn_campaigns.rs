@@ -1,4 +1,5 @@
-//! Campaigns on drawn rigs, for the tables that count how often an interval covers the truth.
+//! Campaigns on randomly drawn rigs, for the tables that count how often an interval covers the
+//! truth.
 
 use crate::campaign::run;
 use crate::rigs::{Drawn, drawn};
@@ -12,14 +13,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// A campaign on a drawn rig: the rig's number, how it is drawn, and the seed of what the campaign draws itself.
+/// A campaign on a randomly drawn rig: the rig's number, the parameters of the draw, and the
+/// campaign's own seed.
 #[derive(Clone, Copy, Debug)]
 pub struct DrawnCampaign {
     /// The rig's number.
     pub number: u64,
     /// The campaign's seed.
     pub seed: u64,
-    /// What the rig is drawn from.
+    /// Parameters from which the rig is drawn.
     pub like: Drawn,
 }
 
@@ -29,12 +31,13 @@ impl DrawnCampaign {
         drawn(self.number, self.like)
     }
 
-    /// The rig's own k_T, N/m.
+    /// The rig's true k_T, N/m.
     pub fn truth_n_per_m(&self) -> f64 {
         self.rig().truth().contact_k_t_n_per_m
     }
 
-    /// Runs it into a file of `folder`, and lets `more` measure what follows the hammer; a file that is there already is left as it is.
+    /// Runs the campaign into a file in `folder`, then calls `more` for measurements after the
+    /// hammer's; an existing file is left unchanged.
     pub fn measured(
         &self,
         folder: &Path,
@@ -53,7 +56,8 @@ impl DrawnCampaign {
         file
     }
 
-    /// What it finds; `JOINTRIG_KEEP` names a folder that keeps the files, and those that are in it are analysed again, not run.
+    /// Results of the campaign; `JOINTRIG_KEEP` names a folder in which the files are kept;
+    /// existing files are analysed again without a new run.
     pub fn results(
         &self,
         plan: fn(&RigConfig) -> String,
@@ -65,13 +69,14 @@ impl DrawnCampaign {
     }
 }
 
-/// What a campaign file tells.
+/// Results of a campaign file.
 pub fn found(file: &Path) -> Results {
     let store = Store::open_read_only(file).unwrap();
     document(jointrig::analyse::analyse(&store, Wanted::default(), &|_| {}).unwrap())
 }
 
-/// `rigs` rigs from number `first` on with `seeds` campaigns each, two at a time, each told to `each`; in the order of their end.
+/// Runs `seeds` campaigns on each of `rigs` rigs from number `first` on, two at a time, and passes
+/// each to `each`; results in the order of completion.
 pub fn campaigns<T: Send>(
     first: u64,
     rigs: u64,
@@ -83,7 +88,8 @@ pub fn campaigns<T: Send>(
     each_of(&(0..rigs * seeds).map(one).collect::<Vec<_>>(), each)
 }
 
-/// These campaigns, two at a time, each told to `each`; in the order of their end.
+/// Runs these campaigns, two at a time, and passes each to `each`; results in the order of
+/// completion.
 pub fn each_of<T: Send>(wanted: &[DrawnCampaign], each: impl Fn(DrawnCampaign) -> T + Sync) -> Vec<T> {
     let (next, all) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     std::thread::scope(|scope| {
@@ -99,7 +105,7 @@ pub fn each_of<T: Send>(wanted: &[DrawnCampaign], each: impl Fn(DrawnCampaign) -
     all.into_inner().unwrap()
 }
 
-/// A count from the environment.
+/// A count from the environment, or `otherwise`.
 pub fn count(name: &str, otherwise: u64) -> u64 {
     std::env::var(name).ok().map_or(otherwise, |text| text.parse().expect("a count"))
 }

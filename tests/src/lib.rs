@@ -1,7 +1,8 @@
-//! Whole-system scenarios, crossing every wall: plan, runner, session, link, firmware, rig, file, analysis.
+//! Whole-system scenarios across all components: plan, runner, session, link, firmware, rig, file,
+//! analysis.
 //!
-//! The scenarios stand under `tests/tests/`; what they share stands here. They run the binaries where they
-//! test the command, and the libraries where they look inside.
+//! The scenarios are in `tests/tests/`; what they share is here. They run the binaries where they
+//! test the command, and the libraries where they inspect internals.
 #![allow(clippy::unwrap_used, clippy::missing_panics_doc, reason = "a scenario that cannot go on has failed")]
 
 pub mod browser;

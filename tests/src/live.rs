@@ -1,4 +1,5 @@
-//! The live page from outside: commands that serve it, requests to its server, pages that listen without a browser.
+//! The live page from outside: commands that serve it, requests to its server, stream clients
+//! without a browser.
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -14,7 +15,7 @@ use tungstenite::{Message, WebSocket};
 use crate::browser::Page;
 use crate::command::jointrig;
 
-/// Runs a command that must succeed; what it prints.
+/// Runs a command that must succeed; returns its output.
 #[allow(clippy::must_use_candidate, reason = "most commands are run for what they do")]
 pub fn done(command: &mut Command) -> String {
     let out = command.output().unwrap();
@@ -22,7 +23,7 @@ pub fn done(command: &mut Command) -> String {
     String::from_utf8(out.stdout).unwrap()
 }
 
-/// A new campaign file of this plan in a folder of its own.
+/// Creates a campaign file with this plan in a new folder.
 #[must_use]
 pub fn campaign(plan: &str) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
@@ -32,7 +33,7 @@ pub fn campaign(plan: &str) -> (TempDir, PathBuf) {
     (folder, file)
 }
 
-/// The page as a picture, into the folder that JOINTRIG_PICTURES names.
+/// Saves a screenshot of the page in the folder given by JOINTRIG_PICTURES.
 pub fn picture(page: &mut Page<'_>, name: &str) {
     if let Some(folder) = std::env::var_os("JOINTRIG_PICTURES") {
         let bytes = BASE64_STANDARD.decode(page.picture()).unwrap();
@@ -40,18 +41,18 @@ pub fn picture(page: &mut Page<'_>, name: &str) {
     }
 }
 
-/// A page that is served. Dropping it ends the process.
+/// A served live page. Dropping it ends the process.
 pub struct Served {
     child: Child,
-    /// The address to look at.
+    /// The read-only address.
     pub url: String,
-    /// The address to edit with, where there is one.
+    /// The address for editing, if there is one.
     pub edit: Option<String>,
     rest: Option<JoinHandle<String>>,
 }
 
 impl Served {
-    /// `jointrig serve` of a file: it only looks.
+    /// Runs `jointrig serve` for a file: read-only.
     #[must_use]
     pub fn of(file: &Path) -> Self {
         let mut child =
@@ -61,7 +62,7 @@ impl Served {
         Self { child, url: url.trim().into(), edit: None, rest: None }
     }
 
-    /// A command that measures and says where its page is.
+    /// Runs a command that measures and prints the address of its page.
     pub fn beside(command: &mut Command) -> Self {
         let mut child =
             command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
@@ -78,14 +79,14 @@ impl Served {
         let edit = command.get_args().all(|argument| argument != "serve").then(|| next("to take notes"));
         let rest = std::thread::spawn(move || {
             let mut rest = String::new();
-            // a screen that cannot be read says nothing
+            // output that cannot be read counts as empty
             let _ = said.read_to_string(&mut rest);
             rest
         });
         Self { child, url, edit, rest: Some(rest) }
     }
 
-    /// Waits for its end: how it ended, and what it said since.
+    /// Waits for its end: exit status, and the output since the start.
     pub fn wait(&mut self) -> (ExitStatus, String) {
         let status = self.child.wait().unwrap();
         (status, self.rest.take().map_or_else(String::new, |rest| rest.join().unwrap()))
@@ -104,25 +105,25 @@ impl Served {
         address.split('/').next().unwrap().parse().unwrap()
     }
 
-    /// The secret to look with.
+    /// The secret of the read-only address.
     #[must_use]
     pub fn token(&self) -> &str {
         self.url.split("#look=").nth(1).unwrap()
     }
 
-    /// The secret to edit with.
+    /// The secret of the editing address.
     #[must_use]
     pub fn edit_token(&self) -> &str {
         self.edit.as_deref().unwrap().split("#edit=").nth(1).unwrap()
     }
 
-    /// The status of an answer to a request with these headers, and its body.
+    /// Status and body of the response to a GET request with these headers.
     #[must_use]
     pub fn asked(&self, path: &str, headers: &[(&str, &str)]) -> (u16, String) {
         self.try_asking("GET", path, headers, "").unwrap()
     }
 
-    /// The status of an answer to something that is wanted, with this token and further headers, and its body.
+    /// Status and body of the response to a POST request with this token and additional headers.
     #[must_use]
     pub fn wanted(&self, path: &str, token: &str, more: &[(&str, &str)], body: &str) -> (u16, String) {
         let host = format!("127.0.0.1:{}", self.port());
@@ -137,10 +138,10 @@ impl Served {
         self.try_asking("POST", path, &headers, body).unwrap()
     }
 
-    /// The same for a server that may be gone.
+    /// Status and body of the response, for a server that may have ended.
     ///
     /// # Errors
-    /// It is gone.
+    /// The server has ended.
     pub fn try_asking(
         &self,
         method: &str,
@@ -158,7 +159,7 @@ impl Served {
         Ok((status, answer.split_once("\r\n\r\n").map_or_else(String::new, |(_, body)| body.into())))
     }
 
-    /// A page without a browser, which wants the stream too.
+    /// Opens a stream client without a browser.
     #[must_use]
     pub fn listener(&self) -> Listener {
         let stream = TcpStream::connect(("127.0.0.1", self.port())).unwrap();
@@ -172,25 +173,25 @@ impl Served {
 
 impl Drop for Served {
     fn drop(&mut self) {
-        // it may have ended by itself, which its test has seen by then
+        // it may already have ended, which the test has noticed by then
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// A page without a browser.
+/// A stream client without a browser.
 pub struct Listener {
     socket: WebSocket<TcpStream>,
-    /// Frames of the stream that it had.
+    /// Number of stream frames received.
     pub frames: u64,
-    /// Messages that it had.
+    /// Messages received.
     pub words: Vec<String>,
-    /// Frames that it was told it missed.
+    /// Number of frames that the server reported as missed.
     pub missed: u32,
 }
 
 impl Listener {
-    /// Listens until the server is gone, and answers every frame.
+    /// Listens until the server ends, and acknowledges every frame.
     #[must_use]
     pub fn to_the_end(mut self) -> Self {
         while let Ok(message) = self.socket.read() {

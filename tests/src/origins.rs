@@ -1,8 +1,10 @@
-//! Whether numbers that the report shows stand in `results.json`, where the report says they do.
+//! Checks that the numbers shown in the report are in `results.json`, at the paths that the report
+//! states.
 
 use serde_json::Value;
 
-/// All numbers at a path in which `*` stands for any key or index, in their order; NaN where something else stands.
+/// All numbers at a path in which `*` matches any key or index, in order; NaN for a value that is
+/// not a number.
 #[must_use]
 pub fn numbers(value: &Value, path: &str) -> Vec<f64> {
     let Some(rest) = path.strip_prefix('/') else { return vec![value.as_f64().unwrap_or(f64::NAN)] };
@@ -18,10 +20,11 @@ pub fn numbers(value: &Value, path: &str) -> Vec<f64> {
     }
 }
 
-/// The numbers that a list of a mark may hold: what stands at its path, with the second number, in its unit.
+/// The numbers that a list of a mark may contain: the values at its path, combined with the second
+/// number, in its unit.
 ///
 /// # Panics
-/// When nothing stands there, or not as many second numbers.
+/// When the path does not exist, or the number of second values differs.
 #[must_use]
 pub fn allowed(results: &Value, origin: &Value) -> Vec<f64> {
     let path = origin["path"].as_str().unwrap();
@@ -50,19 +53,20 @@ pub fn allowed(results: &Value, origin: &Value) -> Vec<f64> {
     known
 }
 
-/// Whether a number of six digits is among these, which are in order.
+/// Whether a six-digit number is among these sorted ones.
 #[must_use]
 pub fn among(known: &[f64], value: f64) -> bool {
-    // six digits in 32 bits: half of the last digit, and what the sixth of 1.00000 is worth
+    // six digits stored as f32: half of the sixth digit, which is at most 5e-6 (at 1.00000), plus
+    // the f32 rounding
     let near = |k: &f64| (k - value).abs() <= 6e-6 * value.abs().max(1e-30);
     let at = known.partition_point(|k| *k < value);
     known[at.saturating_sub(1)..known.len().min(at + 2)].iter().any(near)
 }
 
-/// The numbers in a text: each with its digits as they are shown, and how many decimals it has.
+/// The numbers in a text: each with the value shown, and its number of decimals.
 #[must_use]
 pub fn shown(text: &str) -> Vec<(f64, usize)> {
-    // thousands stand apart by a thin space; numbers do not break from what follows them
+    // thousands are separated by a thin space; word joiners keep a number with what follows it
     let text = text.replace('−', "-").replace(['\u{202f}', '\u{2060}'], "");
     let mut found = Vec::new();
     let mut rest = text.as_str();
@@ -83,17 +87,18 @@ pub fn shown(text: &str) -> Vec<(f64, usize)> {
     found
 }
 
-/// Whether `value` is `number` in some unit, to the decimals that are shown.
+/// Whether `value` is `number` in some unit, to the decimals shown.
 #[must_use]
 pub fn agrees(value: f64, (number, places): (f64, usize)) -> bool {
     let half: f64 = format!("0.5001e-{places}").parse().unwrap();
     [1.0, 1e-6, 1e6, 1e-3, 100.0].into_iter().any(|factor| (value.abs() * factor - number).abs() <= half)
 }
 
-/// Every number of a figure's csv file, held against what the figure's marks say of it; how many there were.
+/// Compares every number in a figure's csv file with the data of the figure's marks; returns the
+/// count of numbers.
 ///
 /// # Panics
-/// Where a number stands nowhere.
+/// When a number is not found.
 pub fn hold_csv(results: &Value, figure: &Value, csv: &str) -> usize {
     let name = figure["name"].as_str().unwrap();
     let mut lines = csv::Reader::from_reader(csv.as_bytes());
@@ -122,14 +127,14 @@ pub fn hold_csv(results: &Value, figure: &Value, csv: &str) -> usize {
     count
 }
 
-/// What a mark's lists may hold.
+/// The values that a mark's lists may contain.
 struct Held {
     panel: String,
     name: String,
-    /// Whether its lines are named by its rows.
+    /// Whether its curves are named after its rows.
     rows: bool,
     scene: bool,
-    /// A part of a cycle is a share, and no result.
+    /// Whether x is a fraction of a cycle, which is not a result.
     share: bool,
     names: [bool; 2],
     lists: Vec<(String, Vec<f64>)>,
@@ -153,7 +158,7 @@ impl Held {
     }
 
     fn writes(&self, panel: &str, curve: &str) -> bool {
-        // names that a spreadsheet takes for a formula have an apostrophe
+        // names that a spreadsheet would take for a formula are prefixed with an apostrophe
         let same = |a: &str, b: &str| a == b.trim_start_matches('\'');
         self.scene || same(&self.panel, panel) && (self.rows || same(&self.name, curve))
     }
@@ -165,18 +170,18 @@ impl Held {
     fn holds(&self, of: &str, value: f64) -> bool {
         let list = |of: &str| self.lists.iter().find(|(list, _)| list == of).map(|(_, known)| known);
         let found = |of: &str| list(of).is_some_and(|known| among(known, value));
-        // an index among things that are no numbers
+        // an index into values that are not numbers
         let index = list("x").is_some_and(|known| {
             of == "x" && known[0].is_nan() && value.fract() == 0.0 && (value as usize) < known.len()
         });
         let step = list("step").is_some_and(|step| {
             let first = list("first").map_or(0.0, |first| first[0]);
             let steps = (value - first) / step[0];
-            // the sixth digit of the value, in steps
+            // tolerance: the sixth digit of the value, in steps
             of == "x" && (steps - steps.round()).abs() <= 1e-3 + 1e-5 * steps.abs()
         });
         let share = of == "x" && self.share && (0.0..=1.0).contains(&value);
-        // the height of a level, places in space, and the values of a matrix or of strips
+        // the height of a level, positions in space, and the values of a matrix or of strips
         let other = of != "high" && (found("at") || found("values"));
         self.named(of) || found(of) || index || step || share || other
     }

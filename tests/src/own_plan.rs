@@ -1,11 +1,11 @@
-//! Plans for simulated rigs with a structure of their own.
+//! Plans for simulated rigs with a user-defined structure.
 
 use jointrig::campaign::plan::SMALL;
 use jointrig_hil_sim::rig::config::{RigConfig, Side};
 use std::fmt::Write;
 
-/// Every point of the rig in cells of its own names: two hits of a second. Vibrometers that stay, and a person who strikes, are in it as
-/// the rig has them.
+/// A plan with every point of the rig, in cells with the rig's names: two hits of one second. Fixed
+/// vibrometers and a manual hammer are included if the rig has them.
 pub fn plan(rig: &RigConfig) -> String {
     let own = rig.structure.as_ref().unwrap();
     let head = SMALL.split_once("[[configuration]]").unwrap().0;

@@ -1,35 +1,37 @@
-//! Rigs that nobody tuned for: every part of the default rig drawn anew, several at once.
+//! Randomly drawn rigs, for which nothing was tuned: all parameters of the default rig are varied
+//! simultaneously.
 
 use jointrig_hil_sim::rig::RigConfig;
 use jointrig_hil_sim::rig::config::{BodyName, Bushing, ContactLaw, ResponsePoint};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// What a drawn rig shall be like.
+/// Parameters of the draw.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drawn {
     /// Largest k_T, N/m; the smallest is 60 N/µm.
     pub stiffest_n_per_m: f64,
-    /// The default errors of position, angle, skew and cross-talk are multiplied by this.
+    /// Factor of the default errors of position, angle, skew and cross-talk.
     pub errors: f64,
     /// Standard deviation of the gain of each load cell and vibrometer, relative.
     pub gain: f64,
-    /// μN, N: contacts of even number slip as a whole beyond it (Jenkins), those of odd number bit by bit below it (Iwan). None: nothing slips.
+    /// μN, N: contacts of even number slip as a whole beyond it (Jenkins), those of odd number have
+    /// microslip below it (Iwan). `None`: no slip.
     pub slip_limit_n: Option<f64>,
 }
 
 impl Default for Drawn {
-    /// Contacts to 300 N/µm that stick, with the default errors.
+    /// Contacts up to 300 N/µm that stick, with the default errors.
     fn default() -> Self {
         Drawn { stiffest_n_per_m: 300e6, errors: 1.0, gain: 0.005, slip_limit_n: None }
     }
 }
 
-/// The rig of this number. A third of them has a clamp on side B too, and on specimen B six points T1–T6 and the marks M1 and M2: the
-/// points and marks of specimen A, mirrored.
+/// The rig with this number. A third of the rigs also have a clamp on side B, and on specimen B six
+/// points T1–T6 and the marks M1 and M2: the points and marks of specimen A, mirrored.
 ///
-/// Contacts of 60 N/µm and up, clamps × 0.3…3, local yaw modes some 100…350 Hz, arms × 0.6…2, rods, load cells, suspensions, damping,
-/// and floors × 0.3…3: each drawn by itself.
+/// Contacts of 60 N/µm and more, clamps × 0.3…3, local yaw modes at about 100…350 Hz, arms × 0.6…2,
+/// rods, load cells, suspensions, damping, and floors × 0.3…3: each drawn independently.
 pub fn drawn(number: u64, drawn: Drawn) -> RigConfig {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(0x0071_0000 + number);
     let mut between = |low: f64, high: f64| -> f64 {
@@ -47,7 +49,7 @@ pub fn drawn(number: u64, drawn: Drawn) -> RigConfig {
     if let Some(limit_n) = drawn.slip_limit_n {
         rig.contact.law = if number.is_multiple_of(2) { ContactLaw::Jenkins } else { ContactLaw::Iwan };
         rig.contact.normal_load_n = limit_n / rig.contact.friction_coefficient;
-        // the default's 2 µs are too long for the stiffest contacts on the lightest specimens
+        // the default of 2 µs is too long for the stiffest contacts on the lightest specimens
         rig.contact.slip_step_s = 1e-6;
     }
 
@@ -126,7 +128,8 @@ fn scale(bushing: &mut Bushing, factor: f64) {
     bushing.rotation_nm_per_rad = bushing.rotation_nm_per_rad.map(|k| k * factor);
 }
 
-/// The plan for such a rig: `contact.toml` with its points T1–T6 where it has them, and what is known of its errors.
+/// The plan for such a rig: `contact.toml` with its points T1–T6 if it has them, and the known
+/// standard deviations of its errors.
 pub fn contact_plan(rig: &RigConfig) -> String {
     let mut plan = jointrig::campaign::plan::CONTACT.to_owned();
     if !rig.clamp_b.rigid {
@@ -144,7 +147,7 @@ pub fn contact_plan(rig: &RigConfig) -> String {
     with_priors(&plan, rig)
 }
 
-/// A plan with what is known of the rig's errors.
+/// A plan with the known standard deviations of the rig's errors.
 pub fn with_priors(plan: &str, rig: &RigConfig) -> String {
     let errors = &rig.errors;
     format!(
@@ -161,7 +164,8 @@ pub fn with_priors(plan: &str, rig: &RigConfig) -> String {
     )
 }
 
-/// The same plan with two marks beside the contact on each specimen that has points, placed as carefully as the spots: N1 and N2, M1 and M2.
+/// The same plan with two marks next to the contact on each specimen that has points, placed as
+/// accurately as the spots: N1 and N2, M1 and M2.
 pub fn near_plan(rig: &RigConfig) -> String {
     let near: Vec<&ResponsePoint> = rig.responses.iter().filter(|point| point.sigma_m.is_some()).collect();
     contact_plan(rig)
@@ -169,12 +173,12 @@ pub fn near_plan(rig: &RigConfig) -> String {
         .replace("response = [\n", &format!("response = [\n{}", rows(&near)))
 }
 
-/// Names as in a plan's list, each with what separates it from the next.
+/// Names as in a plan's list, each followed by its separator.
 fn names(points: &[&ResponsePoint]) -> String {
     points.iter().map(|point| format!("\"{}\", ", point.name)).collect::<Vec<_>>().concat()
 }
 
-/// The same points, on specimens, as rows of a plan's geometry.
+/// The same points on specimens, as rows of a plan's geometry.
 fn rows(points: &[&ResponsePoint]) -> String {
     let row = |p: &&ResponsePoint| {
         let [x, y, z] = p.position_m;
@@ -188,7 +192,7 @@ fn rows(points: &[&ResponsePoint]) -> String {
     points.iter().map(row).collect::<Vec<_>>().concat()
 }
 
-/// As many cells as in `contact.toml`: N1 and N2 in place of S5 and S6.
+/// As many cells as in `contact.toml`: N1 and N2 replace S5 and S6.
 pub fn near_instead_plan(rig: &RigConfig) -> String {
     near_plan(rig).replace(", \"S5\", \"S6\"", "")
 }
@@ -196,7 +200,8 @@ pub fn near_instead_plan(rig: &RigConfig) -> String {
 /// Frequencies of the shaker's levels on such a rig, Hz.
 pub const LEVELS_HZ: [f64; 6] = [100.0, 150.0, 200.0, 300.0, 400.0, 500.0];
 
-/// The same plan with levels of the shaker: 0.15 µm between the spots, at which every contact that is drawn sticks.
+/// The same plan with shaker levels: 0.15 µm between the spots, at which every drawn contact
+/// sticks.
 pub fn levels_plan(rig: &RigConfig) -> String {
     format!("{}\n[shaker]\nfrequencies_hz = {LEVELS_HZ:?}\namplitudes_m = [1.5e-7]\n", contact_plan(rig))
 }

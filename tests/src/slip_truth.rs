@@ -1,24 +1,26 @@
-//! Whether the hits of a campaign make the contact slip, as only the rig itself knows it: the hits are struck again on the rig alone.
+//! Whether the hits of a campaign make the contact slip, which only the simulator knows: the hits
+//! are repeated on the rig alone.
 
 use crate::drawn_campaigns::DrawnCampaign;
 use jointrig_hil_sim::rig::{Configuration, Rig};
 
-/// The hammer's coil pulse of `contact.toml` (s), from which its runner corrects.
+/// The hammer's coil pulse of `contact.toml` (s), which its runner then corrects.
 const PULSE_S: f64 = 3.5e-3;
 
-/// The contact is at rest again long before, s.
+/// Length of the simulation (s): the contact is at rest again long before.
 const LENGTH_S: f64 = 0.15;
 
-/// What each hit along z on the assembly does to the contact.
+/// Effect of one hit along z on the assembly's contact.
 #[derive(Clone, Copy, Debug)]
 pub struct Slid {
-    /// Largest part of the contact's elements that slip at once: 1 is gross slip.
+    /// Largest fraction of the contact's elements that slip simultaneously: 1 is gross slip.
     pub part: f64,
-    /// What slip adds to the largest relative displacement: the path slid over the largest elastic displacement μN/k_T.
+    /// Contribution of slip to the largest relative displacement: the distance slid over the
+    /// largest elastic displacement μN/k_T.
     pub path: f64,
 }
 
-/// One hit of each place of impact along z.
+/// One hit at each impact point along z.
 pub fn slid(campaign: &DrawnCampaign) -> Vec<Slid> {
     let config = campaign.rig();
     let k = config.contact.stiffness_n_per_m[2];

@@ -1,6 +1,8 @@
-//! A campaign over the emulated controller gives the records of the native virtual board, and its log is read.
+//! A campaign over the emulated controller gives the records of the native virtual board, and its
+//! log is decoded.
 //!
-//! `cargo xtask test` builds the image and names it in `JOINTRIG_MPS2_IMAGE`; without it the tests say so.
+//! `cargo xtask test` builds the image and sets its path in `JOINTRIG_MPS2_IMAGE`; without it the
+//! tests print a message.
 #![allow(clippy::unwrap_used)]
 
 use std::io;
@@ -20,7 +22,7 @@ use jointrig_tests::command::Served;
 
 const SEED: u64 = 7;
 
-/// A record as it is stored: its row with all columns, the codes of each channel, and the channels' scales.
+/// A stored record: its row with all columns, the codes of each channel, and the channels' scales.
 #[derive(Debug, PartialEq)]
 struct Stored {
     row: RecordRow,
@@ -54,15 +56,15 @@ fn image() -> Option<PathBuf> {
     image
 }
 
-/// Held by each test: what a program logs is the whole program's.
+/// Held by each test, because logging is global to the program.
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// What two runs of one seed cannot share, brought to what they must share.
+/// Removes from a record what legitimately differs between two runs with one seed.
 ///
-/// Scans are counted from the start of the stream, and each cell is staged some scans later: how many, the computer's scheduler
-/// decides. From there on the runner orders by scan, so that, counted from the cell's first record, all scans must be the same. The
-/// time of day and its error come from the host's clock. All else stays as it is, and so does each
-/// column that is still to come.
+/// Scans are counted from the start of the stream, and each cell is staged some scans later, which
+/// depends on the computer's scheduler. From there on the runner orders by scan, so that, counted
+/// from the cell's first record, all scans must be the same. The time of day and its error come
+/// from the host's clock. All other columns are compared, including columns added later.
 fn comparable(mut stored: Stored, origin: u64) -> Stored {
     let row = &mut stored.row;
     for scan in [&mut row.shot.fired_at, &mut row.shot.trigger] {
@@ -75,21 +77,22 @@ fn comparable(mut stored: Stored, origin: u64) -> Stored {
     stored
 }
 
-/// All of a campaign as it must be the same; scans count from the first scan of each cell's first record.
+/// All records in comparable form; scans count from the first scan of each cell's first record.
 fn comparables(stored: Vec<Stored>) -> Vec<Stored> {
     let origins = origins(stored.iter().map(|stored| &stored.row));
     stored.into_iter().zip(origins).map(|(stored, origin)| comparable(stored, origin)).collect()
 }
 
-/// How much too large the controller's square root may be: where there is no `std`, it is micromath's, which halves the
-/// float's exponent and mantissa as one integer. That makes (1 + m/2)/√(1 + m) of a mantissa 1 + m, and at m = 1 the most.
+/// Largest ratio of the controller's square root to the exact one: without `std` it is micromath's,
+/// which halves the float's exponent and mantissa as one integer. For a mantissa 1 + m the ratio is
+/// (1 + m/2)/√(1 + m), largest at m = 1.
 const ROOT_TOO_LARGE: f32 = 1.5 / std::f32::consts::SQRT_2;
 
-/// The ratio at which the shot was let go is the one figure that the controller rounds otherwise than this computer. It
-/// decides nothing otherwise: that root is exact at 1, where the decision lies. The other root in it, of 2/128 with the plan's
-/// window, is exact too.
+/// The quietness ratio at which the shot was released is the only value that the controller rounds
+/// differently from this computer. It does not change a decision: that root is exact at 1, where
+/// the decision is made. The other root in it, of 2/128 with the plan's window, is exact too.
 fn take_quiet_ratios(emulated: &mut [Stored], native: &[Stored]) {
-    let rounding = 8.0 * f32::EPSILON; // a handful of operations, each right to half of it
+    let rounding = 8.0 * f32::EPSILON; // a few operations, each accurate to half of it
     for (emulated, native) in emulated.iter_mut().zip(native) {
         let (found, right) = (&mut emulated.row.shot.quiet_ratio, native.row.shot.quiet_ratio);
         let (least, most) = (right * (1.0 - rounding), right * ROOT_TOO_LARGE * (1.0 + rounding));
@@ -98,7 +101,7 @@ fn take_quiet_ratios(emulated: &mut [Stored], native: &[Stored]) {
     }
 }
 
-/// Says what differs, not all of a million codes.
+/// Asserts equality and reports what differs, without printing a million codes.
 fn assert_same(address: &str, found: &[Stored], expected: &[Stored]) {
     assert_eq!(found.len(), expected.len(), "{address}");
     for (found, expected) in found.iter().zip(expected) {
@@ -118,7 +121,7 @@ fn one_campaign_over_every_address_gives_the_same_records() {
         return;
     }
     let native = comparables(over("sim:", SEED));
-    // six records of some two seconds of all channels, in three cells; none of the channels is mute
+    // six records of about two seconds of all channels, in three cells; no channel is silent
     assert_eq!(native.iter().map(|stored| stored.row.cell).collect::<Vec<_>>(), [1, 1, 2, 2, 3, 3]);
     for Stored { row, codes, channels } in &native {
         assert!(row.scans > 100_000 && row.trigger_index > 0 && row.gaps.is_empty() && row.peak_n > 30.0);
@@ -133,7 +136,7 @@ fn one_campaign_over_every_address_gives_the_same_records() {
     let socket = Served::start(&["--tcp", "127.0.0.1:0", "--seed", &seed]);
     assert!(terminal.address.starts_with("serial:") && socket.address.starts_with("tcp:"));
     for served in [&terminal, &socket] {
-        // the seed is the served board's; that of the address means nothing here
+        // the served board's seed counts; that of the address has no effect here
         assert_same(&served.address, &comparables(over(&served.address, SEED + 1)), &native);
     }
 
@@ -145,7 +148,7 @@ fn one_campaign_over_every_address_gives_the_same_records() {
     assert!(other.iter().zip(&native).all(|(other, native)| other.codes != native.codes), "another seed");
 }
 
-/// What this program logs.
+/// Collects what this program logs.
 struct Heard(Mutex<Vec<String>>);
 
 static HEARD: Heard = Heard(Mutex::new(Vec::new()));
@@ -163,7 +166,7 @@ impl log::Log for Heard {
     fn flush(&self) {}
 }
 
-/// An emulator of which nobody knows what image it runs, as with a controller that somebody else has flashed.
+/// An emulator whose image is unknown, as with a controller that was flashed elsewhere.
 struct Unknown(Box<dyn Transport>);
 
 impl Transport for Unknown {
@@ -176,7 +179,7 @@ impl Transport for Unknown {
     }
 }
 
-/// Arms and disarms, and waits until `heard` says so.
+/// Arms and disarms, and waits until `heard` returns true.
 fn disarm(transport: Box<dyn Transport>, tables: Tables, heard: impl Fn(&Session, &[String]) -> bool) -> u64 {
     let mut session = Session::open(transport, "qemu:").unwrap();
     session.look_for_log_tables(tables);
@@ -220,7 +223,7 @@ fn what_the_emulated_controller_logs_is_read_by_its_table_or_said_to_have_none()
     assert_eq!(disarm(Box::new(Unknown(open())), tables(), disarmed), build);
     assert!(shown().len() >= 2);
 
-    // from nowhere
+    // without any source
     std::fs::remove_file(folder.path().join(jointrig_logs::file_name(build))).unwrap();
     let counted =
         |session: &Session, lines: &[String]| lines.is_empty() && session.undecoded_log_bytes() > 10;

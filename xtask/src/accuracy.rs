@@ -1,4 +1,5 @@
-//! `cargo xtask accuracy`: runs the campaigns whose truth is known, and writes the tables of docs/accuracy.md.
+//! `cargo xtask accuracy`: runs the campaigns with known truth, and writes the tables of
+//! docs/accuracy.md.
 
 use crate::command;
 use crate::project::Project;
@@ -10,12 +11,12 @@ use std::time::Instant;
 
 /// A test that prints a table.
 struct Source {
-    /// The table's name, in the page and in what the test prints.
+    /// The table's name, in the page and in the test's output.
     table: &'static str,
     package: &'static str,
     target: &'static str,
     test: &'static str,
-    /// Which of its parts the page shows.
+    /// The part of it that the page shows.
     part: Option<(&'static str, &'static str)>,
 }
 
@@ -53,7 +54,7 @@ const SOURCES: [Source; 9] = [
     source("fit", "jointrig", "accuracy", "table_of_the_fit"),
 ];
 
-/// Makes these tables, or all, and puts each in its place in the page.
+/// Computes these tables, or all, and inserts each at its position in the page.
 pub fn run(project: &Project, tables: &[String]) -> Result<()> {
     if let Some(unknown) = tables.iter().find(|name| SOURCES.iter().all(|source| source.table != **name)) {
         let known: Vec<&str> = SOURCES.iter().map(|source| source.table).collect();
@@ -79,7 +80,7 @@ pub fn run(project: &Project, tables: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// Runs a test, shows what it prints, and returns its table and whether it passed.
+/// Runs a test, prints its output, and returns its table and whether it passed.
 fn printed(project: &Project, source: &Source) -> Result<(String, bool)> {
     let mut cargo = command::cargo(&project.root);
     cargo.args(["test", "--release", "--package", source.package, "--test", source.target, "--"]);
@@ -101,7 +102,7 @@ fn printed(project: &Project, source: &Source) -> Result<(String, bool)> {
 
 /// The rows after the line that names the table.
 fn table_in(lines: &[String], name: &str) -> Option<String> {
-    // the test's own name may stand before it on the same line
+    // the test's own name may precede it on the same line
     let named = |line: &String| line.split_once("table: ").is_some_and(|(_, rest)| rest == name);
     let from = lines.iter().position(named)? + 1;
     let rows: Vec<&str> =
@@ -109,7 +110,7 @@ fn table_in(lines: &[String], name: &str) -> Option<String> {
     (rows.len() > 2).then(|| rows.join("\n"))
 }
 
-/// The page with the table in its place.
+/// The page with the table inserted.
 fn placed(page: &str, name: &str, table: &str) -> Result<String> {
     let (begin, end) = (format!("<!-- table: {name} -->\n"), "<!-- end of table -->");
     let from = page.find(&begin).with_context(|| format!("docs/accuracy.md has no place for `{name}`"))?;

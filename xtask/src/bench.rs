@@ -1,4 +1,5 @@
-//! `cargo xtask bench`: one table of how fast our work is, beside its peers and beside the machine's limit.
+//! `cargo xtask bench`: a table of run times, compared with those of peers and with the machine's
+//! limit.
 
 use crate::command;
 use crate::environment::{self, environment};
@@ -8,7 +9,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Stdio;
 
-/// Stands above the tables in docs/performance.md.
+/// Text above the tables in docs/performance.md.
 const ABOUT: &str = "\
 # How fast it is
 
@@ -19,7 +20,8 @@ time over ours; *times as long* is ours over the limit's. The run fails where a 
 
 ";
 
-/// Measures all parts and writes the page, or those that are named and only prints them.
+/// Measures all parts and writes the page; if parts are named, measures only these and prints the
+/// result.
 pub fn run(project: &Project, parts: &[String]) -> Result<()> {
     let Some(system) = ["python3", "python"].into_iter().find_map(command::find_program) else {
         bail!("there is no Python for the peers: install python3 with its venv module");
@@ -44,7 +46,8 @@ pub fn run(project: &Project, parts: &[String]) -> Result<()> {
     }
 }
 
-/// Runs a program of the package that measures: the tables that it prints, and whether all is as quick as wanted.
+/// Runs a program of the benchmark package: the tables that it prints, and whether all targets are
+/// met.
 fn measured(project: &Project, python: &Path, program: &str, parts: &[String]) -> Result<(String, bool)> {
     let mut cargo = command::cargo(&project.root);
     cargo.args(["run", "--release", "--quiet", "--package", "jointrig-benches", "--features", "table"]);
@@ -59,7 +62,7 @@ fn measured(project: &Project, python: &Path, program: &str, parts: &[String]) -
     Ok((tables, output.status.success()))
 }
 
-/// The benchmarks beside the hot paths, of every package that has some.
+/// Runs the benchmarks of the hot paths, of every package that has some.
 pub fn hot_paths(project: &Project, extra: &[String]) -> Result<()> {
     let mut cargo = command::cargo(&project.root);
     // `--workspace` compiles the dependencies with the same features as the tests do.

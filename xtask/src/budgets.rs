@@ -1,7 +1,8 @@
-//! `cargo xtask budgets`: what the firmware costs, counted in the emulator, and its limits.
+//! `cargo xtask budgets`: the cost of the firmware, counted in the emulator, and its limits.
 //!
-//! The image's own benchmark counts executed instructions under QEMU's counted clock; two runs must agree to the
-//! instruction. Instructions are not cycles, and another compiler counts differently: the limits leave room for that.
+//! The image's own benchmark counts executed instructions under QEMU's `-icount` clock; two runs
+//! must agree exactly. Instructions are not cycles, and another compiler gives other counts: the
+//! limits have a margin for that.
 
 use crate::consent::Consent;
 use crate::project::{EMULATED_BOARD, Project, WIRED_BOARD};
@@ -11,10 +12,10 @@ use anyhow::{Context, Result, bail};
 use std::fmt::Write;
 use std::path::Path;
 
-/// Where the table is written, from the repository's root.
+/// Output path of the table, relative to the repository's root.
 const PAGE: &str = "docs/firmware-budgets.md";
 
-/// One figure: its name in the image's report, its heading in the table, its limit.
+/// One quantity: its name in the image's report, its heading in the table, its limit.
 struct Budget {
     name: &'static str,
     what: &'static str,
@@ -35,7 +36,7 @@ const SCANS: [Budget; 6] = [
     budget("scan.stuffed", "streaming, hammer at rest, over a stream of bytes (COBS)", 700),
 ];
 
-/// Instructions for what a scan's cost is made of, and for frames.
+/// Instructions for the parts of a scan's cost, and for frames.
 const PARTS: [Budget; 8] = [
     budget(
         "part.join",
@@ -55,7 +56,7 @@ const PARTS: [Budget; 8] = [
     budget("greet", "a handshake, heard, answered and logged", 7_000),
 ];
 
-/// Instructions from the first byte of a request to the last of its answer.
+/// Instructions from the first byte of a request to the last byte of its answer.
 const COMMANDS: [Budget; 15] = [
     budget("info", "Info", 8_000),
     budget("channel", "Channel", 5_500),
@@ -74,7 +75,7 @@ const COMMANDS: [Budget; 15] = [
     budget("emergency_stop", "EmergencyStop, with its events", 12_000),
 ];
 
-/// Instructions from a delivered block to what must follow from it.
+/// Instructions from a delivered block to the required reaction.
 const LATENCIES: [Budget; 5] = [
     budget("latency.coil_on", "block delivered → coil on", 8_000),
     budget("latency.coil_off", "block with the guard open delivered → coil off", 8_000),
@@ -83,7 +84,7 @@ const LATENCIES: [Budget; 5] = [
     budget("block.worst", "the worst block of the whole run: four blocks leave in COBS", 35_000),
 ];
 
-/// Bytes.
+/// Memory, bytes.
 const MEMORY: [Budget; 5] = [
     budget("flash", "flash of mps2-an505: code, constants, initial values", size::EMULATED_FLASH),
     budget("flash.wired", "flash of nucleo-u5a5", size::WIRED_FLASH),
@@ -96,7 +97,7 @@ const MEMORY: [Budget; 5] = [
     budget("stack", "stack, high-water mark of the benchmark", 32 << 10),
 ];
 
-/// The figures of one image.
+/// The measured quantities of one image.
 struct Figures(Vec<(String, u64)>);
 
 impl Figures {

@@ -1,10 +1,10 @@
-//! Chromium, the browser that the report's page is tested in: whether it is here, and how it gets here.
+//! Chromium, the browser in which the report's page is tested: detection and installation.
 
 use crate::consent::Consent;
 use crate::{command, packages};
 use anyhow::{Result, bail};
 
-/// The program's names, as distributions have them; the first is the package's on Debian too.
+/// Names of the program in different distributions; the first is also the name of Debian's package.
 const PROGRAMS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
 /// Makes Chromium available.

@@ -1,12 +1,14 @@
-//! Starting other programs: each is shown before it runs, and a failure names the program, the place and the code.
+//! Runs other programs: each command is printed before it runs, and an error names the program, the
+//! directory and the exit code.
 
 use anyhow::{Context, Result, bail};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// What `cargo run` tells the program it starts about xtask's own package. Passed on, build scripts of other packages
-/// that watch these variables would be rebuilt at every switch between plain cargo and xtask.
+/// Variables that `cargo run` sets about xtask's own package. If they were passed on, build scripts
+/// of other packages that watch these variables would be rerun at every switch between plain cargo
+/// and xtask.
 const OWN_PACKAGE: [&str; 5] =
     ["CARGO_PKG_", "CARGO_MANIFEST_", "CARGO_BIN_NAME", "CARGO_CRATE_NAME", "CARGO_PRIMARY_PACKAGE"];
 
@@ -17,7 +19,7 @@ pub fn cargo(directory: &Path) -> Command {
     command
 }
 
-/// A program that does not hear about xtask's own package.
+/// A command without the variables about xtask's own package.
 pub fn without_own_package(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     for (name, _) in std::env::vars_os() {
@@ -28,7 +30,7 @@ pub fn without_own_package(program: impl AsRef<OsStr>) -> Command {
     command
 }
 
-/// Shows the command, runs it, and fails unless it exits with 0.
+/// Prints the command, runs it, and fails unless it exits with 0.
 pub fn run(command: &mut Command) -> Result<()> {
     println!("  $ {}", line(command));
     let status = command.status().with_context(|| format!("could not start `{}`", line(command)))?;
@@ -56,7 +58,8 @@ pub fn output(command: &mut Command) -> Result<String> {
     String::from_utf8(output.stdout).with_context(|| format!("`{}` did not answer in UTF-8", line(command)))
 }
 
-/// The command as a person would type it, variables first; long paths to cargo and rustc are shortened to their name.
+/// The command as a user would type it, variables first; long paths to cargo and rustc are
+/// shortened to their name.
 pub fn line(command: &Command) -> String {
     let mut words = Vec::new();
     for (name, value) in command.get_envs() {
@@ -70,7 +73,7 @@ pub fn line(command: &Command) -> String {
     words.join(" ")
 }
 
-/// Where `name` is found on PATH, if it is there and may be executed.
+/// Path of `name` on PATH, if it exists and is executable.
 pub fn find_program(name: &str) -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
     std::env::split_paths(&path)
@@ -78,7 +81,7 @@ pub fn find_program(name: &str) -> Option<PathBuf> {
         .find(|candidate| is_executable(candidate))
 }
 
-/// Whether `path` leads to a file that may be executed (a dangling link does not).
+/// Whether `path` leads to an executable file (a dangling link does not).
 pub fn is_executable(path: &Path) -> bool {
     let Ok(metadata) = std::fs::metadata(path) else { return false };
     #[cfg(unix)]

@@ -1,25 +1,26 @@
-//! Whether the machine may be changed: a person at a terminal is asked before system packages are installed.
+//! Permission to change the machine: a user at a terminal is asked before system packages are
+//! installed.
 
 use anyhow::{Context, Result, bail};
 use std::io::{IsTerminal, Write};
 
-/// The right to install system packages.
+/// Permission to install system packages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Consent {
-    /// Given beforehand: by `--yes`, by `CI`, or because nobody is there to ask.
+    /// Given in advance: by `--yes`, by `CI`, or because stdin is not a terminal.
     Given,
-    /// Somebody sits at the terminal: ask.
+    /// stdin is a terminal: ask the user.
     Ask,
 }
 
 impl Consent {
-    /// Asks only where there is somebody to answer.
+    /// Asks only if stdin is a terminal and `CI` is not set.
     pub fn new(yes: bool) -> Self {
         let somebody = std::io::stdin().is_terminal() && std::env::var_os("CI").is_none();
         if yes || !somebody { Self::Given } else { Self::Ask }
     }
 
-    /// Returns when `what` may be done; otherwise the error says what was declined.
+    /// Returns if `what` is permitted; otherwise the error states what was declined.
     pub fn require(self, what: &str) -> Result<()> {
         if self == Self::Given {
             return Ok(());

@@ -12,7 +12,7 @@ use std::process::Command;
 /// Options of `cargo xtask qemu`.
 #[derive(Args, Debug, Default)]
 pub struct Options {
-    /// Count instructions instead of following the clock: counts are the same in every run.
+    /// Use a clock that counts instructions: counts are the same in every run.
     #[arg(long)]
     icount: bool,
     /// Run the image of golden vectors and benchmark instead of the board's.
@@ -26,7 +26,8 @@ pub struct Options {
     extra: Vec<String>,
 }
 
-/// Builds the emulated board's image and runs it; QEMU's exit code, which is the image's, decides.
+/// Builds the emulated board's image and runs it; fails unless QEMU's exit code, which is the
+/// image's, is 0.
 pub fn run(project: &Project, options: &Options) -> Result<()> {
     if firmware::board(project, EMULATED_BOARD)?.is_none() {
         bail!("there is no board image to run: firmware/boards/{EMULATED_BOARD} does not exist yet");
@@ -43,7 +44,7 @@ pub fn run(project: &Project, options: &Options) -> Result<()> {
     command::run(&mut qemu).context("the emulated board did not end well")
 }
 
-/// Runs an image with one argument and returns what it says.
+/// Runs an image with one argument and returns its output.
 pub fn listen(image: &Path, argument: &str, icount: bool) -> Result<String> {
     let options = Options { icount, image_arguments: vec![argument.to_owned()], ..Options::default() };
     let mut qemu = Command::new(PROGRAM);
@@ -57,7 +58,7 @@ fn arguments(image: &Path, options: &Options) -> Result<Vec<String>> {
         image.to_str().with_context(|| format!("{} is not UTF-8: choose another folder", image.display()))?;
     let mut semihosting = "enable=on,target=native".to_owned();
     for argument in &options.image_arguments {
-        // QEMU splits at commas; a doubled comma is one.
+        // QEMU splits at commas; a doubled comma stands for one.
         semihosting.push_str(",arg=");
         semihosting.push_str(&argument.replace(',', ",,"));
     }

@@ -1,15 +1,18 @@
-//! Environments of Python, and the packages in them: checks' alone, in folders under `target/`; no part of jointrig needs them.
+//! Python environments and their packages: only for checks, in folders under `target/`; jointrig
+//! itself does not need them.
 
 use crate::command;
 use anyhow::{Context, Result};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The packages that jointrig is compared with, in the versions in which the comparison was last seen to hold, and what they need.
+/// The packages with which jointrig is compared, in the versions of the last successful comparison,
+/// and their dependencies.
 const PEERS: [&str; 7] = ["numpy", "pyFRF==1.5.0", "pyuff==2.5.8", "scipy", "pandas", "openpyxl", "tqdm"];
 
-/// Installed without its dependencies: virtual points and SEMM need only what is named above, while the rest (3D views over
-/// pyvista and Qt, Ansys readers) takes a gigabyte and often does not install.
+/// Installed without its dependencies: virtual points and SEMM need only the packages named above,
+/// while the rest (3D views with pyvista and Qt, Ansys readers) takes a gigabyte and often cannot
+/// be installed.
 const ALONE: [&str; 1] = ["pyFBS==1.0.7"];
 
 /// Installs the peers.
@@ -18,7 +21,7 @@ pub fn with_peers(python: &Path) -> Result<()> {
     pip(python, &["install", "--quiet", "--no-deps"], &ALONE)
 }
 
-/// The interpreter of an environment that has these packages; made where it is not there.
+/// The interpreter of an environment with these packages; creates the environment if necessary.
 pub fn environment(system: &Path, folder: &Path, packages: &[&str]) -> Result<PathBuf> {
     let interpreter = folder.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
     if !interpreter.is_file() {

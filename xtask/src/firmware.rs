@@ -1,7 +1,7 @@
 //! Compiling for the microcontroller: the two `no_std` libraries, and the board images.
 //!
-//! Boards are built one at a time, because cargo would join the features of all that are built together, and the
-//! boards' chip features exclude each other.
+//! Boards are built one at a time, because cargo would unify the features of all that are built
+//! together, and the boards' chip features exclude each other.
 
 use crate::consent::Consent;
 use crate::project::{EMULATED_BOARD, EMULATED_CHECKS, Package, Project, TARGET};
@@ -29,9 +29,10 @@ pub fn command(project: &Project, only: Option<&str>) -> Result<()> {
     build_boards(project, &toolchain, only)
 }
 
-/// Compiles the two libraries for the microcontroller, which shows that they need neither `std` nor anything the
-/// microcontroller lacks. The log goes to `defmt` there, so that feature is checked, where there is one. Machine code is
-/// made for the boards only, whose profile is another.
+/// Compiles the two libraries for the microcontroller, which verifies that they need neither `std`
+/// nor anything else that the microcontroller lacks. The log uses `defmt` there, so that feature is
+/// enabled for packages that have it. Machine code is generated only for the boards, which use a
+/// different profile.
 pub fn check(project: &Project, toolchain: &Toolchain) -> Result<()> {
     for name in LIBRARIES {
         let package =
@@ -47,7 +48,8 @@ pub fn check(project: &Project, toolchain: &Toolchain) -> Result<()> {
     Ok(())
 }
 
-/// Builds the boards, or the one named, prints the table of their sizes, and fails when one takes too much flash.
+/// Builds all boards, or only the named one, prints a table of their sizes, and fails if one
+/// exceeds its flash limit.
 pub fn build_boards(project: &Project, toolchain: &Toolchain, only: Option<&str>) -> Result<()> {
     let (mut sizes, mut images) = (Vec::new(), Vec::new());
     for board in project.boards()?.iter().filter(|board| only.is_none_or(|name| board.name == name)) {
@@ -75,12 +77,13 @@ pub fn build_board(project: &Project, toolchain: &Toolchain, name: &str) -> Resu
     build_binary(project, toolchain, name, name)
 }
 
-/// Builds the image of the emulated board that has the golden vectors and the benchmark, and returns its path.
+/// Builds the emulated board's image with the golden vectors and the benchmark, and returns its
+/// path.
 pub fn build_checks(project: &Project, toolchain: &Toolchain) -> Result<PathBuf> {
     build_binary(project, toolchain, EMULATED_BOARD, EMULATED_CHECKS)
 }
 
-/// Builds one binary of a board; the board itself is the one of its name.
+/// Builds one binary of a board; the board's own image is the binary with the board's name.
 fn build_binary(project: &Project, toolchain: &Toolchain, name: &str, binary: &str) -> Result<PathBuf> {
     let missing = || format!("no board is called {name} in firmware/boards, with a binary {binary}");
     let folder = project.boards_root().with_context(missing)?;
@@ -95,8 +98,8 @@ fn build_binary(project: &Project, toolchain: &Toolchain, name: &str, binary: &s
     Ok(image)
 }
 
-/// Keeps a copy of the image under its build id, by which a host finds the strings of the log that it sends: a
-/// controller may run an older build than the newest one here.
+/// Stores a copy of the image under its build id, by which a host finds the strings of the log
+/// messages: a controller may run a build older than the newest one here.
 fn keep_log_table(project: &Project, image: &Path) -> Result<()> {
     let folder = project.target.join(jointrig_logs::FOLDER);
     let bytes = std::fs::read(image).with_context(|| format!("could not read {}", image.display()))?;

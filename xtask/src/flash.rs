@@ -1,4 +1,4 @@
-//! Writing the image to the rig's controller.
+//! Writes the image to the rig's controller.
 
 use crate::consent::Consent;
 use crate::firmware;
@@ -12,9 +12,10 @@ const BOARD: &str = "nucleo-u5a5";
 /// Its chip, as probe-rs names it.
 const CHIP: &str = "STM32U5A5ZJTxQ";
 
-/// `cargo xtask flash`: with `detach`, returns once the image is written; otherwise stays and shows the board's log.
+/// `cargo xtask flash`: with `detach`, returns once the image is written; otherwise stays attached
+/// and shows the board's log.
 pub fn run(project: &Project, detach: bool) -> Result<()> {
-    // Everything that is missing is said at once, before anything is built.
+    // Everything that is missing is reported together, before anything is built.
     let mut missing = Vec::new();
     if firmware::board(project, BOARD)?.is_none() {
         missing.push(format!("there is no board image: firmware/boards/{BOARD} does not exist yet"));

@@ -1,17 +1,19 @@
-//! Images without their wrapping: the bytes of the flash, for boards that are flashed by a drive or by the ROM's loader.
+//! Flat images: the bytes of the flash, for boards that are flashed as a USB drive or by the loader
+//! in ROM.
 
 use anyhow::{Context, Result, bail};
 use object::read::elf::{ElfFile32, ProgramHeader};
 use object::{Endianness, elf};
 use std::path::{Path, PathBuf};
 
-/// What flash that was never written reads.
+/// Value of erased flash bytes.
 const ERASED: u8 = 0xFF;
 
-/// Farthest that two parts of one image may lie apart, bytes: more than any flash has.
+/// Maximum distance between two parts of one image, bytes: more than the size of any flash.
 const LARGEST: usize = 16 << 20;
 
-/// Writes the flash's bytes beside the image as `.bin`; returns the file and the address of its first byte.
+/// Writes the flash's bytes next to the image as `.bin`; returns the file and the address of its
+/// first byte.
 pub fn write(image: &Path) -> Result<(PathBuf, u64)> {
     let bytes = std::fs::read(image).with_context(|| format!("could not read {}", image.display()))?;
     let (first, flat) = of(&bytes).with_context(|| format!("{} cannot be flattened", image.display()))?;
@@ -20,7 +22,8 @@ pub fn write(image: &Path) -> Result<(PathBuf, u64)> {
     Ok((file, first))
 }
 
-/// The loaded segments at their physical addresses, one after the other, and the first of these.
+/// The address of the first loaded segment, and the bytes of all segments at their physical
+/// addresses.
 fn of(image: &[u8]) -> Result<(u64, Vec<u8>)> {
     let file = ElfFile32::<Endianness>::parse(image)?;
     let endian = Endianness::Little;
@@ -49,7 +52,8 @@ fn of(image: &[u8]) -> Result<(u64, Vec<u8>)> {
 mod tests {
     use super::*;
 
-    /// An image of 32 bits with these segments: (virtual address, physical address, bytes, size in memory).
+    /// A 32-bit image with these segments: (virtual address, physical address, bytes, size in
+    /// memory).
     fn image(segments: &[(u32, u32, &[u8], u32)]) -> Vec<u8> {
         let mut out = vec![0x7F, b'E', b'L', b'F', 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0];
         let half =
@@ -73,7 +77,8 @@ mod tests {
     #[test]
     fn segments_stand_at_their_physical_addresses() {
         let text = (0x0800_0000, 0x0800_0000, &b"text"[..], 4);
-        // initialised data live in RAM and are loaded from the flash behind the text; RAM alone is not in the file
+        // initialised data is in RAM and is loaded from the flash after the text; uninitialised RAM
+        // is not in the file
         let data = (0x2000_0000, 0x0800_0008, &b"data"[..], 4);
         let bss = (0x2000_0004, 0x2000_0004, &b""[..], 64);
         let (first, flat) = of(&image(&[data, text, bss])).expect("an image");

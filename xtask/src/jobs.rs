@@ -1,4 +1,4 @@
-//! Programs run side by side: what each says is kept together and shown when it ends.
+//! Runs programs in parallel: the output of each is collected and shown when it ends.
 
 use anyhow::{Context, Result, bail};
 use std::collections::VecDeque;
@@ -8,35 +8,35 @@ use std::process::{Command, ExitStatus};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// Programs at once, at most: the processors are to be busy while one waits, and a test that watches the clock is not to
-/// starve.
+/// Maximum number of parallel programs: enough to use the processors while one waits, but not so
+/// many that a test with a time limit is starved.
 const AT_ONCE: usize = 4;
 
 /// A program to run.
 pub struct Job {
-    /// What it is called in the output.
+    /// Its name in the output.
     pub name: String,
-    /// How it is started.
+    /// The command that starts it.
     pub command: Command,
 }
 
-/// What became of a job.
+/// Result of a job.
 pub struct Ended {
     /// Its name.
     pub name: String,
-    /// How it ended.
+    /// Its exit status.
     pub status: ExitStatus,
-    /// All that it wrote, to its standard output and to its standard error.
+    /// All its output, stdout and stderr.
     pub output: Vec<u8>,
 }
 
-/// How many jobs run at once here: no more than there are processors.
+/// Number of jobs to run in parallel: at most the number of processors.
 pub fn at_once() -> usize {
     std::thread::available_parallelism().map_or(1, NonZero::get).min(AT_ONCE)
 }
 
-/// Runs all jobs, the first ones first and `at_once` side by side. Failures do not keep the others from running; the
-/// error is of a job that could not be started, or of output that could not be shown.
+/// Runs all jobs in order, `at_once` in parallel. If a job fails the others still run; an error
+/// means that a job could not be started, or that output could not be shown.
 pub fn run(jobs: Vec<Job>, at_once: usize, shown: &mut (impl Write + Send)) -> Result<Vec<Ended>> {
     let (number, begun) = (jobs.len(), Instant::now());
     let waiting = Mutex::new(VecDeque::from(jobs));
@@ -65,7 +65,7 @@ pub fn run(jobs: Vec<Job>, at_once: usize, shown: &mut (impl Write + Send)) -> R
 }
 
 fn finish(mut job: Job) -> Result<Ended> {
-    // One pipe for both, so that lines stay in the order in which they were written.
+    // One pipe for both streams, so that lines stay in the order in which they were written.
     let (mut reader, writer) = std::io::pipe().context("could not make a pipe")?;
     let other = writer.try_clone().context("could not make a pipe")?;
     let mut child = job
@@ -74,7 +74,8 @@ fn finish(mut job: Job) -> Result<Ended> {
         .stderr(other)
         .spawn()
         .with_context(|| format!("could not start {}", job.name))?;
-    // The command holds the writing ends; the reader sees the end when the child's are the only ones, and closed.
+    // The command holds the write ends; after it is dropped, the reader reaches the end when the
+    // child's are closed.
     drop(job.command);
     let mut output = Vec::new();
     reader.read_to_end(&mut output).with_context(|| format!("could not read the output of {}", job.name))?;

@@ -24,14 +24,14 @@ pub fn all(project: &Project) -> Result<()> {
     boards(project, &folder)
 }
 
-/// Clippy on the root workspace. It runs in the release profile, like the tests: the build scripts it needs (SQLite's
-/// C code among them) then run once for both.
+/// Clippy on the root workspace. It uses the release profile, like the tests: the required build
+/// scripts (including SQLite's C code) then run once for both.
 fn workspace(project: &Project) -> Result<()> {
     let mut cargo = command::cargo(&project.root);
     cargo.args(["clippy", "--workspace", "--all-targets", "--release", "--", "-Dwarnings"]);
     command::run(&mut cargo)
         .context("clippy found something: each finding above names its file and its remedy")?;
-    // what no other step builds, and would rot otherwise
+    // code that no other step builds, and that would otherwise not be checked
     let mut table = command::cargo(&project.root);
     table.args([
         "clippy",
@@ -44,14 +44,15 @@ fn workspace(project: &Project) -> Result<()> {
         "-Dwarnings",
     ]);
     command::run(&mut table).context("clippy found something in the table of speed")?;
-    // The crates for strangers once more as strangers build them: the workspace above turns their features on.
+    // The published crates once more as external users build them: the workspace above enables
+    // their features.
     let mut alone = command::cargo(&project.root);
     alone.args(["clippy", "--package", "jointrig-analysis", "--package", "jointrig-uff", "--all-targets"]);
     alone.args(["--release", "--", "-Dwarnings"]);
     command::run(&mut alone).context("clippy found something in a crate without its features")
 }
 
-/// Clippy on each board, by the compiler that builds it.
+/// Clippy on each board, with the compiler that builds it.
 fn boards(project: &Project, folder: &Path) -> Result<()> {
     let toolchain = setup::target(project, Consent::new(false))?;
     for board in project.boards()? {

@@ -1,8 +1,10 @@
-//! The two lock files agree on every crate they share: firmware tested on a PC is the firmware on the board.
+//! The two lock files agree on every crate they share: firmware tested on a PC is the firmware on
+//! the board.
 //!
-//! A crate may appear in several versions in one lock. The workspaces agree on a crate when, for every compatible
-//! range (the same first non-zero number) both contain, the versions are the same; `0.9.3` here and only `1.0.0` there
-//! is two crates with one name, and is not compared.
+//! A crate may appear in several versions in one lock. The workspaces agree on a crate if, for
+//! every compatible range (with the same first non-zero number) that both contain, the versions are
+//! the same; `0.9.3` in one and only `1.0.0` in the other are different ranges, which are not
+//! compared.
 
 use anyhow::{Context, Result, bail};
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,7 +13,7 @@ use std::path::Path;
 /// The versions of each crate, by name and compatible range.
 type Versions = BTreeMap<(String, String), BTreeSet<String>>;
 
-/// Compares two lock files, and fails with the names of the crates they differ on.
+/// Compares two lock files, and fails with the names of the crates on which they differ.
 pub fn compare(one: &Path, other: &Path) -> Result<()> {
     let differences = differences(&read(one)?, &read(other)?);
     if differences.is_empty() {
@@ -37,7 +39,7 @@ fn parse(text: &str) -> Result<Versions> {
     let lock: toml::Table = text.parse()?;
     let mut versions = Versions::new();
     for package in lock.get("package").and_then(toml::Value::as_array).context("it has no packages")? {
-        // Packages without a source are the workspaces' own.
+        // Packages without a source are members of the workspaces.
         if package.get("source").is_none() {
             continue;
         }
@@ -63,7 +65,8 @@ fn differences(one: &Versions, other: &Versions) -> Vec<String> {
         .collect()
 }
 
-/// The part of a version that cargo treats as incompatible when it changes: `1.x`, `0.9.x`, `0.0.3`.
+/// The part of a version that cargo treats as incompatible when it changes: `1.x`, `0.9.x`,
+/// `0.0.3`.
 fn compatible_range(version: &str) -> String {
     let mut range = Vec::new();
     for number in version.split(['.', '-', '+']).take(3) {

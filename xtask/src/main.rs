@@ -1,8 +1,9 @@
-//! `cargo xtask`: everything a contributor runs, behind one command.
+//! `cargo xtask`: all tasks for contributors in one command.
 //!
-//! Each command is a thin line here and a file of its own: [`setup`] prepares the machine, [`suite`] is the whole
-//! test run, [`firmware`] builds for the microcontroller. The exit code is 0 when all went well, 1 when a step failed
-//! (the message says what, where and what to do), 2 for a command line that makes no sense.
+//! Each task has one line here and a separate file: [`setup`] prepares the machine, [`suite`] is
+//! the whole test run, [`firmware`] builds for the microcontroller. The exit code is 0 for success,
+//! 1 when a step failed (the message states what, where and what to do), 2 for an invalid command
+//! line.
 
 mod accuracy;
 mod bench;
@@ -38,7 +39,7 @@ use clap::{Parser, Subcommand};
 use project::Project;
 use std::process::ExitCode;
 
-/// Everything a contributor runs.
+/// All tasks for contributors.
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask")]
 struct Arguments {
@@ -66,16 +67,17 @@ enum Task {
     FmtCheck,
     /// Run clippy on both workspaces with warnings as errors, and compare their locks.
     Lint,
-    /// Check the laws of the house: crate graph, circles of files, equations, licences.
+    /// Check the structural rules: crate graph, circular imports of files, equations, licences.
     House,
-    /// Run all that must pass before a change is merged.
+    /// Run all checks that must pass before a change is merged.
     #[command(after_help = setup::ENVIRONMENT_HELP)]
     Test(suite::Options),
     /// Run the emulated board in QEMU.
     Qemu(emulator::Options),
-    /// Count what the firmware costs in the emulator, write the table of it, and enforce its limits.
+    /// Count the firmware's instructions and memory in the emulator, write the table, and enforce
+    /// its limits.
     Budgets,
-    /// Write the rig controller's image to the board on the desk.
+    /// Write the rig controller's image to the connected board.
     Flash {
         /// Write the image and return, without staying attached to show its log.
         #[arg(long)]
@@ -85,23 +87,30 @@ enum Task {
     Python,
     /// Build the Python wheels of a release: manylinux2014, x86-64 and aarch64.
     Wheels,
-    /// Write what each program is made of: every crate of others with version, licence and checksum (CycloneDX).
+    /// Write the components of each program: every third-party crate with version, licence and
+    /// checksum (CycloneDX).
     Sbom,
-    /// Compare the numbers of spectra, universal files and virtual points with those of pyFRF, pyuff and pyFBS.
+    /// Compare the numbers of spectra, universal files and virtual points with those of pyFRF,
+    /// pyuff and pyFBS.
     Parity,
-    /// Run the campaigns whose truth is known (under two hours), and write the tables of docs/accuracy.md.
+    /// Run the campaigns with known truth (under two hours), and write the tables of
+    /// docs/accuracy.md.
     Accuracy {
-        /// Make these tables alone: contact, marks, slip, levels, between-arms, between-arms-campaigns, recommended, methods, fit.
+        /// Compute only these tables: contact, marks, slip, levels, between-arms,
+        /// between-arms-campaigns, recommended, methods, fit.
         tables: Vec<String>,
     },
-    /// Measure how fast everything is beside its peers and the machine's limit, and write docs/performance.md.
+    /// Measure run times, compare them with peers and the machine's limit, and write
+    /// docs/performance.md.
     Bench {
-        /// Measure these parts alone, and write no page: spectra, substructuring, loops, universal, frames, simulator, campaign, growth.
+        /// Measure only these parts, and do not write the page: spectra, substructuring, loops,
+        /// universal, frames, simulator, campaign, growth.
         parts: Vec<String>,
-        /// Run the benchmarks beside the hot paths instead; what follows is passed to `cargo bench`.
+        /// Run the benchmarks of the hot paths instead; the arguments after `--` are passed to
+        /// `cargo bench`.
         #[arg(long, conflicts_with = "parts")]
         hot_paths: bool,
-        /// A part of a benchmark's name, for example.
+        /// For example a part of a benchmark's name.
         #[arg(last = true, requires = "hot_paths")]
         extra: Vec<String>,
     },

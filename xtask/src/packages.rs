@@ -1,4 +1,4 @@
-//! Debian packages, for the things cargo cannot fetch: a compiler with sources, QEMU, and the browser.
+//! Debian packages, for what cargo cannot fetch: a compiler with sources, QEMU, and the browser.
 
 use crate::command;
 use crate::consent::Consent;
@@ -10,9 +10,10 @@ pub fn available() -> bool {
     command::find_program("apt-get").is_some()
 }
 
-/// Installs `packages` with apt-get, through sudo unless root. The package lists are refreshed first: old ones, as on an image
-/// that is some months old, name packages that are gone, or versions that are too old. Where that fails, the lists that are
-/// there may still do.
+/// Installs `packages` with apt-get, through sudo unless root. The package lists are refreshed
+/// first: outdated ones, for example in an image that is some months old, name packages that no
+/// longer exist, or versions that are too old. If the refresh fails, the existing lists may still
+/// work.
 pub fn install(packages: &[&str], consent: Consent) -> Result<()> {
     let names = packages.join(" ");
     if !available() {
@@ -31,7 +32,8 @@ pub fn install(packages: &[&str], consent: Consent) -> Result<()> {
     })
 }
 
-/// The words before apt-get: nothing for root, sudo for others (which must not wait for a password nobody types).
+/// The words before apt-get: none for root, sudo for others (which must not wait for a password
+/// that nobody enters).
 fn privileges(consent: Consent) -> Result<Vec<&'static str>> {
     let user = command::output(Command::new("id").arg("-u"))?;
     if user.trim() == "0" {
@@ -57,7 +59,7 @@ fn apt(prefix: &[&str], consent: Consent, arguments: &[&str]) -> Command {
         "DEBIAN_FRONTEND=noninteractive",
         "apt-get",
         "--quiet",
-        // Another apt-get may be at work, as on a machine that has just started.
+        // Another apt-get may be running, for example on a machine that has just started.
         "-oDPkg::Lock::Timeout=300",
     ]);
     command.args(arguments);

@@ -1,6 +1,7 @@
-//! `cargo xtask parity`: the same numbers as pyFRF, pyuff and pyFBS.
+//! `cargo xtask parity`: compares results with those of pyFRF, pyuff and pyFBS.
 //!
-//! Python and its packages are the check's alone, in a folder under `target/`; no part of jointrig needs them.
+//! Python and its packages are only for this check, in a folder under `target/`; jointrig itself
+//! does not need them.
 
 use crate::command;
 use crate::environment::{self, environment};
@@ -17,7 +18,7 @@ pub fn run(project: &Project) -> Result<()> {
     command::run(&mut cargo)
 }
 
-/// The interpreter of an environment that has the packages; made when it is not there.
+/// The interpreter of an environment with the packages; created if necessary.
 fn python(project: &Project) -> Result<PathBuf> {
     let Some(system) = ["python3", "python"].into_iter().find_map(command::find_program) else {
         bail!(

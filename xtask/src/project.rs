@@ -1,7 +1,8 @@
-//! Where things are: the two workspaces, their packages, and the target directories.
+//! Locations: the two workspaces, their packages, and the target directories.
 //!
-//! The root workspace builds into cargo's target directory; everything for the microcontroller builds into `firmware`
-//! below it, because it may use another compiler, and two compilers in one target directory rebuild each other's work.
+//! The root workspace builds into cargo's target directory; everything for the microcontroller
+//! builds into `firmware` below it, because it may use another compiler, and two compilers in one
+//! target directory rebuild each other's output.
 
 use crate::command;
 use anyhow::{Context, Result};
@@ -11,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// The Cortex-M33 with its floating-point unit: the rig's controller and the emulated board.
 pub const TARGET: &str = "thumbv8m.main-none-eabihf";
 
-/// The emulated board: QEMU's machine `mps2-an505` (Cortex-M33) and our package are named alike.
+/// The emulated board: QEMU's machine `mps2-an505` (Cortex-M33) and our package have the same name.
 pub const EMULATED_BOARD: &str = "mps2-an505";
 
 /// The rig's controller.
@@ -20,7 +21,7 @@ pub const WIRED_BOARD: &str = "nucleo-u5a5";
 /// The emulated board's other image: golden vectors and benchmark.
 pub const EMULATED_CHECKS: &str = "mps2-checks";
 
-/// The repository as xtask sees it.
+/// The repository.
 pub struct Project {
     /// The folder of the root `Cargo.toml`.
     pub root: PathBuf,
@@ -30,16 +31,16 @@ pub struct Project {
     pub packages: Vec<Package>,
 }
 
-/// What cargo says about one package.
+/// Cargo's description of a package.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Package {
-    /// The name `-p` takes.
+    /// The name for cargo's `-p`.
     pub name: String,
-    /// The files that its library and its binaries begin with.
+    /// The root files of its library and its binaries.
     pub roots: Vec<PathBuf>,
-    /// What it is built from; what only its tests need is not here.
+    /// Its dependencies, without those that only tests need.
     pub dependencies: Vec<Dependency>,
-    /// Its features, the implicit ones of optional dependencies included.
+    /// Its features, including the implicit ones of optional dependencies.
     pub features: Vec<String>,
     /// The names of its binaries.
     pub binaries: Vec<String>,
@@ -49,19 +50,20 @@ pub struct Package {
     pub benches: Vec<String>,
 }
 
-/// What a package says that it needs.
+/// A dependency of a package.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Dependency {
     /// The package's name.
     pub name: String,
-    /// Whether only a feature turns it on.
+    /// Whether it is enabled only by a feature.
     pub optional: bool,
 }
 
 impl Project {
-    /// Finds the repository xtask belongs to.
+    /// Finds the repository to which xtask belongs.
     pub fn locate() -> Result<Self> {
-        // Set by `cargo run`; the path known at compile time serves when the binary is started by hand.
+        // Set by `cargo run`; if the binary is started directly, the path known at compile time is
+        // used.
         let manifest =
             std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into());
         let root = Path::new(&manifest)

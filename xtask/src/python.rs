@@ -1,6 +1,8 @@
-//! `cargo xtask python`: the wheel is built, installed into empty environments, and tested from there, not from the tree.
+//! `cargo xtask python`: the wheel is built, installed into empty environments, and tested there,
+//! not in the source tree.
 //!
-//! Python and its packages are this check's alone, in folders under `target/`; no part of jointrig needs them.
+//! Python and its packages are only for this check, in folders under `target/`; jointrig itself
+//! does not need them.
 
 use crate::command;
 use crate::environment::{self, environment, pip};
@@ -11,20 +13,21 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Oldest Python that the wheel is made for.
+/// Oldest Python version that the wheel supports.
 pub const OLDEST: (u32, u32) = (3, 10);
 
-/// Newest that is looked for by its name.
+/// Newest minor version that is searched for by name.
 const NEWEST: u32 = 20;
 
-/// Bytes of the wheel, at most.
+/// Maximum size of the wheel, bytes.
 pub const WHEEL: u64 = 5_000_000;
 
-/// What builds the wheel, and what tests it where nothing else is installed.
+/// The package that builds the wheel, and those that test it where nothing else is installed.
 const TOOLS: [&str; 1] = ["maturin>=1.9,<2"];
 const ALONE: [&str; 3] = ["numpy", "pytest", "pytest-xdist"];
 
-/// What the wheel is used with beside its peers: what notebooks import, engines that read the columns, and a scheduler.
+/// Packages that are used together with the wheel: those of notebooks, engines that read the
+/// columns, and a scheduler.
 const OTHERS: [&str; 9] = [
     "pytest",
     "pytest-xdist",
@@ -37,7 +40,7 @@ const OTHERS: [&str; 9] = [
     "ipykernel",
 ];
 
-/// Builds and tests the wheel; a remark on it, or why it was left out.
+/// Builds and tests the wheel; returns a remark, or why it was skipped.
 pub fn run(project: &Project) -> Result<String> {
     let found = interpreters();
     let (Some((oldest, first)), Some((newest, last))) = (found.first_key_value(), found.last_key_value())
@@ -50,7 +53,7 @@ pub fn run(project: &Project) -> Result<String> {
             "no environment with maturin can be made (on Debian: python3-venv; pip needs its registry)",
         ));
     };
-    // as the tests build it: other features would compile everything once more
+    // with the same features as for the tests, because others would compile everything again
     let mut cargo = command::cargo(&project.root);
     cargo.args(["build", "--release", "--workspace", "--bin", "jointrig"]);
     command::run(&mut cargo).context("the command that the wheel is compared with does not compile")?;
@@ -77,7 +80,7 @@ fn left_out(why: &str) -> String {
     format!("LEFT OUT: {why}")
 }
 
-/// Each version of Python that the wheel is made for, once: by its name on the path, and where pyenv keeps them.
+/// The interpreter of each supported Python version, from PATH and from pyenv's folder.
 pub fn interpreters() -> BTreeMap<(u32, u32), PathBuf> {
     let named = (OLDEST.1..NEWEST).map(|minor| format!("python3.{minor}"));
     let mut candidates: Vec<PathBuf> = ["python3".to_owned(), "python".to_owned()]
@@ -131,7 +134,8 @@ struct Tests<'a> {
 }
 
 impl Tests<'_> {
-    /// With numpy alone, in a fresh environment: what an older wheel or another package left behind must not help.
+    /// With numpy alone, in a new environment: the test must not depend on remains of an older
+    /// wheel or another package.
     fn alone(&self, system: &Path, name: &str) -> Result<()> {
         let fresh = self.folder.join(name);
         if fresh.is_dir() {
@@ -142,7 +146,8 @@ impl Tests<'_> {
         self.pytest(&python, &["--ignore=with_others"])
     }
 
-    /// With the packages that people use beside it, and the stubs. This environment is kept: it takes half a gigabyte.
+    /// With the packages that users combine it with, and the stubs. This environment is kept: it
+    /// takes half a gigabyte.
     fn with_others(&self, system: &Path) -> Result<()> {
         let python = environment(system, &self.folder.join("others"), &OTHERS)?;
         environment::with_peers(&python)?;
@@ -170,7 +175,8 @@ impl Tests<'_> {
     fn pytest(&self, python: &Path, which: &[&str]) -> Result<()> {
         let mut pytest = Command::new(python);
         pytest.args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "--durations=5"]).args(which);
-        // a file at a time on each core: tests of one file share the campaigns that they measure
+        // one file at a time on each core, because the tests of one file share the campaigns that
+        // they measure
         pytest.args(["-n", "auto", "--dist", "loadfile"]);
         pytest.current_dir(self.tests()).env("PYTHONDONTWRITEBYTECODE", "1");
         let command = format!("jointrig{}", std::env::consts::EXE_SUFFIX);

@@ -1,4 +1,4 @@
-//! QEMU, the program: whether it is here, and how it gets here.
+//! The QEMU program: detection and installation.
 
 use crate::consent::Consent;
 use crate::{command, packages};

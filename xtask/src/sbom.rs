@@ -1,6 +1,8 @@
-//! What a program is made of: every crate of others in it, with version, licence and checksum, as a CycloneDX 1.5 document.
+//! Components of a program: every third-party crate in it, with version, licence and checksum, as a
+//! CycloneDX 1.5 document.
 //!
-//! `cargo metadata` and the lock know all of it. The document of the same lock is the same to the byte: it has no time and no serial number.
+//! All data come from `cargo metadata` and the lock file. The document is reproducible byte for
+//! byte from the lock file: it contains no time and no serial number.
 
 use crate::command;
 use crate::project::{EMULATED_BOARD, Project, TARGET};
@@ -9,12 +11,12 @@ use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// A program that leaves the house.
+/// A program that is distributed.
 struct Product<'p> {
     package: &'p str,
-    /// The workspace that it is built in.
+    /// The workspace in which it is built.
     root: PathBuf,
-    /// The machine that it is built for; this one without it.
+    /// The target for which it is built; `None` for this machine.
     target: Option<&'p str>,
 }
 
@@ -39,7 +41,7 @@ pub fn run(project: &Project) -> Result<()> {
     Ok(())
 }
 
-/// What a board's image is made of, beside it.
+/// Writes the document of a board's image next to the image.
 pub fn of_board(root: &Path, package: &str, image: &Path) -> Result<PathBuf> {
     let path = image.with_extension("cdx.json");
     write(&Product { package, root: root.into(), target: Some(TARGET) }, &path)?;
@@ -93,7 +95,8 @@ fn document(metadata: &Value, lock: &str, package: &str) -> Result<Value> {
     let list = |value: &Value| value.as_array().cloned().unwrap_or_default();
     let packages: BTreeMap<String, Value> =
         list(&metadata["packages"]).into_iter().map(|p| (text(&p, "id").to_owned(), p)).collect();
-    // what is built in, or runs while it is built; tests' own crates are in nothing that leaves the house
+    // dependencies that are linked, or run during the build; those of tests are not in any
+    // distributed program
     let counts =
         |dependency: &Value| list(&dependency["dep_kinds"]).iter().any(|kind| text(kind, "kind") != "dev");
     let needs: BTreeMap<String, Vec<String>> = list(&metadata["resolve"]["nodes"])
@@ -123,7 +126,7 @@ fn document(metadata: &Value, lock: &str, package: &str) -> Result<Value> {
             "type": kind, "bom-ref": purl(package), "name": name, "version": version, "purl": purl(package),
         });
         if let Some(licence) = package["license"].as_str() {
-            // cargo allowed a stroke for OR once
+            // cargo formerly allowed a slash for OR
             component["licenses"] = json!([{ "expression": licence.replace('/', " OR ") }]);
         }
         if let Some(sum) = sums.get(&(name.to_owned(), version.to_owned())) {

@@ -1,4 +1,4 @@
-//! `cargo xtask setup`: what the machine needs beyond a Rust compiler, made available once.
+//! `cargo xtask setup`: installs once what the machine needs in addition to a Rust compiler.
 
 use crate::consent::Consent;
 use crate::project::Project;
@@ -6,14 +6,15 @@ use crate::toolchain::{self, Mode, Toolchain};
 use crate::{chromium, qemu};
 use anyhow::Result;
 
-/// The choice a person has, shown by `--help`.
+/// The available choice, shown by `--help`.
 pub const ENVIRONMENT_HELP: &str = "\
 JOINTRIG_FIRMWARE_TOOLCHAIN chooses the compiler for the microcontroller:
   auto    (default) what is installed; else `rustup target add`; else the distribution
   rustup  rustup's target only
   distro  Debian's rustc-web, rust-web-src and rust-web-clippy; core is built once into a private sysroot";
 
-/// Makes the target, the emulator and the browser available, and returns the compiler for the target.
+/// Makes the target, the emulator and the browser available, and returns the compiler for the
+/// target.
 pub fn everything(project: &Project, consent: Consent) -> Result<Toolchain> {
     let toolchain = target(project, consent)?;
     qemu::ensure(consent)?;

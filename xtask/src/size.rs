@@ -1,7 +1,7 @@
 //! How much flash and RAM an image takes, read from its ELF sections.
 //!
-//! Flash holds code, constants and the initial values of variables (text + rodata + data); RAM holds the variables
-//! (data + bss). The stack has no section: what RAM is left over is the stack's.
+//! Flash holds code, constants and the initial values of variables (text + rodata + data); RAM
+//! holds the variables (data + bss). The stack has no section: it uses the remaining RAM.
 
 use anyhow::{Context, Result, bail};
 use object::elf::{SHF_ALLOC, SHF_EXECINSTR, SHF_WRITE};
@@ -11,14 +11,14 @@ use std::path::Path;
 
 use crate::project::EMULATED_BOARD;
 
-/// Bytes of flash that the emulated board's image may take: so a growth that nobody wanted shows.
+/// Bytes of flash that the emulated board's image may take, so that unintended growth is noticed.
 pub const EMULATED_FLASH: u64 = 80_000;
 
-/// Bytes of flash that a wired board's image may take, with its chip's support and USB: it then also fits the smaller controllers of
-/// the same family.
+/// Bytes of flash that a wired board's image may take, including its chip's support and USB: it
+/// then also fits the smaller controllers of the same family.
 pub const WIRED_FLASH: u64 = 96_000;
 
-/// What the image of a board may take.
+/// Flash limit of a board's image, bytes.
 pub fn limit(board: &str) -> u64 {
     if board == EMULATED_BOARD { EMULATED_FLASH } else { WIRED_FLASH }
 }
@@ -57,7 +57,8 @@ fn of_elf(bytes: &[u8]) -> Result<Sizes> {
     for section in file.sections() {
         let SectionFlags::Elf { sh_flags, .. } = section.flags() else { continue };
         let has = |flag: u32| sh_flags & u64::from(flag) != 0;
-        // What is not loaded (debug information, defmt's strings) takes no room on the chip.
+        // Sections that are not loaded (debug information, defmt's strings) take no memory on the
+        // chip.
         if !has(SHF_ALLOC) {
             continue;
         }
@@ -98,7 +99,7 @@ pub fn table(images: &[(String, Sizes)]) -> String {
     text
 }
 
-/// Fails when an image takes more flash than its [`limit`], and names it.
+/// Fails if an image takes more flash than its [`limit`], and names it.
 pub fn enforce(images: &[(String, Sizes)]) -> Result<()> {
     let over: Vec<String> = images
         .iter()

@@ -1,4 +1,4 @@
-//! `cargo xtask test`: everything that must pass, in order, with a table at the end.
+//! `cargo xtask test`: all checks, in order, with a table at the end.
 
 use crate::consent::Consent;
 use crate::firmware;
@@ -14,10 +14,10 @@ use std::time::{Duration, Instant};
 /// Options of `cargo xtask test`.
 #[derive(Args, Debug, Default)]
 pub struct Options {
-    /// Leave out the slow steps; the plan and the table say which.
+    /// Leave out the slow steps; the list of steps and the table state which.
     #[arg(long)]
     quick: bool,
-    /// Go on after a failed step; the exit code still tells.
+    /// Continue after a failed step; the exit code still indicates the failure.
     #[arg(long)]
     keep_going: bool,
     /// Do not ask before installing system packages.
@@ -28,15 +28,15 @@ pub struct Options {
     extra: Vec<String>,
 }
 
-/// What a step finds and leaves for later ones.
+/// Results of the steps that later ones need.
 struct Run<'a> {
     project: &'a Project,
     options: &'a Options,
     toolchain: Option<Toolchain>,
 }
 
-/// One step: its name in the table, what it does, whether `--quick` leaves it out, and the doing, which returns a
-/// remark for the table.
+/// One step: its name in the table, its description, whether `--quick` leaves it out, and its
+/// function, which returns a remark for the table.
 struct Step {
     name: &'static str,
     purpose: &'static str,
@@ -44,7 +44,7 @@ struct Step {
     action: fn(&mut Run) -> Result<String>,
 }
 
-/// The plan. The cheap steps come first, so that a slip shows early.
+/// The steps. The cheap ones come first, so that a mistake is found early.
 const STEPS: [Step; 10] = [
     Step {
         name: "setup",
@@ -59,7 +59,8 @@ const STEPS: [Step; 10] = [
         slow: false,
         action: house_rules,
     },
-    // Clippy on the boards compiles the no_std libraries for the microcontroller, with the features of each board.
+    // Clippy on the boards compiles the no_std libraries for the microcontroller, with the features
+    // of each board.
     Step {
         name: "lint",
         purpose: "clippy is content with host and boards, the locks agree",
@@ -102,7 +103,7 @@ impl Run<'_> {
         if self.options.quick { Scope::WithoutScenarios } else { Scope::Everything }
     }
 
-    /// The toolchain of the set-up step, or the error that it is missing (with `--keep-going`).
+    /// The toolchain of the set-up step, or an error if it is missing (with `--keep-going`).
     fn toolchain(&self) -> Result<&Toolchain> {
         self.toolchain
             .as_ref()
@@ -110,7 +111,7 @@ impl Run<'_> {
     }
 }
 
-/// Runs the plan.
+/// Runs the steps.
 pub fn run(project: &Project, options: &Options) -> Result<()> {
     println!("cargo xtask test runs, in this order:");
     for step in &STEPS {
@@ -231,7 +232,7 @@ fn wheel(run: &mut Run) -> Result<String> {
 
 fn docs(run: &mut Run) -> Result<String> {
     let mut cargo = command::cargo(&run.project.root);
-    // In release, like clippy: the dependencies' metadata is then there already.
+    // In release, like clippy, so that the dependencies' metadata is already available.
     cargo.env("RUSTDOCFLAGS", "-Dwarnings").args(["doc", "--workspace", "--no-deps", "--release"]);
     command::run(&mut cargo).context("the documentation has faults: each one above names its file")?;
     Ok(String::new())

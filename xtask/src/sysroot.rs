@@ -1,13 +1,15 @@
-//! The private sysroot: the target's `core` and `alloc`, built once from the distribution's sources.
+//! The private sysroot: the target's `core` and `alloc`, built once from the distribution's
+//! sources.
 //!
-//! Debian's `rustc-web` is a current compiler and `rust-web-src` its library sources (`rust-web-clippy` is its clippy);
-//! none has the microcontroller's target ready-made. This builds `core`, `alloc` and `compiler_builtins` into a folder beside the build's other
-//! products, laid out as rustc expects a sysroot, with a two-line wrapper that makes rustc use it. From then on plain
-//! `cargo build` with `RUSTC` pointing at the wrapper is all it takes. A compiler only reads libraries of its own
-//! version, so the folder's name carries the version.
+//! Debian's `rustc-web` is a current compiler and `rust-web-src` its library sources
+//! (`rust-web-clippy` is its clippy); none includes the microcontroller's target precompiled. This
+//! module builds `core`, `alloc` and `compiler_builtins` into a folder next to the other build
+//! products, with the layout of a sysroot, and a two-line wrapper that makes rustc use it. After
+//! that plain `cargo build` with `RUSTC` set to the wrapper is enough. A compiler only reads
+//! libraries of its own version, so the folder's name contains the version.
 //!
-//! It takes about 40 s once. The work is done in a `.partial` folder under a file lock, and renamed when complete: a
-//! folder with the final name is always whole, whatever was interrupted.
+//! It takes about 40 s once. The work is done in a `.partial` folder under a file lock, and renamed
+//! when complete: a folder with the final name is always complete, even after an interruption.
 
 use crate::command;
 use crate::consent::Consent;
@@ -20,15 +22,15 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Where Debian's packages put the compiler.
+/// Path of the compiler in Debian's packages.
 const RUSTC: &str = "/usr/bin/rustc";
-/// Where they put the driver of clippy.
+/// Path of the clippy driver in Debian's packages.
 pub const CLIPPY: &str = "/usr/bin/clippy-driver";
 /// The packages: a current compiler, its library sources, and its clippy.
 const PACKAGES: [&str; 3] = ["rustc-web", "rust-web-src", "rust-web-clippy"];
 /// The libraries a `no_std` program with an allocator needs.
 const LIBRARIES: [&str; 3] = ["core", "alloc", "compiler_builtins"];
-/// Settings of the caller's environment that must not reach the build of `core`.
+/// Environment variables of the caller that must not affect the build of `core`.
 const FOREIGN: [&str; 7] = [
     "RUSTFLAGS",
     "CARGO_ENCODED_RUSTFLAGS",
@@ -41,14 +43,14 @@ const FOREIGN: [&str; 7] = [
 
 /// The distribution's compiler with its library sources.
 struct Distribution {
-    /// What `rustc -vV` says: the whole of it decides which sysroot fits.
+    /// Output of `rustc -vV`: all of it determines which sysroot fits.
     version: String,
     /// The compiler's own sysroot.
     sysroot: PathBuf,
 }
 
 impl Distribution {
-    /// What is installed, if it is new enough and has its sources.
+    /// The installed compiler, if it is new enough and has its sources.
     fn find() -> Result<Option<Self>> {
         if !command::is_executable(Path::new(RUSTC)) {
             return Ok(None);
@@ -81,7 +83,7 @@ impl Distribution {
     }
 }
 
-/// A finished sysroot that fits the installed compiler; nothing is installed or built.
+/// A finished sysroot that fits the installed compiler; does not install or build anything.
 pub fn existing(project: &Project) -> Result<Option<PathBuf>> {
     let Some(distribution) = Distribution::find()? else { return Ok(None) };
     let folder = distribution.folder(project)?;
@@ -136,7 +138,8 @@ pub fn ensure(project: &Project, consent: Consent) -> Result<PathBuf> {
         })?;
         println!("  sysroot: {} is complete", folder.display());
     }
-    // The linker may have moved since (a removed toolchain): the link is made anew when it leads nowhere.
+    // The linker may have moved since (a removed toolchain): the link is recreated if it is
+    // dangling.
     let link = linker_link(&folder, &distribution)?;
     if !command::is_executable(&link) {
         let _ = fs::remove_file(&link);
@@ -145,8 +148,8 @@ pub fn ensure(project: &Project, consent: Consent) -> Result<PathBuf> {
     Ok(folder)
 }
 
-/// Lets `work` fill a `.partial` folder and renames it to `folder` when that went well: `folder` is whole or absent. The
-/// caller holds the lock, so a leftover is nobody's work in progress.
+/// Calls `work` to fill a `.partial` folder and renames it to `folder` on success: `folder` is
+/// complete or absent. The caller holds the lock, so a leftover `.partial` folder is not in use.
 fn complete(folder: &Path, work: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     let mut partial = folder.as_os_str().to_owned();
     partial.push(".partial");
@@ -166,7 +169,8 @@ fn complete(folder: &Path, work: impl FnOnce(&Path) -> Result<()>) -> Result<()>
     result
 }
 
-/// Builds the sysroot in `partial`; the wrapper it writes already names `folder`, where it will end up.
+/// Builds the sysroot in `partial`; the wrapper it writes already contains `folder`, the final
+/// path.
 fn build(distribution: &Distribution, partial: &Path, folder: &Path) -> Result<()> {
     let package = partial.join("build");
     write(&package.join("src/lib.rs"), "#![no_std]\n")?;
@@ -181,9 +185,10 @@ fn build(distribution: &Distribution, partial: &Path, folder: &Path) -> Result<(
     }
     cargo
         .env("RUSTC", RUSTC)
-        // `-Zbuild-std` is the one unstable step; what it makes is used by stable means.
+        // `-Zbuild-std` is the only unstable step; its result is used by stable means.
         .env("RUSTC_BOOTSTRAP", "1")
-        // Debian's source package has no lock file where cargo looks for it; this names the folder outright.
+        // Debian's source package has no lock file where cargo looks for it; this variable sets the
+        // folder explicitly.
         .env("__CARGO_TESTS_ONLY_SRC_ROOT", distribution.sources())
         // With bitcode in the libraries, link-time optimisation reaches into core.
         .env(format!("CARGO_TARGET_{}_RUSTFLAGS", variable_form(TARGET)), "-Cembed-bitcode=yes")
@@ -196,7 +201,8 @@ fn build(distribution: &Distribution, partial: &Path, folder: &Path) -> Result<(
     for library in LIBRARIES {
         copy_library(library, &built, &libraries(partial))?;
     }
-    // Build scripts and procedural macros run on this machine: they link to the distribution's own libraries.
+    // Build scripts and procedural macros run on this machine, so they link to the distribution's
+    // own libraries.
     let host = distribution.field("host")?;
     let host_folder = partial.join("lib/rustlib").join(host);
     fs::create_dir_all(host_folder.join("bin"))
@@ -210,7 +216,7 @@ fn build(distribution: &Distribution, partial: &Path, folder: &Path) -> Result<(
     fs::remove_dir_all(&package).with_context(|| format!("could not remove {}", package.display()))
 }
 
-/// Whether `libraries` holds a compiled `core`.
+/// Whether `libraries` contains a compiled `core`.
 pub fn has_core(libraries: &Path) -> bool {
     !matching(libraries, "core").is_empty()
 }
@@ -237,10 +243,11 @@ fn matching(folder: &Path, name: &str) -> Vec<PathBuf> {
     entries.filter_map(|entry| Some(entry.ok()?.path())).filter(names).collect()
 }
 
-/// LLVM's linker: rustup brings one, some distributions' compilers too, and `lld` is a package.
+/// LLVM's linker: rustup includes one, some distributions' compilers do too, and `lld` is a
+/// package.
 fn find_linker(distribution: &Distribution) -> Result<Option<PathBuf>> {
     let mut sysroots = vec![distribution.sysroot.clone()];
-    // The compiler cargo uses by itself is usually rustup's.
+    // The compiler that cargo uses by default is usually rustup's.
     if let Ok(sysroot) = command::output(Command::new("rustc").args(["--print", "sysroot"])) {
         sysroots.push(PathBuf::from(sysroot.trim()));
     }
@@ -251,7 +258,8 @@ fn find_linker(distribution: &Distribution) -> Result<Option<PathBuf>> {
     Ok(candidates.into_iter().find(|candidate| command::is_executable(candidate)))
 }
 
-/// Whether everything is there, and meant for this place: the wrapper names its folder, so one that was moved is built anew.
+/// Whether the sysroot is complete and intended for this path: the wrapper contains its folder, so
+/// a moved sysroot is rebuilt.
 fn is_whole(folder: &Path) -> bool {
     let meant =
         fs::read_to_string(wrapper(folder)).ok().is_some_and(|own| script(folder).is_ok_and(|s| s == own));
@@ -263,7 +271,7 @@ fn script(folder: &Path) -> Result<String> {
     Ok(format!("#!/bin/sh\nexec {RUSTC} --sysroot {} \"$@\"\n", shell_quoted(folder)?))
 }
 
-/// The script in a sysroot that stands in for `rustc`.
+/// The script in a sysroot that replaces `rustc`.
 pub fn wrapper(folder: &Path) -> PathBuf {
     folder.join("bin/rustc")
 }
@@ -286,7 +294,8 @@ fn field<'a>(version: &'a str, name: &str) -> Option<&'a str> {
     version.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(": "))
 }
 
-/// Compares versions such as `1.96.0` and `1.95`; what follows the numbers (`-nightly`) is not looked at.
+/// Compares versions such as `1.96.0` and `1.95`; a suffix after the numbers (`-nightly`) is
+/// ignored.
 fn is_at_least(version: &str, minimum: &str) -> bool {
     let numbers = |text: &str| -> Vec<u32> {
         text.split(['.', '-', '+']).map_while(|part| part.parse().ok()).take(3).collect()

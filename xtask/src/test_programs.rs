@@ -1,4 +1,4 @@
-//! The programs that cargo built out of the tests and examples, ready to be started without it.
+//! The programs that cargo built from the tests and examples, to be started without cargo.
 
 use crate::command;
 use crate::jobs::Job;
@@ -7,8 +7,8 @@ use anyhow::{Context, Result, bail};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// The programs that take longest, by package and target, the longest first. They begin first, so that none of them runs
-/// alone at the end.
+/// The programs that take longest, by package and target, the longest first. They start first, so
+/// that none of them runs alone at the end.
 const LONGEST: [(&str, &str); 3] =
     [("jointrig-tests", "it"), ("jointrig", "it"), ("jointrig-tests", "qemu")];
 
@@ -22,7 +22,8 @@ struct Program {
     path: PathBuf,
 }
 
-/// Every test program, and the tests in the documentation, the longest first. `selection` goes to cargo.
+/// Every test program, and the documentation tests, the longest first. `selection` is passed to
+/// cargo.
 pub fn tests(project: &Project, selection: &[&str]) -> Result<Vec<Job>> {
     let mut cargo = command::cargo(&project.root);
     cargo.args(["test", "--no-run", "--release", "--workspace", "--message-format=json-render-diagnostics"]);
@@ -41,14 +42,15 @@ pub fn tests(project: &Project, selection: &[&str]) -> Result<Vec<Job>> {
     Ok(jobs)
 }
 
-/// The examples within the documentation's text, which only cargo can compile and run.
+/// The documentation tests, which only cargo can compile and run.
 fn documentation(project: &Project, selection: &[&str]) -> Job {
     let mut command = command::cargo(&project.root);
     command.args(["test", "--doc", "--release", "--workspace"]).args(selection);
     Job { name: "documentation tests".into(), command }
 }
 
-/// Every example of the workspace, started without arguments in the repository's root: what a stranger does.
+/// Every example of the workspace, started without arguments in the repository's root, as a new
+/// user would.
 pub fn examples(project: &Project) -> Result<Vec<Job>> {
     let mut jobs = Vec::new();
     for package in &project.packages {
@@ -69,12 +71,12 @@ pub fn examples(project: &Project) -> Result<Vec<Job>> {
     Ok(jobs)
 }
 
-/// Where a program stands in the order.
+/// Position of a program in the order.
 fn place(package: &str, target: &str) -> usize {
     LONGEST.iter().position(|long| *long == (package, target)).unwrap_or(LONGEST.len())
 }
 
-/// The test programs among the messages of cargo, one JSON object a line.
+/// The test programs in cargo's messages, one JSON object per line.
 fn programs(messages: &str) -> Result<Vec<Program>> {
     let mut programs = Vec::new();
     for line in messages.lines() {

@@ -1,8 +1,9 @@
 //! Building and running the tests and examples of the root workspace.
 //!
-//! One profile serves everything: release. The whole-system scenarios simulate minutes of sixteen channels and need its
-//! speed, and a second profile would compile every dependency twice. Binaries and tests are built by one command,
-//! because only then do their dependencies have the same features and are compiled once.
+//! Everything uses the release profile. The whole-system scenarios simulate minutes of sixteen
+//! channels and need its speed, and a second profile would compile every dependency twice. Binaries
+//! and tests are built by one command, because only then do their dependencies have the same
+//! features and are compiled once.
 
 use crate::jobs::{self, Ended};
 use crate::project::Project;
@@ -21,12 +22,12 @@ const PROGRAMS: [(&str, &str, &str); 2] = [
     ("jointrig-hil-sim", "jointrig-hil-sim", "JOINTRIG_HIL_SIM_BIN"),
 ];
 
-/// Which packages are tested.
+/// The packages to test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
     /// All.
     Everything,
-    /// All but the whole-system scenarios.
+    /// All except the whole-system scenarios.
     WithoutScenarios,
 }
 
@@ -48,14 +49,16 @@ impl std::fmt::Display for Counts {
 pub fn build(project: &Project, scope: Scope) -> Result<()> {
     let mut cargo = command::cargo(&project.root);
     cargo.args(["build", "--release", "--workspace", "--tests", "--examples"]);
-    // Not all binaries: xtask's own is in use, and some systems do not let go of a running program's file.
+    // Not all binaries: xtask's own is running, and some systems do not allow replacing a running
+    // program's file.
     cargo.args(PROGRAMS.iter().flat_map(|(_, binary, _)| ["--bin", binary]));
     cargo.args(left_out(scope));
     command::run(&mut cargo).context("the binaries and tests do not compile")
 }
 
-/// Runs the tests with the paths of the binaries in their environment. All of them run side by side, with the examples;
-/// where `extra` narrows them down, or speaks to the test programs, plain `cargo test` gets it and runs one after another.
+/// Runs the tests with the paths of the binaries in their environment. All of them run in parallel,
+/// with the examples; if `extra` selects some, or contains arguments of the test programs, it is
+/// passed to plain `cargo test`, which runs them one after another.
 pub fn run(project: &Project, scope: Scope, extra: &[String]) -> Result<Counts> {
     if !extra.is_empty() {
         let mut cargo = command::cargo(&project.root);
@@ -75,7 +78,7 @@ pub fn run(project: &Project, scope: Scope, extra: &[String]) -> Result<Counts> 
     concluded(&jobs::run(jobs, jobs::at_once(), &mut std::io::stdout())?)
 }
 
-/// Adds up what the programs report, or fails with the names of what failed.
+/// Adds up the programs' reports, or fails with the names of the failed tests.
 fn concluded(ended: &[Ended]) -> Result<Counts> {
     let (mut counts, mut failures) = (Counts::default(), Vec::new());
     for ended in ended {
@@ -89,7 +92,7 @@ fn concluded(ended: &[Ended]) -> Result<Counts> {
             .filter_map(|line| line.strip_prefix("test ")?.split_once(" ... FAILED"))
             .map(|(test, _)| test)
             .collect();
-        // A program may also end before it can say which test it was at.
+        // A program may also end before it can report which test it was running.
         let what = if tests.is_empty() { ended.status.to_string() } else { tests.join(", ") };
         failures.push(format!("{}: {what}", ended.name));
     }
@@ -102,7 +105,7 @@ fn concluded(ended: &[Ended]) -> Result<Counts> {
     )
 }
 
-/// The variables that carry the paths of the programs that scenarios start.
+/// The variables with the paths of the programs that scenarios start.
 fn programs(project: &Project) -> Result<Vec<(&'static str, PathBuf)>> {
     let mut variables = Vec::new();
     for (package, binary, variable) in PROGRAMS {
@@ -111,7 +114,7 @@ fn programs(project: &Project) -> Result<Vec<(&'static str, PathBuf)>> {
     Ok(variables)
 }
 
-/// The variable that carries the path of the emulated board's image.
+/// The variable with the path of the emulated board's image.
 const IMAGE: &str = "JOINTRIG_MPS2_IMAGE";
 /// The tests that need it, by the name of their file.
 const IN_EMULATOR: &str = "qemu";
@@ -151,7 +154,8 @@ fn program(project: &Project, package: &str, binary: &str) -> Result<Option<Path
     Ok(Some(path))
 }
 
-/// Runs the command, passes its output on unchanged to `shown`, and counts what its closing lines report.
+/// Runs the command, passes its output unchanged to `shown`, and adds up the counts in its summary
+/// lines.
 fn watched(command: &mut Command, shown: &mut impl Write) -> Result<(Counts, bool)> {
     println!("  $ {}", command::line(command));
     let mut child = command.stdout(Stdio::piped()).spawn().context("could not start cargo")?;
@@ -166,8 +170,8 @@ fn watched(command: &mut Command, shown: &mut impl Write) -> Result<(Counts, boo
     Ok((counts, status.success()))
 }
 
-/// Adds what one closing line of a test program says, such as
-/// `test result: ok. 12 passed; 0 failed; 1 ignored; 0 measured; 0 filtered out; finished in 0.01s`.
+/// Adds the counts of one summary line of a test program, such as `test result: ok. 12 passed; 0
+/// failed; 1 ignored; 0 measured; 0 filtered out; finished in 0.01s`.
 fn count(line: &str, counts: &mut Counts) {
     let Some(result) = line.strip_prefix("test result: ") else { return };
     let numbers = result.split_once(". ").map_or("", |(_, numbers)| numbers);

@@ -1,8 +1,9 @@
 //! Which compiler builds for the microcontroller.
 //!
-//! rustup carries the target's ready-made `core`, and `rustup target add` is the whole story where rustup may download.
-//! Where it may not (package mirrors only, no rustup at all), Debian's compiler builds `core` from its own sources
-//! once; see [`crate::sysroot`]. The variable [`MODE_VARIABLE`] chooses.
+//! rustup provides the target's precompiled `core`: `rustup target add` is enough if rustup can
+//! download. If it cannot (only package mirrors, or no rustup at all), Debian's compiler builds
+//! `core` from its own sources once; see [`crate::sysroot`]. The variable [`MODE_VARIABLE`] selects
+//! the way.
 
 use crate::consent::Consent;
 use crate::project::{Project, TARGET};
@@ -13,17 +14,17 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::str::FromStr;
 
-/// The environment variable that chooses the [`Mode`].
+/// The environment variable that selects the [`Mode`].
 pub const MODE_VARIABLE: &str = "JOINTRIG_FIRMWARE_TOOLCHAIN";
 
-/// How the target is to be made available.
+/// How the target is made available.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
-    /// What is there already; else rustup; else the distribution.
+    /// An existing toolchain; otherwise rustup; otherwise the distribution.
     Auto,
-    /// rustup's target, and nothing else.
+    /// Only rustup's target.
     Rustup,
-    /// The distribution's compiler and sources, and nothing else.
+    /// Only the distribution's compiler and sources.
     Distro,
 }
 
@@ -41,7 +42,7 @@ impl FromStr for Mode {
 }
 
 impl Mode {
-    /// What the environment asks for; `auto` when it says nothing.
+    /// The mode set in the environment; `auto` if it is not set.
     pub fn from_environment() -> Result<Self> {
         let value = std::env::var_os(MODE_VARIABLE).unwrap_or_default();
         value.to_string_lossy().parse()
@@ -51,11 +52,11 @@ impl Mode {
 /// A compiler that can build for [`TARGET`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Toolchain {
-    /// The one cargo uses anyway has the target.
+    /// The compiler that cargo uses by default has the target.
     Installed,
     /// The distribution's compiler with this private sysroot.
     Private {
-        /// The sysroot; a wrapper in it stands in for `rustc`.
+        /// The sysroot; a wrapper in it replaces `rustc`.
         sysroot: PathBuf,
     },
 }
@@ -67,19 +68,19 @@ impl Toolchain {
         command.env("CARGO_ENCODED_RUSTFLAGS", short_paths(&project.root).join("\x1f"));
         if let Self::Private { sysroot } = self {
             command.env("RUSTC", sysroot::wrapper(sysroot));
-            // They would be rustup's, and check a compiler of another version.
+            // These would be rustup's, and would belong to a compiler of another version.
             command.env_remove("RUSTC_WRAPPER").env_remove("RUSTC_WORKSPACE_WRAPPER");
         }
     }
 
-    /// The command that lints what `selection` names with this toolchain's clippy, warnings as errors.
+    /// The command that runs this toolchain's clippy on `selection`, with warnings as errors.
     pub fn clippy(&self, folder: &Path, project: &Project, selection: &[&str]) -> Command {
         let mut command = command::cargo(folder);
         self.apply(&mut command, project);
         match self {
             Self::Installed => command.arg("clippy").args(selection).args(["--", "-Dwarnings"]),
-            // `cargo clippy` would start rustup's clippy, which cannot read another compiler's libraries: this is what
-            // it does inside, with the distribution's.
+            // `cargo clippy` would start rustup's clippy, which cannot read another compiler's
+            // libraries: this does what it does internally, with the distribution's clippy.
             Self::Private { sysroot } => command
                 .env("RUSTC_WORKSPACE_WRAPPER", sysroot::CLIPPY)
                 .env("SYSROOT", sysroot)
@@ -91,12 +92,14 @@ impl Toolchain {
     }
 }
 
-/// Sources are named from their package or the repository on. A panic keeps a file's name and line, so that every path stands in
-/// the flash, and an image would be larger the deeper the folder in which somebody builds it.
+/// Shortens source paths to start from their package or the repository. A panic stores a file's
+/// name and line, so every path is in the flash, and the size of an image would depend on the
+/// folder in which it is built.
 fn short_paths(root: &Path) -> Vec<String> {
     let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
     let home = home.or_else(|| std::env::home_dir().map(|home| home.join(".cargo")));
-    // a folder for each registry; none before the first download, and then the paths are long for one build
+    // one folder per registry; none before the first download, and then the paths are long for one
+    // build
     let registries = home.and_then(|home| std::fs::read_dir(home.join("registry/src")).ok());
     let folders = registries.into_iter().flatten().flatten().map(|entry| entry.path());
     folders
@@ -105,7 +108,7 @@ fn short_paths(root: &Path) -> Vec<String> {
         .collect()
 }
 
-/// One way to the target, in the order they are tried.
+/// The ways to obtain the target, in the order in which they are tried.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Way {
     Installed,
@@ -114,8 +117,8 @@ enum Way {
     Distro,
 }
 
-/// The ways to try, in order, given those this machine offers. Nothing is downloaded while something that works is
-/// already there, and a named mode never falls back to another.
+/// The ways to try, in order, given those this machine offers. Nothing is downloaded if a working
+/// toolchain is already installed, and an explicit mode never falls back to another.
 fn ways(mode: Mode, offered: &[Way]) -> Vec<Way> {
     match mode {
         Mode::Distro => vec![Way::Distro],
@@ -129,7 +132,7 @@ fn ways(mode: Mode, offered: &[Way]) -> Vec<Way> {
     }
 }
 
-/// The ways this machine offers to `mode`.
+/// The ways this machine offers for `mode`.
 fn offered(project: &Project, mode: Mode) -> Result<Vec<Way>> {
     let mut offered = Vec::new();
     offered.extend((mode != Mode::Distro && target_installed()).then_some(Way::Installed));
@@ -140,7 +143,8 @@ fn offered(project: &Project, mode: Mode) -> Result<Vec<Way>> {
     Ok(offered)
 }
 
-/// Makes the target available and returns the compiler for it, saying at each step what it does and why.
+/// Makes the target available and returns the compiler for it, printing at each step what it does
+/// and why.
 pub fn ensure(project: &Project, mode: Mode, consent: Consent) -> Result<Toolchain> {
     let mut failures = Vec::new();
     for way in ways(mode, &offered(project, mode)?) {
@@ -158,7 +162,7 @@ pub fn ensure(project: &Project, mode: Mode, consent: Consent) -> Result<Toolcha
     bail!("no compiler for {TARGET}: {}. {}", failures.join("; "), remedy(mode))
 }
 
-/// What to do when a mode did not lead to a compiler.
+/// What to do when a mode did not provide a compiler.
 fn remedy(mode: Mode) -> String {
     let rustup = format!("install rustup (https://rustup.rs) and run `rustup target add {TARGET}`");
     let distro = format!("on Debian, set {MODE_VARIABLE}=distro to use its packages");
@@ -206,7 +210,7 @@ fn attempt(way: Way, project: &Project, mode: Mode, consent: Consent) -> Result<
     }
 }
 
-/// Whether the compiler cargo would use by itself has the target's `core`.
+/// Whether cargo's default compiler has the target's `core`.
 fn target_installed() -> bool {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| OsString::from("rustc"));
     command::output(Command::new(rustc).args(["--print", "target-libdir", "--target", TARGET]))

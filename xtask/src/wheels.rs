@@ -1,7 +1,8 @@
-//! `cargo xtask wheels`: the Python wheels of a release, for the Linux systems that laboratories have.
+//! `cargo xtask wheels`: the Python wheels of a release, for the Linux systems of laboratories.
 //!
-//! The wheel of `cargo xtask python` needs the C library of the machine that built it. These need glibc 2.17 (manylinux2014) alone:
-//! maturin links them with Zig's linker, for x86-64 and for aarch64. They are built, and only the first can be run here.
+//! The wheel of `cargo xtask python` needs the C library of the machine that built it. These need
+//! only glibc 2.17 (manylinux2014): maturin links them with Zig's linker, for x86-64 and for
+//! aarch64. They are only built here; of the two, only the first could also be run.
 
 use crate::command;
 use crate::environment::environment;
@@ -12,13 +13,13 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// Machines that a release has wheels for.
+/// Target machines of a release's wheels.
 const TARGETS: [&str; 2] = ["x86_64-unknown-linux-gnu", "aarch64-unknown-linux-gnu"];
 
-/// Old enough for the computers beside a rig.
+/// Old enough for typical computers at a rig.
 const COMPATIBILITY: &str = "manylinux2014";
 
-/// What builds and links them.
+/// The packages that build and link them.
 const TOOLS: [&str; 2] = ["maturin>=1.9,<2", "ziglang"];
 
 /// Builds a wheel for each target into `target/release-wheels`.
@@ -71,7 +72,7 @@ fn build(project: &Project, tools: &Path, interpreter: &Path, target: &str, out:
     maturin.current_dir(project.root.join("host/python"));
     maturin.args(["build", "--release", "--locked", "--zig", "--compatibility", COMPATIBILITY]);
     maturin.args(["--target", target, "--out"]).arg(out).arg("--interpreter").arg(interpreter);
-    // maturin looks for Zig in the Python that it finds first
+    // maturin looks for Zig in the first Python on PATH
     let own = tools.parent().context("an environment has a folder of programs")?;
     let before = std::env::var_os("PATH").unwrap_or_default();
     let path = std::iter::once(own.to_path_buf()).chain(std::env::split_paths(&before));

@@ -1,7 +1,9 @@
-//! One table: how long our work takes, beside the programs that laboratories use and beside the least that this machine needs.
+//! Table of run times, compared with the programs that laboratories use and with the minimum that
+//! this machine needs.
 //!
-//! `cargo xtask bench` prepares Python with numpy, pyFRF and pyuff, runs this, and writes docs/performance.md. Without
-//! `JOINTRIG_PYTHON` the peers' columns stay empty. Fails where something is slower than wanted, after the table.
+//! `cargo xtask bench` prepares Python with numpy, pyFRF and pyuff, runs this program, and writes
+//! docs/performance.md. Without `JOINTRIG_PYTHON` the peers' columns stay empty. It prints the
+//! table and then fails if something is slower than its target.
 
 use jointrig::cli::memory::expect_signals;
 use jointrig_benches::peers::Peers;
@@ -24,11 +26,12 @@ fn main() -> ExitCode {
     }
 }
 
-/// What can be measured, by the words that choose a part of it.
+/// The parts that can be measured, by the words that select them.
 const PARTS: [&str; 7] =
     ["spectra", "substructuring", "loops", "universal", "frames", "simulator", "campaign"];
 
-/// Prints the tables of the parts that are named, or of all; what is slower than wanted.
+/// Prints the tables of the parts named as arguments, or of all; returns what is slower than its
+/// target.
 fn run() -> Result<Vec<String>, Box<dyn Error>> {
     let named: Vec<String> = std::env::args().skip(1).collect();
     if let Some(unknown) = named.iter().find(|name| !PARTS.contains(&name.as_str())) {
@@ -62,7 +65,7 @@ fn run() -> Result<Vec<String>, Box<dyn Error>> {
     Ok(short)
 }
 
-/// Where the times are from.
+/// The machine on which the times were measured.
 fn machine() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));

@@ -1,4 +1,5 @@
-//! How time and memory grow with the size of the work. A program of its own, because counting the heap slows every allocation down.
+//! Growth of time and memory with the size of the work. A separate program, because counting heap
+//! use slows every allocation down.
 
 use jointrig::cli::memory::expect_signals;
 use jointrig_benches::growth::{Growth, table};

@@ -1,4 +1,5 @@
-//! The shaker's drive of a virtual board: codes that are given after one block are played during the next.
+//! The shaker's drive of a virtual board: codes that are given after one block are played during
+//! the next.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -7,16 +8,17 @@ use std::rc::Rc;
 use jointrig_firmware::board::{Drive, RanDry};
 use jointrig_firmware::lockstep::DRIVE_FULL_SCALE_V;
 
-/// Codes on their way from the firmware to the rig.
+/// Queue of drive codes from the firmware to the rig.
 #[derive(Clone, Debug, Default)]
 pub struct VirtualDrive(Rc<RefCell<Motion>>);
 
 #[derive(Debug, Default)]
 struct Motion {
     codes: VecDeque<i16>,
-    /// More codes are to follow.
+    /// More codes will follow.
     open: bool,
-    /// A scan of an open motion found no code: it rests until the firmware has heard of that.
+    /// A scan of an open motion found no code. The output stays at rest until the firmware has been
+    /// notified.
     dry: bool,
 }
 

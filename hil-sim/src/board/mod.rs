@@ -1,8 +1,9 @@
 //! The native virtual board: the real firmware library over the simulated rig, in virtual time.
 //!
-//! One board is one thread. Its converters advance the rig scan by scan, its coil is the rig's, and its
-//! link is a pair of byte queues. Without a stream, and half a ring ahead of the host's acknowledgement, its
-//! time stands still; so a run is repeatable bit for bit however fast host and machine are.
+//! One board is one thread. Its converters advance the rig scan by scan, its coil is the rig's, and
+//! its link is a pair of byte queues. Virtual time stops while no stream is running, and when the
+//! board is half a ring ahead of the host's acknowledgement; so a run is bit-for-bit repeatable,
+//! however fast host and machine are.
 
 mod drive;
 mod parts;
@@ -32,32 +33,33 @@ pub use parts::{Controls, Seen, Virtual};
 use parts::{VirtualCoil, VirtualInputs, VirtualScans, VirtualStage, describe};
 pub use sync::Wires;
 
-/// Seconds of scans that the ring holds, at least.
+/// Minimum duration of the scans that the ring holds (s).
 const RING_S: f64 = 1.0;
 
-/// How a board is run.
+/// Options for running a board.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Decides noise, scatter and every error of position.
+    /// Seed of noise, scatter and every position error.
     pub seed: u64,
-    /// In which order the firmware's tasks are polled; results do not depend on it.
+    /// The order in which the firmware's tasks are polled; results do not depend on it.
     pub polling: Polling,
-    /// Whether time goes on without the host: for tests that declare link loss. Such a run is not repeatable.
+    /// Whether time advances without the host: for tests of a lost link. Such a run is not
+    /// repeatable.
     pub free_running: bool,
-    /// The device's count of its own starts.
+    /// The device's boot counter.
     pub boot: u32,
-    /// For an emulated board: its link is UART 0, connected to this (QEMU's `-serial`), and not the end returned. Such a
-    /// run is not repeatable.
+    /// For an emulated board: its link is UART 0, connected to this target (QEMU's `-serial`), and
+    /// the returned host end is not used. Such a run is not repeatable.
     pub uart: Option<String>,
 }
 
-/// Why a board could not start or has stopped.
+/// Reason why a board could not start or has stopped.
 #[derive(Debug, thiserror::Error)]
 pub enum BoardError {
-    /// The rig's description is wrong.
+    /// The rig's description is invalid.
     #[error(transparent)]
     Rig(#[from] RigError),
-    /// The thread could not be made.
+    /// The thread could not be created.
     #[error("the simulated board could not start its thread: {0}")]
     Thread(#[from] std::io::Error),
 }
@@ -70,10 +72,10 @@ pub struct VirtualBoard {
 }
 
 impl VirtualBoard {
-    /// Starts a board over the rig that `rig_toml` describes (the built-in one if `None`).
+    /// Starts a board over the rig described by `rig_toml` (the built-in one if `None`).
     ///
     /// # Errors
-    /// [`BoardError`] with the line and field that is wrong.
+    /// [`BoardError`] with the invalid line and field.
     pub fn start(rig_toml: Option<&str>, seed: u64) -> Result<(Self, HostEnd), BoardError> {
         let config = match rig_toml {
             Some(text) => RigConfig::from_toml(text)?,
@@ -97,7 +99,7 @@ impl VirtualBoard {
         Ok((Self { link: device, controls, thread: Some(thread) }, host))
     }
 
-    /// Buttons and observations at the rig's side.
+    /// Controls and observations on the rig's side.
     pub fn controls(&self) -> &Arc<Controls> {
         &self.controls
     }
@@ -107,13 +109,13 @@ impl Drop for VirtualBoard {
     fn drop(&mut self) {
         self.link.close();
         if let Some(thread) = self.thread.take() {
-            // a panic of the board has been printed by its own thread
+            // the board's own thread has already printed a panic
             let _ = thread.join();
         }
     }
 }
 
-/// The board's thread: everything of the device lives and dies here.
+/// The board's thread, which owns everything of the device.
 fn run(rig: Rig, options: &Options, link: &DeviceEnd, controls: &Arc<Controls>) {
     let channels: &'static [_] = describe(rig.channels());
     let rate_hz = rig.scan_rate_hz();
@@ -147,8 +149,8 @@ fn run(rig: Rig, options: &Options, link: &DeviceEnd, controls: &Arc<Controls>) 
         }
         if sampling.get() || options.free_running {
             assert!(jump(), "the simulated board waits for something that cannot come: no alarm is set");
-            // Polled whatever the flag says: embassy sets it for the first of several tasks only, and the thread that
-            // woke that one may not have come to set it yet.
+            // Polled whatever the flag is: embassy sets it for the first of several tasks only, and
+            // the thread that woke that task may not have set it yet.
             poller.poll();
         } else {
             link.sleep(&woken);
@@ -185,7 +187,7 @@ fn futures(
     ]
 }
 
-/// Blocks that the ring must hold.
+/// Number of blocks that the ring must hold.
 fn ring_slots(rate_hz: u32, per_block: usize) -> usize {
     (f64::from(rate_hz) * RING_S / per_block as f64).ceil() as usize
 }
@@ -194,7 +196,7 @@ fn name(value: &str) -> jointrig_protocol::channel::Name {
     text(value)
 }
 
-/// What does not fit is left out.
+/// Truncates `value` to N characters.
 fn text<const N: usize>(value: &str) -> Text<N> {
     value.chars().take(N).collect()
 }

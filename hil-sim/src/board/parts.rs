@@ -1,4 +1,4 @@
-//! The virtual board's parts, as the firmware's board contract asks for them.
+//! The virtual board's parts, which implement the firmware's board traits.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -37,30 +37,30 @@ impl Board for Virtual {
     type Stage = VirtualStage;
 }
 
-/// Buttons and observations at the rig's side, usable from any thread.
+/// Controls and observations on the rig's side, usable from any thread.
 #[derive(Debug, Default)]
 pub struct Controls {
     guard_open: AtomicBool,
     pressed: AtomicBool,
     reset: AtomicBool,
     pulses_us: Mutex<Vec<u32>>,
-    /// A normal load that the rig has not heard of yet (N).
+    /// A new normal load that has not been passed to the rig yet (N).
     normal_load_n: Mutex<Option<f64>>,
     watches_joint: AtomicBool,
-    /// Scans that the converters are to lose: the first, and how many.
+    /// Scans that the converters will lose: the first, and how many.
     lost: Mutex<(u64, u64)>,
-    /// Cables that were changed since the start: the hammer's force cell, the shaker's.
+    /// Cables changed since the start: the hammer's force cell, the shaker's.
     cables: Mutex<[Option<Cable>; 2]>,
     seen: Mutex<Seen>,
     wires: Wires,
 }
 
-/// What the rig has come to by the end of a block.
+/// State of the rig at the end of a block.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Seen {
-    /// Scans since the start, lost ones among them.
+    /// Scans since the start, including lost ones.
     pub scans: u64,
-    /// The scan after the last in which the shaker was driven; 0 when it never was.
+    /// The scan after the last one in which the shaker was driven; 0 when it was never driven.
     pub driven_until: u64,
     /// The drive in the last scan, V.
     pub drive_v: f64,
@@ -69,7 +69,7 @@ pub struct Seen {
 }
 
 impl Controls {
-    /// Another recorder at the sync port.
+    /// The wires from the sync port to another recorder.
     pub fn wires(&self) -> &Wires {
         &self.wires
     }
@@ -89,7 +89,7 @@ impl Controls {
         self.reset.store(true, Ordering::Release);
     }
 
-    /// Every pulse that the coil was given, µs, as the rig felt it.
+    /// The durations of all coil pulses, µs, as they acted on the rig.
     pub fn coil_pulses_us(&self) -> Vec<u32> {
         self.pulses_us.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -97,48 +97,48 @@ impl Controls {
     /// Sets the normal load, N, from the next block on.
     ///
     /// # Errors
-    /// [`RigError::Field`] for a load that is negative or no number.
+    /// [`RigError::Field`] for a load that is negative or not a number.
     pub fn set_normal_load(&self, normal_load_n: f64) -> Result<(), RigError> {
         config::normal_load(normal_load_n)?;
         *self.normal_load_n.lock().unwrap_or_else(PoisonError::into_inner) = Some(normal_load_n);
         Ok(())
     }
 
-    /// Lets the native board's converters lose the blocks that hold these scans. They deliver nothing meanwhile; an emulated
-    /// board's have faults of their own.
+    /// Makes the native board's converters lose the blocks that contain these scans and deliver
+    /// nothing meanwhile. An emulated board has its own faults.
     pub fn lose_scans(&self, from_scan: u64, scans: u64) {
         *self.lost.lock().unwrap_or_else(PoisonError::into_inner) = (from_scan, scans);
     }
 
-    /// Changes what the supply of the hammer's force cell finds.
+    /// Changes what the supply of the hammer's force cell detects.
     pub fn set_force_cable(&self, cable: Cable) {
         self.cables.lock().unwrap_or_else(PoisonError::into_inner)[0] = Some(cable);
     }
 
-    /// Changes what the supply of the shaker's force cell finds.
+    /// Changes what the supply of the shaker's force cell detects.
     pub fn set_excitation_cable(&self, cable: Cable) {
         self.cables.lock().unwrap_or_else(PoisonError::into_inner)[1] = Some(cable);
     }
 
-    /// How many blocks are lost if the next one begins with `scan`.
+    /// Number of blocks lost if the next one begins with `scan`.
     fn lost_blocks(&self, scan: u64, per_block: u64) -> u64 {
         let (from, scans) = *self.lost.lock().unwrap_or_else(PoisonError::into_inner);
         if scan < from || scan >= from + scans { 0 } else { (from + scans - scan).div_ceil(per_block) }
     }
 
-    /// Watches the joint from the next block on, which costs more than the block itself.
+    /// Observes the joint from the next block on, which costs more time than the block itself.
     pub fn watch_joint(&self) {
         self.watches_joint.store(true, Ordering::Release);
     }
 
-    /// What the rig had come to by the end of the last block.
+    /// State of the rig at the end of the last block.
     pub fn seen(&self) -> Seen {
         *self.seen.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// The rig's channels in the protocol's words. They live as long as the program: a firmware's channel
-/// table is constant, and a program makes a handful of boards.
+/// The rig's channels as protocol types. They are leaked: a firmware's channel table is constant,
+/// and a program creates only a few boards.
 pub(super) fn describe(channels: &[rig::Channel]) -> &'static [Channel] {
     let cell_or_other = |channel: &rig::Channel| match channel.name.as_str() {
         "force" => Role::HammerForce,
@@ -166,7 +166,7 @@ pub(super) fn describe(channels: &[rig::Channel]) -> &'static [Channel] {
     Box::leak(described.collect::<Vec<_>>().into_boxed_slice())
 }
 
-/// Converters whose samples are the rig's.
+/// Converters that sample the simulated rig.
 pub struct VirtualScans {
     rig: Rc<RefCell<Rig>>,
     drive: VirtualDrive,
@@ -175,7 +175,7 @@ pub struct VirtualScans {
     per_block: usize,
     rate_hz: u64,
     scans: u64,
-    /// Up to here the sync port was looked at.
+    /// The sync port has been read up to this scan.
     looked_at: u64,
     port: SyncPort,
     held: bool,
@@ -207,7 +207,7 @@ impl VirtualScans {
         }
     }
 
-    /// True while the converters run, that is while virtual time may go on.
+    /// True while the converters run, that is while virtual time may advance.
     pub(super) fn sampling(&self) -> Rc<Cell<bool>> {
         Rc::clone(&self.sampling)
     }
@@ -237,10 +237,10 @@ impl Scans for VirtualScans {
         let lost = self.controls.lost_blocks(self.scans, self.per_block as u64);
         self.scans += (lost + 1) * self.per_block as u64;
         self.sampling.set(true);
-        // the instant of the block's last scan, rounded up to the clock's microsecond
+        // the time of the block's last scan, rounded up to the clock's microsecond
         Timer::at(Instant::from_micros((self.scans * 1_000_000).div_ceil(self.rate_hz))).await;
         self.sampling.set(false);
-        // what is lost has happened all the same
+        // the rig advances during lost blocks too
         for _ in 0..=lost {
             fill(
                 &mut self.rig.borrow_mut(),
@@ -255,7 +255,7 @@ impl Scans for VirtualScans {
     }
 }
 
-/// Lets the rig go on by one block, driven as was ordered, and writes its codes.
+/// Advances the rig by one block with the ordered drive, and writes its codes.
 pub(super) fn fill(
     rig: &mut Rig,
     drive: &VirtualDrive,
@@ -266,7 +266,8 @@ pub(super) fn fill(
 ) {
     let mut codes = [0; jointrig_protocol::limits::MAX_CHANNELS];
     if let Some(load) = controls.normal_load_n.lock().unwrap_or_else(PoisonError::into_inner).take() {
-        // Checked when it was ordered, but for a load that varies too steeply at that size: then the old one stays.
+        // Checked when it was ordered, except for a load that varies too steeply at that value:
+        // then the old load stays.
         let _ = rig.set_normal_load(load);
     }
     let mut seen = controls.seen();
@@ -288,7 +289,7 @@ pub(super) fn fill(
     *controls.seen.lock().unwrap_or_else(PoisonError::into_inner) = seen;
 }
 
-/// The rig's coil behind a timer that ends any pulse at the cap.
+/// The rig's coil behind a timer that ends every pulse at the upper limit.
 pub struct VirtualCoil {
     rig: Rc<RefCell<Rig>>,
     controls: Arc<Controls>,
@@ -314,7 +315,7 @@ impl Coil for VirtualCoil {
     fn off(&mut self) {
         let mut rig = self.rig.borrow_mut();
         rig.coil_off();
-        // what the rig felt: the last pulse may have been cut short
+        // the duration that acted on the rig: the last pulse may have been cut short
         if let (Some(felt), Some(told)) = (
             rig.coil_pulses_s().last(),
             self.controls.pulses_us.lock().unwrap_or_else(PoisonError::into_inner).last_mut(),
@@ -324,7 +325,7 @@ impl Coil for VirtualCoil {
     }
 }
 
-/// Guard, emergency stop, and what is measured slowly.
+/// Guard, emergency stop, and slowly measured values.
 pub struct VirtualInputs {
     controls: Arc<Controls>,
     rig: Rc<RefCell<Rig>>,
@@ -332,7 +333,8 @@ pub struct VirtualInputs {
     blocks_left: u32,
 }
 
-/// Slow values are measured ten times a second, as on the wired board: so many blocks, of 24 scans at 51.2 kHz.
+/// Slow values are measured ten times a second, as on the wired board: every 213 blocks of 24 scans
+/// at 51.2 kHz.
 const SLOW_BLOCKS: u32 = 213;
 
 impl VirtualInputs {
@@ -340,7 +342,7 @@ impl VirtualInputs {
         Self { controls: Arc::clone(controls), rig: Rc::clone(rig), blocks_left: 0 }
     }
 
-    /// Slow values as they are now.
+    /// The current slow values.
     pub(super) fn measured(&self) -> Slow {
         let (rig, seen) = (self.rig.borrow(), self.controls.seen());
         let around = &rig.config().surroundings;

@@ -1,7 +1,7 @@
-//! The sync port of a virtual board, and what another recorder does at it.
+//! The sync port of a virtual board, and the other recorder connected to it.
 //!
-//! Time is counted in scans here too: scan k is taken at time k. The rig itself does not hear of another clock: whatever times them, its
-//! scans are equally long.
+//! Time is counted in scans: scan k is taken at time k. An external clock does not affect the rig
+//! itself: its scans are equally long whatever clock times them.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -10,23 +10,24 @@ pub use jointrig_firmware::lockstep::PERIOD;
 use jointrig_firmware::ruler::{Ago, Span};
 use jointrig_protocol::sync::{Clock, ClockFault};
 
-/// By what part of itself a scan is longer when its edge of the external clock does not come, as on the wired board.
+/// Relative extension of a scan whose edge of the external clock does not arrive, as on the wired
+/// board.
 const FLYWHEEL: f64 = 0.01;
-/// The largest difference, ppm, at which a board tries a clock at all.
+/// The largest difference, ppm, at which a board tries to use a clock.
 const TRIED_PPM: f64 = 5_000.0;
-/// After the end of a block the output rises, in parts of a scan: the program's own time.
+/// Delay of the rising output after the end of a block, in scans: the program's run time.
 const LATE: f64 = 0.25;
 
 /// Another recorder.
 #[derive(Clone, Debug, Default)]
 struct Other {
-    /// Its edges at the sync input that were not seen yet.
+    /// Its edges at the sync input that have not been read yet.
     edges: Vec<f64>,
-    /// By how much its clock is faster than the board's crystal, ppm; none where it gives none.
+    /// How much faster its clock is than the board's crystal, ppm; `None` if it provides no clock.
     clock_ppm: Option<f64>,
-    /// From this scan on its clock stands still.
+    /// Its clock stops at this scan.
     stops_at: Option<u64>,
-    /// When it saw the sync output rise.
+    /// Times at which it saw the sync output rise.
     pulses: Vec<f64>,
 }
 
@@ -39,22 +40,22 @@ impl Wires {
         f(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// The other recorder gives an edge at this time, in scans.
+    /// The other recorder sends an edge at this time, in scans.
     pub fn edge(&self, at: f64) {
         self.with(|other| other.edges.push(at));
     }
 
-    /// It gives a clock that is so much faster than the board's crystal, ppm; or none.
+    /// Provides a clock that is this much faster than the board's crystal, ppm; or none.
     pub fn give_clock(&self, ppm: Option<f64>) {
         self.with(|other| (other.clock_ppm, other.stops_at) = (ppm, None));
     }
 
-    /// Its clock stands still from this scan on.
+    /// Its clock stops at this scan.
     pub fn stop_clock_at(&self, scan: u64) {
         self.with(|other| other.stops_at = Some(scan));
     }
 
-    /// When it saw the sync output rise, in scans.
+    /// Times at which it saw the sync output rise, in scans.
     pub fn pulses(&self) -> Vec<f64> {
         self.with(|other| other.pulses.clone())
     }
@@ -64,18 +65,18 @@ impl Wires {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SyncPort {
     external: bool,
-    /// What is left of a count.
+    /// Fractional part of a count that is carried over.
     rest: f64,
 }
 
 impl SyncPort {
-    /// What came during the scans from `from` until `to`, which is the next one.
+    /// Events during the scans from `from` until before `to`.
     pub fn seen(&mut self, wires: &Wires, from: u64, to: u64) -> Option<Seen> {
         wires.with(|other| {
             let (mut came, later): (Vec<f64>, Vec<f64>) = other.edges.iter().partition(|at| **at < to as f64);
             other.edges = later;
             came.sort_by(f64::total_cmp);
-            // the newest is caught, and those before it only leave their mark
+            // only the newest edge is captured; earlier ones are only counted
             let edge = came.last().map(|at| Ago {
                 scans: (to as f64 - at.floor()) as i32,
                 part: ((at - at.floor()) * 65_536.0) as u16,
@@ -95,10 +96,10 @@ impl SyncPort {
         Span { scans: (to - from) as u32, counts: counts as u32 }
     }
 
-    /// Lets this time the scans from `now` on.
+    /// Times the scans with this clock, from `now` on.
     ///
     /// # Errors
-    /// No clock comes, or one of quite another rate.
+    /// No clock arrives, or its rate is wrong.
     pub fn clock(&mut self, wires: &Wires, now: u64, clock: Clock) -> Result<(), ClockFault> {
         self.external = false;
         if clock != Clock::Internal {
@@ -113,7 +114,7 @@ impl SyncPort {
         Ok(())
     }
 
-    /// Raises the output, after the scans before `next`.
+    /// Raises the output after the last scan before `next`.
     pub fn mark(wires: &Wires, next: u64) -> Ago {
         wires.with(|other| other.pulses.push(next as f64 + LATE));
         Ago { scans: 0, part: (LATE * 65_536.0) as u16 }

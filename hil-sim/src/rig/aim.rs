@@ -1,29 +1,32 @@
-//! Where hammer and vibrometer really point: nominal geometry and the errors nobody knows.
+//! True positions and directions of hammer and vibrometer: nominal geometry plus unknown errors.
 //!
-//! A point's own error belongs to its name and stays all campaign long: where it is, and for an impact also the tilt at which
-//! the hammer's holder meets the surface there. Each cell adds an aiming error, but not to a point on a specimen: there marks are
-//! small and are found again under the laser's own camera. All are keyed to (seed, what they are for), so visiting cells in another
-//! order changes nothing.
+//! The error of a point belongs to its name and is constant during a campaign: its position, and
+//! for an impact also the tilt at which the hammer's holder meets the surface. Each cell adds an
+//! aiming error, except for points on a specimen: their marks are small, and the laser finds them
+//! again with its own camera. All errors are keyed to (seed, purpose), so the order in which cells
+//! are visited does not matter.
 //!
-//! The tilt belongs to the point because the holder and the surface decide it, not the day: drawn anew for A and AJB it would
-//! differ between the configurations, no longer cancel, and pull every decoupled stiffness some 13 % down.
+//! The tilt belongs to the point because it results from holder and surface, not from the day of
+//! measurement. If it were drawn separately for A and AJB, it would differ between the
+//! configurations, would no longer cancel, and would reduce every decoupled stiffness by about 13
+//! %.
 
 use super::config::{Errors, ImpactPoint, ResponsePoint};
 use super::key::{Stream, normal, stream};
 use super::probe::{AXES, Probe};
 use super::unit_vector::normalized;
 
-/// One cell's true geometry.
+/// True geometry of one cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Aim {
-    /// Where and along what the hammer hits.
+    /// Position and direction of the hammer's impact.
     pub impact: Probe,
-    /// Where the 3-D vibrometer looks, along x, y and z.
+    /// Where the 3-D vibrometer measures, along x, y and z.
     pub response: [Probe; 3],
 }
 
 impl Aim {
-    /// Of the cell `words` = (configuration, impact, response).
+    /// Geometry of the cell `words` = (configuration, impact, response).
     pub fn new(
         seed: u64,
         words: [&str; 3],
@@ -65,14 +68,15 @@ pub(super) fn shifted(position_m: [f64; 3], sigma_m: f64, stream: &mut Stream) -
     position_m.map(|coordinate| coordinate + sigma_m * normal(stream))
 }
 
-/// `direction` turned by a random angle about each of two axes across it.
+/// `direction` rotated by a random angle about each of two axes normal to it.
 fn tilted(direction: [f64; 3], sigma_rad: f64, stream: &mut Stream) -> [f64; 3] {
     let (about_first, about_second) = (sigma_rad * normal(stream), sigma_rad * normal(stream));
-    // The axis least along the direction gives a safe first perpendicular.
+    // The axis with the smallest component along the direction gives a well-conditioned first
+    // perpendicular.
     let least = (0..3).min_by(|a, b| direction[*a].abs().total_cmp(&direction[*b].abs())).unwrap_or(0);
     let first = normalized(cross(direction, AXES[least]));
     let second = cross(direction, first);
-    // A rotation vector across the direction turns it by its own length.
+    // A rotation vector normal to the direction rotates it by the vector's length.
     let angle = about_first.hypot(about_second);
     if angle == 0.0 {
         return direction;

@@ -5,7 +5,7 @@ use std::fmt;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Which body a point sits on.
+/// The body that a point is on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BodyName {
     /// The moving mass (substructure A).
@@ -18,16 +18,16 @@ pub enum BodyName {
     ArmB,
     /// Specimen B (substructure B); arm B itself when the clamp is rigid.
     SpecimenB,
-    /// A body of a rig with a structure of its own.
+    /// A body of a rig that defines its own structure.
     Own(OwnName),
 }
 
-/// The paper's bodies.
+/// The bodies of the paper's rig.
 const PAPERS: [BodyName; 5] =
     [BodyName::Mass, BodyName::ArmA, BodyName::SpecimenA, BodyName::ArmB, BodyName::SpecimenB];
 
 impl BodyName {
-    /// As rig files write it.
+    /// The name in rig files.
     pub fn as_str(&self) -> &str {
         match self {
             Self::Mass => "mass",
@@ -72,7 +72,7 @@ impl<'de> Deserialize<'de> for BodyName {
     }
 }
 
-/// A name that is copied with the points that bear it.
+/// A body name, `Copy` because every point stores one.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct OwnName {
     bytes: [u8; Self::MOST],
@@ -80,10 +80,10 @@ pub struct OwnName {
 }
 
 impl OwnName {
-    /// Bytes of the longest name.
+    /// Maximum length of a name, bytes.
     pub const MOST: usize = 24;
 
-    /// None for a name that is empty or too long.
+    /// `None` for a name that is empty or too long.
     pub fn new(text: &str) -> Option<Self> {
         let mut bytes = [0; Self::MOST];
         bytes.get_mut(..text.len())?.copy_from_slice(text.as_bytes());
@@ -93,7 +93,7 @@ impl OwnName {
 
     /// The name.
     pub fn as_str(&self) -> &str {
-        // only ever made of whole text
+        // always valid UTF-8: constructed from a whole `str`
         std::str::from_utf8(&self.bytes[..usize::from(self.length)]).unwrap_or_default()
     }
 }

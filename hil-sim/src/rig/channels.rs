@@ -1,26 +1,28 @@
-//! The ten channels: their names, what they measure, and where they stand.
+//! The ten channels: their names, what they measure, and their indices.
 
 use super::config;
 
-/// Channels of the rig.
+/// Number of channels of the rig, without additional fixed vibrometers.
 pub const CHANNELS: usize = 10;
-/// Place of the hammer's force among the channels.
+/// Index of the hammer's force.
 pub const FORCE: usize = 0;
-/// Place of the first of the structure's signals; they follow in the order of [`super::stepper::SIGNALS`].
+/// Index of the structure's first signal; the others follow in the order of
+/// [`super::stepper::SIGNALS`].
 pub const FIRST_SIGNAL: usize = 1;
-/// Places of the 3-D vibrometer.
+/// Indices of the 3-D vibrometer.
 pub const VIBROMETER: [usize; 3] = [1, 2, 3];
-/// Places of the load cells.
+/// Indices of the load cells.
 pub const LOAD_CELLS: [usize; 3] = [6, 7, 8];
-/// Place of the shaker's force.
+/// Index of the shaker's force.
 pub const EXCITATION: usize = 9;
 
-/// Whether the channel's gain is in error by `errors.gain`: load cells and vibrometers, not the two forces that go in.
+/// Whether `errors.gain` applies to the channel: it does to load cells and vibrometers, not to the
+/// two excitation forces.
 pub fn is_gauged(at: usize) -> bool {
     at != FORCE && at != EXCITATION
 }
 
-/// What a channel measures.
+/// The quantity that a channel measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measured {
     /// Force (N).
@@ -32,7 +34,7 @@ pub enum Measured {
 /// One channel of the rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
-    /// Its name: `force`, `vib_x` … `excitation`, or as the rig calls a vibrometer of its own.
+    /// Its name: `force`, `vib_x` … `excitation`, or the rig's name of a fixed vibrometer.
     pub name: String,
     /// What it measures.
     pub quantity: Measured,
@@ -40,18 +42,19 @@ pub struct Channel {
     pub unit: &'static str,
     /// Units per volt.
     pub units_per_volt: f64,
-    /// The converter spans ± this (V).
+    /// Converter range, ± this (V).
     pub range_v: f64,
-    /// How late the signal is (s).
+    /// Delay of the signal (s).
     pub delay_s: f64,
-    /// 1, or −1 where the sensor reads backwards.
+    /// 1, or −1 for a reversed sensor.
     pub polarity: i8,
-    /// The axis it measures along (x, y, z); `None` for the hammer, which measures along the impact.
+    /// The axis it measures along (x, y, z); `None` for the hammer, which measures along the
+    /// impact.
     pub axis: Option<usize>,
 }
 
 impl Channel {
-    /// What one converter step is worth, in the channel's unit.
+    /// Value of one converter step, in the channel's unit.
     pub fn step(&self) -> f64 {
         self.units_per_volt * self.range_v / 32768.0
     }

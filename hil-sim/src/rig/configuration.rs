@@ -1,4 +1,4 @@
-//! What stands on the table: A, B or the assembly.
+//! The configuration of the rig: A, B or the assembly.
 
 use std::fmt;
 
@@ -31,7 +31,7 @@ impl Configuration {
         }
     }
 
-    /// Whether `body` of the paper's rig is there.
+    /// Whether the paper's rig has `body` in this configuration.
     pub(super) fn has(self, body: BodyName) -> bool {
         let of_b = matches!(body, BodyName::ArmB | BodyName::SpecimenB);
         match self {
@@ -48,7 +48,7 @@ impl fmt::Display for Configuration {
     }
 }
 
-/// Which frequency response is meant.
+/// The kind of frequency response function.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// Displacement per force (m/N).

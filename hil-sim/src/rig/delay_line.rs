@@ -1,18 +1,19 @@
-//! Delays of channels, in whole scans and parts of one.
+//! Delays of channels, in whole scans and fractions of one.
 
-/// A signal that comes late: the last samples, read between them by the cubic through the four around.
+/// Delays a signal: cubic interpolation through the four samples around the delayed time.
 #[derive(Debug, Clone)]
 pub(super) struct DelayLine {
     past: Vec<f64>,
     at: usize,
-    /// First of the four samples used, in scans ago, and their weights.
+    /// Age of the newest of the four samples used, in scans, and the four weights.
     first: usize,
     weights: [f64; 4],
 }
 
 impl DelayLine {
     pub(super) fn new(delay_scans: f64) -> Self {
-        // The cubic is best in its middle interval; a delay below one scan has no newer sample than the present one.
+        // The cubic is most accurate in its middle interval; a delay below one scan has no newer
+        // sample than the present one.
         let first = (delay_scans.floor() as usize).saturating_sub(1);
         let d = delay_scans - first as f64;
         let mut weights = [1.0; 4];
@@ -21,7 +22,7 @@ impl DelayLine {
                 *weight *= (d - j as f64) / (i as f64 - j as f64);
             }
         }
-        // A power of two, so that going round is a mask and no division.
+        // A power of two, so that the index wraps with a mask instead of a division.
         Self { past: vec![0.0; (first + 4).next_power_of_two()], at: 0, first, weights }
     }
 

@@ -1,24 +1,24 @@
-//! What can be wrong with a rig or with what is asked of it.
+//! Errors of rig descriptions and of requests to a rig.
 
 use super::Configuration;
 
 /// What went wrong, where, and what to do.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum RigError {
-    /// The rig file is not a rig file.
+    /// The rig file cannot be parsed.
     #[error("rig file{}: {reason}", line.map(|line| format!(", line {line}")).unwrap_or_default())]
     Document {
         /// Line of the file, from 1.
         line: Option<usize>,
-        /// What is wrong, in words.
+        /// The reason, in words.
         reason: String,
     },
-    /// A field has a value that no rig can have.
+    /// A field has an invalid value.
     #[error("rig field {field}{} {reason}", line.map(|line| format!(" (line {line})")).unwrap_or_default())]
     Field {
         /// Path of the field.
         field: String,
-        /// What is wrong with it.
+        /// Why it is invalid.
         reason: String,
         /// Line of the rig file, from 1, where the file sets it.
         line: Option<usize>,
@@ -28,14 +28,14 @@ pub enum RigError {
     UnknownPoint {
         /// `impact` or `response`.
         kind: &'static str,
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// The configuration on the rig.
         configuration: Configuration,
-        /// The names that would do.
+        /// The valid names.
         valid: Vec<String>,
     },
-    /// A point was asked for on a body that this configuration does not have.
+    /// The requested point is on a body that this configuration does not have.
     #[error("a point sits on {body}, which configuration {configuration} does not have")]
     MissingBody {
         /// The body.

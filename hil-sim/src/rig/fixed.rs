@@ -1,7 +1,9 @@
-//! Vibrometers that stay at a point while the hammer goes round: each a channel of its own behind the ten.
+//! Vibrometers that stay at one point while the hammer moves; each has its own channel after the
+//! ten.
 //!
-//! Their errors are those of the other vibrometers: where they really look (keyed to the response point, as for the 3-D vibrometer's, but
-//! without its errors of aim), gain, skew and noise. The noise has a stream of its own, so that they change nothing in the ten.
+//! Their errors are of the same kinds as those of the other vibrometers: true position (keyed to
+//! the response point as for the 3-D vibrometer, but without the aiming error), gain, skew and
+//! noise. Their noise has a separate stream, so that they do not change the ten channels.
 
 use nalgebra::DVector;
 
@@ -14,18 +16,19 @@ use super::key::{Stream, normal, stream};
 use super::probe::Probe;
 use super::unit_vector::normalized;
 
-/// What is wrong with one of them.
+/// Errors of one fixed vibrometer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FixedFlaw {
-    /// Where it really looks.
+    /// Its true position and direction.
     pub probe: Probe,
-    /// What it reads over what it should: 1 without error.
+    /// Ratio of its reading to the true value: 1 without error.
     pub gain: f64,
     /// Delay beyond the declared one and the latency (s).
     pub skew_s: f64,
 }
 
-/// The flaws of the rig `seed`, in the order of the configuration. [`RigConfig::check`] has seen that the points are there.
+/// The errors for the rig `seed`, in the order of the configuration. [`RigConfig::check`] has
+/// verified that the points exist.
 pub(super) fn flaws(seed: u64, config: &RigConfig) -> Vec<FixedFlaw> {
     let errors = config.errors.acting();
     let one = |own: &FixedVibrometer| {
@@ -63,7 +66,7 @@ pub(super) fn channels(config: &RigConfig) -> Vec<Channel> {
     config.sensors.fixed.iter().map(one).collect()
 }
 
-/// What they see of the structure, in state coordinates (2n).
+/// Their output rows, in state coordinates (2n).
 #[derive(Debug, Clone, Default)]
 pub struct FixedRows {
     /// Row of each; zero where the configuration lacks the body.
@@ -72,7 +75,7 @@ pub struct FixedRows {
     pub steps: Vec<f64>,
 }
 
-/// Everything between their true signals and the codes.
+/// Converts the true signals to codes.
 #[derive(Debug, Clone)]
 pub(super) struct FixedSensors {
     own: Vec<One>,
@@ -89,7 +92,7 @@ struct One {
 }
 
 impl FixedSensors {
-    /// With the cell's idle `stream`; all channels come `latency_scans` late.
+    /// With the cell's idle `stream`; all channels are delayed by `latency_scans`.
     pub(super) fn new(config: &RigConfig, flaws: &[FixedFlaw], latency_scans: u32, stream: Stream) -> Self {
         let rate_hz = f64::from(config.scan_rate_hz);
         let one = |((own, channel), flaw): ((&FixedVibrometer, Channel), &FixedFlaw)| {
@@ -105,7 +108,7 @@ impl FixedSensors {
         Self { signals: vec![0.0; own.len()], own, stream }
     }
 
-    /// A hit begins: noise is counted from here.
+    /// A hit begins: the noise stream restarts here.
     pub(super) fn restart(&mut self, stream: Stream) {
         self.stream = stream;
     }

@@ -1,6 +1,7 @@
-//! What is wrong with a campaign's instruments: where the spots really are, and what the sensors misread.
+//! Errors of a campaign's instruments: true positions of the spots, and errors of the sensors.
 //!
-//! All of it is keyed to (seed, what it is for): the same in every cell and configuration, whatever was visited before.
+//! All are keyed to (seed, purpose): the same in every cell and configuration, whatever was visited
+//! before.
 
 use super::aim::shifted;
 use super::channels::{CHANNELS, Channel, FORCE, LOAD_CELLS, is_gauged};
@@ -8,25 +9,27 @@ use super::config::{RigConfig, Spot, Spots};
 use super::fixed::{self, FixedFlaw};
 use super::key::{normal, stream};
 
-/// One campaign's flaws.
+/// Instrument errors of one campaign.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flaws {
-    /// Where the single-point vibrometers really look.
+    /// True positions of the single-point vibrometers.
     pub spots: Spots,
-    /// What each channel reads over what it should: 1 without error.
+    /// Ratio of each channel's reading to the true value: 1 without error.
     pub gains: [f64; CHANNELS],
-    /// Delay of each channel beyond the declared one and the latency below (s); negative where it comes early.
+    /// Delay of each channel beyond the declared one and the latency below (s); negative if it is
+    /// early.
     pub skews_s: [f64; CHANNELS],
-    /// Whole scans by which all channels alike come late, so that none need come before its cause.
+    /// Whole scans by which all channels are delayed, so that none precedes its cause.
     pub latency_scans: u32,
-    /// What is wrong with the vibrometers that stay.
+    /// Errors of the fixed vibrometers.
     pub fixed: Vec<FixedFlaw>,
-    /// Part of the force of each load cell (column) that each other one (row) reads; the diagonal is nothing.
+    /// Fraction of the force of each load cell (column) that each other one (row) reads; the
+    /// diagonal is zero.
     pub cross_talk: [[f64; 3]; 3],
 }
 
 impl Flaws {
-    /// Of the rig `seed`.
+    /// Errors for the rig `seed`.
     pub(super) fn new(seed: u64, config: &RigConfig, channels: &[Channel; CHANNELS]) -> Self {
         let errors = config.errors.acting();
         let draw = |words: &[&str]| normal(&mut stream(seed, words));
@@ -75,8 +78,8 @@ impl Flaws {
     }
 }
 
-/// One scan more than the earliest channel is early, so that the interpolating cubic has a sample on either side; none where
-/// no channel is skewed.
+/// One scan more than the earliest channel is early, so that the interpolating cubic has a sample
+/// on either side; 0 if no channel is skewed.
 fn latency_scans(mut skews_s: impl Iterator<Item = f64> + Clone, rate_hz: f64) -> u32 {
     if skews_s.clone().all(|skew| skew == 0.0) {
         return 0;

@@ -1,4 +1,5 @@
-//! A force that acts for a while: half-sine contacts and steady pressing, and its exact effect on one mode.
+//! A force of limited duration (half-sine contact or constant force), and its exact effect on one
+//! mode.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -25,17 +26,18 @@ impl ForceSegment {
         Self { start_s, end_s: start_s + width_s, amplitude_n: peak_n, omega: PI / width_s, phase: 0.0 }
     }
 
-    /// A steady force.
+    /// A constant force.
     pub fn steady(start_s: f64, end_s: f64, force_n: f64) -> Self {
         Self { start_s, end_s, amplitude_n: force_n, omega: 0.0, phase: FRAC_PI_2 }
     }
 
-    /// How long it acts (s).
+    /// Duration (s).
     pub fn width_s(&self) -> f64 {
         self.end_s - self.start_s
     }
 
-    /// What had begun by `now_s`: an elastic contact whole, a steady force until then.
+    /// The part that had begun by `now_s`: all of an elastic contact, a constant force up to that
+    /// time.
     pub fn until(&self, now_s: f64) -> Option<Self> {
         let end_s = if self.omega > 0.0 { self.end_s } else { self.end_s.min(now_s) };
         (self.start_s <= now_s).then_some(Self { end_s, ..*self })
@@ -57,19 +59,21 @@ impl ForceSegment {
         (a < b).then_some((a, b))
     }
 
-    /// The same force with the clock's zero moved to `zero_s`.
+    /// The same force on a clock whose zero is at `zero_s`.
     #[must_use]
     pub fn seen_from(&self, zero_s: f64) -> Self {
         Self { start_s: self.start_s - zero_s, end_s: self.end_s - zero_s, ..*self }
     }
 
-    /// ∫ e^{λ (to − τ)} f(τ) dτ over `from_s..to_s` (N s), exactly: what a mode z' = λ z + f has gained by `to_s`.
+    /// ∫ e^{λ (to − τ)} f(τ) dτ over `from_s..to_s` (N s), exactly: what a mode z' = λ z + f has
+    /// gained by `to_s`.
     pub fn gained(&self, lambda: Complex<f64>, from_s: f64, to_s: f64) -> Complex<f64> {
         let Some((a, b)) = self.overlap(from_s, to_s) else { return Complex::ZERO };
         let h = b - a;
         let turn = Complex::new(0.0, self.omega);
         let at_end = Complex::cis(self.angle(b));
-        // sin = (e^{iψ} − e^{−iψ}) / 2i, and ∫ e^{λ(b−τ)} e^{±iψ(τ)} dτ = e^{±iψ(b)} h φ((λ ∓ iΩ) h).
+        // sin = (e^{iψ} − e^{−iψ}) / 2i, and ∫ e^{λ(b−τ)} e^{±iψ(τ)} dτ = e^{±iψ(b)} h φ((λ ∓ iΩ)
+        // h).
         let plus = at_end * phi((lambda - turn) * h);
         let minus = at_end.conj() * phi((lambda + turn) * h);
         let decay = if b < to_s { (lambda * (to_s - b)).exp() } else { Complex::ONE };
@@ -77,7 +81,7 @@ impl ForceSegment {
     }
 }
 
-/// φ(x) = (eˣ − 1) / x, to rounding also near zero.
+/// φ(x) = (eˣ − 1) / x, accurate to rounding even near zero.
 pub fn phi(x: Complex<f64>) -> Complex<f64> {
     if x.norm_sqr() > 0.25 {
         return (x.exp() - 1.0) / x;
@@ -86,7 +90,8 @@ pub fn phi(x: Complex<f64>) -> Complex<f64> {
     (1..=16).rev().fold(Complex::ONE, |sum, k| sum * x / f64::from(k + 1) + 1.0)
 }
 
-/// φ₂(x) = (eˣ − 1 − x) / x², to rounding also near zero: of a force that rises linearly from nothing.
+/// φ₂(x) = (eˣ − 1 − x) / x², accurate to rounding even near zero: for a force that rises linearly
+/// from zero.
 pub fn phi_rising(x: Complex<f64>) -> Complex<f64> {
     if x.norm_sqr() > 0.25 {
         return (phi(x) - 1.0) / x;

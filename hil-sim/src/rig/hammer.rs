@@ -1,11 +1,14 @@
-//! The automatic hammer: a coil pulls a bolt against a return spring and lets it fly.
+//! The automatic hammer: a coil accelerates a bolt against a return spring, and the bolt flies
+//! freely after the pulse.
 //!
-//! m x'' = coil − preload − k x while the current is on, m x'' = −preload − k x after it: both are solved in closed form, and
-//! the times of arrival come from them, so a pulse has no step size. At the surface (x = gap) the structure counts as rigid:
-//! the tip's spring turns the bolt round in a half-sine of width π √(m/k_tip) and peak v √(m k_tip), and a fraction of the
-//! speed is left. Too short a pulse: the bolt turns back before it arrives. Longer: faster, until it arrives with the current
-//! still on; longer still: the coil presses it on, it strikes again, and at last rests on the surface until the current ends.
-//! The rest stop swallows the bolt.
+//! m x'' = coil − preload − k x while the current is on, m x'' = −preload − k x after it. Both are
+//! solved in closed form, as are the arrival times, so a pulse has no step size. At the surface
+//! (x = gap) the structure counts as rigid: the tip's spring reverses the bolt in a half-sine of
+//! duration π √(m/k_tip) and peak v √(m k_tip), and a fraction of the speed is left. With too short
+//! a pulse the bolt turns back before it arrives. With a longer one it is faster, until it arrives
+//! with the current still on; with a still longer one the coil pushes it on: it strikes again, and
+//! finally rests on the surface until the current ends. The rest stop absorbs the bolt without a
+//! rebound.
 
 use std::f64::consts::PI;
 
@@ -13,34 +16,37 @@ use super::config::Hammer;
 use super::force::ForceSegment;
 use super::key::{Stream, normal, uniform};
 
-/// A bolt slower than this (m/s) no longer bounces: below it a contact's peak is about a newton.
+/// A bolt slower than this (m/s) no longer bounces: below it the peak of a contact is about a
+/// newton.
 const RESTING_SPEED: f64 = 5e-3;
-/// Contacts of one pulse that are followed; restitution makes more of them impossible in any pulse a coil survives.
+/// Maximum number of contacts per pulse; restitution makes more impossible for any pulse that a
+/// coil survives.
 const MOST_CONTACTS: usize = 16;
 
-/// What went wrong with a hit, if anything.
+/// Disturbance of a hit, if any.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mishap {
-    /// Nothing.
+    /// No disturbance.
     None,
     /// A second pulse follows.
     DoubleHit,
-    /// Far too weak.
+    /// Much too weak.
     Weak,
     /// Beyond the sensors' range.
     Overload,
 }
 
-/// What one coil pulse does.
+/// Effect of one coil pulse.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hit {
-    /// Attempt within the cell.
+    /// Number of the attempt within the cell.
     pub attempt: u32,
-    /// How long the coil was energised (s).
+    /// Time for which the coil was energised (s).
     pub pulse_s: f64,
-    /// What went wrong.
+    /// The disturbance.
     pub mishap: Mishap,
-    /// Forces on the structure along the impact, on a clock that starts when the coil does; empty if the bolt did not arrive.
+    /// Forces on the structure along the impact, on a clock that starts with the coil pulse; empty
+    /// if the bolt did not arrive.
     pub contacts: Vec<ForceSegment>,
 }
 
@@ -51,14 +57,16 @@ impl Hit {
     }
 }
 
-/// Width of an undisturbed contact (s).
+/// Duration of an undisturbed contact (s).
 pub fn nominal_width_s(hammer: &Hammer) -> f64 {
     PI * (hammer.bolt_kg / hammer.tip_n_per_m).sqrt()
 }
 
-/// Fires the coil for `pulse_s`; scatter and mishaps come from `stream`, warming from the attempt's number in its cell.
+/// Fires the coil for `pulse_s`; scatter and mishaps come from `stream`, warming from the attempt's
+/// number in its cell.
 pub fn strike(hammer: &Hammer, pulse_s: f64, attempt: u32, stream: &mut Stream) -> Hit {
-    // Drawn in a fixed order whatever becomes of them, so that one parameter does not shift the others' luck.
+    // All are drawn in a fixed order, used or not, so that changing one parameter does not change
+    // the other draws.
     let speed_scatter = (1.0 + hammer.speed_scatter * normal(stream)).max(0.0);
     let width_scatter = (1.0 + hammer.width_scatter * normal(stream)).max(0.1);
     let luck = uniform(stream);
@@ -124,7 +132,7 @@ fn flight(hammer: &Hammer, pulse_s: f64, coil_n: f64) -> Vec<ForceSegment> {
     contacts
 }
 
-/// Where the bolt is; x from the rest stop towards the surface.
+/// State of the bolt; x from the rest stop towards the surface.
 #[derive(Debug, Clone, Copy)]
 struct Bolt {
     t_s: f64,
@@ -154,7 +162,8 @@ impl Bolt {
     }
 }
 
-/// x = centre + amplitude cos(ω (t − t0) + phase): the bolt on its return spring under a constant force.
+/// x = centre + amplitude cos(ω (t − t0) + phase): the bolt on its return spring under a constant
+/// force.
 struct Swing {
     t0_s: f64,
     centre_m: f64,
@@ -195,7 +204,8 @@ impl Swing {
         let turn = 2.0 * PI;
         let rising = -cosine.acos();
         let mut ahead = (rising - self.phase).rem_euclid(turn);
-        // Leaving the surface is a fall through the level; rounding must not make it an arrival.
+        // When leaving the surface the bolt falls through the level; rounding must not make that an
+        // arrival.
         if ahead < 1e-9 {
             ahead += turn;
         }

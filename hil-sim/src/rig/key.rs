@@ -1,14 +1,15 @@
-//! Random numbers that depend on what they are for, and on nothing else.
+//! Random numbers that depend only on their purpose.
 //!
-//! Every stream is seeded from the rig's seed and a list of words (configuration, cell, attempt, purpose): FNV-1a (64 bit)
-//! over the words' bytes, each word preceded by its length so that "a","bc" and "ab","c" differ, then SplitMix64's finaliser
-//! to spread what FNV leaves clustered. This is part of the format of simulated campaigns: changing it changes every record.
+//! Every stream is seeded from the rig's seed and a list of words (configuration, cell, attempt,
+//! purpose): FNV-1a (64 bit) over the words' bytes, each word preceded by its length so that
+//! "a","bc" and "ab","c" differ, then SplitMix64's finaliser to distribute the bits that FNV leaves
+//! clustered. This is part of the format of simulated campaigns: changing it changes every record.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// The generator of every stream.
+/// The random generator of every stream.
 pub type Stream = Xoshiro256PlusPlus;
 
 /// The stream of `words` on the rig `seed`.
@@ -16,17 +17,17 @@ pub fn stream(seed: u64, words: &[&str]) -> Stream {
     Stream::seed_from_u64(key(seed, words))
 }
 
-/// A standard normal number.
+/// A standard normal random number.
 #[inline]
 pub fn normal(stream: &mut Stream) -> f64 {
     StandardNormal.sample(stream)
 }
 
-/// Evenly in [0, 1).
+/// Uniform in [0, 1).
 #[inline]
 pub fn uniform(stream: &mut Stream) -> f64 {
     use rand::Rng;
-    // The upper 53 bits are the generator's best, and exactly an f64's.
+    // The upper 53 bits are the generator's best, and exactly fill an f64's mantissa.
     (stream.next_u64() >> 11) as f64 * (-53_f64).exp2()
 }
 

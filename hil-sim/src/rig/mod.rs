@@ -1,16 +1,19 @@
-//! The friction rig: 24 degrees of freedom (30 with a clamp on side B), a hammer, a shaker and ten channels or more.
+//! The friction rig: 24 degrees of freedom (30 with a clamp on side B), a hammer, a shaker and ten
+//! or more channels.
 //!
-//! Axes: x lateral, y vertical (normal load), z horizontal (sliding); origin at the contact's centre; SI units.
-//! One [`Rig`] is one device. It advances by whole scans: [`Rig::scan`] moves structure, bolt and shaker on by one scan period
-//! and samples all channels at its end. The stuck structure is advanced exactly (see [`stepper`]), so the scan rate does not
-//! change the physics; a contact that slips ([`sliders`]) is advanced in steps of its own.
+//! Axes: x lateral, y vertical (normal load), z horizontal (sliding); origin at the contact's
+//! centre; SI units. One [`Rig`] is one device. It advances by whole scans: [`Rig::scan`] advances
+//! structure, bolt and shaker by one scan period and samples all channels at its end. The stuck
+//! structure is advanced exactly (see [`stepper`]), so the scan rate does not change the physics; a
+//! contact that slips ([`sliders`]) is advanced in smaller steps.
 //!
-//! **What a record depends on.** Noise, scatter and errors of aim are keyed to (seed, configuration, cell, attempt, purpose)
-//! and counted from the last [`Rig::stage`] or [`Rig::fire`]: never to absolute time, never to what happened in other cells.
-//! [`Rig::stage`] puts the structure at rest. Within a cell an earlier hit's tail is physics and does depend on the scans
-//! that passed since.
+//! **What a record depends on.** Noise, scatter and aiming errors are keyed to (seed,
+//! configuration, cell, attempt, purpose) and counted from the last [`Rig::stage`] or
+//! [`Rig::fire`]: never to absolute time, never to what happened in other cells. [`Rig::stage`]
+//! puts the structure at rest. Within a cell the decay of an earlier hit is physical and does
+//! depend on the scans that have passed since.
 //!
-//! **Budget.** A scan of the assembly at 51.2 kHz costs about 0.1 µs; `benches/rig.rs` measures it.
+//! **Cost.** A scan of the assembly at 51.2 kHz takes about 0.1 µs; `benches/rig.rs` measures it.
 
 mod aim;
 mod body;
@@ -65,7 +68,7 @@ pub struct Rig {
     config: RigConfig,
     seed: u64,
     period_s: f64,
-    /// The ten, then the vibrometers that stay.
+    /// The ten, then the fixed vibrometers.
     channels: Vec<Channel>,
     flaws: Flaws,
     plants: [Plant; 3],
@@ -75,11 +78,11 @@ pub struct Rig {
     attempt: u32,
     aim: Aim,
     stepper: Stepper,
-    /// The joint's sliders, if it can slip and is there.
+    /// The joint's sliders, if it can slip and is present.
     slipping: Option<Slipping>,
     sensors: Sensors,
     fixed: FixedSensors,
-    /// Hammer forces still to come or acting, on the clock below.
+    /// Hammer forces that act now or later, on the clock below.
     pending: Vec<ForceSegment>,
     /// Scans since the last stage or fire.
     scans: u64,
@@ -90,10 +93,12 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// A rig at rest, staged in the assembly at the first impact and the first response of `config`.
+    /// A rig at rest, staged in the assembly at the first impact and the first response of
+    /// `config`.
     ///
     /// # Errors
-    /// [`RigError::Field`] for a bad value; [`RigError::Structure`] if the structure's matrices cannot be factored.
+    /// [`RigError::Field`] for an invalid value; [`RigError::Structure`] if the structure's
+    /// matrices cannot be factored.
     pub fn new(config: &RigConfig, seed: u64) -> Result<Self, RigError> {
         Self::with_stepping(config, seed, Stepping::Fastest)
     }
@@ -113,7 +118,7 @@ impl Rig {
         let fixed = FixedSensors::new(config, &flaws.fixed, flaws.latency_scans, stream(seed, &["at rest"]));
         let channels: Vec<Channel> = ten.into_iter().chain(fixed::channels(config)).collect();
         let configuration = Configuration::Ajb;
-        // check() has seen at least one of each.
+        // check() has verified that there is at least one of each.
         let (impact, response) = (&config.impacts[0], &config.responses[0]);
         let words = [configuration.as_str(), &impact.name, &response.name];
         let aim = Aim::new(seed, words, &config.errors, impact, response);
@@ -151,7 +156,7 @@ impl Rig {
         self.config.scan_rate_hz
     }
 
-    /// The ten channels, then the vibrometers that stay, in the order of the codes.
+    /// The ten channels, then the fixed vibrometers, in the order of the codes.
     pub fn channels(&self) -> &[Channel] {
         &self.channels
     }
@@ -166,7 +171,7 @@ impl Rig {
         self.seed
     }
 
-    /// What stands on the table.
+    /// The current configuration.
     pub fn configuration(&self) -> Configuration {
         self.configuration
     }
@@ -176,11 +181,12 @@ impl Rig {
         self.attempt
     }
 
-    /// Moves hammer and vibrometer to a cell. In a laboratory this takes minutes: the structure is at rest afterwards, the
-    /// shaker off, and the next [`Rig::fire`] is number `attempt` of the cell.
+    /// Moves hammer and vibrometer to a cell. In a laboratory this takes minutes: the structure is
+    /// at rest afterwards, the shaker off, and the next [`Rig::fire`] is number `attempt` of the
+    /// cell.
     ///
     /// # Errors
-    /// [`RigError::UnknownPoint`] listing the names that would do; the rig stays as it was.
+    /// [`RigError::UnknownPoint`] listing the valid names; the rig is unchanged.
     pub fn stage(
         &mut self,
         configuration: Configuration,
@@ -217,9 +223,10 @@ impl Rig {
         Ok(())
     }
 
-    /// Energises the hammer's coil for `pulse_s` from the next scan on. A pulse that is not a positive number does nothing.
+    /// Energises the hammer's coil for `pulse_s` from the next scan on. A pulse that is not a
+    /// positive number does nothing.
     ///
-    /// The attempt's number goes up by one for the next fire.
+    /// Increments the attempt's number for the next fire.
     pub fn fire(&mut self, pulse_s: f64) {
         if !(pulse_s.is_finite() && pulse_s > 0.0) {
             return;
@@ -240,8 +247,9 @@ impl Rig {
         self.attempt = attempt.wrapping_add(1);
     }
 
-    /// Ends the coil's pulse now, if it lasts: the bolt flies as after a pulse of the time that has passed. A bolt that has
-    /// already touched the structure has done so, and only what the coil would still have pressed is gone.
+    /// Ends a running coil pulse now: the bolt flies as after a pulse of the elapsed duration. A
+    /// contact that has already begun remains; only the force with which the coil would still have
+    /// pressed is removed.
     pub fn coil_off(&mut self) {
         let now_s = self.time_s(self.scans);
         let Some(hit) = self.last_hit.as_mut().filter(|hit| now_s < hit.pulse_s) else { return };
@@ -258,7 +266,8 @@ impl Rig {
         self.last_hit = Some(cut);
     }
 
-    /// Sets the shaker's drive (V), held until it is set again and limited as the amplifier is; not a number mutes it.
+    /// Sets the shaker's drive (V), held until it is set again and limited like the amplifier; NaN
+    /// mutes it.
     ///
     /// The excitation channel reads the force that acted during the scan that it ends.
     pub fn drive(&mut self, volts: f64) {
@@ -266,11 +275,13 @@ impl Rig {
         self.drive_v = if volts.is_nan() { 0.0 } else { volts.clamp(-limit, limit) };
     }
 
-    /// Sets the normal load N (N) from the next scan on, as the pneumatic actuator does: the contact carries at most μN along z. It
-    /// stays through later stagings. The linear law has no limit, whatever the load.
+    /// Sets the normal load N (N) from the next scan on, as the pneumatic actuator does: the
+    /// contact carries at most μN along z. It is kept through later stagings. The linear law has no
+    /// limit, whatever the load.
     ///
     /// # Errors
-    /// [`RigError::Field`] for a load that is negative, no number, or too large for a load that varies; the rig stays as it was.
+    /// [`RigError::Field`] for a load that is negative, not a number, or too large for a load that
+    /// varies; the rig is unchanged.
     pub fn set_normal_load(&mut self, normal_load_n: f64) -> Result<(), RigError> {
         let before = std::mem::replace(&mut self.config.contact.normal_load_n, normal_load_n);
         if let Err(error) = self.config.check() {
@@ -283,8 +294,8 @@ impl Rig {
         Ok(())
     }
 
-    /// Advances exactly one scan period and samples: one code per channel, in order. A shorter slice takes the first
-    /// channels, a longer one keeps its tail.
+    /// Advances exactly one scan period and samples: one code per channel, in order. A shorter
+    /// slice receives the first channels; the end of a longer one is unchanged.
     pub fn scan(&mut self, codes: &mut [i16]) {
         if let Some(hand) = self.config.hammer.hand
             && self.scans == (hand.every_s * f64::from(self.config.scan_rate_hz)).round() as u64
@@ -323,20 +334,21 @@ impl Rig {
     }
 }
 
-/// What only the rig itself knows; for tests.
+/// True values that only the simulator knows; for tests.
 impl Rig {
     /// The true geometry of the cell, errors included.
     pub fn aim(&self) -> &Aim {
         &self.aim
     }
 
-    /// What is wrong with this campaign's instruments: the spots' true places, true gains, skews and cross-talk.
+    /// Errors of this campaign's instruments: true positions of the spots, true gains, skews and
+    /// cross-talk.
     pub fn flaws(&self) -> &Flaws {
         &self.flaws
     }
 
-    /// The noise-free signals of the last scan, before cross-talk, gain, delay and polarity, in the channels' units; the hammer's force with
-    /// its cell's ringing.
+    /// The noise-free signals of the last scan, before cross-talk, gain, delay and polarity, in the
+    /// channels' units; the hammer's force with its cell's ringing.
     pub fn truth(&self) -> &[f64; CHANNELS] {
         &self.truth
     }
@@ -346,24 +358,26 @@ impl Rig {
         &self.coil_pulses_s
     }
 
-    /// The last fire since the last stage: its mishap and its contacts, on a clock that starts at the fire.
+    /// The last fire since the last stage: its mishap and its contacts, on a clock that starts at
+    /// the fire.
     pub fn last_hit(&self) -> Option<&Hit> {
         self.last_hit.as_ref()
     }
 
-    /// Mechanical energy of the structure now (J).
+    /// Current mechanical energy of the structure (J).
     pub fn energy_j(&self) -> f64 {
         let plant = &self.plants[self.configuration as usize];
         plant.energy_j(&self.config.contact, &self.stepper, self.slipping.as_ref())
     }
 
-    /// The joint now; `None` outside the assembly.
+    /// Current state of the joint; `None` outside the assembly.
     pub fn joint(&self) -> Option<JointState> {
         let plant = &self.plants[self.configuration as usize];
         plant.joint_state(&self.config.contact, &self.stepper, self.slipping.as_ref())
     }
 
-    /// True displacement (m) and velocity (m/s) along a probe now; `None` if its body is not there.
+    /// Current true displacement (m) and velocity (m/s) along a probe; `None` if its body is not
+    /// present.
     pub fn motion(&self, probe: &Probe) -> Option<(f64, f64)> {
         self.plants[self.configuration as usize].motion(&self.stepper, probe)
     }

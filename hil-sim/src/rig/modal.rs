@@ -1,19 +1,21 @@
-//! The stuck motion's complex modes: eigenvectors of the state matrix, checked before they are trusted.
+//! The stuck motion's complex modes: eigenvectors of the state matrix, verified before use.
 //!
-//! Eigenvalues come from the real Schur form, vectors from inverse iteration. Left vectors are rows of the inverse of the
-//! basis, so that a bad basis shows itself: its condition number and its FRFs against a direct solve decide whether it may
-//! be used. Overdamped modes are real and count once; the others come in conjugate pairs of which one is kept.
+//! Eigenvalues come from the real Schur form, vectors from inverse iteration. Left vectors are rows
+//! of the inverse of the basis, so that a bad basis can be detected: its condition number and a
+//! comparison of its FRFs with a direct solve decide whether it is used. Overdamped modes are real
+//! and count once; the others come in conjugate pairs of which one is kept.
 
 use nalgebra::{DMatrix, DVector, Schur};
 use num_complex::Complex;
 
 use super::state_space::StateSpace;
 
-/// A basis with a larger condition number costs more than the eight digits promised.
+/// With a larger condition number the result would have fewer than the eight digits required.
 const WORST_CONDITION: f64 = 1e7;
-/// Largest deviation of the basis' transfer functions from a direct solve, relative to the largest entry.
+/// Largest deviation of the basis' transfer functions from a direct solve, relative to the largest
+/// entry.
 const WORST_DEVIATION: f64 = 1e-8;
-/// Schur sweeps and inverse iterations that are plenty for any basis worth having.
+/// Schur sweeps and inverse iterations that suffice for any usable basis.
 const SWEEPS: usize = 10_000;
 const ITERATIONS: usize = 3;
 
@@ -76,11 +78,13 @@ pub fn modes(space: &StateSpace) -> Result<Vec<Mode>, ModalError> {
 /// Inverse iteration from `guess`: eigenvalue and unit vector. A real guess stays real.
 fn vector(a: &DMatrix<Complex<f64>>, guess: Complex<f64>) -> Option<(Complex<f64>, DVector<Complex<f64>>)> {
     let order = a.nrows();
-    // Exactly at the eigenvalue the factorisation may meet a zero pivot; a part in 1e12 beside it converges as fast.
+    // Exactly at the eigenvalue the factorisation may have a zero pivot; with a relative offset of
+    // 1e-12 it converges as fast.
     let shift = guess * (1.0 + 1e-12) + f64::MIN_POSITIVE;
     let shifted = a - DMatrix::from_diagonal_element(order, order, shift);
     let factors = shifted.lu();
-    // Any start with a part in every mode: fixed, so that the result is.
+    // Any start with a component in every mode works; it is fixed so that the result is
+    // deterministic.
     let mut x = DVector::from_fn(order, |i, _| {
         let angle = if guess.im > 0.0 { 1.3 * i as f64 } else { 0.0 };
         Complex::from_polar(1.0 + 0.37 * (0.9 * i as f64).sin(), angle)
@@ -133,7 +137,7 @@ fn invert(modes: &mut [Mode], order: usize) -> Result<(), ModalError> {
     Ok(())
 }
 
-/// Compares (s − A)⁻¹ from the modes with a direct solve, on, beside and far from the resonances.
+/// Compares (s − A)⁻¹ from the modes with a direct solve, at, near and far from the resonances.
 fn verify(space: &StateSpace, modes: &[Mode]) -> Result<(), ModalError> {
     let order = space.order();
     let fastest = modes.iter().map(|mode| mode.lambda.norm()).fold(0.0, f64::max);

@@ -1,4 +1,5 @@
-//! One configuration, ready to be stepped: its matrices, its modes, and what its channels see.
+//! One configuration, prepared for stepping: its matrices, its modes, and its channels' output
+//! rows.
 
 use std::sync::Arc;
 
@@ -19,10 +20,10 @@ use super::{Aim, Configuration, JointState, RigError};
 /// How the structure is advanced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Stepping {
-    /// By modes where the modes are good, else by the matrix exponential.
+    /// By modes if the modes pass their checks, otherwise by the matrix exponential.
     #[default]
     Fastest,
-    /// By the matrix exponential always: the baseline.
+    /// Always by the matrix exponential: the baseline.
     Exponential,
 }
 
@@ -67,7 +68,8 @@ impl Plant {
         Ok(Self { structure, joined: config.joined(), space, way, period_s })
     }
 
-    /// A stepper at rest that sees and pushes where `aim` and the `flaws` say, and the sliders of its joint if it can slip.
+    /// A stepper at rest with the inputs and outputs of `aim` and `flaws`, and the sliders of its
+    /// joint if it can slip.
     pub(super) fn aimed(
         &self,
         config: &RigConfig,
@@ -85,7 +87,7 @@ impl Plant {
         let seen = |probe| velocity(probe).ok_or_else(|| missing(probe));
         let sliding = config.contact.sliding();
         let spot = |spot| velocity(&Probe::at(spot, sliding)).unwrap_or_else(nothing);
-        // A load cell's signal is its spring force kz · z on the body that it holds.
+        // A load cell's signal is its spring force kz · z on the body that it supports.
         let cell = |index: usize| {
             let it = &config.load_cells[index];
             let probe = |body| Probe { body, position_m: it.position_m, direction: AXES[2] };
@@ -108,7 +110,7 @@ impl Plant {
                 cell(2),
             ],
             hammer: self.space.input(&hit),
-            // Without its body the shaker pushes nothing.
+            // Without its body the shaker excites nothing.
             shaker: self.structure.row(&pushed).map_or_else(nothing, |row| self.space.input(&row)),
             steps: std::array::from_fn(|signal| channels[FIRST_SIGNAL + signal].step()),
             joint: self.joint(&config.contact),
@@ -140,13 +142,13 @@ impl Plant {
         Ok((stepper, Some(slipping)))
     }
 
-    /// The joint, where there is one that can slip.
+    /// The joint, if there is one that can slip.
     fn joint(&self, contact: &Contact) -> Option<Joint> {
         if contact.law == ContactLaw::Linear {
             return None;
         }
         let row = self.relative(contact)?;
-        // A hair's breadth keeps a whole quotient from being rounded up.
+        // The factor 1 - 1e-9 keeps rounding from increasing an exact integer quotient.
         let steps = (self.period_s / contact.slip_step_s * (1.0 - 1e-9)).ceil().max(1.0);
         Some(Joint {
             row: self.space.displacement(&row) + self.space.velocity(&row) * contact.damping_s[2],
@@ -156,7 +158,8 @@ impl Plant {
         })
     }
 
-    /// Row of the structure that reads specimen A's motion less B's along the sliding direction at the contact; `None` outside the assembly.
+    /// Row of the structure for specimen A's motion minus B's along the sliding direction at the
+    /// contact; `None` outside the assembly.
     fn relative(&self, contact: &Contact) -> Option<DVector<f64>> {
         let at = |body| {
             self.structure.row(&Probe { body, position_m: contact.position_m, direction: contact.sliding() })
@@ -165,7 +168,7 @@ impl Plant {
         Some(at(a)? - at(b)?)
     }
 
-    /// The joint now; `None` outside the assembly.
+    /// Current state of the joint; `None` outside the assembly.
     pub(super) fn joint_state(
         &self,
         contact: &Contact,

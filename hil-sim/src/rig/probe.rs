@@ -1,4 +1,4 @@
-//! A direction at a point of a body: where something is measured or pushed.
+//! A direction at a point of a body, for measurement or excitation.
 
 use super::config::{BodyName, ImpactPoint, ResponsePoint, RigConfig, Spot};
 use super::unit_vector::normalized;
@@ -19,12 +19,12 @@ pub struct Probe {
 }
 
 impl Probe {
-    /// A single-point vibrometer's that looks along `direction`.
+    /// Probe of a single-point vibrometer that measures along `direction`.
     pub fn at(spot: &Spot, direction: [f64; 3]) -> Self {
         Self { body: spot.body, position_m: spot.position_m, direction }
     }
 
-    /// The same where the contact slides along z.
+    /// The same for a contact that slides along z.
     pub fn along_z(spot: &Spot) -> Self {
         Self::at(spot, AXES[2])
     }
@@ -48,7 +48,7 @@ impl RigConfig {
     /// The response point `name`, if `configuration` has it.
     ///
     /// # Errors
-    /// [`RigError::UnknownPoint`] listing the names that would do.
+    /// [`RigError::UnknownPoint`] listing the valid names.
     pub fn response(&self, configuration: Configuration, name: &str) -> Result<&ResponsePoint, RigError> {
         let there = || self.responses.iter().filter(|point| self.has(configuration, point.body));
         there().find(|point| point.name == name).ok_or_else(|| RigError::UnknownPoint {
@@ -62,7 +62,7 @@ impl RigConfig {
     /// The impact point `name`, if `configuration` has it.
     ///
     /// # Errors
-    /// [`RigError::UnknownPoint`] listing the names that would do.
+    /// [`RigError::UnknownPoint`] listing the valid names.
     pub fn impact(&self, configuration: Configuration, name: &str) -> Result<&ImpactPoint, RigError> {
         let there = || self.impacts.iter().filter(|point| self.has(configuration, point.body));
         there().find(|point| point.name == name).ok_or_else(|| RigError::UnknownPoint {

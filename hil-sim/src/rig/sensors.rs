@@ -1,8 +1,9 @@
 //! The sensors: from true signals to converter codes.
 //!
-//! code = round(volts / range · 32768), saturating, volts = (delayed signal · polarity + noise) / scale. Noise is drawn for
-//! every channel in every scan, present or not, so that a channel's stream does not depend on the others. Cross-talk, gain and skew
-//! ([`Flaws`]) come in before the noise.
+//! code = round(volts / range · 32768), saturating, volts = (delayed signal · polarity + noise) /
+//! scale. Noise is drawn for every channel in every scan, present or not, so that a channel's
+//! stream does not depend on the others. Cross-talk, gain and skew ([`Flaws`]) are applied before
+//! the noise.
 
 use std::f64::consts::PI;
 
@@ -17,7 +18,7 @@ use super::force::ForceSegment;
 use super::hammer::nominal_width_s;
 use super::key::{Stream, normal, uniform};
 
-/// Everything between the true signals and the codes.
+/// Converts the true signals to codes.
 #[derive(Debug, Clone)]
 pub struct Sensors {
     codes_per_unit: [f64; CHANNELS],
@@ -31,7 +32,8 @@ pub struct Sensors {
 }
 
 impl Sensors {
-    /// For a response point that is speckled or not, with the cell's idle `stream` and a stream of its own for speckle.
+    /// For a response point with or without speckle, with the cell's idle `stream` and a separate
+    /// stream for speckle.
     pub fn new(
         config: &RigConfig,
         channels: &[Channel; CHANNELS],
@@ -79,7 +81,7 @@ impl Sensors {
         }
     }
 
-    /// A hit begins: noise is counted from here.
+    /// A hit begins: the noise streams restart here.
     pub fn restart(&mut self, stream: Stream, speckle: Stream) {
         self.stream = stream;
         if let Some(it) = &mut self.speckle {
@@ -132,8 +134,8 @@ impl Sensors {
 
 /// The hammer's force cell: reads f + g s²/(s² + 2s/τ + …) f, one light mode above the band.
 ///
-/// It scales with the hit and has no static error. g makes the slope with which a half-sine of nominal width sets in start a
-/// ringing of `ring_fraction` of the peak.
+/// The ringing scales with the hit and has no static error. g is chosen so that the initial slope
+/// of a half-sine of nominal duration excites a ringing of `ring_fraction` of the peak.
 #[derive(Debug, Clone)]
 struct ForceCell {
     lambda: Complex<f64>,
@@ -170,7 +172,7 @@ impl ForceCell {
             self.z += segment.gained(self.lambda, from_s, to_s);
             force_n += segment.value_n(to_s);
         }
-        // 1e-18 N s rings with 1e-13 N: gone, and kept out of the denormals.
+        // 1e-18 N s rings with 1e-13 N: negligible, and set to zero to avoid denormals.
         if !pushed && self.z.norm_sqr() < 1e-36 {
             self.z = Complex::ZERO;
         }
@@ -178,7 +180,7 @@ impl ForceCell {
     }
 }
 
-/// A speckled response point: a raised floor, and dropouts that come and go.
+/// A speckled response point: a raised floor, and intermittent dropouts.
 #[derive(Debug, Clone)]
 struct Speckle {
     begins: f64,

@@ -1,34 +1,39 @@
-//! The contact's law along z: sliders in parallel, each behind its share of the spring and dashpot.
+//! The contact's law along z: sliders in parallel, each in series with its share of the spring and
+//! dashpot.
 //!
-//! One slider is a Jenkins contact, several with different limits an Iwan contact, whose stiffness falls with amplitude as one
-//! after the other lets go (microslip). With Δ the specimens' relative displacement, wᵢ the slip of element i, k its spring and
-//! β k its dashpot, it carries
+//! One slider is a Jenkins contact, several with different limits an Iwan contact, whose stiffness
+//! falls with amplitude as one element after the other slips (microslip). With Δ the specimens'
+//! relative displacement, wᵢ the slip of element i, k its spring and β k its dashpot, it carries
 //!
 //! ```text
 //! Tᵢ = k (Δ − wᵢ) + β k (Δ' − wᵢ'),   |Tᵢ| ≤ Lᵢ,   wᵢ' = 0 unless |Tᵢ| = Lᵢ, and then along Tᵢ.
 //! ```
 //!
-//! Lᵢ is its share of μN, and N may vary with the motion: N = N₀ (1 + c y), with y as below, which is Δ but for the dashpot's lead.
+//! Lᵢ is its share of μN, and N may vary with the motion: N = N₀ (1 + c y), with y as below, which
+//! is Δ plus the dashpot's lead.
 //!
-//! Stuck it is the linear contact. In slip it carries Lᵢ whatever the velocity: the dashpot lies within the limit, not beside it, so
-//! nothing jumps when an element lets go or sticks again, and every element only ever takes energy.
+//! A stuck contact is the linear contact. In slip an element carries Lᵢ at any velocity: the
+//! dashpot force is part of the limited force, not added to it, so the force does not jump when an
+//! element slips or sticks again, and every element only dissipates energy.
 //!
-//! **How it is advanced.** With y = Δ + β Δ' and vᵢ = wᵢ + β wᵢ' the law reads Tᵢ = k (y − vᵢ), and vᵢ = wᵢ clamped to y ± Lᵢ/k: no
-//! events to look for. The linear contact would carry K y; what is missing, k Σ vᵢ, pushes the specimens apart and changes
-//! linearly over a step, so that wᵢ follows vᵢ in closed form and y at the step's end is the root of a monotone, piecewise linear
+//! **How it is advanced.** With y = Δ + β Δ' and vᵢ = wᵢ + β wᵢ' the law reads Tᵢ = k (y − vᵢ), and
+//! vᵢ = wᵢ clamped to y ± Lᵢ/k, so no event detection is needed. The linear contact would carry K
+//! y; the difference, k Σ vᵢ, pushes the specimens apart and changes linearly over a step, so that
+//! wᵢ follows vᵢ in closed form and y at the step's end is the root of a monotone, piecewise linear
 //! equation of one unknown.
 
 use super::config::Contact;
 
-/// Newton's method needs two or three steps; so many halvings of the error bring any start to rounding.
+/// Limit of Newton steps. Two or three are usual; 64 halvings of the error bring any start to
+/// rounding.
 const ROUNDS: usize = 64;
 
-/// Elements that are handled side by side.
+/// Elements that are processed together (SIMD lanes).
 const LANES: usize = 4;
-/// Reach (m) of what fills the last lanes: it never slips, and carries nothing.
+/// Reach (m) of the padding in the last lanes: it never slips and carries no force.
 const NEVER_SLIPS: f64 = 1e300;
 
-/// One number per element, filled up to whole lanes.
+/// One number per element, padded to whole lanes.
 type Lanes = Vec<[f64; LANES]>;
 
 /// The sliders of one contact.
@@ -37,7 +42,7 @@ pub struct Sliders {
     /// k of each (N/m).
     stiffness: f64,
     friction_coefficient: f64,
-    /// Each element's part of the limit μN; they sum to 1.
+    /// Each element's fraction of the limit μN; they sum to 1.
     shares: Vec<f64>,
     /// Lᵢ / k (m) at N₀.
     reach: Lanes,
@@ -51,21 +56,22 @@ pub struct Sliders {
     stuck: Lanes,
     /// Σ vᵢ (m).
     leads: f64,
-    /// y now (m).
+    /// Current y (m).
     y: f64,
     /// No element slips: every vᵢ is wᵢ.
     settled: bool,
-    /// Values of y at which none would, while that is so.
+    /// Range of y in which no element would slip, valid while `settled`.
     holds: (f64, f64),
-    /// What a step leaves of v − w, see [`relaxation`].
+    /// Coefficients of the decay of v − w over a step, see [`relaxation`].
     relaxation: (f64, f64),
     friction_j: f64,
     slid_m: f64,
 }
 
 impl Sliders {
-    /// At rest, advanced by steps of `step_s`; `None` for the linear law, which has none. The normal load grows by
-    /// `load_slope_per_m` of itself per metre; that times any Lᵢ / k must be less than 1 in size.
+    /// At rest, advanced by steps of `step_s`; `None` for the linear law, which has no sliders. The
+    /// normal load grows by the fraction `load_slope_per_m` per metre; |`load_slope_per_m` · Lᵢ /
+    /// k| must be less than 1.
     pub fn new(contact: &Contact, load_slope_per_m: f64, step_s: f64) -> Option<Self> {
         let shares = contact.shares();
         if shares.is_empty() {
@@ -100,15 +106,16 @@ impl Sliders {
             *reach = limit_n * share / self.stiffness;
         }
         self.bound();
-        // The load may have fallen below what is carried.
+        // The new limit may be below the force that is carried now.
         self.settled &= self.holds.0 <= self.y && self.y <= self.holds.1;
     }
 
-    /// Finds where no element would slip.
+    /// Determines the range in which no element slips.
     fn bound(&mut self) {
         self.holds = (f64::NEG_INFINITY, f64::INFINITY);
         for (slip, reach) in self.slip.as_flattened().iter().zip(self.reach.as_flattened()) {
-            // |y − w| = reach (1 + c y), solved for y; what never slips stays out of it, or its infinities would meet.
+            // |y − w| = reach (1 + c y), solved for y; padding is excluded because its infinities
+            // would give NaN.
             if *reach < NEVER_SLIPS {
                 let grows = reach * self.load_slope_per_m;
                 self.holds.0 = self.holds.0.max((slip - reach) / (1.0 + grows));
@@ -117,7 +124,7 @@ impl Sliders {
         }
     }
 
-    /// N over N₀ at `y`; a load that would be negative is none.
+    /// N over N₀ at `y`; a negative load becomes zero.
     #[inline]
     fn load_factor(&self, y: f64) -> f64 {
         let factor = 1.0 + self.load_slope_per_m * y;
@@ -129,7 +136,7 @@ impl Sliders {
         self.stiffness * self.shares.len() as f64
     }
 
-    /// Force between the specimens that the linear contact carries beyond this one (N).
+    /// Force between the specimens by which the linear contact exceeds this one (N).
     #[inline]
     pub fn push_n(&self) -> f64 {
         self.stiffness * self.leads
@@ -141,7 +148,7 @@ impl Sliders {
         self.settled
     }
 
-    /// Whether none slips at `y` either; if so, that is where it stands.
+    /// Whether no element slips at `y` either; if so, y is set to it.
     #[inline]
     pub fn hold(&mut self, y: f64) -> bool {
         let holds = self.settled && self.holds.0 <= y && y <= self.holds.1 && self.load_factor(y) > 0.0;
@@ -151,7 +158,8 @@ impl Sliders {
         holds
     }
 
-    /// Goes one step on; y at its end is `free + receptance` times the push then, which is returned (N).
+    /// Advances one step; y at its end is `free + receptance` times the push then, which is
+    /// returned (N).
     ///
     /// `receptance` times [`Sliders::stiffness`] must lie in 0..0.5.
     pub fn slide(&mut self, free: f64, receptance: f64) -> f64 {
@@ -170,15 +178,15 @@ impl Sliders {
             if off.abs() <= 4.0 * f64::EPSILON * (self.y.abs() + free.abs()) {
                 break;
             }
-            // All slopes lie between 1 − gain · count and 1, so a wrong choice of the slope still brings it nearer; so does the
-            // slope of the limits, which is left out.
+            // All slopes lie between 1 − gain · count and 1, so a wrong slope still reduces the
+            // error; so does neglecting the slope of the limits.
             self.y -= off / (1.0 - gain * sliding);
         }
         self.relax(0.5 * (before + self.load_factor(self.y)));
         self.push_n()
     }
 
-    /// Lets every vᵢ follow y; how many elements slip.
+    /// Updates every vᵢ for the current y; returns the number of slipping elements.
     #[inline]
     fn follow(&mut self) -> f64 {
         let (mut sum, mut sliding) = ([0.0; LANES], [0.0; LANES]);
@@ -196,7 +204,8 @@ impl Sliders {
         sliding.iter().sum()
     }
 
-    /// Ends the step: every wᵢ goes after its vᵢ, and what that takes at the mean load `factor` is counted.
+    /// Ends the step: every wᵢ relaxes towards its vᵢ, and the energy this dissipates at the mean
+    /// load `factor` is added up.
     #[inline]
     fn relax(&mut self, factor: f64) {
         let rest = self.relaxation.1;
@@ -232,19 +241,19 @@ impl Sliders {
         factor * self.stiffness * self.reach.as_flattened()[..self.shares.len()].iter().sum::<f64>()
     }
 
-    /// Part of the elements that slip now, 0…1.
+    /// Fraction of the elements that slip now, 0…1.
     pub fn sliding(&self) -> f64 {
         let elements = self.lead.as_flattened().iter().zip(self.slip.as_flattened());
         let count = elements.filter(|(lead, slip)| lead != slip).count();
         count as f64 / self.shares.len() as f64
     }
 
-    /// Path that the elements have slid (m), their mean.
+    /// Mean of the distances that the elements have slid (m).
     pub fn slid_m(&self) -> f64 {
         self.slid_m
     }
 
-    /// Energy that friction has taken (J).
+    /// Energy dissipated by friction (J).
     pub fn friction_j(&self) -> f64 {
         self.friction_j
     }
@@ -256,8 +265,8 @@ impl Sliders {
     }
 }
 
-/// For a step of `x` time constants, w' = v − w and v linear: (α, φ), so that w ends at φ (α w + (1 − α) v) + (1 − φ) v₁. Without
-/// dashpot (infinite x) w is v.
+/// For a step of `x` time constants, w' = v − w and v linear: (α, φ), so that w ends at φ (α w + (1
+/// − α) v) + (1 − φ) v₁. Without a dashpot (infinite x) w is v.
 fn relaxation(x: f64) -> (f64, f64) {
     if x.is_finite() { (x / x.exp_m1(), -(-x).exp_m1() / x) } else { (0.0, 0.0) }
 }
@@ -279,7 +288,8 @@ mod tests {
         contact
     }
 
-    /// One steady cycle of Δ = X sin under a driver that nothing moves: Δ and T, step by step, and what friction took.
+    /// One steady cycle of prescribed Δ = X sin: Δ and T, step by step, and the energy dissipated
+    /// by friction.
     fn cycle(contact: &Contact, amplitude_m: f64, hz: f64, steps: u32) -> (Vec<(f64, f64)>, f64) {
         let beta = contact.damping_s[2];
         let mut sliders =
@@ -318,7 +328,8 @@ mod tests {
         assert!((energy - 3.290e-3).abs() < 1e-6, "the figure of the text book example: {energy}");
         assert!((area(&seen) / energy - 1.0).abs() < 1e-6, "{}", area(&seen));
         assert!((friction_j / energy - 1.0).abs() < 1e-6, "{friction_j}");
-        // Secant: μN / X. Least squares: from the loop's two branches, with X (1 − cos θ) = 2 μN / k where slip begins.
+        // Secant: μN / X. Least squares: from the loop's two branches, with X (1 − cos θ) = 2 μN /
+        // k where slip begins.
         let most = seen.iter().map(|(_, t)| t.abs()).fold(0.0, f64::max);
         assert!((most / x / 28.5e6 - 1.0).abs() < 1e-6, "{}", most / x);
         let theta = (1.0 - 2.0 * limit / (k * x)).acos();
@@ -353,7 +364,8 @@ mod tests {
             );
             assert!((friction_j - energy).abs() < 1e-5 * energy + 1e-12, "{x}: {friction_j} for {energy}");
         }
-        // As a continuous distribution over 1 ± 0.9 times the mean has it, with 20 elements to 1e-3.
+        // Expected from the continuous distribution over 1 ± 0.9 times the mean; 20 elements agree
+        // to 1e-3.
         let slips_at = |u: f64| u * 171.0 / k;
         let x = slips_at(1.0);
         let (low, high) = (0.1, 1.9);
@@ -363,11 +375,13 @@ mod tests {
 
     #[test]
     fn no_force_is_beyond_the_limit_however_fast_and_a_fast_loop_takes_what_its_parts_take() {
-        // 1300 Hz and 20 µm: 0.16 m/s, at which a dashpot beside the slider would carry 350 N.
+        // 1300 Hz and 20 µm: 0.16 m/s, at which a dashpot in parallel with the slider would carry
+        // 350 N.
         let contact = contact(ContactLaw::Jenkins);
         let (seen, friction_j) = cycle(&contact, 20e-6, 1300.0, 100_000);
         assert!(seen.iter().all(|(_, force)| force.abs() <= 171.0 + 1e-9));
-        // The dashpot's part is what it takes while the contact sticks: β k ∫ Δ'² dt over the time in which T turns round.
+        // The dashpot dissipates only while the contact sticks: β k ∫ Δ'² dt over the time in which
+        // T reverses.
         let part = 1.0 - friction_j / area(&seen);
         assert!((0.0..0.05).contains(&part), "{part}");
     }

@@ -1,15 +1,17 @@
-//! The structure as x' = A x + b f, in coordinates in which every number is of a size.
+//! The structure as x' = A x + b f, in coordinates in which all numbers have similar magnitude.
 //!
-//! Rotations in rad and translations in m make matrices whose entries span ten decades. Here η are the undamped modes'
-//! coordinates (M-orthonormal), and x = (d η, η') with d the undamped frequencies, so that A is skew but for the damping and
-//! |x|²/2 is the mechanical energy in joule. Both steppers work on it.
+//! Rotations in rad and translations in m make matrices whose entries span ten decades. Here η are
+//! the undamped modes' coordinates (M-orthonormal), and x = (d η, η') with d the undamped
+//! frequencies, so that A is skew-symmetric except for the damping and |x|²/2 is the mechanical
+//! energy in joules. Both steppers work on it.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::RigError;
 use super::structure::Structure;
 
-/// Undamped frequencies below this fraction of the highest are scaled as if they were there (a free body has 0 rad/s).
+/// Undamped frequencies below this fraction of the highest are replaced by it for scaling (a free
+/// body has 0 rad/s).
 const SOFTEST: f64 = 1e-6;
 
 /// x' = A x + b f with 2n states.
@@ -46,7 +48,7 @@ impl StateSpace {
         let damping = shapes.transpose() * &structure.damping * &shapes;
         let frequencies = eigen.eigenvalues.map(|square| square.max(0.0).sqrt());
         let softest = SOFTEST * frequencies.max();
-        // All-free structures have no frequency at all; any positive scale does.
+        // A completely free structure has only zero frequencies; then any positive scale works.
         let scale = frequencies.map(|omega| if softest > 0.0 { omega.max(softest) } else { 1.0 });
         let mut a = DMatrix::zeros(2 * n, 2 * n);
         for i in 0..n {
@@ -68,14 +70,14 @@ impl StateSpace {
         &self.frequencies
     }
 
-    /// Row (2n) that reads the displacement seen by the row `seen` (n) of the structure.
+    /// Row (2n) for the displacement along the row `seen` (n) of the structure.
     pub fn displacement(&self, seen: &DVector<f64>) -> DVector<f64> {
         let n = self.scale.len();
         let modal = self.shapes.tr_mul(seen);
         DVector::from_fn(2 * n, |i, _| if i < n { modal[i] / self.scale[i] } else { 0.0 })
     }
 
-    /// Row (2n) that reads the velocity seen by the row `seen` (n) of the structure.
+    /// Row (2n) for the velocity along the row `seen` (n) of the structure.
     pub fn velocity(&self, seen: &DVector<f64>) -> DVector<f64> {
         let n = self.scale.len();
         let modal = self.shapes.tr_mul(seen);

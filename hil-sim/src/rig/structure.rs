@@ -1,11 +1,12 @@
 //! The structure: rigid bodies joined by bushings, as M, C and K.
 //!
-//! A body moves by q = (t, θ) at its centre of gravity; a point r of it by u = t + θ × (r − cg), that is
-//! D = [I, −skew(r − cg); 0, I]. A bushing between two bodies adds Dᵀ diag(k) D to K and Dᵀ diag(β k) D to C with
-//! D = [−D₁, D₂]; ground is a zero row. Six degrees of freedom per body: 18 in A, 6 in B, 24 in AJB. With a rigid clamp A the
-//! specimen is lumped onto arm A: six fewer in A and AJB. With a clamp B that gives, specimen B is a body of its own: six more in B and
-//! AJB. Arm B's figures are those with its specimen, so that a clamp B that hardly gives is as good as a rigid one. A rig with a structure
-//! of its own has the bodies and springs that it names.
+//! A body moves by q = (t, θ) at its centre of gravity; a point r of it by u = t + θ × (r − cg),
+//! that is D = [I, −skew(r − cg); 0, I]. A bushing between two bodies adds Dᵀ diag(k) D to K and Dᵀ
+//! diag(β k) D to C with D = [−D₁, D₂]; ground is a zero row. Six degrees of freedom per body: 18
+//! in A, 6 in B, 24 in AJB. With a rigid clamp A the specimen is lumped onto arm A: six fewer in A
+//! and AJB. With a compliant clamp B, specimen B is a separate body: six more in B and AJB. Arm B's
+//! values include its specimen, so that a very stiff clamp B is equivalent to a rigid one. A rig
+//! with a user-defined structure has the bodies and springs that it lists.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6};
 use num_complex::Complex;
@@ -19,7 +20,7 @@ use super::{Configuration, Probe, Quantity, RigError};
 pub struct Structure {
     configuration: Configuration,
     bodies: Vec<(BodyName, [f64; 3])>,
-    /// Whether the clamps of A and B are rigid: their specimens are then no bodies of their own.
+    /// Whether the clamps of A and B are rigid: their specimens are then not separate bodies.
     rigid: [bool; 2],
     /// Mass (kg, kg m²), symmetric positive definite, n × n.
     pub mass: DMatrix<f64>,
@@ -38,7 +39,7 @@ impl Structure {
         }
     }
 
-    /// Any bodies and springs.
+    /// A user-defined structure of any bodies and springs.
     fn of_its_own(config: &RigConfig, own: &OwnStructure, configuration: Configuration) -> Self {
         let bodies: Vec<_> = own.bodies.iter().filter(|body| config.has(configuration, body.name)).collect();
         let mut structure = Self::empty(
@@ -70,7 +71,7 @@ impl Structure {
         structure
     }
 
-    /// Bodies without mass, by name and centre, joined by nothing.
+    /// Bodies without mass, by name and centre, not connected.
     pub(super) fn empty(
         configuration: Configuration,
         bodies: Vec<(BodyName, [f64; 3])>,
@@ -81,7 +82,7 @@ impl Structure {
         Self { configuration, bodies, rigid, mass: zeros(), damping: zeros(), stiffness: zeros() }
     }
 
-    /// The paper's bodies in a row.
+    /// The paper's chain of bodies.
     fn of_the_paper(config: &RigConfig, configuration: Configuration) -> Self {
         let bodies = &config.bodies;
         let rigid = [config.clamp.rigid, config.clamp_b.rigid];
@@ -116,7 +117,7 @@ impl Structure {
         structure
     }
 
-    /// Adds `sign` times the inertia of `part` to `body`, if it is there, as if they were one.
+    /// Adds `sign` times the inertia of `part` to `body`, if it is present, as if they were one.
     fn add_inertia(&mut self, body: BodyName, part: &RigidBody, sign: f64) {
         if let Some((at, cg)) = self.find(body) {
             let lever = rigid_motion(part.cg_m, cg);
@@ -184,7 +185,7 @@ impl Structure {
         self.connect_along(from, to, bushing, None);
     }
 
-    /// The same of a bushing with axes of its own. A body that is not there holds like the ground.
+    /// The same for a bushing with its own axes. A body that is not present counts as ground.
     pub(super) fn connect_along(
         &mut self,
         from: Option<BodyName>,
@@ -210,7 +211,8 @@ impl Structure {
         }
     }
 
-    /// Row of generalised coordinates (length n) that a probe sees, or pushes along; `None` if its body is not there.
+    /// Row of generalised coordinates (length n) of a probe, as output or input; `None` if its body
+    /// is not present.
     pub fn row(&self, probe: &Probe) -> Option<DVector<f64>> {
         let (at, cg) = self.find(probe.body)?;
         let motion = rigid_motion(probe.position_m, cg);
@@ -221,11 +223,12 @@ impl Structure {
         Some(row)
     }
 
-    /// Exact FRF at the complex frequency `s` (1/s): rows · (s²M + sC + K)⁻¹ · columns, times s for mobility and s² for
-    /// accelerance; shape (outputs, inputs).
+    /// Exact FRF at the complex frequency `s` (1/s): rows · (s²M + sC + K)⁻¹ · columns, times s for
+    /// mobility and s² for accelerance; shape (outputs, inputs).
     ///
     /// # Errors
-    /// [`RigError::MissingBody`] for a probe on a body that is not there; [`RigError::Structure`] if `s` is a pole.
+    /// [`RigError::MissingBody`] for a probe on a body that is not present; [`RigError::Structure`]
+    /// if `s` is a pole.
     pub fn frf(
         &self,
         s: Complex<f64>,
@@ -264,16 +267,18 @@ impl Structure {
         probes.iter().map(|probe| self.row(probe).ok_or_else(|| missing(probe))).collect()
     }
 
-    /// Metres and radians to coordinates of unit mass: their stiffnesses differ by 1e6, which costs a factorisation digits.
+    /// Scales metres and radians to coordinates of unit mass: their stiffnesses differ by 1e6,
+    /// which would cost the factorisation digits.
     fn scale(&self) -> DVector<f64> {
         self.mass.diagonal().map(|m| 1.0 / m.sqrt())
     }
 }
 
-/// Exact FRFs of `configuration` at each complex frequency of `s` (1/s): one (outputs, inputs) matrix per frequency.
+/// Exact FRFs of `configuration` at each complex frequency of `s` (1/s): one (outputs, inputs)
+/// matrix per frequency.
 ///
-/// The probes say where: nominal ones come from [`RigConfig::response`] and [`RigConfig::impact`], those of a rig with its
-/// position errors from [`super::Rig::aim`].
+/// The probes define the positions: nominal ones come from [`RigConfig::response`] and
+/// [`RigConfig::impact`], those of a rig with its position errors from [`super::Rig::aim`].
 ///
 /// # Errors
 /// As [`Structure::frf`].
@@ -298,11 +303,11 @@ fn rigid_motion(at: [f64; 3], cg: [f64; 3]) -> Matrix6<f64> {
     motion
 }
 
-/// What turns translations and rotations into these axes.
+/// Rotates translations and rotations into these axes.
 pub(super) fn turned(axes: Option<[[f64; 3]; 3]>) -> Matrix6<f64> {
     let mut turn = Matrix6::identity();
     if let Some(axes) = axes {
-        // a person writes four digits of them
+        // normalised because users write about four digits
         let unit = axes.map(normalized);
         let rows = Matrix3::from_fn(|row, column| unit[row][column]);
         turn.fixed_view_mut::<3, 3>(0, 0).copy_from(&rows);

@@ -1,4 +1,4 @@
-//! What an ideal measurement of the rig would find: the numbers that estimates are held against.
+//! Result of an ideal measurement of the rig: the reference values for estimates.
 
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -7,37 +7,42 @@ use super::config::{Bushing, ContactLaw, OwnStructure, RigConfig};
 use super::structure::{Structure, turned};
 use super::{Configuration, Probe};
 
-/// A stiffness that is so small beside the largest holds nothing: metres and radians differ by 1e8 at most.
+/// A stiffness smaller than this fraction of the largest counts as zero: metres and radians differ
+/// by 1e8 at most.
 const SMALLEST_OF_LARGEST: f64 = 1e-14;
 
 /// Both virtual points (m): the rig's origin.
 const VIRTUAL_POINT_M: [f64; 3] = [0.0; 3];
 
-/// The stiffnesses along z that a rig's parameters make.
+/// The stiffnesses along z that follow from a rig's parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Truth {
-    /// The contact's own tangential stiffness k_T, all of it stuck (N/m).
+    /// Tangential stiffness k_T of the fully stuck contact alone (N/m).
     pub contact_k_t_n_per_m: f64,
-    /// The contact's own tangential damping c_T (N s/m).
+    /// Tangential damping c_T of the contact alone (N s/m).
     pub contact_c_t_n_s_per_m: f64,
-    /// Between the arms, 1 / C_zz at the virtual points with C the compliance of the contact and both clamps in series (N/m).
+    /// Between the arms, 1 / C_zz at the virtual points with C the compliance of the contact and
+    /// both clamps in series (N/m).
     pub between_arms_k_n_per_m: f64,
-    /// Of the clamps alone, the same way (N/m); none when both are rigid.
+    /// Of the clamps alone, the same way (N/m); `None` when both are rigid.
     pub clamps_k_n_per_m: Option<f64>,
     /// `linear`, `jenkins` or `iwan`.
     pub law: ContactLaw,
-    /// μN, beyond which the contact is in gross slip (N); none for the linear law. An Iwan contact slips in part below it.
+    /// μN, beyond which the contact is in gross slip (N); `None` for the linear law. An Iwan
+    /// contact slips in part below it.
     pub slip_limit_n: Option<f64>,
 }
 
 impl RigConfig {
-    /// What an ideal measurement would find. The clamps are those of the assembly, under load.
+    /// The values that an ideal measurement would find. The clamps are those of the assembly, under
+    /// load.
     pub fn truth(&self) -> Truth {
         let contact = self.compliance(&self.contact.bushing(), self.contact.axes);
         if let Some(own) = &self.structure {
             let all = self.between_arms(own);
-            // in series with the contact; a path beside it stiffens what is found, and then nothing is left for clamps
+            // in series with the contact; a parallel path stiffens the result, and then no
+            // compliance is left for clamps
             let left = all - contact;
             return self.found(all, (left > 1e-9 * all).then_some(left));
         }
@@ -46,16 +51,17 @@ impl RigConfig {
         self.found(clamps.unwrap_or(0.0) + contact, clamps)
     }
 
-    /// Compliance along the sliding direction between the arms, at the virtual points: all springs and bodies that lie between them,
-    /// without their masses.
+    /// Compliance along the sliding direction between the arms, at the virtual points: of all
+    /// springs and massless bodies that lie between them.
     fn between_arms(&self, own: &OwnStructure) -> f64 {
         let [arm, base] = own.arms;
-        // the base is held, as the ground is; bodies that hang on the arms' far sides follow them, and carry nothing
+        // the base is fixed like the ground; bodies attached to the arms' far sides follow them and
+        // carry no force
         let free = own.bodies.iter().map(|body| body.name).filter(|name| *name != base);
         let at_virtual_points = free.map(|name| (name, VIRTUAL_POINT_M)).collect();
         let mut inner = Structure::empty(Configuration::Ajb, at_virtual_points, [false, false]);
         for spring in own.springs.iter().filter(|spring| spring.present.contains(&Configuration::Ajb)) {
-            // what holds a body to the ground is no part of the joint
+            // springs to the ground are not part of the joint
             if let [Some(from), Some(to)] = spring.ends() {
                 inner.connect_along(Some(from), Some(to), &spring.bushing(), spring.axes);
             }
@@ -64,27 +70,30 @@ impl RigConfig {
         inner.connect_along(from, to, &self.contact.bushing(), self.contact.axes);
         let pull = Probe { body: arm, position_m: VIRTUAL_POINT_M, direction: self.contact.sliding() };
         let Some(pull) = inner.row(&pull) else { return f64::NAN };
-        // a motion that nothing holds has no part in this force's answer, if there is one
+        // an unconstrained motion does not contribute to the response to this force, if there is
+        // one
         let parts = inner.stiffness.svd(true, true);
         let largest = parts.singular_values.max();
         let answer = parts.solve(&pull, largest * SMALLEST_OF_LARGEST);
         answer.map_or(f64::NAN, |motion| motion.dot(&pull))
     }
 
-    /// Compliance of a bushing at the virtual point along the sliding direction: what a unit force there does to each of its springs. A
-    /// direction that it does not hold at all has no stiffness.
+    /// Compliance of a bushing at the virtual point along the sliding direction: the sum over its
+    /// springs of their response to a unit force there. A direction without any constraint has no
+    /// stiffness.
     fn compliance(&self, bushing: &Bushing, axes: Option<[[f64; 3]; 3]>) -> f64 {
         let lever = Vector3::from(VIRTUAL_POINT_M) - Vector3::from(bushing.position_m);
         let force = Vector3::from(self.contact.sliding());
         let moment = lever.cross(&force);
         let load = turned(axes) * Vector6::new(force.x, force.y, force.z, moment.x, moment.y, moment.z);
         let springs = bushing.stiffness_n_per_m.into_iter().chain(bushing.rotation_nm_per_rad);
-        // 0 · ∞ would be no number: what is not loaded does not give
+        // 0 · ∞ would be NaN: an unloaded spring contributes nothing
         let loaded = load.iter().zip(springs).filter(|(load, _)| **load != 0.0);
         loaded.map(|(load, k)| load * load / k).sum()
     }
 
-    /// Of these compliances along the sliding direction, m/N: between the arms, and of what lies there beside the contact.
+    /// The truth from these compliances along the sliding direction, m/N: between the arms, and of
+    /// the clamps in series with the contact.
     fn found(&self, between_arms: f64, clamps: Option<f64>) -> Truth {
         let contact = &self.contact;
         Truth {

@@ -1,4 +1,5 @@
-//! The virtual board: the firmware's promises, seen from the link and from the rig's side.
+//! Tests of the virtual board: the firmware's guarantees, observed from the link and from the rig's
+//! side.
 #![allow(clippy::unwrap_used)]
 
 use crate::support;
@@ -134,7 +135,8 @@ fn a_repeated_request_fires_once() {
 fn arming_expires_and_a_waiting_shot_is_cancelled_by_it() {
     let (board, mut host) = board(1);
     host.start();
-    // the board may be half a ring ahead, and that must not be all of the time that the arming is good for
+    // the board may be half a ring ahead, and that must not use up the whole time for which the
+    // arming is valid
     assert_eq!(host.ask(Request::Arm { valid_ms: 20_000 }), Ok(Answer::Done));
     let far = host.next_scan + 50 * 51_200;
     assert_eq!(host.ask(Request::Fire(SmallHost::order(1, 3000, far))), Ok(Answer::Scheduled { number: 1 }));
@@ -180,12 +182,12 @@ fn an_open_guard_or_a_pressed_stop_forbids_shots() {
 
 #[test]
 fn a_host_that_falls_silent_disarms_the_hammer() {
-    // time goes on without the host here: this test declares link loss
+    // here time advances without the host, because this test covers link loss
     let (board, mut host) = with(&Options { seed: 1, free_running: true, ..Options::default() });
     host.start();
     assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
     let far = host.next_scan + 40 * 51_200;
-    // by the time the order arrives the silence may already have disarmed: both are safe
+    // the silence may already have disarmed the board when the order arrives: both are safe
     let _ = host.ask(Request::Fire(SmallHost::order(1, 3000, far)));
     std::thread::sleep(std::time::Duration::from_millis(500));
     let status = host.status();

@@ -1,4 +1,4 @@
-//! A clamp on side B, and what the rig's parameters say of itself.
+//! A clamp on side B, and the truth that follows from the rig's parameters.
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
 
@@ -40,7 +40,7 @@ fn specimen_b_is_a_body_of_its_own_where_its_clamp_gives() {
 fn a_clamp_b_that_hardly_gives_is_a_rigid_one() {
     let mut stiff = with_clamp_b();
     scaled(&mut stiff.clamp_b, 1e4);
-    // Yaw is softer by six orders than the rest.
+    // Yaw is six orders softer than the other directions.
     for bushing in [&mut stiff.clamp_b.loaded, &mut stiff.clamp_b.free] {
         bushing.rotation_nm_per_rad[1] = 1e8;
     }
@@ -55,7 +55,7 @@ fn a_clamp_b_that_hardly_gives_is_a_rigid_one() {
         for (one, other) in frf(&stiff).iter().zip(frf(&default)) {
             let largest = other.iter().map(|v| v.norm()).fold(0.0, f64::max);
             let off = (one - &other).iter().map(|v| v.norm()).fold(0.0, f64::max);
-            // 60 N/µm · 10⁴ beside the arm's 150: the arm's own springs are what moves.
+            // 60 N/µm · 10⁴ compared with the arm's 150: only the arm's own springs deform.
             assert!(off < 1e-3 * largest, "{configuration}: {off} of {largest}");
         }
     }
@@ -101,7 +101,8 @@ fn the_truth_of_the_default_rig() {
     let truth = RigConfig::default().truth();
     assert_eq!(truth.contact_k_t_n_per_m, 180e6);
     assert!((truth.contact_c_t_n_s_per_m - 2700.0).abs() < 1e-9);
-    // 1/60 + 10² mm²/6500 N m/rad, and 12.5 µm aside on a soft yaw, which is a thousandth; that in series with 180.
+    // 1/60 + 10² mm²/6500 N m/rad, and a lateral offset of 12.5 µm with the soft yaw, which adds a
+    // thousandth; that in series with 180.
     let clamp = 1.0 / (1.0 / 60e6 + 1e-4 / 6500.0 + 1.25e-5_f64.powi(2) / 4.95);
     assert!((truth.clamps_k_n_per_m.unwrap() / clamp - 1.0).abs() < 1e-12, "{truth:?}");
     let series = 1.0 / (1.0 / clamp + 1.0 / 180e6);
@@ -119,21 +120,22 @@ fn the_truth_of_other_rigs() {
     assert_eq!((slips.law, slips.slip_limit_n), (ContactLaw::Iwan, Some(180.0)));
     // Stuck, an Iwan contact is as stiff as all its elements together.
     assert_eq!(slips.contact_k_t_n_per_m, 180e6);
-    // The mirrored clamp on B gives as much as that on A: half the stiffness.
+    // The mirrored clamp on B is as compliant as that on A: half the stiffness.
     let (one, two) = (RigConfig::default().truth(), with_clamp_b().truth());
     assert!((two.clamps_k_n_per_m.unwrap() / one.clamps_k_n_per_m.unwrap() - 0.5).abs() < 1e-9, "{two:?}");
     let json = toml::to_string(&two).unwrap();
     assert_eq!(toml::from_str::<jointrig_hil_sim::rig::Truth>(&json).unwrap(), two);
 }
 
-/// The truth is what a quasi-static pull shows: the specimens' arms held, a force between them at the contact.
+/// The truth equals the result of a quasi-static pull: the specimens' arms are held, a force acts
+/// between the specimens at the contact.
 #[test]
 fn the_stiffness_between_the_arms_is_what_a_slow_pull_shows() {
     let mut config = with_clamp_b();
     scaled(&mut config.clamp_b, 0.4);
     config.clamp.loaded.position_m = [0.004, 0.012, 0.003];
     config.contact.position_m = [0.002, 0.001, -0.002];
-    // Arms so heavy that they stand still at 200 Hz, and hang on nothing stiff.
+    // Arms so heavy that they do not move at 200 Hz, without a stiff support.
     for body in [&mut config.bodies.arm_a, &mut config.bodies.arm_b] {
         body.mass_kg = 1e9;
     }
@@ -148,7 +150,8 @@ fn the_stiffness_between_the_arms_is_what_a_slow_pull_shows() {
     let at = |body| Probe { body, position_m: [0.0; 3], direction: z };
     let pair = [at(BodyName::SpecimenA), at(BodyName::SpecimenB)];
     let y = structure.frf(s, Quantity::Receptance, &pair, &pair).unwrap();
-    // With the contact between them that is in parallel to the clamps; without it, the clamps alone.
+    // With the contact between them it is in parallel with the clamps; without it, only the clamps
+    // remain.
     let mut open = config.clone();
     open.contact.stiffness_n_per_m = [0.0; 3];
     open.contact.rotation_nm_per_rad = [0.0; 3];

@@ -1,4 +1,4 @@
-//! Rig files: the default, the shipped variants, and what is said about a wrong one.
+//! Rig files: the default, the shipped variants, and the error messages for an invalid one.
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
 
@@ -19,7 +19,7 @@ const SHIPPED: [(&str, &str); 9] = [
 
 #[test]
 fn the_default_file_is_complete_and_is_the_default() {
-    // Read on its own, without anything under it: nothing is missing, nothing is unknown.
+    // Parsed alone, without the defaults: no field is missing, none is unknown.
     let alone: RigConfig = toml::from_str(DEFAULT_TOML).unwrap();
     assert_eq!(alone, RigConfig::default());
     assert_eq!(RigConfig::from_toml("").unwrap(), RigConfig::default());
@@ -132,7 +132,8 @@ fn contacts_that_cannot_be_are_refused_with_their_field() {
         let error = complaint(&format!("[contact]\nlaw = \"iwan\"\n{lines}\n"));
         assert!(error.contains(field) && error.contains("line 3") && error.contains(words), "{error}");
     }
-    // A light body on a stiff contact, scanned slowly: the step is too long, and that is said when the rig is built.
+    // A light body on a stiff contact with a low scan rate: the step is too long, which is reported
+    // when the rig is built.
     let text = "[contact]\nlaw = \"jenkins\"\nslip_step_s = 1.0\n[bodies.specimen_a]\nmass_kg = 1e-4\n";
     let error = Rig::new(&RigConfig::from_toml(text).unwrap(), 1).unwrap_err().to_string();
     assert!(error.contains("contact.slip_step_s") && error.contains("try"), "{error}");

@@ -23,7 +23,7 @@ fn flexible(law: ContactLaw) -> RigConfig {
     config
 }
 
-/// Drives a sine for so many cycles, which rises in the first tenth of them.
+/// Drives `cycles` cycles of a sine whose amplitude rises in the first tenth of them.
 fn shake(rig: &mut Rig, hz: f64, volts: f64, cycles: u32, mut seen: impl FnMut(&Rig, f64)) {
     let scans = (f64::from(cycles) * RATE / hz).round();
     let mut codes = [0; CHANNELS];
@@ -35,7 +35,8 @@ fn shake(rig: &mut Rig, hz: f64, volts: f64, cycles: u32, mut seen: impl FnMut(&
     }
 }
 
-/// Amplitude (m) of the relative displacement, and what friction takes in a cycle (J), over the last half of a drive.
+/// Amplitude (m) of the relative displacement, and energy dissipated by friction per cycle (J),
+/// over the last half of a drive.
 fn steady(config: &RigConfig, stepping: Stepping, hz: f64, volts: f64, cycles: u32) -> (f64, f64) {
     let mut rig = Rig::with_stepping(config, 1, stepping).unwrap();
     let (mut low, mut high, mut from) = (f64::INFINITY, f64::NEG_INFINITY, None);
@@ -77,7 +78,7 @@ fn what_never_slips_is_the_linear_rig_bit_for_bit() {
 
 #[test]
 fn half_the_step_changes_energy_and_amplitude_by_less_than_1e4() {
-    // Just above the limit, where a little more force means far more motion, and far beyond it.
+    // Just above the limit, where a little more force means much more motion, and far above it.
     let cases = vec![
         ("jenkins", rig_of(JENKINS), 30.0, 4.7),
         ("jenkins", rig_of(JENKINS), 100.0, 9.0),
@@ -113,7 +114,7 @@ fn both_steppers_agree_in_slip() {
     }
 }
 
-/// Frequency (Hz) of these at which a sine of so many volts moves the moving mass most.
+/// The frequency (Hz) among `lines` at which a sine of `volts` moves the moving mass most.
 fn peak_hz(config: &RigConfig, volts: f64, lines: impl Iterator<Item = f64>) -> f64 {
     let shaker = &config.shaker;
     let pushed = Probe { body: shaker.body, position_m: shaker.position_m, direction: [0.0, 0.0, 1.0] };
@@ -192,11 +193,11 @@ fn the_load_can_be_changed_while_it_slips() {
         }
         slid[quarter] = rig.joint().unwrap().slid_m;
     }
-    // They do not move 180 N.
+    // They are below the limit of 180 N.
     assert_eq!(slid[0], 0.0);
     assert!((most[1] - 120.0).abs() < 1e-6 && (most[3] - 90.0).abs() < 1e-6, "{most:?}");
     assert!(slid[1] > 1e-3 && slid[3] > slid[2] && most[2] > 120.0 && most[2] <= 180.0, "{most:?} {slid:?}");
-    // It stays when the rig is staged anew, and nonsense is refused.
+    // The load is kept when the rig is staged again, and invalid loads are refused.
     rig.stage(Configuration::Ajb, "AZ1", "A1", 0).unwrap();
     assert!((rig.joint().unwrap().limit_n - 90.0).abs() < 1e-9);
     for load in [-1.0, f64::NAN, f64::INFINITY] {
@@ -208,7 +209,7 @@ fn the_load_can_be_changed_while_it_slips() {
     assert_eq!(rig.joint(), None);
 }
 
-/// No dashpot anywhere: what goes in is stored or rubbed away.
+/// Without any dashpot: the input energy is stored or dissipated by friction.
 fn undamped(mut config: RigConfig) -> RigConfig {
     let without = |bushing: &mut jointrig_hil_sim::rig::config::Bushing| bushing.damping_s = [0.0; 6];
     config.leaf_springs.iter_mut().chain(&mut config.load_cells).for_each(without);
@@ -244,7 +245,7 @@ proptest! {
             let drive = volts * (TAU * hz * f64::from(scan) / RATE).sin();
             rig.drive(drive);
             rig.scan(&mut codes);
-            // The force is held over the scan: its work is exact.
+            // The force is held over the scan, so its work is exact.
             let now = rig.motion(&pushed).unwrap().0;
             put_in += drive * shaker.gain_n_per_v * (now - at);
             at = now;

@@ -1,4 +1,4 @@
-//! Orders at the virtual rig's side: they reach the rig, and what is wrong is said.
+//! Commands on the virtual rig's side: they reach the rig, and errors are reported.
 #![allow(clippy::unwrap_used)]
 
 use crate::support;

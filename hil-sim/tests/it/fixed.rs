@@ -1,10 +1,10 @@
-//! Vibrometers that stay at a point, and a person who strikes.
+//! Fixed vibrometers, and an operator who strikes.
 #![allow(clippy::unwrap_used)]
 
 use jointrig_hil_sim::rig::{CHANNELS, Configuration, Rig, RigConfig, RigError, Stepping};
 
 const BY_HAND: &str = include_str!("../../rigs/by-hand.toml");
-/// Six of them.
+/// With six fixed vibrometers.
 const ALL: usize = CHANNELS + 6;
 
 /// The example without errors, noise and delays.
@@ -46,7 +46,7 @@ fn they_see_what_the_vibrometer_sees_at_their_points() {
             for scan in &record {
                 for axis in 0..3 {
                     let [staged, stays] = [scan[1 + axis], scan[first + axis]].map(i32::from);
-                    // both round the same motion; the two sums run in another order
+                    // both round the same motion; the two sums are evaluated in different order
                     assert!((staged - stays).abs() <= 1, "{point} axis {axis}: {staged} and {stays}");
                 }
             }

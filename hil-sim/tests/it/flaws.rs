@@ -1,4 +1,5 @@
-//! Errors of the instruments: drawn once per campaign, of the stated size, and acting on what is read.
+//! Errors of the instruments: drawn once per campaign, of the specified size, and effective in the
+//! readings.
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
 
@@ -8,10 +9,10 @@ use jointrig_hil_sim::rig::config::{BodyName, ContactLaw, Errors};
 use jointrig_hil_sim::rig::{CHANNELS, Channel, Configuration, Rig, RigConfig};
 
 const RATE: f64 = 51_200.0;
-/// Places of the load cells.
+/// Indices of the load cells.
 const LOAD_CELLS: [usize; 3] = [6, 7, 8];
 
-/// No error at all, no noise, no mishap.
+/// No errors, no noise, no mishaps.
 fn perfect() -> RigConfig {
     let mut config = RigConfig::default();
     let zero = Errors { none: true, ..config.errors.clone() }.acting();
@@ -23,14 +24,15 @@ fn perfect() -> RigConfig {
     sensors.ldv_b.floor = 0.0;
     sensors.load_cells.noise_n = 0.0;
     sensors.excitation.noise_n = 0.0;
-    // Fine steps, so that rounding does not hide a small error.
+    // Small converter steps, so that rounding does not hide a small error.
     sensors.range_v = 1.0;
     let mishaps = &mut config.hammer.mishaps;
     (mishaps.double_hit, mishaps.weak, mishaps.overload) = (0.0, 0.0, 0.0);
     config
 }
 
-/// Amplitude of every channel's reading and of its true signal at `hz`, over steady cycles of the shaker.
+/// Amplitude of every channel's reading and of its true signal at `hz`, over steady cycles of the
+/// shaker.
 fn shaken(
     rig: &mut Rig,
     hz: f64,
@@ -92,7 +94,7 @@ fn they_have_the_stated_sizes_and_belong_to_the_stated_channels() {
             assert_eq!(parts_of[reads], 0.0);
             parts.extend(parts_of.iter().enumerate().filter(|(of, _)| *of != reads).map(|(_, part)| *part));
         }
-        // No channel comes before its cause.
+        // No channel precedes its cause.
         let earliest = flaws.skews_s.iter().copied().fold(0.0, f64::min);
         assert!(f64::from(flaws.latency_scans) + earliest * RATE >= 1.0);
     }
@@ -130,7 +132,7 @@ fn one_switch_turns_all_of_them_off() {
         assert_eq!(rig.aim().impact, hit);
         assert_eq!(rig.aim().response, config.response(Configuration::Ajb, response).unwrap().probes());
     }
-    // The file's one line does it.
+    // One line of a rig file has the same effect.
     let read = RigConfig::from_toml("[errors]\nnone = true\n").unwrap();
     assert_eq!(
         read.errors.acting(),
@@ -150,7 +152,7 @@ fn gains_and_cross_talk_are_in_what_is_read() {
     rig.fire(3.5e-3);
     let steps: Vec<f64> = rig.channels().iter().map(Channel::step).collect();
     let mut codes = [0; CHANNELS];
-    // What is read on what was to be expected, and on the true signal: least-squares slopes.
+    // Least-squares slopes of the reading on the expected reading, and on the true signal.
     let (mut on_expected, mut on_truth) = ([[0.0; 2]; CHANNELS], [[0.0; 2]; CHANNELS]);
     for _ in 0..5_000 {
         rig.scan(&mut codes);
@@ -168,7 +170,7 @@ fn gains_and_cross_talk_are_in_what_is_read() {
     }
     for at in 1..9 {
         let [expected, truth] = [on_expected[at], on_truth[at]].map(|[read, square]| read / square);
-        // Thousands of roundings of half a step, beside signals of tens of steps and more.
+        // Thousands of roundings of half a step, with signals of tens of steps and more.
         assert!((expected - 1.0).abs() < 1e-3, "{at}: {expected}");
         assert!((truth - 1.0).abs() > 2e-3, "{at}: {truth}, nothing to see");
     }
@@ -182,13 +184,13 @@ fn skew_is_a_delay_beyond_the_declared_one_early_or_late() {
     let mut rig = Rig::new(&config, 3).unwrap();
     let flaws = rig.flaws().clone();
     assert!(flaws.skews_s.iter().any(|skew| *skew < -1e-5) && flaws.skews_s.iter().any(|skew| *skew > 1e-5));
-    // What the protocol announces stays.
+    // The declared delay is unchanged.
     assert_eq!(rig.channels()[4].delay_s, 40e-6);
     let hz = 400.0;
     let found = shaken(&mut rig, hz, 0.5);
     let mut seen = 0;
     for (at, (read, truth)) in found.iter().enumerate().skip(1) {
-        // Where there is something to see: a shaker along z moves little along x.
+        // Only channels with enough signal: a shaker along z moves little along x.
         if truth.norm() / 25_600.0 < 200.0 * rig.channels()[at].step() {
             continue;
         }
@@ -245,13 +247,13 @@ fn points_on_a_specimen_err_by_their_own_error_and_never_by_aim() {
     let n = drawn.len() as f64;
     let rms = (drawn.iter().map(|v| v * v).sum::<f64>() / n).sqrt();
     assert!((rms / 3e-4 - 1.0).abs() < 4.0 / (2.0 * n).sqrt(), "{rms}");
-    // Where the specimen is not, its points are not.
+    // A configuration without the specimen has none of its points.
     let mut rig = Rig::new(&config, 1).unwrap();
     let error = rig.stage(Configuration::B, "BZ1", "S1", 0).unwrap_err().to_string();
     assert!(error.contains("\"S1\"") && error.contains("B1, B2, B3, B4"), "{error}");
 }
 
-/// Shakes into gross slip: of every scan in which the contact slips, the force and the displacement.
+/// Shakes into gross slip: force and displacement in every scan in which the contact slips.
 fn slipping(config: &RigConfig) -> Vec<(f64, f64)> {
     let mut rig = Rig::new(config, 1).unwrap();
     let mut codes = [0; CHANNELS];
@@ -278,7 +280,7 @@ fn the_normal_load_varies_with_the_displacement() {
     config.errors.normal_load_reference_m = 20e-6;
     let seen = slipping(&config);
     for (force_n, relative_m) in &seen {
-        // The law takes Δ + β Δ' for x: at 0.03 m/s that is 0.45 µm beside it, 0.7 % of N.
+        // The law uses Δ + β Δ' for x: at 0.03 m/s that differs by 0.45 µm, 0.7 % of N.
         let expected = 180.0 * (1.0 + 0.3 * relative_m / 20e-6);
         assert!((force_n.abs() - expected).abs() < 0.007 * 180.0, "{force_n} at {relative_m} for {expected}");
     }
@@ -286,7 +288,7 @@ fn the_normal_load_varies_with_the_displacement() {
         (low.min(force_n.abs()), high.max(force_n.abs()))
     });
     assert!(seen.len() > 500 && low < 170.0 && high > 190.0, "{} scans, {low} to {high} N", seen.len());
-    // Too steep: what slips could never stick again.
+    // Too steep: a slipping element could never stick again.
     config.errors.normal_load_reference_m = 0.2e-6;
     let error = config.check().unwrap_err().to_string();
     assert!(error.contains("errors.normal_load_variation"), "{error}");

@@ -1,4 +1,4 @@
-//! The structure against an independent implementation: exact FRFs and eigenfrequencies.
+//! The structure compared with an independent implementation: exact FRFs and eigenfrequencies.
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
 
@@ -13,8 +13,9 @@ use jointrig_hil_sim::rig::structure::Structure;
 use jointrig_hil_sim::rig::{Configuration, Probe, Quantity, RigConfig, exact_frf};
 use num_complex::Complex;
 
-/// Two implementations in double precision of the same 24 equations. The worst conditioned is the free clamp (3e9 N/m) beside
-/// the 27 and 40 Hz modes of A, which takes six of the sixteen digits; elsewhere they agree to 1e-11.
+/// Both implementations solve the same 24 equations in double precision. The worst conditioned case
+/// is the free clamp (3e9 N/m) combined with the 27 and 40 Hz modes of A, which costs six of the
+/// sixteen digits; elsewhere they agree to 1e-11.
 const TOLERANCE: f64 = 1e-9;
 
 const RIGID: &str = include_str!("../../rigs/rigid-clamp.toml");
@@ -62,7 +63,8 @@ fn rigid_clamp_is_the_reference() {
     assert!(deviation("rigid", &RigConfig::from_toml(RIGID).unwrap(), Quantity::Mobility) < TOLERANCE);
 }
 
-/// Clamp and support the same in A and AJB, virtual-point sensors and impacts on specimen A itself.
+/// Clamp and support are the same in A and AJB; virtual-point sensors and impacts are on specimen A
+/// itself.
 fn specimen_rig() -> RigConfig {
     let mut config = RigConfig::default();
     config.clamp.free = config.clamp.loaded.clone();
@@ -85,7 +87,7 @@ fn specimen_rig_is_the_reference() {
 
 #[test]
 fn eigenfrequencies_are_the_reference() {
-    // Undamped, printed to 0.001 Hz: half a unit of the last digit.
+    // Undamped, printed to 0.001 Hz: tolerance of half a unit of the last digit.
     let cases = [
         (
             RigConfig::default(),
@@ -120,8 +122,8 @@ fn eigenfrequencies_are_the_reference() {
         for (found, expected) in found.iter().zip(&expected) {
             assert!((found - expected).abs() < 5.1e-4, "{configuration}: {found} Hz for {expected} Hz");
         }
-        // Damping is light: each damped mode lies within ζ² of its undamped one, and non-proportional damping moves it
-        // by no more than that.
+        // Damping is light: each damped mode lies within ζ² of its undamped one, and
+        // non-proportional damping does not move it further than that.
         let modes = modes(&space).unwrap();
         for expected in expected {
             let nearest = modes.iter().map(|mode| (mode.lambda.norm() / (2.0 * PI) - expected).abs());

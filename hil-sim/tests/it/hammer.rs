@@ -1,4 +1,5 @@
-//! The hammer: calibration, monotony, what a pulse too short or too long does, and how often it goes wrong.
+//! The hammer: calibration, monotonicity, the effect of a pulse that is too short or too long, and
+//! the frequency of mishaps.
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
 
@@ -25,10 +26,10 @@ fn the_nominal_pulse_gives_the_nominal_hit() {
     let mut rig = Rig::new(&strict(), 1).unwrap();
     let hit = fire(&mut rig, 3.5e-3, 0);
     assert_eq!(hit.contacts.len(), 1);
-    // The coil's force is given to all its digits.
+    // The coil's force is specified to all its digits.
     assert!((hit.peak_n() - 50.0).abs() < 1e-6, "{}", hit.peak_n());
     assert!((hit.contacts[0].width_s() - 4.1e-4).abs() < 1e-9);
-    // It flies on after the current, for some milliseconds.
+    // It flies on after the current ends, for some milliseconds.
     let flight_s = hit.contacts[0].start_s - 3.5e-3;
     assert!(flight_s > 5e-4 && flight_s < 1e-2, "{flight_s}");
     // −6 dB at 2 kHz: |cos(π f w) / (1 − (2 f w)²)|.
@@ -51,18 +52,18 @@ fn longer_pulses_hit_harder_until_they_press_on_and_strike_twice() {
     for pair in hits[arrives..].windows(2) {
         assert!(pair[1].peak_n() >= pair[0].peak_n() * (1.0 - 1e-12), "{pair:?}");
     }
-    // Strictly, as long as it still flies on its own.
+    // Strictly monotonic while it flies freely at contact.
     for pair in hits[arrives..].windows(2).take_while(|pair| pair[1].pulse_s < 4.9e-3) {
         assert!(pair[1].peak_n() > pair[0].peak_n());
     }
-    // Pressed on: it strikes again, weaker, and keeps on doing so or rests.
+    // Pushed on by the coil, it strikes again, weaker, and continues to do so or rests.
     assert!(hits[twice..].iter().all(|hit| hit.contacts.len() > 1));
     assert!(hits[twice].contacts[1].amplitude_n < hits[twice].contacts[0].amplitude_n);
     // A very long pulse ends with the bolt resting on the surface until the current stops.
     let long = fire(&mut rig, 0.1, 0);
     let last = long.contacts.last().unwrap();
     assert!(last.omega == 0.0 && last.end_s == 0.1 && last.amplitude_n > 0.0, "{long:?}");
-    // Whatever happens, contacts follow one another.
+    // In every case contacts follow one another without overlap.
     for hit in hits.iter().chain([&long]) {
         assert!(hit.contacts.windows(2).all(|pair| pair[0].end_s <= pair[1].start_s));
     }
@@ -73,7 +74,7 @@ fn a_warm_coil_hits_less_hard() {
     let mut rig = Rig::new(&strict(), 1).unwrap();
     let peaks: Vec<f64> = (0..30).map(|attempt| fire(&mut rig, 3.5e-3, attempt).peak_n()).collect();
     assert!(peaks.windows(2).all(|pair| pair[1] < pair[0]));
-    // 2 % of the force over stroke and time: some 4 % of the speed.
+    // 2 % of the force over stroke and time: about 4 % of the speed.
     assert!(peaks[29] / peaks[0] > 0.9 && peaks[29] / peaks[0] < 0.99, "{}", peaks[29] / peaks[0]);
 }
 
@@ -121,7 +122,7 @@ fn peaks_scatter_and_mishaps_come_at_their_rates() {
                 assert!((0.05..=0.30).contains(&ratio) && (0.002..=0.012).contains(&delay_s));
             }
             Mishap::Weak => assert!(hit.peak_n() < 0.25 * mean && hit.peak_n() > 0.04 * mean),
-            // 10 V at 22.4 mV/N are 446 N: clipped for certain.
+            // 10 V at 22.4 mV/N are 446 N: certainly clipped.
             Mishap::Overload => assert!(hit.peak_n() > 10.0 / 22.4e-3),
             Mishap::None => assert_eq!(hit.contacts.len(), 1),
         }

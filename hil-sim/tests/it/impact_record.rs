@@ -1,4 +1,4 @@
-//! One whole hit, sample by sample, against an independent implementation's record.
+//! One whole hit, sample by sample, compared with an independent implementation's record.
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
 
@@ -22,7 +22,7 @@ fn a_hit_on_az3_is_the_reference_record_but_for_its_noise() {
         .map(|row| row.split(',').map(|value| value.parse().unwrap()).collect())
         .collect();
     let mut config = RigConfig::default();
-    // The record was simulated with a friction element along z, which has no dashpot beside it.
+    // The record was simulated with a friction element along z without a parallel dashpot.
     config.contact.damping_s[2] = 0.0;
     let structure = Structure::new(&config, Configuration::Ajb);
     let space = StateSpace::new(&structure).unwrap();
@@ -47,14 +47,15 @@ fn a_hit_on_az3_is_the_reference_record_but_for_its_noise() {
         hammer: space
             .input(&structure.row(&config.impact(Configuration::Ajb, "AZ3").unwrap().probe()).unwrap()),
         shaker: none,
-        // Finer than anything compared below.
+        // Smaller than anything compared below.
         steps: [1e-9; 8],
         joint: None,
         fixed: FixedRows::default(),
     };
     let period_s = 1.0 / 51_200.0;
     let mut stepper = ModalStepper::new(&Arc::new(modes(&space).unwrap()), &aimed, period_s);
-    // The record's statement: half-sine of 50 N and 0.41 ms on AZ3 at t = 2 ms, sample n at t = n / fs.
+    // As specified for the record: half-sine of 50 N and 0.41 ms on AZ3 at t = 2 ms, sample n at t
+    // = n / fs.
     let hit = [ForceSegment::half_sine(2e-3, 4.1e-4, 50.0)];
     let mut errors = vec![Vec::new(); 5];
     for (n, row) in record.iter().enumerate() {
@@ -64,7 +65,7 @@ fn a_hit_on_az3_is_the_reference_record_but_for_its_noise() {
         let (from_s, to_s) = (n as f64 * period_s, (n + 1) as f64 * period_s);
         stepper.advance(Span::Scan, &ScanForces { from_s, to_s, hammer: &hit, shaker_n: 0.0 });
     }
-    // The record's noise: 0.05 µm/s/√Hz up to 25.6 kHz, 0.02 N; whatever offset it has is taken out here.
+    // The record's noise: 0.05 µm/s/√Hz up to 25.6 kHz, 0.02 N; any offset is subtracted here.
     let noise = [8e-6, 8e-6, 0.02, 0.02, 0.02];
     for (channel, error) in errors.iter().enumerate() {
         let mean = error.iter().sum::<f64>() / error.len() as f64;

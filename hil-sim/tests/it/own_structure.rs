@@ -1,4 +1,4 @@
-//! Rigs with bodies and springs of their own.
+//! Rigs with a user-defined structure.
 #![allow(clippy::unwrap_used)]
 
 use jointrig_hil_sim::rig::config::{ImpactPoint, ResponsePoint, RigConfig};
@@ -10,7 +10,8 @@ use std::fmt::Write;
 
 const TIPS: &str = include_str!("../../rigs/clamped-tips.toml");
 
-/// The paper's rig, its specimen B rigid in its arm, written as a structure of its own.
+/// The paper's rig, with specimen B rigidly attached to its arm, written as a user-defined
+/// structure.
 fn paper_as_its_own() -> String {
     let default = RigConfig::default();
     let mut text = String::from(
@@ -66,7 +67,7 @@ fn paper_as_its_own() -> String {
     text + "[spots]\nldv_a.body = \"tip\"\nldv_b.body = \"base\"\n[shaker]\nbody = \"weight\"\n"
 }
 
-/// FRFs from an impact on each substructure to a response on each, as far as they are there.
+/// FRFs from an impact on each substructure to a response on each, as far as they are present.
 fn frfs(config: &RigConfig, configuration: Configuration) -> Vec<DMatrix<Complex<f64>>> {
     let responses =
         ["A1", "B2", "S3"].into_iter().filter_map(|name| config.response(configuration, name).ok());
@@ -85,7 +86,7 @@ fn the_papers_rig_written_as_a_structure_of_its_own_is_the_papers_rig() {
         for (theirs, ours) in frfs(&paper, configuration).iter().zip(frfs(&own, configuration)) {
             assert!(!theirs.is_empty());
             let off = (theirs - &ours).norm() / theirs.norm();
-            // the same sums in another order
+            // the same sums in a different order
             assert!(off < 1e-9, "{configuration}: {off:e}");
         }
     }
@@ -107,7 +108,7 @@ fn the_truth_of_a_turned_joint_is_that_of_its_springs_in_series() {
         "{truth:?}"
     );
     assert!((truth.clamps_k_n_per_m.unwrap() * (1.0 / 90e6 + 1.0 / 200e6) - 1.0).abs() < 1e-6, "{truth:?}");
-    // the same along z, of the same springs untwisted
+    // the same result along z as from the same springs without rotation
     let mut straight = turned.clone();
     let own = straight.structure.as_mut().unwrap();
     own.springs.iter_mut().for_each(|spring| spring.axes = None);
@@ -159,7 +160,7 @@ fn spots_and_shaker_go_along_the_sliding_direction() {
         rig.scan(&mut codes);
         for (place, spot) in [(4, &config.spots.ldv_a), (5, &config.spots.ldv_b)] {
             let moves = rig.motion(&Probe::at(spot, sliding)).unwrap().1;
-            // the same state, summed in another order
+            // the same state, summed in a different order
             assert!((rig.truth()[place] - moves).abs() < 1e-12, "{moves}");
         }
         let along = rig.motion(&Probe::at(&config.spots.ldv_a, sliding)).unwrap().1;

@@ -1,7 +1,8 @@
-//! The emulated board: the firmware's binary gives the native board's records, and breaks down safely.
+//! The emulated board: the firmware's binary gives the same records as the native board, and fails
+//! safely.
 //!
-//! These tests need the image and QEMU; `cargo xtask test` builds and names the first and installs the
-//! second. Without `JOINTRIG_MPS2_IMAGE` they say so and pass.
+//! These tests need the image and QEMU; `cargo xtask test` builds the image and sets its path, and
+//! installs QEMU. Without `JOINTRIG_MPS2_IMAGE` they print a message and pass.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used)]
 
@@ -115,7 +116,7 @@ fn a_flood_of_garbage_is_counted_and_harms_nothing() {
     assert_eq!((board.failure(), board.controls().coil_pulses_us().len()), (None, 0));
 }
 
-/// Stalls the link for so many scans while the hammer is armed, and reads on.
+/// Stalls the link for `scans` scans while the hammer is armed, then continues to read.
 fn stalled(scans: u64) -> Option<(QemuBoard, SmallHost, u64)> {
     let (board, mut host) = board(5)?;
     host.start();
@@ -167,7 +168,7 @@ fn a_link_that_stalls_for_five_seconds_loses_what_is_reported_and_disarms() {
     assert_eq!((board.failure(), board.controls().coil_pulses_us().len()), (None, 0));
 }
 
-/// What the board says of its end after `fault`.
+/// The board's final message after `fault`.
 fn end_of(fault: impl FnOnce(&Faults)) -> Option<String> {
     let (board, mut host) = board(1)?;
     host.start();
@@ -237,7 +238,7 @@ fn broken_converters(fault: ConverterFault, scans: u64) -> Option<SmallHost> {
     host.start();
     host.hold_at = host.first_scan;
     assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
-    // a shot that waits for a scan that the failure swallows
+    // a shot that waits for a scan that is lost in the failure
     let from = host.first_scan + 51_200;
     let order = Request::Fire(SmallHost::order(1, 3_000, from + 24));
     assert_eq!(host.ask(order), Ok(Answer::Scheduled { number: 1 }));
@@ -250,7 +251,7 @@ fn broken_converters(fault: ConverterFault, scans: u64) -> Option<SmallHost> {
 
 #[test]
 fn converters_that_fail_disarm_and_are_reported() {
-    // stuck for a second; one bad scan costs its block; late by a few blocks
+    // silent for a second; one corrupt scan, which costs its block; late by a few blocks
     for (trouble, scans) in [(Trouble::Silent(0, 0), 51_200), (Trouble::Crc, 24), (Trouble::Overrun, 240)] {
         let Some(host) = broken_converters(ConverterFault::Noticed(trouble), scans) else { return };
         let words = trouble.to_string();
@@ -286,7 +287,7 @@ fn the_uart_is_a_link_too() {
         let numbered = postcard::to_slice(&Numbered { number, request }, &mut bytes).unwrap();
         line.write_all(encode(Kind::Request, numbered, &mut [0; MAX_WIRE]).unwrap()).unwrap();
     };
-    // the handshake, an answer, and a second of samples that nobody has acknowledged
+    // the handshake, a reply, and a second of samples that have not been acknowledged
     let mut scans = 0;
     while scans < 20_000 {
         let count = line.read(&mut bytes).unwrap();
@@ -316,11 +317,12 @@ fn the_uart_is_a_link_too() {
     }
     assert!(matches!(&heard[..], [Answer::Info(info), Answer::Started { .. }] if info.board == "mps2-an505"));
     drop(board);
-    // QEMU made it
+    // created by QEMU
     let _ = std::fs::remove_file(socket);
 }
 
-/// Converters that fall out of step, in every way and with a program that looks late: nothing that was skewed is ever sent.
+/// Converters that lose alignment, in every way and with a program that appears late: misaligned
+/// data is never sent.
 #[test]
 fn converters_out_of_step_are_found_before_anything_is_sent() {
     let options = Options { seed: 7, ..Options::default() };
@@ -349,7 +351,7 @@ fn converters_out_of_step_are_found_before_anything_is_sent() {
         let told = |event: &&Event| matches!(event, Event::Fault(text) if text.contains("out of step") || text.contains("too late"));
         assert_eq!(host.events.iter().filter(told).count(), 1, "{lags:?}, {late}: {:?}", host.events);
         let &[(first, gap_end)] = &host.gaps[..] else { panic!("{lags:?}: {:?}", host.gaps) };
-        // the block with the slip, and what went by until the program looked
+        // the block with the slip, and what passed until the program read the rings
         assert!((first..gap_end).contains(&from), "{lags:?}: {first} to {gap_end}");
         assert!(
             from - first < 24 && gap_end - from <= u64::from(late) + 3 * 24,

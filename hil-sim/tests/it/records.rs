@@ -1,4 +1,4 @@
-//! What a record depends on: its own key, and nothing else.
+//! A record depends only on its own key.
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
 
@@ -56,7 +56,8 @@ fn order_of_visits_and_idle_time_change_nothing() {
 
 #[test]
 fn attempts_may_be_fired_in_a_row_or_staged_one_by_one() {
-    // The shaker is off and B settles within 2 s (27 /s at its slowest): only noise and scatter are left to differ.
+    // The shaker is off and B settles within 2 s (27 /s at its slowest): only noise and scatter can
+    // differ.
     let cell = (Configuration::B, "BZ1", "B1");
     let mut row = rig(4);
     let _ = visit(&mut row, cell, 0, 10);
@@ -106,7 +107,8 @@ fn points_err_as_the_key_says() {
     }
     for axis in 0..3 {
         let mean = seen.iter().map(|p| p[axis]).sum::<f64>() / 5.0;
-        // The point's own error is shared (0.5 mm), the aiming is not (0.2 mm): five standard deviations of each.
+        // The point's own error is shared (0.5 mm), the aiming error is not (0.2 mm): five standard
+        // deviations of each.
         assert!((mean - nominal[axis]).abs() < 5.0 * 5.4e-4);
         assert!(seen.iter().all(|p| (p[axis] - mean).abs() < 5.0 * 2e-4 && p[axis] != mean));
     }

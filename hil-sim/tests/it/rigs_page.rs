@@ -1,4 +1,4 @@
-//! docs/rigs.md has every field of a rig, and none that there is not.
+//! docs/rigs.md describes exactly the fields that a rig has.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeSet;
@@ -6,12 +6,12 @@ use toml::Value;
 
 const PAGE: &str = include_str!("../../../docs/rigs.md");
 const DEFAULT: &str = include_str!("../../rigs/default.toml");
-/// With a structure of its own.
+/// A rig with a user-defined structure.
 const OWN: &str = include_str!("../../rigs/clamped-tips.toml");
-/// With a hammer by hand, and vibrometers that stay.
+/// A rig with a manual hammer and fixed vibrometers.
 const BY_HAND: &str = include_str!("../../rigs/by-hand.toml");
 
-/// Every field, with dots between its tables; lists of tables are one.
+/// Path of every field, with dots between table names; the tables of a list share one path.
 fn fields(path: &str, value: &Value, found: &mut BTreeSet<String>) {
     match value {
         Value::Table(table) if !table.is_empty() => {
@@ -31,7 +31,7 @@ fn fields(path: &str, value: &Value, found: &mut BTreeSet<String>) {
     }
 }
 
-/// What the first column of the page's tables names.
+/// The names in the first column of the page's tables.
 fn patterns() -> Vec<String> {
     let rows = PAGE.lines().filter(|line| line.starts_with("| `"));
     let first = rows.map(|line| line.split('|').nth(1).unwrap());
@@ -54,7 +54,8 @@ fn the_page_and_the_rig_have_the_same_fields() {
     assert!(known.len() > 100, "{}", known.len());
     fields("", &toml::from_str(OWN).unwrap(), &mut known);
     fields("", &toml::from_str(BY_HAND).unwrap(), &mut known);
-    // what that example does without: every spring in all configurations, and no load cell
+    // fields that the example omits: every spring is in all configurations, and there is no load
+    // cell
     known.extend(["structure.springs.in", "structure.load_cells_on"].map(String::from));
     let patterns = patterns();
     for path in &known {

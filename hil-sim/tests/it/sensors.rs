@@ -13,7 +13,7 @@ fn silent() -> RigConfig {
     sensors.ldv_b.floor = 0.0;
     sensors.load_cells.noise_n = 0.0;
     sensors.excitation.noise_n = 0.0;
-    // Codes are held against the very signals here: the sensors' own errors have tests of their own (flaws.rs).
+    // Here codes are compared with the true signals: the instrument errors are tested in flaws.rs.
     config.errors.gain = 0.0;
     config.errors.skew_s = 0.0;
     config.errors.load_cell_cross_talk = 0.0;
@@ -64,7 +64,7 @@ fn without_noise_a_code_is_the_rounded_signal() {
         }
     }
     assert!(seen > 5000);
-    // A shorter slice takes the first channels, a longer one keeps its tail.
+    // A shorter slice receives the first channels; the end of a longer one is unchanged.
     let mut tail = [5; CHANNELS + 2];
     rig.scan(&mut tail);
     assert_eq!(tail[CHANNELS..], [5, 5]);
@@ -89,8 +89,9 @@ fn signals_have_the_sizes_of_the_real_rig() {
         total_n = total_n.max(rig.truth()[6..9].iter().sum::<f64>().abs());
     }
     println!("{largest:?} {total_n}");
-    // Published for a 50 N hit: T of ±16–19 N over the hits on A; single-point spots below 4.2 mm/s, the scanner's points
-    // below 28 mm/s. Widths as wide as those figures are loose.
+    // Published for a 50 N hit: T of ±16–19 N over the hits on A; single-point spots below 4.2
+    // mm/s, the scanner's points below 28 mm/s. The limits are wide because those figures are
+    // approximate.
     assert!((12.0..24.0).contains(&total_n), "{total_n}");
     assert!(largest[4] > 2e-4 && largest[4] < 4.2e-3 && largest[5] < 4.2e-3, "{largest:?}");
     assert!(largest[3] > 1e-3 && largest[3] < 28e-3, "{largest:?}");
@@ -117,7 +118,8 @@ fn noise_has_the_stated_size_and_an_absent_part_reads_only_noise() {
         let channel = &rig.channels()[at];
         let step = channel.units_per_volt * 10.0 / 32768.0;
         let rms = (sums[at] / f64::from(scans)).sqrt() * step;
-        // Rounding adds step²/12 (for the force channels, whose step is near σ, to a per cent); 40000 draws give 0.35 %.
+        // Rounding adds step²/12 (accurate to a per cent even for the force channels, whose step is
+        // near σ); 40000 draws give 0.35 %.
         let expected = (sigma * sigma + step * step / 12.0).sqrt();
         assert!((rms / expected - 1.0).abs() < 0.03, "{}: {rms} for {expected}", channel.name);
     }
@@ -167,7 +169,7 @@ fn a_delay_is_a_delay() {
 #[test]
 fn a_speckled_point_is_noisier_and_drops_out() {
     let mut config = RigConfig::default();
-    // often enough that one second surely has some
+    // often enough that one second certainly contains some
     config.sensors.vibrometer.speckle.dropouts_per_s = 20.0;
     let mut rig = Rig::new(&config, 1).unwrap();
     let mut rms = |response: &str| {
@@ -184,7 +186,7 @@ fn a_speckled_point_is_noisier_and_drops_out() {
     };
     let (quiet, quiet_most) = rms("A3");
     let (speckled, speckled_most) = rms("A4");
-    // Twenty times the floor by the median; and now and then ten times that.
+    // Median: twenty times the floor; in a dropout ten times that.
     assert!((speckled / quiet - 20.0).abs() < 5.0, "{speckled} {quiet}");
     assert!(speckled_most > 5.0 * 20.0 * quiet_most / 2.0, "{speckled_most} {quiet_most}");
 }

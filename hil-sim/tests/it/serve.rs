@@ -1,4 +1,4 @@
-//! The board behind a socket survives whoever comes.
+//! The board served over a socket survives any peer.
 #![allow(clippy::unwrap_used)]
 
 use std::io::{Read, Write};
@@ -12,7 +12,7 @@ use jointrig_protocol::hello::Hello;
 use jointrig_protocol::limits::MAX_WIRE;
 use jointrig_protocol::request::{Numbered, Request};
 
-/// A served board that nobody stops: it goes with the test's process.
+/// A served board, which ends with the test's process.
 fn served() -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
@@ -45,12 +45,12 @@ fn frame(stream: &mut TcpStream, kind: Kind, patience: Duration) -> bool {
 
 fn hello(session: u32) -> Vec<u8> {
     let mut wire = [0; MAX_WIRE];
-    // a zero first: it ends whatever half a frame was left behind
+    // a zero first: it ends any incomplete frame before it
     let frame = encode(Kind::Hello, &Hello::host(session).to_bytes(), &mut wire).unwrap();
     [&[0], frame].concat()
 }
 
-/// A host that shakes hands is answered.
+/// A host that shakes hands receives a reply.
 fn shakes_hands(at: SocketAddr, session: u32) -> TcpStream {
     let mut stream = TcpStream::connect(at).unwrap();
     stream.write_all(&hello(session)).unwrap();
@@ -65,21 +65,21 @@ fn noise_silence_and_haste_end_no_service_and_lock_nobody_out() {
     for client in 0..5 {
         let mut stream = TcpStream::connect(at).unwrap();
         stream.set_write_timeout(Some(Duration::from_millis(200))).unwrap();
-        // it may be let go in the middle
+        // the server may disconnect it in the middle
         let _ = stream.write_all(&noise[client * 1000..]);
     }
-    // far more than the board reads, after a good beginning
+    // far more than the board reads, after a valid start
     for client in 0..3 {
         let mut stream = TcpStream::connect(at).unwrap();
         stream.set_write_timeout(Some(Duration::from_millis(200))).unwrap();
         let _ = stream.write_all(&[hello(100 + client), noise.clone()].concat());
     }
-    // gone at once, with bytes unread
+    // disconnects immediately, with bytes unread
     for _ in 0..5 {
         drop(TcpStream::connect(at).unwrap());
     }
     drop(shakes_hands(at, 1));
-    // two that never say a word, and one who wants to work
+    // two peers that send nothing, and one that completes the handshake
     let silent = [TcpStream::connect(at).unwrap(), TcpStream::connect(at).unwrap()];
     let mut host = shakes_hands(at, 2);
     let ask = Writer::new(Kind::Request)

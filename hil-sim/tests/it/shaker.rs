@@ -1,4 +1,4 @@
-//! The shaker under control, on the simulated rig: the amplitude that was ordered is the one that the structure has.
+//! The controlled shaker on the simulated rig: the structure reaches the ordered amplitude.
 #![allow(clippy::unwrap_used)]
 
 use crate::support;
@@ -15,7 +15,7 @@ use support::SmallHost;
 const JENKINS: &str = include_str!("../../rigs/jenkins.toml");
 const IWAN: &str = include_str!("../../rigs/iwan.toml");
 const RATE: u32 = 51_200;
-/// Places of the two single-point vibrometers in a scan.
+/// Indices of the two single-point vibrometers in a scan.
 const LDV: [usize; 2] = [4, 5];
 
 fn order(frequency_hz: f64, control: Control) -> Shake {
@@ -29,7 +29,8 @@ fn order(frequency_hz: f64, control: Control) -> Shake {
     }
 }
 
-/// Amplitude (m) of the specimens' relative displacement in the last `scans` scans, whole cycles of `frequency_hz`.
+/// Amplitude (m) of the specimens' relative displacement in the last `scans` scans, whole cycles of
+/// `frequency_hz`.
 fn relative_m(host: &SmallHost, frequency_hz: f64, scans: usize) -> f64 {
     let rig = Rig::new(&RigConfig::default(), 1).unwrap();
     let unit = LDV.map(|place| {
@@ -76,8 +77,9 @@ fn the_specimens_move_as_far_as_was_ordered() {
     }
 }
 
-/// Amplitudes (m) of the specimens' relative displacement and of specimen A's own, in the last `scans` scans, whole cycles of
-/// `frequency_hz`; `volts` is what the two vibrometers give over what their scales say.
+/// Amplitudes (m) of the specimens' relative displacement and of specimen A's own, in the last
+/// `scans` scans, whole cycles of `frequency_hz`; `volts` is, for each of the two vibrometers, the
+/// ratio of its voltage to the voltage by its scale.
 fn true_motions_m(host: &SmallHost, frequency_hz: f64, scans: usize, volts: [f64; 2]) -> [f64; 2] {
     let rig = Rig::new(&RigConfig::default(), 1).unwrap();
     let unit = [0, 1].map(|at: usize| {
@@ -104,7 +106,7 @@ fn vibrometers_calibrated_apart_leave_no_common_motion_in_what_is_held() {
         let mut config = RigConfig::default();
         config.errors = Errors { none: true, ..config.errors }.acting();
         config.errors.none = false;
-        // a joint so stiff that the specimens move together, and little apart
+        // a joint so stiff that the specimens move together, with little relative motion
         config.contact.stiffness_n_per_m[2] *= 20.0;
         config.errors.volts = [("ldv_a".into(), volts[0]), ("ldv_b".into(), volts[1])].into();
         let (_board, link) =
@@ -135,7 +137,7 @@ fn vibrometers_calibrated_apart_leave_no_common_motion_in_what_is_held() {
     assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
     let (untold, _) = held(apart, None);
     assert!((untold - 1.0).abs() > 0.1, "by its own scales the device is off: {untold}");
-    // a sensor that is turned
+    // a reversed sensor
     let (turned, _) = held([1.0, -1.0], Some([1.0, -1.0]));
     assert!((turned - 1.0).abs() < 0.02, "{turned}");
 }
@@ -156,7 +158,7 @@ fn scales_are_checked_and_forgotten_with_the_session() {
     for wrong in [0.0, f32::NAN, f32::INFINITY, 1e-3, 1e3] {
         assert!(matches!(host.ask(scales(wrong)), Err(Refusal::OutOfBounds(_))), "{wrong}");
     }
-    // by half the newtons a volt the same force reads half as many
+    // with half as many newtons per volt the same force reads half as much
     let peak = |host: &mut SmallHost, number: u32| {
         let from = host.stage(Configuration::Ajb, "AZ3", "B3", 0);
         let lead = host.lead();
@@ -169,7 +171,7 @@ fn scales_are_checked_and_forgotten_with_the_session() {
     assert_eq!(host.ask(scales(0.5)), Ok(Answer::Done));
     let half = peak(&mut host, 2);
     assert!((half / own - 0.5).abs() < 0.05, "{half} N and {own} N");
-    // neither while the hammer is armed nor while the shaker moves
+    // refused while the hammer is armed and while the shaker moves
     assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
     assert_eq!(host.ask(scales(1.0)), Err(Refusal::HammerArmed));
     assert_eq!(host.ask(Request::Disarm), Ok(Answer::Done));
@@ -214,8 +216,8 @@ fn the_force_can_be_held_too() {
     assert!((status.drive_v - 0.5).abs() < 0.02, "{status:?}");
 }
 
-/// The joint from the last cycles of the streamed records: Δx (m) and T (N), a cycle of scans each, the mean velocity of each
-/// cycle taken out. A cycle is a whole number of scans.
+/// The joint from the last cycles of the streamed records: Δx (m) and T (N), one list of scans per
+/// cycle, with the mean velocity of each cycle removed. A cycle is a whole number of scans.
 fn loops(host: &SmallHost, cycle: usize, cycles: usize) -> Vec<Vec<(f64, f64)>> {
     let rig = Rig::new(&RigConfig::default(), 1).unwrap();
     let unit: Vec<f64> = rig
@@ -245,7 +247,8 @@ fn area(one: &[(f64, f64)]) -> f64 {
     one.iter().zip(next).map(|(a, b)| 0.5 * (a.1 + b.1) * (b.0 - a.0)).sum()
 }
 
-/// Slope of T on Δx over 20 to 40 % of T's swing after each reversal, and the median of |T| over the last 30 % of each stroke.
+/// Slope of T on Δx over 20 to 40 % of T's swing after each reversal, and the median of |T| over
+/// the last 30 % of each stroke.
 fn stick_and_plateau(loops: &[Vec<(f64, f64)>]) -> (f64, f64) {
     let (mut products, mut squares, mut plateau) = (0.0, 0.0, Vec::new());
     for one in loops {
@@ -290,7 +293,8 @@ fn a_contact_that_slips_moves_as_far_as_was_ordered_and_its_records_show_it() {
         (IWAN, 32.0, 6e-6),
     ];
     for (text, frequency_hz, amplitude_m) in cases {
-        // The records are held against the joint itself: errors of spots and sensors would be in between.
+        // The records are compared with the joint itself, so the errors of spots and sensors are
+        // switched off.
         let text = format!("{text}\n[errors]\nnone = true\n");
         let config = RigConfig::from_toml(&text).unwrap();
         let (board, link) = VirtualBoard::start(Some(&text), 4).unwrap();
@@ -300,7 +304,7 @@ fn a_contact_that_slips_moves_as_far_as_was_ordered_and_its_records_show_it() {
         let shake = order(frequency_hz, Control::Displacement { amplitude_m });
         assert_eq!(host.ask(Request::Shake(shake)), Ok(Answer::Done));
         let cycle = (f64::from(RATE) / frequency_hz) as usize;
-        // four cycles are a tenth of a second and more
+        // four cycles take at least a tenth of a second
         let mut amplitudes = Vec::new();
         for _ in 0..80 {
             host.go_on(4 * cycle as u64);
@@ -309,11 +313,11 @@ fn a_contact_that_slips_moves_as_far_as_was_ordered_and_its_records_show_it() {
         let case = format!("{}, {frequency_hz} Hz, {amplitude_m} m", config.name);
         let settled = &amplitudes[60..];
         assert!(settled.iter().all(|ratio| (ratio - 1.0).abs() < 0.02), "{case}: {amplitudes:.3?}");
-        // a per cent of drive beyond the limit moves ten times as far
+        // one per cent of drive beyond the limit moves ten times as far
         let most = amplitudes.iter().copied().fold(0.0, f64::max);
         assert!(most < 2.0, "{case}: {amplitudes:.3?}");
         assert!(!host.events.iter().any(|event| matches!(event, Event::ShakerStops(_))), "{:?}", host.events);
-        // the joint itself, over the cycles that come
+        // the joint itself, over the following cycles
         let from = board.controls().seen();
         host.go_on(40 * cycle as u64);
         let to = board.controls().seen();
@@ -333,12 +337,13 @@ fn a_contact_that_slips_moves_as_far_as_was_ordered_and_its_records_show_it() {
         assert!((seen_j / energy_j - 1.0).abs() < 0.03, "{case}: {seen_j} for {energy_j}");
         assert!((mu / config.contact.friction_coefficient - 1.0).abs() < 0.03, "{case}: {mu}");
         if config.contact.law == ContactLaw::Jenkins {
-            // Raw: the spots see 1.4 % of tilt, the lower push rod takes 1.3 % of T, and what rings while the contact sticks some per
-            // cent more or less: 174 N/um in most runs at 32 Hz and 3 um, and 183 at 10 um.
+            // Without corrections: the spots see 1.4 % of tilt, the lower push rod takes 1.3 % of
+            // T, and ringing while the contact sticks adds or removes some per cent: 174 N/um in
+            // most runs at 32 Hz and 3 um, and 183 at 10 um.
             let off = k_t / config.contact.stiffness_n_per_m[2] - 1.0;
             assert!(off.abs() < 0.05, "{case}: {k_t}");
         } else {
-            // from 20 to 40 % of the swing the weaker elements slip already
+            // from 20 to 40 % of the swing the weaker elements already slip
             assert!(k_t < 0.97 * config.contact.stiffness_n_per_m[2], "{case}: {k_t}");
         }
     }

@@ -1,4 +1,4 @@
-//! The steppers against closed forms and against each other.
+//! The steppers compared with closed forms and with each other.
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
 
@@ -23,7 +23,7 @@ fn no_mishaps() -> RigConfig {
     config
 }
 
-/// ∫ f e^{−st} dt of a half-sine, the textbook's closed form.
+/// ∫ f e^{−st} dt of a half-sine, textbook closed form.
 fn transform(segment: &ForceSegment, s: Complex<f64>) -> Complex<f64> {
     let one = Complex::from(1.0);
     (-s * segment.start_s).exp()
@@ -77,8 +77,9 @@ fn a_hit_carries_the_exact_frfs() {
         let structure = Structure::new(&config, configuration);
         let contacts = &rig.last_hit().unwrap().contacts;
         assert_eq!(contacts.len(), 1);
-        // A sum at the scans is the transform with its images at multiples of the scan rate (Poisson). Velocity falls as
-        // f³ there, so that beyond 32 images a two-thousandth of the first is left, which is 1e-3 of a stiff low line.
+        // A sum at the scans is the transform with its images at multiples of the scan rate
+        // (Poisson). Velocity falls as f³ there, so that beyond 32 images 1/2000 of the first is
+        // left, which is 1e-3 of a low line in the stiffness-controlled range.
         let folded = |s: Complex<f64>, quantity, outputs: &[Probe]| {
             (-32..=32)
                 .map(|image| s + Complex::new(0.0, 2.0 * PI * f64::from(image) / period_s))
@@ -95,7 +96,7 @@ fn a_hit_carries_the_exact_frfs() {
             for (output, exact) in exact.iter().enumerate() {
                 worst = worst.max((sums[line][1 + output] - exact).norm() / largest);
             }
-            // Nobody is there to be measured: exactly nothing.
+            // The body is not present: the signal is exactly zero.
             if configuration == Configuration::A {
                 assert!(sums[line][5..9].iter().all(|sum| sum.norm() == 0.0));
             } else {
@@ -112,8 +113,8 @@ fn a_hit_carries_the_exact_frfs() {
         }
         println!("{configuration} {impact} {response}: {worst:.1e}");
         assert!(worst < 2e-6, "{configuration} {impact} {response}: {worst:.1e}");
-        // The force cell is right within its own ringing, g (f / 6 kHz)² with g = 0.15, and within what twenty samples
-        // of a half-sine say of its area, (Ω T)² / 12 = 0.19 %.
+        // The force cell is accurate to within its own ringing, g (f / 6 kHz)² with g = 0.15, and
+        // to within the error of the area of a half-sine from twenty samples, (Ω T)² / 12 = 0.19 %.
         for (line, f_khz) in [(0, 0.02), (3, 0.208), (5, 1.0)] {
             let seen = sums[line][0] / transform(&contacts[0], lines[line]);
             let tolerance = 2e-3 + 0.15 * f_khz * f_khz / 36.0;
@@ -124,17 +125,17 @@ fn a_hit_carries_the_exact_frfs() {
 
 #[test]
 fn the_shaker_moves_the_structure_as_its_frf_says() {
-    // The published slope at 200 Hz is that of spots where they ought to be.
+    // The published slope at 200 Hz is for spots at their nominal positions.
     let mut config = RigConfig::default();
     config.errors.spot_m = 0.0;
     let mut rig = Rig::new(&config, 3).unwrap();
     let period_s = 1.0 / f64::from(rig.scan_rate_hz());
-    // 256 scans per cycle: 200 Hz, beside the specimen's yaw at 192 Hz.
+    // 256 scans per cycle: 200 Hz, near the specimen's yaw at 192 Hz.
     let cycle = 256;
     let omega = 2.0 * PI / (f64::from(cycle) * period_s);
     let mut codes = [0; CHANNELS];
     let mut sums = [Complex::new(0.0, 0.0); CHANNELS];
-    // The slowest mode (116 Hz, 4 /s) leaves e^{−12} after 3 s.
+    // The slowest mode (116 Hz, 4 /s) decays to e^{−12} after 3 s.
     let cycles = 600;
     for scan in 0..cycle * (cycles + 20) {
         let volts = 0.5 * (omega * f64::from(scan) * period_s).cos();
@@ -153,15 +154,18 @@ fn the_shaker_moves_the_structure_as_its_frf_says() {
     let input = Probe { body: config.shaker.body, position_m: config.shaker.position_m, direction: Z };
     let exact =
         &exact_frf(&config, Configuration::Ajb, Quantity::Mobility, &[s], &outputs, &[input]).unwrap()[0];
-    // Holding delays by half a scan and shrinks by sinc; the excitation channel reads the held value a scan later.
+    // Holding delays by half a scan and attenuates by sinc; the excitation channel reads the held
+    // value a scan later.
     let held =
         Complex::cis(omega * period_s / 2.0) * ((omega * period_s / 2.0).sin() / (omega * period_s / 2.0));
     for spot in 0..2 {
         let seen = sums[4 + spot] / sums[9] / held;
-        // Left over: the start's e^{−12}, and the steps' images at 51 kHz, (200/51000)² of the drive.
+        // Remaining error: the initial transient, e^{−12}, and the steps' images at 51 kHz,
+        // (200/51000)² of the drive.
         assert!((seen / exact[(spot, 0)] - 1.0).norm() < 1e-3, "{seen} for {}", exact[(spot, 0)]);
     }
-    // What the loop shows there: an ellipse of 86 N/µm slope, T ahead of Δx by 65°, not the contact's 180 N/µm.
+    // The resulting loop: an ellipse with a slope of 86 N/µm, T ahead of Δx by 65°, not the
+    // contact's 180 N/µm.
     let force: Complex<f64> = sums[6..9].iter().sum();
     let k = force / ((sums[4] - sums[5]) / s);
     assert!((k.re / 1e6 - 86.0).abs() < 6.0 && (k.arg().to_degrees().abs() - 65.0).abs() < 3.0, "{k}");
@@ -182,7 +186,7 @@ fn both_steppers_agree() {
         let mut differing = 0;
         for rig in [&mut fast, &mut slow] {
             rig.stage(configuration, impact, response, 0).unwrap();
-            // Long enough to strike twice: half-sines and what lies between.
+            // Long enough to strike twice: half-sines and the free motion between them.
             rig.fire(14e-3);
         }
         for scan in 0..2000 {
@@ -202,9 +206,9 @@ fn both_steppers_agree() {
         let worst =
             (0..CHANNELS).filter(|c| largest[*c] > 0.0).map(|c| off[c] / largest[c]).fold(0.0, f64::max);
         println!("{configuration}: {worst:.1e}");
-        // The modes are verified to 1e-8 of the largest transfer function; they do far better.
+        // The modes are verified to 1e-8 of the largest transfer function; they are much better.
         assert!(worst < 1e-9, "{configuration}: {worst:.1e}");
-        // A code differs only where 1e-9 of it straddles a rounding edge.
+        // A code differs only where a relative difference of 1e-9 crosses a rounding threshold.
         assert!(differing <= 1, "{differing}");
     }
 }
@@ -221,7 +225,8 @@ fn overdamped_modes_are_real() {
 
 #[test]
 fn critical_damping_falls_back_to_the_exponential() {
-    // Arm B on one bushing at its centre of gravity, critically damped along z: two modes become one.
+    // Arm B on one bushing at its centre of gravity, critically damped along z: two modes become
+    // one.
     let mut config = no_mishaps();
     for cell in &mut config.load_cells {
         cell.stiffness_n_per_m = [0.0; 3];
@@ -246,7 +251,7 @@ fn critical_damping_falls_back_to_the_exponential() {
     let expected = -impulse / config.bodies.arm_b.mass_kg * t * (-omega * t).exp();
     let centre = Probe { body: BodyName::ArmB, position_m: config.bodies.arm_b.cg_m, direction: Z };
     let (u, _) = rig.motion(&centre).unwrap();
-    // The pulse is not a point: (ω w)²/24 = 0.7 % at its centre.
+    // The pulse has a finite duration: (ω w)²/24 = 0.7 % at its centre.
     assert!((u / expected - 1.0).abs() < 0.02, "{u} for {expected}");
 }
 
@@ -275,7 +280,7 @@ proptest! {
             rig.stage(configuration, impact, response, 0).unwrap();
             rig.fire(3.5e-3);
             let mut codes = [0; CHANNELS];
-            // Half a second of flight and contact, then nothing pushes any more.
+            // Half a second of flight and contact; afterwards no force acts.
             for _ in 0..800 {
                 rig.scan(&mut codes);
             }
@@ -287,7 +292,7 @@ proptest! {
                     rig.scan(&mut codes);
                 }
                 let now = rig.energy_j();
-                // Rounding of a sum of squares, nothing else, may make it rise.
+                // Only the rounding of a sum of squares may increase it.
                 prop_assert!(now <= before + 1e-12 * start, "{before} -> {now}");
                 before = now;
             }

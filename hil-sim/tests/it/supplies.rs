@@ -1,4 +1,5 @@
-//! Sensors fed with a constant current: without one nothing moves that needs it. And the specimen's temperature.
+//! Sensors with a constant-current supply: without a sensor, motion that needs it is refused. Also
+//! the specimen's temperature.
 #![allow(clippy::unwrap_used)]
 
 use crate::support;
@@ -12,7 +13,7 @@ use jointrig_protocol::slow::{Slow, Supply, SupplyFault};
 use support::{SmallHost, Started};
 
 const RATE: u32 = 51_200;
-/// Places of the two force cells in a scan.
+/// Indices of the two force cells in a scan.
 const FORCE: u8 = 0;
 const EXCITATION: u8 = 9;
 
@@ -23,7 +24,8 @@ fn slow(host: &mut SmallHost) -> Slow {
     }
 }
 
-/// Goes on until the device has measured this at the supply of a channel: a virtual board runs up to half a second ahead of its host.
+/// Continues until the device has measured this at the supply of a channel: a virtual board runs up
+/// to half a second ahead of its host.
 fn until_measured(host: &mut SmallHost, channel: u8, fault: Option<SupplyFault>) {
     let own = |slow: &Slow| slow.supplies.iter().find(|supply| supply.channel == channel).map(Supply::fault);
     while own(&slow(host)) != Some(fault) {
@@ -42,11 +44,11 @@ fn shake() -> Request {
     })
 }
 
-/// What must hold of a board, native or emulated.
+/// Requirements for any board, native or emulated.
 fn keeps_its_promises(start: impl Fn(&RigConfig) -> Started) {
     let faults = [(Cable::Open, SupplyFault::Open), (Cable::Short, SupplyFault::Short)];
     for (cable, fault) in faults {
-        // broken from the start: no arming, but the shaker is not concerned
+        // faulty from the start: arming is refused, the shaker is not affected
         let mut config = RigConfig::default();
         config.surroundings.force_cable = cable;
         let (_board, controls, link) = start(&config);
@@ -58,7 +60,7 @@ fn keeps_its_promises(start: impl Fn(&RigConfig) -> Started) {
         assert_eq!(host.ask(shake()), Ok(Answer::Done));
         assert_eq!(host.ask(Request::Rest), Ok(Answer::Done));
         host.until("rest", |host| host.events.contains(&Event::ShakerRests));
-        // mended, and broken again while the hammer is armed
+        // repaired, and faulty again while the hammer is armed
         controls.set_force_cable(Cable::Sensor);
         until_measured(&mut host, FORCE, None);
         assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
@@ -69,7 +71,7 @@ fn keeps_its_promises(start: impl Fn(&RigConfig) -> Started) {
         host.until("the disarming", |host| host.events.contains(&told));
         assert_eq!(controls.coil_pulses_us(), [0_u32; 0]);
 
-        // the shaker's own: refused, and stopped
+        // the shaker's force cell: refused, and stopped
         controls.set_force_cable(Cable::Sensor);
         controls.set_excitation_cable(cable);
         until_measured(&mut host, EXCITATION, Some(fault));
@@ -86,7 +88,7 @@ fn keeps_its_promises(start: impl Fn(&RigConfig) -> Started) {
         host.until("the shaker's stop", |host| host.events.contains(&told));
     }
 
-    // a specimen that warms by a kelvin a second
+    // a specimen that warms by 1 K/s
     let mut config = RigConfig::default();
     config.surroundings.temperature_c = 25.0;
     config.surroundings.warming_k_per_s = 1.0;
@@ -100,7 +102,7 @@ fn keeps_its_promises(start: impl Fn(&RigConfig) -> Started) {
     let celsius = f64::from(begun.temperature_c.unwrap());
     host.go_on(2 * u64::from(RATE));
     let warmer = f64::from(slow(&mut host).temperature_c.unwrap());
-    // measured ten times a second, and up to half a second of scans are on their way
+    // measured ten times a second, with up to half a second of scans in transit
     assert!(
         (25.0..26.0).contains(&celsius) && (warmer - celsius - 2.0).abs() < 0.7,
         "{celsius}, then {warmer}"

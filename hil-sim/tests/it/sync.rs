@@ -1,4 +1,5 @@
-//! In step with another recorder: its edges and ours on one time, its clock for our scans, and what happens when that clock fails.
+//! Synchronisation with another recorder: its edges and ours on a common time axis, its clock for
+//! our scans, and the behaviour when that clock fails.
 #![allow(clippy::unwrap_used)]
 
 use crate::support;
@@ -11,7 +12,7 @@ use jointrig_protocol::sync::{Clock, ClockFault, Edge, Line, Sync};
 use support::{PULSE_US, SmallHost, Started};
 
 const EXTERNAL: Clock = Clock::External { rate_hz: 51_200 };
-/// Half a part of 2¹⁶ of a scan is what rounding down leaves in the mean; this is all that it may.
+/// Rounding down leaves half a unit of 2⁻¹⁶ scan on average; this is the largest rounding error.
 const PART: f64 = 1.0 / 65_536.0;
 
 fn sync(host: &mut SmallHost) -> Sync {
@@ -21,7 +22,7 @@ fn sync(host: &mut SmallHost) -> Sync {
     }
 }
 
-/// Asks for a clock and waits until it is known to be good, or not.
+/// Requests a clock and waits until it is known to be good, or not.
 fn clock(host: &mut SmallHost, clock: Clock) -> Sync {
     assert_eq!(host.ask(Request::Clock(clock)), Ok(Answer::Done));
     loop {
@@ -46,10 +47,10 @@ fn keeps_its_promises(start: impl Fn(&RigConfig) -> Started) {
     a_lost_clock_stops_the_shaker(start(&RigConfig::default()));
 }
 
-/// The other recorder's samples lie at times of their own, of a clock that is 80 ppm faster and began elsewhere. Two edges of its tell
-/// where all of them lie among the scans.
+/// The other recorder's samples are timed by a clock that is 80 ppm faster and started at another
+/// time. Two of its edges determine the position of all its samples among the scans.
 fn another_recorder_is_aligned((_board, controls, link): Started) {
-    // a board runs ahead of its host: what is to come is told before the start
+    // a board runs ahead of its host, so later edges are set before the start
     let mut host = SmallHost::new(link);
     let (began, per_sample) = (1_234.567, 1.0 - 80e-6);
     let at = |sample: f64| began + sample * per_sample;
@@ -65,7 +66,7 @@ fn another_recorder_is_aligned((_board, controls, link): Started) {
     for (told, sample) in [(first, 100.0), (second, 20_100.0)] {
         assert!((0.0..PART).contains(&(at(sample) - told)), "{told} for {}", at(sample));
     }
-    // any sample of its
+    // any of its samples
     let placed = first + (second - first) * (12_345.0 - 100.0) / 20_000.0;
     assert!((placed - at(12_345.0)).abs() < 2.0 * PART);
 }
@@ -83,7 +84,8 @@ fn fast_edges_are_counted((_board, controls, link): Started) {
     assert_eq!((told.edges, told.edges_lost), (4, 2));
 }
 
-/// The output rises when the coil is switched on and when the force is felt; both recorders know when.
+/// The output rises when the coil is switched on and when the force is detected; both recorders
+/// know when.
 fn a_shot_is_marked((_board, controls, link): Started) {
     let mut host = SmallHost::new(link);
     host.start();
@@ -97,7 +99,7 @@ fn a_shot_is_marked((_board, controls, link): Started) {
     let after = |edge: &Edge, what: u64| edge.at.scan - what;
     assert!(after(&told[0], shot.fired_at) <= 1, "{told:?}, {shot:?}");
     assert!(after(&told[1], shot.trigger) <= 25, "a block of 24 scans: {told:?}, {shot:?}");
-    // and when the host asks
+    // and when the host requests it
     host.release();
     assert_eq!(host.ask(Request::Mark), Ok(Answer::Done));
     host.until("the mark", |host| edges(host).len() == 3);
@@ -113,7 +115,7 @@ fn a_clock_is_proven_before_it_is_used((_board, controls, link): Started) {
         let refused = host.ask(Request::Clock(Clock::External { rate_hz }));
         assert!(matches!(refused, Err(Refusal::OutOfBounds(_))), "{rate_hz} Hz");
     }
-    // none there; quite another; one that is a little out of tolerance
+    // no clock; a completely different rate; one slightly out of tolerance
     for (ppm, fault) in
         [(None, ClockFault::Absent), (Some(1e5), ClockFault::Rate), (Some(-450.0), ClockFault::Rate)]
     {
@@ -135,7 +137,7 @@ fn a_clock_is_proven_before_it_is_used((_board, controls, link): Started) {
     );
     let told = sync(&mut host);
     assert!((told.ppm + 120.0).abs() < 0.5, "{}", told.ppm);
-    // another session has to ask anew
+    // a new session must request it again
     let mut host = SmallHost::again(host, 100);
     assert_eq!(sync(&mut host).clock, Clock::Internal);
 }
@@ -158,7 +160,7 @@ fn a_lost_clock_ends_the_stream((_board, controls, link): Started) {
     assert!(host.next_scan <= stops_at + 48, "the stream went on for {} scans", host.next_scan - stops_at);
     assert_eq!(host.ask(Request::Start), Err(Refusal::Clock(ClockFault::Lost)));
     assert!(controls.coil_pulses_us().is_empty());
-    // without it, and with it when it is back
+    // without it, and with it when it has returned
     assert_eq!(clock(&mut host, Clock::Internal).fault, None);
     host.start();
     host.go_on(100);

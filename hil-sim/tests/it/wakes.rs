@@ -1,8 +1,10 @@
-//! Nobody sleeps through a byte, whatever order the device's thread and the host's take. Every order is tried:
+//! No wake-up is lost, in any interleaving of the device's thread and the host's. Every
+//! interleaving is tried:
 //!
-//!     RUSTFLAGS="--cfg every_order" cargo test --release -p jointrig-hil-sim --test wakes --target-dir target/loom
+//!     RUSTFLAGS="--cfg every_order" cargo test --release -p jointrig-hil-sim --test wakes
+//!     --target-dir target/loom
 //!
-//! Without that flag there is nothing here.
+//! Without that flag this file is empty.
 #![cfg(every_order)]
 #![allow(clippy::unwrap_used)]
 
@@ -81,11 +83,12 @@ fn a_frame_reaches_a_host_that_waits() {
             let woken = Arc::new(Woken::default());
             let sleeper = device.clone();
             driven(&sleeper, &woken, device.write(&[9])).unwrap();
-            // nothing more to do: the board's thread sleeps until the host goes
+            // nothing more to do: the board's thread sleeps until the host ends
             sleeper.sleep(&woken);
         });
         let mut bytes = [0; 4];
-        // the model knows no time: a host that is not woken waits for ever, and is found
+        // the model has no time: a host that is not woken waits forever, which the model checker
+        // reports
         let count = host.read(&mut bytes, Duration::from_secs(3600)).unwrap();
         assert_eq!(bytes[..count], [9]);
         drop(host);

@@ -1,6 +1,7 @@
-//! The same numbers as the programs that laboratories use. How long both take is told by `cargo xtask bench`.
+//! Comparison of results with the programs that laboratories use. `cargo xtask bench` compares the
+//! run times.
 //!
-//! `cargo xtask parity` prepares Python with pyFRF, pyuff and pyFBS and starts this.
+//! `cargo xtask parity` prepares Python with pyFRF, pyuff and pyFBS and starts this program.
 
 mod parity;
 mod pyfbs_parity;
@@ -23,7 +24,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// One room's failure does not hide the other's.
+/// Combines two outcomes so that one failure does not hide the other.
 fn both(first: Outcome, second: Outcome) -> Outcome {
     match (first, second) {
         (Err(one), Err(other)) => Err(format!("{one}\n  {other}").into()),
@@ -31,7 +32,7 @@ fn both(first: Outcome, second: Outcome) -> Outcome {
     }
 }
 
-/// Runs a script of the folder `peers` and gives what it prints.
+/// Runs a script of the folder `peers` and returns its output.
 fn script(python: &str, name: &str, argument: &str) -> Result<String, Box<dyn std::error::Error>> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/peers/");
     let output = Command::new(python).arg(format!("{path}{name}")).arg(argument).output()?;

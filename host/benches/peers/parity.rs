@@ -1,9 +1,11 @@
-//! The same numbers as pyFRF and pyuff, in both directions.
+//! Comparison with pyFRF and pyuff, in both directions.
 //!
-//! Spectra: three simulated hits, windowed here, averaged by both. What differs by definition is left out and stated here: pyFRF takes the
-//! mean away after its windows (only 0 Hz sees it without zero padding), scales by the ratio of its windows' means, and its coherence
-//! is |H1/H2|, which is γ² for one input. Its Hv is total least squares for equal noise powers in the units given, which is our Hv with a
-//! noise ratio of 1; the responses are scaled so that |H| is about 1, because its formula cancels otherwise.
+//! Spectra: three simulated hits, windowed here, averaged by both. What differs by definition is
+//! excluded and stated here: pyFRF subtracts the mean after its windows (without zero padding this
+//! affects only 0 Hz), scales by the ratio of its windows' means, and its coherence is |H1/H2|,
+//! which is γ² for one input. Its Hv is total least squares for equal noise powers in the given
+//! units, which is our Hv with a noise ratio of 1; the responses are scaled so that |H| is about 1,
+//! because its formula suffers from cancellation otherwise.
 
 use super::{Outcome, script};
 use jointrig::exchange::npz::Array;
@@ -17,9 +19,10 @@ use num_complex::Complex;
 use serde_json::Value;
 use std::path::Path;
 
-/// Spectra must agree to this part of |H| (of its mean where that is larger), coherences absolutely.
+/// Spectra must agree to this fraction of |H| (of its mean where that is larger), coherences
+/// absolutely.
 const SPECTRA: f64 = 1e-9;
-/// pyuff prints 12 digits of a double, 6 of a place beside it.
+/// pyuff prints 12 digits of a double, 6 of an abscissa value next to it.
 const DOUBLE_TEXT: f64 = 5e-12;
 const SINGLE: f64 = 5e-6;
 
@@ -187,7 +190,8 @@ fn function(kind: i64, encoding: Encoding, precision: Precision, even: bool, com
     }
 }
 
-/// Compares data sets with pyuff's dictionaries of them; gives the largest relative difference of a value, in words.
+/// Compares data sets with pyuff's dictionaries of them; returns the largest relative difference of
+/// a value, as text.
 fn compare(sets: &[DataSet], there: &[Value], worst: &mut Vec<String>) -> String {
     if sets.len() != there.len() {
         worst.push(format!("{} data sets here and {} there", sets.len(), there.len()));
@@ -208,7 +212,7 @@ fn compare(sets: &[DataSet], there: &[Value], worst: &mut Vec<String>) -> String
             let found = theirs.get(what.0).map(|v| flat(v, what.1)).unwrap_or_default();
             let difference = if found.len() == mine.len() {
                 let scale = mine.iter().fold(0.0f64, |m, v| m.max(v.abs())).max(f64::MIN_POSITIVE);
-                // each value by itself where it has its own digits
+                // each value separately where it has its own digits
                 mine.iter()
                     .zip(&found)
                     .fold(0.0f64, |m, (a, b)| m.max((a - b).abs() / a.abs().max(1e-3 * scale)))
@@ -221,7 +225,7 @@ fn compare(sets: &[DataSet], there: &[Value], worst: &mut Vec<String>) -> String
     format!("{largest:.1e} (doubles)")
 }
 
-/// All numbers in a JSON value, one part of complex ones.
+/// All numbers in a JSON value, and one part (real or imaginary) of complex ones.
 fn flat(value: &Value, part: &str) -> Vec<f64> {
     match value {
         Value::Array(items) => items.iter().flat_map(|v| flat(v, part)).collect(),
@@ -235,7 +239,8 @@ fn flat(value: &Value, part: &str) -> Vec<f64> {
 
 type Figures = ((&'static str, &'static str), Vec<f64>, f64);
 
-/// A data set's numbers (and texts, as bytes) by pyuff's names, with the difference that the format allows.
+/// A data set's numbers (and texts, as bytes) under pyuff's names, with the difference that the
+/// format allows.
 fn figures(set: &DataSet) -> Vec<Figures> {
     let exact = |name, values: Vec<f64>| ((name, ""), values, 0.0);
     let text = |name, text: &str| ((name, ""), text.bytes().map(f64::from).collect::<Vec<_>>(), 0.0);
@@ -290,7 +295,7 @@ fn figures(set: &DataSet) -> Vec<Figures> {
             text("id", &line.name),
             exact("nodes", line.nodes.iter().map(|n| *n as f64).collect()),
         ],
-        // by kind in the dictionary of pyuff
+        // grouped by kind in pyuff's dictionary
         DataSet::Elements(elements) => elements
             .iter()
             .filter_map(|e| {

@@ -1,7 +1,9 @@
-//! The same numbers as pyFBS: virtual points (T_u, T_f, Y_vp, weights, an extension mode), consistency, SEMM.
+//! Comparison with pyFBS: virtual points (T_u, T_f, Y_vp, weights, an extension mode), consistency,
+//! SEMM.
 //!
-//! pyFBS's `fully-extend-svd` is not compared: in 1.0.7 its branch is never reached, and it gives what `fully-extend` gives
-//! (which is checked here, so that a repaired version shows). Ours is compared with the formula and pyFBS's own truncated inverse.
+//! pyFBS's `fully-extend-svd` is not compared: in 1.0.7 its branch is never reached, and it returns
+//! the result of `fully-extend` (which is checked here, so that a repaired version is noticed).
+//! Ours is compared with the formula and pyFBS's own truncated inverse.
 
 use super::{Outcome, script};
 use jointrig::exchange::npz::NpzFile;
@@ -16,19 +18,19 @@ use nalgebra::{Complex, DMatrix, Vector3};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// All must agree to this part of the largest entry; consistencies absolutely.
+/// All must agree to this fraction of the largest entry; consistencies absolutely.
 const ALLOWED: f64 = 1e-10;
 
 const SEMM_OUTPUTS: [&str; 4] = ["A1:x", "A1:z", "A2:y", "A3:z"];
 const SEMM_INPUTS: [&str; 4] = ["AZ1", "AZ2", "AZ3", "AY3"];
-/// Of A's nine interface channels, and of its nine impacts.
+/// Weights of A's nine interface channels, and of its nine impacts.
 const WEIGHTS: [f64; 9] = [1.0, 2.0, 0.5, 3.0, 1.5, 0.25, 1.0, 4.0, 0.75];
 
 fn data(file: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file)
 }
 
-/// What is compared, and how it went.
+/// The comparisons and their results.
 struct Table {
     theirs: NpzFile,
     worst: Vec<String>,
@@ -42,7 +44,7 @@ impl Table {
         }
     }
 
-    /// A complex array of theirs against our lines; relative to the largest entry.
+    /// Compares a complex array of theirs with our lines, relative to the largest entry.
     fn lines(
         &mut self,
         array: &str,
@@ -60,7 +62,7 @@ impl Table {
     }
 }
 
-/// Largest difference over the largest size of theirs; infinite where the numbers of values differ.
+/// Largest difference relative to their largest value; infinite if the numbers of values differ.
 fn difference<T: Copy>(
     ours: &[T],
     theirs: &[T],
@@ -93,7 +95,8 @@ pub fn run(python: &str) -> Outcome {
     if table.worst.is_empty() { Ok(()) } else { Err(table.worst.join("\n  ").into()) }
 }
 
-/// The transformation of a configuration as a whole, seen by its action on a matrix that leaves the other side alone.
+/// The complete transformation of a configuration, reconstructed from its action on a matrix, with
+/// the other side unchanged.
 struct Whole {
     t_u: DMatrix<Complex<f64>>,
     t_f: DMatrix<Complex<f64>>,
@@ -211,7 +214,7 @@ fn other_transformations(table: &mut Table, geometry: &Geometry) -> Outcome {
     let mut modes = Dof::RIGID.to_vec();
     modes.push(Dof::Ex);
     let seven = IdmSet::of(&modes).ok_or("seven modes")?;
-    // the forces keep six: as two points of one place, one of motions and one of forces
+    // the forces keep six: two virtual points at one position, one for motions and one for forces
     let motions = VirtualPoint { idms: seven, inputs: Vec::new(), ..six.clone() };
     let forces = VirtualPoint { outputs: Vec::new(), ..six };
     Whole::of(&frf, &geometry.a, &[motions, forces], &Weights::default())?.compare(table, "flexible")
@@ -222,7 +225,7 @@ fn mixing(table: &mut Table) -> Outcome {
     let measured = read_frf(&data("frf_default/A.npz"))?
         .to_receptance()?
         .select(&SEMM_OUTPUTS.map(str::to_owned), &SEMM_INPUTS.map(str::to_owned))?;
-    // half as much again, so that the correction is as large as the parent
+    // larger by half, so that the correction is as large as the parent model
     let measured = measured.map_lines(|_, mut y| y *= Complex::from(1.5));
     let truncated = Form::FullyExtended { drop_compatibility: 2, drop_equilibrium: 1 };
     for (what, array, form) in [

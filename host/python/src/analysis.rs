@@ -1,4 +1,4 @@
-//! What an analysis found: the document of `results.json`, its report and its figures.
+//! Results of an analysis: the document of `results.json`, its report and its figures.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ use crate::frf::Frf;
 use crate::lab::Lab;
 use crate::{raised, values};
 
-/// What an analysis found.
+/// Results of an analysis.
 #[pyclass(module = "jointrig._native", frozen)]
 pub struct Analysis {
     found: Results,
@@ -21,11 +21,11 @@ pub struct Analysis {
     spectra: PyOnceLock<Py<PyDict>>,
 }
 
-/// What was analysed.
+/// The source of an analysis.
 pub enum Of {
     /// A campaign file.
     Campaign(PathBuf),
-    /// FRFs of A, B and the assembly; none where a loop was.
+    /// FRFs of A, B and the assembly; empty for a loop.
     Frfs(Vec<(&'static str, Py<Frf>)>),
 }
 
@@ -44,7 +44,8 @@ impl Analysis {
         values(py, &text)
     }
 
-    /// The FRFs behind it, by the configuration's name: those that have any. Of a campaign they are computed when they are asked for, once.
+    /// The FRFs used, by name of the configuration, for those that have any. For a campaign they
+    /// are computed once, on first use.
     #[getter]
     fn spectra(&self, py: Python<'_>) -> PyResult<Py<PyDict>> {
         let made = self.spectra.get_or_try_init(py, || {
@@ -66,13 +67,13 @@ impl Analysis {
         Ok(made.clone_ref(py))
     }
 
-    /// Names of the figures that there are data for, in the order of the report.
+    /// Names of the figures for which there are data, in the order of the report.
     #[getter]
     fn figures(&self) -> Vec<&'static str> {
         report::all_figures(&self.found).iter().map(|figure| figure.name).collect()
     }
 
-    /// A figure of the report as the text of an SVG, light or dark as the reader's paper is.
+    /// A figure of the report as SVG text that adapts to a light or dark colour scheme.
     fn svg(&self, py: Python<'_>, figure: &str) -> PyResult<String> {
         let all = report::all_figures(&self.found);
         all.iter().find(|own| own.name == figure).map(report::notebook_figure).ok_or_else(|| {
@@ -81,7 +82,8 @@ impl Analysis {
         })
     }
 
-    /// Writes `results.json` and `report.html` into `folder`, which is made if it is not there.
+    /// Writes `results.json` and `report.html` into `folder`, which is created if it does not
+    /// exist.
     fn report(&self, py: Python<'_>, folder: PathBuf) -> PyResult<()> {
         py.detach(|| report::write(&self.found, &folder, &[]))
             .map_err(|error| raised::writing(py, &folder, &error))

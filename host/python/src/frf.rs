@@ -21,9 +21,9 @@ use crate::raised;
 #[pyclass(module = "jointrig._native", frozen)]
 pub struct Frf {
     matrix: jointrig::frf::Frf,
-    /// What the labels of its file say of outputs and inputs; nothing of FRFs from arrays.
+    /// Labels of outputs and inputs from its file; `None` for FRFs from arrays.
     labels: Option<(Vec<Label>, Vec<Label>)>,
-    /// Hits in each average, outputs × inputs; unknown of FRFs from elsewhere.
+    /// Hits in each average, outputs × inputs; `None` for FRFs from other sources.
     hits: Option<DMatrix<usize>>,
 }
 
@@ -32,7 +32,8 @@ impl Frf {
         Self { matrix: frf, labels: None, hits: None }
     }
 
-    /// The FRFs along the directions of these points, and what was turned; labels of a file count for it.
+    /// The FRFs along the directions of these points, and what was reversed; a file's labels take
+    /// precedence.
     ///
     /// # Errors
     /// A label and its point have different axes: both are named.
@@ -58,7 +59,7 @@ impl Frf {
         [self.matrix.lines().len(), self.matrix.outputs().len(), self.matrix.inputs().len()]
     }
 
-    /// Values of all lines in C order: nalgebra keeps columns together.
+    /// Values of all lines in C order (nalgebra stores matrices by columns).
     fn in_order<T: Copy + 'static>(&self, of: impl Fn(usize, usize, usize) -> T) -> Vec<T> {
         let [lines, outputs, inputs] = self.shape();
         let mut all = Vec::with_capacity(lines * outputs * inputs);
@@ -71,7 +72,7 @@ impl Frf {
     }
 }
 
-/// One matrix a line.
+/// One matrix per line.
 fn lines<T: nalgebra::Scalar>(values: ArrayView3<'_, T>) -> Vec<DMatrix<T>> {
     let [_, outputs, inputs] = [values.shape()[0], values.shape()[1], values.shape()[2]];
     values
@@ -140,7 +141,7 @@ impl Frf {
             .reshape(self.shape())
     }
 
-    /// (line, output, input) float64, or None where it is not known.
+    /// (line, output, input) float64, or None if it is not known.
     #[getter]
     fn coherence<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<f64>>>> {
         let all = self.matrix.coherence();
@@ -148,7 +149,8 @@ impl Frf {
             .transpose()
     }
 
-    /// (line, output, input) float64, of the real part (the imaginary part has as much), or None where it is not known.
+    /// (line, output, input) float64, of the real part (that of the imaginary part is equal), or
+    /// None if it is not known.
     #[getter]
     fn variance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<f64>>>> {
         let all = self.matrix.variance();
@@ -156,7 +158,8 @@ impl Frf {
             .transpose()
     }
 
-    /// Hits in the average of each FRF, `(output, input)`; `None` of FRFs from a file or from arrays.
+    /// Number of hits in the average of each FRF, `(output, input)`; `None` for FRFs from a file or
+    /// from arrays.
     #[getter]
     fn hits<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<i64>>>> {
         let Some(hits) = &self.hits else { return Ok(None) };
@@ -216,7 +219,7 @@ impl Frf {
         Ok(Self { matrix: chosen, labels, hits })
     }
 
-    /// Writes an npz that `identify` and `import` take.
+    /// Writes an npz file that `identify` and `import` accept.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let directions = self.labels.as_ref().map_or_else(Vec::new, |(outputs, inputs)| {
             let along = |labels: &[Label]| labels.iter().map(|label| label.direction).collect::<Vec<_>>();

@@ -14,7 +14,8 @@ use crate::analysis::{Analysis, Of};
 use crate::frf::Frf;
 use crate::{in_the_process_that_loaded_this, interruptible, raised};
 
-/// What `jointrig identify` finds in these FRFs; what it says on stderr of the geometry stands in the second place.
+/// Results of `jointrig identify` for these FRFs; the second value contains the messages about the
+/// geometry that the command prints to stderr.
 #[pyfunction]
 #[pyo3(signature = (*, a, b, ajb, geometry, method, idms, band_hz, position_error_m=None, aim_error_m=None, angle_error_rad=None,
                     mounting_error=None, full_joint=false, noise=None))]

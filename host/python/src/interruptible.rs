@@ -1,4 +1,4 @@
-//! Long work: with the interpreter released, and ended by Ctrl-C.
+//! Long computations: with the interpreter released, and interruptible by Ctrl-C.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -12,16 +12,16 @@ use pyo3::prelude::*;
 
 use crate::raised;
 
-/// How often Ctrl-C is looked for.
+/// Polling interval for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Whether whoever asked for the work has gone.
+/// Whether the caller has stopped waiting for the work.
 #[derive(Clone, Default)]
 pub struct Stopped(Arc<AtomicBool>);
 
 impl Stopped {
-    /// Ends the work here when nobody waits for it any more. The analysis has no other way out, and holds nothing that an unwinding
-    /// could leave half written: it only reads.
+    /// Ends the work here if its result is not needed any more. Unwinding is safe, because the
+    /// analysis only reads and leaves nothing half written; it has no other way to end early.
     pub fn end_here_if_so(&self) {
         if self.0.load(Ordering::Relaxed) {
             // without the message that a panic prints
@@ -30,7 +30,8 @@ impl Stopped {
     }
 }
 
-/// What `work` gives. It runs on a thread of its own; Ctrl-C ends the wait within 50 ms, and the work at its next step.
+/// Returns the result of `work`. It runs on a separate thread; Ctrl-C ends the wait within 50 ms,
+/// and the work at its next step.
 pub fn run<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(&Stopped) -> T + Send + 'static,
@@ -39,7 +40,7 @@ pub fn run<T: Send + 'static>(
     let own = stopped.clone();
     let (done, mut ready) = channel();
     let begun = thread::Builder::new().name("jointrig".into()).spawn(move || {
-        // without a receiver nobody waits
+        // sending fails if the receiver is gone, that is, if the result is not needed
         let _ = done.send(catch_unwind(AssertUnwindSafe(|| work(&own))));
     });
     if let Err(error) = begun {

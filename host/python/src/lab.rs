@@ -17,10 +17,11 @@ use crate::interruptible::{self, Stopped};
 use crate::record::Record;
 use crate::{in_the_process_that_loaded_this, raised, values};
 
-/// The lines of FRFs unless others are asked for, Hz.
+/// The default band of FRF lines, Hz.
 const BAND_HZ: (f64, f64) = (10.0, 1000.0);
 
-/// A campaign file, read only; it may be measured meanwhile. Holds a path and no connection, so that it can be pickled.
+/// A campaign file, read only; it may be measured at the same time. Holds a path and no connection,
+/// so that it can be pickled.
 #[pyclass(module = "jointrig._native", frozen)]
 pub struct Lab {
     path: PathBuf,
@@ -50,7 +51,7 @@ impl Lab {
         Ok(format!("Lab({:?}): {kept} of {wanted} good hits", self.path.display().to_string()))
     }
 
-    /// Where the plan sends hammer and vibrometer.
+    /// The positions of hammer and vibrometer in the plan.
     fn _repr_svg_(&self, py: Python<'_>) -> PyResult<Option<String>> {
         let plan = self.read(py, Store::plan)?;
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();
@@ -58,7 +59,7 @@ impl Lab {
         Ok(figure.as_ref().map(report::notebook_figure))
     }
 
-    /// What `jointrig campaign status --json` says.
+    /// The document of `jointrig campaign status --json`.
     fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let found = self.read(py, |store| status::document(store).map(|found| found.to_string()))?;
         values(py, &found)
@@ -85,7 +86,8 @@ impl Lab {
         Ok(all.into_iter().filter(of).collect())
     }
 
-    /// H1 of a configuration's good hits, or the FRFs that were imported for it; lines of `band_hz`, (low, high), 10 Hz to 1 kHz.
+    /// H1 of a configuration's good hits, or the FRFs that were imported for it; lines of
+    /// `band_hz`, (low, high), default 10 Hz to 1 kHz.
     #[pyo3(signature = (configuration, *, band_hz=BAND_HZ))]
     fn frf(&self, py: Python<'_>, configuration: &str, band_hz: (f64, f64)) -> PyResult<Frf> {
         in_the_process_that_loaded_this(py)?;
@@ -103,7 +105,7 @@ impl Lab {
         })
     }
 
-    /// What `jointrig analyse` finds; `progress(done, total)` is called now and then.
+    /// Results of `jointrig analyse`; `progress(done, total)` is called now and then.
     #[pyo3(signature = (progress=None, *, bootstrap=0))]
     fn analyse(&self, py: Python<'_>, progress: Option<Py<PyAny>>, bootstrap: usize) -> PyResult<Analysis> {
         in_the_process_that_loaded_this(py)?;
@@ -113,7 +115,8 @@ impl Lab {
                 stopped.end_here_if_so();
                 if let Some(progress) = &progress {
                     Python::attach(|py| {
-                        // whoever watches does not stop the work: what it raises is printed and not thrown
+                        // an observer must not stop the work: its exceptions are printed and not
+                        // raised
                         if let Err(error) = progress.call1(py, (now.done, now.total)) {
                             error.print(py);
                         }
@@ -156,7 +159,7 @@ impl Lab {
         Ok(found)
     }
 
-    /// The FRFs of a configuration, from hits or imported, and what was wrong with hits.
+    /// The FRFs of a configuration, from hits or imported, and the problems with hits.
     fn measured(
         &self,
         py: Python<'_>,
@@ -174,7 +177,7 @@ impl Lab {
         })
     }
 
-    /// What `work` finds in the file, with the interpreter released.
+    /// Reads from the file with `work`, with the interpreter released.
     fn read<T: Send>(
         &self,
         py: Python<'_>,
@@ -184,7 +187,7 @@ impl Lab {
         found.map_err(|error| raised::file(py, &self.path, &error))
     }
 
-    /// The same of long work, which Ctrl-C ends.
+    /// The same for a long computation, which Ctrl-C interrupts.
     fn computed<T: Send + 'static>(
         &self,
         py: Python<'_>,

@@ -1,7 +1,9 @@
-//! The Python door: it converts, and computes nothing. What Python can do here the command can do too.
+//! The Python interface: it converts, and computes nothing. The command can do everything that is
+//! possible here.
 //!
-//! All work runs with the interpreter released. Arrays go out as the memory that Rust filled; where a signal comes in, it is read once.
-//! Nothing writes into a campaign file, and no device can be opened: what moves a hammer stays with the command.
+//! All work runs with the interpreter released. Returned arrays are the memory that Rust filled,
+//! without a copy; an input signal is read once. Nothing writes into a campaign file, and no device
+//! can be opened: only the command moves a hammer.
 
 #![allow(clippy::needless_pass_by_value, reason = "Python hands arguments over by value")]
 
@@ -21,7 +23,8 @@ use std::sync::OnceLock;
 /// The process that loaded this module.
 static LOADED_IN: OnceLock<u32> = OnceLock::new();
 
-/// Refuses to compute after a fork: the threads of the pool did not come along, and waiting for them would never end.
+/// Refuses to compute after a fork: the threads of the pool are not forked, so waiting for them
+/// would never end.
 fn in_the_process_that_loaded_this(py: Python<'_>) -> PyResult<()> {
     if LOADED_IN.get().is_none_or(|loaded| *loaded == process::id()) {
         return Ok(());
@@ -33,12 +36,12 @@ fn in_the_process_that_loaded_this(py: Python<'_>) -> PyResult<()> {
     ))
 }
 
-/// A JSON text as Python's own values.
+/// A JSON text as native Python values.
 fn values<'py>(py: Python<'py>, json: &str) -> PyResult<Bound<'py, PyAny>> {
     py.import("json")?.call_method1("loads", (json,))
 }
 
-/// jointrig's native part; `jointrig` itself is what to import.
+/// jointrig's native part; import `jointrig` instead.
 #[pymodule(gil_used = false)]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     LOADED_IN.get_or_init(process::id);

@@ -1,4 +1,5 @@
-//! What is raised: the command's own sentences, as classes that Python code can tell apart (`jointrig._errors`).
+//! Exceptions: the command's messages, in classes that Python code can distinguish
+//! (`jointrig._errors`).
 
 use std::io;
 use std::path::Path;
@@ -7,7 +8,7 @@ use jointrig::analyse::AnalyseError;
 use jointrig::campaign::store::error::StoreError;
 use pyo3::prelude::*;
 
-/// An error of this class: the sentence, the place, and whether the sentence ends with what to do.
+/// An error of this class: the message, the path, and whether the message ends with advice.
 fn raised(py: Python<'_>, class: &str, sentence: &str, place: Option<&Path>, with_advice: bool) -> PyErr {
     let place = place.map(|path| path.display().to_string());
     let made = py
@@ -43,7 +44,7 @@ pub fn file(py: Python<'_>, place: &Path, error: &StoreError) -> PyErr {
     }
 }
 
-/// A file that is no campaign cannot be read.
+/// A file that is not a campaign cannot be read.
 pub fn reading(py: Python<'_>, place: &Path, sentence: &str) -> PyErr {
     raised(py, "FileError", sentence, Some(place), false)
 }
@@ -55,17 +56,17 @@ pub fn writing(py: Python<'_>, place: &Path, error: &io::Error) -> PyErr {
     raised(py, "FileError", &sentence, Some(place), true)
 }
 
-/// What was asked for cannot be done with what is there.
+/// The request cannot be carried out with the available data.
 pub fn refused(py: Python<'_>, sentence: &str) -> PyErr {
     raised(py, "Refused", sentence, None, false)
 }
 
-/// The numbers make no sense.
+/// The numbers are invalid.
 pub fn data(py: Python<'_>, sentence: &str) -> PyErr {
     raised(py, "DataError", sentence, None, false)
 }
 
-/// A fault of jointrig.
+/// An internal error of jointrig.
 pub fn panicked(py: Python<'_>, told: &str) -> PyErr {
     let sentence = format!("jointrig has a fault ({told}): report it with what you called");
     raised(py, "Error", &sentence, None, true)

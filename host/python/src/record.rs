@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 
 use crate::raised;
 
-/// One firing of the hammer: what was measured, and what was made of it.
+/// One firing of the hammer: the measured data and their evaluation.
 #[pyclass(module = "jointrig._native", frozen)]
 pub struct Record {
     path: PathBuf,
@@ -22,7 +22,7 @@ pub struct Record {
 }
 
 impl Record {
-    /// All that can be read, in the order in which they were measured.
+    /// All readable records, in the order in which they were measured.
     pub fn all(store: &Store) -> Result<Vec<Self>, StoreError> {
         let cells: HashMap<i64, Cell> = store.cells()?.into_iter().map(|row| (row.id, row.cell)).collect();
         let path = store.path().to_owned();
@@ -37,7 +37,7 @@ impl Record {
         store.channels(self.row.session).map_err(|error| raised::file(py, &self.path, &error))
     }
 
-    /// The file, its channels, and the place of one of them.
+    /// The file, its channels, and the index of one of them.
     fn channel(&self, py: Python<'_>, name: &str) -> PyResult<(Store, ChannelMap, usize)> {
         let store =
             Store::open_read_only(&self.path).map_err(|error| raised::file(py, &self.path, &error))?;
@@ -78,19 +78,19 @@ impl Record {
         &self.cell.response
     }
 
-    /// Which attempt at its cell, from 0.
+    /// Number of the attempt at its cell, from 0.
     #[getter]
     fn attempt(&self) -> u32 {
         self.row.attempt
     }
 
-    /// The verdict at the time.
+    /// The verdict at the time of measurement.
     #[getter]
     fn verdict(&self) -> &'static str {
         self.row.verdict.name()
     }
 
-    /// The verdict that counts: a person's, where there is one.
+    /// The verdict that counts: the user's, if there is one.
     #[getter]
     fn standing(&self) -> &'static str {
         self.row.standing().name()
@@ -102,25 +102,25 @@ impl Record {
         self.row.kept()
     }
 
-    /// What was measured for the verdict.
+    /// The measured value on which the verdict is based.
     #[getter]
     fn measure(&self) -> f64 {
         self.row.measure
     }
 
-    /// The limit that it was held against.
+    /// The limit with which it was compared.
     #[getter]
     fn limit(&self) -> f64 {
         self.row.limit
     }
 
-    /// Both in words.
+    /// Measure and limit in words.
     #[getter]
     fn sentence(&self) -> &str {
         &self.row.sentence
     }
 
-    /// When the trigger was, RFC 3339, UTC.
+    /// Time of the trigger, RFC 3339, UTC.
     #[getter]
     fn utc(&self) -> &str {
         &self.row.utc
@@ -154,7 +154,7 @@ impl Record {
         Ok(self.map(py, &store)?.channels.iter().map(|channel| channel.name.to_string()).collect())
     }
 
-    /// (channel, sample) int16: the codes as they were measured.
+    /// (channel, sample) int16: the codes as measured.
     #[getter]
     fn codes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i16>>> {
         let read = py.detach(|| {
@@ -166,7 +166,8 @@ impl Record {
         codes.into_pyarray(py).reshape(shape)
     }
 
-    /// (sample,) float64 in SI: one channel by its name, as measured; [`Record::delay_s`] says by how much it is late.
+    /// (sample,) float64 in SI: one channel by its name, as measured; [`Record::delay_s`] is its
+    /// delay.
     fn signal<'py>(&self, py: Python<'py>, channel: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (store, map, place) = self.channel(py, channel)?;
         let read = py.detach(move || Ok(map.to_si(place, store.samples(&self.row)?.channel(place))));
@@ -174,7 +175,7 @@ impl Record {
         Ok(signal.into_pyarray(py))
     }
 
-    /// By how much a channel is late, s.
+    /// Delay of a channel, s.
     fn delay_s(&self, py: Python<'_>, channel: &str) -> PyResult<f64> {
         let (_, map, place) = self.channel(py, channel)?;
         Ok(f64::from(map.channels[place].delay_ns) * 1e-9)

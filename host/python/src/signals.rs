@@ -1,4 +1,4 @@
-//! Arrays from anywhere: FRFs of impact records, and loops.
+//! Analyses of arrays: FRFs of impact records, and loops.
 
 use jointrig::analyse::{Findings, RecordLoops};
 use jointrig::campaign::verdict::{Kind, Limits, judge_all};
@@ -109,12 +109,12 @@ fn estimated_by(name: &str) -> Option<Estimator> {
     }
 }
 
-/// One column a line.
+/// One column per line.
 fn columns<T: Scalar>(rows: Vec<Vec<T>>) -> Vec<DMatrix<T>> {
     rows.into_iter().map(|row| DMatrix::from_column_slice(row.len(), 1, &row)).collect()
 }
 
-/// Loops of a time record, what `jointrig hysteresis` finds in them.
+/// Loops of a time record, as found by `jointrig hysteresis`.
 #[pyfunction]
 #[pyo3(signature = (*, fs_hz, velocity_a, velocity_b, force_n, excitation_hz=None, normal_load_n=None))]
 pub fn hysteresis(

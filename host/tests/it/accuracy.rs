@@ -1,7 +1,8 @@
-//! The recommended estimate on twenty simulated campaigns: its interval must hold what was put in.
+//! The recommended estimate on twenty simulated campaigns: its interval must contain the true
+//! value.
 //!
-//! The rig has a rigid clamp and the default errors of position, aim and angle; each campaign has its own. The ignored test
-//! prints the tables of `docs/accuracy.md`:
+//! The rig has a rigid clamp and the default errors of position, aim and angle, drawn separately
+//! for each campaign. The ignored test prints the tables of `docs/accuracy.md`:
 //!
 //!     cargo test --release -p jointrig --test accuracy -- --ignored --nocapture
 #![cfg(feature = "sim")]
@@ -18,7 +19,7 @@ use simulated::{campaign, geometry, measure, measure_with_hits, rigid_rig};
 
 const CAMPAIGNS: u64 = 20;
 const BAND: Band = Band { low_hz: 300.0, high_hz: 600.0 };
-/// Quiet and loud vibrometer, (m/s)/√Hz.
+/// Quiet and noisy vibrometer, (m/s)/√Hz.
 const QUIET: f64 = 0.05e-6;
 const LOUD: f64 = 0.2e-6;
 
@@ -41,12 +42,12 @@ impl From<&FittedDof> for Value {
     }
 }
 
-/// What came of all campaigns of one kind.
+/// Results of all campaigns of one kind.
 struct Outcome {
     mean: f64,
     std: f64,
     covered: usize,
-    /// Half width over value, the median of all; infinite if most are not identified.
+    /// Median of the ratio of half width to value; infinite if most are not identified.
     half_width: f64,
     not_identified: usize,
 }
@@ -90,7 +91,7 @@ fn recommended(truth: f64, floor: f64) -> Outcome {
             let ajb = measure(&config, Configuration::Ajb, &geometry.ajb, floor, seed, lines);
             let priors = Priors::default();
             let found = averaged(&ajb.frf, &geometry, IdmSet::Six, BAND, &priors).expect("data");
-            // the contact's rotations are a thousandth of what the arms' inertia holds against them
+            // the rotational impedance of the contact is a thousandth of that of the arms' inertia
             for dof in [Dof::Rx, Dof::Ry, Dof::Rz] {
                 let rotation = &found.joint[&dof];
                 assert!(!rotation.identified && rotation.ci95[0] < 22.0, "seed {seed}: {dof} {rotation:?}");
@@ -124,7 +125,7 @@ fn fitted(truth: f64, floor: f64) -> Outcome {
     Outcome::of(&found, truth)
 }
 
-/// What the estimate promises, at a floor.
+/// Requirements for the estimate at a noise floor.
 fn keeps_its_promise(outcome: &Outcome, truth: f64, floor: f64) {
     let case = format!("{:.0} N/µm at {:.2} µm/s/√Hz", truth * 1e-6, floor * 1e6);
     assert!(outcome.covered >= 17, "{case}: {} of {CAMPAIGNS} covered", outcome.covered);
@@ -148,7 +149,7 @@ fn the_interval_covers_the_contact_of_a_loud_campaign() {
     keeps_its_promise(&recommended(180e6, LOUD), 180e6, LOUD);
 }
 
-/// The fit over six of its bands; the whole of it is in the table below.
+/// The fit over six of its bands; the table below covers all bands.
 #[test]
 fn the_fit_covers_the_contact_and_describes_the_data() {
     let (config, geometry) = (rigid_rig(180e6), geometry());
@@ -161,13 +162,13 @@ fn the_fit_covers_the_contact_and_describes_the_data() {
         let z = found.joint[&Dof::Z];
         assert!(z.identified && z.ci95[0] < 180e6 && 180e6 < z.ci95[1], "seed {seed}: {z:?}");
         assert!((z.ci95[1] - z.ci95[0]) / 2.0 < 0.1 * z.stiffness, "seed {seed}: {z:?}");
-        // 10 N m/rad is a quarter of a thousandth of what the arms' inertia holds against it: no campaign can tell
+        // 10 N m/rad is 1/4000 of the impedance of the arms' inertia: it cannot be identified
         assert!(!found.joint[&Dof::Ry].identified, "seed {seed}: {:?}", found.joint[&Dof::Ry]);
         assert!((0.6..1.15).contains(&found.chi_square_per_dof), "seed {seed}: {}", found.chi_square_per_dof);
     }
 }
 
-/// Hits drawn anew show the noise that was propagated, and the same figures every time.
+/// The scatter of redrawn hits agrees with the propagated noise, and is the same in every run.
 #[test]
 fn the_bootstrap_agrees_with_the_propagated_noise() {
     let (config, geometry) = (rigid_rig(180e6), geometry());
@@ -192,7 +193,8 @@ fn the_bootstrap_agrees_with_the_propagated_noise() {
         ajb.hits.into_iter().filter(|c| hit(&c.input) && interface(&c.outputs[0])).collect();
     let drawn = prepared.bootstrap(&cells, 200, 7).expect("every cell")[&Dof::Z];
     let propagated = prepared.estimate().joint[&Dof::Z].std_noise;
-    // eight hits drawn from themselves scatter by √(7/8); 200 replicates know it to 5 %, the variance from eight hits to 10 %
+    // eight redrawn hits scatter by √(7/8); 200 replicates determine it to 5 %, eight hits
+    // determine the variance to 10 %
     let ratio = drawn.std / propagated;
     assert!((0.7..1.3).contains(&ratio), "bootstrap {:.3e} against {propagated:.3e}", drawn.std);
     assert_eq!(prepared.bootstrap(&cells, 200, 7).expect("every cell")[&Dof::Z], drawn);
@@ -234,12 +236,12 @@ fn table_of_every_method() {
     }
 }
 
-/// Contact and floor.
+/// All combinations of contact and noise floor.
 fn cases() -> impl Iterator<Item = (f64, f64)> {
     [95e6, 180e6, 320e6].into_iter().flat_map(|truth| [QUIET, LOUD].map(|floor| (truth, floor)))
 }
 
-/// Each method line by line, six modes; its interval knows the scatter of the lines and nothing else.
+/// Each method line by line, six modes; its interval only contains the scatter of the lines.
 fn every_method(truth: f64, floor: f64) {
     let (config, geometry) = (rigid_rig(truth), geometry());
     let found: Vec<_> = (1..=CAMPAIGNS)

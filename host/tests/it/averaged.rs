@@ -1,4 +1,4 @@
-//! The estimate to quote, on exact FRFs of a rig whose joint is known.
+//! The recommended estimate on exact FRFs of a rig with a known joint.
 
 use jointrig::exchange::{read_frf, read_positions};
 use jointrig::substructuring::averaged::{Priors, averaged};
@@ -24,8 +24,8 @@ fn exact_data_give_the_contact_exactly() {
     let (ajb, geometry) = rigid();
     let found = averaged(&ajb, &geometry, IdmSet::Six, BAND, &NOWHERE_WRONG).expect("exact data");
     let z = found.joint[&Dof::Z];
-    // Y^J of K + sC is averaged over lines and inverted at the mean s: the loss factor's square, (1.5e-5 · ω)², differs
-    // over the band by 1e-3 at most
+    // Y^J of K + sC is averaged over lines and inverted at the mean s: the square of the loss
+    // factor, (1.5e-5 · ω)², differs over the band by 1e-3 at most
     assert!((z.stiffness / 180e6 - 1.0).abs() < 1e-3, "{z:?}");
     assert!((found.joint[&Dof::Y].stiffness / 260e6 - 1.0).abs() < 1e-3);
     assert!((found.joint[&Dof::Rx].stiffness / 22.0 - 1.0).abs() < 1e-3);

@@ -1,8 +1,10 @@
-//! The stiffness between the arms on random rigs: its interval must hold the truth, and where nothing can be said it must be none.
+//! The stiffness between the arms on random rigs: its interval must cover the truth, and there must
+//! be no answer where the data do not allow one.
 //!
-//! Contacts of 60 to 600 N/µm, clamps of 0.3 to 3 times the default's or none, the clamp's levers, the specimen's local mode, arms,
-//! load cells and the vibrometer's floor vary at once; every fifth rig has a clamp so far off the contact's axis that the
-//! specimen's local mode shows between the arms. The ignored test prints the table of `docs/accuracy.md`:
+//! Contacts of 60 to 600 N/µm, clamps of 0.3 to 3 times the default's or none, the clamp's levers,
+//! the specimen's local mode, arms, load cells and the vibrometer's floor vary simultaneously;
+//! every fifth rig has a clamp so far from the contact's axis that the specimen's local mode is
+//! visible between the arms. The ignored test prints the table of `docs/accuracy.md`:
 //!
 //!     cargo test --release -p jointrig --test between_arms -- --ignored --nocapture
 #![cfg(feature = "sim")]
@@ -28,7 +30,7 @@ struct Case {
     truth: f64,
 }
 
-/// 1/C_zz of contact and clamp in series at the virtual points, levers included.
+/// 1/C_zz of contact and clamp in series at the virtual points, including levers.
 fn truth(config: &RigConfig) -> f64 {
     let compliance = |position_m: [f64; 3], k: [f64; 3], turning: [f64; 3]| {
         let own = Matrix6::from_diagonal(&Vector6::from_iterator(k.iter().chain(&turning).map(|k| 1.0 / k)));
@@ -98,13 +100,15 @@ impl Case {
 
 #[test]
 fn the_default_rig_is_26_6_between_its_arms() {
-    // 1/180 + 1/60 and the lever of 10 mm on 6500 N m/rad: 0.00556 + 0.01667 + 0.01538 µm/N, and 1.25e-5 m on 4.95 N m/rad
+    // 1/180 + 1/60 and the lever of 10 mm on 6500 N m/rad: 0.00556 + 0.01667 + 0.01538 µm/N, and
+    // 1.25e-5 m on 4.95 N m/rad
     let series: f64 = 1.0 / (1.0 / 180e6 + 1.0 / 60e6 + 1e-4 / 6500.0 + 1.25e-5f64.powi(2) / 4.95);
     assert!((truth(&RigConfig::default()) / series - 1.0).abs() < 1e-9);
     assert!((series - 26.6e6).abs() < 0.05e6);
 }
 
-/// A soft, a stiff and a clampless rig over six of the fit's bands; many over all of it are in the table below.
+/// A soft rig, a stiff one and one without a clamp over six of the fit's bands; the table below has
+/// many over all bands.
 #[test]
 fn an_answer_on_random_rigs_covers_the_truth() {
     let band = Band { low_hz: 400.0, high_hz: 490.0 };
@@ -117,7 +121,7 @@ fn an_answer_on_random_rigs_covers_the_truth() {
     }
 }
 
-/// A floor that is told apart in the table, (m/s)/√Hz.
+/// Noise floor from which the table has a separate row, (m/s)/√Hz.
 const LOUD: f64 = 0.08e-6;
 
 #[test]

@@ -1,4 +1,4 @@
-//! Interface modes by CMIF, against an independent implementation.
+//! Interface modes by CMIF, compared with an independent implementation.
 
 use jointrig::exchange::{read_frf, read_positions};
 use jointrig::substructuring::cmif::cmif;
@@ -27,7 +27,7 @@ fn singular_values_are_those_of_an_independent_implementation() {
                 assert!((found_value - wanted).abs() < 1e-9 * found.singular_values[l][0]);
             }
         }
-        // the arms are rigid bodies: six motions of each virtual point are all there is
+        // the arms are rigid bodies, so six motions of each virtual point describe them completely
         assert!(found.explained[&6] > 0.9, "{:?}", found.explained);
         assert!(found.reason.contains("modes are the fewest"), "{}", found.reason);
         for vectors in &found.participation {

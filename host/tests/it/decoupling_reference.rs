@@ -1,8 +1,10 @@
-//! The front door on exact FRFs of a rig whose joint is known, against an independent implementation's figures.
+//! The main analysis function on exact FRFs of a rig with a known joint, compared with an
+//! independent implementation's results.
 //!
-//! `frf_rigid`: rigid clamp, the contact's 180 N/µm are visible. `frf_default`: flexible clamp between the measured points
-//! and the contact, so no arm-based method may return the contact stiffness. Lines 300…600 Hz, step 4 Hz. `frf_specimen`: the same
-//! clamp, but the points sit on the specimens, so that the contact is visible again; step 20 Hz.
+//! `frf_rigid`: rigid clamp, the contact's 180 N/µm are visible. `frf_default`: flexible clamp
+//! between the measured points and the contact, so no method with points on the arms may return the
+//! contact stiffness. Lines 300…600 Hz, step 4 Hz. `frf_specimen`: the same clamp, but the points
+//! are on the specimens, so that the contact is visible again; step 20 Hz.
 
 use jointrig::exchange::{read_frf, read_positions};
 use jointrig::substructuring::*;
@@ -58,8 +60,9 @@ fn check_case(name: &str) {
             .find(|r| r.method == method && r.idms as f64 == number(row, "idms"))
             .expect("the same methods");
         let z = got.stiffness_n_per_m[&Dof::Z];
-        // With 6 IDMs and a rigid clamp the methods are exact: conditioning leaves 1e-8, 1e-5 is generous. Elsewhere both
-        // implementations evaluate one function of the data; 1e-3 (5e-3 for the std) is far above their rounding.
+        // With 6 IDMs and a rigid clamp the methods are exact: conditioning leaves errors of 1e-8,
+        // and 1e-5 is a generous tolerance. Elsewhere both implementations evaluate the same
+        // function of the data; 1e-3 (5e-3 for the std) is far above their rounding.
         let tolerance = if row["is_truth"] == true { 1e-5 } else { 1e-3 };
         let close = |what: &str, got: f64, wanted: f64, tolerance: f64| {
             assert!(
@@ -75,16 +78,17 @@ fn check_case(name: &str) {
         if row["is_truth"] == true {
             assert!((z.mean / 180e6 - 1.0).abs() < 1e-5, "the contact's 180 N/µm");
         } else if row["tol"]["std"].is_number() {
-            // not where the scatter is mere rounding
+            // not where the scatter is only rounding
             close("std", z.std, number(row, "std"), 5e-3);
         }
         assert_eq!(got.lines as f64, number(row, "lines"));
-        // Three internals for two, four or six interface DoFs: the printed form always says so here.
+        // Three internals for two, four or six interface DoFs: the printed form always reports
+        // it here.
         assert_eq!(method == "internal-printed", got.warnings.iter().any(|w| w.contains("Π has rank")));
     }
     for quality in &result.virtual_points {
         let wanted = &case.expected["consistency"][format!("{}|{}", quality.substructure, quality.idms)];
-        // the lines that the case has figures for
+        // the lines for which the case has reference values
         for line in ["300", "500", "600"].into_iter().filter(|l| wanted["overall_sensor"][l].is_number()) {
             let l = quality.frequency_hz.iter().position(|f| f.to_string() == line).expect("the line");
             // both are projections in double precision
@@ -92,7 +96,8 @@ fn check_case(name: &str) {
             let impact = quality.consistency.overall_impact[l] - number(&wanted["overall_impact"], line);
             assert!(sensor.abs() < 1e-9 && impact.abs() < 1e-9);
         }
-        // the rig is a passive, reciprocal structure; with fewer modes than it moves in, neither is seen exactly
+        // the rig is a passive, reciprocal structure; with fewer modes than it moves in, the result
+        // shows neither exactly
         if quality.idms == 6 {
             assert!(quality.passivity.iter().all(|p| *p == 1.0), "{:?}", quality.passivity);
             assert!(quality.reciprocity > 1.0 - 1e-9, "{}", quality.reciprocity);
@@ -106,7 +111,8 @@ fn rigid_clamp() {
     check_case("frf_rigid");
 }
 
-/// The other three rearrangements of Eq. (1) have no figures of their own: with six modes and a rigid clamp they are exact.
+/// There are no reference values for the other three rearrangements of Eq. (1): with six modes and
+/// a rigid clamp they are exact.
 #[test]
 fn the_other_rearrangements_are_exact_too() {
     let case = Case::read("frf_rigid");
@@ -114,7 +120,7 @@ fn the_other_rearrangements_are_exact_too() {
     let result = case.identify(&methods, &[IdmSet::Six]).expect("files that fit");
     assert_eq!(result.joint.len(), 3, "{:?}", result.refused);
     for row in &result.joint {
-        // conditioning leaves 1e-8
+        // conditioning leaves errors of 1e-8
         assert!((row.stiffness_n_per_m[&Dof::Z].mean / 180e6 - 1.0).abs() < 1e-5, "{row:?}");
     }
 }
@@ -130,7 +136,8 @@ fn points_on_the_specimens() {
     check_case("frf_specimen");
 }
 
-/// Double precision and condition numbers up to 1e6 leave nine digits of the contact's stiffness, along every motion.
+/// Double precision and condition numbers up to 1e6 leave nine digits of the contact's stiffness,
+/// along every motion.
 #[test]
 fn exact_interface_data_give_the_joint_to_nine_digits() {
     let truth = [
@@ -154,7 +161,7 @@ fn exact_interface_data_give_the_joint_to_nine_digits() {
     }
 }
 
-/// A choice that is none of the paper's is used as named.
+/// A set of modes that the paper does not have is used as named.
 #[test]
 fn any_named_set_of_modes() {
     let set = IdmSet::of(&[Dof::X, Dof::Z, Dof::Ry]).expect("three modes");
@@ -162,7 +169,8 @@ fn any_named_set_of_modes() {
     let row = &result.joint[0];
     assert_eq!((row.idms, row.modes.as_slice()), (3, [Dof::X, Dof::Z, Dof::Ry].as_slice()));
     assert_eq!(row.stiffness_n_per_m.keys().copied().collect::<Vec<_>>(), [Dof::X, Dof::Z, Dof::Ry]);
-    // seven modes with an extension along x: the sensors would do, but all impacts along x have one x
+    // seven modes with an extension along x: the sensors would suffice, but all impacts along x
+    // have the same x coordinate
     let mut modes = Dof::RIGID.to_vec();
     modes.push(Dof::Ex);
     let set = IdmSet::of(&modes).expect("seven modes");
@@ -171,7 +179,8 @@ fn any_named_set_of_modes() {
     assert!(reason.contains("the impacts") && reason.contains("6 of 7 motions"), "{reason}");
 }
 
-/// The same values in another quantity or under another window; one line, where asked for, is 1 Hz higher.
+/// The same values as another quantity or with another window; the line `higher`, if given, is 1 Hz
+/// higher.
 fn relabelled(frf: &Frf, higher: Option<usize>, sigma_per_s: f64, quantity: MotionQuantity) -> Frf {
     let mut frequency_hz = frf.frequency_hz().to_vec();
     if let Some(line) = higher {
@@ -181,7 +190,7 @@ fn relabelled(frf: &Frf, higher: Option<usize>, sigma_per_s: f64, quantity: Moti
     Frf::new(frequency_hz, sigma_per_s, quantity, outputs, inputs, frf.lines().to_vec()).expect("all agree")
 }
 
-/// The same without a number in this cell at a line.
+/// The same with NaN in this cell at one line.
 fn broken(frf: &Frf, line: usize, row: usize) -> Frf {
     frf.clone().map_lines(|l, mut y| {
         if l == line {
@@ -213,10 +222,11 @@ fn files_that_do_not_fit_are_refused_with_the_reason() {
 #[test]
 fn missing_and_broken_cells_refuse_only_the_methods_that_need_them() {
     let mut case = Case::read("frf_rigid");
-    // A4 is a spare: it may be anything.
+    // A4 is not used, so it may contain anything.
     let spare = case.a.outputs().iter().position(|o| o == "A4:x").expect("the spare");
     case.a = broken(&case.a, 0, spare);
-    // An interface cell of the assembly between A's virtual point and A's impacts: `internal` does not use it.
+    // An interface cell of the assembly between A's virtual point and A's impacts: `internal` does
+    // not use it.
     let row = case.ajb.outputs().iter().position(|o| o == "A1:x").expect("a channel of A");
     case.ajb = broken(&case.ajb, 5, row);
     let result = case.identify(&Method::ALL, &[IdmSet::Six]).expect("most of it works");

@@ -1,23 +1,25 @@
-//! Files that were made to hurt, at every door of the command line: each is refused with a sentence that names the place, in little time
-//! and in no more memory than its size allows. The bound on memory is the operating system's, for the whole program.
+//! Malicious files at every entry point of the command line: each is refused with a message that
+//! names the problem, in a short time and with no more memory than its size allows. The operating
+//! system limits the memory of the whole program.
 #![cfg(target_os = "linux")]
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What the program takes for itself, without a file: its code, the threads' stacks.
+/// Memory of the program without a file: its code, the threads' stacks.
 const PROGRAM: u64 = 64 << 20;
-/// What any file may take beside four times its size.
+/// Memory allowed for any file in addition to four times its size.
 const BESIDE: u64 = 64 << 20;
-/// However large the file, seconds of the processor: a busy machine makes nobody slower by this clock.
+/// Limit of processor time, s, for any file size: other load on the machine does not affect
+/// processor time.
 const SECONDS: u64 = 10;
 
 fn data(file: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file)
 }
 
-/// A folder with the good files that the doors need beside the bad one.
+/// A folder with the valid files that the commands need in addition to the bad one.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder");
     for name in ["A.npz", "B.npz", "AJB.npz"] {
@@ -29,11 +31,12 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// Runs a command in `folder`, with memory for a file of `size` bytes; its exit code, and what it said.
+/// Runs a command in `folder`, with memory for a file of `size` bytes; returns its exit code and
+/// stderr.
 fn run(folder: &Path, line: &str, size: u64) -> (Option<i32>, String) {
     let kilobytes = (PROGRAM + BESIDE + 4 * size) / 1024;
     let limits = format!("ulimit -v {kilobytes} && ulimit -t {SECONDS} && exec \"$0\" \"$@\"");
-    // what waits for somebody takes no time of the processor
+    // a timeout, because a blocked program uses no processor time
     let out = Command::new("timeout")
         .args(["120", "sh", "-c", &limits])
         .arg(env!("CARGO_BIN_EXE_jointrig"))
@@ -45,7 +48,7 @@ fn run(folder: &Path, line: &str, size: u64) -> (Option<i32>, String) {
     (out.status.code(), String::from_utf8_lossy(&out.stderr).into_owned())
 }
 
-/// Every door that takes a file of others, with `FILE` in its place.
+/// Every command that reads external files, with `FILE` as a placeholder.
 const DOORS: [&str; 14] = [
     "import FILE --out o.npz",
     "import FILE --into c.jrig --configuration A",
@@ -63,9 +66,9 @@ const DOORS: [&str; 14] = [
     "demo --out d --rig FILE",
 ];
 
-/// The command refuses `file` and names it, and one of `parts` is in its words.
+/// The command refuses `file` and names it, and its message contains one of `parts`.
 fn refused(folder: &Path, door: &str, file: &str, parts: &[&str]) {
-    // a demo goes on with what is there
+    // a demo continues with existing files
     let _ = std::fs::remove_dir_all(folder.join("d"));
     let size = std::fs::metadata(folder.join(file)).map_or(0, |there| there.len());
     let (code, said) = run(folder, &door.replace("FILE", file), size);
@@ -75,7 +78,7 @@ fn refused(folder: &Path, door: &str, file: &str, parts: &[&str]) {
     assert!(!said.contains("panicked") && said.lines().count() <= 12, "{door}: {said}");
 }
 
-/// An archive of one array for each name: a header, and what follows it.
+/// An archive with one array per name: a header, and the bytes after it.
 fn npz(folder: &Path, file: &str, names: &[&str], header: &str, zeros: usize) {
     let mut zip = zip::ZipWriter::new(std::fs::File::create(folder.join(file)).expect("writable"));
     for name in names {
@@ -88,7 +91,7 @@ fn npz(folder: &Path, file: &str, names: &[&str], header: &str, zeros: usize) {
     zip.finish().expect("closed");
 }
 
-/// The arrays that the readers ask for.
+/// The arrays that the readers request.
 const ARRAYS: [&str; 8] = [
     "fs.npy",
     "force.npy",
@@ -100,7 +103,7 @@ const ARRAYS: [&str; 8] = [
     "load_cells.npy",
 ];
 
-/// Doors of arrays and functions.
+/// Commands that read arrays and functions.
 const OF_ARRAYS: [&str; 6] = [DOORS[0], DOORS[1], DOORS[2], DOORS[3], DOORS[4], DOORS[5]];
 
 #[test]
@@ -216,7 +219,7 @@ fn large_files_of_any_kind_take_seconds_and_four_times_their_size() {
         }
         std::fs::remove_file(at.join(name)).expect("removed");
     }
-    // settings as deep as they may be long
+    // nested as deeply as the size limit allows
     for text in ["a = ".to_owned() + &"[".repeat(500_000), "[a.".to_owned() + &"b.".repeat(400_000)] {
         std::fs::write(at.join("deep.toml"), text).expect("written");
         for door in [DOORS[6], DOORS[7], DOORS[8], DOORS[13]] {
@@ -285,7 +288,7 @@ fn measured(folder: &Path) {
     }
 }
 
-/// Every door that reads a campaign.
+/// Every command that reads a campaign.
 const OF_CAMPAIGNS: [&str; 8] = [
     "campaign verify c.jrig",
     "campaign verify c.jrig --deep",
@@ -337,7 +340,7 @@ fn campaign_files_that_claim_too_much_are_refused_or_named() {
             file.execute_batch(&format!("DROP TRIGGER {name}")).expect("SQL");
         }
         file.execute_batch(sql).expect("SQL");
-        // as they were: the file looks like one of ours
+        // unchanged, so that the file looks like a valid campaign
         for definition in definitions {
             let _ = file.execute_batch(&definition);
         }

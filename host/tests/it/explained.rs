@@ -1,4 +1,5 @@
-//! What errors of position explain, on exact FRFs of a rig whose joint is known.
+//! The part of the deviations that position errors explain, on exact FRFs of a rig with a known
+//! joint.
 
 use jointrig::exchange::{read_frf, read_positions};
 use jointrig::substructuring::averaged::Priors;
@@ -35,7 +36,8 @@ fn exact_data_agree_everywhere_and_the_draws_say_what_half_a_millimetre_does() {
     assert_eq!(found, judged(&frfs, &geometry), "the same data give the same figures");
 }
 
-/// A spring and mass between a point of A and a point of B, resonant at 520 Hz: far below it a soft spring, near it a path.
+/// A spring and mass between a point of A and a point of B, resonant at 520 Hz: a soft spring far
+/// below it, a parallel path near it.
 #[test]
 fn a_path_beside_the_joint_is_seen_above_its_frequency() {
     let ([a, b, ajb], geometry) = rigid();
@@ -53,7 +55,8 @@ fn a_path_beside_the_joint_is_seen_above_its_frequency() {
         let s = ajb.s(l);
         let own = std::f64::consts::TAU * 520.0;
         let path = 20e6 / (1.0 + 0.02 * s / own + (s / own) * (s / own));
-        // the files hold mobilities: force = path · displacement = path / s · velocity; the ends count as driving points
+        // the files contain mobilities: force = path · displacement = path / s · velocity; the ends
+        // count as driving points
         let gain = path / s;
         let column = (0..y.nrows())
             .map(|r| y[(r, ends[0].1)] * ends[0].2 - y[(r, ends[1].1)] * ends[1].2)
@@ -71,6 +74,6 @@ fn a_path_beside_the_joint_is_seen_above_its_frequency() {
     let priors = Priors::default();
     let found = Explained::of([&a, &b, &changed], &geometry, IdmSet::Six, below, &priors).expect("lines");
     let [from, to] = found.range(below, USUAL).expect("there the path is soft");
-    // the median's window is 75 Hz wide on either side
+    // the median's window extends 75 Hz to either side
     assert!(from <= 300.0 && (400.0..520.0).contains(&to), "{from} {to}");
 }

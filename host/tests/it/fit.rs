@@ -1,4 +1,4 @@
-//! The fit of K and C, on exact FRFs of a rig whose joint is known.
+//! The fit of K and C, on exact FRFs of a rig with a known joint.
 
 use jointrig::exchange::{read_frf, read_positions};
 use jointrig::substructuring::averaged::Priors;
@@ -20,7 +20,8 @@ struct Case {
 }
 
 impl Case {
-    /// The rigid clamp's exact FRFs, said to have this noise, relative to each file's mean size.
+    /// The rigid clamp's exact FRFs, declared to have this noise relative to each file's mean
+    /// magnitude.
     fn rigid(relative: f64) -> Case {
         let frf =
             ["A", "B", "AJB"].map(|f| read_frf(&data(&format!("frf_rigid/{f}.npz"))).expect("test data"));
@@ -50,7 +51,8 @@ fn exact_data_give_the_contact_exactly() {
         [(Dof::X, 180e6), (Dof::Y, 260e6), (Dof::Z, 180e6), (Dof::Rx, 22.0), (Dof::Ry, 10.0)]
     {
         let k = found.joint[&dof];
-        // the data are exact to 1e-12; what moves the estimate is the drawn bias of the noise that is only said to be there
+        // the data are exact to 1e-12; the estimate deviates because of the drawn bias of the
+        // declared noise
         let tolerance = if dof.is_rotation() { 1e-4 } else { 1e-6 };
         assert!((k.stiffness / stiffness - 1.0).abs() < tolerance, "{dof}: {k:?}");
     }
@@ -90,7 +92,7 @@ fn three_internals_are_enough() {
 #[test]
 fn what_the_model_cannot_describe_gives_no_bare_number() {
     let mut case = Case::rigid(1e-4);
-    // an assembly of another scale: no K and C makes that of these parts
+    // an assembly with a wrong scale: no K and C can produce it from these parts
     let [a, b, ajb] = case.frf;
     case.frf = [a, b, ajb.map_lines(|_, mut y| y *= nalgebra::Complex::from(1.5))];
     let options = Options { priors: NOWHERE_WRONG, mounting: 0.0, ..Options::default() };

@@ -1,5 +1,6 @@
-//! Slip under the hammer, over campaigns that nobody tuned for: the cells that a campaign of the contact measures, on rigs that differ
-//! in contact, clamps, masses, damping and noise, half of them stuck.
+//! Slip under the hammer, on randomly drawn campaigns for which nothing was tuned: the cells of a
+//! contact campaign, on rigs that differ in contact, clamps, masses, damping and noise, half of
+//! them stuck.
 //!
 //!     cargo test --release -p jointrig --test hammer_slip -- --ignored --nocapture
 #![cfg(feature = "sim")]
@@ -14,18 +15,21 @@ use rayon::prelude::*;
 
 const IMPACTS: [&str; 4] = ["AZ1", "AZ2", "AZ3", "I_MZ"];
 const RESPONSES: [&str; 7] = ["A1", "A2", "A3", "A4", "B1", "B2", "B3"];
-/// A coil pulse for some 50 N.
+/// A coil pulse for about 50 N.
 const PULSE_S: f64 = 3.5e-3;
 /// Scans of a record.
 const RECORD: usize = 20_480;
-/// The next hit waits until this part of the motion is left, and no longer than so many scans.
+/// The next hit waits until this fraction of the motion remains, and no longer than `SLOWEST`
+/// scans.
 const LEFT: f64 = 0.003;
 const SLOWEST: usize = 51_200;
-/// Sliding below this in a hit changes nothing that anybody could measure, m; elements of an Iwan contact creep so far.
+/// Sliding below this distance in a hit has no measurable effect, m; elements of an Iwan contact
+/// creep this far.
 const NOTHING_M: f64 = 2e-9;
 const MUCH_M: f64 = 10e-9;
 
-/// One campaign: every hit's response by cell, and how far the contact slid in the worst hit (m).
+/// One campaign: every hit's response by cell, and the largest sliding distance of the contact in a
+/// hit (m).
 struct Campaign {
     cells: Vec<(&'static str, Vec<HitResponse>)>,
     slid_m: f64,
@@ -43,7 +47,7 @@ impl Campaign {
     }
 }
 
-/// A rig of its own for each seed.
+/// A different rig for each seed.
 fn rig(seed: u64) -> RigConfig {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut between = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
@@ -74,7 +78,8 @@ fn rig(seed: u64) -> RigConfig {
     config.sensors.ldv_a.delay_s = between(0.0, 1e-4);
     config.sensors.ldv_b.delay_s = between(0.0, 1e-4);
     config.clamp.rigid = between(0.0, 1.0) < 0.3;
-    // one half linear, the other one slipping from 8 to 24 N on if the contact force reaches that
+    // one half linear, the other half slips at a limit between 8 and 24 N if the contact force
+    // reaches it
     config.contact.friction_coefficient = 0.5;
     config.contact.normal_load_n = between(8.0, 24.0) / 0.5;
     config.contact.iwan.spread = between(0.3, 0.95);
@@ -83,14 +88,14 @@ fn rig(seed: u64) -> RigConfig {
         2 => ContactLaw::Jenkins,
         _ => ContactLaw::Iwan,
     };
-    // a stiff contact between light bodies needs a finer step
+    // a stiff contact between light bodies needs a smaller step
     if Rig::new(&config, seed).is_err() {
         config.contact.slip_step_s = 1e-6;
     }
     config
 }
 
-/// Two good hits in each cell, the second on what the first one left.
+/// Two good hits in each cell, the second on the residual motion of the first.
 fn measured(config: &RigConfig, seed: u64) -> Campaign {
     let mut rig = Rig::new(config, seed).expect("a rig");
     let scale: Vec<f64> = rig.channels().iter().map(|c| c.step() * f64::from(c.polarity)).collect();
@@ -140,7 +145,8 @@ fn measured(config: &RigConfig, seed: u64) -> Campaign {
     Campaign { cells, slid_m, about }
 }
 
-/// Waits as the runner does, until 0.3 % of the hit's motion is left; after a mishap the cell is staged anew.
+/// Waits as the runner does, until 0.3 % of the hit's motion remains; after a mishap the cell is
+/// staged again.
 fn quieten(rig: &mut Rig, (impact, response): (&str, &str), energy_j: f64) {
     let mut codes = [0; 10];
     if rig.last_hit().is_some_and(|hit| hit.mishap != Mishap::None) {
@@ -154,7 +160,7 @@ fn quieten(rig: &mut Rig, (impact, response): (&str, &str), energy_j: f64) {
     }
 }
 
-/// What came of campaigns whose truth is beyond doubt.
+/// Results of campaigns with an unambiguous truth.
 #[derive(Debug, Default, Clone, Copy)]
 struct Tally {
     slipping: usize,
@@ -201,7 +207,7 @@ fn slip_is_told_from_stick_over_a_hundred_campaigns() {
     assert!(right * 100 >= 95 * (tally.slipping + tally.stuck), "{tally:?}");
 }
 
-/// Hits that are all alike say nothing, and a few of them neither.
+/// Hits that are all alike contain no information, and neither do a few of them.
 #[test]
 fn what_cannot_be_told_is_said() {
     let mut config = rig(4);

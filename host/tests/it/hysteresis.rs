@@ -1,4 +1,4 @@
-//! The command `hysteresis`, as a user runs it: good records, and records that are none.
+//! The command `hysteresis`, as a user runs it: valid and invalid records.
 #![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
 
 use jointrig::exchange::npz_output::NpzOutput;
@@ -31,7 +31,7 @@ fn one_document_with_raw_loops_and_corrected_ones_where_the_arm_is_stated() {
     for one in loops {
         assert_eq!((&one["kind"], &one["shape"]), (&"shaker".into(), &"elliptical".into()));
         assert!(one["k_t_n_per_m"].is_null());
-        // least squares beside peak secant and fundamental: names of their own
+        // least squares in addition to peak secant and fundamental, under separate names
         let of = |name: &str| one[name].as_f64().unwrap() * 1e-6;
         assert!((of("k_secant_n_per_m") / 213.0 - 1.0).abs() < 0.05, "{one}");
         assert!((of("k_fundamental_n_per_m") / 213.0 - 1.0).abs() < 0.05, "{one}");
@@ -61,7 +61,7 @@ fn an_impact_beside_a_hidden_resonance_has_no_k_t() {
 /// Name, shape and values of each array.
 type Arrays = Vec<(&'static str, Vec<usize>, Vec<f64>)>;
 
-/// What is wrong, how it is made so, and the words that say it.
+/// The error, how it is introduced, and words of its message.
 type Change = (&'static str, fn(&mut Arrays), &'static [&'static str]);
 
 /// A shaker record of 20 cycles of 200 Hz at 20 kHz, changed before it is written.
@@ -92,11 +92,12 @@ fn other_rates_and_frequencies_do_as_well() {
     let folder = tempfile::tempdir().unwrap();
     let found = json(&written(folder.path(), |_| {}), &[]);
     let one = &found["hysteresis"][0];
-    // 30 N over 2e-4 m/s at 200 Hz; the trapezoid at a hundred samples to a cycle loses 3e-4
+    // 30 N over 2e-4 m/s at 200 Hz; the trapezoidal rule with a hundred samples per cycle loses
+    // 3e-4
     let stiffness = 30.0 / (2e-4 / (std::f64::consts::TAU * 200.0));
     assert_eq!(one["shape"], "stuck");
     assert!((one["k_t_n_per_m"]["mean"].as_f64().unwrap() / stiffness - 1.0).abs() < 1e-3, "{one}");
-    // without its frequency it is found in the record
+    // without a given frequency it is found in the record
     let guessed = json(&written(folder.path(), |arrays| drop(arrays.pop())), &[]);
     assert_eq!(guessed["hysteresis"][0]["kind"], "shaker");
     assert!((guessed["hysteresis"][0]["frequency_hz"].as_f64().unwrap() - 200.0).abs() < 1.0);
@@ -144,13 +145,14 @@ fn what_is_no_record_is_refused_by_name_place_and_remedy() {
     assert!(String::from_utf8_lossy(&gone.stderr).contains("none.npz"));
 }
 
-/// A slider of 100 N/µm and 100 N under ± 5 µm at 25 Hz, its force late by so many of the 1024 samples to a cycle.
+/// A slider of 100 N/µm and 100 N under ± 5 µm at 25 Hz, its force late by `late` of the 1024
+/// samples per cycle.
 fn slider(folder: &Path, late: usize, more: Vec<(&'static str, Vec<usize>, Vec<f64>)>) -> PathBuf {
     let (cycle, cycles) = (1_024, 8);
     let x: Vec<f64> =
         (0..cycle * cycles).map(|i| 5e-6 * (std::f64::consts::TAU * i as f64 / cycle as f64).sin()).collect();
     let mut at = 0.0;
-    // a cycle ahead, which loads it
+    // starts a cycle earlier, which loads it
     let force: Vec<f64> = x[..cycle]
         .iter()
         .chain(&x)
@@ -203,7 +205,7 @@ fn the_text_has_every_figure_and_finding_and_calls_the_contacts_own_slope_k_t() 
     let in_step = slider(folder.path(), 0, Vec::new());
     let said = String::from_utf8(run(&in_step, &[]).stdout).unwrap();
     assert!(said.contains("--normal-load") && !said.contains("!!"), "{said}");
-    // an ellipse has no k_T, and the text says why
+    // an ellipse has no k_T, and the text gives the reason
     let said = String::from_utf8(run(&case("elliptical"), &[]).stdout).unwrap();
     assert!(said.contains("k_T: none") && said.contains("resonates"), "{said}");
 }

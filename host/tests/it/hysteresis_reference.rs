@@ -1,4 +1,5 @@
-//! Five records of known truth, checked quantity by quantity with the tolerance and reason that stand beside each in the data.
+//! Five records with known truth; each quantity is checked with the tolerance that the data state
+//! with a reason.
 
 use jointrig::exchange::read_hysteresis;
 use jointrig::hysteresis::{LoopAnalysis, analyse};
@@ -23,7 +24,7 @@ fn check(case: &str) -> LoopAnalysis {
             "k_secant_n_per_m" => json!(got.k_secant_n_per_m),
             "k_fundamental_n_per_m" => json!(got.k_fundamental_n_per_m.map(num_complex::Complex::norm)),
             "friction_limit_n" => json!(got.friction_limit_n),
-            // the load is not in the record
+            // the normal load is not in the record
             "friction_coefficient" => {
                 assert_eq!(got.friction_coefficient, None);
                 continue;
@@ -72,9 +73,11 @@ fn elliptical() {
 #[test]
 fn impact() {
     let got = check("impact");
-    // the mode's true frequency; a Hann window over a decay of 1 % damping resolves it to some tenths
+    // the mode's true frequency; a Hann window over a decay with 1 % damping resolves it to a few
+    // tenths of a hertz
     assert!((got.frequency_hz - 207.95).abs() < 1.0, "{}", got.frequency_hz);
-    // over nearly the sample ranges of the truth: 145.0 and 150.7 N/µm, whose 15 % are for free choice of the beginning
+    // over nearly the sample ranges of the truth, 145.0 and 150.7 N/µm; its tolerance of 15 %
+    // allows for a free choice of the start
     for (cycle, truth) in got.decay_cycles.iter().zip([145.04e6, 150.70e6]) {
         assert!((cycle.stiffness_n_per_m / truth - 1.0).abs() < 0.05, "{cycle:?}");
     }

@@ -1,4 +1,5 @@
-//! `jointrig identify` as a script sees it: documents, exit codes, and the reason of every refusal.
+//! `jointrig identify` as a script uses it: documents, exit codes, and the reason for every
+//! refusal.
 
 use jointrig::exchange::{read_frf, write_frf};
 use jointrig::substructuring::Frf;
@@ -10,13 +11,13 @@ fn data(file: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file)
 }
 
-/// The same values on another axis, under other names.
+/// The same values on another axis, with other names.
 fn relabelled(frf: &Frf, frequency_hz: Vec<f64>, outputs: Vec<String>) -> Frf {
     let (inputs, lines) = (frf.inputs().to_vec(), frf.lines().to_vec());
     Frf::new(frequency_hz, frf.sigma_per_s(), frf.quantity(), outputs, inputs, lines).expect("all agree")
 }
 
-/// Three FRF files and a geometry in a folder of their own, to be spoilt.
+/// Three FRF files and a geometry in a separate folder, to be damaged.
 struct Files {
     folder: tempfile::TempDir,
     geometry: PathBuf,
@@ -60,7 +61,7 @@ impl Files {
         command.arg("--geometry").arg(&self.geometry).args(further).output().expect("the command runs")
     }
 
-    /// Exit code 1, one to a few lines of reason on stderr.
+    /// Requires exit code 1 and a reason of one to a few lines on stderr.
     fn refused(&self, further: &[&str], parts: &[&str]) {
         let out = self.identify(further);
         let text = String::from_utf8_lossy(&out.stderr).into_owned();
@@ -83,7 +84,7 @@ fn every_method_finds_the_contact_of_a_rigid_clamp() {
         let z = &row["stiffness_n_per_m"]["z"];
         let mean = z["mean"].as_f64().expect("a number");
         if row["method"] != "internal-printed" {
-            // exact data and exact methods; conditioning leaves 1e-8
+            // exact data and exact methods; conditioning leaves errors of 1e-8
             assert!((mean / 180e6 - 1.0).abs() < 1e-5, "{row}");
             // the rig's joint is diagonal
             let coupling = row["coupling_si"]["y-z"]["mean"].as_f64().expect("a number");
@@ -98,7 +99,8 @@ fn every_method_finds_the_contact_of_a_rigid_clamp() {
     assert_eq!(best["noise_known"], false);
 }
 
-/// Two sets of two modes have the same count: each one's noise must stand beside its own spectrum.
+/// Two sets of two modes have the same count: the noise of each must be given with its own
+/// spectrum.
 #[test]
 fn the_noise_of_a_line_is_its_own_sets() {
     let files = Files::of("frf_rigid");
@@ -127,7 +129,8 @@ fn the_noise_of_a_line_is_its_own_sets() {
     assert_eq!(both, [first, second].concat());
 }
 
-/// Universal files of another program (58b), their names in the DOF labels, against an independent implementation's figures.
+/// Universal files of another program (58b) with names in the DOF labels, compared with an
+/// independent implementation's results.
 #[test]
 fn universal_files_are_read_as_npz_is() {
     let mut command = Command::new(env!("CARGO_BIN_EXE_jointrig"));
@@ -146,7 +149,8 @@ fn universal_files_are_read_as_npz_is() {
         let row = found["joint"].as_array().expect("rows").iter().find(same).expect("the same methods");
         let number = |v: &Value| v.as_f64().expect("a number");
         let (k, truth) = (number(&row["stiffness_n_per_m"]["z"]["mean"]), number(&wanted["mean"]));
-        // where the method is exact it is the contact's 180 N/µm; elsewhere one function of the same data
+        // where the method is exact it is the contact's 180 N/µm; elsewhere the same function of
+        // the same data
         assert!((k / truth - 1.0).abs() < number(&wanted["tol"]["mean"]), "{wanted}: {k}");
         assert_eq!(row["lines"], wanted["lines"]);
     }
@@ -159,7 +163,7 @@ fn a_damaged_universal_file_is_refused_with_its_name() {
     std::fs::write(&path, "    -1\n    58\nnothing\n").expect("written");
     let out = files.identify(&["--a", path.to_str().expect("a name")]);
     let text = String::from_utf8_lossy(&out.stderr);
-    // given twice is a wrong command line; alone it is bad data
+    // a duplicate is a command line error; the option alone is a data error
     assert_eq!(out.status.code(), Some(2), "{text}");
     let out = Command::new(env!("CARGO_BIN_EXE_jointrig"))
         .arg("identify")
@@ -211,7 +215,7 @@ fn a_sensor_set_of_rank_five_is_refused() {
     files.without_sensor("A3");
     files
         .refused(&["--method", "inverse", "--idms", "6"], &["inverse with 6 IDMs", "5 of 6 motions", "A1:x"]);
-    // what fewer modes allow is still answered
+    // results that fewer modes allow are still given
     let out = files.identify(&["--method", "inverse", "--idms", "2", "--json"]);
     assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
 }
@@ -231,7 +235,7 @@ fn three_internals_for_six_modes_are_refused() {
         &["--method", "internal", "--idms", "6"],
         &["internal with 6 IDMs", "3 internal impacts and 3 internal responses", "6 interface DoFs"],
     );
-    // the printed form answers, and says what it is worth
+    // the printed form gives a result and states its limits
     let out = files.identify(&["--method", "internal-printed", "--idms", "6", "--band", "300:600", "--json"]);
     assert_eq!(out.status.code(), Some(0));
     let found: Value = serde_json::from_slice(&out.stdout).expect("one JSON document");
@@ -286,14 +290,14 @@ fn files_of_overlapping_bands_are_answered_from_their_common_lines_and_it_is_sai
     assert_eq!((lines, missing.contains("in common")), (Value::from(51), false));
     files.change("AJB.npz", |frf| frf.band(300.0, 500.0));
     files.change("A.npz", |frf| {
-        // as six printed digits have it
+        // as printed with six digits
         let printed = frf.frequency_hz().iter().map(|f| f * (1.0 + 2e-6)).collect();
         relabelled(&frf, printed, frf.outputs().to_vec())
     });
     let (common, lines, missing) = joint(&files);
     assert_eq!(lines, 51);
     assert!(missing.contains("51 lines from 300") && missing.contains("500"), "{missing}");
-    // the data are exact, and so is the method
+    // the data and the method are exact
     assert!((common / whole - 1.0).abs() < 1e-4, "{common} {whole}");
     let text = files.identify(&asked);
     assert!(String::from_utf8_lossy(&text.stdout).contains("that A, B and AJB have in common"));

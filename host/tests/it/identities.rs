@@ -1,4 +1,5 @@
-//! The algebra of the methods on random well-posed structures: masses, dampers and springs on s = σ + iω, assembled directly.
+//! The algebra of the methods on random well-posed structures: masses, dampers and springs on
+//! s = σ + iω, assembled directly.
 
 use jointrig::substructuring::coupling::couple;
 use jointrig::substructuring::decoupling::{InverseBlock, PrimalBlock, interface, internal, inverse, primal};
@@ -23,7 +24,8 @@ fn definite(n: usize, v: &[f64], scale: f64) -> DMatrix<f64> {
     (&root * root.transpose() + DMatrix::identity(n, n)) * scale
 }
 
-/// Masses of kilograms, springs of N/µm, a structure's damping in s; the joint stiffer than its neighbours.
+/// Masses of kilograms, springs of N/µm, structural damping in s; the joint is stiffer than its
+/// neighbours.
 #[derive(Debug)]
 struct System {
     s: Complex<f64>,
@@ -83,7 +85,7 @@ fn cases(seed: u64) -> ProptestConfig {
 proptest! {
     #![proptest_config(cases(11))]
 
-    /// Eq. (1) with a compliant joint is the direct assembly of the matrices.
+    /// Eq. (1) with a compliant joint equals the direct assembly of the matrices.
     #[test]
     fn coupling_is_direct_assembly(system in system()) {
         let y = inverted(&system.uncoupled());
@@ -129,10 +131,11 @@ proptest! {
         }
     }
 
-    /// The off-diagonal block of Eq. (A.2) is Eq. (A.1) again: their agreement proves nothing about the data.
+    /// The off-diagonal block of Eq. (A.2) equals Eq. (A.1): their agreement proves nothing about
+    /// the data.
     #[test]
     fn inverse_is_the_off_diagonal_of_primal(v in prop::collection::vec(-1.0..1.0f64, 2 * 36 + 2 * 18)) {
-        // any matrices, of no physical system at all
+        // arbitrary matrices, not of a physical system
         let take = |from: usize, n: usize| M::from_fn(n, n, |r, c| {
             let i = from + 2 * (r * n + c);
             Complex::new(v[i] + if r == c { 3.0 } else { 0.0 }, v[i + 1])
@@ -148,7 +151,7 @@ proptest! {
         prop_assert!((&ba + z.view((3, 0), (3, 3))).norm() < 1e-10 * ba.norm());
     }
 
-    /// T_u of any good set of sensors returns a rigid motion exactly; T_f returns the forces.
+    /// T_u of any valid set of sensors returns a rigid motion exactly; T_f returns the forces.
     #[test]
     fn the_virtual_point_of_a_rigid_motion_is_that_motion(
         positions in prop::collection::vec(prop::array::uniform3(-0.05..0.05f64), 4),

@@ -1,4 +1,5 @@
-//! FRFs and records from elsewhere in a campaign file: a lab with its own analyser gets all that is behind the file.
+//! FRFs and records from other systems in a campaign file: they have access to all analyses of a
+//! campaign.
 
 use jointrig::exchange::frf_uff::{to_functions, write_uff};
 use jointrig::exchange::uff::Encoding;
@@ -26,7 +27,7 @@ fn done(folder: &Path, arguments: &[&str]) -> String {
     String::from_utf8(out.stdout).expect("text")
 }
 
-/// What stderr says of a command that ends with `code`.
+/// stderr of a command that ends with `code`.
 fn refused(folder: &Path, arguments: &[&str], code: i32) -> String {
     let out = jointrig(folder, arguments);
     let said = String::from_utf8_lossy(&out.stderr).into_owned();
@@ -34,7 +35,8 @@ fn refused(folder: &Path, arguments: &[&str], code: i32) -> String {
     said
 }
 
-/// The paper's campaign without a hit, and the exact FRFs of a rig with a rigid clamp beside it: A as npz, the others as universal files.
+/// The paper's campaign without hits, and exact FRFs of a rig with a rigid clamp: A as npz, the
+/// others as universal files.
 fn campaign() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let at = |name: &str| folder.path().join(name);
@@ -95,13 +97,14 @@ fn frfs_from_elsewhere_are_analysed_as_if_measured_here() {
     ))
     .expect("JSON");
     let (here, there) = (stiffness(&campaign, "internal"), stiffness(&alone, "internal"));
-    // the universal files are text of thirteen digits; the decoupling amplifies by some thousand
+    // the universal files are text with thirteen digits; the decoupling amplifies errors by some
+    // thousand
     assert!((here / there - 1.0).abs() < 1e-7, "{here} {there}");
     assert!((here / 180e6 - 1.0).abs() < 1e-3, "{here}");
     assert_eq!(campaign["source"]["settings"]["imported_frf"]["B"]["file"], "B.uff");
     let missing = campaign["missing"].to_string();
     assert!(!missing.contains("AJB has not been measured"), "{missing}");
-    // and out again, with equal numbers
+    // and exported again, with equal numbers
     done(folder, &["export", "c.jrig", "--format", "npz", "--out", "again"]);
     let (first, again) = (read_frf(&folder.join("A.npz")), read_frf(&folder.join("again/frf/A.npz")));
     assert_eq!(again.expect("exported").without_noise(), first.expect("there"));
@@ -128,7 +131,7 @@ fn what_does_not_belong_to_the_plan_is_refused_by_name() {
     assert!(said.contains("A.npz") && said.contains("`fs`"), "FRFs are no records: {said}");
     let said = refused(folder, &[&["import", "A.uff"], &cell[..]].concat(), 1);
     assert!(said.contains("A.uff") && said.contains("function type 1"), "{said}");
-    // nothing of all that is in the file
+    // none of this is stored in the file
     assert!(!done(folder, &["campaign", "status", "c.jrig"]).contains("FRFs of"));
 }
 
@@ -151,11 +154,11 @@ fn hits_and_frfs_of_one_configuration_do_not_stand_side_by_side() {
     assert!(told.contains("3 of 3 hits are good"), "{told}");
     let said = refused(folder, &["import", "A.npz", "--into", "c.jrig", "--configuration", "A"], 1);
     assert!(said.contains("3 good hits"), "{said}");
-    // the other way round the hits count, and it is said
+    // in the opposite order the hits take precedence, and this is reported
     done(folder, &["import", "AJB.npz", "--into", "c.jrig", "--configuration", "AJB"]);
     let cell = ["--into", "c.jrig", "--configuration", "AJB", "--impact", "AZ1", "--response", "A1"];
     done(folder, &[&["import", "hits.uff"], &cell[..]].concat());
-    // two cells give no stiffness, which the exit code says
+    // two cells give no stiffness, which the exit code indicates
     let out = jointrig(folder, &["analyse", "c.jrig", "--out", "out", "--json"]);
     let results = String::from_utf8_lossy(&out.stdout);
     assert_eq!(out.status.code(), Some(1), "{results}");
@@ -208,7 +211,8 @@ impact = [{ name = "AZ1", grouping = 1, position_m = [-0.015, 0.028, 0.03], dire
 
 const CELL: [&str; 8] = ["--into", "c.jrig", "--configuration", "A", "--impact", "AZ1", "--response", "A1"];
 
-/// Two hits of a Hann pulse of 24 and 25 N on an oscillator of 1 kg, 20 Hz, 2 %: its acceleration, exactly.
+/// Two hits of a Hann pulse of 24 and 25 N on an oscillator of 1 kg, 20 Hz, 2 %: its exact
+/// acceleration.
 fn soft_hits(fs_hz: f64, length_s: f64, begin_s: f64, width_s: f64) -> ImpactRecords {
     let (w, zeta) = (40.0 * PI, 0.02);
     let pole = Complex::new(-zeta * w, w * f64::sqrt(1.0 - zeta * zeta));
@@ -258,7 +262,7 @@ fn both_ways(records: &ImpactRecords) -> [f64; 2] {
 
 #[test]
 fn soft_tips_give_the_exact_frf_and_long_records_are_used_whole() {
-    // the plan's records are longer, these are 4 s
+    // the plan's records are longer, these last 4 s
     for width_s in [2e-3, 4e-3, 10e-3, 25e-3] {
         for found in both_ways(&soft_hits(2048.0, 4.0, 0.05, width_s)) {
             // (2πf)² / (2 ζ ω²) at the resonance
@@ -313,7 +317,7 @@ fn frf_and_import_refuse_the_same_hits_for_the_same_reasons() {
         );
         assert!(!said.contains("weak"), "{said}");
     }
-    // an acceleration that drops out for 10 ms, and comes back with a jump
+    // an acceleration that drops out for 10 ms, and returns with a step
     let mut dropout = soft_hits(10_240.0, 2.0, 0.01, 2e-3);
     dropout.response[1][0][2000..2100].fill(0.0);
     dropout.response[1][0][2100..2120].iter_mut().for_each(|v| *v += 30.0);

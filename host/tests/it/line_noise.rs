@@ -1,4 +1,4 @@
-//! What noise does to a line, against what it does when it is really added.
+//! The propagated noise of a line, compared with the effect of noise that is actually added.
 
 use jointrig::exchange::{read_frf, read_positions};
 use jointrig::substructuring::joint_over_bands::stiffness_and_damping;
@@ -10,7 +10,8 @@ fn data(file: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file)
 }
 
-/// A, B and AJB of the rigid clamp on three lines, and a window so strong that K is not the real part.
+/// A, B and AJB of the rigid clamp on three lines, and a window so strong that K is not the real
+/// part.
 fn measured() -> ([Frf; 3], Geometry) {
     let files = ["A.npz", "B.npz", "AJB.npz"].map(|file| {
         let frf = read_frf(&data("frf_rigid").join(file)).expect("test data");
@@ -27,7 +28,7 @@ fn noisy(frf: &Frf, variance: impl Fn(usize, usize) -> f64) -> Frf {
     frf.clone().with_variance(frf.lines().iter().map(matrix).collect()).expect("one for each value")
 }
 
-/// K and C of every degree of freedom at a line, or nothing where the method refuses.
+/// K and C of every degree of freedom at a line, or `None` if the method refuses.
 fn joint(
     files: &[Frf; 3],
     geometry: &Geometry,
@@ -53,11 +54,11 @@ fn every_cell_moves_the_joint_as_propagated() {
             }
             for file in 0..3 {
                 let (rows, columns) = files[file].lines()[l].shape();
-                // interface and internal cells of all kinds, some eighty of them
+                // about eighty interface and internal cells of all kinds
                 for cell in (0..rows * columns).step_by(rows * columns / 29 + 1) {
                     let (o, i) = (cell % rows, cell / rows);
                     let size = 1e-6 * files[file].lines()[l].norm() / ((rows * columns) as f64).sqrt();
-                    // central differences of a step in the real, then in the imaginary part
+                    // central differences with a step in the real, then in the imaginary part
                     let moved = [Complex::new(size, 0.0), Complex::new(0.0, size)].map(|step| {
                         let at = |sign: f64| {
                             let mut files = files.clone();
@@ -74,7 +75,7 @@ fn every_cell_moves_the_joint_as_propagated() {
                             .map(|(u, d)| ((u.0 - d.0) / 2.0, (u.1 - d.1) / 2.0))
                             .collect::<Vec<_>>()
                     });
-                    // the variance is smoothed over lines: the same on all of them
+                    // the variance is smoothed over lines, so it is the same on all of them
                     let noisy = [0, 1, 2].map(|f| {
                         noisy(&files[f], |r, c| if (f, r, c) == (file, o, i) { size * size } else { 0.0 })
                     });
@@ -88,7 +89,8 @@ fn every_cell_moves_the_joint_as_propagated() {
                         let c = moved[0][d].1.hypot(moved[1][d].1);
                         let (got_k, got_c) =
                             (noise.stiffness_n_per_m[dof][l], noise.damping_n_s_per_m[dof][l]);
-                        // steps of 1e-6 move K by up to 1e4 N/m, and rounding by 1e-9 of its 1e8; rotations are N m
+                        // steps of 1e-6 move K by up to 1e4 N/m, and rounding by 1e-9 of its 1e8;
+                        // rotations are N m
                         let scale = if dof.is_rotation() { 40e-3f64.powi(2) } else { 1.0 };
                         let floor = 0.1 * scale;
                         assert!(

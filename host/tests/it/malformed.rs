@@ -1,4 +1,5 @@
-//! Malformed input at every door of the command line: exit 1 or 2, with a message that names the file, the place and what to do.
+//! Malformed input at every entry point of the command line: exit code 1 or 2, with a message that
+//! states the file, the position and what to do.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -7,7 +8,7 @@ fn data(file: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file)
 }
 
-/// A folder with good files, and a few that are spoilt.
+/// A folder with valid files, and some damaged ones.
 struct Folder(tempfile::TempDir);
 
 impl Folder {
@@ -45,7 +46,7 @@ impl Folder {
         std::fs::write(self.0.path().join(name), bytes).expect("written");
     }
 
-    /// Exit code, and what stderr says.
+    /// Exit code and stderr.
     fn run(&self, line: &str) -> (i32, String) {
         let mut command = Command::new(env!("CARGO_BIN_EXE_jointrig"));
         let out =
@@ -53,7 +54,7 @@ impl Folder {
         (out.status.code().unwrap_or(-1), String::from_utf8_lossy(&out.stderr).into_owned())
     }
 
-    /// The command ends with 1, and says every one of these.
+    /// The command ends with 1, and its message contains all of these.
     fn refuses(&self, line: &str, parts: &[&str]) {
         let (code, said) = self.run(line);
         assert_eq!(code, 1, "{line}: {said}");
@@ -64,7 +65,7 @@ impl Folder {
     }
 }
 
-/// What to do, in one of the words of our messages.
+/// The instruction that our messages give.
 const AGAIN: &str = "copy or export it again";
 
 #[test]

@@ -1,6 +1,6 @@
-//! One set of FRFs and one set of records, written again in random ways that other programs have: units,
-//! directions, listed or even places, digits, order, text or binary, padding, line ends. Every file gives
-//! the same numbers to 1e-5, or a refusal that names the cause.
+//! One set of FRFs and one set of records, rewritten in random ways that other programs use: units,
+//! directions, listed or even abscissa values, digits, order, text or binary, padding, line ends.
+//! Every file gives the same numbers to 1e-5, or a refusal that names the cause.
 //!
 //! `JOINTRIG_REWRITES=10000 cargo test -p jointrig --test rewrites` tries more of them.
 
@@ -17,13 +17,13 @@ use proptest::prelude::*;
 use proptest::sample::select;
 use std::f64::consts::TAU;
 
-/// What every number must agree to, as a part of it.
+/// Relative tolerance of every number.
 const SAME: f64 = 1e-5;
 
 fn config(seed: u64) -> ProptestConfig {
     let cases = std::env::var("JOINTRIG_REWRITES").ok().and_then(|count| count.parse().ok()).unwrap_or(300);
     let rng_seed = proptest::test_runner::RngSeed::Fixed(seed);
-    // what fails is printed; there is nothing to keep beside the tests
+    // failures are printed; nothing is stored next to the tests
     ProptestConfig { cases, rng_seed, failure_persistence: None, ..ProptestConfig::default() }
 }
 
@@ -57,11 +57,11 @@ const FORCES: [Unit; 7] =
 const FREQUENCIES: [Unit; 5] =
     [("Hz", 1.0), ("", 1.0), ("kHz", 1e3), ("rad/s", 1.0 / TAU), ("rpm", 1.0 / 60.0)];
 const TIMES: [Unit; 4] = [("s", 1.0), ("", 1.0), ("ms", 1e-3), ("µs", 1e-6)];
-/// Labels that are no unit of a motion or a force, and a word of the refusal.
+/// Labels that are not a unit of motion or force, and a word of the refusal.
 const WRONG: [(&str, &str); 5] =
     [("mV", "sensitivity"), ("furlong/s", "furlong"), ("EU", "sensitivity"), ("%", "%"), ("kg", "a mass")];
 
-/// Codes of data set 164 with the factors of length and force to it.
+/// Codes of data set 164, with the factors of length and force to its units.
 const SYSTEMS: [(i64, f64, f64); 5] = [
     (1, 1.0, 1.0),
     (10, 1e3, 1.0),
@@ -70,10 +70,10 @@ const SYSTEMS: [(i64, f64, f64); 5] = [
     (9, 39.370_078_740_157_5, 1.0),
 ];
 
-/// How units are told.
+/// How the units are stated.
 #[derive(Debug, Clone, Copy)]
 enum Told {
-    /// By no label and no data set: SI.
+    /// Without label or data set: SI.
     Nowhere,
     /// By labels of motion and force.
     Labels,
@@ -87,7 +87,7 @@ enum Told {
     Against(usize),
     /// By a label that is no such unit.
     Wrong(usize),
-    /// By a person, whatever the labels say.
+    /// By the user, whatever the labels are.
     Stated,
 }
 
@@ -104,7 +104,7 @@ fn told() -> impl Strategy<Value = Told> {
     ]
 }
 
-/// How a file is written, beside its units and directions.
+/// How a file is written, apart from its units and directions.
 #[derive(Debug, Clone)]
 struct Form {
     precision: Precision,
@@ -151,18 +151,19 @@ fn form() -> impl Strategy<Value = Form> {
     )
 }
 
-/// A number as six digits hold it.
+/// A number rounded to six digits.
 fn six_digits(value: f64) -> f64 {
     format!("{value:.5e}").parse().expect("a number")
 }
 
 impl Form {
-    /// Places start + i step in a unit of this factor, as this form has them.
+    /// Abscissa values start + i step in a unit of this factor, as written in this form.
     fn abscissa(&self, start: f64, step: f64, count: usize, factor: f64) -> Abscissa {
         let (start, step) = (start / factor, step / factor);
         let print = |value| if self.six_digits { six_digits(value) } else { value };
         if self.listed {
-            // places beside text are printed with six digits, whatever the values have
+            // abscissa values in text are printed with six digits, whatever the precision of the
+            // values
             Abscissa::Uneven((0..count).map(|i| print(start + i as f64 * step)).collect())
         } else {
             Abscissa::Even { start: print(start), step: print(step) }
@@ -174,7 +175,7 @@ impl Form {
         (function.precision, function.encoding) = (self.precision, self.encoding);
         let bytes = write(&[function.into()]).expect("writable");
         let binary = self.encoding != Encoding::Ascii;
-        // the line of -1, that of the number, and eleven of the header
+        // the line with -1, the line with the number, and eleven of the header
         let head = if binary { 13 } else { usize::MAX };
         let ends: Vec<usize> =
             bytes.iter().enumerate().filter(|(_, b)| **b == b'\n').map(|(at, _)| at + 1).take(head).collect();
@@ -191,11 +192,12 @@ impl Form {
         all
     }
 
-    /// A file of these parts in some order, those of one group together and its first part first.
+    /// A file of these parts in a random order; each group stays together with its first part
+    /// first.
     fn file(&self, system: Option<usize>, groups: Vec<Vec<Function>>, keep_first: bool) -> Vec<u8> {
         let mut random = self.shuffle;
         let mut next = |below: usize| {
-            // a step of a congruential generator, of which the high bits count
+            // a step of a linear congruential generator; its high bits are used
             random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (random >> 33) as usize % below.max(1)
         };
@@ -219,8 +221,8 @@ impl Form {
     }
 }
 
-/// Units of motion and force: their labels, their factors, the data set, what a person states, and the
-/// words of a refusal.
+/// Units of motion and force: their labels, their factors, the data set, what a user states, and
+/// the words of a refusal.
 struct ToldUnits {
     motion: (String, f64),
     force: (String, f64),
@@ -267,7 +269,7 @@ fn units(told: Told, motion: Unit, force: Unit, time_power: i32, per_force: bool
             ToldUnits { system: Some(system), ..plain((labels.0, length), (labels.1, force)) }
         }
         Told::Against(system) => {
-            // no system of these has centimetres or kilonewtons
+            // none of these systems has centimetres or kilonewtons
             let label = if time_power == 1 { "cm/s" } else { "cm/s^2" };
             let refusal = Some(vec![label, "data set 164"]);
             ToldUnits { system: Some(system), refusal, ..plain((label.into(), 1e-2), silent) }
@@ -288,7 +290,7 @@ fn axis(quantity: i64, unit: &str) -> Axis {
     Axis { quantity, unit: unit.into(), ..Axis::default() }
 }
 
-/// The motion and the force of a quantity, and the exponent of its time.
+/// The ordinate types of motion and force, and the exponent of time.
 fn ordinate(is_velocity: bool) -> (i64, i32, MotionQuantity) {
     if is_velocity {
         (quantity::VELOCITY, 1, MotionQuantity::Velocity)
@@ -300,12 +302,12 @@ fn ordinate(is_velocity: bool) -> (i64, i32, MotionQuantity) {
 // ------------------------------------------------------------------------------------------ FRFs
 
 const LINES: usize = 17;
-/// Lines that six digits do not hold.
+/// Lines that six digits cannot represent.
 const FIRST_HZ: f64 = 300.078_125;
 const STEP_HZ: f64 = 19.921_875;
 
-/// (name, label's axis) of the outputs, and (name, axis) of the impacts; the second impact and the last
-/// sensor look along negative axes in the geometry.
+/// (name, label's axis) of the outputs, and (name, axis) of the impacts; the second impact and the
+/// last sensor point along negative axes in the geometry.
 const OUTPUTS: [(&str, i64); 4] = [("A1", 1), ("A1", 2), ("A1", 3), ("L", -2)];
 const INPUTS: [(&str, i64); 2] = [("AX1", 1), ("AZ1", -3)];
 
@@ -339,7 +341,7 @@ fn value(line: usize, output: usize, input: usize) -> Complex<f64> {
     (1.0 + 0.3 * output as f64) * s / (s * s + 0.04 * omega * s + omega * omega)
 }
 
-/// What is wrong with one of the functions beside its units.
+/// An error in one of the functions, other than its units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fault {
     None,
@@ -347,9 +349,9 @@ enum Fault {
     Transmissibility,
     /// Its label has another axis than the geometry.
     OtherAxis,
-    /// Its lines are another grid.
+    /// Its lines are on another grid.
     OtherLines,
-    /// It lacks the first two lines, which is no fault: the common ones count.
+    /// It lacks the first two lines, which is not an error: the common lines are used.
     FewerLines,
 }
 
@@ -388,7 +390,7 @@ proptest! {
                 let values: Vec<Complex<f64>> = (first..LINES)
                     .map(|line| {
                         let of = value(line, output, input) * sides[0] * sides[1];
-                        // the second derivative of what a velocity is the first of
+                        // an acceleration is the derivative of the velocity
                         let s = Complex::new(0.0, TAU * (FIRST_HZ + STEP_HZ * line as f64));
                         (if is_velocity { of } else { of * s }) / scale
                     })
@@ -415,7 +417,7 @@ proptest! {
         let found = frf_uff::from_contents(&read(&bytes), &unit.stated)
             .and_then(|file| { let notes = file.notes.clone(); file.along(&points()).map(|(frf, _)| (frf, notes)) });
         let refusal = match fault {
-            // which of the two is met first depends on the order
+            // which of the two is found first depends on the order
             fault if unit.refusal.is_some() && !matches!(fault, Fault::None | Fault::FewerLines) => Some(vec![]),
             Fault::Transmissibility => Some(vec!["denominator"]),
             Fault::OtherAxis => Some(vec![]),
@@ -457,13 +459,15 @@ proptest! {
     }
 }
 
-// ------------------------------------------------------------------------------------------ records
+// ------------------------------------------------------------------------------------------
+// records
 
 const SAMPLES: usize = 600;
 const HITS: usize = 2;
 const PARTS: [f64; 3] = [1.0, -0.5, 0.2];
 
-/// Force of a hit (channel 0), or what a channel feels of an oscillator of 300 Hz, in SI along the plan.
+/// Force of a hit (channel 0), or the response of an oscillator of 300 Hz in a channel, in SI along
+/// the plan's direction.
 fn sample(hit: usize, channel: usize, t: f64) -> f64 {
     let height = 20.0 + 3.0 * hit as f64;
     let local = t - 0.004;
@@ -476,7 +480,8 @@ fn sample(hit: usize, channel: usize, t: f64) -> f64 {
     1e-3 * height * PARTS[channel - 1] * (ring + 2e-3)
 }
 
-/// Stiffness by a line of the FRF of the first channel: a number to which all samples contribute.
+/// Stiffness from one line of the FRF of the first channel: a number to which all samples
+/// contribute.
 fn stiffness(records: &ImpactRecords, delay_s: &[f64]) -> f64 {
     let windowing = Windowing { sigma_per_s: 2.0, ..Windowing::default() };
     let settings = FrfSettings { windowing, delay_s: delay_s.to_vec(), ..FrfSettings::default() };
@@ -501,7 +506,7 @@ proptest! {
     ) {
         let (kind_of, power, motion) = ordinate(is_velocity);
         let unit = units(told, if is_velocity { velocity } else { acceleration }, force, power, false);
-        // a start that six digits hold
+        // a start that six digits can represent
         let start_s = if late > 0 { 0.0 } else { start_s };
         let mut groups = Vec::new();
         for hit in 0..HITS {
@@ -551,7 +556,7 @@ proptest! {
                     let wanted = sample(hit, channel, (i + late) as f64 * step_s);
                     (got - wanted).abs() <= SAME * wanted.abs() + 1e-12
                 };
-                // hits in any order: each is known by its height
+                // hits in any order: each is identified by its height
                 let order = if records.force_n[0].iter().copied().fold(0.0, f64::max) < 21.5 { [0, 1] } else { [1, 0] };
                 let mut plain = ImpactRecords { force_n: vec![], response: vec![], ..records.clone() };
                 for (at, hit) in order.into_iter().enumerate() {

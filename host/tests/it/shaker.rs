@@ -1,4 +1,5 @@
-//! The shaker's levels through the whole chain: simulated rig, firmware, link, campaign file, analysis.
+//! The shaker's levels through the whole chain: simulated rig, firmware, link, campaign file,
+//! analysis.
 #![cfg(feature = "sim")]
 #![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
 
@@ -35,7 +36,7 @@ fn options(levels: Vec<Level>) -> Options {
     }
 }
 
-/// A campaign file in a folder of its own.
+/// A campaign file in a separate folder.
 struct Bench {
     _folder: tempfile::TempDir,
     file: PathBuf,
@@ -49,7 +50,8 @@ impl Bench {
         Self { _folder: folder, file }
     }
 
-    /// The address of a shipped rig without any error: loops are held against the rig's own parameters here.
+    /// The address of a shipped rig without errors: loops are compared with the rig's own
+    /// parameters here.
     fn exact(&self, name: &str) -> String {
         let shipped = format!("{}/../hil-sim/rigs/{name}.toml", env!("CARGO_MANIFEST_DIR"));
         let text = std::fs::read_to_string(shipped).unwrap();
@@ -93,7 +95,7 @@ fn stored(summary: &Summary) -> usize {
     summary.outcomes.iter().filter(|outcome| matches!(outcome, Outcome::Stored(_))).count()
 }
 
-/// The levels of the file; every one must be whole.
+/// The levels of the file; every one must be intact.
 fn rows_of(bench: &Bench) -> Vec<LevelRow> {
     let store = Store::open_read_only(path(bench)).unwrap();
     store.levels().unwrap().into_iter().collect::<Result<_, _>>().unwrap()
@@ -137,7 +139,8 @@ fn the_papers_fifteen_levels_on_the_default_rig() {
             _ => assert_eq!(row.shape, Shape::Stuck, "{row:?}"),
         }
     }
-    // five frequencies, of which one is no contact stiffness and none agree: no one mass explains that
+    // five frequencies, of which one has no contact stiffness and no two agree: a single mass
+    // cannot explain that
     assert!(results.static_arm.is_none(), "{:?}", results.static_arm);
     assert!(results.missing.iter().any(|m| m.contains("--effective-mass")), "{:?}", results.missing);
 }
@@ -156,7 +159,7 @@ fn with_a_rigid_clamp_every_corrected_loop_is_the_contact() {
         let k = row.stick_slope().expect("a straight line").mean;
         assert!((k / 180e6 - 1.0).abs() < 0.03, "{:?} Hz: {k}", row.frequency_hz);
     }
-    // and raw it is not: 14 % too much at 500 Hz
+    // and without the correction it does not: 14 % too high at 500 Hz
     let raw = rows(&results, Force::Raw);
     assert!(raw.iter().any(|row| row.stick_slope().unwrap().mean > 1.1 * 180e6));
 }
@@ -172,7 +175,7 @@ fn a_sweep_finds_the_hidden_resonance() {
     assert!((check.frequency_hz.unwrap() - 192.0).abs() < 3.0, "{check:?}");
 }
 
-/// A rig whose rigid-clamped contact slips as one: k_T (N/µm), μ, N (N).
+/// A rig with a rigid clamp whose contact slips as a whole: k_T (N/µm), μ, N (N).
 struct Slider {
     k: f64,
     friction: f64,
@@ -194,7 +197,8 @@ impl Slider {
     }
 }
 
-/// Errors of the raw k_T, μ and energy of each level through the whole chain, in per cent. The paper's plan says that N is 300 N.
+/// Errors of the raw k_T, μ and energy of each level through the whole chain, in per cent. The
+/// paper's plan states N = 300 N.
 fn slipped(slider: &Slider, levels: Vec<Level>) -> Vec<(Level, [f64; 3])> {
     let bench = Bench::new();
     let Slider { k, friction, load } = *slider;
@@ -205,7 +209,7 @@ fn slipped(slider: &Slider, levels: Vec<Level>) -> Vec<(Level, [f64; 3])> {
     assert_eq!(rows.len(), levels.len());
     let errors = rows.into_iter().map(|row| {
         assert_eq!(row.shape, Shape::GrossSlip, "{row:?}");
-        // nothing is the matter with these loops, however much they ring
+        // no findings for these loops, however much they ring
         assert!(row.findings.is_empty(), "{:?}", row.findings);
         let limit = friction * load;
         let energy = 4.0 * limit * (row.amplitude_m.unwrap() - limit / k * 1e-6);
@@ -219,7 +223,7 @@ fn slipped(slider: &Slider, levels: Vec<Level>) -> Vec<(Level, [f64; 3])> {
     levels.iter().map(LevelRow::level).zip(errors).collect()
 }
 
-/// Raw force, whole chain: k_T, μ and energy of a contact that slips as one.
+/// Raw force, whole chain: k_T, μ and energy of a contact that slips as a whole.
 #[test]
 fn gross_slip_gives_back_the_rigs_friction() {
     let reference = Slider { k: 180.0, friction: 0.6, load: 300.0 };
@@ -235,15 +239,16 @@ fn gross_slip_gives_back_the_rigs_friction() {
     }
 }
 
-/// A table over contacts, frequencies and amplitudes (`--nocapture` prints it). No level may be missing.
-/// Half a millimetre of tilt between spot and contact costs k_T more the stiffer it is: see `docs/hysteresis.md`.
+/// A table over contacts, frequencies and amplitudes (`--nocapture` prints it). No level may be
+/// missing. The error due to a tilt over 0.5 mm between spot and contact grows with k_T: see
+/// `docs/hysteresis.md`.
 #[test]
 fn slip_table() {
     println!("k_T N/µm, μN N, level: errors of raw k_T, μ, energy in per cent");
     for (k, most) in [(95.0, 3.0), (180.0, 3.0), (320.0, 4.5)] {
         for friction in [0.35, 0.6, 0.9] {
             let slider = Slider { k, friction, load: 300.0 };
-            // well beyond where it lets go
+            // well beyond the slip limit
             let slips = |amplitude: &f64| *amplitude > 1.3e-6 * friction * 300.0 / k;
             let amplitudes: Vec<f64> = [3e-6, 5e-6, 10e-6].into_iter().filter(slips).collect();
             let levels: Vec<Level> =
@@ -260,14 +265,15 @@ fn slip_table() {
     }
 }
 
-/// k_eq that Iwan elements (20 of 180 N/µm and 180 N together, limits spread by 0.9) have under this closed cycle of Δx, m.
+/// k_eq of Iwan elements (20, together 180 N/µm and 180 N, limits spread by 0.9) for this closed
+/// cycle of Δx, m.
 fn iwan(displacement_m: &[f64]) -> f64 {
     let elements = 20;
     let each = 180e6 / f64::from(elements);
     let limits = (0..elements).map(|i| 180.0 / 20.0 * (0.1 + 1.8 * f64::from(i) / 19.0));
     let mut sliders: Vec<(f64, f64)> = limits.map(|limit| (limit, 0.0)).collect();
     let mut force = Vec::new();
-    // the first time round it settles
+    // the first cycle is the transient
     for x in displacement_m.iter().chain(displacement_m) {
         force.push(
             sliders
@@ -286,7 +292,7 @@ fn iwan(displacement_m: &[f64]) -> f64 {
 #[test]
 fn microslip_softens_the_loop_with_amplitude_as_its_law_says() {
     let bench = Bench::new();
-    // at a tenth of a micrometre the integrated noise, some nanometres at 32 Hz, takes 1 to 4 % of the slope
+    // at 0.1 µm the integrated noise, some nanometres at 32 Hz, reduces the slope by 1 to 4 %
     let levels: Vec<Level> = [0.4e-6, 0.8e-6, 1.2e-6, 1.6e-6].map(|a| step(32.0, a)).to_vec();
     bench.run(&bench.exact("iwan"), &options(levels)).unwrap();
     let store = Store::open_read_only(path(&bench)).unwrap();
@@ -307,11 +313,12 @@ fn microslip_softens_the_loop_with_amplitude_as_its_law_says() {
         assert!(k < before, "{}", row.level());
         before = k;
     }
-    // at 1.6 µm most of it slips
+    // at 1.6 µm most elements slip
     assert!(before < 0.65 * 180e6);
 }
 
-/// 139 N/µm between the spots at 100 Hz, an ellipse at 200 Hz, and a contact of 180 N/µm: nobody may take one for the other.
+/// 139 N/µm between the spots at 100 Hz, an ellipse at 200 Hz, and a contact of 180 N/µm: these
+/// must not be confused.
 #[test]
 fn a_records_loop_is_never_called_the_contacts_own_stiffness() {
     let bench = Bench::new();
@@ -393,7 +400,7 @@ fn exported_levels_say_the_same_to_other_programs() {
         .collect();
     assert!(matches!(&forces[..], [f] if f.values == Values::Real(record.force_n.clone())));
 
-    // without the records the table alone
+    // without the records only the table is exported
     std::fs::remove_dir_all(&folder).unwrap();
     export("npz", &["--without-records"]);
     assert_eq!(table("levels.csv")[1][column("file")], "");
@@ -408,7 +415,7 @@ fn levels_in_the_file_are_skipped_and_an_interrupt_comes_to_rest() {
     let stop = stopped.stop.clone();
     let summary = bench
         .run_and_tell("sim:", &stopped, &mut |outcome| {
-            // in the second level
+            // during the second level
             if outcome.is_some() {
                 stop.store(true, Ordering::Relaxed);
             }
@@ -417,7 +424,7 @@ fn levels_in_the_file_are_skipped_and_an_interrupt_comes_to_rest() {
     assert!(summary.interrupted && stored(&summary) == 1, "{summary:?}");
     let summary = bench.run("sim:", &options(levels.clone())).unwrap();
     assert!(matches!(summary.outcomes[0], Outcome::Known(_)) && stored(&summary) == 2);
-    // after the cells they are others
+    // measured after the cells they are separate levels
     let after = Options { moment: Moment::After, ..options(levels) };
     assert_eq!(stored(&bench.run("sim:", &after).unwrap()), 3);
     let results = bench.analysed();

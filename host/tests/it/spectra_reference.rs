@@ -1,4 +1,5 @@
-//! H1 and coherence of three good hits of the simulated rig, against an independent implementation with the same windows.
+//! H1 and coherence of three good hits of the simulated rig, compared with an independent
+//! implementation with the same windows.
 
 use jointrig::exchange::read_impacts;
 use jointrig::spectra::{ForceWeighting, FrfSettings, Origin, Windowing, estimate, usable_band};
@@ -21,7 +22,8 @@ fn pair(value: &Value) -> Complex<f64> {
 fn stated_processing_is_reproduced() {
     let records = read_impacts(&Path::new(DATA).join("good.npz")).expect("test data");
     let expected = expected();
-    // Force kept from the record's start to 3 ms after the trigger at 5 ms; response e^(−2.3 (t − 5 ms)) from there on.
+    // Force kept from the record's start to 3 ms after the trigger at 5 ms; response e^(−2.3 (t − 5
+    // ms)) from the trigger on.
     let settings = FrfSettings {
         windowing: Windowing {
             force_before_s: 5e-3,
@@ -38,7 +40,7 @@ fn stated_processing_is_reproduced() {
     for (i, hz) in expected["lines_hz"].as_array().expect("lines").iter().enumerate() {
         let hz = hz.as_f64().expect("a number");
         let line = y.frequency_hz().iter().position(|f| (f - hz).abs() < 1e-9).expect("a half-hertz grid");
-        // single-precision storage: 1e-4 is the stated tolerance, 1e-7 is what is expected
+        // single-precision storage: 1e-4 is the stated tolerance, 1e-7 is expected
         assert!((y.h1(line, 0) - pair(&expected["h1"][i])).norm() < 1e-6 * scale, "{hz} Hz");
         let coherence = expected["coherence"][i].as_f64().expect("a number");
         assert!((y.coherence(line, 0) - coherence).abs() < 1e-6, "{hz} Hz");
@@ -55,8 +57,9 @@ fn default_processing_finds_the_exact_mobility() {
         let hz = hz.as_f64().expect("a number");
         let line = y.frequency_hz().iter().position(|f| (f - hz).abs() < 1e-9).expect("a half-hertz grid");
         let error = (y.h1(line, 0) - pair(&expected["exact_at_sigma"][i])).norm();
-        // four deviations of the noise that the variance formula predicts for these three hits, complex; at the resonance
-        // a thousandth of its height for what three hits cannot show of their noise
+        // four standard deviations of the noise that the variance formula predicts for these three
+        // hits, complex; plus, at the resonance, a thousandth of its height for noise that three
+        // hits cannot show
         let sigma = (2.0 * y.variance(line, 0)).sqrt();
         assert!(
             error < 4.0 * sigma + 1e-3 * y.h1(line, 0).norm() + 1e-2 * scale,

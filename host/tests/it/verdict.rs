@@ -1,5 +1,5 @@
-//! The report's verdict on five rigs whose clamp and contact are known: FBS between the arms sees clamp and contact in series, the
-//! vibrometers at the specimens see the contact.
+//! The report's verdict on five rigs with known clamp and contact: FBS between the arms finds clamp
+//! and contact in series, the vibrometers at the specimens measure the contact.
 #![cfg(feature = "sim")]
 
 use crate::records;
@@ -12,7 +12,8 @@ use jointrig_hil_sim::rig::RigConfig;
 use records::Assembly;
 use std::path::Path;
 
-/// What is in series with the contact on the default rig: 1/60 N/µm of the clamp's spring, and its tilt at 10 mm over 6500 N m/rad.
+/// Stiffness in series with the contact on the default rig (N/m): 60 N/µm of the clamp's spring,
+/// and its tilt at 10 mm over 6500 N m/rad.
 const SERIES: f64 = 31.2e6;
 
 struct Verdict {
@@ -34,7 +35,7 @@ impl Verdict {
 
     fn direct(&self) -> f64 {
         let row = self.results.joint.iter().find(|j| j.method == DIRECT).expect("T and Δx are there");
-        // away from the specimen's local mode, wherever the clamp puts it
+        // away from the specimen's local mode, whose frequency depends on the clamp
         let mode = self.results.check(HIDDEN_RESONANCE).and_then(|check| check.frequency_hz);
         assert!(
             mode.is_none_or(|f| row.band_hz.low_hz > 1.2 * f || row.band_hz.high_hz < 0.8 * f),
@@ -55,7 +56,7 @@ fn on_the_default_rig_fbs_is_not_k_t() {
     let check = verdict.results.check(SERIES_COMPLIANCE).expect("the check");
     assert_eq!(check.ok, Some(false), "{check:?}");
     assert!(check.meaning.contains("not k_T") && check.meaning.contains("in series"), "{}", check.meaning);
-    // the terminal and the report's head say so too
+    // the terminal output and the report's head state it too
     let said = words::summary(&verdict.results).join("\n");
     assert!(said.contains("not k_T"), "{said}");
     assert!(jointrig::report::page(&verdict.results).contains("not k_T"));
@@ -95,7 +96,8 @@ fn a_contact_of_240_is_found_through_the_same_clamp() {
     near("direct", verdict.direct(), 240e6, 0.10);
 }
 
-/// The bootstrap through the whole analysis: spectra of single hits from records, drawn anew, beside the propagated noise.
+/// The bootstrap through the whole analysis: spectra of single hits from records, redrawn, compared
+/// with the propagated noise.
 #[test]
 fn hits_drawn_anew_scatter_as_the_noise_does() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../hil-sim/rigs/noisy.toml");
@@ -105,8 +107,9 @@ fn hits_drawn_anew_scatter_as_the_noise_does() {
     let drawn = results.bootstrap.as_ref().expect("two hits in every cell");
     assert_eq!((drawn.replicates, <[f64; 2]>::from(drawn.band_hz)), (100, [300.0, 600.0]));
     let propagated = results.recommended[0].joint[&Dof::Z].std_noise;
-    // both know two hits only, and see √(1/2) of the scatter that many would show; 100 replicates know it to 7 %, two hits in each of
-    // 108 cells and 601 lines leave some tens of per cent
+    // both are based on two hits only, which show √(1/2) of the scatter that many would show; 100
+    // replicates determine it to 7 %, two hits in each of 108 cells and 601 lines leave some tens
+    // of per cent
     let ratio = drawn.hits[&Dof::Z].std / propagated;
     assert!((0.6..1.6).contains(&ratio), "{:?} against {propagated:e}", drawn.hits[&Dof::Z]);
     assert!(words::summary(&results).join("\n").contains("Hits drawn anew 100 times"));

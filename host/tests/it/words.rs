@@ -1,10 +1,10 @@
-//! Words from outside do nothing: to a terminal, to a page, to a folder.
+//! Control characters in external text have no effect on a terminal, a page or a folder.
 #![cfg(unix)]
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// Clears the screen, and turns what follows around.
+/// Clears the screen, and reverses the writing direction.
 const ACTS: &str = "\u{1b}[2J\u{202e}";
 
 fn data(file: &str) -> PathBuf {
@@ -15,7 +15,7 @@ fn run(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_jointrig")).current_dir(folder).args(arguments).output().expect("runs")
 }
 
-/// What a command that succeeds printed, all of it harmless.
+/// The output of a command that succeeds, without any control characters.
 fn harmless(folder: &Path, arguments: &[&str]) -> String {
     let out = run(folder, arguments);
     let said = [out.stdout, out.stderr].map(|bytes| String::from_utf8(bytes).expect("text")).concat();
@@ -38,7 +38,7 @@ fn the_name_of_an_imported_file_is_shown_and_not_obeyed() {
         let called = format!("{name}{ACTS}.npz");
         std::fs::copy(data(&format!("frf_rigid/{name}.npz")), at.join(&called)).expect("test data");
         let said = harmless(at, &["import", &called, "--into", "c.jrig", "--configuration", name]);
-        // and again, as after a power cut: nothing is stored twice
+        // imported again, as after a power cut: nothing is stored twice
         let again = harmless(at, &["import", &called, "--into", "c.jrig", "--configuration", name]);
         assert!(again.contains("there already"), "{said}{again}");
     }

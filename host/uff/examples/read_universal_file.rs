@@ -1,9 +1,10 @@
-//! What a universal file holds, and where each of its FRFs is highest.
+//! Lists the contents of a universal file, and where each of its FRFs is highest.
 //!
 //!     cargo run -p jointrig-uff --example read_universal_file
 //!     cargo run -p jointrig-uff --example read_universal_file -- your_file.uff
 //!
-//! Without a path it reads two masses joined by a spring: 2 kg and 1 kg, 20 N/µm, so that both FRFs are highest near 872 Hz.
+//! Without a path it reads two masses joined by a spring: 2 kg and 1 kg, 20 N/µm, so that both FRFs
+//! are highest near 872 Hz.
 
 use jointrig_uff::{DataSet, Values, kind, read};
 

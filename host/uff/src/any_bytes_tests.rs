@@ -1,4 +1,5 @@
-//! Whatever the bytes: no panic, no hang, and every good data set before the damage is still read.
+//! For any bytes: no panic, no endless loop, and every good data set before the damage is still
+//! read.
 
 use super::round_trip_tests::set;
 use super::*;

@@ -1,4 +1,5 @@
-//! Where each data set begins and ends: by its lines of `-1`, and by byte counts where the data are binary.
+//! Finds the start and end of each data set: by its lines of `-1`, and by byte counts if the data
+//! are binary.
 
 use super::lines::{LONGEST_LINE, Lines, Record, Span, Wrong, is_delimiter};
 use super::{Outside, set58_header, set58_values};
@@ -9,7 +10,7 @@ pub(super) struct Block<'a> {
     pub number: u32,
     /// Byte offset of its opening `-1`.
     pub offset: usize,
-    /// What follows the number on its line.
+    /// The text after the number on its line.
     pub identifier: Span<'a>,
     /// All lines after that, without the closing one; for 58b without the binary data.
     pub body: Span<'a>,
@@ -17,7 +18,7 @@ pub(super) struct Block<'a> {
     pub binary: Option<Span<'a>>,
 }
 
-/// A place that should be a data set and is none.
+/// A position at which a data set is expected but not found.
 pub(super) struct Unusable {
     pub number: u32,
     pub wrong: Wrong,
@@ -27,14 +28,15 @@ pub(super) struct Unusable {
 pub(super) struct Blocks<'a> {
     bytes: &'a [u8],
     lines: Lines<'a>,
-    /// Text that stood outside the data sets read so far.
+    /// Text outside the data sets read so far.
     pub outside: Vec<Outside>,
 }
 
-/// UTF-8's byte order mark, which editors put before the text.
+/// UTF-8's byte order mark, which some editors put before the text.
 const MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Most places of text outside the data sets that are kept: a file with more has lost its lines of `-1` altogether.
+/// Maximum number of places of text outside the data sets that are kept: a file with more has
+/// probably lost its lines of `-1`.
 const MOST_OUTSIDE: usize = 100;
 
 impl<'a> Blocks<'a> {
@@ -47,7 +49,7 @@ impl<'a> Blocks<'a> {
         Blocks { bytes, lines, outside: Vec::new() }
     }
 
-    /// Where the next one is looked for.
+    /// Where the search for the next one starts.
     pub fn offset(&self) -> usize {
         self.lines.offset()
     }
@@ -73,7 +75,8 @@ impl<'a> Iterator for Blocks<'a> {
                 }
                 continue;
             }
-            // a second `-1` at once: the first one closed something that had not been opened
+            // immediately followed by a second `-1`: the first one closed a data set that had not
+            // been opened
             if let Some((at, identifier)) = lines.next_unless(is_delimiter) {
                 break (offset, at, identifier);
             }
@@ -89,7 +92,7 @@ impl<'a> Iterator for Blocks<'a> {
             return Some(Err(Unusable { number: 0, wrong: Wrong { offset: identifier_offset, reason } }));
         };
         let identifier = &identifier[blanks + digits..];
-        // the format's line has 80 columns
+        // a line of the format has 80 columns
         let identifier =
             Span { bytes: &identifier[..identifier.len().min(LONGEST_LINE)], offset: identifier_offset };
         let start = lines.offset();
@@ -118,7 +121,7 @@ impl<'a> Iterator for Blocks<'a> {
     }
 }
 
-/// Counts a line to the text outside the data sets, unless it is blank.
+/// Adds a line to the text outside the data sets, unless it is blank.
 fn add(passed_over: &mut Option<Outside>, offset: usize, line: &[u8]) {
     if line.trim_ascii().is_empty() {
         return;
@@ -132,11 +135,11 @@ fn note(all: &mut Vec<Outside>, passed_over: Option<Outside>) {
     all.extend(passed_over.filter(|_| all.len() < MOST_OUTSIDE));
 }
 
-/// Characters of a text outside the data sets that are kept.
+/// Number of characters that are kept of a text outside the data sets.
 const MOST_SHOWN: usize = 60;
 
-/// Bytes before a `-1` that ends a line of other text, where the next line is the number of a data set: a program wrote its own text
-/// before the file and no end of line behind it.
+/// Number of bytes before a `-1` that ends a line of other text, if the next line is the number of
+/// a data set: a program wrote its own text before the file without an end of line.
 fn before_delimiter(line: &[u8], lines: &Lines<'_>) -> Option<usize> {
     let text = line.trim_ascii_end().strip_suffix(b"    -1")?;
     let (_, next) = lines.clone().next()?;
@@ -148,8 +151,9 @@ fn before_delimiter(line: &[u8], lines: &Lines<'_>) -> Option<usize> {
     is_number.then_some(text.len())
 }
 
-/// Moves behind the next line of `-1` and gives the offset where that line begins. At the very end of a file, without an end of
-/// its line, it must stand in its columns: ` -1` there may be the rest of a number that was cut off.
+/// Moves past the next line of `-1` and returns the offset where that line begins. At the very end
+/// of a file, without an end of line, it must be in its columns: ` -1` there may be the rest of a
+/// truncated number.
 fn skip_to_end(lines: &mut Lines<'_>) -> Option<usize> {
     while let Some((offset, line)) = lines.next() {
         if is_delimiter(line) && (lines.ended() || line.starts_with(b"    -1")) {
@@ -159,10 +163,11 @@ fn skip_to_end(lines: &mut Lines<'_>) -> Option<usize> {
     None
 }
 
-/// Finds the end of the binary data and moves behind the closing `-1`. False when the file ends before it.
+/// Finds the end of the binary data and moves past the closing `-1`. False if the file ends before
+/// it.
 fn close_binary<'a>(bytes: &'a [u8], lines: &mut Lines<'a>, block: &mut Block<'a>) -> bool {
     let start = lines.offset();
-    // counts that the header allows, each tried against what stands behind it
+    // counts that the header allows, each checked against the bytes that follow
     for count in set58_values::byte_counts(block.identifier, block.body) {
         let Some(end) = start.checked_add(count).filter(|end| *end <= bytes.len()) else { continue };
         if let Some(after) = delimiter_at(bytes, end) {
@@ -171,7 +176,8 @@ fn close_binary<'a>(bytes: &'a [u8], lines: &mut Lines<'a>, block: &mut Block<'a
             return true;
         }
     }
-    // none fits: the next `-1` that ends a line and is followed by the end of the file or another `-1`
+    // none fits: the next `-1` that ends a line and is followed by the end of the file or another
+    // `-1`
     let mut from = start;
     while let Some(at) = memchr::memmem::find(&bytes[from..], b"    -1").map(|at| from + at) {
         if let Some(after) = delimiter_at(bytes, at) {
@@ -188,12 +194,13 @@ fn close_binary<'a>(bytes: &'a [u8], lines: &mut Lines<'a>, block: &mut Block<'a
     false
 }
 
-/// As much of the file from `at` on as a line of `-1` may be long: whoever asks at many places must not look at all of it each time.
+/// The bytes from `at` on, limited to the longest line of `-1`: a caller that checks many positions
+/// must not scan the rest of the file each time.
 fn ahead(bytes: &[u8], at: usize) -> &[u8] {
     &bytes[at..bytes.len().min(at + LONGEST_LINE)]
 }
 
-/// The offset behind a line of `-1` that begins at `at`, or behind one false line end there.
+/// The offset after a line of `-1` that begins at `at`, or after one extra line end there.
 fn delimiter_at(bytes: &[u8], at: usize) -> Option<usize> {
     let rest = ahead(bytes, at);
     let blank =

@@ -1,4 +1,4 @@
-//! Files as other programs write them, with their habits and faults.
+//! Files as other programs write them, with their peculiarities and errors.
 
 use super::*;
 use num_complex::Complex;
@@ -75,7 +75,7 @@ fn binary_of_both_orders_with_a_false_line_end_and_false_counts() {
             let false_end = [&good[..closing], end, &good[closing..]].concat();
             assert_eq!(only(&false_end), wanted);
         }
-        // some writers announce half of the bytes
+        // some writers state half of the bytes
         let head = String::from_utf8_lossy(&good[..100]).into_owned();
         assert!(head.contains("          32"), "{head}");
         let mut false_count = good.clone();
@@ -178,7 +178,7 @@ fn a_byte_order_mark_and_text_outside_the_data_sets_hide_no_function() {
         assert_eq!((place(0), place(1).1), ((encoded.len(), 2), 1));
         assert_eq!(between.functions().count(), 2);
     }
-    // a data set whose opening line is lost is told, and the next one is read
+    // a data set whose opening line is lost is reported, and the next one is read
     let lost = text().replacen("    -1\n", "", 1);
     let read = read(&[lost.as_bytes(), text().as_bytes()].concat());
     assert_eq!((read.functions().count(), read.outside[0].text.as_str()), (1, "58"));

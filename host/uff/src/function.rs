@@ -3,7 +3,7 @@
 use super::number;
 use num_complex::Complex;
 
-/// Kinds of function (record 6, field 1). Others than these are read and written by their number.
+/// Kinds of function (record 6, field 1). Other kinds are read and written by their number.
 pub mod kind {
     /// Unknown.
     pub const GENERAL: i64 = 0;
@@ -59,22 +59,23 @@ pub enum Precision {
     Double,
 }
 
-/// Where the values stand.
+/// Positions of the values.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Abscissa {
     /// At start + i × step.
     Even {
-        /// The first.
+        /// Position of the first value.
         start: f64,
-        /// The distance.
+        /// The distance between values.
         step: f64,
     },
-    /// At these places, one for each value.
+    /// At these positions, one for each value.
     Uneven(Vec<f64>),
 }
 
 impl Abscissa {
-    /// Even where `places` are, to a millionth of a step, what start and step say with the digits of the header; else uneven.
+    /// Even if `places` equal start and step, as printed in the header, to a millionth of a step;
+    /// otherwise uneven.
     pub fn of(places: &[f64]) -> Self {
         let (Some(&start), Some(&last)) = (places.first(), places.last()) else {
             return Abscissa::Uneven(places.to_vec());
@@ -85,7 +86,7 @@ impl Abscissa {
         if fits { even } else { Abscissa::Uneven(places.to_vec()) }
     }
 
-    /// The place of value `i`; NaN beyond uneven places.
+    /// The position of value `i`; NaN beyond the end of uneven positions.
     pub fn at(&self, i: usize) -> f64 {
         match self {
             Abscissa::Even { start, step } => start + i as f64 * step,
@@ -94,7 +95,7 @@ impl Abscissa {
     }
 }
 
-/// A number as the 13 columns of the header hold it.
+/// A number as printed in the 13 columns of the header.
 fn as_printed(value: f64) -> f64 {
     let mut text = Vec::new();
     number::print(&mut text, value, 13, 6);
@@ -111,7 +112,7 @@ pub enum Values {
 }
 
 impl Values {
-    /// How many.
+    /// Number of values.
     pub fn len(&self) -> usize {
         match self {
             Values::Real(values) => values.len(),
@@ -119,13 +120,13 @@ impl Values {
         }
     }
 
-    /// Whether there is none.
+    /// Whether there are no values.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 }
 
-/// What an axis is.
+/// Description of an axis.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Axis {
     /// Its quantity.
@@ -165,17 +166,17 @@ pub struct Function {
     pub kind: i64,
     /// Its number.
     pub number: i64,
-    /// Its version or place in a sequence.
+    /// Its version or position in a sequence.
     pub version: i64,
     /// Load case; 0 is excitation at one point.
     pub load_case: i64,
-    /// Where the response is.
+    /// Position and direction of the response.
     pub response: Dof,
-    /// Where the reference is.
+    /// Position and direction of the reference.
     pub reference: Dof,
     /// Width of the values.
     pub precision: Precision,
-    /// Where the values stand.
+    /// Positions of the values.
     pub abscissa: Abscissa,
     /// The values.
     pub values: Values,
@@ -188,7 +189,8 @@ pub struct Function {
 }
 
 impl Function {
-    /// Values as double-precision text, without names, places and units: fill in what is known with `..Function::new(…)`.
+    /// Values as double-precision text, without names, positions and units: fill in the known
+    /// fields with `..Function::new(…)`.
     pub fn new(kind: i64, abscissa: Abscissa, values: Values) -> Self {
         Function {
             id: Default::default(),

@@ -1,8 +1,9 @@
 //! Universal files (UFF): the exchange format of modal analysis, read and written.
 //!
-//! A universal file is a row of data sets between lines of `    -1`. Known here: 58 and 58b ([`Function`]: FRFs, time signals, spectra,
-//! coherence), 15 and 2411 ([`Node`]), 82 ([`TraceLine`]), 2412 ([`Element`]), 151 ([`Header`]), 164 ([`Units`]). Others are counted with
-//! their number and place.
+//! A universal file is a sequence of data sets between lines of `    -1`. Supported data sets: 58
+//! and 58b ([`Function`]: FRFs, time signals, spectra, coherence), 15 and 2411 ([`Node`]), 82
+//! ([`TraceLine`]), 2412 ([`Element`]), 151 ([`Header`]), 164 ([`Units`]). Others are listed with
+//! their number and position.
 //!
 //! An accelerance of three lines, written and read again:
 //!
@@ -38,18 +39,20 @@
 //! # Ok::<(), jointrig_uff::WriteError>(())
 //! ```
 //!
-//! Reading accepts what other programs write: line ends of any kind (also one too many between
-//! binary data and the closing `-1`), Latin-1 and UTF-8 texts, a byte order mark, text outside the
-//! data sets ([`Contents::outside`] says where), trailing blanks or none, zeros that fill up the last
-//! line of values, `e`, `E`, `d` and `D` exponents, numbers outside their columns, 4- and 8-byte
-//! floats of either byte order, wrong byte counts in the headers of 58b. What cannot be read is a
-//! [`Fault`] with the data set, its byte offset and the reason; everything else is still read. No
-//! input makes it panic, and memory stays within a small multiple of the input: of a file with more
-//! data sets than its size can hold a part is read, which its last fault says. [`read_functions`]
-//! and [`read_only`] pass over all other data sets.
+//! Reading accepts the variants that other programs write: line ends of any kind (also an extra one
+//! between binary data and the closing `-1`), Latin-1 and UTF-8 texts, a byte order mark, text
+//! outside the data sets (listed in [`Contents::outside`]), with or without trailing blanks, zeros
+//! that pad the last line of values, `e`, `E`, `d` and `D` exponents, numbers outside their
+//! columns, 4- and 8-byte floats of either byte order, wrong byte counts in the headers of 58b.
+//! Each data set that cannot be read is reported as a [`Fault`] with its number, byte offset and
+//! the reason; everything else is still read. No input causes a panic, and memory is limited to a
+//! small multiple of the input's size: of a file with more data sets than expected for its size
+//! only a part is read, which its last fault reports. [`read_functions`] and [`read_only`] skip all
+//! other data sets.
 //!
-//! The structs of the data sets mirror a format that has been fixed for decades, so all their fields are public. The feature `parallel`
-//! (off by default) reads and writes large files on all processors.
+//! The structs of the data sets mirror a format that has been fixed for decades, so all their
+//! fields are public. The feature `parallel` (off by default) reads and writes large files on all
+//! processors.
 #![forbid(unsafe_code)]
 
 #[cfg(test)]
@@ -129,11 +132,11 @@ impl From<Function> for DataSet {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Fault {
-    /// Its number; 0 where not even that can be read.
+    /// Its number; 0 if it cannot be read.
     pub data_set: u32,
-    /// Its place among the data sets of the file, from 1.
+    /// Its position among the data sets of the file, from 1.
     pub place: usize,
-    /// Where the trouble is, in bytes from the start of the file.
+    /// Position of the error, in bytes from the start of the file.
     pub offset: usize,
     /// What is wrong.
     pub reason: String,
@@ -146,7 +149,7 @@ impl fmt::Display for Fault {
     }
 }
 
-/// A data set of a type that is not read here.
+/// A data set of a type that is not supported.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Skipped {
@@ -156,7 +159,7 @@ pub struct Skipped {
     pub offset: usize,
 }
 
-/// Text outside the data sets, which is passed over.
+/// Text outside the data sets, which is ignored.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Outside {
@@ -164,19 +167,19 @@ pub struct Outside {
     pub offset: usize,
     /// The beginning of its first line.
     pub text: String,
-    /// Its lines, blank ones not counted.
+    /// Number of its lines, without blank ones.
     pub lines: usize,
 }
 
-/// What a universal file holds.
+/// Contents of a universal file.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct Contents {
     /// Every data set that could be read, in the order of the file.
     pub sets: Vec<DataSet>,
-    /// Every one that could not.
+    /// Every data set that could not be read.
     pub faults: Vec<Fault>,
-    /// Every one of a type that is not known here, or that was not asked for.
+    /// Every data set of a type that is not supported, or that was not requested.
     pub skipped: Vec<Skipped>,
     /// Text before the first data set, between two or after the last.
     pub outside: Vec<Outside>,
@@ -192,11 +195,12 @@ impl Contents {
     }
 }
 
-/// So many data sets any file may have …
+/// Number of data sets that any file may have.
 const LEAST_SETS: usize = 32_768;
-/// … and one more for so many bytes: the header of a function alone has 400.
+/// One more data set is allowed for each of this many bytes: the header of a function alone
+/// has 400.
 const BYTES_OF_SET: usize = 512;
-/// Data sets that are read at a time.
+/// Number of data sets that are read at a time.
 const BATCH: usize = 1024;
 
 /// Reads all data sets of a file's bytes; large ones in parallel.
@@ -204,12 +208,13 @@ pub fn read(bytes: &[u8]) -> Contents {
     read_those(bytes, |_| true)
 }
 
-/// Reads the functions (58 and 58b) alone; every other data set is passed over as one that is not known.
+/// Reads only the functions (58 and 58b); every other data set is skipped like an unsupported one.
 pub fn read_functions(bytes: &[u8]) -> Contents {
     read_only(bytes, &[58])
 }
 
-/// Reads the data sets of these numbers alone (58 stands for 58b too); every other one is passed over as one that is not known.
+/// Reads only the data sets of these numbers (58 includes 58b); every other one is skipped like an
+/// unsupported one.
 pub fn read_only(bytes: &[u8], numbers: &[u32]) -> Contents {
     read_those(bytes, |number| numbers.contains(&number))
 }
@@ -248,7 +253,7 @@ fn read_those(bytes: &[u8], wanted: impl Fn(u32) -> bool + Sync) -> Contents {
     }
 }
 
-/// What came of one data set.
+/// Result of reading one data set.
 enum Read {
     Set(Box<DataSet>),
     Fault(Fault),
@@ -287,7 +292,7 @@ fn one(
     }
 }
 
-/// `f` of each item and its place, in their order; on all processors with the feature `parallel`.
+/// Calls `f` for each item with its index, in order; on all processors with the feature `parallel`.
 fn of_each<T: Send, R: Send>(items: Vec<T>, f: impl Fn((usize, T)) -> R + Send + Sync) -> Vec<R> {
     #[cfg(feature = "parallel")]
     return items.into_par_iter().enumerate().map(f).collect();
@@ -302,7 +307,7 @@ fn of_each<T: Send, R: Send>(items: Vec<T>, f: impl Fn((usize, T)) -> R + Send +
 pub struct WriteError {
     /// Its number.
     pub data_set: u32,
-    /// Its place, from 1.
+    /// Its position, from 1.
     pub place: usize,
     /// What does not fit the format, and what would.
     pub reason: String,
@@ -311,8 +316,8 @@ pub struct WriteError {
 /// The bytes of a universal file with these data sets; large ones are formatted in parallel.
 ///
 /// # Errors
-/// [`WriteError`] for a text that is too long or has line ends, a number that its column cannot hold, values that do not
-/// fit their abscissa.
+/// [`WriteError`] for a text that is too long or has line ends, a number that its column cannot
+/// hold, or values that do not match their abscissa.
 pub fn write(sets: &[DataSet]) -> Result<Vec<u8>, WriteError> {
     let parts = of_each(sets.iter().collect(), |(place, set)| {
         let mut out = output::Output::default();

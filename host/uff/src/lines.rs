@@ -1,19 +1,19 @@
-//! Lines, columns and words of a universal file, each with its place.
+//! Lines, columns and words of a universal file, each with its position.
 
 use super::number;
 use std::borrow::Cow;
 
-/// Most bytes of a line that are looked at as text: the format's lines have 80 columns.
+/// Maximum number of bytes of a line that are read as text: a line of the format has 80 columns.
 pub(super) const LONGEST_LINE: usize = 1000;
 
-/// Bytes of a file, and where in it they begin.
+/// Bytes of a file, and their offset in it.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Span<'a> {
     pub bytes: &'a [u8],
     pub offset: usize,
 }
 
-/// What is wrong at which byte of the file.
+/// An error and its byte offset in the file.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Wrong {
     pub offset: usize,
@@ -35,27 +35,27 @@ impl<'a> Lines<'a> {
         Lines { bytes, at: 0, base: offset, ended: true }
     }
 
-    /// Offset in the file of what has not been read.
+    /// Offset in the file of the first byte that has not been read.
     pub fn offset(&self) -> usize {
         self.base + self.at
     }
 
-    /// Whether the line read last had an end; the last one of a file may have none.
+    /// Whether the last line read had a line end; the last one of a file may have none.
     pub fn ended(&self) -> bool {
         self.ended
     }
 
-    /// What has not been read.
+    /// The bytes that have not been read.
     pub fn rest(&self) -> &'a [u8] {
         &self.bytes[self.at..]
     }
 
-    /// Goes on at this offset of the file.
+    /// Continues at this offset of the file.
     pub fn jump(&mut self, offset: usize) {
         self.at = offset.saturating_sub(self.base).min(self.bytes.len());
     }
 
-    /// The next line, unless it is one that `stop` names: then nothing is read.
+    /// The next line; if `stop` returns true for it, nothing is read.
     pub fn next_unless(&mut self, stop: impl Fn(&[u8]) -> bool) -> Option<(usize, &'a [u8])> {
         let mut ahead = self.clone();
         let line = ahead.next().filter(|(_, line)| !stop(line))?;
@@ -63,7 +63,7 @@ impl<'a> Lines<'a> {
         Some(line)
     }
 
-    /// The next line as text, or what is missing.
+    /// The next line as text, or an error that names `what` is missing.
     pub fn text(&mut self, what: &str) -> Result<Record<'a>, Wrong> {
         let offset = self.offset();
         let (offset, line) =
@@ -93,13 +93,13 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
-/// Whether a line is `-1` in the first six columns; writers that forget the blanks before it are forgiven.
+/// Whether a line is `-1` in the first six columns; missing blanks before it are accepted.
 pub(super) fn is_delimiter(line: &[u8]) -> bool {
     let end = line.iter().rposition(|b| !b.is_ascii_whitespace()).map_or(0, |at| at + 1);
     end <= 6 && line[..end].ends_with(b"-1") && line[..end - 2].iter().all(|b| *b == b' ')
 }
 
-/// At most so many bytes of `line`, without a part of a letter at the end.
+/// At most `most` bytes of `line`, without a partial character at the end.
 fn shortened(line: &[u8], most: usize) -> &[u8] {
     let Some(part) = line.get(..most) else { return line };
     match std::str::from_utf8(part) {
@@ -108,7 +108,7 @@ fn shortened(line: &[u8], most: usize) -> &[u8] {
     }
 }
 
-/// UTF-8 where it is valid, else Latin-1.
+/// Decodes UTF-8 if it is valid, otherwise Latin-1.
 fn decode(line: &[u8]) -> Cow<'_, str> {
     std::str::from_utf8(line)
         .map_or_else(|_| Cow::Owned(line.iter().map(|b| char::from(*b)).collect()), Cow::Borrowed)
@@ -126,12 +126,13 @@ impl<'a> Record<'a> {
         Record { offset, text: decode(shortened(line, LONGEST_LINE)) }
     }
 
-    /// The whole line without blanks around it; `NONE` means nothing.
+    /// The whole line without surrounding blanks; empty for `NONE`.
     pub fn label(&self) -> String {
         unless_none(self.text.trim())
     }
 
-    /// The fields of these widths (in characters), without blanks around them; missing ones are empty.
+    /// The fields of these widths (in characters), without surrounding blanks; missing ones are
+    /// empty.
     pub fn columns<const N: usize>(&self, widths: [usize; N]) -> [String; N] {
         let mut chars = self.text.chars();
         widths.map(|width| chars.by_ref().take(width).collect::<String>().trim().to_string())
@@ -142,18 +143,18 @@ impl<'a> Record<'a> {
         self.text.split_whitespace().collect()
     }
 
-    /// An error of this line.
+    /// An error at this line.
     pub fn wrong(&self, reason: impl Into<String>) -> Wrong {
         Wrong { offset: self.offset, reason: reason.into() }
     }
 }
 
-/// A label with `NONE` read as nothing.
+/// A label; empty for `NONE`.
 pub(super) fn unless_none(label: &str) -> String {
     if label == "NONE" { String::new() } else { label.to_string() }
 }
 
-/// A whole number; an empty field is 0, as in Fortran, and `3.` is 3.
+/// An integer; an empty field is 0, as in Fortran, and `3.` is 3.
 pub(super) fn integer(field: &str) -> Option<i64> {
     if field.is_empty() {
         return Some(0);
@@ -169,7 +170,7 @@ pub(super) fn real(field: &str) -> Option<f64> {
     if field.is_empty() { Some(0.0) } else { number::parse(field.as_bytes()) }
 }
 
-/// Words of many lines in a row, each with its offset: for data sets that are nothing but numbers.
+/// Words of consecutive lines, each with its offset: for data sets that consist only of numbers.
 pub(super) struct Words<'a> {
     lines: Lines<'a>,
     line: &'a [u8],
@@ -212,7 +213,7 @@ impl<'a> Words<'a> {
         })
     }
 
-    /// The next whole number.
+    /// The next integer.
     pub fn integer(&mut self, what: &str) -> Result<i64, Wrong> {
         let offset = self.at;
         let value = self.real(what)?;
@@ -223,7 +224,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// Whether nothing but blanks is left.
+    /// Whether only blanks are left.
     pub fn is_empty(&mut self) -> bool {
         let (lines, line, at) = (self.lines.clone(), self.line, self.at);
         let empty = self.next_word().is_none();

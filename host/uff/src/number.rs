@@ -6,12 +6,14 @@ const POWERS: [f64; 23] = [
     1e19, 1e20, 1e21, 1e22,
 ];
 
-/// The number that `word` is, correctly rounded: exponents by e, E, d, D or by their sign alone (`1.5-101`); also `nan` and `inf`.
+/// Parses `word`, correctly rounded: exponents by e, E, d, D or by their sign alone (`1.5-101`);
+/// also `nan` and `inf`.
 pub(super) fn parse(word: &[u8]) -> Option<f64> {
     quick(word).or_else(|| thorough(word))
 }
 
-/// Numbers of up to 15 digits with small exponents, which one exact multiplication or division rounds correctly.
+/// Numbers of up to 15 digits with small exponents, for which one exact multiplication or division
+/// rounds correctly.
 fn quick(word: &[u8]) -> Option<f64> {
     let (negative, mut rest) = match word {
         [b'-', rest @ ..] => (true, rest),
@@ -53,7 +55,7 @@ fn two(a: u8, b: u8) -> i32 {
     i32::from(a - b'0') * 10 + i32::from(b - b'0')
 }
 
-/// Everything else, by the standard library.
+/// All other numbers, with the standard library.
 fn thorough(word: &[u8]) -> Option<f64> {
     let mut text = String::with_capacity(word.len() + 1);
     let mut last = ' ';
@@ -73,22 +75,25 @@ fn thorough(word: &[u8]) -> Option<f64> {
     text.parse().ok()
 }
 
-/// A count as the format's whole numbers are.
+/// A count as an integer of the format.
 pub(super) fn count(n: usize) -> i64 {
     i64::try_from(n).unwrap_or(i64::MAX)
 }
 
-/// `value` as C's `%{width}.{digits}e` prints it, with as many digits as asked for and the column has room for beside one blank.
+/// `value` as printed by C's `%{width}.{digits}e`, with at most `digits` digits, and no more than
+/// fit the column after one blank.
 pub(super) fn print(out: &mut Vec<u8>, value: f64, width: usize, digits: usize) {
     use std::io::Write;
     let mut text = [0u8; 40];
     for digits in (0..=digits).rev() {
         let mut rest = &mut text[..];
-        // 40 bytes hold any f64 of at most 17 digits, and a slice cannot fail otherwise
+        // 40 bytes are enough for any f64 of at most 17 digits, and writing to a slice cannot fail
+        // otherwise
         let _ = write!(rest, "{value:.digits$e}");
         let length = 40 - rest.len();
         let text = &text[..length];
-        // Rust writes e5 and e-5 where C and Fortran write e+05 and e-05; NaN and inf have no exponent
+        // Rust writes e5 and e-5 where C and Fortran write e+05 and e-05; NaN and inf have no
+        // exponent
         let (mantissa, exponent) = match text.iter().position(|b| *b == b'e') {
             Some(at) => (&text[..at], &text[at + 1..]),
             None => (text, &[][..]),

@@ -1,8 +1,8 @@
-//! Lines of a universal file on their way out: texts and whole numbers that fit their columns.
+//! Output lines of a universal file: texts and integers that fit their columns.
 
 use super::lines::is_delimiter;
 
-/// Lines on their way out.
+/// Output lines.
 #[derive(Default)]
 pub(super) struct Output {
     pub bytes: Vec<u8>,
@@ -28,7 +28,7 @@ impl Output {
         self.bytes.push(b'\n');
     }
 
-    /// A line of text, `NONE` for nothing.
+    /// A line of text, `NONE` if empty.
     pub fn label(&mut self, what: &str, text: &str) -> Result<(), String> {
         let line = label(what, text, 80)?;
         if is_delimiter(line.as_bytes()) {
@@ -39,7 +39,7 @@ impl Output {
     }
 }
 
-/// A text that fits `width` characters, `NONE` for nothing, padded with blanks.
+/// A text that fits `width` characters, `NONE` if empty, padded with blanks.
 pub(super) fn label(what: &str, text: &str, width: usize) -> Result<String, String> {
     let text = if text.is_empty() { "NONE" } else { text };
     if text.chars().count() > width {
@@ -51,12 +51,12 @@ pub(super) fn label(what: &str, text: &str, width: usize) -> Result<String, Stri
     Ok(format!("{text:<width$}"))
 }
 
-/// Whole numbers right-justified in columns of one width.
+/// Integers right-justified in columns of one width.
 pub(super) fn integers(what: &str, values: &[i64], width: usize) -> Result<String, String> {
     let mut line = String::new();
     for value in values {
         let text = value.to_string();
-        // a full column would run into its neighbour
+        // a full column would leave no blank before its neighbour
         if text.len() >= width {
             return Err(format!("{what} is {value}: at most {} characters are possible", width - 1));
         }

@@ -5,14 +5,14 @@ use num_complex::Complex;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-/// A text as a line can hold it: no blanks around it, and not the word that means nothing.
+/// A text that a line can represent: without surrounding blanks, and not the word `NONE`.
 fn text(longest: usize) -> impl Strategy<Value = String> {
     proptest::string::string_regex(&format!("([!-~äµ°²]([ -~äµ°²]{{0,{}}}[!-~äµ°²])?)?", longest - 2))
         .expect("a pattern")
         .prop_filter("NONE is nothing, and -1 an end", |t| t != "NONE" && t != "-1")
 }
 
-/// A value, and what `digits` digits (or single precision) keep of it.
+/// A value rounded to the digits (or to single precision) that the encoding keeps.
 fn kept(value: f64, precision: Precision, encoding: Encoding) -> f64 {
     match (precision, encoding) {
         (Precision::Single, Encoding::Binary(_)) => f64::from(value as f32),
@@ -23,7 +23,7 @@ fn kept(value: f64, precision: Precision, encoding: Encoding) -> f64 {
 }
 
 fn place(value: f64, precision: Precision, encoding: Encoding) -> f64 {
-    // beside double values the text has narrow places
+    // next to double values, text has narrow abscissa columns
     let narrow = encoding == Encoding::Ascii;
     kept(value, if narrow { Precision::Single } else { precision }, encoding)
 }

@@ -48,7 +48,7 @@ pub(super) fn write(nodes: &[Node], out: &mut Output) -> Result<(), String> {
     Ok(())
 }
 
-/// The whole numbers of a node.
+/// The integers of a node.
 pub(super) fn first_line(node: &Node) -> Result<String, String> {
     let Node { label, definition_system, displacement_system, color, .. } = *node;
     integers("a number of a node", &[label, definition_system, displacement_system, color], 10)

@@ -3,12 +3,13 @@
 use super::lines::{Lines, Wrong, integer, unless_none};
 use super::output::{Output, integers, label};
 
-/// Who wrote the file, and when. Dates and times are as they stand: `21-Nov-26`, `14:30:00`.
+/// The program that wrote the file, and when. Dates and times are stored as written: `21-Nov-26`,
+/// `14:30:00`.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Header {
     /// Name of the model's file.
     pub model: String,
-    /// What the model is.
+    /// Description of the model.
     pub description: String,
     /// The program that made the database.
     pub database_program: String,

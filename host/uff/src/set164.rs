@@ -9,7 +9,7 @@ use super::output::{Output, integers, label};
 pub struct Units {
     /// 1 SI (m, N), 2 foot and pound-force, 5 mm and mN, 7 inch and pound-force, 9 others.
     pub code: i64,
-    /// In words.
+    /// Description of the units.
     pub description: String,
     /// 1 absolute, 2 relative temperatures.
     pub temperature_mode: i64,
@@ -52,7 +52,7 @@ pub(super) fn read(mut lines: Lines<'_>) -> Result<Units, Wrong> {
         length: words.real("the factor of length")?,
         force: words.real("the factor of force")?,
         temperature: words.real("the factor of temperature")?,
-        // absolute temperatures have none, and some writers leave it out
+        // absolute temperatures have no offset, and some writers omit it
         temperature_offset: if words.is_empty() { 0.0 } else { words.real("the offset of temperature")? },
     })
 }
@@ -68,7 +68,7 @@ pub(super) fn write(units: &Units, out: &mut Output) -> Result<(), String> {
         for value in row {
             number::print(&mut text, *value, 25, 16);
         }
-        // D exponents are the format's own
+        // the format uses D exponents
         text.iter_mut().filter(|b| **b == b'e').for_each(|b| *b = b'D');
         out.bytes.append(&mut text);
         out.line("");

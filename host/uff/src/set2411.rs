@@ -5,7 +5,7 @@ use super::number;
 use super::output::Output;
 use super::set15::{self, Node};
 
-/// As a row of numbers it is the same as set 15.
+/// Its sequence of numbers is the same as in set 15.
 pub(super) fn read(lines: Lines<'_>) -> Result<Vec<Node>, Wrong> {
     set15::read(lines)
 }

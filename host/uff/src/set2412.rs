@@ -4,7 +4,8 @@ use super::lines::{Lines, Words, Wrong};
 use super::number::count;
 use super::output::{Output, integers};
 
-/// Descriptors of beams, which have a line more: rod, linear, tapered, curved and parabolic beam.
+/// Descriptors of beams, which have an additional line: rod, linear, tapered, curved and parabolic
+/// beam.
 const BEAMS: [i64; 5] = [11, 21, 22, 23, 24];
 
 /// A finite element, or a line or face of a drawing.
@@ -20,13 +21,13 @@ pub struct Element {
     pub material: i64,
     /// Its colour.
     pub color: i64,
-    /// What only beams have.
+    /// Fields that only beams have.
     pub beam: Option<Beam>,
     /// Its nodes.
     pub nodes: Vec<i64>,
 }
 
-/// The further line of a beam.
+/// The additional line of a beam.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Beam {
     /// Node that orients it.

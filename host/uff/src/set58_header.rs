@@ -1,12 +1,12 @@
-//! The header of data sets 58 and 58b: what the eleven lines before the values say.
+//! The header of data sets 58 and 58b: the eleven lines before the values.
 
 use super::function::{Axis, Dof, Precision};
 use super::lines::{Lines, Record, Span, Wrong, integer, real, unless_none};
 
-/// Lines of text before the values.
+/// Number of text lines before the values.
 pub(super) const LINES: usize = 11;
 
-/// What the header says about the values.
+/// Description of the values in the header.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Shape {
     pub complex: bool,
@@ -18,7 +18,7 @@ pub(super) struct Shape {
     pub z: f64,
 }
 
-/// Whether the identifier's line says that values are binary.
+/// Whether the identifier line declares binary values.
 pub(super) fn is_binary(identifier: &[u8]) -> bool {
     matches!(identifier.first(), Some(b'b' | b'B'))
 }
@@ -36,7 +36,7 @@ pub(super) struct Dofs {
 pub(super) fn dofs(record: &Record<'_>) -> Result<Dofs, Wrong> {
     let fields = record.columns([5, 10, 5, 10, 11, 10, 4, 11, 10, 4]);
     let words = record.words();
-    // columns first; where they do not hold numbers, words in the same order
+    // columns first; if they do not contain numbers, words in the same order
     let from = |f: [&str; 10]| {
         let dof = |at: usize| {
             Some(Dof {

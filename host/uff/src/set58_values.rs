@@ -1,8 +1,9 @@
 //! The values of data sets 58 and 58b.
 //!
-//! Text: 6E13.5 for single precision, 4E20.12 for double, with 2(E13.5,E20.12) and E13.5,2E20.12 where places stand between double values.
-//! Binary: the same row of numbers as IEEE floats. Places beside double values are double here, as the common programs write them; read
-//! are also places of 4 bytes beside values of 8, as the standard has it.
+//! Text: 6E13.5 for single precision, 4E20.12 for double, with 2(E13.5,E20.12) and E13.5,2E20.12 if
+//! abscissa values are stored with double values. Binary: the same sequence of numbers as IEEE
+//! floats. Abscissa values with double values are written as double, as common programs do; 4-byte
+//! abscissa values with 8-byte values, as in the standard, are also read.
 
 use super::function::{Abscissa, ByteOrder, Encoding, Function, Precision, Values};
 use super::lines::{Lines, Span, Words, Wrong};
@@ -12,13 +13,13 @@ use super::set58_header::{Shape, shape_of};
 use num_complex::Complex;
 
 impl Shape {
-    /// Numbers of each value: its place where places are stored, and one or two parts.
+    /// Number of numbers per value: its abscissa value if stored, and one or two parts.
     fn numbers(&self) -> usize {
         usize::from(!self.even) + 1 + usize::from(self.complex)
     }
 }
 
-/// Widths in bytes of place and part that a file may have, the likely first.
+/// Widths in bytes of abscissa value and part that a file may have, the most likely first.
 fn widths(shape: &Shape) -> [(usize, usize); 3] {
     match (shape.precision, shape.even) {
         (Precision::Single, _) => [(4, 4), (8, 8), (8, 4)],
@@ -32,7 +33,8 @@ fn bytes_for(shape: &Shape, (place, part): (usize, usize)) -> Option<usize> {
     shape.points.checked_mul(places + part * (1 + usize::from(shape.complex)))
 }
 
-/// How many bytes the data of a 58b may have: what its header announces, and what its form of data needs. Writers disagree.
+/// Possible byte counts of the data of a 58b: the count that its header states, and those that
+/// follow from its form of data. Writers disagree.
 pub(super) fn byte_counts(identifier: Span<'_>, header: Span<'_>) -> Vec<usize> {
     let identifier = String::from_utf8_lossy(identifier.bytes);
     let announced: Option<usize> = identifier.split_whitespace().nth(4).and_then(|word| word.parse().ok());
@@ -94,12 +96,12 @@ pub(super) fn read_binary(
     Ok((abscissa(shape, places), values, Encoding::Binary(order)))
 }
 
-/// Bytes that a number in text takes, its blank with it: the standard's columns have 13 and 20.
+/// Bytes of a number in text, including its blank: the standard's columns have 13 and 20.
 const NARROWEST: usize = 6;
-/// So many numbers may be narrower, as in files of zeros that somebody typed.
+/// Number of numbers that may be narrower, as in manually typed files of zeros.
 const NARROW: usize = 1 << 20;
 
-/// Values in text: by columns, or by words where the columns are not the standard's.
+/// Reads values in text: by columns, or by words if the columns are not the standard's.
 pub(super) fn read_text(lines: Lines<'_>, shape: &Shape) -> Result<(Abscissa, Values, Encoding), Wrong> {
     let start = lines.offset();
     let wanted = shape.points.checked_mul(shape.numbers());
@@ -129,15 +131,16 @@ pub(super) fn read_text(lines: Lines<'_>, shape: &Shape) -> Result<(Abscissa, Va
     Ok((abscissa(shape, found.places), values, Encoding::Ascii))
 }
 
-/// Most zeros that fill up a line: one less than the numbers that a line of the standard holds.
+/// Maximum number of zeros that pad a line: one less than the numbers in a line of the standard.
 const MOST_FILL: usize = 5;
 
-/// Numbers in the order of the file, put where they belong: there is never a second copy of all of them.
+/// Collects numbers in the order of the file directly into their final arrays, so that there is
+/// never a second copy.
 struct Numbers<'s> {
     shape: &'s Shape,
     wanted: usize,
     count: usize,
-    /// Zeros behind the last number that is wanted.
+    /// Zeros after the last number that is needed.
     fill: usize,
     part: usize,
     half: f64,
@@ -163,7 +166,8 @@ impl<'s> Numbers<'s> {
         }
     }
 
-    /// Takes the next number; false when there are more than wanted. Zeros that fill up a last line are none of them.
+    /// Takes the next number; false if there are more than needed. Zeros that pad the last line are
+    /// not counted.
     fn take(&mut self, number: f64) -> bool {
         if self.count == self.wanted && number == 0.0 && self.fill < MOST_FILL {
             self.fill += 1;
@@ -193,7 +197,7 @@ fn abscissa(shape: &Shape, places: Vec<f64>) -> Abscissa {
     }
 }
 
-/// Column widths of a line, repeated: places beside double values are narrower.
+/// Column widths of a line, repeated: abscissa values with double values are narrower.
 fn column_widths(complex: bool, precision: Precision, even: bool) -> &'static [usize] {
     match (precision, even, complex) {
         (Precision::Single, ..) => &[13; 6],
@@ -233,14 +237,14 @@ fn by_words<'s>(lines: Lines<'_>, mut numbers: Numbers<'s>) -> Result<Numbers<'s
     Ok(numbers)
 }
 
-/// Bytes of a function's binary data as written here.
+/// Number of bytes of a function's binary data as written here.
 pub(super) fn byte_count(f: &Function) -> usize {
     let width = if f.precision == Precision::Single { 4 } else { 8 };
     let parts = 1 + usize::from(matches!(f.values, Values::Complex(_)));
     f.values.len() * width * (parts + usize::from(matches!(f.abscissa, Abscissa::Uneven(_))))
 }
 
-/// Writes the values as the function's encoding says.
+/// Writes the values in the function's encoding.
 pub(super) fn write(f: &Function, out: &mut Output) {
     match f.encoding {
         Encoding::Ascii => write_text(f, out),

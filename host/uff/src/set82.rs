@@ -30,7 +30,7 @@ pub(super) fn read(mut lines: Lines<'_>) -> Result<TraceLine, Wrong> {
     while !words.is_empty() {
         nodes.push(words.integer("a node's number")?);
     }
-    // more than announced is common (one writer counts each node once); fewer means that some are lost
+    // more than stated is common (one writer counts each node once); fewer means that some are lost
     if number::count(nodes.len()) < count {
         return Err(first.wrong(format!("{count} nodes are announced and {} are there", nodes.len())));
     }

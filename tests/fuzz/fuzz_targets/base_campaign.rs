@@ -1,4 +1,5 @@
-//! A small campaign in which much has happened, made once; and what a damaged copy of it is held to.
+//! A small campaign with many kinds of entries, created once, and the requirements for a damaged
+//! copy of it.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -16,14 +17,14 @@ use jointrig::report;
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
 use jointrig_protocol::shot::{Phase, Shot};
 
-/// The file, and what is found in it.
+/// The file, and its results.
 pub struct Base {
     pub bytes: Vec<u8>,
     folder: tempfile::TempDir,
     results: String,
 }
 
-/// The one base of this process.
+/// The base of this process, created once.
 pub fn base() -> &'static Base {
     static BASE: OnceLock<Base> = OnceLock::new();
     BASE.get_or_init(|| {
@@ -37,7 +38,7 @@ pub fn base() -> &'static Base {
 }
 
 impl Base {
-    /// A fresh copy to be damaged.
+    /// A new copy that will be damaged.
     pub fn copy(&self, bytes: &[u8]) -> PathBuf {
         let path = self.folder.path().join("a.jrig");
         for name in ["a.jrig-wal", "a.jrig-shm", "a.jrig.lock"] {
@@ -47,7 +48,8 @@ impl Base {
         path
     }
 
-    /// A damaged file is refused, or `verify` names what is wrong, or its results are those of the base.
+    /// A damaged file is refused, or `verify` names the damage, or its results equal those of the
+    /// base.
     pub fn hold(&self, path: &Path, what: &dyn std::fmt::Debug) {
         if let Found::Whole(results) = found(path) {
             assert!(results == self.results, "`verify` is silent, and the results are others: {what:?}\n{results}\n{}", self.results);
@@ -116,7 +118,7 @@ fn eventful(path: &Path) {
     store.close().expect("closed");
 }
 
-/// A pulse, and a motion that dies away in 2048 samples.
+/// A pulse, and a motion that decays within 2048 samples.
 fn record(cell: i64, attempt: u32, session: i64) -> NewRecord {
     let shot = Shot {
         number: attempt + 1,

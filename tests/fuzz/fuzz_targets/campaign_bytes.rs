@@ -1,4 +1,5 @@
-//! A campaign file with damaged bytes. The input is a list of edits, six bytes each: where (of 4), how, and with what.
+//! A campaign file with damaged bytes. The input is a list of edits, six bytes each: position
+//! (modulo 4 bytes), kind and value.
 #![no_main]
 
 mod base_campaign;
@@ -19,7 +20,7 @@ fuzz_target!(|edits: &[u8]| {
                 let end = end(edit[5].into());
                 bytes[at..end].fill(0);
             }
-            // a page that was written elsewhere, or an older one
+            // a page that was written to another place, or an older version of it
             3 => {
                 let from = (at / 4096) * 4096;
                 let to = usize::from(edit[5]) * 4096 % bytes.len();

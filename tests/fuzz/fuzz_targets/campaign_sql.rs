@@ -1,5 +1,5 @@
-//! A campaign file that somebody edited by SQL. The input is a list of statements, eight bytes each: what is done, to which table, column and
-//! row, with which value; those that SQLite refuses are left out.
+//! A campaign file that was edited by SQL. The input is a list of statements, eight bytes each: the
+//! operation, the table, column and row, and the value; statements that SQLite refuses are skipped.
 #![no_main]
 
 mod base_campaign;
@@ -62,7 +62,8 @@ fuzz_target!(|edits: &[u8]| {
     let path = base.copy(&base.bytes);
     let connection = Connection::open(&path).expect("the base is sound");
     connection.execute_batch(VANDALS).expect("the base is sound");
-    // those that keep a statement out are dropped in any case: nobody is kept out for long
+    // triggers that prevent a statement are dropped in any case: they would not protect the file
+    // for long
     for trigger in names(&connection, "SELECT name FROM sqlite_schema WHERE type = 'trigger'") {
         if edits.len() % 2 == 0 {
             let _ = connection.execute_batch(&format!("DROP TRIGGER {trigger}"));

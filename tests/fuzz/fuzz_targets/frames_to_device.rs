@@ -1,5 +1,5 @@
-//! What the device hears: any bytes as a stream of frames, and their payloads. Payloads are also tried without a frame, because
-//! a checksum keeps most of the noise out.
+//! Input of the device: any bytes as a stream of frames, and their payloads. Payloads are also
+//! tried without a frame, because the checksum would reject most random input.
 #![no_main]
 
 use jointrig_protocol::acknowledge::Acknowledge;
@@ -27,11 +27,11 @@ fuzz_target!(|bytes: &[u8]| {
         rest = &rest[used..];
     }
     payload(bytes);
-    // whatever stood on the line before, a zero brings the decoder back into step
+    // whatever preceded it on the line, a zero resynchronises the decoder
     let mut wire = [0; MAX_WIRE];
     let sent = &bytes[..bytes.len().min(BLOCK_HEADER_BYTES + BLOCK_SAMPLE_BYTES - 1)];
     let frame = encode(Kind::Request, sent, &mut wire).expect("short enough");
-    // what it ends is none of this frame's business
+    // the result of the frame that it ends does not matter here
     let _ = accumulator.feed(&[0]);
     let (_, found) = accumulator.feed(frame);
     let heard = found.expect("a whole frame").expect("a good one");

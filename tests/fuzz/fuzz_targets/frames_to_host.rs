@@ -1,4 +1,5 @@
-//! What the host hears: any bytes as a stream of frames, and their payloads; payloads also without a frame.
+//! Input of the host: any bytes as a stream of frames, and their payloads; payloads also without a
+//! frame.
 #![no_main]
 
 use jointrig_protocol::block::Block;
@@ -19,7 +20,7 @@ fn payload(kind: Kind, bytes: &[u8]) {
 }
 
 fuzz_target!(|bytes: &[u8]| {
-    // a Hello among the bytes may go over to packets
+    // a Hello among the bytes may switch the link to packets
     let mut reader = Reader::new();
     let mut rest = bytes;
     while !rest.is_empty() {

@@ -1,5 +1,6 @@
-//! Any bytes as an array in a sound archive, whose own checksums would keep them out: a header up to the first line's end, then values.
-//! Every array that a reader asks for is this one.
+//! Any bytes as an array in a valid archive, because the archive's checksums would reject most
+//! damaged input: a header up to the end of the first line, then values. A reader gets this array
+//! for every name that it requests.
 #![no_main]
 
 use jointrig::exchange::{read_frf, read_hysteresis, read_impacts};

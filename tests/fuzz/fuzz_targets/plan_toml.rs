@@ -1,4 +1,5 @@
-//! Any text as a plan, read as one of a file and as a new one; every error of it; its cells where there are not too many.
+//! Any text as a plan, read both as the plan of a file and as a new one: all its errors, and its
+//! cells if there are not too many.
 #![no_main]
 
 use jointrig::campaign::plan::Plan;

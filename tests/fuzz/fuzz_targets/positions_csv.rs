@@ -1,4 +1,5 @@
-//! Any bytes as the tables of a geometry: each sheet gets a part, cut at form feeds.
+//! Any bytes as the tables of a geometry: the bytes are split at form feeds, one part for each
+//! sheet.
 #![no_main]
 
 use jointrig::exchange::read_positions;

@@ -1,4 +1,5 @@
-//! Any text as the description of a simulated rig: what is accepted makes a rig whose codes are made for a moment.
+//! Any text as the description of a simulated rig: an accepted description makes a rig that
+//! produces codes for a short time.
 #![no_main]
 
 use jointrig_hil_sim::rig::{Rig, config::RigConfig};

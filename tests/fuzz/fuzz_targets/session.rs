@@ -1,5 +1,6 @@
-//! A whole session with a device that says anything. The input is a list of messages: a kind, a length, a payload. Some are any bytes; some
-//! are what a good device would say, changed in a few bytes, so that one lie is heard in the middle of a session.
+//! A whole session with a device that sends anything. The input is a list of messages: a kind, a
+//! length, a payload. Some are arbitrary bytes; others are a correct device's messages with a few
+//! bytes changed, so that a single error occurs in the middle of a session.
 #![no_main]
 
 use std::collections::VecDeque;
@@ -22,7 +23,7 @@ struct Said {
     messages: VecDeque<(u8, Vec<u8>)>,
     asked: request::Numbered,
     session: u32,
-    /// The scan that a good block begins with.
+    /// The first scan of the next correct block.
     next_scan: u64,
     accumulator: Accumulator,
     out: VecDeque<u8>,
@@ -59,7 +60,7 @@ const RATE_HZ: u32 = 51_200;
 const CHANNELS: u8 = 2;
 const BLOCK: u8 = 50;
 
-/// What a good device answers.
+/// The answer of a correct device.
 fn good(asked: &request::Numbered, next_scan: u64) -> Vec<u8> {
     let answer = match &asked.request {
         Request::Info => Answer::Info(Info {
@@ -109,7 +110,7 @@ fn good(asked: &request::Numbered, next_scan: u64) -> Vec<u8> {
     postcard::to_slice(&answer, &mut [0; 512]).expect("it holds every answer").to_vec()
 }
 
-/// Changes bytes: places and what they are flipped by, in turn.
+/// Changes bytes; `by` alternates between positions and XOR masks.
 fn changed(mut bytes: Vec<u8>, by: &[u8]) -> Vec<u8> {
     for pair in by.chunks_exact(2) {
         let count = bytes.len().max(1);
@@ -120,7 +121,7 @@ fn changed(mut bytes: Vec<u8>, by: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// The largest number that postcard writes in front of a message.
+/// Prepends the message number, which postcard encodes in up to five bytes.
 fn numbered(number: u32, rest: &[u8]) -> Vec<u8> {
     let mut bytes = postcard::to_slice(&number, &mut [0; 5]).expect("five bytes hold it").to_vec();
     bytes.extend(rest);
@@ -168,7 +169,7 @@ impl Transport for Said {
                 match frame.kind {
                     Kind::Hello => {
                         let Ok(theirs) = Hello::from_bytes(frame.payload) else { return Ok(()) };
-                        // a good beginning, once: without it nothing else is heard
+                        // one correct Hello first: without it the session ignores everything else
                         if self.session == 0 {
                             self.session = theirs.session;
                             let hello = Hello::device(theirs.session, 5, RING).to_bytes();

@@ -1,4 +1,5 @@
-//! Any bytes as a universal file: no panic; what is read can be written, and read again as the same; it may be FRFs or records.
+//! Any bytes as a universal file: no panic; what is read can be written and reads back the same; it
+//! may contain FRFs or records.
 #![no_main]
 
 use jointrig::exchange::uff::{Contents, read, write};
@@ -13,7 +14,7 @@ fn made_of(contents: &Contents) {
 fuzz_target!(|bytes: &[u8]| {
     let first = read(bytes);
     made_of(&first);
-    // texts and numbers that our columns do not hold are refused, which is no fault
+    // texts and numbers that do not fit the columns are refused, which is correct
     let Ok(written) = write(&first.sets) else { return };
     let second = read(&written);
     assert!(second.faults.is_empty(), "{:?}", second.faults);

@@ -1,4 +1,5 @@
-//! Any bytes as the first sheet of a sound workbook, whose own checksums would keep them out; before a form feed, as its shared texts.
+//! Any bytes as the first sheet of a valid workbook, because the archive's checksums would reject
+//! most damaged input; bytes before a form feed are its shared strings.
 #![no_main]
 
 use jointrig::exchange::read_positions;

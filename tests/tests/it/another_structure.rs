@@ -1,4 +1,5 @@
-//! A campaign that is continued on another structure than that of its records: refused, or accepted and told.
+//! A campaign that is continued on a structure other than that of its records: refused, or accepted
+//! and reported.
 #![allow(clippy::unwrap_used)]
 
 use jointrig::campaign::plan::SMALL;
@@ -26,7 +27,8 @@ fn refused(mut command: Command) -> String {
 fn hits_of_another_structure_are_refused_or_accepted_and_told() {
     let (folder, file) = campaign(SMALL);
     done(&mut run(&file, "sim:", &[]));
-    // more hits are wanted, and what is measured is another draw of the rig, another rig, or one with another parameter
+    // more hits are needed, and the device is now another draw of the rig, another rig, or one with
+    // another parameter
     let more = folder.path().join("more.toml");
     std::fs::write(&more, SMALL.replace("wanted = 2", "wanted = 3")).unwrap();
     let heavier = folder.path().join("heavier.toml");
@@ -66,7 +68,7 @@ fn hits_of_another_structure_are_refused_or_accepted_and_told() {
     assert!(told.ok == Some(false) && told.meaning.contains("a parameter of that rig"), "{told:?}");
     assert_eq!(results.source.structure_changes.len(), 1);
 
-    // the same rig as the last time is no other one
+    // the same rig as last time is not a change
     done(&mut run(&file, &heavier, &[]));
     assert_eq!(found(&file).source.structure_changes.len(), 1);
 }

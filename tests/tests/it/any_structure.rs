@@ -1,5 +1,7 @@
-//! A structure that is not the paper's, measured by another system: three bodies, two clamps, a contact that slides along x + y, six
-//! triaxial accelerometers that hear every hit at once, a hammer held by hand. Universal files with node numbers go in, the joint comes out.
+//! A structure other than the paper's, measured by another system: three bodies, two clamps, a
+//! contact that slides along x + y, six triaxial accelerometers that record every hit
+//! simultaneously, a manual hammer. Universal files with node numbers are read, the joint is
+//! identified.
 #![allow(clippy::unwrap_used)]
 
 use jointrig::campaign::plan::SMALL;
@@ -20,7 +22,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 const RATE_HZ: f64 = 12_800.0;
-/// 2 s, and what stands before the trigger.
+/// 2 s, plus the samples before the trigger.
 const SCANS: usize = 25_600 + 256;
 const HITS: usize = 3;
 
@@ -31,7 +33,7 @@ const ALONG: [f64; 3] = [FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0];
 const ACROSS: [f64; 3] = [-FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0];
 const UP: [f64; 3] = [0.0, 0.0, 1.0];
 
-/// Which bodies there are, and whether the joint is.
+/// A part of the structure: its bodies, with or without the joint.
 #[derive(Clone, Copy, PartialEq)]
 enum Part {
     Frame,
@@ -39,10 +41,11 @@ enum Part {
     Both,
 }
 
-/// (node, where, how its sensor is mounted): the first three on the frame's arm, the others on the blade.
+/// (node, position, orientation of its sensor): the first three on the frame's arm, the others on
+/// the blade.
 fn sensors() -> Vec<(i64, Vector3<f64>, Matrix3<f64>)> {
     let straight = Matrix3::identity();
-    // turned about z, and upside down
+    // rotated about z, and upside down
     let turned = Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
     let over = Matrix3::new(1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0);
     vec![
@@ -55,7 +58,7 @@ fn sensors() -> Vec<(i64, Vector3<f64>, Matrix3<f64>)> {
     ]
 }
 
-/// (node, where, direction): six on the frame's arm, six on the blade.
+/// (node, position, direction): six on the frame's arm, six on the blade.
 fn impacts() -> Vec<(i64, Vector3<f64>, [f64; 3])> {
     let on = |side: f64, first: i64| {
         [
@@ -138,7 +141,8 @@ fn bodies(part: Part) -> &'static [usize] {
     }
 }
 
-/// Spectra of the sensors' channels (m/s² per N) for a unit force at each impact: by impact, by channel, by line.
+/// Spectra of the sensors' channels (m/s² per N) for a unit force at each impact: by impact, by
+/// channel, by line.
 fn accelerances(
     part: Part,
     sensors: &[(i64, Vector3<f64>, Matrix3<f64>)],
@@ -191,7 +195,8 @@ fn accelerances(
     out
 }
 
-/// What the other system writes: a file for each place of impact, in it every hit as its force and 9 or 18 accelerations.
+/// Writes the other system's files: one for each impact point, with every hit as its force and 9 or
+/// 18 accelerations.
 fn measure(part: Part, folder: &Path, rng: &mut Xoshiro256PlusPlus) {
     std::fs::create_dir_all(folder).unwrap();
     let on_part = |node: i64| match part {
@@ -209,7 +214,7 @@ fn measure(part: Part, folder: &Path, rng: &mut Xoshiro256PlusPlus) {
         let mut sets: Vec<DataSet> = Vec::new();
         for hit in 1..=HITS {
             let peak = 50.0 * (1.0 + 0.002 * normal());
-            // a cosine arch of 1.2 ms from the trigger on
+            // a cosine arch of 1.2 ms, starting at the trigger
             let arch = |t: f64| {
                 if (0.0..1.2e-3).contains(&t) { 0.5 * (1.0 - (TAU * t / 1.2e-3).cos()) } else { 0.0 }
             };
@@ -228,7 +233,7 @@ fn measure(part: Part, folder: &Path, rng: &mut Xoshiro256PlusPlus) {
             };
             let dof = |node: i64, direction: i64| Dof { entity: "NONE".into(), node, direction };
             let noisy = pulse.iter().map(|f| f + 0.01 * normal()).collect();
-            // the label says along which side of its own axis the hammer pushes
+            // the label states in which direction along its own axis the hammer pushes
             add(noisy, dof(*node, if direction[2] < 0.0 { -3 } else { 3 }), quantity::FORCE);
             for (channel, h) in of_channels.iter().enumerate() {
                 let mut product: Vec<Complex<f64>> =

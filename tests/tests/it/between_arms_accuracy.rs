@@ -1,5 +1,5 @@
-//! How well the stiffness between the arms is found, through the whole chain: plan, firmware, rig, records, spectra, virtual points, estimate.
-//! The truth is that of the rig's parameters.
+//! Accuracy of the stiffness between the arms, through the whole chain: plan, firmware, rig,
+//! records, spectra, virtual points, estimate. The truth follows from the rig's parameters.
 #![allow(clippy::unwrap_used)]
 
 use jointrig::campaign::plan::DEMO;

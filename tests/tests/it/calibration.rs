@@ -1,4 +1,5 @@
-//! A calibration that is corrected after the campaign: everything is computed anew with it, nothing that was measured changes.
+//! A calibration that is corrected after the campaign: all results are recomputed with it, the
+//! measured data do not change.
 #![allow(clippy::unwrap_used)]
 
 use jointrig::campaign::plan::{CONTACT, SMALL};
@@ -12,7 +13,7 @@ use std::fmt::Write as _;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
-/// A hash over all raw codes, and every scale that the sessions were measured with.
+/// A hash over all raw codes, and every scale with which the sessions were measured.
 fn measured(file: &Path) -> (u64, Vec<f32>) {
     let store = Store::open_read_only(file).unwrap();
     let mut hash = DefaultHasher::new();
@@ -27,7 +28,7 @@ fn k_t(file: &Path) -> f64 {
     found(file).answer.unwrap().contact.k_t_n_per_m.unwrap().mean
 }
 
-/// A laboratory's file: each of these channels gives so many times the volts that `map` says.
+/// A calibration file: the voltage of each of these channels is `times` the voltage by `map`.
 fn laboratory(folder: &Path, map: &ChannelMap, names: &[&str], times: f64) -> PathBuf {
     let one = |name: &&str| {
         let channel = map.channels.iter().find(|channel| channel.name == *name).unwrap();
@@ -42,7 +43,7 @@ fn laboratory(folder: &Path, map: &ChannelMap, names: &[&str], times: f64) -> Pa
     path
 }
 
-/// Enters it; what the command says.
+/// Enters the calibration; returns the command's output.
 fn calibrate(file: &Path, laboratory: &Path, why: &str) -> String {
     done(
         jointrig()
@@ -63,7 +64,7 @@ fn a_calibration_corrected_afterwards_changes_the_answer_and_no_record() {
     let (before, raw) = (k_t(&file), measured(&file));
     let map = Store::open_read_only(&file).unwrap().channels(1).unwrap();
 
-    // 2 % more volts for each newton: every force was 2 % smaller than it was taken for, and so is k_T
+    // 2 % more volts per newton: every force was 2 % smaller than assumed, and so is k_T
     let why = "recalibrated after the campaign: 2 % more";
     let said = calibrate(&file, &laboratory(folder.path(), &map, &FORCES, 1.02), why);
     assert!(FORCES.iter().all(|name| said.contains(name)) && said.contains("+2.00 %"), "{said}");
@@ -72,7 +73,7 @@ fn a_calibration_corrected_afterwards_changes_the_answer_and_no_record() {
     assert_eq!(measured(&file), raw, "records, and what they were measured with, stay as they are");
     assert_eq!(Store::open_read_only(&file).unwrap().verify().unwrap(), []);
 
-    // its history stands in results and report
+    // its history is in results and report
     let out = folder.path().join("out");
     done(jointrig().arg("analyse").arg(&file).arg("--out").arg(&out));
     let results: serde_json::Value =
@@ -85,17 +86,18 @@ fn a_calibration_corrected_afterwards_changes_the_answer_and_no_record() {
     assert!(page.contains("recalibrated after the campaign"), "why");
     assert!(page.contains("LW12345, 2026-11-02"), "the sensor");
 
-    // the motions too: both 2 % smaller, and their ratio is what it was
+    // the motions too: both 2 % smaller, and their ratio is as before
     calibrate(&file, &laboratory(folder.path(), &map, &MOTIONS, 1.02), "the vibrometers too");
     assert!((k_t(&file) / before - 1.0).abs() < 2e-4);
 
-    // the forces taken back by further rows: motions 2 % smaller, a contact 2 % stiffer; the first rows stay
+    // further rows undo the change of the forces: motions 2 % smaller, a contact 2 % stiffer; the
+    // first rows are kept
     let back = laboratory(folder.path(), &map, &FORCES, 1.0);
     calibrate(&file, &back, "the old certificate was right");
     assert!((k_t(&file) / before / 1.02 - 1.0).abs() < 2e-4);
     assert_eq!(Store::open_read_only(&file).unwrap().calibrations().unwrap().len(), 4 + 5 + 4);
 
-    // a channel that is not there
+    // a channel that does not exist
     std::fs::write(&back, "[[channel]]\nname = \"forse\"\nsensitivity_v = 1.0\n").unwrap();
     let refused = jointrig()
         .args(["campaign", "calibrate"])
@@ -113,7 +115,7 @@ fn a_calibration_corrected_afterwards_changes_the_answer_and_no_record() {
 
 #[test]
 fn a_laboratorys_file_counts_while_it_is_measured() {
-    // by the laboratory the hammer's cell gives a quarter more than the device takes it for
+    // by the calibration the hammer's force cell gives a quarter more than the device assumes
     let (folder, file) = campaign(SMALL);
     let map = {
         let (_folder, plain) = campaign(SMALL);
@@ -131,14 +133,15 @@ fn a_laboratorys_file_counts_while_it_is_measured() {
     let good: Vec<_> = store.records().unwrap().into_iter().flatten().filter(RecordRow::kept).collect();
     assert!(good.len() >= 14);
     for record in &good {
-        // the plan's 50 N are those of the laboratory, and so is what the device says of the hit
+        // the plan's 50 N refer to the calibration, and so does the device's report of the hit
         assert!((40.0..60.0).contains(&record.peak_n), "{}", record.peak_n);
         let device = f64::from(record.shot.peak_n);
         assert!((device / record.peak_n - 1.0).abs() < 0.02, "{device} and {}", record.peak_n);
     }
 }
 
-/// A rig on `sim:` whose sensors give these volts over what the device was built for; a laboratory's file that says so.
+/// A rig on `sim:` whose sensors have these voltage ratios to the device's scales, and a
+/// calibration file that states them.
 fn another_rig(folder: &Path, map: &ChannelMap, volts: &[(&str, f64)]) -> (String, PathBuf) {
     let mut rig = "[surroundings]\ntemperature_c = 31.5\n[errors]\nnone = false\n[errors.volts]\n".to_owned();
     let mut laboratory = String::new();
@@ -168,7 +171,8 @@ fn the_device_acts_by_the_calibrated_scales_and_signs() {
         Store::open_read_only(&plain).unwrap().channels(1).unwrap()
     };
     let (folder, file) = campaign(SMALL);
-    // the hammer's cell is turned, and the vibrometers are 3 % off, each its own way
+    // the hammer's force cell is reversed, and the two vibrometers are off by 3 % in opposite
+    // directions
     let volts = [("force", -1.0), ("ldv_a", 1.03), ("ldv_b", 0.97)];
     let (rig, laboratory) = another_rig(folder.path(), &map, &volts);
     let device = ["--device", &rig, "--yes"];
@@ -184,7 +188,7 @@ fn the_device_acts_by_the_calibrated_scales_and_signs() {
     let rows: Vec<_> = store.levels().unwrap().into_iter().flatten().collect();
     let held = rows[0].settled().reached;
     assert!((held / 2e-7 - 1.0).abs() < 0.02, "{held} m by the calibrated scales");
-    // and the specimen's temperature is kept with it
+    // and the specimen's temperature is stored with it
     let celsius: Vec<f64> = store.temperatures().unwrap().iter().map(|row| row.celsius).collect();
     assert!(celsius.len() >= 3 && celsius.iter().all(|celsius| (celsius - 31.5).abs() < 1e-3), "{celsius:?}");
     let out = folder.path().join("out");
@@ -194,7 +198,7 @@ fn the_device_acts_by_the_calibrated_scales_and_signs() {
     assert_eq!(results["source"]["temperature_c"], serde_json::json!([31.5, 31.5, 31.5]));
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
     assert!(page.contains("temperature of the specimen"));
-    // what the device said of itself stays in the session
+    // the device's own description stays in the session
     let as_measured = store.channels_as_measured(1).unwrap();
     assert!(as_measured.channels.iter().zip(&map.channels).all(|(now, then)| now == then));
 }

@@ -1,4 +1,4 @@
-//! Two campaigns compared: a contact that was changed, and one that was not.
+//! Comparison of two campaigns: with a contact that was changed, and with one that was not.
 #![allow(clippy::unwrap_used)]
 
 use jointrig_tests::command::jointrig;
@@ -13,7 +13,8 @@ fn done(command: &mut Command) -> String {
     String::from_utf8(out.stdout).unwrap()
 }
 
-/// A campaign for the contact's own stiffness on the default rig with this k_T along the sliding direction, N/µm.
+/// A campaign for the contact's own stiffness on the default rig with this k_T along the sliding
+/// direction, N/µm.
 fn measured(folder: &Path, k_t: f64, seed: u64) -> PathBuf {
     let (rig, file) = (folder.join(format!("rig-{seed}.toml")), folder.join(format!("contact-{seed}.jrig")));
     let contact = format!("name = \"own-{k_t}\"\n[contact]\nstiffness_n_per_m = [1.8e8, 2.6e8, {k_t}e6]\n");
@@ -31,7 +32,7 @@ fn measured(folder: &Path, k_t: f64, seed: u64) -> PathBuf {
     file
 }
 
-/// What `jointrig compare` finds, and what it prints when no document is asked for.
+/// The document of `jointrig compare`, and the output when no document is requested.
 fn compared(folder: &Path, a: &Path, b: &Path) -> (Value, String) {
     let printed = done(jointrig().arg("compare").arg(a).arg(b).arg("--out").arg(folder));
     let document = std::fs::read_to_string(folder.join("compare.json")).unwrap();
@@ -46,8 +47,9 @@ fn of_k_t(compared: &Value) -> [f64; 3] {
     [&own["mean"], &own["ci95"][0], &own["ci95"][1]].map(|v| 1e-6 * v.as_f64().unwrap())
 }
 
-/// Three campaigns, each with a seed of its own: gains, positions, aim and noise are drawn anew. How often such an interval holds is counted
-/// in `contact_accuracy`; here it is the interval of one draw.
+/// Three campaigns, each with a different seed: gains, positions, aim and noise are drawn again.
+/// How often such an interval covers the truth is counted in `contact_accuracy`; here it is the
+/// interval of one draw.
 #[test]
 fn a_softer_contact_is_told_from_the_same_one_measured_twice() {
     let temporary = tempfile::tempdir().unwrap();

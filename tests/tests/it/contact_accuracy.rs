@@ -1,5 +1,5 @@
-//! How well the contact's own stiffness is found, through the whole chain: plan, firmware, rig, records, spectra, estimate. The truth is
-//! that of the rig's parameters.
+//! Accuracy of the contact's own stiffness, through the whole chain: plan, firmware, rig, records,
+//! spectra, estimate. The truth follows from the rig's parameters.
 #![allow(clippy::unwrap_used)]
 
 use jointrig::campaign::store::Store;
@@ -12,7 +12,7 @@ use jointrig_tests::rigs::{Drawn, contact_plan, near_instead_plan, near_plan};
 use jointrig_tests::slip_truth::slid;
 use std::path::Path;
 
-/// A truth, and what is found of it.
+/// A truth, and its estimate.
 #[derive(Debug, Clone, Copy)]
 struct Estimate {
     truth: f64,
@@ -29,7 +29,7 @@ impl Estimate {
         self.found.map(|[mean, low, high]| Answer::new(mean, [low, high], self.truth))
     }
 
-    /// Whether nothing wrong is said.
+    /// Whether the interval covers the truth, or there is no estimate.
     fn covers(&self) -> bool {
         self.answer().is_none_or(|answer| answer.covers)
     }
@@ -38,7 +38,7 @@ impl Estimate {
 /// The plan for a rig.
 type Plan = fn(&RigConfig) -> String;
 
-/// One campaign's answers beside the truth.
+/// Estimates of one campaign with the truth.
 #[derive(Debug, Clone)]
 struct Row {
     rig: u64,
@@ -47,7 +47,7 @@ struct Row {
     /// c_T, N s/m.
     damping: Estimate,
     why: String,
-    /// Whether the contact is said to slip under the hammer.
+    /// Whether the analysis reports that the contact slips under the hammer.
     slips: Option<bool>,
 }
 
@@ -64,12 +64,12 @@ fn row(campaign: DrawnCampaign, results: Results) -> Row {
     }
 }
 
-/// A campaign with `contact.toml`, told when it ends.
+/// Runs a campaign with `contact.toml` and prints its row when it ends.
 fn told(campaign: DrawnCampaign) -> Row {
     told_of(campaign, contact_plan)
 }
 
-/// A campaign, told when it ends.
+/// Runs a campaign and prints its row when it ends.
 fn told_of(campaign: DrawnCampaign, plan: Plan) -> Row {
     let row = row(campaign, campaign.results(plan, |_, _, _| {}));
     let own = row.stiffness;
@@ -93,7 +93,7 @@ fn coverage(all: impl Iterator<Item = Estimate>) -> Coverage {
     Coverage::of(&all.filter_map(|estimate| estimate.answer()).collect::<Vec<_>>())
 }
 
-/// What a table of answers says of each row after its first column.
+/// Column headings of a table of estimates, with the heading of its first column.
 fn columns(first: &str) -> String {
     format!("{first} | campaigns | {COLUMNS} | no answer")
 }
@@ -110,7 +110,7 @@ fn lines(name: &str, rows: &[Row]) -> [String; 2] {
     ]
 }
 
-/// Takes what the simulator is known to be out of a campaign file.
+/// Removes the known parameters of the simulator from a campaign file.
 fn forget_the_truth(file: &Path) {
     assert!(Store::open_read_only(file).unwrap().simulated_truth().unwrap().is_some());
     let database = rusqlite::Connection::open(file).unwrap();
@@ -121,7 +121,7 @@ fn forget_the_truth(file: &Path) {
 
 #[test]
 fn the_contacts_own_stiffness_is_found_on_rigs_that_nobody_tuned_for() {
-    // One flexible clamp on either side, and one on A alone.
+    // One rig with a flexible clamp on each side, and one with a clamp on A alone.
     let like = Drawn::default();
     let folder = tempfile::tempdir().unwrap();
     let rows = std::thread::scope(|scope| {
@@ -132,7 +132,7 @@ fn the_contacts_own_stiffness_is_found_on_rigs_that_nobody_tuned_for() {
             forget_the_truth(&file);
             let blind = found(&file);
             assert!(!blind.source.settings.contains_key("rig") && blind.source.simulated);
-            // which rig it was is forgotten as well; everything that was found must be the same
+            // the rig's identity is removed as well; all results must be the same
             let blind = Results { source: results.source.clone(), ..blind };
             assert!(blind == results, "an estimate of rig {number} saw the truth");
             row(campaign, results)
@@ -141,14 +141,16 @@ fn the_contacts_own_stiffness_is_found_on_rigs_that_nobody_tuned_for() {
     });
     let Coverage { answers, covered, rms, half } = coverage(rows.iter().map(|row| row.stiffness));
     assert_eq!((covered, answers), (rows.len(), rows.len()), "{rows:?}");
-    // 2.5 % rms is what the placing of spots and points leaves; three of two draws may not exceed three of them
+    // the position errors of spots and points leave 2.5 % rms; the limit allows for the scatter of
+    // two draws
     assert!(rms < 0.06 && half < 0.15, "{rows:?}");
 }
 
-/// Hits of some 50 N against 15 N of friction.
+/// Hits of about 50 N with a slip limit of 15 N.
 const MAY_SLIP: Drawn = Drawn { slip_limit_n: Some(15.0), stiffest_n_per_m: 300e6, errors: 1.0, gain: 0.005 };
 
-/// The first of the rigs from number `first` on that slip under the hammer, and the first that stick: `each` of either.
+/// From rig number `first` on, the first `each` rigs that slip under the hammer, and the first
+/// `each` that stick.
 fn slipping_and_stuck(first: u64, each: usize) -> [Vec<DrawnCampaign>; 2] {
     let [mut slipping, mut stuck] = [Vec::new(), Vec::new()];
     for number in first.. {
@@ -199,7 +201,7 @@ fn a_contact_that_may_slip_has_its_stuck_stiffness_or_none() {
     let right = slipping.iter().filter(|row| row.slips == Some(true)).count()
         + stuck.iter().filter(|row| row.slips == Some(false)).count();
     assert!(20 * right >= 19 * rows.len(), "{rows:?}");
-    // nothing but the stuck stiffness may be called k_T
+    // only the stuck stiffness may be called k_T
     let other = rows.iter().filter(|row| !row.stiffness.covers()).count();
     assert!(20 * other <= rows.len().max(20), "{rows:?}");
 }
@@ -227,7 +229,7 @@ fn marks_beside_the_contact() {
 #[ignore = "docs/accuracy.md, by `cargo xtask accuracy`: the answer"]
 fn accuracy_of_the_contacts_own_stiffness() {
     let drawn = Drawn::default();
-    // name, first rig, how it is drawn, campaigns of each rig
+    // name, first rig, parameters of the draw, campaigns on each rig
     let mut kinds = vec![
         ("default", 0, drawn, 3),
         ("half of them, gains exact", 100, Drawn { errors: 0.5, gain: 0.0, ..drawn }, 3),
@@ -235,7 +237,7 @@ fn accuracy_of_the_contacts_own_stiffness() {
         ("default, gains of 1 %", 500, Drawn { gain: 0.01, ..drawn }, 1),
         ("default, contacts to 600 N/µm", 200, Drawn { stiffest_n_per_m: 600e6, ..drawn }, 1),
     ];
-    // FIRST names the first rig of one of them
+    // FIRST selects one of them by its first rig
     if let Some(only) = std::env::var("FIRST").ok().map(|text| text.parse::<u64>().unwrap()) {
         kinds.retain(|(_, first, ..)| *first == only);
     }

@@ -1,4 +1,5 @@
-//! A flipped bit anywhere in a record is found and named, and the analysis does without that record and says so.
+//! A flipped bit anywhere in a record is found and named, and the analysis excludes that record and
+//! reports it.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
@@ -22,7 +23,7 @@ fn campaign(file: &Path) {
     assert_eq!(summary.kept, 6);
 }
 
-/// The one place of `part` in `whole`; none if there are several.
+/// The only position of `part` in `whole`; none if there are several.
 fn find(whole: &[u8], part: &[u8]) -> Option<usize> {
     let mut places = whole.windows(part.len()).enumerate().filter(|(_, window)| *window == part);
     let (place, _) = places.next()?;
@@ -39,7 +40,7 @@ fn a_flipped_bit_in_the_samples_names_the_record_and_is_left_out() {
     let good: Vec<_> = rows.iter().filter(|row| row.kept()).collect();
     let whole = std::fs::read(&file).unwrap();
 
-    // a record's bytes lie in the file in pieces of a page
+    // a record's bytes are stored in the file in pieces of a page
     let bytes = Store::open_read_only(&file).unwrap().stored_bytes(good[1].id).unwrap();
     let mut tried = 0;
     let places = [0, 1_000, bytes.len() / 4, bytes.len() / 3, bytes.len() / 2, bytes.len() - 1];
@@ -86,14 +87,14 @@ fn whatever_bit_flips_either_it_is_found_or_every_record_is_as_it_was() {
     let (mut found, mut state) = (0, 20_261_121_u64);
     for _ in 0..150 {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        // the file's header and the tables' names have no record in them
+        // the file's header and the tables' names contain no record
         let place = 8_192 + (state >> 20) as usize % (whole.len() - 8_192);
         let mut spoilt = whole.clone();
         spoilt[place] ^= 1 << (state & 7);
         std::fs::write(&copy, &spoilt).unwrap();
         let verified = verify(&copy);
         match verified.status.code() {
-            // room that nothing uses
+            // unused space
             Some(0) => assert!(content(&copy) == before, "byte {place}: a change went unseen"),
             Some(1) => found += 1,
             other => panic!("byte {place}: {other:?}, {}", text(&verified.stderr)),

@@ -1,4 +1,4 @@
-//! `jointrig demo`, as a user runs it: known physics in, recovered physics out.
+//! `jointrig demo`, as a user runs it: it recovers the physics of the simulated rig.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
@@ -25,8 +25,9 @@ fn sliding_stiffness(results: &Value, method: &str) -> f64 {
     row["stiffness_n_per_m"]["z"]["mean"].as_f64().unwrap() * 1e-6
 }
 
-/// Clamp and contact are in series on the default rig: substructuring sees 26.8 N/µm there, of a contact of 180,
-/// and the results must say that this is not k_T. 22 to 31 leaves room for 0.5 mm and 2° of error.
+/// Clamp and contact are in series on the default rig: substructuring finds 26.8 N/µm there for a
+/// contact of 180, and the results must state that this is not k_T. The range 22 to 31 allows for
+/// position errors of 0.5 mm and 2°.
 #[test]
 fn the_default_rig_shows_clamp_and_contact_in_series() {
     let folder = tempfile::tempdir().unwrap();
@@ -39,15 +40,17 @@ fn the_default_rig_shows_clamp_and_contact_in_series() {
     let [low, high] =
         ["low", "high"].map(|end| series[format!("series_stiffness_{end}_n_per_m")].as_f64().unwrap());
     assert!(low < 31.2e6 && 31.2e6 < high, "{series}");
-    // A and B are coupled by nothing else, and errors of position are no finding
+    // A and B are coupled only by the contact, and position errors must not be reported as a
+    // coupling
     let coupled = checks.iter().find(|check| check["name"] == "back-coupling").unwrap();
     assert_ne!(coupled["ok"], false, "{coupled}");
-    // the specimen that has a clamp is the one that leaves its arm
+    // the specimen with a clamp is the one that moves relative to its arm
     let hidden = checks.iter().find(|check| check["name"] == "hidden-resonance").unwrap();
     assert!(hidden["meaning"].as_str().unwrap().contains("specimen A that moves in its clamp"), "{hidden}");
 }
 
-/// With a rigid clamp and no errors of position, substructuring sees the contact itself: 180 N/µm within 5 %.
+/// With a rigid clamp and no position errors, substructuring finds the contact itself: 180 N/µm
+/// within 5 %.
 #[test]
 fn the_rigid_clamp_shows_the_contact() {
     let folder = tempfile::tempdir().unwrap();
@@ -55,8 +58,9 @@ fn the_rigid_clamp_shows_the_contact() {
     let results = demo(folder.path(), &["--rig", rig.to_str().unwrap()]);
     let k = sliding_stiffness(&results, "internal");
     assert!((k / 180.0 - 1.0).abs() < 0.05, "{k} N/µm");
-    // nothing but noise moves these lines, and the noise told for each is what moves it: the median of a normal distribution's
-    // size is 0.674 σ; three hits know a variance to some tens of per cent
+    // only noise changes these lines, and its size is the noise reported for each: the median of
+    // the absolute value of a normal distribution is 0.674 σ; three hits determine a variance to
+    // some tens of per cent
     let spectrum = &results["joint_spectrum"];
     let curves = spectrum["curves"].as_array().unwrap();
     let internal = |c: &&Value| c["method"] == "internal" && c["idms"] == 6 && c["dof"] == "z";

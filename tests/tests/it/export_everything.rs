@@ -1,4 +1,5 @@
-//! What a campaign holds, in forms that other programs read: what counts by default, all of it where that is asked for.
+//! A campaign exported in the formats of other programs: accepted data by default, everything on
+//! request.
 #![allow(clippy::unwrap_used)]
 
 use jointrig::campaign::plan::SMALL;
@@ -67,7 +68,7 @@ fn every_channel_verdict_and_calibration_can_be_had() {
     assert_eq!((&*of["units_per_volt"], &*of["unit"]), ("0.025", "m/s"));
     assert_ne!(of["units_per_volt"], of["units_per_volt_as_measured"]);
 
-    // the signals of a record, wherever it went, are those of the file
+    // the signals of a record are those of the file in every format
     let store = Store::open_read_only(&file).unwrap();
     let kept = rows.iter().find(|row| row.kept() && row.id != dropped).unwrap();
     let (map, samples) = (store.channels(kept.session).unwrap(), store.samples(kept).unwrap());

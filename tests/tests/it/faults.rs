@@ -1,8 +1,9 @@
-//! A disk that fails or loses its power, at any of the things that a small campaign does to it: `verify` is clean or names what is lost, and the
-//! same command goes on to the records of an undisturbed run.
+//! A disk that fails or loses power at any operation of a small campaign: `verify` is clean or
+//! names what is lost, and the same command continues to the same records as an undisturbed run.
 //!
-//! `faults/disk.c` stands under the program and counts what it does to its folder. A failure is one run for each count. Power cuts are played from
-//! one run that was written down: what was not made safe by then is there, or is not, or is there in part, by dice.
+//! `faults/disk.c` is preloaded under the program and counts its operations on its folder. Failures
+//! are tested with one run per operation. Power cuts are replayed from one recorded run: data that
+//! had not been synced by then is present, missing, or partly present, at random.
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used)]
 
@@ -17,7 +18,7 @@ use jointrig_tests::command::jointrig;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-/// Something that the program did to its folder, as `disk.c` writes it down.
+/// An operation of the program on its folder, as recorded by `disk.c`.
 #[derive(Clone, Debug)]
 struct Deed {
     kind: char,
@@ -59,7 +60,8 @@ fn deeds(log: &Path) -> Vec<Deed> {
     deeds
 }
 
-/// The shared object of `disk.c`; the compiler is there, because SQLite is built with it.
+/// Compiles `disk.c` to a shared object; a C compiler is available, because SQLite is built with
+/// it.
 fn disk(folder: &Path) -> PathBuf {
     let out = folder.join("disk.so");
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("faults/disk.c");
@@ -75,7 +77,7 @@ fn disk(folder: &Path) -> PathBuf {
     out
 }
 
-/// A new campaign of few and short records, and what it comes to when nothing disturbs it.
+/// A new campaign with few and short records, and its records after an undisturbed run.
 struct Setting {
     folder: tempfile::TempDir,
     disk: PathBuf,
@@ -123,14 +125,15 @@ impl Setting {
         place
     }
 
-    /// After a mishap: `verify` is clean or names what is lost, and the same command ends with the same records.
+    /// After a fault: `verify` is clean or names what is lost, and the same command ends with the
+    /// same records.
     fn holds(&self, place: &Path, what: &str) {
         let file = place.join("a.jrig");
         let verified = jointrig().args(["campaign", "verify", "--deep"]).arg(&file).output().unwrap();
         let words = said(&verified);
         assert!(!words.contains("panicked"), "{what}: {words}");
         assert!(verified.status.success() || words.contains("damaged"), "{what}: {words}");
-        // what was rescued beside it is a campaign of its own
+        // the rescued file next to it is a separate campaign
         for rescued in fs::read_dir(place).unwrap().map(|entry| entry.unwrap().path()) {
             if rescued.to_string_lossy().contains("rescued")
                 && rescued.extension().is_some_and(|end| end == "jrig")
@@ -145,7 +148,7 @@ impl Setting {
         fs::remove_dir_all(place).unwrap();
     }
 
-    /// One run in which the disk fails; whether the run did.
+    /// One run in which the disk fails; returns whether the run failed.
     fn fails(&self, at: usize, how: &str) -> bool {
         let what = format!("{how} at {at} ({:?})", self.deeds.get(at).map(|deed| (deed.kind, &deed.file)));
         let place = self.fresh(&format!("{how}{at}"));
@@ -158,7 +161,7 @@ impl Setting {
         let words = said(&out);
         assert!(!words.contains("panicked"), "{what}: {words}");
         if out.status.success() {
-            // nothing that counts has failed
+            // no essential operation has failed
             assert!(records(&place.join("a.jrig")) == self.undisturbed, "{what}: exit 0 with other records");
         } else {
             assert_eq!(out.status.code(), Some(1), "{what}: {words}");
@@ -168,16 +171,16 @@ impl Setting {
         !out.status.success()
     }
 
-    /// The folder after the power went away before deed `at`.
+    /// The folder after a power cut before operation `at`.
     fn cut(&self, at: usize, dice: u64) {
         let what = format!("power cut at {at}, dice {dice}");
         let mut dice = Xoshiro256PlusPlus::seed_from_u64(1000 * at as u64 + dice);
         let place = self.fresh(&format!("cut{at}_{}", dice.next_u32()));
         let past = &self.deeds[..at];
-        // names up to the last time that they were made safe, and some of those after
+        // directory entries up to the last sync, and some of those after it
         let named = past.iter().rposition(|deed| deed.kind == 'd').unwrap_or(0);
         let named = named + dice.next_u64() as usize % (at - named + 1);
-        // a file's bytes up to its own last time, and some of those after
+        // a file's bytes up to its own last sync, and some of those after it
         let safe: BTreeMap<&str, usize> = past
             .iter()
             .enumerate()
@@ -206,7 +209,7 @@ impl Setting {
                 }
                 'w' => {
                     let Some(bytes) = files.get_mut(&deed.file) else { continue };
-                    // of the last one, the sectors that went through
+                    // of the last write, the sectors that were completed
                     let whole = n + 1 < at || safe.get(deed.file.as_str()).is_some_and(|safe| n < *safe);
                     let count = if whole {
                         deed.bytes.len()
@@ -223,7 +226,8 @@ impl Setting {
             }
         }
         for (name, bytes) in files {
-            // shared memory, which SQLite makes anew, and the lock of a process that is gone
+            // without shared memory, which SQLite recreates, and the lock of a process that has
+            // ended
             if !name.ends_with("-shm") {
                 fs::write(place.join(name), bytes).unwrap();
             }
@@ -243,7 +247,7 @@ fn said(out: &Output) -> String {
     [&out.stdout, &out.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned()).concat()
 }
 
-/// Does all of these on every processor.
+/// Calls `deed` for all of these in parallel on all processors.
 fn everywhere<T: Sync>(all: &[T], deed: impl Fn(&T) + Sync) {
     let next = AtomicUsize::new(0);
     std::thread::scope(|scope| {
@@ -285,7 +289,7 @@ fn after_a_failure_or_a_power_cut_the_campaign_goes_on_to_the_same_records() {
     power_cuts(&setting, setting.deeds.len() / 40, 1);
 }
 
-/// Some minutes: `cargo test --release -p jointrig-tests --test faults -- --ignored`.
+/// Takes some minutes: `cargo test --release -p jointrig-tests --test faults -- --ignored`.
 #[test]
 #[ignore = "every single one"]
 fn every_single_one() {
@@ -305,7 +309,7 @@ fn results_are_whole_or_not_there_whatever_fails() {
     };
     let log = setting.folder.path().join("log_of_results");
     let out = setting.folder.path().join("out");
-    // two cells give no stiffness, which its exit code says; the documents are written
+    // two cells give no stiffness, which the exit code indicates; the documents are written
     let code =
         analyse(&out).env("LD_PRELOAD", &setting.disk).env("FAULT_LOG", &log).output().unwrap().status.code();
     let wanted = ["results.json", "report.html"].map(|name| fs::read(out.join(name)).unwrap());

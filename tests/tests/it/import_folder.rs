@@ -1,4 +1,4 @@
-//! A folder of records from elsewhere in one command, which may be repeated.
+//! A folder of records from another system imported by one command, which may be repeated.
 #![allow(clippy::unwrap_used)]
 
 use jointrig::campaign::plan::SMALL;
@@ -55,7 +55,8 @@ fn what_was_exported_is_imported_again_by_names_or_labels() {
     assert!(told.contains("were there already"), "{told}");
     assert_eq!(records(&by_name), first);
 
-    // names that say nothing, in folders that name the configuration: the labels tell the rest
+    // file names without information, in folders that name the configuration: the rest comes from
+    // the labels
     for (number, entry) in std::fs::read_dir(at("uff58/records")).unwrap().enumerate() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
@@ -72,7 +73,7 @@ fn what_was_exported_is_imported_again_by_names_or_labels() {
     let (ours, exported) = (read_frf(&matrix).unwrap(), read_frf(&at("npz/frf/A.npz")).unwrap());
     let (row, line) = (ours.outputs().iter().position(|name| name == "A1:z").unwrap(), 400);
     let there = exported.outputs().iter().position(|name| name == "A1:z").unwrap();
-    // the export cuts its records, so that its lines are a little apart from ours
+    // the export truncates its records, so its frequency lines differ slightly from ours
     let same = exported.frequency_hz().iter().position(|f| *f >= ours.frequency_hz()[line]).unwrap();
     let ratio = ours.lines()[line][(row, 0)].norm() / exported.lines()[same][(there, 0)].norm();
     assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
@@ -86,7 +87,7 @@ fn what_was_exported_is_imported_again_by_names_or_labels() {
     assert!(done(jointrig().args(["campaign", "verify", "--deep"]).arg(&by_label)).contains("all whole"));
 }
 
-/// Three hits with three axes, in a file of this name.
+/// Writes three hits with three axes to a file of this name.
 fn hits(path: &Path, gain: f64) {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host/tests/data/impacts/good.npz");
     let mut records = read_impacts(&data).unwrap();
@@ -116,7 +117,7 @@ fn nothing_is_overwritten_unasked_and_nothing_stored_of_files_without_a_name() {
     let names = ["--names", table.to_str().unwrap()];
     done(&mut import(&cell, &file, &names));
     assert_eq!(records(&file), 6);
-    // another content under the same name
+    // different content under the same name
     hits(&cell.join("else.npz"), 1.1);
     let said = refused(import(&cell, &file, &names));
     assert!(said.contains("--replace") && said.contains("1 of 2 files are stored"), "{said}");
@@ -130,7 +131,7 @@ fn nothing_is_overwritten_unasked_and_nothing_stored_of_files_without_a_name() {
     let shown = done(jointrig().args(["campaign", "show", "--no-figure"]).arg(&file).arg("A/AZ1/A1"));
     assert!(shown.contains("replaced by else.npz"), "{shown}");
 
-    // hits of a file of another name are added to what is there
+    // hits from a file of another name are added to the existing ones
     std::fs::remove_file(cell.join("somewhere.npz")).unwrap();
     std::fs::remove_file(cell.join("else.npz")).unwrap();
     hits(&cell.join("A_AZ1_A1.npz"), 0.9);

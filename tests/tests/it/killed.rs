@@ -1,6 +1,7 @@
-//! A campaign that is killed again and again loses nothing, and ends as an undisturbed one.
+//! A campaign that is killed repeatedly loses nothing, and ends like an undisturbed one.
 //!
-//! `JOINTRIG_KILLS` sets how often it is killed (50), `JOINTRIG_SEED` repeats the instants of an earlier run.
+//! `JOINTRIG_KILLS` sets how often it is killed (50), `JOINTRIG_SEED` repeats the kill times of an
+//! earlier run.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used)]
 
@@ -54,7 +55,7 @@ fn draw(state: &mut u64) -> u64 {
 #[test]
 fn killed_at_random_instants_it_ends_as_if_undisturbed() {
     let folder = tempfile::tempdir().unwrap();
-    // more hits than the plan of few cells has, so that a cell is often broken off in its middle
+    // more hits than the plan of few cells has, so that a cell is often interrupted in its middle
     let small = include_str!("../../../docs/plans/small.toml").replace("wanted = 2", "wanted = 5");
     let plan = folder.path().join("plan.toml");
     std::fs::write(&plan, small).unwrap();
@@ -77,11 +78,11 @@ fn killed_at_random_instants_it_ends_as_if_undisturbed() {
     new(&file, &plan);
     let mut seen = Content::new();
     let (mut kill, mut struck, mut campaigns) = (0, 0, 1);
-    // one that had ended before the kill came does not count
+    // a run that ended before the kill does not count
     while struck < kills {
         kill += 1;
         assert!(kill < 4 * kills, "the instants must strike");
-        // anything from the first bytes to a good part of the campaign
+        // any time from the first bytes to a good part of the campaign
         let instant = takes.mul_f64(0.25 * (draw(&mut state) % 10_000) as f64 / 10_000.0);
         let mut child = command(&file).spawn().unwrap();
         std::thread::sleep(instant);
@@ -106,7 +107,8 @@ fn killed_at_random_instants_it_ends_as_if_undisturbed() {
         }
         seen = now;
         if ended_before.is_some_and(|status| status.success()) {
-            // complete in spite of it all: on with a new one, so that every kill hits something
+            // complete despite the kills: continue with a new one, so that every kill interrupts
+            // something
             assert_eq!(seen, undisturbed);
             file = folder.path().join(format!("killed{campaigns}.jrig"));
             new(&file, &plan);

@@ -1,5 +1,6 @@
-//! How well a level of the shaker tells the contact's own stiffness, through the whole chain: plan, hammer's cells, shaker, records,
-//! spectra, estimate. The truth is that of the rig's parameters.
+//! Accuracy of the contact's own stiffness from a level of the shaker, through the whole chain:
+//! plan, hammer's cells, shaker, records, spectra, estimate. The truth follows from the rig's
+//! parameters.
 #![allow(clippy::unwrap_used)]
 
 use jointrig::campaign::plan::level::{Held, Level, Moment};
@@ -31,13 +32,13 @@ impl Campaign {
         rows.filter(|row| row.kind == Excitation::Shaker && row.force == Force::Raw)
     }
 
-    /// A level's k_T against the truth; none where it has none.
+    /// A level's k_T compared with the truth; `None` if it has no k_T.
     fn named(&self, row: &Hysteresis) -> Option<Answer> {
         let k = row.k_t_n_per_m?;
         Some(Answer::new(k.mean, k.ci95.unwrap(), self.truth))
     }
 
-    /// The same of the answer, to which hits and levels both contribute.
+    /// The same for the final answer, to which hits and levels both contribute.
     fn answer(&self) -> Option<Answer> {
         let k = self.results.answer.as_ref()?.contact.k_t_n_per_m?;
         Some(Answer::new(k.mean, k.ci95, self.truth))
@@ -64,7 +65,7 @@ impl Campaign {
     }
 }
 
-/// Measures the levels that the plan asks for.
+/// Measures the levels of the plan.
 fn shake(file: &Path, address: &Address, seed: u64) {
     let mut store = Store::open(file).unwrap();
     let plan = store.plan().unwrap();
@@ -84,7 +85,7 @@ fn shake(file: &Path, address: &Address, seed: u64) {
         stop: Arc::new(AtomicBool::new(false)),
     };
     for level in planned.frequencies_hz.iter().flat_map(|f| each(*f)).map(level) {
-        // a level on a resonance cannot be held, and is stopped: the others can
+        // a level at a resonance cannot be held and is stopped; the others can
         if let Err(error) = shaking::run(&mut store, &mut session, &of(level), &mut |_, _, _| {}) {
             println!("{}: {error}", file.display());
         }
@@ -92,15 +93,15 @@ fn shake(file: &Path, address: &Address, seed: u64) {
     store.close().unwrap();
 }
 
-/// What is counted of some campaigns.
+/// Counts over some campaigns.
 #[derive(Default)]
 struct Counted {
     campaigns: usize,
     levels: usize,
-    /// Each level that is named k_T.
+    /// Each level with a k_T.
     named: Vec<Answer>,
     answers: Vec<Answer>,
-    /// Error of the slope between the spots of the same levels where it has one.
+    /// Error of the slope between the spots of the same levels, if they have one.
     raw: Vec<f64>,
 }
 
@@ -117,7 +118,7 @@ impl Counted {
         }
     }
 
-    /// Levels, and the answers of the same campaigns.
+    /// Table rows of the levels, and of the answers of the same campaigns.
     fn rows(&self, name: &str) -> [String; 2] {
         let told = |all: &[Answer]| Coverage::of(all).cells();
         let Counted { campaigns, levels, named, answers, raw } = self;
@@ -135,16 +136,16 @@ impl Counted {
 
 #[test]
 fn a_level_is_called_k_t_only_where_its_interval_holds() {
-    // a contact of 93 N/µm; between the spots it is 24 at 100 Hz
+    // a contact of 93 N/µm; the slope between the spots is 24 at 100 Hz
     let campaign = Campaign::of(DrawnCampaign { number: 8, seed: 1, like: Drawn::default() });
     let mut counted = Counted::default();
     counted.add(&campaign);
     assert_eq!(counted.levels, 6);
     assert!(counted.named.len() >= 2, "some levels of this rig tell its contact");
     assert!(counted.named.iter().all(|level| level.covers && level.half <= 0.1 && level.error.abs() < 0.1));
-    // what stands beside it, between the spots, is another number
+    // the slope between the spots, shown next to it, is a different number
     assert!(counted.raw.iter().any(|error| error.abs() > 0.1), "{:?}", counted.raw);
-    // the levels that have a k_T count in the answer as well
+    // the levels that have a k_T also contribute to the answer
     let contact = &campaign.results.answer.as_ref().unwrap().contact;
     assert_eq!(contact.basis, jointrig::results::Basis::Joint, "{}", contact.why);
     let Answer { half, covers, .. } = campaign.answer().unwrap();
@@ -152,7 +153,7 @@ fn a_level_is_called_k_t_only_where_its_interval_holds() {
     let shares: f64 = contact.budget.values().map(|share| share * share).sum();
     let k = contact.k_t_n_per_m.unwrap();
     let sigma = (k.ci95[0].recip() - k.ci95[1].recip()) / (2.0 * 1.96) * k.mean;
-    // 1.96 for the exact quantile
+    // 1.96 instead of the exact quantile
     assert!((sigma / shares.sqrt() - 1.0).abs() < 1e-3, "the budget adds up");
     for row in campaign.levels() {
         let why = row.k_t_why.as_ref().expect("a level says what it rests on, or why it has none");
@@ -176,7 +177,7 @@ fn accuracy_of_the_shakers_levels() {
         ));
         (!drawn.rig().clamp_b.rigid, campaign)
     });
-    // all, then those with a clamp on side A only, and on both
+    // all, then those with a clamp on side A only, and with clamps on both sides
     let mut counted = [Counted::default(), Counted::default(), Counted::default()];
     for (both, campaign) in &all {
         counted[0].add(campaign);

@@ -1,9 +1,11 @@
-//! What the live page costs, and what it does over hours. Both are run by hand and print their figures:
+//! Load of the live page, and its behaviour over hours. Both are run manually and print their
+//! results:
 //!
 //!     cargo build --release -p jointrig
-//!     JOINTRIG_BIN=target/release/jointrig cargo test --release -p jointrig-tests --test live_load -- --ignored --nocapture
+//!     JOINTRIG_BIN=target/release/jointrig cargo test --release -p jointrig-tests \
+//!     --test live_load -- --ignored --nocapture
 //!
-//! `JOINTRIG_SOAK_H` says how many hours of the simulated rig the soak lasts [default: 0.5].
+//! `JOINTRIG_SOAK_H` is the duration of the soak test in hours of the simulated rig [default: 0.5].
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used)]
 
@@ -16,10 +18,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Time over which shares of a core are taken.
+/// Time over which processor loads are measured.
 const SPAN: Duration = Duration::from_secs(8);
 
-/// Processor time of the threads of a process whose names begin so, s.
+/// Processor time of the threads of a process whose names begin with `thread`, s.
 fn used(process: u32, thread: &str) -> f64 {
     let tasks = std::fs::read_dir(format!("/proc/{process}/task")).unwrap();
     let of = |task: PathBuf| -> Option<f64> {
@@ -27,13 +29,13 @@ fn used(process: u32, thread: &str) -> f64 {
         let (head, rest) = stat.rsplit_once(") ")?;
         let name = head.split_once('(')?.1;
         let numbers: Vec<f64> = rest.split(' ').skip(11).take(2).map(|n| n.parse().unwrap()).collect();
-        // in hundredths of a second on every Linux of our targets
+        // in hundredths of a second on every Linux target
         name.starts_with(thread).then(|| numbers.iter().sum::<f64>() / 100.0)
     };
     tasks.filter_map(|task| of(task.unwrap().path())).sum()
 }
 
-/// Memory of a process, MB; none once it is gone.
+/// Memory of a process, MB; `None` once it has ended.
 fn memory(process: u32) -> Option<f64> {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
@@ -99,7 +101,8 @@ fn soak() {
     let over = Arc::new(AtomicBool::new(false));
     let (port, hello) = (server.port(), format!("{{\"token\":\"{}\",\"stream\":true}}", server.token()));
     let ended = over.clone();
-    // comes for ten seconds, reads nothing but the first words, and goes without a word
+    // connects for ten seconds, reads only the first messages, and disconnects without closing the
+    // protocol
     let restless = std::thread::spawn(move || {
         let mut came = 0;
         while !ended.load(Ordering::Relaxed) {
@@ -122,7 +125,7 @@ fn soak() {
         let scans = store.link_counters().unwrap().get("scans_received").copied().unwrap_or(0);
         scans as f64 / 51_200.0 / 3_600.0
     };
-    // most of what it takes, and the least, since the last word
+    // largest and smallest memory since the last printed line
     let (mut told, mut least, mut most) = (0.0, f64::INFINITY, 0.0_f64);
     loop {
         let now = memory(server.id()).unwrap();

@@ -1,4 +1,5 @@
-//! The live page of a process that measures: the stream, the shaker's level, and what a page may want changed.
+//! The live page of a process that measures: the stream, the shaker's level, and changes requested
+//! by a page.
 #![allow(clippy::unwrap_used)]
 
 use jointrig::campaign::store::Store;
@@ -24,7 +25,7 @@ fn the_stream_is_seen_as_it_comes() {
     assert_eq!(page.eval("document.getElementById('doing').textContent"), "watching the channels");
     let what = page.eval("document.getElementById('what').textContent");
     assert!(what.as_str().unwrap().starts_with("SIMULATED rig"), "{what}");
-    // something is drawn in every trace, and every number stands there
+    // every trace is drawn, and every number is shown
     let drawn = page.eval(
         "[...document.querySelectorAll('.trace')].map(t => { const c = t.querySelector('canvas'),
          d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let n = 0;
@@ -38,7 +39,7 @@ fn the_stream_is_seen_as_it_comes() {
         );
     }
     picture(&mut page, "scope");
-    // a page that stands still misses frames, counts them, and goes on
+    // a page that is blocked misses frames, counts them, and continues
     let missed = page.eval("live.scope.missed");
     page.eval("(() => { const end = performance.now() + 2000; while (performance.now() < end); })()");
     page.until(&format!("live.scope.missed > {missed}"));
@@ -48,7 +49,8 @@ fn the_stream_is_seen_as_it_comes() {
         page.eval("document.getElementById('link').textContent").as_str().unwrap().contains("frames missed")
     );
     picture(&mut page, "scope-missed");
-    // behind another tab it draws nothing, asks for nothing, and goes on where the stream is when it is in front again
+    // behind another tab it draws nothing and requests nothing; in front again it continues at the
+    // stream's current position
     page.hide(true);
     std::thread::sleep(Duration::from_millis(300));
     let (drawn, received) = (page.eval("live.scope.drawn"), page.eval("live.scope.received"));
@@ -89,7 +91,7 @@ fn the_shakers_level_is_seen_on_its_way() {
     page.until("document.querySelector('figure[data-figure=shaker-now].ready') !== null && live.alive.get('shaker-now').length === 3");
     page.until("live.state.whole.levels.length > 0 && live.state.whole.now.shaker.windows.length > 8");
     page.until("document.querySelector('figure[data-figure=shaker-now].ready') !== null");
-    // the loop is that of the level: as wide as what was measured
+    // the loop is that of the level: as wide as the measured amplitude
     let turn = page.eval("[Math.max(...live.state.whole.now.shaker.turn[0]), live.state.whole.now.shaker.windows.at(-1)[1] * 1e6]");
     let [wide, amplitude] = [0, 1].map(|i| turn[i].as_f64().unwrap());
     assert!((wide / amplitude - 1.0).abs() < 0.25, "{turn}");
@@ -98,7 +100,7 @@ fn the_shakers_level_is_seen_on_its_way() {
     assert!(status.success(), "{rest}");
     assert_eq!(Store::open_read_only(&file).unwrap().levels().unwrap().len(), 6);
     drop(page);
-    // afterwards the file alone has them
+    // afterwards they come from the file alone
     let server = Served::of(&file);
     let mut page = browser.open_url(&server.url, Look { dark: true, ..Look::HAND });
     page.until("live.state.whole?.levels.length === 6");
@@ -109,7 +111,7 @@ fn the_shakers_level_is_seen_on_its_way() {
     assert_eq!(page.errors(), Vec::<String>::new());
 }
 
-/// A trip of the shaker is told with its reason.
+/// A trip of the shaker is shown with its reason.
 #[test]
 fn a_limit_that_stops_the_shaker_is_told() {
     let (_folder, file) = campaign(SMALL);
@@ -150,7 +152,7 @@ fn a_person_answers_notes_keeps_and_drops_on_the_page() {
     ]);
     let mut server = Served::beside(&mut command);
     let mut browser = Browser::start();
-    // who may look sees what is asked, and has no button
+    // the read-only page shows the question, and has no button
     let mut page = browser.open_url(&server.url, Look::DESK);
     page.until("live.state.whole?.now.state?.what === 'move-by-hand'");
     page.until("document.getElementById('doing').textContent.startsWith('move hammer to')");
@@ -166,7 +168,7 @@ fn a_person_answers_notes_keeps_and_drops_on_the_page() {
     page.eval("document.getElementById('hold').click()");
     page.until("document.querySelector('.answers button:first-child:not([disabled])') !== null");
     picture(&mut page, "answers");
-    // nobody else answers meanwhile, and nobody answers what is not asked
+    // meanwhile no other page can answer, and an answer to another question is refused
     let state = page.eval("live.state.whole.now.state");
     let (cell, attempt) = attempt_of(&state);
     let say = |page: &str, attempt: u64| {
@@ -180,7 +182,7 @@ fn a_person_answers_notes_keeps_and_drops_on_the_page() {
     let me = page.eval("live.me").as_str().unwrap().to_owned();
     assert_eq!(status("/api/stage", &edit, &[], &say(&me, attempt + 1)), 409, "stale");
     assert_eq!(status("/api/stage", &edit, &[], &say(&me, attempt).replace("in place", "fire")), 422);
-    // the address to look changes nothing, nor does another page, nor a form
+    // requests with the read-only token, from another origin, or as a form change nothing
     for path in ["notes", "keep", "drop", "undo", "stop", "control", "stage"] {
         let path = format!("/api/{path}");
         assert_eq!(status(&path, server.token(), &[], "{}"), 403, "{path}");
@@ -191,25 +193,25 @@ fn a_person_answers_notes_keeps_and_drops_on_the_page() {
     assert_eq!(status("/api/notes", &edit, &[], &format!("{{\"text\":\"{}\"}}", "x".repeat(9_000))), 413);
     assert_eq!(status("/api/drop", &edit, &[], "{\"record\":99}"), 409);
 
-    // the stream runs all the while; what nobody looks at is not sent
+    // the stream runs all the time; traces that are not shown are not sent
     assert_eq!(page.eval("live.scope.end"), 0);
     page.key("6");
     page.until("live.scope.drawn > 3");
     page.key("1");
     page.until("document.querySelector('.answers button:first-child:not([disabled])') !== null");
-    // what was on its way still comes
+    // frames in transit still arrive
     std::thread::sleep(Duration::from_millis(300));
     let end = page.eval("live.scope.end");
     std::thread::sleep(Duration::from_millis(600));
     assert_eq!(page.eval("live.scope.end"), end);
 
-    // the first cell: in place, and its hits come
+    // the first cell: confirm its position, and its hits arrive
     page.eval("document.querySelector('.answers button').click()");
     page.until(&format!(
         "live.state.whole.now.state.what === 'move-by-hand' && live.state.whole.now.state.cell !== {cell}"
     ));
     page.until(&format!("live.state.whole.cells.find(c => c.id === {cell}).kept === 2"));
-    // drop the newest by a key, see it in the matrix, take it back, keep it again
+    // drop the newest by a key, see it in the matrix, undo, keep it again
     let newest = page.eval("live.state.whole.hits.at(-1).record").as_i64().unwrap();
     page.key("D");
     page.until(&format!("live.state.whole.cells.find(c => c.id === {cell}).kept === 1"));
@@ -226,7 +228,7 @@ fn a_person_answers_notes_keeps_and_drops_on_the_page() {
     page.until("document.querySelector('.matrix button').textContent === '2/2'");
     page.key("D");
     page.until("document.querySelector('.matrix button').textContent === '1/2'");
-    // a note by the keyboard
+    // a note entered by the keyboard
     page.key("n");
     page.until("document.getElementById('note').open");
     page.eval("document.getElementById('note-text').value = 'the clamp <b>creaked</b>'; document.querySelector('#note button[value=write]').click()");
@@ -236,7 +238,7 @@ fn a_person_answers_notes_keeps_and_drops_on_the_page() {
         "document.querySelector('.log, tbody').textContent.includes('note: the clamp <b>creaked</b>')",
     );
     picture(&mut page, "log-note");
-    // all other cells; the one that lost a hit is asked for again at the end
+    // all other cells; the one that lost a hit is repeated at the end
     page.key("1");
     let end = Instant::now() + Duration::from_secs(40);
     while page.eval("live.state.whole.progress.complete") != Value::Bool(true) {
@@ -252,7 +254,7 @@ fn a_person_answers_notes_keeps_and_drops_on_the_page() {
     }
     let (status, rest) = server.wait();
     assert!(status.success(), "{rest}");
-    // the server that is gone is an error of the page's own requests
+    // the lost server is reported as an error of the page's own requests
     drop(page);
     let store = Store::open_read_only(&file).unwrap();
     let overrules: Vec<String> =
@@ -281,7 +283,7 @@ fn a_page_ends_measuring_after_the_shot_in_hand() {
     assert_eq!(Store::open_read_only(&file).unwrap().verify().unwrap(), []);
 }
 
-/// `serve FILE` looks and does nothing else, whatever is asked of it.
+/// `serve FILE` is read-only, whatever is requested.
 #[test]
 fn a_file_alone_cannot_be_edited() {
     let (_folder, file) = campaign(SMALL);
@@ -291,7 +293,7 @@ fn a_file_alone_cannot_be_edited() {
     assert_eq!(server.wanted("/api/stop", server.token(), &[], "{}").0, 403);
 }
 
-/// The browser is given a file that its owner alone can read, never the address.
+/// The browser is given the path of a file that only its owner can read, never the address.
 #[cfg(unix)]
 #[test]
 fn the_browser_is_opened_without_the_secret_among_its_arguments() {

@@ -1,4 +1,5 @@
-//! The live page: a campaign seen in a browser while it is measured, and everything that the server must turn away.
+//! The live page: a campaign viewed in a browser while it is measured, and all requests that the
+//! server must refuse.
 #![allow(clippy::unwrap_used)]
 
 use jointrig::campaign::store::Store;
@@ -23,7 +24,7 @@ fn campaign() -> (TempDir, PathBuf) {
     live::campaign(include_str!("../../../docs/plans/contact.toml"))
 }
 
-/// The same with every number as a real one: a browser writes 100.0 as 100.
+/// The same with every number as a float: a browser writes 100.0 as 100.
 fn as_real(value: Value) -> Value {
     match value {
         Value::Number(number) => number.as_f64().into(),
@@ -55,7 +56,7 @@ fn a_campaign_is_seen_while_it_is_measured() {
         .unwrap();
     page.until("live.state.whole.hits.length > 8");
     page.until("document.querySelectorAll('#main tbody tr').length > 0");
-    // the place of the next cell is lit, and no other
+    // only the position of the next cell is highlighted
     page.until("!!live.alive.get('place')");
     let lit = page.eval("live.alive.get('place')[0].scene.spots.filter(s => s.name).map(s => s.name).sort()");
     assert_eq!(lit.as_array().map(Vec::len), Some(2), "{lit}");
@@ -66,7 +67,7 @@ fn a_campaign_is_seen_while_it_is_measured() {
     assert!(run.wait().unwrap().success());
     page.until(COMPLETE);
 
-    // when the last hit is in, the estimate is that of `analyse`, digit for digit
+    // when the last hit is in, the estimate equals that of `analyse`, digit for digit
     page.until("live.state.whole.estimate?.after_record === live.state.whole.hits.at(-1).record");
     let shown = page.eval("live.state.whole.estimate.answer");
     done(jointrig().arg("analyse").arg(&file).arg("--out").arg(folder.path()));
@@ -94,7 +95,7 @@ fn a_campaign_is_seen_while_it_is_measured() {
         picture(&mut page, name);
         assert!(wide(&mut page) <= 1440, "{name}: {} px wide", wide(&mut page));
     }
-    // a cell by keys, and back to the newest
+    // select a cell by keys, then return to the newest
     page.key("k");
     page.until(
         "live.looked() === live.state.whole.cells.at(-2).id && document.getElementById('cell-name') !== null",
@@ -115,7 +116,8 @@ fn a_campaign_is_seen_while_it_is_measured() {
     assert_eq!(page.errors(), Vec::<String>::new());
 }
 
-/// What the server would say of a hit with this verdict, said by the test.
+/// The test passes to the page the message that the server would send about a hit with each
+/// verdict.
 #[test]
 fn every_verdict_has_a_sign_a_pattern_and_its_reason() {
     let (_folder, file) = campaign();
@@ -158,13 +160,14 @@ fn every_verdict_has_a_sign_a_pattern_and_its_reason() {
             assert!(one.0 != other.0 && (one.1 != other.1), "{one:?} looks like {other:?}");
         }
     }
-    // nothing but that the file has no such records, and so no FRF of their cell
+    // the only errors are that the file has no such records, and so no FRF of their cell
     let missing = |error: &String| error.contains("/api/records/") || error.contains("/api/cells/1/frf");
     let errors: Vec<String> = page.errors().into_iter().filter(|error| !missing(error)).collect();
     assert_eq!(errors, Vec::<String>::new());
 }
 
-/// Every verdict comes into the file, as a measuring process writes it, and is on the page within moments.
+/// Every verdict is written into the file as a measuring process does, and appears on the page
+/// within moments.
 #[test]
 fn a_stored_verdict_is_on_the_page_at_once() {
     let (_folder, file) = live::campaign(include_str!("../../../docs/plans/small.toml"));
@@ -221,7 +224,8 @@ fn a_stored_verdict_is_on_the_page_at_once() {
     assert_eq!(page.errors(), Vec::<String>::new());
 }
 
-/// What a run stored, with its scans counted from each cell's first record on: when a stream begins is a matter of the process's start.
+/// What a run stored, with its scans counted from each cell's first record: the start of a stream
+/// depends on when the process starts.
 fn stored(file: &Path) -> Vec<(i64, u64, u32, f64, String)> {
     let records = rows(&Store::open_read_only(file).unwrap());
     let since = origins(&records);
@@ -241,7 +245,8 @@ fn looking_changes_no_record() {
     done(&mut run(&unseen));
     let (_watched, seen) = new();
     let mut server = Served::beside(run(&seen).arg("--serve"));
-    // ten pages that look at everything, two that never read, and others that ask for the heaviest answer again and again
+    // ten pages that show everything, two that never read, and others that repeatedly request the
+    // most expensive response
     let listeners: Vec<_> = (0..9)
         .map(|_| server.listener())
         .map(|listener| std::thread::spawn(|| listener.to_the_end()))
@@ -287,20 +292,20 @@ fn strangers_are_turned_away() {
     assert_eq!(status("/api/state", &[("Host", &host), ("Authorization", "Bearer 0")]), 401);
     assert_eq!(status("/api/records/99/hit", &[("Host", &host), ("Authorization", &token)]), 404);
     assert_eq!(status("/nowhere", &[("Host", &host)]), 404);
-    // a head without an end, and one that is too long
+    // a request head without an end, and one that is too long
     let mut stream = TcpStream::connect(("127.0.0.1", server.port())).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
     write!(stream, "GET / HTTP/1.1\r\nHost: ").unwrap();
     let mut rest = Vec::new();
-    // the server lets it go; an answer before that is as good
+    // the server disconnects it; a response before that is acceptable too
     let _ = stream.read_to_end(&mut rest);
     let mut stream = TcpStream::connect(("127.0.0.1", server.port())).unwrap();
     let written = write!(stream, "GET / HTTP/1.1\r\nHost: {host}\r\nX-Long: {}\r\n\r\n", "x".repeat(40_000));
     let mut answer = String::new();
-    // it is refused, or cut off in the middle
+    // it is refused, or disconnected in the middle
     let read = stream.read_to_string(&mut answer);
     assert!(written.is_err() || read.is_err() || answer.starts_with("HTTP/1.1 431"), "{answer}");
-    // forty who say nothing lock nobody out for longer than their time
+    // forty silent connections block others only until their time limit
     let silent: Vec<TcpStream> =
         (0..40).map(|_| TcpStream::connect(("127.0.0.1", server.port())).unwrap()).collect();
     let within = Instant::now() + Duration::from_secs(15);

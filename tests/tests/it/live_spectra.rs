@@ -1,4 +1,5 @@
-//! Spectra and numbers of the live page are those of the campaign file: the last hit's force, the FRF of its cell, the matrix' views.
+//! Spectra and numbers of the live page equal those of the campaign file: the last hit's force, the
+//! FRF of its cell, the views of the matrix.
 #![allow(clippy::unwrap_used)]
 
 use jointrig::analyse::{CampaignFile, KnownContact};
@@ -11,13 +12,13 @@ use jointrig_tests::command::jointrig;
 use jointrig_tests::live::{self, Served, done, picture};
 use serde_json::Value;
 
-/// What an expression of the page says, as numbers.
+/// The value of an expression in the page, as numbers.
 fn numbers(page: &mut Page<'_>, expression: &str) -> Vec<f64> {
     let found = page.eval(&format!("Array.from({expression})"));
     found.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
 }
 
-/// Whether two numbers are the same but for the six digits that figures keep.
+/// Whether two numbers are equal to the six digits that figures keep.
 fn same(one: f64, other: f64) -> bool {
     (one - other).abs() <= 2e-6 * other.abs()
 }
@@ -54,7 +55,7 @@ fn frf_is_the_analysis_one(page: &mut Page<'_>, store: &Store) {
     }
 }
 
-/// At the lowest frequencies the force's spectrum is the pulse's area.
+/// At the lowest frequencies the force's spectrum equals the pulse's area.
 fn force_is_the_pulse(page: &mut Page<'_>, store: &Store) {
     let last = store.records().unwrap().into_iter().flatten().last().unwrap();
     let shown = Shown::of(store, last.cell, &last).unwrap().unwrap();
@@ -63,7 +64,7 @@ fn force_is_the_pulse(page: &mut Page<'_>, store: &Store) {
     let area_mn_s = 1e3 * shown.force_n[around].iter().map(|f| f - rest).sum::<f64>() / shown.rate_hz;
     let force = numbers(page, "live.alive.get('force-spectrum')[0].panel.marks.find(m => m.line).line.y");
     assert!(force.len() > 50 && force.iter().all(|v| v.is_finite()));
-    // noise between the pulse and the end of the force's window is in one and not in the other
+    // noise between the pulse and the end of the force window is included in one of them only
     assert!((force[1] / area_mn_s - 1.0).abs() < 0.02, "{} instead of {area_mn_s} mN s", force[1]);
     let band =
         numbers(page, "live.alive.get('force-spectrum')[0].panel.marks.find(m => m.shade).shade.between");

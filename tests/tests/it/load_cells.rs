@@ -1,4 +1,4 @@
-//! A load cell that is mounted the other way round, and a plan that says so.
+//! A load cell that is mounted in the opposite direction, and a plan that states it.
 #![allow(clippy::unwrap_used)]
 
 use jointrig::campaign::plan::CONTACT;
@@ -9,7 +9,7 @@ use std::path::Path;
 
 const LC3: &str = "{ name = \"LC3\", position_m = [0.0, -0.065, -0.15], direction = [0, 0, 1] }";
 
-/// Forty-two hits of a second, with the third cell felt along `direction`.
+/// Forty-two hits of one second, with the third cell measuring along `direction`.
 fn plan(direction: &str) -> String {
     let mut text = CONTACT.to_owned();
     for (old, new) in [
@@ -26,7 +26,7 @@ fn plan(direction: &str) -> String {
     text
 }
 
-/// What is found on a rig with this plan, and what is said of the channels' signs.
+/// Results on a rig with this plan, and the report of the channels' signs.
 fn found(folder: &Path, rig: &str, plan: &str) -> (Value, String) {
     let at = |name: &str| folder.join(name);
     std::fs::create_dir_all(folder).unwrap();
@@ -70,13 +70,14 @@ fn a_cell_that_is_mounted_the_other_way_round_changes_nothing_if_the_plan_says_s
     let (usual, _) = found(&folder.path().join("usual"), "", &plan("[0, 0, 1]"));
     let (said, signs) = found(&folder.path().join("said"), turned, &plan("[0, 0, -1]"));
     let (unsaid, complaint) = found(&folder.path().join("unsaid"), turned, &plan("[0, 0, 1]"));
-    // the cell's noise is not turned with it
+    // the sign of the cell's noise does not change with it
     let k = k_t(&usual).unwrap();
     assert!((k_t(&said).unwrap() / k - 1.0).abs() < 0.003, "{:?} and {k}", k_t(&said));
-    // a slope's own interval is ±0.1 % (eight levels of this kind scatter by 0.03 %), and no two shaker runs are the same record
+    // the slope's own interval is ±0.1 % (eight levels of this kind scatter by 0.03 %), and no two
+    // shaker runs give the same record
     assert!((slope(&said) / slope(&usual) - 1.0).abs() < 5e-3, "{} and {}", slope(&said), slope(&usual));
-    // what its direction is worth: a third of the force with the wrong sign. The contact's own k_T calibrates the sum with hits on B alone,
-    // and does not need it
+    // effect of the direction: a third of the force has the wrong sign. The contact's own k_T
+    // calibrates the sum with hits on B alone and is not affected
     assert!((slope(&unsaid) / slope(&usual) - 1.0).abs() > 0.2, "{}", slope(&unsaid));
     let about = |text: &str| text.lines().find(|line| line.contains("lc_3")).unwrap_or_default().to_owned();
     assert!(about(&signs).contains("right"), "{signs}");

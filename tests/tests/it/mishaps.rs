@@ -1,5 +1,6 @@
-//! What happens to a campaign in a laboratory: a full disk, a read-only folder, a device that vanishes or restarts, an edited plan,
-//! a second writer. Each ends with a clear error or goes on, and nothing that was accepted is lost.
+//! Faults during a campaign in a laboratory: a full disk, a read-only folder, a device that
+//! disappears or restarts, an edited plan, a second writer. Each ends with a clear error or
+//! continues, and no accepted data is lost.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used)]
 
@@ -47,7 +48,8 @@ fn verified(file: &Path) {
     assert!(verified.status.success(), "{}", said(&verified));
 }
 
-/// A shell in a mount namespace of its own, where a small file system can be made; `None` where that is not allowed.
+/// Runs a shell in a separate mount namespace, where a small file system can be mounted; `None`
+/// where that is not allowed.
 fn namespace(script: &str) -> Option<Output> {
     let run = |arguments: &[&str]| {
         Command::new("unshare").args(arguments).args(["sh", "-ec", script]).stdin(Stdio::null()).output().ok()
@@ -64,7 +66,7 @@ fn namespace(script: &str) -> Option<Output> {
 fn a_full_disk_ends_it_in_words_and_with_space_it_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let file = new(folder.path(), SMALL);
-    // 4 MB hold some five records
+    // 4 MB hold about five records
     let script = format!(
         "mount -t tmpfs -o size=4m none /mnt; cp {file} /mnt/a.jrig; \
          if {jointrig} campaign run /mnt/a.jrig --device sim: --seed 4; then echo it ended well; exit 9; fi; \
@@ -172,7 +174,7 @@ fn a_device_that_vanishes_in_mid_record_loses_nothing() {
     let before = kept(&file);
     assert!(before >= 2);
 
-    // it restarts, and the same command goes on: the same records as without the interruption
+    // it restarts, and the same command continues: the same records as without the interruption
     let again = Served::start(&["--tcp", "127.0.0.1:0", "--seed", "4"]);
     let rest =
         jointrig().args(["campaign", "run"]).arg(&file).args(["--device", &again.address]).output().unwrap();
@@ -190,7 +192,7 @@ fn an_edited_plan_is_told_taken_over_when_asked_and_refused_where_it_does_not_fi
     let file = new(folder.path(), SMALL);
     assert!(run(&file, &[]).status.success());
     let plan = folder.path().join("plan.toml");
-    // one more cell, one hit more in each
+    // one more cell, and one more hit in each
     let edited =
         SMALL.replace("responses = [\"A1\", \"A2\"]", "responses = [\"A1\", \"A2\", \"A3\"]").replace(
             "    { name = \"B1\"",
@@ -283,7 +285,7 @@ fn a_person_overrules_and_both_verdicts_stay() {
     assert_eq!((&dropped["verdict"], &dropped["kept"]), (&"good".into(), &false.into()));
     assert_eq!(dropped["overruled"][0]["reason"], "somebody spoke");
     assert_eq!(kept(&file), 13);
-    // the campaign wants another one instead
+    // the campaign requests another one instead
     assert!(run(&file, &[]).status.success());
     assert_eq!((kept(&file), show()["records"].as_array().unwrap().len() > 2), (14, true));
     assert!(drop("keep").status.success());
@@ -324,7 +326,7 @@ fn the_signs_of_all_channels_are_right_on_the_simulated_rig() {
         assert!(ran.status.success(), "{}", said(&ran));
         jointrig().args(["campaign", "check"]).arg(&file).output().unwrap()
     };
-    // a sensor that reads backwards, and says so, is right as well
+    // a reversed sensor with the matching declaration is right as well
     for rig in [None, Some("[sensors.vibrometer]\npolarity = [1, -1, 1]\n")] {
         let checked = check(rig);
         assert!(checked.status.success(), "{}", said(&checked));

@@ -1,4 +1,5 @@
-//! A plan without any of the paper's names, measured on a simulated rig with a structure of its own.
+//! A plan without any of the paper's names, measured on a simulated rig with a user-defined
+//! structure.
 #![allow(clippy::unwrap_used)]
 
 use jointrig_hil_sim::rig::RigConfig;
@@ -9,7 +10,7 @@ use serde_json::Value;
 
 const RIG: &str = include_str!("../../../hil-sim/rigs/clamped-tips.toml");
 
-/// Clamps and contact hold at one point along the same axes: stiffnesses in series, N/m.
+/// Clamps and contact act at one point along the same axes: stiffnesses in series, N/m.
 fn in_series() -> f64 {
     1.0 / (1.0 / 90e6 + 1.0 / 120e6 + 1.0 / 200e6)
 }

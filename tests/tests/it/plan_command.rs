@@ -1,4 +1,4 @@
-//! `jointrig plan`: a plan to begin with, everything that is wrong with one, and its picture.
+//! `jointrig plan`: a plan template, all errors of a plan, and its figure.
 #![allow(clippy::unwrap_used)]
 
 use jointrig_tests::command::jointrig;
@@ -8,7 +8,7 @@ use jointrig_tests::live::done;
 fn a_plan_is_written_checked_drawn_and_made_a_campaign_of() {
     let folder = tempfile::tempdir().unwrap();
     for template in ["contact", "paper", "paper-contact", "small"] {
-        // a name that a shell must have quoted
+        // a name that must be quoted in a shell
         let plan = folder.path().join(format!("my {template}.toml"));
         done(jointrig().args(["plan", "new", "--template", template]).arg(&plan));
         let again = jointrig().args(["plan", "new"]).arg(&plan).output().unwrap();

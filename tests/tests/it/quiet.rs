@@ -1,4 +1,5 @@
-//! The hammer waits until the structure is quiet: the FRF of a second hit is as good as the exact one.
+//! The hammer waits until the structure is quiet, so that the FRF of a second hit is as accurate as
+//! the first.
 #![allow(clippy::unwrap_used)]
 
 use jointrig::campaign::store::Store;
@@ -10,11 +11,12 @@ use num_complex::Complex;
 /// Window's decay, 1/s, as in the plan.
 const SIGMA: f64 = 2.3;
 
-/// Substructure A hangs on a wire and rings at 27 Hz for tens of seconds: two seconds after a hit a third of
-/// that motion is left. Its second hit's FRF, taken from that record alone, must agree with the exact one.
+/// Substructure A hangs on a wire and rings at 27 Hz for tens of seconds: two seconds after a hit a
+/// third of that motion remains. The FRF of the second hit, computed from that record alone, must
+/// agree with the exact one.
 #[test]
 fn the_second_hit_on_a_is_not_spoilt_by_the_first() {
-    // errors of position, angle and sensors would be told apart from ringing by nothing here
+    // errors of position, angle and sensors could not be distinguished from ringing here
     let rig = "[errors]\nnone = true\n\
                [hammer.mishaps]\ndouble_hit = 0.0\nweak = 0.0\noverload = 0.0\n";
     let folder = tempfile::tempdir().unwrap();
@@ -38,7 +40,7 @@ fn the_second_hit_on_a_is_not_spoilt_by_the_first() {
     };
     let (force, velocity) = (si("force"), si("vib_z"));
 
-    // on s = σ + iω the transforms of both decay; the rectangular force window is 8 ms
+    // on s = σ + iω the transforms of both converge; the rectangular force window is 8 ms
     let lines: Vec<f64> = (20..=400).map(|i| 0.5 * f64::from(i)).collect();
     let period = 1.0 / 51_200.0;
     let transform = |signal: &[f64], s: Complex<f64>| -> Complex<f64> {

@@ -1,4 +1,5 @@
-//! Double hits on simulated records: every rebound from 2 % on is found, and clean hits raise no alarm.
+//! Double hits on simulated records: every rebound from 2 % on is found, and clean hits raise no
+//! alarm.
 #![allow(clippy::unwrap_used)]
 
 use std::fmt::Write;
@@ -50,7 +51,8 @@ fn map(channels: &[rig::Channel]) -> ChannelMap {
     ChannelMap { id: 0, rate_hz: 51_200, exact_hz: None, channels: channels.collect() }
 }
 
-/// One hit as it would be recorded: 5 ms before the trigger, then half a second; channel after channel.
+/// One hit as it would be recorded: 5 ms before the trigger, then half a second; channel by
+/// channel.
 fn hit(rig: &mut Rig, map: &ChannelMap, pulse_s: f64) -> Vec<Vec<i16>> {
     let count = map.len();
     let force = map.place(Role::HammerForce).unwrap();
@@ -105,7 +107,8 @@ fn judge(plan: &Plan, map: &ChannelMap, channels: &[Vec<i16>]) -> Verdict {
     ByRecord.judge(&cell, plan, map, &recording, &Others::default())
 }
 
-/// Clean hits, a fresh one each: every configuration, impact and response in turn (A4 left out: its speckle is a fault of its own).
+/// Clean hits over all configurations, impacts and responses, a new one each (without A4, whose
+/// speckle is another fault).
 fn clean(count: usize, seed: u64) -> (ChannelMap, Vec<Vec<Vec<i16>>>) {
     let mut rig = rig(seed);
     let map = map(rig.channels());
@@ -135,7 +138,8 @@ fn every_rebound_from_two_per_cent_on_is_found_in_simulated_hits() {
         for after_ms in [1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0] {
             let delay = (after_ms * 1e-3 * RATE).round() as usize;
             for channels in &hits {
-                // the rebound's force, and what the structure does of it: the hit once more, later and smaller
+                // the rebound's force, and the structure's response to it: the hit repeated, later
+                // and smaller
                 let spoilt: Vec<Vec<i16>> = channels
                     .iter()
                     .map(|codes| {

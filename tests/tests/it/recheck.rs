@@ -1,5 +1,5 @@
-//! `campaign verify --deep`: what the file says of its records and levels follows from their raw codes, whatever happened since; what does not
-//! follow is named.
+//! `campaign verify --deep`: everything stored about records and levels follows from their raw
+//! codes, whatever happened since; anything that does not is named.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
@@ -37,7 +37,7 @@ fn verdicts_and_amplitudes_follow_from_the_codes_whatever_a_person_did_since() {
     campaign(&["drop", path, "2", "--reason", "a lorry"]);
     campaign(&["drop", path, "7", "--reason", "a lorry"]);
     campaign(&["keep", path, "7", "--reason", "no lorry"]);
-    // other scales from here on: the next session is judged by them, the records before it were not
+    // other scales from here on: they apply to the next session, not to earlier records
     let map = Store::open_read_only(&file).unwrap().channels_as_measured(1).unwrap();
     let channel = map.channels.iter().find(|channel| channel.name == "force").unwrap();
     let sensitivity_v = 1.02 / f64::from(channel.units_per_volt.abs());

@@ -1,4 +1,5 @@
-//! Reports of campaigns that lack something, and of contacts that slip: each says what is missing, and its page is whole.
+//! Reports of incomplete campaigns, and of contacts that slip: each states what is missing, and its
+//! page is complete.
 #![allow(clippy::unwrap_used)]
 
 use jointrig_tests::browser::{Browser, Look};
@@ -14,7 +15,7 @@ fn done(command: &mut Command) -> String {
     String::from_utf8(out.stdout).unwrap()
 }
 
-/// A campaign of this plan on this rig (`sim:…`), measured.
+/// Measures a campaign with this plan on this rig (`sim:…`).
 fn measured(folder: &Path, name: &str, plan: &str, device: &str) -> PathBuf {
     let file = created(folder, name, plan);
     done(jointrig().args(["campaign", "run", "--yes", "--device", device]).arg(&file));
@@ -28,10 +29,10 @@ fn created(folder: &Path, name: &str, plan: &str) -> PathBuf {
     file
 }
 
-/// What a report says.
+/// The contents of a report.
 struct Said {
     results: Value,
-    /// All words of the page, and the names of its figures.
+    /// The text of the page, and the names of its figures.
     words: String,
     figures: Vec<String>,
 }
@@ -46,7 +47,8 @@ impl Said {
     }
 }
 
-/// The report of a file: opened at two widths, every figure alive, without errors and no wider than the window.
+/// The report of a file: opened at two widths, with every figure interactive, no errors, and no
+/// wider than the window.
 fn reported(browser: &mut Browser, file: &Path) -> Said {
     let out = file.with_extension("report");
     done(jointrig().arg("report").arg(file).arg("--out").arg(&out));
@@ -83,7 +85,7 @@ fn reported(browser: &mut Browser, file: &Path) -> Said {
 fn contacts_that_slip_are_shown_as_such() {
     let folder = tempfile::tempdir().unwrap();
     let mut browser = Browser::start();
-    // an eighth of the time: fewer points, shorter records; what slips is asked of the shaker
+    // an eighth of the time: fewer points, shorter records; slip is tested with the shaker
     let plan = include_str!("../../../docs/plans/small.toml").replace("length_s = 2.0", "length_s = 1.0");
     for (rig, shape) in [("jenkins", "gross-slip"), ("iwan", "microslip")] {
         let device = format!("sim:{}/../hil-sim/rigs/{rig}.toml", env!("CARGO_MANIFEST_DIR"));
@@ -118,7 +120,7 @@ fn configurations_and_cells_that_are_missing_are_named() {
     let mut browser = Browser::start();
     let small = include_str!("../../../docs/plans/small.toml");
 
-    // one configuration is not in the plan
+    // one configuration is missing from the plan
     let (before, b) = small.split_once("[[configuration]]\nname = \"B\"").unwrap();
     let without = format!("{before}{}", &b[b.find("[[configuration]]").unwrap()..]);
     let said = reported(&mut browser, &measured(folder.path(), "without-b", &without, "sim:"));
@@ -126,7 +128,7 @@ fn configurations_and_cells_that_are_missing_are_named() {
     assert!(said.words.contains("for want of FRFs of A, B and the assembly"));
     assert!(said.draws("receptances") && !said.draws("joint-spectrum"));
 
-    // hardly a hit can be good: all but a hair's breadth of force is refused
+    // hardly any hit can be good: only a very narrow range of force is accepted
     let strict = small
         .replace("weak_n = 30.0", "weak_n = 50.0")
         .replace("strong_n = 75.0", "strong_n = 50.2")

@@ -1,4 +1,5 @@
-//! The report's page in a browser: every figure there and alive, nothing asked of the network, nothing wider than the window.
+//! The report's page in a browser: every figure is present and interactive, no network request, no
+//! overflow of the window.
 #![allow(clippy::unwrap_used)]
 
 use base64::Engine;
@@ -19,7 +20,8 @@ fn done(command: &mut Command) -> String {
     String::from_utf8(out.stdout).unwrap()
 }
 
-/// A campaign of all three configurations with the shaker's levels, as quick as it can be with coherence: two hits in each cell.
+/// A campaign of all three configurations with the shaker's levels, as short as coherence allows:
+/// two hits in each cell.
 fn campaign() -> &'static Path {
     static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
@@ -58,10 +60,10 @@ fn figures(page: &mut Page<'_>) -> Vec<String> {
     names.as_array().unwrap().iter().map(|n| n.as_str().unwrap().to_owned()).collect()
 }
 
-/// Figures of this campaign: all but those that need slip.
+/// Number of figures of this campaign: all except those that need slip.
 const EXPECTED: usize = 24;
 
-/// The middle of a figure's first plot, after it was brought into view and came alive.
+/// Centre of a figure's first plot, after it was scrolled into view and became interactive.
 fn middle(page: &mut Page<'_>, name: &str) -> [f64; 2] {
     page.eval(&format!(
         "document.getElementById('fig-{name}').scrollIntoView({{block:'start',behavior:'instant'}})"
@@ -92,7 +94,7 @@ fn the_page_is_whole_in_every_light_and_at_every_width() {
             middle(&mut page, name);
         }
         page.until("[...report.alive.values()].every(charts => charts.every(c => c.drawn > 0))");
-        // before the test itself reads the pixels back, of which Chromium warns
+        // before the test itself reads back pixels, which causes a warning of Chromium
         assert_eq!(page.errors(), Vec::<String>::new(), "{look:?}");
         assert_eq!(page.requests(), Vec::<String>::new(), "{look:?}");
         let wide = page.eval("document.documentElement.scrollWidth").as_u64().unwrap();
@@ -104,10 +106,11 @@ fn the_page_is_whole_in_every_light_and_at_every_width() {
     }
 }
 
-/// Panels whose canvas shows nothing but its axes: at least 40 pixels, the size of one point, must differ from paper and grid.
+/// Panels whose canvas shows only axes: at least 40 pixels, the size of one point, must differ from
+/// background and grid.
 const BLANK: &str = include_str!("../page_probes/blank_panels.js");
 
-/// Tick labels of the static drawings that stand over one another.
+/// Tick labels of the static drawings that overlap.
 const TOUCHING: &str = include_str!("../page_probes/touching_labels.js");
 
 #[test]
@@ -115,12 +118,12 @@ fn every_figure_reacts_to_drag_wheel_and_keys_and_returns() {
     let mut browser = Browser::start();
     let mut page = browser.open(&report(), Look::DESK);
     for name in figures(&mut page) {
-        // linked figures were moved by the ones before; what takes the focus scrolls into view
+        // linked figures were moved by earlier ones; a focused element is scrolled into view
         page.eval(&format!("document.getElementById('fig-{name}').focus()"));
         page.key("0");
         let [x, y] = middle(&mut page, &name);
         let whole = view(&mut page, &name);
-        // a matrix is no chart: it answers to the keys alone
+        // a matrix is not a chart: it only reacts to keys
         let matrix =
             page.eval(&format!("report.alive.get('{name}').every(c => !c.plot && !c.scene)")) == true;
         page.drag([x - 40.0, y - 20.0], [x + 40.0, y + 25.0]);
@@ -141,7 +144,7 @@ fn every_figure_reacts_to_drag_wheel_and_keys_and_returns() {
         page.key("ArrowRight");
         let said = page.eval(&format!("document.querySelector('#fig-{name} .readout').textContent + (report.alive.get('{name}')[0].yaw || '')"));
         assert_ne!(said, "", "{name}: the arrow keys say nothing");
-        // what is taken away holds numbers and curves
+        // the exported files contain numbers and curves
         let csv = page.eval(&format!("report.csvOf(report.FIGURES.find(f => f.name === '{name}'), document.getElementById('fig-{name}'))"));
         assert!(csv.as_str().unwrap().lines().count() > 1, "{name}: csv");
         let svg = page.eval(&format!("report.svgOf(report.FIGURES.find(f => f.name === '{name}'), document.getElementById('fig-{name}'))"));
@@ -173,7 +176,8 @@ fn drawings_are_taken_away_whole_and_axes_change_their_spread() {
             .as_u64()
             .unwrap()
     };
-    // the paper, and a square for each of 276 cells, or each pair of six values and six motions
+    // the background, and a square for each of 276 cells, or each pair of six values and six
+    // motions
     assert!(count(&mut page, "cells", "<rect") > 276 && count(&mut page, "participation", "<rect") > 36);
     assert!(count(&mut page, "geometry", "<circle") >= 21 && count(&mut page, "geometry", ">AZ1<") == 1);
 
@@ -214,7 +218,7 @@ fn twenty_thousand_zooms_break_nothing() {
     let mut browser = Browser::start();
     let mut page = browser.open(&report(), Look::DESK);
     middle(&mut page, "receptances");
-    // a small generator with a seed, so that a failure comes again
+    // a small seeded generator, so that a failure is repeatable
     let worst = page.eval(
         "(() => {
             const chart = report.alive.get('receptances')[0], axis = chart.panel.x;
@@ -256,7 +260,8 @@ fn without_scripts_and_on_paper_nothing_is_lost() {
     assert!((4..=30).contains(&(pages - trees)), "{} pages", pages - trees);
 }
 
-/// Every number that says where it stands in results.json stands there; so does every number of a table, and of the first screen.
+/// Every number that states its position in results.json is found there, including those of tables
+/// and of the first screen.
 #[test]
 fn every_number_is_found_in_the_results() {
     let results = results();
@@ -278,21 +283,22 @@ fn every_number_is_found_in_the_results() {
             let found = numbers.iter().any(|number| origins::agrees(value, *number));
             assert!(found, "{path}: {value} is shown as {text}");
         }
-        // where nothing but numbers stands, each has its path
+        // if there are only numbers, each has its path
         assert!(one[2] == false || numbers.len() == paths.len(), "{paths:?}: {text}");
     }
     let silent = page.eval(
         "[...document.querySelectorAll('td.n:not([data-path])')].map(e => e.textContent).filter(t => /[0-9]/.test(t))",
     );
     assert_eq!(silent, serde_json::json!([]), "cells of tables that say no path");
-    // units are no numbers, nor is the share of an interval
+    // units are not numbers, nor is the percentage of an interval
     let screen = page.eval(
         "[...document.querySelectorAll('#answer .found:not(.warn) p, #answer .differ')].map(p => { const c = p.cloneNode(true); for (const e of c.querySelectorAll('[data-path]')) e.remove(); return c.textContent.replaceAll('95\u{a0}%', '') }).filter(t => /[0-9]/.test(t))",
     );
     assert_eq!(screen, serde_json::json!([]), "numbers of the first screen that say no path");
 }
 
-/// Every number of every figure's csv file stands in results.json, where the figure says.
+/// Every number in every figure's csv file is found in results.json at the position that the figure
+/// states.
 #[test]
 fn every_number_of_a_csv_file_is_found_in_the_results() {
     let results = results();
@@ -313,7 +319,7 @@ fn results() -> Value {
     serde_json::from_str(&std::fs::read_to_string(campaign().join("results.json")).unwrap()).unwrap()
 }
 
-/// Ticks of the static drawings and of the living charts are by the same rule.
+/// The static drawings and the interactive charts use the same rule for ticks.
 #[test]
 fn a_thousand_random_axes_have_the_same_ticks_in_both_languages() {
     use jointrig::report::axis_labels;
@@ -346,7 +352,7 @@ fn a_thousand_random_axes_have_the_same_ticks_in_both_languages() {
     }
 }
 
-/// A plan's names can be anything; none of them is markup, and none breaks the page.
+/// A plan may contain any names; none is interpreted as markup, and none breaks the page.
 #[test]
 fn hostile_names_break_nothing() {
     let mut results = results();

@@ -1,4 +1,4 @@
-//! A laboratory with an impact hammer and sensors that stay: a person strikes, and one hit fills a row of cells.
+//! A laboratory with a manual impact hammer and fixed sensors: one hit fills a row of cells.
 #![allow(clippy::unwrap_used)]
 
 use jointrig_hil_sim::rig::RigConfig;
@@ -10,10 +10,11 @@ use std::fmt::Write;
 use std::path::Path;
 
 const RIG: &str = include_str!("../../../hil-sim/rigs/clamped-tips.toml");
-/// Clamps and contact of it in series, N/m.
+/// Its clamps and contact in series, N/m.
 const TRUTH: f64 = 1.0 / (1.0 / 90e6 + 1.0 / 120e6 + 1.0 / 200e6);
 
-/// The rig with a person who strikes, and sensors of three channels that stay at two of its six points.
+/// The rig with an operator who strikes, and fixed sensors of three channels at two of its six
+/// points.
 fn by_hand(every_s: f64) -> String {
     let mut text = format!("{RIG}\n[hammer.hand]\nevery_s = {every_s:?}\npulse_s = 3.5e-3\n");
     for point in ["11", "21"] {
@@ -33,7 +34,7 @@ fn json(command: &mut std::process::Command) -> Value {
     serde_json::from_str(&done(command)).unwrap()
 }
 
-/// The plan of the rig with these cells alone.
+/// The rig's plan with only these cells.
 fn few(folder: &Path, cells: &str) -> String {
     let whole = std::fs::read_to_string(folder.join("plan.toml")).unwrap();
     let (head, geometry) =
@@ -58,7 +59,8 @@ fn one_hit_by_hand_fills_a_row_of_cells() {
     done(jointrig().args(["campaign", "run", "--yes", "--device", &address]).arg(&file));
     let status = json(jointrig().args(["campaign", "status", "--json"]).arg(&file));
     assert_eq!(status["complete"], true, "{status}");
-    // 9 impacts on each of the parts with 3 responses, and 18 in the assembly with 6, of which two are one row
+    // 9 impacts on each of the parts with 3 responses, and 18 in the assembly with 6, of which two
+    // share one row
     let (cells, struck) = (9 * 3 * 2 + 18 * 6, 9 * 3 * 2 + 18 * 5);
     assert_eq!(
         (status["cells"].as_array().unwrap().len(), status["wanted"].as_u64()),
@@ -74,7 +76,7 @@ fn one_hit_by_hand_fills_a_row_of_cells() {
     println!("{said}");
     assert!(low < TRUTH && TRUTH < high && high < 1.3 * low, "{between}, and {TRUTH} is true");
 
-    // every sensor has the sign that the device promises; one that is scaled the other way round is told by name
+    // every sensor has the declared sign; one with the opposite scale is named
     let check = || jointrig().args(["campaign", "check", "--json"]).arg(&file).output().unwrap();
     let signs: Value = serde_json::from_slice(&check().stdout).unwrap();
     let signs = signs["polarity"].as_array().unwrap();
@@ -82,7 +84,7 @@ fn one_hit_by_hand_fills_a_row_of_cells() {
     for name in ["force", "vib_z", "ldv_a", "p11_z", "p21_z"] {
         assert_eq!(right(name), true, "{name} of {signs:?}");
     }
-    // nobody struck along x or y
+    // no hits along x or y
     assert_eq!(*right("p11_x"), Value::Null);
     assert!(signs.iter().all(|sign| sign["right"] != false), "{signs:?}");
     std::fs::write(at("lab.toml"), "[[channel]]\nname = \"p11_z\"\npolarity = 1\n").unwrap();
@@ -101,7 +103,7 @@ fn one_hit_by_hand_fills_a_row_of_cells() {
 fn who_strikes_too_early_or_not_at_all_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("lab.jrig");
-    // a hit while the one before still rings; every one but the first of a cell comes too early
+    // a hit while the previous one still rings; all except the first of a cell come too early
     let address = new(folder.path(), &by_hand(1.05));
     let few = few(folder.path(), "name = \"frame\"\nimpacts = [\"101\"]\nresponses = [\"11\"]");
     let few = few.replace("by = \"hand\"", "by = \"hand\"\npatience_s = 30.0");
@@ -112,7 +114,7 @@ fn who_strikes_too_early_or_not_at_all_is_told() {
     let said = done(jointrig().args(["campaign", "show", "--no-figure"]).arg(&small).arg("A/101/11"));
     assert!(said.contains("struck before the structure was at rest: "), "{said}");
 
-    // nobody is there: the default rig strikes only when it is told to
+    // no operator: the default rig strikes only when ordered to
     let nobody = by_hand(4.0).replace("every_s = 4.0", "every_s = 1e6");
     std::fs::write(folder.path().join("rig.toml"), nobody).unwrap();
     std::fs::remove_file(&small).unwrap();
@@ -145,7 +147,7 @@ fn a_row_has_its_hits_in_common() {
     assert!(told.contains("6 cells, 8 hits wanted"), "{told}");
     let run = || done(jointrig().args(["campaign", "run", "--yes", "--device", &address]).arg(&file));
     run();
-    // the same hits in both cells of the row, each with its own sensor's channels
+    // both cells of the row have the same hits, each with its own sensor's channels
     let show = |cell: &str| {
         json(jointrig().args(["campaign", "show", "--no-figure", "--json"]).arg(&file).arg(cell))["records"]
             .clone()
@@ -160,7 +162,7 @@ fn a_row_has_its_hits_in_common() {
     assert_eq!((first.force_n.len(), &first.force_n), (2, &second.force_n));
     assert_ne!(first.response, second.response);
 
-    // dropped once, it is missing in both, and struck once more
+    // dropped once, it is missing in both, and is repeated once
     let record = show("AJB/101/21")[0]["record"].as_i64().unwrap().to_string();
     done(jointrig().args(["campaign", "drop"]).arg(&file).arg(&record).args(["--reason", "a lorry passed"]));
     let kept = |status: &Value, response: &str| {

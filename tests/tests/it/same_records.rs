@@ -1,4 +1,4 @@
-//! The same seed gives the same records, whatever carries them and whatever the link loses.
+//! The same seed gives the same records over any transport and with any losses on the link.
 #![allow(clippy::unwrap_used)]
 
 use jointrig::device::address::Address;

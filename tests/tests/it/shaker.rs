@@ -1,4 +1,5 @@
-//! A host that is killed in mid-shake: the shaker rests, the file is whole, and the same command goes on.
+//! A host that is killed while shaking: the shaker comes to rest, the file is intact, and the same
+//! command continues.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used)]
 
@@ -20,7 +21,7 @@ fn levels(file: &Path) -> Vec<(f64, u32)> {
     rows.iter().map(|row| (row.level().frequency_hz, crc(row))).collect()
 }
 
-/// Four levels of half a minute of the device's time each: there is time enough to be killed in.
+/// Four levels of half a minute of the device's time each: long enough to be killed during them.
 fn shaker(file: &Path, address: &str) -> Command {
     let mut command = jointrig();
     command.arg("shaker").arg(file).args(["--device", address, "--yes", "--seconds", "30"]);

@@ -1,4 +1,5 @@
-//! What a simulated rig truly is stands in the campaign file, and only there where the runner itself simulated it.
+//! The truth of a simulated rig is stored in the campaign file only if the runner itself simulated
+//! it.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
@@ -33,7 +34,7 @@ fn a_campaign_on_sim_keeps_the_rigs_truth() {
     let store = Store::open_read_only(&file).unwrap();
     let SimulatedRig { name, seed, parameters } = store.simulated_rig().unwrap().unwrap();
     assert_eq!((name.as_str(), seed), ("tilted", 11));
-    // of SHA-256, in base64
+    // SHA-256 in base64
     assert_eq!(parameters.unwrap().len(), 44);
     let (kept, truth) =
         (store.simulated_truth().unwrap().unwrap(), RigConfig::from_toml(RIG).unwrap().truth());

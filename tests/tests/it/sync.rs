@@ -1,4 +1,5 @@
-//! A campaign in step with another recorder: by its clock, and by edges that both see; and what a plan gets that the device does not fit.
+//! A campaign synchronised with another recorder, by its clock and by edges that both see; and the
+//! errors of a plan that does not match the device.
 #![allow(clippy::unwrap_used)]
 
 use std::io;
@@ -17,7 +18,7 @@ use jointrig_tests::campaign::{attempt, small_plan};
 use jointrig_tests::command::jointrig;
 use jointrig_tests::live::done;
 
-/// A virtual board with something at its sync port.
+/// A virtual board with a recorder at its sync port.
 struct Wired {
     link: HostEnd,
     _board: VirtualBoard,
@@ -66,7 +67,8 @@ fn clock_and_edges_are_stored_and_exported() {
     assert!((clocks[0].ppm.unwrap() + 70.0).abs() < 12.0, "{clocks:?}");
     let input = edges.iter().find(|edge| edge.line == "input").unwrap();
     assert!((input.at_scan() - 1_000.25).abs() < 1e-9);
-    // each hit is marked when the coil is switched on and when the force is felt; the second lies in its record
+    // each hit is marked when the coil is switched on and when the force is detected; the second
+    // mark is within its record
     let store = Store::open_read_only(&file).unwrap();
     for record in store.records().unwrap().into_iter().flatten() {
         let trigger = record.first_scan + record.trigger_index as u64;
@@ -77,7 +79,7 @@ fn clock_and_edges_are_stored_and_exported() {
         );
     }
     drop(store);
-    // the same samples as without all this
+    // the same samples as without synchronisation
     let alone = folder.path().join("b.jrig");
     measure(&alone, &plan(""), |_| {}).unwrap();
     assert_eq!(noted(&alone), (Vec::new(), Vec::new()), "a plan without [sync] stores none of it");

@@ -1,11 +1,11 @@
-//! What the troubleshooting page quotes is what the program says.
+//! The messages quoted on the troubleshooting page are those of the program.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
 
 const PAGE: &str = include_str!("../../../docs/troubleshooting.md");
 
-/// All sources below a folder, with strings that go over several lines put together.
+/// All sources below a folder, with continued strings joined.
 fn sources(folder: &Path) -> String {
     let mut all = String::new();
     for entry in std::fs::read_dir(folder).unwrap() {

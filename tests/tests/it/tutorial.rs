@@ -1,4 +1,4 @@
-//! Pages with commands, one by one, as somebody would type them.
+//! The commands of documentation pages, run one by one as a user would type them.
 #![allow(clippy::unwrap_used)]
 
 use jointrig_tests::command::jointrig;
@@ -24,7 +24,7 @@ fn blocks(page: &str) -> Vec<(String, Vec<String>)> {
     blocks
 }
 
-/// Whether a line is what the page says; `…` stands for anything.
+/// Whether a line matches the page; `…` matches anything.
 fn is_like(line: &str, pattern: &str) -> bool {
     let mut rest = line;
     let mut parts = pattern.split('…').enumerate().peekable();
@@ -38,7 +38,8 @@ fn is_like(line: &str, pattern: &str) -> bool {
     true
 }
 
-/// Runs a page's commands in a folder, and holds what they print to what the page shows; how many there were.
+/// Runs a page's commands in a folder and compares their output with the page; returns the number
+/// of commands.
 fn run(page: &str, folder: &Path) -> usize {
     let (mut said, mut commands) = (String::new(), 0);
     for (kind, lines) in blocks(page) {

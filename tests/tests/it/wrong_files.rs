@@ -1,4 +1,5 @@
-//! Files that are not what a command takes them for, and places where nothing can be written: what is wrong, and what to do.
+//! Files of the wrong kind, and folders without write permission: the errors state what is wrong
+//! and what to do.
 #![allow(clippy::unwrap_used)]
 
 use jointrig::campaign::plan::SMALL;
@@ -30,7 +31,7 @@ fn a_folder_is_called_one_and_its_campaigns_are_named() {
     assert!(text.contains("is a folder"), "{text}");
 }
 
-/// Whether the rights of files count here: for root they do not.
+/// Whether file permissions apply here: for root they do not.
 #[cfg(unix)]
 fn rights_count(path: &Path) -> bool {
     use std::os::unix::fs::PermissionsExt;
@@ -101,7 +102,7 @@ fn a_figure_that_cannot_be_written_costs_nobody_the_list() {
     assert!(String::from_utf8_lossy(&out.stdout).contains("2 good hits wanted"));
 }
 
-/// A folder on a disk of its own that holds so much; none where this user may not make one.
+/// A folder on a separate file system of limited size; `None` if this user may not mount one.
 #[cfg(target_os = "linux")]
 struct Disk(tempfile::TempDir);
 
@@ -121,7 +122,7 @@ impl Disk {
 #[cfg(target_os = "linux")]
 impl Drop for Disk {
     fn drop(&mut self) {
-        // what is still mounted keeps its folder, which harms nobody
+        // a folder that is still mounted is left behind, which is harmless
         let _ = Command::new("umount").arg(self.0.path()).status();
     }
 }

@@ -1,9 +1,10 @@
-//! No two production files of a crate import each other, directly or around a corner.
+//! No two production files of a crate import each other, directly or indirectly.
 //!
-//! One file is one room. A file imports another when its code names something that the other defines, in a `use` line or
-//! in a path; what a `mod.rs` passes on counts for the file that defines it. A file and the ones below it
-//! (`store/mod.rs` and `store/seal.rs`) are one room with its closets: between them, arrows may go both ways. Tests are
-//! not looked at, nor methods, whose types are not written down where they are called.
+//! A file imports another if its code names something that the other defines, in a `use` line or in
+//! a path; a re-export in a `mod.rs` counts for the file that defines the item. A file and the
+//! files below it (`store/mod.rs` and `store/seal.rs`) form one unit: between them, imports in both
+//! directions are allowed. Tests are ignored, and so are methods, because their types are not
+//! written at the call.
 
 use super::modules::{Found, Tree};
 use crate::project::Project;
@@ -12,18 +13,19 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// A circle that may stay.
+/// A circle that is allowed.
 struct Allowed {
-    /// Its files, from the repository's root.
+    /// Its files, relative to the repository's root.
     files: &'static [&'static str],
-    /// Why these are one room.
+    /// Why these files belong together.
     reason: &'static str,
 }
 
-/// The circles that may stay: parts of one type, which would gain nothing from a common file.
+/// The allowed circles: parts of one type, for which a common file would be no improvement.
 const ALLOWED: [Allowed; 0] = [];
 
-/// Which file imports which: the names, and the first line of each.
+/// For each file, the files it imports, and for each of these the names with the line of their
+/// first use.
 type Imports = BTreeMap<PathBuf, BTreeMap<PathBuf, BTreeMap<String, usize>>>;
 
 /// Looks for circles in every crate of the workspace; returns a remark.
@@ -38,7 +40,7 @@ pub fn check(project: &Project) -> Result<String> {
     Ok(format!("{files} files without circles"))
 }
 
-/// What each file imports of others that are neither above nor below it.
+/// The imports of each file from others that are neither above nor below it.
 fn imports(tree: &Tree, root: &Path) -> Imports {
     let shown = |file: &Path| file.strip_prefix(root).unwrap_or(file).to_path_buf();
     let mut imports = Imports::new();
@@ -57,14 +59,14 @@ fn imports(tree: &Tree, root: &Path) -> Imports {
     imports
 }
 
-/// One circle: its files, with the imports among them.
+/// One circle: its files, and the imports among them.
 #[derive(Debug)]
 struct Circle {
     files: BTreeSet<PathBuf>,
     told: String,
 }
 
-/// The largest sets of files of which each reaches every other.
+/// The largest sets of files in which each reaches every other.
 fn circles(imports: &Imports) -> Vec<Circle> {
     let reached: BTreeMap<&PathBuf, BTreeSet<&PathBuf>> =
         imports.keys().map(|file| (file, reachable(imports, file))).collect();
@@ -81,7 +83,7 @@ fn circles(imports: &Imports) -> Vec<Circle> {
     circles
 }
 
-/// Every file that one step or more lead to.
+/// Every file that is reachable in one or more steps.
 fn reachable<'a>(imports: &'a Imports, from: &PathBuf) -> BTreeSet<&'a PathBuf> {
     let (mut reached, mut open) = (BTreeSet::new(), vec![from]);
     while let Some(file) = open.pop() {
@@ -110,7 +112,7 @@ fn told(imports: &Imports, files: &BTreeSet<PathBuf>) -> String {
     told
 }
 
-/// Fails for circles that are not allowed, and for allowances that nothing needs any more.
+/// Fails for circles that are not allowed, and for allowances that are no longer needed.
 fn judge(found: &[Circle], allowed: &[Allowed]) -> Result<()> {
     let files = |allowed: &Allowed| allowed.files.iter().map(PathBuf::from).collect::<BTreeSet<_>>();
     let mut faults = Vec::new();

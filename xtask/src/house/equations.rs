@@ -1,28 +1,29 @@
 //! Each equation of the paper is evaluated by one function.
 //!
-//! The function that evaluates it says so in a line of its documentation that begins `Implements Eq. (A.1)` (or
-//! `Implements Eqs. (A.3) and (A.4)`). What follows the numbers, up to the full stop, tells forms of one equation apart:
-//! `Implements Eq. (3), as printed.` Everyone else may speak of "Eq. (3)" as they like, and calls that function.
+//! A line in that function's documentation begins with `Implements Eq. (A.1)` (or `Implements Eqs.
+//! (A.3) and (A.4)`). The text after the numbers, up to the full stop, distinguishes forms of one
+//! equation: `Implements Eq. (3), as printed.` Other comments may mention "Eq. (3)" freely, and
+//! other code calls that function.
 
 use crate::project::Project;
 use anyhow::{Context, Result, bail};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// How a tag begins; the sentence for several equations has an s more.
+/// Start of a tag; for several equations an s follows.
 const TAG: &str = "Implements Eq";
 
 /// Where an equation is implemented: the file from the repository's root, the line, the function.
 type Places = BTreeMap<Equation, Vec<String>>;
 
-/// An equation's number, and which form of it.
+/// An equation's number, and the form of the equation.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Equation {
     number: String,
     form: String,
 }
 
-/// Looks through all production code of the workspace; returns a remark.
+/// Searches all production code of the workspace; returns a remark.
 pub fn check(project: &Project) -> Result<String> {
     let roots = project.packages.iter().flat_map(|package| &package.roots);
     let folders: BTreeSet<&Path> = roots.filter_map(|root| root.parent()).collect();
@@ -87,7 +88,7 @@ fn collect(file: &Path, text: &str, places: &mut Places) -> Result<()> {
     Ok(())
 }
 
-/// The equations that a line of documentation claims: `Implements Eq. (3), as printed.`
+/// The equations tagged in a line of documentation: `Implements Eq. (3), as printed.`
 fn equations(said: &str) -> Vec<Equation> {
     let Some(rest) = said.strip_prefix(TAG) else { return Vec::new() };
     let Some(mut rest) = rest.strip_prefix("s. ").or_else(|| rest.strip_prefix(". ")) else {
@@ -106,7 +107,7 @@ fn equations(said: &str) -> Vec<Equation> {
     numbers.into_iter().map(|number| Equation { number, form: form.to_owned() }).collect()
 }
 
-/// The name of the function that a line begins, if it does.
+/// The name of the function that begins on this line, if one does.
 fn function(line: &str) -> Option<&str> {
     let (before, after) = line.split_once("fn ")?;
     let keyword = |word: &str| {

@@ -1,19 +1,19 @@
-//! What a feature brings in is gone without it.
+//! A build without a feature does not contain the feature's dependencies.
 
 use crate::command;
 use crate::project::Project;
 use anyhow::{Result, bail};
 
-/// The package whose feature is looked at.
+/// The package whose feature is checked.
 const PACKAGE: &str = "jointrig";
 
-/// Every other feature of it.
+/// All its other features.
 const OTHERS: &str = "sim,device-logs,png";
 
-/// What nothing but the live page (`dashboard`) needs.
+/// Crates that only the live page (`dashboard`) needs.
 const SERVER: [&str; 6] = ["axum", "hyper", "hyper-util", "tokio", "tokio-tungstenite", "tungstenite"];
 
-/// Looks for the server's crates in a build without it; returns a remark.
+/// Searches a build without the live page for the server's crates; returns a remark.
 pub fn check(project: &Project) -> Result<String> {
     let mut cargo = command::cargo(&project.root);
     cargo.args(["tree", "--package", PACKAGE, "--no-default-features", "--features", OTHERS]);

@@ -1,16 +1,16 @@
-//! Which crate may use which: the walls of the house, as `cargo metadata` sees them.
+//! The allowed dependencies between the crates, checked with `cargo metadata`.
 
 use crate::command;
 use crate::project::{Package, Project};
 use anyhow::{Result, bail};
 use std::collections::BTreeSet;
 
-/// What one package of ours may use of ours.
+/// The workspace packages that one package may depend on.
 struct Rule {
     package: &'static str,
     /// Always.
     uses: &'static [&'static str],
-    /// Behind a feature only.
+    /// Only behind a feature.
     behind_a_feature: &'static [&'static str],
 }
 
@@ -18,7 +18,7 @@ const fn rule(package: &'static str, uses: &'static [&'static str]) -> Rule {
     Rule { package, uses, behind_a_feature: &[] }
 }
 
-/// Every package of the workspace has its line; arrows go up the list only.
+/// Every package of the workspace has an entry; dependencies only point to earlier entries.
 const RULES: [Rule; 12] = [
     rule("jointrig-hot", &[]),
     rule("jointrig-protocol", &["jointrig-hot"]),
@@ -49,18 +49,19 @@ const RULES: [Rule; 12] = [
     rule("xtask", &["jointrig-logs"]),
 ];
 
-/// What a library for strangers may bring along, of ours and of others, counted with all that they need in turn.
+/// Limit on the number of packages, ours and third-party, that a library for external users depends
+/// on, directly or indirectly.
 struct Load {
     package: &'static str,
-    /// Itself included.
+    /// Including itself.
     at_most: usize,
 }
 
-/// The libraries that stand alone.
+/// The libraries that are usable on their own.
 const LOADS: [Load; 2] =
     [Load { package: "jointrig-analysis", at_most: 46 }, Load { package: "jointrig-uff", at_most: 25 }];
 
-/// What none of them may need: devices, files, screens, and the product around them.
+/// Packages on which none of them may depend: devices, files, screens, and the rest of the product.
 const NEVER: [&str; 7] =
     ["jointrig-protocol", "rusqlite", "clap", "serialport", "nusb", "tokio", "indicatif"];
 
@@ -76,7 +77,7 @@ pub fn check(project: &Project) -> Result<String> {
     bail!("{}. The rules are the tables of xtask/src/house/graph.rs", faults.join("; "))
 }
 
-/// What breaks the rules.
+/// Violations of the rules.
 fn edges(packages: &[Package], rules: &[Rule]) -> Vec<String> {
     let mut faults = Vec::new();
     for rule in rules.iter().filter(|rule| !packages.iter().any(|package| package.name == rule.package)) {
@@ -103,8 +104,8 @@ fn edges(packages: &[Package], rules: &[Rule]) -> Vec<String> {
     faults
 }
 
-/// The names of all packages that `package` is built from, itself included, with all its features. Asked alone:
-/// within the whole workspace, other packages' features would add to it.
+/// The names of all packages that `package` is built from, including itself, with all its features.
+/// The package is queried alone: in the whole workspace, other packages' features would add to it.
 fn needed(project: &Project, package: &str) -> Result<Vec<String>> {
     let arguments = [
         "tree",
@@ -119,7 +120,7 @@ fn needed(project: &Project, package: &str) -> Result<Vec<String>> {
         "--no-dedupe",
     ];
     let text = command::output(command::cargo(&project.root).args(arguments))?;
-    // Two versions of a crate are two packages.
+    // Two versions of a crate count as two packages.
     let lines: BTreeSet<(&str, &str)> = text
         .lines()
         .filter_map(|line| line.split_once(' '))

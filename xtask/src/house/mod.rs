@@ -1,4 +1,5 @@
-//! `cargo xtask house`: the laws of the house that a program can check, in seconds and without compiling anything.
+//! `cargo xtask house`: structural rules that a program can check, in seconds and without compiling
+//! anything.
 
 mod circles;
 mod declarations;
@@ -14,7 +15,7 @@ mod tokens;
 use crate::project::Project;
 use anyhow::{Result, bail};
 
-/// One law: its name, and its check, which returns a remark.
+/// One rule: its name, and its check, which returns a remark.
 type Law = (&'static str, fn(&Project) -> Result<String>);
 
 const LAWS: [Law; 7] = [
@@ -27,7 +28,7 @@ const LAWS: [Law; 7] = [
     ("pages", pages::check),
 ];
 
-/// Checks all of them, and fails with everything that was found.
+/// Checks all rules, and fails with all violations found.
 pub fn check(project: &Project) -> Result<()> {
     let mut faults = Vec::new();
     for (name, law) in LAWS {

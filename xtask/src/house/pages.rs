@@ -1,16 +1,17 @@
-//! The pages that say where things are name folders and files that are there.
+//! The folders and files named in the overview pages exist.
 
 use crate::project::Project;
 use anyhow::{Context, Result, bail};
 use std::path::Path;
 
-/// The pages, from the repository's root.
+/// The pages, relative to the repository's root.
 const PAGES: [&str; 3] = ["ARCHITECTURE.md", "CONTRIBUTING.md", "README.md"];
-/// Where a path may begin. Others are short for what stands beside one of these, or are a user's.
+/// The folders with which a path may begin. Other paths are abbreviations relative to one of these,
+/// or belong to the user.
 const TOP: [&str; 9] =
     ["protocol", "firmware", "hil-sim", "host", "tests", "xtask", "docs", ".cargo", ".github"];
 
-/// Follows every path; returns a remark.
+/// Checks every path; returns a remark.
 pub fn check(project: &Project) -> Result<String> {
     let (mut number, mut missing) = (0, Vec::new());
     for page in PAGES {
@@ -29,7 +30,7 @@ pub fn check(project: &Project) -> Result<String> {
     bail!("{}, which is not there", missing.join(", "))
 }
 
-/// What stands between backticks, or is linked to, and begins with one of the folders.
+/// Texts between backticks, or link targets, that begin with one of the folders.
 fn paths(text: &str) -> Vec<&str> {
     text.split(['`', '(', ')'])
         .map(|part| part.split('#').next().unwrap_or(part))

@@ -1,7 +1,8 @@
-//! What may be built into the product, as `deny.toml` says: licences, banned crates, sources, and one version of each crate.
+//! What may be built into the product, as defined in `deny.toml`: licences, banned crates, sources,
+//! and one version of each crate.
 //!
-//! cargo-deny reads the same file and does more (advisories). Building it takes minutes; what is checked here comes from
-//! `cargo metadata` and takes none.
+//! cargo-deny reads the same file and checks more (advisories). Building it takes minutes; the
+//! check here uses only `cargo metadata` and takes no time.
 
 use crate::command;
 use crate::project::Project;
@@ -11,26 +12,26 @@ use spdx::{Expression, Licensee, ParseMode};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// The policy, from the repository's root.
+/// The policy file, relative to the repository's root.
 const FILE: &str = "deny.toml";
 
-/// What `deny.toml` says.
+/// Contents of `deny.toml`.
 #[derive(Debug, Default)]
 struct Policy {
-    /// The systems that the crates are looked at for.
+    /// The target systems for which the crates are checked.
     targets: Vec<String>,
     licences: Vec<Licensee>,
-    /// Licences for one crate only.
+    /// Licences allowed for one crate only.
     exceptions: Vec<(String, Vec<Licensee>)>,
-    /// Crates that must not appear, and why.
+    /// Crates that must not be used, and why.
     banned: Vec<(String, String)>,
-    /// Versions that do not count as a second one, as `crate@version`.
+    /// Versions that do not count as duplicates, as `crate@version`.
     skipped: Vec<String>,
-    /// Where crates may come from.
+    /// Allowed sources of crates.
     sources: Vec<String>,
 }
 
-/// A crate of others.
+/// A third-party crate.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Crate {
     name: String,
@@ -39,7 +40,7 @@ struct Crate {
     source: String,
 }
 
-/// Holds both workspaces to the policy; returns a remark.
+/// Checks both workspaces against the policy; returns a remark.
 pub fn check(project: &Project) -> Result<String> {
     let path = project.root.join(FILE);
     let text =
@@ -59,7 +60,7 @@ pub fn check(project: &Project) -> Result<String> {
     bail!("{FILE} does not allow this: {}", faults.join("; "))
 }
 
-/// A package that has a source; ours have none.
+/// Converts a package that has a source; workspace packages have none.
 fn of_others(package: &Value) -> Option<Crate> {
     let text = |field: &str| package[field].as_str().map(String::from);
     Some(Crate {
@@ -108,7 +109,7 @@ impl Policy {
         })
     }
 
-    /// All crates of others that a workspace is built from.
+    /// All third-party crates that a workspace is built from.
     fn crates(&self, folder: &Path) -> Result<Vec<Crate>> {
         let mut cargo = command::cargo(folder);
         cargo.args(["metadata", "--locked", "--all-features", "--format-version", "1"]);
@@ -151,7 +152,8 @@ impl Policy {
         bail!("its licence {text} is not on the list")
     }
 
-    /// The crates that are there in more than one version, and versions on the list of exceptions that are gone.
+    /// The crates that are used in more than one version, and listed exceptions that are no longer
+    /// used.
     fn duplicates(&self, crates: &[Crate]) -> Vec<String> {
         let (mut versions, mut gone) =
             (BTreeMap::<&str, Vec<&str>>::new(), BTreeSet::from_iter(&self.skipped));
@@ -173,7 +175,7 @@ fn string(value: &toml::Value) -> Result<String> {
     value.as_str().map(String::from).with_context(|| format!("{value} is not a text"))
 }
 
-/// The crate that an entry is about.
+/// The crate to which an entry refers.
 fn named(entry: &toml::Value) -> Result<String> {
     string(entry.get("crate").with_context(|| format!("{entry} names no crate"))?)
 }

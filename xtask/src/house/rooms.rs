@@ -1,13 +1,14 @@
-//! Inside the host, arrows between rooms run one way: a room names only rooms below it.
+//! Inside the host, dependencies between top-level modules are layered: a module only uses modules
+//! of lower layers.
 
 use super::modules::{Found, Tree};
 use crate::project::Project;
 use anyhow::{Context, Result, bail};
 use std::collections::BTreeSet;
 
-/// The package whose rooms are looked at.
+/// The package whose modules are checked.
 const PACKAGE: &str = "jointrig";
-/// Its rooms, the lowest first. Rooms of one line know nothing of each other.
+/// Its layers, the lowest first. Modules of one layer do not use each other.
 const FLOORS: [&[&str]; 8] = [
     &["device", "exchange"],
     &["campaign"],
@@ -19,7 +20,7 @@ const FLOORS: [&[&str]; 8] = [
     &["cli"],
 ];
 
-/// Looks for arrows that run upwards or across; returns a remark.
+/// Searches for dependencies on the same or a higher layer; returns a remark.
 pub fn check(project: &Project) -> Result<String> {
     let package = project.package(PACKAGE).with_context(|| format!("there is no package {PACKAGE}"))?;
     let root = package.roots.first().with_context(|| format!("{PACKAGE} has no source"))?;
@@ -30,7 +31,7 @@ pub fn check(project: &Project) -> Result<String> {
     bail!("{}. The floors are the table of xtask/src/house/rooms.rs", arrows.join("\n    "))
 }
 
-/// What names a room that is not below its own, each file and item once.
+/// Uses of a module that is not in a lower layer, each file and item once.
 fn upwards(tree: &Tree, floors: &[&[&str]]) -> Vec<String> {
     let mut arrows = BTreeSet::new();
     for (number, module) in tree.modules.iter().enumerate() {

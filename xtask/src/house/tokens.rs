@@ -1,8 +1,9 @@
-//! Rust source as tokens: what is code stays, comments go.
+//! Splits Rust source into tokens, without comments.
 //!
-//! Just enough of the language for finding names: identifiers, `::`, single signs, and literals as one token each.
+//! It covers only what is needed to find names: identifiers, `::`, single characters, and literals
+//! as one token each.
 
-/// One token, and the line it stands on, counted from 1.
+/// One token and its line, counted from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Token<'a> {
     /// Its text; a string keeps its quotes.
@@ -68,7 +69,7 @@ impl Reader<'_> {
         end.chars().for_each(|_| self.step());
     }
 
-    /// Steps over what begins with `next`; says whether it is code.
+    /// Skips the token that begins with `next`; returns whether it is code.
     fn pass(&mut self, next: char) -> bool {
         if next.is_whitespace() {
             self.step();
@@ -92,7 +93,7 @@ impl Reader<'_> {
         true
     }
 
-    /// Block comments nest.
+    /// Block comments are nested.
     fn pass_comment(&mut self) {
         let mut depth = 0;
         while self.peek().is_some() {

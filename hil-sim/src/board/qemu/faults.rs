@@ -1,4 +1,4 @@
-//! Faults that a test declares: of the link, of the converters, of the program itself.
+//! Faults that a test injects: in the link, in the converters and in the program itself.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -8,14 +8,14 @@ use jointrig_firmware::lockstep::NEVER;
 
 use super::front_end::Slip;
 
-/// What the converters do wrong.
+/// A fault of the converters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConverterFault {
-    /// The board notices, says this, and delivers nothing.
+    /// The board notices, reports this trouble, and delivers nothing.
     Noticed(Trouble),
-    /// Nothing is delivered, and nobody on the board says anything: it waits.
+    /// Nothing is delivered and the board does not report it: it waits.
     Hung,
-    /// The converters fall out of step with their clock, and go on sending.
+    /// The converters lose their alignment with the clock and continue to send.
     Slips(Slip),
 }
 
@@ -44,14 +44,14 @@ pub struct Faults {
 }
 
 impl Faults {
-    /// From the block with this scan on, and for so many scans, the link moves nothing either way while
-    /// the board's time goes on, as when a PC is busy.
+    /// From the block with scan `from_scan` on, and for `scans` scans, the link moves nothing in
+    /// either direction while the board's time advances, as when a PC is busy.
     pub fn stall_link(&self, from_scan: u64, scans: u64) {
         self.stall_from.store(from_scan, Ordering::Release);
         self.stall_scans.store(scans, Ordering::Release);
     }
 
-    /// From the block with this scan on, and for so many scans, the converters fail.
+    /// From the block with scan `from_scan` on, and for `scans` scans, the converters fail.
     pub fn break_converters(&self, fault: ConverterFault, from_scan: u64, scans: u64) {
         *self.converters.lock().unwrap_or_else(PoisonError::into_inner) =
             Some(Converters { fault, from_scan, scans });
@@ -62,12 +62,12 @@ impl Faults {
         self.panic.store(true, Ordering::Release);
     }
 
-    /// The acquisition task reads where no memory is, at its next block.
+    /// The acquisition task reads an unmapped address at its next block.
     pub fn fault_processor(&self) {
         self.processor.store(true, Ordering::Release);
     }
 
-    /// The acquisition task uses up its stack, at its next block.
+    /// The acquisition task overflows its stack at its next block.
     pub fn overflow_stack(&self) {
         self.stack.store(true, Ordering::Release);
     }
@@ -84,15 +84,16 @@ impl Faults {
         self.panic.load(Ordering::Acquire)
     }
 
-    /// Whether the link is stalled once so many scans were produced.
+    /// Whether the link is stalled after `scans` scans were produced.
     pub(super) fn stalled(&self, scans: u64) -> bool {
         let from = self.stall_from.load(Ordering::Acquire);
         let count = self.stall_scans.load(Ordering::Acquire);
         count > 0 && scans >= from && scans < from.saturating_add(count)
     }
 
-    /// Whether the board's clock waits for nobody once so many scans were produced: what a host is not sent it cannot
-    /// acknowledge, so a board must not wait for that until it has delivered again.
+    /// Whether the board's clock runs without waiting for the host after `scans` scans. A host
+    /// cannot acknowledge what it was not sent, so a board must not wait for that until it has
+    /// delivered again.
     pub(super) fn let_run(&self, scans: u64, per_block: usize) -> bool {
         let again = 2 * per_block as u64;
         let failing = |broken: Converters| {
@@ -105,7 +106,7 @@ impl Faults {
         *self.converters.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// When the block comes that is waited for, and whose last scan is converted at `due_us`.
+    /// When the awaited block arrives, whose last scan is converted at `due_us`.
     pub(super) fn delivered_at(&self, due_us: u64, rate_hz: u32, per_block: usize) -> u64 {
         let Some(broken) = self.converters().filter(|broken| broken.fault == ConverterFault::Hung) else {
             return due_us;
@@ -118,7 +119,7 @@ impl Faults {
         if !broken.covers(first_scan) {
             return due_us;
         }
-        // the board hears of the end of it, and not of the first block after it
+        // the board is notified of the end of the fault, not of the first block after it
         let blocks = lost_blocks(&broken, first_scan, per_block) - 1;
         due_us + (blocks * per_block as u64 * 1_000_000).div_ceil(u64::from(rate_hz))
     }
@@ -140,17 +141,17 @@ impl Faults {
     }
 }
 
-/// What became of a block.
+/// Outcome of a block.
 pub(super) enum Happening {
     /// It was sent, with a slip at one of its scans.
     Sent(Slip, usize),
-    /// So many blocks went by, and nothing was sent.
+    /// This many blocks passed, and nothing was sent.
     StoodStill(u64),
-    /// The board itself says what is wrong.
+    /// The board itself reports the trouble.
     Noticed(Trouble),
 }
 
-/// Blocks from `first_scan` on that do not come.
+/// Number of blocks from `first_scan` on that do not arrive.
 fn lost_blocks(broken: &Converters, first_scan: u64, per_block: usize) -> u64 {
     (broken.from_scan + broken.scans - first_scan).div_ceil(per_block as u64)
 }

@@ -1,19 +1,21 @@
-//! The two converters of an emulated board and the rings they are read into, as hardware would leave them.
+//! The two converters of an emulated board and the rings that they are read into, as hardware would
+//! fill them.
 
 use jointrig_firmware::ad7606b::alignment::{Moment, SCAN_WORDS};
 use jointrig_firmware::lockstep::{CLOCK, Delivery, RING_BLOCKS};
 use jointrig_hot::pair::{CHANNELS, CHIP_BYTES, data_crc};
 
-/// What the hardware does to a block.
+/// Alignment errors that the hardware introduces into a block.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Slip {
-    /// Words that either converter did not send, from some scan of the block on; negative, sent twice. A scan is nine.
+    /// Words that each converter did not send, from some scan of the block on; negative if sent
+    /// twice. A scan is nine words.
     pub lags: [i32; 2],
-    /// Scans by which the program looks late.
+    /// Scans by which the program appears to be late.
     pub late: u32,
 }
 
-/// Words of a block of both converters, and the moment at which the program reads them off.
+/// Words of a block of both converters, and the time at which the program reads them.
 pub struct FrontEnd {
     per_block: usize,
     channels: usize,
@@ -22,23 +24,25 @@ pub struct FrontEnd {
 }
 
 impl FrontEnd {
-    /// Rings not started yet.
+    /// Rings that have not started yet.
     pub fn new(per_block: usize, channels: usize) -> Self {
         Self { per_block, channels, started_at: 0 }
     }
 
-    /// The rings start anew with this scan.
+    /// Restarts the rings with this scan.
     pub fn join(&mut self, first_scan: u64) {
         self.started_at = first_scan;
     }
 
-    /// Blocks that must be converted until either ring has a whole one, and the program looks.
+    /// Blocks that must be converted until both rings contain a whole one and the program reads
+    /// them.
     pub fn blocks_for(&self, slip: &Slip) -> usize {
         1 + (scans_of(slip.lags) + slip.late as usize).div_ceil(self.per_block)
     }
 
-    /// The delivery of the block that begins with scan `first`, and its words: of `codes`, scan by scan, as many as
-    /// [`FrontEnd::blocks_for`] says. The slip happens with the block's scan `at`.
+    /// The delivery of the block that begins with scan `first`, and its words, taken from `codes`
+    /// (scan by scan, as many blocks as [`FrontEnd::blocks_for`] returns). The slip occurs at scan
+    /// `at` of the block.
     pub fn deliver(&self, first: u64, codes: &[i16], slip: &Slip, at: usize) -> (Delivery, Vec<u8>) {
         let read = self.per_block + scans_of(slip.lags) + slip.late as usize;
         let words =
@@ -61,7 +65,7 @@ impl FrontEnd {
         (delivery, words.collect())
     }
 
-    /// The delivery after the converters stood still since scan `first`, while so many scans went by.
+    /// The delivery after the converters stopped at scan `first` for `scans` scans.
     pub fn stood_still(&self, first: u64, scans: u64) -> (Delivery, Vec<u8>) {
         let ring = u64::from(RING_BLOCKS * SCAN_WORDS) * self.per_block as u64;
         let place = (first - self.started_at) * u64::from(SCAN_WORDS) % ring;
@@ -72,7 +76,7 @@ impl FrontEnd {
         (delivery, vec![0; 2 * self.per_block * CHIP_BYTES])
     }
 
-    /// What one converter has put into its ring for this block.
+    /// Words that one converter has put into its ring for this block.
     fn sent(&self, codes: &[i16], chip: usize, lag: i32, at: usize) -> Vec<u16> {
         let mut words: Vec<u16> = codes
             .chunks_exact(self.channels)
@@ -95,7 +99,7 @@ impl FrontEnd {
     }
 }
 
-/// Scans that must go by until the converter that is farthest behind has sent a whole block.
+/// Scans until the converter that lags most has sent a whole block.
 fn scans_of(lags: [i32; 2]) -> usize {
     lags.map(|lag| lag.max(0).cast_unsigned().div_ceil(SCAN_WORDS) as usize).into_iter().max().unwrap_or(0)
 }

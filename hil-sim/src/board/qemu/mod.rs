@@ -1,9 +1,10 @@
 //! The emulated board: the firmware's binary in QEMU, over the simulated rig, in lockstep.
 //!
-//! QEMU runs the same code as the rig's controller has. Its converters, coil, inputs, stage and link are
-//! memory that it shares with this process ([`shared_ram`]), and a byte through a pipe hands the turn over
-//! ([`jointrig_firmware::lockstep`]). While one side works the other stands still, so a run is the native
-//! board's, block for block, whatever the machine is doing. To the host it is a [`HostEnd`] like any other.
+//! QEMU runs the same code as the rig's controller. Its converters, coil, inputs, stage and link
+//! are memory shared with this process ([`shared_ram`]), and a byte through a pipe hands the turn
+//! over ([`jointrig_firmware::lockstep`]). Only one side works at a time, so a run equals the
+//! native board's, block for block, whatever the load of the machine. To the host it is a
+//! [`HostEnd`] like any other.
 
 mod faults;
 mod front_end;
@@ -26,13 +27,13 @@ use jointrig_logs::Table;
 use process::Emulator;
 use server::Server;
 
-/// How long an image may take to introduce itself: a loaded machine starts QEMU in a second or two.
+/// Time limit for an image to introduce itself: a loaded machine starts QEMU in a second or two.
 const START_LIMIT: Duration = Duration::from_mins(1);
 
-/// Why an emulated board could not start.
+/// Reason why an emulated board could not start.
 #[derive(Debug, thiserror::Error)]
 pub enum QemuError {
-    /// The rig's description is wrong.
+    /// The rig's description is invalid.
     #[error(transparent)]
     Rig(#[from] RigError),
     /// There is no image.
@@ -41,18 +42,18 @@ pub enum QemuError {
     /// There is no emulator.
     #[error("could not start qemu-system-arm: {0}; `cargo xtask setup` installs it")]
     NoEmulator(std::io::Error),
-    /// The shared memory could not be made.
+    /// The shared memory could not be created.
     #[error("could not make 16 MB of shared memory in {}: {source}", folder.display())]
     Memory {
-        /// Where it was to be.
+        /// Its intended folder.
         folder: PathBuf,
-        /// Why not.
+        /// The I/O error.
         source: std::io::Error,
     },
-    /// The thread could not be made.
+    /// The thread could not be created.
     #[error("the emulated board could not start its thread: {0}")]
     Thread(std::io::Error),
-    /// The image did not start as it should.
+    /// The image did not start as expected.
     #[error("the firmware image did not start: {0}")]
     Start(String),
 }
@@ -68,10 +69,10 @@ pub struct QemuBoard {
 }
 
 impl QemuBoard {
-    /// Starts this image over the rig that `rig_toml` describes (the built-in one if `None`).
+    /// Starts this image over the rig described by `rig_toml` (the built-in one if `None`).
     ///
     /// # Errors
-    /// [`QemuError`], which says what to do.
+    /// [`QemuError`], which states what to do.
     pub fn start(image: &Path, rig_toml: Option<&str>, seed: u64) -> Result<(Self, HostEnd), QemuError> {
         let config = match rig_toml {
             Some(text) => RigConfig::from_toml(text)?,
@@ -80,10 +81,10 @@ impl QemuBoard {
         Self::start_with(image, &config, &Options { seed, ..Options::default() })
     }
 
-    /// Starts this image over this rig. The order of polling is the image's own.
+    /// Starts this image over this rig. The image determines the order of polling.
     ///
     /// # Errors
-    /// [`QemuError`], which says what to do.
+    /// [`QemuError`], which states what to do.
     pub fn start_with(
         image: &Path,
         config: &RigConfig,
@@ -107,7 +108,7 @@ impl QemuBoard {
                 let mut server =
                     Server::new(rig, &options, &device, &controls, &faults, pipes, ram).with_strings(strings);
                 let outcome = server.start().and_then(|()| {
-                    // nobody listens any more when starting took too long
+                    // the receiver is gone when starting took too long
                     let _ = started.send(());
                     server.serve()
                 });
@@ -134,17 +135,17 @@ impl QemuBoard {
         }
     }
 
-    /// Buttons and observations at the rig's side.
+    /// Controls and observations on the rig's side.
     pub fn controls(&self) -> &Arc<Controls> {
         &self.controls
     }
 
-    /// Faults to be declared.
+    /// Faults that can be injected.
     pub fn faults(&self) -> &Faults {
         &self.faults
     }
 
-    /// Why the board stopped by itself, if it did: the firmware's last sentence, or that QEMU ended.
+    /// Why the board stopped by itself, if it did: the firmware's last message, or that QEMU ended.
     pub fn failure(&self) -> Option<String> {
         self.failure.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -158,10 +159,10 @@ impl QemuBoard {
 impl Drop for QemuBoard {
     fn drop(&mut self) {
         self.link.close();
-        // the thread ends at the board's next turn; a board that takes none is stopped
+        // the thread ends at the board's next turn; a board that does not take a turn is stopped
         self.emulator.end(|| self.thread.as_ref().is_none_or(JoinHandle::is_finished));
         if let Some(thread) = self.thread.take() {
-            // a panic of the thread has been printed by itself
+            // the thread has already printed its own panic
             let _ = thread.join();
         }
     }

@@ -1,4 +1,4 @@
-//! QEMU as a process: started with the shared memory and two pipes, and stopped for certain.
+//! The QEMU process: started with the shared memory and two pipes, and always stopped.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -11,14 +11,14 @@ use super::shared_ram::{self, SharedRam};
 
 /// The emulator of 32-bit Arm machines.
 pub const PROGRAM: &str = "qemu-system-arm";
-/// How long QEMU may take to end by itself.
+/// Time limit for QEMU to end by itself.
 const END_LIMIT: Duration = Duration::from_secs(5);
 
-/// Both ways of handing over the turn.
+/// The pipes that hand the turn over, one per direction.
 pub struct Pipes {
-    /// A byte from the board: it is this side's turn.
+    /// A byte from the board: this side's turn.
     pub ring: ChildStdout,
-    /// A byte to the board: it is the board's.
+    /// A byte to the board: the board's turn.
     pub answer: ChildStdin,
 }
 
@@ -30,7 +30,7 @@ pub struct Emulator {
 }
 
 impl Emulator {
-    /// Starts QEMU with this image; `uart` is what QEMU connects UART 0 to, as the board's link.
+    /// Starts QEMU with this image; `uart` is the target of UART 0, which is then the board's link.
     pub fn start(image: &Path, uart: Option<&str>) -> Result<(Self, Pipes, SharedRam), QemuError> {
         let memory = |source| QemuError::Memory { folder: shared_ram::folder(), source };
         let ram = SharedRam::create().map_err(memory)?;
@@ -72,15 +72,15 @@ impl Emulator {
         self.child.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Stops it at once.
+    /// Stops it immediately.
     pub fn kill(&self) {
         let mut child = self.child();
-        // both fail only when it has ended
+        // both fail only when it has already ended
         let _ = child.kill();
         let _ = child.wait();
     }
 
-    /// Waits until it and its server have ended, and stops it when they do not.
+    /// Waits until it and its server have ended, and stops it at the time limit.
     pub fn end(&self, served: impl Fn() -> bool) {
         let until = Instant::now() + END_LIMIT;
         while Instant::now() < until {
@@ -92,7 +92,7 @@ impl Emulator {
         self.kill();
     }
 
-    /// A sentence with the first thing QEMU complained of; the rest is in the log.
+    /// `sentence` with the first line of QEMU's error output; the rest is in the log.
     pub fn explained(&self, sentence: String) -> String {
         self.kill();
         let complaints = self.complaints.lock().unwrap_or_else(PoisonError::into_inner);
@@ -103,7 +103,7 @@ impl Emulator {
     }
 }
 
-/// Passes on what QEMU says on its standard error, and remembers it.
+/// Logs QEMU's standard error and stores it.
 fn listen(errors: ChildStderr, complaints: &Mutex<String>) {
     for line in BufReader::new(errors).lines().map_while(Result::ok) {
         log::warn!(target: "qemu", "{line}");

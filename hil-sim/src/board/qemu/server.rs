@@ -35,22 +35,22 @@ use crate::executor::Woken;
 use crate::link::DeviceEnd;
 use crate::rig::Rig;
 
-/// How long a board whose link is its UART may stand still.
+/// How often a board whose link is its UART is polled while it is idle.
 const UART_LOOK: Duration = Duration::from_micros(200);
 
-/// How many of the newest log lines are remembered.
+/// Number of the newest log lines that are kept.
 const SAID: usize = 16;
 
-/// Why serving ended, in a sentence.
+/// Why serving ended, as a message.
 type Ended = String;
 
-/// What a wish came to.
+/// Result of a request.
 enum Next {
     Answer,
     End,
 }
 
-/// Everything of one emulated board on this side.
+/// The simulator's state of one emulated board.
 pub struct Server {
     rig: Rc<RefCell<Rig>>,
     coil: VirtualCoil,
@@ -70,16 +70,16 @@ pub struct Server {
     free_running: bool,
     reply: Reply,
     port: SyncPort,
-    /// Scans since the start, lost ones among them.
+    /// Scans since the start, including lost ones.
     produced: u64,
-    /// The image's log strings, where it has any.
+    /// The image's log strings, if it has any.
     strings: Option<Table>,
     /// The newest log lines.
     said: VecDeque<String>,
 }
 
 impl Server {
-    /// Not started yet.
+    /// A server that has not started yet.
     pub fn new(
         rig: Rig,
         options: &Options,
@@ -125,13 +125,13 @@ impl Server {
         }
     }
 
-    /// The same, reading the image's log lines by these strings.
+    /// Sets the strings with which the image's log lines are decoded.
     pub fn with_strings(mut self, strings: Option<Table>) -> Self {
         self.strings = strings;
         self
     }
 
-    /// The first turn: the board introduces itself and hears what it is.
+    /// The first turn: the board introduces itself and receives its configuration.
     pub fn start(&mut self) -> Result<(), Ended> {
         let ask = self.wait()?;
         self.ram.forget_name();
@@ -208,7 +208,7 @@ impl Server {
             .map_err(|error| broken(&error))
     }
 
-    /// All of the board's tasks wait: gives them what has come, or lets time go on.
+    /// Called when all of the board's tasks wait: passes on what has arrived, or lets time advance.
     fn idle(&mut self, ask: &Ask) -> io::Result<Next> {
         loop {
             if self.link.is_closed() {
@@ -234,7 +234,7 @@ impl Server {
         }
     }
 
-    /// Jumps to the next alarm or to the end of the block that is waited for.
+    /// Jumps to the next alarm or to the end of the awaited block.
     fn go_on(&mut self, ask: &Ask) -> io::Result<()> {
         let block_us = self.faults.delivered_at(ask.block_us, self.setup.scan_rate_hz, self.per_block);
         let next = ask.alarm_us.min(block_us);
@@ -250,7 +250,7 @@ impl Server {
                     self.front_end.deliver(first, &codes, &slip, at)
                 }
                 Happening::StoodStill(blocks) => {
-                    // what is lost has happened all the same
+                    // the rig advances during lost blocks too
                     self.convert(blocks as usize);
                     self.front_end.stood_still(first, self.produced - first)
                 }
@@ -274,7 +274,7 @@ impl Server {
         Ok(())
     }
 
-    /// Lets the rig go on by so many blocks; their codes, scan by scan.
+    /// Advances the rig by `blocks` blocks; returns their codes, scan by scan.
     fn convert(&mut self, blocks: usize) -> Vec<i16> {
         let (channels, per_block) = (self.setup.channels.len(), self.per_block);
         let mut codes = Vec::with_capacity(blocks * per_block * channels);
@@ -289,7 +289,7 @@ impl Server {
         codes
     }
 
-    /// Puts slow values where the board finds them, when they were measured.
+    /// Writes the slow values to the board's memory, if new ones were measured.
     fn put_slow(&mut self) -> Result<(), Ended> {
         let Some(slow) = self.inputs.slow() else { return Ok(()) };
         let mut buffer = [0; SLOW_BYTES];
@@ -314,7 +314,7 @@ impl Server {
             | bit(self.faults.must_overflow(), MUST_OVERFLOW);
     }
 
-    /// Bytes from the board to the host; whether any could go.
+    /// Moves bytes from the board to the host; returns whether any could be moved.
     fn move_out(&mut self, ask: &Ask) -> io::Result<bool> {
         let tail = self.reply.to_host_tail;
         let count = ask.to_host_head.wrapping_sub(tail).min(RING_BYTES);
@@ -330,7 +330,7 @@ impl Server {
         Ok(taken)
     }
 
-    /// Bytes from the host to the board; whether there were any.
+    /// Moves bytes from the host to the board; returns whether there were any.
     fn move_in(&mut self, ask: &Ask) -> io::Result<bool> {
         let head = self.reply.to_device_head;
         let room = RING_BYTES - head.wrapping_sub(ask.to_device_tail);
@@ -351,7 +351,7 @@ impl Server {
         Ok(true)
     }
 
-    /// Takes codes for the drive.
+    /// Reads codes for the drive.
     fn play(&mut self, count: u32) -> io::Result<()> {
         let mut bytes = [0; BLOCK_SAMPLE_BYTES];
         let length = (2 * count as usize).min(bytes.len());
@@ -380,10 +380,10 @@ impl Server {
         self.ram.write(TEXT_AT, text).map_err(|error| broken(&error))
     }
 
-    /// Reads the board's log lines as they arise. The link brings the same ones to the host, which shows them;
-    /// here they are for whoever looks closer, and for the report of a board that broke down.
+    /// Reads the board's log lines as they are written. The host receives the same lines over the
+    /// link; here they are for debugging, and for the report of a board that broke down.
     fn hear_log(&mut self, ask: &Ask) -> io::Result<()> {
-        // a board that breaks down says so by other means
+        // a board that breaks down reports that by other means
         let count = ask.log_head.wrapping_sub(self.reply.log_tail);
         if count == 0 || count > RING_BYTES {
             return Ok(());
@@ -392,7 +392,7 @@ impl Server {
         self.ram.read_ring(LOG_AT, self.reply.log_tail, &mut bytes)?;
         self.reply.log_tail = ask.log_head;
         let (said, Some(strings)) = (&mut self.said, &self.strings) else { return Ok(()) };
-        // each turn hands over whole lines
+        // each turn transfers whole lines
         strings.lines(&bytes, |line| {
             log::debug!(target: "qemu", "{} {}", line.level, line.text);
             if said.len() == SAID {
@@ -409,7 +409,7 @@ impl Server {
     }
 }
 
-/// Polls once: the link's futures either act at once or remember the waker.
+/// Polls once: the link's futures either complete immediately or store the waker.
 fn once<F: Future>(future: F, waker: &Waker) -> Poll<F::Output> {
     pin!(future).poll(&mut Context::from_waker(waker))
 }

@@ -1,8 +1,8 @@
 //! The memory that QEMU and this process share.
 //!
-//! It is a file that QEMU maps, and this process reads and writes: on every system that has QEMU's
-//! file-backed memory the two see the same pages. Turns are handed over through a pipe, which orders
-//! the accesses; so nothing here needs to be mapped, atomic or unsafe.
+//! It is a file that QEMU maps and this process reads and writes: on every system with QEMU's
+//! file-backed memory, both access the same pages. Turns are handed over through a pipe, which
+//! orders the accesses; so nothing here needs to be mapped, atomic or unsafe.
 
 use std::fs::File;
 use std::io;
@@ -14,29 +14,29 @@ use jointrig_firmware::lockstep::{
     ASK_AT, Ask, BYTES, MAGIC, MAGIC_AT, REPLY_AT, RING_BYTES, Reply, TEXT_AT, TEXT_BYTES, WORDS,
 };
 
-/// The memory, and its file while that has a name.
+/// The memory, and its file path until that is removed.
 #[derive(Debug)]
 pub struct SharedRam {
     file: File,
     path: Option<PathBuf>,
 }
 
-/// Memory without a disk behind it, where there is such a folder.
+/// A folder in memory rather than on disk, where there is one.
 pub fn folder() -> PathBuf {
     let memory = Path::new("/dev/shm");
     if memory.is_dir() { memory.to_path_buf() } else { std::env::temp_dir() }
 }
 
 impl SharedRam {
-    /// 16 MB of zeros and the mark that somebody serves them.
+    /// Creates 16 MB of zeros and the mark that a server is present.
     ///
     /// # Errors
-    /// When the file cannot be made.
+    /// If the file cannot be created.
     pub fn create() -> io::Result<Self> {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let number = COUNT.fetch_add(1, Ordering::Relaxed);
         let path = folder().join(format!("jointrig-qemu-{}-{number}", std::process::id()));
-        // left over from a process of the same number that was killed
+        // may be left over from a killed process with the same id
         let _ = std::fs::remove_file(&path);
         let file = File::options().read(true).write(true).create_new(true).open(&path)?;
         let ram = Self { file, path: Some(path) };
@@ -45,39 +45,40 @@ impl SharedRam {
         Ok(ram)
     }
 
-    /// The file's name, until it is forgotten.
+    /// The file's path, until it is removed.
     pub fn path(&self) -> Option<&Path> {
         self.path.as_deref()
     }
 
-    /// Removes the file's name once QEMU has opened it: the memory then ends with its users.
+    /// Removes the file's name once QEMU has opened it: the memory is then freed when both users
+    /// end.
     pub fn forget_name(&mut self) {
         if let Some(path) = self.path.take() {
-            // gone already is as good
+            // it does not matter if it is already gone
             let _ = std::fs::remove_file(path);
         }
     }
 
-    /// Copies out.
+    /// Copies bytes out of the memory.
     ///
     /// # Errors
-    /// What the system says.
+    /// The I/O error.
     pub fn read(&self, at: usize, out: &mut [u8]) -> io::Result<()> {
         self.file.read_exact_at(out, at as u64)
     }
 
-    /// Copies in.
+    /// Copies bytes into the memory.
     ///
     /// # Errors
-    /// What the system says.
+    /// The I/O error.
     pub fn write(&self, at: usize, bytes: &[u8]) -> io::Result<()> {
         self.file.write_all_at(bytes, at as u64)
     }
 
-    /// What the board wants.
+    /// The board's request.
     ///
     /// # Errors
-    /// What the system says.
+    /// The I/O error.
     pub fn ask(&self) -> io::Result<Ask> {
         let mut bytes = [0; 4 * WORDS];
         self.read(ASK_AT, &mut bytes)?;
@@ -85,10 +86,10 @@ impl SharedRam {
         Ok(Ask::from_words(&std::array::from_fn(|i| u32::from_le_bytes(words[i]))))
     }
 
-    /// What the board is told.
+    /// Writes the reply to the board.
     ///
     /// # Errors
-    /// What the system says.
+    /// The I/O error.
     pub fn reply(&self, reply: &Reply) -> io::Result<()> {
         let mut bytes = [0; 4 * WORDS];
         for (four, word) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(reply.to_words()) {
@@ -100,17 +101,17 @@ impl SharedRam {
     /// A message of this length.
     ///
     /// # Errors
-    /// What the system says.
+    /// The I/O error.
     pub fn text(&self, length: u32) -> io::Result<Vec<u8>> {
         let mut text = vec![0; (length as usize).min(TEXT_BYTES)];
         self.read(TEXT_AT, &mut text)?;
         Ok(text)
     }
 
-    /// Copies out of a ring from a count of bytes on.
+    /// Copies out of a ring, starting at byte count `from`.
     ///
     /// # Errors
-    /// What the system says.
+    /// The I/O error.
     pub fn read_ring(&self, ring: usize, from: u32, out: &mut [u8]) -> io::Result<()> {
         let at = from % RING_BYTES;
         let first = out.len().min((RING_BYTES - at) as usize);
@@ -119,10 +120,10 @@ impl SharedRam {
         if rest.is_empty() { Ok(()) } else { self.read(ring, rest) }
     }
 
-    /// Copies into a ring from a count of bytes on.
+    /// Copies into a ring, starting at byte count `from`.
     ///
     /// # Errors
-    /// What the system says.
+    /// The I/O error.
     pub fn write_ring(&self, ring: usize, from: u32, bytes: &[u8]) -> io::Result<()> {
         let at = from % RING_BYTES;
         let first = bytes.len().min((RING_BYTES - at) as usize);

@@ -1,4 +1,4 @@
-//! Values that no rig can have.
+//! Checks of the values of a rig.
 
 use super::check_fixed::check_fixed;
 use super::check_structure::check_structure;
@@ -7,11 +7,11 @@ use super::{ContactLaw, RigConfig};
 use crate::rig::channels::channels;
 use crate::rig::error::RigError;
 
-/// Steps into which a scan may be divided in slip.
+/// Maximum number of steps of a scan in slip.
 const MOST_SLIP_STEPS: f64 = 1000.0;
-/// A contact that is softer than this is one in N/µm or N/mm, N/m.
+/// Minimum stiffness of a contact, N/m: a smaller value was probably given in N/µm or N/mm.
 const SOFTEST_N_PER_M: f64 = 1e4;
-/// Elements of an Iwan contact: more would only cost time.
+/// Maximum number of elements of an Iwan contact: more would only cost time.
 const MOST_ELEMENTS: u32 = 1000;
 
 pub fn check(config: &RigConfig) -> Result<(), RigError> {
@@ -92,7 +92,8 @@ fn errors(config: &RigConfig) -> Result<(), RigError> {
     finite("errors.normal_load_variation", &[errors.normal_load_variation])?;
     let contact = &config.contact;
     if contact.law != ContactLaw::Linear {
-        // The limit must grow more slowly than the spring's force, or what slips could never stick again.
+        // The limit must grow more slowly than the spring's force; otherwise a slipping element
+        // could never stick again.
         let shares = contact.shares();
         let largest = shares.iter().copied().fold(0.0, f64::max) * shares.len() as f64;
         let reach_m =
@@ -140,7 +141,7 @@ fn contact(config: &RigConfig) -> Result<(), RigError> {
     Ok(())
 }
 
-/// A normal load that a contact can have (N).
+/// Checks a normal load (N).
 pub fn normal_load(normal_load_n: f64) -> Result<(), RigError> {
     not_negative("contact.normal_load_n", normal_load_n)
 }

@@ -1,4 +1,4 @@
-//! Values that no vibrometer that stays can have.
+//! Checks of the fixed vibrometers.
 
 use super::RigConfig;
 use super::values::{bad, finite, not_negative, positive};
@@ -6,7 +6,7 @@ use crate::rig::channels::{CHANNELS, channels};
 use crate::rig::error::RigError;
 use jointrig_protocol::limits::MAX_CHANNELS;
 
-/// Longest name of a channel, bytes: the protocol's.
+/// Maximum length of a channel's name, bytes, as in the protocol.
 const NAME_BYTES: usize = jointrig_protocol::limits::NAME_BYTES;
 
 pub(super) fn check_fixed(config: &RigConfig) -> Result<(), RigError> {

@@ -1,10 +1,10 @@
-//! Structures that cannot be: names that are not there, springs that join nothing.
+//! Checks of a user-defined structure: unknown names, springs that join nothing.
 
 use super::values::{axes, bad, body, bushing};
 use super::{BodyName, OwnBody, OwnStructure, RigConfig, Side};
 use crate::rig::error::RigError;
 
-/// A structure of a rig's own, and that everything sits on bodies of it.
+/// Checks a user-defined structure, and that every point is on one of its bodies.
 pub(super) fn check_structure(config: &RigConfig, own: &OwnStructure) -> Result<(), RigError> {
     bodies_and_springs(own)?;
     points(config, own)
@@ -63,7 +63,7 @@ fn bodies_and_springs(own: &OwnStructure) -> Result<(), RigError> {
     Ok(())
 }
 
-/// Everything that is measured or pushed sits on a body that is there.
+/// Checks that all measured or excited points are on existing bodies.
 fn points(config: &RigConfig, own: &OwnStructure) -> Result<(), RigError> {
     for (index, point) in config.responses.iter().enumerate() {
         known(own, &format!("responses[{index}].body"), point.body)?;

@@ -5,31 +5,33 @@ use serde::{Deserialize, Serialize};
 use super::Bushing;
 use crate::rig::unit_vector::normalized;
 
-/// How the contact answers.
+/// The law of the contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum ContactLaw {
-    /// Stuck: a bushing, whatever the amplitude.
+    /// Stuck: a bushing, at any amplitude.
     Linear,
-    /// Along z a slider behind the spring and dashpot: stuck up to μN, gross slip beyond.
+    /// Along z a slider in series with the spring and dashpot: stuck up to μN, gross slip beyond.
     Jenkins,
-    /// Along z many of them in parallel, whose limits differ: microslip, then gross slip at μN.
+    /// Along z many such sliders in parallel with different limits: microslip, then gross slip at
+    /// μN.
     Iwan,
 }
 
-/// How the limits of an Iwan contact's elements differ. The stiffness is shared evenly.
+/// Distribution of the limits of an Iwan contact's elements. The stiffness is shared evenly.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Iwan {
-    /// How many.
+    /// Number of elements.
     pub elements: u32,
-    /// The limits spread evenly over 1 ± this times their mean.
+    /// The limits are spread evenly over 1 ± this times their mean.
     pub spread: f64,
 }
 
 impl Iwan {
-    /// Each element's part of μN, the weakest first: the means of as many equal parts of the distribution.
+    /// Each element's fraction of μN, the weakest first: the distribution is divided into
+    /// `elements` equal parts, and each value is the mean of one part.
     pub fn shares(&self) -> Vec<f64> {
         let count = f64::from(self.elements);
         let share = |i: u32| (1.0 + self.spread * ((2.0 * f64::from(i) + 1.0) / count - 1.0)) / count;
@@ -41,9 +43,9 @@ impl Iwan {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Contact {
-    /// How it answers.
+    /// The contact law.
     pub law: ContactLaw,
-    /// Where (m).
+    /// Position (m).
     pub position_m: [f64; 3],
     /// kx, ky, kz (N/m); kz is the tangential contact stiffness.
     pub stiffness_n_per_m: [f64; 3],
@@ -59,13 +61,15 @@ pub struct Contact {
     pub slip_step_s: f64,
     /// The distribution of an Iwan contact.
     pub iwan: Iwan,
-    /// What x, y and z are at the contact, of which z slides: unit vectors at right angles; the rig's own, where nothing is said.
+    /// Axes x, y and z of the contact, of which z slides: orthogonal unit vectors; the rig's axes
+    /// if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axes: Option<[[f64; 3]; 3]>,
 }
 
 impl Contact {
-    /// Each slider's part of μN, the weakest first; none for the linear law. They share the stiffness evenly.
+    /// Each slider's fraction of μN, the weakest first; empty for the linear law. They share the
+    /// stiffness evenly.
     pub fn shares(&self) -> Vec<f64> {
         match self.law {
             ContactLaw::Linear => Vec::new(),
@@ -74,7 +78,7 @@ impl Contact {
         }
     }
 
-    /// Unit vector along which it slides.
+    /// Unit vector of the sliding direction.
     pub fn sliding(&self) -> [f64; 3] {
         self.axes.map_or([0.0, 0.0, 1.0], |axes| normalized(axes[2]))
     }

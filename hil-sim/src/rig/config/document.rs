@@ -1,4 +1,4 @@
-//! From TOML text to a checked configuration, with line numbers in what goes wrong.
+//! From TOML text to a checked configuration, with line numbers in the errors.
 
 use serde::Deserialize;
 use toml::Spanned;
@@ -7,7 +7,7 @@ use toml::de::{DeTable, DeValue};
 use super::{DEFAULT_TOML, RigConfig};
 use crate::rig::error::RigError;
 
-/// What a structure of a rig's own stands instead of.
+/// Fields that a user-defined structure replaces.
 pub(super) const PAPERS_OWN: [&str; 8] =
     ["bodies", "leaf_springs", "knife_edge", "wire", "push_rod_a", "clamp", "clamp_b", "lower_push_rod"];
 
@@ -25,7 +25,7 @@ pub fn read(text: &str) -> Result<RigConfig, RigError> {
             "describes the paper's rig, and [structure] another one: take one of them out".to_owned();
         return Err(RigError::Field { field: field.to_owned(), reason, line });
     }
-    // Only the user's text can be wrong here, so every span is a span of it.
+    // Only the user's text can be wrong here, so every span refers to it.
     let config = RigConfig::deserialize(toml::Deserializer::from(merged))
         .map_err(|error| document_error(&error, text))?;
     config.check().map_err(|error| match error {
@@ -39,7 +39,7 @@ pub fn read(text: &str) -> Result<RigConfig, RigError> {
 }
 
 fn merge<'i>(base: &mut DeTable<'i>, over: DeTable<'i>) {
-    // A body's inertia has two forms; the one that is stated replaces the one it stands for.
+    // A body's inertia has two forms; the one stated by the user replaces the other.
     for (stated, replaced) in [("box_m", "inertia_kg_m2"), ("inertia_kg_m2", "box_m")] {
         if over.contains_key(stated) {
             base.remove(replaced);
@@ -52,7 +52,8 @@ fn merge<'i>(base: &mut DeTable<'i>, over: DeTable<'i>) {
         {
             merge(below, inner.clone());
         } else {
-            // Removed first: inserting over an equal key would keep the old key, and with it the default's span.
+            // Removed first: inserting over an equal key would keep the old key, and with it the
+            // default's span.
             base.remove(name);
             base.insert(key, value);
         }
@@ -68,8 +69,8 @@ fn line_of(text: &str, offset: usize) -> usize {
     text.bytes().take(offset).filter(|byte| *byte == b'\n').count() + 1
 }
 
-/// Byte offset at which the user's document sets `path` (as `bodies.mass.mass_kg` or `impacts[3].name`), or the nearest
-/// table around it that the document has.
+/// Byte offset at which the user's document sets `path` (as `bodies.mass.mass_kg` or
+/// `impacts[3].name`), or the nearest table around it that the document has.
 fn locate(table: &DeTable<'_>, path: &str) -> Option<usize> {
     let (head, rest) = path.split_once('.').map_or((path, None), |(head, rest)| (head, Some(rest)));
     let (name, index) = match head.split_once('[') {

@@ -1,44 +1,49 @@
-//! What nobody at the rig knows: errors of places, angles and sensors.
+//! Unknown errors of positions, angles and sensors.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// Standard deviations, drawn from the rig's seed; the last three are no draws but stated.
+/// Standard deviations of errors that are drawn from the rig's seed; the last three are not drawn
+/// but given directly.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Errors {
-    /// None of them, whatever the others say.
+    /// Switches off all errors, whatever the other fields are.
     pub none: bool,
-    /// Each response and impact point that is not on a specimen, along each axis (m), the same in every cell.
+    /// Each response and impact point that is not on a specimen, along each axis (m), the same in
+    /// every cell.
     pub position_m: f64,
-    /// Added to these anew in each cell (m along each axis).
+    /// Aiming error added to these, drawn again for each cell (m along each axis).
     pub aim_m: f64,
-    /// Each response point on a specimen, along each axis (m), the same in every cell; nothing is added in a cell.
+    /// Each response point on a specimen, along each axis (m), the same in every cell, without an
+    /// aiming error.
     pub specimen_point_m: f64,
     /// Each single-point vibrometer's spot, along each axis (m), the same in every cell.
     pub spot_m: f64,
-    /// Hammer's tilt about each of the two axes across the impact (rad), the same in every cell.
+    /// Hammer's tilt about each of the two axes normal to the impact (rad), the same in every cell.
     pub hammer_angle_rad: f64,
-    /// Relative, of the gain of each load cell, each single-point vibrometer and each axis of the 3-D vibrometer.
+    /// Relative gain error of each load cell, each single-point vibrometer and each axis of the 3-D
+    /// vibrometer.
     pub gain: f64,
-    /// Relative, of the gain of the hammer's force cell.
+    /// Relative gain error of the hammer's force cell.
     pub hammer_gain: f64,
-    /// Delay beyond the declared one (s) of every channel but the hammer's, early or late.
+    /// Deviation from the declared delay (s), early or late, of every channel except the hammer's.
     pub skew_s: f64,
-    /// Part of each neighbour's force that a load cell reads beside its own.
+    /// Fraction of each neighbour's force that a load cell reads in addition to its own.
     pub load_cell_cross_talk: f64,
-    /// a of N (1 + a x / x₀), the normal load of a contact that slips at its relative displacement x.
+    /// a of N (1 + a x / x₀), the normal load of a slipping contact at its relative displacement x.
     pub normal_load_variation: f64,
-    /// x₀ of that (m).
+    /// x₀ of that formula (m).
     pub normal_load_reference_m: f64,
-    /// What channels give over what their scale says, by name, on top of what is drawn; negative where a sensor is turned.
+    /// Ratio of a channel's voltage to the voltage by its scale, by channel name, on top of the
+    /// drawn errors; negative for a reversed sensor.
     #[serde(default)]
     pub volts: BTreeMap<String, f64>,
 }
 
 impl Errors {
-    /// As they act: all zero if there shall be none.
+    /// The errors that act: all zero if `none` is set.
     #[must_use]
     pub fn acting(&self) -> Self {
         if !self.none {
@@ -61,7 +66,7 @@ impl Errors {
         }
     }
 
-    /// By how much the normal load grows per metre of relative displacement, over itself (1/m).
+    /// Relative increase of the normal load per metre of relative displacement (1/m).
     pub fn normal_load_slope_per_m(&self) -> f64 {
         let acting = self.acting();
         acting.normal_load_variation / acting.normal_load_reference_m

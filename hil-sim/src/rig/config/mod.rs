@@ -1,7 +1,8 @@
-//! The parameters of a rig: what a rig TOML may say.
+//! The parameters of a rig: the contents of a rig TOML file.
 //!
-//! `rigs/default.toml` is the built-in default and the one home of every number; [`RigConfig::default`] reads the embedded
-//! copy. A user's file states any subset: its tables merge into the default's, its lists replace the default's lists.
+//! `rigs/default.toml` is the built-in default and defines every default value;
+//! [`RigConfig::default`] reads the embedded copy. A user's file states any subset: its tables
+//! merge into the default's, its lists replace the default's lists.
 
 mod check;
 mod check_fixed;
@@ -40,7 +41,7 @@ pub struct RigConfig {
     pub name: String,
     /// Scans per second (Hz).
     pub scan_rate_hz: u32,
-    /// Bodies and springs of its own, instead of those that follow up to the load cells.
+    /// User-defined bodies and springs, instead of the fields below up to the load cells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub structure: Option<OwnStructure>,
     /// The rigid bodies.
@@ -63,11 +64,11 @@ pub struct RigConfig {
     pub load_cells: Vec<Bushing>,
     /// Ground to arm B.
     pub lower_push_rod: Bushing,
-    /// Points the 3-D vibrometer may be aimed at.
+    /// Points at which the 3-D vibrometer can measure.
     pub responses: Vec<ResponsePoint>,
-    /// Points the hammer may hit.
+    /// Points that the hammer can hit.
     pub impacts: Vec<ImpactPoint>,
-    /// Where the single-point vibrometers look.
+    /// Where the single-point vibrometers measure.
     pub spots: Spots,
     /// The shaker.
     pub shaker: Shaker,
@@ -77,7 +78,7 @@ pub struct RigConfig {
     pub sensors: Sensors,
     /// Temperature and cables.
     pub surroundings: Surroundings,
-    /// What nobody at the rig knows: errors of places, angles and sensors.
+    /// Unknown errors of positions, angles and sensors.
     pub errors: Errors,
 }
 
@@ -85,13 +86,13 @@ impl RigConfig {
     /// Reads a rig file: any subset of the default's fields.
     ///
     /// # Errors
-    /// [`RigError::Document`] for text that is not TOML, an unknown field or a wrong type, with its line;
-    /// [`RigError::Field`] for a value that no rig can have.
+    /// [`RigError::Document`] for text that is not TOML, an unknown field or a wrong type, with its
+    /// line; [`RigError::Field`] for an invalid value.
     pub fn from_toml(text: &str) -> Result<Self, RigError> {
         document::read(text)
     }
 
-    /// The rig written out completely; [`RigConfig::from_toml`] reads it back equal.
+    /// The complete rig as TOML; [`RigConfig::from_toml`] reads it back equal.
     ///
     /// # Panics
     /// Never: every field has a TOML form.
@@ -101,12 +102,12 @@ impl RigConfig {
             return toml::to_string(self).expect(written);
         }
         let mut table = toml::Table::try_from(self).expect(written);
-        // they describe another rig
+        // these fields describe another rig
         table.retain(|field, _| !document::PAPERS_OWN.contains(&field));
         table.to_string()
     }
 
-    /// Whether `body` is there in `configuration`.
+    /// Whether `configuration` has `body`.
     pub fn has(&self, configuration: Configuration, body: BodyName) -> bool {
         let Some(own) = &self.structure else { return configuration.has(body) };
         own.body(body).is_some_and(|body| match configuration {
@@ -116,12 +117,12 @@ impl RigConfig {
         })
     }
 
-    /// The bodies that the contact joins: of A, then of B.
+    /// The bodies that the contact joins: A's, then B's.
     pub fn joined(&self) -> [BodyName; 2] {
         self.structure.as_ref().map_or([BodyName::SpecimenA, BodyName::SpecimenB], |own| own.joint)
     }
 
-    /// The body that the load cells hold; none without load cells.
+    /// The body that the load cells support; `None` without load cells.
     pub fn load_cells_on(&self) -> Option<BodyName> {
         self.structure.as_ref().map_or(Some(BodyName::ArmB), |own| own.load_cells_on)
     }
@@ -129,7 +130,7 @@ impl RigConfig {
     /// Checks every value, as [`RigConfig::from_toml`] does; for rigs that were changed in code.
     ///
     /// # Errors
-    /// [`RigError::Field`] naming the first bad field.
+    /// [`RigError::Field`] naming the first invalid field.
     pub fn check(&self) -> Result<(), RigError> {
         check::check(self)
     }
@@ -153,7 +154,7 @@ pub struct Bodies {
     pub specimen_a: RigidBody,
     /// Arm B with its specimen.
     pub arm_b: RigidBody,
-    /// Specimen B: taken out of arm B and a body of its own when its clamp is not rigid.
+    /// Specimen B: subtracted from arm B and a separate body when its clamp is not rigid.
     pub specimen_b: RigidBody,
 }
 
@@ -177,7 +178,7 @@ pub struct RigidBody {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bushing {
-    /// Where (m).
+    /// Position (m).
     pub position_m: [f64; 3],
     /// kx, ky, kz (N/m).
     pub stiffness_n_per_m: [f64; 3],
@@ -187,7 +188,7 @@ pub struct Bushing {
     pub damping_s: [f64; 6],
 }
 
-/// A support that is there only in some configurations.
+/// A support that is present only in some configurations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tether {
@@ -203,11 +204,11 @@ pub struct Tether {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Clamp {
-    /// No clamp at all: arm and specimen are one body.
+    /// No clamp: arm and specimen are one body.
     pub rigid: bool,
     /// Under the normal load: in the assembly.
     pub loaded: Bushing,
-    /// Without it: the substructure alone.
+    /// Without the normal load: the substructure alone.
     pub free: Bushing,
 }
 
@@ -221,10 +222,10 @@ pub struct ResponsePoint {
     pub body: BodyName,
     /// Nominal position (m).
     pub position_m: [f64; 3],
-    /// How well it is placed, standard deviation along each axis (m); without it, as `errors` says of its kind.
+    /// Standard deviation of its position along each axis (m); if not given, `errors` defines it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_m: Option<f64>,
-    /// Polluted by speckle noise.
+    /// Affected by speckle noise.
     #[serde(default)]
     pub speckle: bool,
 }
@@ -239,21 +240,21 @@ pub struct ImpactPoint {
     pub body: BodyName,
     /// Nominal position (m).
     pub position_m: [f64; 3],
-    /// Direction of the force on the structure (any length; sign included).
+    /// Direction of the force on the structure (any length; the sign counts).
     pub direction: [f64; 3],
 }
 
-/// Where one single-point vibrometer looks, along the sliding direction.
+/// Where one single-point vibrometer measures, along the sliding direction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spot {
-    /// The body it looks at.
+    /// The body it measures.
     pub body: BodyName,
-    /// Where (m).
+    /// Position (m).
     pub position_m: [f64; 3],
 }
 
-/// The two spots beside the contact.
+/// The two spots next to the contact.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spots {
@@ -269,7 +270,7 @@ pub struct Spots {
 pub struct Shaker {
     /// The body it pushes.
     pub body: BodyName,
-    /// Where (m).
+    /// Position (m).
     pub position_m: [f64; 3],
     /// Force per drive (N/V).
     pub gain_n_per_v: f64,
@@ -277,7 +278,7 @@ pub struct Shaker {
     pub limit_v: f64,
 }
 
-/// The automatic hammer; [`crate::rig::hammer`] says what it does with them.
+/// The automatic hammer; [`crate::rig::hammer`] describes how these are used.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Hammer {
@@ -293,49 +294,49 @@ pub struct Hammer {
     pub preload_n: f64,
     /// Coil's pull when cold (N).
     pub coil_n: f64,
-    /// Speed after a contact over speed before it.
+    /// Ratio of the speed after a contact to the speed before it.
     pub restitution: f64,
     /// Fraction of the coil's pull lost when warm.
     pub warming: f64,
-    /// Attempts within a cell to 63 % of that loss.
+    /// Attempts within a cell to reach 63 % of that loss.
     pub warming_attempts: f64,
     /// Standard deviation of the speed at contact, relative.
     pub speed_scatter: f64,
-    /// Standard deviation of the contact's width, relative.
+    /// Standard deviation of the contact's duration, relative.
     pub width_scatter: f64,
-    /// What goes wrong now and then.
+    /// Occasional disturbances of a hit.
     pub mishaps: Mishaps,
-    /// Somebody strikes with it again and again, whatever the device orders; nobody does without it.
+    /// If set, an operator strikes repeatedly, independent of the device's orders.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hand: Option<Hand>,
 }
 
-/// A person with the hammer, as hard as a coil pulse would strike.
+/// An operator with the hammer, who strikes as hard as a coil pulse of `pulse_s` would.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Hand {
-    /// From the staging to the first hit, and from hit to hit (s).
+    /// Time from staging to the first hit, and between hits (s).
     pub every_s: f64,
-    /// The pulse (s).
+    /// Duration of the equivalent coil pulse (s).
     pub pulse_s: f64,
 }
 
-/// Chances per attempt (at most one happens), and ranges drawn from evenly.
+/// Probabilities per attempt (at most one happens), and ranges of uniform draws.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mishaps {
-    /// Chance of a second pulse.
+    /// Probability of a second pulse.
     pub double_hit: f64,
-    /// Its peak over the first.
+    /// Ratio of its peak to the first.
     pub double_fraction: [f64; 2],
     /// Its delay after the first (s).
     pub double_delay_s: [f64; 2],
-    /// Chance of a weak hit.
+    /// Probability of a weak hit.
     pub weak: f64,
-    /// Its peak over the undisturbed.
+    /// Ratio of its peak to an undisturbed one.
     pub weak_fraction: [f64; 2],
-    /// Chance of a hit beyond the sensors' range.
+    /// Probability of a hit beyond the sensors' range.
     pub overload: f64,
-    /// Its peak over the undisturbed.
+    /// Ratio of its peak to an undisturbed one.
     pub overload_factor: [f64; 2],
 }

@@ -1,29 +1,30 @@
-//! A structure of a rig's own, instead of the paper's bodies in a row.
+//! A user-defined structure, which replaces the paper's chain of bodies.
 
 use serde::{Deserialize, Serialize};
 
 use super::{BodyName, Bushing, RigidBody};
 use crate::rig::Configuration;
 
-/// Any rigid bodies, springs between them, and which two the contact joins.
+/// Any rigid bodies, the springs between them, and the two bodies that the contact joins.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OwnStructure {
-    /// The bodies that the contact joins: of A, then of B.
+    /// The bodies that the contact joins: A's, then B's.
     pub joint: [BodyName; 2],
-    /// The bodies that are hit and measured as A's and B's interface: what lies between them is what substructuring sees.
+    /// The bodies that are hit and measured as A's and B's interfaces: substructuring identifies
+    /// what lies between them.
     pub arms: [BodyName; 2],
-    /// The body that the three load cells hold; none without load cells.
+    /// The body that the three load cells support; `None` without load cells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub load_cells_on: Option<BodyName>,
     /// The bodies.
     pub bodies: Vec<OwnBody>,
-    /// What holds them.
+    /// Supports and connections.
     pub springs: Vec<Spring>,
 }
 
 impl OwnStructure {
-    /// The body of this name.
+    /// The body with this name.
     pub fn body(&self, name: BodyName) -> Option<&OwnBody> {
         self.bodies.iter().find(|body| body.name == name)
     }
@@ -38,13 +39,14 @@ pub enum Side {
     B,
 }
 
-/// A rigid body of a substructure. (Its fields are a [`RigidBody`]'s once more: serde refuses unknown fields only where none is flattened.)
+/// A rigid body of a substructure. (It repeats the fields of [`RigidBody`], because serde cannot
+/// refuse unknown fields in a flattened struct.)
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OwnBody {
     /// Its name, unique among bodies.
     pub name: BodyName,
-    /// The substructure that it belongs to.
+    /// The substructure to which it belongs.
     pub of: Side,
     /// Mass (kg).
     pub mass_kg: f64,
@@ -70,17 +72,17 @@ impl OwnBody {
     }
 }
 
-/// A spring and dashpot for all six relative motions, between two bodies or from the ground (`ground`) to one. (Its fields are a
-/// [`Bushing`]'s, for the same reason.)
+/// A spring and dashpot for all six relative motions, between two bodies or from the ground
+/// (`ground`) to one. (It repeats the fields of [`Bushing`], for the same reason.)
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spring {
-    /// What it joins.
+    /// The bodies it joins.
     pub between: [BodyName; 2],
-    /// The configurations that have it; all that have its bodies, where nothing is said.
+    /// The configurations that have it; if not given, all that have its bodies.
     #[serde(default = "everywhere", rename = "in")]
     pub present: Vec<Configuration>,
-    /// Where (m).
+    /// Position (m).
     pub position_m: [f64; 3],
     /// kx, ky, kz (N/m).
     pub stiffness_n_per_m: [f64; 3],
@@ -88,7 +90,7 @@ pub struct Spring {
     pub rotation_nm_per_rad: [f64; 3],
     /// β (s) of c = β k for x, y, z, rx, ry, rz.
     pub damping_s: [f64; 6],
-    /// What x, y and z are here: unit vectors at right angles; the rig's own, where nothing is said.
+    /// Axes x, y and z of the spring: orthogonal unit vectors; the rig's axes if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axes: Option<[[f64; 3]; 3]>,
 }
@@ -98,12 +100,12 @@ fn everywhere() -> Vec<Configuration> {
 }
 
 impl Spring {
-    /// Its bodies; none is the ground.
+    /// Its bodies; `None` is the ground.
     pub fn ends(&self) -> [Option<BodyName>; 2] {
         self.between.map(|end| (end.as_str() != "ground").then_some(end))
     }
 
-    /// Where it is, and how stiff.
+    /// Position and stiffness.
     pub fn bushing(&self) -> Bushing {
         Bushing {
             position_m: self.position_m,

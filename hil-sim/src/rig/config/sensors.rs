@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sensors {
-    /// Converters span ± this (V).
+    /// Converter range, ± this (V).
     pub range_v: f64,
     /// The hammer's force cell.
     pub force: ForceSensor,
@@ -20,26 +20,26 @@ pub struct Sensors {
     pub load_cells: LoadCells,
     /// The shaker's force cell.
     pub excitation: Excitation,
-    /// Vibrometers that stay at a point; none in the default rig.
+    /// Vibrometers fixed to one point; none in the default rig.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fixed: Vec<FixedVibrometer>,
 }
 
-/// A vibrometer that stays at a response point: one channel along one direction.
+/// A vibrometer fixed to a response point: one channel along one direction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FixedVibrometer {
     /// Its channel's name.
     pub name: String,
-    /// The response point at which it looks.
+    /// The response point at which it measures.
     pub response: String,
-    /// What it feels (any length; sign included).
+    /// Measured direction (any length; the sign counts).
     pub direction: [f64; 3],
     /// m/s per V.
     pub units_per_volt: f64,
     /// White noise floor ((m/s)/√Hz) up to half the scan rate.
     pub floor: f64,
-    /// How late the signal is (s).
+    /// Delay of the signal (s).
     #[serde(default)]
     pub delay_s: f64,
     /// 1 or −1.
@@ -59,11 +59,11 @@ pub struct ForceSensor {
     pub units_per_volt: f64,
     /// Noise (N rms).
     pub noise_n: f64,
-    /// How late the signal is (s).
+    /// Delay of the signal (s).
     pub delay_s: f64,
     /// 1 or −1.
     pub polarity: i8,
-    /// Ringing that the onset of a hit of nominal width starts, over the hit's peak.
+    /// Amplitude of the ringing that a hit of nominal duration excites, relative to the hit's peak.
     pub ring_fraction: f64,
     /// The ringing's frequency (Hz).
     pub ring_hz: f64,
@@ -79,11 +79,11 @@ pub struct Vibrometer {
     pub units_per_volt: f64,
     /// White noise floor ((m/s)/√Hz) up to half the scan rate.
     pub floor: f64,
-    /// How late each axis is (s).
+    /// Delay of each axis (s).
     pub delay_s: [f64; 3],
     /// 1 or −1.
     pub polarity: [i8; 3],
-    /// What a speckled point adds.
+    /// Additional noise of a speckled point.
     pub speckle: SpeckleNoise,
 }
 
@@ -91,13 +91,13 @@ pub struct Vibrometer {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SpeckleNoise {
-    /// The floor is this many times higher.
+    /// Factor by which the floor is higher.
     pub floor_factor: f64,
-    /// Dropouts begin at this mean rate (1/s).
+    /// Mean rate at which dropouts begin (1/s).
     pub dropouts_per_s: f64,
-    /// Their mean duration (s); the signal is lost meanwhile.
+    /// Their mean duration (s), in which the signal is lost.
     pub dropout_s: f64,
-    /// The floor within a dropout, over the ordinary one.
+    /// Ratio of the floor within a dropout to the ordinary one.
     pub dropout_floor_factor: f64,
 }
 
@@ -109,7 +109,7 @@ pub struct SpotVibrometer {
     pub units_per_volt: f64,
     /// White noise floor ((m/s)/√Hz) up to half the scan rate.
     pub floor: f64,
-    /// How late the signal is (s).
+    /// Delay of the signal (s).
     pub delay_s: f64,
     /// 1 or −1.
     pub polarity: i8,
@@ -123,7 +123,7 @@ pub struct LoadCells {
     pub units_per_volt: f64,
     /// Noise of each (N rms).
     pub noise_n: f64,
-    /// How late each is (s).
+    /// Delay of each (s).
     pub delay_s: [f64; 3],
     /// 1 or −1.
     pub polarity: [i8; 3],
@@ -137,7 +137,7 @@ pub struct Excitation {
     pub units_per_volt: f64,
     /// Noise (N rms).
     pub noise_n: f64,
-    /// How late the signal is (s).
+    /// Delay of the signal (s).
     pub delay_s: f64,
     /// 1 or −1.
     pub polarity: i8,

@@ -1,4 +1,4 @@
-//! What a single value must be, with the field's name in the refusal.
+//! Checks of single values; the error names the field.
 
 use super::{Bushing, RigidBody};
 use crate::rig::error::RigError;
@@ -35,7 +35,7 @@ pub(super) fn axes(field: &str, axes: Option<[[f64; 3]; 3]>) -> Result<(), RigEr
     let Some([x, y, z]) = axes else { return Ok(()) };
     let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let off = [dot(x, x) - 1.0, dot(y, y) - 1.0, dot(z, z) - 1.0, dot(x, y), dot(y, z), dot(z, x)];
-    // four digits are what a person writes
+    // users write about four digits
     if off.iter().all(|off| off.abs() < 1e-3) {
         return Ok(());
     }

@@ -1,4 +1,4 @@
-//! The whole state by e^{AT}: no modes needed, and the baseline the modal stepper is measured against.
+//! Advances the whole state by e^{AT}: needs no modes, and is the baseline for the modal stepper.
 
 use std::sync::Arc;
 
@@ -17,21 +17,22 @@ pub struct ExponentialStepper {
     rows: DMatrix<f64>,
     hammer: DVector<f64>,
     shaker: DVector<f64>,
-    /// Effect of a whole scan of a sine of the keyed Ω (its bits), as [`forced`] gives it.
+    /// Effect of a sine over a whole scan, keyed by the bits of Ω, as returned by [`forced`].
     whole_scans: Vec<(u64, DMatrix<f64>)>,
     joint: Option<Jointed>,
     fixed: Vec<DVector<f64>>,
     kept: DVector<f64>,
 }
 
-/// What the joint adds.
+/// Additional matrices for the joint.
 #[derive(Debug, Clone)]
 struct Jointed {
     row: DVector<f64>,
-    /// Gained over a scan and over a step from a newton that falls to nothing, and from one that rises from it (2n × 2).
+    /// Gain over a scan and over a step from a force that falls from 1 N to zero, and from one that
+    /// rises from zero to 1 N (2n × 2).
     scan: DMatrix<f64>,
     step: DMatrix<f64>,
-    /// e^{Ah} of a step, and what the shaker's newton does in it.
+    /// e^{Ah} of a step, and the effect of 1 N of the shaker during it.
     turn: DMatrix<f64>,
     shaker: DVector<f64>,
 }
@@ -49,10 +50,11 @@ impl Jointed {
 }
 
 impl ExponentialStepper {
-    /// At rest, with the scan period `period_s`; `turn` is [`ExponentialStepper::turn`] of the same `a` and period.
+    /// At rest, with the scan period `period_s`; `turn` is [`ExponentialStepper::turn`] of the same
+    /// `a` and period.
     pub fn new(a: &Arc<DMatrix<f64>>, turn: &Arc<DMatrix<f64>>, aimed: &Aimed, period_s: f64) -> Self {
         let order = a.nrows();
-        // A steady force is a sine held at its crest: Ω = 0, phase π/2.
+        // A constant force is a sine held at its crest: Ω = 0, phase π/2.
         let shaker = forced(a, &aimed.shaker, 0.0, period_s).column(0).into_owned();
         Self {
             a: Arc::clone(a),
@@ -107,7 +109,7 @@ impl ExponentialStepper {
         self.x += ramps * Vector2::new(from_n, to_n);
     }
 
-    /// y of the joint now (m).
+    /// Current y of the joint (m).
     pub fn joint(&self) -> f64 {
         self.joint.as_ref().map_or(0.0, |joint| joint.row.dot(&self.x))
     }
@@ -117,23 +119,23 @@ impl ExponentialStepper {
         self.joint.as_ref().map_or(0.0, |joint| joint.row.dot(&joint.step.column(1)))
     }
 
-    /// Remembers how it stands.
+    /// Saves the state.
     pub fn keep(&mut self) {
         self.kept.copy_from(&self.x);
     }
 
-    /// Goes back there.
+    /// Restores the saved state.
     pub fn go_back(&mut self) {
         self.x.copy_from(&self.kept);
     }
 
-    /// The signals now.
+    /// The current signals.
     pub fn signals(&self) -> [f64; SIGNALS] {
         let seen = &self.rows * &self.x;
         std::array::from_fn(|signal| seen[signal])
     }
 
-    /// What the vibrometers that stay see now.
+    /// The current signals of the fixed vibrometers.
     pub fn fixed(&self, into: &mut [f64]) {
         for (signal, row) in into.iter_mut().zip(&self.fixed) {
             *signal = row.dot(&self.x);
@@ -148,7 +150,7 @@ impl ExponentialStepper {
     fn whole_scan(&mut self, omega: f64) -> &DMatrix<f64> {
         let key = omega.to_bits();
         let at = self.whole_scans.iter().position(|(known, _)| *known == key).unwrap_or_else(|| {
-            // A contact's Ω is its own; the last few are all that can be in flight.
+            // Each contact has a different Ω; no more than the last few can be active.
             if self.whole_scans.len() == 8 {
                 self.whole_scans.remove(0);
             }
@@ -159,9 +161,11 @@ impl ExponentialStepper {
     }
 }
 
-/// What the state has gained after `h` from b · (s(t)) with s' = Ω c, c' = −Ω s: 2n × 2, to be applied to (s, c) at the start.
+/// Gain of the state after `h` from b · s(t) with s' = Ω c, c' = −Ω s: 2n × 2, to be applied to (s,
+/// c) at the start.
 ///
-/// The exponential of the augmented matrix [A, b, 0; 0, 0, Ω; 0, −Ω, 0] h holds it exactly.
+/// It is contained exactly in the exponential of the augmented matrix [A, b, 0; 0, 0, Ω; 0, −Ω, 0]
+/// h.
 fn forced(a: &DMatrix<f64>, b: &DVector<f64>, omega: f64, h: f64) -> DMatrix<f64> {
     let order = a.nrows();
     let mut augmented = DMatrix::zeros(order + 2, order + 2);
@@ -172,10 +176,12 @@ fn forced(a: &DMatrix<f64>, b: &DVector<f64>, omega: f64, h: f64) -> DMatrix<f64
     (augmented * h).exp().view((0, order), (order, 2)).into_owned()
 }
 
-/// What the state has gained after `h` from b f with f falling from one to nothing, and rising from nothing to one: 2n × 2.
+/// Gain of the state after `h` from b f with f falling from one to zero, and rising from zero to
+/// one: 2n × 2.
 fn ramps(a: &DMatrix<f64>, b: &DVector<f64>, h: f64) -> DMatrix<f64> {
     let order = a.nrows();
-    // [A h, b h, 0; 0, 0, 1; 0, 0, 0]: its exponential holds what one held and one rising newton do.
+    // The exponential of [A h, b h, 0; 0, 0, 1; 0, 0, 0] contains the effects of a constant and of
+    // a rising unit force.
     let mut augmented = DMatrix::zeros(order + 2, order + 2);
     augmented.view_mut((0, 0), (order, order)).copy_from(&(a * h));
     augmented.view_mut((0, order), (order, 1)).copy_from(&(b * h));

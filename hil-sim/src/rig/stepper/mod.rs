@@ -1,9 +1,9 @@
-//! Advancing the structure by one scan: stuck exactly, slipping in steps.
+//! Advances the structure by one scan: exactly while stuck, in steps while slipping.
 //!
-//! Stuck motion is linear, so nothing is integrated numerically: [`ModalStepper`] turns each complex mode by e^{λT};
-//! [`ExponentialStepper`] multiplies the whole state by e^{AT}, slower, for structures whose modes are dependent.
-//! A contact that can slip stays linear for the steppers: what its sliders do not carry is a force between the specimens
-//! ([`Slipping`]).
+//! Stuck motion is linear, so there is no numerical integration: [`ModalStepper`] multiplies each
+//! complex mode by e^{λT}; [`ExponentialStepper`] multiplies the whole state by e^{AT}, slower, for
+//! structures whose modes are dependent. A contact that can slip stays linear for the steppers: the
+//! difference to its sliders' force is applied as a force between the specimens ([`Slipping`]).
 
 mod exponential;
 mod modal;
@@ -21,7 +21,7 @@ use super::force::ForceSegment;
 /// Signals of the structure: vibrometer x, y, z, the two spots (m/s), the three load cells (N).
 pub const SIGNALS: usize = 8;
 
-/// What is measured and pushed, in state coordinates (2n).
+/// Inputs and outputs, in state coordinates (2n).
 #[derive(Debug, Clone)]
 pub struct Aimed {
     /// Row of each signal; zero where the configuration lacks the body.
@@ -34,24 +34,24 @@ pub struct Aimed {
     pub steps: [f64; SIGNALS],
     /// The joint, if it can slip.
     pub joint: Option<Joint>,
-    /// What the vibrometers that stay see.
+    /// Output rows of the fixed vibrometers.
     pub fixed: FixedRows,
 }
 
-/// Where a joint that can slip is seen and pushed, in state coordinates (2n).
+/// Input and output of a joint that can slip, in state coordinates (2n).
 #[derive(Debug, Clone)]
 pub struct Joint {
-    /// Row of y = Δ + β Δ', with Δ the displacement of specimen A less that of B along z.
+    /// Row of y = Δ + β Δ', with Δ the displacement of specimen A minus that of B along z.
     pub row: DVector<f64>,
-    /// Column of a force that pushes A along z and B against it.
+    /// Column of a force that pushes A along z and B in the opposite direction.
     pub column: DVector<f64>,
-    /// Steps of a scan in which something slips.
+    /// Number of steps of a scan in which an element slips.
     pub steps: u32,
-    /// How long one is (s).
+    /// Duration of one step (s).
     pub step_s: f64,
 }
 
-/// How far one call goes.
+/// Time span of one call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Span {
     /// A scan period.
@@ -82,7 +82,7 @@ pub enum Stepper {
     Exponential(Box<ExponentialStepper>),
 }
 
-/// Hands a call on to whichever it is.
+/// Forwards a call to the stepper in use.
 macro_rules! either {
     ($stepper:expr, $it:ident => $call:expr) => {
         match $stepper {
@@ -99,43 +99,43 @@ impl Stepper {
         either!(self, stepper => stepper.advance(span, forces));
     }
 
-    /// Adds what a force between the specimens has done over the span just passed, in which it went from the first to the second
-    /// of these (N).
+    /// Adds the effect of a force between the specimens over the span just passed, during which it
+    /// changed linearly from `from_n` to `to_n` (N).
     #[inline]
     pub fn push(&mut self, span: Span, from_n: f64, to_n: f64) {
         either!(self, stepper => stepper.push(span, from_n, to_n));
     }
 
-    /// y of the joint now (m); 0 without a joint that can slip.
+    /// Current y of the joint (m); 0 without a joint that can slip.
     #[inline]
     pub fn joint(&self) -> f64 {
         either!(self, stepper => stepper.joint())
     }
 
-    /// What y gains over a step from a force between the specimens that rises to a newton (m/N).
+    /// Gain of y over a step from a force between the specimens that rises from zero to 1 N (m/N).
     pub fn receptance(&self) -> f64 {
         either!(self, stepper => stepper.receptance())
     }
 
-    /// Remembers how it stands.
+    /// Saves the state.
     #[inline]
     pub fn keep(&mut self) {
         either!(self, stepper => stepper.keep());
     }
 
-    /// Goes back there.
+    /// Restores the saved state.
     #[inline]
     pub fn go_back(&mut self) {
         either!(self, stepper => stepper.go_back());
     }
 
-    /// The signals now.
+    /// The current signals.
     #[inline]
     pub fn signals(&self) -> [f64; SIGNALS] {
         either!(self, stepper => stepper.signals())
     }
 
-    /// What the vibrometers that stay see now.
+    /// The current signals of the fixed vibrometers.
     pub fn fixed(&self, into: &mut [f64]) {
         either!(self, stepper => stepper.fixed(into));
     }

@@ -1,7 +1,8 @@
 //! One complex multiplication per mode and scan.
 //!
-//! Modes lie in arrays of real and imaginary parts, slowest decay first, and each mode's eight output coefficients lie
-//! together, so that both loops run over contiguous `f64`. The tail of the arrays is left out once it has died away.
+//! Modes are stored in arrays of real and imaginary parts, slowest decay first, and each mode's
+//! eight output coefficients are adjacent, so that both loops run over contiguous `f64`. Modes at
+//! the end of the arrays are skipped once they have decayed.
 
 use std::sync::Arc;
 
@@ -12,8 +13,8 @@ use super::{Aimed, Joint, SIGNALS, ScanForces, Span};
 use crate::rig::force::{phi, phi_rising};
 use crate::rig::modal::Mode;
 
-/// A mode is left out when it moves no signal by more than this part of a converter step: far below rounding of anything
-/// that is ever read, and far above the denormals that would slow the loop down.
+/// A mode is skipped when it changes no signal by more than this fraction of a converter step: far
+/// below the rounding of any reading, and far above the denormals that would slow the loop down.
 const NEGLIGIBLE_STEPS: f64 = 1e-9;
 
 /// One number per mode: real parts, imaginary parts.
@@ -45,14 +46,15 @@ impl FromIterator<Complex<f64>> for Parts {
     }
 }
 
-/// What a span of time does to the modes.
+/// Effect of a time span on the modes.
 #[derive(Debug, Clone)]
 struct Pace {
     /// e^{λh}.
     turn: Parts,
-    /// Gained from a newton of the shaker, held.
+    /// Gain from a constant 1 N of the shaker.
     shaker: Parts,
-    /// Gained from a newton between the specimens that falls to nothing, and from one that rises from it.
+    /// Gain from a force between the specimens that falls from 1 N to zero, and from one that rises
+    /// from zero to 1 N.
     falling: Parts,
     rising: Parts,
 }
@@ -83,19 +85,20 @@ fn project(mode: &Mode, column: &DVector<f64>) -> Complex<f64> {
 pub struct ModalStepper {
     modes: Arc<Vec<Mode>>,
     scan: Pace,
-    /// A step of a scan in which something slips; without a joint that can, as long as the scan.
+    /// A step of a scan in which an element slips; as long as the scan without a joint that can
+    /// slip.
     step: Pace,
     z: Parts,
     rows_re: Vec<[f64; SIGNALS]>,
     rows_im: Vec<[f64; SIGNALS]>,
     hammer: Vec<Complex<f64>>,
-    /// Reads y of the joint: Σ re · re + im · im.
+    /// Output row of the joint's y: Σ re · re + im · im.
     joint: Parts,
-    /// Reads what the vibrometers that stay see.
+    /// Output rows of the fixed vibrometers.
     fixed: Vec<Parts>,
     negligible: Vec<f64>,
     active: usize,
-    /// As it was: `z` and `active`.
+    /// Saved `z` and `active`.
     kept: (Parts, usize),
 }
 
@@ -140,7 +143,8 @@ impl ModalStepper {
                 fixed.rows.iter().zip(&fixed.steps).map(|(row, step)| read(mode, row).norm() / step);
             let steps = seen.iter().zip(aimed.steps).map(|(c, step)| c.norm() / step);
             let steps = steps.chain(of_fixed).fold(0.0, f64::max);
-            // A mode that no signal sees may go at any size; the floor keeps 0/0 away.
+            // A mode that affects no signal may be skipped at any amplitude; the lower bound
+            // prevents 0/0.
             stepper.negligible.push((NEGLIGIBLE_STEPS / steps.max(1e-30)).powi(2));
         }
         stepper
@@ -188,8 +192,8 @@ impl ModalStepper {
         }
     }
 
-    /// Adds what a force between the specimens has done over the span just passed, in which it went from the first to the second
-    /// of these (N).
+    /// Adds the effect of a force between the specimens over the span just passed, during which it
+    /// changed linearly from `from_n` to `to_n` (N).
     #[inline]
     pub fn push(&mut self, span: Span, from_n: f64, to_n: f64) {
         let pace = match span {
@@ -205,18 +209,18 @@ impl ModalStepper {
         }
     }
 
-    /// y of the joint now (m).
+    /// Current y of the joint (m).
     #[inline]
     pub fn joint(&self) -> f64 {
         read_parts(&self.joint, &self.z, self.active)
     }
 
-    /// What y gains over a step from a force that rises to a newton (m/N).
+    /// Gain of y over a step from a force that rises from zero to 1 N (m/N).
     pub fn receptance(&self) -> f64 {
         read_parts(&self.joint, &self.step.rising, self.modes.len())
     }
 
-    /// Remembers how it stands.
+    /// Saves the state.
     #[inline]
     pub fn keep(&mut self) {
         let (kept, active) = &mut self.kept;
@@ -225,20 +229,20 @@ impl ModalStepper {
         *active = self.active;
     }
 
-    /// Goes back there.
+    /// Restores the saved state.
     #[inline]
     pub fn go_back(&mut self) {
         std::mem::swap(&mut self.z, &mut self.kept.0);
         self.active = self.kept.1;
     }
 
-    /// The signals now.
+    /// The current signals.
     #[inline]
     pub fn signals(&self) -> [f64; SIGNALS] {
         let count = self.active;
         let (rows_re, rows_im) = (&self.rows_re[..count], &self.rows_im[..count]);
         let (z_re, z_im) = (&self.z.re[..count], &self.z.im[..count]);
-        // Two sums at a time: one alone waits for its own last addition.
+        // Two sums at a time: a single sum would wait for its own last addition.
         let (mut even, mut odd) = ([0.0; SIGNALS], [0.0; SIGNALS]);
         let paired = count & !1;
         for k in (0..paired).step_by(2) {
@@ -256,7 +260,7 @@ impl ModalStepper {
         std::array::from_fn(|signal| even[signal] + odd[signal])
     }
 
-    /// What the vibrometers that stay see now.
+    /// The current signals of the fixed vibrometers.
     pub fn fixed(&self, into: &mut [f64]) {
         for (signal, row) in into.iter_mut().zip(&self.fixed) {
             *signal = read_parts(row, &self.z, self.active);

@@ -1,12 +1,13 @@
-//! A stepper and the sliders of its joint, together.
+//! A stepper together with the sliders of its joint.
 //!
-//! Stuck, a scan is one exact turn of the linear structure under a constant force between the specimens, which earlier slip has left
-//! there. Only a scan in which an element would let go is gone back on and done in steps.
+//! While stuck, a scan is one exact step of the linear structure under a constant force between the
+//! specimens that remains from earlier slip. A scan in which an element would slip is undone and
+//! repeated in steps.
 
 use super::{Joint, ScanForces, Span, Stepper};
 use crate::rig::sliders::Sliders;
 
-/// The step's equation is solved for any start while its slopes differ by less than a half.
+/// The step's equation converges from any start while its slopes differ by less than a half.
 const MOST_GAIN: f64 = 0.5;
 
 /// The sliders, and how a scan is divided for them.

@@ -1,18 +1,19 @@
-//! Exact FRFs of an independent implementation, as committed under `tests/data`.
+//! Exact FRFs of an independent implementation, stored in `tests/data`.
 
 use std::path::Path;
 
 use nalgebra::DMatrix;
 use num_complex::Complex;
 
-/// One file: FRF matrices (outputs, inputs) at a few lines.
+/// One file: FRF matrices (outputs, inputs) at a few frequency lines.
 pub struct Reference {
     pub outputs: Vec<String>,
     pub inputs: Vec<String>,
     pub lines: Vec<(f64, DMatrix<Complex<f64>>)>,
 }
 
-/// Reads `tests/data/<name>.csv`: a header `f_hz,output,<input>:re,<input>:im,…`, then one row per line and output.
+/// Reads `tests/data/<name>.csv`: a header `f_hz,output,<input>:re,<input>:im,…`, then one row per
+/// frequency line and output.
 pub fn load(name: &str) -> Reference {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(format!("{name}.csv"));
     let text = std::fs::read_to_string(&path).unwrap();

@@ -1,4 +1,4 @@
-//! A host of the fewest lines, for tests of the virtual board: requests, acknowledgements, samples.
+//! A minimal host for tests of the virtual board: requests, acknowledgements, samples.
 #![allow(clippy::unwrap_used, dead_code, reason = "test support; each test file uses a part of it")]
 
 pub mod scenarios;
@@ -24,14 +24,14 @@ use jointrig_protocol::packet::Reader;
 use jointrig_protocol::request::{self, Configuration, Fire, Request, Stage};
 use jointrig_protocol::shot::{Phase, Shot};
 
-/// A coil pulse for some 50 N on the default rig, from cold (its description says so).
+/// A coil pulse for about 50 N on the default rig, from cold (as stated in its description).
 pub const PULSE_US: u32 = 3_500;
 /// Scans of a record before its trigger.
 const BEFORE: u64 = 256;
 /// Scans of a record.
 const LENGTH: u64 = 20_480;
 
-/// A running board, what a test may see and do of it, and its link.
+/// A running board, its controls and observations, and its link.
 pub type Started = (Box<dyn Any>, Arc<Controls>, HostEnd);
 
 /// The native board with this rig.
@@ -42,7 +42,7 @@ pub fn native(config: &RigConfig) -> Started {
     (Box::new(board), controls, link)
 }
 
-/// The image for QEMU; where there is none, it says so.
+/// The image for QEMU; prints a message if there is none.
 pub fn image() -> Option<PathBuf> {
     let image = std::env::var_os("JOINTRIG_MPS2_IMAGE").map(PathBuf::from);
     if image.is_none() {
@@ -51,7 +51,7 @@ pub fn image() -> Option<PathBuf> {
     image
 }
 
-/// The emulated board with this rig, of an [`image`].
+/// The emulated board with this rig, running an [`image`].
 #[cfg(unix)]
 pub fn emulated(image: &Path, config: &RigConfig) -> Started {
     let options = Options { seed: 3, ..Options::default() };
@@ -73,13 +73,13 @@ pub struct SmallHost {
     /// Codes of all scans since the stream's start, scan by scan.
     pub codes: Vec<i16>,
     pub channels: usize,
-    /// The host never acknowledges beyond this.
+    /// The host never acknowledges beyond this scan.
     pub hold_at: u64,
-    /// The scan after the last that has come.
+    /// The scan after the last received one.
     pub latest: u64,
-    /// Scans that are missing before `latest`, as (first, end).
+    /// Missing scans before `latest`, as (first, end).
     pub gaps: Vec<(u64, u64)>,
-    /// A shot is waited for, whose record will be read.
+    /// A shot is expected, whose record will be read.
     shooting: bool,
     /// An earlier host of the link may have read half of the first frame.
     within_frame: bool,
@@ -91,12 +91,12 @@ impl SmallHost {
         Self::reading(link, false)
     }
 
-    /// Shakes hands over the link of an earlier host, in a session of its own.
+    /// Shakes hands over the link of an earlier host, in a new session.
     pub fn again(earlier: Self, session: u32) -> Self {
         Self::in_session(earlier.link, false, session, true)
     }
 
-    /// Shakes hands, and reads packets if told so.
+    /// Shakes hands; reads packets if `packets` is set.
     pub fn reading(link: HostEnd, packets: bool) -> Self {
         Self::in_session(link, packets, 99, false)
     }
@@ -130,7 +130,7 @@ impl SmallHost {
         self.link
     }
 
-    /// Pulls the link's plug, and puts it in again.
+    /// Disconnects the link, and reconnects it.
     pub fn cut(&mut self) {
         self.link.cut();
     }
@@ -162,7 +162,7 @@ impl SmallHost {
                 Kind::Hello => self.hello = Some(Hello::from_bytes(frame.payload).unwrap()),
                 Kind::Answer => {
                     let answer: answer::Numbered = postcard::from_bytes(frame.payload).unwrap();
-                    // blocks follow on its heels
+                    // blocks follow immediately
                     if let Ok(Answer::Started { epoch, first_scan, .. }) = answer.outcome {
                         (self.epoch, self.first_scan, self.next_scan) = (epoch, first_scan, first_scan);
                         self.latest = first_scan;
@@ -177,8 +177,9 @@ impl SmallHost {
                         && shot.phase == Phase::Listening
                         && self.shooting
                     {
-                        // Events overtake the blocks they tell of. Acknowledged beyond the record's end, the board
-                        // might pass the next shot's scan before it hears of that shot.
+                        // Events overtake the blocks to which they refer. If the host acknowledged
+                        // beyond the record's end, the board might pass the next shot's scan before
+                        // it receives the order for that shot.
                         self.hold_at = self.hold_at.min(end_of_record(shot));
                     }
                     self.events.push(event);
@@ -189,7 +190,7 @@ impl SmallHost {
                         let first = block.header.first_scan;
                         if first > self.latest {
                             self.gaps.push((self.latest, first));
-                            // lost for good: the record that this host keeps begins anew
+                            // lost permanently: this host's record starts again after the gap
                             (self.first_scan, self.next_scan) = (first, first);
                             self.codes.clear();
                         }
@@ -213,19 +214,19 @@ impl SmallHost {
         self.send(Kind::Acknowledge, &acknowledge.to_bytes());
     }
 
-    /// Lets a held board go on.
+    /// Lets a held board continue.
     pub fn release(&mut self) {
         self.hold_at = u64::MAX;
         self.acknowledge();
     }
 
-    /// Reads so many scans more.
+    /// Reads `scans` more scans.
     pub fn go_on(&mut self, scans: u64) {
         let end = self.next_scan + scans;
         self.until("scans", |host| host.next_scan >= end);
     }
 
-    /// The phases of all shots that were told of.
+    /// The phases of all reported shots.
     pub fn phases(&self) -> Vec<Phase> {
         let phase = |event: &Event| if let Event::Shot(shot) = event { Some(shot.phase) } else { None };
         self.events.iter().filter_map(phase).collect()
@@ -268,7 +269,7 @@ impl SmallHost {
 
     pub fn stage(&mut self, configuration: Configuration, impact: &str, response: &str, attempt: u32) -> u64 {
         let (impact, response) = (impact.try_into().unwrap(), response.try_into().unwrap());
-        // the board must not pass the shot's scan before it hears of the shot
+        // the board must not pass the shot's scan before it receives the order
         self.hold_at = self.next_scan;
         match self.ask(Request::Stage(Stage { configuration, impact, response, attempt })) {
             Ok(Answer::Staged { at_scan }) => at_scan,
@@ -276,7 +277,8 @@ impl SmallHost {
         }
     }
 
-    /// Scans by which `not_before` must lie ahead of a held acknowledgement so that the device cannot have passed it.
+    /// Number of scans by which `not_before` must be ahead of a held acknowledgement, so that the
+    /// device cannot have passed it.
     pub fn lead(&self) -> u64 {
         u64::from(self.hello.unwrap().ring_scans / 2) + 64
     }
@@ -292,7 +294,7 @@ impl SmallHost {
         }
     }
 
-    /// Arms, fires and waits for the shot's end.
+    /// Arms, fires and waits for the end of the shot.
     pub fn shoot(&mut self, order: Fire) -> Shot {
         self.shooting = true;
         assert_eq!(self.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
@@ -320,7 +322,8 @@ impl SmallHost {
         self.codes[at(shot.trigger - BEFORE)..at(end)].to_vec()
     }
 
-    /// Two hits in one cell and one in another: their records. A host that dawdles leaves the board waiting.
+    /// Records of two hits in one cell and one in another. With `dawdle`, the host is slow and the
+    /// board must wait.
     pub fn three_shots(&mut self, dawdle: bool) -> Vec<Vec<i16>> {
         self.start();
         let mut records = Vec::new();
@@ -330,7 +333,7 @@ impl SmallHost {
                 from = self.stage(Configuration::B, "BY1", "B4", 0);
             }
             if dawdle {
-                // the board's time must stand still meanwhile
+                // the board's time must stop meanwhile
                 (0..20).for_each(|_| self.pump());
             }
             let shot = self.shoot(Self::order(number, PULSE_US, from + self.lead()));

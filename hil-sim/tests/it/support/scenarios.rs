@@ -1,4 +1,5 @@
-//! What must hold on every virtual board, native or emulated: each scenario takes a board's buttons and a host.
+//! Requirements for every virtual board, native or emulated: each scenario takes a board's controls
+//! and a host.
 
 use jointrig_hil_sim::board::Controls;
 use jointrig_hil_sim::rig::RigConfig;
@@ -11,11 +12,11 @@ use jointrig_protocol::shot::Phase;
 use super::{PULSE_US, SmallHost};
 
 const RATE: u32 = 51_200;
-/// Place of the excitation channel in a scan.
+/// Index of the excitation channel in a scan.
 const EXCITATION: usize = 9;
 const AMPLITUDE_V: f32 = 2.0;
 
-/// An order for 200 Hz that rises in a tenth of a second.
+/// An order for 200 Hz that rises within a tenth of a second.
 pub fn shake() -> Shake {
     Shake {
         step: Shake::step_of(200.0, RATE),
@@ -27,10 +28,10 @@ pub fn shake() -> Shake {
     }
 }
 
-/// What holds between a board's buttons and its host.
+/// A scenario with a board's controls and its host.
 pub type Scenario = fn(&Controls, &mut SmallHost);
 
-/// Those for a board whose time waits for its host.
+/// The scenarios for a board whose time waits for its host.
 pub const ALL: [Scenario; 9] = [
     a_shot_without_arming_is_refused,
     one_arming_allows_one_shot,
@@ -43,7 +44,7 @@ pub const ALL: [Scenario; 9] = [
     a_pulled_link_brings_the_shaker_to_rest,
 ];
 
-/// Whatever was ordered, no pulse was longer than the cap.
+/// In all cases, no pulse was longer than the upper limit.
 pub fn the_coil_kept_its_cap(controls: &Controls) {
     let pulses = controls.coil_pulses_us();
     assert!(pulses.iter().all(|pulse| *pulse <= COIL_PULSE_CAP_US), "{pulses:?}");
@@ -88,7 +89,7 @@ fn hammer_and_shaker_exclude_each_other(controls: &Controls, host: &mut SmallHos
     assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Err(Refusal::ShakerRuns));
     assert_eq!(host.ask(order()), Err(Refusal::ShakerRuns));
     assert!(controls.seen().driven_until > 0, "the rig is driven");
-    // its time stands still while it is on its way down
+    // its time stops during the ramp-down
     halt(host);
     assert_eq!(host.ask(Request::Rest), Ok(Answer::Done));
     assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Err(Refusal::ShakerRuns), "on its way down");
@@ -99,14 +100,14 @@ fn hammer_and_shaker_exclude_each_other(controls: &Controls, host: &mut SmallHos
     assert!(controls.coil_pulses_us().is_empty());
 }
 
-/// Holds the board, and waits until it stands: half a ring on.
+/// Holds the board, and waits until it stops, half a ring ahead.
 fn halt(host: &mut SmallHost) {
     host.hold_at = host.next_scan;
     let halt = host.hold_at + u64::from(host.hello.unwrap().ring_scans / 2);
     host.until("the halt", |host| host.next_scan >= halt);
 }
 
-/// Peak code of the excitation channel in some last scans.
+/// Peak code of the excitation channel in the last `scans` scans.
 fn excitation(host: &SmallHost, scans: usize) -> i16 {
     let first = host.codes.len() - scans * host.channels;
     let codes = host.codes[first..].iter().skip(EXCITATION).step_by(host.channels);
@@ -122,7 +123,7 @@ fn the_shaker_pushes_as_ordered_and_comes_to_rest(_: &Controls, host: &mut Small
     let config = RigConfig::default();
     let newtons = f64::from(AMPLITUDE_V) * config.shaker.gain_n_per_v;
     let code = newtons / config.sensors.excitation.units_per_volt / 10.0 * 32_768.0;
-    // ten cycles; noise of the force cell adds some codes to the peak
+    // ten cycles; the force cell's noise adds some codes to the peak
     let peak = f64::from(excitation(host, 2_560));
     assert!((peak / code - 1.0).abs() < 0.02, "{peak} for {code}");
     assert_eq!(host.ask(Request::Rest), Ok(Answer::Done));
@@ -132,7 +133,7 @@ fn the_shaker_pushes_as_ordered_and_comes_to_rest(_: &Controls, host: &mut Small
     assert_eq!(host.status().shaker, Shaker::Resting);
 }
 
-/// From a tenth of a second after this scan on the rig feels no drive, for half a second and more.
+/// From 0.1 s after this scan on the drive is zero, for at least half a second.
 fn the_drive_rests_within_100_ms_of(scan: u64, controls: &Controls, host: &mut SmallHost) {
     host.until("a second", |host| host.latest >= scan + u64::from(RATE));
     let seen = controls.seen();
@@ -148,7 +149,7 @@ fn a_limit_brings_the_shaker_to_rest(controls: &Controls, host: &mut SmallHost) 
     for _ in 0..EXCITATION {
         order.limits.push(0.0).unwrap();
     }
-    // half of the force that the order would come to
+    // half of the force that the order would reach
     let limit_n = f64::from(AMPLITUDE_V) * config.shaker.gain_n_per_v / 2.0;
     order.limits.push(limit_n as f32).unwrap();
     assert_eq!(host.ask(Request::Shake(order)), Ok(Answer::Done));
@@ -164,8 +165,9 @@ fn a_limit_brings_the_shaker_to_rest(controls: &Controls, host: &mut SmallHost) 
 fn a_stop_in_mid_pulse_takes_the_coil_away(controls: &Controls, host: &mut SmallHost) {
     host.start();
     host.stage(Configuration::Ajb, "AZ3", "A3", 0);
-    // A held board halts half a ring on. The order is given while it stands, and it is let run to a second halt, a hundred
-    // scans (2 ms) or a few blocks after the coil went on.
+    // A held board stops half a ring ahead. The order is given while it is stopped, and it
+    // continues until a second stop, a hundred scans (2 ms) or a few blocks after the coil was
+    // switched on.
     let half = u64::from(host.hello.unwrap().ring_scans / 2);
     let (first, second) = (host.hold_at, host.hold_at + 10_240);
     host.until("the first halt", |host| host.next_scan >= first + half);
@@ -181,7 +183,7 @@ fn a_stop_in_mid_pulse_takes_the_coil_away(controls: &Controls, host: &mut Small
     host.release();
     host.until("the stop", |host| host.events.contains(&Event::EmergencyStop(true)));
     host.go_on(RATE.into());
-    // 100 scans and two blocks of 24 at most
+    // at most 100 scans and two blocks of 24
     let pulses = controls.coil_pulses_us();
     assert!(pulses.len() == 1 && (1_000..3_000).contains(&pulses[0]), "{pulses:?}");
     let status = host.status();
@@ -217,7 +219,7 @@ fn a_pulled_link_brings_the_shaker_to_rest(controls: &Controls, host: &mut Small
     host.start();
     assert_eq!(host.ask(Request::Shake(shake())), Ok(Answer::Done));
     host.go_on(RATE.into());
-    // the link is cut while the board's time stands still, in mid-shake
+    // the link is cut while the board's time is stopped, during the shake
     halt(host);
     let seen = controls.seen();
     assert!(seen.scans < seen.driven_until + 24, "{seen:?}");
@@ -227,18 +229,19 @@ fn a_pulled_link_brings_the_shaker_to_rest(controls: &Controls, host: &mut Small
     assert!(host.events.contains(&Event::ShakerStops(Reason::LinkLost)), "{:?}", host.events);
 }
 
-/// `lose` makes the converters lose so many scans from one on.
+/// `lose(from, scans)` makes the converters lose `scans` scans.
 pub fn lost_scans_take_the_drive_away(lose: impl Fn(u64, u64), controls: &Controls, host: &mut SmallHost) {
     host.start();
     assert_eq!(host.ask(Request::Shake(shake())), Ok(Answer::Done));
     host.go_on(RATE.into());
     assert_eq!(host.status().shaker, Shaker::Steady);
-    // further than the board can be ahead; blocks of 24 scans
+    // further ahead than the board can be; blocks of 24 scans
     let (from, scans) = ((host.next_scan + 2 * host.lead()) / 24 * 24, 240);
     lose(from, scans);
     host.until("the loss", |host| host.latest > from + scans);
     the_drive_rests_within_100_ms_of(from, controls, host);
-    // what it had been given for one block was all that it played: it did not go on when scans came again
+    // it played only what it had been given for one block, and did not continue when scans came
+    // again
     let seen = controls.seen();
     assert!((from..=from + 48).contains(&seen.driven_until), "{seen:?} from {from}");
     for event in [Event::ShakerStops(Reason::FrontEnd), Event::ShakerRests] {
@@ -249,7 +252,7 @@ pub fn lost_scans_take_the_drive_away(lose: impl Fn(u64, u64), controls: &Contro
     assert_eq!(host.status().shaker, Shaker::Steady, "it can be begun anew");
 }
 
-/// Needs a board whose time goes on without its host.
+/// Needs a board whose time advances without its host.
 pub fn a_host_that_is_gone_leaves_nothing_moving(controls: &Controls, host: &mut SmallHost) {
     host.start();
     assert_eq!(host.ask(Request::Shake(shake())), Ok(Answer::Done));
@@ -258,7 +261,8 @@ pub fn a_host_that_is_gone_leaves_nothing_moving(controls: &Controls, host: &mut
     let status = host.status();
     assert_eq!((status.shaker, status.drive_v), (Shaker::Resting, 0.0));
     assert!(host.events.contains(&Event::ShakerStops(Reason::LinkLost)), "{:?}", host.events);
-    // a second of silence, the tenth in which it is noticed, a tenth of a second to rest, and one until the word was heard
+    // 1 s of silence, 0.1 s until it is noticed, 0.1 s to rest, and 0.1 s until the order was
+    // processed
     let seen = controls.seen();
     let bound = u64::from(RATE / 10 * 13);
     assert!(seen.driven_until > 0 && seen.driven_until < last_word + bound, "{seen:?} after {last_word}");
@@ -269,20 +273,20 @@ pub fn a_host_that_is_gone_leaves_nothing_moving(controls: &Controls, host: &mut
     assert!(controls.coil_pulses_us().is_empty());
 }
 
-/// Says and reads nothing for many seconds of the board's time.
+/// Sends and reads nothing for many seconds of the board's time.
 fn silence(host: &mut SmallHost) {
     std::thread::sleep(std::time::Duration::from_millis(500));
     host.pump();
 }
 
-/// What a board says and does when its front end fails for so long.
+/// Behaviour of a board whose front end fails for `scans` scans.
 pub fn after_a_front_end_failure(host: &mut SmallHost, from: u64, scans: u64) {
     let end = from + scans + u64::from(RATE);
     host.until("the end of the failure", |host| host.latest >= end);
     let missing: u64 = host.gaps.iter().map(|(first, end)| end - first).sum();
     let status = host.status();
     assert_eq!(status.counters.scans_missed, missing, "what is missing is what was counted");
-    // to whole blocks
+    // rounded to whole blocks
     assert!(missing > 0 && missing.abs_diff(scans) <= 24, "{missing} of {scans}");
     let told: u64 = host
         .events

@@ -1,5 +1,6 @@
-//! Impact records of a rig without waiting for them: the exact FRFs at each cell's true (wrong) geometry, times the hammer's
-//! spectrum, back into time, with the sensors' noise. What the analysis sees is what it would read from a campaign file.
+//! Impact records of a rig, computed without simulating them in time: the exact FRFs at each cell's
+//! true (erroneous) geometry, times the hammer's spectrum, transformed to time, with the sensors'
+//! noise. The analysis receives what it would read from a campaign file.
 
 use jointrig::analyse::{CellName, ContactDelays, ContactSignals, Hit, Measurements};
 use jointrig::exchange::read_positions;
@@ -23,16 +24,18 @@ const RATE_HZ: f64 = 51_200.0;
 const RECORD_S: f64 = 2.0;
 const SAMPLES: usize = 102_400;
 const HITS: i64 = 2;
-/// Records are made on s = σ + iω, where they have decayed before they begin anew, and multiplied by e^(σt) afterwards.
+/// Records are computed on s = σ + iω, where they decay before they repeat, and multiplied by
+/// e^(σt) afterwards (1/s).
 const SIGMA: f64 = 6.0;
-/// The hammer's half-sine, and where it begins.
+/// The hammer's half-sine, and its start.
 const PEAK_N: f64 = 50.0;
 const WIDTH_S: f64 = 0.41e-3;
 const START_S: f64 = 5e-3;
-/// The force's spectrum fades as exp(−(f / this)²), Hz: a bell in time, so that nothing rings before the pulse. (What does would
-/// wrap round to the record's end, where e^(σt) makes it 10⁵ times as large.)
+/// The force's spectrum is attenuated by exp(−(f / `FADE_HZ`)²): a Gaussian in time, so that
+/// nothing rings before the pulse. (Such ringing would wrap round to the record's end, where e^(σt)
+/// makes it 10⁵ times as large.)
 const FADE_HZ: f64 = 1000.0;
-/// Lines up to here, Hz: exp(−25) is left of the force.
+/// Highest line, Hz: exp(−25) of the force is left there.
 const HIGHEST_HZ: f64 = 5000.0;
 
 /// The assembly of a rig, hit at its interface and on its moving mass.
@@ -56,7 +59,7 @@ impl Assembly {
         let compliance = (0..lines)
             .map(|l| {
                 let s = variable(l);
-                // coordinates of unit mass, or metres and radians cost digits
+                // coordinates of unit mass, because metres and radians would cost digits
                 let z = DMatrix::from_fn(scale.len(), scale.len(), |i, j| {
                     (s * s * structure.mass[(i, j)]
                         + s * structure.damping[(i, j)]
@@ -114,7 +117,7 @@ impl Measurements for Assembly {
         let mut cells = Vec::new();
         for impact in &self.geometry.ajb.impacts {
             for channel in self.geometry.ajb.channels.iter().step_by(3).filter(|c| interface(c.grouping)) {
-                // of the moving mass one cell is enough: its hits count at the contact only
+                // one cell is enough for the moving mass: its hits are only used for the contact
                 let mass = impact.grouping == Grouping::InternalA && impact.direction[2].abs() > 0.9;
                 if interface(impact.grouping) || (mass && channel.name == "A1") {
                     cells.push(CellName {

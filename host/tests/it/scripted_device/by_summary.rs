@@ -1,4 +1,4 @@
-//! A judge for tests whose records are not hits: it goes by the device's own summary of the shot.
+//! A judge for tests whose records are not real hits: it uses the device's own summary of the shot.
 
 use jointrig_protocol::channel::Role;
 
@@ -9,7 +9,8 @@ use jointrig::campaign::verdict::{Kind, Verdict};
 use jointrig::device::channels::ChannelMap;
 use jointrig::device::recording::Recording;
 
-/// Judges by the device's own summary of the shot and by the codes' range; needs no signal processing.
+/// Judges by the device's own summary of the shot and by the range of the codes; needs no signal
+/// processing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ByShotSummary;
 
@@ -36,7 +37,7 @@ impl Judge for ByShotSummary {
             let extreme =
                 recording.channel(place).iter().filter(|code| **code == i16::MAX || **code == i16::MIN);
             let touched = extreme.count();
-            // one code at the end of the range may be chance, two are a flat top
+            // a single code at the end of the range may be chance, two are a flat top
             if touched > 1 {
                 let name = channels.channels.get(place).map_or("?", |channel| channel.name.as_str());
                 let sentence = format!("channel {name} stands at the end of its range for {touched} samples");

@@ -1,7 +1,9 @@
-//! A scripted device for tests: it speaks the protocol, streams, sends again, fires a hammer of its own.
+//! A scripted device for tests: it implements the protocol, streams, retransmits, and fires a
+//! simulated hammer.
 //!
-//! Its time advances while it is read and stands still half a ring beyond the acknowledgement, as a virtual
-//! board's does. Samples depend on (cell, attempt, scan since the coil went on) and on nothing else.
+//! Its time advances while it is read and stops half a ring ahead of the acknowledgement, as a
+//! virtual board's does. Samples depend only on (cell, attempt, scan since the coil was switched
+//! on).
 
 use std::collections::VecDeque;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -43,29 +45,29 @@ pub struct Fake {
     pub drops: Range<u64>,
     /// Every shot with a shorter pulse misses, µs.
     pub reach_us: u32,
-    /// Peak force per µs of pulse beyond reach, N.
+    /// Peak force per µs of pulse above `reach_us`, N.
     pub newtons_per_us: f32,
     /// Longest pulse of its coil, µs.
     pub coil_cap_us: u32,
-    /// After this many requests the cable is pulled.
+    /// After this many requests the cable is disconnected.
     pub dies_after: Option<u32>,
-    /// Payloads of log frames, one sent before each answer, from the beginning again after the last.
+    /// Payloads of log frames; one is sent before each answer, cyclically.
     pub says: Vec<Vec<u8>>,
-    /// After this many requests it starts anew: its stream is gone, its memory too.
+    /// After this many requests it restarts: its stream and its memory are lost.
     pub restarts_after: Option<u32>,
-    /// Whether it knows a stage.
+    /// Whether it remembers a stage.
     pub stage_known: bool,
     pub hello: Hello,
-    /// What it says of itself, and of a channel.
+    /// Changes its description of itself, and of a channel.
     pub info: fn(&mut Info),
     pub channel: fn(&mut Channel),
-    /// What it says of a shot that hit.
+    /// Changes its report of a shot that hit.
     pub tells_shot: fn(&mut Shot),
     /// Scans that it reports as lost at each block, whatever it sends.
     pub loses: Option<Range<u64>>,
-    /// It waits so long before each block, and sends one at a time.
+    /// Delay before each block; it sends one at a time.
     pub slow: Option<Duration>,
-    /// Its time goes on whatever the host acknowledges, as that of a real device on USB does.
+    /// Its time advances whatever the host acknowledges, as that of a real device on USB does.
     pub free_running: bool,
     /// A minute passes without the host while the shot of this order waits, counted from 1.
     pub stalls_at_order: Option<u32>,
@@ -73,7 +75,7 @@ pub struct Fake {
     pub stalls_after_order: Option<u32>,
     /// The link breaks once while the shot of this order waits.
     pub cut_at_order: Option<u32>,
-    /// Shots that it was ordered, whatever became of them.
+    /// Number of shots that were ordered, whatever their outcome.
     pub orders: Arc<AtomicU32>,
     accumulator: Accumulator,
     out: VecDeque<u8>,
@@ -154,7 +156,8 @@ impl Fake {
                 if theirs.session != self.hello.session {
                     self.memory.clear();
                     self.last_number = 0;
-                    // on its way when the link broke, and received by the next host before the hello
+                    // was in transit when the link broke, and the next host received it before the
+                    // hello
                     self.cancel();
                     self.streaming = false;
                 }
@@ -370,7 +373,7 @@ impl Fake {
         self.out.extend(wire);
     }
 
-    /// Takes a waiting shot back.
+    /// Cancels a waiting shot.
     fn cancel(&mut self) {
         self.armed = false;
         if self.fire.take().is_some()
@@ -382,7 +385,8 @@ impl Fake {
         }
     }
 
-    /// The host stalls for a minute: all scans leave the ring unsent, and the silence cancels a waiting shot.
+    /// The host stalls for a minute: all scans leave the ring unsent, and the silence cancels a
+    /// waiting shot.
     fn stall(&mut self) {
         let (first, scans) = (self.next_scan, 60 * RATE);
         self.next_scan += u64::from(scans);
@@ -541,7 +545,7 @@ impl Transport for Fake {
     }
 }
 
-/// A device that outlives its session: the next one speaks with the same device.
+/// A device that outlives its session: the next session uses the same device.
 #[derive(Clone, Default)]
 pub struct Shared(Arc<Mutex<Fake>>);
 

@@ -1,7 +1,7 @@
-//! A link that loses, damages, doubles and cuts off frames.
+//! A link that loses, damages, duplicates and truncates frames.
 //!
-//! It wraps any [`Transport`] and spoils a seeded share of the *frames* of both directions, so that tests
-//! can show that a session delivers the same samples whatever the link does.
+//! It wraps any [`Transport`] and damages a seeded fraction of the *frames* of both directions, so
+//! that tests can show that a session delivers the same samples whatever the link does.
 
 use std::collections::VecDeque;
 use std::io;
@@ -9,20 +9,20 @@ use std::time::Duration;
 
 use jointrig::device::transport::Transport;
 
-/// Share of the frames to which each fault happens, 0 to 1, in each direction.
+/// Fraction of the frames affected by each fault, 0 to 1, in each direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Faults {
-    /// The frame vanishes.
+    /// The frame is lost.
     pub drop: f64,
     /// One bit of it flips.
     pub corrupt: f64,
     /// It arrives twice.
     pub duplicate: f64,
-    /// Its second half vanishes, its end with it: it runs into the next frame.
+    /// Its second half is lost, including its end: it runs into the next frame.
     pub truncate: f64,
 }
 
-/// A transport that spoils a share of the frames.
+/// A transport that damages a fraction of the frames.
 pub struct Faulty<T> {
     inner: T,
     faults: Faults,
@@ -38,7 +38,7 @@ struct Line {
 }
 
 impl<T: Transport> Faulty<T> {
-    /// Spoils what goes over `inner`; the same seed spoils the same frames of the same traffic.
+    /// Damages the traffic over `inner`; the same seed damages the same frames of the same traffic.
     pub fn new(inner: T, faults: Faults, seed: u64) -> Self {
         Self { inner, faults, random: seed, to_host: Line::default(), to_device: Line::default() }
     }

@@ -1,4 +1,5 @@
-//! What an eye on the campaign file tells bit by bit is what one that comes late reads at once.
+//! A follower of the campaign file that reports changes incrementally has the same state as one
+//! that starts later and reads all in one pass.
 #![cfg(feature = "dashboard")]
 
 use std::path::Path;
@@ -19,7 +20,7 @@ use jointrig::live::follow::Follower;
 use jointrig::live::message::Message;
 use serde_json::Value;
 
-/// Judges as usual, and looks at the file before.
+/// Judges as usual, after reading the file's changes.
 struct Looks {
     follower: Follower,
     bus: Bus,
@@ -56,7 +57,7 @@ fn whole(bus: &Bus) -> Value {
     whole
 }
 
-/// As somebody sees it who comes now.
+/// The state of a follower that starts now.
 fn at_once(path: &Path) -> Value {
     let bus = Bus::default();
     bus.say(Message::Snapshot(Box::new(Follower::new(path).unwrap().whole())));
@@ -75,7 +76,7 @@ fn what_is_told_bit_by_bit_is_the_whole() {
     assert_eq!(whole(&looks.bus), at_once(&path));
     assert_eq!(whole(&looks.bus)["hits"].as_array().unwrap().len() as u64, summary.hits);
 
-    // a verdict overruled afterwards, and taken back
+    // a verdict overruled afterwards, and the overruling undone
     let store = Store::open(&path).unwrap();
     let good = store.records().unwrap().into_iter().flatten().find(RecordRow::kept).unwrap();
     for verdict in [Kind::Dropped, Kind::Good] {

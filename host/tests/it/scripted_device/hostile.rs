@@ -1,4 +1,4 @@
-//! Devices that are broken, or made to hurt: each is refused by a sentence, before anything moves and before anything is stored.
+//! Broken or malicious devices: each is refused with a message, before anything moves or is stored.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpListener;
@@ -18,14 +18,15 @@ use crate::scripted_device::by_summary::ByShotSummary;
 use crate::scripted_device::fake::Fake;
 use crate::scripted_device::runner::{create, options, plan, run_on};
 
-/// What makes a device another one.
+/// A change of the scripted device.
 type Change = fn(&mut Fake);
 
 fn open(fake: Fake) -> Result<Session, DeviceError> {
     Session::open(Box::new(fake), "fake:")
 }
 
-/// What a campaign on this device ends with, how many shots it was ordered, and how many records are in the file.
+/// The final message of a campaign on this device, the number of ordered shots, and the number of
+/// records in the file.
 fn campaign(fake: Fake) -> (String, u32, usize) {
     let folder = tempfile::tempdir().unwrap();
     let path = create(&folder, "a.jrig", &plan());
@@ -68,7 +69,7 @@ fn a_ring_that_no_controller_has_is_refused_at_the_handshake() {
 #[test]
 fn lost_scans_far_ahead_take_no_memory_and_no_time() {
     let begun = Instant::now();
-    // the largest ring that is believed, and all that one event can lose
+    // the largest ring that is accepted, and the largest loss that one event can report
     let fake = Fake::scripted(|fake| {
         fake.hello = Hello::device(0, 5, 1 << 20);
         fake.loses = Some(0..u64::from(u32::MAX));
@@ -81,7 +82,7 @@ fn lost_scans_far_ahead_take_no_memory_and_no_time() {
     let accounts = session.accounts();
     assert_eq!(accounts.lost, u64::from(u32::MAX), "{accounts:?}");
     assert!(begun.elapsed() < Duration::from_secs(5));
-    // ranges that never come to their turn are not collected without end
+    // ranges whose turn never comes are not collected without limit
     let mut session = open(Fake::scripted(|fake| fake.loses = Some(1 << 40..(1 << 40) + 1))).unwrap();
     session.start(5).unwrap();
     let said = session.wait_for(1_000_000).expect_err("refused").to_string();
@@ -109,7 +110,8 @@ fn a_shot_at_no_scan_is_not_recorded() {
 
 #[test]
 fn a_device_that_sends_next_to_nothing_holds_nobody() {
-    // 48 scans every half second are a 500th of its rate; one block of them in five seconds is next to nothing
+    // 48 scans every 0.4 s are slow but not a stall; 48 scans every 0.1 s at a nominal 1 MHz count
+    // as a stall
     let mut session = open(Fake::scripted(|fake| fake.slow = Some(Duration::from_millis(400)))).unwrap();
     session.stalls_after(Duration::from_millis(300));
     session.start(5).unwrap();
@@ -126,7 +128,7 @@ fn a_device_that_sends_next_to_nothing_holds_nobody() {
     assert!(said.contains("scans in 1 s") && said.contains("reset the controller"), "{said}");
 }
 
-/// A device behind a socket.
+/// Serves a device on a socket and returns its address.
 fn serve(mut fake: Fake) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("tcp:{}", listener.local_addr().unwrap());

@@ -1,5 +1,5 @@
-//! What the link does to a campaign: a host that is killed while a shot waits, a stall of a minute, lost scans, and
-//! what is announced before it is stored.
+//! Effects of the link on a campaign: a host that is killed while a shot waits, a stall of a
+//! minute, lost scans, and announcements before data is stored.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ fn a_host_that_ends_while_a_shot_waits_loses_and_repeats_no_hit() {
     let whole = create(&folder, "whole.jrig", &long_plan());
     run_on(&whole, Fake::default(), &options(), &mut ByShotSummary).unwrap();
     assert!(kept(&whole) > 50);
-    // a small number is used again by a host that counts from 1
+    // a low number is used again by a host that counts from 1
     for waiting in [3, 37] {
         let path = create(&folder, &format!("at{waiting}.jrig"), &long_plan());
         let device = Shared::new(Fake::scripted(|fake| fake.cut_at_order = Some(waiting)));
@@ -70,7 +70,7 @@ fn a_stall_of_a_minute_costs_no_hit_where_nothing_holds_the_device() {
     }
 }
 
-/// Judges as usual, except for some records, whose samples it calls lost.
+/// Judges as usual, except that it reports the samples of some records as lost.
 struct Loses {
     judged: u32,
     lost: [u32; 2],
@@ -109,7 +109,7 @@ fn a_record_with_missing_samples_does_not_change_the_pulse() {
 /// Compares each announcement with the file.
 struct Compares {
     path: PathBuf,
-    /// Announced and stored hits, in the order of the announcements.
+    /// Numbers of announced and stored hits, in the order of the announcements.
     seen: Mutex<Vec<(usize, usize)>>,
 }
 

@@ -1,4 +1,4 @@
-//! Sessions and campaigns on a scripted device, over a link that loses and damages what it likes.
+//! Sessions and campaigns on a scripted device, over a link that loses and damages frames.
 #![allow(clippy::unwrap_used)]
 
 mod by_summary;

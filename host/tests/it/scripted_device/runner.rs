@@ -1,4 +1,5 @@
-//! Campaigns on a scripted device: complete, interrupted, over a bad link, with a device that dies or starts anew.
+//! Campaigns on a scripted device: complete, interrupted, over a bad link, with a device that fails
+//! or restarts.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -34,7 +35,7 @@ pub fn plan() -> String {
     SMALL
         .replace("length_s = 2.0", "length_s = 0.1")
         .replace("listen_s = 0.15", "listen_s = 0.02")
-        // far from the force wanted, so that the loop has something to do
+        // far from the target force, so that the pulse must be adjusted
         .replace("pulse_us = 3500", "pulse_us = 2000")
         .replace("pulse_bounds_us = [2500, 6000]", "pulse_bounds_us = [500, 8000]")
 }
@@ -68,12 +69,12 @@ pub fn create(folder: &tempfile::TempDir, name: &str, text: &str) -> std::path::
     path
 }
 
-/// The rows of all records, every one whole.
+/// The rows of all records, every one intact.
 pub fn rows(store: &Store) -> Vec<RecordRow> {
     store.records().expect("rows").into_iter().collect::<Result<_, _>>().expect("whole")
 }
 
-/// What two equal runs have in common: everything but absolute scans and times.
+/// What two equal runs have in common: everything except absolute scans and times.
 pub fn content(path: &Path) -> Vec<(i64, u32, Kind, usize, u32, Vec<i16>)> {
     let store = Store::open_read_only(path).expect("opens");
     assert_eq!(store.verify().expect("checked"), []);
@@ -116,7 +117,7 @@ fn a_campaign_is_complete_and_the_same_over_any_link() {
 #[test]
 fn what_the_controller_logs_is_kept_with_the_campaign() {
     let folder = tempfile::tempdir().expect("a folder");
-    // the build that the fake names
+    // the build that the scripted device names
     std::fs::write(folder.path().join(file_name(1)), image(1)).expect("written");
     let path = create(&folder, "c.jrig", &plan());
     let fake = Fake::scripted(|fake| fake.says = vec![line(WARNING, 3, &[7, 0, 0, 0])]);
@@ -127,7 +128,7 @@ fn what_the_controller_logs_is_kept_with_the_campaign() {
     let file = rusqlite::Connection::open(&path).expect("opens");
     let sql = "SELECT count(*) FROM log WHERE text = 'controller: WARN 0.000003 pressure 7'";
     let kept: u64 = file.query_row(sql, [], |row| row.get(0)).expect("counted");
-    // a shot takes two requests and more, each of which is answered with a line
+    // a shot takes at least two requests, and each answer is preceded by a log line
     assert!(kept >= 2 * summary.hits, "{kept} lines of {} hits", summary.hits);
 }
 
@@ -172,7 +173,8 @@ fn an_interrupted_campaign_resumes_to_the_same_records() {
     assert!(content(&whole) == content(&parts));
 }
 
-/// Judges as usual when all before is stored, drops a good hit of the first cell once there are three, and notes how many it is given.
+/// Judges as usual when all earlier records are stored, drops a good hit of the first cell once
+/// there are three, and records how many hits it is given.
 struct DropsOne {
     desk: Option<Desk>,
     path: PathBuf,
@@ -221,7 +223,8 @@ fn a_hit_dropped_meanwhile_is_no_measure_for_those_after_it() {
     let first = store.cells().unwrap()[0].id;
     let of_first: Vec<RecordRow> = rows(&store).into_iter().filter(|row| row.cell == first).collect();
     assert_eq!(of_first.iter().filter(|row| row.kept()).count(), 8, "another one in its place");
-    // the last one wanted is judged by the seven others that count; with the dropped one they would be eight
+    // the last one is judged with the seven others that count; including the dropped one there
+    // would be eight
     assert_eq!(judge.given[of_first.len() - 1], 7, "{:?}", &judge.given[..of_first.len()]);
 }
 
@@ -328,7 +331,7 @@ fn a_bolt_that_does_not_arrive_is_weak_and_the_pulse_grows() {
 #[test]
 fn a_cell_that_never_succeeds_is_given_up_with_a_reason() {
     let folder = tempfile::tempdir().expect("a folder");
-    // a pulse that may not be lengthened never hits hard enough
+    // a pulse that may not be lengthened never reaches the target force
     let text = plan()
         .replace("weak_n = 30.0", "weak_n = 74.0")
         .replace("target_n = 50.0", "target_n = 74.5")
@@ -367,7 +370,7 @@ fn a_coil_whose_pulses_are_too_short_for_the_plan_is_refused_before_anything_mov
     let said = refused.to_string();
     assert!(said.contains("at most 400 µs") && said.contains("pulse_bounds_us"), "{said}");
     assert!(Store::open_read_only(&path).expect("opens").records().expect("rows").is_empty());
-    // a cap between the plan's bounds is kept to
+    // a limit between the plan's bounds is respected
     let device = Fake::scripted(|fake| fake.coil_cap_us = 2_500);
     let summary = run_on(&path, device, &options(), &mut ByShotSummary).expect("runs");
     assert!(summary.hits > 0);

@@ -1,4 +1,5 @@
-//! A session puts the same samples together whatever the link does, and says what is wrong with a device.
+//! A session reconstructs the same samples whatever the link does, and reports what is wrong with a
+//! device.
 
 use std::time::Duration;
 
@@ -18,7 +19,7 @@ fn open(transport: impl Transport + 'static) -> Session {
     Session::open(Box::new(transport), "fake:").expect("it answers")
 }
 
-/// Streams, fires once, and returns the samples around the trigger and the closed accounts.
+/// Streams, fires once, and returns the samples around the trigger and the final counts.
 fn measure(transport: impl Transport + 'static) -> (Vec<i16>, Accounts, u64) {
     let mut session = open(transport);
     let info = session.info().expect("info");
@@ -60,7 +61,7 @@ fn a_faulty_link_gives_the_same_samples_and_every_scan_is_accounted_for() {
     }
 }
 
-/// Log frames in the stream, of every kind of content.
+/// Log frames in the stream, with all kinds of content.
 fn logs() -> Vec<Vec<u8>> {
     let garbage = |seed: u32| {
         (0..400_u32).map(|i| (i.wrapping_add(seed).wrapping_mul(2_654_435_761) >> 13) as u8).collect()
@@ -81,7 +82,7 @@ fn log_frames_of_any_content_change_no_sample() {
 #[test]
 fn a_log_is_read_by_the_table_of_the_build_and_counted_without_one() {
     let folder = tempfile::tempdir().expect("a folder");
-    // the build that the fake names
+    // the build that the scripted device names
     std::fs::write(folder.path().join(file_name(1)), image(1)).expect("written");
     for (folders, text) in [(vec![folder.path().into()], Some("WARN 0.000003 pressure 7")), (vec![], None)] {
         let encoded = line(WARNING, 3, &[7, 0, 0, 0]);
@@ -169,7 +170,8 @@ fn a_controller_of_an_older_protocol_is_not_told_scales_and_is_asked_for_nothing
         refused.contains("speaks protocol 1.0") && refused.contains("flash firmware of protocol 1.1"),
         "{refused}"
     );
-    // one that can is told, and told again when the first scales count once more
+    // a device that supports it receives the scales, and receives them again when the first scales
+    // apply again
     let mut session = open(Fake::default());
     session.info().expect("info");
     session.calibrate(&device, &calibrated).expect("told");
@@ -186,7 +188,7 @@ fn a_controller_of_an_older_protocol_is_refused_by_a_plan_with_sync_and_asked_fo
         refused.contains("speaks protocol 1.1") && refused.contains("flash firmware of protocol 1.2"),
         "{refused}"
     );
-    // one that knows of it and has no sync port says so
+    // one that knows the request but has no sync port reports this
     let refused = open(Fake::default()).take_clock(Clock::External { rate_hz: 48_000 }).expect_err("no port");
     assert!(refused.to_string().contains("cannot do that"), "{refused}");
 }

@@ -1,5 +1,6 @@
-//! Simulated campaigns as FRFs: the rig's exact admittance at each cell's true (wrong) geometry, with the noise of the
-//! vibrometer, the exponential window and the average of eight hits. No record is made, so a campaign takes a fraction of a second.
+//! Simulated campaigns as FRFs: the rig's exact mobility at each cell's true (erroneous) geometry,
+//! with the noise of the vibrometer, the exponential window and the average of eight hits. No
+//! record is computed, so a campaign takes a fraction of a second.
 
 use jointrig::exchange::read_positions;
 use jointrig::substructuring::averaged::CellHits;
@@ -28,7 +29,7 @@ const WIDTH_S: f64 = 0.41e-3;
 /// One configuration as measured.
 pub struct Measurement {
     pub frf: Frf,
-    /// The hits of every sensor and impact, where they were kept.
+    /// The hits of every sensor and impact, if they were kept.
     pub hits: Vec<CellHits>,
 }
 
@@ -53,7 +54,8 @@ pub fn rigid_rig(contact_n_per_m: f64) -> RigConfig {
     config
 }
 
-/// A campaign on `config` with this vibrometer floor, (m/s)/√Hz, over lines of `low_hz` to `high_hz`.
+/// A campaign on `config` with this vibrometer floor, (m/s)/√Hz, over lines of `low_hz` to
+/// `high_hz`.
 pub fn campaign(config: &RigConfig, floor: f64, seed: u64, band_hz: [f64; 2]) -> Campaign {
     let geometry = geometry();
     let one = |configuration, points: &Points| measure(config, configuration, points, floor, seed, band_hz);
@@ -64,7 +66,7 @@ pub fn campaign(config: &RigConfig, floor: f64, seed: u64, band_hz: [f64; 2]) ->
     }
 }
 
-/// One configuration of it, averaged; the hits are forgotten.
+/// One configuration, averaged; the hits are not kept.
 pub fn measure(
     config: &RigConfig,
     configuration: Configuration,
@@ -124,7 +126,7 @@ fn simulate(
         .map(|f| {
             let s = Complex::new(SIGMA, TAU * f);
             let n = structure.order();
-            // coordinates of unit mass, or metres and radians cost digits
+            // coordinates of unit mass, because metres and radians would cost digits
             let scale = structure.mass.diagonal().map(|m| 1.0 / m.sqrt());
             let z = DMatrix::from_fn(n, n, |i, j| {
                 (s * s * structure.mass[(i, j)] + s * structure.damping[(i, j)] + structure.stiffness[(i, j)])
@@ -172,14 +174,15 @@ fn simulate(
             for l in 0..lines.len() {
                 let mean = sum[l] / HITS as f64;
                 lines[l][(o, i)] += mean;
-                // of a part of the mean: half the complex sample variance, over the hits
+                // variance of one part of the mean: half the complex sample variance, divided by
+                // the number of hits
                 variance[l][(o, i)] =
                     (square[l] - HITS as f64 * mean.norm_sqr()) / (HITS - 1) as f64 / HITS as f64 / 2.0;
             }
             if !keep_hits {
                 continue;
             }
-            // the three axes of a sensor stand together in the workbook
+            // the three axes of a sensor are adjacent in the workbook
             let channel = &points.channels[o];
             if cell.as_ref().is_none_or(|_| o > 0 && points.channels[o - 1].name != channel.name) {
                 hits.extend(cell.take());
