@@ -2,8 +2,8 @@
 
 use crate::results::Completeness;
 
-/// From counts per cell: whether the cell is struck itself rather than filled by the hits of another,
-/// and (planned, kept, refused by verdict).
+/// From counts per cell: whether the cell is struck itself rather than filled by the hits of
+/// another, and (planned, kept, refused by verdict).
 pub fn completeness<'a>(
     name: &str,
     cells: impl IntoIterator<Item = (bool, (usize, usize, Vec<(&'a str, usize)>))>,
