@@ -7,8 +7,8 @@ use serde::Serialize;
 #[serde(rename_all = "kebab-case", tag = "finding")]
 #[non_exhaustive]
 pub enum LoopFinding {
-    /// The force falls while the contact is pushed, and the loop releases energy: the sign of the
-    /// force is wrong, or A and B are swapped. No k_T is reported.
+    /// The force falls while the contact is pushed, and the loop dissipates no energy: the sign of
+    /// the force is wrong, or A and B are swapped. No k_T is reported.
     ReversedForce {
         /// Least-squares slope over the whole loop, N/m.
         k_eq_n_per_m: f64,

@@ -74,7 +74,7 @@ fn between_arms(found: &Findings) -> BetweenArms {
             },
             why: say::between_the_arms(between.basis),
         },
-        // without three configurations the fit was not possible
+        // without all three configurations there is no estimate
         Some(Err(_)) if found.substructured.is_none() => {
             BetweenArms { k_n_per_m: None, basis: "none", why: say::without_all_three() }
         }
